@@ -1,0 +1,34 @@
+/* The memory promise: every large buffer is taken from a budget that can refuse and knows its
+ * peak. One budget per process run, shared by all threads. */
+#ifndef TRIP_BUDGET_H
+#define TRIP_BUDGET_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct trip_budget trip_budget;
+
+/* limit_bytes 0: trip_memory_available() / 4. */
+int trip_budget_create(trip_budget **out, uint64_t limit_bytes);
+void trip_budget_destroy(trip_budget *b);
+
+uint64_t trip_budget_limit_bytes(const trip_budget *b);
+uint64_t trip_budget_left_bytes(const trip_budget *b);
+uint64_t trip_budget_peak_bytes(const trip_budget *b);
+
+/* Memory aligned to 4096 bytes, zeroed, or NULL (nothing printed) when it does not fit the budget
+ * or the system refuses. `bytes` must be given again on release. */
+void *trip_budget_take(trip_budget *b, size_t bytes);
+void trip_budget_release(trip_budget *b, void *memory, size_t bytes);
+
+/* What this process may use: physical memory, or the cgroup's (v1 or v2) limit where smaller. */
+uint64_t trip_memory_available_bytes(void);
+/* Peak resident set of this process so far (VmHWM). */
+uint64_t trip_memory_peak_rss_bytes(void);
+
+/* "256M", "1.5G", "4096": binary suffixes K M G T, optional "iB"/"B". False when not a size. */
+int trip_parse_bytes(const char *text, uint64_t *bytes_out);
+/* "1.23 GB"-style text with decimal units into `text` (at least 32 bytes). */
+const char *trip_format_bytes(uint64_t bytes, char *text);
+
+#endif

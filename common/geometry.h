@@ -1,0 +1,76 @@
+/* Double-precision vectors and affine maps. cglm has single precision only, and the reference
+ * renderer and all preprocessing geometry are double; GL code converts at upload. */
+#ifndef TRIP_GEOMETRY_H
+#define TRIP_GEOMETRY_H
+
+#include <math.h>
+#include <stdbool.h>
+
+typedef struct trip_vec3 {
+    double x, y, z;
+} trip_vec3;
+
+/* Affine map p -> linear * p + translation, row-major 3 x 4, last column the translation. */
+typedef struct trip_affine {
+    double m[3][4];
+} trip_affine;
+
+static inline trip_vec3 trip_v3(double x, double y, double z)
+{
+    return (trip_vec3){ x, y, z };
+}
+
+static inline trip_vec3 trip_add(trip_vec3 a, trip_vec3 b)
+{
+    return trip_v3(a.x + b.x, a.y + b.y, a.z + b.z);
+}
+
+static inline trip_vec3 trip_sub(trip_vec3 a, trip_vec3 b)
+{
+    return trip_v3(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+
+static inline trip_vec3 trip_scale(trip_vec3 a, double s)
+{
+    return trip_v3(a.x * s, a.y * s, a.z * s);
+}
+
+static inline double trip_dot(trip_vec3 a, trip_vec3 b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+static inline trip_vec3 trip_cross(trip_vec3 a, trip_vec3 b)
+{
+    return trip_v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
+static inline double trip_length(trip_vec3 a)
+{
+    return sqrt(trip_dot(a, a));
+}
+
+/* The zero vector stays zero. */
+static inline trip_vec3 trip_normalize(trip_vec3 a)
+{
+    double l = trip_length(a);
+    return l > 0 ? trip_scale(a, 1 / l) : a;
+}
+
+static inline double trip_component(trip_vec3 a, int axis)
+{
+    return axis == 0 ? a.x : axis == 1 ? a.y : a.z;
+}
+
+trip_affine trip_affine_identity(void);
+trip_vec3 trip_affine_point(const trip_affine *a, trip_vec3 p);
+trip_vec3 trip_affine_vector(const trip_affine *a, trip_vec3 v);
+/* linear^T * n: maps a gradient in the target space of `a` back to its source space; with the
+ * inverse of index-to-world it takes index-space gradients to world space. */
+trip_vec3 trip_affine_transpose_vector(const trip_affine *a, trip_vec3 n);
+trip_affine trip_affine_multiply(const trip_affine *a, const trip_affine *b);
+double trip_affine_determinant(const trip_affine *a);
+/* False when the map is singular or not finite. */
+bool trip_affine_invert(const trip_affine *a, trip_affine *out);
+
+#endif

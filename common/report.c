@@ -1,0 +1,140 @@
+#include "report.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { LINE_BYTES = 4096 };
+
+/* A line under construction; what does not fit is cut and marked. */
+typedef struct line {
+    char text[LINE_BYTES];
+    size_t length;
+} line;
+
+static void (*report_sink)(const char *line, void *user);
+static void *report_user;
+static volatile sig_atomic_t interrupted;
+
+void trip_report_redirect(void (*sink)(const char *line, void *user), void *user)
+{
+    report_sink = sink;
+    report_user = user;
+}
+
+static void put(line *l, const char *bytes, size_t count)
+{
+    size_t room = LINE_BYTES - 8 - l->length;
+    if (count > room)
+        count = room;
+    memcpy(l->text + l->length, bytes, count);
+    l->length += count;
+}
+
+/* Control characters, C1 (two bytes in UTF-8) included, become \n, \t or \xNN. */
+static void put_visible(line *l, const char *text)
+{
+    for (const unsigned char *p = (const unsigned char *)text; *p; p++) {
+        char escape[5];
+        if (*p == '\n' || *p == '\t') {
+            put(l, *p == '\n' ? "\\n" : "\\t", 2);
+        } else if (*p < 0x20 || *p == 0x7f || (*p == 0xc2 && p[1] >= 0x80 && p[1] < 0xa0)) {
+            put(l, escape, (size_t)snprintf(escape, sizeof escape, "\\x%02x", *p));
+        } else {
+            put(l, (const char *)p, 1);
+        }
+    }
+}
+
+/* One write(2) a line, so that lines of several threads do not mix. */
+static void emit(line *l)
+{
+    if (l->length == LINE_BYTES - 8) {
+        memcpy(l->text + l->length, "...", 3);
+        l->length += 3;
+    }
+    l->text[l->length] = 0;
+    if (report_sink) {
+        report_sink(l->text, report_user);
+        return;
+    }
+    l->text[l->length++] = '\n';
+    for (size_t done = 0; done < l->length;) {
+        ssize_t n = write(STDERR_FILENO, l->text + done, l->length - done);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            break;
+        done += (size_t)n;
+    }
+}
+
+__attribute__((format(printf, 3, 0))) static void report(const char *what, const char *where,
+                                                         const char *why, va_list args)
+{
+    int saved_errno = errno;
+    char text[LINE_BYTES];
+    line l = { .length = 0 };
+    vsnprintf(text, sizeof text, why, args);
+    put_visible(&l, "triptych: ");
+    put_visible(&l, what);
+    put_visible(&l, ": ");
+    if (where && *where) {
+        put_visible(&l, where);
+        put_visible(&l, ": ");
+    }
+    put_visible(&l, text);
+    emit(&l);
+    errno = saved_errno;
+}
+
+int trip_fail(int status, const char *what, const char *where, const char *why, ...)
+{
+    va_list args;
+    va_start(args, why);
+    report(what, where, why, args);
+    va_end(args);
+    return status;
+}
+
+int trip_fail_errno(const char *what, const char *where, const char *action)
+{
+    char buffer[256];
+    const char *reason = strerror_r(errno, buffer, sizeof buffer);
+    if (action && *action)
+        return trip_fail(TRIP_ERROR, what, where, "%s: %s", action, reason);
+    return trip_fail(TRIP_ERROR, what, where, "%s", reason);
+}
+
+void trip_warn(const char *where, const char *why, ...)
+{
+    va_list args;
+    va_start(args, why);
+    report("warning", where, why, args);
+    va_end(args);
+}
+
+static void on_signal(int number)
+{
+    (void)number;
+    interrupted = 1;
+    signal(SIGINT, SIG_DFL);
+    signal(SIGTERM, SIG_DFL);
+}
+
+void trip_interrupt_install(void)
+{
+    struct sigaction action = { .sa_handler = on_signal, .sa_flags = SA_RESTART };
+    sigemptyset(&action.sa_mask);
+    interrupted = 0;
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+int trip_interrupted(void)
+{
+    return interrupted;
+}

@@ -1,0 +1,34 @@
+/* Errors, warnings and results for people. Functions return 0 or a negative trip_status; whoever
+ * detects a fault reports it once with trip_fail(), callers only forward the code. Any thread may
+ * call these; each message is one line on stderr: "triptych: what: where: why". */
+#ifndef TRIP_REPORT_H
+#define TRIP_REPORT_H
+
+enum trip_status {
+    TRIP_OK = 0,
+    TRIP_ERROR = -1,       /* failed: exit status 1 */
+    TRIP_USAGE = -2,       /* wrong usage: exit status 2 */
+    TRIP_INTERRUPTED = -3, /* Ctrl-C or SIGTERM: exit status 1 */
+};
+
+/* Prints "triptych: WHAT: WHERE: why" and returns `status`. WHAT is the stage ("read", "brick",
+ * "render", ...), WHERE the file and place ("a.nrrd: line 3"), why says cause and remedy. Control
+ * characters from file names are made visible, so a message is always one line. */
+__attribute__((format(printf, 4, 5))) int trip_fail(int status, const char *what, const char *where,
+                                                    const char *why, ...);
+
+/* Like trip_fail() with strerror(errno) as the why, after an optional action ("cannot open"). */
+int trip_fail_errno(const char *what, const char *where, const char *action);
+
+/* Prints "triptych: warning: WHERE: why". */
+__attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const char *why, ...);
+
+/* Where lines go instead of stderr, for tests; NULL restores stderr. Not thread-safe to change. */
+void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
+
+/* Installs handlers for SIGINT and SIGTERM that only set a flag; long loops poll the flag and
+ * return trip_fail(TRIP_INTERRUPTED, ...). A second signal ends the process at once. */
+void trip_interrupt_install(void);
+int trip_interrupted(void);
+
+#endif
