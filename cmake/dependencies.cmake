@@ -1,0 +1,16 @@
+# Libraries, all from Debian; scripts/install-dependencies.sh installs them.
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(BZip2 REQUIRED)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+pkg_check_modules(CJSON REQUIRED IMPORTED_TARGET libcjson)
+pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET epoxy)
+pkg_check_modules(EGL REQUIRED IMPORTED_TARGET egl)
+pkg_check_modules(URING REQUIRED IMPORTED_TARGET liburing)
+pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
+find_package(OpenImageIO REQUIRED)
+list(APPEND CMAKE_MODULE_PATH /usr/lib/x86_64-linux-gnu/cmake/OpenVDB /usr/lib/aarch64-linux-gnu/cmake/OpenVDB)
+find_package(OpenVDB REQUIRED)
+# Debian's own Python, for the plain second reader and the independent counts used by the tests.
+find_program(TRIP_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)

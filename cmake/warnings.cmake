@@ -1,0 +1,19 @@
+# Warning flags for our own targets: trip_warnings(TARGET). Shims in C++ get the common subset.
+add_library(trip_flags INTERFACE)
+target_compile_definitions(trip_flags INTERFACE _GNU_SOURCE _FILE_OFFSET_BITS=64)
+target_compile_options(trip_flags INTERFACE
+    -Wall -Wextra -Wshadow -Wundef -Wformat=2 -Wpointer-arith
+    $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes>
+    $<$<COMPILE_LANGUAGE:C>:-Wmissing-prototypes>
+    $<$<COMPILE_LANGUAGE:C>:-Wcast-qual>
+    $<$<COMPILE_LANGUAGE:C>:-Wvla>
+    # The image is a function of data and settings only: no contraction that depends on the compiler's mood.
+    -ffp-contract=off
+    $<$<BOOL:${TRIP_WERROR}>:-Werror>)
+if(TRIP_SANITIZE)
+    target_compile_options(trip_flags INTERFACE -fsanitize=${TRIP_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(trip_flags INTERFACE -fsanitize=${TRIP_SANITIZE})
+endif()
+if(TRIP_FUZZ)
+    target_compile_options(trip_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()

@@ -1,0 +1,17 @@
+#!/bin/sh
+# Sets up, builds, bricks an included data set, draws it, and says where the picture is.
+set -eu
+cd "$(dirname "$0")"
+
+scripts/install-dependencies.sh
+cmake --preset release -DBUILD_TESTING=OFF >build.log 2>&1 && cmake --build --preset release >>build.log 2>&1 || {
+    tail -20 build.log >&2
+    echo "demo: the build failed; the whole log is build.log" >&2
+    exit 1
+}
+
+triptych=build/release/triptych
+mkdir -p demo
+$triptych brick datasets/bonsai.nii.gz -o demo/bonsai.trip --force
+$triptych render demo/bonsai.trip -o demo/bonsai.png --size 1024x1024
+echo "The picture: $(pwd)/demo/bonsai.png"

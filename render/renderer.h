@@ -1,0 +1,58 @@
+/* The interface behind which renderers stand: begin frame, for each list of the plan begin list and
+ * draw its batches in order, end frame. All calls come from one thread. Created once, used for many
+ * frames; the frame path does not allocate once sizes have settled. */
+#ifndef TRIP_RENDERER_H
+#define TRIP_RENDERER_H
+
+#include "camera.h"
+#include "plan.h"
+#include "reader.h"
+#include "settings.h"
+#include "transfer_function.h"
+
+/* What a frame is drawn from; outlives the frame. */
+typedef struct trip_frame {
+    const trip_dataset *data;
+    const trip_camera *camera;
+    const trip_settings *settings;
+    const trip_plan *plan;
+    const trip_tf_entry *table; /* 65536 entries */
+    bool count;                 /* fill the counts below exactly, where counting costs time */
+} trip_frame;
+
+typedef struct trip_list_stats {
+    uint64_t splats_read;      /* handed to the renderer */
+    uint64_t splats_projected; /* of those, not culled by w +- dw or the plane of the eye */
+    uint64_t splats_drawn;     /* of those, with a pixel centre of the image in their support where
+                                  the list has weight (whatever their opacity) */
+    uint64_t bytes_read;
+} trip_list_stats;
+
+typedef struct trip_renderer trip_renderer;
+
+typedef struct trip_renderer_ops {
+    const char *name; /* "reference", "gl", "cpu" */
+    void (*destroy)(trip_renderer *r);
+    const char *(*device)(const trip_renderer *r);
+    int (*begin_frame)(trip_renderer *r, const trip_frame *frame);
+    /* The layer of `axis` starts empty. */
+    int (*begin_list)(trip_renderer *r, int axis);
+    /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
+    int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
+    /* Merges the layers, puts the background behind, and gives width * height * 4 floats,
+     * premultiplied, row 0 at the top. */
+    int (*end_frame)(trip_renderer *r, float *rgba);
+    /* Counts of the frame just ended, by axis (bytes_read is the caller's). */
+    void (*stats)(const trip_renderer *r, trip_list_stats lists[3]);
+} trip_renderer_ops;
+
+/* Every renderer's first member. */
+struct trip_renderer {
+    const trip_renderer_ops *ops;
+};
+
+int trip_reference_create(trip_renderer **out, trip_budget *budget);
+int trip_gl_create(trip_renderer **out, trip_budget *budget);
+int trip_cpu_create(trip_renderer **out, trip_budget *budget, unsigned threads);
+
+#endif

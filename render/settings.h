@@ -1,0 +1,55 @@
+/* What the user asked a picture to be. Plain values, zero means the default (see each field);
+ * trip_settings_resolve() fills the defaults in, after which every renderer reads the same numbers. */
+#ifndef TRIP_SETTINGS_H
+#define TRIP_SETTINGS_H
+
+#include <stdbool.h>
+
+#include "geometry.h"
+
+/* Standard deviation of the reconstruction Gaussian is kernel_radius / TRIP_CUTOFF, and every
+ * footprint, low-pass included, is cut at TRIP_CUTOFF standard deviations: there it has fallen to
+ * exp(-TRIP_CUTOFF^2 / 2) = 0.39 % of its peak. */
+#define TRIP_CUTOFF (10.0 / 3.0)
+#define TRIP_KERNEL_RADIUS_VOXELS 2.0
+/* Standard deviation of the low-pass Gaussian in pixels (the h of Zwicker et al. 2001, EWA volume
+ * resampling filter), so that a splat never falls between pixel centres. */
+#define TRIP_LOW_PASS_PX 0.4
+/* Compositing front to back, a pixel whose transmittance is below this takes no more splats. */
+#define TRIP_SATURATION (1.0 / 8192.0)
+
+typedef enum trip_method {
+    TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005 section 5.2, 2008 section 4.2) */
+    TRIP_METHOD_CLIP,  /* every pixel from the list its ray is most aligned with (2005 section 5.1) */
+    TRIP_METHOD_AXIS,  /* one list per frame, by the ray at the image centre (Westover 1989) */
+} trip_method;
+
+typedef enum trip_traversal {
+    TRIP_TRAVERSAL_OUTWARD,   /* from the eye's coordinate outward, front to back */
+    TRIP_TRAVERSAL_ASCENDING, /* file order, blend equation by the ray at the image centre (2008 5.3) */
+} trip_traversal;
+
+typedef enum trip_target {
+    TRIP_TARGET_RGBA32F,
+    TRIP_TARGET_RGBA16F,
+    TRIP_TARGET_RGBA8,
+} trip_target;
+
+typedef struct trip_settings {
+    trip_method method;
+    trip_traversal traversal;
+    trip_target target;
+    bool indexed;          /* one vertex array with three index lists instead of three lists */
+    bool triangles;        /* bounding quads of two triangles instead of point sprites */
+    bool shading;          /* diffuse and specular from the stored gradients */
+    bool headlight;        /* light from the eye; otherwise from light_direction */
+    trip_vec3 light_direction; /* world space, towards the light, unit length */
+    double h;              /* 0 <= h < 1 */
+    double kernel_radius;  /* voxels (index space) */
+    double background[4];  /* r, g, b, a; not premultiplied */
+} trip_settings;
+
+/* The defaults: merge, outward, h 0.85, kernel radius 2, shading by headlight, rgba32f, black. */
+trip_settings trip_settings_default(void);
+
+#endif

@@ -1,0 +1,24 @@
+/* Light on a splat: Blinn-Phong from the stored world-space gradient, the same numbers in every
+ * renderer. A surface faces down the gradient (values fall outwards); both sides are lit alike.
+ *     strength = min(1, |gradient| / gradient_full)        flat regions are left unshaded
+ *     diffuse  = |n . l|,  specular = |n . half|^TRIP_SHININESS
+ *     colour'  = colour (1 + strength (AMBIENT + DIFFUSE diffuse - 1)) + strength SPECULAR specular
+ * clamped to [0, 1]; l towards the light, half between l and the direction to the eye. */
+#ifndef TRIP_SHADE_H
+#define TRIP_SHADE_H
+
+#include "camera.h"
+#include "settings.h"
+
+#define TRIP_AMBIENT 0.25
+#define TRIP_DIFFUSE 0.75
+#define TRIP_SPECULAR 0.2
+#define TRIP_SHININESS 24.0
+/* Gradient at which shading is full, as a fraction of the code range per voxel length. */
+#define TRIP_GRADIENT_FULL 0.02
+
+/* World-space direction towards the light and towards the eye from a world-space position. */
+void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full,
+                trip_vec3 world_position, const double gradient[3], double rgb[3]);
+
+#endif

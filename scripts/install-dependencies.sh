@@ -1,0 +1,48 @@
+#!/bin/sh
+# Installs the Debian packages Triptych is built from, when any is missing. Works as root or with
+# sudo; asks for nothing and uses no network when everything is there already.
+#
+#   scripts/install-dependencies.sh [--tests] [--compare]
+#
+# --tests adds what the tests use, --compare the programs that the benchmark compares with.
+set -eu
+
+build="cmake ninja-build gcc g++ pkg-config libopenvdb-dev libopenimageio-dev libepoxy-dev libegl-dev
+ libgl1-mesa-dri libegl1 libgbm1 liburing-dev libcjson-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
+tests="libcmocka-dev python3 python3-numpy python3-xxhash clang-14 libclang-rt-14-dev clang-format-14"
+compare="python3-vtk9 libopenvdb-tools"
+
+wanted=$build
+for option in "$@"; do
+    case $option in
+    --tests) wanted="$wanted $tests" ;;
+    --compare) wanted="$wanted $compare" ;;
+    *) echo "install-dependencies: unknown option: $option" >&2; exit 2 ;;
+    esac
+done
+
+missing=
+for package in $wanted; do
+    status=$(dpkg-query -W -f '${Status}' "$package" 2>/dev/null || true)
+    [ "$status" = "install ok installed" ] || missing="$missing $package"
+done
+[ -n "$missing" ] || exit 0
+
+as_root=
+if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || {
+        echo "install-dependencies: run as root or install sudo; missing:$missing" >&2
+        exit 1
+    }
+    as_root=sudo
+fi
+echo "Installing:$missing"
+export DEBIAN_FRONTEND=noninteractive
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+# shellcheck disable=SC2086
+if ! { $as_root apt-get -q update && $as_root apt-get -q install -y --no-install-recommends $missing; } >"$log" 2>&1; then
+    tail -20 "$log" >&2
+    echo "install-dependencies: apt-get failed; missing:$missing" >&2
+    exit 1
+fi

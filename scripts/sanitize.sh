@@ -1,0 +1,19 @@
+#!/bin/sh
+# The tests under AddressSanitizer with UBSan, the threaded ones under ThreadSanitizer, and every
+# fuzzer over its corpus for a few seconds (TRIP_FUZZ_SECONDS each, default 10).
+set -eu
+cd "$(dirname "$0")/.."
+
+scripts/install-dependencies.sh --tests
+
+cmake --preset asan -DTRIP_WERROR=ON
+cmake --build --preset asan
+ctest --preset asan -j "$(nproc)"
+
+cmake --preset tsan
+cmake --build --preset tsan
+ctest --preset tsan -j "$(nproc)" -L threads
+
+cmake --preset fuzz -DTRIP_FUZZ_SECONDS="${TRIP_FUZZ_SECONDS:-10}"
+cmake --build --preset fuzz
+ctest --test-dir build/fuzz --output-on-failure -L fuzz

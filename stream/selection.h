@@ -1,0 +1,55 @@
+/* Which bricks of a list one pass reads, and the runs they give in draw order. A selection is made
+ * by the plan, then read-only; iterators are plain values owned by one thread. Memory is one bit per
+ * brick, whatever the number of runs. */
+#ifndef TRIP_SELECTION_H
+#define TRIP_SELECTION_H
+
+#include <stdbool.h>
+
+#include "dataset.h"
+
+typedef struct trip_selection {
+    const trip_dataset *data;
+    int axis;
+    bool descending;               /* draw order is the exact reverse of the file's */
+    int64_t sheet_first, sheet_last; /* inclusive; the side of the eye this pass covers */
+    uint64_t *bricks;              /* bit per brick of the list */
+} trip_selection;
+
+/* A contiguous piece of a list: splats [first, first + count) of tile origin (u, v) in `sheet`. In a
+ * descending pass its splats are drawn last to first. */
+typedef struct trip_run {
+    uint64_t first;
+    uint32_t count;
+    uint32_t brick;
+    int32_t sheet;
+    int32_t u, v;
+} trip_run;
+
+typedef struct trip_run_iterator {
+    const trip_selection *selection;
+    int64_t slab;        /* position in lists[axis].slabs */
+    int64_t sheet;       /* within the slab */
+    int64_t brick;       /* within the slab */
+    uint64_t splat;      /* list position of the current brick's run */
+} trip_run_iterator;
+
+int trip_selection_create(trip_selection *s, const trip_dataset *d, int axis, bool descending,
+                          int64_t sheet_first, int64_t sheet_last, trip_budget *budget);
+void trip_selection_destroy(trip_selection *s, trip_budget *budget);
+
+static inline void trip_selection_add(trip_selection *s, uint64_t brick)
+{
+    s->bricks[brick / 64] |= UINT64_C(1) << (brick % 64);
+}
+
+static inline bool trip_selection_has(const trip_selection *s, uint64_t brick)
+{
+    return s->bricks[brick / 64] >> (brick % 64) & 1;
+}
+
+trip_run_iterator trip_run_begin(const trip_selection *s);
+/* False at the end. Runs with count 0 are left out. */
+bool trip_run_next(trip_run_iterator *it, trip_run *run);
+
+#endif
