@@ -6,6 +6,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct trip_budget trip_budget;
 
 /* limit_bytes 0: trip_memory_available() / 4. */
@@ -30,5 +34,9 @@ uint64_t trip_memory_peak_rss_bytes(void);
 int trip_parse_bytes(const char *text, uint64_t *bytes_out);
 /* "1.23 GB"-style text with decimal units into `text` (at least 32 bytes). */
 const char *trip_format_bytes(uint64_t bytes, char *text);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

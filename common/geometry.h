@@ -6,6 +6,10 @@
 #include <math.h>
 #include <stdbool.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct trip_vec3 {
     double x, y, z;
 } trip_vec3;
@@ -72,5 +76,9 @@ trip_affine trip_affine_multiply(const trip_affine *a, const trip_affine *b);
 double trip_affine_determinant(const trip_affine *a);
 /* False when the map is singular or not finite. */
 bool trip_affine_invert(const trip_affine *a, trip_affine *out);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

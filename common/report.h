@@ -4,6 +4,10 @@
 #ifndef TRIP_REPORT_H
 #define TRIP_REPORT_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum trip_status {
     TRIP_OK = 0,
     TRIP_ERROR = -1,       /* failed: exit status 1 */
@@ -30,5 +34,9 @@ void trip_report_redirect(void (*sink)(const char *line, void *user), void *user
  * return trip_fail(TRIP_INTERRUPTED, ...). A second signal ends the process at once. */
 void trip_interrupt_install(void);
 int trip_interrupted(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
