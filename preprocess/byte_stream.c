@@ -1,0 +1,372 @@
+#include "byte_stream.h"
+
+#include <bzlib.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include "report.h"
+
+/* One read of compressed bytes; plain files are read straight into the caller's memory. */
+#define PIECE_BYTES ((size_t)1 << 20)
+/* The decompressors count in 32 bits. */
+#define OUTPUT_BYTES_MAX ((size_t)1 << 30)
+
+struct trip_byte_stream {
+    trip_byte_source source;
+    char *path;
+    int fd;
+    uint64_t file_bytes;
+    uint64_t position; /* in the file, of the next byte to read */
+    uint64_t done;     /* bytes of the source delivered */
+
+    unsigned char *piece; /* compressed bytes read but not used yet: */
+    size_t piece_used, piece_bytes;
+    bool ended; /* the compressed stream is complete */
+    bool codec_ready;
+    union {
+        z_stream zlib;
+        bz_stream bzip2;
+    } codec;
+};
+
+trip_byte_encoding trip_byte_encoding_of(const char *path)
+{
+    const char *dot = strrchr(path, '.');
+    if (dot && strcasecmp(dot, ".gz") == 0)
+        return TRIP_BYTES_ZLIB;
+    if (dot && strcasecmp(dot, ".bz2") == 0)
+        return TRIP_BYTES_BZIP2;
+    return TRIP_BYTES_PLAIN;
+}
+
+static int open_regular(const char *path, int *fd_out, uint64_t *bytes_out)
+{
+    /* Not blocking, so that a FIFO is refused rather than waited for. */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    struct stat st;
+    if (fd < 0)
+        return trip_fail_errno("read", path, "cannot open");
+    if (fstat(fd, &st) != 0) {
+        int status = trip_fail_errno("read", path, "cannot look at");
+        close(fd);
+        return status;
+    }
+    if (!S_ISREG(st.st_mode)) {
+        close(fd);
+        return trip_fail(TRIP_ERROR, "read", path, "is not a regular file");
+    }
+    *fd_out = fd;
+    *bytes_out = (uint64_t)st.st_size;
+    return 0;
+}
+
+int trip_file_size(const char *path, uint64_t *bytes_out)
+{
+    int fd;
+    int status = open_regular(path, &fd, bytes_out);
+    if (status == 0)
+        close(fd);
+    return status;
+}
+
+static void codec_end(trip_byte_stream *s)
+{
+    if (s->codec_ready && s->source.encoding == TRIP_BYTES_ZLIB)
+        inflateEnd(&s->codec.zlib);
+    else if (s->codec_ready)
+        BZ2_bzDecompressEnd(&s->codec.bzip2);
+    s->codec_ready = false;
+}
+
+static int codec_begin(trip_byte_stream *s)
+{
+    codec_end(s);
+    memset(&s->codec, 0, sizeof s->codec);
+    int failed = s->source.encoding == TRIP_BYTES_ZLIB
+                     ? inflateInit2(&s->codec.zlib, 15 + 32) != Z_OK /* gzip or zlib */
+                     : BZ2_bzDecompressInit(&s->codec.bzip2, 0, 0) != BZ_OK;
+    if (failed)
+        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress");
+    s->codec_ready = true;
+    return 0;
+}
+
+/* Reads `bytes` bytes at the present position, fewer only at the end of the file. */
+static int read_file(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
+{
+    size_t got = 0;
+    while (got < bytes) {
+        ssize_t n = pread(s->fd, (char *)to + got, bytes - got, (off_t)s->position);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n < 0)
+            return trip_fail_errno("read", s->path, "cannot read");
+        if (n == 0)
+            break;
+        got += (size_t)n;
+        s->position += (uint64_t)n;
+    }
+    *got_out = got;
+    return 0;
+}
+
+static int fill_piece(trip_byte_stream *s)
+{
+    s->piece_used = 0;
+    return read_file(s, s->piece, PIECE_BYTES, &s->piece_bytes);
+}
+
+static int corrupt(const trip_byte_stream *s)
+{
+    const char *kind = s->source.encoding == TRIP_BYTES_ZLIB ? "zlib" : "bzip2";
+    return trip_fail(TRIP_ERROR, "read", s->path,
+                     "%s data is corrupt near byte %" PRIu64 " of the file", kind,
+                     s->position - (s->piece_bytes - s->piece_used));
+}
+
+/* One step of the decompressor over what the piece holds. */
+static int step_zlib(trip_byte_stream *s, unsigned char *to, size_t bytes, size_t *got_out)
+{
+    z_stream *z = &s->codec.zlib;
+    z->next_in = s->piece + s->piece_used;
+    z->avail_in = (uInt)(s->piece_bytes - s->piece_used);
+    z->next_out = to;
+    z->avail_out = (uInt)bytes;
+    int code = inflate(z, Z_NO_FLUSH);
+    s->piece_used = s->piece_bytes - z->avail_in;
+    *got_out = bytes - z->avail_out;
+    s->ended = code == Z_STREAM_END;
+    return code == Z_OK || code == Z_STREAM_END || code == Z_BUF_ERROR ? 0 : corrupt(s);
+}
+
+static int step_bzip2(trip_byte_stream *s, unsigned char *to, size_t bytes, size_t *got_out)
+{
+    bz_stream *b = &s->codec.bzip2;
+    b->next_in = (char *)s->piece + s->piece_used;
+    b->avail_in = (unsigned)(s->piece_bytes - s->piece_used);
+    b->next_out = (char *)to;
+    b->avail_out = (unsigned)bytes;
+    int code = BZ2_bzDecompress(b);
+    s->piece_used = s->piece_bytes - b->avail_in;
+    *got_out = bytes - b->avail_out;
+    s->ended = code == BZ_STREAM_END;
+    return code == BZ_OK || code == BZ_STREAM_END ? 0 : corrupt(s);
+}
+
+/* Whether the piece goes on with another member of the same kind after a completed one. */
+static bool another_member(const trip_byte_stream *s)
+{
+    const unsigned char *next = s->piece + s->piece_used;
+    if (s->piece_bytes - s->piece_used < 2)
+        return false;
+    if (s->source.encoding == TRIP_BYTES_ZLIB)
+        return next[0] == 0x1f && next[1] == 0x8b;
+    return next[0] == 'B' && next[1] == 'Z';
+}
+
+/* After a completed member: begins the next one, if any. */
+static int next_member(trip_byte_stream *s)
+{
+    size_t left = s->piece_bytes - s->piece_used, more = 0;
+    if (left < 2) {
+        memmove(s->piece, s->piece + s->piece_used, left);
+        s->piece_used = 0;
+        int status = read_file(s, s->piece + left, PIECE_BYTES - left, &more);
+        s->piece_bytes = left + more;
+        if (status < 0)
+            return status;
+    }
+    if (!another_member(s))
+        return 0;
+    s->ended = false;
+    return codec_begin(s);
+}
+
+/* Decompresses up to `bytes` bytes, fewer only at the end of the stream. */
+static int decompress(trip_byte_stream *s, unsigned char *to, size_t bytes, size_t *got_out)
+{
+    int status = 0;
+    size_t done = 0;
+    while (done < bytes && !s->ended && status == 0) {
+        size_t want = bytes - done < OUTPUT_BYTES_MAX ? bytes - done : OUTPUT_BYTES_MAX, got = 0;
+        bool starved = false;
+        if (s->piece_used == s->piece_bytes) {
+            status = fill_piece(s);
+            starved = s->piece_bytes == 0;
+        }
+        if (status == 0)
+            status = s->source.encoding == TRIP_BYTES_ZLIB ? step_zlib(s, to + done, want, &got)
+                                                           : step_bzip2(s, to + done, want, &got);
+        done += got;
+        if (status == 0 && s->ended)
+            status = next_member(s);
+        else if (status == 0 && starved && got == 0)
+            break; /* the file ends inside the stream */
+    }
+    *got_out = done;
+    return status;
+}
+
+static int too_short(const trip_byte_stream *s, uint64_t bytes)
+{
+    return trip_fail(TRIP_ERROR, "read", s->path,
+                     "holds %" PRIu64 " bytes of data where %" PRIu64
+                     " are promised: is it cut off?",
+                     bytes, s->source.size_bytes);
+}
+
+static void warn_left_over(trip_byte_stream *s, const char *count_text)
+{
+    if (!s->source.warned)
+        trip_warn(s->path, "%s left over after the %" PRIu64 " bytes of data", count_text,
+                  s->source.size_bytes);
+    s->source.warned = true;
+}
+
+/* Reads to the end of a compressed stream, which checks its checksum. */
+static int finish(trip_byte_stream *s)
+{
+    unsigned char extra;
+    size_t got;
+    int status = s->ended ? 0 : decompress(s, &extra, 1, &got);
+    if (status < 0)
+        return status;
+    if (!s->ended && got == 0)
+        return trip_fail(TRIP_ERROR, "read", s->path, "compressed data is cut off at its very end");
+    if (!s->ended)
+        warn_left_over(s, "compressed bytes are");
+    return 0;
+}
+
+static int read_compressed(trip_byte_stream *s, unsigned char *to, size_t bytes)
+{
+    size_t got;
+    int status = decompress(s, to, bytes, &got);
+    if (status < 0)
+        return status;
+    if (got < bytes)
+        return too_short(s, s->done + got);
+    return 0;
+}
+
+int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes)
+{
+    size_t got = bytes;
+    int status = s->source.encoding == TRIP_BYTES_PLAIN ? read_file(s, to, bytes, &got)
+                                                        : read_compressed(s, to, bytes);
+    if (status < 0)
+        return status;
+    if (got < bytes)
+        return too_short(s, s->done + got);
+    s->done += bytes;
+    bool last = s->done == s->source.size_bytes;
+    return last && s->source.encoding != TRIP_BYTES_PLAIN ? finish(s) : 0;
+}
+
+static int skip_decompressed(trip_byte_stream *s)
+{
+    unsigned char waste[4096];
+    uint64_t left = s->source.skip_bytes;
+    while (left > 0) {
+        size_t n = left < sizeof waste ? (size_t)left : sizeof waste, got;
+        int status = decompress(s, waste, n, &got);
+        if (status < 0)
+            return status;
+        if (got < n)
+            return trip_fail(TRIP_ERROR, "read", s->path,
+                             "ends within the %" PRIu64 " bytes to skip", s->source.skip_bytes);
+        left -= n;
+    }
+    return 0;
+}
+
+int trip_byte_stream_rewind(trip_byte_stream *s)
+{
+    s->position = s->source.offset_bytes;
+    s->done = 0;
+    s->piece_used = s->piece_bytes = 0;
+    s->ended = false;
+    if (s->source.encoding == TRIP_BYTES_PLAIN) {
+        s->position += s->source.skip_bytes;
+        return 0;
+    }
+    int status = codec_begin(s);
+    return status < 0 ? status : skip_decompressed(s);
+}
+
+/* A plain file's length is known before anything is read. */
+static int check_length(trip_byte_stream *s)
+{
+    uint64_t start, end;
+    if (__builtin_add_overflow(s->source.offset_bytes, s->source.skip_bytes, &start) ||
+        start > s->file_bytes)
+        return trip_fail(TRIP_ERROR, "read", s->path,
+                         "data should start at byte %" PRIu64 ", but the file has %" PRIu64
+                         " bytes",
+                         s->source.offset_bytes, s->file_bytes);
+    if (s->source.encoding != TRIP_BYTES_PLAIN)
+        return 0;
+    if (__builtin_add_overflow(start, s->source.size_bytes, &end) || end > s->file_bytes)
+        return too_short(s, s->file_bytes - start);
+    if (end < s->file_bytes) {
+        char text[64];
+        snprintf(text, sizeof text, "%" PRIu64 " bytes are", s->file_bytes - end);
+        warn_left_over(s, text);
+    }
+    return 0;
+}
+
+static int prepare(trip_byte_stream *s)
+{
+    int status = open_regular(s->path, &s->fd, &s->file_bytes);
+    if (status < 0)
+        return status;
+    status = check_length(s);
+    if (status < 0)
+        return status;
+    if (s->source.encoding != TRIP_BYTES_PLAIN && !(s->piece = malloc(PIECE_BYTES)))
+        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress");
+    posix_fadvise(s->fd, 0, 0, POSIX_FADV_SEQUENTIAL);
+    return trip_byte_stream_rewind(s);
+}
+
+int trip_byte_stream_open(trip_byte_stream **out, const trip_byte_source *source)
+{
+    trip_byte_stream *s = calloc(1, sizeof *s);
+    char *path = strdup(source->path);
+    if (!s || !path) {
+        free(s);
+        free(path);
+        return trip_fail(TRIP_ERROR, "read", source->path, "no memory to open");
+    }
+    s->source = *source;
+    s->source.path = s->path = path;
+    s->fd = -1;
+    int status = prepare(s);
+    if (status < 0) {
+        trip_byte_stream_close(s);
+        return status;
+    }
+    *out = s;
+    return 0;
+}
+
+void trip_byte_stream_close(trip_byte_stream *s)
+{
+    if (!s)
+        return;
+    codec_end(s);
+    if (s->fd >= 0)
+        close(s->fd);
+    free(s->piece);
+    free(s->path);
+    free(s);
+}

@@ -1,0 +1,155 @@
+/* NRRD: attached (.nrrd) and detached (.nhdr) headers; raw, gzip and bzip2; one data file or many.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "byte_stream.h"
+#include "dense_file.h"
+#include "nrrd_header.h"
+#include "report.h"
+#include "volume_reader.h"
+
+static bool nrrd_probe(const char *path, const unsigned char *head, size_t bytes,
+                       const trip_volume_params *params)
+{
+    (void)path;
+    (void)params;
+    return bytes >= 8 && memcmp(head, "NRRD", 4) == 0;
+}
+
+static int read_header(const char *path, trip_nrrd_header *h)
+{
+    char *text = malloc(TRIP_NRRD_HEADER_BYTES_MAX + 1);
+    FILE *file = fopen(path, "rbe");
+    int status = 0;
+    if (!text)
+        status = trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
+    else if (!file)
+        status = trip_fail_errno("read", path, "cannot open");
+    size_t bytes = status == 0 ? fread(text, 1, TRIP_NRRD_HEADER_BYTES_MAX, file) : 0;
+    if (status == 0 && ferror(file))
+        status = trip_fail_errno("read", path, "cannot read");
+    if (status == 0)
+        status = trip_nrrd_header_parse(h, path, text, bytes, bytes < TRIP_NRRD_HEADER_BYTES_MAX);
+    if (file)
+        fclose(file);
+    free(text);
+    return status;
+}
+
+/* Where the text goes on after `lines` more lines from byte `start`. */
+static int skip_lines(const char *path, uint64_t start, int64_t lines, uint64_t *offset)
+{
+    FILE *file = fopen(path, "rbe");
+    if (!file)
+        return trip_fail_errno("read", path, "cannot open");
+    int64_t left = lines;
+    int c = fseeko(file, (off_t)start, SEEK_SET) == 0 ? 0 : EOF;
+    *offset = start;
+    while (left > 0 && c != EOF) {
+        c = getc_unlocked(file);
+        *offset += c != EOF;
+        left -= c == '\n';
+    }
+    fclose(file);
+    if (left > 0)
+        return trip_fail(TRIP_ERROR, "read", path, "ends within the %" PRId64 " lines to skip",
+                         lines);
+    return 0;
+}
+
+/* A name in the header is relative to the folder that the header is in. */
+static char *join(const char *header_path, const char *name)
+{
+    const char *slash = strrchr(header_path, '/');
+    char *path;
+    if (name[0] == '/' || !slash)
+        return strdup(name);
+    return asprintf(&path, "%.*s/%s", (int)(slash - header_path), header_path, name) < 0 ? NULL
+                                                                                         : path;
+}
+
+/* Lines are skipped in the file, bytes after decompression: as the format defines it. */
+static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t part_bytes)
+{
+    int status = 0;
+    uint64_t file_bytes;
+    if (h->line_skip > 0)
+        status =
+            skip_lines(source->path, source->offset_bytes, h->line_skip, &source->offset_bytes);
+    if (h->byte_skip >= 0 || status < 0) {
+        source->skip_bytes = (uint64_t)(h->byte_skip > 0 ? h->byte_skip : 0);
+        return status;
+    }
+    status = trip_file_size(source->path, &file_bytes);
+    if (status == 0 && file_bytes >= part_bytes)
+        source->offset_bytes = file_bytes - part_bytes;
+    return status; /* a file too short is reported when it is opened */
+}
+
+static int open_sources(const char *path, const trip_nrrd_header *h, const trip_volume_info *info,
+                        trip_byte_source *sources, void **state)
+{
+    size_t count = h->file_count ? h->file_count : 1;
+    uint64_t part_bytes = (uint64_t)info->dims[0] * (uint64_t)info->dims[1] *
+                          (uint64_t)info->dims[2] * trip_scalar_bytes(info->type) / count;
+    for (size_t i = 0; i < count; i++) {
+        char *name = h->file_count ? join(path, h->files[i]) : strdup(path);
+        if (!name)
+            return trip_fail(TRIP_ERROR, "read", path, "no memory for its data files");
+        sources[i] = (trip_byte_source){ .path = name,
+                                         .encoding = h->encoding,
+                                         .offset_bytes = h->file_count ? 0 : h->header_bytes };
+        int status = locate(&sources[i], h, part_bytes);
+        if (status < 0)
+            return status;
+    }
+    return trip_dense_open(state, sources, (int64_t)count, info,
+                           h->big_endian != trip_machine_is_big_endian());
+}
+
+static int open_data(const char *path, const trip_nrrd_header *h, const trip_volume_info *info,
+                     void **state)
+{
+    size_t count = h->file_count ? h->file_count : 1;
+    int status = trip_volume_check_dims(path, info);
+    if (status < 0)
+        return status;
+    trip_byte_source *sources = calloc(count, sizeof *sources);
+    if (!sources)
+        return trip_fail(TRIP_ERROR, "read", path, "no memory for its data files");
+    status = open_sources(path, h, info, sources, state);
+    for (size_t i = 0; i < count; i++)
+        free((char *)(uintptr_t)sources[i].path);
+    free(sources);
+    return status;
+}
+
+static int nrrd_open(const char *path, const trip_volume_params *params, trip_budget *budget,
+                     trip_volume_info *info, void **state)
+{
+    (void)params;
+    (void)budget;
+    trip_nrrd_header h;
+    int status = read_header(path, &h);
+    if (status < 0)
+        return status;
+    memcpy(info->dims, h.dims, sizeof info->dims);
+    info->index_to_world = h.index_to_world;
+    info->type = h.type;
+    status = open_data(path, &h, info, state);
+    trip_nrrd_header_free(&h);
+    return status;
+}
+
+const trip_volume_reader trip_read_nrrd = {
+    .format = "nrrd",
+    .probe = nrrd_probe,
+    .open = nrrd_open,
+    .close = trip_dense_close,
+    .rewind = trip_dense_rewind,
+    .read_slices = trip_dense_read_slices,
+    .swap = trip_dense_swap,
+};

@@ -1,0 +1,129 @@
+/* Headerless values: what they are comes from the options, or from a file name such as
+ * engine_256x256x128_uint8.raw, the naming of the Open SciVis Datasets. */
+#include <ctype.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#include "byte_stream.h"
+#include "dense_file.h"
+#include "report.h"
+#include "volume_reader.h"
+
+/* Length of the path without ".gz" or ".bz2". */
+static size_t uncompressed_length(const char *path)
+{
+    size_t length = strlen(path);
+    return trip_byte_encoding_of(path) == TRIP_BYTES_PLAIN ? length
+                                                           : (size_t)(strrchr(path, '.') - path);
+}
+
+static bool is_raw_name(const char *path)
+{
+    size_t length = uncompressed_length(path);
+    return length >= 4 && strncasecmp(path + length - 4, ".raw", 4) == 0;
+}
+
+/* "WxHxD" between underscores, then the type: from the end of the name backwards, since the rest
+ * of it is free. */
+static bool parse_name(const char *path, int64_t dims[3], int *type)
+{
+    char name[256];
+    const char *base = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
+    size_t length = uncompressed_length(base);
+    if (length < 4 || length - 4 >= sizeof name)
+        return false;
+    snprintf(name, sizeof name, "%.*s", (int)(length - 4), base);
+    char *type_name = strrchr(name, '_');
+    if (!type_name)
+        return false;
+    *type_name++ = '\0';
+    char *size = strrchr(name, '_');
+    int used = 0;
+    size = size ? size + 1 : name;
+    if (!isdigit((unsigned char)*size) ||
+        sscanf(size, "%9" SCNd64 "x%9" SCNd64 "x%9" SCNd64 "%n", &dims[0], &dims[1], &dims[2],
+               &used) != 3 ||
+        size[used])
+        return false;
+    *type = trip_scalar_from_name(type_name);
+    return *type >= 0;
+}
+
+static bool raw_probe(const char *path, const unsigned char *head, size_t bytes,
+                      const trip_volume_params *params)
+{
+    (void)head;
+    return bytes > 0 && (params->raw_dims[0] || is_raw_name(path));
+}
+
+static int no_size(const char *path)
+{
+    char header[4096];
+    size_t stem = uncompressed_length(path);
+    if (stem > 4 && stem < sizeof header - 8) {
+        snprintf(header, sizeof header, "%.*s.nhdr", (int)(stem - 4), path);
+        if (access(header, R_OK) == 0)
+            return trip_fail(TRIP_USAGE, "read", path,
+                             "has no header of its own: open %s instead, or give --size X Y Z and "
+                             "--type",
+                             header);
+    }
+    return trip_fail(TRIP_USAGE, "read", path,
+                     "has no header: give --size X Y Z and --type (and --spacing, --endian, "
+                     "--offset if needed)");
+}
+
+/* Options first; the name fills what they leave open. */
+static int find_layout(const char *path, const trip_volume_params *params, trip_volume_info *info)
+{
+    int64_t dims[3] = { 0 };
+    int named_type = -1, type = -1;
+    bool named = is_raw_name(path) && parse_name(path, dims, &named_type);
+    if (params->raw_dims[0])
+        memcpy(dims, params->raw_dims, sizeof dims);
+    else if (!named)
+        return no_size(path);
+    type = params->raw_type ? trip_scalar_from_name(params->raw_type)
+           : named          ? named_type
+                            : TRIP_U8;
+    if (type < 0)
+        return trip_fail(
+            TRIP_USAGE, "read", path,
+            "unknown --type \"%s\": uint8, int8, uint16, int16, uint32, int32, uint64, "
+            "int64, half, float or double",
+            params->raw_type);
+    memcpy(info->dims, dims, sizeof dims);
+    info->type = (trip_scalar)type;
+    return 0;
+}
+
+static int raw_open(const char *path, const trip_volume_params *params, trip_budget *budget,
+                    trip_volume_info *info, void **state)
+{
+    (void)budget;
+    int status = find_layout(path, params, info);
+    if (status < 0)
+        return status;
+    int native = trip_machine_is_big_endian() ? 2 : 1;
+    trip_byte_source source = { .path = path, .encoding = trip_byte_encoding_of(path) };
+    if (source.encoding == TRIP_BYTES_PLAIN)
+        source.offset_bytes = params->raw_offset_bytes;
+    else
+        source.skip_bytes = params->raw_offset_bytes;
+    return trip_dense_open(state, &source, 1, info,
+                           params->raw_endian && params->raw_endian != native);
+}
+
+const trip_volume_reader trip_read_raw = {
+    .format = "raw",
+    .probe = raw_probe,
+    .open = raw_open,
+    .close = trip_dense_close,
+    .rewind = trip_dense_rewind,
+    .read_slices = trip_dense_read_slices,
+    .swap = trip_dense_swap,
+};

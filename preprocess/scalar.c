@@ -1,0 +1,186 @@
+#include "volume_reader.h"
+
+#include <string.h>
+#include <strings.h>
+
+static const struct {
+    unsigned bytes;
+    const char *name;
+} scalars[TRIP_SCALARS] = {
+    [TRIP_U8] = { 1, "uint8" },   [TRIP_I8] = { 1, "int8" },    [TRIP_U16] = { 2, "uint16" },
+    [TRIP_I16] = { 2, "int16" },  [TRIP_U32] = { 4, "uint32" }, [TRIP_I32] = { 4, "int32" },
+    [TRIP_U64] = { 8, "uint64" }, [TRIP_I64] = { 8, "int64" },  [TRIP_F16] = { 2, "half" },
+    [TRIP_F32] = { 4, "float" },  [TRIP_F64] = { 8, "double" },
+};
+
+/* NRRD's spellings, those of the Open SciVis file names, and NumPy's. */
+static const struct {
+    const char *name;
+    trip_scalar type;
+} aliases[] = {
+    { "unsigned char", TRIP_U8 },
+    { "uchar", TRIP_U8 },
+    { "uint8_t", TRIP_U8 },
+    { "byte", TRIP_U8 },
+    { "u8", TRIP_U8 },
+    { "signed char", TRIP_I8 },
+    { "int8_t", TRIP_I8 },
+    { "i8", TRIP_I8 },
+    { "unsigned short", TRIP_U16 },
+    { "unsigned short int", TRIP_U16 },
+    { "ushort", TRIP_U16 },
+    { "uint16_t", TRIP_U16 },
+    { "u16", TRIP_U16 },
+    { "short", TRIP_I16 },
+    { "short int", TRIP_I16 },
+    { "signed short", TRIP_I16 },
+    { "signed short int", TRIP_I16 },
+    { "int16_t", TRIP_I16 },
+    { "i16", TRIP_I16 },
+    { "unsigned int", TRIP_U32 },
+    { "uint", TRIP_U32 },
+    { "uint32_t", TRIP_U32 },
+    { "u32", TRIP_U32 },
+    { "int", TRIP_I32 },
+    { "signed int", TRIP_I32 },
+    { "int32_t", TRIP_I32 },
+    { "i32", TRIP_I32 },
+    { "unsigned long long", TRIP_U64 },
+    { "unsigned long long int", TRIP_U64 },
+    { "ulonglong", TRIP_U64 },
+    { "uint64_t", TRIP_U64 },
+    { "u64", TRIP_U64 },
+    { "long long", TRIP_I64 },
+    { "long long int", TRIP_I64 },
+    { "signed long long", TRIP_I64 },
+    { "signed long long int", TRIP_I64 },
+    { "longlong", TRIP_I64 },
+    { "int64_t", TRIP_I64 },
+    { "i64", TRIP_I64 },
+    { "float16", TRIP_F16 },
+    { "f16", TRIP_F16 },
+    { "float32", TRIP_F32 },
+    { "f32", TRIP_F32 },
+    { "float64", TRIP_F64 },
+    { "f64", TRIP_F64 },
+};
+
+unsigned trip_scalar_bytes(trip_scalar type)
+{
+    return scalars[type].bytes;
+}
+
+const char *trip_scalar_name(trip_scalar type)
+{
+    return scalars[type].name;
+}
+
+int trip_scalar_from_name(const char *name)
+{
+    for (int i = 0; i < TRIP_SCALARS; i++)
+        if (strcasecmp(name, scalars[i].name) == 0)
+            return i;
+    for (size_t i = 0; i < sizeof aliases / sizeof aliases[0]; i++)
+        if (strcasecmp(name, aliases[i].name) == 0)
+            return (int)aliases[i].type;
+    return -1;
+}
+
+static inline uint8_t swap_8(uint8_t v)
+{
+    return v;
+}
+
+static inline uint16_t swap_16(uint16_t v)
+{
+    return __builtin_bswap16(v);
+}
+
+static inline uint32_t swap_32(uint32_t v)
+{
+    return __builtin_bswap32(v);
+}
+
+static inline uint64_t swap_64(uint64_t v)
+{
+    return __builtin_bswap64(v);
+}
+
+/* IEEE half to single, exact: the exponent is rebiased by a multiplication, which also normalises
+ * subnormals. */
+static inline float half_to_float(uint16_t half)
+{
+    uint32_t magnitude = half & 0x7fffu, bits = magnitude << 13;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    value *= 0x1p112f;
+    memcpy(&bits, &value, sizeof bits);
+    if (magnitude >= 0x7c00u) /* infinity or NaN */
+        bits = magnitude << 13 | 0x7f800000u;
+    bits |= (uint32_t)(half & 0x8000u) << 16;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* One row of values of one type. The branches are outside the loops, so that each loop vectorises;
+ * memcpy because rows of a file need not be aligned. */
+#define DEFINE_DECODE(NAME, TYPE, BITS, VALUE)                                                     \
+    static inline TYPE load_##NAME(const unsigned char *from, bool swap)                           \
+    {                                                                                              \
+        uint##BITS##_t word;                                                                       \
+        memcpy(&word, from, sizeof word);                                                          \
+        if (swap)                                                                                  \
+            word = swap_##BITS(word);                                                              \
+        TYPE v;                                                                                    \
+        memcpy(&v, &word, sizeof v);                                                               \
+        return v;                                                                                  \
+    }                                                                                              \
+    static inline void row_##NAME(const unsigned char *from, size_t count, bool swap, bool scaled, \
+                                  double slope, double inter, float *to)                           \
+    {                                                                                              \
+        if (scaled)                                                                                \
+            for (size_t i = 0; i < count; i++)                                                     \
+                to[i] = (float)(slope * (double)VALUE(load_##NAME(from + i * (BITS / 8), swap)) +  \
+                                inter);                                                            \
+        else                                                                                       \
+            for (size_t i = 0; i < count; i++)                                                     \
+                to[i] = (float)VALUE(load_##NAME(from + i * (BITS / 8), swap));                    \
+    }                                                                                              \
+    static void decode_##NAME(const unsigned char *from, size_t count, bool swap, double slope,    \
+                              double inter, float *to)                                             \
+    {                                                                                              \
+        bool scaled = slope != 1 || inter != 0;                                                    \
+        if (swap && scaled)                                                                        \
+            row_##NAME(from, count, true, true, slope, inter, to);                                 \
+        else if (swap)                                                                             \
+            row_##NAME(from, count, true, false, slope, inter, to);                                \
+        else if (scaled)                                                                           \
+            row_##NAME(from, count, false, true, slope, inter, to);                                \
+        else                                                                                       \
+            row_##NAME(from, count, false, false, slope, inter, to);                               \
+    }
+
+DEFINE_DECODE(u8, uint8_t, 8, )
+DEFINE_DECODE(i8, int8_t, 8, )
+DEFINE_DECODE(u16, uint16_t, 16, )
+DEFINE_DECODE(i16, int16_t, 16, )
+DEFINE_DECODE(u32, uint32_t, 32, )
+DEFINE_DECODE(i32, int32_t, 32, )
+DEFINE_DECODE(u64, uint64_t, 64, )
+DEFINE_DECODE(i64, int64_t, 64, )
+DEFINE_DECODE(f16, uint16_t, 16, half_to_float)
+DEFINE_DECODE(f32, float, 32, )
+DEFINE_DECODE(f64, double, 64, )
+
+void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
+                        size_t count, float *values)
+{
+    static void (*const decoders[TRIP_SCALARS])(const unsigned char *, size_t, bool, double, double,
+                                                float *) = {
+        [TRIP_U8] = decode_u8,   [TRIP_I8] = decode_i8,   [TRIP_U16] = decode_u16,
+        [TRIP_I16] = decode_i16, [TRIP_U32] = decode_u32, [TRIP_I32] = decode_i32,
+        [TRIP_U64] = decode_u64, [TRIP_I64] = decode_i64, [TRIP_F16] = decode_f16,
+        [TRIP_F32] = decode_f32, [TRIP_F64] = decode_f64,
+    };
+    decoders[type](stored, count, swap, slope, inter, values);
+}

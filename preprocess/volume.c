@@ -1,0 +1,399 @@
+#include "volume.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "report.h"
+#include "volume_reader.h"
+
+#define HEAD_BYTES 1024
+/* A slab's size where the caller has no opinion. */
+#define SLAB_BYTES ((int64_t)16 << 20)
+
+/* In the order they are asked: those with a magic number first. */
+static const trip_volume_reader *const readers[] = {
+    &trip_read_vdb, &trip_read_nrrd,   &trip_read_nifti,
+    &trip_read_vol, &trip_read_images, &trip_read_raw,
+};
+
+/* Whole slices [first, first + count) as stored: a block's own and one neighbour on each side. */
+typedef struct slab {
+    int64_t first, count;
+    unsigned char *slices;
+    size_t bytes;
+} slab;
+
+struct trip_volume {
+    const trip_volume_reader *reader;
+    void *state;
+    trip_volume_info info;
+    trip_budget *budget;
+    char *path;
+
+    /* The rest is for slice readers. */
+    size_t slice_bytes;
+    bool swap;
+    int64_t next_slice;   /* first slice of the next block */
+    int64_t read_slices;  /* slices the reader has delivered: up to two more than next_slice - 1 */
+    unsigned char *carry; /* [next_slice - 1, read_slices), for the next slab */
+    int broken;           /* the status of a failed read: no further block can be right */
+    /* One released slab kept for the next block, since fresh pages cost about as much as reading
+     * into them. Exchanged atomically: blocks may be released by any thread. */
+    _Atomic(slab *) spare;
+};
+
+static bool is_raw_option_given(const trip_volume_params *p)
+{
+    return p->raw_dims[0] || p->raw_dims[1] || p->raw_dims[2] || p->raw_type || p->raw_endian ||
+           p->raw_offset_bytes;
+}
+
+/* An option that the format cannot follow is an error, not ignored. */
+static int check_options(const char *path, const char *format, const trip_volume_params *p)
+{
+    if (strcmp(format, "raw") != 0 && is_raw_option_given(p))
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "is a %s file: --size, --type, --endian and --offset are for raw data",
+                         format);
+    if (strcmp(format, "openvdb") != 0 && (p->grid || p->level_set))
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "is a %s file: --grid and --level-set are for OpenVDB", format);
+    for (int a = 0; a < 3; a++)
+        if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
+            (p->spacing[a] == 0) != (p->spacing[0] == 0))
+            return trip_fail(TRIP_USAGE, "read", path, "--spacing takes three positive lengths");
+    return 0;
+}
+
+/* The first bytes of a regular file; none for a folder or a pattern. */
+static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
+{
+    *bytes_out = 0;
+    struct stat st;
+    if (stat(path, &st) != 0) {
+        if (errno == ENOENT && strpbrk(path, "%*?["))
+            return 0;
+        return trip_fail_errno("read", path, "cannot open");
+    }
+    if (S_ISDIR(st.st_mode))
+        return 0;
+    if (!S_ISREG(st.st_mode))
+        return trip_fail(TRIP_ERROR, "read", path, "is not a regular file");
+    if (st.st_size == 0)
+        return trip_fail(TRIP_ERROR, "read", path, "is empty");
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return trip_fail_errno("read", path, "cannot open");
+    ssize_t n = pread(fd, head, HEAD_BYTES, 0);
+    int status = n < 0 ? trip_fail_errno("read", path, "cannot read") : 0;
+    close(fd);
+    *bytes_out = n < 0 ? 0 : (size_t)n;
+    return status;
+}
+
+static int choose_reader(trip_volume *v, const trip_volume_params *params)
+{
+    unsigned char head[HEAD_BYTES];
+    size_t bytes;
+    int status = read_head(v->path, head, &bytes);
+    if (status < 0)
+        return status;
+    for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
+        if (!readers[i]->probe(v->path, head, bytes, params))
+            continue;
+        v->reader = readers[i];
+        return check_options(v->path, v->reader->format, params);
+    }
+    return trip_fail(TRIP_ERROR, "read", v->path,
+                     "neither its content nor its name is of a known format (VDB, NRRD, NIfTI, "
+                     ".vol, images); raw data needs --size X Y Z and --type");
+}
+
+/* Gives the index axes the wanted lengths in world space and keeps their directions. */
+static void override_spacing(trip_affine *m, const double spacing[3])
+{
+    for (int a = 0; a < 3; a++) {
+        double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
+        for (int row = 0; row < 3 && length > 0; row++)
+            m->m[row][a] *= spacing[a] / length;
+    }
+}
+
+int trip_volume_check_dims(const char *path, const trip_volume_info *info)
+{
+    int64_t bytes = trip_scalar_bytes(info->type);
+    bool possible = true;
+    for (int a = 0; a < 3; a++)
+        possible =
+            possible && info->dims[a] >= 1 && !__builtin_mul_overflow(bytes, info->dims[a], &bytes);
+    if (possible)
+        return 0;
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "has an impossible size, %" PRId64 " x %" PRId64 " x %" PRId64, info->dims[0],
+                     info->dims[1], info->dims[2]);
+}
+
+static int check_info(const trip_volume *v)
+{
+    const trip_volume_info *info = &v->info;
+    trip_affine inverse;
+    int status = trip_volume_check_dims(v->path, info);
+    if (status < 0)
+        return status;
+    if (!trip_affine_invert(&info->index_to_world, &inverse))
+        return trip_fail(TRIP_ERROR, "read", v->path,
+                         "its map from voxels to space is singular or not finite; --spacing X Y Z "
+                         "may give the axes other lengths");
+    if (!isfinite(info->slope) || info->slope == 0 || !isfinite(info->inter))
+        return trip_fail(TRIP_ERROR, "read", v->path,
+                         "scales its values by %g and offsets them by %g, which loses them",
+                         info->slope, info->inter);
+    return 0;
+}
+
+static int open_with_reader(trip_volume *v, const trip_volume_params *params)
+{
+    int status = choose_reader(v, params);
+    if (status < 0)
+        return status;
+    v->info = (trip_volume_info){ .index_to_world = trip_affine_identity(),
+                                  .slope = 1,
+                                  .format = v->reader->format };
+    status = v->reader->open(v->path, params, v->budget, &v->info, &v->state);
+    if (status < 0)
+        return status;
+    if (params->spacing[0] > 0)
+        override_spacing(&v->info.index_to_world, params->spacing);
+    status = check_info(v);
+    if (status < 0 || !v->reader->read_slices)
+        return status;
+    v->slice_bytes = (size_t)(v->info.dims[0] * v->info.dims[1]) * trip_scalar_bytes(v->info.type);
+    v->swap = v->reader->swap(v->state);
+    return 0;
+}
+
+int trip_volume_open(trip_volume **out, const char *path, const trip_volume_params *params,
+                     trip_budget *budget)
+{
+    static const trip_volume_params defaults;
+    trip_volume *v = calloc(1, sizeof *v);
+    if (!v || !(v->path = strdup(path))) {
+        free(v);
+        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    }
+    v->budget = budget;
+    int status = open_with_reader(v, params ? params : &defaults);
+    if (status < 0) {
+        trip_volume_close(v);
+        return status;
+    }
+    *out = v;
+    return 0;
+}
+
+const trip_volume_info *trip_volume_get_info(const trip_volume *v)
+{
+    return &v->info;
+}
+
+static void slab_free(trip_volume *v, slab *s)
+{
+    if (!s)
+        return;
+    trip_budget_release(v->budget, s->slices, s->bytes);
+    free(s);
+}
+
+static void drop_spare(trip_volume *v)
+{
+    slab_free(v, atomic_exchange(&v->spare, NULL));
+}
+
+static slab *slab_take(trip_volume *v, int64_t first, int64_t count)
+{
+    size_t bytes;
+    slab *s = atomic_exchange(&v->spare, NULL);
+    if (__builtin_mul_overflow(v->slice_bytes, (size_t)count, &bytes))
+        bytes = SIZE_MAX / 2; /* refused below */
+    if (s && s->bytes < bytes) {
+        slab_free(v, s);
+        s = NULL;
+    }
+    if (!s && (s = calloc(1, sizeof *s))) {
+        s->bytes = bytes;
+        s->slices = trip_budget_take(v->budget, bytes);
+        if (!s->slices) {
+            free(s);
+            return NULL;
+        }
+    }
+    if (s) {
+        s->first = first;
+        s->count = count;
+    }
+    return s;
+}
+
+static int refused(const trip_volume *v, int64_t slices)
+{
+    char needed[32], left[32];
+    trip_format_bytes((uint64_t)slices * v->slice_bytes, needed);
+    trip_format_bytes(trip_budget_left_bytes(v->budget), left);
+    return trip_fail(TRIP_ERROR, "read", v->path,
+                     "%" PRId64 " slices at a time need %s, but %s are left of the memory allowed; "
+                     "a larger --memory would do",
+                     slices, needed, left);
+}
+
+void trip_volume_close(trip_volume *v)
+{
+    if (!v)
+        return;
+    drop_spare(v);
+    if (v->carry)
+        trip_budget_release(v->budget, v->carry, 2 * v->slice_bytes);
+    if (v->state)
+        v->reader->close(v->state);
+    free(v->path);
+    free(v);
+}
+
+int trip_volume_rewind(trip_volume *v)
+{
+    v->next_slice = v->read_slices = 0;
+    v->broken = 0;
+    return v->reader->rewind(v->state);
+}
+
+/* Fills a slab: the slices that the last one ended with, then new ones from the reader. */
+static int fill_slab(trip_volume *v, slab *s, int64_t next_slice)
+{
+    int64_t kept = v->read_slices - s->first;
+    size_t kept_bytes = (size_t)kept * v->slice_bytes;
+    if (kept > 0)
+        memcpy(s->slices, v->carry, kept_bytes);
+    if (s->count > kept) {
+        int status = v->reader->read_slices(v->state, s->count - kept, s->slices + kept_bytes);
+        if (status < 0)
+            return v->broken = status;
+    }
+    v->read_slices = s->first + s->count;
+    v->next_slice = next_slice;
+    if (next_slice < v->info.dims[2]) {
+        size_t offset = (size_t)(next_slice - 1 - s->first) * v->slice_bytes;
+        memcpy(v->carry, s->slices + offset,
+               (size_t)(v->read_slices - next_slice + 1) * v->slice_bytes);
+    }
+    return 0;
+}
+
+static int next_slab(trip_volume *v, int64_t slices, trip_block *block)
+{
+    int64_t begin = v->next_slice, depth = v->info.dims[2];
+    int64_t end = slices < depth - begin ? begin + slices : depth;
+    int64_t first = begin > 0 ? begin - 1 : 0, past = end < depth ? end + 1 : depth;
+    if (end < depth && !v->carry && !(v->carry = trip_budget_take(v->budget, 2 * v->slice_bytes)))
+        return refused(v, past - first + 2);
+    slab *s = slab_take(v, first, past - first);
+    if (!s)
+        return refused(v, past - first);
+    int status = fill_slab(v, s, end);
+    if (status < 0) {
+        slab_free(v, s);
+        return status;
+    }
+    *block = (trip_block){ .origin = { 0, 0, begin },
+                           .size = { v->info.dims[0], v->info.dims[1], end - begin },
+                           .data = s };
+    return 1;
+}
+
+int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block)
+{
+    if (!v->reader->read_slices)
+        return v->reader->next(v->state, block);
+    if (v->broken < 0)
+        return v->broken;
+    if (v->next_slice == v->info.dims[2])
+        return 0;
+    if (slices_hint < 1)
+        slices_hint = SLAB_BYTES / (int64_t)v->slice_bytes;
+    return next_slab(v, slices_hint < 1 ? 1 : slices_hint, block);
+}
+
+static int64_t clamp(int64_t v, int64_t lo, int64_t hi)
+{
+    return v < lo ? lo : v > hi ? hi : v;
+}
+
+/* Values [lo, lo + count) of a stored row of `width` values; beyond its ends the end ones repeat.
+ */
+static void decode_row(const trip_volume *v, const unsigned char *row, int64_t width, int64_t lo,
+                       int64_t count, float *values)
+{
+    const trip_volume_info *info = &v->info;
+    int64_t begin = clamp(lo, 0, width - 1), end = clamp(lo + count, begin + 1, width);
+    int64_t before = clamp(begin - lo, 0, count - 1);
+    int64_t inside = clamp(end - begin, 1, count - before);
+    trip_scalar_decode(info->type, v->swap, info->slope, info->inter,
+                       row + (size_t)begin * trip_scalar_bytes(info->type), (size_t)inside,
+                       values + before);
+    for (int64_t i = 0; i < before; i++)
+        values[i] = values[before];
+    for (int64_t i = before + inside; i < count; i++)
+        values[i] = values[before + inside - 1];
+}
+
+static void mark_row(int64_t width, bool exists, int64_t lo, int64_t count, uint8_t *active)
+{
+    memset(active, 0, (size_t)count);
+    int64_t begin = clamp(-lo, 0, count), end = clamp(width - lo, begin, count);
+    if (exists)
+        memset(active + begin, 1, (size_t)(end - begin));
+}
+
+static void decode_slab(const trip_volume *v, const slab *s, const int64_t lo[3],
+                        const int64_t size[3], float *values, uint8_t *active)
+{
+    const int64_t *dims = v->info.dims;
+    size_t row_bytes = v->slice_bytes / (size_t)dims[1];
+    for (int64_t k = 0; k < size[2]; k++)
+        for (int64_t j = 0; j < size[1]; j++) {
+            int64_t z = clamp(lo[2] + k, 0, dims[2] - 1), y = clamp(lo[1] + j, 0, dims[1] - 1);
+            size_t to = (size_t)((k * size[1] + j) * size[0]);
+            const unsigned char *slice = s->slices + (size_t)(z - s->first) * v->slice_bytes;
+            decode_row(v, slice + (size_t)y * row_bytes, dims[0], lo[0], size[0], values + to);
+            if (active)
+                mark_row(dims[0], z == lo[2] + k && y == lo[1] + j, lo[0], size[0], active + to);
+        }
+}
+
+int trip_block_decode(const trip_volume *v, const trip_block *block, const int64_t lo[3],
+                      const int64_t size[3], float *values, uint8_t *active)
+{
+    if (!v->reader->read_slices)
+        return v->reader->decode(v->state, block, lo, size, values, active);
+    for (int a = 0; a < 3; a++)
+        if (lo[a] < block->origin[a] - 1 || size[a] < 1 ||
+            lo[a] + size[a] > block->origin[a] + block->size[a] + 1)
+            return trip_fail(TRIP_ERROR, "read", v->path, "asked for voxels outside the block");
+    decode_slab(v, block->data, lo, size, values, active);
+    return 0;
+}
+
+void trip_block_release(trip_volume *v, trip_block *block)
+{
+    if (!block->data)
+        return;
+    if (v->reader->read_slices)
+        slab_free(v, atomic_exchange(&v->spare, block->data));
+    else
+        v->reader->release(v->state, block);
+    block->data = NULL;
+}
