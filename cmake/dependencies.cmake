@@ -9,7 +9,8 @@ pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET epoxy)
 pkg_check_modules(EGL REQUIRED IMPORTED_TARGET egl)
 pkg_check_modules(URING REQUIRED IMPORTED_TARGET liburing)
 pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
-find_package(OpenImageIO REQUIRED)
+# Not find_package: its CMake files want OpenCV headers that nothing here uses.
+pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 list(APPEND CMAKE_MODULE_PATH /usr/lib/x86_64-linux-gnu/cmake/OpenVDB /usr/lib/aarch64-linux-gnu/cmake/OpenVDB)
 find_package(OpenVDB REQUIRED)
 # Debian's own Python, for the plain second reader and the independent counts used by the tests.

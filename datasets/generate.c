@@ -1,0 +1,310 @@
+/* triptych-generate: writes a volume of any size whose every value is known in closed form, slice
+ * by slice, so that a terabyte needs no more memory than a megabyte. */
+#include <argp.h>
+#include <errno.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "fields.h"
+#include "report.h"
+#include "write_vdb.h"
+
+enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, LEAF = 8 };
+
+typedef enum sample_type { SAMPLE_U8, SAMPLE_U16, SAMPLE_F32 } sample_type;
+
+static const struct {
+    const char *name;
+    size_t bytes;
+} sample_types[] = { { "uint8", 1 }, { "uint16", 2 }, { "float", 4 } };
+
+typedef struct job {
+    const trip_field *field;
+    const char *output;
+    long dims[3];
+    sample_type type;
+    double detail;
+    long threads;
+} job;
+
+/* LEAF slices at a time; threads take rows from `next`. */
+typedef struct slab {
+    const job *job;
+    long first, slices;
+    long next;
+    void *values;
+} slab;
+
+/* Index to the cube: the longest axis spans [-1, 1] between its first and last voxel centres. */
+static trip_vec3 position(const job *j, long x, long y, long z)
+{
+    long longest = 2;
+    for (int a = 0; a < 3; a++)
+        longest = j->dims[a] > longest ? j->dims[a] : longest;
+    double step = 2.0 / (double)(longest - 1);
+    return trip_v3(((double)x - (double)(j->dims[0] - 1) / 2) * step,
+                   ((double)y - (double)(j->dims[1] - 1) / 2) * step,
+                   ((double)z - (double)(j->dims[2] - 1) / 2) * step);
+}
+
+static void sample_row(const slab *s, long row)
+{
+    const job *j = s->job;
+    long y = row % j->dims[1], z = s->first + row / j->dims[1];
+    size_t start = (size_t)row * (size_t)j->dims[0];
+    for (long x = 0; x < j->dims[0]; x++) {
+        double v = j->field->sample(position(j, x, y, z), j->detail, NULL);
+        size_t at = start + (size_t)x;
+        if (j->type == SAMPLE_U8)
+            ((uint8_t *)s->values)[at] = (uint8_t)lrint(v * 255);
+        else if (j->type == SAMPLE_U16)
+            ((uint16_t *)s->values)[at] = (uint16_t)lrint(v * 65535);
+        else
+            ((float *)s->values)[at] = (float)v;
+    }
+}
+
+static void *sample_rows(void *user)
+{
+    slab *s = user;
+    long rows = s->job->dims[1] * s->slices;
+    for (;;) {
+        long first = __atomic_fetch_add(&s->next, ROWS_PER_TASK, __ATOMIC_RELAXED);
+        if (first >= rows)
+            return NULL;
+        for (long row = first; row < rows && row < first + ROWS_PER_TASK; row++)
+            sample_row(s, row);
+    }
+}
+
+static void sample_slab(slab *s)
+{
+    pthread_t threads[MAX_THREADS];
+    long started = 0;
+    s->next = 0;
+    while (started < s->job->threads - 1 &&
+           pthread_create(&threads[started], NULL, sample_rows, s) == 0)
+        started++;
+    sample_rows(s);
+    for (long t = 0; t < started; t++)
+        pthread_join(threads[t], NULL);
+}
+
+typedef int slab_consumer(const slab *s, void *user);
+
+/* Gives every slab of the volume to `consume` in order. */
+static int for_each_slab(const job *j, slab_consumer *consume, void *user)
+{
+    size_t slice_values = (size_t)j->dims[0] * (size_t)j->dims[1];
+    slab s = { .job = j, .values = malloc(slice_values * LEAF * sample_types[j->type].bytes) };
+    int status =
+        s.values ? TRIP_OK
+                 : trip_fail(TRIP_ERROR, "generate", j->output, "no memory for %d slices", LEAF);
+    for (s.first = 0; status == TRIP_OK && s.first < j->dims[2]; s.first += LEAF) {
+        long left = j->dims[2] - s.first;
+        s.slices = left < LEAF ? left : LEAF;
+        if (trip_interrupted())
+            status = trip_fail(TRIP_INTERRUPTED, "generate", j->output, "interrupted");
+        else {
+            sample_slab(&s);
+            status = consume(&s, user);
+        }
+    }
+    free(s.values);
+    return status;
+}
+
+static int write_slab(const slab *s, void *user)
+{
+    size_t count = (size_t)s->job->dims[0] * (size_t)s->job->dims[1] * (size_t)s->slices;
+    if (fwrite(s->values, sample_types[s->job->type].bytes, count, user) != count)
+        return trip_fail_errno("generate", s->job->output, "cannot write");
+    return TRIP_OK;
+}
+
+static int write_dense(const job *j, const char *path, bool header)
+{
+    FILE *file = fopen(path, "wb");
+    if (!file)
+        return trip_fail_errno("generate", path, "cannot create");
+    if (header)
+        fprintf(file,
+                "NRRD0004\n# %s, detail %g\ntype: %s\ndimension: 3\nsizes: %ld %ld %ld\n"
+                "spacings: 1 1 1\nendian: little\nencoding: raw\n\n",
+                j->field->name, j->detail, sample_types[j->type].name, j->dims[0], j->dims[1],
+                j->dims[2]);
+    int status = for_each_slab(j, write_slab, file);
+    if (fclose(file) != 0 && status == TRIP_OK)
+        status = trip_fail_errno("generate", path, "cannot write");
+    return status;
+}
+
+/* One leaf of a slab of floats, zero where it reaches beyond the volume. */
+static void copy_leaf(const slab *s, long x0, long y0, float leaf[LEAF * LEAF * LEAF])
+{
+    const long *dims = s->job->dims;
+    const float *values = s->values;
+    memset(leaf, 0, LEAF * LEAF * LEAF * sizeof *leaf);
+    for (long z = 0; z < s->slices; z++)
+        for (long y = 0; y < LEAF && y0 + y < dims[1]; y++)
+            for (long x = 0; x < LEAF && x0 + x < dims[0]; x++)
+                leaf[(z * LEAF + y) * LEAF + x] = values[(z * dims[1] + y0 + y) * dims[0] + x0 + x];
+}
+
+static int add_leaves(const slab *s, void *user)
+{
+    float leaf[LEAF * LEAF * LEAF];
+    int status = TRIP_OK;
+    for (long y = 0; status == TRIP_OK && y < s->job->dims[1]; y += LEAF) {
+        for (long x = 0; status == TRIP_OK && x < s->job->dims[0]; x += LEAF) {
+            copy_leaf(s, x, y, leaf);
+            status = trip_vdb_writer_leaf(user, (int64_t[3]){ x, y, s->first }, leaf);
+        }
+    }
+    return status;
+}
+
+static int write_sparse(const job *j, const char *path)
+{
+    trip_vdb_writer *writer = NULL;
+    int status = trip_vdb_writer_create(&writer, 1.0);
+    if (status == TRIP_OK)
+        status = for_each_slab(j, add_leaves, writer);
+    if (status == TRIP_OK)
+        status = trip_vdb_writer_save(writer, path);
+    trip_vdb_writer_destroy(writer);
+    return status;
+}
+
+static bool ends_with(const char *text, const char *end)
+{
+    size_t n = strlen(text), m = strlen(end);
+    return n > m && strcmp(text + n - m, end) == 0;
+}
+
+static int generate(job *j)
+{
+    char partial[4096];
+    if (snprintf(partial, sizeof partial, "%s.partial", j->output) >= (int)sizeof partial)
+        return trip_fail(TRIP_USAGE, "generate", j->output, "the name is too long");
+    int status;
+    if (ends_with(j->output, ".vdb")) {
+        j->type = SAMPLE_F32;
+        status = write_sparse(j, partial);
+    } else if (ends_with(j->output, ".nrrd") || ends_with(j->output, ".raw")) {
+        status = write_dense(j, partial, ends_with(j->output, ".nrrd"));
+    } else {
+        return trip_fail(TRIP_USAGE, "generate", j->output,
+                         "the name must end in .nrrd, .raw or .vdb");
+    }
+    if (status == TRIP_OK && rename(partial, j->output) != 0)
+        status = trip_fail_errno("generate", j->output, "cannot rename to");
+    if (status != TRIP_OK)
+        unlink(partial);
+    return status;
+}
+
+static int parse_size(const char *text, long dims[3])
+{
+    int used = 0, n = sscanf(text, "%ldx%ldx%ld%n", &dims[0], &dims[1], &dims[2], &used);
+    if (n == 1 && sscanf(text, "%ld%n", &dims[0], &used) == 1)
+        dims[1] = dims[2] = dims[0];
+    else if (n != 3)
+        return -1;
+    for (int a = 0; a < 3; a++)
+        if (dims[a] < 1 || dims[a] > 1 << 20)
+            return -1;
+    return text[used] == 0 ? 0 : -1;
+}
+
+static int parse_type(const char *text, sample_type *type)
+{
+    for (int t = SAMPLE_U8; t <= SAMPLE_F32; t++) {
+        if (strcmp(text, sample_types[t].name) == 0) {
+            *type = (sample_type)t;
+            return 0;
+        }
+    }
+    return -1;
+}
+
+static error_t parse_option(int key, char *arg, struct argp_state *state)
+{
+    job *j = state->input;
+    char *end = NULL;
+    switch (key) {
+    case 'o':
+        j->output = arg;
+        return 0;
+    case 's':
+        if (parse_size(arg, j->dims) != 0)
+            argp_error(state, "--size: '%s' is neither N nor NXxNYxNZ", arg);
+        return 0;
+    case 't':
+        if (parse_type(arg, &j->type) != 0)
+            argp_error(state, "--type: '%s' is not uint8, uint16 or float", arg);
+        return 0;
+    case 'd':
+        j->detail = strtod(arg, &end);
+        if (*end || !(j->detail > 0 && j->detail < 1e6))
+            argp_error(state, "--detail: '%s' is not a positive number", arg);
+        return 0;
+    case 'j':
+        j->threads = strtol(arg, &end, 10);
+        if (*end || j->threads < 1 || j->threads > MAX_THREADS)
+            argp_error(state, "--threads: '%s' is not a number from 1 to %d", arg, MAX_THREADS);
+        return 0;
+    case ARGP_KEY_ARG:
+        j->field = state->arg_num == 0 ? trip_field_find(arg) : NULL;
+        if (!j->field)
+            argp_error(state, "no such field: '%s'", arg);
+        return 0;
+    case ARGP_KEY_END:
+        if (!j->field || !j->output)
+            argp_error(state, "a FIELD and -o FILE are needed");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option options[] = {
+    { "output", 'o', "FILE", 0,
+      "What to write: .nrrd, .raw (both streamed) or .vdb (sparse, in memory)", 0 },
+    { "size", 's', "N|NXxNYxNZ", 0, "Voxels (default 256)", 0 },
+    { "type", 't', "TYPE", 0, "uint8 (default), uint16 or float; .vdb is always float", 0 },
+    { "detail", 'd', "X", 0, "Fineness of the structure (default: longest side / 256)", 0 },
+    { "threads", 'j', "N", 0, "Threads (default: all processors)", 0 },
+    { 0 },
+};
+
+int main(int argc, char **argv)
+{
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    job j = { .dims = { 256, 256, 256 },
+              .threads = processors < MAX_THREADS ? processors : MAX_THREADS };
+    struct argp argp = {
+        options,
+        parse_option,
+        "FIELD",
+        "Writes a volume with known values. FIELD is one of: marschner-lobb (dense), "
+        "cloud (about half empty), shells, filaments (almost empty).",
+        NULL,
+        NULL,
+        NULL
+    };
+    argp_err_exit_status = 2;
+    argp_parse(&argp, argc, argv, 0, NULL, &j);
+    if (j.detail == 0) {
+        long longest = j.dims[0];
+        for (int a = 1; a < 3; a++)
+            longest = j.dims[a] > longest ? j.dims[a] : longest;
+        j.detail = fmax(1, (double)longest / 256);
+    }
+    trip_interrupt_install();
+    int status = generate(&j);
+    return status == TRIP_OK ? 0 : status == TRIP_USAGE ? 2 : 1;
+}
