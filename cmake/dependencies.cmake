@@ -15,3 +15,9 @@ list(APPEND CMAKE_MODULE_PATH /usr/lib/x86_64-linux-gnu/cmake/OpenVDB /usr/lib/a
 find_package(OpenVDB REQUIRED)
 # Debian's own Python, for the plain second reader and the independent counts used by the tests.
 find_program(TRIP_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)
+# Debian's libnifti2-dev has neither pkg-config nor CMake files.
+find_path(NIFTI_INCLUDE_DIR nifti2_io.h PATH_SUFFIXES nifti REQUIRED)
+find_library(NIFTI_LIBRARY nifti2 REQUIRED)
+add_library(trip_nifti INTERFACE)
+target_include_directories(trip_nifti SYSTEM INTERFACE ${NIFTI_INCLUDE_DIR})
+target_link_libraries(trip_nifti INTERFACE ${NIFTI_LIBRARY})

@@ -1,0 +1,326 @@
+/* NIfTI-1 and -2, .nii or a pair .hdr/.img, gzipped or not, in either byte order. libnifti gives
+ * the header's layout, its byte swapping and the quaternion's meaning; the values are streamed by
+ * ourselves, since libnifti reads whole images. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include <nifti2_io.h>
+
+#include "byte_stream.h"
+#include "dense_file.h"
+#include "report.h"
+#include "volume_reader.h"
+
+#define MAGIC_1_OFFSET offsetof(nifti_1_header, magic)
+#define MAGIC_2_OFFSET offsetof(nifti_2_header, magic)
+
+_Static_assert(sizeof(nifti_1_header) == 348, "as on disk");
+_Static_assert(sizeof(nifti_2_header) == 540, "as on disk");
+
+/* A header of either version, widened to that of version 2, in the machine's byte order. */
+typedef struct header {
+    nifti_2_header n;
+    bool swapped;  /* the file's byte order is the other one */
+    bool own_file; /* the values are in an .img beside it */
+} header;
+
+static bool has_magic(const unsigned char *head, size_t bytes)
+{
+    const unsigned char *m1 = head + MAGIC_1_OFFSET, *m2 = head + MAGIC_2_OFFSET;
+    if (bytes >= sizeof(nifti_1_header) && (!memcmp(m1, "n+1", 4) || !memcmp(m1, "ni1", 4)))
+        return true;
+    return bytes >= sizeof(nifti_2_header) && (!memcmp(m2, "n+2", 4) || !memcmp(m2, "ni2", 4));
+}
+
+/* Whether the path ends in `suffix`, with or without ".gz" after it. */
+static bool ends_in(const char *path, const char *suffix)
+{
+    size_t length = strlen(path), n = strlen(suffix);
+    if (length >= 3 && strcasecmp(path + length - 3, ".gz") == 0)
+        length -= 3;
+    return length > n && strncasecmp(path + length - n, suffix, n) == 0;
+}
+
+static bool nifti_probe(const char *path, const unsigned char *head, size_t bytes,
+                        const trip_volume_params *params)
+{
+    (void)params;
+    if (bytes == 0)
+        return false;
+    return has_magic(head, bytes) || ends_in(path, ".nii") || ends_in(path, ".hdr") ||
+           ends_in(path, ".img");
+}
+
+/* The other file of a pair: ".hdr" and ".img" exchanged, the case and a ".gz" kept. */
+static char *partner(const char *path, const char *from, const char *to)
+{
+    char *copy = strdup(path);
+    if (!copy || !ends_in(path, from))
+        return copy;
+    size_t length = strlen(copy);
+    if (strcasecmp(copy + length - 3, ".gz") == 0)
+        length -= 3;
+    memcpy(copy + length - strlen(to), to, strlen(to));
+    return copy;
+}
+
+static int read_head(const char *path, unsigned char *head, size_t bytes)
+{
+    trip_byte_stream *stream;
+    trip_byte_source source = {
+        .path = path, .encoding = trip_byte_encoding_of(path), .size_bytes = bytes, .warned = true
+    };
+    int status = trip_byte_stream_open(&stream, &source);
+    if (status < 0)
+        return status;
+    status = trip_byte_stream_read(stream, head, bytes);
+    trip_byte_stream_close(stream);
+    return status;
+}
+
+/* The fields of version 1 that are used here. */
+static nifti_2_header widen(const nifti_1_header *h)
+{
+    nifti_2_header n = { 0 };
+    memcpy(n.magic, h->magic, 4);
+    for (int i = 0; i < 8; i++) {
+        n.dim[i] = h->dim[i];
+        n.pixdim[i] = h->pixdim[i];
+    }
+    for (int i = 0; i < 4; i++) {
+        n.srow_x[i] = h->srow_x[i];
+        n.srow_y[i] = h->srow_y[i];
+        n.srow_z[i] = h->srow_z[i];
+    }
+    n.datatype = h->datatype;
+    /* A float on disk; whatever no file can have becomes a negative offset, refused later. */
+    n.vox_offset = h->vox_offset >= 0 && h->vox_offset < 0x1p62f ? (int64_t)h->vox_offset : -1;
+    n.scl_slope = h->scl_slope;
+    n.scl_inter = h->scl_inter;
+    n.qform_code = h->qform_code;
+    n.sform_code = h->sform_code;
+    n.quatern_b = h->quatern_b;
+    n.quatern_c = h->quatern_c;
+    n.quatern_d = h->quatern_d;
+    n.qoffset_x = h->qoffset_x;
+    n.qoffset_y = h->qoffset_y;
+    n.qoffset_z = h->qoffset_z;
+    return n;
+}
+
+static int not_nifti(const char *path)
+{
+    return trip_fail(TRIP_ERROR, "read", path, "is not a NIfTI-1 or NIfTI-2 header");
+}
+
+static int read_version_1(const char *path, header *h)
+{
+    nifti_1_header n;
+    int status = read_head(path, (unsigned char *)&n, sizeof n);
+    if (status < 0)
+        return status;
+    if (!has_magic((const unsigned char *)&n, sizeof n))
+        return not_nifti(path);
+    h->swapped = n.sizeof_hdr != (int)sizeof n;
+    if (h->swapped)
+        swap_nifti_header(&n, 1);
+    h->own_file = n.magic[1] == 'i';
+    h->n = widen(&n);
+    return n.sizeof_hdr == (int)sizeof n ? 0 : not_nifti(path);
+}
+
+static int read_version_2(const char *path, header *h)
+{
+    int status = read_head(path, (unsigned char *)&h->n, sizeof h->n);
+    if (status < 0)
+        return status;
+    if (memcmp(h->n.magic + 4, "\r\n\032\n", 4) != 0)
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "its NIfTI-2 magic is damaged, as by a transfer in text mode");
+    h->swapped = h->n.sizeof_hdr != (int)sizeof h->n;
+    if (h->swapped)
+        swap_nifti_header(&h->n, 2);
+    h->own_file = h->n.magic[1] == 'i';
+    return h->n.sizeof_hdr == (int)sizeof h->n ? 0 : not_nifti(path);
+}
+
+static int read_header(const char *path, header *h)
+{
+    unsigned char head[MAGIC_2_OFFSET + 4];
+    int status = read_head(path, head, sizeof head);
+    if (status < 0)
+        return status;
+    const unsigned char *magic = head + MAGIC_2_OFFSET;
+    return memcmp(magic, "n+2", 4) == 0 || memcmp(magic, "ni2", 4) == 0 ? read_version_2(path, h)
+                                                                        : read_version_1(path, h);
+}
+
+static int set_dims(const char *path, const nifti_2_header *n, trip_volume_info *info)
+{
+    if (n->dim[0] < 1 || n->dim[0] > 7)
+        return trip_fail(TRIP_ERROR, "read", path, "has %" PRId64 " axes, not 1 to 7", n->dim[0]);
+    for (int i = 1; i <= n->dim[0]; i++) {
+        if (n->dim[i] < 1)
+            return trip_fail(TRIP_ERROR, "read", path, "axis %d has size %" PRId64, i, n->dim[i]);
+        if (i <= 3)
+            info->dims[i - 1] = n->dim[i];
+        else if (n->dim[i] > 1)
+            trip_warn(path, "axis %d has %" PRId64 " entries; only the first is read", i,
+                      n->dim[i]);
+    }
+    for (int i = (int)n->dim[0]; i < 3; i++)
+        info->dims[i] = 1;
+    return 0;
+}
+
+static int set_type(const char *path, const nifti_2_header *n, trip_volume_info *info)
+{
+    switch (n->datatype) {
+    case DT_UINT8:
+        info->type = TRIP_U8;
+        return 0;
+    case DT_INT8:
+        info->type = TRIP_I8;
+        return 0;
+    case DT_UINT16:
+        info->type = TRIP_U16;
+        return 0;
+    case DT_INT16:
+        info->type = TRIP_I16;
+        return 0;
+    case DT_UINT32:
+        info->type = TRIP_U32;
+        return 0;
+    case DT_INT32:
+        info->type = TRIP_I32;
+        return 0;
+    case DT_UINT64:
+        info->type = TRIP_U64;
+        return 0;
+    case DT_INT64:
+        info->type = TRIP_I64;
+        return 0;
+    case DT_FLOAT32:
+        info->type = TRIP_F32;
+        return 0;
+    case DT_FLOAT64:
+        info->type = TRIP_F64;
+        return 0;
+    default:
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "datatype %d (%s) cannot be read: only integers, float and double can",
+                         n->datatype, nifti_datatype_string(n->datatype));
+    }
+}
+
+static trip_affine from_sform(const nifti_2_header *n)
+{
+    trip_affine a;
+    for (int i = 0; i < 4; i++) {
+        a.m[0][i] = n->srow_x[i];
+        a.m[1][i] = n->srow_y[i];
+        a.m[2][i] = n->srow_z[i];
+    }
+    return a;
+}
+
+/* The quaternion if there is one, else the voxel sizes alone. */
+static trip_affine from_qform(const nifti_2_header *n)
+{
+    double size[3];
+    for (int i = 0; i < 3; i++) {
+        size[i] = fabs(n->pixdim[i + 1]);
+        if (!(size[i] > 0 && isfinite(size[i])))
+            size[i] = 1; /* unknown */
+    }
+    trip_affine a = trip_affine_identity();
+    if (n->qform_code <= 0) {
+        for (int i = 0; i < 3; i++)
+            a.m[i][i] = size[i];
+        return a;
+    }
+    nifti_dmat44 q = nifti_quatern_to_dmat44(n->quatern_b, n->quatern_c, n->quatern_d, n->qoffset_x,
+                                             n->qoffset_y, n->qoffset_z, size[0], size[1], size[2],
+                                             n->pixdim[0] < 0 ? -1 : 1);
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 4; column++)
+            a.m[row][column] = q.m[row][column];
+    return a;
+}
+
+static trip_affine find_map(const char *path, const nifti_2_header *n)
+{
+    trip_affine a = from_sform(n), inverse;
+    if (n->sform_code <= 0)
+        return from_qform(n);
+    if (trip_affine_invert(&a, &inverse))
+        return a;
+    trip_warn(path, "its sform is singular or not finite; the qform or the voxel sizes are used");
+    return from_qform(n);
+}
+
+static void set_scaling(const nifti_2_header *n, trip_volume_info *info)
+{
+    if (n->scl_slope == 0 || !isfinite(n->scl_slope))
+        return; /* by the standard, no scaling */
+    info->slope = n->scl_slope;
+    info->inter = isfinite(n->scl_inter) ? n->scl_inter : 0;
+}
+
+static int open_values(const char *path, const header *h, const trip_volume_info *info,
+                       void **state)
+{
+    int64_t least = h->own_file ? 0 : h->n.dim[0] && h->n.magic[2] == '2' ? 544 : 352;
+    if (h->n.vox_offset < least)
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "its values should start inside its header or nowhere (vox_offset)");
+    int64_t beyond = 1;
+    for (int i = 4; i <= h->n.dim[0]; i++)
+        beyond = h->n.dim[i] > 1 ? 2 : beyond;
+    char *data_path = h->own_file ? partner(path, ".hdr", ".img") : strdup(path);
+    if (!data_path)
+        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    trip_byte_source source = { .path = data_path,
+                                .encoding = trip_byte_encoding_of(data_path),
+                                .skip_bytes = (uint64_t)h->n.vox_offset,
+                                .warned = beyond > 1 };
+    int status = trip_dense_open(state, &source, 1, info, h->swapped);
+    free(data_path);
+    return status;
+}
+
+static int nifti_open(const char *path, const trip_volume_params *params, trip_budget *budget,
+                      trip_volume_info *info, void **state)
+{
+    (void)params;
+    (void)budget;
+    header h;
+    char *header_path = partner(path, ".img", ".hdr");
+    if (!header_path)
+        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    nifti_set_debug_level(0); /* it would print by itself */
+    int status = read_header(header_path, &h);
+    if (status == 0 && (status = set_dims(header_path, &h.n, info)) == 0)
+        status = set_type(header_path, &h.n, info);
+    if (status == 0) {
+        info->index_to_world = find_map(header_path, &h.n);
+        set_scaling(&h.n, info);
+        status = open_values(header_path, &h, info, state);
+    }
+    free(header_path);
+    return status;
+}
+
+const trip_volume_reader trip_read_nifti = {
+    .format = "nifti",
+    .probe = nifti_probe,
+    .open = nifti_open,
+    .close = trip_dense_close,
+    .rewind = trip_dense_rewind,
+    .read_slices = trip_dense_read_slices,
+    .swap = trip_dense_swap,
+};
