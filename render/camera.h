@@ -47,6 +47,11 @@ trip_camera_params trip_camera_frame_volume(const int64_t dims[3], const trip_af
                                             int width, int height, double azimuth_degrees,
                                             trip_vec3 up);
 
+/* The same for a box of index space, [lo, hi] along each axis. */
+trip_camera_params trip_camera_frame_box(const double lo[3], const double hi[3],
+                                         const trip_affine *index_to_world, int width, int height,
+                                         double azimuth_degrees, trip_vec3 up);
+
 /* Direction (index space, not normalised) of the ray at a pixel position. */
 static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y)
 {

@@ -1,5 +1,5 @@
-/* What the user asked a picture to be. Plain values, zero means the default (see each field);
- * trip_settings_resolve() fills the defaults in, after which every renderer reads the same numbers. */
+/* What the user asked a picture to be. Plain values that every renderer reads alike; start from
+ * trip_settings_default(). */
 #ifndef TRIP_SETTINGS_H
 #define TRIP_SETTINGS_H
 

@@ -17,7 +17,14 @@
 /* Gradient at which shading is full, as a fraction of the code range per voxel length. */
 #define TRIP_GRADIENT_FULL 0.02
 
-/* World-space direction towards the light and towards the eye from a world-space position. */
+/* |gradient| in value per world unit at which shading is full. */
+static inline double trip_shade_gradient_full(double code_lo, double code_hi, double voxel_world)
+{
+    return TRIP_GRADIENT_FULL * (code_hi - code_lo) / voxel_world;
+}
+
+/* Lights the colour `rgb` (not premultiplied) of a splat at a world-space position with the given
+ * world-space gradient. */
 void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full,
                 trip_vec3 world_position, const double gradient[3], double rgb[3]);
 

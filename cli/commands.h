@@ -1,0 +1,13 @@
+/* The commands of the program. Each is a short file whose body is the stages in order. argv[0] is
+ * the command's name; returned is the exit status: 0 done, 1 failed, 2 wrong usage. */
+#ifndef TRIP_COMMANDS_H
+#define TRIP_COMMANDS_H
+
+int trip_command_brick(int argc, char **argv);  /* brick.c */
+int trip_command_info(int argc, char **argv);   /* info.c */
+int trip_command_render(int argc, char **argv); /* render.c */
+
+/* Exit status of a trip_status. */
+int trip_exit_status(int status);
+
+#endif

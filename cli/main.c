@@ -1,0 +1,62 @@
+/* triptych COMMAND ...: picks the command; everything else is the command's. */
+#include "commands.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "report.h"
+
+static const struct command {
+    const char *name, *summary;
+    int (*run)(int argc, char **argv);
+} commands[] = {
+    { "brick", "turn a volume into a data set that is drawn from disk", trip_command_brick },
+    { "info", "show what is in a data set, and check it", trip_command_info },
+    { "render", "draw a data set into image files", trip_command_render },
+};
+enum { COMMANDS = sizeof commands / sizeof commands[0] };
+
+int trip_exit_status(int status)
+{
+    return status >= 0 ? 0 : status == TRIP_USAGE ? 2 : 1;
+}
+
+static void print_help(void)
+{
+    printf("Usage: triptych COMMAND [OPTION...]\n"
+           "Draws volumes too large for memory.\n\n");
+    for (int i = 0; i < COMMANDS; i++)
+        printf("  %-8s %s\n", commands[i].name, commands[i].summary);
+    printf("\n`triptych COMMAND --help` shows a command's options; each has a man page,\n"
+           "triptych-COMMAND(1). `triptych --version` shows the version.\n");
+}
+
+/* Writes everything out, so that a full disk behind stdout is a failure and not silence. */
+static int finish(int exit_status)
+{
+    if (fflush(stdout) != 0 || ferror(stdout))
+        return trip_exit_status(trip_fail_errno("write", "standard output", NULL));
+    return exit_status;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2)
+        return trip_exit_status(
+            trip_fail(TRIP_USAGE, "usage", "command", "none given; `triptych --help` lists them"));
+    const char *name = argv[1];
+    if (!strcmp(name, "--help") || !strcmp(name, "help") || !strcmp(name, "-h")) {
+        print_help();
+        return finish(0);
+    }
+    if (!strcmp(name, "--version")) {
+        printf("triptych %s\n", TRIP_VERSION);
+        return finish(0);
+    }
+    trip_interrupt_install();
+    for (int i = 0; i < COMMANDS; i++)
+        if (!strcmp(name, commands[i].name))
+            return finish(commands[i].run(argc - 1, argv + 1));
+    return trip_exit_status(
+        trip_fail(TRIP_USAGE, "usage", name, "no such command; `triptych --help` lists them"));
+}

@@ -1,0 +1,186 @@
+#include "camera.h"
+
+#include "report.h"
+
+#define PI 3.14159265358979323846
+#define DEFAULT_FOV_DEGREES 30.0
+#define DEFAULT_AZIMUTH_DEGREES 30.0
+#define DEFAULT_ELEVATION_DEGREES 20.0
+#define DEFAULT_FILL 0.95 /* of the image by the framed box */
+#define MAX_SIZE_PX 65536
+
+/* Orthonormal, right-handed with forward towards the scene: right x up = -forward. */
+typedef struct basis {
+    trip_vec3 right, up, forward;
+} basis;
+
+static bool finite3(trip_vec3 v)
+{
+    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
+}
+
+static int check_params(const trip_camera_params *p)
+{
+    if (p->width < 1 || p->height < 1 || p->width > MAX_SIZE_PX || p->height > MAX_SIZE_PX)
+        return trip_fail(TRIP_USAGE, "camera", "size", "%d x %d px is not between 1 and %d",
+                         p->width, p->height, MAX_SIZE_PX);
+    if (!finite3(p->eye) || !finite3(p->look) || !finite3(p->up))
+        return trip_fail(TRIP_USAGE, "camera", "eye, look, up", "not finite");
+    if (p->ortho_height != 0 && !(isfinite(p->ortho_height) && p->ortho_height > 0))
+        return trip_fail(TRIP_USAGE, "camera", "ortho height", "%g is not a positive length",
+                         p->ortho_height);
+    if (p->ortho_height == 0 && !(p->fov_degrees > 0 && p->fov_degrees < 180))
+        return trip_fail(TRIP_USAGE, "camera", "fov", "%g is not between 0 and 180 degrees",
+                         p->fov_degrees);
+    return 0;
+}
+
+static int make_basis(const trip_camera_params *p, basis *b)
+{
+    trip_vec3 gaze = trip_sub(p->look, p->eye);
+    if (!(trip_length(gaze) > 0 && isfinite(trip_length(gaze))))
+        return trip_fail(TRIP_USAGE, "camera", "look",
+                         "the point looked at must differ from the eye");
+    b->forward = trip_normalize(gaze);
+    trip_vec3 right = trip_cross(b->forward, trip_normalize(p->up));
+    if (!(trip_length(right) > 1e-9))
+        return trip_fail(TRIP_USAGE, "camera", "up",
+                         "is zero or lies along the view; give another");
+    b->right = trip_normalize(right);
+    b->up = trip_cross(b->right, b->forward);
+    return 0;
+}
+
+/* World units per pixel at depth 1 (perspective) or everywhere (parallel). */
+static double pixel_size(const trip_camera_params *p)
+{
+    if (p->ortho_height > 0)
+        return p->ortho_height / p->height;
+    return 2 * tan(p->fov_degrees * (PI / 360)) / p->height;
+}
+
+static void set_rays(trip_camera *c, const basis *b, const trip_affine *world_to_index, double k)
+{
+    trip_vec3 corner =
+        trip_add(trip_scale(b->right, -0.5 * c->width * k), trip_scale(b->up, 0.5 * c->height * k));
+    trip_vec3 eye = c->world_eye, r0 = b->forward;
+    if (c->ortho)
+        eye = trip_add(eye, corner);
+    else
+        r0 = trip_add(r0, corner);
+    c->eye = trip_affine_point(world_to_index, eye);
+    c->r0 = trip_affine_vector(world_to_index, r0);
+    c->rx = trip_affine_vector(world_to_index, trip_scale(b->right, k));
+    c->ry = trip_affine_vector(world_to_index, trip_scale(b->up, -k));
+}
+
+/* The inverse of set_rays, taken from the same world-space basis rather than by inverting it. */
+static void set_projection(trip_camera *c, const basis *b, double k)
+{
+    trip_vec3 x = trip_scale(b->right, 1 / k), y = trip_scale(b->up, -1 / k);
+    if (!c->ortho) {
+        x = trip_add(x, trip_scale(b->forward, 0.5 * c->width));
+        y = trip_add(y, trip_scale(b->forward, 0.5 * c->height));
+    }
+    c->forward = trip_affine_transpose_vector(&c->index_to_world, b->forward);
+    c->to_x = trip_affine_transpose_vector(&c->index_to_world, x);
+    c->to_y = trip_affine_transpose_vector(&c->index_to_world, y);
+}
+
+int trip_camera_make(trip_camera *c, const trip_camera_params *params,
+                     const trip_affine *index_to_world)
+{
+    trip_affine world_to_index;
+    basis b;
+    int status = check_params(params);
+    if (!status)
+        status = make_basis(params, &b);
+    if (status)
+        return status;
+    if (!trip_affine_invert(index_to_world, &world_to_index))
+        return trip_fail(TRIP_ERROR, "camera", "index to world", "the map is singular");
+
+    double k = pixel_size(params);
+    *c = (trip_camera){
+        .params = *params,
+        .width = params->width,
+        .height = params->height,
+        .ortho = params->ortho_height > 0,
+        .index_to_world = *index_to_world,
+        .voxel_world = cbrt(fabs(trip_affine_determinant(index_to_world))),
+        .world_eye = params->eye,
+        .world_forward = b.forward,
+    };
+    set_rays(c, &b, &world_to_index, k);
+    set_projection(c, &b, k);
+    return 0;
+}
+
+static trip_vec3 box_corner(const double lo[3], const double hi[3], int corner)
+{
+    return trip_v3(corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1],
+                   corner & 4 ? hi[2] : lo[2]);
+}
+
+/* Unit vector from the scene to the eye. For up +z the front is the side of -y, for up +y that of
+ * +z: in both +x is to the right. */
+static trip_vec3 direction_to_eye(trip_vec3 up, double azimuth_degrees)
+{
+    trip_vec3 right = fabs(up.x) < 0.9 ? trip_v3(1, 0, 0) : trip_v3(0, 1, 0);
+    trip_vec3 front = trip_normalize(trip_cross(right, up));
+    right = trip_cross(up, front);
+    double azimuth = (DEFAULT_AZIMUTH_DEGREES + azimuth_degrees) * (PI / 180);
+    double elevation = DEFAULT_ELEVATION_DEGREES * (PI / 180);
+    trip_vec3 level = trip_add(trip_scale(front, cos(azimuth)), trip_scale(right, sin(azimuth)));
+    return trip_add(trip_scale(level, cos(elevation)), trip_scale(up, sin(elevation)));
+}
+
+/* Smallest distance from the box's centre at which all its corners project inside the frame. */
+static double framing_distance(const basis *b, const double lo[3], const double hi[3],
+                               const trip_affine *index_to_world, trip_vec3 centre, double half_x,
+                               double half_y)
+{
+    double distance = 0;
+    for (int i = 0; i < 8; i++) {
+        trip_vec3 p = trip_affine_point(index_to_world, box_corner(lo, hi, i));
+        trip_vec3 d = trip_sub(p, centre);
+        double nearer = -trip_dot(d, b->forward);
+        distance = fmax(distance, nearer + fabs(trip_dot(d, b->right)) / half_x);
+        distance = fmax(distance, nearer + fabs(trip_dot(d, b->up)) / half_y);
+    }
+    return distance;
+}
+
+trip_camera_params trip_camera_frame_box(const double lo[3], const double hi[3],
+                                         const trip_affine *index_to_world, int width, int height,
+                                         double azimuth_degrees, trip_vec3 up)
+{
+    up = trip_length(up) > 0 ? trip_normalize(up) : trip_v3(0, 0, 1);
+    trip_vec3 middle = trip_scale(trip_add(box_corner(lo, hi, 0), box_corner(lo, hi, 7)), 0.5);
+    trip_camera_params p = {
+        .up = up, .fov_degrees = DEFAULT_FOV_DEGREES, .width = width, .height = height
+    };
+    p.look = trip_affine_point(index_to_world, middle);
+
+    trip_vec3 to_eye = direction_to_eye(up, azimuth_degrees);
+    basis b = { .forward = trip_scale(to_eye, -1) };
+    b.right = trip_normalize(trip_cross(b.forward, up));
+    b.up = trip_cross(b.right, b.forward);
+    double half_y = DEFAULT_FILL * tan(p.fov_degrees * (PI / 360));
+    double half_x = half_y * width / height;
+    double distance = framing_distance(&b, lo, hi, index_to_world, p.look, half_x, half_y);
+    p.eye = trip_add(p.look, trip_scale(to_eye, distance));
+    return p;
+}
+
+trip_camera_params trip_camera_frame_volume(const int64_t dims[3],
+                                            const trip_affine *index_to_world, int width,
+                                            int height, double azimuth_degrees, trip_vec3 up)
+{
+    double lo[3], hi[3];
+    for (int a = 0; a < 3; a++) {
+        lo[a] = -0.5;
+        hi[a] = (double)dims[a] - 0.5;
+    }
+    return trip_camera_frame_box(lo, hi, index_to_world, width, height, azimuth_degrees, up);
+}

@@ -1,0 +1,108 @@
+#include "test.h"
+
+#include "shade.h"
+
+static trip_camera camera(bool ortho)
+{
+    trip_camera_params p = { .eye = { 0, 0, 10 },
+                             .up = { 0, 1, 0 },
+                             .fov_degrees = 90,
+                             .ortho_height = ortho ? 5 : 0,
+                             .width = 10,
+                             .height = 10 };
+    trip_affine m = trip_affine_identity();
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &p, &m), 0);
+    return c;
+}
+
+/* The grey of a splat at the origin of colour 0.5, gradient_full 2. */
+static double lit(const trip_settings *s, double gx, double gy, double gz)
+{
+    trip_camera c = camera(false);
+    double gradient[3] = { gx, gy, gz }, rgb[3] = { 0.5, 0.5, 0.5 };
+    trip_shade(s, &c, 2, trip_v3(0, 0, 0), gradient, rgb);
+    assert_close(rgb[0], rgb[1], 0);
+    assert_close(rgb[0], rgb[2], 0);
+    return rgb[0];
+}
+
+static void flat_regions_keep_their_colour(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    assert_close(lit(&s, 0, 0, 0), 0.5, 0);
+}
+
+static void a_surface_facing_the_headlight_is_brightest_on_either_side(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    double full = 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE) + TRIP_SPECULAR;
+    assert_close(lit(&s, 0, 0, 5), full, 1e-12);
+    assert_close(lit(&s, 0, 0, -2), full, 1e-12);
+}
+
+static void at_the_silhouette_only_ambient_light_is_left(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    assert_close(lit(&s, 3, -4, 0), 0.5 * TRIP_AMBIENT, 1e-12);
+}
+
+static void weak_gradients_are_shaded_in_proportion(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    assert_close(lit(&s, 1, 0, 0), 0.5 * (1 + 0.5 * (TRIP_AMBIENT - 1)), 1e-12);
+}
+
+static void a_given_light_shines_from_its_direction(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    s.headlight = false;
+    s.light_direction = trip_v3(1, 0, 0);
+    /* Facing the light; half way between it and the eye is 45 degrees off. */
+    double expected =
+        0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE) + TRIP_SPECULAR * pow(sqrt(0.5), TRIP_SHININESS);
+    assert_close(lit(&s, 9, 0, 0), expected, 1e-12);
+    assert_close(lit(&s, 0, 7, 0), 0.5 * TRIP_AMBIENT, 1e-12);
+}
+
+static void the_result_stays_within_the_colours_range(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    trip_camera c = camera(false);
+    double gradient[3] = { 0, 0, 9 }, rgb[3] = { 1, 0, 1 };
+    trip_shade(&s, &c, 2, trip_v3(0, 0, 0), gradient, rgb);
+    assert_close(rgb[0], 1, 0);
+    assert_close(rgb[1], TRIP_SPECULAR, 1e-12);
+}
+
+static void a_parallel_view_is_lit_alike_everywhere(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    trip_camera c = camera(true);
+    for (int i = 0; i < 3; i++) {
+        double gradient[3] = { 0, 0, 9 }, rgb[3] = { 0.5, 0.5, 0.5 };
+        trip_shade(&s, &c, 2, trip_v3(2 * i, -i, 1), gradient, rgb);
+        assert_close(rgb[0], 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE) + TRIP_SPECULAR, 1e-12);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(flat_regions_keep_their_colour),
+        cmocka_unit_test(a_surface_facing_the_headlight_is_brightest_on_either_side),
+        cmocka_unit_test(at_the_silhouette_only_ambient_light_is_left),
+        cmocka_unit_test(weak_gradients_are_shaded_in_proportion),
+        cmocka_unit_test(a_given_light_shines_from_its_direction),
+        cmocka_unit_test(the_result_stays_within_the_colours_range),
+        cmocka_unit_test(a_parallel_view_is_lit_alike_everywhere),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

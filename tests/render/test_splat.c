@@ -1,0 +1,205 @@
+#include "test.h"
+
+#include "splat.h"
+
+/* A view of the origin from `distance` along a random direction, over a random grid map. */
+static trip_splat_frame random_frame(double distance, double fov, bool ortho)
+{
+    trip_camera_params p = { .look = { 0, 0, 0 },
+                             .up = { test_random(), test_random(), 1 },
+                             .fov_degrees = fov,
+                             .ortho_height = ortho ? distance : 0,
+                             .width = 400,
+                             .height = 300 };
+    trip_vec3 d = { test_random() - 0.5, test_random() - 0.5, test_random() - 0.5 };
+    p.eye = trip_scale(trip_normalize(d), distance);
+    trip_affine m = trip_affine_identity();
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            m.m[i][j] += 0.6 * (test_random() - 0.5);
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &p, &m), 0);
+    trip_settings s = trip_settings_default();
+    return trip_splat_frame_make(&c, &s);
+}
+
+/* Distance in index space from v to the ray of a pixel position, by the plain formula. */
+static double distance_to_ray(const trip_camera *c, trip_vec3 v, double x, double y)
+{
+    trip_vec3 origin = c->eye, ray = trip_camera_ray(c, x, y);
+    if (c->ortho)
+        origin = trip_add(origin, trip_add(trip_scale(c->rx, x), trip_scale(c->ry, y)));
+    return trip_length(trip_cross(trip_sub(v, origin), ray)) / trip_length(ray);
+}
+
+static void without_low_pass_the_radius_is_the_distance_to_the_ray_in_sigmas(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 200; i++) {
+        trip_splat_frame f = random_frame(30, 20 + i % 120, i % 2);
+        f.low_pass2 = 0;
+        trip_vec3 v = { test_random() * 6, test_random() * 6, test_random() * 6 };
+        trip_splat s;
+        if (!trip_splat_project(&f, v, &s))
+            continue;
+        for (int j = 0; j < 20; j++) {
+            double x = s.x0 + (s.x1 - s.x0) * test_random();
+            double y = s.y0 + (s.y1 - s.y0) * test_random();
+            double d = distance_to_ray(&f.camera, v, x, y) / f.sigma;
+            assert_close(trip_splat_radius2(&f, &s, x, y), d * d, 1e-7);
+        }
+        assert_close(trip_splat_radius2(&f, &s, s.x, s.y), 0, 1e-12);
+        assert_close(s.radius, f.sigma * TRIP_CUTOFF, 1e-12);
+    }
+}
+
+static void the_support_touches_its_bounds_and_does_not_pass_them(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 200; i++) {
+        trip_splat_frame f = random_frame(20, 20 + i % 120, i % 2);
+        trip_vec3 v = { test_random() * 6, test_random() * 6, test_random() * 6 };
+        trip_splat s;
+        if (!trip_splat_project(&f, v, &s))
+            continue;
+        double nearest[4] = { 1e9, 1e9, 1e9, 1e9 };
+        for (int j = 0; j <= 2000; j++) {
+            double x = s.x0 + (s.x1 - s.x0) * j / 2000, y = s.y0 + (s.y1 - s.y0) * j / 2000;
+            nearest[0] = fmin(nearest[0], trip_splat_radius2(&f, &s, s.x0, y));
+            nearest[1] = fmin(nearest[1], trip_splat_radius2(&f, &s, s.x1, y));
+            nearest[2] = fmin(nearest[2], trip_splat_radius2(&f, &s, x, s.y0));
+            nearest[3] = fmin(nearest[3], trip_splat_radius2(&f, &s, x, s.y1));
+        }
+        for (int side = 0; side < 4; side++)
+            assert_close(nearest[side], f.cutoff2, 1e-4);
+    }
+}
+
+static void every_ray_of_the_support_passes_within_the_radius(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 200; i++) {
+        trip_splat_frame f = random_frame(400, 20 + i % 120, i % 2);
+        trip_vec3 v = { test_random() * 6, test_random() * 6, test_random() * 6 };
+        trip_splat s;
+        assert_true(trip_splat_project(&f, v, &s));
+        double farthest = 0;
+        for (int j = 0; j < 4000; j++) {
+            double x = s.x0 + (s.x1 - s.x0) * test_random();
+            double y = s.y0 + (s.y1 - s.y0) * test_random();
+            if (trip_splat_radius2(&f, &s, x, y) <= f.cutoff2)
+                farthest = fmax(farthest, distance_to_ray(&f.camera, v, x, y));
+        }
+        assert_true(farthest <= s.radius * (1 + 1e-9));
+        assert_true(farthest > 0.9 * s.radius);
+    }
+}
+
+/* Over the ray's perpendicular plane the footprint's integral is the mass of the splat, one voxel's
+ * volume; in pixels of a parallel view, whatever the zoom, the low-pass keeps it. */
+static void the_footprint_integrates_to_one_voxel_at_any_zoom(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        trip_splat_frame f = random_frame(30 * pow(2, i - 3), 0, true);
+        trip_splat s;
+        assert_true(trip_splat_project(&f, trip_v3(0.3, 0.1, 0.2), &s));
+        double sum = 0;
+        const int n = 400;
+        double sx = (s.x1 - s.x0) / n, sy = (s.y1 - s.y0) / n;
+        for (int j = 0; j < n * n; j++) {
+            double x = s.x0 + (j % n + 0.5) * sx, y = s.y0 + ((double)(j / n) + 0.5) * sy;
+            double m = trip_splat_radius2(&f, &s, x, y);
+            if (m <= f.cutoff2)
+                sum += s.amplitude * exp(-m / 2) * sx * sy;
+        }
+        /* Index-space area of a pixel, perpendicular to the ray. */
+        trip_vec3 pixel = trip_cross(f.camera.rx, f.camera.ry);
+        double area = fabs(trip_dot(pixel, trip_normalize(f.camera.r0)));
+        assert_close(sum * area, 1, 2e-3);
+    }
+}
+
+static void minified_splats_are_as_wide_as_the_low_pass(void **state)
+{
+    (void)state;
+    trip_splat_frame f = random_frame(1e7, 0, true);
+    trip_splat s;
+    assert_true(trip_splat_project(&f, trip_v3(0, 0, 0), &s));
+    assert_close(s.x1 - s.x0, 2 * TRIP_CUTOFF * TRIP_LOW_PASS_PX, 1e-4);
+    assert_close(s.y1 - s.y0, 2 * TRIP_CUTOFF * TRIP_LOW_PASS_PX, 1e-4);
+}
+
+static void a_round_splat_before_an_upright_grid_is_a_circle_of_known_size(void **state)
+{
+    (void)state;
+    trip_camera_params p = {
+        .eye = { 0, -10, 0 }, .up = { 0, 0, 1 }, .fov_degrees = 90, .width = 2000, .height = 2000
+    };
+    trip_affine m = trip_affine_identity();
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &p, &m), 0);
+    trip_settings settings = trip_settings_default();
+    trip_splat_frame f = trip_splat_frame_make(&c, &settings);
+    f.low_pass2 = 0;
+    trip_splat s;
+    assert_true(trip_splat_project(&f, trip_v3(0, 0, 0), &s));
+    /* A ball of radius 2 at distance 10, seen under asin(0.2); 1000 px is tan 45 degrees. */
+    double half = 1000 * tan(asin(0.2));
+    assert_close(s.x0, 1000 - half, 1e-9);
+    assert_close(s.x1, 1000 + half, 1e-9);
+    assert_close(s.y0, 1000 - half, 1e-9);
+    assert_close(s.y1, 1000 + half, 1e-9);
+    assert_close(s.z, 10, 1e-12);
+}
+
+static void splats_behind_or_across_the_plane_of_the_eye_are_not_drawn(void **state)
+{
+    (void)state;
+    trip_camera_params p = {
+        .eye = { 0, -10, 0 }, .up = { 0, 0, 1 }, .fov_degrees = 90, .width = 100, .height = 100
+    };
+    trip_affine m = trip_affine_identity();
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &p, &m), 0);
+    trip_settings settings = trip_settings_default();
+    trip_splat_frame f = trip_splat_frame_make(&c, &settings);
+    f.low_pass2 = 0; /* then the support is the cone round a ball of radius 2 */
+    trip_splat s;
+    assert_false(trip_splat_project(&f, trip_v3(0, -11, 0), &s));
+    assert_false(trip_splat_project(&f, trip_v3(50, -10, 0), &s));
+    assert_false(trip_splat_project(&f, trip_v3(50, -8.01, 0), &s));
+    assert_true(trip_splat_project(&f, trip_v3(50, -7.99, 0), &s));
+    assert_false(trip_splat_project(&f, trip_v3(0.5, -9, 0), &s));
+}
+
+static void the_stretch_is_the_world_length_of_an_index_step_along_the_ray(void **state)
+{
+    (void)state;
+    trip_camera_params p = {
+        .eye = { 0, -10, 0 }, .up = { 0, 0, 1 }, .fov_degrees = 90, .width = 100, .height = 100
+    };
+    trip_affine m = { { { 1, 0, 0, 0 }, { 0, 3, 0, 0 }, { 0, 0, 1, 0 } } };
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &p, &m), 0);
+    trip_settings settings = trip_settings_default();
+    trip_splat_frame f = trip_splat_frame_make(&c, &settings);
+    assert_close(trip_splat_stretch(&f, 50, 50), 3, 1e-12);
+    /* At the right edge the world ray is (1, 1, 0), in index space (1, 1/3, 0). */
+    assert_close(trip_splat_stretch(&f, 100, 50), sqrt(2) / sqrt(1 + 1.0 / 9), 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(without_low_pass_the_radius_is_the_distance_to_the_ray_in_sigmas),
+        cmocka_unit_test(the_support_touches_its_bounds_and_does_not_pass_them),
+        cmocka_unit_test(every_ray_of_the_support_passes_within_the_radius),
+        cmocka_unit_test(the_footprint_integrates_to_one_voxel_at_any_zoom),
+        cmocka_unit_test(minified_splats_are_as_wide_as_the_low_pass),
+        cmocka_unit_test(a_round_splat_before_an_upright_grid_is_a_circle_of_known_size),
+        cmocka_unit_test(splats_behind_or_across_the_plane_of_the_eye_are_not_drawn),
+        cmocka_unit_test(the_stretch_is_the_world_length_of_an_index_step_along_the_ray),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
