@@ -1,0 +1,51 @@
+/* Pictures in files: PNG, JPEG, TIFF and OpenEXR through OpenImageIO. This is the only door to it
+ * in this folder. Calls keep no state; any thread may call them.
+ *
+ * In memory a picture is float RGBA, premultiplied (associated) alpha, `height` rows of `width`
+ * pixels, row 0 at the top. Colours are display values: what is written is what the transfer
+ * function says, without a curve; EXR holds the same numbers. */
+#ifndef TRIP_IMAGE_FILE_H
+#define TRIP_IMAGE_FILE_H
+
+#include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum trip_image_depth {
+    TRIP_IMAGE_DEPTH_DEFAULT = 0, /* PNG and JPEG 8 bits, TIFF 16 bits, EXR float */
+    TRIP_IMAGE_U8,                /* PNG, JPEG, TIFF */
+    TRIP_IMAGE_U16,               /* PNG, TIFF */
+    TRIP_IMAGE_HALF,              /* EXR */
+    TRIP_IMAGE_FLOAT,             /* EXR, TIFF */
+} trip_image_depth;
+
+/* Zero means the default everywhere. */
+typedef struct trip_image_params {
+    trip_image_depth depth;
+    bool drop_alpha;  /* write RGB only: the picture over black; JPEG always does */
+    int jpeg_quality; /* 1 to 100; default 95 */
+} trip_image_params;
+
+/* Checks that `path` names a format that can hold `params` (which may be NULL), before any work is
+ * done: 0, or TRIP_USAGE and one line that names the formats. */
+int trip_image_check_path(const char *path, const trip_image_params *params);
+
+/* Writes the picture in the format that the extension names (.png, .jpg, .jpeg, .tif, .tiff, .exr,
+ * in any case). Integers are rounded to nearest after clamping to [0, 1]. PNG gets unassociated
+ * alpha, computed before rounding, as its standard wants; TIFF and EXR associated alpha. The file
+ * is written under another name in the same folder and renamed when complete, so that a failed
+ * write leaves what was there. A pixel that is not finite is a reported failure, not written. */
+int trip_image_write(const char *path, int width, int height, const float *rgba,
+                     const trip_image_params *params);
+
+/* Reads a picture of one to four channels (grey, grey and alpha, RGB, RGBA) into *rgba_out, which
+ * the caller frees with free(). */
+int trip_image_read(const char *path, int *width_out, int *height_out, float **rgba_out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
