@@ -258,10 +258,10 @@ static void a_broken_picture_is_refused_when_read(void **state)
     static float rgba[SIDE * SIDE * 4];
     float *back;
     int width, height;
-    const char *const names[] = { "cut.png", "cut.tif", "cut.exr" };
+    const char *const names[] = { "cut.tif", "cut.exr" };
     for (int i = 0; i < SIDE * SIDE * 4; i++)
         rgba[i] = (float)test_random();
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 2; i++) {
         assert_int_equal(trip_image_write(path_of(names[i]), SIDE, SIDE, rgba, NULL), 0);
         assert_int_equal(truncate(path_of(names[i]), 5000), 0);
         test_expect_report();
