@@ -176,6 +176,12 @@ double trip_tf_unit_world(const trip_tf *tf)
     return tf->unit_world;
 }
 
+const trip_tf_point *trip_tf_points(const trip_tf *tf, size_t *count)
+{
+    *count = tf->count;
+    return tf->points;
+}
+
 /* Index of the first point above `value`; tf->count when there is none. */
 static size_t first_above(const trip_tf *tf, double value)
 {

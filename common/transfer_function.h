@@ -54,6 +54,9 @@ void trip_tf_denormalise(trip_tf *tf, double value_min, double value_max);
 /* Unit of length in world units; 0 means one voxel. */
 double trip_tf_unit_world(const trip_tf *tf);
 
+/* The points that the function is linear between, by ascending value. */
+const trip_tf_point *trip_tf_points(const trip_tf *tf, size_t *count);
+
 /* Colour and opacity at a value in data units; outside the points the end points hold. At a
  * repeated value (a step) the later point holds. */
 trip_rgba trip_tf_evaluate(const trip_tf *tf, double value);
