@@ -305,14 +305,13 @@ int trip_byte_stream_rewind(trip_byte_stream *s)
 /* A plain file's length is known before anything is read. */
 static int check_length(trip_byte_stream *s)
 {
-    uint64_t start, end;
-    if (__builtin_add_overflow(s->source.offset_bytes, s->source.skip_bytes, &start) ||
+    bool plain = s->source.encoding == TRIP_BYTES_PLAIN;
+    uint64_t start = s->source.offset_bytes, end;
+    if ((plain && __builtin_add_overflow(start, s->source.skip_bytes, &start)) ||
         start > s->file_bytes)
         return trip_fail(TRIP_ERROR, "read", s->path,
-                         "data should start at byte %" PRIu64 ", but the file has %" PRIu64
-                         " bytes",
-                         s->source.offset_bytes, s->file_bytes);
-    if (s->source.encoding != TRIP_BYTES_PLAIN)
+                         "data should start beyond its end, %" PRIu64 " bytes", s->file_bytes);
+    if (!plain)
         return 0;
     if (__builtin_add_overflow(start, s->source.size_bytes, &end) || end > s->file_bytes)
         return too_short(s, s->file_bytes - start);
