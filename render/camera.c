@@ -91,7 +91,7 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
                      const trip_affine *index_to_world)
 {
     trip_affine world_to_index;
-    basis b;
+    basis b = { 0 };
     int status = check_params(params);
     if (!status)
         status = make_basis(params, &b);

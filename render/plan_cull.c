@@ -1,0 +1,135 @@
+#include "plan_cull.h"
+
+#include "report.h"
+#include "weight.h"
+
+enum { CODES = 65536 };
+static const size_t visible_bytes = (CODES + 1) * sizeof(uint32_t);
+
+/* Bounds of the voxel positions of a brick, from the eye. */
+typedef struct box {
+    double lo[3], hi[3];
+} box;
+
+static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, double sign)
+{
+    trip_vec3 normal = c->ortho ? to : trip_sub(to, trip_scale(c->forward, pixel));
+    double length = trip_length(normal);
+    return (trip_cull_plane){ trip_scale(normal, sign / length),
+                              c->ortho ? sign * pixel / length : 0 };
+}
+
+int trip_cull_create(trip_cull *cull, const trip_dataset *data, const trip_camera *camera,
+                     const trip_settings *settings, int axis_of_view, const trip_tf_entry *table,
+                     trip_budget *budget)
+{
+    double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
+    *cull = (trip_cull){
+        .camera = camera,
+        .settings = settings,
+        .tile_log2 = data->header.tile_log2,
+        .axis_of_view = axis_of_view,
+        .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
+                   side(camera, camera->to_x, camera->width - 0.5, -1),
+                   side(camera, camera->to_y, camera->height - 0.5, -1) },
+        .radius2 = settings->kernel_radius * settings->kernel_radius,
+        /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
+         * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
+        .spread2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
+        .visible = trip_budget_take(budget, visible_bytes),
+    };
+    if (!cull->visible)
+        return trip_fail(TRIP_ERROR, "render", "plan", "%zu bytes do not fit the memory given",
+                         visible_bytes);
+    for (int i = 0; i < CODES; i++)
+        cull->visible[i + 1] = cull->visible[i] + (table[i].extinction > 0);
+    return 0;
+}
+
+void trip_cull_destroy(trip_cull *cull, trip_budget *budget)
+{
+    if (cull->visible)
+        trip_budget_release(budget, cull->visible, visible_bytes);
+    cull->visible = NULL;
+}
+
+static box brick_box(const trip_cull *cull, int axis, const trip_file_brick *b, int64_t slab_sheet)
+{
+    int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    double tile_u = (double)((int64_t)b->tile_u << cull->tile_log2);
+    double tile_v = (double)((int64_t)b->tile_v << cull->tile_log2);
+    box r;
+    r.lo[axis] = (double)(slab_sheet + b->sheet_min);
+    r.hi[axis] = (double)(slab_sheet + b->sheet_max);
+    r.lo[u] = tile_u + b->u_min;
+    r.hi[u] = tile_u + b->u_max;
+    r.lo[v] = tile_v + b->v_min;
+    r.hi[v] = tile_v + b->v_max;
+    for (int a = 0; a < 3; a++) {
+        r.lo[a] -= trip_component(cull->camera->eye, a);
+        r.hi[a] -= trip_component(cull->camera->eye, a);
+    }
+    return r;
+}
+
+/* Largest n . p over the box. */
+static double farthest_along(const box *b, trip_vec3 n)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += fmax(trip_component(n, a) * b->lo[a], trip_component(n, a) * b->hi[a]);
+    return sum;
+}
+
+static bool eye_within(const box *b, double margin)
+{
+    for (int a = 0; a < 3; a++)
+        if (b->lo[a] > margin || b->hi[a] < -margin)
+            return false;
+    return true;
+}
+
+/* A splat touches a pixel only when it lies within `radius` of a ray of the image, in front of the
+ * eye; only about the eye itself can the nearest point of the ray lie behind. */
+static bool outside(const trip_cull *cull, const box *b, double radius)
+{
+    if (!cull->camera->ortho && eye_within(b, radius))
+        return false;
+    for (int i = 0; i < 4; i++)
+        if (farthest_along(b, cull->sides[i].normal) + radius < cull->sides[i].offset)
+            return true;
+    return false;
+}
+
+/* A point of the box, grown by the radius, with |c_a| > h |c_b|: its coordinates are independent,
+ * so the largest |c_a| meets the smallest |c_b|. Such points carry rays with weight. */
+static bool may_weigh(const trip_cull *cull, const box *b, double radius, int axis)
+{
+    const trip_settings *s = cull->settings;
+    if (s->method == TRIP_METHOD_AXIS || cull->camera->ortho)
+        return true; /* decided for the list as a whole */
+    double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    double most = fmax(fabs(b->lo[axis] - radius), fabs(b->hi[axis] + radius));
+    for (int a = 0; a < 3; a++) {
+        double least = fmax(0, fmax(b->lo[a], -b->hi[a]) - radius);
+        if (a != axis && most < h * least)
+            return false;
+    }
+    return true;
+}
+
+trip_cull_reason trip_cull_brick(const trip_cull *cull, int axis, const trip_file_brick *brick,
+                                 int64_t slab_sheet)
+{
+    if (cull->visible[brick->code_max + 1] == cull->visible[brick->code_min])
+        return TRIP_CULL_TRANSPARENT;
+    box b = brick_box(cull, axis, brick, slab_sheet);
+    double depth = farthest_along(&b, cull->camera->forward);
+    if (!(depth > 0))
+        return TRIP_CULL_OUTSIDE;
+    double spread2 = cull->camera->ortho ? cull->spread2 : cull->spread2 * depth * depth;
+    double radius = sqrt(cull->radius2 + spread2) * (1 + 1e-9); /* room for rounding */
+    if (outside(cull, &b, radius))
+        return TRIP_CULL_OUTSIDE;
+    return may_weigh(cull, &b, radius, axis) ? TRIP_CULL_KEEP : TRIP_CULL_NO_WEIGHT;
+}

@@ -1,0 +1,43 @@
+/* Which bricks a frame can leave out: a part of the plan. All tests are exact in the safe
+ * direction: a brick is left out only when none of its splats can change a pixel. */
+#ifndef TRIP_PLAN_CULL_H
+#define TRIP_PLAN_CULL_H
+
+#include "camera.h"
+#include "dataset.h"
+#include "settings.h"
+#include "transfer_function.h"
+
+typedef enum trip_cull_reason {
+    TRIP_CULL_KEEP,
+    TRIP_CULL_TRANSPARENT, /* no code of its range has extinction */
+    TRIP_CULL_OUTSIDE,     /* of the view */
+    TRIP_CULL_NO_WEIGHT,   /* no ray near it has weight in the list */
+} trip_cull_reason;
+
+/* The side of a plane in index space: inside where normal . (p - eye) >= offset; unit normal. */
+typedef struct trip_cull_plane {
+    trip_vec3 normal;
+    double offset;
+} trip_cull_plane;
+
+typedef struct trip_cull {
+    const trip_camera *camera;
+    const trip_settings *settings;
+    unsigned tile_log2;
+    int axis_of_view;
+    trip_cull_plane sides[4]; /* through the outermost pixel centres */
+    double radius2, spread2;  /* radius of a splat at depth z: sqrt(radius2 + spread2 z^2) */
+    uint32_t *visible;        /* [65537]: codes below this one with extinction */
+} trip_cull;
+
+int trip_cull_create(trip_cull *cull, const trip_dataset *data, const trip_camera *camera,
+                     const trip_settings *settings, int axis_of_view, const trip_tf_entry *table,
+                     trip_budget *budget);
+void trip_cull_destroy(trip_cull *cull, trip_budget *budget);
+
+/* `slab_sheet` is the first sheet of the brick's slab. */
+trip_cull_reason trip_cull_brick(const trip_cull *cull, int axis, const trip_file_brick *brick,
+                                 int64_t slab_sheet);
+
+#endif

@@ -1,0 +1,275 @@
+/* The definition of the picture: double precision, every splat of every batch against every pixel
+ * of its bounds, as splat.h, weight.h and shade.h are written. Slow, and meant to be read. */
+#include "renderer.h"
+
+#include <string.h>
+
+#include "report.h"
+#include "shade.h"
+#include "splat.h"
+#include "weight.h"
+
+/* One pixel: the list being drawn, and the sum over the lists before it. */
+typedef struct pixel {
+    double layer[4];  /* premultiplied over-composite of the list */
+    double weight;    /* w of the list at this pixel */
+    double stretch;   /* world units per index length along the ray */
+    double merged[4]; /* sum of w^2 layer over the lists that are done */
+} pixel;
+
+typedef struct reference {
+    trip_renderer base;
+    trip_budget *budget;
+    const trip_frame *frame;
+    trip_splat_frame constants;
+    double gradient_full;
+    pixel *pixels;
+    size_t pixels_bytes;
+    int axis; /* of the list being drawn; -1 before the first */
+    trip_list_stats stats[3];
+} reference;
+
+static void destroy(trip_renderer *base)
+{
+    reference *r = (reference *)base;
+    trip_budget *budget = r->budget;
+    trip_budget_release(budget, r->pixels, r->pixels_bytes);
+    trip_budget_release(budget, r, sizeof *r);
+}
+
+static const char *device(const trip_renderer *base)
+{
+    (void)base;
+    return "CPU, double precision";
+}
+
+/* Ends with pixels for `count` of them, all zero. */
+static int take_pixels(reference *r, size_t count)
+{
+    size_t bytes = count * sizeof(pixel);
+    if (bytes != r->pixels_bytes) {
+        trip_budget_release(r->budget, r->pixels, r->pixels_bytes);
+        r->pixels_bytes = 0;
+        r->pixels = trip_budget_take(r->budget, bytes);
+        if (!r->pixels)
+            return trip_fail(TRIP_ERROR, "render", "reference renderer",
+                             "%zu bytes of pixels do not fit the memory given; "
+                             "raise --memory or draw a smaller image",
+                             bytes);
+        r->pixels_bytes = bytes;
+    }
+    memset(r->pixels, 0, bytes);
+    return 0;
+}
+
+static int begin_frame(trip_renderer *base, const trip_frame *frame)
+{
+    reference *r = (reference *)base;
+    const trip_file_header *header = &frame->data->header;
+    r->frame = frame;
+    r->constants = trip_splat_frame_make(frame->camera, frame->settings);
+    r->gradient_full =
+        trip_shade_gradient_full(header->code_lo, header->code_hi, frame->camera->voxel_world);
+    r->axis = -1;
+    memset(r->stats, 0, sizeof r->stats);
+    return take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
+}
+
+/* Adds the finished layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. */
+static void fold_layer(reference *r)
+{
+    if (r->axis < 0)
+        return;
+    size_t count = r->pixels_bytes / sizeof(pixel);
+    for (size_t i = 0; i < count; i++) {
+        pixel *p = &r->pixels[i];
+        for (int c = 0; c < 4; c++)
+            p->merged[c] += p->weight * p->weight * p->layer[c];
+    }
+}
+
+static int begin_list(trip_renderer *base, int axis)
+{
+    reference *r = (reference *)base;
+    const trip_camera *camera = r->frame->camera;
+    fold_layer(r);
+    r->axis = axis;
+    for (int y = 0; y < camera->height; y++) {
+        for (int x = 0; x < camera->width; x++) {
+            pixel *p = &r->pixels[(size_t)y * (size_t)camera->width + (size_t)x];
+            trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
+            memset(p->layer, 0, sizeof p->layer);
+            p->weight = trip_weight(r->frame->settings, r->frame->plan->axis_of_view, ray, axis);
+            p->stretch = trip_splat_stretch(&r->constants, x + 0.5, y + 0.5);
+        }
+    }
+    return 0;
+}
+
+/* Puts a fragment behind what is there (front to back) or over it. */
+static void composite(double layer[4], const double rgb[3], double alpha, bool front_to_back)
+{
+    double keep = 1 - alpha, add = alpha;
+    if (front_to_back) {
+        keep = 1;
+        add = alpha * (1 - layer[3]);
+        if (1 - layer[3] < TRIP_SATURATION)
+            return;
+    }
+    for (int c = 0; c < 3; c++)
+        layer[c] = layer[c] * keep + rgb[c] * add;
+    layer[3] = layer[3] * keep + add;
+}
+
+/* The pixels whose centres lie in [lo, hi], cut to the image. */
+static void pixel_range(double lo, double hi, int size, int *first, int *last)
+{
+    *first = (int)fmin(size, fmax(0, ceil(lo - 0.5)));
+    *last = (int)fmax(-1, fmin(size - 1, floor(hi - 0.5)));
+}
+
+/* True when some pixel centre is in the support where the list has weight. */
+static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3],
+                           double extinction, bool front_to_back)
+{
+    const trip_camera *camera = r->frame->camera;
+    int x0, x1, y0, y1;
+    bool touched = false;
+    pixel_range(s->x0, s->x1, camera->width, &x0, &x1);
+    pixel_range(s->y0, s->y1, camera->height, &y0, &y1);
+    for (int y = y0; y <= y1; y++) {
+        for (int x = x0; x <= x1; x++) {
+            pixel *p = &r->pixels[(size_t)y * (size_t)camera->width + (size_t)x];
+            double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
+            if (!(p->weight > 0 && m <= r->constants.cutoff2))
+                continue;
+            touched = true;
+            double footprint = s->amplitude * exp(-m / 2);
+            double alpha = -expm1(-extinction * p->stretch * footprint);
+            composite(p->layer, rgb, alpha, front_to_back);
+        }
+    }
+    return touched;
+}
+
+static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *entry,
+                   const uint32_t *normal, double rgb[3])
+{
+    const trip_frame *frame = r->frame;
+    rgb[0] = entry->r;
+    rgb[1] = entry->g;
+    rgb[2] = entry->b;
+    if (!frame->settings->shading || !normal)
+        return;
+    double gradient[3];
+    trip_normal_unpack(*normal, frame->data->header.gradient_scale, gradient);
+    trip_shade(frame->settings, frame->camera, r->gradient_full,
+               trip_affine_point(&frame->camera->index_to_world, voxel), gradient, rgb);
+}
+
+static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal,
+                       bool front_to_back)
+{
+    const trip_frame *frame = r->frame;
+    trip_list_stats *stats = &r->stats[r->axis];
+    trip_splat s;
+    stats->splats_read++;
+    if (!trip_splat_project(&r->constants, voxel, &s) ||
+        !trip_weight_may_reach(frame->settings, frame->camera, frame->plan->axis_of_view, r->axis,
+                               trip_sub(voxel, frame->camera->eye), s.radius))
+        return;
+    stats->splats_projected++;
+
+    const trip_tf_entry *entry = &frame->table[trip_voxel_code(record)];
+    double rgb[3];
+    colour(r, voxel, entry, normal, rgb);
+    stats->splats_drawn += draw_footprint(r, &s, rgb, entry->extinction, front_to_back);
+}
+
+/* Index position of a record: sheet along the list's axis, u and v along the next two. */
+static trip_vec3 voxel_position(int axis, const trip_run *run, uint32_t record)
+{
+    double p[3];
+    p[axis] = run->sheet;
+    p[(axis + 1) % 3] = run->u + (int)trip_voxel_u(record);
+    p[(axis + 2) % 3] = run->v + (int)trip_voxel_v(record);
+    return trip_v3(p[0], p[1], p[2]);
+}
+
+static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
+{
+    reference *r = (reference *)base;
+    for (size_t i = 0; i < batch->run_count; i++) {
+        const trip_run *run = &batch->runs[i];
+        for (uint32_t k = 0; k < run->count; k++) {
+            uint32_t in_run = batch->selection->descending ? run->count - 1 - k : k;
+            size_t at = run->first + in_run;
+            uint32_t record = batch->voxels[at];
+            draw_splat(r, voxel_position(r->axis, run, record), record,
+                       batch->normals ? &batch->normals[at] : NULL, front_to_back);
+        }
+    }
+    return 0;
+}
+
+/* The merge's divisor: lists that were not drawn count too, as empty layers. */
+static double weight_sum(const reference *r, int x, int y)
+{
+    const trip_frame *frame = r->frame;
+    trip_vec3 ray = trip_camera_ray(frame->camera, x + 0.5, y + 0.5);
+    double sum = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        double w = trip_weight(frame->settings, frame->plan->axis_of_view, ray, axis);
+        sum += w * w;
+    }
+    return sum;
+}
+
+static int end_frame(trip_renderer *base, float *rgba)
+{
+    reference *r = (reference *)base;
+    const trip_camera *camera = r->frame->camera;
+    const double *background = r->frame->settings->background;
+    const double behind[4] = { background[0] * background[3], background[1] * background[3],
+                               background[2] * background[3], background[3] };
+    fold_layer(r);
+    for (int y = 0; y < camera->height; y++) {
+        for (int x = 0; x < camera->width; x++) {
+            size_t at = (size_t)y * (size_t)camera->width + (size_t)x;
+            double sum = weight_sum(r, x, y);
+            double transmittance = 1 - r->pixels[at].merged[3] / sum;
+            for (int c = 0; c < 4; c++)
+                rgba[4 * at + (size_t)c] =
+                    (float)(r->pixels[at].merged[c] / sum + transmittance * behind[c]);
+        }
+    }
+    return 0;
+}
+
+static void stats(const trip_renderer *base, trip_list_stats lists[3])
+{
+    memcpy(lists, ((const reference *)base)->stats, 3 * sizeof *lists);
+}
+
+static const trip_renderer_ops reference_ops = {
+    .name = "reference",
+    .destroy = destroy,
+    .device = device,
+    .begin_frame = begin_frame,
+    .begin_list = begin_list,
+    .draw = draw,
+    .end_frame = end_frame,
+    .stats = stats,
+};
+
+int trip_reference_create(trip_renderer **out, trip_budget *budget)
+{
+    reference *r = trip_budget_take(budget, sizeof *r);
+    *out = NULL;
+    if (!r)
+        return trip_fail(TRIP_ERROR, "render", "reference renderer", "out of memory");
+    r->base.ops = &reference_ops;
+    r->budget = budget;
+    *out = &r->base;
+    return 0;
+}
