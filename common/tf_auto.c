@@ -9,16 +9,24 @@
 
 enum { BINS = 1024, GROUPS = 64, GROUP_BINS = BINS / GROUPS, LEVELS = 24 };
 
-static const double strongest_opacity = 0.7; /* at the highest rank */
-static const double rank_power = 4;
-static const double solid_opacity = 0.3; /* of a volume of one value */
+static const double solid_opacity = 0.3;     /* of a volume of one value */
+static const double strongest_opacity = 0.7; /* at rank 1 */
+static const double invisible_rank = 0.15;   /* up to here opacity is 0: mostly noise */
+/* The optical depth that the lower four fifths of the foreground may have along a typical ray. */
+static const double veil_depth = 1.2;
 
-/* Colours of increasing luminance, at equal steps of rank and value: a cut from dusk to daylight.
- */
+/* Dusk to daylight: luminance rises throughout. */
 static const double colours[][3] = {
     { 0.20, 0.16, 0.42 }, { 0.36, 0.20, 0.55 }, { 0.63, 0.25, 0.52 }, { 0.86, 0.38, 0.38 },
     { 0.96, 0.58, 0.31 }, { 0.98, 0.80, 0.45 }, { 1.00, 0.97, 0.85 },
 };
+
+typedef struct analysis {
+    double low, range; /* of the values; range is negative when bins go downwards */
+    double counts[BINS];
+    int end;                         /* the last bin of the background */
+    double total, foreground, under; /* voxels: all, above the background peak, below it */
+} analysis;
 
 static trip_rgba colour_at(double t, double opacity)
 {
@@ -31,52 +39,113 @@ static trip_rgba colour_at(double t, double opacity)
     return (trip_rgba){ c[0], c[1], c[2], opacity };
 }
 
-static double upper_edge(const trip_histogram *h, int bin)
+/* The background peak is the lowest group of bins that is no mere tail; it ends where it no longer
+ * falls steeply. */
+static void find_background(analysis *a)
 {
-    return h->value_min + (h->value_max - h->value_min) * (bin + 1) / BINS;
+    double group[GROUPS] = { 0 }, most = 0;
+    for (int i = 0; i < BINS; i++)
+        group[i / GROUP_BINS] += a->counts[i];
+    for (int g = 0; g < GROUPS; g++)
+        most = fmax(most, group[g]);
+    int end = 0;
+    while (group[end] < most / 4)
+        a->under += group[end++];
+    while (end + 1 < GROUPS && group[end + 1] > group[end])
+        end++;
+    double peak = group[end];
+    while (end + 1 < GROUPS && group[end + 1] >= peak / 100 && group[end + 1] < group[end] / 2)
+        end++;
+    a->end = end * GROUP_BINS + GROUP_BINS - 1;
+    for (int g = end + 1; g < GROUPS; g++)
+        a->foreground += group[g];
 }
 
-/* The bin that ends the background peak. */
-static int background_end(const trip_histogram *h)
+static void analyse(analysis *a, const trip_histogram *h, bool downwards)
 {
-    uint64_t group[GROUPS] = { 0 };
-    int peak = 0;
-    for (int i = 0; i < BINS; i++)
-        group[i / GROUP_BINS] += h->counts[i];
-    for (int g = 1; g < GROUPS; g++)
-        if (group[g] > group[peak])
-            peak = g;
-    int end = peak;
-    while (end + 1 < GROUPS && group[end + 1] > group[peak] / 100)
-        end++;
-    return end * GROUP_BINS + GROUP_BINS - 1;
+    *a = (analysis){ .low = h->value_min, .range = h->value_max - h->value_min };
+    if (downwards) {
+        a->low = h->value_max;
+        a->range = -a->range;
+    }
+    for (int i = 0; i < BINS; i++) {
+        a->counts[i] = (double)h->counts[downwards ? BINS - 1 - i : i];
+        a->total += a->counts[i];
+    }
+    find_background(a);
+}
+
+static double upper_edge(const analysis *a, int bin)
+{
+    return a->low + a->range * (bin + 1) / BINS;
+}
+
+static double rank_opacity(double rank, double power)
+{
+    double r = (rank - invisible_rank) / (1 - invisible_rank);
+    return r > 0 ? strongest_opacity * pow(r, power) : 0;
+}
+
+/* The power that keeps the veil on a ray with so many foreground voxels at veil_depth or less. */
+static double choose_power(double foreground_voxels)
+{
+    double power = 2;
+    while (power < 8) {
+        double depth = 0;
+        for (int i = 0; i < 80; i++)
+            depth += 0.01 * trip_extinction(rank_opacity((i + 0.5) / 100, power));
+        if (depth * foreground_voxels <= veil_depth)
+            break;
+        power += 0.25;
+    }
+    return power;
+}
+
+/* One point at the background's edge, one whenever the rank has grown by 1 / LEVELS. */
+static size_t make_points(const analysis *a, trip_tf_point points[LEVELS + 2])
+{
+    double power = choose_power(cbrt(a->total) * a->foreground / a->total);
+    double below = 0;
+    size_t count = 0;
+    int level = 1;
+    /* A code's width further up: values are stored in 16 bits, and may be rounded upwards. */
+    points[count++] = (trip_tf_point){ upper_edge(a, a->end) + a->range / 65535, colour_at(0, 0) };
+    for (int i = a->end + 1; i < BINS; i++) {
+        below += a->counts[i];
+        double rank = below / a->foreground;
+        if (a->counts[i] == 0 || rank * LEVELS < level)
+            continue;
+        level = (int)(rank * LEVELS) + 1;
+        double linear = (double)(i - a->end) / (BINS - 1 - a->end);
+        trip_rgba colour = colour_at((rank + linear) / 2, rank_opacity(rank, power));
+        points[count++] = (trip_tf_point){ upper_edge(a, i), colour };
+    }
+    return count;
+}
+
+static void reverse(trip_tf_point *points, size_t count)
+{
+    for (size_t i = 0; i < count / 2; i++) {
+        trip_tf_point p = points[i];
+        points[i] = points[count - 1 - i];
+        points[count - 1 - i] = p;
+    }
 }
 
 int trip_tf_from_histogram(trip_tf **out, const trip_histogram *h)
 {
     trip_tf_point points[LEVELS + 2];
-    size_t count = 0;
-    double total = 0, below = 0;
-    int end = background_end(h);
-    for (int i = end + 1; i < BINS; i++)
-        total += (double)h->counts[i];
-    if (!(total > 0)) {
+    analysis a;
+    analyse(&a, h, false);
+    bool downwards = a.foreground * 1000 < a.under; /* a bright background */
+    if (downwards)
+        analyse(&a, h, true);
+    if (!(a.foreground > 0) || !isfinite(a.range)) {
         points[0] = (trip_tf_point){ h->value_min, colour_at(0.7, solid_opacity) };
         return trip_tf_from_points(out, points, 1, false, 0);
     }
-    points[count++] = (trip_tf_point){ upper_edge(h, end), colour_at(0, 0) };
-    double next = 1.0 / LEVELS;
-    for (int i = end + 1; i < BINS; i++) {
-        below += (double)h->counts[i];
-        double rank = below / total;
-        if (rank < next && i < BINS - 1)
-            continue;
-        while (next <= rank)
-            next += 1.0 / LEVELS;
-        double linear = (double)(i - end) / (BINS - 1 - end);
-        points[count++] = (trip_tf_point){ upper_edge(h, i),
-                                           colour_at((rank + linear) / 2,
-                                                     strongest_opacity * pow(rank, rank_power)) };
-    }
+    size_t count = make_points(&a, points);
+    if (downwards)
+        reverse(points, count);
     return trip_tf_from_points(out, points, count, false, 0);
 }

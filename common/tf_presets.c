@@ -18,8 +18,8 @@ typedef struct preset {
 static const preset presets[] = {
     { "grey",
       { { 0.00, { 0.00, 0.00, 0.00, 0.000 } },
-        { 0.10, { 0.10, 0.10, 0.10, 0.000 } },
-        { 0.40, { 0.40, 0.40, 0.40, 0.020 } },
+        { 0.10, { 0.25, 0.25, 0.25, 0.000 } },
+        { 0.40, { 0.60, 0.60, 0.60, 0.030 } },
         { 1.00, { 1.00, 1.00, 1.00, 0.300 } } } },
     /* Skin and muscle as a faint red veil, bone ivory and solid. */
     { "bone",
@@ -48,7 +48,7 @@ static const preset presets[] = {
         { 0.875, { 0.678, 0.864, 0.190, 0.250 } },
         { 1.000, { 0.993, 0.906, 0.144, 0.400 } } } },
     /* Extinction proportional to density, as in real fog. */
-    { "fog", { { 0.00, { 0.90, 0.93, 0.97, 0.000 } }, { 1.00, { 1.00, 1.00, 1.00, 0.120 } } } },
+    { "fog", { { 0.00, { 0.90, 0.93, 0.97, 0.000 } }, { 1.00, { 1.00, 1.00, 1.00, 0.200 } } } },
     { "vessels",
       { { 0.00, { 0.35, 0.02, 0.02, 0.000 } },
         { 0.12, { 0.45, 0.03, 0.03, 0.000 } },
@@ -59,21 +59,13 @@ static const preset presets[] = {
     { "xray",
       { { 0.00, { 1.00, 1.00, 1.00, 0.000 } },
         { 0.05, { 1.00, 1.00, 1.00, 0.000 } },
-        { 1.00, { 1.00, 1.00, 1.00, 0.025 } } } },
-    /* Both ends of a signed quantity, the middle left out. */
-    { "cool-warm",
-      { { 0.00, { 0.230, 0.299, 0.754, 0.400 } },
-        { 0.25, { 0.552, 0.690, 0.996, 0.080 } },
-        { 0.45, { 0.865, 0.865, 0.865, 0.000 } },
-        { 0.55, { 0.865, 0.865, 0.865, 0.000 } },
-        { 0.75, { 0.957, 0.604, 0.482, 0.080 } },
-        { 1.00, { 0.706, 0.016, 0.150, 0.400 } } } },
+        { 1.00, { 1.00, 1.00, 1.00, 0.030 } } } },
 };
 
 enum { PRESETS = sizeof presets / sizeof *presets };
 
-static const char *const names[] = { "grey",    "bone", "hot-metal", "viridis", "fog",
-                                     "vessels", "xray", "cool-warm", NULL };
+static const char *const names[] = { "grey", "bone",    "hot-metal", "viridis",
+                                     "fog",  "vessels", "xray",      NULL };
 static_assert(sizeof names / sizeof *names == PRESETS + 1, "a name for every preset");
 
 const char *const *trip_tf_preset_names(void)
