@@ -8,23 +8,25 @@
 #include "format.h"
 #include "geometry.h"
 
+#define TRIP_INDEX_NAME "index.trip"
+
 typedef struct trip_list {
     int axis;
     uint64_t splats;
     uint64_t slab_count, brick_count;
     const trip_file_slab *slabs;
     const trip_file_brick *bricks;
-    const uint16_t *counts;                        /* [brick][sheet in slab] */
-    const uint64_t *page_checksums[TRIP_PLANES];   /* NULL where the plane is absent */
+    const uint16_t *counts;                      /* [brick][sheet in slab] */
+    const uint64_t *page_checksums[TRIP_PLANES]; /* NULL where the plane is absent */
 } trip_list;
 
 typedef struct trip_dataset {
     char *path;
     trip_file_header header;
     trip_affine index_to_world;
-    trip_list lists[3]; /* X, Y, Z at level 0 */
-    char *text;         /* JSON, terminated */
-    uint64_t bytes;     /* of all files */
+    trip_list lists[3];           /* X, Y, Z at level 0 */
+    char *text;                   /* JSON, terminated */
+    uint64_t bytes;               /* of all files */
     int plane_fd[3][TRIP_PLANES]; /* -1 where absent; opened for reading */
     void *memory;                 /* the index; from the budget */
     size_t memory_bytes;
@@ -40,7 +42,7 @@ void trip_dataset_close(trip_dataset *d);
 int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
 
 /* Name of a plane file, "x.voxels"; `name` has room for 32 bytes. */
-const char *trip_plane_file_name(int axis, int plane, char *name);
+const char *trip_dataset_plane_name(int axis, int plane, char *name);
 
 static inline double trip_dataset_value(const trip_dataset *d, unsigned code)
 {

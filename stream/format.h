@@ -2,18 +2,19 @@
  * people. Fixed width, little-endian, no pointers; reserved bits are zero and refused otherwise.
  *
  *   index.trip        header, list descriptors, slabs, bricks, run counts, page checksums, text
- *   x.voxels x.normals   plane files of the list along X: one 4-byte record per splat, in list order
- *   y.voxels ...      and so on for Y and Z
+ *   x.voxels x.normals   plane files of the list along X: one 4-byte record per splat, in list
+ * order y.voxels ...      and so on for Y and Z
  *
  * A list along axis a holds its splats by ascending sheet (coordinate along a), within a sheet by
  * the Morton code of (u, v), u = axis (a + 1) mod 3 in the even bits, v = axis (a + 2) mod 3 in the
  * odd ones. Tiles are aligned powers of two, so this order does not depend on the tile size, and
  * the splats of one tile in one sheet (a run) are contiguous. A brick is a tile over the sheets of
- * one slab (slab_sheets consecutive sheets); a list's file is slab after slab, in a slab sheet after
- * sheet, in a sheet the tiles of the slab's bricks in Morton order of (tile_u, tile_v).
+ * one slab (slab_sheets consecutive sheets); a list's file is slab after slab, in a slab sheet
+ * after sheet, in a sheet the tiles of the slab's bricks in Morton order of (tile_u, tile_v).
  *
  * Every plane file is checked in pages of 2^page_log2 bytes (XXH64, seed 0), the last one short.
- * The index file is checked the same way: its page checksums stand at its end, theirs in the header. */
+ * The index file is checked the same way: its page checksums stand at its end, theirs in the
+ * header. */
 #ifndef TRIP_FORMAT_H
 #define TRIP_FORMAT_H
 
@@ -34,29 +35,29 @@ enum trip_plane {
 
 /* index.trip, offset 0. Offsets are from the start of index.trip. */
 typedef struct trip_file_header {
-    char magic[8];                 /* TRIP_MAGIC, no terminator */
-    uint32_t version;              /* TRIP_FORMAT_VERSION */
-    uint32_t header_bytes;         /* TRIP_HEADER_BYTES */
-    uint64_t header_checksum;      /* XXH64 of the header with this field zero */
-    uint64_t index_bytes;          /* length of index.trip */
-    uint64_t checksums_offset;     /* index page checksums: 8 bytes per page of
-                                      [header_bytes, checksums_offset), pages counted from there */
-    uint64_t checksums_checksum;   /* XXH64 of that table */
-    uint64_t dims[3];              /* voxels along i, j, k */
-    double index_to_world[12];     /* row-major 3 x 4; voxel centres at integer indices */
-    double code_lo, code_hi;       /* value of code 0 and of code 65535 */
-    double value_min, value_max;   /* range of the volume's finite values */
-    double gradient_scale;         /* world-space gradient magnitude of magnitude code 255 */
-    uint64_t voxels;               /* voxels read (existing ones, for sparse grids) */
-    uint64_t kept;                 /* splats per list at level 0 */
-    uint32_t tile_log2;            /* 4 to 7: tile edge 16 to 128 voxels */
-    uint32_t slab_sheets;          /* sheets per slab, 1 to 64 */
-    uint32_t page_log2;            /* 12 to 24 */
-    uint32_t planes;               /* bit per trip_plane present; voxels always */
-    uint32_t list_count;           /* 3 in version 1: X, Y, Z at level 0 */
+    char magic[8];               /* TRIP_MAGIC, no terminator */
+    uint32_t version;            /* TRIP_FORMAT_VERSION */
+    uint32_t header_bytes;       /* TRIP_HEADER_BYTES */
+    uint64_t header_checksum;    /* XXH64 of the header with this field zero */
+    uint64_t index_bytes;        /* length of index.trip */
+    uint64_t checksums_offset;   /* index page checksums: 8 bytes per page of
+                                    [header_bytes, checksums_offset), pages counted from there */
+    uint64_t checksums_checksum; /* XXH64 of that table */
+    uint64_t dims[3];            /* voxels along i, j, k */
+    double index_to_world[12];   /* row-major 3 x 4; voxel centres at integer indices */
+    double code_lo, code_hi;     /* value of code 0 and of code 65535 */
+    double value_min, value_max; /* range of the volume's finite values */
+    double gradient_scale;       /* world-space gradient magnitude of magnitude code 255 */
+    uint64_t voxels;             /* voxels read (existing ones, for sparse grids) */
+    uint64_t kept;               /* splats per list at level 0 */
+    uint32_t tile_log2;          /* 4 to 7: tile edge 16 to 128 voxels */
+    uint32_t slab_sheets;        /* sheets per slab, 1 to 64 */
+    uint32_t page_log2;          /* 12 to 24 */
+    uint32_t planes;             /* bit per trip_plane present; voxels always */
+    uint32_t list_count;         /* 3 in version 1: X, Y, Z at level 0 */
     uint32_t reserved0;
-    uint64_t lists_offset;         /* trip_file_list[list_count] */
-    uint64_t text_offset;          /* UTF-8 JSON: source, envelope, transfer function */
+    uint64_t lists_offset; /* trip_file_list[list_count] */
+    uint64_t text_offset;  /* UTF-8 JSON: source, envelope, transfer function */
     uint64_t text_bytes;
     uint8_t reserved[TRIP_HEADER_BYTES - 272];
 } trip_file_header;
@@ -65,10 +66,11 @@ typedef struct trip_file_list {
     uint32_t axis;  /* 0, 1, 2 */
     uint32_t level; /* 0: full resolution */
     uint64_t splats;
-    uint64_t slab_count, slabs_offset;   /* trip_file_slab, ascending; empty slabs are left out */
-    uint64_t brick_count, bricks_offset; /* trip_file_brick, by slab, then Morton (tile_u, tile_v) */
-    uint64_t counts_offset;              /* uint16 run counts, [brick][sheet of the slab] */
-    uint64_t page_checksums_offset[4];   /* per plane: 8 bytes per page; 0 where absent */
+    uint64_t slab_count, slabs_offset; /* trip_file_slab, ascending; empty slabs are left out */
+    uint64_t brick_count,
+        bricks_offset;                 /* trip_file_brick, by slab, then Morton (tile_u, tile_v) */
+    uint64_t counts_offset;            /* uint16 run counts, [brick][sheet of the slab] */
+    uint64_t page_checksums_offset[4]; /* per plane: 8 bytes per page; 0 where absent */
     uint64_t reserved[5];
 } trip_file_list;
 
@@ -80,11 +82,11 @@ typedef struct trip_file_slab {
 } trip_file_slab;
 
 typedef struct trip_file_brick {
-    uint32_t tile_u, tile_v;               /* tile origin = tile << tile_log2 */
-    uint32_t splats;                       /* sum of its run counts, >= 1 */
-    uint16_t code_min, code_max;           /* of its splats */
-    uint8_t u_min, u_max, v_min, v_max;    /* tight bounds within the tile, inclusive */
-    uint8_t sheet_min, sheet_max;          /* within the slab, inclusive */
+    uint32_t tile_u, tile_v;            /* tile origin = tile << tile_log2 */
+    uint32_t splats;                    /* sum of its run counts, >= 1 */
+    uint16_t code_min, code_max;        /* of its splats */
+    uint8_t u_min, u_max, v_min, v_max; /* tight bounds within the tile, inclusive */
+    uint8_t sheet_min, sheet_max;       /* within the slab, inclusive */
     uint16_t reserved;
 } trip_file_brick;
 
@@ -118,7 +120,8 @@ static inline unsigned trip_voxel_code(uint32_t voxel)
 
 /* Normal record: bits 0-11 and 12-23 octahedral coordinates of the world-space gradient direction
  * (unorm12 over [-1, 1]), bits 24-31 the magnitude m: |gradient| = (m / 255)^2 * gradient_scale.
- * Magnitude 0 has no direction. Pack and unpack: stream/normal.c; worst angle error 0.05 degrees. */
+ * Magnitude 0 has no direction. Pack and unpack: stream/normal.c; worst angle error 0.05 degrees.
+ */
 uint32_t trip_normal_pack(const double gradient[3], double gradient_scale);
 void trip_normal_unpack(uint32_t normal, double gradient_scale, double gradient[3]);
 

@@ -9,21 +9,36 @@
 
 typedef enum trip_engine {
     TRIP_ENGINE_AUTO,  /* io_uring where the kernel allows it, else pread */
-    TRIP_ENGINE_URING,
+    TRIP_ENGINE_URING, /* refused where the kernel does not allow it */
     TRIP_ENGINE_PREAD, /* threads */
+    TRIP_ENGINE_NULL,  /* everything is read into memory at creation and copied from there: the same
+                          picture without the disk, to find what drawing alone can reach */
 } trip_engine;
 
 /* Zero means the default. */
 typedef struct trip_reader_params {
     trip_engine engine;
-    unsigned planes;        /* bit per trip_plane; voxels always */
-    unsigned slots;         /* ring length, default 8 */
-    size_t slot_bytes;      /* per plane, a multiple of the page size; default 1 MiB */
-    unsigned threads;       /* pread engine, default 4 */
-    /* Asked before a run's bytes are requested: true = leave it out (it lies behind what is already
-     * saturated). Called on the thread that calls trip_reader_next(). */
+    unsigned planes;   /* bit per trip_plane; voxels always */
+    unsigned slots;    /* ring length, 2 or more, default 8 */
+    size_t slot_bytes; /* per plane, a multiple of the page size; default 1 MiB or one page */
+    size_t gap_bytes;  /* gaps up to this are read through; default 128 KiB, at least a page */
+    unsigned threads;  /* that read (pread) and check; default 4, io_uring 2 */
+    bool buffered;     /* through the page cache, not O_DIRECT */
+    /* Of verified pages kept in memory between passes, from the budget; 0 = none. */
+    size_t cache_bytes;
+    /* The caller's own memory for the slots: `slots` pointers aligned to 4096 bytes, each to
+     * slot_bytes for the voxels followed by slot_bytes for each further plane read. NULL: taken
+     * from the budget. */
+    void *const *slot_memory;
+    /* Asked right before a run's bytes are requested: true = leave it out (it lies behind what is
+     * already saturated). Called on the thread that calls begin and next. */
     bool (*skip)(void *user, const trip_selection *s, uint32_t brick);
     void *skip_user;
+    /* For tests: given the bytes that a read has put at `data` from `offset` on and its result (a
+     * count or -errno), returns the result to go on with; may wait, and change the bytes. Called on
+     * any of the engine's threads. */
+    long (*fault)(void *user, void *data, uint64_t offset, size_t bytes, long result);
+    void *fault_user;
 } trip_reader_params;
 
 /* Runs ready to draw: run i has its splats at voxels[runs[i].first ...] and normals[...], `first`
@@ -40,8 +55,11 @@ typedef struct trip_batch {
 } trip_batch;
 
 typedef struct trip_reader_stats {
-    uint64_t bytes_read, reads, splats, runs_skipped, bytes_skipped;
-    uint64_t wait_ns; /* time next() waited for the disk */
+    uint64_t bytes_read, reads;           /* from the disk */
+    uint64_t bytes_cached;                /* instead from the cache */
+    uint64_t splats;                      /* handed out */
+    uint64_t runs_skipped, bytes_skipped; /* by the skip callback; gaps read through count too */
+    uint64_t wait_ns;                     /* time next() waited for the disk */
 } trip_reader_stats;
 
 typedef struct trip_reader trip_reader;
@@ -49,14 +67,15 @@ typedef struct trip_reader trip_reader;
 int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_reader_params *params,
                        trip_budget *budget);
 void trip_reader_destroy(trip_reader *r);
-/* Starts reading; the selection must outlive the pass. */
+/* Starts reading; the selection must outlive the pass. A pass that is not over is given up; all its
+ * batches must have been released. */
 int trip_reader_begin(trip_reader *r, const trip_selection *s);
 /* 1: *batch is filled and its slot held until released; 0: the pass is over; negative: failed. */
 int trip_reader_next(trip_reader *r, trip_batch *batch);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
 /* Of the current or last pass. */
 trip_reader_stats trip_reader_get_stats(const trip_reader *r);
-/* "io_uring", "io_uring+O_DIRECT", "pread", ... */
+/* "io_uring", "io_uring+O_DIRECT", "pread", "pread+O_DIRECT" or "null". */
 const char *trip_reader_engine_name(const trip_reader *r);
 
 #endif

@@ -1,6 +1,6 @@
 /* Which bricks of a list one pass reads, and the runs they give in draw order. A selection is made
- * by the plan, then read-only; iterators are plain values owned by one thread. Memory is one bit per
- * brick, whatever the number of runs. */
+ * by the plan, then read-only; iterators are plain values owned by one thread. Memory is one bit
+ * per brick, whatever the number of runs. */
 #ifndef TRIP_SELECTION_H
 #define TRIP_SELECTION_H
 
@@ -11,13 +11,13 @@
 typedef struct trip_selection {
     const trip_dataset *data;
     int axis;
-    bool descending;               /* draw order is the exact reverse of the file's */
+    bool descending;                 /* draw order is the exact reverse of the file's */
     int64_t sheet_first, sheet_last; /* inclusive; the side of the eye this pass covers */
-    uint64_t *bricks;              /* bit per brick of the list */
+    uint64_t *bricks;                /* bit per brick of the list */
 } trip_selection;
 
-/* A contiguous piece of a list: splats [first, first + count) of tile origin (u, v) in `sheet`. In a
- * descending pass its splats are drawn last to first. */
+/* A contiguous piece of a list: splats [first, first + count) of tile origin (u, v) in `sheet`. In
+ * a descending pass its splats are drawn last to first. */
 typedef struct trip_run {
     uint64_t first;
     uint32_t count;
@@ -28,10 +28,10 @@ typedef struct trip_run {
 
 typedef struct trip_run_iterator {
     const trip_selection *selection;
-    int64_t slab;        /* position in lists[axis].slabs */
-    int64_t sheet;       /* within the slab */
-    int64_t brick;       /* within the slab */
-    uint64_t splat;      /* list position of the current brick's run */
+    int64_t slab;   /* position in lists[axis].slabs */
+    int64_t sheet;  /* within the slab */
+    int64_t brick;  /* within the slab */
+    uint64_t splat; /* list position of the current brick's run */
 } trip_run_iterator;
 
 int trip_selection_create(trip_selection *s, const trip_dataset *d, int axis, bool descending,

@@ -15,11 +15,11 @@ typedef struct trip_writer trip_writer;
 
 /* Zero means the default. */
 typedef struct trip_writer_params {
-    bool replace;              /* an existing NAME.trip is replaced; otherwise refused */
+    bool replace; /* an existing NAME.trip is replaced; otherwise refused */
     bool normals;
-    unsigned tile_voxels;      /* 16, 32, 64 (default) or 128 */
-    unsigned slab_sheets;      /* default 8 */
-    unsigned page_bytes;       /* default 65536 */
+    unsigned tile_voxels; /* 16, 32, 64 (default) or 128 */
+    unsigned slab_sheets; /* default 8 */
+    unsigned page_bytes;  /* default 65536 */
     int64_t dims[3];
     trip_affine index_to_world;
     double code_lo, code_hi;

@@ -1,0 +1,205 @@
+#include "dataset.h"
+
+#include "dataset_check.h"
+#include "report.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+const char *trip_dataset_plane_name(int axis, int plane, char *name)
+{
+    snprintf(name, 32, "%c.%s", 'x' + axis, plane == TRIP_PLANE_VOXELS ? "voxels" : "normals");
+    return name;
+}
+
+static void set_path(char *where, size_t room, const trip_dataset *d, const char *name)
+{
+    snprintf(where, room, "%s/%s", d->path, name);
+}
+
+/* Opens a regular file of the data set and gives its size. Never waits, as opening a pipe would. */
+static int open_file(const trip_dataset *d, int folder, const char *name, int *fd, uint64_t *bytes)
+{
+    char where[4096];
+    struct stat st;
+    set_path(where, sizeof where, d, name);
+    *fd = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (*fd < 0 && errno == ENOENT)
+        return trip_fail(TRIP_ERROR, "open", where,
+                         "the file is missing: the data set is incomplete");
+    if (*fd < 0 || fstat(*fd, &st) < 0)
+        return trip_fail_errno("open", where, "cannot open");
+    if (!S_ISREG(st.st_mode))
+        return trip_fail(TRIP_ERROR, "open", where, "not a regular file");
+    *bytes = (uint64_t)st.st_size;
+    return TRIP_OK;
+}
+
+static int read_at(int fd, const char *where, uint64_t offset, void *data, uint64_t bytes)
+{
+    unsigned char *p = data;
+    while (bytes > 0) {
+        size_t piece = bytes < 1 << 24 ? (size_t)bytes : 1 << 24;
+        ssize_t n = pread(fd, p, piece, (off_t)offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n < 0)
+            return trip_fail_errno("open", where, "cannot read");
+        if (n == 0)
+            return trip_fail(TRIP_ERROR, "open", where, "ends early, at byte %llu",
+                             (unsigned long long)offset);
+        p += n;
+        offset += (uint64_t)n;
+        bytes -= (uint64_t)n;
+    }
+    return TRIP_OK;
+}
+
+/* The whole index into memory. */
+static int read_index(trip_dataset *d, int fd, uint64_t file_bytes)
+{
+    char where[4096];
+    set_path(where, sizeof where, d, TRIP_INDEX_NAME);
+    if (file_bytes < TRIP_HEADER_BYTES)
+        return trip_fail(TRIP_ERROR, "open", where, "%llu bytes, shorter than its header of %d",
+                         (unsigned long long)file_bytes, TRIP_HEADER_BYTES);
+    int status = read_at(fd, where, 0, &d->header, TRIP_HEADER_BYTES);
+    if (status == TRIP_OK)
+        status = trip_dataset_check_header(&d->header, file_bytes, where);
+    if (status < 0)
+        return status;
+    d->memory = trip_budget_take(d->budget, file_bytes);
+    d->memory_bytes = file_bytes;
+    if (!d->memory)
+        return trip_fail(TRIP_ERROR, "open", where,
+                         "no memory for the index of %llu bytes: give more with --memory",
+                         (unsigned long long)file_bytes);
+    status = read_at(fd, where, 0, d->memory, file_bytes);
+    if (status == TRIP_OK)
+        status = trip_dataset_check_pages(d->memory, &d->header, where);
+    return status == TRIP_OK ? trip_dataset_check_tables(d->memory, &d->header, where) : status;
+}
+
+static const void *table(const trip_dataset *d, uint64_t offset)
+{
+    return (const unsigned char *)d->memory + offset;
+}
+
+static int set_lists(trip_dataset *d)
+{
+    const trip_file_list *files = table(d, d->header.lists_offset);
+    for (int a = 0; a < 3; a++) {
+        const trip_file_list *f = &files[a];
+        trip_list *l = &d->lists[a];
+        *l = (trip_list){ .axis = a,
+                          .splats = f->splats,
+                          .slab_count = f->slab_count,
+                          .brick_count = f->brick_count,
+                          .slabs = table(d, f->slabs_offset),
+                          .bricks = table(d, f->bricks_offset),
+                          .counts = table(d, f->counts_offset) };
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            if (d->header.planes >> plane & 1)
+                l->page_checksums[plane] = table(d, f->page_checksums_offset[plane]);
+    }
+    memcpy(d->index_to_world.m, d->header.index_to_world, sizeof d->index_to_world.m);
+    d->text = strndup(table(d, d->header.text_offset), d->header.text_bytes);
+    return d->text ? TRIP_OK : trip_fail(TRIP_ERROR, "open", d->path, "out of memory");
+}
+
+static int open_plane(trip_dataset *d, int folder, int axis, int plane)
+{
+    char name[32], where[4096];
+    uint64_t bytes, wanted = d->lists[axis].splats * TRIP_RECORD_BYTES;
+    trip_dataset_plane_name(axis, plane, name);
+    int status = open_file(d, folder, name, &d->plane_fd[axis][plane], &bytes);
+    if (status < 0)
+        return status;
+    d->bytes += bytes;
+    if (bytes == wanted)
+        return TRIP_OK;
+    set_path(where, sizeof where, d, name);
+    return trip_fail(TRIP_ERROR, "open", where, "%llu bytes instead of the %llu of %llu splats",
+                     (unsigned long long)bytes, (unsigned long long)wanted,
+                     (unsigned long long)d->lists[axis].splats);
+}
+
+static int open_files(trip_dataset *d, int folder)
+{
+    int fd;
+    int status = open_file(d, folder, TRIP_INDEX_NAME, &fd, &d->bytes);
+    if (status == TRIP_OK)
+        status = read_index(d, fd, d->bytes);
+    if (fd >= 0)
+        close(fd);
+    if (status == TRIP_OK)
+        status = set_lists(d);
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            if (status == TRIP_OK && d->header.planes >> plane & 1)
+                status = open_plane(d, folder, axis, plane);
+    return status;
+}
+
+static trip_dataset *allocate(const char *path, trip_budget *budget)
+{
+    size_t length = strlen(path);
+    trip_dataset *d = calloc(1, sizeof *d);
+    while (length > 1 && path[length - 1] == '/')
+        length--;
+    if (!d || !(d->path = strndup(path, length))) {
+        free(d);
+        return NULL;
+    }
+    d->budget = budget;
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            d->plane_fd[axis][plane] = -1;
+    return d;
+}
+
+/* The files are opened relative to the folder, so that all are of one data set even while another
+ * takes its name. */
+int trip_dataset_open(trip_dataset **out, const char *path, trip_budget *budget)
+{
+    *out = NULL;
+    trip_dataset *d = allocate(path, budget);
+    if (!d)
+        return trip_fail(TRIP_ERROR, "open", path, "out of memory");
+    int folder = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    int status = TRIP_OK;
+    if (folder < 0 && errno == ENOTDIR)
+        status = trip_fail(TRIP_ERROR, "open", path,
+                           "not a data set, which is a folder made by triptych brick");
+    else if (folder < 0)
+        status = trip_fail_errno("open", path, "cannot open");
+    else
+        status = open_files(d, folder);
+    if (folder >= 0)
+        close(folder);
+    if (status < 0) {
+        trip_dataset_close(d);
+        return status;
+    }
+    *out = d;
+    return TRIP_OK;
+}
+
+void trip_dataset_close(trip_dataset *d)
+{
+    if (!d)
+        return;
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            if (d->plane_fd[axis][plane] >= 0)
+                close(d->plane_fd[axis][plane]);
+    trip_budget_release(d->budget, d->memory, d->memory_bytes);
+    free(d->text);
+    free(d->path);
+    free(d);
+}

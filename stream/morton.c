@@ -1,0 +1,17 @@
+#include "format.h"
+
+/* Spreads the bits of x to the even positions. */
+static uint64_t spread(uint32_t x)
+{
+    uint64_t b = x;
+    b = (b | b << 16) & UINT64_C(0x0000ffff0000ffff);
+    b = (b | b << 8) & UINT64_C(0x00ff00ff00ff00ff);
+    b = (b | b << 4) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+    b = (b | b << 2) & UINT64_C(0x3333333333333333);
+    return (b | b << 1) & UINT64_C(0x5555555555555555);
+}
+
+uint64_t trip_morton(uint32_t u, uint32_t v)
+{
+    return spread(u) | spread(v) << 1;
+}

@@ -1,0 +1,42 @@
+/* A file being written in order, in large pieces, with a checksum for every page if wanted. Used by
+ * the writer only; one thread at a time. Failures are reported here, once, with the file's name. */
+#ifndef TRIP_OUTPUT_H
+#define TRIP_OUTPUT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "budget.h"
+
+typedef struct trip_output {
+    int fd; /* -1 when closed */
+    char *path;
+    trip_budget *budget;
+    unsigned char *buffer;
+    size_t buffer_bytes, used_bytes;
+    uint64_t bytes;                /* appended so far */
+    size_t page_bytes;             /* divides buffer_bytes; 0: no checksums */
+    struct trip_output *checksums; /* gets the XXH64 of every page */
+} trip_output;
+
+/* Creates FOLDER/NAME; `skip_bytes` are left out at its start, for trip_output_patch(). */
+int trip_output_create(trip_output *o, const char *folder, const char *name, size_t buffer_bytes,
+                       uint64_t skip_bytes, trip_budget *budget);
+/* The same without a name: it is gone when closed, whatever happens. */
+int trip_output_create_unnamed(trip_output *o, const char *folder, const char *name,
+                               size_t buffer_bytes, trip_budget *budget);
+int trip_output_append(trip_output *o, const void *data, size_t bytes);
+/* Appends all of `from`, which is flushed and stays as it is. */
+int trip_output_append_output(trip_output *o, trip_output *from);
+/* Zeros up to the next multiple of `alignment` bytes. */
+int trip_output_align(trip_output *o, size_t alignment);
+/* Writes what is buffered; a short last page gets its checksum now, so nothing may follow it. */
+int trip_output_flush(trip_output *o);
+/* Reads back what has been flushed. */
+int trip_output_read(const trip_output *o, uint64_t offset, void *data, size_t bytes);
+int trip_output_patch(trip_output *o, uint64_t offset, const void *data, size_t bytes);
+int trip_output_sync(trip_output *o);
+/* Closes and frees, also what was never opened (all zero). */
+void trip_output_close(trip_output *o);
+
+#endif

@@ -1,0 +1,150 @@
+#include "selection.h"
+
+#include "report.h"
+
+#include <assert.h>
+
+static size_t bitmap_bytes(const trip_selection *s)
+{
+    return (s->data->lists[s->axis].brick_count / 64 + 1) * sizeof(uint64_t);
+}
+
+int trip_selection_create(trip_selection *s, const trip_dataset *d, int axis, bool descending,
+                          int64_t sheet_first, int64_t sheet_last, trip_budget *budget)
+{
+    assert(axis >= 0 && axis < 3);
+    *s = (trip_selection){ .data = d,
+                           .axis = axis,
+                           .descending = descending,
+                           .sheet_first = sheet_first,
+                           .sheet_last = sheet_last };
+    s->bricks = trip_budget_take(budget, bitmap_bytes(s));
+    if (!s->bricks)
+        return trip_fail(TRIP_ERROR, "plan", d->path,
+                         "no memory for the choice of %llu bricks: give more with --memory",
+                         (unsigned long long)d->lists[axis].brick_count);
+    return TRIP_OK;
+}
+
+void trip_selection_destroy(trip_selection *s, trip_budget *budget)
+{
+    if (s->bricks)
+        trip_budget_release(budget, s->bricks, bitmap_bytes(s));
+    *s = (trip_selection){ 0 };
+}
+
+static const trip_list *list_of(const trip_run_iterator *it)
+{
+    return &it->selection->data->lists[it->selection->axis];
+}
+
+static const trip_file_slab *slab_of(const trip_run_iterator *it)
+{
+    return &list_of(it)->slabs[it->slab];
+}
+
+static int64_t slab_sheets(const trip_run_iterator *it)
+{
+    return it->selection->data->header.slab_sheets;
+}
+
+/* Whether any brick of [first, end) is selected. */
+static bool any_selected(const trip_selection *s, uint64_t first, uint64_t end)
+{
+    while (first < end) {
+        uint64_t word = s->bricks[first / 64] >> first % 64;
+        uint64_t here = 64 - first % 64;
+        if (end - first < here)
+            word &= (UINT64_C(1) << (end - first)) - 1;
+        if (word)
+            return true;
+        first += here;
+    }
+    return false;
+}
+
+static bool slab_wanted(const trip_run_iterator *it)
+{
+    const trip_selection *s = it->selection;
+    const trip_file_slab *slab = slab_of(it);
+    int64_t first = (int64_t)slab->slab * slab_sheets(it);
+    return first <= s->sheet_last && first + slab_sheets(it) > s->sheet_first &&
+           any_selected(s, slab->first_brick, slab->first_brick + slab->brick_count);
+}
+
+/* Goes on to the next slab with selected bricks, `it->slab` included, and to its first run in draw
+ * order. False when there is none. */
+static bool enter_slab(trip_run_iterator *it)
+{
+    const trip_list *l = list_of(it);
+    bool down = it->selection->descending;
+    while (it->slab >= 0 && it->slab < (int64_t)l->slab_count && !slab_wanted(it))
+        it->slab += down ? -1 : 1;
+    if (it->slab < 0 || it->slab >= (int64_t)l->slab_count)
+        return false;
+    const trip_file_slab *slab = slab_of(it);
+    bool last = it->slab + 1 == (int64_t)l->slab_count;
+    it->sheet = down ? slab_sheets(it) - 1 : 0;
+    it->brick = down ? (int64_t)slab->brick_count - 1 : 0;
+    it->splat = !down ? slab->first_splat : last ? l->splats : slab[1].first_splat;
+    return true;
+}
+
+trip_run_iterator trip_run_begin(const trip_selection *s)
+{
+    const trip_list *l = &s->data->lists[s->axis];
+    trip_run_iterator it = { .selection = s };
+    it.slab = s->descending ? (int64_t)l->slab_count - 1 : 0;
+    enter_slab(&it);
+    return it;
+}
+
+/* Whether the iterator stands at a run, going on to the next sheet or slab where one is used up. */
+static bool settle(trip_run_iterator *it)
+{
+    const trip_list *l = list_of(it);
+    if (it->slab < 0 || it->slab >= (int64_t)l->slab_count)
+        return false;
+    if (it->brick >= 0 && it->brick < (int64_t)slab_of(it)->brick_count)
+        return true;
+    bool down = it->selection->descending;
+    it->sheet += down ? -1 : 1;
+    it->brick = down ? (int64_t)slab_of(it)->brick_count - 1 : 0;
+    if (it->sheet >= 0 && it->sheet < slab_sheets(it))
+        return true;
+    it->slab += down ? -1 : 1;
+    return enter_slab(it);
+}
+
+static void fill_run(const trip_run_iterator *it, uint64_t brick, int64_t sheet, uint64_t first,
+                     uint32_t count, trip_run *run)
+{
+    const trip_file_brick *b = &list_of(it)->bricks[brick];
+    unsigned log2 = it->selection->data->header.tile_log2;
+    *run = (trip_run){ .first = first,
+                       .count = count,
+                       .brick = (uint32_t)brick,
+                       .sheet = (int32_t)sheet,
+                       .u = (int32_t)(b->tile_u << log2),
+                       .v = (int32_t)(b->tile_v << log2) };
+}
+
+bool trip_run_next(trip_run_iterator *it, trip_run *run)
+{
+    const trip_selection *s = it->selection;
+    while (settle(it)) {
+        uint64_t brick = slab_of(it)->first_brick + (uint64_t)it->brick;
+        int64_t sheet = (int64_t)slab_of(it)->slab * slab_sheets(it) + it->sheet;
+        uint32_t count =
+            list_of(it)->counts[brick * (uint64_t)slab_sheets(it) + (uint64_t)it->sheet];
+        uint64_t first = s->descending ? it->splat - count : it->splat;
+        it->splat = s->descending ? first : first + count;
+        it->brick += s->descending ? -1 : 1;
+        if (count > 0 && sheet >= s->sheet_first && sheet <= s->sheet_last &&
+            trip_selection_has(s, brick)) {
+            fill_run(it, brick, sheet, first, count, run);
+            return true;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,153 @@
+#include "slab.h"
+
+#include "report.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+void trip_slab_init(trip_slab *s, unsigned sheets, trip_budget *budget)
+{
+    *s = (trip_slab){ .budget = budget, .sheets = sheets };
+}
+
+static void release(trip_slab *s)
+{
+    size_t brick_bytes = s->room * sizeof *s->bricks;
+    size_t count_bytes = s->room * s->sheets * sizeof *s->counts;
+    trip_budget_release(s->budget, s->bricks, brick_bytes);
+    trip_budget_release(s->budget, s->bricks_spare, brick_bytes);
+    trip_budget_release(s->budget, s->counts, count_bytes);
+    trip_budget_release(s->budget, s->counts_spare, count_bytes);
+}
+
+void trip_slab_free(trip_slab *s)
+{
+    if (s->budget)
+        release(s);
+    *s = (trip_slab){ 0 };
+}
+
+static int grow(trip_slab *s)
+{
+    trip_slab n = *s;
+    n.room = s->room ? 2 * s->room : 512;
+    size_t brick_bytes = n.room * sizeof *n.bricks;
+    size_t count_bytes = n.room * n.sheets * sizeof *n.counts;
+    n.bricks = trip_budget_take(n.budget, brick_bytes);
+    n.bricks_spare = trip_budget_take(n.budget, brick_bytes);
+    n.counts = trip_budget_take(n.budget, count_bytes);
+    n.counts_spare = trip_budget_take(n.budget, count_bytes);
+    if (!n.bricks || !n.bricks_spare || !n.counts || !n.counts_spare) {
+        release(&n);
+        return trip_fail(TRIP_ERROR, "write", "",
+                         "no memory for the %zu bricks of a slab: give more, or use larger tiles",
+                         n.room);
+    }
+    if (s->brick_count > 0) {
+        memcpy(n.bricks, s->bricks, s->brick_count * sizeof *n.bricks);
+        memcpy(n.counts, s->counts, s->brick_count * s->sheets * sizeof *n.counts);
+    }
+    release(s);
+    *s = n;
+    return TRIP_OK;
+}
+
+/* The tile's brick from an earlier sheet, or a new one at the end. NULL: no memory. */
+static trip_slab_brick *find(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v)
+{
+    uint64_t tile = trip_morton(tile_u, tile_v);
+    while (s->cursor < s->merged && s->bricks[s->cursor].tile < tile)
+        s->cursor++;
+    if (s->cursor < s->merged && s->bricks[s->cursor].tile == tile)
+        return &s->bricks[s->cursor];
+    if (s->brick_count == s->room && grow(s) < 0)
+        return NULL;
+    trip_slab_brick *b = &s->bricks[s->brick_count++];
+    *b = (trip_slab_brick){ .tile = tile,
+                            .brick = { .tile_u = tile_u,
+                                       .tile_v = tile_v,
+                                       .code_min = UINT16_MAX,
+                                       .u_min = UINT8_MAX,
+                                       .v_min = UINT8_MAX,
+                                       .sheet_min = (uint8_t)sheet } };
+    memset(s->counts + (size_t)(b - s->bricks) * s->sheets, 0, s->sheets * sizeof *s->counts);
+    return b;
+}
+
+static void widen8(uint8_t *lo, uint8_t *hi, unsigned lo_new, unsigned hi_new)
+{
+    *lo = (uint8_t)(lo_new < *lo ? lo_new : *lo);
+    *hi = (uint8_t)(hi_new > *hi ? hi_new : *hi);
+}
+
+static void widen(trip_file_brick *b, const uint32_t *voxels, uint32_t count)
+{
+    unsigned u_min = 255, u_max = 0, v_min = 255, v_max = 0;
+    unsigned code_min = b->code_min, code_max = b->code_max;
+    for (uint32_t i = 0; i < count; i++) {
+        unsigned u = trip_voxel_u(voxels[i]), v = trip_voxel_v(voxels[i]);
+        unsigned code = trip_voxel_code(voxels[i]);
+        u_min = u < u_min ? u : u_min;
+        u_max = u > u_max ? u : u_max;
+        v_min = v < v_min ? v : v_min;
+        v_max = v > v_max ? v : v_max;
+        code_min = code < code_min ? code : code_min;
+        code_max = code > code_max ? code : code_max;
+    }
+    widen8(&b->u_min, &b->u_max, u_min, u_max);
+    widen8(&b->v_min, &b->v_max, v_min, v_max);
+    b->code_min = (uint16_t)code_min;
+    b->code_max = (uint16_t)code_max;
+}
+
+int trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
+                  const uint32_t *voxels, uint32_t count)
+{
+    trip_slab_brick *b = find(s, sheet, tile_u, tile_v);
+    if (!b)
+        return TRIP_ERROR;
+    b->brick.splats += count;
+    b->brick.sheet_max = (uint8_t)sheet;
+    s->counts[(size_t)(b - s->bricks) * s->sheets + sheet] = (uint16_t)count;
+    widen(&b->brick, voxels, count);
+    return TRIP_OK;
+}
+
+static void move(trip_slab *s, size_t to, size_t from)
+{
+    s->bricks_spare[to] = s->bricks[from];
+    memcpy(s->counts_spare + to * s->sheets, s->counts + from * s->sheets,
+           s->sheets * sizeof *s->counts);
+}
+
+static void swap_spare(trip_slab *s)
+{
+    trip_slab_brick *bricks = s->bricks;
+    uint16_t *counts = s->counts;
+    s->bricks = s->bricks_spare;
+    s->counts = s->counts_spare;
+    s->bricks_spare = bricks;
+    s->counts_spare = counts;
+}
+
+/* Merges the bricks new in this sheet, in order among themselves, with those of the sheets before.
+ */
+void trip_slab_end_sheet(trip_slab *s)
+{
+    size_t old = 0, added = s->merged;
+    if (added > 0 && added < s->brick_count) {
+        for (size_t to = 0; to < s->brick_count; to++) {
+            bool take_old = added == s->brick_count ||
+                            (old < s->merged && s->bricks[old].tile < s->bricks[added].tile);
+            move(s, to, take_old ? old++ : added++);
+        }
+        swap_spare(s);
+    }
+    s->merged = s->brick_count;
+    s->cursor = 0;
+}
+
+void trip_slab_clear(trip_slab *s)
+{
+    s->brick_count = s->merged = s->cursor = 0;
+}

@@ -1,0 +1,167 @@
+#include "fixture.h"
+
+#include <stdio.h>
+#include <unistd.h>
+
+uint64_t fixture_random(uint64_t *state)
+{
+    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
+    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+    return z ^ z >> 31;
+}
+
+/* Bit by bit, unlike the code under test. */
+static uint64_t plain_morton(uint32_t u, uint32_t v)
+{
+    uint64_t m = 0;
+    for (int b = 0; b < 32; b++)
+        m |= (uint64_t)(u >> b & 1) << 2 * b | (uint64_t)(v >> b & 1) << (2 * b + 1);
+    return m;
+}
+
+static int sort_axis;
+
+static int by_list_order(const void *a, const void *b)
+{
+    const fixture_voxel *x = a, *y = b;
+    int n = sort_axis, u = (n + 1) % 3, v = (n + 2) % 3;
+    if (x->p[n] != y->p[n])
+        return x->p[n] < y->p[n] ? -1 : 1;
+    uint64_t m = plain_morton(x->p[u], x->p[v]), o = plain_morton(y->p[u], y->p[v]);
+    return (m > o) - (m < o);
+}
+
+static void make_voxels(fixture *f)
+{
+    const int64_t *dims = f->params.dims;
+    uint64_t state = f->params.seed;
+    double density = f->params.density > 0 ? f->params.density : 0.2;
+    size_t room = (size_t)(dims[0] * dims[1] * dims[2]);
+    fixture_voxel *list = calloc(room, sizeof *list);
+    for (size_t i = 0; i < room && !f->params.empty; i++) {
+        uint64_t r = fixture_random(&state);
+        if ((double)(r >> 40) >= density * (1 << 24))
+            continue;
+        list[f->count++] =
+            (fixture_voxel){ .p = { (uint32_t)(i % (size_t)dims[0]),
+                                    (uint32_t)(i / (size_t)dims[0] % (size_t)dims[1]),
+                                    (uint32_t)(i / (size_t)(dims[0] * dims[1])) },
+                             .code = r & 65535,
+                             .normal = (uint32_t)(r * 2654435761u >> 3) };
+    }
+    f->lists[0] = list;
+    for (int a = 1; a < 3; a++) {
+        f->lists[a] = calloc(room, sizeof *list);
+        memcpy(f->lists[a], list, f->count * sizeof *list);
+    }
+    for (sort_axis = 0; sort_axis < 3; sort_axis++)
+        qsort(f->lists[sort_axis], f->count, sizeof *list, by_list_order);
+}
+
+static int write_list(fixture *f, trip_writer *w, int axis)
+{
+    static uint32_t voxels[128 * 128], normals[128 * 128];
+    uint32_t tile = f->params.tile_voxels ? f->params.tile_voxels : 64;
+    int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (size_t i = 0, end; i < f->count; i = end) {
+        const fixture_voxel *first = &f->lists[axis][i];
+        uint32_t n = 0;
+        for (end = i; end < f->count; end++, n++) {
+            const fixture_voxel *x = &f->lists[axis][end];
+            if (x->p[axis] != first->p[axis] || x->p[u] / tile != first->p[u] / tile ||
+                x->p[v] / tile != first->p[v] / tile)
+                break;
+            voxels[n] = trip_voxel_pack(x->p[u] % tile, x->p[v] % tile, x->code);
+            normals[n] = x->normal;
+        }
+        int status =
+            trip_writer_append(w, axis, first->p[axis], first->p[u] / tile, first->p[v] / tile,
+                               voxels, f->params.normals ? normals : NULL, n);
+        if (status < 0)
+            return status;
+    }
+    return TRIP_OK;
+}
+
+int fixture_write(fixture *f, const char *path)
+{
+    trip_writer *w;
+    const fixture_params *p = &f->params;
+    trip_writer_params params = { .replace = p->replace,
+                                  .normals = p->normals,
+                                  .tile_voxels = p->tile_voxels,
+                                  .slab_sheets = p->slab_sheets,
+                                  .page_bytes = p->page_bytes,
+                                  .dims = { p->dims[0], p->dims[1], p->dims[2] },
+                                  .index_to_world = trip_affine_identity(),
+                                  .code_lo = -1,
+                                  .code_hi = 2,
+                                  .gradient_scale = 3 };
+    int status = trip_writer_open(&w, path, &params, f->budget);
+    if (status < 0)
+        return status;
+    for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
+        status = write_list(f, w, axis);
+    trip_writer_summary summary = { .value_min = -1,
+                                    .value_max = 2,
+                                    .voxels = (uint64_t)(p->dims[0] * p->dims[1] * p->dims[2]),
+                                    .text = "{\"source\":\"test\"}" };
+    if (status == TRIP_OK)
+        status = trip_writer_finish(w, &summary);
+    if (status < 0)
+        trip_writer_abort(w);
+    return status;
+}
+
+void fixture_make(fixture *f, const fixture_params *params)
+{
+    *f = (fixture){ .params = *params };
+    for (int a = 0; a < 3; a++)
+        f->params.dims[a] = params->dims[a] ? params->dims[a] : 40;
+    strcpy(f->folder, "/tmp/trip-test-XXXXXX");
+    assert_non_null(mkdtemp(f->folder));
+    snprintf(f->path, sizeof f->path, "%s/a.trip", f->folder);
+    assert_int_equal(trip_budget_create(&f->budget, UINT64_C(1) << 30), TRIP_OK);
+    make_voxels(f);
+    assert_int_equal(fixture_write(f, f->path), TRIP_OK);
+}
+
+void fixture_free(fixture *f)
+{
+    fixture_run_command("rm -rf %s", f->folder);
+    for (int a = 0; a < 3; a++)
+        free(f->lists[a]);
+    trip_budget_destroy(f->budget);
+}
+
+void fixture_run_command(const char *format, ...)
+{
+    char command[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(command, sizeof command, format, args);
+    va_end(args);
+    assert_int_equal(system(command), 0);
+}
+
+static char reports[8192];
+
+static void add_report(const char *line, void *user)
+{
+    (void)user;
+    size_t length = strlen(reports);
+    snprintf(reports + length, sizeof reports - length, "%s\n", line);
+}
+
+void fixture_catch_reports(void)
+{
+    reports[0] = 0;
+    trip_report_redirect(add_report, NULL);
+}
+
+const char *fixture_reports(void)
+{
+    trip_report_redirect(NULL, NULL);
+    return reports;
+}
