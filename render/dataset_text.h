@@ -1,0 +1,35 @@
+/* What `brick` wrote about a data set, for drawing it: the JSON text in its index. A key that is
+ * missing or of another kind is taken as not given, so that data sets made by other programs draw.
+ *
+ *   "format"             "openvdb", "nrrd", ... : where the volume came from
+ *   "up", "front"        "+x" ... "-z": the world direction that is up, and that the object faces
+ *   "transfer_function"  a function as `.tf` text, in data units: drawn when none is given
+ *   "envelope"           [[lo, hi], ...]: the values that were kept, closed intervals, ascending
+ *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: of all finite values,
+ *                        kept or not, in equal bins over [a, b] */
+#ifndef TRIP_DATASET_TEXT_H
+#define TRIP_DATASET_TEXT_H
+
+#include "camera.h"
+#include "dataset.h"
+#include "transfer_function.h"
+
+typedef struct trip_dataset_text trip_dataset_text;
+
+/* Fails when the text is not a JSON object. */
+int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d);
+void trip_dataset_text_destroy(trip_dataset_text *t);
+
+/* The stored function; without one, all values alike in a faint grey ramp. */
+int trip_dataset_text_tf(const trip_dataset_text *t, trip_tf **out);
+
+/* How many voxels hold values that `tf` shows but that were left out when the data set was made,
+ * and the range of those values. An estimate from the histogram (bins count in proportion); 0 when
+ * the text does not tell. */
+double trip_dataset_text_culled(const trip_dataset_text *t, const trip_tf *tf, double range[2]);
+
+/* The view used when none is given: all splats framed, the right way up, from the front. */
+trip_camera_params trip_dataset_text_view(const trip_dataset_text *t, const trip_dataset *d,
+                                          int width, int height, double azimuth_degrees);
+
+#endif
