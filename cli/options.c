@@ -1,0 +1,108 @@
+#include "options.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "budget.h"
+#include "report.h"
+#include "text.h"
+
+/* getopt prints its own line, "ARGV0: unrecognized option ...": with this argv[0] that line has our
+ * form, and with no err_stream argp adds nothing to it. --help takes the name from state->name. */
+static char error_prefix[] = "triptych: usage";
+static char help_name[64];
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    (void)arg;
+    if (key != ARGP_KEY_INIT)
+        return ARGP_ERR_UNKNOWN;
+    state->name = help_name;
+    state->err_stream = NULL;
+    state->child_inputs[0] = state->input;
+    return 0;
+}
+
+int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input)
+{
+    const struct argp_child children[] = { { argp, 0, NULL, 0 }, { 0 } };
+    const struct argp outer = { .parser = parse_key, .children = children };
+    snprintf(help_name, sizeof help_name, "triptych %s", argv[0]);
+    argv[0] = error_prefix;
+    error_t status = argp_parse(&outer, argc, argv, 0, NULL, input);
+    if (status == ENOMEM)
+        return trip_fail(TRIP_ERROR, "usage", help_name, "out of memory");
+    return status ? TRIP_USAGE : 0;
+}
+
+int trip_option_fail(const char *option, const char *why)
+{
+    return trip_fail(TRIP_USAGE, "usage", option, "%s", why);
+}
+
+int trip_option_number(const char *option, const char *text, double lo, double hi, double *out)
+{
+    if (!trip_text_to_double(text, out))
+        return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a number", text);
+    if (*out < lo || *out > hi)
+        return trip_fail(TRIP_USAGE, "usage", option, "%s is not between %g and %g", text, lo, hi);
+    return 0;
+}
+
+int trip_option_integer(const char *option, const char *text, int lo, int hi, int *out)
+{
+    double number;
+    if (!trip_text_to_double(text, &number) || number != (double)(long)number)
+        return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a whole number", text);
+    if (number < lo || number > hi)
+        return trip_fail(TRIP_USAGE, "usage", option, "%s is not between %d and %d", text, lo, hi);
+    *out = (int)number;
+    return 0;
+}
+
+int trip_option_numbers(const char *option, const char *text, int least, int most, double *out,
+                        int *count)
+{
+    const char *rest = text;
+    *count = 0;
+    while (rest) {
+        char number[64];
+        const char *comma = strchr(rest, ',');
+        size_t length = comma ? (size_t)(comma - rest) : strlen(rest);
+        snprintf(number, sizeof number, "%.*s", (int)(length < 64 ? length : 63), rest);
+        if (*count == most || length >= sizeof number || !trip_text_to_double(number, &out[*count]))
+            break;
+        (*count)++;
+        rest = comma ? comma + 1 : NULL;
+    }
+    if (!rest && *count >= least)
+        return 0;
+    if (least == most)
+        return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not %d numbers joined by commas",
+                         text, most);
+    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not %d to %d numbers joined by commas",
+                     text, least, most);
+}
+
+int trip_option_bytes(const char *option, const char *text, uint64_t *out)
+{
+    if (trip_parse_bytes(text, out) && *out > 0)
+        return 0;
+    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a size like 512M or 2G", text);
+}
+
+int trip_option_choice(const char *option, const char *text, const char *const *names, int *out)
+{
+    char list[256] = "";
+    for (int i = 0; names[i]; i++) {
+        if (!strcmp(text, names[i])) {
+            *out = i;
+            return 0;
+        }
+        size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", names[i]);
+    }
+    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is none of %s", text, list);
+}

@@ -1,0 +1,26 @@
+/* Command lines by argp, with errors in the project's form: one line, exit status 2. Also the kinds
+ * of values that options take. Each trip_option_* reports a bad value, naming the option, and
+ * returns TRIP_USAGE, which an argp parser forwards. Main thread only. */
+#ifndef TRIP_OPTIONS_H
+#define TRIP_OPTIONS_H
+
+#include <argp.h>
+#include <stdint.h>
+
+/* Parses argv (argv[0] is the command's name) with `input` for the parser; --help prints and exits.
+ * Returns 0, or TRIP_USAGE once reported. */
+int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input);
+
+int trip_option_number(const char *option, const char *text, double lo, double hi, double *out);
+int trip_option_integer(const char *option, const char *text, int lo, int hi, int *out);
+/* Comma-separated numbers: at least `least`, at most `most`; *count is how many there were. */
+int trip_option_numbers(const char *option, const char *text, int least, int most, double *out,
+                        int *count);
+/* Sizes with binary suffixes: "256M". */
+int trip_option_bytes(const char *option, const char *text, uint64_t *out);
+/* The position of `text` in a NULL-terminated list of names. */
+int trip_option_choice(const char *option, const char *text, const char *const *names, int *out);
+/* `why` completes "OPTION: ...". */
+int trip_option_fail(const char *option, const char *why);
+
+#endif
