@@ -44,10 +44,9 @@ static int fail_line(const char *path, int line, const char *why)
 static int take_field(vol_header *h, const char *line)
 {
     static const char *const axes[3] = { "X", "Y", "Z" };
-    char name[32], value[64];
+    char name[32], value[64], *end = NULL;
     if (sscanf(line, "%31[^:]: %63s", name, value) != 2)
         return -1;
-    char *end = value;
     for (int a = 0; a < 3; a++)
         if (strcmp(name, axes[a]) == 0)
             h->dims[a] = strtoll(value, &end, 10);
@@ -55,9 +54,7 @@ static int take_field(vol_header *h, const char *line)
         h->version = strtoll(value, &end, 10);
     else if (strcmp(name, "Voxel-Size") == 0)
         h->spacing = strtod(value, &end);
-    else if (end == value)
-        return 0;
-    return *end ? -1 : 0;
+    return end && (end == value || *end) ? -1 : 0;
 }
 
 static int read_header(const char *path, FILE *file, vol_header *h)

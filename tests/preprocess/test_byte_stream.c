@@ -1,0 +1,232 @@
+#include "volume_files.h"
+
+#include "byte_stream.h"
+
+enum { COUNT = 10000 };
+
+static bytes plain(void)
+{
+    bytes b = { .count = 0 };
+    for (unsigned i = 0; i < COUNT; i++)
+        append(&b, &(unsigned char){ (unsigned char)(i * i >> 5) }, 1);
+    return b;
+}
+
+/* Reads the source in pieces of `step` bytes and compares it with the plain bytes from `from` on.
+ */
+static void assert_delivers(const trip_byte_source *source, size_t from, size_t step)
+{
+    bytes expected = plain();
+    trip_byte_stream *s;
+    unsigned char got[COUNT];
+    assert_int_equal(trip_byte_stream_open(&s, source), 0);
+    for (int round = 0; round < 2; round++) {
+        for (size_t done = 0; done < source->size_bytes; done += step) {
+            size_t left = (size_t)source->size_bytes - done, n = left < step ? left : step;
+            assert_int_equal(trip_byte_stream_read(s, got + done, n), 0);
+        }
+        assert_memory_equal(got, expected.data + from, (size_t)source->size_bytes);
+        assert_int_equal(trip_byte_stream_rewind(s), 0);
+    }
+    trip_byte_stream_close(s);
+}
+
+/* Opens and reads everything; fails with one line that contains `text`. */
+static void assert_fails(const trip_byte_source *source, const char *text)
+{
+    trip_byte_stream *s = NULL;
+    unsigned char got[COUNT + 100];
+    catch_reports();
+    int status = trip_byte_stream_open(&s, source);
+    if (status == 0)
+        status = trip_byte_stream_read(s, got, (size_t)source->size_bytes);
+    trip_report_redirect(NULL, NULL);
+    trip_byte_stream_close(s);
+    if (status != TRIP_ERROR || reports != 1 || !strstr(reported, text))
+        fail_msg("status %d, %d reports, expected one with \"%s\": %s", status, reports, text,
+                 reported);
+}
+
+static const char *write_encoded(const char *name, trip_byte_encoding encoding, const bytes *b)
+{
+    bytes out = { .count = 0 };
+    if (encoding == TRIP_BYTES_ZLIB)
+        append_gzip(&out, b);
+    else if (encoding == TRIP_BYTES_BZIP2)
+        append_bzip2(&out, b);
+    else
+        append(&out, b->data, b->count);
+    return write_file(name, &out);
+}
+
+static void all_encodings_deliver_the_same_bytes_in_any_pieces(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    for (int e = TRIP_BYTES_PLAIN; e <= TRIP_BYTES_BZIP2; e++) {
+        const char *path = write_encoded("same", (trip_byte_encoding)e, &b);
+        for (size_t step = 1; step <= COUNT; step = step * 7 + 3)
+            assert_delivers(&(trip_byte_source){ .path = path,
+                                                 .encoding = (trip_byte_encoding)e,
+                                                 .size_bytes = COUNT },
+                            0, step);
+    }
+}
+
+static void bytes_can_be_skipped_before_and_after_decompression(void **state)
+{
+    (void)state;
+    bytes b = plain(), out;
+    for (int e = TRIP_BYTES_ZLIB; e <= TRIP_BYTES_BZIP2; e++) {
+        out.count = 0;
+        append_text(&out, "a header");
+        if (e == TRIP_BYTES_ZLIB)
+            append_zlib(&out, &b);
+        else
+            append_bzip2(&out, &b);
+        const char *path = write_file("skip", &out);
+        assert_delivers(&(trip_byte_source){ .path = path,
+                                             .encoding = (trip_byte_encoding)e,
+                                             .offset_bytes = 8,
+                                             .skip_bytes = 5000,
+                                             .size_bytes = COUNT - 5000 },
+                        5000, 777);
+    }
+}
+
+static void members_one_after_the_other_are_one_stream(void **state)
+{
+    (void)state;
+    for (int e = TRIP_BYTES_ZLIB; e <= TRIP_BYTES_BZIP2; e++) {
+        bytes all = plain(), out = { .count = 0 };
+        for (size_t start = 0; start < COUNT; start += COUNT / 4) {
+            bytes part = { .count = 0 };
+            append(&part, all.data + start, COUNT / 4);
+            if (e == TRIP_BYTES_ZLIB)
+                append_gzip(&out, &part);
+            else
+                append_bzip2(&out, &part);
+        }
+        const char *path = write_file("members", &out);
+        assert_delivers(&(trip_byte_source){ .path = path,
+                                             .encoding = (trip_byte_encoding)e,
+                                             .size_bytes = COUNT },
+                        0, 3000);
+    }
+}
+
+/* One byte less at a time, down to an empty file: also the checksums at the end are missed. */
+static void a_cut_file_is_refused_wherever_it_is_cut(void **state)
+{
+    (void)state;
+    bytes small = { .count = 0 };
+    append_volume(&small, TRIP_U8, false);
+    for (int e = TRIP_BYTES_PLAIN; e <= TRIP_BYTES_BZIP2; e++) {
+        bytes out = { .count = 0 };
+        if (e == TRIP_BYTES_ZLIB)
+            append_gzip(&out, &small);
+        else if (e == TRIP_BYTES_BZIP2)
+            append_bzip2(&out, &small);
+        else
+            append(&out, small.data, small.count);
+        for (size_t length = 0; length < out.count; length++) {
+            const char *path = write_bytes("cut", out.data, length);
+            assert_fails(&(trip_byte_source){ .path = path,
+                                              .encoding = (trip_byte_encoding)e,
+                                              .size_bytes = VOXELS },
+                         e == TRIP_BYTES_PLAIN ? "are promised" : "c");
+        }
+    }
+}
+
+static void corrupt_data_is_found_by_the_checksum(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    for (int e = TRIP_BYTES_ZLIB; e <= TRIP_BYTES_BZIP2; e++) {
+        bytes out = { .count = 0 };
+        if (e == TRIP_BYTES_ZLIB)
+            append_gzip(&out, &b);
+        else
+            append_bzip2(&out, &b);
+        size_t length = out.count;
+        out.data[length - 6] ^= 1; /* within the last checksum */
+        const char *path = write_file("corrupt", &out);
+        assert_fails(&(trip_byte_source){ .path = path,
+                                          .encoding = (trip_byte_encoding)e,
+                                          .size_bytes = COUNT },
+                     "corrupt near byte");
+    }
+}
+
+static void other_content_than_promised_is_refused(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    const char *path = write_file("plain", &b);
+    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_ZLIB, 0, 0, COUNT, false }, "zlib data");
+    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_BZIP2, 0, 0, COUNT, false }, "bzip2 data");
+}
+
+static void bytes_left_over_are_warned_of_once(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    for (int e = TRIP_BYTES_PLAIN; e <= TRIP_BYTES_BZIP2; e++) {
+        const char *path = write_encoded("longer", (trip_byte_encoding)e, &b);
+        catch_reports();
+        assert_delivers(&(trip_byte_source){ .path = path,
+                                             .encoding = (trip_byte_encoding)e,
+                                             .size_bytes = COUNT - 3 },
+                        0, 5000);
+        trip_report_redirect(NULL, NULL);
+        assert_int_equal(reports, 1);
+        assert_non_null(strstr(reported, "left over"));
+        if (e == TRIP_BYTES_PLAIN)
+            assert_non_null(strstr(reported, "3 bytes are left over"));
+    }
+}
+
+static void impossible_offsets_and_sizes_are_refused(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    const char *path = write_file("offsets", &b);
+    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, COUNT + 1, 0, 1, false },
+                 "beyond its end");
+    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, UINT64_MAX, UINT64_MAX, 1, false },
+                 "beyond its end");
+    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, COUNT, 0, 1, false }, "are promised");
+    trip_byte_stream *s;
+    catch_reports();
+    assert_int_equal(trip_byte_stream_open(&s, &(trip_byte_source){ .path = path,
+                                                                    .offset_bytes = 5,
+                                                                    .size_bytes = UINT64_MAX - 2 }),
+                     TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+}
+
+static void what_is_no_file_is_refused(void **state)
+{
+    (void)state;
+    assert_fails(&(trip_byte_source){ .path = folder, .size_bytes = 1 }, "not a regular file");
+    assert_fails(&(trip_byte_source){ .path = path_of("missing"), .size_bytes = 1 },
+                 "No such file");
+    assert_fails(&(trip_byte_source){ .path = "/dev/zero", .size_bytes = 1 }, "not a regular file");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(all_encodings_deliver_the_same_bytes_in_any_pieces),
+        cmocka_unit_test(bytes_can_be_skipped_before_and_after_decompression),
+        cmocka_unit_test(members_one_after_the_other_are_one_stream),
+        cmocka_unit_test(a_cut_file_is_refused_wherever_it_is_cut),
+        cmocka_unit_test(corrupt_data_is_found_by_the_checksum),
+        cmocka_unit_test(other_content_than_promised_is_refused),
+        cmocka_unit_test(bytes_left_over_are_warned_of_once),
+        cmocka_unit_test(impossible_offsets_and_sizes_are_refused),
+        cmocka_unit_test(what_is_no_file_is_refused),
+    };
+    return cmocka_run_group_tests_name("byte_stream", tests, make_folder, remove_folder);
+}

@@ -1,0 +1,409 @@
+#include "volume_files.h"
+
+static const char *const nrrd_types[] = { "uint8",  "signed char", "unsigned short", "short",
+                                          "uint32", "int",         "uint64",         "longlong",
+                                          NULL,     "float",       "double" };
+
+/* A header with the given further lines, which end it or not. */
+static void append_header(bytes *b, trip_scalar type, bool big, const char *encoding,
+                          const char *more)
+{
+    char text[1024];
+    snprintf(text, sizeof text,
+             "NRRD0004\n# a comment\ntype: %s\ndimension: 3\nsizes: %d %d %d\nendian: %s\n"
+             "encoding: %s\n%s",
+             nrrd_types[type], NX, NY, NZ, big ? "big" : "little", encoding, more);
+    append_text(b, text);
+}
+
+/* The sample as uint16 with the header given, whose values follow it plain. */
+static const char *write_with_header(const char *name, const char *header)
+{
+    bytes b = { .count = 0 };
+    append_text(&b, header);
+    append_volume(&b, TRIP_U16, false);
+    return write_file(name, &b);
+}
+
+static const char *write_with_lines(const char *name, const char *more)
+{
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw", more);
+    append_text(&b, "\n");
+    append_volume(&b, TRIP_U16, false);
+    return write_file(name, &b);
+}
+
+static trip_affine map_of(const char *path)
+{
+    float values[VOXELS];
+    trip_volume_info info;
+    assert_int_equal(read_volume(path, NULL, 3, values, VOXELS, &info), 0);
+    return info.index_to_world;
+}
+
+static void every_type_is_read_in_both_byte_orders(void **state)
+{
+    (void)state;
+    for (int t = 0; t < TRIP_SCALARS; t++)
+        for (int big = 0; big < 2 && nrrd_types[t]; big++) {
+            bytes b = { .count = 0 };
+            append_header(&b, (trip_scalar)t, big, "raw", "\n");
+            append_volume(&b, (trip_scalar)t, big);
+            assert_holds_sample(write_file("type.nrrd", &b), NULL, (trip_scalar)t);
+        }
+}
+
+static void compressed_values_are_read(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "gzip", "gz", "bzip2", "bz2" };
+    for (int n = 0; n < 4; n++) {
+        bytes values = { .count = 0 }, b = { .count = 0 };
+        append_volume(&values, TRIP_I32, true);
+        append_header(&b, TRIP_I32, true, names[n], "\n");
+        if (n < 2)
+            append_gzip(&b, &values);
+        else
+            append_bzip2(&b, &values);
+        assert_holds_sample(write_file("compressed.nrrd", &b), NULL, TRIP_I32);
+    }
+}
+
+static void lines_may_end_in_carriage_returns(void **state)
+{
+    (void)state;
+    assert_holds_sample(
+        write_with_header("crlf.nrrd", "NRRD0001\r\ntype: ushort\r\ndimension: 3\r\n"
+                                       "sizes: 5 4 7\r\nendian: little\r\nencoding: raw\r\n\r\n"),
+        NULL, TRIP_U16);
+}
+
+static void fields_come_in_any_order_and_keys_are_passed_over(void **state)
+{
+    (void)state;
+    assert_holds_sample(
+        write_with_header("order.nrrd",
+                          "NRRD0005\nencoding: raw\nendian: little\nmy key:=sizes: 1\n"
+                          "content: a: b: c\nsizes: 5 4 7\ncenterings: cell cell cell\n"
+                          "units: \"mm\" \"mm\" \"mm\"\ntype: uint16\ndimension: 3\n\n"),
+        NULL, TRIP_U16);
+}
+
+static void a_detached_header_finds_its_data_beside_it(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "data file: detached.raw", "datafile: ./detached.raw" };
+    bytes values = { .count = 0 };
+    append_volume(&values, TRIP_I16, true);
+    write_file("detached.raw", &values);
+    for (int n = 0; n < 2; n++) {
+        bytes b = { .count = 0 };
+        append_header(&b, TRIP_I16, true, "raw", names[n]); /* no line end: the file ends it */
+        assert_holds_sample(write_file("detached.nhdr", &b), NULL, TRIP_I16);
+    }
+}
+
+static void detached_data_may_be_compressed(void **state)
+{
+    (void)state;
+    bytes values = { .count = 0 }, gz = { .count = 0 }, b = { .count = 0 };
+    append_volume(&values, TRIP_F32, false);
+    append_gzip(&gz, &values);
+    write_file("detached.raw.gz", &gz);
+    append_header(&b, TRIP_F32, false, "gzip", "data file: detached.raw.gz\n");
+    assert_holds_sample(write_file("gz.nhdr", &b), NULL, TRIP_F32);
+}
+
+/* The sample as `count` files of equal length. */
+static void write_parts(const char *stem, int width, int first, int step, int count, bool gzip)
+{
+    bytes all = { .count = 0 };
+    append_volume(&all, TRIP_U16, false);
+    for (int n = 0; n < count; n++) {
+        bytes part = { .count = 0 }, gz = { .count = 0 };
+        char name[64];
+        append(&part, all.data + (size_t)n * all.count / (size_t)count, all.count / (size_t)count);
+        append_gzip(&gz, &part);
+        snprintf(name, sizeof name, "%s%0*d", stem, width, first + n * step);
+        write_file(name, gzip ? &gz : &part);
+    }
+}
+
+static void many_data_files_follow_one_another(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    write_parts("list", 1, 0, 1, NZ, false);
+    append_header(&b, TRIP_U16, false, "raw",
+                  "data file: LIST\nlist0\nlist1\nlist2\nlist3\nlist4\n"
+                  "list5\nlist6\n");
+    assert_holds_sample(write_file("list.nhdr", &b), NULL, TRIP_U16);
+
+    b.count = 0;
+    write_parts("two", 1, 0, 1, 2, false);
+    append_header(&b, TRIP_U16, false, "raw", "data file: LIST 3\ntwo0\ntwo1");
+    assert_holds_sample(write_file("two.nhdr", &b), NULL, TRIP_U16);
+}
+
+static void a_pattern_counts_its_files(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    write_parts("up", 3, 2, 3, NZ, false);
+    append_header(&b, TRIP_U16, false, "raw", "data file: up%03d 2 20 3\n");
+    assert_holds_sample(write_file("up.nhdr", &b), NULL, TRIP_U16);
+
+    b.count = 0;
+    write_parts("down", 1, 6, -1, NZ, true);
+    append_header(&b, TRIP_U16, false, "gzip", "data file: down%d 6 0 -1 2\n");
+    assert_holds_sample(write_file("down.nhdr", &b), NULL, TRIP_U16);
+}
+
+static void lines_and_bytes_are_skipped(void **state)
+{
+    (void)state;
+    bytes data = { .count = 0 }, values = { .count = 0 }, gz = { .count = 0 }, b = { .count = 0 };
+    append_text(&data, "one line\nanother\n12345");
+    append_volume(&data, TRIP_U16, false);
+    write_file("skip.raw", &data);
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 2\nbyte skip: 5\ndata file: skip.raw\n");
+    assert_holds_sample(write_file("skip.nhdr", &b), NULL, TRIP_U16);
+
+    append_text(&values, "54321");
+    append_volume(&values, TRIP_U16, false);
+    append_text(&gz, "a line before gzip begins\n");
+    append_gzip(&gz, &values);
+    write_file("skip.gz", &gz);
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "gzip", "lineskip: 1\nbyteskip: 5\ndata file: skip.gz\n");
+    assert_holds_sample(write_file("skipgz.nhdr", &b), NULL, TRIP_U16);
+}
+
+static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
+{
+    (void)state;
+    bytes data = { .count = 0 }, b = { .count = 0 };
+    append_text(&data, "a header of unknown length");
+    append_volume(&data, TRIP_U16, false);
+    write_file("tail.raw", &data);
+    append_header(&b, TRIP_U16, false, "raw", "byte skip: -1\ndata file: tail.raw\n");
+    assert_holds_sample(write_file("tail.nhdr", &b), NULL, TRIP_U16);
+}
+
+static void spacings_and_directions_become_the_map(void **state)
+{
+    (void)state;
+    trip_affine a = map_of(write_with_lines("spacings.nrrd", "spacings: 0.5 nan 3e0\n"));
+    assert_map(&a, (const double[3][4]){ { 0.5, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 3, 0 } });
+    a = map_of(write_with_lines("directions.nrrd",
+                                "space: left-posterior-superior\n"
+                                "space directions: (1,0.25,0) ( 0 , 2 , 0.5 )  (-0.5,0,3)\n"
+                                "space origin: (-10, 20, 1e1)\n"));
+    assert_map(&a,
+               (const double[3][4]){ { 1, 0, -0.5, -10 }, { 0.25, 2, 0, 20 }, { 0, 0.5, 3, 10 } });
+    a = map_of(write_with_lines("neither.nrrd", ""));
+    assert_map(&a, (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+}
+
+static void axes_of_size_one_are_dropped(void **state)
+{
+    (void)state;
+    const char *path = write_with_header(
+        "leading.nrrd", "NRRD0004\ntype: uint16\ndimension: 4\nsizes: 1 5 4 7\nendian: little\n"
+                        "encoding: raw\nkinds: vector domain domain domain\nspace dimension: 3\n"
+                        "space directions: none (1,0,0) (0,2,0) (0,0,3)\n\n");
+    assert_holds_sample(path, NULL, TRIP_U16);
+    trip_affine a = map_of(path);
+    assert_map(&a, (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 2, 0, 0 }, { 0, 0, 3, 0 } });
+    path = write_with_header("trailing.nrrd",
+                             "NRRD0004\ntype: uint16\ndimension: 5\nsizes: 5 4 7 1 1\n"
+                             "endian: little\nencoding: raw\nspacings: 4 5 6 nan nan\n\n");
+    assert_holds_sample(path, NULL, TRIP_U16);
+    a = map_of(path);
+    assert_map(&a, (const double[3][4]){ { 4, 0, 0, 0 }, { 0, 5, 0, 0 }, { 0, 0, 6, 0 } });
+}
+
+static void what_is_no_scalar_volume_is_refused(void **state)
+{
+    (void)state;
+    assert_refused(write_with_header("rgb.nrrd",
+                                     "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 5 4 7\n"
+                                     "encoding: raw\nkinds: RGB-color domain domain domain\n\n"),
+                   "only scalar volumes");
+    assert_refused(write_with_lines("vector.nrrd", "kinds: 3-vector domain domain\n"),
+                   "axis 0 is of kind \"3-vector\"");
+    assert_refused(write_with_lines("none.nrrd", "space directions: none (1,0,0) (0,1,0)\n"),
+                   "axis 0 has no direction");
+    assert_refused(write_with_header("flat.nrrd", "NRRD0004\ntype: uint8\ndimension: 2\n"
+                                                  "sizes: 5 4\nencoding: raw\n\n"),
+                   "three axes");
+    assert_refused(write_with_header("block.nrrd", "NRRD0004\ntype: block\nblock size: 3\n"
+                                                   "dimension: 3\nsizes: 5 4 7\nencoding: raw\n\n"),
+                   "line 2: type \"block\"");
+}
+
+static void wrong_fields_are_refused_with_their_line(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *line, *report;
+    } wrong[] = {
+        { "spacings: 1 2\n", "line 8: \"spacings\" must be 3" },
+        { "spacings: 1 2 x\n", "line 8: \"spacings\" must be 3" },
+        { "spacings: 0 1 1\n", "singular" },
+        { "spacings: inf 1 1\n", "singular or not finite" },
+        { "space directions: (1,0,0) (0,1,0)\n", "line 8: \"space directions\"" },
+        { "space directions: (1,0) (0,1,0) (0,0,1)\n", "line 8: \"space directions\"" },
+        { "space directions: (1,0,0 (0,1,0) (0,0,1)\n", "line 8: \"space directions\"" },
+        { "space directions: (1,0,0) (2,0,0) (0,0,1)\n", "singular" },
+        { "space directions: (nan,0,0) (0,1,0) (0,0,1)\n", "singular or not finite" },
+        { "space origin: (1,2)\n", "line 8: \"space origin\"" },
+        { "space origin: (1,2,3) 4\n", "line 8: \"space origin\"" },
+        { "sizes: 5 4 7\n", "line 8: \"sizes\" is given twice" },
+        { "line skip: -1\n", "line 8: \"line skip\"" },
+        { "line skip: 1000\n", "lines to skip" },
+        { "byte skip: -2\n", "line 8: \"byte skip\"" },
+        { "byte skip: 1\n", "are promised" },
+        { "byte skip: 9223372036854775807\n", "beyond its end" },
+        { "no colon\n", "line 8: \"no colon\" is neither" },
+        { "data file:\n", "line 8: \"data file\" is empty" },
+        { "data file: nowhere.raw\n", "nowhere.raw: cannot open: No such file" },
+        { "data file: %n%n 1 7 1\n", "line 8: \"data file\" with a %" },
+        { "data file: %d%s 1 7 1\n", "line 8: \"data file\" with a %" },
+        { "data file: %99d 1 7 1\n", "line 8: \"data file\" with a %" },
+        { "data file: a%d 1 7 0\n", "line 8: \"data file\" with a %" },
+        { "data file: a%d 1 7\n", "line 8: \"data file\" with a %" },
+        { "data file: a%d 7 1 1\n", "counts no files" },
+        { "data file: a%d 1 9 1\n", "cannot be shared out evenly to 9" },
+        { "data file: a%d 1 2000000000 1\n", "more than 65536 data files" },
+        { "data file: LIST\n", "line 8: the list of data files is empty" },
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        bytes b = { .count = 0 };
+        append_header(&b, TRIP_U16, false, "raw", wrong[i].line);
+        if (!strstr(wrong[i].line, "LIST")) {
+            append_text(&b, "\n");
+            append_volume(&b, TRIP_U16, false);
+        }
+        assert_refused(write_file("wrong.nrrd", &b), wrong[i].report);
+    }
+}
+
+static void wrong_headers_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *header, *report;
+    } wrong[] = {
+        { "NRRD0009\n\n", "version 1 to 5" },
+        { "NRRD00041\n\n", "version 1 to 5" },
+        { "NRRD0004\n\n", "no \"dimension\"" },
+        { "NRRD0004\ndimension: 3\n\n", "no \"sizes\"" },
+        { "NRRD0004\ndimension: 99\nsizes: 1\n\n", "line 2: \"dimension\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4\n\n", "line 3: \"sizes\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7 2\n\n", "line 3: \"sizes\" has more" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 -4 7\n\n", "line 3: \"sizes\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 0\n\n", "line 3: \"sizes\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\n\n", "no \"type\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: string\n\n", "line 4: type \"string\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: short\n\n", "no \"endian\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: short\nendian: middle\n\n", "line 5" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\n\n", "no \"encoding\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: ascii\n\n",
+          "line 5: encoding \"ascii\" cannot be read" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: gzip\nbyte skip: -1\n\n",
+          "no meaning for compressed" },
+        { "NRRD0004\ndimension: 3\nsizes: 9999999999 9999999999 9999999999\ntype: uchar\n"
+          "encoding: raw\n\n",
+          "impossibly large" },
+        { "NRRD0004\ndimension: 3\nsizes: 99999999999999999999 1 1\ntype: uchar\nencoding: raw\n\n",
+          "are promised" },
+        { "NRRD0004\ndimension: 3\nsizes: 4000000000 1000000000 1\ntype: double\nendian: big\n"
+          "encoding: raw\n\n",
+          "impossible size" },
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+        assert_refused(write_with_header("wrong.nrrd", wrong[i].header), wrong[i].report);
+}
+
+static void an_unknown_field_is_warned_of(void **state)
+{
+    (void)state;
+    float values[VOXELS];
+    const char *path = write_with_lines("unknown.nrrd", "spacing: 1 1 2\n");
+    catch_reports();
+    assert_int_equal(read_volume(path, NULL, 2, values, VOXELS, NULL), 0);
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(reports, 1);
+    assert_non_null(strstr(reported, "line 8: unknown field \"spacing\""));
+}
+
+static void a_header_without_end_is_refused(void **state)
+{
+    (void)state;
+    size_t count = 2 << 20;
+    char *text = malloc(count);
+    assert_non_null(text);
+    memset(text, '#', count);
+    memcpy(text, "NRRD0004\n", 9);
+    assert_refused(write_bytes("endless.nrrd", text, count), "does not end within");
+    free(text);
+}
+
+static void a_file_cut_anywhere_is_refused(void **state)
+{
+    (void)state;
+    for (int compressed = 0; compressed < 2; compressed++) {
+        bytes values = { .count = 0 }, b = { .count = 0 };
+        append_volume(&values, TRIP_U16, false);
+        append_header(&b, TRIP_U16, false, compressed ? "gzip" : "raw", "spacings: 1 2 3\n\n");
+        if (compressed)
+            append_gzip(&b, &values);
+        else
+            append(&b, values.data, values.count);
+        for (size_t length = 0; length < b.count; length++)
+            assert_true(survives(write_bytes("cut.nrrd", b.data, length), NULL));
+    }
+}
+
+static void any_byte_of_the_header_may_be_wrong(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw", "space directions: (1,0,0) (0,1,0) (0,0,1)\n");
+    append_text(&b, "data file: x%d 1 7 1\n");
+    static const unsigned char other[] = { 0, '\n', ':', '9', '%', '(', 0xff };
+    for (size_t at = 0; at < b.count; at++)
+        for (size_t o = 0; o < sizeof other; o++) {
+            bytes changed = b;
+            changed.data[at] = other[o];
+            survives(write_file("changed.nrrd", &changed), NULL);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_type_is_read_in_both_byte_orders),
+        cmocka_unit_test(compressed_values_are_read),
+        cmocka_unit_test(lines_may_end_in_carriage_returns),
+        cmocka_unit_test(fields_come_in_any_order_and_keys_are_passed_over),
+        cmocka_unit_test(a_detached_header_finds_its_data_beside_it),
+        cmocka_unit_test(detached_data_may_be_compressed),
+        cmocka_unit_test(many_data_files_follow_one_another),
+        cmocka_unit_test(a_pattern_counts_its_files),
+        cmocka_unit_test(lines_and_bytes_are_skipped),
+        cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
+        cmocka_unit_test(spacings_and_directions_become_the_map),
+        cmocka_unit_test(axes_of_size_one_are_dropped),
+        cmocka_unit_test(what_is_no_scalar_volume_is_refused),
+        cmocka_unit_test(wrong_fields_are_refused_with_their_line),
+        cmocka_unit_test(wrong_headers_are_refused),
+        cmocka_unit_test(an_unknown_field_is_warned_of),
+        cmocka_unit_test(a_header_without_end_is_refused),
+        cmocka_unit_test(a_file_cut_anywhere_is_refused),
+        cmocka_unit_test(any_byte_of_the_header_may_be_wrong),
+    };
+    return cmocka_run_group_tests_name("read_nrrd", tests, make_folder, remove_folder);
+}

@@ -1,0 +1,291 @@
+#include "volume_files.h"
+
+static trip_budget *budget;
+
+static trip_volume *open_sample(trip_scalar type, const trip_volume_params *extra)
+{
+    bytes b = { .count = 0 };
+    trip_volume *v;
+    trip_volume_params p = extra ? *extra : (trip_volume_params){ 0 };
+    append_volume(&b, type, true);
+    p.raw_dims[0] = NX, p.raw_dims[1] = NY, p.raw_dims[2] = NZ;
+    p.raw_type = trip_scalar_name(type);
+    p.raw_endian = 2;
+    assert_int_equal(trip_volume_open(&v, write_file("sample.raw", &b), &p, budget), 0);
+    return v;
+}
+
+static int make_budget(void **state)
+{
+    (void)state;
+    return trip_budget_create(&budget, 1 << 20);
+}
+
+static int end_budget(void **state)
+{
+    (void)state;
+    bool all_returned = trip_budget_left_bytes(budget) == trip_budget_limit_bytes(budget);
+    trip_budget_destroy(budget);
+    return all_returned ? 0 : -1;
+}
+
+static void blocks_are_slabs_that_cover_the_volume_once(void **state)
+{
+    (void)state;
+    for (int64_t hint = 0; hint <= NZ + 3; hint++) {
+        trip_volume *v = open_sample(TRIP_U16, NULL);
+        trip_block block;
+        int64_t next = 0;
+        while (trip_volume_next(v, hint, &block) == 1) {
+            assert_int_equal(block.origin[0], 0);
+            assert_int_equal(block.origin[1], 0);
+            assert_int_equal(block.origin[2], next);
+            assert_int_equal(block.size[0], NX);
+            assert_int_equal(block.size[1], NY);
+            int64_t left = NZ - next;
+            assert_int_equal(block.size[2], hint == 0 || hint > left ? left : hint);
+            next += block.size[2];
+            trip_block_release(v, &block);
+        }
+        assert_int_equal(next, NZ);
+        assert_int_equal(trip_volume_next(v, hint, &block), 0);
+        trip_volume_close(v);
+    }
+}
+
+static int clamp(int v, int n)
+{
+    return v < 0 ? 0 : v >= n ? n - 1 : v;
+}
+
+/* The box [lo, hi) of a block against the sample's formula, edges repeated. */
+static void assert_box(const trip_volume *v, const trip_block *block, const int64_t lo[3],
+                       const int64_t size[3])
+{
+    float values[(NX + 2) * (NY + 2) * (NZ + 2)], *value = values;
+    uint8_t active[(NX + 2) * (NY + 2) * (NZ + 2)], *mark = active;
+    assert_int_equal(trip_block_decode(v, block, lo, size, values, active), 0);
+    for (int k = (int)lo[2]; k < lo[2] + size[2]; k++)
+        for (int j = (int)lo[1]; j < lo[1] + size[1]; j++)
+            for (int i = (int)lo[0]; i < lo[0] + size[0]; i++) {
+                int ci = clamp(i, NX), cj = clamp(j, NY), ck = clamp(k, NZ);
+                assert_true(*value++ == (float)sample(TRIP_I16, ci, cj, ck));
+                assert_int_equal(*mark++, ci == i && cj == j && ck == k);
+            }
+}
+
+static void every_box_decodes_with_repeated_edges(void **state)
+{
+    (void)state;
+    for (int64_t hint = 1; hint <= NZ; hint += 2) {
+        trip_volume *v = open_sample(TRIP_I16, NULL);
+        trip_block block;
+        while (trip_volume_next(v, hint, &block) == 1) {
+            int64_t first = block.origin[2] - 1, depth = block.size[2] + 2;
+            for (int64_t i = -1; i <= NX; i++)
+                for (int64_t w = 1; i + w <= NX + 1; w++)
+                    for (int64_t j = -1; j <= NY; j += 2) {
+                        assert_box(v, &block, (int64_t[3]){ i, -1, first },
+                                   (int64_t[3]){ w, NY + 2, depth });
+                        assert_box(v, &block, (int64_t[3]){ i, j, first + depth - 1 },
+                                   (int64_t[3]){ w, 1, 1 });
+                    }
+            trip_block_release(v, &block);
+        }
+        trip_volume_close(v);
+    }
+}
+
+static void a_volume_of_one_voxel_repeats_it_on_all_sides(void **state)
+{
+    (void)state;
+    trip_volume *v;
+    trip_block block;
+    float values[27];
+    uint8_t active[27];
+    const trip_volume_params p = { .raw_dims = { 1, 1, 1 } };
+    assert_int_equal(trip_volume_open(&v, write_bytes("one.raw", "*", 1), &p, budget), 0);
+    assert_int_equal(trip_volume_next(v, 4, &block), 1);
+    const int64_t lo[3] = { -1, -1, -1 }, size[3] = { 3, 3, 3 };
+    assert_int_equal(trip_block_decode(v, &block, lo, size, values, active), 0);
+    for (int i = 0; i < 27; i++) {
+        assert_true(values[i] == '*');
+        assert_int_equal(active[i], i == 13);
+    }
+    trip_block_release(v, &block);
+    trip_volume_close(v);
+}
+
+static void a_box_outside_the_block_is_refused(void **state)
+{
+    (void)state;
+    trip_volume *v = open_sample(TRIP_U8, NULL);
+    trip_block block;
+    float values[VOXELS];
+    assert_int_equal(trip_volume_next(v, 2, &block), 1);
+    catch_reports();
+    assert_int_equal(trip_block_decode(v, &block, (int64_t[3]){ 0, 0, 2 }, (int64_t[3]){ 1, 1, 2 },
+                                       values, NULL),
+                     TRIP_ERROR);
+    assert_int_equal(trip_block_decode(v, &block, (int64_t[3]){ -2, 0, 0 }, (int64_t[3]){ 1, 1, 1 },
+                                       values, NULL),
+                     TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+    trip_block_release(v, &block);
+    trip_volume_close(v);
+}
+
+static void blocks_live_until_they_are_released(void **state)
+{
+    (void)state;
+    trip_volume *v = open_sample(TRIP_I16, NULL);
+    trip_block blocks[NZ];
+    for (int k = 0; k < NZ; k++)
+        assert_int_equal(trip_volume_next(v, 1, &blocks[k]), 1);
+    for (int k = 0; k < NZ; k++) {
+        assert_box(v, &blocks[k], (int64_t[3]){ -1, -1, k - 1 }, (int64_t[3]){ NX + 2, NY + 2, 3 });
+        trip_block_release(v, &blocks[k]);
+        assert_null(blocks[k].data);
+        trip_block_release(v, &blocks[k]);
+    }
+    trip_volume_close(v);
+}
+
+static void rewinding_starts_again_even_in_mid_volume(void **state)
+{
+    (void)state;
+    trip_volume *v = open_sample(TRIP_I16, NULL);
+    for (int stop = 0; stop <= NZ; stop++) {
+        trip_block block;
+        for (int k = 0; k < stop; k++) {
+            assert_int_equal(trip_volume_next(v, 1, &block), 1);
+            assert_int_equal(block.origin[2], k);
+            assert_box(v, &block, (int64_t[3]){ 0, 0, k }, (int64_t[3]){ NX, NY, 1 });
+            trip_block_release(v, &block);
+        }
+        assert_int_equal(trip_volume_rewind(v), 0);
+    }
+    trip_volume_close(v);
+}
+
+static void slabs_come_out_of_the_budget_and_can_be_refused(void **state)
+{
+    (void)state;
+    trip_volume *v;
+    trip_block block;
+    const trip_volume_params p = { .raw_dims = { 1024, 1024, 4 } };
+    const char *path = path_of("sparse.raw");
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fclose(f), 0);
+    assert_int_equal(truncate(path, 4 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, path, &p, budget), 0);
+    catch_reports();
+    assert_int_equal(trip_volume_next(v, 1, &block), TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(reports, 1);
+    assert_non_null(strstr(reported, "--memory"));
+    trip_volume_close(v);
+}
+
+static void a_read_that_fails_in_mid_volume_stays_failed(void **state)
+{
+    (void)state;
+    trip_volume *v = open_sample(TRIP_U8, NULL);
+    trip_block block;
+    assert_int_equal(trip_volume_next(v, 2, &block), 1);
+    trip_block_release(v, &block);
+    assert_int_equal(truncate(path_of("sample.raw"), 4 * NX * NY), 0);
+    catch_reports();
+    assert_int_equal(trip_volume_next(v, 2, &block), TRIP_ERROR);
+    assert_int_equal(trip_volume_next(v, 2, &block), TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(reports, 1);
+    trip_volume_close(v);
+}
+
+static void spacing_replaces_lengths_and_keeps_directions(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    float values[VOXELS];
+    trip_volume_info info;
+    append_text(&b, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 7\nencoding: raw\n"
+                    "space: right-anterior-superior\n"
+                    "space directions: (0,3,4) (0,-8,6) (-5,0,0)\nspace origin: (1,2,3)\n\n");
+    append_volume(&b, TRIP_U8, false);
+    const trip_volume_params p = { .spacing = { 1, 2, 3 } };
+    assert_int_equal(read_volume(write_file("turned.nrrd", &b), &p, 2, values, VOXELS, &info), 0);
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 0, 0, -3, 1 }, { 0.6, -1.6, 0, 2 }, { 0.8, 1.2, 0, 3 } });
+}
+
+static void options_of_another_format_are_wrong_usage(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_text(&b, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 7\nencoding: raw\n\n");
+    append_volume(&b, TRIP_U8, false);
+    const char *nrrd = write_file("options.nrrd", &b);
+    static const trip_volume_params wrong[] = {
+        { .raw_dims = { 5, 4, 7 } }, { .raw_type = "uint8" },
+        { .raw_endian = 1 },         { .raw_offset_bytes = 1 },
+        { .grid = "density" },       { .level_set = TRIP_LEVEL_SET_FILLED },
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+        assert_refused_as(TRIP_USAGE, nrrd, &wrong[i], "is a nrrd file");
+    static const double spacings[][3] = { { 1, 0, 1 }, { 0, 0, 1 }, { -1, 1, 1 }, { NAN, 1, 1 } };
+    for (size_t i = 0; i < sizeof spacings / sizeof spacings[0]; i++) {
+        trip_volume_params p = { .spacing = { spacings[i][0], spacings[i][1], spacings[i][2] } };
+        assert_refused_as(TRIP_USAGE, nrrd, &p, "--spacing");
+    }
+}
+
+static void what_cannot_be_opened_is_named(void **state)
+{
+    (void)state;
+    assert_refused(path_of("missing.nrrd"), "missing.nrrd: cannot open: No such file");
+    assert_refused(write_bytes("empty.nrrd", "", 0), "is empty");
+    assert_refused(write_bytes("text.txt", "hello", 5), "neither its content nor its name");
+    assert_refused("/dev/null", "not a regular file");
+}
+
+/* Only a user without root's rights can be denied. */
+static void a_file_without_permission_is_named(void **state)
+{
+    (void)state;
+    if (geteuid() == 0) {
+        print_message("root may read anything\n");
+        skip();
+    }
+    const char *path = write_bytes("secret.nrrd", "NRRD0004\n", 9);
+    assert_int_equal(chmod(path, 0), 0);
+    assert_refused(path, "Permission denied");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(blocks_are_slabs_that_cover_the_volume_once, make_budget,
+                                        end_budget),
+        cmocka_unit_test_setup_teardown(every_box_decodes_with_repeated_edges, make_budget,
+                                        end_budget),
+        cmocka_unit_test_setup_teardown(a_volume_of_one_voxel_repeats_it_on_all_sides, make_budget,
+                                        end_budget),
+        cmocka_unit_test_setup_teardown(a_box_outside_the_block_is_refused, make_budget,
+                                        end_budget),
+        cmocka_unit_test_setup_teardown(blocks_live_until_they_are_released, make_budget,
+                                        end_budget),
+        cmocka_unit_test_setup_teardown(rewinding_starts_again_even_in_mid_volume, make_budget,
+                                        end_budget),
+        cmocka_unit_test_setup_teardown(slabs_come_out_of_the_budget_and_can_be_refused,
+                                        make_budget, end_budget),
+        cmocka_unit_test_setup_teardown(a_read_that_fails_in_mid_volume_stays_failed, make_budget,
+                                        end_budget),
+        cmocka_unit_test(spacing_replaces_lengths_and_keeps_directions),
+        cmocka_unit_test(options_of_another_format_are_wrong_usage),
+        cmocka_unit_test(what_cannot_be_opened_is_named),
+        cmocka_unit_test(a_file_without_permission_is_named),
+    };
+    return cmocka_run_group_tests_name("volume", tests, make_folder, remove_folder);
+}
