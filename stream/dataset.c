@@ -31,7 +31,7 @@ static int open_file(const trip_dataset *d, int folder, const char *name, int *f
     *fd = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (*fd < 0 && errno == ENOENT)
         return trip_fail(TRIP_ERROR, "open", where,
-                         "the file is missing: the data set is incomplete");
+                         "the file is missing: not a data set, or an incomplete one");
     if (*fd < 0 || fstat(*fd, &st) < 0)
         return trip_fail_errno("open", where, "cannot open");
     if (!S_ISREG(st.st_mode))

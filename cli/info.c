@@ -1,0 +1,229 @@
+/* triptych info: what is in a data set, for people or as JSON, and whether it is sound. */
+#include "commands.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "dataset.h"
+#include "options.h"
+#include "report.h"
+#include "text.h"
+
+typedef struct options {
+    const char *path;
+    bool verify, json;
+} options;
+
+static const struct argp_option option_table[] = {
+    { "verify", 'v', NULL, 0, "Read everything and check it", 0 },
+    { "json", 'j', NULL, 0, "Print JSON", 0 },
+    { 0 },
+};
+
+static error_t parse_option(int key, char *argument, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case 'v':
+        o->verify = true;
+        return 0;
+    case 'j':
+        o->json = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (o->path)
+            return trip_option_fail(argument, "one data set at a time");
+        o->path = argument;
+        return 0;
+    case ARGP_KEY_END:
+        return o->path ? 0 : trip_option_fail("NAME.trip", "no data set given");
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static double spacing(const trip_dataset *d, int axis)
+{
+    const double(*m)[4] = d->index_to_world.m;
+    return sqrt(m[0][axis] * m[0][axis] + m[1][axis] * m[1][axis] + m[2][axis] * m[2][axis]);
+}
+
+/* Every byte count below is exact in a double: files are far smaller than 2^53 bytes. */
+static cJSON *number(double value)
+{
+    char text[32];
+    return cJSON_CreateRaw(trip_text_from_double(value, text));
+}
+
+static cJSON *numbers(const double *values, int count)
+{
+    cJSON *array = cJSON_CreateArray();
+    for (int i = 0; i < count; i++)
+        cJSON_AddItemToArray(array, number(values[i]));
+    return array;
+}
+
+static void add_lists(cJSON *root, const trip_dataset *d)
+{
+    cJSON *lists = cJSON_AddObjectToObject(root, "lists");
+    for (int axis = 0; axis < 3; axis++) {
+        const char name[2] = { (char)('x' + axis), 0 };
+        cJSON *list = cJSON_AddObjectToObject(lists, name);
+        cJSON_AddItemToObject(list, "splats", number((double)d->lists[axis].splats));
+        cJSON_AddItemToObject(list, "slabs", number((double)d->lists[axis].slab_count));
+        cJSON_AddItemToObject(list, "bricks", number((double)d->lists[axis].brick_count));
+    }
+}
+
+static void add_matrix(cJSON *root, const trip_dataset *d)
+{
+    cJSON *rows = cJSON_AddArrayToObject(root, "index_to_world");
+    for (int row = 0; row < 3; row++)
+        cJSON_AddItemToArray(rows, numbers(d->index_to_world.m[row], 4));
+}
+
+static cJSON *to_json(const trip_dataset *d, bool verified)
+{
+    const trip_file_header *h = &d->header;
+    double dims[3], steps[3];
+    cJSON *root = cJSON_CreateObject();
+    for (int a = 0; a < 3; a++) {
+        dims[a] = (double)h->dims[a];
+        steps[a] = spacing(d, a);
+    }
+    cJSON_AddItemToObject(root, "format_version", number(h->version));
+    cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
+    cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
+    add_matrix(root, d);
+    cJSON_AddItemToObject(root, "value_min", number(h->value_min));
+    cJSON_AddItemToObject(root, "value_max", number(h->value_max));
+    cJSON_AddItemToObject(root, "code_lo", number(h->code_lo));
+    cJSON_AddItemToObject(root, "code_hi", number(h->code_hi));
+    cJSON_AddItemToObject(root, "gradient_scale", number(h->gradient_scale));
+    cJSON_AddItemToObject(root, "voxels", number((double)h->voxels));
+    cJSON_AddItemToObject(root, "kept", number((double)h->kept));
+    cJSON_AddItemToObject(root, "bytes", number((double)d->bytes));
+    cJSON_AddItemToObject(root, "index_bytes", number((double)h->index_bytes));
+    cJSON_AddBoolToObject(root, "normals", h->planes >> TRIP_PLANE_NORMALS & 1);
+    cJSON_AddItemToObject(root, "tile_voxels", number(1u << h->tile_log2));
+    cJSON_AddItemToObject(root, "slab_sheets", number(h->slab_sheets));
+    cJSON_AddItemToObject(root, "page_bytes", number(1u << h->page_log2));
+    if (verified)
+        cJSON_AddTrueToObject(root, "verified");
+    add_lists(root, d);
+    cJSON *source = cJSON_Parse(d->text);
+    cJSON_AddItemToObject(root, "source", source ? source : cJSON_CreateString(d->text));
+    return root;
+}
+
+static int print_json(const trip_dataset *d, bool verified)
+{
+    cJSON *root = to_json(d, verified);
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (!text)
+        return trip_fail(TRIP_ERROR, "info", d->path, "out of memory");
+    puts(text);
+    free(text);
+    return TRIP_OK;
+}
+
+static const char *shortest(double value, char *text)
+{
+    snprintf(text, 32, "%.7g", value);
+    return text;
+}
+
+static void print_range(const char *label, double lo, double hi)
+{
+    char a[32], b[32];
+    printf("%-12s %s to %s\n", label, shortest(lo, a), shortest(hi, b));
+}
+
+static void print_world(const trip_dataset *d)
+{
+    char a[32], b[32], c[32], t[32];
+    printf("%-12s %s x %s x %s\n", "spacing", shortest(spacing(d, 0), a),
+           shortest(spacing(d, 1), b), shortest(spacing(d, 2), c));
+    for (int row = 0; row < 3; row++) {
+        const double *m = d->index_to_world.m[row];
+        printf("%-12s %12s %12s %12s %12s\n", row ? "" : "to world", shortest(m[0], a),
+               shortest(m[1], b), shortest(m[2], c), shortest(m[3], t));
+    }
+}
+
+/* The top-level texts and numbers of the notes that brick left. */
+static void print_notes(const trip_dataset *d)
+{
+    cJSON *root = cJSON_Parse(d->text);
+    for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
+        if (cJSON_IsString(item) && strlen(item->valuestring) < 200 &&
+            !strchr(item->valuestring, '\n'))
+            printf("%-12s %s\n", item->string, item->valuestring);
+    cJSON_Delete(root);
+}
+
+static void print_text(const trip_dataset *d)
+{
+    const trip_file_header *h = &d->header;
+    char bytes[32], index[32];
+    double kept = h->kept ? (double)h->kept : 1, voxels = h->voxels ? (double)h->voxels : 1;
+    printf("%-12s %s (format version %u)\n", "data set", d->path, h->version);
+    printf("%-12s %llu x %llu x %llu\n", "grid", (unsigned long long)h->dims[0],
+           (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
+    print_world(d);
+    print_range("values", h->value_min, h->value_max);
+    print_range("stored as", h->code_lo, h->code_hi);
+    printf("%-12s %llu\n", "voxels", (unsigned long long)h->voxels);
+    printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)h->kept,
+           100.0 * (double)h->kept / voxels);
+    printf("%-12s %s, %.3g per kept voxel; index %s (%.2g %%)\n", "size",
+           trip_format_bytes(d->bytes, bytes), (double)d->bytes / kept,
+           trip_format_bytes(h->index_bytes, index),
+           100.0 * (double)h->index_bytes / (double)d->bytes);
+    printf("%-12s voxels%s\n", "planes", h->planes >> TRIP_PLANE_NORMALS & 1 ? ", normals" : "");
+    printf("%-12s tiles of %u x %u voxels over %u sheets; x %llu, y %llu, z %llu\n", "bricks",
+           1u << h->tile_log2, 1u << h->tile_log2, h->slab_sheets,
+           (unsigned long long)d->lists[0].brick_count, (unsigned long long)d->lists[1].brick_count,
+           (unsigned long long)d->lists[2].brick_count);
+    print_notes(d);
+}
+
+static int show(const options *o, trip_budget *budget)
+{
+    trip_dataset *d;
+    int status = trip_dataset_open(&d, o->path, budget);
+    if (status == TRIP_OK && o->verify)
+        status = trip_dataset_verify(d, budget);
+    if (status == TRIP_OK && o->json)
+        status = print_json(d, o->verify);
+    else if (status == TRIP_OK)
+        print_text(d);
+    if (status == TRIP_OK && o->verify && !o->json)
+        printf("%-12s every page and record is as it was written\n", "verified");
+    trip_dataset_close(d);
+    return status;
+}
+
+int trip_command_info(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse_option,
+        .args_doc = "NAME.trip",
+        .doc = "Show what is in a data set: grid, values, sizes, where it came from.",
+    };
+    options o = { 0 };
+    trip_budget *budget;
+    int status = trip_options_parse(&argp, argc, argv, &o);
+    if (status == 0)
+        status = trip_budget_create(&budget, 0);
+    if (status < 0)
+        return trip_exit_status(status);
+    status = show(&o, budget);
+    trip_budget_destroy(budget);
+    return trip_exit_status(status);
+}
