@@ -1,0 +1,233 @@
+/* OpenVDB grids as a block reader. Opening reads the grid's tree and passes over its leaves once,
+ * to note where they are and to check them; values are read when a block is decoded and not kept.
+ *
+ * Memory: per leaf (up to 512 voxels) about 130 bytes, per 128-voxel cube in use 32 KiB, per
+ * 4096-voxel cube 256 KiB, 16 bytes a block, all counted against the budget before they are
+ * allocated; and per decoding thread a leaf and a 16 KiB buffer. */
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <string>
+
+#include <strings.h>
+
+#include <openvdb/openvdb.h>
+
+#include "report.h"
+#include "vdb_grid.h"
+#include "volume_reader.h"
+
+namespace
+{
+
+struct State {
+    State(const char *file) : path(file), fd(file)
+    {
+    }
+    std::string path;
+    trip_vdb_fd fd;
+    std::unique_ptr<trip_vdb_grid> grid;
+    size_t next = 0; /* box */
+};
+
+/* Runs body(); no exception gets past, each becomes one line. */
+template <typename Body> int guard(const std::string &path, const Body &body)
+try {
+    return body();
+} catch (const trip_vdb_error &e) {
+    return trip_fail(e.status, "read", path.c_str(), "%s", e.what());
+} catch (const std::bad_alloc &) {
+    return trip_fail(TRIP_ERROR, "read", path.c_str(), "no memory for its tree");
+} catch (const std::exception &e) {
+    return trip_fail(TRIP_ERROR, "read", path.c_str(), "is corrupt or unsupported: %s", e.what());
+}
+
+bool probe(const char *path, const unsigned char *head, size_t bytes, const trip_volume_params *)
+{
+    size_t length = std::strlen(path);
+    return (bytes >= 4 && std::memcmp(head, " BDV", 4) == 0) ||
+           (length > 4 && bytes > 0 && strcasecmp(path + length - 4, ".vdb") == 0);
+}
+
+std::string list_grids(const trip_vdb_contents &contents)
+{
+    std::string list;
+    for (size_t i = 0; i < contents.grids.size() && i < 20; i++)
+        list += (i ? ", " : "") + contents.grids[i].name + " (" + contents.grids[i].type + ")";
+    return list + (contents.grids.size() > 20 ? ", ..." : "");
+}
+
+const trip_vdb_entry &choose_grid(const trip_vdb_contents &contents, const char *wanted)
+{
+    for (const trip_vdb_entry &entry : contents.grids) {
+        if (wanted ? entry.name != wanted : !trip_vdb_is_scalar(entry))
+            continue;
+        if (!trip_vdb_is_scalar(entry))
+            throw trip_vdb_error("grid \"" + entry.name + "\" holds " + entry.type +
+                                 ", which is no scalar; it holds: " + list_grids(contents));
+        return entry;
+    }
+    if (wanted)
+        throw trip_vdb_error(std::string("has no grid \"") + wanted +
+                                 "\"; it holds: " + list_grids(contents) +
+                                 (contents.has_offsets ? "" : " and, as a stream, perhaps more"),
+                             TRIP_USAGE);
+    throw trip_vdb_error("has no scalar grid; it holds: " + list_grids(contents));
+}
+
+openvdb::math::Transform::Ptr read_transform(trip_vdb_stream &is)
+{
+    int64_t start = is.tellg();
+    is.get_string(1024); /* its name, whose length the library would trust */
+    is.seekg(start);
+    auto transform = openvdb::math::Transform::createLinearTransform();
+    transform->read(is);
+    if (!transform->isLinear())
+        throw trip_vdb_error("its voxels lie in a frustum; only affine maps are drawn (resample "
+                             "the grid)");
+    return transform;
+}
+
+/* From (i, j, k), counted from `lo`, to world space. OpenVDB's matrices act on row vectors. */
+trip_affine index_to_world(const openvdb::math::Transform &transform, const int32_t lo[3])
+{
+    openvdb::Mat4d m = transform.baseMap()->getAffineMap()->getMat4();
+    trip_affine a = {};
+    for (int r = 0; r < 3; r++) {
+        a.m[r][3] = m(3, r);
+        for (int c = 0; c < 3; c++) {
+            a.m[r][c] = m(c, r);
+            a.m[r][3] += m(c, r) * lo[c];
+        }
+    }
+    return a;
+}
+
+trip_vdb_conversion choose_conversion(const trip_vdb_head &head, const trip_vdb_entry &entry,
+                                      trip_level_set_mode wanted,
+                                      const openvdb::math::Transform &transform)
+{
+    bool real = entry.type == "float" || entry.type == "double";
+    bool is_set = head.grid_class == "level set";
+    const std::string grid = "grid \"" + entry.name + "\" ";
+    if (is_set && wanted == TRIP_LEVEL_SET_REFUSE)
+        throw trip_vdb_error(grid + "is a level set, distances rather than densities: choose "
+                                    "--level-set filled or --level-set band",
+                             TRIP_USAGE);
+    if (wanted != TRIP_LEVEL_SET_REFUSE && (head.grid_class == "fog volume" || !real))
+        throw trip_vdb_error(grid + "is no level set, so that --level-set does not apply",
+                             TRIP_USAGE);
+    double volume = std::fabs(transform.baseMap()->getAffineMap()->determinant());
+    if (wanted == TRIP_LEVEL_SET_FILLED && !(volume > 0 && std::isfinite(volume)))
+        throw trip_vdb_error(grid + "has a map from voxels to space that is singular");
+    return { wanted, std::cbrt(volume) };
+}
+
+/* A grid that shares another's tree has only its own metadata and transform. */
+void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const trip_vdb_entry &entry,
+               trip_vdb_head &head)
+{
+    if (entry.parent.empty())
+        return;
+    for (const trip_vdb_entry &other : contents.grids)
+        if (other.unique_name == entry.parent && other.parent.empty() && other.type == entry.type &&
+            other.half == entry.half) {
+            head.compression = trip_vdb_read_head(is, contents, other).compression;
+            read_transform(is);
+            return;
+        }
+    throw trip_vdb_error("is corrupt: grid \"" + entry.name +
+                         "\" shares the tree of a grid that is not there");
+}
+
+void fill_info(const State &state, const trip_vdb_entry &entry,
+               const openvdb::math::Transform &transform, trip_volume_info *info)
+{
+    const trip_vdb_grid &grid = *state.grid;
+    for (int a = 0; a < 3; a++)
+        info->dims[a] = (int64_t)grid.hi[a] - grid.lo[a] + 1;
+    info->index_to_world = index_to_world(transform, grid.lo);
+    info->type = grid.type;
+    info->slope = 1;
+    info->inter = 0;
+    info->sparse = true;
+    info->background = grid.background;
+    info->format = "openvdb";
+    snprintf(info->name, sizeof info->name, "%s", entry.name.c_str());
+}
+
+int open_vdb(const char *path, const trip_volume_params *params, trip_budget *budget,
+             trip_volume_info *info, void **out)
+{
+    return guard(path, [&] {
+        static const bool initialized = (openvdb::initialize(), true);
+        (void)initialized;
+        auto state = std::make_unique<State>(path);
+        const trip_vdb_contents contents = trip_vdb_read_contents(state->fd);
+        const trip_vdb_entry &entry = choose_grid(contents, params->grid);
+        trip_vdb_stream is(state->fd);
+        openvdb::io::setVersion(is, { contents.library[0], contents.library[1] }, contents.version);
+        trip_vdb_head head = trip_vdb_read_head(is, contents, entry);
+        auto transform = read_transform(is);
+        auto conversion = choose_conversion(head, entry, params->level_set, *transform);
+        seek_tree(is, contents, entry, head);
+        state->grid = trip_vdb_load(state->fd, is, contents, head, entry, conversion, budget);
+        fill_info(*state, entry, *transform, info);
+        *out = state.release();
+        return 0;
+    });
+}
+
+void close_vdb(void *state)
+{
+    delete (State *)state;
+}
+
+int rewind_vdb(void *state)
+{
+    ((State *)state)->next = 0;
+    return 0;
+}
+
+int next_box(void *opaque, trip_block *block)
+{
+    State &state = *(State *)opaque;
+    const trip_vdb_grid &grid = *state.grid;
+    if (state.next == grid.boxes.size())
+        return 0;
+    const trip_vdb_box &box = grid.boxes[state.next++];
+    for (int a = 0; a < 3; a++) {
+        block->origin[a] = (int64_t)box.lo[a] - grid.lo[a];
+        block->size[a] = box.size[a];
+    }
+    block->data = &state; /* boxes hold nothing of their own */
+    return 1;
+}
+
+int decode_box(const void *opaque, const trip_block *block, const int64_t lo[3],
+               const int64_t size[3], float *values, uint8_t *active)
+{
+    const State &state = *(const State *)opaque;
+    const trip_vdb_grid &grid = *state.grid;
+    return guard(state.path, [&] {
+        int64_t at[3];
+        for (int a = 0; a < 3; a++) {
+            if (lo[a] < block->origin[a] - 1 || size[a] < 1 ||
+                lo[a] + size[a] > block->origin[a] + block->size[a] + 1)
+                throw trip_vdb_error("asked for voxels outside the block");
+            at[a] = lo[a] + grid.lo[a];
+        }
+        grid.decode(at, size, values, active);
+        return 0;
+    });
+}
+
+void release_box(void *, trip_block *)
+{
+}
+
+} // namespace
+
+const trip_volume_reader trip_read_vdb = { "openvdb", probe,   open_vdb, close_vdb,  rewind_vdb,
+                                           nullptr,   nullptr, next_box, decode_box, release_box };

@@ -1,0 +1,68 @@
+/* One scalar grid of an OpenVDB file as boxes of existing voxels. In memory are the grid's tree
+ * without its leaves' values, where each leaf lies in the file, and the boxes; the values of a box
+ * are read from the file when it is decoded, so that decoding keeps nothing. Everything here
+ * throws; only read_vdb.cpp includes it. */
+#ifndef TRIP_VDB_GRID_H
+#define TRIP_VDB_GRID_H
+
+#include <memory>
+#include <vector>
+
+#include "vdb_file.h"
+#include "volume.h"
+
+/* A box of at most 64 voxels a side around existing voxels, in the grid's own coordinates. It lies
+ * in one cell of a grid of 64-voxel cells, so boxes do not overlap. */
+struct trip_vdb_box {
+    int32_t lo[3];
+    uint8_t size[3];
+};
+
+/* A part of the budget that the library's memory is counted against: taken but never touched. */
+class trip_vdb_reservation
+{
+  public:
+    trip_vdb_reservation() = default;
+    trip_vdb_reservation(const trip_vdb_reservation &) = delete;
+    trip_vdb_reservation &operator=(const trip_vdb_reservation &) = delete;
+    ~trip_vdb_reservation();
+    /* Throws, naming what for, when it does not fit. Once only. */
+    void take(trip_budget *budget, uint64_t bytes, const char *what);
+
+  private:
+    trip_budget *budget_ = nullptr;
+    void *memory_ = nullptr;
+    size_t bytes_ = 0;
+};
+
+/* How stored values become densities. */
+struct trip_vdb_conversion {
+    trip_level_set_mode mode; /* TRIP_LEVEL_SET_REFUSE: as they are */
+    double voxel_world;       /* a voxel's side; distances are in world units */
+};
+
+class trip_vdb_grid
+{
+  public:
+    virtual ~trip_vdb_grid() = default;
+    /* Values and existence of a box in the grid's coordinates; any thread. */
+    virtual void decode(const int64_t lo[3], const int64_t size[3], float *values,
+                        uint8_t *active) const = 0;
+
+    trip_scalar type;                /* as stored */
+    double background = 0;           /* after conversion */
+    int32_t lo[3], hi[3];            /* of all existing voxels, inclusive */
+    std::vector<trip_vdb_box> boxes; /* by their corner's k, then j, then i */
+};
+
+/* Whether a grid of this type ("float", "vec3s", ...) can be loaded. */
+bool trip_vdb_is_scalar(const trip_vdb_entry &entry);
+
+/* Loads the tree of `entry`, at which `is` stands, from `fd`, which must outlive the grid. */
+std::unique_ptr<trip_vdb_grid> trip_vdb_load(const trip_vdb_fd &fd, trip_vdb_stream &is,
+                                             const trip_vdb_contents &contents,
+                                             const trip_vdb_head &head, const trip_vdb_entry &entry,
+                                             const trip_vdb_conversion &conversion,
+                                             trip_budget *budget);
+
+#endif

@@ -1,0 +1,151 @@
+/* A dry run over a grid's tree in its file, before the library builds it in memory: the library
+ * writes beyond its buffers when a chunk claims another size than it should have, and would
+ * allocate the nodes of a tree of any size. The same functions of the library do the reading, told
+ * to pass over the values. Only vdb_grid.cpp includes this. */
+#ifndef TRIP_VDB_TREE_CHECK_H
+#define TRIP_VDB_TREE_CHECK_H
+
+#include <cstdlib>
+#include <set>
+
+#include <openvdb/openvdb.h>
+#include <openvdb/io/Compression.h>
+
+#include "vdb_file.h"
+
+/* Coordinates beyond this would make a box span more than 32 bits. */
+constexpr int32_t trip_vdb_far = 1 << 30;
+
+template <typename TreeT> class trip_vdb_tree_check
+{
+  public:
+    /* `is` stands at the tree and knows the file's version and compression; it is moved past the
+     * tree's nodes, to the leaves' values. */
+    trip_vdb_tree_check(trip_vdb_stream &is, bool as_half) : is_(is), half_(as_half)
+    {
+        if (is_.get_value<int32_t>() != 1)
+            throw trip_vdb_error("has several buffers a leaf, which is an obsolete form");
+        check_root();
+    }
+
+    /* Memory that the tree will take without its leaves' values. */
+    uint64_t bytes = 0;
+    uint64_t leaves = 0;
+
+  private:
+    using ValueT = typename TreeT::ValueType;
+    using LeafT = typename TreeT::LeafNodeType;
+    using TopT = typename TreeT::RootNodeType::ChildNodeType;
+    static constexpr uint64_t heap_bytes = 16; /* around every node */
+
+    void check_root()
+    {
+        check_value();
+        uint32_t tiles = is_.get_value<uint32_t>(), children = is_.get_value<uint32_t>();
+        for (uint32_t i = 0; i < tiles; i++) {
+            check_origin();
+            check_value();
+            if ((unsigned char)is_.get_value<char>() > 1)
+                throw trip_vdb_error("is corrupt: a tile is neither active nor inactive");
+        }
+        for (uint32_t i = 0; i < children; i++) {
+            check_origin();
+            check_node<TopT>();
+        }
+    }
+
+    void check_value()
+    {
+        if constexpr (std::is_same<ValueT, bool>::value) {
+            if ((unsigned char)is_.get_value<char>() > 1)
+                throw trip_vdb_error("is corrupt: a truth value is neither true nor false");
+        } else {
+            is_.get_value<ValueT>();
+        }
+    }
+
+    void check_origin()
+    {
+        openvdb::Coord origin;
+        for (int a = 0; a < 3; a++) {
+            origin[a] = is_.get_value<int32_t>();
+            if (origin[a] < -trip_vdb_far || origin[a] >= trip_vdb_far)
+                throw trip_vdb_error("reaches voxel coordinate " + std::to_string(origin[a]) +
+                                     "; those beyond 2^30 are not drawn");
+            if (origin[a] % (int32_t)TopT::DIM != 0)
+                throw trip_vdb_error("is corrupt: a node begins at coordinate " +
+                                     std::to_string(origin[a]));
+        }
+        if (!origins_.insert(origin).second)
+            throw trip_vdb_error("is corrupt: a part of the tree is there twice");
+        bytes += sizeof(openvdb::Coord) + 64; /* an entry of the root's table */
+    }
+
+    template <typename NodeT> void check_node()
+    {
+        bytes += sizeof(NodeT) + heap_bytes;
+        if constexpr (NodeT::LEVEL == 0) {
+            leaves++;
+            is_.skip(NodeT::SIZE / 8); /* its mask */
+        } else {
+            typename NodeT::NodeMaskType children, values;
+            children.load(is_);
+            values.load(is_);
+            bool old = openvdb::io::getFormatVersion(is_) <
+                       openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
+            check_values(old ? children.countOff() : (openvdb::Index)NodeT::NUM_VALUES, values);
+            for (auto child = children.beginOn(); child; ++child)
+                check_node<typename NodeT::ChildNodeType>();
+        }
+    }
+
+  public:
+    /* Passes over `count` stored values; a chunk's size must fit them. */
+    template <typename MaskT>
+    static void pass_values(trip_vdb_stream &is, openvdb::Index count, const MaskT &mask,
+                            bool as_half)
+    {
+        openvdb::io::readCompressedValues<ValueT>(is, nullptr, count, mask, as_half);
+        check_chunk(is, count * sizeof(ValueT));
+    }
+
+    /* After a chunk of at most `bytes` uncompressed bytes was passed over. */
+    static void check_chunk(trip_vdb_stream &is, uint64_t bytes)
+    {
+        namespace io = openvdb::io;
+        uint32_t compression = io::getDataCompression(is);
+        int64_t stored = is.chunk_bytes(), start = is.chunk_start(), end = is.tellg();
+        if (!(compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)) || stored <= 0 ||
+            start + stored != end)
+            return;
+        bool fits = (uint64_t)stored <= 2 * bytes + 1024;
+        if (fits && compression & io::COMPRESS_BLOSC)
+            fits = is_blosc_chunk(is, start, stored);
+        if (!fits)
+            throw trip_vdb_error("is corrupt: impossible compressed values at byte " +
+                                 std::to_string(start));
+    }
+
+  private:
+    /* Blosc trusts the sizes in its own header. */
+    static bool is_blosc_chunk(trip_vdb_stream &is, int64_t start, int64_t stored)
+    {
+        if (stored < 16)
+            return false;
+        is.seekg(start + 12);
+        bool same = is.get_value<uint32_t>() == (uint64_t)stored;
+        is.seekg(start + stored);
+        return same;
+    }
+
+    template <typename MaskT> void check_values(openvdb::Index count, const MaskT &mask)
+    {
+        pass_values(is_, count, mask, half_);
+    }
+
+    trip_vdb_stream &is_;
+    bool half_;
+    std::set<openvdb::Coord> origins_;
+};
+
+#endif
