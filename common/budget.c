@@ -126,6 +126,16 @@ void trip_budget_release(trip_budget *b, void *memory, size_t bytes)
     atomic_fetch_sub_explicit(&b->used_bytes, round_up(bytes), memory_order_relaxed);
 }
 
+bool trip_budget_charge(trip_budget *b, uint64_t bytes)
+{
+    return reserve(b, bytes);
+}
+
+void trip_budget_discharge(trip_budget *b, uint64_t bytes)
+{
+    atomic_fetch_sub_explicit(&b->used_bytes, bytes, memory_order_relaxed);
+}
+
 uint64_t trip_memory_available_bytes(void)
 {
     uint64_t physical = trip_proc_field_bytes("/proc/meminfo", "MemTotal");

@@ -3,6 +3,7 @@
 #ifndef TRIP_BUDGET_H
 #define TRIP_BUDGET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -24,6 +25,10 @@ uint64_t trip_budget_peak_bytes(const trip_budget *b);
  * or the system refuses. `bytes` must be given again on release. */
 void *trip_budget_take(trip_budget *b, size_t bytes);
 void trip_budget_release(trip_budget *b, void *memory, size_t bytes);
+
+/* Counts bytes that others hold for us, such as a GL driver; false when they do not fit. */
+bool trip_budget_charge(trip_budget *b, uint64_t bytes);
+void trip_budget_discharge(trip_budget *b, uint64_t bytes);
 
 /* What this process may use: physical memory, or the cgroup's (v1 or v2) limit where smaller. */
 uint64_t trip_memory_available_bytes(void);

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -34,18 +35,28 @@ static void put(line *l, const char *bytes, size_t count)
     l->length += count;
 }
 
-/* Control characters, C1 (two bytes in UTF-8) included, become \n, \t or \xNN. */
+/* Control characters, those of two bytes in UTF-8 (C2 80 to C2 9F) included. */
+static bool is_control(const unsigned char *p, const unsigned char *start)
+{
+    if (*p < 0x20 || *p == 0x7f)
+        return true;
+    if (*p == 0xc2)
+        return p[1] >= 0x80 && p[1] < 0xa0;
+    return p > start && p[-1] == 0xc2 && *p >= 0x80 && *p < 0xa0;
+}
+
+/* Control characters become \n, \t or \xNN. */
 static void put_visible(line *l, const char *text)
 {
-    for (const unsigned char *p = (const unsigned char *)text; *p; p++) {
+    const unsigned char *start = (const unsigned char *)text;
+    for (const unsigned char *p = start; *p; p++) {
         char escape[5];
-        if (*p == '\n' || *p == '\t') {
+        if (*p == '\n' || *p == '\t')
             put(l, *p == '\n' ? "\\n" : "\\t", 2);
-        } else if (*p < 0x20 || *p == 0x7f || (*p == 0xc2 && p[1] >= 0x80 && p[1] < 0xa0)) {
+        else if (is_control(p, start))
             put(l, escape, (size_t)snprintf(escape, sizeof escape, "\\x%02x", *p));
-        } else {
+        else
             put(l, (const char *)p, 1);
-        }
     }
 }
 

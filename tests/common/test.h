@@ -1,0 +1,70 @@
+/* What the tests of this folder share: cmocka with its headers, comparing within a tolerance, a
+ * repeatable random sequence, and catching reports instead of printing them. */
+#ifndef TEST_H
+#define TEST_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "report.h"
+
+#define assert_close(actual, expected, tolerance)                                                  \
+    test_close((actual), (expected), (tolerance), #actual, __FILE__, __LINE__)
+
+static inline void test_close(double actual, double expected, double tolerance, const char *what,
+                              const char *file, int line)
+{
+    if (fabs(actual - expected) <= tolerance)
+        return;
+    print_error("%s is %.17g, expected %.17g within %g\n", what, actual, expected, tolerance);
+    _fail(file, line);
+}
+
+/* Uniform in [0, 1), the same sequence in every run (a 64-bit linear congruential generator). */
+static inline double test_random(void)
+{
+    static uint64_t seed = 1;
+    seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(seed >> 11) * 0x1p-53;
+}
+
+static int test_reports;
+static char test_last_report[4200];
+
+static inline void test_catch(const char *line, void *user)
+{
+    (void)user;
+    test_reports++;
+    snprintf(test_last_report, sizeof test_last_report, "%s", line);
+}
+
+/* Reports are kept from here on instead of printed. */
+static inline void test_catch_reports(void)
+{
+    test_reports = 0;
+    test_last_report[0] = 0;
+    trip_report_redirect(test_catch, NULL);
+}
+
+/* Exactly one report since test_catch_reports(), with `part` in it; further ones are printed. */
+#define assert_one_report(part) test_one_report((part), __FILE__, __LINE__)
+
+static inline void test_one_report(const char *part, const char *file, int line)
+{
+    trip_report_redirect(NULL, NULL);
+    if (test_reports == 1 && strstr(test_last_report, part))
+        return;
+    print_error("%d reports, expected one with `%s`; the last: %s\n", test_reports, part,
+                test_last_report);
+    _fail(file, line);
+}
+
+#endif

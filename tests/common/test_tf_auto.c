@@ -1,0 +1,206 @@
+#include "test.h"
+
+#include "tf_internal.h"
+
+static trip_histogram h;
+
+static trip_tf *automatic(void)
+{
+    trip_tf *tf;
+    h.total = 0;
+    for (int i = 0; i < 1024; i++)
+        h.total += h.counts[i];
+    assert_int_equal(trip_tf_from_histogram(&tf, &h), TRIP_OK);
+    assert_false(trip_tf_is_normalised(tf));
+    return tf;
+}
+
+static void start(double value_min, double value_max)
+{
+    memset(&h, 0, sizeof h);
+    h.value_min = value_min;
+    h.value_max = value_max;
+}
+
+static void put(double value, double count)
+{
+    int bin = (int)((value - h.value_min) / (h.value_max - h.value_min) * 1024);
+    h.counts[bin < 1024 ? bin : 1023] += (uint64_t)count;
+}
+
+/* `count` voxels spread over the values lo, lo + 1, ... hi like a normal distribution. */
+static void put_peak(double lo, double hi, double mean, double deviation, double count)
+{
+    for (double v = lo; v <= hi; v++) {
+        double x = (v - mean) / deviation;
+        put(v, count / (deviation * 2.5066) * exp(-x * x / 2));
+    }
+}
+
+static double opacity(const trip_tf *tf, double value)
+{
+    return trip_tf_evaluate(tf, value).opacity;
+}
+
+static double luminance(trip_rgba c)
+{
+    return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
+}
+
+static void one_value_is_a_solid(void **state)
+{
+    (void)state;
+    start(7, 7);
+    h.counts[0] = 1000;
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, 7) > 0.1);
+    trip_tf_destroy(tf);
+}
+
+static void nothing_at_all_still_makes_a_function(void **state)
+{
+    (void)state;
+    start(0, 0);
+    trip_tf_destroy(automatic());
+}
+
+static void two_values_show_the_upper_one_only(void **state)
+{
+    (void)state;
+    start(0, 128);
+    put(0, 77);
+    put(128, 23);
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, 0) == 0);
+    assert_true(opacity(tf, 128) > 0.5);
+    trip_tf_destroy(tf);
+}
+
+static void angiogram_shows_all_but_its_zeros(void **state)
+{
+    (void)state;
+    start(0, 255);
+    put(0, 16.6e6);
+    for (int v = 1; v < 256; v++)
+        put(v, 20000.0 / v + 300);
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, 0) == 0);
+    assert_false(trip_tf_visible_in(tf, 0, 1));
+    assert_true(opacity(tf, 60) > 0.01);
+    assert_true(opacity(tf, 255) > 0.5);
+    trip_tf_destroy(tf);
+}
+
+static void tomogram_hides_air_veils_tissue_and_shows_bone(void **state)
+{
+    (void)state;
+    start(-1000, 2000);
+    put_peak(-1000, 2000, -900, 40, 6e6);
+    put_peak(-1000, 2000, 40, 30, 3e6);
+    put_peak(-1000, 2000, 900, 200, 3e5);
+    trip_tf *tf = automatic();
+    assert_false(trip_tf_visible_in(tf, -1000, -850));
+    assert_in_range(1000 * opacity(tf, 40), 1, 150);
+    assert_true(opacity(tf, 900) > 0.3);
+    assert_true(opacity(tf, 900) > 5 * opacity(tf, 40));
+    trip_tf_destroy(tf);
+}
+
+static void small_values_below_the_background_do_not_count_as_it(void **state)
+{
+    (void)state;
+    start(0, 1300);
+    put_peak(0, 1300, 370, 25, 1e6);
+    put_peak(0, 1300, 850, 30, 4e5);
+    for (int v = 0; v < 300; v++)
+        put(v, 20);
+    trip_tf *tf = automatic();
+    assert_false(trip_tf_visible_in(tf, 0, 390));
+    assert_true(opacity(tf, 880) > 0.05);
+    trip_tf_destroy(tf);
+}
+
+static void fog_with_a_long_tail_shows_its_dense_part(void **state)
+{
+    (void)state;
+    start(1e-5, 5.7);
+    for (int i = 0; i < 5700; i++)
+        put(i / 1000.0, 2e5 * exp(-i / 300.0));
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, 1e-5) == 0);
+    assert_true(opacity(tf, 1) > 0.02);
+    assert_true(opacity(tf, 3) > 0.3);
+    trip_tf_destroy(tf);
+}
+
+static void bright_background_is_turned_round(void **state)
+{
+    (void)state;
+    start(0, 255);
+    put_peak(0, 255, 80, 15, 2e5);
+    put(255, 5e6);
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, 255) == 0);
+    assert_true(opacity(tf, 60) > 0.1);
+    assert_true(opacity(tf, 60) > opacity(tf, 100));
+    trip_tf_destroy(tf);
+}
+
+static void background_rounded_up_to_the_next_code_stays_invisible(void **state)
+{
+    (void)state;
+    start(0, 1);
+    double background = nextafter(16.0 / 1024, 0); /* the very end of a group of bins */
+    put(background, 9e5);
+    put(0, 2);
+    for (int i = 100; i < 1000; i++)
+        put(i / 1000.0, 100);
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, ceil(background * 65535) / 65535) == 0);
+    trip_tf_destroy(tf);
+}
+
+static void opacity_and_luminance_rise_with_the_value(void **state)
+{
+    (void)state;
+    start(0, 255);
+    put_peak(0, 255, 10, 5, 1e6);
+    put_peak(0, 255, 120, 20, 3e5);
+    put_peak(0, 255, 220, 10, 5e4);
+    trip_tf *tf = automatic();
+    assert_true(tf->count > 10);
+    for (size_t i = 1; i < tf->count; i++) {
+        assert_true(tf->points[i].value > tf->points[i - 1].value);
+        assert_true(tf->points[i].colour.opacity >= tf->points[i - 1].colour.opacity);
+        assert_true(luminance(tf->points[i].colour) > luminance(tf->points[i - 1].colour));
+    }
+    trip_tf_destroy(tf);
+}
+
+static void range_that_is_not_finite_is_refused(void **state)
+{
+    (void)state;
+    trip_tf *tf;
+    start(NAN, 5);
+    test_catch_reports();
+    assert_int_equal(trip_tf_from_histogram(&tf, &h), TRIP_ERROR);
+    assert_one_report("not a finite number");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(one_value_is_a_solid),
+        cmocka_unit_test(nothing_at_all_still_makes_a_function),
+        cmocka_unit_test(two_values_show_the_upper_one_only),
+        cmocka_unit_test(angiogram_shows_all_but_its_zeros),
+        cmocka_unit_test(tomogram_hides_air_veils_tissue_and_shows_bone),
+        cmocka_unit_test(small_values_below_the_background_do_not_count_as_it),
+        cmocka_unit_test(fog_with_a_long_tail_shows_its_dense_part),
+        cmocka_unit_test(bright_background_is_turned_round),
+        cmocka_unit_test(background_rounded_up_to_the_next_code_stays_invisible),
+        cmocka_unit_test(opacity_and_luminance_rise_with_the_value),
+        cmocka_unit_test(range_that_is_not_finite_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
