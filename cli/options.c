@@ -1,6 +1,7 @@
 #include "options.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +55,7 @@ int trip_option_number(const char *option, const char *text, double lo, double h
 int trip_option_integer(const char *option, const char *text, int lo, int hi, int *out)
 {
     double number;
-    if (!trip_text_to_double(text, &number) || number != (double)(long)number)
+    if (!trip_text_to_double(text, &number) || number != floor(number))
         return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a whole number", text);
     if (number < lo || number > hi)
         return trip_fail(TRIP_USAGE, "usage", option, "%s is not between %d and %d", text, lo, hi);

@@ -122,14 +122,16 @@ static trip_vec3 box_corner(const double lo[3], const double hi[3], int corner)
                    corner & 4 ? hi[2] : lo[2]);
 }
 
-/* Unit vector from the scene to the eye. For up +z the front is the side of -y, for up +y that of
- * +z: in both +x is to the right. */
-static trip_vec3 direction_to_eye(trip_vec3 up, double azimuth_degrees)
+/* Unit vector from the scene to the eye. Without a given front it is -y for up +z, and +z for up
+ * +y: in both +x is to the right. */
+static trip_vec3 direction_to_eye(const trip_camera_framing *f, trip_vec3 up)
 {
     trip_vec3 right = fabs(up.x) < 0.9 ? trip_v3(1, 0, 0) : trip_v3(0, 1, 0);
+    if (trip_length(trip_cross(up, f->front)) > 0)
+        right = trip_cross(up, f->front);
     trip_vec3 front = trip_normalize(trip_cross(right, up));
     right = trip_cross(up, front);
-    double azimuth = (DEFAULT_AZIMUTH_DEGREES + azimuth_degrees) * (PI / 180);
+    double azimuth = (DEFAULT_AZIMUTH_DEGREES + f->azimuth_degrees) * (PI / 180);
     double elevation = DEFAULT_ELEVATION_DEGREES * (PI / 180);
     trip_vec3 level = trip_add(trip_scale(front, cos(azimuth)), trip_scale(right, sin(azimuth)));
     return trip_add(trip_scale(level, cos(elevation)), trip_scale(up, sin(elevation)));
@@ -151,24 +153,25 @@ static double framing_distance(const basis *b, const double lo[3], const double 
     return distance;
 }
 
-trip_camera_params trip_camera_frame_box(const double lo[3], const double hi[3],
-                                         const trip_affine *index_to_world, int width, int height,
-                                         double azimuth_degrees, trip_vec3 up)
+trip_camera_params trip_camera_frame(const trip_camera_framing *f,
+                                     const trip_affine *index_to_world)
 {
-    up = trip_length(up) > 0 ? trip_normalize(up) : trip_v3(0, 0, 1);
-    trip_vec3 middle = trip_scale(trip_add(box_corner(lo, hi, 0), box_corner(lo, hi, 7)), 0.5);
-    trip_camera_params p = {
-        .up = up, .fov_degrees = DEFAULT_FOV_DEGREES, .width = width, .height = height
-    };
-    p.look = trip_affine_point(index_to_world, middle);
-
-    trip_vec3 to_eye = direction_to_eye(up, azimuth_degrees);
+    trip_vec3 up = trip_length(f->up) > 0 ? trip_normalize(f->up) : trip_v3(0, 0, 1);
+    trip_vec3 middle =
+        trip_scale(trip_add(box_corner(f->lo, f->hi, 0), box_corner(f->lo, f->hi, 7)), 0.5);
+    trip_camera_params p = { .up = up,
+                             .look = trip_affine_point(index_to_world, middle),
+                             .fov_degrees =
+                                 f->fov_degrees > 0 ? f->fov_degrees : DEFAULT_FOV_DEGREES,
+                             .width = f->width,
+                             .height = f->height };
+    trip_vec3 to_eye = direction_to_eye(f, up);
     basis b = { .forward = trip_scale(to_eye, -1) };
     b.right = trip_normalize(trip_cross(b.forward, up));
     b.up = trip_cross(b.right, b.forward);
     double half_y = DEFAULT_FILL * tan(p.fov_degrees * (PI / 360));
-    double half_x = half_y * width / height;
-    double distance = framing_distance(&b, lo, hi, index_to_world, p.look, half_x, half_y);
+    double half_x = half_y * f->width / f->height;
+    double distance = framing_distance(&b, f->lo, f->hi, index_to_world, p.look, half_x, half_y);
     p.eye = trip_add(p.look, trip_scale(to_eye, distance));
     return p;
 }
@@ -177,10 +180,25 @@ trip_camera_params trip_camera_frame_volume(const int64_t dims[3],
                                             const trip_affine *index_to_world, int width,
                                             int height, double azimuth_degrees, trip_vec3 up)
 {
-    double lo[3], hi[3];
+    trip_camera_framing f = {
+        .width = width, .height = height, .up = up, .azimuth_degrees = azimuth_degrees
+    };
     for (int a = 0; a < 3; a++) {
-        lo[a] = -0.5;
-        hi[a] = (double)dims[a] - 0.5;
+        f.lo[a] = -0.5;
+        f.hi[a] = (double)dims[a] - 0.5;
     }
-    return trip_camera_frame_box(lo, hi, index_to_world, width, height, azimuth_degrees, up);
+    return trip_camera_frame(&f, index_to_world);
+}
+
+trip_camera_params trip_camera_turn(const trip_camera_params *view, double azimuth_degrees)
+{
+    trip_camera_params p = *view;
+    trip_vec3 axis = trip_normalize(view->up), arm = trip_sub(view->eye, view->look);
+    double angle = azimuth_degrees * (PI / 180);
+    trip_vec3 along = trip_scale(axis, trip_dot(axis, arm));
+    trip_vec3 across = trip_sub(arm, along);
+    trip_vec3 turned =
+        trip_add(trip_scale(across, cos(angle)), trip_scale(trip_cross(axis, across), sin(angle)));
+    p.eye = trip_add(view->look, trip_add(along, turned));
+    return p;
 }

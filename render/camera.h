@@ -1,12 +1,11 @@
 /* The view, taken to the data's index space, where kernels are round and sheets are planes whatever
  * the spacing, rotation or shear. Plain values; nothing here changes during a frame.
  *
- * Pixel coordinates: x to the right, y down, in pixels, (0, 0) the image's top left corner, so pixel
- * centres lie at + 0.5. The ray of pixel position p = (x, y) in index space is
- *   perspective:  origin eye,                    direction r(p) = r0 + x rx + y ry
- *   parallel:     origin eye + x rx + y ry,      direction r0
- * Directions are scaled so that the depth z of a point (distance along the viewing direction, world
- * units) satisfies  point = origin + z * direction. */
+ * Pixel coordinates: x to the right, y down, in pixels, (0, 0) the image's top left corner, so
+ * pixel centres lie at + 0.5. The ray of pixel position p = (x, y) in index space is perspective:
+ * origin eye,                    direction r(p) = r0 + x rx + y ry parallel:     origin eye + x rx
+ * + y ry,      direction r0 Directions are scaled so that the depth z of a point (distance along
+ * the viewing direction, world units) satisfies  point = origin + z * direction. */
 #ifndef TRIP_CAMERA_H
 #define TRIP_CAMERA_H
 
@@ -16,22 +15,22 @@
 #include "geometry.h"
 
 typedef struct trip_camera_params {
-    trip_vec3 eye, look, up;  /* world space */
-    double fov_degrees;       /* full vertical angle of a perspective view, (0, 180) */
-    double ortho_height;      /* > 0: parallel view of this height in world units */
-    int width, height;        /* pixels */
+    trip_vec3 eye, look, up; /* world space */
+    double fov_degrees;      /* full vertical angle of a perspective view, (0, 180) */
+    double ortho_height;     /* > 0: parallel view of this height in world units */
+    int width, height;       /* pixels */
 } trip_camera_params;
 
 typedef struct trip_camera {
     trip_camera_params params; /* as given, up and look made orthonormal not needed */
     int width, height;
     bool ortho;
-    trip_vec3 eye, r0, rx, ry;   /* index space, see above */
-    trip_vec3 forward;           /* index-space covector: depth z = forward . (point - eye) */
-    trip_vec3 to_x, to_y;        /* index-space covectors: perspective x = to_x . c / z with
-                                    c = point - eye; parallel x = to_x . c; y alike */
+    trip_vec3 eye, r0, rx, ry; /* index space, see above */
+    trip_vec3 forward;         /* index-space covector: depth z = forward . (point - eye) */
+    trip_vec3 to_x, to_y;      /* index-space covectors: perspective x = to_x . c / z with
+                                  c = point - eye; parallel x = to_x . c; y alike */
     trip_affine index_to_world;
-    double voxel_world;          /* cube root of |det index_to_world|: the length of one voxel */
+    double voxel_world; /* cube root of |det index_to_world|: the length of one voxel */
     trip_vec3 world_eye, world_forward; /* for lighting; world_forward of unit length */
 } trip_camera;
 
@@ -43,14 +42,25 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
 /* The view used when none is given: the whole volume framed in perspective, seen from the front,
  * a little from the right and from above, `up` as given (zero: +z). `azimuth_degrees` turns it
  * about up, for turntables. */
-trip_camera_params trip_camera_frame_volume(const int64_t dims[3], const trip_affine *index_to_world,
-                                            int width, int height, double azimuth_degrees,
-                                            trip_vec3 up);
+trip_camera_params trip_camera_frame_volume(const int64_t dims[3],
+                                            const trip_affine *index_to_world, int width,
+                                            int height, double azimuth_degrees, trip_vec3 up);
 
-/* The same for a box of index space, [lo, hi] along each axis. */
-trip_camera_params trip_camera_frame_box(const double lo[3], const double hi[3],
-                                         const trip_affine *index_to_world, int width, int height,
-                                         double azimuth_degrees, trip_vec3 up);
+/* What trip_camera_frame() frames. Zero means the default. */
+typedef struct trip_camera_framing {
+    double lo[3], hi[3];    /* a box of index space */
+    int width, height;      /* pixels */
+    trip_vec3 up, front;    /* world directions: up (+z), and the one the object faces (-y; where +y
+                               is up, +z) */
+    double azimuth_degrees; /* about up, counted from the default view */
+    double fov_degrees;     /* 30 */
+} trip_camera_framing;
+
+trip_camera_params trip_camera_frame(const trip_camera_framing *f,
+                                     const trip_affine *index_to_world);
+
+/* The view turned by an angle about up, through the point looked at. */
+trip_camera_params trip_camera_turn(const trip_camera_params *view, double azimuth_degrees);
 
 /* Direction (index space, not normalised) of the ray at a pixel position. */
 static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y)

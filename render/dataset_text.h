@@ -20,16 +20,18 @@ typedef struct trip_dataset_text trip_dataset_text;
 int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d);
 void trip_dataset_text_destroy(trip_dataset_text *t);
 
-/* The stored function; without one, all values alike in a faint grey ramp. */
-int trip_dataset_text_tf(const trip_dataset_text *t, trip_tf **out);
+/* The stored function; without one, a grey ramp over the values, faint as fog. */
+int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out);
 
 /* How many voxels hold values that `tf` shows but that were left out when the data set was made,
  * and the range of those values. An estimate from the histogram (bins count in proportion); 0 when
  * the text does not tell. */
 double trip_dataset_text_culled(const trip_dataset_text *t, const trip_tf *tf, double range[2]);
 
-/* The view used when none is given: all splats framed, the right way up, from the front. */
+/* The view used when none is given: all splats framed, the right way up, from the front, turned by
+ * the azimuth; fov_degrees 0: the default. */
 trip_camera_params trip_dataset_text_view(const trip_dataset_text *t, const trip_dataset *d,
-                                          int width, int height, double azimuth_degrees);
+                                          int width, int height, double azimuth_degrees,
+                                          double fov_degrees);
 
 #endif

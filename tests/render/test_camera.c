@@ -185,6 +185,34 @@ static void azimuth_turns_the_default_view_about_up(void **state)
     assert_close(d[1].z, d[0].z, 1e-9);
 }
 
+static void a_given_front_is_seen_from_the_front(void **state)
+{
+    (void)state;
+    trip_affine identity = trip_affine_identity();
+    trip_camera_framing f = { .hi = { 9, 9, 9 }, .width = 10, .height = 10, .front = { 0, 1, 0 } };
+    trip_camera_params p = trip_camera_frame(&f, &identity);
+    trip_vec3 d = trip_sub(p.eye, p.look);
+    /* Facing +y with +z up, the viewer's right is -x. */
+    assert_true(d.y > -d.x && -d.x > 0 && d.z > 0);
+}
+
+static void a_view_turned_is_the_view_framed_at_that_azimuth(void **state)
+{
+    (void)state;
+    trip_affine identity = trip_affine_identity();
+    trip_camera_framing f = {
+        .hi = { 9, 9, 9 }, .width = 10, .height = 10, .up = { 0, 1, 0 }, .fov_degrees = 50
+    };
+    trip_camera_params p = trip_camera_frame(&f, &identity);
+    trip_camera_params turned = trip_camera_turn(&p, 90);
+    f.azimuth_degrees = 90; /* a cube turned by 90 degrees is framed at the same distance */
+    trip_camera_params framed = trip_camera_frame(&f, &identity);
+    assert_close(framed.fov_degrees, 50, 0);
+    assert_close(turned.eye.x, framed.eye.x, 1e-9);
+    assert_close(turned.eye.y, framed.eye.y, 1e-9);
+    assert_close(turned.eye.z, framed.eye.z, 1e-9);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -195,6 +223,8 @@ int main(void)
         cmocka_unit_test(views_that_are_none_are_refused_as_wrong_usage),
         cmocka_unit_test(the_default_view_holds_the_whole_volume_with_a_small_margin),
         cmocka_unit_test(the_default_view_is_from_the_front_right_and_above),
+        cmocka_unit_test(a_given_front_is_seen_from_the_front),
+        cmocka_unit_test(a_view_turned_is_the_view_framed_at_that_azimuth),
         cmocka_unit_test(azimuth_turns_the_default_view_about_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

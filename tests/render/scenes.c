@@ -1,0 +1,192 @@
+#include "scenes.h"
+
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The voxels of one tile of a sheet in Morton order. */
+static uint32_t gather_run(const scene_params *p, int axis, int sheet, int tile_u, int tile_v,
+                           int tile, double gradient_scale, uint32_t *voxels, uint32_t *normals)
+{
+    int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    uint32_t count = 0;
+    for (uint32_t m = 0; m < (uint32_t)(tile * tile); m++) {
+        int u = 0, v = 0, at[3];
+        for (int bit = 0; bit < 8; bit++) {
+            u |= (int)(m >> (2 * bit) & 1) << bit;
+            v |= (int)(m >> (2 * bit + 1) & 1) << bit;
+        }
+        at[axis] = sheet;
+        at[u_axis] = tile_u * tile + u;
+        at[v_axis] = tile_v * tile + v;
+        if (at[u_axis] >= p->dims[u_axis] || at[v_axis] >= p->dims[v_axis])
+            continue;
+        unsigned code = 65535;
+        double gradient[3] = { 0 };
+        if (p->voxel && !p->voxel(p->user, at[0], at[1], at[2], &code, gradient))
+            continue;
+        voxels[count] = trip_voxel_pack((unsigned)u, (unsigned)v, code);
+        normals[count++] = trip_normal_pack(gradient, gradient_scale);
+    }
+    return count;
+}
+
+static void append_sheet(trip_writer *w, const scene_params *p, int axis, int sheet, int tile)
+{
+    static uint32_t voxels[128 * 128], normals[128 * 128];
+    int tiles_u = (int)((p->dims[(axis + 1) % 3] + tile - 1) / tile);
+    int tiles_v = (int)((p->dims[(axis + 2) % 3] + tile - 1) / tile);
+    for (uint32_t m = 0; m < 64 * 64; m++) {
+        int tile_u = 0, tile_v = 0;
+        for (int bit = 0; bit < 6; bit++) {
+            tile_u |= (int)(m >> (2 * bit) & 1) << bit;
+            tile_v |= (int)(m >> (2 * bit + 1) & 1) << bit;
+        }
+        if (tile_u >= tiles_u || tile_v >= tiles_v)
+            continue;
+        uint32_t count = gather_run(p, axis, sheet, tile_u, tile_v, tile, 1, voxels, normals);
+        if (count)
+            assert_int_equal(trip_writer_append(w, axis, (uint32_t)sheet, (uint32_t)tile_u,
+                                                (uint32_t)tile_v, voxels,
+                                                p->normals ? normals : NULL, count),
+                             0);
+    }
+}
+
+static void write_dataset(const scene *s, const scene_params *p)
+{
+    trip_writer_params params = {
+        .normals = p->normals,
+        .tile_voxels = p->tile_voxels,
+        .slab_sheets = p->slab_sheets,
+        .page_bytes = 4096,
+        .dims = { p->dims[0], p->dims[1], p->dims[2] },
+        .index_to_world = p->index_to_world,
+        .code_lo = 0,
+        .code_hi = 1,
+        .gradient_scale = 1,
+    };
+    bool given = false;
+    for (int i = 0; i < 12; i++)
+        given |= p->index_to_world.m[i / 4][i % 4] != 0;
+    if (!given)
+        params.index_to_world = trip_affine_identity();
+    trip_writer *w;
+    assert_int_equal(trip_writer_open(&w, s->path, &params, s->budget), 0);
+    int tile = p->tile_voxels ? (int)p->tile_voxels : 64;
+    for (int axis = 0; axis < 3; axis++)
+        for (int sheet = 0; sheet < p->dims[axis]; sheet++)
+            append_sheet(w, p, axis, sheet, tile);
+    trip_writer_summary summary = {
+        .value_max = 1,
+        .voxels = (uint64_t)(p->dims[0] * p->dims[1] * p->dims[2]),
+        .text = "{}",
+    };
+    assert_int_equal(trip_writer_finish(w, &summary), 0);
+}
+
+void scene_create(scene *s, const scene_params *params)
+{
+    memset(s, 0, sizeof *s);
+    snprintf(s->folder, sizeof s->folder, "/tmp/trip-scene-XXXXXX");
+    assert_non_null(mkdtemp(s->folder));
+    snprintf(s->path, sizeof s->path, "%s/scene.trip", s->folder);
+    assert_int_equal(trip_budget_create(&s->budget, UINT64_C(1) << 30), 0);
+    write_dataset(s, params);
+    assert_int_equal(trip_dataset_open(&s->data, s->path, s->budget), 0);
+    s->table = calloc(65536, sizeof *s->table);
+    assert_non_null(s->table);
+}
+
+void scene_destroy(scene *s)
+{
+    char command[128];
+    trip_dataset_close(s->data);
+    trip_budget_destroy(s->budget);
+    free(s->table);
+    snprintf(command, sizeof command, "rm -r '%s'", s->folder);
+    assert_int_equal(system(command), 0);
+}
+
+void scene_colour(scene *s, unsigned first, unsigned last, double r, double g, double b,
+                  double opacity)
+{
+    double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    trip_tf_entry entry = { (float)r, (float)g, (float)b,
+                            (float)(trip_extinction(opacity) / voxel) };
+    for (unsigned i = first; i <= last; i++)
+        s->table[i] = entry;
+}
+
+const scene_renderer *scene_renderers(void)
+{
+    static const scene_renderer all[] = {
+        { "reference", trip_reference_create, 0 },
+        { NULL, NULL, 0 },
+    };
+    return all;
+}
+
+scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
+                              const trip_camera_params *view, const trip_settings *settings,
+                              const trip_reader_params *reader_params)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_renderer *r;
+    trip_reader *reader;
+    trip_reader_params params = *reader_params;
+    scene_picture p = { .width = view->width, .height = view->height };
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, settings, s->table, s->budget), 0);
+    params.planes = plan.planes;
+    assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
+    assert_int_equal(renderer->create(&r, s->budget), 0);
+
+    trip_frame frame = { s->data, &camera, settings, &plan, s->table, true };
+    p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
+    assert_non_null(p.rgba);
+    assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, &p.stats), 0);
+
+    r->ops->destroy(r);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s->budget);
+    return p;
+}
+
+scene_picture scene_draw(const scene *s, const scene_renderer *renderer,
+                         const trip_camera_params *view, const trip_settings *settings)
+{
+    return scene_draw_with(s, renderer, view, settings, &(trip_reader_params){ 0 });
+}
+
+void scene_picture_free(scene_picture *p)
+{
+    free(p->rgba);
+    p->rgba = NULL;
+}
+
+double scene_difference(const scene_picture *a, const scene_picture *b)
+{
+    double most = 0;
+    assert_int_equal(a->width, b->width);
+    assert_int_equal(a->height, b->height);
+    for (size_t i = 0; i < 4 * (size_t)a->width * (size_t)a->height; i++)
+        most = fmax(most, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    return most;
+}
+
+trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distance,
+                              double fov_degrees, int size)
+{
+    const uint64_t *dims = s->data->header.dims;
+    trip_vec3 middle = { 0.5 * ((double)dims[0] - 1), 0.5 * ((double)dims[1] - 1),
+                         0.5 * ((double)dims[2] - 1) };
+    trip_camera_params p = { .fov_degrees = fov_degrees, .width = size, .height = size };
+    p.look = trip_affine_point(&s->data->index_to_world, middle);
+    p.eye = trip_add(p.look, trip_scale(trip_normalize(direction), distance));
+    /* Any up that is not along the view. */
+    p.up = fabs(direction.z) < 0.9 * trip_length(direction) ? trip_v3(0, 0, 1) : trip_v3(0, 1, 0);
+    return p;
+}

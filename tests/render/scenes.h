@@ -1,0 +1,74 @@
+/* Small data sets with known contents, written through stream/writer.h into a folder that is
+ * removed at the end, and pictures of them by any renderer. Failures end the test. */
+#ifndef SCENES_H
+#define SCENES_H
+
+#include "frame.h"
+#include "writer.h"
+
+/* What voxel (i, j, k) holds: false when it is not there; `gradient` (world space) is zero when the
+ * function does not set it. */
+typedef bool (*scene_voxel)(void *user, int i, int j, int k, unsigned *code, double gradient[3]);
+
+typedef struct scene_params {
+    int64_t dims[3];
+    trip_affine index_to_world; /* all zero: the identity */
+    unsigned tile_voxels, slab_sheets;
+    bool normals;
+    scene_voxel voxel; /* NULL: every voxel is there with code 65535 */
+    void *user;
+} scene_params;
+
+typedef struct scene {
+    char folder[64], path[96];
+    trip_budget *budget;
+    trip_dataset *data;
+    trip_tf_entry *table; /* 65536 entries, all transparent black at first */
+} scene;
+
+void scene_create(scene *s, const scene_params *params);
+void scene_destroy(scene *s);
+
+/* Codes [first, last] get a colour and an opacity per voxel. */
+void scene_colour(scene *s, unsigned first, unsigned last, double r, double g, double b,
+                  double opacity);
+
+/* What draws: created by name so that tests run over all there are. */
+typedef int (*scene_renderer_create)(trip_renderer **out, trip_budget *budget);
+
+typedef struct scene_renderer {
+    const char *name;
+    scene_renderer_create create;
+    double tolerance; /* of a premultiplied component, against the reference */
+} scene_renderer;
+
+/* Every renderer this machine can run, ended by an entry without name. */
+const scene_renderer *scene_renderers(void);
+
+typedef struct scene_picture {
+    int width, height;
+    float *rgba;
+    trip_frame_stats stats;
+} scene_picture;
+
+scene_picture scene_draw(const scene *s, const scene_renderer *renderer,
+                         const trip_camera_params *view, const trip_settings *settings);
+/* The same with the reader's parameters given (planes are filled in). */
+scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
+                              const trip_camera_params *view, const trip_settings *settings,
+                              const trip_reader_params *reader);
+void scene_picture_free(scene_picture *p);
+
+static inline const float *scene_pixel(const scene_picture *p, int x, int y)
+{
+    return p->rgba + 4 * ((size_t)y * (size_t)p->width + (size_t)x);
+}
+
+/* Largest difference of any component. */
+double scene_difference(const scene_picture *a, const scene_picture *b);
+
+/* A view of the volume's middle from a direction (world space, from the middle to the eye). */
+trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distance,
+                              double fov_degrees, int size);
+
+#endif
