@@ -70,7 +70,7 @@ static int open_regular(const char *path, int *fd_out, uint64_t *bytes_out)
 
 int trip_file_size(const char *path, uint64_t *bytes_out)
 {
-    int fd;
+    int fd = -1;
     int status = open_regular(path, &fd, bytes_out);
     if (status == 0)
         close(fd);

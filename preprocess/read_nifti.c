@@ -298,7 +298,7 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
 {
     (void)params;
     (void)budget;
-    header h;
+    header h = { 0 };
     char *header_path = partner(path, ".img", ".hdr");
     if (!header_path)
         return trip_fail(TRIP_ERROR, "read", path, "no memory to open");

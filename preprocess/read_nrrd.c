@@ -132,7 +132,7 @@ static int nrrd_open(const char *path, const trip_volume_params *params, trip_bu
 {
     (void)params;
     (void)budget;
-    trip_nrrd_header h;
+    trip_nrrd_header h = { 0 };
     int status = read_header(path, &h);
     if (status < 0)
         return status;

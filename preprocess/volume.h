@@ -1,6 +1,6 @@
 /* A volume being read, whatever its file format: an affine grid of scalar values that arrives once,
  * front to back, in blocks small enough for memory. trip_volume_next() is called by one thread;
- * blocks it returned may be decoded by any thread and live until released. Opening reads headers
+ * blocks it returned may be decoded and released by any thread and live until released. Opening reads headers
  * only. One file per format implements trip_volume_reader; volume.c picks it by content, then name.
  *
  * Voxel (i, j, k) has its centre at index coordinates (i, j, k), i fastest in memory, the first
@@ -60,7 +60,7 @@ typedef struct trip_volume_params {
     const char *grid;               /* OpenVDB grid name; default: the first scalar grid */
     trip_level_set_mode level_set;
     int64_t raw_dims[3];            /* headerless raw only: --size */
-    const char *raw_type;           /* --type */
+    const char *raw_type;           /* --type; default: from the file's name, else uint8 */
     double spacing[3];              /* --spacing: raw and image stacks; elsewhere overrides the file's */
     int raw_endian;                 /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes;      /* --offset */
@@ -93,6 +93,7 @@ int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block);
  * outside the volume repeat the edge voxel (dense) or are the background (sparse), active 0. */
 int trip_block_decode(const trip_volume *v, const trip_block *block, const int64_t lo[3],
                       const int64_t size[3], float *values, uint8_t *active);
+/* The memory of one released slab stays with the volume, for the next block, until it is closed. */
 void trip_block_release(trip_volume *v, trip_block *block);
 
 #ifdef __cplusplus

@@ -339,6 +339,28 @@ static void an_unknown_field_is_warned_of(void **state)
     assert_non_null(strstr(reported, "line 8: unknown field \"spacing\""));
 }
 
+/* Sum and single values as NumPy reads them. */
+static void the_included_tooth_is_read_as_by_others(void **state)
+{
+    (void)state;
+    const size_t count = 103 * 94 * 161;
+    float *values = malloc(count * sizeof *values);
+    trip_volume_info info;
+    double sum = 0;
+    assert_non_null(values);
+    assert_int_equal(
+        read_volume(TRIP_SOURCE_DIR "/datasets/tooth.nhdr", NULL, 10, values, count, &info), 0);
+    assert_int_equal(info.type, TRIP_U16);
+    for (size_t i = 0; i < count; i++)
+        sum += (double)values[i];
+    assert_true(sum == 821287590);
+    assert_true(values[(80 * 94 + 40) * 103 + 50] == 832);
+    assert_true(values[(100 * 94 + 50) * 103 + 30] == 706);
+    assert_true(values[1] == 389);
+    assert_true(values[count - 1] == 379);
+    free(values);
+}
+
 static void a_header_without_end_is_refused(void **state)
 {
     (void)state;
@@ -401,6 +423,7 @@ int main(void)
         cmocka_unit_test(wrong_fields_are_refused_with_their_line),
         cmocka_unit_test(wrong_headers_are_refused),
         cmocka_unit_test(an_unknown_field_is_warned_of),
+        cmocka_unit_test(the_included_tooth_is_read_as_by_others),
         cmocka_unit_test(a_header_without_end_is_refused),
         cmocka_unit_test(a_file_cut_anywhere_is_refused),
         cmocka_unit_test(any_byte_of_the_header_may_be_wrong),

@@ -1,5 +1,7 @@
 #include "volume_files.h"
 
+#include <pthread.h>
+
 static trip_budget *budget;
 
 static trip_volume *open_sample(trip_scalar type, const trip_volume_params *extra)
@@ -151,6 +153,51 @@ static void blocks_live_until_they_are_released(void **state)
     trip_volume_close(v);
 }
 
+static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
+
+/* Takes blocks in turn with the other threads, then decodes and releases without a lock. */
+static void *decode_blocks(void *volume)
+{
+    trip_volume *v = volume;
+    trip_block block;
+    bool *right = malloc(sizeof *right);
+    *right = true;
+    for (;;) {
+        float values[NX * NY];
+        pthread_mutex_lock(&reading);
+        int status = trip_volume_next(v, 1, &block);
+        pthread_mutex_unlock(&reading);
+        if (status <= 0)
+            break;
+        status = trip_block_decode(v, &block, block.origin, block.size, values, NULL);
+        for (int i = 0; i < NX * NY; i++)
+            *right = *right && status == 0 &&
+                     values[i] == (float)sample(TRIP_I16, i % NX, i / NX, (int)block.origin[2]);
+        trip_block_release(v, &block);
+    }
+    return right;
+}
+
+static void blocks_may_be_decoded_and_released_by_other_threads(void **state)
+{
+    (void)state;
+    enum { THREADS = 4 };
+    trip_volume *v = open_sample(TRIP_I16, NULL);
+    for (int round = 0; round < 50; round++) {
+        pthread_t threads[THREADS];
+        for (int t = 0; t < THREADS; t++)
+            assert_int_equal(pthread_create(&threads[t], NULL, decode_blocks, v), 0);
+        for (int t = 0; t < THREADS; t++) {
+            void *right;
+            assert_int_equal(pthread_join(threads[t], &right), 0);
+            assert_true(*(bool *)right);
+            free(right);
+        }
+        assert_int_equal(trip_volume_rewind(v), 0);
+    }
+    trip_volume_close(v);
+}
+
 static void rewinding_starts_again_even_in_mid_volume(void **state)
 {
     (void)state;
@@ -276,6 +323,8 @@ int main(void)
                                         end_budget),
         cmocka_unit_test_setup_teardown(blocks_live_until_they_are_released, make_budget,
                                         end_budget),
+        cmocka_unit_test_setup_teardown(blocks_may_be_decoded_and_released_by_other_threads,
+                                        make_budget, end_budget),
         cmocka_unit_test_setup_teardown(rewinding_starts_again_even_in_mid_volume, make_budget,
                                         end_budget),
         cmocka_unit_test_setup_teardown(slabs_come_out_of_the_budget_and_can_be_refused,
