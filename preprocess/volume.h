@@ -1,7 +1,8 @@
 /* A volume being read, whatever its file format: an affine grid of scalar values that arrives once,
  * front to back, in blocks small enough for memory. trip_volume_next() is called by one thread;
- * blocks it returned may be decoded and released by any thread and live until released. Opening reads headers
- * only. One file per format implements trip_volume_reader; volume.c picks it by content, then name.
+ * blocks it returned may be decoded and released by any thread and live until released. Opening
+ * reads headers only. One file per format implements trip_volume_reader; volume.c picks it by
+ * content, then name.
  *
  * Voxel (i, j, k) has its centre at index coordinates (i, j, k), i fastest in memory, the first
  * voxel at (0, 0, 0) whatever the file calls it. index_to_world takes those to world space. */
@@ -51,19 +52,19 @@ typedef struct trip_volume_info {
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_REFUSE = 0, /* say that it is one and name the options */
-    TRIP_LEVEL_SET_FILLED,     /* density 1 inside, 0 outside, a ramp one voxel wide at the surface */
-    TRIP_LEVEL_SET_BAND,       /* density max(0, 1 - |distance| / half band width) */
+    TRIP_LEVEL_SET_FILLED, /* density 1 inside, 0 outside, a ramp one voxel wide at the surface */
+    TRIP_LEVEL_SET_BAND,   /* density max(0, 1 - |distance| / half band width) */
 } trip_level_set_mode;
 
 /* Zero means the default everywhere. */
 typedef struct trip_volume_params {
-    const char *grid;               /* OpenVDB grid name; default: the first scalar grid */
+    const char *grid; /* OpenVDB grid name; default: the first scalar grid */
     trip_level_set_mode level_set;
-    int64_t raw_dims[3];            /* headerless raw only: --size */
-    const char *raw_type;           /* --type; default: from the file's name, else uint8 */
-    double spacing[3];              /* --spacing: raw and image stacks; elsewhere overrides the file's */
-    int raw_endian;                 /* 0 native, 1 little, 2 big */
-    uint64_t raw_offset_bytes;      /* --offset */
+    int64_t raw_dims[3];       /* headerless raw only: --size */
+    const char *raw_type;      /* --type; default: from the file's name, else uint8 */
+    double spacing[3];         /* --spacing: raw and image stacks; elsewhere overrides the file's */
+    int raw_endian;            /* 0 native, 1 little, 2 big */
+    uint64_t raw_offset_bytes; /* --offset */
 } trip_volume_params;
 
 typedef struct trip_volume trip_volume;

@@ -26,7 +26,8 @@ typedef struct trip_volume_reader {
     /* Slice readers: the next `count` slices, each dims[0] * dims[1] values of the stored type, in
      * the file's byte order. Short data is a reported failure. */
     int (*read_slices)(void *state, int64_t count, void *values);
-    bool (*swap)(const void *state); /* slice readers: stored byte order differs from the machine's */
+    bool (*swap)(
+        const void *state); /* slice readers: stored byte order differs from the machine's */
 
     /* Block readers (read_slices NULL): as trip_volume_next, trip_block_decode, _release. decode
      * is called by many threads at once. */
