@@ -1,6 +1,7 @@
 /* Transfer functions: scalar value -> colour and opacity, piecewise linear. A function is built
  * once, is read-only afterwards, and may be shared by threads. Forms: our plain `.tf` text,
- * ParaView colour-map JSON, built-in presets, and one made from a histogram.
+ * ParaView colour-map JSON, built-in presets, and one made from a histogram; TRANSFER_FUNCTIONS.md
+ * describes them all.
  *
  * Opacity is per unit length: a constant region of opacity o and thickness L units has opacity
  * 1 - (1 - o)^L. So extinction is tau = -ln(1 - o) / unit. One voxel is the default unit, that is
@@ -34,8 +35,9 @@ typedef struct trip_histogram {
     uint64_t total;
 } trip_histogram;
 
-/* From a file: `.tf` text or ParaView JSON (told apart by content); "preset:NAME"; or the text of
- * a `.tf` itself via trip_tf_parse. All report and return a negative status on failure. */
+/* From a file: `.tf` text or ParaView JSON (told apart by content), "FILE.json#NAME" for one map of
+ * several; "preset:NAME"; or the text of a `.tf` itself via trip_tf_parse. All report and return a
+ * negative status on failure, TRIP_USAGE for an unknown preset. */
 int trip_tf_load(trip_tf **out, const char *path_or_preset);
 int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t bytes);
 int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count, bool normalised,
