@@ -50,6 +50,15 @@ static void set_defaults(trip_writer_params *p)
     p->page_bytes = p->page_bytes ? p->page_bytes : 65536;
 }
 
+static int check_codes(const trip_writer_params *p, const char *path)
+{
+    if (!isfinite(p->code_lo) || !isfinite(p->code_hi) || p->code_lo > p->code_hi)
+        return trip_fail(TRIP_ERROR, "write", path, "value range %g to %g", p->code_lo, p->code_hi);
+    if (!isfinite(p->gradient_scale) || p->gradient_scale < 0)
+        return trip_fail(TRIP_ERROR, "write", path, "gradient scale %g", p->gradient_scale);
+    return TRIP_OK;
+}
+
 static int check_params(const trip_writer_params *p, const char *path)
 {
     trip_affine inverse;
@@ -69,11 +78,7 @@ static int check_params(const trip_writer_params *p, const char *path)
     if (!trip_affine_invert(&p->index_to_world, &inverse))
         return trip_fail(TRIP_ERROR, "write", path,
                          "the index-to-world map is singular or not finite");
-    if (!isfinite(p->code_lo) || !isfinite(p->code_hi) || p->code_lo > p->code_hi)
-        return trip_fail(TRIP_ERROR, "write", path, "value range %g to %g", p->code_lo, p->code_hi);
-    if (!isfinite(p->gradient_scale) || p->gradient_scale < 0)
-        return trip_fail(TRIP_ERROR, "write", path, "gradient scale %g", p->gradient_scale);
-    return TRIP_OK;
+    return check_codes(p, path);
 }
 
 /* The parts of the header known from the start. */
@@ -236,6 +241,14 @@ int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u
     l->splats += count;
     atomic_fetch_add_explicit(&l->bytes, normals ? 2 * bytes : bytes, memory_order_relaxed);
     return status;
+}
+
+int trip_writer_set_codes(trip_writer *w, double code_lo, double code_hi, double gradient_scale)
+{
+    w->params.code_lo = w->header.code_lo = code_lo;
+    w->params.code_hi = w->header.code_hi = code_hi;
+    w->params.gradient_scale = w->header.gradient_scale = gradient_scale;
+    return check_codes(&w->params, w->folder.path);
 }
 
 static int check_summary(const trip_writer *w, const trip_writer_summary *s)

@@ -35,6 +35,10 @@ int trip_writer_open(trip_writer **out, const char *path, const trip_writer_para
 int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u, uint32_t tile_v,
                        const uint32_t *voxels, const uint32_t *normals, uint32_t count);
 
+/* Replaces what the parameters said of codes and gradients: records hold codes, so that their range
+ * may be found while the volume is read. Before finish. */
+int trip_writer_set_codes(trip_writer *w, double code_lo, double code_hi, double gradient_scale);
+
 /* What is known only at the end. */
 typedef struct trip_writer_summary {
     double value_min, value_max;
