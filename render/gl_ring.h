@@ -1,0 +1,40 @@
+/* GL memory that batches are copied into and drawn from: a few buffers, mapped for good, each
+ * reused once the GPU has passed the fence behind its last draw. Owned by one renderer; made once
+ * and grown to the largest batch seen. Its bytes count against the budget. */
+#ifndef TRIP_GL_RING_H
+#define TRIP_GL_RING_H
+
+#include <epoxy/gl.h>
+#include <stddef.h>
+
+#include "budget.h"
+
+enum { TRIP_GL_RING_SLOTS = 3, TRIP_GL_ALIGNMENT_BYTES = 256 };
+
+typedef struct trip_gl_slot {
+    GLuint buffer;
+    size_t bytes;
+    unsigned char *memory; /* mapped, write only */
+    GLsync fence;          /* NULL: not in use */
+} trip_gl_slot;
+
+typedef struct trip_gl_ring {
+    trip_budget *budget;
+    trip_gl_slot slots[TRIP_GL_RING_SLOTS];
+    unsigned next;
+} trip_gl_ring;
+
+/* The next slot with room for `bytes`, waiting until the GPU has done with it. */
+int trip_gl_ring_take(trip_gl_ring *r, size_t bytes, trip_gl_slot **slot);
+/* After the last draw from the slot. */
+void trip_gl_ring_give(trip_gl_slot *slot);
+void trip_gl_ring_release(trip_gl_ring *r);
+
+/* The offset of the next aligned part behind a part of `bytes` at `offset`. */
+static inline size_t trip_gl_ring_after(size_t offset, size_t bytes)
+{
+    size_t end = offset + bytes + TRIP_GL_ALIGNMENT_BYTES - 1;
+    return end - end % TRIP_GL_ALIGNMENT_BYTES;
+}
+
+#endif

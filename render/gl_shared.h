@@ -1,0 +1,79 @@
+/* Binding numbers and record layouts shared by C and GLSL: shaders include this file textually.
+ * Vectors of a frame are in list axes: component 0 runs along the list, 1 along u, 2 along v, so
+ * that one shader serves all three lists. Pixel positions in the shaders are taken from
+ * the image's centre (screen.xy), which keeps their last bits. */
+#ifndef TRIP_GL_SHARED_H
+#define TRIP_GL_SHARED_H
+
+/* Uniform blocks. */
+#define TRIP_GL_FRAME 0
+/* Storage blocks. */
+#define TRIP_GL_VOXELS 0
+#define TRIP_GL_NORMALS 1
+#define TRIP_GL_RUNS 2
+#define TRIP_GL_RUN_OF 3
+#define TRIP_GL_TABLE 4
+#define TRIP_GL_COUNTS 5
+#define TRIP_GL_VERTICES 6
+#define TRIP_GL_ORDER 7
+/* Texture units: the layer of axis a is unit a. */
+#define TRIP_GL_LAYER 0
+/* Invocations of a counting work group. */
+#define TRIP_GL_COUNT_GROUP 64
+
+/* Constants of one list of a frame; R is float for drawing, double for counting and weights. */
+#define TRIP_GL_FRAME_FIELDS(R4)                                                                   \
+    R4 forward;        /* xyz: depth = forward . c; w: K = r . (rx x ry), the same for all rays */ \
+    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective) */                          \
+    R4 ray_x, ray_y;   /* xyz: d ray / d pixel, rays scaled to length 1 at the image's centre */   \
+    R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */               \
+    R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                      \
+    R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                \
+    R4 world_0, world_1, world_2;       /* xyz: columns of J */                                    \
+    R4 light;         /* xyz: towards the light, world space; w: gradient at full shading */       \
+    R4 to_eye;        /* xyz: towards the eye in parallel views; w: gradient scale */              \
+    R4 screen;        /* xy: the image's centre, whole pixels; zw: width, height */                \
+    R4 kernel;        /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */       \
+    R4 parallel;      /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */      \
+    R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \
+    R4 weight;        /* h, sqrt(1 + h^2), list axis, axis of view */                              \
+    R4 background;    /* r, g, b, a; not premultiplied */
+
+#ifdef TRIP_GLSL
+#define TRIP_GL_VEC3 vec3
+#define TRIP_GL_INT int
+#else
+#include <stdint.h>
+#define TRIP_GL_VEC3 trip_gl_vec3
+#define TRIP_GL_INT int32_t
+typedef struct trip_gl_vec3 {
+    float x, y, z;
+} trip_gl_vec3;
+typedef struct trip_gl_float4 {
+    float v[4];
+} trip_gl_float4;
+typedef struct trip_gl_double4 {
+    double v[4];
+} trip_gl_double4;
+typedef struct trip_gl_frame_float {
+    TRIP_GL_FRAME_FIELDS(trip_gl_float4)
+} trip_gl_frame_float;
+typedef struct trip_gl_frame_double {
+    TRIP_GL_FRAME_FIELDS(trip_gl_double4)
+} trip_gl_frame_double;
+#endif
+
+/* A run of a list to draw: draw position i of it is record first + step * i. Its origin (sheet,
+ * tile), formed in double: from the eye as base + base_low, and as the products (to_x . c, to_y .
+ * c, forward . c), pixels from the image's centre, whose floats keep their precision however far
+ * the eye is. */
+struct trip_gl_run {
+    TRIP_GL_VEC3 base;
+    TRIP_GL_INT first;
+    TRIP_GL_VEC3 base_low;
+    TRIP_GL_INT step;
+    TRIP_GL_VEC3 place;
+    TRIP_GL_INT unused;
+};
+
+#endif

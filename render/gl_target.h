@@ -1,0 +1,33 @@
+/* What a frame is drawn into: one layer per list, made when the list is first drawn, the stencil
+ * that masks pixels without weight, and the merged image. Owned by one renderer; kept from frame to
+ * frame while size and type stay. Its bytes count against the budget. */
+#ifndef TRIP_GL_TARGET_H
+#define TRIP_GL_TARGET_H
+
+#include <epoxy/gl.h>
+#include <stdbool.h>
+
+#include "budget.h"
+#include "settings.h"
+
+typedef struct trip_gl_target {
+    trip_budget *budget;
+    int width, height;
+    trip_target type;
+    GLuint layers[3], framebuffers[3];
+    GLuint stencil;            /* shared by the layers */
+    GLuint image, framebuffer; /* rgba32f */
+    uint64_t bytes;
+} trip_gl_target;
+
+/* Readies an image of this size for layers of this type. */
+int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type);
+/* Binds the layer of a list for drawing, empty; with `stencil` its stencil too, all zero. */
+int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
+/* Binds the image for drawing; it holds rgba32f whatever the layers hold. */
+int trip_gl_target_begin_image(trip_gl_target *t);
+/* width * height * 4 floats, row 0 first. */
+void trip_gl_target_read_image(const trip_gl_target *t, float *rgba);
+void trip_gl_target_release(trip_gl_target *t);
+
+#endif

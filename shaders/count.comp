@@ -1,0 +1,60 @@
+// Counts the splats of a batch that are projected and drawn, as trip_list_stats defines them, in
+// double precision like the reference; one invocation a splat. In: the batch's storage blocks and
+// the number of splats. Out: added to the list's counters. Runs only when counts are asked for.
+#include "fetch.glsl"
+#include "project.glsl"
+#include "weight.glsl"
+
+layout(local_size_x = TRIP_GL_COUNT_GROUP) in;
+layout(location = 0) uniform uint splats;
+
+// Low and high half of "projected", then of "drawn", per axis.
+layout(std430, binding = TRIP_GL_COUNTS) buffer trip_gl_counts { uint counts[]; };
+
+void count(int which)
+{
+    uint at = uint(weight.z) * 4u + uint(which) * 2u;
+    if (atomicAdd(counts[at], 1u) == 0xffffffffu)
+        atomicAdd(counts[at + 1u], 1u);
+}
+
+bool touches(splat s, ivec2 pixel)
+{
+    real2 p = real2(pixel) + 0.5, q = p - s.centre;
+    real m = s.conic.x * q.x * q.x + 2.0 * s.conic.y * q.x * q.y + s.conic.z * q.y * q.y;
+#ifndef PARALLEL
+    real ray2 = dot(ray2_a, real4(1.0, p, p.x * p.x)) + dot(ray2_b.xy, p.y * p);
+    m *= s.ray2 / ray2;
+#endif
+    return m <= kernel.y && weight_of(p + screen.xy, int(weight.z)) > 0.0;
+}
+
+bool drawn(splat s)
+{
+    ivec4 pixels = covered_pixels(s);
+    if (any(greaterThan(pixels.xy, pixels.zw)))
+        return false;
+    ivec2 nearest = ivec2(floor(clamp(s.centre, real2(-screen.xy), screen.zw - screen.xy)));
+    if (touches(s, clamp(nearest, pixels.xy, pixels.zw)))
+        return true;
+    for (int y = pixels.y; y <= pixels.w; y++)
+        for (int x = pixels.x; x <= pixels.z; x++)
+            if (touches(s, ivec2(x, y)))
+                return true;
+    return false;
+}
+
+void main()
+{
+    uint position = gl_GlobalInvocationID.y * gl_NumWorkGroups.x * TRIP_GL_COUNT_GROUP +
+                    gl_GlobalInvocationID.x;
+    if (position >= splats)
+        return;
+    record r = fetch_record(position);
+    splat s;
+    if (!project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius))
+        return;
+    count(0);
+    if (drawn(s))
+        count(1);
+}

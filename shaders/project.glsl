@@ -1,0 +1,76 @@
+// The projection of a splat. Mirrors trip_splat_project() in render/splat.c with the rays scaled
+// and A, B taken per unit of depth; see render/splat.h for the formulas. `c` and `place` are a
+// record's (fetch.glsl).
+#include "real.glsl"
+
+struct splat {
+    real2 centre;     // pixels from the image's centre
+    real3 conic;      // xx, xy, yy of S'^-1
+    real ray2;        // |ray|^2 through the centre; 1 in parallel views
+    real amplitude;
+    real4 bounds;     // x0, y0, x1, y1
+    real radius;      // index space
+};
+
+#ifdef PARALLEL
+bool project(real3 c, real3 place, out splat s)
+{
+    s.centre = place.xy;
+    s.conic = parallel.xyz;
+    s.ray2 = 1.0;
+    s.amplitude = parallel.w;
+    s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
+    s.radius = parallel_size.z;
+    return place.z > 0.0;
+}
+#else
+bool project(real3 c, real3 place, out splat s)
+{
+    if (!(place.z > 0.0))
+        return false;
+    real inverse = 1.0 / place.z;
+    real3 ray = c * inverse;
+    s.centre = place.xy * inverse;
+    s.ray2 = dot(ray, ray);
+
+    // S = t [b.b -a.b; -a.b a.a] with t = sigma^2 / (K depth)^2, |S| = (t K)^2 ray2.
+    real3 a = cross(ray, ray_x.xyz), b = cross(ray, ray_y.xyz);
+    real low = kernel.z, scale = inverse / forward.w;
+    real t = kernel.x * scale * scale, tk = t * forward.w;
+    real sxx = t * dot(b, b), sxy = -t * dot(a, b), syy = t * dot(a, a);
+    real det_s = tk * tk * s.ray2;
+    real inverse_det = 1.0 / (det_s + low * (sxx + syy) + low * low);
+    s.conic = real3(syy + low, -sxy, sxx + low) * inverse_det;
+    s.amplitude = kernel.w * sqrt(det_s * inverse_det);
+
+    // The largest eigenvalue of S^-1 is that of S over |S|.
+    real half_difference = 0.5 * (sxx - syy);
+    real largest = 0.5 * (sxx + syy) + sqrt(half_difference * half_difference + sxy * sxy);
+    s.radius = sqrt(kernel.x * kernel.y * (1.0 + low * largest / det_s));
+
+    real k = kernel.y / s.ray2;
+    real exx = s.conic.x - k * dot(ray_x.xyz, ray_x.xyz);
+    real exy = s.conic.y - k * dot(ray_x.xyz, ray_y.xyz);
+    real eyy = s.conic.z - k * dot(ray_y.xyz, ray_y.xyz);
+    real lx = k * dot(ray, ray_x.xyz), ly = k * dot(ray, ray_y.xyz);
+    real det = exx * eyy - exy * exy;
+    if (!(exx > 0.0 && det > 0.0))
+        return false;
+    real inverse_e = 1.0 / det;
+    real2 middle = real2(eyy * lx - exy * ly, exx * ly - exy * lx) * inverse_e;
+    real size = (kernel.y + lx * middle.x + ly * middle.y) * inverse_e;
+    real2 half_size = real2(sqrt(size * eyy), sqrt(size * exx));
+    s.bounds = real4(s.centre + middle - half_size, s.centre + middle + half_size);
+    return true;
+}
+#endif
+
+// First and last pixel (from the image's centre) whose centre lies in the bounds and in the image;
+// none where a first exceeds its last.
+ivec4 covered_pixels(splat s)
+{
+    real4 inside = clamp(s.bounds, real4(-screen.xy, -screen.xy) - 1.0,
+                         real4(screen.zw - screen.xy, screen.zw - screen.xy) + 1.0);
+    ivec2 first = ivec2(ceil(inside.xy - 0.5)), last = ivec2(floor(inside.zw - 0.5));
+    return ivec4(max(first, ivec2(-screen.xy)), min(last, ivec2(screen.zw - screen.xy) - 1));
+}

@@ -1,0 +1,36 @@
+// Light on a splat. Mirrors trip_shade() in render/shade.c and trip_normal_unpack() in
+// stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS come from render/shade.h.
+#include "real.glsl"
+
+// World-space gradient direction and, in w, its magnitude.
+vec4 unpack_normal(uint normal)
+{
+    vec2 p = vec2(normal & 4095u, normal >> 12 & 4095u) * (2.0 / 4095.0) - 1.0;
+    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    if (n.z < 0.0)
+        n.xy = (1.0 - abs(p.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(p, vec2(0.0)));
+    float m = float(normal >> 24) / 255.0;
+    return vec4(normalize(n), m * m * float(to_eye.w));
+}
+
+vec3 shade(vec3 colour, uint normal, vec3 from_eye)
+{
+    vec4 gradient = unpack_normal(normal);
+#ifdef PARALLEL
+    vec3 eye = to_eye.xyz;
+#else
+    vec3 eye = -normalize(world_0.xyz * from_eye.x + world_1.xyz * from_eye.y +
+                          world_2.xyz * from_eye.z);
+#endif
+#ifdef HEADLIGHT
+    vec3 towards_light = eye, middle = eye;
+#else
+    vec3 towards_light = light.xyz, middle = light.xyz + eye;
+    middle /= max(length(middle), 1e-30);
+#endif
+    float strength = min(1.0, gradient.w / light.w);
+    float diffuse = abs(dot(gradient.xyz, towards_light));
+    float specular = pow(abs(dot(gradient.xyz, middle)), SHININESS);
+    float matt = 1.0 + strength * (AMBIENT + DIFFUSE * diffuse - 1.0);
+    return clamp(colour * matt + strength * SPECULAR * specular, 0.0, 1.0);
+}

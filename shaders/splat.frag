@@ -1,0 +1,33 @@
+// A splat's colour and opacity at a pixel. In: the footprint, flat. Out: premultiplied colour, for
+// blending in list order. Mirrors trip_splat_radius2() and the opacity in render/splat.h; where
+// m(p) exceeds the cut-off nothing is added.
+#include "real.glsl"
+
+layout(location = 0) flat in vec4 footprint;
+layout(location = 1) flat in vec4 colour;
+layout(location = 2) flat in float shear;
+layout(location = 0) out vec4 fragment;
+
+// 1 - exp(-x) without the cancellation at small x.
+float opacity(float x)
+{
+    return x < 1e-3 ? x * (1.0 - x * (0.5 - x * (1.0 / 6.0))) : 1.0 - exp(-x);
+}
+
+void main()
+{
+    vec2 p = gl_FragCoord.xy - screen.xy, q = p - footprint.xy;
+    float m = q.x * (footprint.z * q.x + shear * q.y) + footprint.w * q.y * q.y;
+    float stretch = 1.0;
+#ifndef PARALLEL
+    vec4 terms = vec4(1.0, p, p.x * p.x);
+    vec2 more = p.y * p;
+    float inverse_ray2 = 1.0 / (dot(ray2_a, terms) + dot(ray2_b.xy, more));
+    m *= inverse_ray2;
+#ifdef STRETCHED
+    stretch = sqrt((dot(world2_a, terms) + dot(world2_b.xy, more)) * inverse_ray2);
+#endif
+#endif
+    float alpha = m <= kernel.y ? opacity(colour.a * stretch * exp(-0.5 * m)) : 0.0;
+    fragment = vec4(colour.rgb * alpha, alpha);
+}

@@ -1,0 +1,69 @@
+// Splats of a batch to footprints on the screen. In: draw positions by gl_VertexID (four vertices
+// per splat with QUADS), the batch's storage blocks, the frame's constants. Out: the pixels to
+// cover, and flat the numbers of the footprint that splat.frag evaluates. Mirrors
+// trip_splat_project(), trip_weight_may_reach() and trip_shade().
+#include "fetch.glsl"
+#include "project.glsl"
+#include "weight.glsl"
+#include "shade.glsl"
+
+layout(std430, binding = TRIP_GL_TABLE) readonly buffer trip_gl_table { vec4 table[]; };
+
+layout(location = 0) flat out vec4 footprint;  // centre, conic xx and yy times ray2
+layout(location = 1) flat out vec4 colour;     // r, g, b, extinction * amplitude
+layout(location = 2) flat out float shear;     // 2 conic xy times ray2
+
+out gl_PerVertex
+{
+    vec4 gl_Position;
+    float gl_PointSize;
+};
+
+// Corners at pixel borders, so that every pixel of the bounds is covered and rounding cannot
+// decide; a sprite is a square round the middle.
+void cover(ivec4 pixels)
+{
+    vec2 image = vec2(screen.zw), corner = vec2(pixels.xy), size = vec2(pixels.zw - pixels.xy + 1);
+#ifdef QUADS
+    corner += size * vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1);
+#else
+    corner += 0.5 * size;
+    gl_PointSize = max(size.x, size.y);
+#endif
+    gl_Position = vec4((corner + vec2(screen.xy)) * 2.0 / image - 1.0, 0.0, 1.0);
+}
+
+void drop()
+{
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+    gl_PointSize = 1.0;
+    footprint = colour = vec4(0.0);
+    shear = 0.0;
+}
+
+void main()
+{
+#ifdef QUADS
+    record r = fetch_record(uint(gl_VertexID) >> 2);
+#else
+    record r = fetch_record(uint(gl_VertexID));
+#endif
+    splat s;
+    vec4 entry = table[r.code];
+    if (entry.a <= 0.0 || !project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius)) {
+        drop();
+        return;
+    }
+    ivec4 pixels = covered_pixels(s);
+    if (any(greaterThan(pixels.xy, pixels.zw))) {
+        drop();
+        return;
+    }
+    cover(pixels);
+    footprint = vec4(s.centre, s.conic.xz * s.ray2);
+    shear = 2.0 * s.conic.y * s.ray2;
+#ifdef SHADED
+    entry.rgb = shade(entry.rgb, r.normal, r.from_eye);
+#endif
+    colour = vec4(entry.rgb, entry.a * s.amplitude);
+}

@@ -1,0 +1,51 @@
+// Which list a pixel takes its colour from. Mirrors render/weight.c. METHOD: 0 merge, 1 clip, 2
+// axis, as trip_method.
+#include "real.glsl"
+
+#if defined(PARALLEL) || METHOD == 2
+#define WEIGHT_IS_CONSTANT
+#endif
+
+real largest_of(real3 r)
+{
+    return max(abs(r.x), max(abs(r.y), abs(r.z)));
+}
+
+int largest_axis(real3 r)
+{
+    real3 a = abs(r);
+    if (a.x >= a.y && a.x >= a.z)
+        return 0;
+    return a.y >= a.z ? 1 : 2;
+}
+
+// trip_weight() of a pixel position (from the image's corner) in the data's axes.
+real weight_of(real2 pixel, int axis)
+{
+#if METHOD == 2
+    return axis == int(weight.w) ? 1.0 : 0.0;
+#else
+    precise real3 ray = camera_r0.xyz + (camera_rx.xyz * pixel.x + camera_ry.xyz * pixel.y);
+#if METHOD == 1
+    return axis == largest_axis(ray) ? 1.0 : 0.0;
+#else
+    real h = weight.x;
+    return max(real(0.0), (abs(ray[axis]) / largest_of(ray) - h) / (1.0 - h));
+#endif
+#endif
+}
+
+// trip_weight_may_reach() of a splat, list axes; where weights are constant the plan has decided.
+bool may_reach(real3 from_eye, real radius)
+{
+#ifdef WEIGHT_IS_CONSTANT
+    return true;
+#else
+    real bound = abs(from_eye.x) - weight.x * largest_of(from_eye) + weight.y * radius;
+#if METHOD == 1
+    return bound >= 0.0;
+#else
+    return bound > 0.0;
+#endif
+#endif
+}
