@@ -23,6 +23,9 @@ enum field {
     ENDIAN,
     ENCODING,
     SPACINGS,
+    MINS,
+    MAXS,
+    CENTERS,
     DIRECTIONS,
     ORIGIN,
     KINDS,
@@ -64,12 +67,12 @@ static const struct {
     { "old max", FIELDS },
     { "oldmax", FIELDS },
     { "thicknesses", FIELDS },
-    { "axis mins", FIELDS },
-    { "axismins", FIELDS },
-    { "axis maxs", FIELDS },
-    { "axismaxs", FIELDS },
-    { "centers", FIELDS },
-    { "centerings", FIELDS },
+    { "axis mins", MINS },
+    { "axismins", MINS },
+    { "axis maxs", MAXS },
+    { "axismaxs", MAXS },
+    { "centers", CENTERS },
+    { "centerings", CENTERS },
     { "labels", FIELDS },
     { "units", FIELDS },
     { "space", FIELDS }, /* the world is the file's own, whatever its axes are called */
@@ -382,33 +385,65 @@ static int parse_directions(const parser *p, trip_nrrd_header *h)
     return 0;
 }
 
-/* A spacing of NaN means that the file does not know it. */
+/* One number for each axis; NaN, which means unknown, where the field is absent. */
+static int parse_numbers(const parser *p, enum field f, const char *name, double v[AXES_MAX])
+{
+    char *text = p->values[f];
+    for (int axis = 0; axis < p->axes; axis++) {
+        v[axis] = NAN;
+        if (!text)
+            continue;
+        char *end, *word = next_word(&text);
+        v[axis] = strtod(word, &end);
+        if (end == word || *end)
+            return fail_line(p, p->lines[f], "\"%s\" must be %d numbers", name, p->axes);
+    }
+    return 0;
+}
+
+/* Whether samples are at the ends of their axis ("node") rather than in the middle of its cells,
+ * which is the default. */
+static void parse_centers(const parser *p, bool node[AXES_MAX])
+{
+    char *text = p->values[CENTERS];
+    for (int axis = 0; axis < p->axes; axis++)
+        node[axis] = text && strcasecmp(next_word(&text), "node") == 0;
+}
+
+/* Spacings, or the extents that stand for them. */
 static int parse_spacings(const parser *p, trip_nrrd_header *h)
 {
-    char *text = p->values[SPACINGS];
-    for (int axis = 0; axis < p->axes; axis++) {
-        char *end, *word = next_word(&text);
-        double v = strtod(word, &end);
-        if (end == word || *end)
-            return fail_line(p, p->lines[SPACINGS], "\"spacings\" must be %d numbers", p->axes);
-        for (int a = 0; a < 3; a++)
-            if (axis == p->kept[a] && !isnan(v))
-                h->index_to_world.m[a][a] = v;
+    double spacing[AXES_MAX], min[AXES_MAX], max[AXES_MAX];
+    bool node[AXES_MAX];
+    int status;
+    if ((status = parse_numbers(p, SPACINGS, "spacings", spacing)) < 0 ||
+        (status = parse_numbers(p, MINS, "axis mins", min)) < 0 ||
+        (status = parse_numbers(p, MAXS, "axis maxs", max)) < 0)
+        return status;
+    parse_centers(p, node);
+    for (int a = 0; a < 3; a++) {
+        int axis = p->kept[a];
+        int64_t steps = h->dims[a] - node[axis];
+        double step = spacing[axis];
+        if (isnan(step))
+            step = steps > 0 ? (max[axis] - min[axis]) / (double)steps : 1;
+        if (isnan(step))
+            step = 1;
+        h->index_to_world.m[a][a] = step;
+        h->index_to_world.m[a][3] = isnan(min[axis]) ? 0 : min[axis] + (node[axis] ? 0 : step / 2);
     }
     return 0;
 }
 
 static int parse_geometry(const parser *p, trip_nrrd_header *h)
 {
-    double origin[3] = { 0 };
+    double origin[3];
     char *text = p->values[ORIGIN];
     h->index_to_world = trip_affine_identity();
-    int status = p->values[DIRECTIONS] ? parse_directions(p, h)
-                 : p->values[SPACINGS] ? parse_spacings(p, h)
-                                       : 0;
-    if (status < 0)
+    int status = p->values[DIRECTIONS] ? parse_directions(p, h) : parse_spacings(p, h);
+    if (status < 0 || !text)
         return status;
-    if (text && (!parse_vector(&text, origin) || *text))
+    if (!parse_vector(&text, origin) || *text)
         return fail_line(p, p->lines[ORIGIN], "\"space origin\" must be \"(x,y,z)\"");
     for (int row = 0; row < 3; row++)
         h->index_to_world.m[row][3] = origin[row];

@@ -202,6 +202,9 @@ static void spacings_and_directions_become_the_map(void **state)
                                 "space origin: (-10, 20, 1e1)\n"));
     assert_map(&a,
                (const double[3][4]){ { 1, 0, -0.5, -10 }, { 0.25, 2, 0, 20 }, { 0, 0.5, 3, 10 } });
+    a = map_of(write_with_lines("extent.nrrd", "axis mins: 1 -3 nan\naxis maxs: 11 3 nan\n"
+                                               "centers: cell node cell\n"));
+    assert_map(&a, (const double[3][4]){ { 2, 0, 0, 2 }, { 0, 2, 0, -3 }, { 0, 0, 1, 0 } });
     a = map_of(write_with_lines("neither.nrrd", ""));
     assert_map(&a, (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
 }
@@ -253,6 +256,8 @@ static void wrong_fields_are_refused_with_their_line(void **state)
         { "spacings: 1 2 x\n", "line 8: \"spacings\" must be 3" },
         { "spacings: 0 1 1\n", "singular" },
         { "spacings: inf 1 1\n", "singular or not finite" },
+        { "axis mins: 1 2\n", "line 8: \"axis mins\" must be 3" },
+        { "axis mins: 1 1 1\naxis maxs: 1 2 2\n", "singular" },
         { "space directions: (1,0,0) (0,1,0)\n", "line 8: \"space directions\"" },
         { "space directions: (1,0) (0,1,0) (0,0,1)\n", "line 8: \"space directions\"" },
         { "space directions: (1,0,0 (0,1,0) (0,0,1)\n", "line 8: \"space directions\"" },
