@@ -41,7 +41,10 @@ static void uring_submit(void *engine, trip_request *chain)
         trip_read read = trip_request_read(q);
         struct io_uring_sqe *sqe = get_entry(e);
         next = q->next;
-        io_uring_prep_read(sqe, read.fd, read.data, (unsigned)read.bytes, read.offset);
+        if (q->cached)
+            io_uring_prep_nop(sqe);
+        else
+            io_uring_prep_read(sqe, read.fd, read.data, (unsigned)read.bytes, read.offset);
         io_uring_sqe_set_data(sqe, q);
         /* Release, for the thread that reaps it: the kernel orders them, but does not say so. */
         atomic_store_explicit(&q->given, true, memory_order_release);
@@ -72,7 +75,7 @@ static void *work(void *engine)
         bool given = atomic_load_explicit(&q->given, memory_order_acquire);
         assert(given);
         (void)given;
-        if (trip_request_step(q, result))
+        if (q->cached || trip_request_step(q, result))
             trip_request_run(q);
     }
     return NULL;

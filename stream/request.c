@@ -1,6 +1,7 @@
 #include "request.h"
 
 #include <errno.h>
+#include <string.h>
 #include <sys/types.h>
 #include <unistd.h>
 #include <xxhash.h>
@@ -35,17 +36,34 @@ static void fail(trip_request *q, trip_request_fault fault, uint64_t at, int num
     q->fault_errno = number;
 }
 
+/* Checks the pages, and keeps those that the cache has made room for. */
 static void check_pages(trip_request *q)
 {
-    size_t page = (size_t)1 << q->source->page_log2;
-    const uint64_t *sum = q->source->checksums + (q->offset >> q->source->page_log2);
-    for (size_t at = 0; at < q->bytes; at += page, sum++) {
-        size_t left = q->bytes - at;
-        if (XXH64(q->data + at, left < page ? left : page, 0) != *sum) {
+    const trip_source *s = q->source;
+    size_t page_bytes = (size_t)1 << s->page_log2;
+    uint64_t page = q->offset >> s->page_log2;
+    for (size_t at = 0; at < q->bytes; at += page_bytes, page++) {
+        size_t left = q->bytes - at, bytes = left < page_bytes ? left : page_bytes;
+        if (XXH64(q->data + at, bytes, 0) != s->checksums[page]) {
             fail(q, TRIP_REQUEST_CHECKSUM, q->offset + at, 0);
             return;
         }
+        if (q->keep)
+            trip_cache_store(s->cache, s->first_page + (uint32_t)page, q, q->data + at, bytes);
     }
+}
+
+static void copy_pages(trip_request *q)
+{
+    const trip_source *s = q->source;
+    size_t page_bytes = (size_t)1 << s->page_log2;
+    uint32_t page = s->first_page + (uint32_t)(q->offset >> s->page_log2);
+    for (size_t at = 0; at < q->bytes; at += page_bytes, page++) {
+        size_t left = q->bytes - at;
+        memcpy(q->data + at, trip_cache_get(s->cache, page), left < page_bytes ? left : page_bytes);
+    }
+    q->done_bytes = q->bytes;
+    q->done(q);
 }
 
 /* Whether the read can be tried again. A file system or memory that takes no direct reads says so
@@ -95,6 +113,10 @@ bool trip_request_step(trip_request *q, long result)
 void trip_request_run(trip_request *q)
 {
     long result;
+    if (q->cached) {
+        copy_pages(q);
+        return;
+    }
     do {
         trip_read read = trip_request_read(q);
         ssize_t n = pread(read.fd, read.data, read.bytes, (off_t)read.offset);

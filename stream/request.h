@@ -1,4 +1,4 @@
-/* One read of a few pages of a plane file into a slot: made by the reader, carried out and checked
+/* One read of some pages of a plane file into a slot: made by the reader, carried out and checked
  * on an engine's thread, which then calls `done`. Faults are noted here and reported by the reader
  * when their turn comes, so that the message does not depend on timing. */
 #ifndef TRIP_REQUEST_H
@@ -7,7 +7,7 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
-#include "format.h"
+#include "cache.h"
 
 /* A plane file being read; the same for all requests of a pass. */
 typedef struct trip_source {
@@ -17,6 +17,8 @@ typedef struct trip_source {
     uint64_t file_bytes;
     unsigned page_log2;
     const uint64_t *checksums; /* of the file's pages */
+    trip_cache *cache;         /* or NULL */
+    uint32_t first_page;       /* of the file, in the cache */
     long (*fault)(void *user, void *data, uint64_t offset, size_t bytes, long result);
     void *fault_user;
 } trip_source;
@@ -36,6 +38,8 @@ typedef struct trip_request {
     void (*done)(struct trip_request *q);
     void *owner;
     int plane;
+    bool cached;               /* all its pages are in the cache and are copied from there */
+    bool keep;                 /* pages that the cache has made room for are stored there */
     struct trip_request *next; /* the engine's */
     _Atomic bool given;        /* the engine's: set (release) when it goes to the kernel */
     /* Result; the reader's again after `done`. */
@@ -60,7 +64,7 @@ trip_read trip_request_read(const trip_request *q);
 /* Takes the result of that read, a count or -errno. True when another is needed; false when the
  * request is over: then it has been checked and `done` called, and it belongs to the reader. */
 bool trip_request_step(trip_request *q, long result);
-/* Carries out the rest of the request on this thread. */
+/* Carries out the rest of the request on this thread: all of it where it is cached. */
 void trip_request_run(trip_request *q);
 
 #endif

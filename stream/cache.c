@@ -1,0 +1,162 @@
+#include "cache.h"
+
+#include "report.h"
+
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    STALE_PASSES =
+        12,         /* two frames of three lists with two sides: a page unused for longer may go */
+    SEARCH_MAX = 8, /* entries looked at for one that may go */
+};
+
+typedef struct entry {
+    uint32_t page; /* reader's thread */
+    uint32_t last_pass;
+    const void *filler; /* set before its request is submitted */
+    _Atomic bool valid; /* release when stored, acquire when found */
+} entry;
+
+struct trip_cache {
+    trip_budget *budget;
+    uint32_t first_page[3][TRIP_PLANES];
+    unsigned page_log2;
+    uint32_t page_count, entry_count, used, hand, pass;
+    /* Of a page: position + 1, 0 = not here. Written by the reader's thread, release; acquire in
+     * engine threads. */
+    _Atomic uint32_t *entry_of;
+    entry *entries;
+    unsigned char *memory;
+};
+
+static uint64_t plane_pages(const trip_dataset *d)
+{
+    uint64_t bytes = d->header.kept * TRIP_RECORD_BYTES;
+    uint64_t page = UINT64_C(1) << d->header.page_log2;
+    return bytes / page + (bytes % page != 0);
+}
+
+uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes)
+{
+    return 3 * (uint64_t)__builtin_popcount(planes) * plane_pages(d) << d->header.page_log2;
+}
+
+static size_t memory_bytes(const trip_cache *c)
+{
+    return (size_t)c->entry_count << c->page_log2;
+}
+
+int trip_cache_create(trip_cache **out, const trip_dataset *d, size_t bytes, trip_budget *budget)
+{
+    *out = NULL;
+    uint64_t pages = 3 * TRIP_PLANES * plane_pages(d);
+    uint64_t entries = bytes >> d->header.page_log2;
+    trip_cache *c = calloc(1, sizeof *c);
+    if (!c)
+        return trip_fail(TRIP_ERROR, "read", d->path, "out of memory");
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            c->first_page[axis][plane] =
+                (uint32_t)((uint64_t)(axis * TRIP_PLANES + plane) * plane_pages(d));
+    c->budget = budget;
+    c->page_log2 = d->header.page_log2;
+    c->page_count = (uint32_t)(pages < UINT32_MAX ? pages : 0);
+    c->entry_count = (uint32_t)(entries < pages ? entries : pages);
+    c->entry_of = trip_budget_take(budget, c->page_count * sizeof *c->entry_of);
+    c->entries = trip_budget_take(budget, c->entry_count * sizeof *c->entries);
+    c->memory = trip_budget_take(budget, memory_bytes(c));
+    if (pages < UINT32_MAX && c->entry_of && c->entries && c->memory) {
+        *out = c;
+        return TRIP_OK;
+    }
+    trip_cache_destroy(c);
+    return trip_fail(TRIP_ERROR, "read", d->path,
+                     "no memory to keep %zu bytes of it: give more with --memory", bytes);
+}
+
+void trip_cache_destroy(trip_cache *c)
+{
+    if (!c)
+        return;
+    trip_budget_release(c->budget, c->entry_of, c->page_count * sizeof *c->entry_of);
+    trip_budget_release(c->budget, c->entries, c->entry_count * sizeof *c->entries);
+    trip_budget_release(c->budget, c->memory, memory_bytes(c));
+    free(c);
+}
+
+uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offset)
+{
+    return c->first_page[axis][plane] + (uint32_t)(offset >> c->page_log2);
+}
+
+void trip_cache_begin_pass(trip_cache *c)
+{
+    c->pass++;
+}
+
+bool trip_cache_find(trip_cache *c, uint32_t page)
+{
+    uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_acquire);
+    if (position == 0)
+        return false;
+    entry *e = &c->entries[position - 1];
+    if (!atomic_load_explicit(&e->valid, memory_order_acquire))
+        return false;
+    e->last_pass = c->pass;
+    return true;
+}
+
+/* An entry for the page: its own from a pass that failed, an empty one, or one that may go. */
+static entry *find_room(trip_cache *c, uint32_t page)
+{
+    uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_relaxed);
+    if (position) {
+        entry *own = &c->entries[position - 1];
+        return own->last_pass == c->pass ? NULL : own;
+    }
+    if (c->used < c->entry_count)
+        return &c->entries[c->used++];
+    for (int i = 0; i < SEARCH_MAX && c->entry_count > 0; i++) {
+        entry *e = &c->entries[c->hand];
+        c->hand = (c->hand + 1) % c->entry_count;
+        if (c->pass - e->last_pass > STALE_PASSES) {
+            atomic_store_explicit(&c->entry_of[e->page], 0, memory_order_relaxed);
+            return e;
+        }
+    }
+    return NULL;
+}
+
+void trip_cache_reserve(trip_cache *c, uint32_t page, const void *filler)
+{
+    entry *e = find_room(c, page);
+    if (!e)
+        return;
+    e->page = page;
+    e->last_pass = c->pass;
+    e->filler = filler;
+    atomic_store_explicit(&e->valid, false, memory_order_relaxed);
+    atomic_store_explicit(&c->entry_of[page], (uint32_t)(e - c->entries) + 1, memory_order_release);
+}
+
+static unsigned char *memory_of(const trip_cache *c, uint32_t position)
+{
+    return c->memory + ((size_t)(position - 1) << c->page_log2);
+}
+
+const void *trip_cache_get(const trip_cache *c, uint32_t page)
+{
+    return memory_of(c, atomic_load_explicit(&c->entry_of[page], memory_order_acquire));
+}
+
+void trip_cache_store(trip_cache *c, uint32_t page, const void *filler, const void *data,
+                      size_t bytes)
+{
+    uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_acquire);
+    if (position == 0 || c->entries[position - 1].filler != filler)
+        return;
+    memcpy(memory_of(c, position), data, bytes);
+    atomic_store_explicit(&c->entries[position - 1].valid, true, memory_order_release);
+}

@@ -1,0 +1,35 @@
+/* Verified pages kept in memory between passes, so that views of the same data one after another
+ * read less. A page stays as long as passes keep asking for it: frames read their lists from end to
+ * end, where replacing the page unused for longest would always drop the one needed next.
+ *
+ * The reader's thread looks up and reserves; engine threads store and copy the pages of requests
+ * under way, which stay where they are until the pass is over. */
+#ifndef TRIP_CACHE_H
+#define TRIP_CACHE_H
+
+#include "dataset.h"
+
+typedef struct trip_cache trip_cache;
+
+/* A page is named by its number in a table of all pages of all planes. */
+int trip_cache_create(trip_cache **out, const trip_dataset *d, size_t bytes, trip_budget *budget);
+void trip_cache_destroy(trip_cache *c);
+/* Bytes that hold everything. */
+uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes);
+uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offset);
+
+/* Reader's thread: nothing is under way. */
+void trip_cache_begin_pass(trip_cache *c);
+/* Reader's thread: whether the page is there; if so it stays for this pass. */
+bool trip_cache_find(trip_cache *c, uint32_t page);
+/* Reader's thread: makes room for a page that is not there, to be stored by `filler`, if some page
+ * is not needed any more. */
+void trip_cache_reserve(trip_cache *c, uint32_t page, const void *filler);
+
+/* Engine threads: the page, which was found. */
+const void *trip_cache_get(const trip_cache *c, uint32_t page);
+/* Engine threads: stores the page if it was reserved for this filler. */
+void trip_cache_store(trip_cache *c, uint32_t page, const void *filler, const void *data,
+                      size_t bytes);
+
+#endif

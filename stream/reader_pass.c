@@ -1,0 +1,266 @@
+/* A pass: extents are planned and requested as slots become free, and handed out in draw order. */
+#include "reader.h"
+
+#include "reader_state.h"
+#include "report.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+/* On an engine's thread: the last thing it does with the request. */
+static void request_done(trip_request *q)
+{
+    trip_slot *s = q->owner;
+    trip_reader *r = s->reader;
+    pthread_mutex_lock(&r->lock);
+    if (--s->pending == 0)
+        pthread_cond_signal(&r->ready);
+    pthread_mutex_unlock(&r->lock);
+}
+
+static trip_request *add_request(trip_reader *r, trip_slot *s, int plane, uint64_t offset,
+                                 size_t bytes, unsigned char *data)
+{
+    const trip_source *source = &r->sources[plane];
+    trip_request *q = &s->requests[s->request_count++];
+    uint64_t left = source->file_bytes - offset;
+    q->source = source;
+    q->data = data;
+    q->offset = offset;
+    q->bytes = bytes < left ? bytes : (size_t)left;
+    q->done = request_done;
+    q->owner = s;
+    q->plane = plane;
+    q->cached = q->keep = false;
+    trip_request_start(q);
+    return q;
+}
+
+/* Bytes from `offset` on, at least a page, up to which all or no pages are cached. */
+static size_t alike_bytes(trip_reader *r, const trip_source *source, uint64_t offset, size_t bytes,
+                          bool cached)
+{
+    uint32_t page = source->first_page + (uint32_t)(offset >> source->page_log2);
+    size_t page_bytes = (size_t)1 << source->page_log2, at = page_bytes;
+    while (at < bytes && trip_cache_find(r->cache, ++page) == cached)
+        at += page_bytes;
+    return at;
+}
+
+static void reserve_pages(trip_reader *r, const trip_request *q)
+{
+    uint32_t page = q->source->first_page + (uint32_t)(q->offset >> q->source->page_log2);
+    for (size_t at = 0; at < q->bytes; at += (size_t)1 << q->source->page_log2)
+        trip_cache_reserve(r->cache, page++, q);
+}
+
+/* Requests for a segment of a plane: one, or by turns what is cached and what is not. A slot
+ * always keeps a request for every segment and plane still to come. */
+static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment, int plane,
+                         unsigned char *data)
+{
+    const trip_source *source = &r->sources[plane];
+    unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX * TRIP_PLANES;
+    for (size_t at = 0; at < segment->bytes;) {
+        uint64_t offset = segment->offset + at;
+        size_t bytes = segment->bytes - at;
+        uint32_t page = source->first_page + (uint32_t)(offset >> source->page_log2);
+        bool split = r->cache && s->request_count < last;
+        bool cached = split && trip_cache_find(r->cache, page);
+        if (split)
+            bytes = alike_bytes(r, source, offset, bytes, cached);
+        trip_request *q = add_request(r, s, plane, offset, bytes, data + at);
+        q->cached = cached;
+        q->keep = split && !cached;
+        if (q->keep)
+            reserve_pages(r, q);
+        at += bytes;
+    }
+}
+
+/* The planes of a segment are requested side by side. */
+static void submit(trip_reader *r, trip_slot *s)
+{
+    s->request_count = 0;
+    for (unsigned i = 0; i < s->extent.segment_count; i++) {
+        const trip_segment *segment = &s->extent.segments[i];
+        unsigned char *data = s->memory + segment->slot_offset;
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            if (r->read_planes[plane]) {
+                add_requests(r, s, segment, plane, data);
+                data += r->params.slot_bytes;
+            }
+    }
+    for (unsigned i = 0; i < s->request_count; i++)
+        s->requests[i].next = i + 1 < s->request_count ? &s->requests[i + 1] : NULL;
+    s->state = TRIP_SLOT_READING;
+    s->pending = s->request_count;
+    r->queue[(r->queue_first + r->queue_count++) % r->params.slots] = s;
+    r->ops->submit(r->engine, s->requests);
+}
+
+/* Plans and requests as much as there are free slots for. */
+static void fill_slots(trip_reader *r)
+{
+    for (unsigned i = 0; i < r->params.slots && !r->planned; i++) {
+        trip_slot *s = &r->slots[i];
+        if (s->state != TRIP_SLOT_FREE)
+            continue;
+        if (trip_planner_fill(&r->planner, &s->extent))
+            submit(r, s);
+        else
+            r->planned = true;
+    }
+}
+
+static uint64_t now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
+}
+
+static void count_requests(trip_reader *r, const trip_slot *s)
+{
+    for (unsigned i = 0; i < s->request_count; i++) {
+        const trip_request *q = &s->requests[i];
+        r->stats.reads += q->reads;
+        *(q->cached ? &r->stats.bytes_cached : &r->stats.bytes_read) += q->done_bytes;
+    }
+}
+
+/* Takes the first slot of the queue when it has been read. */
+static trip_slot *wait_first(trip_reader *r)
+{
+    trip_slot *s = r->queue[r->queue_first];
+    pthread_mutex_lock(&r->lock);
+    if (s->pending > 0) {
+        uint64_t start = now_ns();
+        while (s->pending > 0)
+            pthread_cond_wait(&r->ready, &r->lock);
+        r->stats.wait_ns += now_ns() - start;
+    }
+    pthread_mutex_unlock(&r->lock);
+    r->queue_first = (r->queue_first + 1) % r->params.slots;
+    r->queue_count--;
+    count_requests(r, s);
+    return s;
+}
+
+void trip_reader_drain(trip_reader *r)
+{
+    while (r->queue_count > 0)
+        wait_first(r)->state = TRIP_SLOT_FREE;
+}
+
+static void set_sources(trip_reader *r, int axis)
+{
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        r->sources[plane] = (trip_source){
+            .fd = r->data->plane_fd[axis][plane],
+            .direct_fd = r->direct_fd[axis][plane],
+            .direct_refused = &r->direct_refused,
+            .file_bytes = r->data->lists[axis].splats * TRIP_RECORD_BYTES,
+            .page_log2 = r->data->header.page_log2,
+            .checksums = r->data->lists[axis].page_checksums[plane],
+            .cache = r->cache,
+            .first_page = r->cache ? trip_cache_page(r->cache, axis, plane, 0) : 0,
+            .fault = r->params.fault,
+            .fault_user = r->params.fault_user,
+        };
+}
+
+int trip_reader_begin(trip_reader *r, const trip_selection *s)
+{
+    trip_reader_drain(r);
+    for (unsigned i = 0; i < r->params.slots; i++)
+        assert(r->slots[i].state == TRIP_SLOT_FREE);
+    r->stats = (trip_reader_stats){ 0 };
+    r->selection = s;
+    r->planned = false;
+    r->failed = 0;
+    r->planner = (trip_planner){ .page_bytes = (size_t)1 << r->data->header.page_log2,
+                                 .slot_bytes = r->params.slot_bytes,
+                                 .gap_bytes = r->params.gap_bytes,
+                                 .skip = r->params.skip,
+                                 .skip_user = r->params.skip_user };
+    trip_planner_begin(&r->planner, s);
+    set_sources(r, s->axis);
+    if (r->cache)
+        trip_cache_begin_pass(r->cache);
+    fill_slots(r);
+    return TRIP_OK;
+}
+
+static int report_fault(const trip_reader *r, const trip_request *q)
+{
+    char name[32], where[4096];
+    unsigned long long at = q->fault_at;
+    snprintf(where, sizeof where, "%s/%s", r->data->path,
+             trip_dataset_plane_name(r->selection->axis, q->plane, name));
+    if (q->fault == TRIP_REQUEST_CHECKSUM)
+        return trip_fail(TRIP_ERROR, "read", where,
+                         "byte %llu: the page that starts here is damaged (checksum): make the "
+                         "data set again",
+                         at);
+    if (q->fault == TRIP_REQUEST_SHORT)
+        return trip_fail(TRIP_ERROR, "read", where, "byte %llu: the file ends early", at);
+    return trip_fail(TRIP_ERROR, "read", where, "byte %llu: cannot read: %s", at,
+                     strerrordesc_np(q->fault_errno));
+}
+
+static int check_slot(const trip_reader *r, const trip_slot *s)
+{
+    for (unsigned i = 0; i < s->request_count; i++)
+        if (s->requests[i].fault != TRIP_REQUEST_OK)
+            return report_fault(r, &s->requests[i]);
+    return TRIP_OK;
+}
+
+static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
+{
+    bool normals = r->read_planes[TRIP_PLANE_NORMALS];
+    *batch = (trip_batch){
+        .selection = r->selection,
+        .voxels = (const uint32_t *)(const void *)s->memory,
+        .normals =
+            normals ? (const uint32_t *)(const void *)(s->memory + r->params.slot_bytes) : NULL,
+        .splats = s->extent.bytes / TRIP_RECORD_BYTES,
+        .runs = s->extent.runs,
+        .run_count = s->extent.run_count,
+        .slot = s,
+    };
+    r->stats.splats += s->extent.splats;
+}
+
+int trip_reader_next(trip_reader *r, trip_batch *batch)
+{
+    if (r->failed)
+        return r->failed;
+    fill_slots(r);
+    if (r->queue_count == 0 && !r->planned)
+        return trip_fail(TRIP_ERROR, "read", r->data->path,
+                         "all %u slots of the ring are held: release one first", r->params.slots);
+    if (r->queue_count == 0)
+        return 0;
+    trip_slot *s = wait_first(r);
+    r->failed = check_slot(r, s);
+    if (r->failed) {
+        s->state = TRIP_SLOT_FREE;
+        return r->failed;
+    }
+    s->state = TRIP_SLOT_DRAWING;
+    fill_batch(r, s, batch);
+    return 1;
+}
+
+void trip_reader_release(trip_reader *r, trip_batch *batch)
+{
+    trip_slot *s = batch->slot;
+    (void)r;
+    assert(s->state == TRIP_SLOT_DRAWING);
+    s->state = TRIP_SLOT_FREE;
+    batch->slot = NULL;
+}

@@ -1,0 +1,60 @@
+/* What the reader's two files share: reader.c makes it, reader_pass.c runs passes. */
+#ifndef TRIP_READER_STATE_H
+#define TRIP_READER_STATE_H
+
+#include <pthread.h>
+
+#include "engine.h"
+#include "extent.h"
+#include "reader.h"
+
+/* Room to tell apart cached pages from others within a segment. */
+#define TRIP_SLOT_REQUESTS_MAX (4 * TRIP_SEGMENTS_MAX * TRIP_PLANES)
+
+typedef enum trip_slot_state {
+    TRIP_SLOT_FREE,
+    TRIP_SLOT_READING, /* ready when nothing is pending */
+    TRIP_SLOT_DRAWING,
+} trip_slot_state;
+
+typedef struct trip_slot {
+    trip_reader *reader;
+    trip_slot_state state;
+    unsigned pending; /* under the reader's lock: requests not done */
+    unsigned char *memory;
+    trip_extent extent;
+    trip_request requests[TRIP_SLOT_REQUESTS_MAX];
+    unsigned request_count;
+} trip_slot;
+
+struct trip_reader {
+    const trip_dataset *data;
+    trip_reader_params params;
+    trip_budget *budget;
+    const trip_engine_ops *ops;
+    void *engine;
+    bool read_planes[TRIP_PLANES];
+    unsigned plane_count;
+    int direct_fd[3][TRIP_PLANES];
+    _Atomic bool direct_refused;
+    trip_source sources[TRIP_PLANES]; /* of the pass */
+    trip_cache *cache;                /* or NULL */
+    const trip_selection *selection;
+    trip_planner planner;
+    bool planned; /* no runs are left to plan */
+    int failed;   /* status that ended the pass */
+    trip_reader_stats stats;
+    trip_slot *slots;
+    unsigned char *slot_memory; /* NULL where it is the caller's */
+    trip_run *runs;
+    /* Slots being read, in draw order, from queue[queue_first % slots] on. */
+    trip_slot **queue;
+    unsigned queue_first, queue_count;
+    pthread_mutex_t lock;
+    pthread_cond_t ready; /* a slot has nothing pending any more */
+};
+
+/* Waits until nothing is being read. */
+void trip_reader_drain(trip_reader *r);
+
+#endif
