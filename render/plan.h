@@ -17,8 +17,8 @@ typedef struct trip_plan_pass {
 } trip_plan_pass;
 
 typedef struct trip_plan_list {
-    bool used;                 /* some ray of the view has weight in this list */
-    int pass_count;            /* at most 2: beyond the eye (ascending), then below (descending) */
+    bool used;      /* some ray of the view has weight in this list */
+    int pass_count; /* at most 2: beyond the eye (ascending), then below (descending) */
     trip_plan_pass passes[2];
     uint64_t bricks, bricks_selected;
     uint64_t bricks_outside, bricks_without_weight, bricks_transparent; /* why left out */
@@ -27,7 +27,7 @@ typedef struct trip_plan_list {
 
 typedef struct trip_plan {
     int axis_of_view;
-    unsigned planes;           /* bit per trip_plane to read */
+    unsigned planes; /* bit per trip_plane to read */
     trip_plan_list lists[3];
 } trip_plan;
 
@@ -37,7 +37,7 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
 void trip_plan_release(trip_plan *plan, trip_budget *budget);
 
 /* The plan in words, an effect a line: whether it runs and why. */
-void trip_plan_explain(const trip_plan *plan, const trip_dataset *data, const trip_settings *settings,
-                       FILE *out);
+void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
+                       const trip_settings *settings, FILE *out);
 
 #endif

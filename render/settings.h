@@ -1,5 +1,6 @@
 /* What the user asked a picture to be. Plain values that every renderer reads alike; start from
- * trip_settings_default(). */
+ * trip_settings_default(). Sections of papers: 2005 is Hofsetz & Max, 2008 Hofsetz, Max & Bastos.
+ */
 #ifndef TRIP_SETTINGS_H
 #define TRIP_SETTINGS_H
 
@@ -19,14 +20,14 @@
 #define TRIP_SATURATION (1.0 / 8192.0)
 
 typedef enum trip_method {
-    TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005 section 5.2, 2008 section 4.2) */
-    TRIP_METHOD_CLIP,  /* every pixel from the list its ray is most aligned with (2005 section 5.1) */
+    TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005, 5.2; 2008, 4.2) */
+    TRIP_METHOD_CLIP,  /* every pixel from the list its ray is most aligned with (2005, 5.1) */
     TRIP_METHOD_AXIS,  /* one list per frame, by the ray at the image centre (Westover 1989) */
 } trip_method;
 
 typedef enum trip_traversal {
     TRIP_TRAVERSAL_OUTWARD,   /* from the eye's coordinate outward, front to back */
-    TRIP_TRAVERSAL_ASCENDING, /* file order, blend equation by the ray at the image centre (2008 5.3) */
+    TRIP_TRAVERSAL_ASCENDING, /* file order, blend equation by the central ray (2008, 5.3) */
 } trip_traversal;
 
 typedef enum trip_target {
@@ -39,14 +40,14 @@ typedef struct trip_settings {
     trip_method method;
     trip_traversal traversal;
     trip_target target;
-    bool indexed;          /* one vertex array with three index lists instead of three lists */
-    bool triangles;        /* bounding quads of two triangles instead of point sprites */
-    bool shading;          /* diffuse and specular from the stored gradients */
-    bool headlight;        /* light from the eye; otherwise from light_direction */
+    bool indexed;              /* one vertex array with three index lists instead of three lists */
+    bool triangles;            /* bounding quads of two triangles instead of point sprites */
+    bool shading;              /* diffuse and specular from the stored gradients */
+    bool headlight;            /* light from the eye; otherwise from light_direction */
     trip_vec3 light_direction; /* world space, towards the light, unit length */
-    double h;              /* 0 <= h < 1 */
-    double kernel_radius;  /* voxels (index space) */
-    double background[4];  /* r, g, b, a; not premultiplied */
+    double h;                  /* 0 <= h < 1 */
+    double kernel_radius;      /* voxels (index space) */
+    double background[4];      /* r, g, b, a; not premultiplied */
 } trip_settings;
 
 /* The defaults: merge, outward, h 0.85, kernel radius 2, shading by headlight, rgba32f, black. */

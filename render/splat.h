@@ -5,8 +5,8 @@
  * deviation sigma = kernel_radius / TRIP_CUTOFF in index space, of unit integral over one voxel's
  * volume. For the ray of a pixel position p at distance d (index space) from v its line integral is
  *     footprint = 1 / (2 pi sigma^2) exp(-d^2 / (2 sigma^2))            [1 / index length]
- * Let (x, y, z) be the projection of v, q = (dx, dy) = p - (x, y), and r_c = r(x, y) the ray through
- * the centre. Since v - eye is parallel to r_c, the exact distance is a quadratic form in q:
+ * Let (x, y, z) be the projection of v, q = (dx, dy) = p - (x, y), and r_c = r(x, y) the ray
+ * through the centre. As v - eye is parallel to r_c, the exact distance is quadratic in q:
  *     d^2 = |dx A + dy B|^2 / |r(p)|^2,  A = (v - eye) x rx,  B = (v - eye) x ry      (perspective)
  *     d^2 = |dx A + dy B|^2 / |r0|^2,    A = r0 x rx,         B = r0 x ry             (parallel)
  * With g(p) = |r_c|^2 / |r(p)|^2 (1 in parallel views) and the 2 x 2 screen covariance
@@ -19,15 +19,17 @@
  *     amplitude  = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) / (1 - exp(-TRIP_CUTOFF^2 / 2))
  *     footprint' = amplitude exp(-m(p) / 2)    where m(p) <= TRIP_CUTOFF^2, else nothing
  * (the last factor of the amplitude gives back the mass that the cut-off takes). A ray covers
- * stretch(p) = |J r(p)| / |r(p)| world units per index length, J the linear part of index_to_world, so
+ * stretch(p) = |J r(p)| / |r(p)| world units per index length, J being the linear part of
+ * index_to_world, so
  *     alpha(p) = 1 - exp(-tau * stretch(p) * footprint').
  *
  * The support {m(p) <= TRIP_CUTOFF^2} is the inside of a conic. Writing k = TRIP_CUTOFF,
  *     E = S'^-1 - (k^2 / |r_c|^2) [rx.rx rx.ry; rx.ry ry.ry],  l = (k^2 / |r_c|^2) (r_c.rx, r_c.ry)
- * (no second terms in parallel views) it is the ellipse (q - E^-1 l)^T E (q - E^-1 l) <= k^2 + l^T E^-1 l
- * when E is positive definite, whose half extents are sqrt((k^2 + l^T E^-1 l) (E^-1)_xx) and _yy.
- * Splats with z <= 0, or whose support is not an ellipse (it crosses the plane of the eye, Hofsetz &
- * Max 2005 section 4), are not drawn. */
+ * (no second terms in parallel views) it is, when E is positive definite, the ellipse
+ *     (q - E^-1 l)^T E (q - E^-1 l) <= k^2 + l^T E^-1 l
+ * whose half extents are sqrt((k^2 + l^T E^-1 l) (E^-1)_xx) and _yy. Splats with z <= 0, or whose
+ * support is not an ellipse (it crosses the plane of the eye, Hofsetz & Max 2005 section 4), are
+ * not drawn. */
 #ifndef TRIP_SPLAT_H
 #define TRIP_SPLAT_H
 
@@ -39,21 +41,21 @@
 /* Constants of one frame. */
 typedef struct trip_splat_frame {
     trip_camera camera;
-    double sigma;          /* index space */
-    double cutoff2;        /* TRIP_CUTOFF^2 */
-    double low_pass2;      /* px^2 */
-    double amplitude;      /* 1 / (2 pi sigma^2) / (1 - exp(-cutoff2 / 2)) */
+    double sigma;     /* index space */
+    double cutoff2;   /* TRIP_CUTOFF^2 */
+    double low_pass2; /* px^2 */
+    double amplitude; /* 1 / (2 pi sigma^2) / (1 - exp(-cutoff2 / 2)) */
     double rxrx, rxry, ryry;
 } trip_splat_frame;
 
 /* A projected splat. */
 typedef struct trip_splat {
-    double x, y, z;               /* pixel position of the centre and depth */
-    double ray2;                  /* |r_c|^2; 1 in parallel views */
+    double x, y, z;                      /* pixel position of the centre and depth */
+    double ray2;                         /* |r_c|^2; 1 in parallel views */
     double conic_xx, conic_xy, conic_yy; /* S'^-1 */
     double amplitude;
-    double x0, y0, x1, y1;        /* bounds of the support in pixel positions */
-    double radius;                /* index-space radius that contains every ray of the support */
+    double x0, y0, x1, y1; /* bounds of the support in pixel positions */
+    double radius;         /* index-space radius that contains every ray of the support */
 } trip_splat;
 
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings);

@@ -15,8 +15,8 @@ double trip_weight(const trip_settings *s, int axis_of_view, trip_vec3 ray, int 
 /* argmax |r_a| of the ray at the image centre: the one list of Westover's method. */
 int trip_weight_axis_of_view(const trip_camera *c);
 
-/* A bound for culling by w +- dw (2008 section 5.4), exact in the safe direction: false only when no
- * ray that passes within `radius` (index space) of `centre` has weight in list `axis`. For a ray
+/* A bound for culling by w +- dw (2008 section 5.4), exact in the safe direction: false only when
+ * no ray that passes within `radius` (index space) of `centre` has weight in list `axis`. For a ray
  * through c + e, |e| <= radius: |r_a| - h max |r_b| <= |c_a| - h max |c_b| + sqrt(1 + h^2) radius,
  * c taken from the eye. (clip: h = 1. Parallel views: the weight of the one direction decides.) */
 bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axis_of_view, int axis,
