@@ -91,7 +91,7 @@ static void midpoint_and_sharpness_bend_opacity_as_in_vtk(void **state)
                  "{\"RGBPoints\":[0,0,0,0,2,1,1,1],\"Points\":[0,0.1,%g,%g,2,0.9,0.5,0]}",
                  cases[i].midpoint, cases[i].sharpness);
         trip_tf *tf = from_json(text);
-        for (int k = 0; k < 5; k++) /* bent curves are sampled: within 1/255 / 20 */
+        for (int k = 0; k < 5; k++) /* bent curves are sampled */
             assert_close(trip_tf_evaluate(tf, at[k]).opacity, cases[i].expected[k], 2e-4);
         trip_tf_destroy(tf);
     }
