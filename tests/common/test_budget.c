@@ -156,8 +156,8 @@ static void other_texts_are_not_sizes(void **state)
                                          "nan",
                                          "0x10",
                                          "+5",
-                                         "000000000000000000000000000000000000000000000000000000"
-                                         "00000000000000000001" };
+                                         ("000000000000000000000000000000000000000000000000000000"
+                                          "00000000000000000001") };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         uint64_t bytes = 77;
         assert_false(trip_parse_bytes(texts[i], &bytes));
