@@ -331,39 +331,38 @@ static int pick_map(const cJSON *root, const char *name, const char *preset, con
     return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, name, "holds no colour map named `%s`", preset);
 }
 
-static int fail_syntax(const char *name, const char *text, const char *at)
+static void report_syntax(const char *name, const char *text, const char *at)
 {
     char where[512];
     long line_number = 1;
     for (const char *p = text; p < at; p++)
         line_number += *p == '\n';
     snprintf(where, sizeof where, "%.400s: line %ld", name, line_number);
-    return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "not JSON from here on");
+    trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "not JSON from here on");
 }
 
-static int parse_json(cJSON **root, const char *name, const char *text, size_t bytes)
+/* NULL, and a report, where the text is not JSON from end to end. */
+static cJSON *parse_json(const char *name, const char *text, size_t bytes)
 {
     const char *end = text;
-    *root = cJSON_ParseWithLengthOpts(text, bytes, &end, 0);
-    if (*root)
+    cJSON *root = cJSON_ParseWithLengthOpts(text, bytes, &end, 0);
+    if (root)
         while (end < text + bytes && (*end == ' ' || (*end >= '\t' && *end <= '\r')))
             end++;
-    if (*root && (end == text + bytes || *end == 0))
-        return TRIP_OK;
-    cJSON_Delete(*root);
-    *root = NULL;
-    return fail_syntax(name, text, end);
+    if (root && (end == text + bytes || *end == 0))
+        return root;
+    cJSON_Delete(root);
+    report_syntax(name, text, end);
+    return NULL;
 }
 
 int trip_tf_parse_colormap(trip_tf **out, const char *name, const char *text, size_t bytes,
                            const char *preset)
 {
-    cJSON *root = NULL;
     map_reader r = { .map = NULL };
     *out = NULL;
-    int status = parse_json(&root, name, text, bytes);
-    if (!status)
-        status = pick_map(root, name, preset, &r.map);
+    cJSON *root = parse_json(name, text, bytes);
+    int status = root ? pick_map(root, name, preset, &r.map) : TRIP_ERROR;
     if (!status) {
         const char *own = name_of(r.map);
         snprintf(r.where, sizeof r.where, "%.300s%s%.100s", name, *own ? ": " : "", own);
