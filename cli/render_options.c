@@ -1,0 +1,314 @@
+#include "render_options.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "image_file.h"
+#include "options.h"
+#include "report.h"
+
+enum {
+    KEY_SIZE = 256,
+    KEY_EYE,
+    KEY_LOOK,
+    KEY_UP,
+    KEY_FOV,
+    KEY_ORTHO,
+    KEY_ORBIT,
+    KEY_BACKGROUND,
+    KEY_TF,
+    KEY_LIGHT,
+    KEY_NO_SHADING,
+    KEY_H,
+    KEY_KERNEL_RADIUS,
+    KEY_TARGET,
+    KEY_RENDERER,
+    KEY_METHOD,
+    KEY_SUBMIT,
+    KEY_TRAVERSAL,
+    KEY_STATS,
+    KEY_EXPLAIN,
+    KEY_MEMORY,
+    KEY_ENGINE,
+    KEY_THREADS,
+};
+
+static const struct argp_option options[] = {
+    { NULL, 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
+    { NULL, 0, NULL, 0, "View:", 1 },
+    { "size", KEY_SIZE, "WxH", 0, "Pixels (1024x1024)", 1 },
+    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (the whole volume in view)", 1 },
+    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (the middle)", 1 },
+    { "up", KEY_UP, "X,Y,Z", 0, "What is up (0,0,1; 0,1,0 for OpenVDB)", 1 },
+    { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (30)", 1 },
+    { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, HEIGHT world units high", 1 },
+    { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...", 1 },
+    { NULL, 0, NULL, 0, "Look:", 2 },
+    { "tf", KEY_TF, "FILE", 0,
+      "Transfer function: .tf, ParaView JSON or preset:NAME (the one kept in the data set)", 2 },
+    { "light", KEY_LIGHT, "X,Y,Z|head", 0, "Direction to the light, or from the eye (head)", 2 },
+    { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
+    { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
+      "Behind the volume, 0 to 1 (0,0,0; none for .exr)", 2 },
+    { NULL, 0, NULL, 0, "Method:", 3 },
+    { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (merge)", 3 },
+    { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (0.85); merge only", 3 },
+    { "traversal", KEY_TRAVERSAL, "NAME", 0, "outward or ascending (outward)", 3 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (2)", 3 },
+    { NULL, 0, NULL, 0, "Renderer:", 4 },
+    { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu, reference or auto (auto)", 4 },
+    { "target", KEY_TARGET, "NAME", 0, "Layers of rgba32f, rgba16f or rgba8 (rgba32f); gl only",
+      4 },
+    { "submit", KEY_SUBMIT, "FORM", 0,
+      "replicated or indexed lists, sprites or triangles (replicated,sprites); gl only", 4 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Bound for all buffers (a quarter of what there is)", 4 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (auto)", 4 },
+    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (one a processor)", 4 },
+    { NULL, 0, NULL, 0, "Results:", 5 },
+    { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
+    { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
+    { 0 },
+};
+
+/* While parsing: what was given, for the checks of combinations. */
+typedef struct parse {
+    render_options *o;
+    bool h, target, background, lists, forms;
+} parse;
+
+static int parse_size(const char *text, render_options *o)
+{
+    int used = 0;
+    if (sscanf(text, "%5dx%5d%n", &o->width, &o->height, &used) == 2 && !text[used] &&
+        o->width > 0 && o->height > 0 && strspn(text, "0123456789x") == strlen(text))
+        return 0;
+    return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
+}
+
+static int parse_point(const char *option, const char *text, trip_vec3 *out, bool *given)
+{
+    double v[3];
+    int count, status = trip_option_numbers(option, text, 3, 3, v, &count);
+    *out = trip_v3(v[0], v[1], v[2]);
+    *given = true;
+    return status;
+}
+
+static int parse_light(const char *text, trip_settings *s)
+{
+    bool given;
+    s->headlight = !strcmp(text, "head");
+    if (s->headlight)
+        return 0;
+    int status = parse_point("--light", text, &s->light_direction, &given);
+    if (!status && !(trip_length(s->light_direction) > 0))
+        return trip_option_fail("--light", "the direction is zero");
+    s->light_direction = trip_normalize(s->light_direction);
+    return status;
+}
+
+static int parse_background(const char *text, trip_settings *s)
+{
+    int count;
+    memset(s->background, 0, sizeof s->background);
+    if (!strcmp(text, "none"))
+        return 0;
+    s->background[3] = 1;
+    int status = trip_option_numbers("--background", text, 3, 4, s->background, &count);
+    for (int i = 0; i < 4 && !status; i++)
+        if (s->background[i] < 0 || s->background[i] > 1)
+            return trip_option_fail("--background", "components lie between 0 and 1");
+    return status;
+}
+
+/* One or two of the four names, joined by a comma. */
+static int parse_submit(const char *text, parse *p)
+{
+    static const char *const names[] = { "replicated", "indexed", "sprites", "triangles", NULL };
+    for (const char *rest = text; rest;) {
+        char name[16];
+        const char *comma = strchr(rest, ',');
+        int which, length = (int)(comma ? comma - rest : (long)strlen(rest));
+        snprintf(name, sizeof name, "%.*s", length, rest);
+        int status = trip_option_choice("--submit", name, names, &which);
+        if (status)
+            return status;
+        bool *given = which < 2 ? &p->lists : &p->forms;
+        if (*given)
+            return trip_option_fail("--submit", "replicated excludes indexed, sprites triangles");
+        *given = true;
+        *(which < 2 ? &p->o->settings.indexed : &p->o->settings.triangles) = which % 2;
+        rest = comma ? comma + 1 : NULL;
+    }
+    return 0;
+}
+
+static int parse_view(int key, char *arg, render_options *o)
+{
+    switch (key) {
+    case KEY_SIZE:
+        return parse_size(arg, o);
+    case KEY_EYE:
+        return parse_point("--eye", arg, &o->eye, &o->eye_given);
+    case KEY_LOOK:
+        return parse_point("--look", arg, &o->look, &o->look_given);
+    case KEY_UP:
+        return parse_point("--up", arg, &o->up, &o->up_given);
+    case KEY_FOV:
+        return trip_option_number("--fov", arg, 0.001, 179.999, &o->fov_degrees);
+    case KEY_ORTHO:
+        return trip_option_number("--ortho", arg, 1e-100, 1e100, &o->ortho_height);
+    case KEY_ORBIT:
+        return trip_option_integer("--orbit", arg, 1, 100000, &o->orbit);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int parse_method(int key, char *arg, parse *p)
+{
+    static const char *const methods[] = { "merge", "clip", "axis", NULL };
+    static const char *const traversals[] = { "outward", "ascending", NULL };
+    trip_settings *s = &p->o->settings;
+    int which = 0, status;
+    switch (key) {
+    case KEY_METHOD:
+        status = trip_option_choice("--method", arg, methods, &which);
+        s->method = (trip_method)which;
+        return status;
+    case KEY_TRAVERSAL:
+        status = trip_option_choice("--traversal", arg, traversals, &which);
+        s->traversal = (trip_traversal)which;
+        return status;
+    case KEY_H:
+        p->h = true;
+        status = trip_option_number("--h", arg, 0, 1, &s->h);
+        return !status && s->h == 1 ? trip_option_fail("--h", "must be below 1") : status;
+    case KEY_KERNEL_RADIUS:
+        return trip_option_number("--kernel-radius", arg, 0.1, 100, &s->kernel_radius);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int parse_look(int key, char *arg, parse *p)
+{
+    render_options *o = p->o;
+    switch (key) {
+    case KEY_TF:
+        o->tf = arg;
+        return 0;
+    case KEY_LIGHT:
+        return parse_light(arg, &o->settings);
+    case KEY_NO_SHADING:
+        o->settings.shading = false;
+        return 0;
+    case KEY_BACKGROUND:
+        p->background = true;
+        return parse_background(arg, &o->settings);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int parse_renderer(int key, char *arg, parse *p)
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", NULL };
+    static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
+    static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
+    render_options *o = p->o;
+    int which = 0, status;
+    switch (key) {
+    case KEY_RENDERER:
+        status = trip_option_choice("--renderer", arg, renderers, &which);
+        o->renderer = (trip_renderer_kind)which;
+        return status;
+    case KEY_TARGET:
+        p->target = true;
+        status = trip_option_choice("--target", arg, targets, &which);
+        o->settings.target = (trip_target)which;
+        return status;
+    case KEY_SUBMIT:
+        return parse_submit(arg, p);
+    case KEY_MEMORY:
+        return trip_option_bytes("--memory", arg, &o->memory_bytes);
+    case KEY_ENGINE:
+        status = trip_option_choice("--engine", arg, engines, &which);
+        o->engine = (trip_engine)which;
+        return status;
+    case KEY_THREADS:
+        return trip_option_integer("--threads", arg, 1, 1024, &o->threads);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* Options that cannot apply together; what one implies for another. */
+static int check(parse *p)
+{
+    render_options *o = p->o;
+    if (!o->input)
+        return trip_option_fail("NAME.trip", "no data set given; `triptych render --help`");
+    if (!o->output)
+        return trip_option_fail("-o", "no image file given; `triptych render --help`");
+    if (o->ortho_height > 0 && o->fov_degrees > 0)
+        return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
+    if (p->h && o->settings.method != TRIP_METHOD_MERGE)
+        return trip_option_fail("--h", "applies to --method merge only");
+    bool gl_only = p->target || p->lists || p->forms;
+    if (gl_only && o->renderer != TRIP_RENDERER_AUTO && o->renderer != TRIP_RENDERER_GL)
+        return trip_option_fail(p->target ? "--target" : "--submit",
+                                "applies to --renderer gl only");
+    if (gl_only)
+        o->renderer = TRIP_RENDERER_GL;
+    const char *extension = strrchr(o->output, '.');
+    if (!p->background && extension && !strcasecmp(extension, ".exr"))
+        memset(o->settings.background, 0, sizeof o->settings.background);
+    return trip_image_check_path(o->output, NULL);
+}
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    parse *p = state->input;
+    switch (key) {
+    case 'o':
+        p->o->output = arg;
+        return 0;
+    case KEY_STATS:
+        p->o->stats = arg;
+        return 0;
+    case KEY_EXPLAIN:
+        p->o->explain = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (p->o->input)
+            return trip_option_fail(arg, "one data set at a time");
+        p->o->input = arg;
+        return 0;
+    case ARGP_KEY_END:
+        return check(p);
+    default:
+        break;
+    }
+    int status = parse_view(key, arg, p->o);
+    if (status == ARGP_ERR_UNKNOWN)
+        status = parse_look(key, arg, p);
+    if (status == ARGP_ERR_UNKNOWN)
+        status = parse_method(key, arg, p);
+    return status == ARGP_ERR_UNKNOWN ? parse_renderer(key, arg, p) : status;
+}
+
+int render_options_parse(render_options *o, int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse_key,
+        .args_doc = "NAME.trip",
+        .doc = "Draws a data set made by `triptych brick` into an image file, reading it from disk "
+               "once.\vDefaults in parentheses. Points and lengths are in the data's world units.",
+    };
+    *o = (render_options){ .width = 1024, .height = 1024, .settings = trip_settings_default() };
+    parse p = { .o = o };
+    return trip_options_parse(&argp, argc, argv, &p);
+}

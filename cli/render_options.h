@@ -1,0 +1,29 @@
+/* What `triptych render` was asked for: the command line, checked, defaults filled in. */
+#ifndef TRIP_RENDER_OPTIONS_H
+#define TRIP_RENDER_OPTIONS_H
+
+#include "reader.h"
+#include "renderer_choice.h"
+#include "settings.h"
+
+typedef struct render_options {
+    const char *input, *output; /* the data set; an image file, its name's model in an orbit */
+    const char *tf;             /* file or preset; NULL: the function kept in the data set */
+    const char *stats;          /* file, "-" for stdout, or NULL */
+    int width, height;
+    bool eye_given, look_given, up_given;
+    trip_vec3 eye, look, up;
+    double fov_degrees, ortho_height; /* 0: not given */
+    int orbit;                        /* images of a turntable; 0: one image */
+    trip_settings settings;
+    trip_renderer_kind renderer;
+    trip_engine engine;
+    uint64_t memory_bytes; /* 0: the default */
+    int threads;           /* 0: the default */
+    bool explain;
+} render_options;
+
+/* 0, or TRIP_USAGE once reported; --help prints and exits. */
+int render_options_parse(render_options *o, int argc, char **argv);
+
+#endif

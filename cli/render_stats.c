@@ -1,0 +1,142 @@
+#include "render_stats.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cjson/cJSON.h>
+
+#include "report.h"
+
+struct render_stats {
+    cJSON *root, *frames;
+};
+
+static const char *const axis_names[3] = { "x", "y", "z" };
+static const char *const method_names[] = { "merge", "clip", "axis" };
+
+static int out_of_memory(void)
+{
+    return trip_fail(TRIP_ERROR, "render", "--stats", "out of memory");
+}
+
+int render_stats_create(render_stats **out)
+{
+    render_stats *s = calloc(1, sizeof *s);
+    *out = s;
+    if (!s)
+        return out_of_memory();
+    s->root = cJSON_CreateObject();
+    s->frames = cJSON_CreateArray();
+    return s->root && s->frames ? 0 : out_of_memory();
+}
+
+void render_stats_destroy(render_stats *s)
+{
+    if (!s)
+        return;
+    cJSON_Delete(s->root);
+    cJSON_Delete(s->frames);
+    free(s);
+}
+
+static void add_list(cJSON *lists, int axis, const trip_list_stats *s)
+{
+    cJSON *list = cJSON_AddObjectToObject(lists, axis_names[axis]);
+    cJSON_AddNumberToObject(list, "splats_read", (double)s->splats_read);
+    cJSON_AddNumberToObject(list, "splats_projected", (double)s->splats_projected);
+    cJSON_AddNumberToObject(list, "splats_drawn", (double)s->splats_drawn);
+    cJSON_AddNumberToObject(list, "bytes_read", (double)s->bytes_read);
+}
+
+int render_stats_add_frame(render_stats *s, const trip_frame_stats *frame)
+{
+    cJSON *f = cJSON_CreateObject();
+    cJSON_AddNumberToObject(f, "ms", frame->ms);
+    cJSON_AddNumberToObject(f, "read_ms", frame->read_ms);
+    cJSON_AddNumberToObject(f, "draw_ms", frame->draw_ms);
+    cJSON_AddNumberToObject(f, "merge_ms", frame->merge_ms);
+    cJSON_AddNumberToObject(f, "bytes_cached", (double)frame->reader.bytes_cached);
+    cJSON *lists = cJSON_AddObjectToObject(f, "lists");
+    for (int axis = 0; axis < 3; axis++)
+        add_list(lists, axis, &frame->lists[axis]);
+    return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
+}
+
+static int write_stdout(const char *text)
+{
+    if (puts(text) < 0 || fflush(stdout) != 0)
+        return trip_fail_errno("write", "standard output", "--stats");
+    return 0;
+}
+
+static int write_file(const char *path, const char *text)
+{
+    char partial[4096];
+    if (snprintf(partial, sizeof partial, "%s.partial", path) >= (int)sizeof partial)
+        return trip_fail(TRIP_ERROR, "write", path, "the name is too long");
+    FILE *f = fopen(partial, "w");
+    if (!f)
+        return trip_fail_errno("write", partial, "cannot create");
+    bool good = fputs(text, f) >= 0 && fputs("\n", f) >= 0;
+    good = fclose(f) == 0 && good;
+    if (good && rename(partial, path) == 0)
+        return 0;
+    int status = trip_fail_errno("write", path, "cannot write");
+    unlink(partial);
+    return status;
+}
+
+int render_stats_write(render_stats *s, const render_options *o, const trip_renderer *renderer,
+                       const trip_reader *reader, const trip_budget *budget)
+{
+    cJSON *root = s->root;
+    const int size[2] = { o->width, o->height };
+    cJSON_AddStringToObject(root, "renderer", renderer->ops->name);
+    cJSON_AddStringToObject(root, "device", renderer->ops->device(renderer));
+    cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
+    cJSON_AddStringToObject(root, "engine", trip_reader_engine_name(reader));
+    cJSON_AddItemToObject(root, "size", cJSON_CreateIntArray(size, 2));
+    cJSON_AddNumberToObject(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
+    cJSON_AddNumberToObject(root, "memory_limit_bytes", (double)trip_budget_limit_bytes(budget));
+    cJSON_AddNumberToObject(root, "memory_peak_bytes", (double)trip_budget_peak_bytes(budget));
+    cJSON_AddItemToObject(root, "frames", s->frames);
+    s->frames = NULL;
+    char *text = cJSON_Print(root);
+    if (!text)
+        return out_of_memory();
+    int status = strcmp(o->stats, "-") ? write_file(o->stats, text) : write_stdout(text);
+    free(text);
+    return status;
+}
+
+void render_stats_explain(const trip_frame_stats *frame, FILE *out)
+{
+    char bytes[32];
+    for (int axis = 0; axis < 3; axis++) {
+        const trip_list_stats *s = &frame->lists[axis];
+        if (s->splats_read == 0)
+            continue;
+        fprintf(out, "cost %s      %s read, %" PRIu64 " splats read, %" PRIu64 " projected",
+                axis_names[axis], trip_format_bytes(s->bytes_read, bytes), s->splats_read,
+                s->splats_projected);
+        fprintf(out, ", %" PRIu64 " drawn\n", s->splats_drawn);
+    }
+    fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
+            frame->ms, frame->read_ms, frame->draw_ms, frame->merge_ms);
+}
+
+void render_stats_summary(const char *path, const render_options *o, const trip_frame_stats *frame,
+                          FILE *out)
+{
+    uint64_t splats = 0, bytes = 0;
+    char text[32];
+    for (int axis = 0; axis < 3; axis++) {
+        splats += frame->lists[axis].splats_read;
+        bytes += frame->lists[axis].bytes_read;
+    }
+    fprintf(out, "%s: %d x %d, %.2f million splats, %s read, %.2f s\n", path, o->width, o->height,
+            (double)splats * 1e-6, trip_format_bytes(bytes, text), frame->ms * 1e-3);
+}
