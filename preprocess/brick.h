@@ -1,0 +1,51 @@
+/* A volume file to a data set: the whole of `triptych brick` but for its command line. One call at
+ * a time in a process; it starts and ends its own threads. */
+#ifndef TRIP_BRICK_H
+#define TRIP_BRICK_H
+
+#include "volume.h"
+
+typedef struct trip_value_range {
+    double lo, hi; /* inclusive */
+} trip_value_range;
+
+/* Zero means the default everywhere. */
+typedef struct trip_brick_params {
+    const char *input, *output;
+    trip_volume_params volume;
+
+    /* The opacity envelope: the union of these. With none of them, the function that
+     * trip_tf_from_histogram() makes of the volume. */
+    const char *const *functions; /* as trip_tf_load() takes them */
+    size_t function_count;
+    const trip_value_range *ranges;
+    size_t range_count;
+    bool keep_all; /* every finite voxel */
+
+    bool no_normals;
+    bool replace; /* an existing data set */
+    unsigned tile_voxels, slab_sheets;
+    uint64_t memory_bytes; /* default: a quarter of what the process may use */
+    unsigned threads;      /* default: one a processor */
+    int64_t slices;        /* read at a time; default: by memory */
+
+    /* Hears how far a stage ("scan", "read", "merge") is, on the calling thread. */
+    void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);
+    void *progress_user;
+} trip_brick_params;
+
+typedef struct trip_brick_summary {
+    int64_t dims[3];
+    double spacing[3];
+    uint64_t voxels, kept, not_finite;
+    double value_min, value_max;
+    uint64_t input_bytes;     /* as stored, decompressed */
+    uint64_t bytes;           /* of the data set's splats */
+    uint64_t temporary_bytes; /* spilled */
+    double scan_seconds, read_seconds, merge_seconds, finish_seconds;
+    uint64_t memory_bytes, peak_memory_bytes; /* promised and taken from the budget */
+} trip_brick_summary;
+
+int trip_brick(const trip_brick_params *params, trip_brick_summary *summary);
+
+#endif

@@ -1,0 +1,120 @@
+#include "brick_text.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "report.h"
+#include "text.h"
+
+/* Numbers in their shortest exact form: cJSON's own differs between its versions. */
+static cJSON *number(double value)
+{
+    char text[32];
+    return cJSON_CreateRaw(trip_text_from_double(value, text));
+}
+
+static void add_number(cJSON *object, const char *name, double value)
+{
+    cJSON_AddItemToObject(object, name, number(value));
+}
+
+static void add_function(cJSON *root, const char *name, const trip_tf *tf)
+{
+    char *text = tf ? trip_tf_to_text(tf) : NULL;
+    if (text)
+        cJSON_AddStringToObject(root, name, text);
+    free(text);
+}
+
+static void add_envelope(cJSON *root, const trip_brick_text *t)
+{
+    cJSON *intervals = cJSON_AddArrayToObject(root, "envelope");
+    for (size_t i = 0; i < t->envelope->count; i++) {
+        cJSON *interval = cJSON_CreateArray();
+        cJSON_AddItemToArray(interval, number(t->envelope->intervals[i].lo));
+        cJSON_AddItemToArray(interval, number(t->envelope->intervals[i].hi));
+        cJSON_AddItemToArray(intervals, interval);
+    }
+}
+
+static void add_histogram(cJSON *root, const trip_histogram *h)
+{
+    cJSON *histogram = cJSON_AddObjectToObject(root, "histogram");
+    add_number(histogram, "value_min", h->value_min);
+    add_number(histogram, "value_max", h->value_max);
+    cJSON *counts = cJSON_AddArrayToObject(histogram, "counts");
+    for (size_t i = 0; i < sizeof h->counts / sizeof *h->counts; i++)
+        cJSON_AddItemToArray(counts, number((double)h->counts[i]));
+}
+
+/* For ranges alone: what they hold shows, more the higher the value, and nothing else does. */
+static int make_ramp(trip_tf **out, const trip_brick_text *t)
+{
+    enum { POINTS = 4 };
+    const trip_rgba dark = { 0.45, 0.25, 0.1, 0.02 }, light = { 1, 0.95, 0.85, 0.5 };
+    double lo = t->envelope->intervals[0].lo;
+    double hi = t->envelope->intervals[t->envelope->count - 1].hi;
+    lo = lo > t->histogram->value_min ? lo : t->histogram->value_min;
+    hi = hi < t->histogram->value_max ? hi : t->histogram->value_max;
+    hi = hi > lo ? hi : lo;
+    trip_rgba before = dark, after = light;
+    before.opacity = after.opacity = 0;
+    const trip_tf_point points[POINTS] = {
+        { lo, before }, { lo, dark }, { hi, light }, { nextafter(hi, INFINITY), after }
+    };
+    return trip_tf_from_points(out, points, POINTS, false, 0);
+}
+
+/* What is drawn when no function is given. */
+static int add_default_function(cJSON *root, const trip_brick_text *t)
+{
+    trip_tf *made = NULL;
+    int status = 0;
+    if (t->params->function_count == 0 && t->params->range_count > 0 && t->envelope->count > 0)
+        status = make_ramp(&made, t);
+    else if (t->params->function_count == 0)
+        status = trip_tf_from_histogram(&made, t->histogram);
+    if (status == 0)
+        add_function(root, "transfer_function", made ? made : t->functions[0]);
+    trip_tf_destroy(made);
+    return status;
+}
+
+static void add_functions(cJSON *root, const trip_brick_text *t)
+{
+    cJSON *functions = cJSON_AddArrayToObject(root, "functions");
+    for (size_t i = 0; i < t->params->function_count; i++) {
+        char *text = trip_tf_to_text(t->functions[i]);
+        if (text)
+            cJSON_AddItemToArray(functions, cJSON_CreateString(text));
+        free(text);
+    }
+}
+
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash && slash[1] ? slash + 1 : path;
+}
+
+char *trip_brick_text_make(const trip_brick_text *t)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "source", base_name(t->params->input));
+    cJSON_AddStringToObject(root, "format", t->info->format);
+    if (t->info->name[0])
+        cJSON_AddStringToObject(root, "grid", t->info->name);
+    cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
+    cJSON_AddBoolToObject(root, "keep_all", t->params->keep_all);
+    add_envelope(root, t);
+    add_functions(root, t);
+    int status = add_default_function(root, t);
+    add_histogram(root, t->histogram);
+    char *text = status == 0 ? cJSON_PrintUnformatted(root) : NULL;
+    cJSON_Delete(root);
+    if (status == 0 && !text)
+        trip_fail(TRIP_ERROR, "brick", t->params->output, "out of memory");
+    return text;
+}

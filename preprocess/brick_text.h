@@ -1,0 +1,20 @@
+/* What a data set says of itself, as JSON; render/dataset_text.h lists the keys that drawing uses.
+ * Nothing in it depends on memory, threads or time. */
+#ifndef TRIP_BRICK_TEXT_H
+#define TRIP_BRICK_TEXT_H
+
+#include "brick.h"
+#include "envelope.h"
+
+typedef struct trip_brick_text {
+    const trip_brick_params *params;
+    const trip_volume_info *info;
+    const trip_envelope *envelope;
+    trip_tf *const *functions; /* params->function_count of them, in data units */
+    const trip_histogram *histogram;
+} trip_brick_text;
+
+/* The text, for free(); NULL after a reported failure. */
+char *trip_brick_text_make(const trip_brick_text *t);
+
+#endif

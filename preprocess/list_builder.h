@@ -1,0 +1,52 @@
+/* The three lists from pieces in any order, in bounded memory. Producers (one thread each) put
+ * pieces into memory that they reserve; a background thread of the builder's own appends the list
+ * that arrives in order to the data set, and sorts the others' pieces and spills them to disk when
+ * memory fills up. At the end pieces on disk and in memory are merged, all lists at once, and
+ * written. What is written depends on the splats only.
+ *
+ * Calls other than reserve are the owner's, from one thread. */
+#ifndef TRIP_LIST_BUILDER_H
+#define TRIP_LIST_BUILDER_H
+
+#include "piece.h"
+#include "spill.h"
+#include "workers.h"
+#include "writer.h"
+
+typedef struct trip_list_builder_params {
+    trip_piece_format format;
+    trip_quantiser quantiser; /* of a list in order; the others get theirs at the end */
+    int64_t dims[3];
+    unsigned producers;
+    /* The list whose sheets arrive in order, batch by batch: written as it comes, never spilled;
+     * -1 when there is none. All its splats of a batch have to fit. */
+    int ordered_axis;
+    uint64_t memory_bytes; /* for pieces */
+    trip_writer *writer;
+    trip_spill *spill;
+} trip_list_builder_params;
+
+typedef struct trip_list_builder trip_list_builder;
+
+/* Memory that params.memory_bytes must not be below. */
+uint64_t trip_list_builder_min_bytes(const trip_piece_format *f, unsigned producers);
+
+int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_params *params,
+                             trip_budget *budget);
+void trip_list_builder_destroy(trip_list_builder *b);
+
+/* Memory for a piece of the list along `axis`, aligned to 8 bytes; the piece has to be complete
+ * before the same producer reserves again or the batch ends. Waits for memory. NULL when something
+ * failed, which was reported. */
+void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, int axis, size_t bytes);
+
+/* All pieces of some batches are there, and no producer is at work. */
+int trip_list_builder_end_batch(trip_list_builder *b);
+
+/* After the last batch: merges and appends what was not yet. `progress`, when not NULL, hears of
+ * the splats appended so far, on the calling thread. */
+int trip_list_builder_finish(trip_list_builder *b, const trip_quantiser *quantiser,
+                             trip_workers *workers, void (*progress)(void *user, uint64_t splats),
+                             void *user);
+
+#endif

@@ -1,0 +1,287 @@
+#include "scan.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "report.h"
+
+enum { SCAN_EDGE = 64, SCAN_HEIGHT = 16, SCAN_VOXELS = SCAN_EDGE * SCAN_EDGE * SCAN_HEIGHT };
+
+void trip_tally_clear(trip_tally *t)
+{
+    memset(t, 0, sizeof *t);
+    t->value_min = INFINITY;
+    t->value_max = -INFINITY;
+}
+
+/* Bits of a float as an integer that sorts like it: minimum and maximum are then integer ones,
+ * which vectorise although there are NaNs about. */
+static inline int32_t sortable(int32_t bits)
+{
+    return bits ^ (bits >> 31 & 0x7fffffff);
+}
+
+static inline bool is_finite_bits(int32_t bits)
+{
+    return (bits & 0x7f800000) != 0x7f800000;
+}
+
+static float float_of_sortable(int32_t s)
+{
+    int32_t bits = sortable(s);
+    float f;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
+void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active, size_t count)
+{
+    int32_t lo = INT32_MAX, hi = INT32_MIN;
+    uint32_t finite = 0, exist = (uint32_t)count;
+    if (active) {
+        exist = 0;
+        for (size_t i = 0; i < count; i++)
+            exist += active[i];
+    }
+    for (size_t i = 0; i < count; i++) {
+        int32_t bits;
+        memcpy(&bits, &values[i], sizeof bits);
+        bool use = is_finite_bits(bits) & (!active || active[i]);
+        int32_t s = sortable(bits);
+        int32_t for_lo = use ? s : INT32_MAX, for_hi = use ? s : INT32_MIN;
+        lo = for_lo < lo ? for_lo : lo;
+        hi = for_hi > hi ? for_hi : hi;
+        finite += use;
+    }
+    t->voxels += exist;
+    t->finite += finite;
+    if (finite) {
+        t->value_min = fmin(t->value_min, float_of_sortable(lo));
+        t->value_max = fmax(t->value_max, float_of_sortable(hi));
+    }
+}
+
+/* Exponent of the last bit of a float of this magnitude: a finer bin would hold nothing more. */
+static int last_bit(double magnitude)
+{
+    int e = magnitude > 0 ? ilogb(magnitude) - 23 : -149;
+    return e < -149 ? -149 : e;
+}
+
+static int64_t bin_of(double value, int exponent)
+{
+    return (int64_t)floor(ldexp(value, -exponent));
+}
+
+/* The narrowest bins that hold the range. As a range grows this never falls, so that bins only ever
+ * have to be merged and the last state depends on the last range only. */
+static int exponent_for(double lo, double hi)
+{
+    int e = last_bit(fmax(fabs(lo), fabs(hi)));
+    int wide = hi > lo ? ilogb(hi - lo) - 15 : e;
+    if (wide > e)
+        e = wide;
+    while (bin_of(hi, e) - bin_of(lo, e) >= TRIP_TALLY_BINS)
+        e++;
+    return e;
+}
+
+static void merge_bins(trip_tally *t, int exponent)
+{
+    int64_t first = (int64_t)floor(ldexp((double)t->first, t->exponent - exponent));
+    for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
+        uint64_t n = t->counts[b];
+        if (n == 0)
+            continue;
+        int64_t to = (int64_t)floor(ldexp((double)(t->first + b), t->exponent - exponent)) - first;
+        t->counts[b] = 0;
+        t->counts[to] += n; /* to <= b: not to be met again */
+    }
+    t->first = first;
+    t->exponent = exponent;
+}
+
+static void move_bins(trip_tally *t, int64_t first)
+{
+    int64_t by = t->first - first; /* upwards */
+    if (by > 0)
+        memmove(t->counts + by, t->counts, (size_t)(TRIP_TALLY_BINS - by) * sizeof *t->counts);
+    if (by > 0)
+        memset(t->counts, 0, (size_t)by * sizeof *t->counts);
+    if (by < 0)
+        memmove(t->counts, t->counts - by, (size_t)(TRIP_TALLY_BINS + by) * sizeof *t->counts);
+    if (by < 0)
+        memset(t->counts + TRIP_TALLY_BINS + by, 0, (size_t)-by * sizeof *t->counts);
+    t->first = first;
+}
+
+/* Makes the bins hold the tally's range. */
+static void fit(trip_tally *t)
+{
+    int exponent = exponent_for(t->value_min, t->value_max);
+    int64_t first = bin_of(t->value_min, exponent);
+    if (t->counted == 0) {
+        t->exponent = exponent;
+        t->first = first;
+        return;
+    }
+    if (exponent != t->exponent)
+        merge_bins(t, exponent);
+    if (first < t->first || bin_of(t->value_max, exponent) >= t->first + TRIP_TALLY_BINS)
+        move_bins(t, first);
+}
+
+static bool fits(const trip_tally *t)
+{
+    return t->counted > 0 && bin_of(t->value_min, t->exponent) >= t->first &&
+           bin_of(t->value_max, t->exponent) < t->first + TRIP_TALLY_BINS &&
+           exponent_for(t->value_min, t->value_max) == t->exponent;
+}
+
+void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active, size_t count)
+{
+    if (t->finite == 0)
+        return;
+    if (!fits(t))
+        fit(t);
+    const double per_value = ldexp(1, -t->exponent);
+    uint64_t counted = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(values[i]) || (active && !active[i]))
+            continue;
+        double scaled = values[i] * per_value; /* exact; within 2^24, see last_bit() */
+        int64_t bin = (int64_t)scaled;
+        bin -= scaled < (double)bin;
+        t->counts[bin - t->first]++;
+        counted++;
+    }
+    t->counted += counted;
+}
+
+void trip_tally_add(trip_tally *t, const trip_tally *other)
+{
+    t->voxels += other->voxels;
+    t->finite += other->finite;
+    t->value_min = fmin(t->value_min, other->value_min);
+    t->value_max = fmax(t->value_max, other->value_max);
+    if (other->counted == 0)
+        return;
+    fit(t);
+    for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
+        if (other->counts[b] == 0)
+            continue;
+        double bin = ldexp((double)(other->first + b), other->exponent - t->exponent);
+        t->counts[(int64_t)floor(bin) - t->first] += other->counts[b];
+    }
+    t->counted += other->counted;
+}
+
+void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
+{
+    const int bins = sizeof histogram->counts / sizeof *histogram->counts;
+    double range = t->value_max - t->value_min;
+    memset(histogram, 0, sizeof *histogram);
+    histogram->value_min = t->value_min;
+    histogram->value_max = t->value_max;
+    histogram->total = t->counted;
+    for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
+        if (t->counts[b] == 0)
+            continue;
+        /* The lower edge stands for a fine bin: exact for integers in up to 14 bits. */
+        double value = fmax(ldexp((double)(t->first + b), t->exponent), t->value_min);
+        int to = range > 0 ? (int)((value - t->value_min) / range * bins) : 0;
+        histogram->counts[to < bins ? to : bins - 1] += t->counts[b];
+    }
+}
+
+typedef struct scan {
+    bool sparse;
+    trip_tally *tallies; /* one a thread */
+    float *values;       /* SCAN_VOXELS a thread */
+    uint8_t *active;
+    void (*progress)(void *user, uint64_t voxels);
+    void *user;
+} scan;
+
+static int scan_box(void *user, unsigned thread, const trip_box *box)
+{
+    scan *s = user;
+    float *values = s->values + (size_t)thread * SCAN_VOXELS;
+    uint8_t *active = s->sparse ? s->active + (size_t)thread * SCAN_VOXELS : NULL;
+    int status = trip_block_decode(box->volume, box->block, box->lo, box->size, values, active);
+    if (status < 0)
+        return status;
+    size_t row = (size_t)box->size[0], rows = (size_t)(box->size[1] * box->size[2]);
+    for (size_t r = 0; r < rows; r++) {
+        const uint8_t *row_active = active ? active + r * row : NULL;
+        trip_tally_range(&s->tallies[thread], values + r * row, row_active, row);
+        trip_tally_count(&s->tallies[thread], values + r * row, row_active, row);
+    }
+    return 0;
+}
+
+static int scan_batch(void *user, uint64_t batches, uint64_t voxels)
+{
+    const scan *s = user;
+    (void)batches;
+    if (s->progress)
+        s->progress(s->user, voxels);
+    return 0;
+}
+
+static int check_tally(const trip_tally *t, const char *path)
+{
+    if (t->voxels == 0)
+        return trip_fail(TRIP_ERROR, "brick", path, "has no active voxels");
+    if (t->finite == 0)
+        return trip_fail(TRIP_ERROR, "brick", path, "holds no finite value");
+    return 0;
+}
+
+static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *path,
+                     trip_workers *workers, int64_t slices)
+{
+    unsigned threads = trip_workers_count(workers);
+    trip_walk_params walk = { .slices = slices,
+                              .read_ahead = true,
+                              .edge = SCAN_EDGE,
+                              .height = SCAN_HEIGHT,
+                              .box = scan_box,
+                              .batch = scan_batch,
+                              .user = s };
+    for (unsigned i = 0; i < threads; i++)
+        trip_tally_clear(&s->tallies[i]);
+    trip_tally_clear(out);
+    int status = trip_walk(volume, workers, &walk);
+    for (unsigned i = 0; i < threads; i++)
+        trip_tally_add(out, &s->tallies[i]);
+    if (status == 0)
+        status = check_tally(out, path);
+    return status == 0 ? trip_volume_rewind(volume) : status;
+}
+
+int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, trip_workers *workers,
+                     int64_t slices, trip_budget *budget,
+                     void (*progress)(void *user, uint64_t voxels), void *user)
+{
+    size_t threads = trip_workers_count(workers);
+    scan s = { .sparse = trip_volume_get_info(volume)->sparse, .progress = progress, .user = user };
+    size_t tallies = threads * sizeof *s.tallies, values = threads * SCAN_VOXELS * sizeof *s.values;
+    size_t active = s.sparse ? threads * SCAN_VOXELS : 0;
+    int status;
+    s.tallies = trip_budget_take(budget, tallies);
+    s.values = trip_budget_take(budget, values);
+    s.active = active ? trip_budget_take(budget, active) : NULL;
+    if (s.tallies && s.values && (s.active || !active))
+        status = scan_with(&s, out, volume, path, workers, slices);
+    else
+        status = trip_fail(TRIP_ERROR, "brick", path,
+                           "%zu threads need more memory than is allowed: give more with --memory, "
+                           "or take fewer --threads",
+                           threads);
+    trip_budget_release(budget, s.tallies, tallies);
+    trip_budget_release(budget, s.values, values);
+    if (active)
+        trip_budget_release(budget, s.active, active);
+    return status;
+}

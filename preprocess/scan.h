@@ -1,0 +1,41 @@
+/* What is known of a volume's values once they were all seen: their range, how many are not finite,
+ * and a histogram fine enough to make the 1024 bins that transfer functions are made from, although
+ * the range is only known at the end. Every thread keeps a tally; tallies are added up. The result
+ * depends on the values only, not on their order. */
+#ifndef TRIP_SCAN_H
+#define TRIP_SCAN_H
+
+#include "transfer_function.h"
+#include "walk.h"
+
+enum { TRIP_TALLY_BINS = 16384 };
+
+/* Cleared by trip_tally_clear(). Fine bin b counts the values in [first + b, first + b + 1) times
+ * 2^exponent; the width follows from the range so far and only grows. */
+typedef struct trip_tally {
+    uint64_t voxels; /* that exist */
+    uint64_t finite; /* of them */
+    double value_min,
+        value_max; /* of the finite ones; infinity and -infinity when there are none */
+    uint64_t counted;
+    int exponent;
+    int64_t first;
+    uint64_t counts[TRIP_TALLY_BINS];
+} trip_tally;
+
+void trip_tally_clear(trip_tally *t);
+/* Range and numbers of a row; active[i] (NULL: all ones) says which voxels exist. */
+void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active, size_t count);
+/* Counts the row's finite values into the fine bins; after trip_tally_range() of the same row. */
+void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active, size_t count);
+void trip_tally_add(trip_tally *t, const trip_tally *other);
+/* What was counted, in 1024 bins over the range. */
+void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram);
+
+/* One pass over the volume, which is rewound after it. All values not finite, or none at all, is a
+ * reported failure. `progress`, when not NULL, hears of the voxels seen so far. */
+int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, trip_workers *workers,
+                     int64_t slices, trip_budget *budget,
+                     void (*progress)(void *user, uint64_t voxels), void *user);
+
+#endif

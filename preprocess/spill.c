@@ -1,0 +1,307 @@
+#include "spill.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "report.h"
+
+enum { BLOCK_BYTES = 4096, BUFFER_BYTES = 1 << 20 };
+
+#define DATA_NAME "pieces"
+
+struct trip_spill {
+    char *path;
+    trip_budget *budget;
+    int folder; /* holds the lock */
+    int file;
+    unsigned char *buffer;
+    size_t used;
+    uint64_t offset; /* in the file, of the buffer */
+    trip_segment *segments;
+    size_t count, room;
+    XXH64_state_t *hash; /* of the segment being written */
+};
+
+static int fail_memory(const trip_spill *s)
+{
+    return trip_fail(TRIP_ERROR, "brick", s->path,
+                     "needs more memory than is allowed: give more with --memory");
+}
+
+/* What an interrupted run may have left; the names are this program's own. */
+static void remove_files(int folder)
+{
+    static const char *const names[] = { DATA_NAME };
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        unlinkat(folder, names[i], 0);
+}
+
+static int open_folder(trip_spill *s)
+{
+    if (mkdir(s->path, 0777) < 0 && errno != EEXIST)
+        return trip_fail_errno("brick", s->path, "cannot create");
+    s->folder = open(s->path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (s->folder < 0)
+        return trip_fail_errno("brick", s->path, "cannot open");
+    if (flock(s->folder, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)
+        return trip_fail(TRIP_ERROR, "brick", s->path, "another process is at work there");
+    remove_files(s->folder);
+    return 0;
+}
+
+int trip_spill_open(trip_spill **out, const char *path, trip_budget *budget)
+{
+    trip_spill *s = *out = calloc(1, sizeof *s);
+    if (!s || !(s->path = strdup(path))) {
+        free(s);
+        *out = NULL;
+        return trip_fail(TRIP_ERROR, "brick", path, "out of memory");
+    }
+    s->folder = s->file = -1;
+    s->budget = budget;
+    s->buffer = trip_budget_take(budget, BUFFER_BYTES);
+    s->hash = XXH64_createState();
+    int status = s->buffer && s->hash ? open_folder(s) : fail_memory(s);
+    if (status < 0) {
+        if (s->folder >= 0)
+            close(s->folder);
+        s->folder = -1; /* another's: not to be removed */
+        trip_spill_close(s);
+        *out = NULL;
+    }
+    return status;
+}
+
+void trip_spill_close(trip_spill *s)
+{
+    if (!s)
+        return;
+    if (s->file >= 0)
+        close(s->file);
+    if (s->folder >= 0) {
+        remove_files(s->folder);
+        rmdir(s->path);
+        close(s->folder);
+    }
+    trip_budget_release(s->budget, s->buffer, BUFFER_BYTES);
+    XXH64_freeState(s->hash);
+    free(s->segments);
+    free(s->path);
+    free(s);
+}
+
+const char *trip_spill_path(const trip_spill *s)
+{
+    return s->path;
+}
+
+static int open_file(trip_spill *s)
+{
+    int flags = O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC;
+    s->file = openat(s->folder, DATA_NAME, flags | O_DIRECT, 0666);
+    if (s->file < 0 && errno == EINVAL) /* the file system knows no direct I/O */
+        s->file = openat(s->folder, DATA_NAME, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    return s->file < 0 ? trip_fail_errno("brick", s->path, "cannot create " DATA_NAME) : 0;
+}
+
+static int write_buffer(trip_spill *s, size_t bytes)
+{
+    for (size_t done = 0; done < bytes;) {
+        ssize_t n = pwrite(s->file, s->buffer + done, bytes - done, (off_t)(s->offset + done));
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n == 0 || (n < 0 && (errno == ENOSPC || errno == EDQUOT)))
+            return trip_fail(TRIP_ERROR, "brick", s->path,
+                             "no space left on the disk after %llu bytes of temporary data: free "
+                             "some, write elsewhere, or allow more --memory",
+                             (unsigned long long)(s->offset + done));
+        if (n < 0)
+            return trip_fail_errno("brick", s->path, "cannot write");
+        done += (size_t)n;
+    }
+    s->offset += bytes;
+    s->used = 0;
+    return 0;
+}
+
+int trip_spill_begin(trip_spill *s, int axis)
+{
+    if (s->file < 0 && open_file(s) < 0)
+        return TRIP_ERROR;
+    if (s->count == s->room) {
+        size_t room = s->room ? 2 * s->room : 64;
+        trip_segment *larger = realloc(s->segments, room * sizeof *larger);
+        if (!larger)
+            return fail_memory(s);
+        s->segments = larger;
+        s->room = room;
+    }
+    s->segments[s->count] = (trip_segment){ .offset = s->offset, .axis = (uint32_t)axis };
+    XXH64_reset(s->hash, 0);
+    return 0;
+}
+
+int trip_spill_append(trip_spill *s, const void *piece, size_t bytes)
+{
+    const unsigned char *p = piece;
+    XXH64_update(s->hash, piece, bytes);
+    s->segments[s->count].bytes += bytes;
+    while (bytes > 0) {
+        size_t room = BUFFER_BYTES - s->used, n = bytes < room ? bytes : room;
+        memcpy(s->buffer + s->used, p, n);
+        s->used += n;
+        p += n;
+        bytes -= n;
+        int status = s->used == BUFFER_BYTES ? write_buffer(s, BUFFER_BYTES) : 0;
+        if (status < 0)
+            return status;
+    }
+    return 0;
+}
+
+int trip_spill_end(trip_spill *s)
+{
+    size_t whole = (s->used + BLOCK_BYTES - 1) & ~((size_t)BLOCK_BYTES - 1);
+    memset(s->buffer + s->used, 0, whole - s->used);
+    int status = write_buffer(s, whole);
+    s->segments[s->count].checksum = XXH64_digest(s->hash);
+    if (status == 0)
+        s->count++;
+    return status;
+}
+
+size_t trip_spill_count(const trip_spill *s)
+{
+    return s->count;
+}
+
+const trip_segment *trip_spill_segment(const trip_spill *s, size_t index)
+{
+    return &s->segments[index];
+}
+
+void trip_spill_retire(trip_spill *s, size_t index)
+{
+    s->segments[index].retired = 1;
+}
+
+uint64_t trip_spill_bytes(const trip_spill *s)
+{
+    return s->offset;
+}
+
+static int fail_damaged(const trip_segment_reader *r)
+{
+    return trip_fail(TRIP_ERROR, "brick", r->spill->path,
+                     "temporary data at byte %llu is not what was written: the disk or another "
+                     "program changed it",
+                     (unsigned long long)r->segment.offset);
+}
+
+/* Moves what is left to the end of the head and reads behind it: reads stay aligned. */
+static int refill(trip_segment_reader *r)
+{
+    size_t left = r->end - r->begin;
+    uint64_t unread = r->segment.bytes - r->next;
+    size_t want = r->buffer_bytes - r->head_bytes;
+    if (unread < want)
+        want = (size_t)unread;
+    if (left > r->head_bytes)
+        return fail_damaged(r);
+    memmove(r->buffer + r->head_bytes - left, r->buffer + r->begin, left);
+    r->begin = r->head_bytes - left;
+    r->end = r->head_bytes;
+    size_t whole = (want + BLOCK_BYTES - 1) & ~((size_t)BLOCK_BYTES - 1);
+    for (size_t done = 0; done < want;) {
+        ssize_t n = pread(r->spill->file, r->buffer + r->head_bytes + done, whole - done,
+                          (off_t)(r->segment.offset + r->next + done));
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n < 0)
+            return trip_fail_errno("brick", r->spill->path, "cannot read");
+        if (n == 0)
+            return fail_damaged(r);
+        done += (size_t)n;
+    }
+    XXH64_update(r->hash, r->buffer + r->head_bytes, want);
+    r->next += want;
+    r->end += want;
+    return 0;
+}
+
+static bool piece_at_hand(const trip_segment_reader *r)
+{
+    const trip_piece *p = (const void *)(r->buffer + r->begin);
+    size_t left = r->end - r->begin;
+    return left >= sizeof *p && trip_piece_check(p, r->format, left);
+}
+
+static int show_piece(trip_segment_reader *r)
+{
+    int status = 0;
+    if (!piece_at_hand(r) && r->next < r->segment.bytes)
+        status = refill(r);
+    if (status < 0)
+        return status;
+    r->source.piece = NULL;
+    if (piece_at_hand(r))
+        r->source.piece = (const void *)(r->buffer + r->begin);
+    else if (r->begin < r->end || XXH64_digest(r->hash) != r->segment.checksum)
+        status = fail_damaged(r);
+    return status;
+}
+
+static int advance_segment(trip_piece_source *source)
+{
+    trip_segment_reader *r = (trip_segment_reader *)source;
+    uint64_t key = source->piece->key;
+    r->begin += trip_piece_get_parts(r->format, source->piece).bytes;
+    int status = show_piece(r);
+    if (status == 0 && source->piece && source->piece->key < key)
+        status = fail_damaged(r);
+    return status;
+}
+
+static size_t head_bytes(const trip_piece_format *f)
+{
+    return (trip_piece_max_bytes(f) + BLOCK_BYTES - 1) & ~((size_t)BLOCK_BYTES - 1);
+}
+
+size_t trip_segment_buffer_bytes(const trip_piece_format *f)
+{
+    return 2 * head_bytes(f);
+}
+
+int trip_segment_reader_open(trip_segment_reader *r, const trip_spill *s, size_t index,
+                             const trip_piece_format *format, void *buffer, size_t buffer_bytes)
+{
+    size_t head = head_bytes(format);
+    *r = (trip_segment_reader){ .source = { .advance = advance_segment },
+                                .spill = s,
+                                .segment = s->segments[index],
+                                .format = format,
+                                .buffer = buffer,
+                                .buffer_bytes = buffer_bytes,
+                                .head_bytes = head,
+                                .begin = head,
+                                .end = head,
+                                .hash = XXH64_createState() };
+    if (!r->hash)
+        return fail_memory(s);
+    XXH64_reset(r->hash, 0);
+    return show_piece(r);
+}
+
+void trip_segment_reader_close(trip_segment_reader *r)
+{
+    XXH64_freeState(r->hash);
+    r->hash = NULL;
+}

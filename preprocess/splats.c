@@ -1,0 +1,417 @@
+#include "splats.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "format.h"
+#include "report.h"
+
+/* What one thread works on: a box in local coordinates, which count from the corner of its cell of
+ * the grid along x and y and from the box's own first slice along z. Arrays of voxels are dense,
+ * x fastest, `edge` a row; only entries of kept voxels are written and read. */
+typedef struct workspace {
+    float *decoded;   /* the box with one voxel around it where gradients are wanted */
+    uint8_t *active;  /* of the same voxels, in sparse volumes */
+    uint32_t *values; /* codes, or the bits of floats */
+    uint32_t *normals;
+    float *magnitudes;
+    uint64_t *bits[3]; /* [sheet][word]: which places of the cell's part of a sheet are taken */
+    uint64_t kept;     /* in all boxes so far */
+    trip_tally tally;
+} workspace;
+
+struct trip_splatter {
+    trip_splat_params params;
+    trip_budget *budget;
+    trip_affine to_index; /* inverse of index_to_world */
+    int64_t edge;
+    unsigned words;       /* of the bitmap of an edge x edge square */
+    uint16_t spread[128]; /* bits of a coordinate at the even places */
+    uint16_t place_u[TRIP_TILE_MAX_SPLATS], place_v[TRIP_TILE_MAX_SPLATS]; /* of a Morton code */
+    size_t thread_bytes, bytes;
+    unsigned char *memory; /* of all threads; each begins with its workspace */
+};
+
+/* The box at hand, and how to step through the decoded values. */
+typedef struct view {
+    const trip_splatter *s;
+    const trip_box *box;
+    workspace *w;
+    int64_t cell[3];      /* grid coordinates of the local origin */
+    int64_t from[3];      /* local coordinates of the box's first voxel */
+    int64_t pitch, slice; /* decoded values to the next row and slice */
+    const float *first;   /* decoded value of the box's first voxel */
+} view;
+
+int64_t trip_splat_edge(const trip_piece_format *f)
+{
+    return f->tile_log2 > 6 ? (int64_t)1 << f->tile_log2 : 64;
+}
+
+/* The next `bytes` of a thread's memory; NULL where only the size is asked for. */
+static void *carve(unsigned char *base, size_t *used, size_t bytes)
+{
+    size_t at = *used;
+    *used = at + ((bytes + 63) & ~(size_t)63);
+    return base ? base + at : NULL;
+}
+
+/* Lays a workspace out from `base`, or, with base NULL, counts its bytes. */
+static size_t lay_out(const trip_piece_format *f, bool sparse, unsigned char *base, workspace *w)
+{
+    size_t edge = (size_t)trip_splat_edge(f), plane = edge * edge, used = 0;
+    size_t halo = (edge + 2) * (edge + 2) * (TRIP_SPLAT_HEIGHT + 2);
+    size_t voxels = plane * TRIP_SPLAT_HEIGHT;
+    carve(base, &used, sizeof *w);
+    w->decoded = carve(base, &used, halo * sizeof(float));
+    w->active = carve(base, &used, sparse ? halo : 0);
+    w->values = carve(base, &used, voxels * sizeof(uint32_t));
+    w->normals = carve(base, &used, f->normals ? voxels * sizeof(uint32_t) : 0);
+    w->magnitudes = carve(base, &used, f->normals && !f->quantised ? voxels * sizeof(float) : 0);
+    for (int axis = 0; axis < 3; axis++)
+        w->bits[axis] = carve(base, &used, (axis == 2 ? TRIP_SPLAT_HEIGHT : edge) * plane / 8);
+    return (used + 4095) & ~(size_t)4095;
+}
+
+size_t trip_splat_thread_bytes(const trip_piece_format *f, bool sparse)
+{
+    workspace w;
+    return lay_out(f, sparse, NULL, &w);
+}
+
+static workspace *workspace_of(const trip_splatter *s, unsigned thread)
+{
+    return (workspace *)(void *)(s->memory + thread * s->thread_bytes);
+}
+
+static void fill_tables(trip_splatter *s)
+{
+    for (unsigned x = 0; x < 128; x++)
+        s->spread[x] = (uint16_t)trip_morton(x, 0);
+    for (unsigned v = 0; v < (unsigned)s->edge; v++)
+        for (unsigned u = 0; u < (unsigned)s->edge; u++) {
+            s->place_u[trip_morton(u, v)] = (uint16_t)u;
+            s->place_v[trip_morton(u, v)] = (uint16_t)v;
+        }
+}
+
+static void fill_workspaces(trip_splatter *s)
+{
+    const trip_splat_params *p = &s->params;
+    for (unsigned i = 0; i < p->threads; i++) {
+        unsigned char *base = s->memory + i * s->thread_bytes;
+        workspace *w = workspace_of(s, i);
+        lay_out(&p->format, p->info->sparse, base, w);
+        trip_tally_clear(&w->tally);
+    }
+}
+
+int trip_splatter_create(trip_splatter **out, const trip_splat_params *params, trip_budget *budget)
+{
+    size_t own = (sizeof(trip_splatter) + 4095) & ~(size_t)4095;
+    size_t each = trip_splat_thread_bytes(&params->format, params->info->sparse);
+    size_t bytes = own + each * params->threads;
+    trip_splatter *s = *out = trip_budget_take(budget, bytes);
+    if (!s)
+        return trip_fail(TRIP_ERROR, "brick", "splats",
+                         "%u threads need %zu bytes, which is more than is allowed: give more with "
+                         "--memory, or take fewer --threads",
+                         params->threads, bytes);
+    s->params = *params;
+    s->budget = budget;
+    s->bytes = bytes;
+    s->thread_bytes = each;
+    s->memory = (unsigned char *)s + own;
+    s->edge = trip_splat_edge(&params->format);
+    s->words = (unsigned)(s->edge * s->edge / 64);
+    trip_affine_invert(&params->info->index_to_world, &s->to_index);
+    fill_tables(s);
+    fill_workspaces(s);
+    return 0;
+}
+
+void trip_splatter_destroy(trip_splatter *s)
+{
+    if (s)
+        trip_budget_release(s->budget, s, s->bytes);
+}
+
+static view view_of(const trip_splatter *s, unsigned thread, const trip_box *box)
+{
+    view v = { .s = s, .box = box, .w = workspace_of(s, thread) };
+    int64_t halo = s->params.format.normals ? 1 : 0;
+    for (int a = 0; a < 2; a++) {
+        v.cell[a] = box->lo[a] & ~(s->edge - 1);
+        v.from[a] = box->lo[a] - v.cell[a];
+    }
+    v.cell[2] = box->lo[2];
+    v.pitch = box->size[0] + 2 * halo;
+    v.slice = v.pitch * (box->size[1] + 2 * halo);
+    v.first = v.w->decoded + halo * (v.slice + v.pitch + 1);
+    return v;
+}
+
+static int decode(const view *v)
+{
+    int64_t halo = v->s->params.format.normals ? 1 : 0, lo[3], size[3];
+    for (int a = 0; a < 3; a++) {
+        lo[a] = v->box->lo[a] - halo;
+        size[a] = v->box->size[a] + 2 * halo;
+    }
+    return trip_block_decode(v->box->volume, v->box->block, lo, size, v->w->decoded,
+                             v->s->params.info->sparse ? v->w->active : NULL);
+}
+
+/* A neighbour that is not a number is replaced by the voxel's own value. */
+static double neighbour(const float *at, int64_t step)
+{
+    float value = at[step];
+    return isfinite(value) ? value : *at;
+}
+
+/* World-space gradient by central differences: J^-T times the differences of index space. */
+static trip_vec3 gradient(const view *v, const float *at)
+{
+    trip_vec3 g = { 0.5 * (neighbour(at, 1) - neighbour(at, -1)),
+                    0.5 * (neighbour(at, v->pitch) - neighbour(at, -v->pitch)),
+                    0.5 * (neighbour(at, v->slice) - neighbour(at, -v->slice)) };
+    return trip_affine_transpose_vector(&v->s->to_index, g);
+}
+
+static void put_normal(const view *v, const float *at, size_t index)
+{
+    const trip_splat_params *p = &v->s->params;
+    trip_vec3 world = gradient(v, at);
+    double g[3] = { world.x, world.y, world.z };
+    if (p->format.quantised) {
+        v->w->normals[index] = trip_normal_pack(g, p->quantiser.gradient_scale);
+        return;
+    }
+    double magnitude = trip_length(world);
+    v->w->normals[index] = trip_normal_pack(g, magnitude) & 0xffffff;
+    v->w->magnitudes[index] = (float)magnitude;
+}
+
+static void put_value(const view *v, float value, size_t index)
+{
+    if (v->s->params.format.quantised)
+        v->w->values[index] = trip_quantise(&v->s->params.quantiser, value);
+    else
+        memcpy(&v->w->values[index], &value, sizeof value);
+}
+
+static inline void set_bit(uint64_t *sheet, unsigned place)
+{
+    sheet[place / 64] |= UINT64_C(1) << (place % 64);
+}
+
+/* Marks a voxel in the sheets of the three lists; c are its local coordinates, and z_place its
+ * third coordinate counted from a multiple of the edge. */
+static inline void mark(const view *v, const int64_t c[3], int64_t z_place)
+{
+    const uint16_t *spread = v->s->spread;
+    size_t words = v->s->words;
+    unsigned x = spread[c[0]], y = spread[c[1]], z = spread[z_place];
+    set_bit(v->w->bits[0] + (size_t)c[0] * words, y | z << 1);
+    set_bit(v->w->bits[1] + (size_t)c[1] * words, z | x << 1);
+    set_bit(v->w->bits[2] + (size_t)c[2] * words, x | y << 1);
+}
+
+static bool none(const uint8_t *keep, int64_t count)
+{
+    uint64_t any = 0, eight;
+    int64_t i = 0;
+    for (; i + 8 <= count; i += 8) {
+        memcpy(&eight, keep + i, sizeof eight);
+        any |= eight;
+    }
+    for (; i < count; i++)
+        any |= keep[i];
+    return any == 0;
+}
+
+static unsigned put_kept(const view *v, const uint8_t *keep, const float *row, int64_t y, int64_t z)
+{
+    const int64_t edge = v->s->edge, z_place = (v->box->lo[2] + z) & (edge - 1);
+    int64_t c[3] = { 0, v->from[1] + y, z };
+    unsigned kept = 0;
+    for (int64_t x = 0; x < v->box->size[0]; x++) {
+        if (!keep[x])
+            continue;
+        c[0] = v->from[0] + x;
+        size_t index = (size_t)((z * edge + c[1]) * edge + c[0]);
+        mark(v, c, z_place);
+        put_value(v, row[x], index);
+        if (v->s->params.format.normals)
+            put_normal(v, row + x, index);
+        kept++;
+    }
+    return kept;
+}
+
+static unsigned do_row(const view *v, int64_t y, int64_t z)
+{
+    uint8_t keep[128];
+    const float *row = v->first + z * v->slice + y * v->pitch;
+    const trip_splat_params *p = &v->s->params;
+    const uint8_t *active = p->info->sparse ? v->w->active + (row - v->w->decoded) : NULL;
+    size_t count = (size_t)v->box->size[0];
+    if (p->tally)
+        trip_tally_range(&v->w->tally, row, active, count);
+    if (p->tally)
+        trip_tally_count(&v->w->tally, row, active, count);
+    trip_envelope_keep_row(p->envelope, row, count, keep);
+    for (size_t i = 0; active && i < count; i++)
+        keep[i] &= active[i];
+    return none(keep, v->box->size[0]) ? 0 : put_kept(v, keep, row, y, z);
+}
+
+static void clear_bits(const view *v)
+{
+    size_t words = v->s->words;
+    for (int axis = 0; axis < 3; axis++)
+        memset(v->w->bits[axis] + (size_t)v->from[axis] * words, 0,
+               (size_t)v->box->size[axis] * words * sizeof(uint64_t));
+}
+
+/* Where the splats of one tile of one sheet are, to be gathered in list order. */
+typedef struct part {
+    int axis;
+    int64_t sheet;          /* local */
+    unsigned first_place;   /* of the tile in the cell's square */
+    const uint64_t *bitmap; /* of the tile */
+    unsigned words;         /* of that */
+} part;
+
+static uint64_t key_of(const view *v, const part *p)
+{
+    const int u = (p->axis + 1) % 3, w = (p->axis + 2) % 3;
+    unsigned log2 = v->s->params.format.tile_log2;
+    int64_t cell[3] = { v->cell[0], v->cell[1], v->cell[2] & ~(v->s->edge - 1) };
+    uint32_t tile_u = (uint32_t)((cell[u] + v->s->place_u[p->first_place]) >> log2);
+    uint32_t tile_v = (uint32_t)((cell[w] + v->s->place_v[p->first_place]) >> log2);
+    return (uint64_t)(v->cell[p->axis] + p->sheet) << TRIP_TILE_MORTON_BITS |
+           trip_morton(tile_u, tile_v);
+}
+
+/* Index of each of the part's voxels in the dense arrays, in list order. */
+static uint32_t gather_indices(const view *v, const part *p, uint32_t *indices)
+{
+    const int64_t edge = v->s->edge, stride[3] = { 1, edge, edge * edge };
+    const int64_t su = stride[(p->axis + 1) % 3], sv = stride[(p->axis + 2) % 3];
+    /* Places count the third coordinate from a multiple of the edge, the arrays from the box. */
+    int64_t base = p->sheet * stride[p->axis];
+    if (p->axis != 2)
+        base -= (v->box->lo[2] & (edge - 1)) * stride[2];
+    uint32_t n = 0;
+    for (unsigned w = 0; w < p->words; w++)
+        for (uint64_t bits = p->bitmap[w]; bits; bits &= bits - 1) {
+            unsigned place = p->first_place + w * 64 + (unsigned)__builtin_ctzll(bits);
+            indices[n++] = (uint32_t)(base + v->s->place_u[place] * su + v->s->place_v[place] * sv);
+        }
+    return n;
+}
+
+static void fill_piece(const view *v, trip_piece *piece, const uint32_t *indices, uint32_t splats)
+{
+    const workspace *w = v->w;
+    unsigned char *base = (unsigned char *)piece;
+    trip_piece_parts parts = trip_piece_get_parts(&v->s->params.format, piece);
+    uint16_t *codes = (void *)(base + parts.values);
+    uint32_t *floats = (void *)(base + parts.values), *normals = (void *)(base + parts.normals);
+    float *magnitudes = (void *)(base + parts.magnitudes);
+    if (v->s->params.format.quantised)
+        for (uint32_t i = 0; i < splats; i++)
+            codes[i] = (uint16_t)w->values[indices[i]];
+    else
+        for (uint32_t i = 0; i < splats; i++)
+            floats[i] = w->values[indices[i]];
+    if (parts.normals)
+        for (uint32_t i = 0; i < splats; i++)
+            normals[i] = w->normals[indices[i]];
+    if (parts.magnitudes)
+        for (uint32_t i = 0; i < splats; i++)
+            magnitudes[i] = w->magnitudes[indices[i]];
+}
+
+static int emit_part(const view *v, unsigned thread, const part *p)
+{
+    uint32_t indices[TRIP_TILE_MAX_SPLATS];
+    const trip_splat_params *params = &v->s->params;
+    unsigned used = 0;
+    for (unsigned w = 0; w < p->words; w++)
+        used += p->bitmap[w] != 0;
+    if (used == 0)
+        return 0;
+    uint32_t splats = gather_indices(v, p, indices);
+    unsigned words = trip_piece_choose_words(&params->format, splats, used);
+    size_t bytes = trip_piece_layout(&params->format, splats, words).bytes;
+    trip_piece *piece = params->reserve(params->user, thread, p->axis, bytes);
+    if (!piece)
+        return TRIP_ERROR;
+    trip_piece_begin(piece, &params->format, key_of(v, p), splats, words, p->bitmap);
+    fill_piece(v, piece, indices, splats);
+    return 0;
+}
+
+static int emit_list(const view *v, unsigned thread, int axis)
+{
+    unsigned tile_words = 1u << (2 * v->s->params.format.tile_log2 - 6);
+    int status = 0;
+    for (int64_t i = 0; i < v->box->size[axis] && status == 0; i++) {
+        int64_t sheet = v->from[axis] + i;
+        const uint64_t *bits = v->w->bits[axis] + (size_t)sheet * v->s->words;
+        for (unsigned w = 0; w < v->s->words && status == 0; w += tile_words)
+            status = emit_part(v, thread, &(part){ axis, sheet, w * 64, bits + w, tile_words });
+    }
+    return status;
+}
+
+int trip_splatter_box(trip_splatter *s, unsigned thread, const trip_box *box)
+{
+    view v = view_of(s, thread, box);
+    uint64_t kept = 0;
+    int status = decode(&v);
+    if (status < 0)
+        return status;
+    clear_bits(&v);
+    for (int64_t z = 0; z < box->size[2]; z++)
+        for (int64_t y = 0; y < box->size[1]; y++)
+            kept += do_row(&v, y, z);
+    v.w->kept += kept;
+    for (int axis = 0; axis < 3 && kept > 0 && status == 0; axis++)
+        status = emit_list(&v, thread, axis);
+    return status;
+}
+
+void trip_splatter_tally(const trip_splatter *s, trip_tally *out)
+{
+    trip_tally_clear(out);
+    for (unsigned i = 0; i < s->params.threads; i++)
+        trip_tally_add(out, &workspace_of(s, i)->tally);
+}
+
+uint64_t trip_splatter_kept(const trip_splatter *s)
+{
+    uint64_t kept = 0;
+    for (unsigned i = 0; i < s->params.threads; i++)
+        kept += workspace_of(s, i)->kept;
+    return kept;
+}
+
+double trip_gradient_bound(const trip_volume_info *info, double lo, double hi)
+{
+    trip_affine to_index;
+    double most = 0;
+    if (info->sparse) {
+        lo = fmin(lo, info->background);
+        hi = fmax(hi, info->background);
+    }
+    trip_affine_invert(&info->index_to_world, &to_index);
+    for (int signs = 0; signs < 4; signs++) {
+        trip_vec3 corner = { 1, signs & 1 ? 1 : -1, signs & 2 ? 1 : -1 };
+        most = fmax(most, trip_length(trip_affine_transpose_vector(&to_index, corner)));
+    }
+    double bound = most * (hi - lo) / 2;
+    return bound > 0 && isfinite(bound) ? bound : 1;
+}

@@ -1,0 +1,173 @@
+#include "walk.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "report.h"
+
+/* Blocks that lie side by side are small in sparse formats; a batch gives all threads some work. */
+enum { BATCH_BLOCKS = 512 };
+#define BATCH_VOXELS (UINT64_C(1) << 21)
+
+typedef struct batch {
+    trip_block blocks[BATCH_BLOCKS];
+    uint64_t first_box[BATCH_BLOCKS + 1]; /* boxes before each block, and in all */
+    size_t count;
+    uint64_t voxels;
+} batch;
+
+typedef struct walk {
+    const trip_walk_params *params;
+    trip_volume *volume;
+    const batch *at_work;
+} walk;
+
+/* Pieces that the grid of `step` cuts [lo, lo + size) into. */
+static int64_t cuts(int64_t lo, int64_t size, int64_t step)
+{
+    return (lo + size - 1) / step - lo / step + 1;
+}
+
+static int64_t step_along(const trip_walk_params *p, int axis)
+{
+    return axis == 2 ? p->height : p->edge;
+}
+
+static uint64_t boxes_of(const trip_walk_params *p, const trip_block *b)
+{
+    uint64_t count = 1;
+    for (int a = 0; a < 3; a++)
+        count *= (uint64_t)cuts(b->origin[a], b->size[a], step_along(p, a));
+    return count;
+}
+
+/* Piece `index` of the block's extent along an axis. */
+static void cut(const trip_walk_params *p, const trip_block *b, int axis, int64_t index,
+                trip_box *box)
+{
+    int64_t step = step_along(p, axis);
+    int64_t begin = b->origin[axis], end = begin + b->size[axis];
+    int64_t from = (begin / step + index) * step, to = from + step;
+    box->lo[axis] = from > begin ? from : begin;
+    box->size[axis] = (to < end ? to : end) - box->lo[axis];
+}
+
+static int do_box(void *user, unsigned thread, uint64_t item)
+{
+    const walk *w = user;
+    const batch *b = w->at_work;
+    size_t low = 0, high = b->count; /* the block with first_box <= item < next first_box */
+    while (high - low > 1) {
+        size_t middle = (low + high) / 2;
+        if (b->first_box[middle] <= item)
+            low = middle;
+        else
+            high = middle;
+    }
+    trip_box box = { .volume = w->volume, .block = &b->blocks[low] };
+    uint64_t index = item - b->first_box[low];
+    for (int a = 0; a < 3; a++) {
+        uint64_t n =
+            (uint64_t)cuts(box.block->origin[a], box.block->size[a], step_along(w->params, a));
+        cut(w->params, box.block, a, (int64_t)(index % n), &box);
+        index /= n;
+    }
+    return w->params->box(w->params->user, thread, &box);
+}
+
+static void release(walk *w, batch *b)
+{
+    for (size_t i = 0; i < b->count; i++)
+        trip_block_release(w->volume, &b->blocks[i]);
+    b->count = 0;
+}
+
+/* Fills a batch; an empty one is the end. A slab of slices is a batch by itself. */
+static int read_batch(walk *w, batch *b)
+{
+    bool slabs = !trip_volume_get_info(w->volume)->sparse;
+    int more = 1;
+    b->voxels = 0;
+    b->count = 0;
+    b->first_box[0] = 0;
+    while (b->count < (slabs ? 1 : BATCH_BLOCKS) && b->voxels < BATCH_VOXELS) {
+        trip_block *block = &b->blocks[b->count];
+        more = trip_volume_next(w->volume, w->params->slices, block);
+        if (more <= 0)
+            break;
+        b->count++;
+        b->first_box[b->count] = b->first_box[b->count - 1] + boxes_of(w->params, block);
+        b->voxels += (uint64_t)(block->size[0] * block->size[1] * block->size[2]);
+    }
+    if (more < 0)
+        release(w, b);
+    return more < 0 ? more : 0;
+}
+
+static int check_interrupted(void)
+{
+    return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted") : 0;
+}
+
+static void start(walk *w, trip_workers *workers, const batch *b)
+{
+    w->at_work = b;
+    trip_workers_start(workers, do_box, w, b->first_box[b->count]);
+}
+
+static int skip_batches(walk *w, batch *b, uint64_t *batches, uint64_t *voxels)
+{
+    int status = read_batch(w, b);
+    while (status == 0 && b->count > 0 && *batches < w->params->skip) {
+        *voxels += b->voxels;
+        ++*batches;
+        release(w, b);
+        status = check_interrupted();
+        if (status == 0)
+            status = read_batch(w, b);
+    }
+    return status;
+}
+
+/* batches[0] is at work while batches[1] is being read. */
+static int walk_batches(walk *w, trip_workers *workers, batch *batches)
+{
+    const trip_walk_params *p = w->params;
+    uint64_t done = 0, voxels = 0;
+    batch *now = &batches[0], *ahead = &batches[1];
+    int status = skip_batches(w, now, &done, &voxels);
+    while (status == 0 && now->count > 0) {
+        int read = 0;
+        ahead->count = 0;
+        start(w, workers, now);
+        if (p->read_ahead)
+            read = read_batch(w, ahead);
+        trip_workers_wait(workers, 0, &status);
+        voxels += now->voxels;
+        release(w, now);
+        if (status == 0)
+            status = p->batch(p->user, ++done, voxels);
+        if (status == 0 && !p->read_ahead)
+            read = read_batch(w, ahead);
+        if (status == 0)
+            status = read;
+        if (status == 0)
+            status = check_interrupted();
+        batch *other = now;
+        now = ahead;
+        ahead = other;
+    }
+    release(w, now);
+    return status;
+}
+
+int trip_walk(trip_volume *volume, trip_workers *workers, const trip_walk_params *params)
+{
+    walk w = { .params = params, .volume = volume };
+    batch *batches = calloc(2, sizeof *batches);
+    if (!batches)
+        return trip_fail(TRIP_ERROR, "brick", "blocks", "out of memory");
+    int status = walk_batches(&w, workers, batches);
+    free(batches);
+    return status;
+}
