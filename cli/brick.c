@@ -1,0 +1,403 @@
+/* triptych brick: turns a volume into a data set, once; see preprocess/brick.h for how. */
+#include "commands.h"
+
+#include <cjson/cJSON.h>
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "brick.h"
+#include "options.h"
+#include "progress.h"
+#include "report.h"
+#include "text.h"
+
+enum { MAX_FUNCTIONS = 64, MAX_RANGES = 64 };
+
+enum key {
+    KEY_GRID = 256,
+    KEY_LEVEL_SET,
+    KEY_SIZE,
+    KEY_TYPE,
+    KEY_SPACING,
+    KEY_ENDIAN,
+    KEY_OFFSET,
+    KEY_TF,
+    KEY_RANGE,
+    KEY_KEEP_ALL,
+    KEY_NO_NORMALS,
+    KEY_TILE,
+    KEY_SLAB_SHEETS,
+    KEY_MEMORY,
+    KEY_THREADS,
+    KEY_FORCE,
+    KEY_JSON,
+};
+
+typedef struct options {
+    trip_brick_params brick;
+    const char *functions[MAX_FUNCTIONS];
+    trip_value_range ranges[MAX_RANGES];
+    char *default_output; /* freed at the end */
+    bool quiet, json;
+} options;
+
+static const struct argp_option option_table[] = {
+    { NULL, 0, NULL, 0, "Input:", 1 },
+    { "grid", KEY_GRID, "NAME", 0, "OpenVDB grid (default: the first one of scalars)", 1 },
+    { "level-set", KEY_LEVEL_SET, "HOW", 0,
+      "What to make of an OpenVDB level set: filled or band (default: refuse)", 1 },
+    { "size", KEY_SIZE, "X,Y,Z", 0, "Raw data: voxels along each axis, the fastest first", 1 },
+    { "type", KEY_TYPE, "TYPE", 0, "Raw data: uint8, int16, float, ...", 1 },
+    { "endian", KEY_ENDIAN, "little|big", 0, "Raw data: byte order (default: this machine's)", 1 },
+    { "offset", KEY_OFFSET, "BYTES", 0, "Raw data: where it starts in the file (default: 0)", 1 },
+    { "spacing", KEY_SPACING, "X,Y,Z", 0,
+      "Distance of voxels along each axis (default: the file's, else 1)", 1 },
+    { NULL, 0, NULL, 0, "What is kept (default: what an automatic transfer function shows):", 2 },
+    { "tf", KEY_TF, "FILE", 0, "What this transfer function shows; several add up", 2 },
+    { "range", KEY_RANGE, "LO:HI", 0, "Values from LO to HI; several add up", 2 },
+    { "keep-all", KEY_KEEP_ALL, NULL, 0, "Every finite value", 2 },
+    { NULL, 0, NULL, 0, "Output:", 3 },
+    { "output", 'o', "NAME.trip", 0, "The data set (default: the input's name, in this folder)",
+      3 },
+    { "force", KEY_FORCE, NULL, 0, "Replace an existing data set", 3 },
+    { "no-normals", KEY_NO_NORMALS, NULL, 0, "Leave out what only shading needs", 3 },
+    { "tile", KEY_TILE, "N", 0, "Tile edge in voxels: 16, 32, 64 or 128 (default: 64)", 3 },
+    { "slab-sheets", KEY_SLAB_SHEETS, "N", 0, "Sheets of a brick, 1 to 64 (default: 8)", 3 },
+    { "json", KEY_JSON, NULL, 0, "Print the summary as JSON", 3 },
+    { "quiet", 'q', NULL, 0, "Print no progress and no summary", 3 },
+    { NULL, 0, NULL, 0, "Resources:", 4 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
+      4 },
+    { "threads", KEY_THREADS, "N", 0, "Threads (default: one a processor)", 4 },
+    { 0 },
+};
+
+/* "256,256,128" or "256x256x128". */
+static int parse_size(const char *text, int64_t dims[3])
+{
+    char commas[128];
+    double numbers[3];
+    int count;
+    snprintf(commas, sizeof commas, "%s", text);
+    for (char *x = commas; (x = strchr(x, 'x'));)
+        *x = ',';
+    int status = trip_option_numbers("--size", commas, 3, 3, numbers, &count);
+    for (int a = 0; a < 3 && status == 0; a++) {
+        if (!(numbers[a] >= 1) || numbers[a] > INT32_MAX || numbers[a] != floor(numbers[a]))
+            return trip_option_fail("--size", "takes three whole numbers, each 1 or more");
+        dims[a] = (int64_t)numbers[a];
+    }
+    return status;
+}
+
+static int parse_spacing(const char *text, double spacing[3])
+{
+    int count;
+    int status = trip_option_numbers("--spacing", text, 3, 3, spacing, &count);
+    for (int a = 0; a < 3 && status == 0; a++)
+        if (!(spacing[a] > 0))
+            return trip_option_fail("--spacing", "takes three positive lengths");
+    return status;
+}
+
+static int parse_offset(const char *text, uint64_t *bytes)
+{
+    double number;
+    if (!trip_text_to_double(text, &number) || number != floor(number) || number < 0 ||
+        number > 0x1p62)
+        return trip_option_fail("--offset", "takes a number of bytes");
+    *bytes = (uint64_t)number;
+    return 0;
+}
+
+/* "LO:HI"; an empty side is open. */
+static int parse_range(options *o, const char *text)
+{
+    trip_value_range *r = &o->ranges[o->brick.range_count];
+    const char *colon = strchr(text, ':');
+    char lo[64] = "";
+    if (o->brick.range_count == MAX_RANGES)
+        return trip_option_fail("--range", "is given too often");
+    if (!colon || colon - text >= (int)sizeof lo)
+        return trip_option_fail("--range", "takes two values with a colon between them, LO:HI");
+    memcpy(lo, text, (size_t)(colon - text));
+    *r = (trip_value_range){ -FLT_MAX, FLT_MAX };
+    if ((*lo && !trip_text_to_double(lo, &r->lo)) ||
+        (colon[1] && !trip_text_to_double(colon + 1, &r->hi)) || r->lo > r->hi)
+        return trip_option_fail("--range", "takes two numbers, the smaller first, as LO:HI");
+    o->brick.range_count++;
+    return 0;
+}
+
+static int add_function(options *o, const char *path)
+{
+    if (o->brick.function_count == MAX_FUNCTIONS)
+        return trip_option_fail("--tf", "is given too often");
+    o->functions[o->brick.function_count++] = path;
+    return 0;
+}
+
+static int parse_tile(const char *text, unsigned *tile)
+{
+    static const char *const names[] = { "16", "32", "64", "128", NULL };
+    int choice;
+    int status = trip_option_choice("--tile", text, names, &choice);
+    if (status == 0)
+        *tile = 16u << choice;
+    return status;
+}
+
+static int parse_unsigned(const char *option, const char *text, int hi, unsigned *out)
+{
+    int number;
+    int status = trip_option_integer(option, text, 1, hi, &number);
+    if (status == 0)
+        *out = (unsigned)number;
+    return status;
+}
+
+static int parse_endian(const char *text, int *endian)
+{
+    static const char *const names[] = { "little", "big", NULL };
+    int status = trip_option_choice("--endian", text, names, endian);
+    *endian += 1;
+    return status;
+}
+
+static int parse_level_set(const char *text, trip_level_set_mode *mode)
+{
+    static const char *const names[] = { "refuse", "filled", "band", NULL };
+    int choice = 0;
+    int status = trip_option_choice("--level-set", text, names, &choice);
+    *mode = (trip_level_set_mode)choice;
+    return status;
+}
+
+static error_t parse_input_option(int key, char *argument, trip_volume_params *v)
+{
+    switch (key) {
+    case KEY_GRID:
+        v->grid = argument;
+        return 0;
+    case KEY_LEVEL_SET:
+        return parse_level_set(argument, &v->level_set);
+    case KEY_SIZE:
+        return parse_size(argument, v->raw_dims);
+    case KEY_TYPE:
+        v->raw_type = argument;
+        return trip_scalar_from_name(argument) < 0
+                   ? trip_option_fail("--type", "no such type; for example uint8, int16 or float")
+                   : 0;
+    case KEY_SPACING:
+        return parse_spacing(argument, v->spacing);
+    case KEY_ENDIAN:
+        return parse_endian(argument, &v->raw_endian);
+    case KEY_OFFSET:
+        return parse_offset(argument, &v->raw_offset_bytes);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static error_t parse_output_option(int key, char *argument, options *o)
+{
+    switch (key) {
+    case 'o':
+        o->brick.output = argument;
+        return 0;
+    case KEY_FORCE:
+        o->brick.replace = true;
+        return 0;
+    case KEY_NO_NORMALS:
+        o->brick.no_normals = true;
+        return 0;
+    case KEY_TILE:
+        return parse_tile(argument, &o->brick.tile_voxels);
+    case KEY_SLAB_SHEETS:
+        return parse_unsigned("--slab-sheets", argument, 64, &o->brick.slab_sheets);
+    case KEY_JSON:
+        o->json = true;
+        return 0;
+    case 'q':
+        o->quiet = true;
+        return 0;
+    default:
+        return parse_input_option(key, argument, &o->brick.volume);
+    }
+}
+
+static error_t check_options(const options *o)
+{
+    const trip_brick_params *p = &o->brick;
+    if (!p->input)
+        return trip_option_fail("INPUT", "no volume given");
+    if (p->keep_all && p->range_count)
+        return trip_option_fail("--range", "says nothing beside --keep-all");
+    if (o->quiet && o->json)
+        return trip_option_fail("--json", "prints nothing beside --quiet");
+    return 0;
+}
+
+static error_t parse_option(int key, char *argument, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case KEY_TF:
+        return add_function(o, argument);
+    case KEY_RANGE:
+        return parse_range(o, argument);
+    case KEY_KEEP_ALL:
+        o->brick.keep_all = true;
+        return 0;
+    case KEY_MEMORY:
+        return trip_option_bytes("--memory", argument, &o->brick.memory_bytes);
+    case KEY_THREADS:
+        return parse_unsigned("--threads", argument, 256, &o->brick.threads);
+    case ARGP_KEY_ARG:
+        if (o->brick.input)
+            return trip_option_fail(argument, "one volume at a time");
+        o->brick.input = argument;
+        return 0;
+    case ARGP_KEY_END:
+        return check_options(o);
+    default:
+        return parse_output_option(key, argument, o);
+    }
+}
+
+/* INPUT's own name with .trip for what is after its first dot, in this folder. */
+static int choose_output(options *o)
+{
+    const char *input = o->brick.input;
+    size_t length = strlen(input);
+    if (o->brick.output)
+        return 0;
+    while (length > 1 && input[length - 1] == '/')
+        length--;
+    size_t begin = length;
+    while (begin > 0 && input[begin - 1] != '/')
+        begin--;
+    size_t stem = 0;
+    while (begin + stem < length && (stem == 0 || input[begin + stem] != '.'))
+        stem++;
+    if (stem == 0 || asprintf(&o->default_output, "%.*s.trip", (int)stem, input + begin) < 0) {
+        o->default_output = NULL;
+        return trip_option_fail("--output", "is needed: the input's name gives none");
+    }
+    o->brick.output = o->default_output;
+    return 0;
+}
+
+static void on_progress(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    trip_progress_show(user, stage, done, total, strcmp(stage, "merge") ? "voxels" : "splats");
+}
+
+static double seconds_of(const trip_brick_summary *s)
+{
+    return s->scan_seconds + s->read_seconds + s->merge_seconds + s->finish_seconds;
+}
+
+static void add_number(cJSON *object, const char *name, double value)
+{
+    char text[32];
+    cJSON_AddItemToObject(object, name, cJSON_CreateRaw(trip_text_from_double(value, text)));
+}
+
+static int print_json(const options *o, const trip_brick_summary *s)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "output", o->brick.output);
+    cJSON *dims = cJSON_AddArrayToObject(root, "dims");
+    cJSON *spacing = cJSON_AddArrayToObject(root, "spacing");
+    for (int a = 0; a < 3; a++) {
+        cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)s->dims[a]));
+        cJSON_AddItemToArray(spacing, cJSON_CreateNumber(s->spacing[a]));
+    }
+    add_number(root, "value_min", s->value_min);
+    add_number(root, "value_max", s->value_max);
+    add_number(root, "voxels", (double)s->voxels);
+    add_number(root, "kept", (double)s->kept);
+    add_number(root, "not_finite", (double)s->not_finite);
+    add_number(root, "input_bytes", (double)s->input_bytes);
+    add_number(root, "bytes", (double)s->bytes);
+    add_number(root, "temporary_bytes", (double)s->temporary_bytes);
+    add_number(root, "scan_seconds", s->scan_seconds);
+    add_number(root, "read_seconds", s->read_seconds);
+    add_number(root, "merge_seconds", s->merge_seconds);
+    add_number(root, "finish_seconds", s->finish_seconds);
+    add_number(root, "seconds", seconds_of(s));
+    add_number(root, "memory_bytes", (double)s->memory_bytes);
+    add_number(root, "peak_memory_bytes", (double)s->peak_memory_bytes);
+    add_number(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (!text)
+        return trip_fail(TRIP_ERROR, "brick", o->brick.output, "out of memory");
+    puts(text);
+    free(text);
+    return 0;
+}
+
+static void print_text(const options *o, const trip_brick_summary *s)
+{
+    char bytes[32], temporary[32], peak[32], promise[32];
+    double seconds = seconds_of(s), kept = (double)s->kept, voxels = (double)s->voxels;
+    printf("%-9s %s\n", "data set", o->brick.output);
+    printf("%-9s %lld x %lld x %lld, spacing %.6g x %.6g x %.6g\n", "grid", (long long)s->dims[0],
+           (long long)s->dims[1], (long long)s->dims[2], s->spacing[0], s->spacing[1],
+           s->spacing[2]);
+    printf("%-9s %llu read, values %.7g to %.7g\n", "voxels", (unsigned long long)s->voxels,
+           s->value_min, s->value_max);
+    printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
+    printf("%-9s %s, %.3g bytes per kept voxel\n", "written", trip_format_bytes(s->bytes, bytes),
+           (double)s->bytes / kept);
+    if (s->temporary_bytes)
+        printf("%-9s %s\n", "spilled", trip_format_bytes(s->temporary_bytes, temporary));
+    printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, finish %.2f), %.0f MB/s of input\n",
+           "time", seconds, s->scan_seconds, s->read_seconds, s->merge_seconds, s->finish_seconds,
+           (double)s->input_bytes / 1e6 / (seconds > 0 ? seconds : 1));
+    printf("%-9s %s resident at most, %s promised for data\n", "memory",
+           trip_format_bytes(trip_memory_peak_rss_bytes(), peak),
+           trip_format_bytes(s->memory_bytes, promise));
+}
+
+static int brick(options *o)
+{
+    trip_brick_summary summary;
+    trip_progress progress = trip_progress_start(o->quiet);
+    o->brick.functions = o->functions;
+    o->brick.ranges = o->ranges;
+    o->brick.progress = on_progress;
+    o->brick.progress_user = &progress;
+    int status = trip_brick(&o->brick, &summary);
+    trip_progress_end(&progress);
+    if (status < 0 || o->quiet)
+        return status;
+    if (o->json)
+        return print_json(o, &summary);
+    print_text(o, &summary);
+    return 0;
+}
+
+int trip_command_brick(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse_option,
+        .args_doc = "INPUT",
+        .doc = "Turn a volume into a data set that is drawn from disk: the splats of its visible "
+               "voxels, sorted along X, Y and Z.",
+    };
+    options o = { 0 };
+    int status = trip_options_parse(&argp, argc, argv, &o);
+    if (status == 0)
+        status = choose_output(&o);
+    if (status == 0)
+        status = brick(&o);
+    free(o.default_output);
+    return trip_exit_status(status);
+}

@@ -1,0 +1,71 @@
+#include "progress.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static const double interval_seconds = 0.25;
+static const double settled_seconds = 1; /* before that, a rate says little */
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+trip_progress trip_progress_start(bool quiet)
+{
+    return (trip_progress){ .shown = !quiet && isatty(STDERR_FILENO) == 1 };
+}
+
+/* "0:42", "12:05", "3:02:10". */
+static const char *format_time(double seconds, char *text, size_t bytes)
+{
+    unsigned s = seconds < 359999 ? (unsigned)(seconds + 0.5) : 359999;
+    if (s >= 3600)
+        snprintf(text, bytes, "%u:%02u:%02u", s / 3600, s / 60 % 60, s % 60);
+    else
+        snprintf(text, bytes, "%u:%02u", s / 60, s % 60);
+    return text;
+}
+
+static void print_line(const trip_progress *p, double share, double rate, double left,
+                       const char *things)
+{
+    char time_text[16];
+    fprintf(stderr, "\r\033[K%-6s %3.0f %%", p->stage, 100 * share);
+    if (rate > 0)
+        fprintf(stderr, "  %.0f million %s/s  %s left", rate / 1e6, things,
+                format_time(left, time_text, sizeof time_text));
+    fputc('\r', stderr); /* what is printed next stands in its place */
+    fflush(stderr);
+}
+
+void trip_progress_show(trip_progress *p, const char *stage, uint64_t done, uint64_t total,
+                        const char *things)
+{
+    double now = now_seconds();
+    if (!p->shown)
+        return;
+    if (strcmp(p->stage, stage) != 0) {
+        snprintf(p->stage, sizeof p->stage, "%s", stage);
+        p->stage_begin = now;
+        p->last_shown = 0;
+    }
+    if (now - p->last_shown < interval_seconds)
+        return;
+    double spent = now - p->stage_begin, share = total ? (double)done / (double)total : 0;
+    double rate = spent > settled_seconds ? (double)done / spent : 0;
+    print_line(p, share, rate, rate > 0 ? (double)(total - done) / rate : 0, things);
+    p->last_shown = now;
+    p->line = true;
+}
+
+void trip_progress_end(trip_progress *p)
+{
+    if (p->line)
+        fputs("\r\033[K", stderr);
+    p->line = false;
+}
