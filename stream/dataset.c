@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,6 +23,16 @@ static void set_path(char *where, size_t room, const trip_dataset *d, const char
     snprintf(where, room, "%s/%s", d->path, name);
 }
 
+/* Not a failure: the folder was replaced by another data set while it was being opened. */
+enum { REPLACED = 1, REPLACED_TRIES = 100 };
+
+static bool was_replaced(const trip_dataset *d, int folder)
+{
+    struct stat opened, named;
+    return fstat(folder, &opened) == 0 && stat(d->path, &named) == 0 &&
+           (opened.st_dev != named.st_dev || opened.st_ino != named.st_ino);
+}
+
 /* Opens a regular file of the data set and gives its size. Never waits, as opening a pipe would. */
 static int open_file(const trip_dataset *d, int folder, const char *name, int *fd, uint64_t *bytes)
 {
@@ -29,6 +40,8 @@ static int open_file(const trip_dataset *d, int folder, const char *name, int *f
     struct stat st;
     set_path(where, sizeof where, d, name);
     *fd = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (*fd < 0 && errno == ENOENT && was_replaced(d, folder))
+        return REPLACED;
     if (*fd < 0 && errno == ENOENT)
         return trip_fail(TRIP_ERROR, "open", where,
                          "the file is missing: not a data set, or an incomplete one");
@@ -118,7 +131,7 @@ static int open_plane(trip_dataset *d, int folder, int axis, int plane)
     uint64_t bytes, wanted = d->lists[axis].splats * TRIP_RECORD_BYTES;
     trip_dataset_plane_name(axis, plane, name);
     int status = open_file(d, folder, name, &d->plane_fd[axis][plane], &bytes);
-    if (status < 0)
+    if (status != TRIP_OK)
         return status;
     d->bytes += bytes;
     if (bytes == wanted)
@@ -165,9 +178,8 @@ static trip_dataset *allocate(const char *path, trip_budget *budget)
 
 /* The files are opened relative to the folder, so that all are of one data set even while another
  * takes its name. */
-int trip_dataset_open(trip_dataset **out, const char *path, trip_budget *budget)
+static int open_once(trip_dataset **out, const char *path, trip_budget *budget)
 {
-    *out = NULL;
     trip_dataset *d = allocate(path, budget);
     if (!d)
         return trip_fail(TRIP_ERROR, "open", path, "out of memory");
@@ -182,12 +194,22 @@ int trip_dataset_open(trip_dataset **out, const char *path, trip_budget *budget)
         status = open_files(d, folder);
     if (folder >= 0)
         close(folder);
-    if (status < 0) {
+    if (status != TRIP_OK)
         trip_dataset_close(d);
-        return status;
-    }
-    *out = d;
-    return TRIP_OK;
+    else
+        *out = d;
+    return status;
+}
+
+int trip_dataset_open(trip_dataset **out, const char *path, trip_budget *budget)
+{
+    int status = REPLACED;
+    *out = NULL;
+    for (int i = 0; i < REPLACED_TRIES && status == REPLACED; i++)
+        status = open_once(out, path, budget);
+    if (status == REPLACED)
+        return trip_fail(TRIP_ERROR, "open", path, "is being replaced all the time");
+    return status;
 }
 
 void trip_dataset_close(trip_dataset *d)

@@ -52,8 +52,7 @@ void fixture_free(fixture *f);
 void fixture_catch_reports(void);
 const char *fixture_reports(void);
 
-/* Reads the data set by a selection of everything with the given reader and compares with `lists`
- * through `begin` and `end` of list positions. */
+/* A shell command, which must succeed. */
 void fixture_run_command(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 #endif

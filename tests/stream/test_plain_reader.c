@@ -1,0 +1,107 @@
+/* The plain second reader, written from FORMAT.md alone, sees in a data set what was written. */
+#include "fixture.h"
+
+#include <stdio.h>
+#include <sys/wait.h>
+#include <math.h>
+
+static FILE *start_reader(const char *path)
+{
+    char command[512];
+    snprintf(command, sizeof command, "%s %s/tests/stream/plain_reader.py %s", TRIP_PYTHON,
+             TRIP_SOURCE_DIR, path);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    return pipe;
+}
+
+static void check_line(const char *line, int axis, const fixture_voxel *x, bool normals)
+{
+    char list;
+    unsigned p[3], code, normal = 0;
+    double g[3] = { 0 }, wanted[3];
+    int n = sscanf(line, "%c %u %u %u %u %x %lf %lf %lf", &list, &p[0], &p[1], &p[2], &code,
+                   &normal, &g[0], &g[1], &g[2]);
+    assert_int_equal(n, normals ? 9 : 5);
+    assert_int_equal(list, 'x' + axis);
+    assert_memory_equal(p, x->p, sizeof p);
+    assert_int_equal(code, x->code);
+    if (!normals)
+        return;
+    assert_int_equal(normal, x->normal);
+    trip_normal_unpack(normal, 3, wanted);
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(g[i] - wanted[i]) < 1e-7);
+}
+
+/* False when the modules that the reader needs are missing. */
+static bool check_output(const fixture *f)
+{
+    char line[256];
+    size_t lines = 0;
+    FILE *pipe = start_reader(f->path);
+    for (; fgets(line, sizeof line, pipe); lines++) {
+        assert_true(lines < 3 * f->count);
+        int axis = (int)(lines / f->count);
+        check_line(line, axis, &f->lists[axis][lines % f->count], f->params.normals);
+    }
+    int status = pclose(pipe);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 77)
+        return false;
+    assert_int_equal(status, 0);
+    assert_int_equal(lines, 3 * f->count);
+    return true;
+}
+
+static void the_plain_reader_sees_what_was_written(void **state)
+{
+    fixture_params params[] = {
+        { .dims = { 40, 37, 30 }, .normals = true, .tile_voxels = 16, .page_bytes = 4096 },
+        { .dims = { 70, 130, 5 }, .slab_sheets = 3, .density = 0.1 },
+        { .dims = { 9, 9, 9 }, .empty = true, .normals = true },
+    };
+    bool ran = true;
+    (void)state;
+    for (int i = 0; i < 3 && ran; i++) {
+        fixture f;
+        fixture_make(&f, &params[i]);
+        ran = check_output(&f);
+        fixture_free(&f);
+    }
+    if (!ran)
+        skip();
+}
+
+static void the_plain_reader_notices_a_changed_byte(void **state)
+{
+    static const char *const files[] = { "index.trip", "y.voxels", "z.normals" };
+    fixture f;
+    char line[256];
+    (void)state;
+    fixture_make(&f, &(fixture_params){ .dims = { 20, 20, 20 }, .normals = true });
+    bool ran = check_output(&f);
+    for (int i = 0; i < 3 && ran; i++) {
+        fixture_run_command("rm -rf %s/b.trip && cp -r %s %s/b.trip", f.folder, f.path, f.folder);
+        fixture_run_command("printf '\\377\\001' | dd of=%s/b.trip/%s bs=1 seek=1201 conv=notrunc"
+                            " status=none",
+                            f.folder, files[i]);
+        char path[128];
+        snprintf(path, sizeof path, "%s/b.trip 2>/dev/null", f.folder);
+        FILE *pipe = start_reader(path);
+        while (fgets(line, sizeof line, pipe))
+            ;
+        assert_int_equal(WEXITSTATUS(pclose(pipe)), 1);
+    }
+    fixture_free(&f);
+    if (!ran)
+        skip();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_plain_reader_sees_what_was_written),
+        cmocka_unit_test(the_plain_reader_notices_a_changed_byte),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
