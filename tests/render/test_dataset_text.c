@@ -1,0 +1,129 @@
+#include "test.h"
+
+#include <string.h>
+
+#include "dataset_text.h"
+
+/* A data set of 10 x 20 x 40 voxels without splats, whose text is given. */
+static trip_dataset with_text(char *text)
+{
+    static char path[] = "a.trip";
+    trip_dataset d = { .path = path, .index_to_world = trip_affine_identity(), .text = text };
+    d.header.dims[0] = 10;
+    d.header.dims[1] = 20;
+    d.header.dims[2] = 40;
+    d.header.code_hi = 100;
+    return d;
+}
+
+static trip_dataset_text *parse(trip_dataset *d)
+{
+    trip_dataset_text *t;
+    assert_int_equal(trip_dataset_text_parse(&t, d), 0);
+    return t;
+}
+
+/* The direction from the middle to the eye of the default view, and its up. */
+static trip_vec3 view_from(char *text, trip_vec3 *up)
+{
+    trip_dataset d = with_text(text);
+    trip_dataset_text *t = parse(&d);
+    trip_camera_params p = trip_dataset_text_view(t, &d, 100, 100, 0, 0);
+    trip_dataset_text_destroy(t);
+    *up = p.up;
+    return trip_normalize(trip_sub(p.eye, p.look));
+}
+
+static void text_that_is_no_object_is_refused(void **state)
+{
+    (void)state;
+    char *const bad[] = { "", "[]", "{", "7", "null" };
+    for (int i = 0; i < 5; i++) {
+        trip_dataset d = with_text(bad[i]);
+        trip_dataset_text *t;
+        test_expect_report();
+        assert_int_equal(trip_dataset_text_parse(&t, &d), TRIP_ERROR);
+        assert_int_equal(test_reports(), 1);
+        assert_null(t);
+    }
+}
+
+static void keys_of_another_kind_are_taken_as_missing(void **state)
+{
+    (void)state;
+    trip_dataset d = with_text("{\"transfer_function\": 3, \"envelope\": {}, \"histogram\": [],"
+                               " \"up\": [1], \"front\": \"left\", \"format\": null}");
+    trip_dataset_text *t = parse(&d);
+    trip_tf *tf;
+    double range[2];
+    assert_int_equal(trip_dataset_text_tf(t, &d, &tf), 0);
+    assert_true(trip_tf_evaluate(tf, 100).opacity > 0);
+    assert_close(trip_dataset_text_culled(t, tf, range), 0, 0);
+    trip_camera_params p = trip_dataset_text_view(t, &d, 10, 10, 0, 0);
+    assert_close(p.up.z, 1, 0);
+    trip_tf_destroy(tf);
+    trip_dataset_text_destroy(t);
+}
+
+static void the_stored_function_is_drawn(void **state)
+{
+    (void)state;
+    trip_dataset d = with_text("{\"transfer_function\": \"0 0 0 0 0\\n100 1 0.5 0.25 0.8\\n\"}");
+    trip_dataset_text *t = parse(&d);
+    trip_tf *tf;
+    assert_int_equal(trip_dataset_text_tf(t, &d, &tf), 0);
+    assert_close(trip_tf_evaluate(tf, 50).opacity, 0.4, 1e-12);
+    trip_tf_destroy(tf);
+    trip_dataset_text_destroy(t);
+}
+
+static void each_kind_of_data_is_shown_the_right_way_up(void **state)
+{
+    (void)state;
+    trip_vec3 up, d = view_from("{}", &up);
+    assert_true(up.z == 1 && -d.y > d.x && d.x > 0 && d.z > 0);
+    d = view_from("{\"format\": \"openvdb\"}", &up);
+    assert_true(up.y == 1 && d.z > d.x && d.x > 0 && d.y > 0);
+    d = view_from("{\"format\": \"nifti\"}", &up);
+    assert_true(up.z == 1 && d.y > -d.x && d.x < 0 && d.z > 0);
+    d = view_from("{\"up\": \"-x\", \"front\": \"+z\"}", &up);
+    assert_true(up.x == -1 && d.z > 0.5 && d.x < 0);
+}
+
+static void voxels_shown_but_left_out_are_counted_from_the_histogram(void **state)
+{
+    (void)state;
+    trip_dataset d =
+        with_text("{\"envelope\": [[20, 30], [60, 100]], \"histogram\": {\"value_min\": 0,"
+                  " \"value_max\": 100, \"counts\": [1000, 100, 10, 70, 50, 40, 30, 20, 10, 5]}}");
+    trip_dataset_text *t = parse(&d);
+    const trip_rgba none = { 0 }, some = { 1, 1, 1, 0.5 };
+    /* Shows 35 to 55 and all from 60: the half bin to 40, a whole one, and the half bin to 55. */
+    const trip_tf_point points[] = { { 35, none }, { 35, some }, { 55, some },
+                                     { 55, none }, { 60, none }, { 60, some } };
+    trip_tf *tf;
+    double range[2];
+    assert_int_equal(trip_tf_from_points(&tf, points, 6, false, 0), 0);
+    assert_close(trip_dataset_text_culled(t, tf, range), 35 + 50 + 20, 1e-9);
+    assert_close(range[0], 30, 1e-9);
+    assert_close(range[1], 60, 1e-9);
+    trip_tf_destroy(tf);
+
+    const trip_tf_point kept[] = { { 20, none }, { 20, some }, { 30, some }, { 30, none } };
+    assert_int_equal(trip_tf_from_points(&tf, kept, 4, false, 0), 0);
+    assert_close(trip_dataset_text_culled(t, tf, range), 0, 0);
+    trip_tf_destroy(tf);
+    trip_dataset_text_destroy(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(text_that_is_no_object_is_refused),
+        cmocka_unit_test(keys_of_another_kind_are_taken_as_missing),
+        cmocka_unit_test(the_stored_function_is_drawn),
+        cmocka_unit_test(each_kind_of_data_is_shown_the_right_way_up),
+        cmocka_unit_test(voxels_shown_but_left_out_are_counted_from_the_histogram),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,184 @@
+#include "scenes.h"
+#include "test.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void make_scene(scene *s)
+{
+    scene_create(s, &(scene_params){ .dims = { 40, 30, 20 }, .tile_voxels = 16, .normals = true });
+    scene_colour(s, 0, 65535, 1, 0.8, 0.6, 0.2);
+}
+
+/* One frame with what is given; returns its status. */
+static int draw(const scene *s, trip_renderer *r, trip_reader *reader,
+                const trip_camera_params *view, float *rgba, trip_frame_stats *stats)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_settings settings = trip_settings_default();
+    settings.h = 0.2;
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
+    trip_frame frame = { s->data, &camera, &settings, &plan, s->table, true };
+    int status = trip_frame_draw(r, reader, &frame, rgba, stats);
+    trip_plan_release(&plan, s->budget);
+    return status;
+}
+
+static trip_reader *make_reader(const scene *s, trip_reader_params params)
+{
+    trip_reader *reader;
+    params.planes = 3;
+    assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
+    return reader;
+}
+
+static void a_renderer_and_reader_serve_many_frames_of_any_size(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        trip_renderer *r;
+        assert_int_equal(kind->create(&r, s.budget), 0);
+        trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
+        const int sizes[] = { 24, 40, 16, 40 };
+        for (int i = 0; i < 4; i++) {
+            trip_frame_stats stats;
+            trip_camera_params view = scene_view(&s, trip_v3(1, 0.3 * i, 1), 80, 30, sizes[i]);
+            size_t bytes = (size_t)(sizes[i] * sizes[i]) * 4 * sizeof(float);
+            float *rgba = calloc(1, bytes);
+            assert_non_null(rgba);
+            assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), 0);
+            trip_settings settings = trip_settings_default();
+            settings.h = 0.2;
+            scene_picture fresh = scene_draw(&s, kind, &view, &settings);
+            assert_memory_equal(rgba, fresh.rgba, bytes);
+            scene_picture_free(&fresh);
+            free(rgba);
+        }
+        trip_reader_destroy(reader);
+        r->ops->destroy(r);
+    }
+    scene_destroy(&s);
+}
+
+static void bytes_and_splats_are_counted_for_each_list(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 200, 20, 16);
+    trip_settings settings = trip_settings_default();
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        scene_picture p = scene_draw(&s, kind, &view, &settings);
+        const trip_list_stats *z = &p.stats.lists[2];
+        assert_int_equal(z->splats_read, 40 * 30 * 20);
+        assert_int_equal(z->splats_projected, 40 * 30 * 20);
+        assert_int_equal(z->splats_drawn, 40 * 30 * 20);
+        assert_true(z->bytes_read >= 40 * 30 * 20 * 2 * TRIP_RECORD_BYTES);
+        assert_int_equal(p.stats.lists[0].splats_read + p.stats.lists[1].splats_read, 0);
+        assert_int_equal(p.stats.lists[0].bytes_read + p.stats.lists[1].bytes_read, 0);
+        assert_int_equal(p.stats.reader.bytes_read, z->bytes_read);
+        assert_true(p.stats.ms > 0 && p.stats.ms >= p.stats.draw_ms);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+static long fail_reading(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    (void)user;
+    (void)data;
+    (void)offset;
+    (void)bytes;
+    (void)result;
+    return -EIO;
+}
+
+static long flip_a_bit(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    (void)user;
+    (void)offset;
+    (void)bytes;
+    ((unsigned char *)data)[result / 2] ^= 16;
+    return result;
+}
+
+static void a_failed_or_damaged_read_ends_the_frame_with_one_report(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
+    long (*const faults[])(void *, void *, uint64_t, size_t, long) = { fail_reading, flip_a_bit };
+    for (int i = 0; i < 2; i++) {
+        trip_renderer *r;
+        trip_frame_stats stats;
+        float rgba[16 * 16 * 4];
+        assert_int_equal(trip_reference_create(&r, s.budget), 0);
+        trip_reader *reader = make_reader(&s, (trip_reader_params){ .fault = faults[i] });
+        test_expect_report();
+        assert_true(draw(&s, r, reader, &view, rgba, &stats) < 0);
+        assert_int_equal(test_reports(), 1);
+        trip_reader_destroy(reader);
+        r->ops->destroy(r);
+    }
+    scene_destroy(&s);
+}
+
+static void without_memory_for_its_pixels_the_reference_says_so(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_renderer *r;
+    trip_frame_stats stats;
+    float rgba[4];
+    trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 8000);
+    assert_int_equal(trip_reference_create(&r, s.budget), 0);
+    trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
+    test_expect_report();
+    assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_ERROR);
+    assert_int_equal(test_reports(), 1);
+    trip_reader_destroy(reader);
+    r->ops->destroy(r);
+    scene_destroy(&s);
+}
+
+/* The last test: nothing takes the signal back. */
+static void an_interrupt_ends_the_frame(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_renderer *r;
+    trip_frame_stats stats;
+    float rgba[16 * 16 * 4];
+    trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
+    assert_int_equal(trip_reference_create(&r, s.budget), 0);
+    trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
+    trip_interrupt_install();
+    raise(SIGINT);
+    test_expect_report();
+    assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_INTERRUPTED);
+    assert_int_equal(test_reports(), 1);
+    trip_reader_destroy(reader);
+    r->ops->destroy(r);
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_renderer_and_reader_serve_many_frames_of_any_size),
+        cmocka_unit_test(bytes_and_splats_are_counted_for_each_list),
+        cmocka_unit_test(a_failed_or_damaged_read_ends_the_frame_with_one_report),
+        cmocka_unit_test(without_memory_for_its_pixels_the_reference_says_so),
+        cmocka_unit_test(an_interrupt_ends_the_frame),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

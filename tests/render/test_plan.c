@@ -1,0 +1,326 @@
+#include "scenes.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "plan.h"
+#include "splat.h"
+#include "weight.h"
+
+static trip_settings unlit(trip_method method, double h)
+{
+    trip_settings s = trip_settings_default();
+    s.method = method;
+    s.h = h;
+    s.shading = false;
+    return s;
+}
+
+/* Sparse, with codes that differ from place to place. */
+static bool clumps(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    uint32_t x = (uint32_t)(i * 73856093) ^ (uint32_t)(j * 19349663) ^ (uint32_t)(k * 83492791);
+    (void)user;
+    (void)gradient;
+    x ^= x >> 13;
+    x *= 0x5bd1e995u;
+    x ^= x >> 15;
+    *code = (unsigned)((i / 16 * 4 + j / 16 * 2 + k / 16) * 2000) + x % 500;
+    return (x >> 20) % 5 == 0;
+}
+
+static void make_scene(scene *s)
+{
+    scene_create(s, &(scene_params){ .dims = { 50, 40, 60 },
+                                     .tile_voxels = 16,
+                                     .slab_sheets = 4,
+                                     .normals = true,
+                                     .voxel = clumps });
+    scene_colour(s, 0, 65535, 1, 1, 1, 0.2);
+}
+
+static trip_plan make_plan(const scene *s, const trip_camera *c, const trip_settings *settings)
+{
+    trip_plan plan;
+    assert_int_equal(trip_plan_make(&plan, s->data, c, settings, s->table, s->budget), 0);
+    return plan;
+}
+
+static trip_camera make_camera(const scene *s, const trip_camera_params *p)
+{
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, p, &s->data->index_to_world), 0);
+    return c;
+}
+
+static trip_vec3 random_direction(void)
+{
+    return trip_v3(test_random() * 2 - 1, test_random() * 2 - 1, test_random() * 2 - 1);
+}
+
+/* From inside, outside, near and far, narrow and wide. */
+static trip_camera random_camera(const scene *s, int i)
+{
+    trip_camera_params p =
+        scene_view(s, random_direction(), 1 + 150 * test_random(),
+                   i % 3 ? 10 + 60 * test_random() : 90 + 80 * test_random(), 24);
+    p.look = trip_add(p.look, trip_scale(random_direction(), 30));
+    p.ortho_height = i % 5 == 0 ? 5 + 80 * test_random() : 0;
+    p.width = 8 + i % 40;
+    return make_camera(s, &p);
+}
+
+static void a_list_is_used_exactly_when_some_pixel_has_weight_in_it(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    int used = 0, unused = 0;
+    for (int i = 0; i < 300; i++) {
+        trip_camera c = random_camera(&s, i);
+        trip_settings settings = unlit((trip_method)(i % 3), i % 4 ? test_random() : 0);
+        trip_plan plan = make_plan(&s, &c, &settings);
+        for (int axis = 0; axis < 3; axis++) {
+            bool weighs = false;
+            for (int at = 0; at < c.width * c.height && !weighs; at++) {
+                trip_vec3 ray = trip_camera_ray(&c, at % c.width + 0.5, at / c.width + 0.5);
+                weighs = trip_weight(&settings, plan.axis_of_view, ray, axis) > 0;
+            }
+            assert_int_equal(plan.lists[axis].used, weighs);
+            used += weighs;
+            unused += !weighs;
+        }
+        trip_plan_release(&plan, s.budget);
+    }
+    assert_true(used > 100 && unused > 100);
+    scene_destroy(&s);
+}
+
+static void a_parallel_view_along_an_axis_uses_that_list_alone(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (int axis = 0; axis < 3; axis++) {
+        trip_vec3 d = { axis == 0, axis == 1, axis == 2 };
+        trip_camera_params p = scene_view(&s, d, 100, 30, 16);
+        p.ortho_height = 70;
+        trip_camera c = make_camera(&s, &p);
+        trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
+        trip_plan plan = make_plan(&s, &c, &settings);
+        for (int a = 0; a < 3; a++) {
+            assert_int_equal(plan.lists[a].used, a == axis);
+            assert_int_equal(plan.lists[a].pass_count, a == axis);
+        }
+        assert_int_equal(plan.lists[axis].splats_selected, s.data->header.kept);
+        assert_true(plan.lists[axis].passes[0].selection.descending); /* seen from above */
+        assert_true(plan.lists[axis].passes[0].front_to_back);
+        trip_plan_release(&plan, s.budget);
+    }
+    scene_destroy(&s);
+}
+
+static void inside_the_volume_each_list_is_read_from_the_eye_outwards(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 1, 1), 1, 150, 16);
+    p.eye = trip_v3(20.5, 30, -3);
+    p.look = trip_v3(40, 10, 30);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
+    trip_plan plan = make_plan(&s, &c, &settings);
+    const trip_plan_pass *x = plan.lists[0].passes, *y = plan.lists[1].passes;
+    assert_int_equal(plan.lists[0].pass_count, 2);
+    assert_int_equal(x[0].selection.sheet_first, 21);
+    assert_int_equal(x[0].selection.sheet_last, 49);
+    assert_false(x[0].selection.descending);
+    assert_int_equal(x[1].selection.sheet_first, 0);
+    assert_int_equal(x[1].selection.sheet_last, 20);
+    assert_true(x[1].selection.descending);
+    assert_int_equal(plan.lists[1].pass_count, 2);
+    assert_int_equal(y[0].selection.sheet_first, 30);
+    assert_int_equal(y[1].selection.sheet_last, 29);
+    assert_int_equal(plan.lists[2].pass_count, 1); /* the eye is below all sheets */
+    assert_int_equal(plan.lists[2].passes[0].selection.sheet_first, 0);
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
+static void ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(-1, 1, 1), 100, 30, 16);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
+    settings.traversal = TRIP_TRAVERSAL_ASCENDING;
+    trip_plan plan = make_plan(&s, &c, &settings);
+    for (int axis = 0; axis < 3; axis++) {
+        assert_int_equal(plan.lists[axis].pass_count, 1);
+        assert_false(plan.lists[axis].passes[0].selection.descending);
+        assert_int_equal(plan.lists[axis].passes[0].front_to_back, axis == 0);
+    }
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
+/* The splats of a list that touch a pixel with weight, counted from the whole list. */
+static uint64_t count_touching(const scene *s, const trip_camera *c, const trip_settings *settings,
+                               int axis_of_view, int axis, bool (*counts)(const scene *s, int code))
+{
+    trip_splat_frame f = trip_splat_frame_make(c, settings);
+    uint64_t n = 0;
+    const uint64_t *dims = s->data->header.dims;
+    for (uint64_t i = 0; i < dims[0] * dims[1] * dims[2]; i++) {
+        int at[3] = { (int)(i % dims[0]), (int)(i / dims[0] % dims[1]),
+                      (int)(i / dims[0] / dims[1]) };
+        unsigned code;
+        double gradient[3];
+        trip_splat p;
+        if (!clumps(NULL, at[0], at[1], at[2], &code, gradient) || !counts(s, (int)code) ||
+            !trip_splat_project(&f, trip_v3(at[0], at[1], at[2]), &p))
+            continue;
+        bool touches = false;
+        for (int y = 0; y < c->height && !touches; y++) {
+            for (int x = 0; x < c->width && !touches; x++) {
+                trip_vec3 ray = trip_camera_ray(c, x + 0.5, y + 0.5);
+                touches = x + 0.5 >= p.x0 && x + 0.5 <= p.x1 && y + 0.5 >= p.y0 &&
+                          y + 0.5 <= p.y1 &&
+                          trip_splat_radius2(&f, &p, x + 0.5, y + 0.5) <= f.cutoff2 &&
+                          trip_weight(settings, axis_of_view, ray, axis) > 0;
+            }
+        }
+        n += touches;
+    }
+    return n;
+}
+
+static bool any_code(const scene *s, int code)
+{
+    (void)s;
+    (void)code;
+    return true;
+}
+
+/* The reference counts what it was given; nothing that touches a pixel may have been left out. */
+static void no_splat_that_touches_a_pixel_is_left_out(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    uint64_t left_out = 0;
+    for (int i = 0; i < 40; i++) {
+        trip_camera c = random_camera(&s, i);
+        trip_settings settings = unlit((trip_method)(i % 3), i % 4 ? test_random() : 0.85);
+        settings.kernel_radius = i % 7 == 0 ? 4 : 2;
+        scene_picture p = scene_draw(&s, scene_renderers(), &c.params, &settings);
+        int axis_of_view = trip_weight_axis_of_view(&c);
+        for (int axis = 0; axis < 3; axis++) {
+            assert_int_equal(p.stats.lists[axis].splats_drawn,
+                             count_touching(&s, &c, &settings, axis_of_view, axis, any_code));
+            left_out += s.data->header.kept - p.stats.lists[axis].splats_read;
+        }
+        scene_picture_free(&p);
+    }
+    assert_true(left_out > 20 * s.data->header.kept); /* the bounds are of some use */
+    scene_destroy(&s);
+}
+
+static bool is_visible(const scene *s, int code)
+{
+    return s->table[code].extinction > 0;
+}
+
+static void bricks_that_the_transfer_function_hides_are_not_read(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    scene_colour(&s, 0, 65535, 1, 1, 1, 0);
+    scene_colour(&s, 6000, 9000, 1, 1, 1, 0.5);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 0.4, 0.3), 150, 40, 32);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_AXIS, 0);
+    trip_plan plan = make_plan(&s, &c, &settings);
+    assert_true(plan.lists[0].bricks_transparent > plan.lists[0].bricks / 2);
+    assert_int_equal(plan.lists[0].bricks,
+                     plan.lists[0].bricks_selected + plan.lists[0].bricks_transparent +
+                         plan.lists[0].bricks_outside + plan.lists[0].bricks_without_weight);
+    uint64_t visible = count_touching(&s, &c, &settings, 0, 0, is_visible);
+    assert_true(visible > 0 && plan.lists[0].splats_selected >= visible);
+    assert_true(plan.lists[0].splats_selected < s.data->header.kept / 2);
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
+static void normals_are_planned_only_for_shading(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 0.4, 0.3), 150, 40, 32);
+    trip_camera c = make_camera(&s, &p);
+    for (int shading = 0; shading < 2; shading++) {
+        trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+        settings.shading = shading;
+        trip_plan plan = make_plan(&s, &c, &settings);
+        assert_int_equal(plan.planes, shading ? 3 : 1);
+        trip_plan_release(&plan, s.budget);
+    }
+    scene_destroy(&s);
+}
+
+static char *explain(const scene *s, const trip_camera *c, const trip_settings *settings)
+{
+    char *text;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    assert_non_null(f);
+    trip_plan plan = make_plan(s, c, settings);
+    trip_plan_explain(&plan, s->data, settings, f);
+    trip_plan_release(&plan, s->budget);
+    fclose(f);
+    return text;
+}
+
+static void the_plan_explains_what_runs_and_why(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(0, 0, 1), 150, 20, 32);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+    char *text = explain(&s, &c, &settings);
+    assert_non_null(strstr(text, "list x      not read: no ray of the view has weight in it\n"));
+    assert_non_null(strstr(text, "list z      read: "));
+    assert_non_null(strstr(text, "sheets 0 to 59 descending, front to back\n"));
+    assert_non_null(strstr(text, "shading     does not run: not asked for"));
+    free(text);
+    settings.shading = true;
+    settings.method = TRIP_METHOD_AXIS;
+    text = explain(&s, &c, &settings);
+    assert_non_null(strstr(text, "method      axis: list z alone"));
+    assert_non_null(strstr(text, "shading     runs, lit from the eye: normal planes are read\n"));
+    free(text);
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_list_is_used_exactly_when_some_pixel_has_weight_in_it),
+        cmocka_unit_test(a_parallel_view_along_an_axis_uses_that_list_alone),
+        cmocka_unit_test(inside_the_volume_each_list_is_read_from_the_eye_outwards),
+        cmocka_unit_test(ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze),
+        cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
+        cmocka_unit_test(bricks_that_the_transfer_function_hides_are_not_read),
+        cmocka_unit_test(normals_are_planned_only_for_shading),
+        cmocka_unit_test(the_plan_explains_what_runs_and_why),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
