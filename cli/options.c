@@ -11,28 +11,43 @@
 #include "text.h"
 
 /* getopt prints its own line, "ARGV0: unrecognized option ...": with this argv[0] that line has our
- * form, and with no err_stream argp adds nothing to it. --help takes the name from state->name. */
+ * form, and with no err_stream argp adds nothing to it. --help shows the command's own name. */
 static char error_prefix[] = "triptych: usage";
 static char help_name[64];
+
+enum { KEY_HELP = 1000 };
+
+static const struct argp_option common_options[] = {
+    { "help", KEY_HELP, NULL, 0, "Show this help", -1 },
+    { 0 },
+};
 
 static error_t parse_key(int key, char *arg, struct argp_state *state)
 {
     (void)arg;
-    if (key != ARGP_KEY_INIT)
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->err_stream = NULL;
+        state->child_inputs[0] = state->input;
+        return 0;
+    case KEY_HELP:
+        state->name = help_name;
+        argp_state_help(state, stdout, ARGP_HELP_STD_HELP);
+        return 0;
+    default:
         return ARGP_ERR_UNKNOWN;
-    state->name = help_name;
-    state->err_stream = NULL;
-    state->child_inputs[0] = state->input;
-    return 0;
+    }
 }
 
 int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input)
 {
     const struct argp_child children[] = { { argp, 0, NULL, 0 }, { 0 } };
-    const struct argp outer = { .parser = parse_key, .children = children };
+    const struct argp outer = { .options = common_options,
+                                .parser = parse_key,
+                                .children = children };
     snprintf(help_name, sizeof help_name, "triptych %s", argv[0]);
     argv[0] = error_prefix;
-    error_t status = argp_parse(&outer, argc, argv, 0, NULL, input);
+    error_t status = argp_parse(&outer, argc, argv, ARGP_NO_HELP, NULL, input);
     if (status == ENOMEM)
         return trip_fail(TRIP_ERROR, "usage", help_name, "out of memory");
     return status ? TRIP_USAGE : 0;

@@ -35,7 +35,7 @@ enum {
 };
 
 static const struct argp_option options[] = {
-    { NULL, 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
+    { "output", 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
     { NULL, 0, NULL, 0, "View:", 1 },
     { "size", KEY_SIZE, "WxH", 0, "Pixels (1024x1024)", 1 },
     { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (the whole volume in view)", 1 },
