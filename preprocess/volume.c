@@ -59,11 +59,11 @@ static int check_options(const char *path, const char *format, const trip_volume
 {
     if (strcmp(format, "raw") != 0 && is_raw_option_given(p))
         return trip_fail(TRIP_USAGE, "read", path,
-                         "is a %s file: --size, --type, --endian and --offset are for raw data",
+                         "its format is %s: --size, --type, --endian and --offset are for raw data",
                          format);
     if (strcmp(format, "openvdb") != 0 && (p->grid || p->level_set))
         return trip_fail(TRIP_USAGE, "read", path,
-                         "is a %s file: --grid and --level-set are for OpenVDB", format);
+                         "its format is %s: --grid and --level-set are for OpenVDB", format);
     for (int a = 0; a < 3; a++)
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))

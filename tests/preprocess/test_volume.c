@@ -280,7 +280,7 @@ static void options_of_another_format_are_wrong_usage(void **state)
         { .grid = "density" },       { .level_set = TRIP_LEVEL_SET_FILLED },
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
-        assert_refused_as(TRIP_USAGE, nrrd, &wrong[i], "is a nrrd file");
+        assert_refused_as(TRIP_USAGE, nrrd, &wrong[i], "its format is nrrd");
     static const double spacings[][3] = { { 1, 0, 1 }, { 0, 0, 1 }, { -1, 1, 1 }, { NAN, 1, 1 } };
     for (size_t i = 0; i < sizeof spacings / sizeof spacings[0]; i++) {
         trip_volume_params p = { .spacing = { spacings[i][0], spacings[i][1], spacings[i][2] } };
