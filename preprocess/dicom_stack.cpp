@@ -1,0 +1,396 @@
+/* DICOM slices through DCMTK. OpenImageIO reads DICOM too, but hands out the decoder's intermediate
+ * values in another type than it says, and neither place, spacing nor rescaling. World space is the
+ * patient's, in millimetres: x to the left, y to the back, z to the head. */
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+#include <vector>
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcrledrg.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmjpeg/djdecode.h>
+#include <dcmtk/dcmjpls/djdecode.h>
+#include <dcmtk/oflog/oflog.h>
+
+#include "slice_stack.h"
+#include "volume_reader.h"
+
+namespace
+{
+
+/* Elements longer than this stay in the file until they are asked for. */
+constexpr Uint32 lazy_bytes = 4096;
+
+/* What a slice's file says besides its pixels; what it does not say is empty or NAN. */
+struct Header {
+    std::string file;
+    std::string series;
+    int64_t width = 0, height = 0, frames = 1;
+    unsigned allocated = 0, stored = 0, high = 0; /* bits */
+    bool is_signed = false;
+    double slope = 1, inter = 0;
+    std::vector<double> position, last_position; /* first and last frame */
+    std::vector<double> rows;                    /* directions of i, then j */
+    std::vector<double> pixel_spacing;           /* between rows, then between columns */
+    double location = NAN, number = NAN, spacing = NAN;
+
+    bool same_pixels(const Header &o) const
+    {
+        return width == o.width && height == o.height && allocated == o.allocated &&
+               stored == o.stored && high == o.high && is_signed == o.is_signed;
+    }
+    std::string text() const
+    {
+        return std::to_string(width) + " x " + std::to_string(height) + ", " +
+               (is_signed ? "signed, " : "unsigned, ") + std::to_string(stored) + " bits in " +
+               std::to_string(allocated);
+    }
+};
+
+void set_up_once()
+{
+    static std::once_flag done;
+    std::call_once(done, [] {
+        OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+        DJDecoderRegistration::registerCodecs();
+        DJLSDecoderRegistration::registerCodecs();
+        DcmRLEDecoderRegistration::registerCodecs();
+    });
+}
+
+void require(const std::string &file, const OFCondition &condition)
+{
+    if (condition.bad())
+        throw trip_slice_error(file, std::string("cannot be read: ") + condition.text());
+}
+
+std::vector<double> get_numbers(DcmItem &item, const DcmTagKey &tag, unsigned count, bool nested)
+{
+    std::vector<double> numbers;
+    for (unsigned i = 0; i < count; i++) {
+        Float64 v;
+        if (item.findAndGetFloat64(tag, v, i, nested).bad() || !std::isfinite(v))
+            return {};
+        numbers.push_back(v);
+    }
+    return numbers;
+}
+
+double get_number(DcmItem &item, const DcmTagKey &tag, bool nested, double missing)
+{
+    std::vector<double> v = get_numbers(item, tag, 1, nested);
+    return v.empty() ? missing : v[0];
+}
+
+unsigned get_count(DcmItem &item, const DcmTagKey &tag, unsigned missing)
+{
+    Uint16 v;
+    return item.findAndGetUint16(tag, v).good() ? v : missing;
+}
+
+/* A length between samples, or NAN. */
+double get_length(DcmItem &item, const DcmTagKey &tag, bool nested)
+{
+    double v = std::fabs(get_number(item, tag, nested, NAN));
+    return v > 0 ? v : NAN;
+}
+
+/* Place of the last of several frames. */
+std::vector<double> get_last_position(DcmItem &item, unsigned long frames)
+{
+    DcmItem *last = nullptr;
+    if (item.findAndGetSequenceItem(DCM_PerFrameFunctionalGroupsSequence, last, (long)frames - 1)
+            .bad())
+        return {};
+    return get_numbers(*last, DCM_ImagePositionPatient, 3, true);
+}
+
+/* Several frames keep their geometry in nested items. */
+void read_geometry(DcmItem &item, Header &h)
+{
+    bool nested = h.frames > 1;
+    h.position = get_numbers(item, DCM_ImagePositionPatient, 3, nested);
+    if (nested)
+        h.last_position = get_last_position(item, (unsigned long)h.frames);
+    h.rows = get_numbers(item, DCM_ImageOrientationPatient, 6, nested);
+    h.pixel_spacing = get_numbers(item, DCM_PixelSpacing, 2, nested);
+    if (!h.pixel_spacing.empty() && !(h.pixel_spacing[0] > 0 && h.pixel_spacing[1] > 0))
+        h.pixel_spacing.clear();
+    h.location = get_number(item, DCM_SliceLocation, false, NAN);
+    h.number = get_number(item, DCM_InstanceNumber, false, NAN);
+    h.spacing = get_length(item, DCM_SpacingBetweenSlices, nested);
+    if (std::isnan(h.spacing))
+        h.spacing = get_length(item, DCM_SliceThickness, nested);
+    h.slope = get_number(item, DCM_RescaleSlope, nested, 1);
+    h.inter = get_number(item, DCM_RescaleIntercept, nested, 0);
+}
+
+void check_header(const Header &h, unsigned samples)
+{
+    if (h.width < 1 || h.height < 1 || h.frames < 1)
+        throw trip_slice_error(h.file, "has no picture");
+    if (samples != 1)
+        throw trip_slice_error(h.file, "is in colour; only grey DICOM slices are read");
+    if ((h.allocated != 8 && h.allocated != 16 && h.allocated != 32) || h.stored < 1 ||
+        h.stored > h.allocated || h.high + 1 < h.stored || h.high >= h.allocated)
+        throw trip_slice_error(h.file, "has pixels of " + std::to_string(h.stored) + " bits in " +
+                                           std::to_string(h.allocated) + ", which are not read");
+    if (h.slope == 0)
+        throw trip_slice_error(h.file, "has a rescale slope of 0");
+}
+
+Header read_header(const std::string &file)
+{
+    DcmFileFormat format;
+    require(file, format.loadFile(file.c_str(), EXS_Unknown, EGL_noChange, lazy_bytes));
+    DcmDataset &set = *format.getDataset();
+    Header h;
+    OFString series;
+    h.file = file;
+    if (set.findAndGetOFString(DCM_SeriesInstanceUID, series).good())
+        h.series = series.c_str();
+    h.width = get_count(set, DCM_Columns, 0);
+    h.height = get_count(set, DCM_Rows, 0);
+    h.frames = (int64_t)get_number(set, DCM_NumberOfFrames, false, 1);
+    h.allocated = get_count(set, DCM_BitsAllocated, 0);
+    h.stored = get_count(set, DCM_BitsStored, h.allocated);
+    h.high = get_count(set, DCM_HighBit, h.stored - 1);
+    h.is_signed = get_count(set, DCM_PixelRepresentation, 0) != 0;
+    check_header(h, get_count(set, DCM_SamplesPerPixel, 1));
+    read_geometry(set, h);
+    return h;
+}
+
+trip_vec3 vector_of(const std::vector<double> &v, size_t at)
+{
+    return trip_v3(v[at], v[at + 1], v[at + 2]);
+}
+
+template <typename Has> bool all_have(const std::vector<Header> &headers, const Has &has)
+{
+    return std::all_of(headers.begin(), headers.end(), has);
+}
+
+/* Puts the slices in order of `key`, which must differ from slice to slice. */
+template <typename Key> void sort_by(std::vector<Header> &headers, const Key &key, const char *what)
+{
+    std::stable_sort(headers.begin(), headers.end(),
+                     [&](const Header &a, const Header &b) { return key(a) < key(b); });
+    for (size_t i = 1; i < headers.size(); i++)
+        if (!(key(headers[i]) - key(headers[i - 1]) > 1e-6))
+            throw trip_slice_error(headers[i].file, std::string("has the same ") + what + " as " +
+                                                        headers[i - 1].file +
+                                                        ": several series in one folder?");
+}
+
+/* By place along the slices' normal, else by the location or the number that they state, else as
+ * the names are ordered. */
+void sort_slices(std::vector<Header> &headers)
+{
+    bool placed = all_have(
+        headers, [&](const Header &h) { return h.position.size() == 3 && h.rows.size() == 6; });
+    if (placed) {
+        const std::vector<double> rows = headers[0].rows;
+        trip_vec3 normal = trip_cross(vector_of(rows, 0), vector_of(rows, 3));
+        for (const Header &h : headers)
+            for (int i = 0; i < 6; i++)
+                if (std::fabs(h.rows[(size_t)i] - rows[(size_t)i]) > 1e-3)
+                    throw trip_slice_error(h.file, "is oriented unlike " + headers[0].file);
+        sort_by(
+            headers, [&](const Header &h) { return trip_dot(vector_of(h.position, 0), normal); },
+            "place");
+    } else if (all_have(headers, [](const Header &h) { return std::isfinite(h.location); })) {
+        sort_by(
+            headers, [](const Header &h) { return h.location; }, "location");
+    } else if (all_have(headers, [](const Header &h) { return std::isfinite(h.number); })) {
+        sort_by(
+            headers, [](const Header &h) { return h.number; }, "instance number");
+    }
+}
+
+void warn_if_uneven(const std::vector<Header> &headers, double mean)
+{
+    double least = INFINITY, most = 0;
+    for (size_t i = 1; i < headers.size(); i++) {
+        double d = trip_length(
+            trip_sub(vector_of(headers[i].position, 0), vector_of(headers[i - 1].position, 0)));
+        least = std::min(least, d);
+        most = std::max(most, d);
+    }
+    if (most - least > 0.02 * mean)
+        trip_warn(headers[0].file.c_str(),
+                  "slices are %g to %g apart, perhaps some are missing; drawn %g apart", least,
+                  most, mean);
+}
+
+/* The step from slice to slice in space. */
+trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal)
+{
+    const Header &first = headers.front(), &last = headers.back();
+    bool frames = first.frames > 1;
+    const std::vector<double> &end = frames ? first.last_position : last.position;
+    double gaps = (double)(frames ? first.frames : (int64_t)headers.size()) - 1;
+    if (gaps > 0 && first.position.size() == 3 && end.size() == 3 && first.rows.size() == 6) {
+        trip_vec3 step =
+            trip_scale(trip_sub(vector_of(end, 0), vector_of(first.position, 0)), 1 / gaps);
+        if (!frames)
+            warn_if_uneven(headers, trip_length(step));
+        if (trip_length(step) > 0)
+            return step;
+    }
+    double length = (last.location - first.location) / gaps;
+    if (!(std::isfinite(length) && length > 0))
+        length = std::isfinite(first.spacing) ? first.spacing : 1;
+    return trip_scale(normal, length);
+}
+
+trip_affine make_map(const std::vector<Header> &headers)
+{
+    const Header &h = headers[0];
+    bool oriented = h.rows.size() == 6;
+    double di = h.pixel_spacing.empty() ? 1 : h.pixel_spacing[1];
+    double dj = h.pixel_spacing.empty() ? 1 : h.pixel_spacing[0];
+    trip_vec3 i = oriented ? trip_normalize(vector_of(h.rows, 0)) : trip_v3(1, 0, 0);
+    trip_vec3 j = oriented ? trip_normalize(vector_of(h.rows, 3)) : trip_v3(0, 1, 0);
+    trip_vec3 k = slice_step(headers, trip_cross(i, j));
+    trip_vec3 origin = h.position.size() == 3 ? vector_of(h.position, 0) : trip_v3(0, 0, 0);
+    trip_affine map;
+    for (int r = 0; r < 3; r++) {
+        map.m[r][0] = trip_component(i, r) * di;
+        map.m[r][1] = trip_component(j, r) * dj;
+        map.m[r][2] = trip_component(k, r);
+        map.m[r][3] = trip_component(origin, r);
+    }
+    return map;
+}
+
+/* Stored bits to whole numbers: the bits below high - stored are dropped, the sign is extended. */
+template <typename T> void align_bits(const Header &h, T *values, size_t count)
+{
+    using Unsigned = typename std::make_unsigned<T>::type;
+    const unsigned left = h.allocated - 1 - h.high, right = h.allocated - h.stored;
+    if (left == 0 && right == 0)
+        return;
+    for (size_t i = 0; i < count; i++)
+        values[i] = (T)((T)(Unsigned)((Unsigned)values[i] << left) >> right);
+}
+
+void align_values(const Header &h, trip_scalar type, void *values, size_t count)
+{
+    switch (type) {
+    case TRIP_U8:
+        return align_bits(h, (uint8_t *)values, count);
+    case TRIP_I8:
+        return align_bits(h, (int8_t *)values, count);
+    case TRIP_U16:
+        return align_bits(h, (uint16_t *)values, count);
+    case TRIP_I16:
+        return align_bits(h, (int16_t *)values, count);
+    case TRIP_U32:
+        return align_bits(h, (uint32_t *)values, count);
+    default:
+        return align_bits(h, (int32_t *)values, count);
+    }
+}
+
+class DicomStack : public trip_slice_stack
+{
+  public:
+    DicomStack(const trip_slice_files &files, trip_budget *budget);
+    void read(int64_t k, void *values) override;
+
+  private:
+    void load(const std::string &file);
+    void read_frame(const Header &h, Uint32 frame);
+
+    std::vector<Header> headers_;
+    trip_scalar stored_ = TRIP_U8;
+    trip_slice_buffer frame_;
+    uint64_t frame_bytes_ = 0;
+    std::unique_ptr<DcmFileFormat> format_; /* of the slice that was read last */
+    std::string loaded_;
+    Uint32 fragment_ = 0;
+};
+
+DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget)
+{
+    set_up_once();
+    bool rescaled_alike = true;
+    for (const std::string &name : files.names) {
+        headers_.push_back(read_header(name));
+        const Header &h = headers_.back(), &first = headers_.front();
+        if (!h.same_pixels(first))
+            throw trip_slice_error(name, "is " + h.text() + ", unlike " + first.file + ", " +
+                                             first.text());
+        if (h.series != first.series)
+            throw trip_slice_error(name, "belongs to another series than " + first.file);
+        if (h.frames > 1 && files.names.size() > 1)
+            throw trip_slice_error(name, "holds several frames, and is one of several files");
+        rescaled_alike = rescaled_alike && h.slope == first.slope && h.inter == first.inter;
+    }
+    sort_slices(headers_);
+    const Header &h = headers_[0];
+    index_to_world = make_map(headers_);
+    dims[0] = h.width;
+    dims[1] = h.height;
+    dims[2] = h.frames > 1 ? h.frames : (int64_t)headers_.size();
+    stored_ = h.allocated == 8    ? (h.is_signed ? TRIP_I8 : TRIP_U8)
+              : h.allocated == 16 ? (h.is_signed ? TRIP_I16 : TRIP_U16)
+                                  : (h.is_signed ? TRIP_I32 : TRIP_U32);
+    type = rescaled_alike ? stored_ : TRIP_F32;
+    slope = rescaled_alike ? h.slope : 1;
+    inter = rescaled_alike ? h.inter : 0;
+    frame_bytes_ = (uint64_t)h.width * (uint64_t)h.height * (h.allocated / 8);
+    frame_.take(budget, h.file, frame_bytes_ + 1); /* the decoder wants an even number */
+}
+
+void DicomStack::load(const std::string &file)
+{
+    if (file == loaded_)
+        return;
+    loaded_.clear();
+    fragment_ = 0;
+    format_ = std::make_unique<DcmFileFormat>();
+    require(file, format_->loadFile(file.c_str(), EXS_Unknown, EGL_noChange, lazy_bytes));
+    loaded_ = file;
+}
+
+/* Decompressed where it has to be. */
+void DicomStack::read_frame(const Header &h, Uint32 frame)
+{
+    load(h.file);
+    DcmElement *element = nullptr;
+    OFString colours;
+    Uint32 bytes = 0;
+    DcmDataset *set = format_->getDataset();
+    require(h.file, set->findAndGetElement(DCM_PixelData, element));
+    DcmPixelData *pixels = dynamic_cast<DcmPixelData *>(element);
+    if (!pixels || pixels->getUncompressedFrameSize(set, bytes).bad() ||
+        (bytes != frame_bytes_ && bytes != frame_bytes_ + 1))
+        throw trip_slice_error(h.file, "has pixels that do not fit its size");
+    require(h.file,
+            pixels->getUncompressedFrame(set, frame, fragment_, frame_.data(),
+                                         (Uint32)((frame_bytes_ + 1) & ~(uint64_t)1), colours));
+}
+
+void DicomStack::read(int64_t k, void *values)
+{
+    const Header &h = headers_[headers_.size() > 1 ? (size_t)k : 0];
+    size_t count = (size_t)(dims[0] * dims[1]);
+    read_frame(h, headers_.size() > 1 ? 0 : (Uint32)k);
+    align_values(h, stored_, frame_.data(), count);
+    if (type == stored_)
+        std::memcpy(values, frame_.data(), frame_bytes_);
+    else
+        trip_scalar_decode(stored_, false, h.slope, h.inter, frame_.data(), count, (float *)values);
+}
+
+} // namespace
+
+std::unique_ptr<trip_slice_stack> trip_dicom_stack(const trip_slice_files &files,
+                                                   trip_budget *budget)
+{
+    return std::unique_ptr<trip_slice_stack>(new DicomStack(files, budget));
+}

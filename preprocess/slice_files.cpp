@@ -1,0 +1,250 @@
+#include "slice_files.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <glob.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace
+{
+
+/* Runs of digits compare as numbers, the rest as bytes. */
+bool natural_less(const std::string &a, const std::string &b)
+{
+    auto digits = [](const std::string &s, size_t &at) {
+        while (at < s.size() && s[at] == '0')
+            at++;
+        size_t begin = at;
+        while (at < s.size() && isdigit((unsigned char)s[at]))
+            at++;
+        return s.substr(begin, at - begin);
+    };
+    size_t i = 0, j = 0;
+    while (i < a.size() && j < b.size()) {
+        if (isdigit((unsigned char)a[i]) && isdigit((unsigned char)b[j])) {
+            std::string x = digits(a, i), y = digits(b, j);
+            if (x != y)
+                return x.size() != y.size() ? x.size() < y.size() : x < y;
+        } else if (a[i] != b[j]) {
+            return (unsigned char)a[i] < (unsigned char)b[j];
+        } else {
+            i++;
+            j++;
+        }
+    }
+    bool a_ends = i == a.size(), b_ends = j == b.size();
+    return a_ends != b_ends ? a_ends : a < b;
+}
+
+trip_slice_kind kind_of_file(const std::string &name)
+{
+    unsigned char head[132];
+    int fd = ::open(name.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        throw trip_slice_error(name, std::string("cannot open: ") + std::strerror(errno));
+    ssize_t n = ::pread(fd, head, sizeof head, 0);
+    std::string why = n < 0 ? std::strerror(errno) : "";
+    ::close(fd);
+    if (n < 0)
+        throw trip_slice_error(name, "cannot read: " + why);
+    return trip_slice_kind_of(head, (size_t)n);
+}
+
+bool is_regular(const std::string &name)
+{
+    struct stat st;
+    return ::stat(name.c_str(), &st) == 0 && S_ISREG(st.st_mode);
+}
+
+/* Names in a folder, without those that begin with a dot. */
+std::vector<std::string> list_folder(const std::string &folder)
+{
+    std::unique_ptr<DIR, int (*)(DIR *)> dir(::opendir(folder.c_str()), ::closedir);
+    if (!dir)
+        throw trip_slice_error(folder, std::string("cannot open: ") + std::strerror(errno));
+    std::vector<std::string> names;
+    errno = 0;
+    while (struct dirent *entry = ::readdir(dir.get()))
+        if (entry->d_name[0] != '.')
+            names.push_back(entry->d_name);
+    if (errno)
+        throw trip_slice_error(folder, std::string("cannot list: ") + std::strerror(errno));
+    return names;
+}
+
+/* "folder/name" as "folder/" and "name". */
+void split_path(const std::string &path, std::string &folder, std::string &name)
+{
+    size_t slash = path.rfind('/');
+    folder = slash == std::string::npos ? "" : path.substr(0, slash + 1);
+    name = slash == std::string::npos ? path : path.substr(slash + 1);
+}
+
+/* A file name with one number in it. */
+struct NumberPattern {
+    std::string before, after;
+    size_t width = 0; /* digits at least, filled up with zeros */
+};
+
+/* True when `name` has exactly one of %d, %i, %u, with a width perhaps ("%03d"). "%%" is a
+ * percent sign. */
+bool parse_pattern(const std::string &name, NumberPattern &pattern)
+{
+    int conversions = 0;
+    for (size_t i = 0; i < name.size(); i++) {
+        std::string &text = conversions ? pattern.after : pattern.before;
+        if (name[i] != '%' || (i + 1 < name.size() && name[i + 1] == '%')) {
+            i += name[i] == '%';
+            text += name[i];
+            continue;
+        }
+        size_t end = name.find_first_not_of("0123456789", i + 1);
+        if (conversions++ || end == std::string::npos || !std::strchr("diu", name[end]) ||
+            end - i > 3)
+            return false;
+        bool zeros = name[i + 1] == '0';
+        pattern.width = zeros ? (size_t)std::atoi(name.c_str() + i + 1) : 0;
+        i = end;
+    }
+    return conversions == 1;
+}
+
+/* The number of a name that fits, written as the pattern would write it. */
+bool match_number(const NumberPattern &p, const std::string &name, long long &number)
+{
+    if (name.size() <= p.before.size() + p.after.size() ||
+        name.compare(0, p.before.size(), p.before) != 0 ||
+        name.compare(name.size() - p.after.size(), p.after.size(), p.after) != 0)
+        return false;
+    std::string digits =
+        name.substr(p.before.size(), name.size() - p.before.size() - p.after.size());
+    if (digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos)
+        return false;
+    size_t least = std::max<size_t>(p.width, 1);
+    if (digits.size() < least || (digits.size() > least && digits[0] == '0'))
+        return false;
+    number = std::atoll(digits.c_str());
+    return true;
+}
+
+std::vector<std::string> find_numbered(const std::string &path, const std::string &folder,
+                                       const NumberPattern &pattern)
+{
+    std::vector<std::pair<long long, std::string>> found;
+    for (const std::string &name : list_folder(folder.empty() ? "." : folder)) {
+        long long number;
+        if (match_number(pattern, name, number))
+            found.emplace_back(number, folder + name);
+    }
+    std::sort(found.begin(), found.end());
+    std::vector<std::string> names;
+    for (size_t i = 0; i < found.size(); i++) {
+        if (i > 0 && found[i].first != found[i - 1].first + 1)
+            throw trip_slice_error(path, "slice " + std::to_string(found[i - 1].first + 1) +
+                                             " is missing: there are " +
+                                             std::to_string(found[0].first) + " to " +
+                                             std::to_string(found[i - 1].first) + ", then " +
+                                             std::to_string(found[i].first));
+        names.push_back(found[i].second);
+    }
+    if (names.empty())
+        throw trip_slice_error(path, "no file fits this pattern");
+    return names;
+}
+
+std::vector<std::string> find_glob(const std::string &path)
+{
+    glob_t matches;
+    int status = ::glob(path.c_str(), GLOB_NOSORT, nullptr, &matches);
+    std::vector<std::string> names;
+    if (status == 0)
+        names.assign(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
+    ::globfree(&matches);
+    if (status != 0)
+        throw trip_slice_error(path, status == GLOB_NOMATCH ? "no file fits this pattern"
+                                                            : "cannot be searched for");
+    std::sort(names.begin(), names.end(), natural_less);
+    return names;
+}
+
+std::vector<std::string> find_in_folder(const std::string &path)
+{
+    std::vector<std::string> names;
+    for (const std::string &name : list_folder(path)) {
+        std::string file = path + (path.back() == '/' ? "" : "/") + name;
+        if (name != "DICOMDIR" && is_regular(file) && kind_of_file(file) != trip_slice_kind::OTHER)
+            names.push_back(file);
+    }
+    if (names.empty())
+        throw trip_slice_error(path, "holds no TIFF, PNG, EXR or DICOM files");
+    std::sort(names.begin(), names.end(), natural_less);
+    return names;
+}
+
+std::vector<std::string> find_names(const std::string &path)
+{
+    struct stat st;
+    if (::stat(path.c_str(), &st) == 0)
+        return S_ISDIR(st.st_mode) ? find_in_folder(path) : std::vector<std::string>{ path };
+    std::string folder, name;
+    split_path(path, folder, name);
+    NumberPattern pattern;
+    if (name.find('%') == std::string::npos)
+        return find_glob(path);
+    if (!parse_pattern(name, pattern))
+        throw trip_slice_error(path, "a pattern has one number in the file's name, like %d or %03d",
+                               TRIP_USAGE);
+    return find_numbered(path, folder, pattern);
+}
+
+} // namespace
+
+trip_slice_kind trip_slice_kind_of(const unsigned char *head, size_t bytes)
+{
+    static const struct {
+        trip_slice_kind kind;
+        size_t offset;
+        const char *magic;
+        size_t bytes;
+    } magics[] = {
+        { trip_slice_kind::TIFF, 0, "II*\0", 4 },      { trip_slice_kind::TIFF, 0, "MM\0*", 4 },
+        { trip_slice_kind::TIFF, 0, "II+\0", 4 },      { trip_slice_kind::TIFF, 0, "MM\0+", 4 },
+        { trip_slice_kind::PNG, 0, "\x89PNG\r\n", 6 }, { trip_slice_kind::EXR, 0, "v/1\1", 4 },
+        { trip_slice_kind::DICOM, 128, "DICM", 4 },
+    };
+    for (const auto &m : magics)
+        if (bytes >= m.offset + m.bytes && std::memcmp(head + m.offset, m.magic, m.bytes) == 0)
+            return m.kind;
+    return trip_slice_kind::OTHER;
+}
+
+const char *trip_slice_kind_name(trip_slice_kind kind)
+{
+    static const char *const names[] = { "unknown", "TIFF", "PNG", "EXR", "DICOM" };
+    return names[(int)kind];
+}
+
+trip_slice_files trip_slice_find(const std::string &path)
+{
+    trip_slice_files files = { trip_slice_kind::OTHER, find_names(path) };
+    for (const std::string &name : files.names) {
+        trip_slice_kind kind = is_regular(name) ? kind_of_file(name) : trip_slice_kind::OTHER;
+        if (kind == trip_slice_kind::OTHER)
+            throw trip_slice_error(name, "is no TIFF, PNG, EXR or DICOM file");
+        if (&name == &files.names.front())
+            files.kind = kind;
+        else if (kind != files.kind)
+            throw trip_slice_error(path, std::string("has slices of different kinds, ") +
+                                             trip_slice_kind_name(files.kind) + " and " +
+                                             trip_slice_kind_name(kind) +
+                                             "; a pattern like \"*.tif\" would choose");
+    }
+    return files;
+}
