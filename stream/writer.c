@@ -238,9 +238,11 @@ int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u
         status = trip_output_append(&l->planes[TRIP_PLANE_VOXELS], voxels, bytes);
     if (status == TRIP_OK && normals)
         status = trip_output_append(&l->planes[TRIP_PLANE_NORMALS], normals, bytes);
+    if (status < 0)
+        return status;
     l->splats += count;
     atomic_fetch_add_explicit(&l->bytes, normals ? 2 * bytes : bytes, memory_order_relaxed);
-    return status;
+    return TRIP_OK;
 }
 
 int trip_writer_set_codes(trip_writer *w, double code_lo, double code_hi, double gradient_scale)

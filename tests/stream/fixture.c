@@ -119,7 +119,8 @@ void fixture_make(fixture *f, const fixture_params *params)
     *f = (fixture){ .params = *params };
     for (int a = 0; a < 3; a++)
         f->params.dims[a] = params->dims[a] ? params->dims[a] : 40;
-    strcpy(f->folder, "/tmp/trip-test-XXXXXX");
+    bool shm = params->in_memory && access("/dev/shm", W_OK) == 0;
+    snprintf(f->folder, sizeof f->folder, "%s/trip-test-XXXXXX", shm ? "/dev/shm" : "/tmp");
     assert_non_null(mkdtemp(f->folder));
     snprintf(f->path, sizeof f->path, "%s/a.trip", f->folder);
     assert_int_equal(trip_budget_create(&f->budget, UINT64_C(1) << 30), TRIP_OK);

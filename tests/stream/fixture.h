@@ -30,10 +30,11 @@ typedef struct fixture_params {
     unsigned seed;
     unsigned tile_voxels, slab_sheets, page_bytes;
     bool normals, empty, replace;
+    bool in_memory; /* in /dev/shm where there is one: no waiting for the disk to sync */
 } fixture_params;
 
 typedef struct fixture {
-    char folder[64]; /* under /tmp, removed at the end */
+    char folder[64]; /* in /tmp, removed at the end */
     char path[96];
     fixture_params params;
     size_t count;

@@ -43,7 +43,9 @@ static void check_round_trip(const fixture_params *params)
 {
     fixture f;
     trip_dataset *d;
-    fixture_make(&f, params);
+    fixture_params p = *params;
+    p.in_memory = true;
+    fixture_make(&f, &p);
     assert_int_equal(trip_dataset_open(&d, f.path, f.budget), TRIP_OK);
     assert_int_equal(d->header.kept, f.count);
     fixture_voxel *out = calloc(f.count + 1, sizeof *out);
@@ -88,12 +90,223 @@ static void an_empty_and_a_full_volume_are_written(void **state)
     check_round_trip(&(fixture_params){ .density = 1.1, .dims = { 1, 1, 1 } });
 }
 
+/* A fixture in memory and a report catcher for what the writer refuses. */
+static void make_small(fixture *f)
+{
+    fixture_make(f, &(fixture_params){ .dims = { 20, 20, 20 }, .in_memory = true });
+}
+
+static void expect_refused(fixture *f, const char *path, const char *why)
+{
+    fixture_catch_reports();
+    int status = fixture_write(f, path);
+    const char *reports = fixture_reports();
+    if (status != TRIP_ERROR || !strstr(reports, why) || strchr(reports, '\n')[1])
+        fail_msg("wanted \"%s\": status %d, \"%s\"", why, status, reports);
+}
+
+static void expect_sound(const fixture *f, const char *path)
+{
+    trip_dataset *d;
+    assert_int_equal(trip_dataset_open(&d, path, f->budget), TRIP_OK);
+    assert_int_equal(d->header.kept, f->count);
+    assert_int_equal(trip_dataset_verify(d, f->budget), TRIP_OK);
+    trip_dataset_close(d);
+}
+
+static bool is_there(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0;
+}
+
+static void an_existing_data_set_is_kept_unless_it_may_be_replaced(void **state)
+{
+    fixture f;
+    char partial[128];
+    (void)state;
+    make_small(&f);
+    snprintf(partial, sizeof partial, "%s.partial", f.path);
+    expect_refused(&f, f.path, "exists already");
+    f.params.replace = true;
+    f.count = 1;
+    for (int a = 0; a < 3; a++)
+        f.lists[a][0] = (fixture_voxel){ .p = { 3, 4, 5 }, .code = 9 };
+    assert_int_equal(fixture_write(&f, f.path), TRIP_OK);
+    expect_sound(&f, f.path);
+    assert_false(is_there(partial));
+    fixture_free(&f);
+}
+
+static void only_a_data_set_is_replaced(void **state)
+{
+    fixture f;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    f.params.replace = true;
+    snprintf(path, sizeof path, "%s/letters", f.folder);
+    fixture_run_command("mkdir %s && touch %s/mine", path, path);
+    expect_refused(&f, path, "not a data set");
+    fixture_run_command("test -f %s/mine", path);
+    expect_refused(&f, "/", "not a name");
+    expect_refused(&f, "", "not a name");
+    expect_refused(&f, "/nowhere/a.trip", "No such file");
+    fixture_free(&f);
+}
+
+static void what_an_interrupted_run_left_is_removed(void **state)
+{
+    fixture f;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    fixture_run_command("cp -r %s %s.partial && truncate -s 9 %s.partial/index.trip", f.path, path,
+                        path);
+    assert_int_equal(fixture_write(&f, path), TRIP_OK);
+    expect_sound(&f, path);
+    fixture_run_command("test ! -e %s.partial", path);
+    fixture_run_command("rm -r %s; mkdir %s.partial && touch %s.partial/mine", path, path, path);
+    expect_refused(&f, path, "holds files that are not");
+    fixture_run_command("test -f %s.partial/mine", path);
+    fixture_free(&f);
+}
+
+static void a_replacement_cut_off_between_its_two_renames_is_undone(void **state)
+{
+    fixture f;
+    (void)state;
+    make_small(&f);
+    fixture_run_command("mv %s %s.replaced && mkdir %s.partial", f.path, f.path, f.path);
+    expect_refused(&f, f.path, "exists already");
+    expect_sound(&f, f.path);
+    fixture_free(&f);
+}
+
+static trip_writer *open_writer(const char *path, trip_budget *budget)
+{
+    trip_writer *w;
+    int status = trip_writer_open(&w, path,
+                                  &(trip_writer_params){
+                                      .dims = { 40, 40, 40 },
+                                      .tile_voxels = 16,
+                                      .index_to_world = trip_affine_identity(),
+                                  },
+                                  budget);
+    return status == TRIP_OK ? w : NULL;
+}
+
+static void two_writers_of_one_name_do_not_mix(void **state)
+{
+    fixture f;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    trip_writer *w = open_writer(path, f.budget);
+    assert_non_null(w);
+    expect_refused(&f, path, "another process is writing it");
+    trip_writer_abort(w);
+    assert_int_equal(fixture_write(&f, path), TRIP_OK);
+    fixture_free(&f);
+}
+
+static void runs_out_of_order_or_place_are_refused(void **state)
+{
+    fixture f;
+    char path[128];
+    uint32_t voxel = trip_voxel_pack(0, 0, 1);
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    trip_writer *w = open_writer(path, f.budget);
+    assert_non_null(w);
+    fixture_catch_reports();
+    assert_int_equal(trip_writer_append(w, 0, 40, 0, 0, &voxel, NULL, 1), TRIP_ERROR);
+    assert_int_equal(trip_writer_append(w, 0, 0, 3, 0, &voxel, NULL, 1), TRIP_ERROR);
+    assert_int_equal(trip_writer_append(w, 0, 5, 1, 1, &voxel, NULL, 1), TRIP_OK);
+    assert_int_equal(trip_writer_append(w, 0, 5, 0, 1, &voxel, NULL, 1), TRIP_ERROR);
+    assert_int_equal(trip_writer_append(w, 0, 5, 1, 1, &voxel, NULL, 1), TRIP_ERROR);
+    assert_int_equal(trip_writer_append(w, 0, 4, 1, 1, &voxel, NULL, 1), TRIP_ERROR);
+    assert_int_equal(trip_writer_append(w, 0, 6, 0, 0, &voxel, NULL, 1), TRIP_OK);
+    trip_writer_summary summary = { .voxels = 64000 };
+    assert_int_equal(trip_writer_finish(w, &summary), TRIP_ERROR);
+    trip_writer_abort(w);
+    assert_non_null(strstr(fixture_reports(), "the lists hold 2, 0 and 0 splats"));
+    assert_false(is_there(path));
+    fixture_run_command("test ! -e %s.partial", path);
+    fixture_free(&f);
+}
+
+static void parameters_out_of_range_are_refused(void **state)
+{
+    trip_budget *budget;
+    trip_writer *w;
+    const trip_writer_params good = { .dims = { 4, 4, 4 },
+                                      .index_to_world = trip_affine_identity() };
+    trip_writer_params bad[10];
+    (void)state;
+    assert_int_equal(trip_budget_create(&budget, 1 << 24), TRIP_OK);
+    for (int i = 0; i < 10; i++)
+        bad[i] = good;
+    bad[0].dims[1] = 0;
+    bad[1].dims[2] = INT64_C(1) << 31;
+    bad[2].tile_voxels = 48;
+    bad[3].tile_voxels = 256;
+    bad[4].slab_sheets = 65;
+    bad[5].page_bytes = 5000;
+    bad[6].index_to_world.m[0][0] = 0;
+    bad[7].code_lo = 1;
+    bad[8].gradient_scale = NAN;
+    bad[9].page_bytes = 1 << 24; /* six buffers of 16 MiB do not fit 16 MiB */
+    fixture_catch_reports();
+    for (int i = 0; i < 10; i++)
+        assert_true(trip_writer_open(&w, "/tmp/trip-never.trip", &bad[i], budget) < 0);
+    fixture_reports();
+    assert_false(is_there("/tmp/trip-never.trip.partial"));
+    trip_budget_destroy(budget);
+}
+
+/* Needs the right to mount; the file system is of 1 MiB. */
+static void a_full_disk_is_one_line_and_leaves_nothing(void **state)
+{
+    fixture f;
+    char path[128];
+    (void)state;
+    fixture_make(&f, &(fixture_params){ .dims = { 90, 90, 90 }, .normals = true });
+    snprintf(path, sizeof path, "%s/disk/b.trip", f.folder);
+    char command[256];
+    snprintf(command, sizeof command,
+             "mkdir %s/disk && mount -t tmpfs -o size=1m tmpfs %s/disk 2>/dev/null", f.folder,
+             f.folder);
+    if (system(command) != 0) {
+        fixture_free(&f);
+        print_message("skipped: mounting a small disk is not allowed here\n");
+        skip();
+    }
+    expect_refused(&f, path, "no space left on the disk");
+    snprintf(command, sizeof command, "test -z \"$(ls -A %s/disk)\"", f.folder);
+    int left = system(command);
+    fixture_run_command("umount %s/disk", f.folder);
+    assert_int_equal(left, 0);
+    fixture_free(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_written_is_read_in_both_directions),
         cmocka_unit_test(the_voxels_of_a_list_do_not_depend_on_tiles_slabs_or_pages),
         cmocka_unit_test(an_empty_and_a_full_volume_are_written),
+        cmocka_unit_test(an_existing_data_set_is_kept_unless_it_may_be_replaced),
+        cmocka_unit_test(only_a_data_set_is_replaced),
+        cmocka_unit_test(what_an_interrupted_run_left_is_removed),
+        cmocka_unit_test(a_replacement_cut_off_between_its_two_renames_is_undone),
+        cmocka_unit_test(two_writers_of_one_name_do_not_mix),
+        cmocka_unit_test(runs_out_of_order_or_place_are_refused),
+        cmocka_unit_test(parameters_out_of_range_are_refused),
+        cmocka_unit_test(a_full_disk_is_one_line_and_leaves_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
