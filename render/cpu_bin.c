@@ -1,0 +1,273 @@
+#include "cpu_bin.h"
+
+#include <string.h>
+
+#include "report.h"
+
+/* Room for a splat's places in the tiles' orders, on average; splats that need more are wide, and
+ * their chunks are spread. */
+enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_SEGMENT = 4, SMALLEST_CHUNK = 64 };
+
+static void *part(char *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? memory + *at : NULL;
+    *at += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+/* Lays the arrays out in `memory`, or only counts when it is NULL. */
+static size_t lay_out(trip_cpu_flush *f, char *memory)
+{
+    size_t at = 0;
+    f->splats = part(memory, &at, (size_t)f->capacity * sizeof *f->splats);
+    f->order = part(memory, &at, (size_t)f->order_capacity * sizeof *f->order);
+    f->segments = part(memory, &at, (size_t)f->segment_capacity * sizeof *f->segments);
+    f->chunks = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->chunks);
+    f->spread = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->spread);
+    return at;
+}
+
+int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget)
+{
+    f->capacity = capacity;
+    f->order_capacity = capacity * ORDERS_PER_SPLAT;
+    f->segment_capacity = capacity / SPLATS_PER_SEGMENT;
+    f->chunk_capacity = capacity / SMALLEST_CHUNK;
+    f->bytes = lay_out(f, NULL);
+    char *memory = trip_budget_take(budget, f->bytes);
+    if (!memory) {
+        f->bytes = 0;
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "its buffers do not fit the memory given; raise --memory");
+    }
+    lay_out(f, memory);
+    return 0;
+}
+
+void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget)
+{
+    trip_budget_release(budget, f->splats, f->bytes);
+    trip_budget_release(budget, f->shares, f->share_bytes);
+}
+
+int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
+{
+    if (tiles <= f->tile_capacity)
+        return 0;
+    trip_budget_release(budget, f->shares, f->share_bytes);
+    f->tile_capacity = 0;
+    f->share_bytes = tiles * sizeof *f->shares;
+    f->shares = trip_budget_take(budget, f->share_bytes);
+    if (!f->shares) {
+        f->share_bytes = 0;
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "the image's tiles do not fit the memory given; raise --memory or draw a "
+                         "smaller image");
+    }
+    f->tile_capacity = tiles;
+    return 0;
+}
+
+void trip_cpu_flush_empty(trip_cpu_flush *f)
+{
+    f->used = f->chunk_count = f->spread_count = 0;
+    atomic_store_explicit(&f->orders_used, 0, memory_order_relaxed);
+    atomic_store_explicit(&f->segments_used, 0, memory_order_relaxed);
+}
+
+uint32_t trip_cpu_flush_room(const trip_cpu_flush *f)
+{
+    if (f->chunk_count == f->chunk_capacity || f->capacity - f->used < 2)
+        return 0;
+    return f->capacity - f->used - 1;
+}
+
+trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f, uint32_t voxels)
+{
+    if (voxels > trip_cpu_flush_room(f))
+        return NULL;
+    trip_cpu_chunk *chunk = &f->chunks[f->chunk_count++];
+    *chunk = (trip_cpu_chunk){ .voxels = voxels, .splat = f->used };
+    f->used += voxels + 1;
+    return chunk;
+}
+
+/* Tiles that a splat's pixels lie in. */
+typedef struct reach {
+    uint32_t first;        /* top left tile */
+    uint32_t across, down; /* further ones */
+} reach;
+
+static inline reach reach_of(const trip_cpu_splat *s, uint32_t tiles_across)
+{
+    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
+    return (reach){ y * tiles_across + x, s->x1 / TRIP_CPU_TILE - x, s->y1 / TRIP_CPU_TILE - y };
+}
+
+typedef struct span {
+    uint32_t first, last; /* tiles counted, inclusive */
+    uint64_t places;
+} span;
+
+static void count_wide(reach r, uint32_t across, uint32_t *counts)
+{
+    for (uint32_t y = 0; y <= r.down; y++)
+        for (uint32_t x = 0; x <= r.across; x++)
+            counts[r.first + y * across + x]++;
+}
+
+/* Most splats lie in one tile and few in more than 2 x 2, so four counts without a branch are
+ * cheaper than a loop whose length the processor cannot guess. */
+static span count(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *counts)
+{
+    span s = { UINT32_MAX, 0, 0 };
+    for (uint32_t i = 0; i < n; i++) {
+        reach r = reach_of(&splats[i], across);
+        uint32_t last = r.first + r.down * across + r.across;
+        s.first = r.first < s.first ? r.first : s.first;
+        s.last = last > s.last ? last : s.last;
+        s.places += (uint64_t)(r.across + 1) * (r.down + 1);
+        if ((r.across | r.down) > 1) {
+            count_wide(r, across, counts);
+            continue;
+        }
+        uint32_t *c = counts + r.first;
+        c[0]++;
+        c[1] += r.across;
+        c[across] += r.down;
+        c[across + 1] += r.across & r.down;
+    }
+    return s;
+}
+
+static void place_wide(reach r, uint32_t across, uint32_t *next, uint16_t *order, uint16_t splat)
+{
+    for (uint32_t y = 0; y <= r.down; y++)
+        for (uint32_t x = 0; x <= r.across; x++)
+            order[next[r.first + y * across + x]++] = splat;
+}
+
+/* The next place of a tile when `wanted`, else `sink`. */
+static inline void put(uint16_t *order, uint32_t *next, uint32_t wanted, uint32_t sink,
+                       uint16_t splat)
+{
+    order[wanted ? *next : sink] = splat;
+    *next += wanted;
+}
+
+/* `next` holds where each tile's next place is; what is written to order[sink] is not used. */
+static void place(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *next,
+                  uint16_t *order, uint32_t sink)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        reach r = reach_of(&splats[i], across);
+        uint16_t splat = (uint16_t)i;
+        if ((r.across | r.down) > 1) {
+            place_wide(r, across, next, order, splat);
+            continue;
+        }
+        uint32_t *c = next + r.first;
+        put(order, c, 1, sink, splat);
+        put(order, c + 1, r.across, sink, splat);
+        put(order, c + across, r.down, sink, splat);
+        put(order, c + across + 1, r.across & r.down, sink, splat);
+    }
+}
+
+/* Turns counts into places and makes a segment of every tile that has some. */
+static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, const span *s,
+                              uint32_t place_at, uint32_t *counts)
+{
+    uint32_t made = chunk->first_segment;
+    for (uint32_t t = s->first; t <= s->last; t++) {
+        uint32_t n = counts[t];
+        if (n == 0)
+            continue;
+        f->segments[made++] = (trip_cpu_segment){
+            .tile = t,
+            .chunk = (uint32_t)(chunk - f->chunks),
+            .first = place_at,
+            .count = n,
+        };
+        counts[t] = place_at;
+        place_at += n;
+    }
+    return made - chunk->first_segment;
+}
+
+static uint32_t occupied(const uint32_t *counts, const span *s)
+{
+    uint32_t n = 0;
+    for (uint32_t t = s->first; t <= s->last; t++)
+        n += counts[t] != 0;
+    return n;
+}
+
+void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid, uint32_t *counts)
+{
+    const trip_cpu_splat *splats = f->splats + chunk->splat;
+    if (chunk->splats == 0)
+        return;
+    span s = count(splats, chunk->splats, grid.across, counts);
+    uint32_t segments = occupied(counts, &s);
+    uint64_t segment = atomic_fetch_add_explicit(&f->segments_used, segments, memory_order_relaxed);
+    uint64_t at = atomic_fetch_add_explicit(&f->orders_used, s.places + 1, memory_order_relaxed);
+    chunk->spread =
+        segment + segments > f->segment_capacity || at + s.places + 1 > f->order_capacity;
+    if (!chunk->spread) {
+        chunk->first_segment = (uint32_t)segment;
+        chunk->segments = make_segments(f, chunk, &s, (uint32_t)at, counts);
+        place(splats, chunk->splats, grid.across, counts, f->order, (uint32_t)(at + s.places));
+    }
+    memset(counts + s.first, 0, (s.last - s.first + 1) * sizeof *counts);
+}
+
+static void append(trip_cpu_flush *f, uint32_t segment)
+{
+    trip_cpu_share *share = &f->shares[f->segments[segment].tile];
+    f->segments[segment].next = TRIP_CPU_NONE;
+    if (share->head == TRIP_CPU_NONE)
+        share->head = segment;
+    else
+        f->segments[share->tail].next = segment;
+    share->tail = segment;
+    share->splats += f->segments[segment].count;
+}
+
+void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid, const _Atomic uint8_t *closed)
+{
+    uint32_t tiles = grid.across * grid.down;
+    for (uint32_t t = 0; t < tiles; t++)
+        f->shares[t] = (trip_cpu_share){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
+    for (uint32_t c = 0; c < f->chunk_count; c++) {
+        const trip_cpu_chunk *chunk = &f->chunks[c];
+        if (chunk->spread)
+            f->spread[f->spread_count++] = c;
+        for (uint32_t i = 0; i < chunk->segments; i++) {
+            uint32_t segment = chunk->first_segment + i;
+            if (!atomic_load_explicit(&closed[f->segments[segment].tile], memory_order_relaxed))
+                append(f, segment);
+        }
+    }
+    for (uint32_t i = 0; i < f->spread_count; i++)
+        for (uint32_t t = 0; t < tiles; t++)
+            f->shares[t].splats += f->chunks[f->spread[i]].splats;
+}
+
+void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
+                         void (*take)(void *user, const trip_cpu_splat *splats,
+                                      const uint16_t *order, uint32_t count),
+                         void *user)
+{
+    uint32_t segment = f->shares[tile].head, spread = 0;
+    while (segment != TRIP_CPU_NONE || spread < f->spread_count) {
+        const trip_cpu_segment *s = segment == TRIP_CPU_NONE ? NULL : &f->segments[segment];
+        if (spread < f->spread_count && (!s || f->spread[spread] < s->chunk)) {
+            const trip_cpu_chunk *chunk = &f->chunks[f->spread[spread++]];
+            take(user, f->splats + chunk->splat, NULL, chunk->splats);
+        } else {
+            take(user, f->splats + f->chunks[s->chunk].splat, f->order + s->first, s->count);
+            segment = s->next;
+        }
+    }
+}

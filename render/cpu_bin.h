@@ -1,0 +1,89 @@
+/* Projected splats on their way to the screen tiles: a flush buffer takes them chunk by chunk from
+ * the projecting threads, sorts each chunk's by tile without disturbing their order, and then links
+ * every tile's share of the chunks, in order, for the blending threads.
+ *
+ * Chunks are reserved and linked by the renderer's thread; each is filled by one projecting thread;
+ * a linked buffer is read-only. */
+#ifndef TRIP_CPU_BIN_H
+#define TRIP_CPU_BIN_H
+
+#include <stdatomic.h>
+
+#include "budget.h"
+#include "cpu_kernels.h"
+
+/* Splats of one chunk in one tile: order[first ...] of them, counted from the chunk's first. */
+typedef struct trip_cpu_segment {
+    uint32_t tile, chunk;
+    uint32_t first, count;
+    uint32_t next; /* segment of the same tile, or TRIP_CPU_NONE */
+} trip_cpu_segment;
+
+#define TRIP_CPU_NONE UINT32_MAX
+
+/* Voxels of consecutive runs of a batch, and the splats that they became. */
+typedef struct trip_cpu_chunk {
+    size_t run;      /* the first, in the batch */
+    uint32_t skip;   /* of its voxels, in draw order */
+    uint32_t voxels; /* in all */
+    uint32_t splat;  /* first one in the buffer; room for `voxels` and one more */
+    uint32_t splats;
+    uint32_t first_segment, segments;
+    bool spread; /* not sorted: every tile looks through all its splats */
+} trip_cpu_chunk;
+
+/* A tile's share of a flush. */
+typedef struct trip_cpu_share {
+    uint32_t head, tail; /* segments */
+    uint32_t splats;
+} trip_cpu_share;
+
+typedef struct trip_cpu_flush {
+    uint32_t capacity; /* splats */
+    uint32_t segment_capacity, order_capacity, chunk_capacity, tile_capacity;
+    trip_cpu_splat *splats;
+    uint16_t *order;
+    trip_cpu_segment *segments;
+    trip_cpu_chunk *chunks;
+    trip_cpu_share *shares; /* by tile */
+    uint32_t *spread;       /* chunks that are spread */
+    uint32_t used, chunk_count, spread_count;
+    _Atomic uint64_t orders_used, segments_used;
+    size_t bytes, share_bytes;
+} trip_cpu_flush;
+
+/* Tiles across the image and down. */
+typedef struct trip_cpu_grid {
+    uint32_t across, down;
+} trip_cpu_grid;
+
+/* Most voxels of a chunk. */
+#define TRIP_CPU_CHUNK 4096
+
+int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget);
+void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget);
+/* Makes room for a frame's tiles. */
+int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget);
+void trip_cpu_flush_empty(trip_cpu_flush *f);
+
+/* The next chunk, or NULL when there is no room for so many voxels. */
+trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f, uint32_t voxels);
+
+/* Voxels that another chunk may still have. */
+uint32_t trip_cpu_flush_room(const trip_cpu_flush *f);
+
+/* Sorts a filled chunk by tile. `counts` has an entry for each tile and across + 2 more, zero, and
+ * is left so. */
+void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid, uint32_t *counts);
+
+/* Links the chunks' segments by tile, leaving out closed tiles. */
+void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid, const _Atomic uint8_t *closed);
+
+/* Calls `take` with a tile's splats, piece by piece in their order; order NULL: all of them are to
+ * be looked through. */
+void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
+                         void (*take)(void *user, const trip_cpu_splat *splats,
+                                      const uint16_t *order, uint32_t count),
+                         void *user);
+
+#endif

@@ -1,0 +1,155 @@
+#include "cpu_near.h"
+
+#include <string.h>
+
+#include "shade.h"
+
+#define LOG2_E 1.44269504088896340736
+
+double trip_cpu_cutoff(const trip_splat_frame *f)
+{
+    return 0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * f->cutoff2;
+}
+
+/* Squared length of the longest column of a matrix bounds what it can stretch from below, their sum
+ * from above. */
+static double most_stretch(const trip_affine *a)
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            sum += a->m[i][j] * a->m[i][j];
+    return sqrt(sum);
+}
+
+float trip_cpu_thick_log2(const trip_cpu_view *view)
+{
+    double most = view->stretch_varies ? most_stretch(&view->splat.camera.index_to_world) : 1;
+    return (float)(log2(TRIP_CPU_THIN) - log2(most));
+}
+
+void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
+{
+    double unit = 0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * s->ray2;
+    double xx = s->conic_xx * unit, xy = s->conic_xy * unit, yy = s->conic_yy * unit;
+    double l11 = sqrt(xx), l21 = xy / l11;
+    out->l11 = (float)l11;
+    out->l21 = (float)l21;
+    out->l22 = (float)sqrt(fmax(0, yy - l21 * l21));
+}
+
+/* Pixels whose centres lie in [lo, hi], cut to the image; false when there are none. */
+static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *last)
+{
+    double a = fmax(0, ceil(lo - 0.5 - 1e-3)), b = fmin(size - 1, floor(hi - 0.5 + 1e-3));
+    if (!(a <= b))
+        return false;
+    *first = (uint16_t)a;
+    *last = (uint16_t)b;
+    return true;
+}
+
+bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
+                           trip_cpu_splat *out)
+{
+    const trip_camera *camera = &view->splat.camera;
+    double position[3];
+    position[view->u_axis] = u;
+    position[view->v_axis] = v;
+    position[view->axis] = sheet;
+    trip_splat s;
+    memset(out, 0, sizeof *out);
+    if (!trip_splat_project(&view->splat, trip_v3(position[0], position[1], position[2]), &s) ||
+        !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
+        !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
+        return false;
+    /* Centres far outside the image need no more than a float; their splats are as wide. */
+    out->whole_x = (float)trunc(s.x);
+    out->whole_y = (float)trunc(s.y);
+    out->x = (float)(s.x - (double)out->whole_x);
+    out->y = (float)(s.y - (double)out->whole_y);
+    trip_cpu_set_conic(&s, out);
+    double depth = log2(extinction * s.amplitude * view->stretch);
+    out->peak = (float)((depth + 127) * TRIP_CPU_EXP_UNIT);
+    out->least = (float)(out->peak - trip_cpu_cutoff(&view->splat));
+    out->thick = depth > trip_cpu_thick_log2(view);
+    return depth > -60;
+}
+
+/* X = to_x . (voxel - eye) and so on as a function of the list's own coordinates. */
+static void set_along(double out[4], const trip_cpu_view *view, trip_vec3 to)
+{
+    const trip_camera *camera = &view->splat.camera;
+    out[0] = trip_component(to, view->u_axis);
+    out[1] = trip_component(to, view->v_axis);
+    out[2] = trip_component(to, view->axis);
+    out[3] = -trip_dot(to, camera->eye);
+}
+
+static bool is_similarity(const trip_affine *a)
+{
+    double size = cbrt(fabs(trip_affine_determinant(a)));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            double dot = 0;
+            for (int k = 0; k < 3; k++)
+                dot += a->m[k][i] * a->m[k][j];
+            if (fabs(dot - (i == j) * size * size) > 1e-9 * size * size)
+                return false;
+        }
+    }
+    return true;
+}
+
+/* Tables of G and stretch where they vary, and always in the rarer ways of blending. */
+static void set_rays(trip_cpu_view *view)
+{
+    const trip_camera *camera = &view->splat.camera;
+    bool alike = is_similarity(&camera->index_to_world);
+    bool usual = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
+    view->stretch = 1;
+    if (camera->ortho || alike)
+        view->stretch = trip_splat_stretch(&view->splat, 0, 0);
+    view->stretch_varies = !(camera->ortho || alike);
+    view->rays = TRIP_CPU_STRETCHED;
+    if (usual && camera->ortho)
+        view->rays = TRIP_CPU_PARALLEL;
+    else if (usual && alike)
+        view->rays = TRIP_CPU_PERSPECTIVE;
+}
+
+/* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */
+static void set_parallel(trip_cpu_view *view)
+{
+    const trip_camera *camera = &view->splat.camera;
+    if (camera->ortho)
+        trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
+}
+
+void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back)
+{
+    const trip_file_header *header = &frame->data->header;
+    const trip_camera *camera = frame->camera;
+    const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
+    *view = (trip_cpu_view){
+        .of = frame,
+        .splat = trip_splat_frame_make(camera, frame->settings),
+        .front_to_back = front_to_back,
+        .axis = axis,
+        .u_axis = (axis + 1) % 3,
+        .v_axis = (axis + 2) % 3,
+        .gradient_full =
+            trip_shade_gradient_full(header->code_lo, header->code_hi, camera->voxel_world),
+    };
+    const int axes[3] = { view->u_axis, view->v_axis, axis };
+    for (int i = 0; i < 3; i++) {
+        view->eye[i] = eye[axes[i]];
+        for (int k = 0; k < 3; k++)
+            view->world[k][i] = camera->index_to_world.m[k][axes[i]];
+    }
+    set_along(view->along_x, view, camera->to_x);
+    set_along(view->along_y, view, camera->to_y);
+    set_along(view->along_z, view, camera->forward);
+    set_rays(view);
+    set_parallel(view);
+}

@@ -1,0 +1,24 @@
+/* Projection of single splats for the CPU renderer in double precision, and the conversions that
+ * the vector kernels share with it. Pure functions. */
+#ifndef TRIP_CPU_NEAR_H
+#define TRIP_CPU_NEAR_H
+
+#include "cpu_kernels.h"
+
+/* A splat by trip_splat_project(); colours are left unset. False when nothing of it is drawn. */
+bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
+                           trip_cpu_splat *out);
+
+/* l11, l21 and l22 of a projected splat. */
+void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);
+
+/* The constants of the list along `axis`; `shading` is set by whoever knows of normals. */
+void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back);
+
+/* How far below its peak a support ends, in TRIP_CPU_EXP_UNIT. */
+double trip_cpu_cutoff(const trip_splat_frame *f);
+
+/* log2 of the largest optical depth, stretch aside, from which on a splat is thick. */
+float trip_cpu_thick_log2(const trip_cpu_view *view);
+
+#endif

@@ -1,0 +1,484 @@
+/* Kernels that turn the voxels of runs into projected splats, V at a time: included by each
+ * cpu_isa_*.c after cpu_simd.h. Positions are computed in double precision from the voxel's
+ * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
+ * footprint in single. The few splats near the plane of the eye go through trip_cpu_project_near().
+ */
+#ifndef TRIP_CPU_PROJECT_H
+#define TRIP_CPU_PROJECT_H
+
+#include "cpu_kernels.h"
+#include "cpu_near.h"
+#include "cpu_simd.h"
+#include "shade.h"
+
+/* Splats whose largest optical depth is below 2^-60 are left out: 10^18 of them would not show. */
+#define FAINTEST_LOG2 (-60.0f)
+
+#define LOG2_E 1.44269504088896340736
+
+/* ---- staging: runs of voxels to lanes ---- */
+
+INLINE vi load_lanes(const uint32_t *from, uint32_t at, uint32_t lanes, uint32_t count,
+                     bool reversed)
+{
+    if (lanes == V)
+        return reversed ? vi_reverse(vi_load(from + count - at - V)) : vi_load(from + at);
+    int32_t part[V] = { 0 };
+    for (uint32_t i = 0; i < lanes; i++)
+        part[i] = (int32_t)(reversed ? from[lanes - 1 - i] : from[at + i]);
+    return vi_load(part);
+}
+
+static uint32_t stage(const trip_cpu_view *view, const trip_run *run, const uint32_t *voxels,
+                      const uint32_t *normals, uint32_t count, bool reversed,
+                      trip_cpu_staged *staged, uint32_t filled)
+{
+    const float *extinction = &view->of->table[0].extinction;
+    const vi run_u = vi_set(run->u), run_v = vi_set(run->v), sheet = vi_set(run->sheet);
+    for (uint32_t i = 0; i < count; i += V) {
+        uint32_t lanes = count - i < V ? count - i : V;
+        vi voxel = load_lanes(voxels, i, lanes, count, reversed);
+        vi code = v_shift_right(voxel, 16);
+        vm seen = vm_and(v_gt(v_gather(extinction, code * 4), v_set(0)), vm_first(lanes));
+        vi_store_packed(staged->u + filled, seen, run_u + (voxel & 255));
+        vi_store_packed(staged->v + filled, seen, run_v + (v_shift_right(voxel, 8) & 255));
+        vi_store_packed(staged->sheet + filled, seen, sheet);
+        vi_store_packed(staged->code + filled, seen, code);
+        if (normals)
+            vi_store_packed(staged->normal + filled, seen,
+                            load_lanes(normals, i, lanes, count, reversed));
+        filled += (uint32_t)__builtin_popcount(vm_bits(seen));
+    }
+    return filled;
+}
+
+/* ---- the centre ---- */
+
+typedef struct centre {
+    vf whole_x, whole_y; /* integers near it */
+    vf x, y;             /* its offset from them */
+    vf z;
+    vf inverse_z;
+} centre;
+
+INLINE vd_pair along(const double c[4], vd_pair u, vd_pair v, vd_pair s)
+{
+    return (vd_pair){
+        vd_fma(u.lo, vd_set(c[0]),
+               vd_fma(v.lo, vd_set(c[1]), vd_fma(s.lo, vd_set(c[2]), vd_set(c[3])))),
+        vd_fma(u.hi, vd_set(c[0]),
+               vd_fma(v.hi, vd_set(c[1]), vd_fma(s.hi, vd_set(c[2]), vd_set(c[3])))),
+    };
+}
+
+INLINE vd_pair widen_int(vi a)
+{
+    return (vd_pair){ vd_low_int(a), vd_high_int(a) };
+}
+
+/* 1 / z to double precision: a Newton step from the single-precision quotient. */
+INLINE vd refine(vd z, vd inverse)
+{
+    return vd_fma(inverse, vd_fma(-z, inverse, vd_set(1)), inverse);
+}
+
+INLINE void split(vd_pair p, vf *whole, vf *part)
+{
+    *whole = v_from_int(v_truncate(v_narrow(p.lo, p.hi)));
+    *part = v_narrow(p.lo - vd_low(*whole), p.hi - vd_high(*whole));
+}
+
+INLINE centre place(const trip_cpu_view *view, vi iu, vi iv, vi isheet)
+{
+    vd_pair u = widen_int(iu), v = widen_int(iv), s = widen_int(isheet);
+    vd_pair x = along(view->along_x, u, v, s), y = along(view->along_y, u, v, s);
+    vd_pair z = along(view->along_z, u, v, s);
+    centre c = { .z = v_narrow(z.lo, z.hi) };
+    if (!view->splat.camera.ortho) {
+        c.inverse_z = v_set(1) / c.z;
+        vd lo = refine(z.lo, vd_low(c.inverse_z)), hi = refine(z.hi, vd_high(c.inverse_z));
+        x = (vd_pair){ x.lo * lo, x.hi * hi };
+        y = (vd_pair){ y.lo * lo, y.hi * hi };
+    }
+    split(x, &c.whole_x, &c.x);
+    split(y, &c.whole_y, &c.y);
+    return c;
+}
+
+/* ---- the footprint ---- */
+
+typedef struct footprint {
+    vf l11, l21, l22;                    /* as in trip_cpu_splat */
+    vf spread;                           /* |S| / |S'| */
+    vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
+    vm near;                             /* too near the plane of the eye for these numbers */
+} footprint;
+
+/* Constants of a perspective view as floats; rays relative to the image's middle. */
+typedef struct perspective {
+    vf middle_x, middle_y;
+    vf rr, rrx, rry, rxrx, rxry, ryry; /* of r at the middle, rx and ry */
+    vf scale;                          /* sigma / (r . rx x ry) */
+    vf det;                            /* (r . rx x ry)^2 */
+} perspective;
+
+INLINE perspective perspective_of(const trip_splat_frame *f)
+{
+    const trip_camera *c = &f->camera;
+    trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    double volume = trip_dot(r, trip_cross(c->rx, c->ry));
+    return (perspective){
+        .middle_x = v_set((float)(0.5 * c->width)),
+        .middle_y = v_set((float)(0.5 * c->height)),
+        .rr = v_set((float)trip_dot(r, r)),
+        .rrx = v_set((float)trip_dot(r, c->rx)),
+        .rry = v_set((float)trip_dot(r, c->ry)),
+        .rxrx = v_set((float)f->rxrx),
+        .rxry = v_set((float)f->rxry),
+        .ryry = v_set((float)f->ryry),
+        .scale = v_set((float)(f->sigma / volume)),
+        .det = v_set((float)(volume * volume)),
+    };
+}
+
+/* Bounds of the support, the ellipse of E and l in splat.h: rough, to be widened by the caller. */
+INLINE void bound(footprint *f, vf cxx, vf cxy, vf cyy, vf lx, vf ly, vf k2)
+{
+    vf inverse = v_rcp_rough(v_fnma(cxy, cxy, cxx * cyy));
+    f->shift_x = v_fnma(cxy, ly, cyy * lx) * inverse;
+    f->shift_y = v_fnma(cxy, lx, cxx * ly) * inverse;
+    vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
+    vf x2 = size * cyy, y2 = size * cxx;
+    f->half_x = x2 * v_rsqrt_rough(x2);
+    f->half_y = y2 * v_rsqrt_rough(y2);
+}
+
+/* With D = r_c . rx x ry, constant over the image, S = (sigma / (D z))^2 adj [rx x r_c, ry x r_c]
+ * and |S| = (sigma / (D z))^4 D^2 |r_c|^2. */
+INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f, const centre *c)
+{
+    footprint out;
+    const vf low_pass = v_set((float)f->low_pass2), k2 = v_set((float)f->cutoff2);
+    vf x = (c->whole_x - p->middle_x) + c->x, y = (c->whole_y - p->middle_y) + c->y;
+    vf rx = v_fma(x, p->rxrx, v_fma(y, p->rxry, p->rrx)); /* r_c . rx */
+    vf ry = v_fma(x, p->rxry, v_fma(y, p->ryry, p->rry));
+    vf rr = v_fma(x, p->rrx + rx, v_fma(y, p->rry + ry, p->rr)); /* |r_c|^2 */
+    vf s = p->scale * c->inverse_z;
+    s = s * s;
+    vf sxx = s * v_fnma(ry, ry, rr * p->ryry), syy = s * v_fnma(rx, rx, rr * p->rxrx);
+    vf sxy = s * v_fnma(rr, p->rxry, rx * ry);
+    vf det_s = s * s * p->det * rr;
+    vf det = v_fma(low_pass, sxx + syy + low_pass, det_s);
+    sxx = sxx + low_pass;
+    syy = syy + low_pass;
+
+    /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
+    vf inverse = v_set(1) / (det * syy);
+    vf inverse_det = syy * inverse, inverse_syy = det * inverse;
+    vf unit = rr * v_set((float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT));
+    out.l11 = v_sqrt(unit * syy * inverse_det);
+    out.l21 = -(sxy * inverse_syy) * out.l11;
+    out.l22 = v_sqrt(unit * inverse_syy);
+    out.spread = det_s * inverse_det;
+
+    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. */
+    vf trace = v_fma(p->rxrx, sxx, v_fma(p->ryry, syy, (p->rxry + p->rxry) * sxy));
+    out.near = v_gt(trace * k2, rr * v_set(0.5f));
+    vf t = k2 * v_rcp_rough(rr);
+    bound(&out, v_fnma(t, p->rxrx, syy * inverse_det), v_fnma(t, p->rxry, -sxy * inverse_det),
+          v_fnma(t, p->ryry, sxx * inverse_det), t * rx, t * ry, k2);
+    return out;
+}
+
+INLINE footprint footprint_parallel(const trip_cpu_view *view)
+{
+    const trip_splat *s = &view->parallel;
+    trip_cpu_splat one;
+    trip_cpu_set_conic(s, &one);
+    return (footprint){
+        .l11 = v_set(one.l11),
+        .l21 = v_set(one.l21),
+        .l22 = v_set(one.l22),
+        .spread = v_set((float)pow(s->amplitude / view->splat.amplitude, 2)),
+        .shift_x = v_set((float)(0.5 * (s->x0 + s->x1) - s->x)),
+        .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
+        .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
+        .half_y = v_set((float)(0.5 * (s->y1 - s->y0))),
+        .near = v_gt(v_set(0), v_set(1)),
+    };
+}
+
+/* ---- colour and light ---- */
+
+typedef struct colour {
+    vf r, g, b;
+} colour;
+
+typedef struct v3 {
+    vf x, y, z;
+} v3;
+
+INLINE vf dot(v3 a, v3 b)
+{
+    return v_fma(a.x, b.x, v_fma(a.y, b.y, a.z * b.z));
+}
+
+INLINE v3 unit(v3 a)
+{
+    vf inverse = v_set(1) / v_sqrt(v_max(dot(a, a), v_set(1e-30f)));
+    return (v3){ a.x * inverse, a.y * inverse, a.z * inverse };
+}
+
+INLINE v3 v3_of(trip_vec3 a)
+{
+    return (v3){ v_set((float)a.x), v_set((float)a.y), v_set((float)a.z) };
+}
+
+INLINE vf offset(vi index, double eye)
+{
+    vd_pair a = widen_int(index);
+    return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
+}
+
+/* From the voxel to the eye, world space, not normalised. */
+INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
+{
+    const trip_camera *camera = &view->splat.camera;
+    if (camera->ortho)
+        return v3_of(trip_scale(camera->world_forward, -1));
+    vf c[3] = { offset(u, view->eye[0]), offset(v, view->eye[1]), offset(sheet, view->eye[2]) };
+    vf w[3];
+    for (int i = 0; i < 3; i++)
+        w[i] = -v_fma(
+            v_set((float)view->world[i][0]), c[0],
+            v_fma(v_set((float)view->world[i][1]), c[1], v_set((float)view->world[i][2]) * c[2]));
+    return (v3){ w[0], w[1], w[2] };
+}
+
+/* As trip_normal_unpack(): the direction, and the magnitude over gradient_scale. */
+INLINE v3 unpack_normal(vi normal, vf *magnitude)
+{
+    const vf step = v_set(2.0f / 4095);
+    vf a = v_fma(v_from_int(normal & 4095), step, v_set(-1));
+    vf b = v_fma(v_from_int(v_shift_right(normal, 12) & 4095), step, v_set(-1));
+    vf m = v_from_int(v_shift_right(normal, 24)) * v_set(1.0f / 255);
+    *magnitude = m * m;
+    v3 n = { .z = v_set(1) - v_abs(a) - v_abs(b) };
+    vm below = v_gt(v_set(0), n.z);
+    n.x = v_select(below, v_copysign(v_set(1) - v_abs(b), a), a);
+    n.y = v_select(below, v_copysign(v_set(1) - v_abs(a), b), b);
+    return unit(n);
+}
+
+INLINE vf clamp01(vf a)
+{
+    return v_min(v_set(1), v_max(v_set(0), a));
+}
+
+/* As trip_shade(). */
+INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
+{
+    const trip_settings *s = view->of->settings;
+    vf magnitude;
+    v3 normal = unpack_normal(packed, &magnitude);
+    eye = unit(eye);
+    v3 light = eye, half = eye;
+    if (!s->headlight) {
+        light = v3_of(s->light_direction);
+        half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
+    }
+    double full = view->of->data->header.gradient_scale / view->gradient_full;
+    vf strength = v_min(v_set(1), magnitude * v_set((float)fmin(full, 1e30)));
+    vf diffuse = v_abs(dot(normal, light));
+    vf h2 = dot(normal, half) * dot(normal, half);
+    vf h8 = (h2 * h2) * (h2 * h2);
+    static_assert(TRIP_SHININESS == 24, "the power below");
+    vf gloss = strength * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
+    vf matt = v_fma(diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
+    matt = v_fma(strength, matt, v_set(1));
+    vm flat = v_ge(v_set(0), magnitude);
+    return (colour){ v_select(flat, c.r, clamp01(v_fma(c.r, matt, gloss))),
+                     v_select(flat, c.g, clamp01(v_fma(c.g, matt, gloss))),
+                     v_select(flat, c.b, clamp01(v_fma(c.b, matt, gloss))) };
+}
+
+/* ---- putting it together ---- */
+
+/* log2 of a positive number; error below 3e-7. The polynomial is Cephes' logf(). */
+INLINE vf log2_of(vf a)
+{
+    vi t = v_bits(a) - 0x3f3504f3; /* sqrt(1/2) */
+    vf e = v_from_int(t >> 23);
+    vf f = v_from_bits((t & 0x7fffff) + 0x3f3504f3) - v_set(1);
+    vf p = v_set(7.0376836292e-2f);
+    p = v_fma(p, f, v_set(-1.1514610310e-1f));
+    p = v_fma(p, f, v_set(1.1676998740e-1f));
+    p = v_fma(p, f, v_set(-1.2420140846e-1f));
+    p = v_fma(p, f, v_set(1.4249322787e-1f));
+    p = v_fma(p, f, v_set(-1.6668057665e-1f));
+    p = v_fma(p, f, v_set(2.0000714765e-1f));
+    p = v_fma(p, f, v_set(-2.4999993993e-1f));
+    p = v_fma(p, f, v_set(3.3333331174e-1f));
+    vf f2 = f * f;
+    vf ln = v_fma(f2, v_fma(f, p, v_set(-0.5f)), f);
+    return v_fma(ln, v_set((float)LOG2_E), e);
+}
+
+/* First and last pixel whose centre lies in shift +- half about whole + part, a little more than
+ * less; nothing when first > last. */
+INLINE void pixels(vf whole, vf part, vf shift, vf half, int size, vi *first, vi *last)
+{
+    const vf zero = v_set(0), edge = v_set((float)size);
+    vf middle = whole + (part + shift);
+    vf slack = v_fma(half + v_abs(shift), v_set(1e-3f), v_set(1e-3f));
+    slack = v_fma(v_abs(middle), v_set(1e-6f), slack);
+    vf reach = half + slack - v_set(0.5f);
+    *first = v_truncate(v_min(edge, v_max(zero, middle - reach)));
+    *last = v_truncate(v_min(edge, v_max(zero, middle + reach + v_set(1)))) - 1;
+}
+
+typedef struct projected {
+    vf x, y, whole_x, whole_y;
+    vf l11, l21, l22, peak;
+    vf least, thick, first, last; /* first, last: two uint16 each */
+} projected;
+
+INLINE vm less_or_equal(vi a, vi b)
+{
+    return v_ge(v_from_int(b), v_from_int(a));
+}
+
+INLINE vm complete(const trip_cpu_view *view, const centre *c, const footprint *f, vf extinction,
+                   projected *p)
+{
+    const trip_camera *camera = &view->splat.camera;
+    const vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
+    vf depth = extinction * v_set((float)(view->splat.amplitude * view->stretch));
+    vf log2_depth = log2_of(depth * depth * f->spread) * v_set(0.5f);
+    vi x0, x1, y0, y1;
+    pixels(c->whole_x, c->x, f->shift_x, f->half_x, camera->width, &x0, &x1);
+    pixels(c->whole_y, c->y, f->shift_y, f->half_y, camera->height, &y0, &y1);
+    *p = (projected){ .x = c->x, .y = c->y, .whole_x = c->whole_x, .whole_y = c->whole_y };
+    p->l11 = f->l11;
+    p->l21 = f->l21;
+    p->l22 = f->l22;
+    p->peak = v_fma(log2_depth, one, bias);
+    p->least = p->peak - v_set((float)trip_cpu_cutoff(&view->splat));
+    p->thick = v_select(v_gt(log2_depth, v_set(trip_cpu_thick_log2(view))), v_set(1), v_set(0));
+    p->first = v_from_bits(x0 | y0 << 16);
+    p->last = v_from_bits(x1 | y1 << 16);
+    vm seen = vm_and(v_gt(c->z, v_set(0)), v_gt(log2_depth, v_set(FAINTEST_LOG2)));
+    return vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1)));
+}
+
+/* Offsets in floats of the lanes' records in the output: a lane that is not kept is overwritten by
+ * the next. */
+INLINE uint32_t rank(vm kept, uint32_t row[V])
+{
+    unsigned bits = vm_bits(kept);
+    uint32_t n = 0;
+    for (unsigned i = 0; i < V; i++) {
+        row[i] = n * 16;
+        n += bits >> i & 1;
+    }
+    return n;
+}
+
+/* The lanes near the plane of the eye, one by one; returns those that are drawn. */
+static unsigned project_near(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                             unsigned lanes, trip_cpu_splat near[V])
+{
+    unsigned drawn = 0;
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned i = (unsigned)__builtin_ctz(lanes);
+        uint32_t k = at + i;
+        double extinction = (double)view->of->table[staged->code[k]].extinction;
+        if (trip_cpu_project_near(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
+                                  &near[i]))
+            drawn |= 1u << i;
+    }
+    return drawn;
+}
+
+/* Puts the geometry of near splats over what the lanes computed; their colours stay. */
+static void replace_near(trip_cpu_splat *out, const uint32_t row[V], unsigned lanes,
+                         const trip_cpu_splat near[V])
+{
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned i = (unsigned)__builtin_ctz(lanes);
+        trip_cpu_splat *s = out + row[i] / 16;
+        trip_cpu_splat n = near[i];
+        n.r = s->r;
+        n.g = s->g;
+        n.b = s->b;
+        *s = n;
+    }
+}
+
+INLINE vm vm_of(unsigned bits)
+{
+    vi lane, bit;
+    for (int i = 0; i < V; i++) {
+        lane[i] = (int32_t)(bits >> i & 1);
+        bit[i] = 1;
+    }
+    return less_or_equal(bit, lane);
+}
+
+INLINE void store(trip_cpu_splat *out, const uint32_t row[V], const projected *p, colour c)
+{
+    float *base = &out->x;
+    v_store_rows(base, row, p->x, p->y, p->whole_x, p->whole_y);
+    v_store_rows(base + 4, row, p->l11, p->l21, p->l22, p->peak);
+    v_store_rows(base + 8, row, c.r, c.g, c.b, p->least);
+    v_store_rows(base + 12, row, p->first, p->last, p->thick, v_set(0));
+}
+
+INLINE uint32_t project_lanes(const trip_cpu_view *view, const perspective *persp,
+                              const footprint *parallel, const trip_cpu_staged *staged, uint32_t at,
+                              uint32_t lanes, trip_cpu_splat *out)
+{
+    vi u = vi_load(staged->u + at), v = vi_load(staged->v + at);
+    vi sheet = vi_load(staged->sheet + at);
+    vi code = vi_load(staged->code + at);
+    centre c = place(view, u, v, sheet);
+    footprint f = parallel ? *parallel : footprint_of(persp, &view->splat, &c);
+    const float *table = &view->of->table[0].r;
+    projected p;
+    vm valid = vm_first(lanes);
+    vm kept = vm_and(valid, complete(view, &c, &f, v_gather(table + 3, code * 4), &p));
+    trip_cpu_splat near[V];
+    unsigned close = vm_bits(vm_and(vm_and(valid, f.near), v_gt(c.z, v_set(0))));
+    if (__builtin_expect(close != 0, 0)) {
+        close = project_near(view, staged, at, close, near);
+        kept = vm_of((vm_bits(vm_and_not(kept, f.near))) | close);
+    }
+    if (vm_bits(kept) == 0)
+        return 0;
+
+    colour rgb = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
+                   v_gather(table + 2, code * 4) };
+    if (view->shading)
+        rgb = shaded(view, rgb, towards_eye(view, u, v, sheet), vi_load(staged->normal + at));
+    uint32_t row[V];
+    uint32_t n = rank(kept, row);
+    store(out, row, &p, rgb);
+    if (__builtin_expect(close != 0, 0))
+        replace_near(out, row, close, near);
+    return n;
+}
+
+static uint32_t project(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
+                        trip_cpu_splat *out)
+{
+    uint32_t n = 0;
+    bool ortho = view->splat.camera.ortho;
+    footprint parallel = footprint_parallel(view);
+    perspective persp = perspective_of(&view->splat);
+    for (uint32_t i = 0; i < count; i += V)
+        n += project_lanes(view, &persp, ortho ? &parallel : NULL, staged, i,
+                           count - i < V ? count - i : V, out + n);
+    return n;
+}
+
+#endif

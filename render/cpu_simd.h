@@ -1,0 +1,616 @@
+/* Vectors for the kernels of the CPU renderer: one small vocabulary over AVX-512, AVX2 + FMA, NEON
+ * and plain C (the compiler's own vectors, four floats at the baseline). Each cpu_isa_*.c defines
+ * TRIP_SIMD to one of the numbers below and includes the kernels; nothing else includes this.
+ *
+ *   vf, vi   V floats or 32-bit integers; + - * / and comparison-free arithmetic by operator
+ *   vd       V / 2 doubles; a pair of them (lo, hi) goes with one vf
+ *   vm       one truth value a lane
+ *
+ * Products and sums are fused only where v_fma, v_fnma or vd_fma says so, and all other operations
+ * are the IEEE ones except v_rcp_rough and v_rsqrt_rough, so that a kernel's numbers are the same
+ * on every processor that runs it. */
+#ifndef TRIP_CPU_SIMD_H
+#define TRIP_CPU_SIMD_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#define TRIP_SIMD_PLAIN 0
+#define TRIP_SIMD_AVX2 2
+#define TRIP_SIMD_AVX512 3
+#define TRIP_SIMD_NEON 4
+
+#if TRIP_SIMD == TRIP_SIMD_AVX512 || TRIP_SIMD == TRIP_SIMD_AVX2
+#include <immintrin.h>
+#elif TRIP_SIMD == TRIP_SIMD_NEON
+#include <arm_neon.h>
+#endif
+
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+#define V 16
+#elif TRIP_SIMD == TRIP_SIMD_AVX2
+#define V 8
+#else
+#define V 4
+#endif
+
+typedef float vf __attribute__((vector_size(4 * V)));
+typedef int32_t vi __attribute__((vector_size(4 * V)));
+typedef uint32_t vu __attribute__((vector_size(4 * V)));
+typedef double vd __attribute__((vector_size(4 * V)));
+
+/* The doubles of one vf's lanes. */
+typedef struct vd_pair {
+    vd lo, hi;
+} vd_pair;
+
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+typedef __mmask16 vm;
+#else
+typedef vi vm;
+#endif
+
+#define INLINE static inline __attribute__((always_inline))
+
+INLINE vf v_set(float x)
+{
+    return x - (vf){ 0 };
+}
+
+INLINE vi vi_set(int32_t x)
+{
+    return x - (vi){ 0 };
+}
+
+INLINE vd vd_set(double x)
+{
+    return x - (vd){ 0 };
+}
+
+INLINE vf v_load(const float *p)
+{
+    vf r;
+    memcpy(&r, p, sizeof r);
+    return r;
+}
+
+INLINE vi vi_load(const void *p)
+{
+    vi r;
+    memcpy(&r, p, sizeof r);
+    return r;
+}
+
+INLINE void v_store(float *p, vf a)
+{
+    memcpy(p, &a, sizeof a);
+}
+
+INLINE void vi_store(void *p, vi a)
+{
+    memcpy(p, &a, sizeof a);
+}
+
+INLINE vi v_bits(vf a)
+{
+    return (vi)a;
+}
+
+INLINE vf v_from_bits(vi a)
+{
+    return (vf)a;
+}
+
+INLINE vi v_shift_right(vi a, int bits)
+{
+    return (vi)((vu)a >> bits);
+}
+
+INLINE vf v_abs(vf a)
+{
+    return (vf)((vi)a & 0x7fffffff);
+}
+
+/* a with the sign of b. */
+INLINE vf v_copysign(vf a, vf b)
+{
+    return (vf)(((vi)a & 0x7fffffff) | ((vi)b & INT32_MIN));
+}
+
+/* ---- AVX-512 ---- */
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+
+INLINE vf v_fma(vf a, vf b, vf c)
+{
+    return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
+}
+
+INLINE vf v_fnma(vf a, vf b, vf c)
+{
+    return (vf)_mm512_fnmadd_ps((__m512)a, (__m512)b, (__m512)c);
+}
+
+INLINE vd vd_fma(vd a, vd b, vd c)
+{
+    return (vd)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
+}
+
+INLINE vf v_sqrt(vf a)
+{
+    return (vf)_mm512_sqrt_ps((__m512)a);
+}
+
+INLINE vf v_rcp_rough(vf a)
+{
+    return (vf)_mm512_rcp14_ps((__m512)a);
+}
+
+INLINE vf v_rsqrt_rough(vf a)
+{
+    return (vf)_mm512_rsqrt14_ps((__m512)a);
+}
+
+INLINE vf v_min(vf a, vf b)
+{
+    return (vf)_mm512_min_ps((__m512)a, (__m512)b);
+}
+
+INLINE vf v_max(vf a, vf b)
+{
+    return (vf)_mm512_max_ps((__m512)a, (__m512)b);
+}
+
+INLINE vi v_truncate(vf a)
+{
+    return (vi)_mm512_cvttps_epi32((__m512)a);
+}
+
+INLINE vf v_from_int(vi a)
+{
+    return (vf)_mm512_cvtepi32_ps((__m512i)a);
+}
+
+INLINE vm v_ge(vf a, vf b)
+{
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_GE_OQ);
+}
+
+INLINE vm v_gt(vf a, vf b)
+{
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_GT_OQ);
+}
+
+INLINE vm v_ge_and(vm m, vf a, vf b)
+{
+    return _mm512_mask_cmp_ps_mask(m, (__m512)a, (__m512)b, _CMP_GE_OQ);
+}
+
+INLINE vm vm_and(vm a, vm b)
+{
+    return (vm)(a & b);
+}
+
+INLINE vm vm_and_not(vm a, vm b)
+{
+    return (vm)(a & ~b);
+}
+
+INLINE vf v_select(vm m, vf a, vf b)
+{
+    return (vf)_mm512_mask_blend_ps(m, (__m512)b, (__m512)a);
+}
+
+/* m ? a * b : a */
+INLINE vf v_mul_where(vm m, vf a, vf b)
+{
+    return (vf)_mm512_mask_mul_ps((__m512)a, m, (__m512)a, (__m512)b);
+}
+
+/* m ? a * b : 0 */
+INLINE vf v_mul_or_zero(vm m, vf a, vf b)
+{
+    return (vf)_mm512_maskz_mul_ps(m, (__m512)a, (__m512)b);
+}
+
+INLINE unsigned vm_bits(vm m)
+{
+    return m;
+}
+
+INLINE vm vm_first(unsigned lanes)
+{
+    return (vm)(lanes >= 16 ? 0xffffu : (1u << lanes) - 1);
+}
+
+/* (a & low bits) | bits of b elsewhere */
+INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
+{
+    return (vi)_mm512_ternarylogic_epi32((__m512i)a, _mm512_set1_epi32(low),
+                                         _mm512_set1_epi32(high), 0xea);
+}
+
+INLINE vf v_gather(const float *base, vi index)
+{
+    return (vf)_mm512_i32gather_ps((__m512i)index, base, 4);
+}
+
+INLINE vd vd_low(vf a)
+{
+    return (vd)_mm512_cvtps_pd(_mm512_castps512_ps256((__m512)a));
+}
+
+INLINE vd vd_high(vf a)
+{
+    return (vd)_mm512_cvtps_pd(_mm512_extractf32x8_ps((__m512)a, 1));
+}
+
+INLINE vd vd_low_int(vi a)
+{
+    return (vd)_mm512_cvtepi32_pd(_mm512_castsi512_si256((__m512i)a));
+}
+
+INLINE vd vd_high_int(vi a)
+{
+    return (vd)_mm512_cvtepi32_pd(_mm512_extracti32x8_epi32((__m512i)a, 1));
+}
+
+INLINE vf v_narrow(vd lo, vd hi)
+{
+    return (vf)_mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)lo)),
+                                  _mm512_cvtpd_ps((__m512d)hi), 1);
+}
+
+INLINE vi vi_reverse(vi a)
+{
+    const __m512i order = _mm512_set_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    return (vi)_mm512_permutexvar_epi32(order, (__m512i)a);
+}
+
+/* Lanes of a where m is set, packed to the front of p; V lanes of p may be overwritten. */
+INLINE void vi_store_packed(void *p, vm m, vi a)
+{
+    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, (__m512i)a));
+}
+
+/* Lane i of (a, b, c, d) to the four floats at out + row[i]; later lanes over earlier ones. */
+INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
+{
+    __m512 ab0 = _mm512_unpacklo_ps((__m512)a, (__m512)b);
+    __m512 ab1 = _mm512_unpackhi_ps((__m512)a, (__m512)b);
+    __m512 cd0 = _mm512_unpacklo_ps((__m512)c, (__m512)d);
+    __m512 cd1 = _mm512_unpackhi_ps((__m512)c, (__m512)d);
+#define PAIR(x, y, unpack) _mm512_castpd_ps(unpack(_mm512_castps_pd(x), _mm512_castps_pd(y)))
+    __m512 r0 = PAIR(ab0, cd0, _mm512_unpacklo_pd), r1 = PAIR(ab0, cd0, _mm512_unpackhi_pd);
+    __m512 r2 = PAIR(ab1, cd1, _mm512_unpacklo_pd), r3 = PAIR(ab1, cd1, _mm512_unpackhi_pd);
+#undef PAIR
+#define QUARTER(lane)                                                                              \
+    _mm_storeu_ps(out + row[4 * lane + 0], _mm512_extractf32x4_ps(r0, lane));                      \
+    _mm_storeu_ps(out + row[4 * lane + 1], _mm512_extractf32x4_ps(r1, lane));                      \
+    _mm_storeu_ps(out + row[4 * lane + 2], _mm512_extractf32x4_ps(r2, lane));                      \
+    _mm_storeu_ps(out + row[4 * lane + 3], _mm512_extractf32x4_ps(r3, lane))
+    QUARTER(0);
+    QUARTER(1);
+    QUARTER(2);
+    QUARTER(3);
+#undef QUARTER
+}
+
+#else /* ---- vectors of masks: AVX2, NEON and plain ---- */
+
+INLINE vm v_ge(vf a, vf b)
+{
+    return (vm)(a >= b);
+}
+
+INLINE vm v_gt(vf a, vf b)
+{
+    return (vm)(a > b);
+}
+
+INLINE vm v_ge_and(vm m, vf a, vf b)
+{
+    return m & (vm)(a >= b);
+}
+
+INLINE vm vm_and(vm a, vm b)
+{
+    return a & b;
+}
+
+INLINE vm vm_and_not(vm a, vm b)
+{
+    return a & ~b;
+}
+
+INLINE vf v_select(vm m, vf a, vf b)
+{
+    return (vf)((m & (vi)a) | (~m & (vi)b));
+}
+
+INLINE vf v_mul_where(vm m, vf a, vf b)
+{
+    return v_select(m, a * b, a);
+}
+
+INLINE vf v_mul_or_zero(vm m, vf a, vf b)
+{
+    return (vf)(m & (vi)(a * b));
+}
+
+INLINE vm vm_first(unsigned lanes)
+{
+    vm m;
+    for (unsigned i = 0; i < V; i++)
+        m[i] = i < lanes ? -1 : 0;
+    return m;
+}
+
+INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
+{
+    return (a & low) | high;
+}
+
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+
+INLINE vf v_fma(vf a, vf b, vf c)
+{
+    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+}
+
+INLINE vf v_fnma(vf a, vf b, vf c)
+{
+    return (vf)_mm256_fnmadd_ps((__m256)a, (__m256)b, (__m256)c);
+}
+
+INLINE vd vd_fma(vd a, vd b, vd c)
+{
+    return (vd)_mm256_fmadd_pd((__m256d)a, (__m256d)b, (__m256d)c);
+}
+
+INLINE vf v_sqrt(vf a)
+{
+    return (vf)_mm256_sqrt_ps((__m256)a);
+}
+
+INLINE vf v_rcp_rough(vf a)
+{
+    return (vf)_mm256_rcp_ps((__m256)a);
+}
+
+INLINE vf v_rsqrt_rough(vf a)
+{
+    return (vf)_mm256_rsqrt_ps((__m256)a);
+}
+
+INLINE vf v_min(vf a, vf b)
+{
+    return (vf)_mm256_min_ps((__m256)a, (__m256)b);
+}
+
+INLINE vf v_max(vf a, vf b)
+{
+    return (vf)_mm256_max_ps((__m256)a, (__m256)b);
+}
+
+INLINE vi v_truncate(vf a)
+{
+    return (vi)_mm256_cvttps_epi32((__m256)a);
+}
+
+INLINE vf v_from_int(vi a)
+{
+    return (vf)_mm256_cvtepi32_ps((__m256i)a);
+}
+
+INLINE unsigned vm_bits(vm m)
+{
+    return (unsigned)_mm256_movemask_ps((__m256)m);
+}
+
+INLINE vf v_gather(const float *base, vi index)
+{
+    return (vf)_mm256_i32gather_ps(base, (__m256i)index, 4);
+}
+
+INLINE vd vd_low(vf a)
+{
+    return (vd)_mm256_cvtps_pd(_mm256_castps256_ps128((__m256)a));
+}
+
+INLINE vd vd_high(vf a)
+{
+    return (vd)_mm256_cvtps_pd(_mm256_extractf128_ps((__m256)a, 1));
+}
+
+INLINE vd vd_low_int(vi a)
+{
+    return (vd)_mm256_cvtepi32_pd(_mm256_castsi256_si128((__m256i)a));
+}
+
+INLINE vd vd_high_int(vi a)
+{
+    return (vd)_mm256_cvtepi32_pd(_mm256_extracti128_si256((__m256i)a, 1));
+}
+
+INLINE vf v_narrow(vd lo, vd hi)
+{
+    return (vf)_mm256_set_m128(_mm256_cvtpd_ps((__m256d)hi), _mm256_cvtpd_ps((__m256d)lo));
+}
+
+INLINE vi vi_reverse(vi a)
+{
+    return (vi)_mm256_permutevar8x32_epi32((__m256i)a, _mm256_set_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+}
+
+INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
+{
+    __m256 ab0 = _mm256_unpacklo_ps((__m256)a, (__m256)b);
+    __m256 ab1 = _mm256_unpackhi_ps((__m256)a, (__m256)b);
+    __m256 cd0 = _mm256_unpacklo_ps((__m256)c, (__m256)d);
+    __m256 cd1 = _mm256_unpackhi_ps((__m256)c, (__m256)d);
+#define PAIR(x, y, unpack) _mm256_castpd_ps(unpack(_mm256_castps_pd(x), _mm256_castps_pd(y)))
+    __m256 r0 = PAIR(ab0, cd0, _mm256_unpacklo_pd), r1 = PAIR(ab0, cd0, _mm256_unpackhi_pd);
+    __m256 r2 = PAIR(ab1, cd1, _mm256_unpacklo_pd), r3 = PAIR(ab1, cd1, _mm256_unpackhi_pd);
+#undef PAIR
+#define HALF(lane)                                                                                 \
+    _mm_storeu_ps(out + row[4 * lane + 0], _mm256_extractf128_ps(r0, lane));                       \
+    _mm_storeu_ps(out + row[4 * lane + 1], _mm256_extractf128_ps(r1, lane));                       \
+    _mm_storeu_ps(out + row[4 * lane + 2], _mm256_extractf128_ps(r2, lane));                       \
+    _mm_storeu_ps(out + row[4 * lane + 3], _mm256_extractf128_ps(r3, lane))
+    HALF(0);
+    HALF(1);
+#undef HALF
+}
+
+#else /* NEON and plain: four floats, two doubles */
+
+#if TRIP_SIMD == TRIP_SIMD_NEON
+
+INLINE vf v_fma(vf a, vf b, vf c)
+{
+    return (vf)vfmaq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
+}
+
+INLINE vf v_fnma(vf a, vf b, vf c)
+{
+    return (vf)vfmsq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
+}
+
+INLINE vd vd_fma(vd a, vd b, vd c)
+{
+    return (vd)vfmaq_f64((float64x2_t)c, (float64x2_t)a, (float64x2_t)b);
+}
+
+INLINE vf v_sqrt(vf a)
+{
+    return (vf)vsqrtq_f32((float32x4_t)a);
+}
+
+INLINE unsigned vm_bits(vm m)
+{
+    const uint32x4_t bit = { 1, 2, 4, 8 };
+    return vaddvq_u32(vandq_u32((uint32x4_t)m, bit));
+}
+
+#else
+
+INLINE vf v_fma(vf a, vf b, vf c)
+{
+    return a * b + c;
+}
+
+INLINE vf v_fnma(vf a, vf b, vf c)
+{
+    return c - a * b;
+}
+
+INLINE vd vd_fma(vd a, vd b, vd c)
+{
+    return a * b + c;
+}
+
+INLINE vf v_sqrt(vf a)
+{
+    return (vf){ sqrtf(a[0]), sqrtf(a[1]), sqrtf(a[2]), sqrtf(a[3]) };
+}
+
+INLINE unsigned vm_bits(vm m)
+{
+    return (unsigned)((m[0] & 1) | (m[1] & 2) | (m[2] & 4) | (m[3] & 8));
+}
+
+#endif
+
+INLINE vf v_rcp_rough(vf a)
+{
+    return 1 / a;
+}
+
+INLINE vf v_rsqrt_rough(vf a)
+{
+    return 1 / v_sqrt(a);
+}
+
+INLINE vf v_min(vf a, vf b)
+{
+    return v_select((vm)(a < b), a, b);
+}
+
+INLINE vf v_max(vf a, vf b)
+{
+    return v_select((vm)(a > b), a, b);
+}
+
+/* Values beyond the integers give some integer, as the vector instructions do. */
+INLINE vi v_truncate(vf a)
+{
+    return __builtin_convertvector(v_max(v_min(a, v_set(2147483520.0f)), v_set(-2147483648.0f)),
+                                   vi);
+}
+
+INLINE vf v_from_int(vi a)
+{
+    return __builtin_convertvector(a, vf);
+}
+
+INLINE vf v_gather(const float *base, vi index)
+{
+    return (vf){ base[index[0]], base[index[1]], base[index[2]], base[index[3]] };
+}
+
+INLINE vd vd_low(vf a)
+{
+    return (vd){ a[0], a[1] };
+}
+
+INLINE vd vd_high(vf a)
+{
+    return (vd){ a[2], a[3] };
+}
+
+INLINE vd vd_low_int(vi a)
+{
+    return (vd){ a[0], a[1] };
+}
+
+INLINE vd vd_high_int(vi a)
+{
+    return (vd){ a[2], a[3] };
+}
+
+INLINE vf v_narrow(vd lo, vd hi)
+{
+    return (vf){ (float)lo[0], (float)lo[1], (float)hi[0], (float)hi[1] };
+}
+
+INLINE vi vi_reverse(vi a)
+{
+    return (vi){ a[3], a[2], a[1], a[0] };
+}
+
+INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
+{
+    for (int i = 0; i < V; i++) {
+        vf r = { a[i], b[i], c[i], d[i] };
+        v_store(out + row[i], r);
+    }
+}
+
+#endif
+
+INLINE void vi_store_packed(void *p, vm m, vi a)
+{
+    unsigned bits = vm_bits(m);
+    int32_t *out = p;
+    if (bits == (1u << V) - 1) {
+        vi_store(out, a);
+        return;
+    }
+    for (; bits; bits &= bits - 1)
+        *out++ = a[__builtin_ctz(bits)];
+}
+
+#endif
+
+#endif
