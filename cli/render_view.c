@@ -1,20 +1,20 @@
 #include "render_view.h"
 
+/* The framed view; of a turntable, as far off as its widest side needs. */
 static trip_camera_params framed(const render_options *o, const trip_dataset *d,
-                                 const trip_dataset_text *text, double azimuth_degrees)
+                                 const trip_dataset_text *text)
 {
-    return trip_dataset_text_view(text, d, o->width, o->height, azimuth_degrees, o->fov_degrees);
-}
-
-/* The framed view, as far off as the largest side of a turntable needs it. */
-static trip_camera_params framed_all_round(const render_options *o, const trip_dataset *d,
-                                           const trip_dataset_text *text)
-{
-    trip_camera_params view = framed(o, d, text, 0);
+    trip_camera_framing f = { .width = o->width,
+                              .height = o->height,
+                              .fov_degrees = o->fov_degrees,
+                              .turntable = o->orbit > 0 };
+    trip_dataset_text_frame(text, d, &f);
+    trip_camera_params view = trip_camera_frame(&f, &d->index_to_world);
     trip_vec3 arm = trip_sub(view.eye, view.look);
     double distance = trip_length(arm);
     for (int i = 1; i < o->orbit; i++) {
-        trip_camera_params other = framed(o, d, text, 360.0 * i / o->orbit);
+        f.azimuth_degrees = 360.0 * i / o->orbit;
+        trip_camera_params other = trip_camera_frame(&f, &d->index_to_world);
         distance = fmax(distance, trip_length(trip_sub(other.eye, other.look)));
     }
     view.eye = trip_add(view.look, trip_scale(trip_normalize(arm), distance));
@@ -32,7 +32,7 @@ static void avoid_up_along_view(trip_camera_params *view)
 trip_camera_params render_view(const render_options *o, const trip_dataset *d,
                                const trip_dataset_text *text, int index)
 {
-    trip_camera_params view = framed_all_round(o, d, text);
+    trip_camera_params view = framed(o, d, text);
     trip_vec3 arm = trip_sub(view.eye, view.look);
     if (o->look_given)
         view.look = o->look;

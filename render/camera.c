@@ -137,20 +137,27 @@ static trip_vec3 direction_to_eye(const trip_camera_framing *f, trip_vec3 up)
     return trip_add(trip_scale(level, cos(elevation)), trip_scale(up, sin(elevation)));
 }
 
-/* Smallest distance from the box's centre at which all its corners project inside the frame. */
-static double framing_distance(const basis *b, const double lo[3], const double hi[3],
-                               const trip_affine *index_to_world, trip_vec3 centre, double half_x,
-                               double half_y)
+/* Where along `axis` the corners' middle lies as seen, and the smallest distance at which all of
+ * them project within the half angle whose tangent is `half`: for a corner at (t, d), d the depth
+ * beyond the middle of the box, |t - middle| <= half (distance + d). */
+typedef struct fit {
+    double middle, distance;
+} fit;
+
+static fit fit_along(const trip_camera_framing *f, const trip_affine *index_to_world,
+                     trip_vec3 centre, trip_vec3 axis, trip_vec3 forward, double half)
 {
-    double distance = 0;
+    double high = -INFINITY, low = INFINITY;
     for (int i = 0; i < 8; i++) {
-        trip_vec3 p = trip_affine_point(index_to_world, box_corner(lo, hi, i));
-        trip_vec3 d = trip_sub(p, centre);
-        double nearer = -trip_dot(d, b->forward);
-        distance = fmax(distance, nearer + fabs(trip_dot(d, b->right)) / half_x);
-        distance = fmax(distance, nearer + fabs(trip_dot(d, b->up)) / half_y);
+        trip_vec3 p = trip_affine_point(index_to_world, box_corner(f->lo, f->hi, i));
+        double t = trip_dot(trip_sub(p, centre), axis);
+        double d = trip_dot(trip_sub(p, centre), forward);
+        high = fmax(high, t - half * d);
+        low = fmin(low, t + half * d);
     }
-    return distance;
+    if (f->turntable)
+        return (fit){ 0, fmax(high, -low) / half };
+    return (fit){ 0.5 * (high + low), 0.5 * (high - low) / half };
 }
 
 trip_camera_params trip_camera_frame(const trip_camera_framing *f,
@@ -171,8 +178,10 @@ trip_camera_params trip_camera_frame(const trip_camera_framing *f,
     b.up = trip_cross(b.right, b.forward);
     double half_y = DEFAULT_FILL * tan(p.fov_degrees * (PI / 360));
     double half_x = half_y * f->width / f->height;
-    double distance = framing_distance(&b, f->lo, f->hi, index_to_world, p.look, half_x, half_y);
-    p.eye = trip_add(p.look, trip_scale(to_eye, distance));
+    fit x = fit_along(f, index_to_world, p.look, b.right, b.forward, half_x);
+    fit y = fit_along(f, index_to_world, p.look, b.up, b.forward, half_y);
+    p.look = trip_add(p.look, trip_add(trip_scale(b.right, x.middle), trip_scale(b.up, y.middle)));
+    p.eye = trip_add(p.look, trip_scale(to_eye, fmax(x.distance, y.distance)));
     return p;
 }
 

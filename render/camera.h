@@ -54,6 +54,8 @@ typedef struct trip_camera_framing {
                                is up, +z) */
     double azimuth_degrees; /* about up, counted from the default view */
     double fov_degrees;     /* 30 */
+    bool turntable;         /* look at the box's middle, which stays in place when the view turns;
+                               otherwise at what puts the box in the middle of the image */
 } trip_camera_framing;
 
 trip_camera_params trip_camera_frame(const trip_camera_framing *f,

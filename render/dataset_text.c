@@ -124,19 +124,36 @@ static trip_vec3 direction_at(const trip_dataset_text *t, const char *key)
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
 }
 
+/* No orientation was given, and sheets lie further apart than the voxels in them: a scan, and scans
+ * are mostly stored from the top of the head down, with the face in the first rows. */
+static bool is_scan_from_above(const trip_affine *m)
+{
+    double least = INFINITY, most = 0;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 4; j++)
+            if (i != j && m->m[i][j] != 0)
+                return false;
+        least = fmin(least, m->m[i][i]);
+        most = fmax(most, m->m[i][i]);
+    }
+    return least > 0 && most >= 1.5 * least;
+}
+
 /* Which way is up and where the front is, from the text or by the format's convention. */
-static void orient(const trip_dataset_text *t, trip_vec3 *up, trip_vec3 *front)
+static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 *up,
+                   trip_vec3 *front)
 {
     const char *format = string_at(t, "format");
+    bool y_up = format && !strcmp(format, "openvdb");
+    bool patient = format && !strcmp(format, "nifti"); /* +y is anterior, +z superior */
     *up = direction_at(t, "up");
     *front = direction_at(t, "front");
-    bool y_up = format && !strcmp(format, "openvdb");
-    bool patient =
-        format && !strcmp(format, "nifti"); /* +x left or right, +y anterior, +z superior */
-    if (!(trip_length(*up) > 0))
-        *up = y_up ? trip_v3(0, 1, 0) : trip_v3(0, 0, 1);
-    if (!(trip_length(*front) > 0) && patient)
-        *front = trip_v3(0, 1, 0);
+    if (trip_length(*up) > 0)
+        return;
+    bool scan = !y_up && !patient && is_scan_from_above(&d->index_to_world);
+    *up = y_up ? trip_v3(0, 1, 0) : trip_v3(0, 0, scan ? -1 : 1);
+    if (!(trip_length(*front) > 0) && (patient || scan))
+        *front = trip_v3(0, patient ? 1 : -1, 0);
 }
 
 /* Bounds of all splats in index space, from the bricks of one list. */
@@ -164,19 +181,13 @@ static void splat_bounds(const trip_dataset *d, double lo[3], double hi[3])
     }
 }
 
-trip_camera_params trip_dataset_text_view(const trip_dataset_text *t, const trip_dataset *d,
-                                          int width, int height, double azimuth_degrees,
-                                          double fov_degrees)
+void trip_dataset_text_frame(const trip_dataset_text *t, const trip_dataset *d,
+                             trip_camera_framing *framing)
 {
-    trip_camera_framing f = { .width = width,
-                              .height = height,
-                              .azimuth_degrees = azimuth_degrees,
-                              .fov_degrees = fov_degrees };
-    splat_bounds(d, f.lo, f.hi);
+    splat_bounds(d, framing->lo, framing->hi);
     for (int a = 0; a < 3; a++) {
-        f.lo[a] -= TRIP_KERNEL_RADIUS_VOXELS;
-        f.hi[a] += TRIP_KERNEL_RADIUS_VOXELS;
+        framing->lo[a] -= TRIP_KERNEL_RADIUS_VOXELS;
+        framing->hi[a] += TRIP_KERNEL_RADIUS_VOXELS;
     }
-    orient(t, &f.up, &f.front);
-    return trip_camera_frame(&f, &d->index_to_world);
+    orient(t, d, &framing->up, &framing->front);
 }

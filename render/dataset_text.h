@@ -28,10 +28,9 @@ int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip
  * the text does not tell. */
 double trip_dataset_text_culled(const trip_dataset_text *t, const trip_tf *tf, double range[2]);
 
-/* The view used when none is given: all splats framed, the right way up, from the front, turned by
- * the azimuth; fov_degrees 0: the default. */
-trip_camera_params trip_dataset_text_view(const trip_dataset_text *t, const trip_dataset *d,
-                                          int width, int height, double azimuth_degrees,
-                                          double fov_degrees);
+/* Adds what the data set says to what is asked of the default view: bounds of the splats, up,
+ * front. The bounds do not depend on how the data set is divided into tiles. */
+void trip_dataset_text_frame(const trip_dataset_text *t, const trip_dataset *d,
+                             trip_camera_framing *framing);
 
 #endif

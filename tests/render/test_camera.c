@@ -128,29 +128,51 @@ static void views_that_are_none_are_refused_as_wrong_usage(void **state)
     }
 }
 
-static void the_default_view_holds_the_whole_volume_with_a_small_margin(void **state)
+/* Bounds of the projected corners about the image's centre, in half widths and half heights. */
+static void corner_bounds(const trip_camera_framing *f, const trip_affine *m, double lo[2],
+                          double hi[2])
+{
+    trip_camera_params p = trip_camera_frame(f, m);
+    trip_camera c = make(&p, *m);
+    for (int a = 0; a < 2; a++) {
+        lo[a] = INFINITY;
+        hi[a] = -INFINITY;
+    }
+    for (int corner = 0; corner < 8; corner++) {
+        double at[3];
+        project(&c,
+                trip_v3(corner & 1 ? f->hi[0] : f->lo[0], corner & 2 ? f->hi[1] : f->lo[1],
+                        corner & 4 ? f->hi[2] : f->lo[2]),
+                &at[0], &at[1], &at[2]);
+        assert_true(at[2] > 0);
+        for (int a = 0; a < 2; a++) {
+            double half = 0.5 * (a ? f->height : f->width);
+            lo[a] = fmin(lo[a], at[a] / half - 1);
+            hi[a] = fmax(hi[a], at[a] / half - 1);
+        }
+    }
+}
+
+static void the_default_view_holds_the_whole_box_in_the_middle_with_a_small_margin(void **state)
 {
     (void)state;
-    const int64_t dims[][3] = { { 100, 100, 100 }, { 10, 200, 30 }, { 1, 1, 1 } };
+    const double sizes[][3] = { { 100, 100, 100 }, { 10, 200, 30 }, { 1, 1, 1 } };
     const trip_vec3 ups[] = { { 0, 0, 0 }, { 0, 1, 0 }, { 0, 0, -1 }, { 1, 0, 0 } };
     trip_affine m = sheared();
-    for (int i = 0; i < 3 * 4 * 8; i++) {
-        const int64_t *d = dims[i % 3];
-        trip_camera_params p =
-            trip_camera_frame_volume(d, &m, 300, 200, 45.0 * (i / 12), ups[i / 3 % 4]);
-        trip_camera c = make(&p, m);
-        double reach = 0;
-        for (int corner = 0; corner < 8; corner++) {
-            double x, y, z;
-            project(&c,
-                    trip_v3(corner & 1 ? (double)d[0] - 0.5 : -0.5,
-                            corner & 2 ? (double)d[1] - 0.5 : -0.5,
-                            corner & 4 ? (double)d[2] - 0.5 : -0.5),
-                    &x, &y, &z);
-            assert_true(z > 0);
-            reach = fmax(reach, fmax(fabs(x - 150) / 150, fabs(y - 100) / 100));
-        }
-        assert_close(reach, 0.95, 1e-9);
+    for (int i = 0; i < 2 * 3 * 4 * 8; i++) {
+        const double *d = sizes[i % 3];
+        trip_camera_framing f = { .hi = { d[0], d[1], d[2] },
+                                  .width = 300,
+                                  .height = 200,
+                                  .azimuth_degrees = 45.0 * (i / 12 % 8),
+                                  .up = ups[i / 3 % 4],
+                                  .fov_degrees = i % 5 ? 0 : 70,
+                                  .turntable = i >= 96 };
+        double lo[2], hi[2];
+        corner_bounds(&f, &m, lo, hi);
+        assert_close(fmax(fmax(hi[0], -lo[0]), fmax(hi[1], -lo[1])), 0.95, 1e-9);
+        bool middle = fabs(hi[0] + lo[0]) < 1e-9 || fabs(hi[1] + lo[1]) < 1e-9;
+        assert_true(middle || f.turntable);
     }
 }
 
@@ -200,9 +222,12 @@ static void a_view_turned_is_the_view_framed_at_that_azimuth(void **state)
 {
     (void)state;
     trip_affine identity = trip_affine_identity();
-    trip_camera_framing f = {
-        .hi = { 9, 9, 9 }, .width = 10, .height = 10, .up = { 0, 1, 0 }, .fov_degrees = 50
-    };
+    trip_camera_framing f = { .hi = { 9, 9, 9 },
+                              .width = 10,
+                              .height = 10,
+                              .up = { 0, 1, 0 },
+                              .fov_degrees = 50,
+                              .turntable = true };
     trip_camera_params p = trip_camera_frame(&f, &identity);
     trip_camera_params turned = trip_camera_turn(&p, 90);
     f.azimuth_degrees = 90; /* a cube turned by 90 degrees is framed at the same distance */
@@ -221,7 +246,7 @@ int main(void)
         cmocka_unit_test(right_in_the_world_is_right_in_the_picture_and_up_is_up),
         cmocka_unit_test(a_voxel_is_as_long_as_the_cube_root_of_its_volume),
         cmocka_unit_test(views_that_are_none_are_refused_as_wrong_usage),
-        cmocka_unit_test(the_default_view_holds_the_whole_volume_with_a_small_margin),
+        cmocka_unit_test(the_default_view_holds_the_whole_box_in_the_middle_with_a_small_margin),
         cmocka_unit_test(the_default_view_is_from_the_front_right_and_above),
         cmocka_unit_test(a_given_front_is_seen_from_the_front),
         cmocka_unit_test(a_view_turned_is_the_view_framed_at_that_azimuth),

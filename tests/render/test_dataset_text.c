@@ -28,8 +28,10 @@ static trip_vec3 view_from(char *text, trip_vec3 *up)
 {
     trip_dataset d = with_text(text);
     trip_dataset_text *t = parse(&d);
-    trip_camera_params p = trip_dataset_text_view(t, &d, 100, 100, 0, 0);
+    trip_camera_framing f = { .width = 100, .height = 100 };
+    trip_dataset_text_frame(t, &d, &f);
     trip_dataset_text_destroy(t);
+    trip_camera_params p = trip_camera_frame(&f, &d.index_to_world);
     *up = p.up;
     return trip_normalize(trip_sub(p.eye, p.look));
 }
@@ -59,8 +61,9 @@ static void keys_of_another_kind_are_taken_as_missing(void **state)
     assert_int_equal(trip_dataset_text_tf(t, &d, &tf), 0);
     assert_true(trip_tf_evaluate(tf, 100).opacity > 0);
     assert_close(trip_dataset_text_culled(t, tf, range), 0, 0);
-    trip_camera_params p = trip_dataset_text_view(t, &d, 10, 10, 0, 0);
-    assert_close(p.up.z, 1, 0);
+    trip_camera_framing f = { 0 };
+    trip_dataset_text_frame(t, &d, &f);
+    assert_close(f.up.z, 1, 0);
     trip_tf_destroy(tf);
     trip_dataset_text_destroy(t);
 }
@@ -88,6 +91,21 @@ static void each_kind_of_data_is_shown_the_right_way_up(void **state)
     assert_true(up.z == 1 && d.y > -d.x && d.x < 0 && d.z > 0);
     d = view_from("{\"up\": \"-x\", \"front\": \"+z\"}", &up);
     assert_true(up.x == -1 && d.z > 0.5 && d.x < 0);
+}
+
+static void thick_slices_without_an_orientation_are_a_scan_from_above(void **state)
+{
+    (void)state;
+    trip_dataset d = with_text("{\"format\": \"nrrd\"}");
+    trip_dataset_text *t = parse(&d);
+    trip_camera_framing f = { 0 };
+    d.index_to_world.m[2][2] = 2;
+    trip_dataset_text_frame(t, &d, &f);
+    assert_close(f.up.z, -1, 0);
+    d.index_to_world.m[2][3] = -300; /* an origin: the file says where it is */
+    trip_dataset_text_frame(t, &d, &f);
+    assert_close(f.up.z, 1, 0);
+    trip_dataset_text_destroy(t);
 }
 
 static void voxels_shown_but_left_out_are_counted_from_the_histogram(void **state)
@@ -123,6 +141,7 @@ int main(void)
         cmocka_unit_test(keys_of_another_kind_are_taken_as_missing),
         cmocka_unit_test(the_stored_function_is_drawn),
         cmocka_unit_test(each_kind_of_data_is_shown_the_right_way_up),
+        cmocka_unit_test(thick_slices_without_an_orientation_are_a_scan_from_above),
         cmocka_unit_test(voxels_shown_but_left_out_are_counted_from_the_histogram),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
