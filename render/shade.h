@@ -10,12 +10,12 @@
 #include "camera.h"
 #include "settings.h"
 
-#define TRIP_AMBIENT 0.25
-#define TRIP_DIFFUSE 0.75
+#define TRIP_AMBIENT 0.3
+#define TRIP_DIFFUSE 0.7
 #define TRIP_SPECULAR 0.2
 #define TRIP_SHININESS 24.0
 /* Gradient at which shading is full, as a fraction of the code range per voxel length. */
-#define TRIP_GRADIENT_FULL 0.02
+#define TRIP_GRADIENT_FULL 0.04
 
 /* |gradient| in value per world unit at which shading is full. */
 static inline double trip_shade_gradient_full(double code_lo, double code_hi, double voxel_world)
