@@ -50,7 +50,7 @@ extern const trip_volume_reader trip_read_vdb;    /* read_vdb.cpp */
 extern const trip_volume_reader trip_read_nrrd;   /* read_nrrd.c */
 extern const trip_volume_reader trip_read_nifti;  /* read_nifti.c */
 extern const trip_volume_reader trip_read_vol;    /* read_vol.c */
-extern const trip_volume_reader trip_read_images; /* read_images.cpp */
+extern const trip_volume_reader trip_read_images; /* read_images.c */
 extern const trip_volume_reader trip_read_raw;    /* read_raw.c */
 
 #ifdef __cplusplus

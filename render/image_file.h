@@ -1,5 +1,5 @@
-/* Pictures in files: PNG, JPEG, TIFF and OpenEXR through OpenImageIO. This is the only door to it
- * in this folder. Calls keep no state; any thread may call them.
+/* Pictures in files: PNG, JPEG, TIFF and OpenEXR, written by the helper program of image_helper.h.
+ * Any thread may call these; they take turns.
  *
  * In memory a picture is float RGBA, premultiplied (associated) alpha, `height` rows of `width`
  * pixels, row 0 at the top. Colours are display values: what is written is what the transfer
@@ -31,6 +31,10 @@ typedef struct trip_image_params {
 /* Checks that `path` names a format that can hold `params` (which may be NULL), before any work is
  * done: 0, or TRIP_USAGE and one line that names the formats. */
 int trip_image_check_path(const char *path, const trip_image_params *params);
+
+/* Starts the helper, which needs a fifth of a second to get ready, so that the first picture need
+ * not wait. Not needed. */
+int trip_image_prepare(void);
 
 /* Writes the picture in the format that the extension names (.png, .jpg, .jpeg, .tif, .tiff, .exr,
  * in any case). Integers are rounded to nearest after clamping to [0, 1]. PNG gets unassociated

@@ -7,7 +7,7 @@
 # --tests adds what the tests use, --compare the programs that the benchmark compares with.
 set -eu
 
-build="cmake ninja-build gcc g++ pkg-config libopenvdb-dev libopenimageio-dev libepoxy-dev libegl-dev
+build="cmake ninja-build gcc g++ pkg-config libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev
  libgl1-mesa-dri libegl1 libgbm1 liburing-dev libcjson-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
 tests="libcmocka-dev python3 python3-numpy python3-xxhash clang-14 libclang-rt-14-dev clang-format-14"
 compare="python3-vtk9 libopenvdb-tools"

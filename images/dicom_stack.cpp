@@ -12,7 +12,6 @@
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmjpeg/djdecode.h>
 #include <dcmtk/dcmjpls/djdecode.h>
-#include <dcmtk/oflog/oflog.h>
 
 #include "slice_stack.h"
 #include "volume_reader.h"
@@ -53,7 +52,6 @@ void set_up_once()
 {
     static std::once_flag done;
     std::call_once(done, [] {
-        OFLog::configure(OFLogger::OFF_LOG_LEVEL);
         DJDecoderRegistration::registerCodecs();
         DJLSDecoderRegistration::registerCodecs();
         DcmRLEDecoderRegistration::registerCodecs();

@@ -1,4 +1,3 @@
-#include <cstdio>
 #include <cstring>
 #include <vector>
 
@@ -11,30 +10,6 @@ namespace
 {
 
 using Input = std::unique_ptr<OIIO::ImageInput>;
-
-/* libpng writes its errors to stderr itself, besides passing them on. Reports of this program go to
- * the descriptor and are not affected. */
-class QuietStdio
-{
-  public:
-    explicit QuietStdio(bool wanted)
-        : saved_(stderr), null_(wanted ? fopen("/dev/null", "w") : nullptr)
-    {
-        if (null_)
-            stderr = null_;
-    }
-    QuietStdio(const QuietStdio &) = delete;
-    QuietStdio &operator=(const QuietStdio &) = delete;
-    ~QuietStdio()
-    {
-        stderr = saved_;
-        if (null_)
-            fclose(null_);
-    }
-
-  private:
-    FILE *saved_, *null_;
-};
 
 /* What all slices must have in common. */
 struct Form {
@@ -132,7 +107,7 @@ void PictureStack::count_pages(OIIO::ImageInput &in)
 {
     int pages = 1;
     while (in.seek_subimage(pages, 0)) {
-        if (files_.kind != trip_slice_kind::TIFF) {
+        if (files_.kind != TRIP_IMAGE_TIFF) {
             trip_warn(files_.names[0].c_str(), "has several parts; the first one is read");
             break;
         }
@@ -166,7 +141,6 @@ void PictureStack::choose_channels(trip_budget *budget)
 
 PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) : files_(files)
 {
-    QuietStdio quiet(files.kind == trip_slice_kind::PNG);
     Input in = open(files.names[0]);
     form_ = std::make_unique<Form>(in->spec());
     tile_depth_ = in->spec().tile_depth > 1 ? in->spec().tile_depth : 1;
@@ -175,7 +149,7 @@ PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) :
     dims[2] = (int64_t)files.names.size();
     if (files.names.size() == 1)
         count_pages(*in);
-    else if (form_->depth > 1 || (files.kind == trip_slice_kind::TIFF && in->seek_subimage(1, 0)))
+    else if (form_->depth > 1 || (files.kind == TRIP_IMAGE_TIFF && in->seek_subimage(1, 0)))
         throw trip_slice_error(files.names[0], "holds several slices by itself, and is one of "
                                                "several files");
     in->geterror();
@@ -241,7 +215,6 @@ void PictureStack::colour_to_luma(float *values) const
 
 void PictureStack::read(int64_t k, void *values)
 {
-    QuietStdio quiet(files_.kind == trip_slice_kind::PNG);
     bool single = files_.names.size() == 1;
     int64_t file = single ? 0 : k;
     int64_t in_file = single ? k : 0;

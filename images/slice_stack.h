@@ -1,5 +1,5 @@
 /* A stack of slices, wherever they are stored. What is needed of it is read when it is made; slices
- * are read one at a time, by one thread. Throws; only the slice readers (.cpp) include this. */
+ * are read one at a time, by one thread. Throws trip_slice_error with the file at fault. */
 #ifndef TRIP_SLICE_STACK_H
 #define TRIP_SLICE_STACK_H
 

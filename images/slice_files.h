@@ -1,5 +1,4 @@
-/* Which files a stack of slices is made of, in order. Throws trip_slice_error; only the slice
- * readers (.cpp) include this. */
+/* Which files a stack of slices is made of, in order. Throws trip_slice_error. */
 #ifndef TRIP_SLICE_FILES_H
 #define TRIP_SLICE_FILES_H
 
@@ -7,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "image_helper.h"
 #include "report.h"
 
 /* What is wrong, and with which file. */
@@ -19,14 +19,8 @@ struct trip_slice_error : std::runtime_error {
     int status;
 };
 
-enum class trip_slice_kind { OTHER, TIFF, PNG, EXR, DICOM };
-
-/* By content. */
-trip_slice_kind trip_slice_kind_of(const unsigned char *head, size_t bytes);
-const char *trip_slice_kind_name(trip_slice_kind kind);
-
 struct trip_slice_files {
-    trip_slice_kind kind;
+    trip_image_kind kind;
     std::vector<std::string> names; /* at least one */
 };
 

@@ -43,7 +43,7 @@ bool natural_less(const std::string &a, const std::string &b)
     return a_ends != b_ends ? a_ends : a < b;
 }
 
-trip_slice_kind kind_of_file(const std::string &name)
+trip_image_kind kind_of_file(const std::string &name)
 {
     unsigned char head[132];
     int fd = ::open(name.c_str(), O_RDONLY | O_CLOEXEC);
@@ -54,7 +54,7 @@ trip_slice_kind kind_of_file(const std::string &name)
     ::close(fd);
     if (n < 0)
         throw trip_slice_error(name, "cannot read: " + why);
-    return trip_slice_kind_of(head, (size_t)n);
+    return trip_image_kind_of(head, (size_t)n);
 }
 
 bool is_regular(const std::string &name)
@@ -179,7 +179,7 @@ std::vector<std::string> find_in_folder(const std::string &path)
     std::vector<std::string> names;
     for (const std::string &name : list_folder(path)) {
         std::string file = path + (path.back() == '/' ? "" : "/") + name;
-        if (name != "DICOMDIR" && is_regular(file) && kind_of_file(file) != trip_slice_kind::OTHER)
+        if (name != "DICOMDIR" && is_regular(file) && kind_of_file(file) != TRIP_IMAGE_OTHER)
             names.push_back(file);
     }
     if (names.empty())
@@ -206,44 +206,19 @@ std::vector<std::string> find_names(const std::string &path)
 
 } // namespace
 
-trip_slice_kind trip_slice_kind_of(const unsigned char *head, size_t bytes)
-{
-    static const struct {
-        trip_slice_kind kind;
-        size_t offset;
-        const char *magic;
-        size_t bytes;
-    } magics[] = {
-        { trip_slice_kind::TIFF, 0, "II*\0", 4 },      { trip_slice_kind::TIFF, 0, "MM\0*", 4 },
-        { trip_slice_kind::TIFF, 0, "II+\0", 4 },      { trip_slice_kind::TIFF, 0, "MM\0+", 4 },
-        { trip_slice_kind::PNG, 0, "\x89PNG\r\n", 6 }, { trip_slice_kind::EXR, 0, "v/1\1", 4 },
-        { trip_slice_kind::DICOM, 128, "DICM", 4 },
-    };
-    for (const auto &m : magics)
-        if (bytes >= m.offset + m.bytes && std::memcmp(head + m.offset, m.magic, m.bytes) == 0)
-            return m.kind;
-    return trip_slice_kind::OTHER;
-}
-
-const char *trip_slice_kind_name(trip_slice_kind kind)
-{
-    static const char *const names[] = { "unknown", "TIFF", "PNG", "EXR", "DICOM" };
-    return names[(int)kind];
-}
-
 trip_slice_files trip_slice_find(const std::string &path)
 {
-    trip_slice_files files = { trip_slice_kind::OTHER, find_names(path) };
+    trip_slice_files files = { TRIP_IMAGE_OTHER, find_names(path) };
     for (const std::string &name : files.names) {
-        trip_slice_kind kind = is_regular(name) ? kind_of_file(name) : trip_slice_kind::OTHER;
-        if (kind == trip_slice_kind::OTHER)
+        trip_image_kind kind = is_regular(name) ? kind_of_file(name) : TRIP_IMAGE_OTHER;
+        if (kind == TRIP_IMAGE_OTHER)
             throw trip_slice_error(name, "is no TIFF, PNG, EXR or DICOM file");
         if (&name == &files.names.front())
             files.kind = kind;
         else if (kind != files.kind)
             throw trip_slice_error(path, std::string("has slices of different kinds, ") +
-                                             trip_slice_kind_name(files.kind) + " and " +
-                                             trip_slice_kind_name(kind) +
+                                             trip_image_kind_name(files.kind) + " and " +
+                                             trip_image_kind_name(kind) +
                                              "; a pattern like \"*.tif\" would choose");
     }
     return files;

@@ -1,0 +1,55 @@
+/* What both sides of the connection have in common. */
+#include <errno.h>
+#include <stdbool.h>
+#include <string.h>
+#include <sys/socket.h>
+
+#include "image_helper.h"
+
+int trip_image_send_all(int fd, const void *data, size_t bytes)
+{
+    for (size_t done = 0; done < bytes;) {
+        ssize_t n = send(fd, (const char *)data + done, bytes - done, MSG_NOSIGNAL);
+        if (n < 0 && errno != EINTR)
+            return false;
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return true;
+}
+
+int trip_image_receive_all(int fd, void *data, size_t bytes)
+{
+    for (size_t done = 0; done < bytes;) {
+        errno = 0;
+        ssize_t n = recv(fd, (char *)data + done, bytes - done, 0);
+        if (n == 0 || (n < 0 && errno != EINTR))
+            return false;
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return true;
+}
+
+trip_image_kind trip_image_kind_of(const unsigned char *head, size_t bytes)
+{
+    static const struct {
+        trip_image_kind kind;
+        size_t offset, bytes;
+        const char *magic;
+    } magics[] = {
+        { TRIP_IMAGE_TIFF, 0, 4, "II*\0" },   { TRIP_IMAGE_TIFF, 0, 4, "MM\0*" },
+        { TRIP_IMAGE_TIFF, 0, 4, "II+\0" },   { TRIP_IMAGE_TIFF, 0, 4, "MM\0+" },
+        { TRIP_IMAGE_EXR, 0, 4, "v/1\1" },    { TRIP_IMAGE_PNG, 0, 6, "\x89PNG\r\n" },
+        { TRIP_IMAGE_DICOM, 128, 4, "DICM" },
+    };
+    for (size_t i = 0; i < sizeof magics / sizeof magics[0]; i++)
+        if (bytes >= magics[i].offset + magics[i].bytes &&
+            memcmp(head + magics[i].offset, magics[i].magic, magics[i].bytes) == 0)
+            return magics[i].kind;
+    return TRIP_IMAGE_OTHER;
+}
+
+const char *trip_image_kind_name(trip_image_kind kind)
+{
+    static const char *const names[] = { "unknown", "TIFF", "PNG", "EXR", "DICOM" };
+    return names[kind];
+}

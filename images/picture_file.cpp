@@ -1,0 +1,278 @@
+#include "picture_file.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include <fcntl.h>
+#include <strings.h>
+#include <unistd.h>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include "slice_files.h"
+
+namespace
+{
+
+/* Bytes go to the file by write(2) as the encoder hands them over, so that a full disk is seen with
+ * its errno whatever the encoder makes of it. Unless renamed, the file goes with this object. */
+class FileSink : public OIIO::Filesystem::IOProxy
+{
+  public:
+    explicit FileSink(const std::string &path) : IOProxy(path, Write)
+    {
+        fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        created_ = fd_ >= 0;
+        if (!created_)
+            errno_ = errno;
+    }
+    FileSink(const FileSink &) = delete;
+    FileSink &operator=(const FileSink &) = delete;
+    ~FileSink() override
+    {
+        finish();
+        if (created_)
+            ::unlink(m_filename.c_str());
+    }
+
+    const char *proxytype() const override
+    {
+        return "triptych";
+    }
+    size_t write(const void *buf, size_t size) override
+    {
+        size_t done = pwrite(buf, size, m_pos);
+        m_pos += (int64_t)done;
+        return done;
+    }
+    size_t pwrite(const void *buf, size_t size, int64_t offset) override
+    {
+        size_t done = 0;
+        while (errno_ == 0 && done < size) {
+            ssize_t n = ::pwrite(fd_, (const char *)buf + done, size - done, offset + (off_t)done);
+            if (n < 0 && errno != EINTR)
+                errno_ = errno;
+            done += n > 0 ? (size_t)n : 0;
+        }
+        if (offset + (int64_t)done > size_)
+            size_ = offset + (int64_t)done;
+        return done;
+    }
+    size_t size() const override
+    {
+        return (size_t)size_;
+    }
+
+    /* Closes the file; returns the first error of all, as errno. */
+    int finish()
+    {
+        if (fd_ >= 0 && ::close(fd_) != 0 && errno_ == 0)
+            errno_ = errno;
+        fd_ = -1;
+        return errno_;
+    }
+    int rename_to(const char *path)
+    {
+        if (::rename(m_filename.c_str(), path) != 0)
+            return errno;
+        created_ = false;
+        return 0;
+    }
+    int error_number() const
+    {
+        return errno_;
+    }
+
+  private:
+    int fd_ = -1, errno_ = 0;
+    bool created_ = false;
+    int64_t size_ = 0;
+};
+
+/* How a picture is stored. */
+struct Encoding {
+    const char *plugin;
+    trip_image_depth depth;
+    int channels;
+    bool associated; /* alpha, where there are four channels */
+};
+
+Encoding choose_encoding(const trip_picture &p)
+{
+    const char *extension = std::strrchr(p.path.c_str(), '.') + 1;
+    bool alpha = !p.params.drop_alpha;
+    Encoding e = { "png", TRIP_IMAGE_U8, alpha ? 4 : 3, false };
+    if (strcasecmp(extension, "exr") == 0)
+        e = { "openexr", TRIP_IMAGE_FLOAT, alpha ? 4 : 3, true };
+    else if (strncasecmp(extension, "tif", 3) == 0)
+        e = { "tiff", TRIP_IMAGE_U16, alpha ? 4 : 3, true };
+    else if (strcasecmp(extension, "png") != 0)
+        e = { "jpeg", TRIP_IMAGE_U8, 3, false };
+    if (p.params.depth != TRIP_IMAGE_DEPTH_DEFAULT)
+        e.depth = p.params.depth;
+    return e;
+}
+
+/* Colour times 1 / alpha, before rounding, so that thin places keep their hue. */
+void unpremultiply(float rgba[4])
+{
+    float alpha = rgba[3] < 0 ? 0 : rgba[3] > 1 ? 1 : rgba[3];
+    for (int c = 0; c < 3; c++)
+        rgba[c] = alpha > 0 ? rgba[c] / alpha : 0;
+}
+
+template <typename T> void quantise(const float *from, int channels, T *to)
+{
+    const float top = (T)-1;
+    for (int c = 0; c < channels; c++) {
+        float v = from[c] < 0 ? 0 : from[c] > 1 ? 1 : from[c];
+        to[c] = (T)std::floor(v * top + 0.5f);
+    }
+}
+
+/* One row in the file's channels and type. */
+void convert_row(const Encoding &e, int width, const float *from, void *to)
+{
+    for (int x = 0; x < width; x++, from += 4) {
+        float rgba[4];
+        size_t at = (size_t)x * (size_t)e.channels;
+        std::memcpy(rgba, from, sizeof rgba);
+        if (e.channels == 4 && !e.associated)
+            unpremultiply(rgba);
+        if (e.depth == TRIP_IMAGE_U8)
+            quantise(rgba, e.channels, (uint8_t *)to + at);
+        else if (e.depth == TRIP_IMAGE_U16)
+            quantise(rgba, e.channels, (uint16_t *)to + at);
+        else
+            std::memcpy((float *)to + at, rgba, (size_t)e.channels * sizeof(float));
+    }
+}
+
+OIIO::TypeDesc memory_type(trip_image_depth depth)
+{
+    return depth == TRIP_IMAGE_U8    ? OIIO::TypeDesc::UINT8
+           : depth == TRIP_IMAGE_U16 ? OIIO::TypeDesc::UINT16
+                                     : OIIO::TypeDesc::FLOAT;
+}
+
+OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
+{
+    OIIO::TypeDesc type =
+        e.depth == TRIP_IMAGE_HALF ? OIIO::TypeDesc(OIIO::TypeDesc::HALF) : memory_type(e.depth);
+    OIIO::ImageSpec spec(p.width, p.height, e.channels, type);
+    if (e.channels == 4) {
+        spec.alpha_channel = 3;
+        /* Says what the values are, so that OpenImageIO leaves them alone. */
+        spec.attribute("oiio:UnassociatedAlpha", e.associated ? 0 : 1);
+    }
+    if (std::strcmp(e.plugin, "jpeg") == 0) {
+        spec.attribute("CompressionQuality", p.params.jpeg_quality ? p.params.jpeg_quality : 95);
+        spec.attribute("jpeg:subsampling", "4:4:4");
+    } else if (std::strcmp(e.plugin, "png") != 0) {
+        spec.attribute("compression", "zip");
+    }
+    return spec;
+}
+
+std::string trim(std::string text)
+{
+    while (!text.empty() && (text.back() == '\n' || text.back() == ' '))
+        text.pop_back();
+    return text;
+}
+
+[[noreturn]] void fail_encoding(const trip_picture &p, const FileSink &sink, OIIO::ImageOutput &out)
+{
+    std::string why = trim(out.geterror());
+    if (sink.error_number())
+        throw trip_slice_error(p.path,
+                               std::string("cannot write: ") + std::strerror(sink.error_number()));
+    throw trip_slice_error(p.path, "cannot encode: " + why);
+}
+
+void encode(const trip_picture &p, const trip_picture_row &next_row, FileSink &sink)
+{
+    const Encoding e = choose_encoding(p);
+    auto out = OIIO::ImageOutput::create(e.plugin);
+    if (!out)
+        throw trip_slice_error(p.path, trim(OIIO::geterror()));
+    if (!out->set_ioproxy(&sink) || !out->open(sink.filename(), make_spec(p, e)))
+        fail_encoding(p, sink, *out);
+    OIIO::TypeDesc type = memory_type(e.depth);
+    std::vector<float> row((size_t)p.width * 4);
+    std::vector<char> encoded((size_t)p.width * (size_t)e.channels * type.size());
+    for (int y = 0; y < p.height; y++) {
+        if (!next_row(row.data()))
+            throw trip_slice_error(p.path, "only part of the picture came");
+        convert_row(e, p.width, row.data(), encoded.data());
+        if (!out->write_scanline(y, 0, type, encoded.data()))
+            fail_encoding(p, sink, *out);
+    }
+    if (!out->close())
+        fail_encoding(p, sink, *out);
+}
+
+std::string temporary_name(const std::string &path)
+{
+    size_t slash = path.rfind('/');
+    return path.substr(0, slash == std::string::npos ? 0 : slash + 1) + ".triptych-" +
+           std::to_string(getpid()) + ".tmp";
+}
+
+/* `channels` values as RGBA, premultiplied. */
+void spread(const float *from, int channels, bool premultiplied, float rgba[4])
+{
+    bool grey = channels < 3;
+    float alpha = channels % 2 == 0 ? from[channels - 1] : 1;
+    float scale = premultiplied ? 1 : alpha;
+    for (int c = 0; c < 3; c++)
+        rgba[c] = from[grey ? 0 : c] * scale;
+    rgba[3] = alpha;
+}
+
+} // namespace
+
+void trip_picture_write(const trip_picture &p, const trip_picture_row &next_row)
+{
+    FileSink sink(temporary_name(p.path));
+    int error = sink.error_number();
+    if (error)
+        throw trip_slice_error(p.path, std::string("cannot create a file beside it: ") +
+                                           std::strerror(error));
+    encode(p, next_row, sink);
+    error = sink.finish();
+    if (error == 0)
+        error = sink.rename_to(p.path.c_str());
+    if (error)
+        throw trip_slice_error(p.path, std::string("cannot write: ") + std::strerror(error));
+}
+
+std::vector<float> trip_picture_read(const std::string &path, int &width, int &height)
+{
+    OIIO::ImageSpec hints;
+    hints.attribute("oiio:UnassociatedAlpha", 1); /* premultiplied here, in float */
+    auto in = OIIO::ImageInput::open(path, &hints);
+    if (!in)
+        throw trip_slice_error(path, trim(OIIO::geterror()));
+    const OIIO::ImageSpec spec = in->spec();
+    if (spec.nchannels > 4 || spec.depth > 1 || spec.width < 1 || spec.height < 1)
+        throw trip_slice_error(path, "is no picture of one to four channels");
+    std::vector<float> row((size_t)spec.width * (size_t)spec.nchannels);
+    std::vector<float> rgba((size_t)spec.width * (size_t)spec.height * 4);
+    bool premultiplied = !spec.get_int_attribute("oiio:UnassociatedAlpha", 0);
+    for (int y = 0; y < spec.height; y++) {
+        if (!in->read_scanline(y + spec.y, 0, OIIO::TypeDesc::FLOAT, row.data()))
+            throw trip_slice_error(path, trim(in->geterror()));
+        for (int x = 0; x < spec.width; x++)
+            spread(&row[(size_t)x * (size_t)spec.nchannels], spec.nchannels, premultiplied,
+                   &rgba[((size_t)y * (size_t)spec.width + (size_t)x) * 4]);
+    }
+    width = spec.width;
+    height = spec.height;
+    return rgba;
+}

@@ -1,0 +1,21 @@
+#include "slice_stack.h"
+
+trip_slice_buffer::~trip_slice_buffer()
+{
+    if (memory_)
+        trip_budget_release(budget_, memory_, bytes_);
+}
+
+void trip_slice_buffer::take(trip_budget *budget, const std::string &file, uint64_t bytes)
+{
+    char needed[32], left[32];
+    memory_ = trip_budget_take(budget, bytes);
+    if (!memory_)
+        throw trip_slice_error(file, std::string("a slice needs ") +
+                                         trip_format_bytes(bytes, needed) + ", but " +
+                                         trip_format_bytes(trip_budget_left_bytes(budget), left) +
+                                         " are left of the memory allowed; a larger --memory would "
+                                         "do");
+    budget_ = budget;
+    bytes_ = bytes;
+}

@@ -1,0 +1,143 @@
+/* Stacks of pictures as a slice reader: a folder, a pattern or one file with several slices, read
+ * by the helper program (image_helper.h), which keeps one slice at a time.
+ *
+ * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. Without metadata
+ * voxels are 1 apart; DICOM says how far, and where. */
+#include <string.h>
+#include <stdlib.h>
+
+#include "image_helper.h"
+#include "report.h"
+#include "volume_reader.h"
+
+typedef struct state {
+    trip_image_helper *helper;
+    trip_budget *budget;
+    void *reserved; /* the helper's share of the budget, never touched */
+    size_t reserved_bytes;
+    int64_t next; /* slice */
+    size_t slice_bytes;
+    char path[];
+} state;
+
+static bool probe(const char *path, const unsigned char *head, size_t bytes,
+                  const trip_volume_params *params)
+{
+    (void)path, (void)params;
+    return bytes == 0 || trip_image_kind_of(head, bytes) != TRIP_IMAGE_OTHER;
+}
+
+static void close_images(void *opaque)
+{
+    state *s = opaque;
+    trip_image_helper_stop(s->helper);
+    trip_budget_release(s->budget, s->reserved, s->reserved_bytes);
+    free(s);
+}
+
+static int open_stack(state *s, trip_image_stack *stack)
+{
+    uint64_t bytes;
+    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget) };
+    int status = trip_image_helper_start(&s->helper, "read");
+    if (status == 0)
+        status = trip_image_helper_request(s->helper, TRIP_IMAGE_OPEN_STACK, s->path, numbers);
+    if (status == 0)
+        status = trip_image_helper_outcome(s->helper, &bytes);
+    if (status == 0)
+        status = trip_image_helper_receive(s->helper, stack, sizeof *stack);
+    return status;
+}
+
+/* The helper holds one slice, besides what it reports. */
+static int reserve_memory(state *s, const trip_image_stack *stack)
+{
+    if (__builtin_mul_overflow((uint64_t)stack->dims[0], (uint64_t)stack->dims[1],
+                               &s->slice_bytes) ||
+        __builtin_mul_overflow(s->slice_bytes, trip_scalar_bytes((trip_scalar)stack->type),
+                               &s->slice_bytes) ||
+        __builtin_add_overflow(s->slice_bytes, stack->helper_bytes, &s->reserved_bytes))
+        return trip_fail(TRIP_ERROR, "read", s->path, "has slices of an impossible size");
+    s->reserved = trip_budget_take(s->budget, s->reserved_bytes);
+    if (s->reserved)
+        return 0;
+    char needed[32], left[32];
+    trip_format_bytes(s->reserved_bytes, needed);
+    trip_format_bytes(trip_budget_left_bytes(s->budget), left);
+    return trip_fail(TRIP_ERROR, "read", s->path,
+                     "its slices need %s, but %s are left of the memory allowed; a larger --memory "
+                     "would do",
+                     needed, left);
+}
+
+static int open_images(const char *path, const trip_volume_params *params, trip_budget *budget,
+                       trip_volume_info *info, void **out)
+{
+    (void)params;
+    size_t path_bytes = strlen(path) + 1;
+    state *s = calloc(1, sizeof *s + path_bytes);
+    if (!s)
+        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    memcpy(s->path, path, path_bytes);
+    s->budget = budget;
+    trip_image_stack stack;
+    int status = open_stack(s, &stack);
+    if (status == 0)
+        status = reserve_memory(s, &stack);
+    if (status < 0) {
+        close_images(s);
+        return status;
+    }
+    memcpy(info->dims, stack.dims, sizeof info->dims);
+    memcpy(info->index_to_world.m, stack.index_to_world, sizeof info->index_to_world.m);
+    info->type = (trip_scalar)stack.type;
+    info->slope = stack.slope;
+    info->inter = stack.inter;
+    info->sparse = false;
+    info->background = 0;
+    info->format = "images";
+    info->name[0] = 0;
+    *out = s;
+    return 0;
+}
+
+static int rewind_images(void *opaque)
+{
+    ((state *)opaque)->next = 0;
+    return 0;
+}
+
+static int read_slices(void *opaque, int64_t count, void *values)
+{
+    state *s = opaque;
+    for (int64_t i = 0; i < count; i++) {
+        uint64_t bytes;
+        const int64_t numbers[5] = { s->next++ };
+        int status = trip_image_helper_request(s->helper, TRIP_IMAGE_READ_SLICE, s->path, numbers);
+        if (status == 0)
+            status = trip_image_helper_outcome(s->helper, &bytes);
+        if (status == 0)
+            status = trip_image_helper_receive(
+                s->helper, (char *)values + (size_t)i * s->slice_bytes, s->slice_bytes);
+        if (status < 0)
+            return status;
+    }
+    return 0;
+}
+
+/* The helper delivers the machine's byte order. */
+static bool swap_images(const void *opaque)
+{
+    (void)opaque;
+    return false;
+}
+
+const trip_volume_reader trip_read_images = {
+    .format = "images",
+    .probe = probe,
+    .open = open_images,
+    .close = close_images,
+    .rewind = rewind_images,
+    .read_slices = read_slices,
+    .swap = swap_images,
+};
