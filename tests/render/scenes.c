@@ -119,12 +119,44 @@ void scene_colour(scene *s, unsigned first, unsigned last, double r, double g, d
         s->table[i] = entry;
 }
 
+static int create_cpu(trip_renderer **out, trip_budget *budget)
+{
+    return trip_cpu_create(out, budget, 3);
+}
+
+static void drop(const char *line, void *user)
+{
+    (void)line;
+    (void)user;
+}
+
+/* Whether this machine has what the gl renderer needs. */
+static bool has_gl(void)
+{
+    trip_budget *budget;
+    trip_renderer *gl;
+    assert_int_equal(trip_budget_create(&budget, UINT64_C(1) << 30), 0);
+    trip_report_redirect(drop, NULL);
+    bool has = trip_gl_create(&gl, budget) == 0;
+    trip_report_redirect(NULL, NULL);
+    if (has)
+        gl->ops->destroy(gl);
+    else
+        print_message("[  SKIPPED ] for gl: this machine has no OpenGL 4.5 by EGL\n");
+    trip_budget_destroy(budget);
+    return has;
+}
+
 const scene_renderer *scene_renderers(void)
 {
-    static const scene_renderer all[] = {
+    static scene_renderer all[4] = {
         { "reference", trip_reference_create, 0 },
-        { NULL, NULL, 0 },
+        { "cpu", create_cpu, 1.0 / 255 },
     };
+    static bool asked;
+    if (!asked && has_gl())
+        all[2] = (scene_renderer){ "gl", trip_gl_create, 1.0 / 255 };
+    asked = true;
     return all;
 }
 
