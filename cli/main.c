@@ -13,6 +13,7 @@ static const struct command {
     { "brick", "turn a volume into a data set that is drawn from disk", trip_command_brick },
     { "info", "show what is in a data set, and check it", trip_command_info },
     { "render", "draw a data set into image files", trip_command_render },
+    { "bench", "measure drawing and reading, as tables", trip_command_bench },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 

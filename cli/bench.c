@@ -1,0 +1,64 @@
+/* triptych bench: measures drawing and reading a data set, and prints tables with their limits. */
+#include "commands.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "bench_tables.h"
+
+static const struct {
+    const char *name;
+    int (*run)(const session *s, const bench_options *o, bench_report *r);
+} tables[] = {
+    { "orders", bench_orders },
+    { "submit", bench_submit },
+    { "stream", bench_stream },
+    { "renderers", bench_renderers },
+};
+
+static void describe(const session *s, const bench_options *o, bench_report *r)
+{
+    cJSON *settings = bench_report_settings(r);
+    const trip_file_header *h = &s->data->header;
+    char text[64];
+    snprintf(text, sizeof text, "%llu x %llu x %llu", (unsigned long long)h->dims[0],
+             (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
+    cJSON_AddStringToObject(settings, "grid", text);
+    cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
+    cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
+    snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
+    if (o->size_count == 1)
+        cJSON_AddStringToObject(settings, "size", text);
+    cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
+    cJSON_AddBoolToObject(settings, "shading",
+                          bench_planes(s, &o->settings) >> TRIP_PLANE_NORMALS & 1);
+    cJSON_AddNumberToObject(settings, "repeat", o->repeat);
+}
+
+static int measure(const session *s, const bench_options *o, bench_report *r)
+{
+    describe(s, o, r);
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
+        if (!strcmp(tables[i].name, o->table))
+            return tables[i].run(s, o, r);
+    return 0;
+}
+
+int trip_command_bench(int argc, char **argv)
+{
+    session s = { 0 };
+    bench_options o;
+    bench_report *report = NULL;
+    int status = bench_options_parse(&o, argc, argv);
+    if (!status)
+        status = session_open(&s, o.input, o.tf, o.memory_bytes);
+    if (!status)
+        status = bench_report_create(&report, o.table, o.input);
+    if (!status)
+        status = measure(&s, &o, report);
+    if (!status)
+        status = bench_report_print(report, o.json);
+    bench_report_destroy(report);
+    session_close(&s);
+    return trip_exit_status(status);
+}

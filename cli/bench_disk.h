@@ -1,0 +1,26 @@
+/* What the disk gives a program that only reads: files from end to end, past the page cache, in
+ * large blocks, several at once. */
+#ifndef TRIP_BENCH_DISK_H
+#define TRIP_BENCH_DISK_H
+
+#include "session.h"
+
+/* Plane files, as bits: axis * TRIP_PLANES + plane. */
+typedef unsigned bench_files;
+
+/* The files that a plan's passes read from. */
+bench_files bench_files_of_plan(const trip_plan *plan);
+uint64_t bench_files_bytes(const session *s, bench_files files);
+
+/* Asks the system to forget what it holds of them; direct reads do not need that. */
+void bench_files_forget(const session *s, bench_files files);
+
+typedef struct bench_disk_read {
+    double ms;
+    uint64_t bytes;
+    bool direct; /* O_DIRECT was not refused */
+} bench_disk_read;
+
+int bench_files_read(const session *s, bench_files files, bench_disk_read *out);
+
+#endif

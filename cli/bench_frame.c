@@ -1,0 +1,199 @@
+#include "bench_frame.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "report.h"
+
+double bench_now_ms(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+uint64_t bench_splats_drawn(const trip_frame_stats *s)
+{
+    return s->lists[0].splats_drawn + s->lists[1].splats_drawn + s->lists[2].splats_drawn;
+}
+
+uint64_t bench_splats_read(const trip_frame_stats *s)
+{
+    return s->lists[0].splats_read + s->lists[1].splats_read + s->lists[2].splats_read;
+}
+
+unsigned bench_planes(const session *s, const trip_settings *settings)
+{
+    unsigned planes = 1u << TRIP_PLANE_VOXELS;
+    if (settings->shading)
+        planes |= s->data->header.planes & 1u << TRIP_PLANE_NORMALS;
+    return planes;
+}
+
+static int draw_planned(const bench_frame *f, const trip_camera *camera, bool count,
+                        bench_cost *cost)
+{
+    trip_plan plan;
+    double start = bench_now_ms();
+    int status = trip_plan_make(&plan, f->session->data, camera, &f->settings, f->session->table,
+                                f->session->budget);
+    if (status)
+        return status;
+    double planned = bench_now_ms();
+    trip_frame frame = {
+        .data = f->session->data,
+        .camera = camera,
+        .settings = &f->settings,
+        .plan = &plan,
+        .table = f->session->table,
+        .count = count,
+    };
+    status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, &cost->stats);
+    cost->ms = bench_now_ms() - start;
+    cost->plan_ms = planned - start;
+    cost->wait_ms = cost->stats.read_ms;
+    cost->draw_ms = cost->stats.draw_ms;
+    cost->merge_ms = cost->stats.merge_ms;
+    trip_plan_release(&plan, f->session->budget);
+    return status;
+}
+
+int bench_frame_draw(const bench_frame *f, bool count, bench_cost *cost)
+{
+    trip_camera camera;
+    int status = trip_camera_make(&camera, &f->view, &f->session->data->index_to_world);
+    return status ? status : draw_planned(f, &camera, count, cost);
+}
+
+int bench_runs_take(bench_runs *r, const bench_frame *frames, int count, int repeat)
+{
+    *r = (bench_runs){ count, repeat, calloc((size_t)count * (size_t)repeat, sizeof *r->costs) };
+    if (!r->costs)
+        return trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
+    int status = 0;
+    for (int run = 0; run < repeat; run++)
+        for (int i = 0; i < count && !status; i++)
+            if (frames[i].renderer)
+                status = bench_frame_draw(&frames[i], false, &r->costs[i * repeat + run]);
+    return status;
+}
+
+void bench_runs_free(bench_runs *r)
+{
+    free(r->costs);
+}
+
+static int by_time(const void *a, const void *b)
+{
+    double x = ((const bench_cost *)a)->ms, y = ((const bench_cost *)b)->ms;
+    return (x > y) - (x < y);
+}
+
+const bench_cost *bench_runs_sorted(bench_runs *r, int frame)
+{
+    bench_cost *costs = &r->costs[frame * r->repeat];
+    qsort(costs, (size_t)r->repeat, sizeof *costs, by_time);
+    return costs;
+}
+
+/* The largest part of a frame, and its share: "drawing 93 %". */
+static void bound(const bench_cost *c, char text[48])
+{
+    const struct {
+        const char *name;
+        double ms;
+    } parts[] = { { "planning", c->plan_ms },
+                  { "waiting for data", c->wait_ms },
+                  { "drawing", c->draw_ms },
+                  { "merging", c->merge_ms } };
+    int most = 0;
+    for (int i = 1; i < 4; i++)
+        if (parts[i].ms > parts[most].ms)
+            most = i;
+    snprintf(text, 48, "%s %.0f %%", parts[most].name, 100 * parts[most].ms / c->ms);
+}
+
+void bench_runs_describe(bench_runs *r, int frame, cJSON *row)
+{
+    char text[48];
+    const bench_cost *runs = bench_runs_sorted(r, frame), *middle = &runs[(r->repeat - 1) / 2];
+    bound(middle, text);
+    cJSON_AddNumberToObject(row, "ms", middle->ms);
+    cJSON_AddNumberToObject(row, "ms_min", runs[0].ms);
+    cJSON_AddNumberToObject(row, "ms_max", runs[r->repeat - 1].ms);
+    cJSON_AddNumberToObject(row, "fps", 1e3 / middle->ms);
+    cJSON_AddNumberToObject(row, "plan_ms", middle->plan_ms);
+    cJSON_AddNumberToObject(row, "wait_ms", middle->wait_ms);
+    cJSON_AddNumberToObject(row, "draw_ms", middle->draw_ms);
+    cJSON_AddNumberToObject(row, "merge_ms", middle->merge_ms);
+    cJSON_AddStringToObject(row, "bound_by", text);
+}
+
+/* Keeps the last line that would have gone to stderr. */
+static void keep_line(const char *line, void *user)
+{
+    static const char prefix[] = "triptych: ";
+    size_t skip = strncmp(line, prefix, sizeof prefix - 1) ? 0 : sizeof prefix - 1;
+    snprintf(user, 256, "%.*s", (int)strcspn(line + skip, "\n"), line + skip);
+}
+
+void bench_keep_report(char *why)
+{
+    trip_report_redirect(why ? keep_line : NULL, why);
+}
+
+int bench_renderer_create(const session *s, trip_renderer **out, trip_renderer_kind kind,
+                          int threads, bool needed, char why[256])
+{
+    *out = NULL;
+    why[0] = 0;
+    if (!needed)
+        bench_keep_report(why);
+    int status = trip_renderer_create(out, kind, (unsigned)threads, s->budget);
+    if (!needed)
+        bench_keep_report(NULL);
+    if (!status || needed)
+        return status;
+    *out = NULL;
+    return 0;
+}
+
+void bench_renderer_destroy(trip_renderer *r)
+{
+    if (r)
+        r->ops->destroy(r);
+}
+
+int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bench_report *r)
+{
+    char why[256];
+    *b = (bench_scene){ .frame = { .session = s, .settings = o->settings },
+                        .size = { o->sizes[0][0], o->sizes[0][1] } };
+    bench_frame *f = &b->frame;
+    int status = session_take_image(s, b->size[0], b->size[1], &f->rgba);
+    if (!status)
+        status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
+    if (!status)
+        status = session_make_reader(s, &f->reader, bench_planes(s, &o->settings), TRIP_ENGINE_NULL,
+                                     0, false);
+    if (status)
+        return status;
+    cJSON *machine = bench_report_machine(r);
+    cJSON_AddStringToObject(machine, "renderer", f->renderer->ops->name);
+    cJSON_AddStringToObject(machine, "device", f->renderer->ops->device(f->renderer));
+    cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(f->reader));
+    if (o->threads[0])
+        cJSON_AddNumberToObject(machine, "threads", o->threads[0]);
+    return 0;
+}
+
+void bench_scene_close(bench_scene *b)
+{
+    bench_frame *f = &b->frame;
+    if (f->reader)
+        trip_reader_destroy(f->reader);
+    bench_renderer_destroy(f->renderer);
+    session_release_image(f->session, b->size[0], b->size[1], f->rgba);
+}

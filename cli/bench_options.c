@@ -1,0 +1,236 @@
+#include "bench_options.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "options.h"
+#include "report.h"
+
+enum {
+    KEY_TF = 256,
+    KEY_SIZE,
+    KEY_RENDERER,
+    KEY_THREADS,
+    KEY_REPEAT,
+    KEY_VIEWS,
+    KEY_NO_SHADING,
+    KEY_KERNEL_RADIUS,
+    KEY_ENGINE,
+    KEY_MEMORY,
+    KEY_JSON,
+};
+
+#define BIT(key) (1u << ((key)-KEY_TF))
+
+static const struct argp_option options[] = {
+    { "tf", KEY_TF, "FILE", 0,
+      "Transfer function: .tf, ParaView JSON or preset:NAME (the one kept in the data set)", 0 },
+    { "size", KEY_SIZE, "WxH[,...]", 0,
+      "Pixels (512x512; renderers: 512x512,1024x1024; stream: 1024x1024)", 0 },
+    { "renderer", KEY_RENDERER, "NAME[,...]", 0,
+      "gl, cpu, reference or auto (auto; submit: gl; renderers: all there are)", 0 },
+    { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw (one a processor)", 0 },
+    { "repeat", KEY_REPEAT, "N", 0, "Interleaved runs to take the middle one of (5; renderers: 1)",
+      0 },
+    { "views", KEY_VIEWS, "N", 0, "Views round the object (20); renderers only", 0 },
+    { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (2)", 0 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (auto); stream only", 0 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Bound for all buffers (a quarter of what there is)", 0 },
+    { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
+    { 0 },
+};
+
+static const struct table {
+    const char *name;
+    unsigned refused; /* options that have no meaning here */
+    bool lists;       /* takes several sizes, renderers and thread counts */
+    int repeat;
+    int sizes[2], size_count;
+    trip_renderer_kind renderers[3];
+    int renderer_count;
+} tables[] = {
+    { "orders", BIT(KEY_VIEWS) | BIT(KEY_ENGINE), false, 5, { 512 }, 1, { TRIP_RENDERER_AUTO }, 1 },
+    { "submit",
+      BIT(KEY_VIEWS) | BIT(KEY_ENGINE) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+      false,
+      5,
+      { 512 },
+      1,
+      { TRIP_RENDERER_GL },
+      1 },
+    { "stream", BIT(KEY_VIEWS), false, 5, { 1024 }, 1, { TRIP_RENDERER_AUTO }, 1 },
+    { "renderers",
+      BIT(KEY_ENGINE),
+      true,
+      1,
+      { 512, 1024 },
+      2,
+      { TRIP_RENDERER_CPU, TRIP_RENDERER_GL, TRIP_RENDERER_REFERENCE },
+      3 },
+};
+
+/* While parsing: what was given, for the check against the table. */
+typedef struct parse {
+    bench_options *o;
+    unsigned given;
+} parse;
+
+/* Calls `one` with each of the texts that commas join. */
+static int parse_list(const char *option, const char *text, bench_options *o, int *count,
+                      int (*one)(const char *, bench_options *, int))
+{
+    int status = 0;
+    *count = 0;
+    for (const char *rest = text; rest && !status;) {
+        char item[64];
+        const char *comma = strchr(rest, ',');
+        size_t length = comma ? (size_t)(comma - rest) : strlen(rest);
+        if (*count == BENCH_LIST_MAX || length >= sizeof item)
+            return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is too long a list", text);
+        memcpy(item, rest, length);
+        item[length] = 0;
+        status = one(item, o, (*count)++);
+        rest = comma ? comma + 1 : NULL;
+    }
+    return status;
+}
+
+static int parse_size(const char *text, bench_options *o, int i)
+{
+    int used = 0, *size = o->sizes[i];
+    if (sscanf(text, "%5dx%5d%n", &size[0], &size[1], &used) == 2 && !text[used] && size[0] > 0 &&
+        size[1] > 0 && strspn(text, "0123456789x") == strlen(text))
+        return 0;
+    return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
+}
+
+static int parse_renderer(const char *text, bench_options *o, int i)
+{
+    static const char *const names[] = { "auto", "gl", "cpu", "reference", NULL };
+    int which = 0, status = trip_option_choice("--renderer", text, names, &which);
+    o->renderers[i] = (trip_renderer_kind)which;
+    return status;
+}
+
+static int parse_threads(const char *text, bench_options *o, int i)
+{
+    return trip_option_integer("--threads", text, 1, 1024, &o->threads[i]);
+}
+
+static int parse_engine(const char *text, bench_options *o)
+{
+    static const char *const names[] = { "auto", "io_uring", "pread", NULL };
+    int which = 0, status = trip_option_choice("--engine", text, names, &which);
+    o->engine = (trip_engine)which;
+    return status;
+}
+
+static int parse_option(int key, char *arg, bench_options *o)
+{
+    switch (key) {
+    case KEY_TF:
+        o->tf = arg;
+        return 0;
+    case KEY_SIZE:
+        return parse_list("--size", arg, o, &o->size_count, parse_size);
+    case KEY_RENDERER:
+        return parse_list("--renderer", arg, o, &o->renderer_count, parse_renderer);
+    case KEY_THREADS:
+        return parse_list("--threads", arg, o, &o->thread_count, parse_threads);
+    case KEY_REPEAT:
+        return trip_option_integer("--repeat", arg, 1, 1000, &o->repeat);
+    case KEY_VIEWS:
+        return trip_option_integer("--views", arg, 1, 1000, &o->views);
+    case KEY_NO_SHADING:
+        o->settings.shading = false;
+        return 0;
+    case KEY_KERNEL_RADIUS:
+        return trip_option_number("--kernel-radius", arg, 0.1, 100, &o->settings.kernel_radius);
+    case KEY_ENGINE:
+        return parse_engine(arg, o);
+    case KEY_MEMORY:
+        return trip_option_bytes("--memory", arg, &o->memory_bytes);
+    case KEY_JSON:
+        o->json = true;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void fill_defaults(bench_options *o, const struct table *t)
+{
+    if (!o->repeat)
+        o->repeat = t->repeat;
+    if (!o->size_count)
+        for (int i = 0; i < t->size_count; i++, o->size_count++)
+            o->sizes[i][0] = o->sizes[i][1] = t->sizes[i];
+    if (!o->renderer_count)
+        for (int i = 0; i < t->renderer_count; i++, o->renderer_count++)
+            o->renderers[i] = t->renderers[i];
+    if (!o->thread_count)
+        o->thread_count = 1;
+}
+
+static int check(parse *p)
+{
+    static const char *const names[] = { "orders", "submit", "stream", "renderers", NULL };
+    bench_options *o = p->o;
+    int which;
+    if (!o->table || !o->input)
+        return trip_option_fail("TABLE NAME.trip", "give both; `triptych bench --help`");
+    int status = trip_option_choice("TABLE", o->table, names, &which);
+    if (status)
+        return status;
+    const struct table *t = &tables[which];
+    for (int i = 0; options[i].name; i++)
+        if (p->given & t->refused & BIT(options[i].key))
+            return trip_fail(TRIP_USAGE, "usage", options[i].name, "does not apply to bench %s",
+                             t->name);
+    fill_defaults(o, t);
+    if (!t->lists && (o->size_count > 1 || o->renderer_count > 1 || o->thread_count > 1))
+        return trip_fail(TRIP_USAGE, "usage", t->name,
+                         "takes one size, one renderer and one number of threads");
+    return 0;
+}
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    parse *p = state->input;
+    if (key == ARGP_KEY_ARG && !p->o->table) {
+        p->o->table = arg;
+        return 0;
+    }
+    if (key == ARGP_KEY_ARG) {
+        if (p->o->input)
+            return trip_option_fail(arg, "one data set at a time");
+        p->o->input = arg;
+        return 0;
+    }
+    if (key == ARGP_KEY_END)
+        return check(p);
+    int status = parse_option(key, arg, p->o);
+    if (key >= KEY_TF && key <= KEY_JSON)
+        p->given |= BIT(key);
+    return status;
+}
+
+int bench_options_parse(bench_options *o, int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse_key,
+        .args_doc = "TABLE NAME.trip",
+        .doc = "Measures drawing a data set made by `triptych brick` and prints a table:\n"
+               "  orders     the list methods of Hofsetz & Max 2005, Tables 1 and 2\n"
+               "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"
+               "  stream     reading and drawing against the disk's bandwidth\n"
+               "  renderers  the renderers there are, over views round the object\v"
+               "Defaults in parentheses. Runs of what is compared take turns, so that a machine "
+               "busy for a while slows all of them.",
+    };
+    *o = (bench_options){ .views = 20, .settings = trip_settings_default() };
+    parse p = { .o = o };
+    return trip_options_parse(&argp, argc, argv, &p);
+}

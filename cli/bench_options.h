@@ -1,0 +1,29 @@
+/* What `triptych bench` was asked for: the command line, checked, the table's defaults filled in.
+ */
+#ifndef TRIP_BENCH_OPTIONS_H
+#define TRIP_BENCH_OPTIONS_H
+
+#include "reader.h"
+#include "renderer_choice.h"
+#include "settings.h"
+
+enum { BENCH_LIST_MAX = 16 };
+
+typedef struct bench_options {
+    const char *table, *input;
+    const char *tf; /* file or preset; NULL: the function kept in the data set */
+    int sizes[BENCH_LIST_MAX][2], size_count;
+    trip_renderer_kind renderers[BENCH_LIST_MAX];
+    int renderer_count;
+    int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
+    int repeat, views;
+    trip_settings settings;
+    trip_engine engine;
+    uint64_t memory_bytes; /* 0: the default */
+    bool json;
+} bench_options;
+
+/* 0, or TRIP_USAGE once reported; --help prints and exits. */
+int bench_options_parse(bench_options *o, int argc, char **argv);
+
+#endif

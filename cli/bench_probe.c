@@ -1,0 +1,113 @@
+#include "bench_probe.h"
+
+#include <string.h>
+
+#include "splat.h"
+#include "weight.h"
+
+static bench_probe *probe_of(trip_renderer *r)
+{
+    return (bench_probe *)r;
+}
+
+static void destroy(trip_renderer *r)
+{
+    (void)r;
+}
+
+static const char *device(const trip_renderer *r)
+{
+    (void)r;
+    return "none";
+}
+
+static int begin_frame(trip_renderer *r, const trip_frame *frame)
+{
+    bench_probe *p = probe_of(r);
+    *p = bench_probe_make(p->every);
+    p->frame = frame;
+    return 0;
+}
+
+static int begin_list(trip_renderer *r, int axis)
+{
+    probe_of(r)->axis = axis;
+    return 0;
+}
+
+/* Pixels of the image whose centre lies in the support where the list has weight. */
+static uint64_t covered(const bench_probe *p, const trip_splat_frame *f, const trip_splat *s)
+{
+    const trip_camera *camera = p->frame->camera;
+    uint64_t pixels = 0;
+    int x0 = (int)fmax(0, ceil(s->x0 - 0.5)), x1 = (int)fmin(camera->width - 1, s->x1 - 0.5);
+    int y0 = (int)fmax(0, ceil(s->y0 - 0.5)), y1 = (int)fmin(camera->height - 1, s->y1 - 0.5);
+    for (int y = y0; y <= y1; y++)
+        for (int x = x0; x <= x1; x++) {
+            trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
+            pixels +=
+                trip_splat_radius2(f, s, x + 0.5, y + 0.5) <= f->cutoff2 &&
+                trip_weight(p->frame->settings, p->frame->plan->axis_of_view, ray, p->axis) > 0;
+        }
+    return pixels;
+}
+
+static void look_at(bench_probe *p, const trip_splat_frame *f, const trip_run *run, uint32_t voxel)
+{
+    double at[3];
+    trip_splat s;
+    at[p->axis] = run->sheet;
+    at[(p->axis + 1) % 3] = run->u + (int)trip_voxel_u(voxel);
+    at[(p->axis + 2) % 3] = run->v + (int)trip_voxel_v(voxel);
+    p->sampled++;
+    if (!trip_splat_project(f, trip_v3(at[0], at[1], at[2]), &s))
+        return;
+    uint64_t pixels = covered(p, f, &s);
+    p->pixels += pixels;
+    p->drawn += pixels > 0;
+}
+
+static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
+{
+    bench_probe *p = probe_of(r);
+    (void)front_to_back;
+    if (!p->every)
+        return 0;
+    trip_splat_frame f = trip_splat_frame_make(p->frame->camera, p->frame->settings);
+    for (size_t i = 0; i < batch->run_count; i++) {
+        const trip_run *run = &batch->runs[i];
+        uint64_t next = (p->every - p->seen % p->every) % p->every;
+        for (uint64_t k = next; k < run->count; k += p->every)
+            look_at(p, &f, run, batch->voxels[run->first + k]);
+        p->seen += run->count;
+    }
+    return 0;
+}
+
+static int end_frame(trip_renderer *r, float *rgba)
+{
+    (void)r;
+    (void)rgba;
+    return 0;
+}
+
+static void stats(const trip_renderer *r, trip_list_stats lists[3])
+{
+    (void)r;
+    memset(lists, 0, 3 * sizeof *lists);
+}
+
+bench_probe bench_probe_make(unsigned every)
+{
+    static const trip_renderer_ops ops = {
+        .name = "probe",
+        .destroy = destroy,
+        .device = device,
+        .begin_frame = begin_frame,
+        .begin_list = begin_list,
+        .draw = draw,
+        .end_frame = end_frame,
+        .stats = stats,
+    };
+    return (bench_probe){ .base = { &ops }, .every = every };
+}

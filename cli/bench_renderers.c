@@ -1,0 +1,231 @@
+/* bench renderers: frames and splats per second of the renderers there are, over views round the
+ * object. */
+#include "bench_tables.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "bench_probe.h"
+#include "bench_view.h"
+#include "report.h"
+
+enum { MAX_CONTENDERS = BENCH_LIST_MAX * BENCH_LIST_MAX, SAMPLE_EVERY = 16 };
+
+static const bench_column columns[] = {
+    { "renderer", "renderer", 0, 0 },
+    { "threads", "threads", 0, 0 },
+    { "size", "size", 0, 0 },
+    { "ms", "median ms", 1, 0 },
+    { "ms_min", "fastest", 1, 0 },
+    { "ms_max", "slowest", 1, 0 },
+    { "fps", "frames/s", 2, 0 },
+    { "msplats_per_s", "Msplats/s", 2, 0 },
+    { "pixels_per_splat", "pixels/splat", 1, 0 },
+    { "mpixels_per_s", "Mpixels/s", 1, 0 },
+};
+
+/* A renderer and its number of threads; 0: one a processor. */
+typedef struct contender {
+    trip_renderer *renderer;
+    int threads;
+    bench_cost *costs; /* of the size being drawn: [view * repeat + run] */
+} contender;
+
+/* What a view has to be drawn, whoever draws it. */
+typedef struct load {
+    double splats, pixels;
+} load;
+
+typedef struct race {
+    const session *session;
+    const bench_options *options;
+    trip_reader *reader;
+    contender contenders[MAX_CONTENDERS];
+    int count;
+    load *loads; /* of the size being drawn: [view] */
+} race;
+
+static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_report *r)
+{
+    static const char *const names[] = { "auto", "gl", "cpu", "reference" };
+    contender *own = &c->contenders[c->count];
+    char why[256];
+    own->threads = kind == TRIP_RENDERER_CPU ? threads : 0;
+    int status = bench_renderer_create(c->session, &own->renderer, kind, threads, false, why);
+    if (status || !own->renderer) {
+        bench_report_limit(r, "Left out: %s: %s", names[kind], why);
+        return status;
+    }
+    cJSON_AddStringToObject(bench_report_machine(r), own->renderer->ops->name,
+                            own->renderer->ops->device(own->renderer));
+    own->costs = calloc((size_t)(c->options->views * c->options->repeat), sizeof *own->costs);
+    if (!own->costs)
+        return trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
+    c->count++;
+    return 0;
+}
+
+/* Each renderer once, those with threads of their own once per number of threads. */
+static int add_contenders(race *c, bench_report *r)
+{
+    const bench_options *o = c->options;
+    int status = 0;
+    for (int i = 0; i < o->renderer_count; i++)
+        for (int k = 0; k < o->thread_count && !status; k++)
+            if (k == 0 || o->renderers[i] == TRIP_RENDERER_CPU)
+                status = add_contender(c, o->renderers[i], o->threads[k], r);
+    if (!status && c->count == 0)
+        return trip_fail(TRIP_ERROR, "bench", "renderers", "none of them runs on this machine");
+    return status;
+}
+
+/* Splats by the first contender's exact count, pixels by a sample of the footprints. */
+static int measure_load(bench_frame frame, load *out)
+{
+    bench_cost cost;
+    bench_probe probe = bench_probe_make(SAMPLE_EVERY);
+    int status = bench_frame_draw(&frame, true, &cost);
+    out->splats = (double)bench_splats_drawn(&cost.stats);
+    frame.renderer = &probe.base;
+    if (!status)
+        status = bench_frame_draw(&frame, false, &cost);
+    out->pixels = probe.drawn ? out->splats * (double)probe.pixels / (double)probe.drawn : 0;
+    return status;
+}
+
+static int draw_view(race *c, bench_frame frame, int view)
+{
+    int repeat = c->options->repeat, status = 0;
+    frame.renderer = c->contenders[0].renderer;
+    status = measure_load(frame, &c->loads[view]);
+    for (int run = 0; run < repeat; run++)
+        for (int i = 0; i < c->count && !status; i++) {
+            frame.renderer = c->contenders[i].renderer;
+            status = bench_frame_draw(&frame, false, &c->contenders[i].costs[view * repeat + run]);
+        }
+    return status;
+}
+
+/* Shaders are compiled and buffers grown before anything is timed. */
+static int warm_up(race *c, bench_frame frame)
+{
+    bench_cost cost;
+    int status = 0;
+    for (int i = 1; i < c->count && !status; i++) {
+        frame.renderer = c->contenders[i].renderer;
+        status = bench_frame_draw(&frame, false, &cost);
+    }
+    return status;
+}
+
+static int draw_views(race *c, const int size[2])
+{
+    bench_frame frame = { .session = c->session,
+                          .reader = c->reader,
+                          .settings = c->options->settings };
+    int status = session_take_image(c->session, size[0], size[1], &frame.rgba);
+    for (int view = 0; view < c->options->views && !status; view++) {
+        frame.view = bench_view_round(c->session, size, view, c->options->views);
+        if (view == 0)
+            status = warm_up(c, frame);
+        if (!status)
+            status = draw_view(c, frame, view);
+    }
+    session_release_image(c->session, size[0], size[1], frame.rgba);
+    return status;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void add_row(const race *c, const contender *own, const int size[2], double *values,
+                    cJSON *rows)
+{
+    int repeat = c->options->repeat, frames = c->options->views * repeat;
+    double ms = 0, splats = 0, pixels = 0;
+    for (int i = 0; i < frames; i++) {
+        values[i] = own->costs[i].ms;
+        ms += own->costs[i].ms;
+        splats += c->loads[i / repeat].splats;
+        pixels += c->loads[i / repeat].pixels;
+    }
+    qsort(values, (size_t)frames, sizeof *values, ascending);
+    double median = values[(frames - 1) / 2];
+    char text[32];
+    snprintf(text, sizeof text, "%d x %d", size[0], size[1]);
+    cJSON *row = cJSON_CreateObject();
+    cJSON_AddStringToObject(row, "renderer", own->renderer->ops->name);
+    if (own->threads)
+        cJSON_AddNumberToObject(row, "threads", own->threads);
+    cJSON_AddStringToObject(row, "size", text);
+    cJSON_AddNumberToObject(row, "views", c->options->views);
+    cJSON_AddNumberToObject(row, "ms", median);
+    cJSON_AddNumberToObject(row, "ms_min", values[0]);
+    cJSON_AddNumberToObject(row, "ms_max", values[frames - 1]);
+    cJSON_AddNumberToObject(row, "fps", 1e3 / median);
+    cJSON_AddNumberToObject(row, "splats_drawn", splats / frames);
+    cJSON_AddNumberToObject(row, "msplats_per_s", splats / ms * 1e-3);
+    if (splats > 0)
+        cJSON_AddNumberToObject(row, "pixels_per_splat", pixels / splats);
+    cJSON_AddNumberToObject(row, "mpixels_per_s", pixels / ms * 1e-3);
+    cJSON_AddItemToArray(rows, row);
+}
+
+static int run(race *c, bench_report *r)
+{
+    const bench_options *o = c->options;
+    cJSON *rows = bench_report_table(r, "renderers", "Renderers over views round the object",
+                                     columns, sizeof columns / sizeof columns[0]);
+    double *values = calloc((size_t)(o->views * o->repeat), sizeof *values);
+    c->loads = calloc((size_t)o->views, sizeof *c->loads);
+    int status = values && c->loads ? 0 : trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
+    for (int size = 0; size < o->size_count && !status; size++) {
+        status = draw_views(c, o->sizes[size]);
+        for (int i = 0; i < c->count && !status; i++)
+            add_row(c, &c->contenders[i], o->sizes[size], values, rows);
+    }
+    free(values);
+    return status;
+}
+
+static void add_limits(bench_report *r)
+{
+    bench_report_limit(r, "The data set is in memory (null engine): no figure contains the disk. A "
+                          "frame is planning, copying from memory, drawing and merging, and ends "
+                          "with the picture in the program's memory.");
+    bench_report_limit(r, "Msplats/s: splats with a pixel centre in their footprint where their "
+                          "list has weight, all views together, over the time of all views. Those "
+                          "behind saturated pixels count too, though a renderer may skip them.");
+    bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
+                       SAMPLE_EVERY);
+    bench_report_limit(r, "Times are over views; renderers take turns at each view.");
+}
+
+int bench_renderers(const session *s, const bench_options *o, bench_report *r)
+{
+    race *c = calloc(1, sizeof *c);
+    if (!c)
+        return trip_fail(TRIP_ERROR, "bench", "renderers", "out of memory");
+    c->session = s;
+    c->options = o;
+    cJSON_AddNumberToObject(bench_report_settings(r), "views", o->views);
+    add_limits(r);
+    int status = add_contenders(c, r);
+    if (!status)
+        status = session_make_reader(s, &c->reader, bench_planes(s, &o->settings), TRIP_ENGINE_NULL,
+                                     0, false);
+    if (!status)
+        status = run(c, r);
+    if (c->reader)
+        trip_reader_destroy(c->reader);
+    for (int i = 0; i < c->count; i++) {
+        bench_renderer_destroy(c->contenders[i].renderer);
+        free(c->contenders[i].costs);
+    }
+    free(c->loads);
+    free(c);
+    return status;
+}

@@ -1,0 +1,292 @@
+/* bench stream: reading and drawing from disk against what the disk gives a plain reader, and how
+ * well the two overlap. */
+#include "bench_tables.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "bench_disk.h"
+#include "bench_probe.h"
+#include "bench_view.h"
+#include "report.h"
+
+enum { PLAIN, READ, DRAW, FRAME, STAGES };
+
+static const double gigabyte = 1e9, second_ms = 1e3;
+
+static const bench_column stage_columns[] = {
+    { "stage", "stage", 0, 0 },
+    { "ms", "median s", 3, second_ms },
+    { "ms_min", "fastest", 3, second_ms },
+    { "ms_max", "slowest", 3, second_ms },
+    { "bytes_read", "GB read", 3, gigabyte },
+    { "gb_per_s", "GB/s", 3, 0 },
+    { "of_plain", "of plain read", 3, 0 },
+};
+
+static const bench_column summary_columns[] = {
+    { "dataset_bytes", "data set GB", 3, gigabyte },
+    { "memory_limit_bytes", "memory MB", 1, 1e6 },
+    { "memory_peak_bytes", "taken MB", 1, 1e6 },
+    { "peak_rss_bytes", "resident MB", 1, 1e6 },
+    { "seconds_per_frame", "s/frame", 3, 0 },
+    { "gb_per_s", "GB/s", 3, 0 },
+    { "disk_gb_per_s", "disk GB/s", 3, 0 },
+    { "frame_of_disk", "of disk", 3, 0 },
+    { "read_of_disk", "read alone of disk", 3, 0 },
+    { "frame_of_bound", "frame / max(read, draw)", 3, 0 },
+};
+
+typedef struct sample {
+    double ms, bytes;
+} sample;
+
+/* Everything that the stages need. */
+typedef struct stream {
+    const session *session;
+    const bench_options *options;
+    trip_budget *whole; /* holds the data set for drawing without the disk; not under the promise */
+    bench_frame frame;  /* from disk */
+    bench_frame in_memory; /* no renderer: does not fit */
+    bench_frame unread;    /* read and not drawn */
+    bench_probe probe;
+    bench_files files;
+    bool direct;
+    uint64_t peak_rss_bytes, peak_bytes;
+    sample *samples; /* [stage * repeat + run] */
+} stream;
+
+static sample of_cost(const bench_cost *c)
+{
+    return (sample){ c->ms, (double)c->stats.reader.bytes_read };
+}
+
+static int take_plain(stream *t, sample *out)
+{
+    bench_disk_read read;
+    int status = bench_files_read(t->session, t->files, &read);
+    *out = (sample){ read.ms, (double)read.bytes };
+    t->direct = read.direct;
+    return status;
+}
+
+static int take(stream *t, int stage, sample *out)
+{
+    const bench_frame *frames[STAGES] = {
+        [READ] = &t->unread, [DRAW] = &t->in_memory, [FRAME] = &t->frame
+    };
+    bench_cost cost;
+    if (stage == DRAW && !t->in_memory.renderer)
+        return 0;
+    bench_files_forget(t->session, t->files);
+    if (stage == PLAIN)
+        return take_plain(t, out);
+    int status = bench_frame_draw(frames[stage], false, &cost);
+    *out = of_cost(&cost);
+    return status;
+}
+
+static int find_files(stream *t)
+{
+    trip_camera camera;
+    trip_plan plan;
+    int status = trip_camera_make(&camera, &t->frame.view, &t->session->data->index_to_world);
+    if (!status)
+        status = trip_plan_make(&plan, t->session->data, &camera, &t->frame.settings,
+                                t->session->table, t->session->budget);
+    if (status)
+        return status;
+    t->files = bench_files_of_plan(&plan);
+    trip_plan_release(&plan, t->session->budget);
+    return 0;
+}
+
+/* What draws from disk, under the promise; ends with one frame drawn, and the peaks noted before
+ * anything else takes memory. */
+static int open_frame(stream *t)
+{
+    const session *s = t->session;
+    const bench_options *o = t->options;
+    const int *size = o->sizes[0];
+    char why[256];
+    bench_cost cost;
+    bench_frame *f = &t->frame;
+    *f = (bench_frame){ .session = s, .settings = o->settings };
+    f->view = bench_view_oblique(s, size);
+    int status = session_take_image(s, size[0], size[1], &f->rgba);
+    if (!status)
+        status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
+    if (!status)
+        status = session_make_reader(s, &f->reader, bench_planes(s, &o->settings), o->engine,
+                                     o->threads[0], false);
+    if (!status)
+        status = find_files(t);
+    if (!status)
+        status = bench_frame_draw(f, false, &cost);
+    t->peak_rss_bytes = trip_memory_peak_rss_bytes();
+    t->peak_bytes = trip_budget_peak_bytes(s->budget);
+    t->probe = bench_probe_make(0);
+    t->unread = *f;
+    t->unread.renderer = &t->probe.base;
+    return status;
+}
+
+/* The data set in memory, from a budget of its own; left out where it does not fit. */
+static int open_in_memory(stream *t, bench_report *r)
+{
+    char why[256] = "";
+    session other = *t->session;
+    t->in_memory = t->frame;
+    t->in_memory.reader = NULL;
+    int status = trip_budget_create(&t->whole, trip_memory_available_bytes() / 4 * 3);
+    if (status)
+        return status;
+    other.budget = t->whole;
+    bench_keep_report(why);
+    status = session_make_reader(&other, &t->in_memory.reader,
+                                 bench_planes(t->session, &t->options->settings), TRIP_ENGINE_NULL,
+                                 0, false);
+    bench_keep_report(NULL);
+    if (!status || trip_interrupted())
+        return status;
+    bench_report_limit(r, "Drawing alone is left out: %s", why);
+    t->in_memory.renderer = NULL;
+    return 0;
+}
+
+static int by_time(const void *a, const void *b)
+{
+    double x = ((const sample *)a)->ms, y = ((const sample *)b)->ms;
+    return (x > y) - (x < y);
+}
+
+/* The middle run. */
+static sample middle(const stream *t, int stage)
+{
+    sample *runs = &t->samples[stage * t->options->repeat];
+    qsort(runs, (size_t)t->options->repeat, sizeof *runs, by_time);
+    return runs[(t->options->repeat - 1) / 2];
+}
+
+static double gb_per_s(sample s)
+{
+    return s.ms > 0 ? s.bytes / gigabyte / (s.ms / second_ms) : 0;
+}
+
+static void add_stages(const stream *t, bench_report *r)
+{
+    static const char *const names[] = { "plain read", "read alone", "draw alone", "frame" };
+    static const char *const keys[] = { "plain", "read", "draw", "frame" };
+    cJSON *rows = bench_report_table(r, "stages", "One frame's parts alone and together",
+                                     stage_columns, sizeof stage_columns / sizeof stage_columns[0]);
+    for (int stage = 0; stage < STAGES; stage++) {
+        sample own = middle(t, stage), plain = middle(t, PLAIN);
+        const sample *runs = &t->samples[stage * t->options->repeat];
+        cJSON *row = cJSON_CreateObject();
+        cJSON_AddStringToObject(row, "key", keys[stage]);
+        cJSON_AddStringToObject(row, "stage", names[stage]);
+        if (stage != DRAW || t->in_memory.renderer) {
+            cJSON_AddNumberToObject(row, "ms", own.ms);
+            cJSON_AddNumberToObject(row, "ms_min", runs[0].ms);
+            cJSON_AddNumberToObject(row, "ms_max", runs[t->options->repeat - 1].ms);
+        }
+        if (stage != DRAW) {
+            cJSON_AddNumberToObject(row, "bytes_read", own.bytes);
+            cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(own));
+            cJSON_AddNumberToObject(row, "of_plain", gb_per_s(own) / gb_per_s(plain));
+        }
+        cJSON_AddItemToArray(rows, row);
+    }
+}
+
+static void add_summary(const stream *t, bench_report *r)
+{
+    cJSON *rows = bench_report_table(r, "summary", "The frame against its bounds", summary_columns,
+                                     sizeof summary_columns / sizeof summary_columns[0]);
+    cJSON *row = cJSON_CreateObject();
+    sample plain = middle(t, PLAIN), read = middle(t, READ), draw = middle(t, DRAW);
+    sample frame = middle(t, FRAME);
+    cJSON_AddNumberToObject(row, "dataset_bytes", (double)t->session->data->bytes);
+    cJSON_AddNumberToObject(row, "memory_limit_bytes",
+                            (double)trip_budget_limit_bytes(t->session->budget));
+    cJSON_AddNumberToObject(row, "memory_peak_bytes", (double)t->peak_bytes);
+    cJSON_AddNumberToObject(row, "peak_rss_bytes", (double)t->peak_rss_bytes);
+    cJSON_AddNumberToObject(row, "seconds_per_frame", frame.ms / second_ms);
+    cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(frame));
+    cJSON_AddNumberToObject(row, "disk_gb_per_s", gb_per_s(plain));
+    cJSON_AddNumberToObject(row, "frame_of_disk", gb_per_s(frame) / gb_per_s(plain));
+    cJSON_AddNumberToObject(row, "read_of_disk", gb_per_s(read) / gb_per_s(plain));
+    if (t->in_memory.renderer) {
+        cJSON_AddStringToObject(row, "bound", read.ms > draw.ms ? "read" : "draw");
+        cJSON_AddNumberToObject(row, "frame_of_bound", frame.ms / fmax(read.ms, draw.ms));
+    }
+    cJSON_AddItemToArray(rows, row);
+}
+
+static void describe(const stream *t, bench_report *r)
+{
+    cJSON *machine = bench_report_machine(r);
+    trip_renderer *renderer = t->frame.renderer;
+    cJSON_AddStringToObject(machine, "renderer", renderer->ops->name);
+    cJSON_AddStringToObject(machine, "device", renderer->ops->device(renderer));
+    cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(t->frame.reader));
+    cJSON_AddStringToObject(machine, "plain_read",
+                            t->direct ? "8 threads, blocks of 1 MiB, O_DIRECT"
+                                      : "8 threads, blocks of 1 MiB, through the page cache "
+                                        "(O_DIRECT refused), dropped before each run");
+    bench_report_limit(r, "Plain read: the plane files of the lists that the view needs, each from "
+                          "end to end. It neither checks nor draws. The machine under a virtual "
+                          "disk may hold the files in its own memory, for every stage alike.");
+    bench_report_limit(r, "Read alone: the frame's own plan, ring and checksums, with a renderer "
+                          "that takes batches and does nothing. Bricks that the plan leaves out "
+                          "are not read, so bytes may differ from the plain read's.");
+    bench_report_limit(r, "Draw alone: the same frame with the data set in memory (null engine), "
+                          "from memory besides the promise; its copying is part of it.");
+    bench_report_limit(r, "Memory: what was promised, what of it was taken and what was resident "
+                          "at most, code and libraries included, after one frame from disk.");
+    bench_report_limit(r, "Oblique perspective view that needs all three lists; stages take turns, "
+                          "and a figure is the middle run.");
+}
+
+static int measure(stream *t)
+{
+    int status = 0, repeat = t->options->repeat;
+    t->samples = calloc((size_t)(STAGES * repeat), sizeof *t->samples);
+    if (!t->samples)
+        return trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
+    for (int run = 0; run < repeat; run++)
+        for (int stage = 0; stage < STAGES && !status; stage++)
+            status = take(t, stage, &t->samples[stage * repeat + run]);
+    return status;
+}
+
+static void close_stream(stream *t)
+{
+    const int *size = t->options->sizes[0];
+    free(t->samples);
+    if (t->in_memory.reader)
+        trip_reader_destroy(t->in_memory.reader);
+    if (t->whole)
+        trip_budget_destroy(t->whole);
+    if (t->frame.reader)
+        trip_reader_destroy(t->frame.reader);
+    bench_renderer_destroy(t->frame.renderer);
+    session_release_image(t->session, size[0], size[1], t->frame.rgba);
+}
+
+int bench_stream(const session *s, const bench_options *o, bench_report *r)
+{
+    stream t = { .session = s, .options = o };
+    int status = open_frame(&t);
+    if (!status)
+        status = open_in_memory(&t, r);
+    if (!status)
+        status = measure(&t);
+    if (!status) {
+        describe(&t, r);
+        add_summary(&t, r);
+        add_stages(&t, r);
+    }
+    close_stream(&t);
+    return status;
+}

@@ -1,0 +1,12 @@
+/* The tables of `triptych bench`, a file each: bench_NAME.c. Each measures and fills the report. */
+#ifndef TRIP_BENCH_TABLES_H
+#define TRIP_BENCH_TABLES_H
+
+#include "bench_frame.h"
+
+int bench_orders(const session *s, const bench_options *o, bench_report *r);
+int bench_submit(const session *s, const bench_options *o, bench_report *r);
+int bench_stream(const session *s, const bench_options *o, bench_report *r);
+int bench_renderers(const session *s, const bench_options *o, bench_report *r);
+
+#endif

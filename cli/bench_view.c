@@ -1,0 +1,83 @@
+#include "bench_view.h"
+
+#include "render_view.h"
+
+static const double fov_degrees = 30, fill = 0.95, degree = 3.14159265358979323846 / 180;
+
+/* The box of all splats, kernels included, in world space, and a view's basis. */
+typedef struct framing {
+    trip_vec3 corners[8], middle;
+    trip_vec3 right, up, gaze; /* unit length */
+} framing;
+
+static void frame_box(framing *f, const session *s)
+{
+    trip_camera_framing box = { 0 };
+    trip_dataset_text_frame(s->text, s->data, &box);
+    const double *lo = box.lo, *hi = box.hi;
+    for (int i = 0; i < 8; i++)
+        f->corners[i] = trip_affine_point(
+            &s->data->index_to_world,
+            trip_v3(i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2]));
+    f->middle = trip_scale(trip_add(f->corners[0], f->corners[7]), 0.5);
+}
+
+/* Directions of the index space, taken to the world. */
+static framing make_framing(const session *s, trip_vec3 gaze, trip_vec3 up)
+{
+    framing f;
+    frame_box(&f, s);
+    f.gaze = trip_normalize(trip_affine_vector(&s->data->index_to_world, gaze));
+    f.right = trip_normalize(trip_cross(f.gaze, trip_affine_vector(&s->data->index_to_world, up)));
+    f.up = trip_cross(f.right, f.gaze);
+    return f;
+}
+
+static trip_camera_params params(const framing *f, const int size[2], double distance)
+{
+    return (trip_camera_params){
+        .eye = trip_sub(f->middle, trip_scale(f->gaze, distance)),
+        .look = f->middle,
+        .up = f->up,
+        .width = size[0],
+        .height = size[1],
+    };
+}
+
+trip_camera_params bench_view_oblique(const session *s, const int size[2])
+{
+    framing f = make_framing(s, trip_v3(-1, -1, -1), trip_v3(0, 0, 1));
+    double slope_y = fill * tan(fov_degrees * degree / 2), distance = 0;
+    double slope_x = slope_y * size[0] / size[1];
+    for (int i = 0; i < 8; i++) {
+        trip_vec3 corner = trip_sub(f.corners[i], f.middle);
+        double needed =
+            fmax(fabs(trip_dot(corner, f.right)) / slope_x, fabs(trip_dot(corner, f.up)) / slope_y);
+        distance = fmax(distance, needed - trip_dot(corner, f.gaze));
+    }
+    trip_camera_params view = params(&f, size, distance);
+    view.fov_degrees = fov_degrees;
+    return view;
+}
+
+trip_camera_params bench_view_lateral(const session *s, const int size[2])
+{
+    framing f = make_framing(s, trip_v3(0, 0, -1), trip_v3(0, 1, 0));
+    double height = 0, distance = 0;
+    for (int i = 0; i < 8; i++) {
+        trip_vec3 corner = trip_sub(f.corners[i], f.middle);
+        double needed =
+            fmax(fabs(trip_dot(corner, f.right)) * size[1] / size[0], fabs(trip_dot(corner, f.up)));
+        height = fmax(height, 2 * needed / fill);
+        distance = fmax(distance, 2 * trip_length(corner));
+    }
+    trip_camera_params view = params(&f, size, distance);
+    view.ortho_height = height;
+    return view;
+}
+
+trip_camera_params bench_view_round(const session *s, const int size[2], int index, int count)
+{
+    const render_options o = { .width = size[0], .height = size[1], .orbit = count };
+    return render_view(&o, s->data, s->text, index);
+}

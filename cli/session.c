@@ -1,0 +1,108 @@
+#include "session.h"
+
+#include "report.h"
+
+static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
+
+static void warn_of_culled_values(const session *s, const trip_tf *tf)
+{
+    double range[2], voxels = trip_dataset_text_culled(s->text, tf, range);
+    if (voxels >= 1)
+        trip_warn(s->input,
+                  "the transfer function shows about %.0f voxels with values from %g to %g that "
+                  "were left out when the data set was made; brick it again for this function",
+                  voxels, range[0], range[1]);
+}
+
+static int load_transfer_function(session *s, const char *name)
+{
+    const trip_file_header *h = &s->data->header;
+    trip_tf *tf = NULL;
+    int status = name ? trip_tf_load(&tf, name) : trip_dataset_text_tf(s->text, s->data, &tf);
+    if (status)
+        return status;
+    trip_tf_denormalise(tf, h->value_min, h->value_max);
+    warn_of_culled_values(s, tf);
+    double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
+    trip_tf_destroy(tf);
+    return 0;
+}
+
+static int take_table(session *s)
+{
+    s->table = trip_budget_take(s->budget, table_bytes);
+    if (s->table)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", s->input,
+                     "the transfer function's table does not fit the memory given; raise --memory");
+}
+
+int session_open(session *s, const char *input, const char *tf, uint64_t memory_bytes)
+{
+    *s = (session){ .input = input };
+    int status = trip_budget_create(&s->budget, memory_bytes);
+    if (!status)
+        status = trip_dataset_open(&s->data, input, s->budget);
+    if (!status)
+        status = trip_dataset_text_parse(&s->text, s->data);
+    if (!status)
+        status = take_table(s);
+    if (!status)
+        status = load_transfer_function(s, tf);
+    return status;
+}
+
+void session_close(session *s)
+{
+    if (s->table)
+        trip_budget_release(s->budget, s->table, table_bytes);
+    trip_dataset_text_destroy(s->text);
+    if (s->data)
+        trip_dataset_close(s->data);
+    if (s->budget)
+        trip_budget_destroy(s->budget);
+    *s = (session){ 0 };
+}
+
+int session_make_reader(const session *s, trip_reader **out, unsigned planes, trip_engine engine,
+                        int threads, bool cache)
+{
+    enum { SLOTS = 8, MAX_SLOT_BYTES = 1 << 20 };
+    uint64_t left = trip_budget_left_bytes(s->budget);
+    size_t page = (size_t)1 << s->data->header.page_log2;
+    size_t plane_count = planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
+    size_t slot = (size_t)(left / 4) / (SLOTS * plane_count) / page * page;
+    slot = slot < page ? page : slot;
+    trip_reader_params params = {
+        .engine = engine,
+        .planes = planes,
+        .slots = SLOTS,
+        .slot_bytes = slot < MAX_SLOT_BYTES || page > MAX_SLOT_BYTES ? slot : MAX_SLOT_BYTES,
+        .threads = (unsigned)threads,
+        .cache_bytes = cache ? (size_t)(left / 2) : 0,
+    };
+    return trip_reader_create(out, s->data, &params, s->budget);
+}
+
+static size_t image_bytes(int width, int height)
+{
+    return (size_t)width * (size_t)height * 4 * sizeof(float);
+}
+
+int session_take_image(const session *s, int width, int height, float **rgba)
+{
+    *rgba = trip_budget_take(s->budget, image_bytes(width, height));
+    if (*rgba)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", s->input,
+                     "an image of %d x %d does not fit the memory given; raise --memory or make "
+                     "it smaller",
+                     width, height);
+}
+
+void session_release_image(const session *s, int width, int height, float *rgba)
+{
+    if (rgba)
+        trip_budget_release(s->budget, rgba, image_bytes(width, height));
+}

@@ -1,0 +1,33 @@
+/* What the commands that draw have in common: the budget, an opened data set, its transfer function
+ * as a table, and readers whose rings fit the memory given. One thread. */
+#ifndef TRIP_CLI_SESSION_H
+#define TRIP_CLI_SESSION_H
+
+#include "dataset_text.h"
+#include "plan.h"
+#include "reader.h"
+#include "transfer_function.h"
+
+typedef struct session {
+    const char *input;
+    trip_budget *budget;
+    trip_dataset *data;
+    trip_dataset_text *text;
+    trip_tf_entry *table; /* 65536 entries */
+} session;
+
+/* `tf` is a file or preset, NULL: the function kept in the data set. Warns when the function shows
+ * values that were left out when the data set was made. Close it also after a failure. */
+int session_open(session *s, const char *input, const char *tf, uint64_t memory_bytes);
+void session_close(session *s);
+
+/* A reader of `planes` (bit per trip_plane): its ring takes at most a quarter of the memory that is
+ * left, its cache, where wanted, half. `threads` 0: the default. */
+int session_make_reader(const session *s, trip_reader **out, unsigned planes, trip_engine engine,
+                        int threads, bool cache);
+
+/* width * height * 4 floats; release with session_release_image(). */
+int session_take_image(const session *s, int width, int height, float **rgba);
+void session_release_image(const session *s, int width, int height, float *rgba);
+
+#endif
