@@ -10,68 +10,59 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-static int fail_write(const trip_output *o, uint64_t offset)
+static int fail_write(const trip_output *o, uint64_t offset, int error)
 {
-    if (errno == ENOSPC || errno == EDQUOT)
+    if (error == ENOSPC || error == EDQUOT)
         return trip_fail(TRIP_ERROR, "write", o->path,
                          "no space left on the disk after %llu bytes: free some or write elsewhere",
                          (unsigned long long)offset);
+    errno = error;
     return trip_fail_errno("write", o->path, "cannot write");
 }
 
-static int write_all(trip_output *o, uint64_t offset, const void *data, size_t bytes)
+static size_t memory_bytes(const trip_output *o)
 {
-    const unsigned char *p = data;
-    while (bytes > 0) {
-        ssize_t n = pwrite(o->fd, p, bytes, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n == 0)
-            errno = ENOSPC;
-        if (n <= 0)
-            return fail_write(o, offset);
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
-    return TRIP_OK;
+    return o->flusher ? 2 * o->buffer_bytes : o->buffer_bytes;
 }
 
-static int allocate(trip_output *o, const char *folder, const char *name, size_t buffer_bytes,
-                    uint64_t skip_bytes, trip_budget *budget)
+static unsigned char *filling(const trip_output *o)
 {
-    *o = (trip_output){ .fd = -1, .budget = budget, .bytes = skip_bytes };
-    if (asprintf(&o->path, "%s/%s", folder, name) < 0) {
+    return o->buffer + o->filling * o->buffer_bytes;
+}
+
+static int open_file(trip_output *o, const trip_output_params *p)
+{
+    if (asprintf(&o->path, "%s/%s", p->folder, p->name) < 0) {
         o->path = NULL;
-        return trip_fail(TRIP_ERROR, "write", name, "out of memory");
+        return trip_fail(TRIP_ERROR, "write", p->name, "out of memory");
     }
-    o->buffer = trip_budget_take(budget, buffer_bytes);
-    o->buffer_bytes = buffer_bytes;
+    o->buffer = trip_budget_take(o->budget, memory_bytes(o));
     if (!o->buffer)
         return trip_fail(TRIP_ERROR, "write", o->path,
                          "no memory for a buffer of %zu bytes: give more with --memory",
-                         buffer_bytes);
+                         memory_bytes(o));
     o->fd = open(o->path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    return o->fd < 0 ? trip_fail_errno("write", o->path, "cannot create") : TRIP_OK;
+    if (o->fd < 0)
+        return trip_fail_errno("write", o->path, "cannot create");
+    if (p->unnamed && unlink(o->path) < 0)
+        return trip_fail_errno("write", o->path, "cannot unlink");
+    if (o->flusher)
+        fcntl(o->fd, F_SETFL, O_DIRECT); /* where refused, through the page cache */
+    return TRIP_OK;
 }
 
-int trip_output_create(trip_output *o, const char *folder, const char *name, size_t buffer_bytes,
-                       uint64_t skip_bytes, trip_budget *budget)
+int trip_output_create(trip_output *o, const trip_output_params *params, trip_budget *budget)
 {
-    int status = allocate(o, folder, name, buffer_bytes, skip_bytes, budget);
+    *o = (trip_output){ .fd = -1,
+                        .budget = budget,
+                        .buffer_bytes = params->buffer_bytes,
+                        .flusher = params->flusher,
+                        .bytes = params->skip_bytes,
+                        .page_bytes = params->page_bytes,
+                        .checksums = params->checksums };
+    int status = open_file(o, params);
     if (status < 0)
         trip_output_close(o);
-    return status;
-}
-
-int trip_output_create_unnamed(trip_output *o, const char *folder, const char *name,
-                               size_t buffer_bytes, trip_budget *budget)
-{
-    int status = trip_output_create(o, folder, name, buffer_bytes, 0, budget);
-    if (status == TRIP_OK && unlink(o->path) < 0) {
-        status = trip_fail_errno("write", o->path, "cannot unlink");
-        trip_output_close(o);
-    }
     return status;
 }
 
@@ -80,7 +71,7 @@ static int append_checksums(trip_output *o)
 {
     for (size_t at = 0; at < o->used_bytes; at += o->page_bytes) {
         size_t left = o->used_bytes - at;
-        uint64_t sum = XXH64(o->buffer + at, left < o->page_bytes ? left : o->page_bytes, 0);
+        uint64_t sum = XXH64(filling(o) + at, left < o->page_bytes ? left : o->page_bytes, 0);
         int status = trip_output_append(o->checksums, &sum, sizeof sum);
         if (status < 0)
             return status;
@@ -88,17 +79,44 @@ static int append_checksums(trip_output *o)
     return TRIP_OK;
 }
 
+/* Waits for the buffer that is being written. */
+static int wait_written(trip_output *o)
+{
+    int error = o->flusher ? trip_flusher_wait(o->flusher, &o->job) : 0;
+    return error ? fail_write(o, o->job.offset, error) : TRIP_OK;
+}
+
+/* A full buffer goes to the flusher, and the other is filled next. */
+static int send_buffer(trip_output *o)
+{
+    int status = o->page_bytes ? append_checksums(o) : TRIP_OK;
+    if (status == TRIP_OK)
+        status = wait_written(o);
+    if (status < 0)
+        return status;
+    o->job = (trip_flush_job){
+        .fd = o->fd, .data = filling(o), .bytes = o->used_bytes, .offset = o->bytes - o->used_bytes
+    };
+    trip_flusher_submit(o->flusher, &o->job);
+    o->filling ^= 1;
+    o->used_bytes = 0;
+    return TRIP_OK;
+}
+
+/* What is left need not be whole blocks, so it goes through the page cache. */
 int trip_output_flush(trip_output *o)
 {
     uint64_t offset = o->bytes - o->used_bytes;
     int status = o->page_bytes ? append_checksums(o) : TRIP_OK;
     if (status == TRIP_OK)
-        status = write_all(o, offset, o->buffer, o->used_bytes);
+        status = wait_written(o);
     if (status < 0)
         return status;
-    /* Starts the disk now, so that the last sync is short and dirty pages do not pile up. Advice:
-     * a file system that does not know it does no harm. */
-    sync_file_range(o->fd, (off_t)offset, (off_t)o->used_bytes, SYNC_FILE_RANGE_WRITE);
+    if (o->flusher)
+        fcntl(o->fd, F_SETFL, 0);
+    int error = trip_flusher_write(o->fd, filling(o), o->used_bytes, offset);
+    if (error)
+        return fail_write(o, offset, error);
     o->used_bytes = 0;
     return TRIP_OK;
 }
@@ -109,12 +127,14 @@ int trip_output_append(trip_output *o, const void *data, size_t bytes)
     while (bytes > 0) {
         size_t room = o->buffer_bytes - o->used_bytes;
         size_t n = bytes < room ? bytes : room;
-        memcpy(o->buffer + o->used_bytes, p, n);
+        memcpy(filling(o) + o->used_bytes, p, n);
         o->used_bytes += n;
         o->bytes += n;
         p += n;
         bytes -= n;
-        int status = o->used_bytes == o->buffer_bytes ? trip_output_flush(o) : TRIP_OK;
+        int status = TRIP_OK;
+        if (o->used_bytes == o->buffer_bytes)
+            status = o->flusher ? send_buffer(o) : trip_output_flush(o);
         if (status < 0)
             return status;
     }
@@ -161,24 +181,26 @@ int trip_output_align(trip_output *o, size_t alignment)
 
 int trip_output_patch(trip_output *o, uint64_t offset, const void *data, size_t bytes)
 {
-    return write_all(o, offset, data, bytes);
+    int error = trip_flusher_write(o->fd, data, bytes, offset);
+    return error ? fail_write(o, offset, error) : TRIP_OK;
 }
 
 int trip_output_sync(trip_output *o)
 {
     int status = trip_output_flush(o);
     if (status == TRIP_OK && fsync(o->fd) < 0)
-        status = errno == ENOSPC || errno == EDQUOT ? fail_write(o, o->bytes)
-                                                    : trip_fail_errno("write", o->path, "sync");
+        return fail_write(o, o->bytes, errno);
     return status;
 }
 
 void trip_output_close(trip_output *o)
 {
+    if (o->flusher && o->fd >= 0)
+        trip_flusher_wait(o->flusher, &o->job);
     if (o->path && o->fd >= 0)
         close(o->fd);
     if (o->budget)
-        trip_budget_release(o->budget, o->buffer, o->buffer_bytes);
+        trip_budget_release(o->budget, o->buffer, memory_bytes(o));
     free(o->path);
     *o = (trip_output){ .fd = -1 };
 }

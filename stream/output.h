@@ -3,32 +3,39 @@
 #ifndef TRIP_OUTPUT_H
 #define TRIP_OUTPUT_H
 
-#include <stddef.h>
-#include <stdint.h>
-
 #include "budget.h"
+#include "flusher.h"
 
 typedef struct trip_output {
     int fd; /* -1 when closed */
     char *path;
     trip_budget *budget;
-    unsigned char *buffer;
+    unsigned char *buffer; /* with a flusher, two of buffer_bytes: one is filled, one written */
     size_t buffer_bytes, used_bytes;
+    unsigned filling; /* which of the two */
+    trip_flusher *flusher;
+    trip_flush_job job;
     uint64_t bytes;                /* appended so far */
     size_t page_bytes;             /* divides buffer_bytes; 0: no checksums */
     struct trip_output *checksums; /* gets the XXH64 of every page */
 } trip_output;
 
-/* Creates FOLDER/NAME; `skip_bytes` are left out at its start, for trip_output_patch(). */
-int trip_output_create(trip_output *o, const char *folder, const char *name, size_t buffer_bytes,
-                       uint64_t skip_bytes, trip_budget *budget);
-/* The same without a name: it is gone when closed, whatever happens. */
-int trip_output_create_unnamed(trip_output *o, const char *folder, const char *name,
-                               size_t buffer_bytes, trip_budget *budget);
+/* Zero means none. */
+typedef struct trip_output_params {
+    const char *folder, *name;
+    size_t buffer_bytes;   /* a multiple of 4096 */
+    uint64_t skip_bytes;   /* left out at the start, for trip_output_patch() */
+    trip_flusher *flusher; /* full buffers are written by it, past the page cache where possible */
+    size_t page_bytes;
+    trip_output *checksums;
+    bool unnamed; /* the file is gone when closed, whatever happens */
+} trip_output_params;
+
+int trip_output_create(trip_output *o, const trip_output_params *params, trip_budget *budget);
 int trip_output_append(trip_output *o, const void *data, size_t bytes);
 /* Appends all of `from`, which is flushed and stays as it is. */
 int trip_output_append_output(trip_output *o, trip_output *from);
-/* Zeros up to the next multiple of `alignment` bytes. */
+/* Zeros up to the next multiple of `alignment` bytes, at most 64. */
 int trip_output_align(trip_output *o, size_t alignment);
 /* Writes what is buffered; a short last page gets its checksum now, so nothing may follow it. */
 int trip_output_flush(trip_output *o);

@@ -7,6 +7,7 @@
 #include "slab.h"
 
 #include <assert.h>
+#include <errno.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,6 +34,7 @@ struct trip_writer {
     trip_writer_params params;
     trip_budget *budget;
     trip_folder folder;
+    trip_flusher *flusher;
     trip_file_header header;
     unsigned planes;
     list_writer lists[3];
@@ -104,23 +106,36 @@ static void fill_header(trip_writer *w)
 
 static int open_spool(trip_writer *w, trip_output *o, const char *name)
 {
-    return trip_output_create_unnamed(o, w->folder.partial, name, SPOOL_BUFFER_BYTES, w->budget);
+    return trip_output_create(o,
+                              &(trip_output_params){ .folder = w->folder.partial,
+                                                     .name = name,
+                                                     .buffer_bytes = SPOOL_BUFFER_BYTES,
+                                                     .unnamed = true },
+                              w->budget);
+}
+
+static size_t larger(size_t a, size_t b)
+{
+    return a > b ? a : b;
 }
 
 static int open_plane(trip_writer *w, int axis, int plane)
 {
     char name[32];
     list_writer *l = &w->lists[axis];
-    trip_output *o = &l->planes[plane];
     size_t page = w->params.page_bytes;
     int status = open_spool(w, &l->checksums[plane], "checksums");
-    if (status == TRIP_OK)
-        status =
-            trip_output_create(o, w->folder.partial, trip_dataset_plane_name(axis, plane, name),
-                               page > PLANE_BUFFER_BYTES ? page : PLANE_BUFFER_BYTES, 0, w->budget);
-    o->page_bytes = page;
-    o->checksums = &l->checksums[plane];
-    return status;
+    if (status < 0)
+        return status;
+    return trip_output_create(
+        &l->planes[plane],
+        &(trip_output_params){ .folder = w->folder.partial,
+                               .name = trip_dataset_plane_name(axis, plane, name),
+                               .buffer_bytes = larger(page, PLANE_BUFFER_BYTES),
+                               .flusher = w->flusher,
+                               .page_bytes = page,
+                               .checksums = &l->checksums[plane] },
+        w->budget);
 }
 
 static int open_list(trip_writer *w, int axis)
@@ -155,6 +170,8 @@ int trip_writer_open(trip_writer **out, const char *path, const trip_writer_para
     int status = check_params(&w->params, path);
     if (status == TRIP_OK)
         status = trip_folder_begin(&w->folder, path, params->replace);
+    if (status == TRIP_OK && (errno = trip_flusher_create(&w->flusher)))
+        status = trip_fail_errno("write", path, "cannot start threads");
     for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
         status = open_list(w, axis);
     if (status < 0) {
@@ -376,11 +393,15 @@ static int write_index(trip_writer *w, const char *text)
     size_t page = w->params.page_bytes;
     int status = open_spool(w, &checksums, "checksums");
     if (status == TRIP_OK)
-        status = trip_output_create(&index, w->folder.partial, TRIP_INDEX_NAME,
-                                    page > SPOOL_BUFFER_BYTES ? page : SPOOL_BUFFER_BYTES,
-                                    TRIP_HEADER_BYTES, w->budget);
-    index.page_bytes = page;
-    index.checksums = &checksums;
+        status = trip_output_create(
+            &index,
+            &(trip_output_params){ .folder = w->folder.partial,
+                                   .name = TRIP_INDEX_NAME,
+                                   .buffer_bytes = larger(page, SPOOL_BUFFER_BYTES),
+                                   .skip_bytes = TRIP_HEADER_BYTES,
+                                   .page_bytes = page,
+                                   .checksums = &checksums },
+            w->budget);
     if (status == TRIP_OK)
         status = append_tables(w, &index, text);
     if (status == TRIP_OK)
@@ -427,6 +448,7 @@ void trip_writer_abort(trip_writer *w)
         return;
     for (int axis = 0; axis < 3; axis++)
         close_list(&w->lists[axis]);
+    trip_flusher_destroy(w->flusher);
     trip_folder_close(&w->folder);
     free(w);
 }
