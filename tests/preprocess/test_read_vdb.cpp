@@ -1,0 +1,634 @@
+#include "volume_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <unistd.h>
+
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+extern "C" {
+#include <cmocka.h>
+}
+
+#include "report.h"
+
+namespace
+{
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+
+int lines;
+std::string last_line;
+
+void keep_line(const char *line, void *)
+{
+    lines++;
+    last_line = line;
+}
+
+/* Reports are kept from here on instead of printed. */
+void expect_line()
+{
+    lines = 0;
+    last_line.clear();
+    trip_report_redirect(keep_line, nullptr);
+}
+
+void assert_one_line(const char *part)
+{
+    trip_report_redirect(nullptr, nullptr);
+    assert_int_equal(lines, 1);
+    if (last_line.find(part) == std::string::npos)
+        fail_msg("\"%s\" is not in: %s", part, last_line.c_str());
+}
+
+/* A file that goes with the object. */
+struct File {
+    File() : path("test_read_vdb-" + std::to_string(getpid()) + ".vdb")
+    {
+    }
+    explicit File(const openvdb::GridCPtrVec &grids) : File()
+    {
+        openvdb::io::File(path).write(grids);
+    }
+    ~File()
+    {
+        ::unlink(path.c_str());
+    }
+    std::string bytes() const
+    {
+        std::ifstream in(path, std::ios::binary);
+        return { std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>() };
+    }
+    void put(const std::string &bytes) const
+    {
+        std::ofstream(path, std::ios::binary) << bytes;
+    }
+    std::string path;
+};
+
+/* A volume opened through the reader, with a budget of its own. */
+struct Volume {
+    explicit Volume(const File &file, const trip_volume_params &params = {},
+                    uint64_t memory = 1 << 28)
+    {
+        assert_int_equal(trip_budget_create(&budget, memory), 0);
+        status = trip_read_vdb.open(file.path.c_str(), &params, budget, &info, &state);
+    }
+    Volume(const Volume &) = delete;
+    ~Volume()
+    {
+        if (state)
+            trip_read_vdb.close(state);
+        trip_budget_destroy(budget);
+    }
+    std::vector<trip_block> blocks() const
+    {
+        std::vector<trip_block> all;
+        trip_block block;
+        trip_read_vdb.rewind(state);
+        while (trip_read_vdb.next(state, &block) == 1)
+            all.push_back(block);
+        return all;
+    }
+    trip_budget *budget = nullptr;
+    trip_volume_info info = {};
+    void *state = nullptr;
+    int status;
+};
+
+/* A block with one voxel around it. */
+struct Decoded {
+    Decoded(const Volume &v, const trip_block &block)
+    {
+        for (int a = 0; a < 3; a++) {
+            lo[a] = block.origin[a] - 1;
+            size[a] = block.size[a] + 2;
+        }
+        values.resize((size_t)(size[0] * size[1] * size[2]));
+        active.resize(values.size());
+        status = trip_read_vdb.decode(v.state, &block, lo, size, values.data(), active.data());
+    }
+    int64_t lo[3], size[3];
+    std::vector<float> values;
+    std::vector<uint8_t> active;
+    int status;
+};
+
+using Expected = std::function<void(const Coord &at, float &value, bool &active)>;
+
+/* Every voxel of every block and of its border is as expected at its coordinates, which are those
+ * of the volume's first voxel plus `first`. Returns how many voxels exist; none may be in two
+ * blocks, and blocks come in order. */
+size_t check_voxels(const Volume &v, const Coord &first, const Expected &expected)
+{
+    size_t existing = 0;
+    Coord before = Coord::min();
+    for (const trip_block &block : v.blocks()) {
+        Decoded d(v, block);
+        assert_int_equal(d.status, 0);
+        Coord order((int)block.origin[2], (int)block.origin[1], (int)block.origin[0]);
+        assert_true(before < order);
+        before = order;
+        for (size_t n = 0; n < d.values.size(); n++) {
+            int64_t i = (int64_t)n % d.size[0], j = (int64_t)n / d.size[0] % d.size[1],
+                    k = (int64_t)n / d.size[0] / d.size[1];
+            Coord at = first + Coord((int)(d.lo[0] + i), (int)(d.lo[1] + j), (int)(d.lo[2] + k));
+            float value = 0;
+            bool active = false;
+            expected(at, value, active);
+            if (d.values[n] != value || d.active[n] != active)
+                fail_msg("at %d %d %d: %g %d, expected %g %d", at.x(), at.y(), at.z(),
+                         (double)d.values[n], d.active[n], (double)value, active);
+            bool border = i == 0 || j == 0 || k == 0 || i == d.size[0] - 1 || j == d.size[1] - 1 ||
+                          k == d.size[2] - 1;
+            existing += !border && active;
+        }
+    }
+    return existing;
+}
+
+/* As the library itself sees the grid; inactive voxels hold the background. */
+template <typename GridT> Expected as_in(const GridT &grid)
+{
+    return [&grid](const Coord &at, float &value, bool &active) {
+        active = grid.tree().isValueOn(at);
+        value = (float)(active ? grid.tree().getValue(at) : grid.background());
+    };
+}
+
+/* Voxels in several leaves and nodes, also at negative coordinates, and a leaf-sized tile. */
+template <typename GridT> void fill_scattered(GridT &grid)
+{
+    std::mt19937 random(7);
+    for (int n = 0; n < 3000; n++) {
+        Coord at((int)(random() % 150) - 70, (int)(random() % 90) - 20, (int)(random() % 40) - 130);
+        grid.tree().setValueOn(at, typename GridT::ValueType(random() % 1000 - 300.0));
+    }
+    grid.tree().addTile(1, Coord(8, 16, -120), typename GridT::ValueType(5), true);
+}
+
+template <typename GridT> void check_type(trip_scalar type, bool half_stored = false)
+{
+    openvdb::initialize();
+    typename GridT::Ptr grid = GridT::create(typename GridT::ValueType(2));
+    grid->setName("g");
+    grid->setSaveFloatAsHalf(half_stored);
+    fill_scattered(*grid);
+    File file({ grid });
+    Volume v(file);
+    assert_int_equal(v.status, 0);
+    assert_int_equal(v.info.type, type);
+    assert_true(v.info.sparse);
+    assert_string_equal(v.info.name, "g");
+    assert_true(v.info.background == (double)grid->background());
+    CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    for (int a = 0; a < 3; a++)
+        assert_int_equal(v.info.dims[a], box.dim()[a]);
+    /* All values used here are exact as half floats. */
+    assert_int_equal(check_voxels(v, box.min(), as_in(*grid)), grid->activeVoxelCount());
+}
+
+void float_grids_are_read(void **)
+{
+    check_type<openvdb::FloatGrid>(TRIP_F32);
+}
+
+void double_grids_are_read(void **)
+{
+    check_type<openvdb::DoubleGrid>(TRIP_F64);
+}
+
+void floats_stored_as_half_are_read(void **)
+{
+    check_type<openvdb::FloatGrid>(TRIP_F16, true);
+    check_type<openvdb::DoubleGrid>(TRIP_F16, true);
+}
+
+void integer_grids_are_read(void **)
+{
+    check_type<openvdb::Int32Grid>(TRIP_I32);
+    check_type<openvdb::Int64Grid>(TRIP_I64);
+}
+
+void bool_grids_are_read(void **)
+{
+    openvdb::initialize();
+    openvdb::BoolGrid::Ptr grid = openvdb::BoolGrid::create(false);
+    std::mt19937 random(3);
+    for (int n = 0; n < 2000; n++)
+        grid->tree().setValueOn(
+            Coord((int)(random() % 30), (int)(random() % 20), -(int)(random() % 9)), random() % 2);
+    File file({ grid });
+    Volume v(file);
+    assert_int_equal(v.status, 0);
+    assert_int_equal(v.info.type, TRIP_U8);
+    Coord first = grid->evalActiveVoxelBoundingBox().min();
+    assert_int_equal(check_voxels(v, first, as_in(*grid)), grid->activeVoxelCount());
+}
+
+void mask_grids_are_one_where_active(void **)
+{
+    openvdb::initialize();
+    openvdb::MaskGrid::Ptr grid = openvdb::MaskGrid::create();
+    for (int n = 0; n < 500; n++)
+        grid->tree().setValueOn(Coord(n * 7 % 31, n * 5 % 17, n % 23));
+    grid->tree().addTile(1, Coord(64, 0, 0), true, true);
+    File file({ grid });
+    Volume v(file);
+    assert_int_equal(v.status, 0);
+    Coord first = grid->evalActiveVoxelBoundingBox().min();
+    size_t count = check_voxels(v, first, [&](const Coord &at, float &value, bool &active) {
+        active = grid->tree().isValueOn(at);
+        value = active;
+    });
+    assert_int_equal(count, grid->activeVoxelCount());
+}
+
+void every_compression_is_read(void **)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(1);
+    fill_scattered(*grid);
+    Coord first = grid->evalActiveVoxelBoundingBox().min();
+    namespace io = openvdb::io;
+    for (uint32_t flags : { (uint32_t)io::COMPRESS_NONE, (uint32_t)io::COMPRESS_ZIP,
+                            (uint32_t)io::COMPRESS_BLOSC, (uint32_t)io::COMPRESS_ACTIVE_MASK,
+                            (uint32_t)(io::COMPRESS_ZIP | io::COMPRESS_ACTIVE_MASK) }) {
+        File file;
+        io::File out(file.path);
+        out.setCompression(flags);
+        out.write({ grid });
+        out.close();
+        Volume v(file);
+        assert_int_equal(v.status, 0);
+        assert_int_equal(check_voxels(v, first, as_in(*grid)), grid->activeVoxelCount());
+    }
+}
+
+/* Tiles of 8, 128 and 4096 voxels a side: counted and looked at in a few blocks, not all of the
+ * 4096-voxel one. */
+void active_tiles_of_any_level_become_boxes(void **)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+    grid->tree().addTile(1, Coord(-8, 0, 0), 1, true);
+    grid->tree().addTile(2, Coord(128, 0, 0), 2, true);
+    grid->tree().addTile(3, Coord(4096, 0, 0), 3, true);
+    File file({ grid });
+    Volume v(file);
+    assert_int_equal(v.status, 0);
+    assert_int_equal(v.info.dims[0], 8 + 8192);
+    std::vector<trip_block> blocks = v.blocks();
+    uint64_t voxels = 0;
+    for (const trip_block &b : blocks) {
+        assert_true(b.size[0] <= 64 && b.size[1] <= 64 && b.size[2] <= 64);
+        voxels += (uint64_t)(b.size[0] * b.size[1] * b.size[2]);
+    }
+    assert_true(voxels == 512 + (uint64_t)128 * 128 * 128 + (uint64_t)4096 * 4096 * 4096);
+    for (size_t n = 0; n < blocks.size(); n += 20000) {
+        Decoded d(v, blocks[n]);
+        float expected = blocks[n].origin[0] < 8 ? 1 : blocks[n].origin[0] < 4104 ? 2 : 3;
+        size_t inside = (size_t)((d.size[1] + 1) * d.size[0] + 1);
+        assert_true(d.values[inside] == expected && d.active[inside] == 1);
+    }
+}
+
+/* The first voxel of the volume is at (0, 0, 0), wherever the file has it. */
+void rotation_shear_and_offset_reach_world_space(void **)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+    grid->tree().setValueOn(Coord(-5, 7, 11), 1);
+    grid->tree().setValueOn(Coord(20, 9, 40), 1);
+    openvdb::Mat4R m = openvdb::Mat4R::identity();
+    m.setToRotation(openvdb::math::X_AXIS, 0.3);
+    m.postShear(openvdb::math::Y_AXIS, openvdb::math::X_AXIS, 0.4);
+    m.postScale(openvdb::Vec3d(0.5, 2, 1.25));
+    m.postTranslate(openvdb::Vec3d(10, -20, 30));
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(m));
+    File file({ grid });
+    Volume v(file);
+    assert_int_equal(v.status, 0);
+    for (Coord c : { Coord(-5, 7, 11), Coord(20, 9, 40), Coord(0, 0, 0) }) {
+        openvdb::Vec3d world = grid->indexToWorld(c);
+        trip_vec3 p =
+            trip_affine_point(&v.info.index_to_world, trip_v3(c.x() + 5, c.y() - 7, c.z() - 11));
+        assert_true(std::fabs(p.x - world.x()) < 1e-9 && std::fabs(p.y - world.y()) < 1e-9 &&
+                    std::fabs(p.z - world.z()) < 1e-9);
+    }
+}
+
+openvdb::FloatGrid::Ptr one_voxel(const char *name, float value)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+    grid->setName(name);
+    grid->tree().setValueOn(Coord(0, 0, 0), value);
+    return grid;
+}
+
+float only_value(const Volume &v)
+{
+    Decoded d(v, v.blocks().at(0));
+    return *std::max_element(d.values.begin(), d.values.end());
+}
+
+void a_grid_is_chosen_by_name_or_is_the_first_scalar_one(void **)
+{
+    openvdb::initialize();
+    openvdb::Vec3SGrid::Ptr vectors = openvdb::Vec3SGrid::create();
+    vectors->setName("v");
+    vectors->tree().setValueOn(Coord(0, 0, 0), openvdb::Vec3f(1, 2, 3));
+    File file({ vectors, one_voxel("a", 1), one_voxel("b", 2), one_voxel("a", 3) });
+    trip_volume_params params = {};
+    assert_true(only_value(Volume(file)) == 1);
+    params.grid = "b";
+    assert_true(only_value(Volume(file, params)) == 2);
+    params.grid = "a[1]";
+    assert_true(only_value(Volume(file, params)) == 3);
+    params.grid = "c";
+    expect_line();
+    assert_int_equal(Volume(file, params).status, TRIP_USAGE);
+    assert_one_line("v (vec3s), a[0] (float), b (float), a[1] (float)");
+    params.grid = "v";
+    expect_line();
+    assert_int_equal(Volume(file, params).status, TRIP_ERROR);
+    assert_one_line("no scalar");
+}
+
+void grids_that_share_a_tree_have_their_own_transforms(void **)
+{
+    openvdb::FloatGrid::Ptr a = one_voxel("a", 4);
+    openvdb::FloatGrid::Ptr b = a->copy();
+    b->setName("b");
+    b->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
+    File file({ a, b });
+    trip_volume_params params = {};
+    params.grid = "b";
+    Volume v(file, params);
+    assert_int_equal(v.status, 0);
+    assert_true(only_value(v) == 4 && v.info.index_to_world.m[1][1] == 0.25);
+}
+
+void a_file_written_as_a_stream_gives_its_first_grid(void **)
+{
+    openvdb::FloatGrid::Ptr grid = one_voxel("first", 6);
+    File file;
+    std::ofstream out(file.path, std::ios::binary);
+    openvdb::io::Stream(out).write(openvdb::GridCPtrVec{ grid, one_voxel("second", 7) });
+    out.close();
+    assert_true(only_value(Volume(file)) == 6);
+    trip_volume_params params = {};
+    params.grid = "second";
+    expect_line();
+    assert_int_equal(Volume(file, params).status, TRIP_USAGE);
+    assert_one_line("perhaps more");
+}
+
+/* Distance to a sphere of radius 20 voxels of 0.1. */
+openvdb::FloatGrid::Ptr sphere()
+{
+    openvdb::initialize();
+    auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+        2, openvdb::Vec3f(0.33f, 0, 0), 0.1f, 3);
+    grid->setName("ball");
+    return grid;
+}
+
+void a_level_set_is_refused_unless_an_option_says_how(void **)
+{
+    File file({ sphere() });
+    expect_line();
+    assert_int_equal(Volume(file).status, TRIP_USAGE);
+    assert_one_line("--level-set filled or --level-set band");
+    File fog({ [] {
+        auto grid = one_voxel("fog", 1);
+        grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+        return grid;
+    }() });
+    trip_volume_params params = {};
+    params.level_set = TRIP_LEVEL_SET_BAND;
+    expect_line();
+    assert_int_equal(Volume(fog, params).status, TRIP_USAGE);
+    assert_one_line("does not apply");
+}
+
+/* Inside 1, outside 0, a ramp of one voxel's width between; the interior has no active voxels in
+ * the file. The densities' sum is the ball's volume. */
+void a_filled_level_set_is_a_ball(void **)
+{
+    openvdb::FloatGrid::Ptr grid = sphere();
+    File file({ grid });
+    trip_volume_params params = {};
+    params.level_set = TRIP_LEVEL_SET_FILLED;
+    Volume v(file, params);
+    assert_int_equal(v.status, 0);
+    assert_true(v.info.background == 0);
+    double sum = 0;
+    Coord first = grid->evalActiveVoxelBoundingBox().min();
+    check_voxels(v, first, [&](const Coord &at, float &value, bool &active) {
+        double d = (double)grid->tree().getValue(at) / grid->voxelSize()[0];
+        value = (float)std::min(1.0, std::max(0.0, 0.5 - d));
+        active = value > 0;
+    });
+    for (const trip_block &block : v.blocks()) {
+        std::vector<float> values((size_t)(block.size[0] * block.size[1] * block.size[2]));
+        assert_int_equal(
+            trip_read_vdb.decode(v.state, &block, block.origin, block.size, values.data(), nullptr),
+            0);
+        for (float value : values)
+            sum += value;
+    }
+    assert_true(std::fabs(sum / (4 / 3.0 * M_PI * 20 * 20 * 20) - 1) < 0.001);
+}
+
+/* 1 at the surface, falling to 0 at the edges of the band, which is 3 voxels wide on each side. */
+void a_band_is_one_at_the_surface(void **)
+{
+    openvdb::FloatGrid::Ptr grid = sphere();
+    File file({ grid });
+    trip_volume_params params = {};
+    params.level_set = TRIP_LEVEL_SET_BAND;
+    Volume v(file, params);
+    assert_int_equal(v.status, 0);
+    Coord first = grid->evalActiveVoxelBoundingBox().min();
+    double half_width = (double)grid->background();
+    size_t count = check_voxels(v, first, [&](const Coord &at, float &value, bool &active) {
+        active = grid->tree().isValueOn(at);
+        double d = std::fabs((double)grid->tree().getValue(at));
+        value = active ? (float)std::max(0.0, 1 - d * (1 / half_width)) : 0;
+    });
+    assert_int_equal(count, grid->activeVoxelCount());
+}
+
+void what_cannot_be_drawn_is_refused(void **)
+{
+    openvdb::FloatGrid::Ptr frustum = one_voxel("camera", 1);
+    frustum->setTransform(openvdb::math::Transform::createFrustumTransform(
+        openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(10)), 0.5, 10));
+    expect_line();
+    assert_int_equal(Volume(File({ frustum })).status, TRIP_ERROR);
+    assert_one_line("frustum");
+    openvdb::FloatGrid::Ptr empty = openvdb::FloatGrid::create(0);
+    expect_line();
+    assert_int_equal(Volume(File({ empty })).status, TRIP_ERROR);
+    assert_one_line("without any active voxel");
+    openvdb::FloatGrid::Ptr far = one_voxel("far", 1);
+    far->tree().setValueOn(Coord(2000000000, 0, 0), 1);
+    expect_line();
+    assert_int_equal(Volume(File({ far })).status, TRIP_ERROR);
+    assert_one_line("2^30");
+    expect_line();
+    assert_int_equal(Volume(File(openvdb::GridCPtrVec{})).status, TRIP_ERROR);
+    assert_one_line("holds no grid");
+}
+
+void memory_that_does_not_suffice_is_refused_first(void **)
+{
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+    fill_scattered(*grid);
+    File file({ grid });
+    expect_line();
+    assert_int_equal(Volume(file, {}, 100000).status, TRIP_ERROR);
+    assert_one_line("--memory");
+    openvdb::FloatGrid::Ptr tiles = openvdb::FloatGrid::create(0);
+    for (int n = 0; n < 8; n++)
+        tiles->tree().addTile(3, Coord(n * 4096, 0, 0), 1, true);
+    expect_line();
+    assert_int_equal(Volume(File({ tiles }), {}, 20000000).status, TRIP_ERROR);
+    assert_one_line("--memory");
+}
+
+void many_threads_decode_at_once(void **)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+    fill_scattered(*grid);
+    File file({ grid });
+    Volume v(file);
+    assert_int_equal(v.status, 0);
+    std::vector<trip_block> blocks = v.blocks();
+    std::vector<std::vector<float>> serial, parallel(blocks.size());
+    for (const trip_block &block : blocks)
+        serial.push_back(Decoded(v, block).values);
+    std::vector<std::thread> threads;
+    for (size_t t = 0; t < 4; t++)
+        threads.emplace_back([&, t] {
+            for (size_t n = t; n < blocks.size(); n += 4)
+                parallel[n] = Decoded(v, blocks[n]).values;
+        });
+    for (std::thread &thread : threads)
+        thread.join();
+    assert_true(serial == parallel);
+}
+
+/* Opens and decodes all; the number of lines is 0 for success, else 1 for each failure. */
+void read_whatever_it_is(const File &file)
+{
+    expect_line();
+    Volume v(file);
+    int failures = v.status < 0;
+    if (v.status == 0) {
+        std::vector<trip_block> blocks = v.blocks();
+        for (size_t n = 0; n < blocks.size() && n < 100; n++)
+            failures += Decoded(v, blocks[n]).status < 0;
+    }
+    trip_report_redirect(nullptr, nullptr);
+    assert_int_equal(lines, failures);
+}
+
+std::string small_file(uint32_t compression)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+    for (int n = 0; n < 700; n++)
+        grid->tree().setValueOn(Coord(n % 11, n % 13, n % 9), (float)(n % 17));
+    grid->setName("density");
+    File file;
+    openvdb::io::File out(file.path);
+    out.setCompression(compression);
+    out.write({ grid });
+    out.close();
+    return file.bytes();
+}
+
+void a_truncated_file_is_refused(void **)
+{
+    const std::string whole =
+        small_file(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+    File file;
+    for (size_t length = 1; length < whole.size(); length += length < 400 ? 1 : 97) {
+        file.put(whole.substr(0, length));
+        expect_line();
+        assert_int_equal(Volume(file).status, TRIP_ERROR);
+        assert_one_line("test_read_vdb");
+    }
+}
+
+/* Bytes, and sizes of eight and four bytes, that are wrong: a line or a picture, never a crash. */
+void a_corrupted_file_does_no_harm(void **)
+{
+    namespace io = openvdb::io;
+    std::mt19937_64 random(11);
+    File file;
+    for (uint32_t flags : { (uint32_t)io::COMPRESS_NONE, (uint32_t)io::COMPRESS_ZIP,
+                            (uint32_t)(io::COMPRESS_BLOSC | io::COMPRESS_ACTIVE_MASK) }) {
+        const std::string whole = small_file(flags);
+        for (int n = 0; n < 300; n++) {
+            std::string bad = whole;
+            const int64_t sizes[] = { -1, -100000, INT64_MIN, INT64_MAX, 0, 1 << 30 };
+            size_t bytes = n % 3 == 0 ? 1 : n % 3 == 1 ? 4 : 8;
+            int64_t value = bytes == 1 ? (int64_t)random() : sizes[random() % 6];
+            std::memcpy(&bad[random() % (bad.size() - 8)], &value, bytes);
+            file.put(bad);
+            read_whatever_it_is(file);
+        }
+    }
+}
+
+} // namespace
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(float_grids_are_read),
+        cmocka_unit_test(double_grids_are_read),
+        cmocka_unit_test(floats_stored_as_half_are_read),
+        cmocka_unit_test(integer_grids_are_read),
+        cmocka_unit_test(bool_grids_are_read),
+        cmocka_unit_test(mask_grids_are_one_where_active),
+        cmocka_unit_test(every_compression_is_read),
+        cmocka_unit_test(active_tiles_of_any_level_become_boxes),
+        cmocka_unit_test(rotation_shear_and_offset_reach_world_space),
+        cmocka_unit_test(a_grid_is_chosen_by_name_or_is_the_first_scalar_one),
+        cmocka_unit_test(grids_that_share_a_tree_have_their_own_transforms),
+        cmocka_unit_test(a_file_written_as_a_stream_gives_its_first_grid),
+        cmocka_unit_test(a_level_set_is_refused_unless_an_option_says_how),
+        cmocka_unit_test(a_filled_level_set_is_a_ball),
+        cmocka_unit_test(a_band_is_one_at_the_surface),
+        cmocka_unit_test(what_cannot_be_drawn_is_refused),
+        cmocka_unit_test(memory_that_does_not_suffice_is_refused_first),
+        cmocka_unit_test(many_threads_decode_at_once),
+        cmocka_unit_test(a_truncated_file_is_refused),
+        cmocka_unit_test(a_corrupted_file_does_no_harm),
+    };
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}
