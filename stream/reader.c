@@ -15,7 +15,7 @@ enum {
     DEFAULT_GAP_BYTES = 128 << 10,
     DEFAULT_PREAD_THREADS = 4,
     DEFAULT_URING_THREADS = 2,
-    SLOT_BYTES_PER_RUN = 128, /* room for runs; where they are shorter, slots are not filled */
+    SLOT_BYTES_PER_RUN = 64, /* room for runs; where they are shorter, slots are not filled */
 };
 
 static size_t slot_total_bytes(const trip_reader *r)

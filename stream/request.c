@@ -12,6 +12,7 @@ void trip_request_start(trip_request *q)
 {
     q->direct = q->source->direct_fd >= 0 &&
                 !atomic_load_explicit(q->source->direct_refused, memory_order_relaxed);
+    atomic_store_explicit(&q->given, false, memory_order_relaxed);
     q->done_bytes = 0;
     q->reads = 0;
     q->fault = TRIP_REQUEST_OK;
