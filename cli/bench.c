@@ -23,6 +23,7 @@ static void describe(const session *s, const bench_options *o, bench_report *r)
     char text[64];
     snprintf(text, sizeof text, "%llu x %llu x %llu", (unsigned long long)h->dims[0],
              (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
+    cJSON_AddStringToObject(settings, "data_set", o->input);
     cJSON_AddStringToObject(settings, "grid", text);
     cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
     cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
@@ -44,16 +45,26 @@ static int measure(const session *s, const bench_options *o, bench_report *r)
     return 0;
 }
 
+/* "triptych bench orders ...", cut where it is too long. */
+static void join(int argc, char **argv, char *text, size_t bytes)
+{
+    size_t used = (size_t)snprintf(text, bytes, "triptych");
+    for (int i = 0; i < argc && used < bytes; i++)
+        used += (size_t)snprintf(text + used, bytes - used, " %s", argv[i]);
+}
+
 int trip_command_bench(int argc, char **argv)
 {
+    char command[4096];
     session s = { 0 };
     bench_options o;
     bench_report *report = NULL;
+    join(argc, argv, command, sizeof command);
     int status = bench_options_parse(&o, argc, argv);
     if (!status)
         status = session_open(&s, o.input, o.tf, o.memory_bytes);
     if (!status)
-        status = bench_report_create(&report, o.table, o.input);
+        status = bench_report_create(&report, o.table, command);
     if (!status)
         status = measure(&s, &o, report);
     if (!status)

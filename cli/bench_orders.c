@@ -120,6 +120,9 @@ static void add_limits(bench_report *r)
                           "than the data set's own lowers all multiples.");
     bench_report_limit(r, "Speed: against axis in the same view; the median is the middle run of "
                           "runs that take turns.");
+    bench_report_limit(r, "Bound by: the largest part of the middle run, as the calling thread saw "
+                          "it; work that a GPU or other threads do later shows where it waits for "
+                          "them.");
     bench_report_limit(r, "The parallel view gives one list all the weight. A perspective view "
                           "parallel to X-Y would draw three lists at h = 0, though not at the "
                           "other h of a narrow view.");

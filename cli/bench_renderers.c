@@ -49,15 +49,17 @@ static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_re
 {
     static const char *const names[] = { "auto", "gl", "cpu", "reference" };
     contender *own = &c->contenders[c->count];
-    char why[256];
+    char why[256], key[32];
     own->threads = kind == TRIP_RENDERER_CPU ? threads : 0;
     int status = bench_renderer_create(c->session, &own->renderer, kind, threads, false, why);
     if (status || !own->renderer) {
         bench_report_limit(r, "Left out: %s: %s", names[kind], why);
         return status;
     }
-    cJSON_AddStringToObject(bench_report_machine(r), own->renderer->ops->name,
-                            own->renderer->ops->device(own->renderer));
+    cJSON *machine = bench_report_machine(r);
+    snprintf(key, sizeof key, "renderer_%s", own->renderer->ops->name);
+    if (!cJSON_HasObjectItem(machine, key))
+        cJSON_AddStringToObject(machine, key, own->renderer->ops->device(own->renderer));
     own->costs = calloc((size_t)(c->options->views * c->options->repeat), sizeof *own->costs);
     if (!own->costs)
         return trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
@@ -158,6 +160,7 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
     snprintf(text, sizeof text, "%d x %d", size[0], size[1]);
     cJSON *row = cJSON_CreateObject();
     cJSON_AddStringToObject(row, "renderer", own->renderer->ops->name);
+    cJSON_AddStringToObject(row, "device", own->renderer->ops->device(own->renderer));
     if (own->threads)
         cJSON_AddNumberToObject(row, "threads", own->threads);
     cJSON_AddStringToObject(row, "size", text);

@@ -66,14 +66,14 @@ static void describe_machine(cJSON *machine)
     cJSON_AddStringToObject(machine, "system", kernel);
 }
 
-int bench_report_create(bench_report **out, const char *name, const char *data_set)
+int bench_report_create(bench_report **out, const char *name, const char *command)
 {
     bench_report *r = *out = calloc(1, sizeof *r);
     if (!r)
         return out_of_memory();
     r->root = cJSON_CreateObject();
     cJSON_AddStringToObject(r->root, "bench", name);
-    cJSON_AddStringToObject(r->root, "data_set", data_set);
+    cJSON_AddStringToObject(r->root, "command", command);
     r->settings = cJSON_AddObjectToObject(r->root, "settings");
     r->machine = cJSON_AddObjectToObject(r->root, "machine");
     r->tables = cJSON_AddObjectToObject(r->root, "tables");
@@ -198,6 +198,8 @@ static void print_facts(const char *heading, const cJSON *facts)
     {
         if (cJSON_IsString(item))
             printf("- %s: %s\n", item->string, item->valuestring);
+        else if (cJSON_IsBool(item))
+            printf("- %s: %s\n", item->string, cJSON_IsTrue(item) ? "yes" : "no");
         else if (strstr(item->string, "_bytes"))
             printf("- %.*s: %s\n", (int)(strstr(item->string, "_bytes") - item->string),
                    item->string, trip_format_bytes((uint64_t)item->valuedouble, bytes));
@@ -221,9 +223,7 @@ int bench_report_print(bench_report *r, int json)
     const cJSON *limit;
     if (json)
         return print_json(r);
-    printf("triptych bench %s %s\n",
-           cJSON_GetObjectItemCaseSensitive(r->root, "bench")->valuestring,
-           cJSON_GetObjectItemCaseSensitive(r->root, "data_set")->valuestring);
+    printf("%s\n", cJSON_GetObjectItemCaseSensitive(r->root, "command")->valuestring);
     for (int i = 0; i < r->table_count; i++)
         print_table(&r->shown[i]);
     printf("\nLimits of these figures\n\n");

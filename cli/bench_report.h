@@ -15,10 +15,12 @@ typedef struct bench_column {
 
 typedef struct bench_report bench_report;
 
-int bench_report_create(bench_report **out, const char *name, const char *data_set);
+/* `command`: the line that the report was asked for by. */
+int bench_report_create(bench_report **out, const char *name, const char *command);
 void bench_report_destroy(bench_report *r);
 
-/* What was measured how: texts and numbers, printed one a line; names that end in _bytes as sizes.
+/* What was measured how: texts, numbers and truths, printed one a line; names that end in _bytes as
+ * sizes.
  */
 cJSON *bench_report_settings(bench_report *r);
 /* The CPU, its cores, memory and kernel; more may be added. */
