@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cpu_renderer.h"
 #include "frame.h"
 #include "image_file.h"
 #include "render_options.h"
@@ -124,6 +125,8 @@ static int make_reader(session *s, unsigned planes)
         .slots = SLOTS,
         .slot_bytes = slot < MAX_SLOT_BYTES || page > MAX_SLOT_BYTES ? slot : MAX_SLOT_BYTES,
         .threads = (unsigned)s->o.threads,
+        .skip = s->o.hidden == RENDER_HIDDEN_SKIP ? trip_cpu_covered : NULL,
+        .skip_user = s->renderer,
         .cache_bytes = s->o.orbit > 1 ? (size_t)(left / 2) : 0,
     };
     return trip_reader_create(&s->reader, s->data, &params, s->budget);

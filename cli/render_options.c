@@ -29,6 +29,7 @@ enum {
     KEY_TRAVERSAL,
     KEY_STATS,
     KEY_EXPLAIN,
+    KEY_HIDDEN,
     KEY_MEMORY,
     KEY_ENGINE,
     KEY_THREADS,
@@ -37,34 +38,44 @@ enum {
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
     { NULL, 0, NULL, 0, "View:", 1 },
-    { "size", KEY_SIZE, "WxH", 0, "Pixels (1024x1024)", 1 },
-    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (the whole volume in view)", 1 },
-    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (the middle)", 1 },
-    { "up", KEY_UP, "X,Y,Z", 0, "What is up (0,0,1; 0,1,0 for OpenVDB)", 1 },
-    { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (30)", 1 },
+    { "size", KEY_SIZE, "WxH", 0, "Pixels (default: 1024x1024)", 1 },
+    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
+    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (default: the middle)", 1 },
+    { "up", KEY_UP, "X,Y,Z", 0,
+      "What is up (default: 0,0,1; OpenVDB 0,1,0; scans of thick slices 0,0,-1)", 1 },
+    { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (default: 30)", 1 },
     { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, HEIGHT world units high", 1 },
     { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...", 1 },
     { NULL, 0, NULL, 0, "Look:", 2 },
     { "tf", KEY_TF, "FILE", 0,
-      "Transfer function: .tf, ParaView JSON or preset:NAME (the one kept in the data set)", 2 },
-    { "light", KEY_LIGHT, "X,Y,Z|head", 0, "Direction to the light, or from the eye (head)", 2 },
+      "Transfer function: .tf, ParaView JSON or preset:NAME (default: kept in the data set)", 2 },
+    { "light", KEY_LIGHT, "X,Y,Z|head", 0,
+      "Direction to the light, or from the eye (default: head)", 2 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
-      "Behind the volume, 0 to 1 (0,0,0; none for .exr)", 2 },
+      "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
     { NULL, 0, NULL, 0, "Method:", 3 },
-    { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (merge)", 3 },
-    { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (0.85); merge only", 3 },
-    { "traversal", KEY_TRAVERSAL, "NAME", 0, "outward or ascending (outward)", 3 },
-    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (2)", 3 },
+    { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
+    { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
+      3 },
+    { "traversal", KEY_TRAVERSAL, "NAME", 0, "outward or ascending (default: outward)", 3 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 3 },
     { NULL, 0, NULL, 0, "Renderer:", 4 },
-    { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu, reference or auto (auto)", 4 },
-    { "target", KEY_TARGET, "NAME", 0, "Layers of rgba32f, rgba16f or rgba8 (rgba32f); gl only",
-      4 },
+    { "renderer", KEY_RENDERER, "NAME", 0,
+      "gl, cpu, reference or auto (default: auto: gl on graphics hardware, else cpu)", 4 },
+    { "target", KEY_TARGET, "NAME", 0,
+      "Layers of rgba32f, rgba16f or rgba8 (default: rgba32f); gl only", 4 },
     { "submit", KEY_SUBMIT, "FORM", 0,
-      "replicated or indexed lists, sprites or triangles (replicated,sprites); gl only", 4 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Bound for all buffers (a quarter of what there is)", 4 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (auto)", 4 },
-    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (one a processor)", 4 },
+      "replicated or indexed lists, sprites or triangles (default: replicated,sprites); gl only",
+      4 },
+    { "hidden", KEY_HIDDEN, "skip|draw", 0,
+      "Whether bricks behind what is opaque are read (default: skip; with --stats draw, so that "
+      "it counts all splats of the view); the picture is the same; cpu only",
+      4 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
+      4 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 4 },
+    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 4 },
     { NULL, 0, NULL, 0, "Results:", 5 },
     { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
     { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
@@ -216,6 +227,7 @@ static int parse_renderer(int key, char *arg, parse *p)
 {
     static const char *const renderers[] = { "auto", "gl", "cpu", "reference", NULL };
     static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
+    static const char *const hidden[] = { "skip", "draw", NULL };
     static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
     render_options *o = p->o;
     int which = 0, status;
@@ -231,6 +243,10 @@ static int parse_renderer(int key, char *arg, parse *p)
         return status;
     case KEY_SUBMIT:
         return parse_submit(arg, p);
+    case KEY_HIDDEN:
+        status = trip_option_choice("--hidden", arg, hidden, &which);
+        o->hidden = (render_hidden)(which + 1);
+        return status;
     case KEY_MEMORY:
         return trip_option_bytes("--memory", arg, &o->memory_bytes);
     case KEY_ENGINE:
@@ -262,6 +278,12 @@ static int check(parse *p)
                                 "applies to --renderer gl only");
     if (gl_only)
         o->renderer = TRIP_RENDERER_GL;
+    if (o->hidden && o->renderer != TRIP_RENDERER_AUTO && o->renderer != TRIP_RENDERER_CPU)
+        return trip_option_fail("--hidden", "applies to --renderer cpu only");
+    if (o->hidden)
+        o->renderer = TRIP_RENDERER_CPU;
+    else
+        o->hidden = o->stats ? RENDER_HIDDEN_DRAW : RENDER_HIDDEN_SKIP;
     const char *extension = strrchr(o->output, '.');
     if (!p->background && extension && !strcasecmp(extension, ".exr"))
         memset(o->settings.background, 0, sizeof o->settings.background);
@@ -306,7 +328,7 @@ int render_options_parse(render_options *o, int argc, char **argv)
         .parser = parse_key,
         .args_doc = "NAME.trip",
         .doc = "Draws a data set made by `triptych brick` into an image file, reading it from disk "
-               "once.\vDefaults in parentheses. Points and lengths are in the data's world units.",
+               "once.\vPoints and lengths are in the data's world units.",
     };
     *o = (render_options){ .width = 1024, .height = 1024, .settings = trip_settings_default() };
     parse p = { .o = o };

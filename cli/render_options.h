@@ -6,6 +6,13 @@
 #include "renderer_choice.h"
 #include "settings.h"
 
+/* What becomes of bricks behind what is already opaque. */
+typedef enum render_hidden {
+    RENDER_HIDDEN_UNSET,
+    RENDER_HIDDEN_SKIP,
+    RENDER_HIDDEN_DRAW,
+} render_hidden;
+
 typedef struct render_options {
     const char *input, *output; /* the data set; an image file, its name's model in an orbit */
     const char *tf;             /* file or preset; NULL: the function kept in the data set */
@@ -17,6 +24,7 @@ typedef struct render_options {
     int orbit;                        /* images of a turntable; 0: one image */
     trip_settings settings;
     trip_renderer_kind renderer;
+    render_hidden hidden;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
     int threads;           /* 0: the default */

@@ -42,6 +42,14 @@ void render_stats_destroy(render_stats *s)
     free(s);
 }
 
+/* Milliseconds to the microsecond. */
+static void add_ms(cJSON *object, const char *name, double ms)
+{
+    char text[32];
+    snprintf(text, sizeof text, "%.3f", ms);
+    cJSON_AddRawToObject(object, name, text);
+}
+
 static void add_list(cJSON *lists, int axis, const trip_list_stats *s)
 {
     cJSON *list = cJSON_AddObjectToObject(lists, axis_names[axis]);
@@ -54,11 +62,13 @@ static void add_list(cJSON *lists, int axis, const trip_list_stats *s)
 int render_stats_add_frame(render_stats *s, const trip_frame_stats *frame)
 {
     cJSON *f = cJSON_CreateObject();
-    cJSON_AddNumberToObject(f, "ms", frame->ms);
-    cJSON_AddNumberToObject(f, "read_ms", frame->read_ms);
-    cJSON_AddNumberToObject(f, "draw_ms", frame->draw_ms);
-    cJSON_AddNumberToObject(f, "merge_ms", frame->merge_ms);
+    add_ms(f, "ms", frame->ms);
+    add_ms(f, "read_ms", frame->read_ms);
+    add_ms(f, "draw_ms", frame->draw_ms);
+    add_ms(f, "merge_ms", frame->merge_ms);
+    cJSON_AddNumberToObject(f, "reads", (double)frame->reader.reads);
     cJSON_AddNumberToObject(f, "bytes_cached", (double)frame->reader.bytes_cached);
+    cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame->reader.bytes_skipped);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     for (int axis = 0; axis < 3; axis++)
         add_list(lists, axis, &frame->lists[axis]);
@@ -124,6 +134,9 @@ void render_stats_explain(const trip_frame_stats *frame, FILE *out)
                 s->splats_projected);
         fprintf(out, ", %" PRIu64 " drawn\n", s->splats_drawn);
     }
+    if (frame->reader.bytes_skipped)
+        fprintf(out, "hidden      %s in %" PRIu64 " runs not read: behind what is opaque\n",
+                trip_format_bytes(frame->reader.bytes_skipped, bytes), frame->reader.runs_skipped);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame->ms, frame->read_ms, frame->draw_ms, frame->merge_ms);
 }

@@ -15,6 +15,7 @@ static void add_reader_stats(trip_reader_stats *sum, const trip_reader_stats *s)
 {
     sum->bytes_read += s->bytes_read;
     sum->reads += s->reads;
+    sum->bytes_cached += s->bytes_cached;
     sum->splats += s->splats;
     sum->runs_skipped += s->runs_skipped;
     sum->bytes_skipped += s->bytes_skipped;

@@ -1,10 +1,8 @@
 #include "plan.h"
 
 #include <inttypes.h>
-#include <stdlib.h>
 
 #include "plan_cull.h"
-#include "report.h"
 #include "weight.h"
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
