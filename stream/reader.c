@@ -12,7 +12,7 @@
 enum {
     DEFAULT_SLOTS = 8,
     DEFAULT_SLOT_BYTES = 1 << 20,
-    DEFAULT_GAP_BYTES = 128 << 10,
+    DEFAULT_GAP_BYTES = 32 << 10,
     DEFAULT_PREAD_THREADS = 4,
     DEFAULT_URING_THREADS = 2,
     SLOT_BYTES_PER_RUN = 64, /* room for runs; where they are shorter, slots are not filled */

@@ -49,7 +49,7 @@ static void set_defaults(trip_writer_params *p)
 {
     p->tile_voxels = p->tile_voxels ? p->tile_voxels : 64;
     p->slab_sheets = p->slab_sheets ? p->slab_sheets : 8;
-    p->page_bytes = p->page_bytes ? p->page_bytes : 65536;
+    p->page_bytes = p->page_bytes ? p->page_bytes : 16384;
 }
 
 static int check_codes(const trip_writer_params *p, const char *path)

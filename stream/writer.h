@@ -19,7 +19,7 @@ typedef struct trip_writer_params {
     bool normals;
     unsigned tile_voxels; /* 16, 32, 64 (default) or 128 */
     unsigned slab_sheets; /* default 8 */
-    unsigned page_bytes;  /* default 65536 */
+    unsigned page_bytes;  /* default 16384 */
     int64_t dims[3];
     trip_affine index_to_world;
     double code_lo, code_hi;
