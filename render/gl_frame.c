@@ -32,7 +32,7 @@ static void square(trip_gl_double4 *a, trip_gl_double4 *b, trip_vec3 r0, trip_ve
  * depend on the scale, and floats keep far from their limits whatever the world's unit. */
 static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis)
 {
-    double px = floor(0.5 * c->width), py = floor(0.5 * c->height);
+    double px = 0.5 * c->width, py = 0.5 * c->height;
     f->screen = (trip_gl_double4){ { px, py, c->width, c->height } };
     trip_vec3 r0 = trip_camera_ray(c, px, py);
     double length = c->ortho ? 1 : trip_length(r0);
@@ -136,7 +136,7 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, int axis)
     if (frame->camera->ortho)
         effects |= TRIP_GL_PARALLEL;
     else if (!is_isotropic(frame->camera))
-        effects |= TRIP_GL_STRETCHED;
+        effects |= TRIP_GL_ANISOTROPIC;
     if (s->shading && frame->plan->planes & 1u << TRIP_PLANE_NORMALS)
         effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0);
     if (s->indexed)

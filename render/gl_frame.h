@@ -10,8 +10,8 @@
 
 /* Effects compiled into a shader only when the scene or view needs them. */
 enum trip_gl_effect {
-    TRIP_GL_PARALLEL = 1,  /* parallel view */
-    TRIP_GL_STRETCHED = 2, /* world length along a ray depends on its direction */
+    TRIP_GL_PARALLEL = 1,    /* parallel view */
+    TRIP_GL_ANISOTROPIC = 2, /* not cubes: a voxel is not as long every way */
     TRIP_GL_SHADED = 4,
     TRIP_GL_HEADLIGHT = 8,
     TRIP_GL_INDEXED = 16,

@@ -8,9 +8,10 @@
 #include "gl_shader_text.h"
 #include "report.h"
 
-enum { MAX_FILES = 16, MAX_SHADER_BYTES = 1 << 20, MAX_NAME = 64 };
+/* Some compilers drop the file number of #line, so that the line number carries it. */
+enum { MAX_FILES = 16, MAX_SHADER_BYTES = 1 << 20, MAX_NAME = 64, LINES_PER_FILE = 10000 };
 
-/* One stage's text with its includes, and the files it came from: #line numbers them. */
+/* One stage's text with its includes, and the files it came from. */
 typedef struct stage_text {
     FILE *out;
     char *bytes;
@@ -88,7 +89,7 @@ static int append_file(stage_text *t, const char *name)
         return TRIP_ERROR;
     int number = t->files++, status = TRIP_OK;
     strcpy(t->names[number], name);
-    fprintf(t->out, "#line 1 %d\n", number);
+    fprintf(t->out, "#line %d\n", number * LINES_PER_FILE + 1);
     int line_number = 1;
     for (char *line = text, *end; *line && !status; line = end, line_number++) {
         char included[MAX_NAME];
@@ -100,7 +101,7 @@ static int append_file(stage_text *t, const char *name)
             continue;
         }
         status = append_file(t, included);
-        fprintf(t->out, "#line %d %d\n", line_number + 1, number);
+        fprintf(t->out, "#line %d\n", number * LINES_PER_FILE + line_number + 1);
     }
     free(text);
     return status;
@@ -119,8 +120,17 @@ static int make_text(stage_text *t, const char *name, const char *defines)
     return status;
 }
 
-/* Where the first error of a compiler's log is: "0:12(3): error: ..." (Mesa) and "0(12) : error
- * ..." (NVIDIA) begin with the number of the file and the line. */
+/* The number behind the first "0:" or "0(" of a line: "0:12(3): error: ..." (Mesa), "0(12) : error
+ * ..." (NVIDIA), "ERROR: 0:12: ..." (others). -1 where there is none. */
+static long line_number_in(const char *line)
+{
+    for (const char *at = strchr(line, '0'); at; at = strchr(at + 1, '0'))
+        if ((at[1] == ':' || at[1] == '(') && at[2] >= '0' && at[2] <= '9')
+            return strtol(at + 2, NULL, 10);
+    return -1;
+}
+
+/* Reports the first error of a compiler's log at the file and line it is about. */
 static int fail_compile(const stage_text *t, const char *name, char *log)
 {
     char *error = strstr(log, "error");
@@ -128,14 +138,13 @@ static int fail_compile(const stage_text *t, const char *name, char *log)
     while (line > log && line[-1] != '\n')
         line--;
     line[strcspn(line, "\n")] = 0;
-    char where[MAX_NAME + 16], *rest = line;
-    long file = strtol(line, &rest, 10);
-    if (rest == line || (*rest != ':' && *rest != '(') || file < 0 || file >= t->files)
+    long number = line_number_in(line), file = number / LINES_PER_FILE;
+    if (number < 0 || file >= t->files)
         return trip_fail(TRIP_ERROR, "gl", name, "the shader does not compile: %s", line);
-    long number = strtol(rest + 1, &rest, 10);
-    snprintf(where, sizeof where, "%s:%ld", t->names[file], number);
+    char where[MAX_NAME + 16];
+    snprintf(where, sizeof where, "%s:%ld", t->names[file], number % LINES_PER_FILE);
     return trip_fail(TRIP_ERROR, "gl", where, "the shader does not compile: %s",
-                     error ? error : rest);
+                     error ? error : line);
 }
 
 static int compile(GLuint program, GLenum kind, const char *name, const char *defines)

@@ -32,7 +32,7 @@
     R4 world_0, world_1, world_2;       /* xyz: columns of J */                                    \
     R4 light;         /* xyz: towards the light, world space; w: gradient at full shading */       \
     R4 to_eye;        /* xyz: towards the eye in parallel views; w: gradient scale */              \
-    R4 screen;        /* xy: the image's centre, whole pixels; zw: width, height */                \
+    R4 screen;        /* xy: the image's centre, pixels; zw: width, height */                      \
     R4 kernel;        /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */       \
     R4 parallel;      /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */      \
     R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \

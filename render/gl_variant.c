@@ -26,7 +26,7 @@ static void write_effects(FILE *out, unsigned effects)
         unsigned effect;
         const char *name;
     } names[] = {
-        { TRIP_GL_PARALLEL, "PARALLEL" }, { TRIP_GL_STRETCHED, "STRETCHED" },
+        { TRIP_GL_PARALLEL, "PARALLEL" }, { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
         { TRIP_GL_SHADED, "SHADED" },     { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
         { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
         { TRIP_GL_UNCULLED, "UNCULLED" },

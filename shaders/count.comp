@@ -20,7 +20,7 @@ void count(int which)
 
 bool touches(splat s, ivec2 pixel)
 {
-    real2 p = real2(pixel) + 0.5, q = p - s.centre;
+    real2 p = real2(pixel) + 0.5 - screen.xy, q = p - s.centre;
     real m = s.conic.x * q.x * q.x + 2.0 * s.conic.y * q.x * q.y + s.conic.z * q.y * q.y;
 #ifndef PARALLEL
     real ray2 = dot(ray2_a, real4(1.0, p, p.x * p.x)) + dot(ray2_b.xy, p.y * p);
@@ -34,7 +34,7 @@ bool drawn(splat s)
     ivec4 pixels = covered_pixels(s);
     if (any(greaterThan(pixels.xy, pixels.zw)))
         return false;
-    ivec2 nearest = ivec2(floor(clamp(s.centre, real2(-screen.xy), screen.zw - screen.xy)));
+    ivec2 nearest = ivec2(clamp(s.centre + screen.xy, real2(0.0), screen.zw));
     if (touches(s, clamp(nearest, pixels.xy, pixels.zw)))
         return true;
     for (int y = pixels.y; y <= pixels.w; y++)

@@ -65,12 +65,11 @@ bool project(real3 c, real3 place, out splat s)
 }
 #endif
 
-// First and last pixel (from the image's centre) whose centre lies in the bounds and in the image;
+// First and last pixel (from the image's corner) whose centre lies in the bounds and in the image;
 // none where a first exceeds its last.
 ivec4 covered_pixels(splat s)
 {
-    real4 inside = clamp(s.bounds, real4(-screen.xy, -screen.xy) - 1.0,
-                         real4(screen.zw - screen.xy, screen.zw - screen.xy) + 1.0);
+    real4 inside = clamp(s.bounds + screen.xyxy, real4(-1.0), screen.zwzw + 1.0);
     ivec2 first = ivec2(ceil(inside.xy - 0.5)), last = ivec2(floor(inside.zw - 0.5));
-    return ivec4(max(first, ivec2(-screen.xy)), min(last, ivec2(screen.zw - screen.xy) - 1));
+    return ivec4(max(first, ivec2(0)), min(last, ivec2(screen.zw) - 1));
 }

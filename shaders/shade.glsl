@@ -2,6 +2,8 @@
 // stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS come from render/shade.h.
 #include "real.glsl"
 
+#ifdef SHADED
+
 // World-space gradient direction and, in w, its magnitude.
 vec4 unpack_normal(uint normal)
 {
@@ -34,3 +36,4 @@ vec3 shade(vec3 colour, uint normal, vec3 from_eye)
     float matt = 1.0 + strength * (AMBIENT + DIFFUSE * diffuse - 1.0);
     return clamp(colour * matt + strength * SPECULAR * specular, 0.0, 1.0);
 }
+#endif

@@ -19,14 +19,14 @@ void main()
     vec2 p = gl_FragCoord.xy - screen.xy, q = p - footprint.xy;
     float m = q.x * (footprint.z * q.x + shear * q.y) + footprint.w * q.y * q.y;
     float stretch = 1.0;
-#ifndef PARALLEL
+#if defined(ANISOTROPIC)
     vec4 terms = vec4(1.0, p, p.x * p.x);
     vec2 more = p.y * p;
     float inverse_ray2 = 1.0 / (dot(ray2_a, terms) + dot(ray2_b.xy, more));
     m *= inverse_ray2;
-#ifdef STRETCHED
     stretch = sqrt((dot(world2_a, terms) + dot(world2_b.xy, more)) * inverse_ray2);
-#endif
+#elif !defined(PARALLEL)
+    m /= 1.0 + ray2_a.w * dot(p, p);
 #endif
     float alpha = m <= kernel.y ? opacity(colour.a * stretch * exp(-0.5 * m)) : 0.0;
     fragment = vec4(colour.rgb * alpha, alpha);

@@ -30,7 +30,7 @@ void cover(ivec4 pixels)
     corner += 0.5 * size;
     gl_PointSize = max(size.x, size.y);
 #endif
-    gl_Position = vec4((corner + vec2(screen.xy)) * 2.0 / image - 1.0, 0.0, 1.0);
+    gl_Position = vec4(corner * 2.0 / image - 1.0, 0.0, 1.0);
 }
 
 void drop()

@@ -2,7 +2,7 @@
 // axis, as trip_method.
 #include "real.glsl"
 
-#if defined(PARALLEL) || METHOD == 2
+#if defined(PARALLEL) || defined(UNCULLED) || METHOD == 2
 #define WEIGHT_IS_CONSTANT
 #endif
 
