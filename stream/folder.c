@@ -21,6 +21,7 @@ static void remove_files(int fd)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
             unlinkat(fd, trip_dataset_plane_name(axis, plane, name), 0);
     unlinkat(fd, TRIP_INDEX_NAME, 0);
+    unlinkat(fd, TRIP_SPOOL_NAME, 0);
 }
 
 /* Removes a data set; a folder that holds anything else stays. */

@@ -5,6 +5,9 @@
 
 #include <stdbool.h>
 
+/* Unnamed files have this name for the moment between their creation and their removal. */
+#define TRIP_SPOOL_NAME "spool"
+
 typedef struct trip_folder {
     char *path;    /* the final name, without slashes at its end */
     char *partial; /* what is written to */

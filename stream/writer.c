@@ -104,11 +104,11 @@ static void fill_header(trip_writer *w)
     h->list_count = 3;
 }
 
-static int open_spool(trip_writer *w, trip_output *o, const char *name)
+static int open_spool(trip_writer *w, trip_output *o)
 {
     return trip_output_create(o,
                               &(trip_output_params){ .folder = w->folder.partial,
-                                                     .name = name,
+                                                     .name = TRIP_SPOOL_NAME,
                                                      .buffer_bytes = SPOOL_BUFFER_BYTES,
                                                      .unnamed = true },
                               w->budget);
@@ -124,7 +124,7 @@ static int open_plane(trip_writer *w, int axis, int plane)
     char name[32];
     list_writer *l = &w->lists[axis];
     size_t page = w->params.page_bytes;
-    int status = open_spool(w, &l->checksums[plane], "checksums");
+    int status = open_spool(w, &l->checksums[plane]);
     if (status < 0)
         return status;
     return trip_output_create(
@@ -141,13 +141,13 @@ static int open_plane(trip_writer *w, int axis, int plane)
 static int open_list(trip_writer *w, int axis)
 {
     list_writer *l = &w->lists[axis];
-    int status = open_spool(w, &l->slabs, "slabs");
+    int status = open_spool(w, &l->slabs);
     trip_slab_init(&l->slab, w->params.slab_sheets, w->budget);
     l->sheet = -1;
     if (status == TRIP_OK)
-        status = open_spool(w, &l->bricks, "bricks");
+        status = open_spool(w, &l->bricks);
     if (status == TRIP_OK)
-        status = open_spool(w, &l->counts, "counts");
+        status = open_spool(w, &l->counts);
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (status == TRIP_OK && w->planes >> plane & 1)
             status = open_plane(w, axis, plane);
@@ -391,7 +391,7 @@ static int write_index(trip_writer *w, const char *text)
 {
     trip_output index = { .fd = -1 }, checksums = { .fd = -1 };
     size_t page = w->params.page_bytes;
-    int status = open_spool(w, &checksums, "checksums");
+    int status = open_spool(w, &checksums);
     if (status == TRIP_OK)
         status = trip_output_create(
             &index,

@@ -1,7 +1,9 @@
 #include "fixture.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 /* Decodes a whole list through the iterator and a plain read of the plane files. */
@@ -268,6 +270,35 @@ static void parameters_out_of_range_are_refused(void **state)
     trip_budget_destroy(budget);
 }
 
+/* Writers in child processes, killed at random moments: under the name is a whole data set, and the
+ * next writer is not in the way of what they left. */
+static void a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set(void **state)
+{
+    fixture f;
+    uint64_t random = 11;
+    (void)state;
+    make_small(&f);
+    f.params.replace = true;
+    for (int i = 0; i < 40; i++) {
+        int status;
+        pid_t child = fork();
+        if (child == 0) {
+            while (fixture_write(&f, f.path) == TRIP_OK)
+                ;
+            _exit(1);
+        }
+        usleep((unsigned)(fixture_random(&random) % 20000));
+        kill(child, SIGKILL);
+        waitpid(child, &status, 0);
+        assert_true(WIFSIGNALED(status));
+        expect_sound(&f, f.path);
+    }
+    assert_int_equal(fixture_write(&f, f.path), TRIP_OK);
+    expect_sound(&f, f.path);
+    fixture_run_command("test $(ls %s | wc -l) = 1", f.folder);
+    fixture_free(&f);
+}
+
 /* Needs the right to mount; the file system is of 1 MiB. */
 static void a_full_disk_is_one_line_and_leaves_nothing(void **state)
 {
@@ -306,6 +337,7 @@ int main(void)
         cmocka_unit_test(two_writers_of_one_name_do_not_mix),
         cmocka_unit_test(runs_out_of_order_or_place_are_refused),
         cmocka_unit_test(parameters_out_of_range_are_refused),
+        cmocka_unit_test(a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set),
         cmocka_unit_test(a_full_disk_is_one_line_and_leaves_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
