@@ -10,6 +10,15 @@
  * function does not set it. */
 typedef bool (*scene_voxel)(void *user, int i, int j, int k, unsigned *code, double gradient[3]);
 
+/* Random bits of a voxel, the same in every run. */
+static inline uint32_t scene_hash(int i, int j, int k)
+{
+    uint32_t x = (uint32_t)i * 73856093u ^ (uint32_t)j * 19349663u ^ (uint32_t)k * 83492791u;
+    x ^= x >> 13;
+    x *= 0x5bd1e995u;
+    return x ^ x >> 15;
+}
+
 typedef struct scene_params {
     int64_t dims[3];
     trip_affine index_to_world; /* all zero: the identity */

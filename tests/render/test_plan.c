@@ -20,12 +20,9 @@ static trip_settings unlit(trip_method method, double h)
 /* Sparse, with codes that differ from place to place. */
 static bool clumps(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
-    uint32_t x = (uint32_t)(i * 73856093) ^ (uint32_t)(j * 19349663) ^ (uint32_t)(k * 83492791);
+    uint32_t x = scene_hash(i, j, k);
     (void)user;
     (void)gradient;
-    x ^= x >> 13;
-    x *= 0x5bd1e995u;
-    x ^= x >> 15;
     *code = (unsigned)((i / 16 * 4 + j / 16 * 2 + k / 16) * 2000) + x % 500;
     return (x >> 20) % 5 == 0;
 }

@@ -241,11 +241,8 @@ static uint64_t count_drawn(const scene *s, const scene_renderer *r, const trip_
 
 static bool half_random(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
-    uint32_t x = (uint32_t)(i * 73856093) ^ (uint32_t)(j * 19349663) ^ (uint32_t)(k * 83492791);
+    uint32_t x = scene_hash(i, j, k);
     (void)user;
-    x ^= x >> 13;
-    x *= 0x5bd1e995u;
-    x ^= x >> 15;
     *code = 1 + x % 65535;
     for (int a = 0; a < 3; a++)
         gradient[a] = ((double)(x >> 8 * a & 255) - 127) / 256;
