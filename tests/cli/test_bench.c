@@ -1,0 +1,262 @@
+/* triptych bench: every table runs, and its figures agree with each other and with what is known of
+ * the data set. How fast anything is does not matter here. */
+#include <stdbool.h>
+#include <unistd.h>
+
+#include "program.h"
+
+#include <cjson/cJSON.h>
+#include <sys/stat.h>
+
+static const double kept = 20 * 18 * 16;
+
+/* A block of 20 x 18 x 16 voxels, all kept. */
+static int enter(void **state)
+{
+    program_run r;
+    unsigned char values[20 * 18 * 16];
+    if (program_enter_folder(state) != 0)
+        return -1;
+    for (size_t i = 0; i < sizeof values; i++)
+        values[i] = (unsigned char)(50 + i % 200);
+    FILE *f = fopen("block.raw", "wb");
+    if (!f || fwrite(values, 1, sizeof values, f) != sizeof values || fclose(f) != 0)
+        return -1;
+    program_call(&r, "brick block.raw --size 20,18,16 --type uint8 --keep-all -o block.trip -q");
+    return r.exit_status;
+}
+
+static cJSON *bench(const char *arguments)
+{
+    program_run r;
+    program_call(&r, "bench %s --json", arguments);
+    assert_works(&r);
+    cJSON *root = cJSON_Parse(r.out);
+    assert_non_null(root);
+    assert_true(cJSON_IsString(cJSON_GetObjectItem(root, "command")));
+    assert_true(cJSON_GetArraySize(cJSON_GetObjectItem(root, "limits")) > 0);
+    const cJSON *machine = cJSON_GetObjectItem(root, "machine");
+    assert_true(cJSON_IsString(cJSON_GetObjectItem(machine, "cpu")));
+    assert_true(cJSON_GetObjectItem(machine, "cores")->valueint >= 1);
+    return root;
+}
+
+static const cJSON *rows_of(const cJSON *root, const char *table)
+{
+    const cJSON *rows = cJSON_GetObjectItem(
+        cJSON_GetObjectItem(cJSON_GetObjectItem(root, "tables"), table), "rows");
+    assert_true(cJSON_IsArray(rows));
+    return rows;
+}
+
+static double number(const cJSON *row, const char *key)
+{
+    const cJSON *item = cJSON_GetObjectItem(row, key);
+    if (!cJSON_IsNumber(item))
+        print_error("%s is missing\n", key);
+    assert_true(cJSON_IsNumber(item));
+    return item->valuedouble;
+}
+
+static void assert_close(double a, double b)
+{
+    assert_true(fabs(a - b) <= 1e-9 * fmax(fabs(a), fabs(b)));
+}
+
+/* The times of a row with fps. */
+static void check_times(const cJSON *row)
+{
+    double ms = number(row, "ms");
+    assert_true(ms > 0);
+    assert_true(number(row, "ms_min") <= ms && ms <= number(row, "ms_max"));
+    assert_close(number(row, "fps"), 1000 / ms);
+}
+
+static void check_orders(const cJSON *rows, const double multiples[5])
+{
+    static const char *const names[] = { "merge, h = 0.00", "merge, h = 0.85", "merge, h = 0.95",
+                                         "clip", "axis" };
+    assert_int_equal(cJSON_GetArraySize(rows), 5);
+    for (int i = 0; i < 5; i++) {
+        const cJSON *row = cJSON_GetArrayItem(rows, i), *axis = cJSON_GetArrayItem(rows, 4);
+        assert_string_equal(cJSON_GetObjectItem(row, "method")->valuestring, names[i]);
+        check_times(row);
+        assert_close(number(row, "multiple"), number(row, "splats_drawn") / kept);
+        assert_close(number(row, "speed"), number(axis, "ms") / number(row, "ms"));
+        assert_true(number(row, "splats_drawn") >= number(axis, "splats_drawn"));
+        assert_true(number(row, "splats_read") >= number(row, "splats_drawn"));
+        assert_close(number(row, "paper_multiple"), number(row, "paper_splats") / 897229);
+        if (multiples[i] > 0)
+            assert_true(number(row, "multiple") == multiples[i]);
+    }
+}
+
+static void orders_draws_thrice_at_h_0_and_once_from_the_side(void **state)
+{
+    static const double oblique[] = { 3, 0, 0, 0, 1 }, lateral[] = { 1, 1, 1, 1, 1 };
+    (void)state;
+    static const char *const renderers[] = { "reference", "cpu" };
+    for (int i = 0; i < 2; i++) {
+        char arguments[128];
+        snprintf(arguments, sizeof arguments,
+                 "orders block.trip --renderer %s --size 96x80 --repeat 3", renderers[i]);
+        cJSON *root = bench(arguments);
+        const cJSON *rows = rows_of(root, "oblique");
+        check_orders(rows, oblique);
+        check_orders(rows_of(root, "lateral"), lateral);
+        for (int k = 0; k < 4; k++)
+            assert_true(number(cJSON_GetArrayItem(rows, k), "splats_drawn") >=
+                        number(cJSON_GetArrayItem(rows, k + 1), "splats_drawn"));
+        cJSON_Delete(root);
+    }
+}
+
+static double file_bytes(const char *path)
+{
+    struct stat s;
+    assert_int_equal(stat(path, &s), 0);
+    return (double)s.st_size;
+}
+
+static const cJSON *stage(const cJSON *rows, const char *key)
+{
+    const cJSON *row;
+    cJSON_ArrayForEach(row, rows)
+    {
+        if (!strcmp(cJSON_GetObjectItem(row, "key")->valuestring, key))
+            return row;
+    }
+    fail_msg("no stage %s", key);
+    return NULL;
+}
+
+static void stream_reads_the_files_of_all_lists(void **state)
+{
+    (void)state;
+    cJSON *root = bench("stream block.trip --renderer cpu --size 64x64 --repeat 2 --memory 64M");
+    const cJSON *rows = rows_of(root, "stages");
+    const cJSON *summary = cJSON_GetArrayItem(rows_of(root, "summary"), 0);
+    double planes = file_bytes("block.trip/x.voxels") + file_bytes("block.trip/y.voxels") +
+                    file_bytes("block.trip/z.voxels") + file_bytes("block.trip/x.normals") +
+                    file_bytes("block.trip/y.normals") + file_bytes("block.trip/z.normals");
+    assert_true(number(stage(rows, "plain"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "read"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "frame"), "bytes_read") == planes);
+    assert_true(number(summary, "dataset_bytes") == planes + file_bytes("block.trip/index.trip"));
+    assert_true(number(summary, "memory_limit_bytes") == 64.0 * (1 << 20));
+    assert_true(number(summary, "memory_peak_bytes") <= 64.0 * (1 << 20));
+    assert_close(number(summary, "frame_of_disk"),
+                 number(summary, "gb_per_s") / number(summary, "disk_gb_per_s"));
+    assert_close(number(summary, "seconds_per_frame") * 1000, number(stage(rows, "frame"), "ms"));
+    assert_close(number(summary, "frame_of_bound"),
+                 number(stage(rows, "frame"), "ms") /
+                     fmax(number(stage(rows, "read"), "ms"), number(stage(rows, "draw"), "ms")));
+    cJSON_Delete(root);
+}
+
+static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void **state)
+{
+    (void)state;
+    cJSON *root = bench("renderers block.trip --renderer cpu,reference --size 32x32,48x40 "
+                        "--views 3 --threads 1,2");
+    const cJSON *rows = rows_of(root, "renderers"), *row;
+    assert_int_equal(cJSON_GetArraySize(rows), 6);
+    cJSON_ArrayForEach(row, rows)
+    {
+        check_times(row);
+        assert_true(number(row, "views") == 3);
+        /* A block in full view is drawn from one list at least, from three at most. */
+        assert_true(number(row, "splats_drawn") >= kept);
+        assert_true(number(row, "splats_drawn") <= 3 * kept);
+        assert_close(number(row, "mpixels_per_s"),
+                     number(row, "msplats_per_s") * number(row, "pixels_per_splat"));
+    }
+    cJSON_Delete(root);
+}
+
+static void submit_compares_forms_where_there_is_gl(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r, "bench submit block.trip --size 64x64 --repeat 1 --json");
+    if (r.exit_status != 0 && strstr(r.err, "OpenGL")) {
+        print_message("skipped: %s", r.err);
+        skip();
+    }
+    assert_works(&r);
+    cJSON *root = cJSON_Parse(r.out);
+    const cJSON *rows = rows_of(root, "submit"), *row;
+    assert_int_equal(cJSON_GetArraySize(rows), 8);
+    cJSON_ArrayForEach(row, rows)
+    {
+        bool axis = !strcmp(cJSON_GetObjectItem(row, "orders")->valuestring, "axis");
+        check_times(row);
+        assert_true(axis ? number(row, "multiple") == 1 : number(row, "multiple") > 1);
+    }
+    assert_true(number(cJSON_GetArrayItem(rows, 0), "speed") == 1);
+    cJSON_Delete(root);
+}
+
+static void tables_for_people_name_the_command_and_their_limits(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r, "bench orders block.trip --renderer cpu --size 32x32 --repeat 1");
+    assert_works(&r);
+    assert_non_null(strstr(r.out, "triptych bench orders block.trip --renderer cpu --size 32x32"));
+    assert_non_null(strstr(r.out, "| merge, h = 0.85 |"));
+    assert_non_null(strstr(r.out, "\nLimits of these figures\n"));
+    assert_non_null(strstr(r.out, "\nMachine\n"));
+}
+
+static void wrong_usage_is_refused_in_one_line(void **state)
+{
+    (void)state;
+    static const char *const wrong[] = {
+        "bench",
+        "bench orders",
+        "bench sideways block.trip",
+        "bench orders block.trip block.trip",
+        "bench orders block.trip --views 3",
+        "bench orders block.trip --engine pread",
+        "bench orders block.trip --size 32x32,64x64",
+        "bench orders block.trip --renderer cpu,gl",
+        "bench submit block.trip --renderer cpu",
+        "bench renderers block.trip --engine pread",
+        "bench renderers block.trip --renderer none",
+        "bench stream block.trip --views 2",
+        "bench orders block.trip --repeat 0",
+        "bench orders block.trip --size 0x32",
+        "bench orders block.trip --threads 1,2",
+        "bench renderers block.trip --threads 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1",
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        program_run r;
+        program_call(&r, "%s", wrong[i]);
+        assert_fails(&r, 2);
+    }
+}
+
+static void what_cannot_be_measured_fails_in_one_line(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r, "bench orders missing.trip");
+    assert_fails(&r, 1);
+    program_call(&r, "bench orders block.trip --renderer cpu --memory 1M");
+    assert_fails(&r, 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(orders_draws_thrice_at_h_0_and_once_from_the_side),
+        cmocka_unit_test(stream_reads_the_files_of_all_lists),
+        cmocka_unit_test(renderers_gives_a_row_for_each_renderer_size_and_thread_count),
+        cmocka_unit_test(submit_compares_forms_where_there_is_gl),
+        cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
+        cmocka_unit_test(wrong_usage_is_refused_in_one_line),
+        cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),
+    };
+    return cmocka_run_group_tests(tests, enter, program_leave_folder);
+}
