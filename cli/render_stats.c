@@ -75,13 +75,6 @@ int render_stats_add_frame(render_stats *s, const trip_frame_stats *frame)
     return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
 }
 
-static int write_stdout(const char *text)
-{
-    if (puts(text) < 0 || fflush(stdout) != 0)
-        return trip_fail_errno("write", "standard output", "--stats");
-    return 0;
-}
-
 static int write_file(const char *path, const char *text)
 {
     char partial[4096];
@@ -117,7 +110,11 @@ int render_stats_write(render_stats *s, const render_options *o, const trip_rend
     char *text = cJSON_Print(root);
     if (!text)
         return out_of_memory();
-    int status = strcmp(o->stats, "-") ? write_file(o->stats, text) : write_stdout(text);
+    int status = 0;
+    if (strcmp(o->stats, "-"))
+        status = write_file(o->stats, text);
+    else
+        puts(text); /* main() says when stdout cannot be written */
     free(text);
     return status;
 }
