@@ -5,6 +5,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "cpu_renderer.h"
 #include "report.h"
 
 double bench_now_ms(void)
@@ -32,10 +33,29 @@ unsigned bench_planes(const session *s, const trip_settings *settings)
     return planes;
 }
 
+static bool is_covered(void *user, const trip_selection *selection, uint32_t brick)
+{
+    trip_renderer *covering = *(trip_renderer **)user;
+    return covering && trip_cpu_covered(covering, selection, brick);
+}
+
+int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
+                        trip_engine engine, trip_renderer **covering)
+{
+    return session_make_reader(s, out,
+                               &(session_reader){ .engine = engine,
+                                                  .planes = bench_planes(s, &o->settings),
+                                                  .threads = o->threads[0],
+                                                  .skip = covering ? is_covered : NULL,
+                                                  .skip_user = covering });
+}
+
 static int draw_planned(const bench_frame *f, const trip_camera *camera, bool count,
                         bench_cost *cost)
 {
     trip_plan plan;
+    if (f->covering)
+        *f->covering = count ? NULL : f->renderer;
     double start = bench_now_ms();
     int status = trip_plan_make(&plan, f->session->data, camera, &f->settings, f->session->table,
                                 f->session->budget);
@@ -176,8 +196,7 @@ int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, b
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
     if (!status)
-        status = session_make_reader(s, &f->reader, bench_planes(s, &o->settings), TRIP_ENGINE_NULL,
-                                     0, false);
+        status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, NULL);
     if (status)
         return status;
     cJSON *machine = bench_report_machine(r);

@@ -14,6 +14,8 @@ typedef struct bench_frame {
     trip_camera_params view;
     trip_settings settings;
     float *rgba;
+    /* The reader leaves out what lies behind what this one has drawn; NULL: reads everything. */
+    trip_renderer **covering;
 } bench_frame;
 
 /* What most tables draw with: the first renderer, size and number of threads of the options, and
@@ -55,6 +57,9 @@ double bench_now_ms(void);
 /* Splats over the lists. */
 uint64_t bench_splats_drawn(const trip_frame_stats *s);
 uint64_t bench_splats_read(const trip_frame_stats *s);
+/* A reader of what the frames of the options read; `covering` as in bench_frame, or NULL. */
+int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
+                        trip_engine engine, trip_renderer **covering);
 /* What the session's data and the settings have to be read: bit per trip_plane. */
 unsigned bench_planes(const session *s, const trip_settings *settings);
 

@@ -15,6 +15,7 @@ enum {
     KEY_VIEWS,
     KEY_NO_SHADING,
     KEY_KERNEL_RADIUS,
+    KEY_HIDDEN,
     KEY_ENGINE,
     KEY_MEMORY,
     KEY_JSON,
@@ -24,19 +25,23 @@ enum {
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
-      "Transfer function: .tf, ParaView JSON or preset:NAME (the one kept in the data set)", 0 },
+      "Transfer function: .tf, ParaView JSON or preset:NAME (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
-      "Pixels (512x512; renderers: 512x512,1024x1024; stream: 1024x1024)", 0 },
+      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024)", 0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (auto; submit: gl; renderers: all there are)", 0 },
-    { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw (one a processor)", 0 },
-    { "repeat", KEY_REPEAT, "N", 0, "Interleaved runs to take the middle one of (5; renderers: 1)",
+      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are)", 0 },
+    { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
       0 },
-    { "views", KEY_VIEWS, "N", 0, "Views round the object (20); renderers only", 0 },
+    { "repeat", KEY_REPEAT, "N", 0,
+      "Runs, in turns, to take the middle one of (default: 5; renderers 1)", 0 },
+    { "views", KEY_VIEWS, "N", 0, "Views round the object (default: 20); renderers only", 0 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
-    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (2)", 0 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (auto); stream only", 0 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Bound for all buffers (a quarter of what there is)", 0 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
+    { "hidden", KEY_HIDDEN, "skip|draw", 0,
+      "Whether bricks behind what is opaque are read (default: stream draw, renderers skip)", 0 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (default: auto); stream only", 0 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
+      0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -46,28 +51,52 @@ static const struct table {
     unsigned refused; /* options that have no meaning here */
     bool lists;       /* takes several sizes, renderers and thread counts */
     int repeat;
+    bool draw_hidden;
     int sizes[2], size_count;
     trip_renderer_kind renderers[3];
     int renderer_count;
 } tables[] = {
-    { "orders", BIT(KEY_VIEWS) | BIT(KEY_ENGINE), false, 5, { 512 }, 1, { TRIP_RENDERER_AUTO }, 1 },
-    { "submit",
-      BIT(KEY_VIEWS) | BIT(KEY_ENGINE) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
-      false,
-      5,
-      { 512 },
-      1,
-      { TRIP_RENDERER_GL },
-      1 },
-    { "stream", BIT(KEY_VIEWS), false, 5, { 1024 }, 1, { TRIP_RENDERER_AUTO }, 1 },
-    { "renderers",
-      BIT(KEY_ENGINE),
-      true,
-      1,
-      { 512, 1024 },
-      2,
-      { TRIP_RENDERER_CPU, TRIP_RENDERER_GL, TRIP_RENDERER_REFERENCE },
-      3 },
+    {
+        .name = "orders",
+        .refused = BIT(KEY_VIEWS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
+        .draw_hidden = true,
+        .repeat = 5,
+        .sizes = { 512 },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_AUTO },
+        .renderer_count = 1,
+    },
+    {
+        .name = "submit",
+        .refused = BIT(KEY_VIEWS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) |
+                   BIT(KEY_THREADS),
+        .draw_hidden = true,
+        .repeat = 5,
+        .sizes = { 512 },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_GL },
+        .renderer_count = 1,
+    },
+    {
+        .name = "stream",
+        .refused = BIT(KEY_VIEWS),
+        .draw_hidden = true,
+        .repeat = 5,
+        .sizes = { 1024 },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_AUTO },
+        .renderer_count = 1,
+    },
+    {
+        .name = "renderers",
+        .refused = BIT(KEY_ENGINE),
+        .lists = true,
+        .repeat = 1,
+        .sizes = { 512, 1024 },
+        .size_count = 2,
+        .renderers = { TRIP_RENDERER_CPU, TRIP_RENDERER_GL, TRIP_RENDERER_REFERENCE },
+        .renderer_count = 3,
+    },
 };
 
 /* While parsing: what was given, for the check against the table. */
@@ -126,6 +155,14 @@ static int parse_engine(const char *text, bench_options *o)
     return status;
 }
 
+static int parse_hidden(const char *text, bench_options *o)
+{
+    static const char *const names[] = { "skip", "draw", NULL };
+    int which = 0, status = trip_option_choice("--hidden", text, names, &which);
+    o->draw_hidden = which == 1;
+    return status;
+}
+
 static int parse_option(int key, char *arg, bench_options *o)
 {
     switch (key) {
@@ -147,6 +184,8 @@ static int parse_option(int key, char *arg, bench_options *o)
         return 0;
     case KEY_KERNEL_RADIUS:
         return trip_option_number("--kernel-radius", arg, 0.1, 100, &o->settings.kernel_radius);
+    case KEY_HIDDEN:
+        return parse_hidden(arg, o);
     case KEY_ENGINE:
         return parse_engine(arg, o);
     case KEY_MEMORY:
@@ -186,8 +225,10 @@ static int check(parse *p)
     const struct table *t = &tables[which];
     for (int i = 0; options[i].name; i++)
         if (p->given & t->refused & BIT(options[i].key))
-            return trip_fail(TRIP_USAGE, "usage", options[i].name, "does not apply to bench %s",
-                             t->name);
+            return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
+                             options[i].name);
+    if (!(p->given & BIT(KEY_HIDDEN)))
+        o->draw_hidden = t->draw_hidden;
     fill_defaults(o, t);
     if (!t->lists && (o->size_count > 1 || o->renderer_count > 1 || o->thread_count > 1))
         return trip_fail(TRIP_USAGE, "usage", t->name,
@@ -227,7 +268,7 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"
                "  stream     reading and drawing against the disk's bandwidth\n"
                "  renderers  the renderers there are, over views round the object\v"
-               "Defaults in parentheses. Runs of what is compared take turns, so that a machine "
+               "Runs of what is compared take turns, so that a machine "
                "busy for a while slows all of them.",
     };
     *o = (bench_options){ .views = 20, .settings = trip_settings_default() };

@@ -20,6 +20,7 @@ typedef struct bench_options {
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
+    bool draw_hidden;      /* bricks behind what is opaque */
     bool json;
 } bench_options;
 

@@ -42,8 +42,14 @@ typedef struct race {
     trip_reader *reader;
     contender contenders[MAX_CONTENDERS];
     int count;
-    load *loads; /* of the size being drawn: [view] */
+    trip_renderer *covering; /* of the frame being drawn */
+    load *loads;             /* of the size being drawn: [view] */
 } race;
+
+static trip_renderer **covering(race *c)
+{
+    return c->options->draw_hidden ? NULL : &c->covering;
+}
 
 static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_report *r)
 {
@@ -124,6 +130,7 @@ static int draw_views(race *c, const int size[2])
 {
     bench_frame frame = { .session = c->session,
                           .reader = c->reader,
+                          .covering = covering(c),
                           .settings = c->options->settings };
     int status = session_take_image(c->session, size[0], size[1], &frame.rgba);
     for (int view = 0; view < c->options->views && !status; view++) {
@@ -194,7 +201,7 @@ static int run(race *c, bench_report *r)
     return status;
 }
 
-static void add_limits(bench_report *r)
+static void add_limits(bench_report *r, bool draw_hidden)
 {
     bench_report_limit(r, "The data set is in memory (null engine): no figure contains the disk. A "
                           "frame is planning, copying from memory, drawing and merging, and ends "
@@ -204,6 +211,9 @@ static void add_limits(bench_report *r)
                           "behind saturated pixels count too, though a renderer may skip them.");
     bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
                        SAMPLE_EVERY);
+    if (!draw_hidden)
+        bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
+                              "same.");
     bench_report_limit(r, "Times are over views; renderers take turns at each view.");
 }
 
@@ -215,11 +225,10 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
     c->session = s;
     c->options = o;
     cJSON_AddNumberToObject(bench_report_settings(r), "views", o->views);
-    add_limits(r);
+    add_limits(r, o->draw_hidden);
     int status = add_contenders(c, r);
     if (!status)
-        status = session_make_reader(s, &c->reader, bench_planes(s, &o->settings), TRIP_ENGINE_NULL,
-                                     0, false);
+        status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, covering(c));
     if (!status)
         status = run(c, r);
     if (c->reader)

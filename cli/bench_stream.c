@@ -50,6 +50,7 @@ typedef struct stream {
     bench_frame in_memory; /* no renderer: does not fit */
     bench_frame unread;    /* read and not drawn */
     bench_probe probe;
+    trip_renderer *covering; /* of the frame being drawn */
     bench_files files;
     bool direct;
     uint64_t peak_rss_bytes, peak_bytes;
@@ -112,13 +113,13 @@ static int open_frame(stream *t)
     bench_cost cost;
     bench_frame *f = &t->frame;
     *f = (bench_frame){ .session = s, .settings = o->settings };
+    f->covering = o->draw_hidden ? NULL : &t->covering;
     f->view = bench_view_oblique(s, size);
     int status = session_take_image(s, size[0], size[1], &f->rgba);
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
     if (!status)
-        status = session_make_reader(s, &f->reader, bench_planes(s, &o->settings), o->engine,
-                                     o->threads[0], false);
+        status = bench_reader_create(s, &f->reader, o, o->engine, f->covering);
     if (!status)
         status = find_files(t);
     if (!status)
@@ -143,9 +144,8 @@ static int open_in_memory(stream *t, bench_report *r)
         return status;
     other.budget = t->whole;
     bench_keep_report(why);
-    status = session_make_reader(&other, &t->in_memory.reader,
-                                 bench_planes(t->session, &t->options->settings), TRIP_ENGINE_NULL,
-                                 0, false);
+    status = bench_reader_create(&other, &t->in_memory.reader, t->options, TRIP_ENGINE_NULL,
+                                 t->frame.covering);
     bench_keep_report(NULL);
     if (!status || trip_interrupted())
         return status;
@@ -242,6 +242,9 @@ static void describe(const stream *t, bench_report *r)
                           "are not read, so bytes may differ from the plain read's.");
     bench_report_limit(r, "Draw alone: the same frame with the data set in memory (null engine), "
                           "from memory besides the promise; its copying is part of it.");
+    if (t->frame.covering)
+        bench_report_limit(r, "The frame leaves out bricks behind what is opaque, which reading "
+                              "alone cannot.");
     bench_report_limit(r, "Memory: what was promised, what of it was taken and what was resident "
                           "at most, code and libraries included, after one frame from disk.");
     bench_report_limit(r, "Oblique perspective view that needs all three lists; stages take turns, "

@@ -65,22 +65,23 @@ void session_close(session *s)
     *s = (session){ 0 };
 }
 
-int session_make_reader(const session *s, trip_reader **out, unsigned planes, trip_engine engine,
-                        int threads, bool cache)
+int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
 {
     enum { SLOTS = 8, MAX_SLOT_BYTES = 1 << 20 };
     uint64_t left = trip_budget_left_bytes(s->budget);
     size_t page = (size_t)1 << s->data->header.page_log2;
-    size_t plane_count = planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
+    size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
     size_t slot = (size_t)(left / 4) / (SLOTS * plane_count) / page * page;
     slot = slot < page ? page : slot;
     trip_reader_params params = {
-        .engine = engine,
-        .planes = planes,
+        .engine = wanted->engine,
+        .planes = wanted->planes,
         .slots = SLOTS,
         .slot_bytes = slot < MAX_SLOT_BYTES || page > MAX_SLOT_BYTES ? slot : MAX_SLOT_BYTES,
-        .threads = (unsigned)threads,
-        .cache_bytes = cache ? (size_t)(left / 2) : 0,
+        .threads = (unsigned)wanted->threads,
+        .skip = wanted->skip,
+        .skip_user = wanted->skip_user,
+        .cache_bytes = wanted->cache ? (size_t)(left / 2) : 0,
     };
     return trip_reader_create(out, s->data, &params, s->budget);
 }

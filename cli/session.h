@@ -21,10 +21,18 @@ typedef struct session {
 int session_open(session *s, const char *input, const char *tf, uint64_t memory_bytes);
 void session_close(session *s);
 
-/* A reader of `planes` (bit per trip_plane): its ring takes at most a quarter of the memory that is
- * left, its cache, where wanted, half. `threads` 0: the default. */
-int session_make_reader(const session *s, trip_reader **out, unsigned planes, trip_engine engine,
-                        int threads, bool cache);
+/* What a reader is wanted for; zero means the default. */
+typedef struct session_reader {
+    trip_engine engine;
+    unsigned planes; /* bit per trip_plane */
+    int threads;
+    bool cache; /* keep pages for the frames to come */
+    bool (*skip)(void *user, const trip_selection *selection, uint32_t brick);
+    void *skip_user;
+} session_reader;
+
+/* Its ring takes at most a quarter of the memory that is left, its cache half. */
+int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted);
 
 /* width * height * 4 floats; release with session_release_image(). */
 int session_take_image(const session *s, int width, int height, float **rgba);
