@@ -22,16 +22,37 @@ static void add_reader_stats(trip_reader_stats *sum, const trip_reader_stats *s)
     sum->wait_ns += s->wait_ns;
 }
 
-static int draw_batches(trip_renderer *renderer, trip_reader *reader, bool front_to_back,
-                        trip_frame_stats *stats)
+/* A frame being drawn. */
+typedef struct drawing {
+    trip_renderer *renderer;
+    trip_reader *reader;
+    const trip_frame *frame;
+    trip_frame_stats *stats;
+    uint64_t splats; /* drawn so far */
+} drawing;
+
+static void tell_progress(drawing *d, const trip_batch *batch)
+{
+    uint64_t total = 0;
+    if (!d->frame->progress)
+        return;
+    for (size_t i = 0; i < batch->run_count; i++)
+        d->splats += batch->runs[i].count;
+    for (int axis = 0; axis < 3; axis++)
+        total += d->frame->plan->lists[axis].splats_selected;
+    d->frame->progress(d->frame->progress_user, d->splats, total);
+}
+
+static int draw_batches(drawing *d, bool front_to_back)
 {
     trip_batch batch;
     int status;
-    while ((status = trip_reader_next(reader, &batch)) > 0) {
+    while ((status = trip_reader_next(d->reader, &batch)) > 0) {
         double start = now_ms();
-        status = renderer->ops->draw(renderer, &batch, front_to_back);
-        trip_reader_release(reader, &batch);
-        stats->draw_ms += now_ms() - start;
+        status = d->renderer->ops->draw(d->renderer, &batch, front_to_back);
+        d->stats->draw_ms += now_ms() - start;
+        tell_progress(d, &batch);
+        trip_reader_release(d->reader, &batch);
         if (status)
             return status;
         if (trip_interrupted())
@@ -40,29 +61,27 @@ static int draw_batches(trip_renderer *renderer, trip_reader *reader, bool front
     return status;
 }
 
-static int draw_pass(trip_renderer *renderer, trip_reader *reader, const trip_plan_pass *pass,
-                     trip_frame_stats *stats)
+static int draw_pass(drawing *d, const trip_plan_pass *pass)
 {
-    int status = trip_reader_begin(reader, &pass->selection);
+    int status = trip_reader_begin(d->reader, &pass->selection);
     if (status)
         return status;
-    status = draw_batches(renderer, reader, pass->front_to_back, stats);
-    trip_reader_stats read = trip_reader_get_stats(reader);
-    add_reader_stats(&stats->reader, &read);
-    stats->lists[pass->selection.axis].bytes_read += read.bytes_read;
+    status = draw_batches(d, pass->front_to_back);
+    trip_reader_stats read = trip_reader_get_stats(d->reader);
+    add_reader_stats(&d->stats->reader, &read);
+    d->stats->lists[pass->selection.axis].bytes_read += read.bytes_read;
     return status;
 }
 
-static int draw_lists(trip_renderer *renderer, trip_reader *reader, const trip_plan *plan,
-                      trip_frame_stats *stats)
+static int draw_lists(drawing *d)
 {
     for (int axis = 0; axis < 3; axis++) {
-        const trip_plan_list *list = &plan->lists[axis];
+        const trip_plan_list *list = &d->frame->plan->lists[axis];
         if (list->pass_count == 0)
             continue;
-        int status = renderer->ops->begin_list(renderer, axis);
+        int status = d->renderer->ops->begin_list(d->renderer, axis);
         for (int i = 0; i < list->pass_count && !status; i++)
-            status = draw_pass(renderer, reader, &list->passes[i], stats);
+            status = draw_pass(d, &list->passes[i]);
         if (status)
             return status;
     }
@@ -85,9 +104,10 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
 {
     double start = now_ms();
     *stats = (trip_frame_stats){ 0 };
+    drawing d = { .renderer = renderer, .reader = reader, .frame = frame, .stats = stats };
     int status = renderer->ops->begin_frame(renderer, frame);
     if (!status)
-        status = draw_lists(renderer, reader, frame->plan, stats);
+        status = draw_lists(&d);
     double merge_start = now_ms();
     if (!status)
         status = renderer->ops->end_frame(renderer, rgba);

@@ -18,6 +18,9 @@ typedef struct trip_frame {
     const trip_plan *plan;
     const trip_tf_entry *table; /* 65536 entries */
     bool count;                 /* fill the counts below exactly, where counting costs time */
+    /* Hears between batches how many splats were drawn, of how many; NULL: nobody asks. */
+    void (*progress)(void *user, uint64_t splats, uint64_t total);
+    void *progress_user;
 } trip_frame;
 
 typedef struct trip_list_stats {

@@ -176,7 +176,12 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
     assert_int_equal(renderer->create(&r, s->budget), 0);
 
-    trip_frame frame = { s->data, &camera, settings, &plan, s->table, true };
+    trip_frame frame = { .data = s->data,
+                         .camera = &camera,
+                         .settings = settings,
+                         .plan = &plan,
+                         .table = s->table,
+                         .count = true };
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
     assert_non_null(p.rgba);
     assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, &p.stats), 0);

@@ -22,7 +22,12 @@ static int draw(const scene *s, trip_renderer *r, trip_reader *reader,
     settings.h = 0.2;
     assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
     assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
-    trip_frame frame = { s->data, &camera, &settings, &plan, s->table, true };
+    trip_frame frame = { .data = s->data,
+                         .camera = &camera,
+                         .settings = &settings,
+                         .plan = &plan,
+                         .table = s->table,
+                         .count = true };
     int status = trip_frame_draw(r, reader, &frame, rgba, stats);
     trip_plan_release(&plan, s->budget);
     return status;
@@ -86,6 +91,47 @@ static void bytes_and_splats_are_counted_for_each_list(void **state)
         assert_true(p.stats.ms > 0 && p.stats.ms >= p.stats.draw_ms);
         scene_picture_free(&p);
     }
+    scene_destroy(&s);
+}
+
+static void keep_progress(void *user, uint64_t splats, uint64_t total)
+{
+    uint64_t *last = user;
+    assert_true(splats > last[0] && splats <= total);
+    last[0] = splats;
+    last[1] = total;
+}
+
+static void progress_rises_to_the_number_of_splats(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_renderer *r;
+    trip_camera camera;
+    trip_plan plan;
+    trip_frame_stats stats;
+    float rgba[16 * 16 * 4];
+    uint64_t last[2] = { 0 };
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
+    assert_int_equal(trip_reference_create(&r, s.budget), 0);
+    trip_reader *reader = make_reader(&s, (trip_reader_params){ .slots = 2, .slot_bytes = 4096 });
+    assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s.data, &camera, &settings, s.table, s.budget), 0);
+    trip_frame frame = { .data = s.data,
+                         .camera = &camera,
+                         .settings = &settings,
+                         .plan = &plan,
+                         .table = s.table,
+                         .progress = keep_progress,
+                         .progress_user = last };
+    assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, &stats), 0);
+    assert_true(last[0] > 0);
+    assert_int_equal(last[0], last[1]);
+    trip_plan_release(&plan, s.budget);
+    trip_reader_destroy(reader);
+    r->ops->destroy(r);
     scene_destroy(&s);
 }
 
@@ -176,6 +222,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_renderer_and_reader_serve_many_frames_of_any_size),
         cmocka_unit_test(bytes_and_splats_are_counted_for_each_list),
+        cmocka_unit_test(progress_rises_to_the_number_of_splats),
         cmocka_unit_test(a_failed_or_damaged_read_ends_the_frame_with_one_report),
         cmocka_unit_test(without_memory_for_its_pixels_the_reference_says_so),
         cmocka_unit_test(an_interrupt_ends_the_frame),
