@@ -217,7 +217,7 @@ int trip_command_info(int argc, char **argv)
         .doc = "Show what is in a data set: grid, values, sizes, where it came from.",
     };
     options o = { 0 };
-    trip_budget *budget;
+    trip_budget *budget = NULL;
     int status = trip_options_parse(&argp, argc, argv, &o);
     if (status == 0)
         status = trip_budget_create(&budget, 0);

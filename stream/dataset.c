@@ -128,7 +128,7 @@ static int set_lists(trip_dataset *d)
 static int open_plane(trip_dataset *d, int folder, int axis, int plane)
 {
     char name[32], where[4096];
-    uint64_t bytes, wanted = d->lists[axis].splats * TRIP_RECORD_BYTES;
+    uint64_t bytes = 0, wanted = d->lists[axis].splats * TRIP_RECORD_BYTES;
     trip_dataset_plane_name(axis, plane, name);
     int status = open_file(d, folder, name, &d->plane_fd[axis][plane], &bytes);
     if (status != TRIP_OK)

@@ -115,20 +115,38 @@ static int open_partial(trip_folder *f)
     return TRIP_OK;
 }
 
-static int set_paths(trip_folder *f, const char *path)
+static bool is_link(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0 && S_ISLNK(st.st_mode);
+}
+
+/* The name without slashes at its end; where it is a link, what it leads to, so that the link stays
+ * and that is replaced. */
+static char *plain_path(const char *path)
 {
     size_t length = strlen(path);
     while (length > 1 && path[length - 1] == '/')
         length--;
-    f->path = strndup(path, length);
-    if (length == 0 || strcmp(path, "/") == 0)
-        return trip_fail(TRIP_ERROR, "write", path, "not a name for a data set");
-    if (asprintf(&f->partial, "%.*s.partial", (int)length, path) < 0)
+    char *plain = strndup(path, length);
+    char *target = plain && is_link(plain) ? realpath(plain, NULL) : NULL;
+    if (!target)
+        return plain;
+    free(plain);
+    return target;
+}
+
+static int set_paths(trip_folder *f, const char *path)
+{
+    f->path = plain_path(path);
+    if (!f->path || asprintf(&f->partial, "%s.partial", f->path) < 0)
         f->partial = NULL;
-    if (asprintf(&f->aside, "%.*s.replaced", (int)length, path) < 0)
+    if (!f->path || asprintf(&f->aside, "%s.replaced", f->path) < 0)
         f->aside = NULL;
     if (!f->path || !f->partial || !f->aside)
         return trip_fail(TRIP_ERROR, "write", path, "out of memory");
+    if (!*f->path || strcmp(f->path, "/") == 0)
+        return trip_fail(TRIP_ERROR, "write", path, "not a name for a data set");
     return TRIP_OK;
 }
 

@@ -186,6 +186,21 @@ static void a_replacement_cut_off_between_its_two_renames_is_undone(void **state
     fixture_free(&f);
 }
 
+static void a_data_set_behind_a_link_is_replaced_and_the_link_stays(void **state)
+{
+    fixture f;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/link", f.folder);
+    assert_int_equal(symlink("a.trip", path), 0);
+    f.params.replace = true;
+    assert_int_equal(fixture_write(&f, path), TRIP_OK);
+    fixture_run_command("test -L %s && test $(ls %s | wc -l) = 2", path, f.folder);
+    expect_sound(&f, path);
+    fixture_free(&f);
+}
+
 static trip_writer *open_writer(const char *path, trip_budget *budget)
 {
     trip_writer *w;
@@ -334,6 +349,7 @@ int main(void)
         cmocka_unit_test(only_a_data_set_is_replaced),
         cmocka_unit_test(what_an_interrupted_run_left_is_removed),
         cmocka_unit_test(a_replacement_cut_off_between_its_two_renames_is_undone),
+        cmocka_unit_test(a_data_set_behind_a_link_is_replaced_and_the_link_stays),
         cmocka_unit_test(two_writers_of_one_name_do_not_mix),
         cmocka_unit_test(runs_out_of_order_or_place_are_refused),
         cmocka_unit_test(parameters_out_of_range_are_refused),
