@@ -7,6 +7,7 @@
 #include "cpu_renderer.h"
 #include "frame.h"
 #include "image_file.h"
+#include "progress.h"
 #include "render_options.h"
 #include "render_stats.h"
 #include "render_view.h"
@@ -21,6 +22,7 @@ typedef struct drawing {
     trip_renderer *renderer;
     trip_reader *reader;
     render_stats *stats;
+    trip_progress progress;
 } drawing;
 
 static int open_drawing(drawing *d)
@@ -74,6 +76,12 @@ static int image_path(const drawing *d, int index, char *path, size_t bytes)
     return 0;
 }
 
+static void show_progress(void *user, uint64_t splats, uint64_t total)
+{
+    drawing *d = user;
+    trip_progress_show(&d->progress, "draw", splats, total, "splats");
+}
+
 static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *plan,
                         trip_frame_stats *stats)
 {
@@ -85,12 +93,16 @@ static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *
         .plan = plan,
         .table = s->table,
         .count = d->o.stats || d->o.explain,
+        .progress = show_progress,
+        .progress_user = d,
     };
     if (d->o.explain)
         trip_plan_explain(plan, s->data, &d->o.settings, stdout);
     int status = make_reader(d, plan->planes);
+    d->progress = trip_progress_start(false);
     if (!status)
         status = trip_frame_draw(d->renderer, d->reader, &frame, d->rgba, stats);
+    trip_progress_end(&d->progress);
     if (!status && d->o.explain)
         render_stats_explain(stats, stdout);
     return status;
