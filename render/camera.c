@@ -185,20 +185,6 @@ trip_camera_params trip_camera_frame(const trip_camera_framing *f,
     return p;
 }
 
-trip_camera_params trip_camera_frame_volume(const int64_t dims[3],
-                                            const trip_affine *index_to_world, int width,
-                                            int height, double azimuth_degrees, trip_vec3 up)
-{
-    trip_camera_framing f = {
-        .width = width, .height = height, .up = up, .azimuth_degrees = azimuth_degrees
-    };
-    for (int a = 0; a < 3; a++) {
-        f.lo[a] = -0.5;
-        f.hi[a] = (double)dims[a] - 0.5;
-    }
-    return trip_camera_frame(&f, index_to_world);
-}
-
 trip_camera_params trip_camera_turn(const trip_camera_params *view, double azimuth_degrees)
 {
     trip_camera_params p = *view;

@@ -22,7 +22,7 @@ typedef struct trip_camera_params {
 } trip_camera_params;
 
 typedef struct trip_camera {
-    trip_camera_params params; /* as given, up and look made orthonormal not needed */
+    trip_camera_params params; /* as given */
     int width, height;
     bool ortho;
     trip_vec3 eye, r0, rx, ry; /* index space, see above */
@@ -39,13 +39,6 @@ typedef struct trip_camera {
 int trip_camera_make(trip_camera *c, const trip_camera_params *params,
                      const trip_affine *index_to_world);
 
-/* The view used when none is given: the whole volume framed in perspective, seen from the front,
- * a little from the right and from above, `up` as given (zero: +z). `azimuth_degrees` turns it
- * about up, for turntables. */
-trip_camera_params trip_camera_frame_volume(const int64_t dims[3],
-                                            const trip_affine *index_to_world, int width,
-                                            int height, double azimuth_degrees, trip_vec3 up);
-
 /* What trip_camera_frame() frames. Zero means the default. */
 typedef struct trip_camera_framing {
     double lo[3], hi[3];    /* a box of index space */
@@ -58,6 +51,8 @@ typedef struct trip_camera_framing {
                                otherwise at what puts the box in the middle of the image */
 } trip_camera_framing;
 
+/* The view used when none is given: the whole box framed in perspective with a small margin, seen
+ * from the front, a little from the right and from above. */
 trip_camera_params trip_camera_frame(const trip_camera_framing *f,
                                      const trip_affine *index_to_world);
 
