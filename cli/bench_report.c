@@ -1,5 +1,6 @@
 #include "bench_report.h"
 
+#include <math.h>
 #include <sched.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -125,7 +126,7 @@ void bench_report_limit(bench_report *r, const char *sentence, ...)
 static void cell(const cJSON *row, const bench_column *c, char text[CELL_BYTES])
 {
     const cJSON *value = cJSON_GetObjectItemCaseSensitive(row, c->key);
-    if (cJSON_IsNumber(value))
+    if (cJSON_IsNumber(value) && isfinite(value->valuedouble))
         snprintf(text, CELL_BYTES, "%.*f", c->decimals,
                  value->valuedouble / (c->unit ? c->unit : 1));
     else
