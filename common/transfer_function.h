@@ -43,6 +43,9 @@ int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t byte
 int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count, bool normalised,
                         double unit_world);
 int trip_tf_from_histogram(trip_tf **out, const trip_histogram *histogram);
+/* The same for densities, as of smoke and clouds, where the histogram holds only the voxels in
+ * which there is any: for values below zero it is trip_tf_from_histogram(). */
+int trip_tf_fog_from_histogram(trip_tf **out, const trip_histogram *histogram);
 void trip_tf_destroy(trip_tf *tf);
 
 /* Names of the built-in presets, NULL-terminated. */

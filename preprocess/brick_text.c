@@ -67,6 +67,12 @@ static int make_ramp(trip_tf **out, const trip_brick_text *t)
     return trip_tf_from_points(out, points, POINTS, false, 0);
 }
 
+/* Sparse volumes are smoke and clouds: what there is of them is all foreground. */
+int trip_brick_automatic_tf(trip_tf **out, const trip_volume_info *info, const trip_histogram *h)
+{
+    return info->sparse ? trip_tf_fog_from_histogram(out, h) : trip_tf_from_histogram(out, h);
+}
+
 /* What is drawn when no function is given. */
 static int add_default_function(cJSON *root, const trip_brick_text *t)
 {
@@ -75,7 +81,7 @@ static int add_default_function(cJSON *root, const trip_brick_text *t)
     if (t->params->function_count == 0 && t->params->range_count > 0 && t->envelope->count > 0)
         status = make_ramp(&made, t);
     else if (t->params->function_count == 0)
-        status = trip_tf_from_histogram(&made, t->histogram);
+        status = trip_brick_automatic_tf(&made, t->info, t->histogram);
     if (status == 0)
         add_function(root, "transfer_function", made ? made : t->functions[0]);
     trip_tf_destroy(made);
