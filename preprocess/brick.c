@@ -138,7 +138,7 @@ static int scan(brick *b)
 static int add_automatic(brick *b)
 {
     trip_tf *tf;
-    int status = trip_tf_from_histogram(&tf, &b->histogram);
+    int status = trip_brick_automatic_tf(&tf, b->info, &b->histogram);
     if (status < 0)
         return status;
     status = trip_envelope_add_tf(&b->envelope, tf);
