@@ -1,0 +1,427 @@
+/* The gl renderer against the reference: forms of submission, methods, targets, the limits of a
+ * driver, and what happens when something is missing. Pictures of real data: test_gl_views.c. The
+ * order of layers and the opacity of blocks are tested with all renderers in test_reference.c. */
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "gl_context.h"
+#include "scenes.h"
+#include "test.h"
+
+static const scene_renderer reference = { "reference", trip_reference_create, 0 };
+static const scene_renderer gl = { "gl", trip_gl_create, 1.0 / 255 };
+
+/* ---- scenes ---- */
+
+/* Shells of changing colour with a hole in them; everything has a gradient. */
+static bool shells(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    double x = i - 20.5, y = j - 17.2, z = k - 19.1, r = sqrt(x * x + y * y + z * z) + 1e-9;
+    double slope = -0.35 * sin(0.7 * r);
+    *code = (unsigned)(65535 * (0.5 + 0.5 * cos(0.7 * r)));
+    gradient[0] = slope * x / r;
+    gradient[1] = slope * y / r;
+    gradient[2] = slope * z / r;
+    return r < 17 && !(x > 2 && y > 3);
+}
+
+static const trip_affine cubes = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
+static const trip_affine boxes = { { { 0.7, 0, 0, 5 }, { 0, 1.2, 0, -9 }, { 0, 0, 2.1, 2 } } };
+static const trip_affine sheared = {
+    { { 0.8, 0.25, 0.05, 3 }, { -0.1, 1.1, 0.4, -7 }, { 0.1, 0.1, 1.4, 1 } }
+};
+/* A rotated grid of voxels a micrometre wide, in metres: floats must not run out of range. */
+static const trip_affine tiny = {
+    { { 0.6e-6, -0.8e-6, 0, 0.01 }, { 0.8e-6, 0.6e-6, 0, -0.02 }, { 0, 0, 1e-6, 0.03 } }
+};
+
+static void make_shells(scene *s, const trip_affine *index_to_world)
+{
+    scene_create(s, &(scene_params){ .dims = { 41, 36, 38 },
+                                     .index_to_world = *index_to_world,
+                                     .tile_voxels = 16,
+                                     .normals = true,
+                                     .voxel = shells });
+    scene_colour(s, 0, 20000, 0.2, 0.5, 1, 0.02);
+    scene_colour(s, 20001, 45000, 0.9, 0.4, 0.1, 0.2);
+    scene_colour(s, 45001, 65535, 1, 1, 0.6, 0.8);
+}
+
+/* ---- comparison ---- */
+
+static double mean_difference(const scene_picture *a, const scene_picture *b)
+{
+    double sum = 0;
+    size_t count = 4 * (size_t)a->width * (size_t)a->height;
+    for (size_t i = 0; i < count; i++)
+        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
+    return sum / (double)count;
+}
+
+static void assert_same_counts(const scene_picture *a, const scene_picture *b)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const trip_list_stats *l = &a->stats.lists[axis], *m = &b->stats.lists[axis];
+        assert_int_equal(l->splats_read, m->splats_read);
+        assert_int_equal(l->splats_projected, m->splats_projected);
+        assert_int_equal(l->splats_drawn, m->splats_drawn);
+    }
+}
+
+/* The bound that a float layer is held to. */
+static void assert_agrees(const char *what, const scene_picture *a, const scene_picture *b)
+{
+    double most = scene_difference(a, b), mean = mean_difference(a, b);
+    print_message("%-36s most %.4f mean %.5f of 1/255\n", what, 255 * most, 255 * mean);
+    assert_true(most <= 1.0 / 255);
+    assert_true(mean < 0.05 / 255);
+}
+
+static void compare(const char *what, const scene *s, const trip_camera_params *view,
+                    const trip_settings *settings)
+{
+    scene_picture a = scene_draw(s, &reference, view, settings);
+    scene_picture b = scene_draw(s, &gl, view, settings);
+    assert_agrees(what, &a, &b);
+    assert_same_counts(&a, &b);
+    scene_picture_free(&a);
+    scene_picture_free(&b);
+}
+
+/* ---- pictures ---- */
+
+static void every_form_of_submission_gives_the_same_picture_and_counts(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 40, 120);
+    trip_settings settings = trip_settings_default();
+    scene_picture expected = scene_draw(&s, &reference, &view, &settings);
+    for (int form = 0; form < 4; form++) {
+        static const char *const names[] = { "replicated sprites", "replicated triangles",
+                                             "indexed sprites", "indexed triangles" };
+        settings.triangles = form & 1;
+        settings.indexed = form & 2;
+        scene_picture p = scene_draw(&s, &gl, &view, &settings);
+        assert_agrees(names[form], &expected, &p);
+        assert_same_counts(&expected, &p);
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&expected);
+    scene_destroy(&s);
+}
+
+static void every_method_and_traversal_agrees_with_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.9, 0.8), 50, 60, 101);
+    trip_settings settings = trip_settings_default();
+    settings.method = TRIP_METHOD_CLIP;
+    compare("clip", &s, &view, &settings);
+    settings.method = TRIP_METHOD_AXIS;
+    compare("axis", &s, &view, &settings);
+    settings.method = TRIP_METHOD_MERGE;
+    settings.h = 0;
+    compare("merge, h 0", &s, &view, &settings);
+    settings.traversal = TRIP_TRAVERSAL_ASCENDING;
+    compare("ascending, back to front", &s, &view, &settings);
+    scene_destroy(&s);
+}
+
+static void grids_that_are_not_cubic_agree_with_the_reference(void **state)
+{
+    (void)state;
+    const trip_affine *grids[] = { &boxes, &sheared, &tiny };
+    static const char *const names[] = { "anisotropic", "sheared", "micrometres" };
+    trip_settings settings = trip_settings_default();
+    for (int i = 0; i < 3; i++) {
+        scene s;
+        char what[64];
+        make_shells(&s, grids[i]);
+        double size = cbrt(fabs(trip_affine_determinant(grids[i]))) * 40;
+        trip_camera_params view = scene_view(&s, trip_v3(0.5, 1, 0.7), 1.8 * size, 45, 100);
+        compare(names[i], &s, &view, &settings);
+        view.ortho_height = 1.3 * size;
+        snprintf(what, sizeof what, "%s, parallel", names[i]);
+        compare(what, &s, &view, &settings);
+        view.ortho_height = 0;
+        view.eye = trip_add(view.look, trip_scale(trip_v3(0.1, 0.07, 0.03), size));
+        view.fov_degrees = 160;
+        snprintf(what, sizeof what, "%s, from inside, 160 degrees", names[i]);
+        compare(what, &s, &view, &settings);
+        scene_destroy(&s);
+    }
+}
+
+static void light_and_kernel_settings_agree_with_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &sheared);
+    trip_camera_params view = scene_view(&s, trip_v3(-1, 0.4, 0.6), 70, 40, 100);
+    trip_settings settings = trip_settings_default();
+    settings.headlight = false;
+    settings.light_direction = trip_normalize(trip_v3(1, -2, 1));
+    compare("directional light", &s, &view, &settings);
+    settings.shading = false;
+    settings.background[0] = 0.8;
+    settings.background[3] = 0.5;
+    compare("no light, background", &s, &view, &settings);
+    settings.kernel_radius = 1.2;
+    compare("small kernel", &s, &view, &settings);
+    settings.kernel_radius = 3.5;
+    compare("large kernel", &s, &view, &settings);
+    scene_destroy(&s);
+}
+
+static void supports_larger_than_sprites_are_drawn_as_triangles(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, 0.2), 22, 14, 300);
+    compare("magnified, 300 px", &s, &view, &settings);
+    view.ortho_height = 3;
+    compare("magnified, 300 px, parallel", &s, &view, &settings);
+    scene_destroy(&s);
+}
+
+static void splats_with_centres_out_of_view_are_drawn(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_settings settings = trip_settings_default();
+    /* One voxel fills the image: all other splats that reach it have their centres outside. */
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, 0.2), 30, 2, 40);
+    compare("within a voxel", &s, &view, &settings);
+    scene_destroy(&s);
+}
+
+static void the_size_of_batches_makes_no_difference(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 40, 64);
+    trip_settings settings = trip_settings_default();
+    for (int indexed = 0; indexed < 2; indexed++) {
+        settings.indexed = indexed;
+        scene_picture large = scene_draw(&s, &gl, &view, &settings);
+        scene_picture small = scene_draw_with(
+            &s, &gl, &view, &settings, &(trip_reader_params){ .slots = 2, .slot_bytes = 4096 });
+        assert_true(scene_difference(&large, &small) == 0);
+        scene_picture_free(&large);
+        scene_picture_free(&small);
+    }
+    scene_destroy(&s);
+}
+
+static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 40, 120);
+    trip_settings settings = trip_settings_default();
+    scene_picture expected = scene_draw(&s, &reference, &view, &settings);
+    static const struct {
+        trip_target target;
+        const char *name;
+        double most;
+    } targets[] = { { TRIP_TARGET_RGBA16F, "rgba16f", 8.0 / 255 },
+                    { TRIP_TARGET_RGBA8, "rgba8", 60.0 / 255 } };
+    for (int i = 0; i < 2; i++) {
+        settings.target = targets[i].target;
+        scene_picture p = scene_draw(&s, &gl, &view, &settings);
+        print_message("%s: most %.3f mean %.4f of 1/255\n", targets[i].name,
+                      255 * scene_difference(&expected, &p), 255 * mean_difference(&expected, &p));
+        assert_true(scene_difference(&expected, &p) < targets[i].most);
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&expected);
+    scene_destroy(&s);
+}
+
+/* ---- failures ---- */
+
+static char last_line[512];
+static int line_count;
+
+static void keep_line(const char *line, void *user)
+{
+    (void)user;
+    line_count++;
+    snprintf(last_line, sizeof last_line, "%s", line);
+}
+
+/* Status of a frame that is expected to report once if it fails; the report is in last_line. */
+static int try_frame(const scene *s, trip_renderer *r, const trip_camera_params *view,
+                     const trip_settings *settings)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_reader *reader;
+    trip_frame_stats stats;
+    float *rgba = malloc((size_t)view->width * (size_t)view->height * 4 * sizeof *rgba);
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, settings, s->table, s->budget), 0);
+    assert_int_equal(trip_reader_create(&reader, s->data,
+                                        &(trip_reader_params){ .planes = plan.planes }, s->budget),
+                     0);
+    trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = settings, .plan = &plan, .table = s->table
+    };
+    line_count = 0;
+    trip_report_redirect(keep_line, NULL);
+    int status = trip_frame_draw(r, reader, &frame, rgba, &stats);
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(line_count, status ? 1 : 0);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s->budget);
+    free(rgba);
+    return status;
+}
+
+static void what_does_not_fit_is_refused_and_the_next_frame_draws(void **state)
+{
+    (void)state;
+    scene s;
+    trip_renderer *r;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 80, 40, 32), huge = view;
+    trip_settings settings = trip_settings_default();
+    assert_int_equal(trip_gl_create(&r, s.budget), 0);
+
+    huge.width = 65536;
+    huge.height = 1;
+    assert_true(try_frame(&s, r, &huge, &settings) < 0);
+
+    /* All but a little of the budget is gone. */
+    size_t most = (size_t)trip_budget_left_bytes(s.budget) - (48u << 20);
+    void *taken = trip_budget_take(s.budget, most);
+    assert_non_null(taken);
+    trip_camera_params wide = view;
+    wide.width = wide.height = 2048;
+    assert_true(try_frame(&s, r, &wide, &settings) < 0);
+    trip_budget_release(s.budget, taken, most);
+
+    assert_int_equal(try_frame(&s, r, &view, &settings), 0);
+    r->ops->destroy(r);
+    scene_destroy(&s);
+}
+
+static void copy_shaders(const char *folder)
+{
+    char command[512];
+    snprintf(command, sizeof command, "cp %s/shaders/* '%s'", TRIP_SOURCE_DIR, folder);
+    assert_int_equal(system(command), 0);
+}
+
+static void append_line(const char *folder, const char *name, const char *line)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "a");
+    assert_non_null(file);
+    fprintf(file, "%s\n", line);
+    fclose(file);
+}
+
+/* Lines of a file, the one appended last included. */
+static int count_lines(const char *folder, const char *name)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    int lines = 0, c;
+    while ((c = fgetc(file)) != EOF)
+        lines += c == '\n';
+    fclose(file);
+    return lines;
+}
+
+static void a_shader_that_does_not_compile_is_named_with_its_line(void **state)
+{
+    (void)state;
+    scene s;
+    trip_renderer *r;
+    char folder[] = "/tmp/trip-shaders-XXXXXX", command[64], where[64];
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 80, 40, 32);
+    trip_settings settings = trip_settings_default();
+    assert_non_null(mkdtemp(folder));
+    copy_shaders(folder);
+    setenv("TRIPTYCH_SHADER_DIR", folder, 1);
+
+    assert_int_equal(trip_gl_create(&r, s.budget), 0);
+    assert_int_equal(try_frame(&s, r, &view, &settings), 0); /* from disk as from the binary */
+    r->ops->destroy(r);
+
+    append_line(folder, "project.glsl", "float broken = nothing;");
+    snprintf(where, sizeof where, "project.glsl:%d: ", count_lines(folder, "project.glsl"));
+    assert_int_equal(trip_gl_create(&r, s.budget), 0);
+    assert_true(try_frame(&s, r, &view, &settings) < 0);
+    assert_non_null(strstr(last_line, where));
+    r->ops->destroy(r);
+
+    unsetenv("TRIPTYCH_SHADER_DIR");
+    snprintf(command, sizeof command, "rm -r '%s'", folder);
+    assert_int_equal(system(command), 0);
+    scene_destroy(&s);
+}
+
+static void a_missing_shader_is_reported(void **state)
+{
+    (void)state;
+    scene s;
+    trip_renderer *r;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 80, 40, 32);
+    trip_settings settings = trip_settings_default();
+    setenv("TRIPTYCH_SHADER_DIR", "/nonexistent", 1);
+    assert_int_equal(trip_gl_create(&r, s.budget), 0);
+    assert_true(try_frame(&s, r, &view, &settings) < 0);
+    r->ops->destroy(r);
+    unsetenv("TRIPTYCH_SHADER_DIR");
+    scene_destroy(&s);
+}
+
+/* Exit status 77 where there is no OpenGL 4.5 by EGL; the line printed says why. */
+static bool has_gl(void)
+{
+    trip_gl_context *context;
+    bool has = trip_gl_context_create(&context) == 0;
+    if (has)
+        print_message("%s\n", trip_gl_context_device(context));
+    trip_gl_context_destroy(context);
+    return has;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_form_of_submission_gives_the_same_picture_and_counts),
+        cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
+        cmocka_unit_test(grids_that_are_not_cubic_agree_with_the_reference),
+        cmocka_unit_test(light_and_kernel_settings_agree_with_the_reference),
+        cmocka_unit_test(supports_larger_than_sprites_are_drawn_as_triangles),
+        cmocka_unit_test(splats_with_centres_out_of_view_are_drawn),
+        cmocka_unit_test(the_size_of_batches_makes_no_difference),
+        cmocka_unit_test(coarser_targets_stay_close_and_their_errors_are_known),
+        cmocka_unit_test(what_does_not_fit_is_refused_and_the_next_frame_draws),
+        cmocka_unit_test(a_shader_that_does_not_compile_is_named_with_its_line),
+        cmocka_unit_test(a_missing_shader_is_reported),
+    };
+    if (!has_gl())
+        return 77;
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
