@@ -33,6 +33,7 @@ enum key {
     KEY_MEMORY,
     KEY_THREADS,
     KEY_FORCE,
+    KEY_RESUME,
     KEY_JSON,
 };
 
@@ -63,6 +64,7 @@ static const struct argp_option option_table[] = {
     { "output", 'o', "NAME.trip", 0, "The data set (default: the input's name, in this folder)",
       3 },
     { "force", KEY_FORCE, NULL, 0, "Replace an existing data set", 3 },
+    { "resume", KEY_RESUME, NULL, 0, "Go on from where the same command was killed", 3 },
     { "no-normals", KEY_NO_NORMALS, NULL, 0, "Leave out what only shading needs", 3 },
     { "tile", KEY_TILE, "N", 0, "Tile edge in voxels: 16, 32, 64 or 128 (default: 64)", 3 },
     { "slab-sheets", KEY_SLAB_SHEETS, "N", 0, "Sheets of a brick, 1 to 64 (default: 8)", 3 },
@@ -211,6 +213,9 @@ static error_t parse_output_option(int key, char *argument, options *o)
     case KEY_FORCE:
         o->brick.replace = true;
         return 0;
+    case KEY_RESUME:
+        o->brick.resume = true;
+        return 0;
     case KEY_NO_NORMALS:
         o->brick.no_normals = true;
         return 0;
@@ -325,6 +330,7 @@ static int print_json(const options *o, const trip_brick_summary *s)
     add_number(root, "input_bytes", (double)s->input_bytes);
     add_number(root, "bytes", (double)s->bytes);
     add_number(root, "temporary_bytes", (double)s->temporary_bytes);
+    cJSON_AddBoolToObject(root, "resumed", s->resumed);
     add_number(root, "scan_seconds", s->scan_seconds);
     add_number(root, "read_seconds", s->read_seconds);
     add_number(root, "merge_seconds", s->merge_seconds);

@@ -4,12 +4,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 
 #include "brick_memory.h"
 #include "brick_text.h"
+#include "dataset.h"
+#include "identity.h"
 #include "list_builder.h"
 #include "report.h"
+#include "resume.h"
 #include "scan.h"
 #include "splats.h"
 
@@ -23,6 +27,7 @@ typedef struct brick {
     const trip_volume_info *info;
     uint64_t grid_voxels;  /* of the dims: what progress counts */
     uint64_t memory_bytes; /* left once the input was opened */
+    uint64_t reader_bytes; /* that it keeps from the scan */
 
     trip_tf **functions;
     trip_envelope envelope;
@@ -33,8 +38,10 @@ typedef struct brick {
     trip_piece_format format;
     trip_quantiser quantiser;
     trip_memory_plan plan;
-    trip_writer *writer;
     trip_spill *spill;
+    trip_leftover leftover;
+    trip_journal *journal;
+    trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
 } brick;
@@ -122,12 +129,20 @@ static void on_scan_progress(void *user, uint64_t voxels)
     report_progress(b, "scan", voxels, b->grid_voxels);
 }
 
+/* Once it was done, a run that goes on knows the result. */
 static int scan(brick *b)
 {
+    const trip_journal_start *start = trip_journal_get_start(b->journal);
+    uint64_t left = trip_budget_left_bytes(b->budget);
     double begin = now_seconds();
-    int status = trip_scan_volume(b->tally, b->volume, b->params->input, b->workers, b->plan.slices,
+    int status = 0;
+    if (start)
+        *b->tally = start->tally;
+    else
+        status = trip_scan_volume(b->tally, b->volume, b->params->input, b->workers, b->plan.slices,
                                   b->budget, on_scan_progress, b);
     b->scanned = true;
+    b->reader_bytes = left - trip_budget_left_bytes(b->budget);
     b->summary->scan_seconds = now_seconds() - begin;
     trip_tally_histogram(b->tally, &b->histogram);
     for (size_t i = 0; i < b->params->function_count && status == 0; i++)
@@ -189,21 +204,80 @@ static void choose_codes(brick *b)
 
 static int plan_memory(brick *b)
 {
+    const trip_journal_start *start = b->journal ? trip_journal_get_start(b->journal) : NULL;
     return trip_memory_plan_make(&b->plan, b->params->input, b->info, &b->format,
-                                 trip_workers_count(b->workers), trip_budget_limit_bytes(b->budget),
-                                 b->params->slices);
+                                 trip_workers_count(b->workers), b->memory_bytes,
+                                 start ? start->slices : b->params->slices);
 }
 
-static int open_spill(brick *b)
+/* When all but the lists is open. */
+static int settle_memory(brick *b)
+{
+    const trip_journal_start *start = trip_journal_get_start(b->journal);
+    int status =
+        trip_memory_plan_settle(&b->plan, b->params->input, b->info, &b->format,
+                                trip_workers_count(b->workers), trip_budget_left_bytes(b->budget));
+    b->plan.in_order = b->plan.in_order && b->format.quantised;
+    if (status < 0 || !start)
+        return status;
+    if (start->in_order && !b->plan.in_order)
+        return trip_fail(TRIP_ERROR, "brick", b->params->input,
+                         "to go on takes as much --memory as the interrupted run had");
+    b->plan.in_order = start->in_order;
+    return 0;
+}
+
+/* The output's name and a suffix, for free(); NULL after a reported failure. */
+static char *name_beside(const brick *b, const char *suffix)
 {
     char *path;
     size_t length = strlen(b->params->output);
     while (length > 1 && b->params->output[length - 1] == '/')
         length--;
-    if (asprintf(&path, "%.*s.spill", (int)length, b->params->output) < 0)
-        return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
-    int status = trip_spill_open(&b->spill, path, b->budget);
+    if (asprintf(&path, "%.*s%s", (int)length, b->params->output, suffix) >= 0)
+        return path;
+    trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
+    return NULL;
+}
+
+/* Locks the place for temporary files and looks what a killed run left. */
+static int open_spill(brick *b)
+{
+    bool resume = b->params->resume;
+    uint64_t identity;
+    char *path = name_beside(b, ".spill"), *partial = name_beside(b, ".partial");
+    int status = path && partial ? trip_spill_open(&b->spill, path, resume, b->budget) : TRIP_ERROR;
+    if (status == 0)
+        status = trip_brick_identity(b->params, b->functions, &identity);
+    if (status == 0 && resume)
+        b->leftover = trip_leftover_take(b->spill, partial, b->format.normals);
+    if (status == 0)
+        status = trip_journal_open(&b->journal, b->spill, resume, identity, b->leftover.splats);
     free(path);
+    free(partial);
+    return status;
+}
+
+/* Notes how this run works, or takes over how far the killed one was. */
+static int start_journal(brick *b)
+{
+    const trip_checkpoint *c = trip_journal_get_checkpoint(b->journal);
+    b->summary->resumed = c != NULL;
+    if (c)
+        return trip_spill_restore(b->spill, trip_journal_get_segments(b->journal), c->segments);
+    if (trip_journal_get_start(b->journal))
+        return 0;
+    trip_journal_start *start = calloc(1, sizeof *start);
+    if (!start || trip_brick_identity(b->params, b->functions, &start->identity) < 0) {
+        free(start);
+        return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
+    }
+    start->slices = b->plan.slices;
+    start->in_order = b->plan.in_order;
+    start->scanned = b->scanned;
+    start->tally = *b->tally;
+    int status = trip_journal_write_start(b->journal, start);
+    free(start);
     return status;
 }
 
@@ -227,10 +301,11 @@ static int open_builder(brick *b)
         .format = b->format,
         .quantiser = b->quantiser,
         .producers = trip_workers_count(b->workers),
-        .ordered_axis = b->plan.in_order && b->format.quantised ? 2 : -1,
+        .in_order = b->plan.in_order,
         .memory_bytes = b->plan.list_bytes,
         .writer = b->writer,
         .spill = b->spill,
+        .journal = b->journal,
     };
     memcpy(p.dims, b->info->dims, sizeof p.dims);
     return trip_list_builder_create(&b->builder, &p, b->budget);
@@ -238,7 +313,8 @@ static int open_builder(brick *b)
 
 static void *reserve(void *user, unsigned thread, int axis, size_t bytes)
 {
-    return trip_list_builder_reserve(user, thread, axis, bytes);
+    const brick *b = user;
+    return trip_list_builder_reserve(b->builder, thread, axis, bytes);
 }
 
 static int open_splatter(brick *b)
@@ -250,18 +326,51 @@ static int open_splatter(brick *b)
                             .tally = !b->scanned,
                             .threads = trip_workers_count(b->workers),
                             .reserve = reserve,
-                            .user = b->builder };
+                            .user = b };
     return trip_splatter_create(&b->splatter, &p, b->budget);
+}
+
+/* A run that was killed when all was done but for its temporary files. */
+static bool is_done(const brick *b)
+{
+    struct stat st;
+    return b->params->resume && !b->params->replace && trip_journal_get_start(b->journal) &&
+           stat(b->params->output, &st) == 0;
+}
+
+/* The summary of a data set that is there. */
+static int summarise_done(brick *b)
+{
+    trip_dataset *d;
+    int status = trip_dataset_open(&d, b->params->output, b->budget);
+    if (status < 0)
+        return status;
+    trip_tally_clear(b->tally);
+    b->tally->voxels = b->tally->finite = d->header.voxels;
+    b->tally->value_min = d->header.value_min;
+    b->tally->value_max = d->header.value_max;
+    b->summary->kept = d->header.kept;
+    b->summary->bytes = d->bytes - d->header.index_bytes;
+    b->summary->resumed = true;
+    trip_dataset_close(d);
+    return 0;
 }
 
 static int open_output(brick *b)
 {
     int status = open_writer(b);
     if (status == 0)
-        status = open_spill(b);
+        status = open_splatter(b);
+    if (status == 0)
+        status = settle_memory(b);
+    if (status == 0)
+        status = start_journal(b);
     if (status == 0)
         status = open_builder(b);
-    return status == 0 ? open_splatter(b) : status;
+    if (status == 0 && b->plan.in_order && b->summary->resumed)
+        status = trip_leftover_replay(&b->leftover, b->journal,
+                                      trip_list_builder_ordered(b->builder), b->budget);
+    return status;
 }
 
 static int on_box(void *user, unsigned thread, const trip_box *box)
@@ -270,12 +379,31 @@ static int on_box(void *user, unsigned thread, const trip_box *box)
     return trip_splatter_box(b->splatter, thread, box);
 }
 
+/* Adds what the boxes so far gave to what a killed run had seen before. */
+static void add_up(const brick *b, trip_tally *tally, uint64_t *kept)
+{
+    const trip_checkpoint *before = trip_journal_get_checkpoint(b->journal);
+    *kept = trip_splatter_kept(b->splatter) + (before ? before->kept : 0);
+    if (b->scanned)
+        return;
+    trip_splatter_tally(b->splatter, tally);
+    if (before)
+        trip_tally_add(tally, &before->tally);
+}
+
 static int on_batch(void *user, uint64_t batches, uint64_t voxels)
 {
     const brick *b = user;
-    (void)batches;
     report_progress(b, "read", voxels, b->grid_voxels);
-    return trip_list_builder_end_batch(b->builder);
+    int full = trip_list_builder_end_batch(b->builder);
+    if (full <= 0)
+        return full;
+    trip_checkpoint *c = calloc(1, sizeof *c);
+    if (!c)
+        return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
+    c->batches = batches;
+    add_up(b, &c->tally, &c->kept);
+    return trip_list_builder_spill(b->builder, c);
 }
 
 static int check_tally(brick *b)
@@ -298,10 +426,12 @@ static int check_tally(brick *b)
 
 static int read_volume(brick *b)
 {
+    const trip_checkpoint *before = trip_journal_get_checkpoint(b->journal);
     trip_walk_params walk = { .slices = b->plan.slices,
                               .read_ahead = b->plan.read_ahead,
                               .edge = trip_splat_edge(&b->format),
                               .height = TRIP_SPLAT_HEIGHT,
+                              .skip = before ? before->batches : 0,
                               .box = on_box,
                               .batch = on_batch,
                               .user = b };
@@ -310,11 +440,8 @@ static int read_volume(brick *b)
     b->summary->read_seconds = now_seconds() - begin;
     if (status < 0)
         return status;
-    if (!b->scanned)
-        trip_splatter_tally(b->splatter, b->tally);
-    if (!b->scanned)
-        trip_tally_histogram(b->tally, &b->histogram);
-    b->summary->kept = trip_splatter_kept(b->splatter);
+    add_up(b, b->tally, &b->summary->kept);
+    trip_tally_histogram(b->tally, &b->histogram);
     return check_tally(b);
 }
 
@@ -377,16 +504,20 @@ static void fill_summary(brick *b)
     s->peak_memory_bytes = trip_budget_peak_bytes(b->budget);
 }
 
-static int run(brick *b)
+static int prepare(brick *b)
 {
     int status = open_input(b);
     if (status == 0)
         status = load_functions(b);
-    b->format.quantised = true;
+    b->format.quantised = true; /* for a first plan; choose_codes() decides */
     if (status == 0)
         status = plan_memory(b);
-    if (status == 0 && needs_scan(b))
-        status = scan(b);
+    return status == 0 ? open_spill(b) : status;
+}
+
+static int make(brick *b)
+{
+    int status = needs_scan(b) ? scan(b) : 0;
     if (status == 0)
         status = make_envelope(b);
     if (status < 0)
@@ -399,8 +530,14 @@ static int run(brick *b)
         status = read_volume(b);
     if (status == 0)
         status = merge_lists(b);
+    return status == 0 ? finish_output(b) : status;
+}
+
+static int run(brick *b)
+{
+    int status = prepare(b);
     if (status == 0)
-        status = finish_output(b);
+        status = is_done(b) ? summarise_done(b) : make(b);
     if (status == 0)
         fill_summary(b);
     return status;
@@ -411,6 +548,8 @@ static void close_all(brick *b)
     trip_list_builder_destroy(b->builder);
     trip_splatter_destroy(b->splatter);
     trip_writer_abort(b->writer);
+    trip_journal_close(b->journal);
+    trip_leftover_close(&b->leftover);
     trip_spill_close(b->spill);
     trip_envelope_destroy(&b->envelope);
     for (size_t i = 0; b->functions && i < b->params->function_count; i++)
@@ -426,7 +565,7 @@ static void close_all(brick *b)
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
 {
-    brick b = { .params = params, .summary = summary };
+    brick b = { .params = params, .summary = summary, .leftover = { .fd = { -1, -1 } } };
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);
     close_all(&b);

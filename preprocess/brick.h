@@ -24,6 +24,8 @@ typedef struct trip_brick_params {
 
     bool no_normals;
     bool replace; /* an existing data set */
+    /* Go on from where a run with the same input and parameters was killed, if there was one. */
+    bool resume;
     unsigned tile_voxels, slab_sheets;
     uint64_t memory_bytes; /* default: a quarter of what the process may use */
     unsigned threads;      /* default: one a processor */
@@ -42,6 +44,7 @@ typedef struct trip_brick_summary {
     uint64_t input_bytes;     /* as stored, decompressed */
     uint64_t bytes;           /* of the data set's splats */
     uint64_t temporary_bytes; /* spilled */
+    bool resumed;
     double scan_seconds, read_seconds, merge_seconds, finish_seconds;
     uint64_t memory_bytes, peak_memory_bytes; /* promised and taken from the budget */
 } trip_brick_summary;

@@ -8,21 +8,38 @@
 
 enum { MOST_SLICES = 32 };
 
-/* What the writer, the spill, the tiles and the readers' own buffers take. */
-#define FIXED_BYTES ((uint64_t)14 << 20)
+/* What the writer and the spill take. */
+#define OPENED_BYTES ((uint64_t)18 << 20)
+/* What the builder takes beside its pieces, and readers for themselves. */
+#define LATE_BYTES ((uint64_t)2 << 20)
+/* Of the writer's index, for a tile of a sheet. */
+#define TILE_BYTES 400
 
 typedef struct needs {
     uint64_t slice_bytes;  /* as stored */
     uint64_t slice_splats; /* pieces of one slice, in one list, if all of it is kept */
-    uint64_t fixed_bytes;
+    uint64_t opened_bytes; /* taken before the lists */
+    uint64_t late_bytes;   /* taken after them */
     uint64_t list_min_bytes;
 } needs;
+
+static uint64_t tiles_of_largest_sheet(const trip_volume_info *info, const trip_piece_format *f)
+{
+    uint64_t most = 0;
+    for (int a = 0; a < 3; a++) {
+        uint64_t tiles = (uint64_t)((info->dims[a] >> f->tile_log2) + 1) *
+                         (uint64_t)((info->dims[(a + 1) % 3] >> f->tile_log2) + 1);
+        most = tiles > most ? tiles : most;
+    }
+    return most;
+}
 
 static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, unsigned threads)
 {
     uint64_t slice = (uint64_t)(info->dims[0] * info->dims[1]);
     uint64_t tile = UINT64_C(1) << 2 * f->tile_log2;
-    needs n = { .fixed_bytes = FIXED_BYTES + threads * trip_splat_thread_bytes(f, info->sparse),
+    needs n = { .opened_bytes = OPENED_BYTES + threads * trip_splat_thread_bytes(f, info->sparse),
+                .late_bytes = LATE_BYTES + TILE_BYTES * tiles_of_largest_sheet(info, f),
                 .list_min_bytes = trip_list_builder_min_bytes(f, threads) };
     if (info->sparse)
         return n;
@@ -38,18 +55,24 @@ static uint64_t reader_bytes(const needs *n, int64_t slices, bool read_ahead)
     return (uint64_t)(slices + 2 + (read_ahead ? slices + 2 : 0) + 2) * n->slice_bytes;
 }
 
+/* Shares out what is left once the rest is open; false when it is too little. */
+static bool share(trip_memory_plan *plan, const needs *n, uint64_t left)
+{
+    uint64_t used = n->late_bytes + reader_bytes(n, plan->slices, plan->read_ahead);
+    if (used + n->list_min_bytes > left)
+        return false;
+    plan->list_bytes = left - used;
+    uint64_t splats = 2 * (uint64_t)plan->slices * n->slice_splats;
+    plan->in_order = splats > 0 && n->list_min_bytes + splats <= plan->list_bytes;
+    return true;
+}
+
 /* Whether blocks of so many slices fit; fills the plan. */
 static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, int64_t slices,
                        bool read_ahead)
 {
-    uint64_t used = n->fixed_bytes + reader_bytes(n, slices, read_ahead);
     *plan = (trip_memory_plan){ .slices = slices, .read_ahead = read_ahead };
-    if (used + n->list_min_bytes > memory)
-        return false;
-    plan->list_bytes = memory - used;
-    plan->in_order = n->slice_splats > 0 &&
-                     n->list_min_bytes + 2 * (uint64_t)slices * n->slice_splats <= plan->list_bytes;
-    return true;
+    return n->opened_bytes <= memory && share(plan, n, memory - n->opened_bytes);
 }
 
 /* Large blocks cost less at their borders, but splats want most of the memory. */
@@ -61,7 +84,8 @@ static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_
 static int refuse(const char *path, const trip_volume_info *info, const needs *n, unsigned threads,
                   int64_t slices)
 {
-    uint64_t least = n->fixed_bytes + reader_bytes(n, slices, false) + n->list_min_bytes;
+    uint64_t least =
+        n->opened_bytes + n->late_bytes + reader_bytes(n, slices, false) + n->list_min_bytes;
     return trip_fail(TRIP_ERROR, "brick", path,
                      "slices of %" PRId64 " x %" PRId64 " with %u threads need --memory %" PRIu64
                      "M at least; fewer --threads need less",
@@ -73,11 +97,8 @@ int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_v
                           int64_t slices)
 {
     needs n = needs_of(info, format, threads);
-    if (info->sparse) {
-        /* Readers of sparse formats took what they need when they were opened. */
-        uint64_t memory = memory_bytes - memory_bytes / 16;
-        return try_slices(plan, &n, memory, 1, true) ? 0 : refuse(path, info, &n, threads, 1);
-    }
+    if (info->sparse) /* readers of sparse formats took what they need when they were opened */
+        return try_slices(plan, &n, memory_bytes, 1, true) ? 0 : refuse(path, info, &n, threads, 1);
     for (int64_t s = slices ? slices : MOST_SLICES; s >= (slices ? slices : 1); s /= 2)
         if (try_slices(plan, &n, memory_bytes, s, true) && is_comfortable(plan, &n, memory_bytes))
             return 0;
@@ -86,4 +107,11 @@ int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_v
         try_slices(plan, &n, memory_bytes, slices, false))
         return 0;
     return refuse(path, info, &n, threads, slices);
+}
+
+int trip_memory_plan_settle(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
+                            const trip_piece_format *format, unsigned threads, uint64_t left_bytes)
+{
+    needs n = needs_of(info, format, threads);
+    return share(plan, &n, left_bytes) ? 0 : refuse(path, info, &n, threads, plan->slices);
 }

@@ -18,4 +18,9 @@ int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_v
                           const trip_piece_format *format, unsigned threads, uint64_t memory_bytes,
                           int64_t slices);
 
+/* Once all but the lists and the slices has been taken and `left_bytes` are there: what the lists
+ * get of them. */
+int trip_memory_plan_settle(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
+                            const trip_piece_format *format, unsigned threads, uint64_t left_bytes);
+
 #endif

@@ -8,22 +8,23 @@
 #ifndef TRIP_LIST_BUILDER_H
 #define TRIP_LIST_BUILDER_H
 
-#include "piece.h"
+#include "journal.h"
+#include "list_output.h"
 #include "spill.h"
 #include "workers.h"
-#include "writer.h"
 
 typedef struct trip_list_builder_params {
     trip_piece_format format;
     trip_quantiser quantiser; /* of a list in order; the others get theirs at the end */
     int64_t dims[3];
     unsigned producers;
-    /* The list whose sheets arrive in order, batch by batch: written as it comes, never spilled;
-     * -1 when there is none. All its splats of a batch have to fit. */
-    int ordered_axis;
+    /* The Z list's sheets arrive in order, batch by batch: it is written as it comes and never
+     * spilled. All its splats of a batch have to fit. */
+    bool in_order;
     uint64_t memory_bytes; /* for pieces */
     trip_writer *writer;
     trip_spill *spill;
+    trip_journal *journal;
 } trip_list_builder_params;
 
 typedef struct trip_list_builder trip_list_builder;
@@ -35,13 +36,21 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
                              trip_budget *budget);
 void trip_list_builder_destroy(trip_list_builder *b);
 
+/* The list in order, which an interrupted run had begun to append itself: its output, to be used
+ * before the first batch. */
+trip_list_output *trip_list_builder_ordered(trip_list_builder *b);
+
 /* Memory for a piece of the list along `axis`, aligned to 8 bytes; the piece has to be complete
  * before the same producer reserves again or the batch ends. Waits for memory. NULL when something
  * failed, which was reported. */
 void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, int axis, size_t bytes);
 
-/* All pieces of some batches are there, and no producer is at work. */
+/* All pieces of a batch are there, and no producer is at work. Returns 1 when it is time for
+ * trip_list_builder_spill(). */
 int trip_list_builder_end_batch(trip_list_builder *b);
+/* Right after a batch: spills all there is in the background; then the journal gets the checkpoint,
+ * which is the builder's to free() from now on. */
+int trip_list_builder_spill(trip_list_builder *b, trip_checkpoint *checkpoint);
 
 /* After the last batch: merges and appends what was not yet. `progress`, when not NULL, hears of
  * the splats appended so far, on the calling thread. */

@@ -36,15 +36,15 @@ static int fail_memory(const trip_spill *s)
                      "needs more memory than is allowed: give more with --memory");
 }
 
-/* What an interrupted run may have left; the names are this program's own. */
+/* The names are this program's own: the journal's files and those of resume.c, too. */
 static void remove_files(int folder)
 {
-    static const char *const names[] = { DATA_NAME };
+    static const char *const names[] = { DATA_NAME, "journal", "runs", "z.voxels", "z.normals" };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         unlinkat(folder, names[i], 0);
 }
 
-static int open_folder(trip_spill *s)
+static int open_folder(trip_spill *s, bool resume)
 {
     if (mkdir(s->path, 0777) < 0 && errno != EEXIST)
         return trip_fail_errno("brick", s->path, "cannot create");
@@ -53,11 +53,12 @@ static int open_folder(trip_spill *s)
         return trip_fail_errno("brick", s->path, "cannot open");
     if (flock(s->folder, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)
         return trip_fail(TRIP_ERROR, "brick", s->path, "another process is at work there");
-    remove_files(s->folder);
+    if (!resume)
+        remove_files(s->folder);
     return 0;
 }
 
-int trip_spill_open(trip_spill **out, const char *path, trip_budget *budget)
+int trip_spill_open(trip_spill **out, const char *path, bool resume, trip_budget *budget)
 {
     trip_spill *s = *out = calloc(1, sizeof *s);
     if (!s || !(s->path = strdup(path))) {
@@ -69,7 +70,7 @@ int trip_spill_open(trip_spill **out, const char *path, trip_budget *budget)
     s->budget = budget;
     s->buffer = trip_budget_take(budget, BUFFER_BYTES);
     s->hash = XXH64_createState();
-    int status = s->buffer && s->hash ? open_folder(s) : fail_memory(s);
+    int status = s->buffer && s->hash ? open_folder(s, resume) : fail_memory(s);
     if (status < 0) {
         if (s->folder >= 0)
             close(s->folder);
@@ -103,13 +104,42 @@ const char *trip_spill_path(const trip_spill *s)
     return s->path;
 }
 
+/* Opens the data file, as long as what is valid of it. */
 static int open_file(trip_spill *s)
 {
-    int flags = O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC;
+    int flags = O_RDWR | O_CREAT | O_CLOEXEC;
     s->file = openat(s->folder, DATA_NAME, flags | O_DIRECT, 0666);
     if (s->file < 0 && errno == EINVAL) /* the file system knows no direct I/O */
-        s->file = openat(s->folder, DATA_NAME, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    return s->file < 0 ? trip_fail_errno("brick", s->path, "cannot create " DATA_NAME) : 0;
+        s->file = openat(s->folder, DATA_NAME, flags, 0666);
+    if (s->file < 0)
+        return trip_fail_errno("brick", s->path, "cannot create " DATA_NAME);
+    return ftruncate(s->file, (off_t)s->offset) < 0
+               ? trip_fail_errno("brick", s->path, "cannot cut " DATA_NAME)
+               : 0;
+}
+
+static int make_room(trip_spill *s, size_t count)
+{
+    if (count <= s->room)
+        return 0;
+    trip_segment *larger = realloc(s->segments, 2 * count * sizeof *larger);
+    if (!larger)
+        return fail_memory(s);
+    s->segments = larger;
+    s->room = 2 * count;
+    return 0;
+}
+
+int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count)
+{
+    int status = make_room(s, count);
+    if (status < 0 || count == 0)
+        return status;
+    memcpy(s->segments, segments, count * sizeof *segments);
+    s->count = count;
+    s->offset = (segments[count - 1].offset + segments[count - 1].bytes + BLOCK_BYTES - 1) &
+                ~((uint64_t)BLOCK_BYTES - 1);
+    return open_file(s);
 }
 
 static int write_buffer(trip_spill *s, size_t bytes)
@@ -136,14 +166,8 @@ int trip_spill_begin(trip_spill *s, int axis)
 {
     if (s->file < 0 && open_file(s) < 0)
         return TRIP_ERROR;
-    if (s->count == s->room) {
-        size_t room = s->room ? 2 * s->room : 64;
-        trip_segment *larger = realloc(s->segments, room * sizeof *larger);
-        if (!larger)
-            return fail_memory(s);
-        s->segments = larger;
-        s->room = room;
-    }
+    if (make_room(s, s->count + 1) < 0)
+        return TRIP_ERROR;
     s->segments[s->count] = (trip_segment){ .offset = s->offset, .axis = (uint32_t)axis };
     XXH64_reset(s->hash, 0);
     return 0;

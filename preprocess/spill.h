@@ -18,9 +18,13 @@ typedef struct trip_segment {
 typedef struct trip_spill trip_spill;
 
 /* Makes the folder PATH, or takes over the one that an interrupted run left, and locks it: another
- * process at work there is a reported failure. The data file is made at the first segment. */
-int trip_spill_open(trip_spill **out, const char *path, trip_budget *budget);
-/* Removes the folder and what is in it. */
+ * process at work there is a reported failure. What an interrupted run left in it is removed,
+ * unless `resume`. */
+int trip_spill_open(trip_spill **out, const char *path, bool resume, trip_budget *budget);
+/* After opening with `resume`: takes over these segments of the interrupted run, the first ones of
+ * its file, and cuts off what is after them. */
+int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count);
+/* Removes the folder and what this program put into it. */
 void trip_spill_close(trip_spill *s);
 
 const char *trip_spill_path(const trip_spill *s);

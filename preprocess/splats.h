@@ -14,7 +14,7 @@ typedef struct trip_splat_params {
     const trip_envelope *envelope;
     trip_piece_format format;
     trip_quantiser quantiser; /* where the format is quantised */
-    bool tally; /* of the values of all voxels, kept or not */
+    bool tally;               /* of the values of all voxels, kept or not */
     unsigned threads;
     /* Memory for a piece of a list, aligned to 8 bytes, or NULL when the run is to end. */
     void *(*reserve)(void *user, unsigned thread, int axis, size_t bytes);

@@ -1,0 +1,59 @@
+#include "identity.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include "format.h"
+#include "report.h"
+
+/* Changes whenever other bytes come out of the same input and parameters. */
+enum { BRICKER_VERSION = 1 };
+
+/* A file is known by its name, length and time of change; of a pattern only the name is known. */
+static void write_input(FILE *f, const trip_brick_params *p)
+{
+    const trip_volume_params *v = &p->volume;
+    struct stat st = { 0 };
+    if (stat(p->input, &st) != 0)
+        st.st_size = 0;
+    fprintf(f, "%s %jd %jd %ld\n", p->input, (intmax_t)st.st_size, (intmax_t)st.st_mtim.tv_sec,
+            st.st_mtim.tv_nsec);
+    fprintf(f, "%s %d %s %d %" PRIu64 "\n", v->grid ? v->grid : "", (int)v->level_set,
+            v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes);
+    for (int a = 0; a < 3; a++)
+        fprintf(f, "%" PRId64 " %a\n", v->raw_dims[a], v->spacing[a]);
+}
+
+static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
+{
+    fprintf(f, "%d %d %d %d %u %u\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
+            p->no_normals, p->tile_voxels, p->slab_sheets);
+    for (size_t i = 0; i < p->range_count; i++)
+        fprintf(f, "%a %a\n", p->ranges[i].lo, p->ranges[i].hi);
+    for (size_t i = 0; i < p->function_count; i++) {
+        char *text = trip_tf_to_text(functions[i]);
+        fprintf(f, "%s\n", text ? text : "");
+        free(text);
+    }
+}
+
+int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, uint64_t *out)
+{
+    char *text = NULL;
+    size_t bytes = 0;
+    FILE *f = open_memstream(&text, &bytes);
+    if (f) {
+        write_input(f, p);
+        write_params(f, p, functions);
+    }
+    if (!f || fclose(f) != 0) {
+        free(text);
+        return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
+    }
+    *out = XXH64(text, bytes, 0);
+    free(text);
+    return 0;
+}

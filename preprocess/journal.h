@@ -1,0 +1,61 @@
+/* What a run of `brick` notes down beside its spilled pieces, so that another one can go on where
+ * it was when it was killed. Two files in the spill's folder: "journal", records with checksums of
+ * which the last may be cut off, and "runs", what was appended to the list that is written in
+ * order. They are read back on the machine that wrote them only. One thread at a time. */
+#ifndef TRIP_JOURNAL_H
+#define TRIP_JOURNAL_H
+
+#include "scan.h"
+#include "spill.h"
+
+/* Written once, when the way of working is settled. */
+typedef struct trip_journal_start {
+    uint64_t identity; /* of the input and all parameters that the output depends on */
+    int64_t slices;    /* of a block: batches are counted in these */
+    uint32_t in_order; /* the Z list is written as it comes */
+    uint32_t scanned;  /* the tally is of all values */
+    trip_tally tally;
+} trip_journal_start;
+
+/* All pieces of the first `batches` batches are in segments or in the ordered list. */
+typedef struct trip_checkpoint {
+    uint64_t batches, kept;
+    uint64_t segments;             /* that there are */
+    uint64_t runs, ordered_splats; /* of the ordered list */
+    trip_tally tally;              /* of the batches, unless scanned */
+} trip_checkpoint;
+
+/* One run of the ordered list. */
+typedef struct trip_run_record {
+    uint64_t key;
+    uint32_t splats;
+    uint32_t checksum; /* of its records, trip_run_checksum() */
+} trip_run_record;
+
+uint32_t trip_run_checksum(const uint32_t *voxels, const uint32_t *normals, uint32_t splats);
+
+typedef struct trip_journal trip_journal;
+
+/* Opens the journal in the folder of `spill`. With `resume`, what stands there is read: up to the
+ * last checkpoint with at most `ordered_splats`, so many being still at hand; what is after it is
+ * cut off. An identity other than that of the run that wrote it is a reported failure. Without
+ * `resume`, or when nothing stands there, the journal is new. */
+int trip_journal_open(trip_journal **out, const trip_spill *spill, bool resume, uint64_t identity,
+                      uint64_t ordered_splats);
+void trip_journal_close(trip_journal *j);
+
+/* What was read back; NULL when the journal is new, or has no checkpoint. */
+const trip_journal_start *trip_journal_get_start(const trip_journal *j);
+const trip_checkpoint *trip_journal_get_checkpoint(const trip_journal *j);
+/* The segments up to that checkpoint. */
+const trip_segment *trip_journal_get_segments(const trip_journal *j);
+/* Reads back run `index` of those up to the checkpoint. */
+int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_record *runs,
+                           size_t count);
+
+int trip_journal_write_start(trip_journal *j, const trip_journal_start *start);
+int trip_journal_add_run(trip_journal *j, const trip_run_record *run);
+/* Fills in segments, runs and ordered_splats. */
+int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill);
+
+#endif

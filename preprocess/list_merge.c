@@ -1,0 +1,199 @@
+#include "list_merge.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+#include "report.h"
+
+enum { PROGRESS_MS = 200 };
+
+/* Pieces on their way to the spill. */
+typedef struct spilling {
+    trip_spill *spill;
+    const trip_piece_format *format;
+} spilling;
+
+static int spill_piece(void *user, const trip_piece *piece)
+{
+    const spilling *s = user;
+    if (trip_interrupted())
+        return trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
+    return trip_spill_append(s->spill, piece, trip_piece_get_parts(s->format, piece).bytes);
+}
+
+static int spill_sources(trip_spill *spill, int axis, const trip_piece_format *format,
+                         trip_piece_source **sources, size_t count)
+{
+    int status = trip_spill_begin(spill, axis);
+    if (status == 0)
+        status = trip_merge(sources, count, spill_piece, &(spilling){ spill, format });
+    return status == 0 ? trip_spill_end(spill) : status;
+}
+
+int trip_spill_chain(trip_spill *spill, int axis, const trip_piece_pool *pool,
+                     const trip_chain *chain)
+{
+    if (chain->first == TRIP_NO_CHUNK)
+        return 0;
+    trip_pool_source memory = trip_pool_source_make(pool, chain);
+    trip_piece_source *source = &memory.source;
+    return spill_sources(spill, axis, &pool->format, &source, 1);
+}
+
+/* What the workers share. */
+typedef struct merge_job {
+    const trip_list_merge *merge;
+    int axes[3];
+    pthread_mutex_t lock; /* guards the pool's free chain */
+} merge_job;
+
+static size_t segments_of(const trip_list_merge *m, int axis)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < trip_spill_count(m->spill); i++) {
+        const trip_segment *s = trip_spill_segment(m->spill, i);
+        count += s->axis == (uint32_t)axis && !s->retired;
+    }
+    return count;
+}
+
+/* Readers of segments of one list, each with a chunk to read through. */
+typedef struct source_set {
+    merge_job *job;
+    trip_segment_reader *readers;
+    size_t *segments; /* index of each reader's */
+    trip_piece_source **sources;
+    size_t count;
+    trip_chain buffers;
+} source_set;
+
+static void close_sources(source_set *s)
+{
+    for (size_t i = 0; i < s->count; i++)
+        trip_segment_reader_close(&s->readers[i]);
+    pthread_mutex_lock(&s->job->lock);
+    trip_chain_free(s->job->merge->pool, &s->buffers);
+    pthread_mutex_unlock(&s->job->lock);
+    free(s->readers);
+    free(s->segments);
+    free(s->sources);
+}
+
+static int open_segment(source_set *s, size_t index)
+{
+    const trip_list_merge *m = s->job->merge;
+    trip_piece_pool *pool = m->pool;
+    pthread_mutex_lock(&s->job->lock);
+    uint32_t buffer = trip_chain_pop(pool, &pool->free);
+    trip_chain_push(pool, &s->buffers, buffer);
+    pthread_mutex_unlock(&s->job->lock);
+    trip_segment_reader *r = &s->readers[s->count];
+    int status = trip_segment_reader_open(r, m->spill, index, &pool->format,
+                                          trip_chunk_memory(pool, buffer), pool->chunk_bytes);
+    s->segments[s->count] = index;
+    s->sources[s->count++] = &r->source;
+    return status;
+}
+
+/* The first `limit` segments of a list; there is room for one source more. */
+static int open_sources(source_set *s, merge_job *job, int axis, size_t limit)
+{
+    const trip_list_merge *m = job->merge;
+    size_t wanted = segments_of(m, axis);
+    wanted = wanted < limit ? wanted : limit;
+    *s = (source_set){ .job = job, .buffers = trip_chain_empty() };
+    s->readers = calloc(wanted + 1, sizeof *s->readers);
+    s->segments = calloc(wanted + 1, sizeof *s->segments);
+    s->sources = calloc(wanted + 1, sizeof(trip_piece_source *));
+    if (!s->readers || !s->segments || !s->sources)
+        return trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
+    int status = 0;
+    for (size_t i = 0; s->count < wanted && status == 0; i++) {
+        const trip_segment *segment = trip_spill_segment(m->spill, i);
+        if (segment->axis == (uint32_t)axis && !segment->retired)
+            status = open_segment(s, i);
+    }
+    return status;
+}
+
+static int merge_list(void *user, unsigned thread, uint64_t item)
+{
+    merge_job *job = user;
+    const trip_list_merge *m = job->merge;
+    int axis = job->axes[item];
+    source_set s;
+    (void)thread;
+    int status = open_sources(&s, job, axis, SIZE_MAX);
+    if (status == 0) {
+        trip_pool_source memory = trip_pool_source_make(m->pool, &m->in_memory[axis]);
+        s.sources[s.count] = &memory.source;
+        status = trip_list_output_merge(&m->outputs[axis], m->quantiser, s.sources, s.count + 1);
+    }
+    close_sources(&s);
+    return status;
+}
+
+/* Merges as many segments of a list as there are buffers for into one. */
+static int consolidate(merge_job *job, int axis)
+{
+    const trip_list_merge *m = job->merge;
+    source_set s;
+    int status = open_sources(&s, job, axis, m->pool->free.chunks);
+    if (status == 0)
+        status = spill_sources(m->spill, axis, &m->pool->format, s.sources, s.count);
+    for (size_t i = 0; i < s.count && status == 0; i++)
+        trip_spill_retire(m->spill, s.segments[i]);
+    close_sources(&s);
+    return status;
+}
+
+/* Every segment needs a chunk to be read through: makes room for that, then merges segments. */
+static int make_room(merge_job *job)
+{
+    const trip_list_merge *m = job->merge;
+    size_t segments = 0;
+    int status = 0, lists = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        segments += m->lists[axis] ? segments_of(m, axis) : 0;
+        lists += m->lists[axis];
+    }
+    if (segments <= m->pool->free.chunks)
+        return 0;
+    for (int axis = 0; axis < 3 && status == 0; axis++) {
+        status = trip_spill_chain(m->spill, axis, m->pool, &m->in_memory[axis]);
+        trip_chain_free(m->pool, &m->in_memory[axis]);
+    }
+    for (int axis = 0; axis < 3 && status == 0; axis++)
+        while (status == 0 && segments_of(m, axis) > m->pool->free.chunks / (size_t)lists)
+            status = consolidate(job, axis);
+    return status;
+}
+
+static uint64_t splats_so_far(const trip_list_merge *m)
+{
+    uint64_t splats = 0;
+    for (int axis = 0; axis < 3; axis++)
+        splats += atomic_load_explicit(&m->outputs[axis].splats, memory_order_relaxed);
+    return splats;
+}
+
+int trip_list_merge_run(const trip_list_merge *m, trip_workers *workers,
+                        void (*progress)(void *user, uint64_t splats), void *user)
+{
+    merge_job job = { .merge = m };
+    unsigned lists = 0;
+    for (int axis = 0; axis < 3; axis++)
+        if (m->lists[axis])
+            job.axes[lists++] = axis;
+    pthread_mutex_init(&job.lock, NULL);
+    int status = make_room(&job);
+    if (status == 0) {
+        trip_workers_start(workers, merge_list, &job, lists);
+        while (!trip_workers_wait(workers, PROGRESS_MS, &status))
+            if (progress)
+                progress(user, splats_so_far(m));
+    }
+    pthread_mutex_destroy(&job.lock);
+    return status;
+}

@@ -1,0 +1,28 @@
+/* The end of building lists: sorted segments on disk and pieces in memory become the lists of the
+ * data set, one worker a list. */
+#ifndef TRIP_LIST_MERGE_H
+#define TRIP_LIST_MERGE_H
+
+#include "list_output.h"
+#include "piece_pool.h"
+#include "spill.h"
+#include "workers.h"
+
+typedef struct trip_list_merge {
+    trip_piece_pool *pool; /* its free chunks are what segments are read through */
+    trip_chain *in_memory; /* of each axis */
+    trip_spill *spill;
+    trip_list_output *outputs; /* of each axis */
+    bool lists[3];             /* axes to merge */
+    const trip_quantiser *quantiser;
+} trip_list_merge;
+
+/* `progress` as for trip_list_builder_finish(). */
+int trip_list_merge_run(const trip_list_merge *m, trip_workers *workers,
+                        void (*progress)(void *user, uint64_t splats), void *user);
+
+/* Sorts the pieces of a chain into a segment of the spill. */
+int trip_spill_chain(trip_spill *spill, int axis, const trip_piece_pool *pool,
+                     const trip_chain *chain);
+
+#endif

@@ -1,0 +1,83 @@
+#include "list_output.h"
+
+#include <stdatomic.h>
+
+#include "report.h"
+
+enum { LOOK_PIECES = 4096 };
+
+int trip_list_output_create(trip_list_output *o, int axis, const trip_piece_format *f,
+                            trip_writer *writer, trip_budget *budget)
+{
+    *o = (trip_list_output){ .axis = axis, .writer = writer };
+    return trip_tile_create(&o->tile, f, budget);
+}
+
+void trip_list_output_destroy(trip_list_output *o)
+{
+    trip_tile_destroy(o->tile);
+    o->tile = NULL;
+}
+
+/* Every second bit of a Morton code, from bit 0. */
+static uint32_t even_bits(uint64_t m)
+{
+    m &= UINT64_C(0x5555555555555555);
+    m = (m | m >> 1) & UINT64_C(0x3333333333333333);
+    m = (m | m >> 2) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+    m = (m | m >> 4) & UINT64_C(0x00ff00ff00ff00ff);
+    m = (m | m >> 8) & UINT64_C(0x0000ffff0000ffff);
+    return (uint32_t)(m | m >> 16);
+}
+
+int trip_list_output_append(trip_list_output *o, uint64_t key, const uint32_t *voxels,
+                            const uint32_t *normals, uint32_t splats)
+{
+    uint64_t tile = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
+    int status = trip_writer_append(o->writer, o->axis, (uint32_t)(key >> TRIP_TILE_MORTON_BITS),
+                                    even_bits(tile), even_bits(tile >> 1), voxels, normals, splats);
+    atomic_fetch_add_explicit(&o->splats, splats, memory_order_relaxed);
+    return status;
+}
+
+/* The tile that is being put together. */
+typedef struct assembly {
+    trip_list_output *output;
+    const trip_quantiser *quantiser;
+    uint64_t key;
+    bool pending;
+} assembly;
+
+static int flush(assembly *a)
+{
+    trip_list_output *o = a->output;
+    const uint32_t *voxels, *normals;
+    if (!a->pending)
+        return 0;
+    a->pending = false;
+    uint32_t splats = trip_tile_take(o->tile, a->quantiser, &voxels, &normals);
+    int status = trip_list_output_append(o, a->key, voxels, normals, splats);
+    return status == 0 && o->run ? o->run(o->run_user, a->key, voxels, normals, splats) : status;
+}
+
+static int take_piece(void *user, const trip_piece *piece)
+{
+    assembly *a = user;
+    int status = 0;
+    if (a->pending && piece->key != a->key)
+        status = flush(a);
+    trip_tile_add(a->output->tile, piece);
+    a->key = piece->key;
+    a->pending = true;
+    if (++a->output->looked % LOOK_PIECES == 0 && status == 0 && trip_interrupted())
+        status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
+    return status;
+}
+
+int trip_list_output_merge(trip_list_output *o, const trip_quantiser *quantiser,
+                           trip_piece_source **sources, size_t count)
+{
+    assembly a = { .output = o, .quantiser = quantiser };
+    int status = trip_merge(sources, count, take_piece, &a);
+    return status == 0 ? flush(&a) : status;
+}

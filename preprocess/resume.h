@@ -1,0 +1,23 @@
+/* What a killed run left of the list that is written in order. Its plane files are taken out of the
+ * partial data set, before a new writer removes them, and appended again up to a checkpoint. */
+#ifndef TRIP_RESUME_H
+#define TRIP_RESUME_H
+
+#include "journal.h"
+#include "list_output.h"
+
+typedef struct trip_leftover {
+    int fd[TRIP_PLANES]; /* -1 where there is none */
+    uint64_t splats;     /* that all planes hold */
+} trip_leftover;
+
+/* Moves the Z list's planes of the partial data set into the spill's folder, unless as much of them
+ * is there already, and opens them. The caller holds the spill's lock. */
+trip_leftover trip_leftover_take(const trip_spill *spill, const char *partial_path, bool normals);
+void trip_leftover_close(trip_leftover *l);
+
+/* Appends the runs of the journal's checkpoint. */
+int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_output *output,
+                         trip_budget *budget);
+
+#endif
