@@ -176,6 +176,8 @@ OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
     } else if (std::strcmp(e.plugin, "png") != 0) {
         spec.attribute("compression", "zip");
     }
+    /* Otherwise OpenImageIO notes the time, and the same picture would be another file. */
+    spec.attribute("DateTime", "");
     return spec;
 }
 
