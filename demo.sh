@@ -12,6 +12,6 @@ cmake --preset release -DBUILD_TESTING=OFF >build.log 2>&1 && cmake --build --pr
 
 triptych=build/release/triptych
 mkdir -p demo
-$triptych brick datasets/bonsai.nii.gz -o demo/bonsai.trip --force
-$triptych render demo/bonsai.trip -o demo/bonsai.png --size 1024x1024
-echo "The picture: $(pwd)/demo/bonsai.png"
+$triptych brick datasets/tooth.nhdr -o demo/tooth.trip --force
+$triptych render demo/tooth.trip -o demo/tooth.png --size 1024x1024
+echo "The picture: $(pwd)/demo/tooth.png"
