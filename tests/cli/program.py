@@ -1,0 +1,278 @@
+"""Runs the program as a user does; writes volumes in every format; reads the pictures it draws.
+
+For the tests in this folder, which Debian's own Python runs with NumPy. ctest says by the
+environment where the program is.
+"""
+import json
+import os
+import re
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+import numpy
+
+PROGRAM = os.environ["TRIP_PROGRAM"]
+GENERATE = os.environ["TRIP_GENERATE"]
+DATASETS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "datasets")
+SANITIZED = bool(os.environ.get("TRIP_SANITIZE"))
+
+LINE = re.compile(r"triptych: [^:\n]+: [^\n]+: [^\n]+\n")
+
+
+def start(*arguments, **options):
+    options.setdefault("stdin", subprocess.DEVNULL)
+    options.setdefault("stdout", subprocess.PIPE)
+    options.setdefault("stderr", subprocess.PIPE)
+    return subprocess.Popen([PROGRAM, *map(str, arguments)], **options)
+
+
+def call(*arguments, timeout=60, **options):
+    """What subprocess.run() says of the program; a run that hangs is an error."""
+    process = start(*arguments, **options)
+    try:
+        out, err = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise AssertionError(f"hangs: {arguments}")
+    return subprocess.CompletedProcess(arguments, process.returncode, out, err.decode())
+
+
+class ProgramTest(unittest.TestCase):
+    """Each class works in a folder of its own, the current one."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="trip-cli-")
+        os.chdir(cls.folder)
+
+    @classmethod
+    def tearDownClass(cls):
+        os.chdir("/")
+        shutil.rmtree(cls.folder)
+
+    def works(self, *arguments, **options):
+        run = call(*arguments, **options)
+        self.assertEqual(run.returncode, 0, f"{arguments}: {run.stderr}")
+        return run
+
+    def fails(self, status, *arguments, says="", **options):
+        """One line on stderr in the project's form, and this exit status."""
+        run = call(*arguments, **options)
+        about = f"{arguments}: exit status {run.returncode}, stderr: {run.stderr!r}"
+        self.assertEqual(run.returncode, status, about)
+        self.assertTrue(LINE.fullmatch(run.stderr), about)
+        self.assertIn(says, run.stderr)
+        return run
+
+    def leaves_nothing(self, status, *arguments, says="", **options):
+        """It fails, and no file or folder has come."""
+        before = set(os.listdir("."))
+        run = self.fails(status, *arguments, says=says, **options)
+        self.assertEqual(set(os.listdir(".")), before, arguments)
+        return run
+
+    def info(self, path):
+        return json.loads(self.works("info", "--json", path).stdout)
+
+    def brick(self, source, output, *options):
+        """Bricks anew; what `info --json` says of it."""
+        shutil.rmtree(output, ignore_errors=True)
+        self.works("brick", source, "-o", output, "-q", *options)
+        return self.info(output)
+
+    def stats(self, *arguments):
+        """The --stats of drawing a.exr."""
+        return json.loads(self.works("render", *arguments, "-o", "a.exr", "--stats", "-").stdout)
+
+    def picture(self, *arguments):
+        """What `render` draws, height x width x RGBA, float, premultiplied."""
+        self.works("render", *arguments, "-o", "picture.exr")
+        return read_exr("picture.exr")
+
+
+def splats_drawn(stats):
+    return sum(l["splats_drawn"] for l in stats["frames"][0]["lists"].values())
+
+
+def main():
+    unittest.main(verbosity=2)
+
+
+# Pictures
+
+
+def read_exr(path):
+    """An OpenEXR file of scan lines, floats by zip: height x width x RGBA."""
+    with open(path, "rb") as f:
+        data = f.read()
+    at, window = 8, None
+    while data[at]:
+        name_end = data.index(0, at)
+        type_end = data.index(0, name_end + 1)
+        (size,) = struct.unpack_from("<i", data, type_end + 1)
+        if data[at:name_end] == b"dataWindow":
+            window = struct.unpack_from("<4i", data, type_end + 5)
+        at = type_end + 5 + size
+    width, height = window[2] + 1, window[3] + 1
+    blocks = -(-height // 16)
+    picture = numpy.empty((height, width, 4), numpy.float32)
+    for offset in struct.unpack_from(f"<{blocks}Q", data, at + 1):
+        y, size = struct.unpack_from("<2i", data, offset)
+        rows = min(16, height - y)
+        plain = exr_unpack(data[offset + 8 : offset + 8 + size], rows * width * 16)
+        picture[y : y + rows] = plain.reshape(rows, 4, width).transpose(0, 2, 1)[..., [3, 2, 1, 0]]
+    return picture
+
+
+def exr_unpack(packed, size):
+    """zlib, differences, and the bytes' halves in turn; stored as it is where that is shorter."""
+    if len(packed) == size:
+        return numpy.frombuffer(packed, "<f4")
+    steps = numpy.frombuffer(zlib.decompress(packed), numpy.uint8).astype(numpy.int64)
+    steps[1:] -= 128
+    halves = (numpy.cumsum(steps) & 255).astype(numpy.uint8)
+    plain = numpy.empty_like(halves)
+    plain[0::2], plain[1::2] = halves[: (size + 1) // 2], halves[(size + 1) // 2 :]
+    return plain.view("<f4")
+
+
+# Volumes: arrays have the shape (z, y, x), as the values stand in the file.
+
+NRRD_TYPES = {"u1": "uint8", "i1": "int8", "u2": "uint16", "i2": "int16", "u4": "uint32",
+              "i4": "int32", "f4": "float", "f8": "double"}
+NIFTI_TYPES = {"u1": 2, "i2": 4, "i4": 8, "f4": 16, "f8": 64, "i1": 256, "u2": 512, "u4": 768}
+
+
+def write(path, data):
+    with open(path, "wb") as f:
+        f.write(data)
+
+
+def write_raw(path, volume):
+    write(path, volume.tobytes())
+
+
+def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little"):
+    data = volume.astype(volume.dtype.newbyteorder("<" if endian == "little" else ">")).tobytes()
+    if encoding == "gzip":
+        packer = zlib.compressobj(wbits=31)
+        data = packer.compress(data) + packer.flush()
+    z, y, x = volume.shape
+    header = (f"NRRD0004\ntype: {NRRD_TYPES[volume.dtype.str[1:]]}\ndimension: 3\n"
+              f"sizes: {x} {y} {z}\nspacings: {spacing[0]} {spacing[1]} {spacing[2]}\n"
+              f"endian: {endian}\nencoding: {encoding}\n\n")
+    write(path, header.encode() + data)
+
+
+def write_nifti(path, volume, affine=None, packed=False, slope=1, inter=0):
+    affine = numpy.eye(4) if affine is None else affine
+    z, y, x = volume.shape
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, x, y, z, 1, 1, 1, 1)
+    struct.pack_into("<2h", header, 70, NIFTI_TYPES[volume.dtype.str[1:]],
+                     8 * volume.dtype.itemsize)
+    struct.pack_into("<8f", header, 76, 1, *numpy.linalg.norm(affine[:3, :3], axis=0), 0, 0, 0, 0)
+    struct.pack_into("<3f", header, 108, 352, slope, inter)
+    struct.pack_into("<2h", header, 252, 0, 1)
+    struct.pack_into("<12f", header, 280, *affine[:3].ravel())
+    header[344:348] = b"n+1\0"
+    data = bytes(header) + volume.tobytes()
+    if packed:
+        packer = zlib.compressobj(wbits=31)
+        data = packer.compress(data) + packer.flush()
+    write(path, data)
+
+
+def write_vol(path, volume, version=3):
+    z, y, x = volume.shape
+    header = (f"Center-X: 0\nCenter-Y: 0\nCenter-Z: 0\nX: {x}\nY: {y}\nZ: {z}\nVoxel-Size: 1\n"
+              f"Alpha-Color: 0\nVoxel-Endian: 0\nInt-Endian: 0123\nVersion: {version}\n.\n")
+    data = volume.tobytes()
+    write(path, header.encode() + (zlib.compress(data) if version == 3 else data))
+
+
+def write_tiff(path, image):
+    """One grey strip."""
+    height, width = image.shape
+    data = image.tobytes()
+    tags = [(256, width), (257, height), (258, 8 * image.dtype.itemsize), (259, 1), (262, 1),
+            (273, 8), (277, 1), (278, height), (279, len(data))]
+    folder = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags)
+    write(path, struct.pack("<2sHI", b"II", 42, 8 + len(data)) + data +
+          struct.pack("<H", len(tags)) + folder + struct.pack("<I", 0))
+
+
+def write_png(path, image):
+    height, width = image.shape
+    rows = b"".join(b"\0" + row.astype(">" + image.dtype.str[1:]).tobytes() for row in image)
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+    write(path, b"\x89PNG\r\n\x1a\n" +
+          chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, 0, 0, 0, 0)) +
+          chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def write_stack(folder, volume, write_image, extension):
+    os.makedirs(folder, exist_ok=True)
+    for z, image in enumerate(volume):
+        write_image(os.path.join(folder, f"slice-{z:04d}.{extension}"), image)
+
+
+def dicom_element(group, element, kind, value):
+    value += b"" if len(value) % 2 == 0 else (b"\0" if kind == b"UI" else b" ")
+    if kind in (b"OW", b"OB"):
+        return struct.pack("<HH2sHI", group, element, kind, 0, len(value)) + value
+    return struct.pack("<HH2sH", group, element, kind, len(value)) + value
+
+
+def write_dicom(path, image, z, spacing=(1, 1, 1)):
+    """Explicit VR little endian, 16 bits."""
+    e, rows, columns = dicom_element, *image.shape
+    us = lambda value: struct.pack("<H", value)
+    meta = (e(2, 0x0001, b"OB", b"\0\1") + e(2, 0x0002, b"UI", b"1.2.840.10008.5.1.4.1.1.2") +
+            e(2, 0x0003, b"UI", f"1.2.3.{z + 1}".encode()) +
+            e(2, 0x0010, b"UI", b"1.2.840.10008.1.2.1") + e(2, 0x0012, b"UI", b"1.2.3"))
+    data = (e(8, 0x0016, b"UI", b"1.2.840.10008.5.1.4.1.1.2") +
+            e(8, 0x0018, b"UI", f"1.2.3.{z + 1}".encode()) +
+            e(0x20, 0x000E, b"UI", b"1.2.3.4") +
+            e(0x20, 0x0013, b"IS", str(z + 1).encode()) +
+            e(0x20, 0x0032, b"DS", f"0\\0\\{z * spacing[2]}".encode()) +
+            e(0x20, 0x0037, b"DS", b"1\\0\\0\\0\\1\\0") +
+            e(0x28, 0x0002, b"US", us(1)) + e(0x28, 0x0004, b"CS", b"MONOCHROME2") +
+            e(0x28, 0x0010, b"US", us(rows)) + e(0x28, 0x0011, b"US", us(columns)) +
+            e(0x28, 0x0030, b"DS", f"{spacing[1]}\\{spacing[0]}".encode()) +
+            e(0x28, 0x0100, b"US", us(16)) + e(0x28, 0x0101, b"US", us(16)) +
+            e(0x28, 0x0102, b"US", us(15)) + e(0x28, 0x0103, b"US", us(0)) +
+            e(0x7FE0, 0x0010, b"OW", image.astype("<u2").tobytes()))
+    write(path, bytes(128) + b"DICM" + e(2, 0, b"UL", struct.pack("<I", len(meta))) + meta + data)
+
+
+def ball(shape, spacing=(1, 1, 1), dtype="u1", radius=0.8):
+    """A soft ball about the middle, its radius a share of half the shortest world side."""
+    half = [(n - 1) / 2 * s for n, s in zip(shape[::-1], spacing)]
+    z, y, x = numpy.meshgrid(*((numpy.arange(n) - (n - 1) / 2) * s
+                               for n, s in zip(shape, spacing[::-1])), indexing="ij")
+    inside = radius * min(half) - numpy.sqrt(x * x + y * y + z * z)
+    top = 200 if dtype == "u1" else 1 if dtype[0] == "f" else 20000
+    soft = numpy.clip(inside / max(spacing) + 0.5, 0, 1) * top
+    return soft.astype(dtype) if dtype[0] == "f" else numpy.rint(soft).astype(dtype)
+
+
+def noise(shape, dtype="u1", seed=1):
+    """Smooth enough to look like something, with no symmetry at all."""
+    random = numpy.random.default_rng(seed)
+    coarse = random.random([n // 4 + 2 for n in shape])
+    for axis, n in enumerate(shape):
+        at = numpy.arange(n) / 4
+        low = at.astype(int)
+        f = (at - low).reshape([-1 if a == axis else 1 for a in range(3)])
+        coarse = numpy.take(coarse, low, axis) * (1 - f) + numpy.take(coarse, low + 1, axis) * f
+    top = 255 if dtype == "u1" else 1 if dtype[0] == "f" else 30000
+    values = coarse * top
+    return values.astype(dtype) if dtype[0] == "f" else numpy.rint(values).astype(dtype)
