@@ -1,0 +1,201 @@
+/* For tests of the bricker: a folder of their own, raw volumes in it, and data sets read back into
+ * dense arrays, one for each list, by the reader's iterators. */
+#ifndef TRIP_TEST_BRICK_FILES_H
+#define TRIP_TEST_BRICK_FILES_H
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "brick.h"
+#include "dataset.h"
+#include "report.h"
+#include "selection.h"
+
+static char test_folder[64];
+static char test_report[8192];
+
+static inline void test_catch(const char *line, void *user)
+{
+    (void)user;
+    size_t used = strlen(test_report);
+    snprintf(test_report + used, sizeof test_report - used, "%s\n", line);
+}
+
+/* For cmocka's setup and teardown: a fresh folder, and reports kept. */
+static inline int test_begin(void **state)
+{
+    (void)state;
+    strcpy(test_folder,
+           access("/dev/shm", W_OK) == 0 ? "/dev/shm/trip-XXXXXX" : "/tmp/trip-XXXXXX");
+    test_report[0] = 0;
+    trip_report_redirect(test_catch, NULL);
+    return mkdtemp(test_folder) ? 0 : -1;
+}
+
+static inline int test_end(void **state)
+{
+    (void)state;
+    char command[128];
+    trip_report_redirect(NULL, NULL);
+    snprintf(command, sizeof command, "rm -rf '%s'", test_folder);
+    return system(command);
+}
+
+/* FOLDER/NAME; good until the eighth call after. */
+static inline const char *test_path(const char *name)
+{
+    static char paths[8][128];
+    static unsigned next;
+    char *path = paths[next++ % 8];
+    snprintf(path, sizeof paths[0], "%s/%s", test_folder, name);
+    return path;
+}
+
+static inline void test_write(const char *name, const void *data, size_t bytes)
+{
+    FILE *f = fopen(test_path(name), "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(data, 1, bytes, f), bytes);
+    assert_int_equal(fclose(f), 0);
+}
+
+static inline uint32_t test_random(uint64_t *state)
+{
+    *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (uint32_t)(*state >> 33);
+}
+
+static inline bool test_exists(const char *name)
+{
+    return access(test_path(name), F_OK) == 0;
+}
+
+/* What a data set holds: [k][j][i] of every list, code -1 where there is no splat. */
+typedef struct test_lists {
+    trip_file_header header;
+    size_t voxels;
+    int32_t *codes[3];
+    uint32_t *normals[3];
+    uint64_t splats[3];
+    uint64_t out_of_order; /* splats not after the one before, by sheet and Morton code */
+    char *text;
+} test_lists;
+
+static inline void test_read_run(const trip_dataset *d, int axis, const trip_run *run,
+                                 test_lists *l, uint64_t *last_key)
+{
+    uint32_t voxels[16384], normals[16384] = { 0 };
+    size_t bytes = run->count * sizeof *voxels;
+    const int64_t offset = (int64_t)run->first * 4;
+    assert_int_equal(pread(d->plane_fd[axis][0], voxels, bytes, offset), bytes);
+    if (d->plane_fd[axis][1] >= 0)
+        assert_int_equal(pread(d->plane_fd[axis][1], normals, bytes, offset), bytes);
+    for (uint32_t n = 0; n < run->count; n++) {
+        int64_t p[3];
+        p[axis] = run->sheet;
+        p[(axis + 1) % 3] = run->u + trip_voxel_u(voxels[n]);
+        p[(axis + 2) % 3] = run->v + trip_voxel_v(voxels[n]);
+        size_t at =
+            (size_t)((p[2] * (int64_t)l->header.dims[1] + p[1]) * (int64_t)l->header.dims[0] +
+                     p[0]);
+        uint64_t key = (uint64_t)run->sheet << 40 |
+                       trip_morton((uint32_t)p[(axis + 1) % 3], (uint32_t)p[(axis + 2) % 3]);
+        l->out_of_order += l->splats[axis] > 0 && key <= *last_key;
+        *last_key = key;
+        assert_int_equal(l->codes[axis][at], -1);
+        l->codes[axis][at] = (int32_t)trip_voxel_code(voxels[n]);
+        l->normals[axis][at] = normals[n];
+        l->splats[axis]++;
+    }
+}
+
+static inline void test_read_lists(const char *name, test_lists *l)
+{
+    trip_budget *budget;
+    trip_dataset *d;
+    assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 30), 0);
+    assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
+    assert_int_equal(trip_dataset_verify(d, budget), 0);
+    *l = (test_lists){ .header = d->header, .text = strdup(d->text) };
+    l->voxels = (size_t)(d->header.dims[0] * d->header.dims[1] * d->header.dims[2]);
+    for (int axis = 0; axis < 3; axis++) {
+        uint64_t last_key = 0;
+        trip_selection s;
+        trip_run run;
+        l->codes[axis] = malloc(l->voxels * sizeof(int32_t));
+        l->normals[axis] = calloc(l->voxels, sizeof(uint32_t));
+        memset(l->codes[axis], 0xff, l->voxels * sizeof(int32_t));
+        assert_int_equal(
+            trip_selection_create(&s, d, axis, false, 0, (int64_t)d->header.dims[axis] - 1, budget),
+            0);
+        for (uint64_t brick = 0; brick < d->lists[axis].brick_count; brick++)
+            trip_selection_add(&s, brick);
+        trip_run_iterator it = trip_run_begin(&s);
+        while (trip_run_next(&it, &run))
+            test_read_run(d, axis, &run, l, &last_key);
+        trip_selection_destroy(&s, budget);
+    }
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+}
+
+static inline void test_free_lists(test_lists *l)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        free(l->codes[axis]);
+        free(l->normals[axis]);
+    }
+    free(l->text);
+}
+
+/* Sound, in order, and the same splats in all three lists. */
+static inline void test_check_lists(const test_lists *l)
+{
+    assert_int_equal(l->out_of_order, 0);
+    for (int axis = 0; axis < 3; axis++) {
+        assert_int_equal(l->splats[axis], l->header.kept);
+        assert_memory_equal(l->codes[axis], l->codes[0], l->voxels * sizeof(int32_t));
+        assert_memory_equal(l->normals[axis], l->normals[0], l->voxels * sizeof(uint32_t));
+    }
+}
+
+static inline bool test_same_file(const char *a, const char *b)
+{
+    FILE *f = fopen(a, "rb"), *g = fopen(b, "rb");
+    int c = 0, d = 0;
+    assert_true(f && g);
+    while (c == d && c != EOF) {
+        c = getc(f);
+        d = getc(g);
+    }
+    fclose(f);
+    fclose(g);
+    return c == d;
+}
+
+/* All files of two data sets alike, byte for byte. */
+static inline void test_same_dataset(const char *a, const char *b)
+{
+    static const char *const files[] = { "index.trip", "x.voxels",  "y.voxels", "z.voxels",
+                                         "x.normals",  "y.normals", "z.normals" };
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        char first[256], second[256];
+        snprintf(first, sizeof first, "%s/%s", test_path(a), files[i]);
+        snprintf(second, sizeof second, "%s/%s", test_path(b), files[i]);
+        if (access(first, F_OK) != 0 && access(second, F_OK) != 0)
+            continue;
+        if (!test_same_file(first, second))
+            fail_msg("%s and %s differ", first, second);
+    }
+}
+
+#endif

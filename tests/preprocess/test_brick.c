@@ -1,0 +1,446 @@
+#include "brick_files.h"
+
+#include <math.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+enum { NX = 97, NY = 70, NZ = 61, N = NX * NY * NZ };
+
+static uint8_t bytes[N];
+static float floats[N];
+
+/* Spheres around the middle with some noise, so that neither dense nor empty regions are missing.
+ */
+static void make_bytes(void)
+{
+    uint64_t random = 11;
+    for (int i = 0; i < N; i++) {
+        double x = i % NX - NX / 2, y = i / NX % NY - NY / 2, z = i / NX / NY - NZ / 2;
+        double r = sqrt(x * x + y * y + z * z);
+        bytes[i] = (uint8_t)(120 + 100 * cos(r / 4) + test_random(&random) % 20);
+    }
+    test_write("v.raw", bytes, sizeof bytes);
+}
+
+static void make_floats(void)
+{
+    for (int i = 0; i < N; i++)
+        floats[i] = (float)sin(i % NX * 0.1) * (float)(i / NX % NY) - (float)(i / NX / NY) * 0.7f;
+    test_write("v.raw", floats, sizeof floats);
+}
+
+static trip_brick_params params_for(const char *type, const char *output)
+{
+    static char input_path[128], output_path[128];
+    strcpy(input_path, test_path("v.raw"));
+    strcpy(output_path, test_path(output));
+    return (trip_brick_params){ .input = input_path,
+                                .output = output_path,
+                                .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = type },
+                                .threads = 2 };
+}
+
+static const trip_value_range middle = { 100, 180 };
+
+static void kept_voxels_are_those_of_the_envelope(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    p.ranges = &middle;
+    p.range_count = 1;
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    uint64_t kept = 0;
+    for (int i = 0; i < N; i++) {
+        bool keep = bytes[i] >= 100 && bytes[i] <= 180;
+        kept += keep;
+        assert_int_equal(l.codes[0][i], keep ? 257 * bytes[i] : -1);
+    }
+    assert_int_equal(l.header.kept, kept);
+    assert_int_equal(s.kept, kept);
+    assert_int_equal(s.voxels, N);
+    assert_int_equal(s.bytes, 24 * kept);
+    assert_false(test_exists("a.trip.partial"));
+    assert_false(test_exists("a.trip.spill"));
+    test_free_lists(&l);
+}
+
+static void a_transfer_function_keeps_what_it_shows(void **state)
+{
+    (void)state;
+    static const char text[] = "values data\n10 0 0 0 0\n90 1 1 1 0\n120 1 1 1 0.5\n150 1 1 1 0\n";
+    test_lists l;
+    trip_brick_summary s;
+    const char *function = test_path("f.tf");
+    trip_brick_params p = params_for("uint8", "a.trip");
+    test_write("f.tf", text, sizeof text - 1);
+    p.functions = &function;
+    p.function_count = 1;
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    for (int i = 0; i < N; i++)
+        assert_int_equal(l.codes[0][i] >= 0, bytes[i] > 90 && bytes[i] < 150);
+    assert_non_null(strstr(l.text, "\"envelope\":[[90.0"));
+    assert_non_null(strstr(l.text, "120 1 1 1 0.5"));
+    test_free_lists(&l);
+}
+
+static void without_an_envelope_something_is_kept_and_a_function_stored(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(s.kept > 0 && s.kept < N);
+    test_read_lists("a.trip", &l);
+    assert_non_null(strstr(l.text, "\"transfer_function\":\"unit voxel"));
+    assert_non_null(strstr(l.text, "\"source\":\"v.raw\""));
+    test_free_lists(&l);
+}
+
+/* The range of wide types is only known at the end; codes are of the whole range nevertheless. */
+static void codes_of_floats_are_of_the_range_of_all_values(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("float", "a.trip");
+    trip_value_range range = { -1, 20 };
+    float lo = INFINITY, hi = -INFINITY;
+    p.ranges = &range;
+    p.range_count = 1;
+    make_floats();
+    for (int i = 0; i < N; i++) {
+        lo = fminf(lo, floats[i]);
+        hi = fmaxf(hi, floats[i]);
+    }
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    assert_true(l.header.code_lo == lo && l.header.code_hi == hi);
+    assert_true(l.header.value_min == lo && l.header.value_max == hi);
+    for (int i = 0; i < N; i++) {
+        double value = lo + ((double)hi - lo) * l.codes[0][i] / 65535;
+        assert_int_equal(l.codes[0][i] >= 0, floats[i] >= -1 && floats[i] <= 20);
+        if (l.codes[0][i] >= 0)
+            assert_true(fabs(value - floats[i]) <= 0.5001 * ((double)hi - lo) / 65535);
+    }
+    test_free_lists(&l);
+}
+
+static void gradients_of_floats_are_right(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("float", "a.trip");
+    p.keep_all = true;
+    p.volume.spacing[0] = 0.5;
+    p.volume.spacing[1] = 1;
+    p.volume.spacing[2] = 2;
+    make_floats();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    for (int k = 1; k < NZ - 1; k++)
+        for (int j = 1; j < NY - 1; j++)
+            for (int i = 1; i < NX - 1; i++) {
+                const float *f = floats + ((size_t)k * NY + (size_t)j) * NX + (size_t)i;
+                double g[3],
+                    e[3] = { ((double)f[1] - f[-1]) / 2 / 0.5, ((double)f[NX] - f[-NX]) / 2,
+                             ((double)f[NX * NY] - f[-NX * NY]) / 2 / 2 };
+                trip_normal_unpack(l.normals[0][f - floats], l.header.gradient_scale, g);
+                double length = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+                /* Half a step of the magnitude's root, and 0.06 degrees. */
+                double step = sqrt(length * l.header.gradient_scale) / 255 + 0.0012 * length;
+                for (int a = 0; a < 3; a++)
+                    assert_true(fabs(g[a] - e[a]) <= 1.01 * step);
+            }
+    test_free_lists(&l);
+}
+
+static void values_that_are_not_finite_are_left_out_with_one_warning(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("float", "a.trip");
+    p.keep_all = true;
+    make_floats();
+    for (int i = 0; i < N; i += 7)
+        floats[i] = i % 2 ? NAN : INFINITY;
+    test_write("v.raw", floats, sizeof floats);
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(s.not_finite, (N + 6) / 7);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    for (int i = 0; i < N; i++)
+        assert_int_equal(l.codes[0][i] >= 0, i % 7 != 0);
+    assert_ptr_equal(strchr(test_report, '\n'), test_report + strlen(test_report) - 1);
+    assert_non_null(strstr(test_report, "values that are not finite are taken as not there"));
+    test_free_lists(&l);
+}
+
+static void brick_to(trip_brick_params p, const char *output)
+{
+    trip_brick_summary s;
+    p.output = test_path(output);
+    p.replace = true;
+    if (trip_brick(&p, &s) != 0)
+        fail_msg("%s", test_report);
+}
+
+static void check_ways(const trip_brick_params *base)
+{
+    brick_to(*base, "a.trip");
+    for (int way = 0; way < 5; way++) {
+        trip_brick_params p = *base;
+        p.threads = (unsigned[]){ 1, 1, 4, 3, 2 }[way];
+        p.slices = (int64_t[]){ 0, 1, 5, 23, 64 }[way];
+        p.memory_bytes = (uint64_t[]){ 0, 28 << 20, 48 << 20, 64 << 20, 256 << 20 }[way];
+        brick_to(p, "b.trip");
+        test_same_dataset("a.trip", "b.trip");
+    }
+}
+
+static void memory_threads_and_slabs_make_no_difference(void **state)
+{
+    (void)state;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    make_bytes();
+    p.keep_all = true;
+    check_ways(&p);
+    p = params_for("uint8", "a.trip");
+    check_ways(&p);
+    make_floats();
+    p = params_for("float", "a.trip");
+    p.keep_all = true;
+    check_ways(&p);
+    p = params_for("float", "a.trip");
+    check_ways(&p);
+}
+
+static void splats_come_in_one_order_whatever_the_tile(void **state)
+{
+    (void)state;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    p.ranges = &middle;
+    p.range_count = 1;
+    make_bytes();
+    brick_to(p, "a.trip");
+    for (unsigned tile = 16; tile <= 128; tile *= 2) {
+        test_lists l;
+        p.tile_voxels = tile;
+        p.slab_sheets = tile / 4;
+        brick_to(p, "b.trip");
+        test_read_lists("b.trip", &l);
+        test_check_lists(&l);
+        test_free_lists(&l);
+        /* Normals follow the order but not the tile, unlike positions in voxel records. */
+        assert_true(test_same_file(test_path("a.trip/x.normals"), test_path("b.trip/x.normals")));
+        assert_true(test_same_file(test_path("a.trip/y.normals"), test_path("b.trip/y.normals")));
+        assert_true(test_same_file(test_path("a.trip/z.normals"), test_path("b.trip/z.normals")));
+    }
+}
+
+static void without_normals_there_is_no_such_plane(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    p.no_normals = true;
+    p.keep_all = true;
+    make_bytes();
+    brick_to(p, "a.trip");
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    assert_int_equal(l.header.planes, 1);
+    assert_int_equal(l.header.kept, N);
+    assert_false(test_exists("a.trip/x.normals"));
+    test_free_lists(&l);
+}
+
+static void check_refused(trip_brick_params p, const char *why)
+{
+    trip_brick_summary s;
+    test_report[0] = 0;
+    assert_true(trip_brick(&p, &s) < 0);
+    if (!strstr(test_report, why))
+        fail_msg("\"%s\" does not say \"%s\"", test_report, why);
+    assert_ptr_equal(strchr(test_report, '\n'), test_report + strlen(test_report) - 1);
+    assert_false(test_exists("a.trip"));
+    assert_false(test_exists("a.trip.partial"));
+    assert_false(test_exists("a.trip.spill"));
+}
+
+static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **state)
+{
+    (void)state;
+    const trip_value_range above = { 300, 400 };
+    trip_brick_params p = params_for("uint8", "a.trip");
+    make_bytes();
+    p.ranges = &above;
+    p.range_count = 1;
+    check_refused(p, "no voxel is visible: the values are from 20 to ");
+    p = params_for("uint8", "a.trip");
+    p.memory_bytes = 1 << 20;
+    check_refused(p, "--memory");
+    p = params_for("uint8", "a.trip");
+    p.volume.raw_dims[2] = NZ + 1;
+    check_refused(p, "v.raw");
+    p = params_for("uint8", "no/such/folder.trip");
+    check_refused(p, "No such file");
+    p = params_for("float", "a.trip");
+    for (int i = 0; i < N; i++)
+        floats[i] = NAN;
+    test_write("v.raw", floats, sizeof floats);
+    p.keep_all = true;
+    check_refused(p, "holds no finite value");
+}
+
+static void an_existing_data_set_stays_unless_it_is_to_be_replaced(void **state)
+{
+    (void)state;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    p.ranges = &middle;
+    p.range_count = 1;
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(trip_brick(&p, &s) < 0);
+    assert_non_null(strstr(test_report, "exists"));
+    assert_true(test_exists("a.trip/index.trip"));
+    p.replace = true;
+    assert_int_equal(trip_brick(&p, &s), 0);
+}
+
+/* Kills the process when a stage is so far. */
+typedef struct killer {
+    const char *stage;
+    double share;
+} killer;
+
+static void kill_at(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    const killer *k = user;
+    if (strcmp(stage, k->stage) == 0 && (double)done >= k->share * (double)total)
+        raise(SIGKILL);
+}
+
+static void run_killed(trip_brick_params p, const killer *k)
+{
+    pid_t child = fork();
+    int how;
+    assert_true(child >= 0);
+    if (child == 0) {
+        trip_brick_summary s;
+        p.progress = kill_at;
+        p.progress_user = (void *)(uintptr_t)k;
+        trip_brick(&p, &s);
+        fputs(test_report, stderr);
+        _exit(0);
+    }
+    assert_int_equal(waitpid(child, &how, 0), child);
+    if (!WIFSIGNALED(how))
+        fail_msg("not killed in %s at %g", k->stage, k->share);
+}
+
+static void check_resumed(const trip_brick_params *base, bool *any_checkpoint)
+{
+    const killer killers[] = { { "scan", 0.5 }, { "read", 0 },   { "read", 0.3 },
+                               { "read", 0.6 }, { "read", 0.8 }, { "read", 1 } };
+    trip_brick_params p = *base;
+    trip_brick_summary s;
+    char output[128], command[160];
+    strcpy(output, test_path("b.trip"));
+    p.output = output;
+    p.resume = true;
+    /* The scan is only in runs that have one: those are the ones with an automatic envelope. */
+    for (size_t i = p.keep_all ? 1 : 0; i < sizeof killers / sizeof *killers; i++)
+        run_killed(p, &killers[i]);
+    assert_false(test_exists("b.trip"));
+    assert_int_equal(trip_brick(&p, &s), 0);
+    *any_checkpoint = *any_checkpoint || s.resumed;
+    test_same_dataset("a.trip", "b.trip");
+    assert_false(test_exists("b.trip.spill"));
+    snprintf(command, sizeof command, "rm -rf %s", output);
+    assert_int_equal(system(command), 0);
+}
+
+static void killed_runs_go_on_and_end_in_the_same_bytes(void **state)
+{
+    (void)state;
+    bool resumed = false;
+    for (int kind = 0; kind < 3; kind++) {
+        trip_brick_params p = params_for(kind < 2 ? "uint8" : "float", "a.trip");
+        if (kind < 2)
+            make_bytes();
+        else
+            make_floats();
+        p.keep_all = kind > 0;
+        p.threads = 1;
+        p.slices = 4;
+        p.memory_bytes = 28 << 20;
+        brick_to(p, "a.trip");
+        check_resumed(&p, &resumed);
+    }
+    assert_true(resumed);
+}
+
+static void another_input_or_other_parameters_are_not_gone_on_with(void **state)
+{
+    (void)state;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    trip_brick_summary s;
+    make_bytes();
+    p.keep_all = true;
+    p.slices = 4;
+    run_killed(p, &(killer){ "read", 0.5 });
+    assert_true(test_exists("a.trip.spill"));
+    p.resume = true;
+    p.tile_voxels = 32;
+    assert_true(trip_brick(&p, &s) < 0);
+    assert_non_null(strstr(test_report, "another input or other options"));
+    p.resume = false;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_false(s.resumed);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(kept_voxels_are_those_of_the_envelope, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(a_transfer_function_keeps_what_it_shows, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(without_an_envelope_something_is_kept_and_a_function_stored,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(codes_of_floats_are_of_the_range_of_all_values, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(gradients_of_floats_are_right, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(values_that_are_not_finite_are_left_out_with_one_warning,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(memory_threads_and_slabs_make_no_difference, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(splats_come_in_one_order_whatever_the_tile, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(without_normals_there_is_no_such_plane, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(what_cannot_be_done_is_said_in_one_line_and_leaves_nothing,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(an_existing_data_set_stays_unless_it_is_to_be_replaced,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(killed_runs_go_on_and_end_in_the_same_bytes, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(another_input_or_other_parameters_are_not_gone_on_with,
+                                        test_begin, test_end),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,310 @@
+#include "brick_files.h"
+
+#include <math.h>
+
+#include "splats.h"
+
+/* A volume of floats as a raw file, opened, with a splatter whose pieces are put together again
+ * into the splats of each list. */
+typedef struct bench {
+    int64_t dims[3];
+    trip_budget *budget;
+    trip_workers *workers;
+    trip_volume *volume;
+    trip_volume_info info; /* the map may be changed before start() */
+    trip_splatter *splatter;
+    trip_piece_format format;
+    trip_quantiser quantiser;
+    unsigned char *memory[3]; /* pieces, one after the other */
+    size_t used[3];
+} bench;
+
+enum { PIECE_MEMORY = 16 << 20 };
+
+static void *keep_piece(void *user, unsigned thread, int axis, size_t bytes)
+{
+    bench *b = user;
+    (void)thread;
+    void *at = b->memory[axis] + b->used[axis];
+    assert_true(b->used[axis] + bytes <= PIECE_MEMORY);
+    b->used[axis] += bytes;
+    return at;
+}
+
+static void open_bench(bench *b, const int64_t dims[3], const float *values, unsigned tile_log2,
+                       bool quantised)
+{
+    size_t count = (size_t)(dims[0] * dims[1] * dims[2]);
+    trip_volume_params p = { .raw_dims = { dims[0], dims[1], dims[2] }, .raw_type = "float" };
+    *b = (bench){ .format = { tile_log2, quantised, true },
+                  .quantiser = { .lo = -1000, .hi = 1000, .gradient_scale = 4096 } };
+    memcpy(b->dims, dims, sizeof b->dims);
+    test_write("v.raw", values, count * sizeof *values);
+    assert_int_equal(trip_budget_create(&b->budget, (uint64_t)1 << 28), 0);
+    assert_int_equal(trip_workers_create(&b->workers, 1), 0);
+    assert_int_equal(trip_volume_open(&b->volume, test_path("v.raw"), &p, b->budget), 0);
+    b->info = *trip_volume_get_info(b->volume);
+    for (int axis = 0; axis < 3; axis++)
+        b->memory[axis] = aligned_alloc(8, PIECE_MEMORY);
+}
+
+static int splat_box(void *user, unsigned thread, const trip_box *box)
+{
+    bench *b = user;
+    return trip_splatter_box(b->splatter, thread, box);
+}
+
+static int next_batch(void *user, uint64_t batches, uint64_t voxels)
+{
+    (void)user;
+    (void)batches;
+    (void)voxels;
+    return 0;
+}
+
+static void splat_all(bench *b, const trip_envelope *e, int64_t slices)
+{
+    trip_splat_params p = { .info = &b->info,
+                            .envelope = e,
+                            .format = b->format,
+                            .quantiser = b->quantiser,
+                            .tally = true,
+                            .threads = 1,
+                            .reserve = keep_piece,
+                            .user = b };
+    trip_walk_params walk = { .slices = slices,
+                              .edge = trip_splat_edge(&b->format),
+                              .height = TRIP_SPLAT_HEIGHT,
+                              .box = splat_box,
+                              .batch = next_batch,
+                              .user = b };
+    assert_int_equal(trip_splatter_create(&b->splatter, &p, b->budget), 0);
+    assert_int_equal(trip_walk(b->volume, b->workers, &walk), 0);
+}
+
+static void close_bench(bench *b)
+{
+    trip_splatter_destroy(b->splatter);
+    trip_volume_close(b->volume);
+    trip_workers_destroy(b->workers);
+    trip_budget_destroy(b->budget);
+    for (int axis = 0; axis < 3; axis++)
+        free(b->memory[axis]);
+}
+
+/* The splats of a list by voxel: records, 0xff... where there is none. */
+static void gather(bench *b, int axis, uint32_t *voxels, uint32_t *normals)
+{
+    trip_tile *tile;
+    size_t count = (size_t)(b->dims[0] * b->dims[1] * b->dims[2]);
+    memset(voxels, 0xff, count * sizeof *voxels);
+    memset(normals, 0xff, count * sizeof *normals);
+    assert_int_equal(trip_tile_create(&tile, &b->format, b->budget), 0);
+    for (size_t at = 0; at < b->used[axis];) {
+        const trip_piece *piece = (const void *)(b->memory[axis] + at);
+        const uint32_t *v, *n;
+        size_t bytes = trip_piece_get_parts(&b->format, piece).bytes;
+        assert_true(trip_piece_check(piece, &b->format, bytes));
+        at += bytes;
+        trip_tile_add(tile, piece);
+        uint32_t splats = trip_tile_take(tile, &b->quantiser, &v, &n);
+        uint64_t morton = piece->key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
+        int64_t tile_u = 0, tile_v = 0, p[3];
+        while (trip_morton((uint32_t)tile_u, 0) != (morton & UINT64_C(0x5555555555555555)))
+            tile_u++;
+        while (trip_morton(0, (uint32_t)tile_v) != (morton & UINT64_C(0xaaaaaaaaaaaaaaaa)))
+            tile_v++;
+        for (uint32_t i = 0; i < splats; i++) {
+            p[axis] = (int64_t)(piece->key >> TRIP_TILE_MORTON_BITS);
+            p[(axis + 1) % 3] = (tile_u << b->format.tile_log2) + trip_voxel_u(v[i]);
+            p[(axis + 2) % 3] = (tile_v << b->format.tile_log2) + trip_voxel_v(v[i]);
+            size_t to = (size_t)((p[2] * b->dims[1] + p[1]) * b->dims[0] + p[0]);
+            assert_true(to < count && normals[to] == UINT32_MAX);
+            voxels[to] = trip_voxel_code(v[i]);
+            normals[to] = n[i];
+        }
+    }
+    trip_tile_destroy(tile);
+}
+
+static void every_kept_voxel_is_once_in_every_list(void **state)
+{
+    (void)state;
+    enum { NX = 131, NY = 70, NZ = 37, N = NX * NY * NZ };
+    const int64_t dims[3] = { NX, NY, NZ };
+    static float values[N];
+    static uint32_t voxels[N], normals[N];
+    trip_envelope e = { 0 };
+    uint64_t random = 9;
+    for (int i = 0; i < N; i++)
+        values[i] = (float)(test_random(&random) % 1000);
+    assert_int_equal(trip_envelope_add_range(&e, 300, 349), 0);
+    for (unsigned log2 = 4; log2 <= 7; log2++) {
+        bench b;
+        open_bench(&b, dims, values, log2, true);
+        b.quantiser.lo = 0;
+        b.quantiser.hi = 65535;
+        splat_all(&b, &e, 1 + log2);
+        uint64_t expected = 0;
+        for (int i = 0; i < N; i++)
+            expected += values[i] >= 300 && values[i] <= 349;
+        assert_int_equal(trip_splatter_kept(b.splatter), expected);
+        for (int axis = 0; axis < 3; axis++) {
+            gather(&b, axis, voxels, normals);
+            for (int i = 0; i < N; i++)
+                assert_int_equal(voxels[i], values[i] >= 300 && values[i] <= 349
+                                                ? (uint32_t)values[i]
+                                                : UINT32_MAX);
+        }
+        close_bench(&b);
+    }
+    trip_envelope_destroy(&e);
+}
+
+/* A rotation, a shear and unequal spacings. */
+static const trip_affine sheared = {
+    { { 0.8, -0.3, 0.1, 5 }, { 0.5, 1.1, -0.2, -7 }, { 0.05, 0.4, 2.5, 11 } }
+};
+
+/* Angle error and magnitude error that a normal record may have. */
+static void check_normal(const bench *b, uint32_t normal, trip_vec3 expected)
+{
+    double g[3];
+    double scale = b->quantiser.gradient_scale, length = trip_length(expected);
+    trip_normal_unpack(normal, scale, g);
+    trip_vec3 got = { g[0], g[1], g[2] };
+    double codes = fabs(sqrt(trip_length(got) / scale) - sqrt(length / scale)) * 255;
+    double sine = trip_length(trip_cross(got, expected)) / (trip_length(got) * length);
+    if (codes > 0.501 || sine > 0.0012 || trip_dot(got, expected) < 0)
+        fail_msg("gradient %g %g %g instead of %g %g %g", g[0], g[1], g[2], expected.x, expected.y,
+                 expected.z);
+}
+
+static void check_gradients(bool quantised, double bend)
+{
+    enum { NX = 20, NY = 17, NZ = 18, N = NX * NY * NZ };
+    const int64_t dims[3] = { NX, NY, NZ };
+    static float values[N];
+    static uint32_t voxels[N], normals[N];
+    trip_envelope e = { 0 };
+    bench b;
+    /* f = s . p + bend q . p^2 in world space, p relative to the middle. */
+    const trip_vec3 s = { 3, -2, 1.5 }, q = { 0.3, 0.2, -0.25 };
+    for (int i = 0; i < N; i++) {
+        trip_vec3 index = { i % NX - NX / 2, i / NX % NY - NY / 2, i / NX / NY - NZ / 2 };
+        trip_vec3 p = trip_affine_vector(&sheared, index);
+        values[i] =
+            (float)(trip_dot(s, p) + bend * (q.x * p.x * p.x + q.y * p.y * p.y + q.z * p.z * p.z));
+    }
+    assert_int_equal(trip_envelope_add_all(&e), 0);
+    open_bench(&b, dims, values, 6, quantised);
+    b.info.index_to_world = sheared;
+    splat_all(&b, &e, 5);
+    gather(&b, 1, voxels, normals);
+    for (int k = 1; k < NZ - 1; k++)
+        for (int j = 1; j < NY - 1; j++)
+            for (int i = 1; i < NX - 1; i++) {
+                trip_vec3 index = { i - NX / 2, j - NY / 2, k - NZ / 2 };
+                trip_vec3 p = trip_affine_vector(&sheared, index);
+                trip_vec3 bent = { 2 * q.x * p.x, 2 * q.y * p.y, 2 * q.z * p.z };
+                check_normal(&b, normals[(k * NY + j) * NX + i],
+                             trip_add(s, trip_scale(bent, bend)));
+            }
+    close_bench(&b);
+    trip_envelope_destroy(&e);
+}
+
+static void gradients_of_a_linear_field_are_right_in_a_sheared_space(void **state)
+{
+    (void)state;
+    check_gradients(true, 0);
+    check_gradients(false, 0);
+}
+
+/* Central differences are exact for quadratic fields, too. */
+static void gradients_of_a_quadratic_field_are_right_in_a_sheared_space(void **state)
+{
+    (void)state;
+    check_gradients(true, 1);
+    check_gradients(false, 1);
+}
+
+static void differences_at_a_border_are_halved_one_sided_ones(void **state)
+{
+    (void)state;
+    enum { N = 4 };
+    const int64_t dims[3] = { N, 1, 1 };
+    const float values[N] = { 0, 8, 10, 40 };
+    uint32_t voxels[N], normals[N];
+    trip_envelope e = { 0 };
+    bench b;
+    assert_int_equal(trip_envelope_add_all(&e), 0);
+    open_bench(&b, dims, values, 4, false);
+    splat_all(&b, &e, 1);
+    gather(&b, 0, voxels, normals);
+    const double expected[N] = { 4, 5, 16, 15 };
+    for (int i = 0; i < N; i++)
+        check_normal(&b, normals[i], trip_v3(expected[i], 0, 0));
+    close_bench(&b);
+    trip_envelope_destroy(&e);
+}
+
+static void a_neighbour_that_is_not_finite_counts_as_the_voxel_itself(void **state)
+{
+    (void)state;
+    enum { N = 5 };
+    const int64_t dims[3] = { 1, N, 1 };
+    const float values[N] = { 3, 7, NAN, 10, INFINITY };
+    uint32_t voxels[N], normals[N];
+    trip_envelope e = { 0 };
+    trip_tally tally;
+    bench b;
+    assert_int_equal(trip_envelope_add_all(&e), 0);
+    open_bench(&b, dims, values, 4, true);
+    splat_all(&b, &e, 1);
+    gather(&b, 2, voxels, normals);
+    check_normal(&b, normals[1], trip_v3(0, 2, 0));
+    assert_int_equal(normals[3], 0); /* both sides stand for itself: no gradient */
+    assert_int_equal(normals[2], UINT32_MAX);
+    trip_splatter_tally(b.splatter, &tally);
+    assert_int_equal(tally.voxels, N);
+    assert_int_equal(tally.finite, 3);
+    close_bench(&b);
+    trip_envelope_destroy(&e);
+}
+
+static void no_gradient_exceeds_the_bound_and_some_reach_it(void **state)
+{
+    (void)state;
+    trip_affine to_index;
+    trip_volume_info info = { .index_to_world = sheared };
+    double bound = trip_gradient_bound(&info, -1, 3), most = 0;
+    assert_true(trip_affine_invert(&sheared, &to_index));
+    for (int i = 0; i < 27; i++) {
+        /* Differences of index space are at most half the range along each axis. */
+        trip_vec3 g = { 2 * (i % 3 - 1), 2 * (i / 3 % 3 - 1), 2 * (i / 9 - 1) };
+        most = fmax(most, trip_length(trip_affine_transpose_vector(&to_index, g)));
+    }
+    assert_true(fabs(most - bound) < 1e-12 * bound);
+    info.sparse = true;
+    info.background = -5;
+    assert_true(fabs(trip_gradient_bound(&info, -1, 3) - 2 * bound) < 1e-12 * bound);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(every_kept_voxel_is_once_in_every_list, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(gradients_of_a_linear_field_are_right_in_a_sheared_space,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(gradients_of_a_quadratic_field_are_right_in_a_sheared_space,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(differences_at_a_border_are_halved_one_sided_ones,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(a_neighbour_that_is_not_finite_counts_as_the_voxel_itself,
+                                        test_begin, test_end),
+        cmocka_unit_test(no_gradient_exceeds_the_bound_and_some_reach_it),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
