@@ -6,17 +6,19 @@
 
 #include "report.h"
 
-/* Vertex numbers, four a splat, stay below 2^31. */
-static const uint64_t max_positions = UINT64_C(1) << 29;
+/* OpenGL 4.5 promises storage blocks of 128 MiB; vertex numbers, four a splat, stay below 2^31. */
+enum { MAX_BLOCK_BYTES = 1 << 27, MAX_POSITIONS = MAX_BLOCK_BYTES / sizeof(uint32_t) };
 
 static int count_positions(trip_gl_batch *b, const trip_batch *batch)
 {
     uint64_t sum = 0;
     for (size_t i = 0; i < batch->run_count; i++)
         sum += batch->runs[i].count;
-    if (sum >= max_positions || batch->splats >= max_positions)
-        return trip_fail(TRIP_ERROR, "gl", "batch", "%llu splats in one batch are too many",
-                         (unsigned long long)sum);
+    if (sum > MAX_POSITIONS || batch->splats > MAX_POSITIONS ||
+        batch->run_count > MAX_BLOCK_BYTES / sizeof(struct trip_gl_run))
+        return trip_fail(TRIP_ERROR, "gl", "batch",
+                         "%zu splats at a time are too many; read in smaller pieces",
+                         batch->splats);
     b->positions = (uint32_t)sum;
     return TRIP_OK;
 }

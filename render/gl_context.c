@@ -8,7 +8,7 @@
 
 #include "report.h"
 
-enum { MAX_DEVICES = 16 };
+enum { MAX_DEVICES = 16, NEEDED_STORAGE_BLOCKS = 8 };
 
 struct trip_gl_context {
     EGLDisplay display;
@@ -27,8 +27,10 @@ static bool has_word(const char *list, const char *word)
 static void GLAPIENTRY debug_message(GLenum source, GLenum type, GLuint id, GLenum severity,
                                      GLsizei length, const GLchar *message, const void *user)
 {
-    (void)source, (void)id, (void)length, (void)user;
-    if (severity == GL_DEBUG_SEVERITY_NOTIFICATION || type == GL_DEBUG_TYPE_PERFORMANCE)
+    (void)id, (void)length, (void)user;
+    /* Compilers' complaints are reported with their file and line by gl_program.c. */
+    if (severity == GL_DEBUG_SEVERITY_NOTIFICATION || type == GL_DEBUG_TYPE_PERFORMANCE ||
+        source == GL_DEBUG_SOURCE_SHADER_COMPILER)
         return;
     trip_warn("gl", "%s", message);
 }
@@ -156,6 +158,18 @@ static void read_limits(trip_gl_limits *limits)
     };
 }
 
+/* Drivers may offer none to vertex shaders and still be OpenGL 4.5. */
+static int check_storage_blocks(const trip_gl_context *c)
+{
+    GLint blocks = 0;
+    glGetIntegerv(GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS, &blocks);
+    if (blocks >= NEEDED_STORAGE_BLOCKS)
+        return TRIP_OK;
+    return trip_fail(TRIP_ERROR, "gl", c->device,
+                     "%d of %d storage blocks for vertex shaders; use another renderer", blocks,
+                     NEEDED_STORAGE_BLOCKS);
+}
+
 int trip_gl_context_create(trip_gl_context **out)
 {
     trip_gl_context *c = calloc(1, sizeof *c);
@@ -171,6 +185,10 @@ int trip_gl_context_create(trip_gl_context **out)
     report_debug_messages();
     describe(c);
     read_limits(&c->limits);
+    if (check_storage_blocks(c)) {
+        trip_gl_context_destroy(c);
+        return TRIP_ERROR;
+    }
     *out = c;
     return TRIP_OK;
 }

@@ -38,6 +38,10 @@ static int make_texture(trip_gl_target *t, trip_target type, GLuint *texture, GL
         return status;
     glCreateTextures(GL_TEXTURE_2D, 1, texture);
     glTextureStorage2D(*texture, 1, internal_format(type), t->width, t->height);
+    if (glGetError() != GL_NO_ERROR)
+        return trip_fail(TRIP_ERROR, "gl", "image",
+                         "the driver has no memory for layers of %d x %d px; draw a smaller image",
+                         t->width, t->height);
     glTextureParameteri(*texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTextureParameteri(*texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glCreateFramebuffers(1, framebuffer);
