@@ -11,9 +11,9 @@ cmake --build --preset asan
 ctest --preset asan -j "$(nproc)"
 
 cmake --preset tsan
-cmake --build --preset tsan
+cmake --build --preset tsan --target threaded_tests
 ctest --preset tsan -j "$(nproc)" -L threads
 
 cmake --preset fuzz -DTRIP_FUZZ_SECONDS="${TRIP_FUZZ_SECONDS:-10}"
-cmake --build --preset fuzz
-ctest --test-dir build/fuzz --output-on-failure -L fuzz
+cmake --build --preset fuzz --target fuzzers
+ctest --test-dir build/fuzz --output-on-failure -j "$(nproc)" -L fuzz
