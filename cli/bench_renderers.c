@@ -44,6 +44,7 @@ typedef struct race {
     int count;
     trip_renderer *covering; /* of the frame being drawn */
     load *loads;             /* of the size being drawn: [view] */
+    trip_camera_params *views;
 } race;
 
 static trip_renderer **covering(race *c)
@@ -134,7 +135,7 @@ static int draw_views(race *c, const int size[2])
                           .settings = c->options->settings };
     int status = session_take_image(c->session, size[0], size[1], &frame.rgba);
     for (int view = 0; view < c->options->views && !status; view++) {
-        frame.view = bench_view_round(c->session, size, view, c->options->views);
+        frame.view = c->views[view] = bench_view_round(c->session, size, view, c->options->views);
         if (view == 0)
             status = warm_up(c, frame);
         if (!status)
@@ -142,6 +143,29 @@ static int draw_views(race *c, const int size[2])
     }
     session_release_image(c->session, size[0], size[1], frame.rgba);
     return status;
+}
+
+static void add_vector(cJSON *object, const char *name, trip_vec3 v)
+{
+    const double numbers[3] = { v.x, v.y, v.z };
+    cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray(numbers, 3));
+}
+
+/* Each view and the time of each of its runs, so that others can be timed at the same views. */
+static void add_views(const race *c, const contender *own, cJSON *row)
+{
+    int repeat = c->options->repeat;
+    cJSON *views = cJSON_AddArrayToObject(row, "each_view");
+    for (int i = 0; i < c->options->views; i++) {
+        cJSON *view = cJSON_CreateObject(), *runs = cJSON_AddArrayToObject(view, "ms");
+        add_vector(view, "eye", c->views[i].eye);
+        add_vector(view, "look", c->views[i].look);
+        add_vector(view, "up", c->views[i].up);
+        cJSON_AddNumberToObject(view, "fov_degrees", c->views[i].fov_degrees);
+        for (int run = 0; run < repeat; run++)
+            cJSON_AddItemToArray(runs, cJSON_CreateNumber(own->costs[i * repeat + run].ms));
+        cJSON_AddItemToArray(views, view);
+    }
 }
 
 static int ascending(const void *a, const void *b)
@@ -181,6 +205,7 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
     if (splats > 0)
         cJSON_AddNumberToObject(row, "pixels_per_splat", pixels / splats);
     cJSON_AddNumberToObject(row, "mpixels_per_s", pixels / ms * 1e-3);
+    add_views(c, own, row);
     cJSON_AddItemToArray(rows, row);
 }
 
@@ -191,7 +216,9 @@ static int run(race *c, bench_report *r)
                                      columns, sizeof columns / sizeof columns[0]);
     double *values = calloc((size_t)(o->views * o->repeat), sizeof *values);
     c->loads = calloc((size_t)o->views, sizeof *c->loads);
-    int status = values && c->loads ? 0 : trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
+    c->views = calloc((size_t)o->views, sizeof *c->views);
+    bool taken = values && c->loads && c->views;
+    int status = taken ? 0 : trip_fail(TRIP_ERROR, "bench", "runs", "out of memory");
     for (int size = 0; size < o->size_count && !status; size++) {
         status = draw_views(c, o->sizes[size]);
         for (int i = 0; i < c->count && !status; i++)
@@ -238,6 +265,7 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
         free(c->contenders[i].costs);
     }
     free(c->loads);
+    free(c->views);
     free(c);
     return status;
 }
