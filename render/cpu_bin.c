@@ -92,28 +92,32 @@ trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f, uint32_t voxels)
     return chunk;
 }
 
-/* Tiles that a splat's pixels lie in. */
-typedef struct reach {
-    uint32_t first;        /* top left tile */
-    uint32_t across, down; /* further ones */
-} reach;
-
-static inline reach reach_of(const trip_cpu_splat *s, uint32_t tiles_across)
-{
-    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
-    return (reach){ y * tiles_across + x, s->x1 / TRIP_CPU_TILE - x, s->y1 / TRIP_CPU_TILE - y };
-}
-
 typedef struct span {
     uint32_t first, last; /* tiles counted, inclusive */
     uint64_t places;
 } span;
 
-static void count_wide(reach r, uint32_t across, uint32_t *counts)
+/* Tiles of a splat that lies in many. */
+typedef struct reach {
+    uint32_t first, across, down;
+} reach;
+
+static reach reach_of(const trip_cpu_splat *s)
 {
-    for (uint32_t y = 0; y <= r.down; y++)
-        for (uint32_t x = 0; x <= r.across; x++)
+    return (reach){ s->tiles & TRIP_CPU_TILES_FIRST,
+                    s->x1 / TRIP_CPU_TILE - s->x0 / TRIP_CPU_TILE + 1,
+                    s->y1 / TRIP_CPU_TILE - s->y0 / TRIP_CPU_TILE + 1 };
+}
+
+static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *counts, span *s)
+{
+    reach r = reach_of(splat);
+    for (uint32_t y = 0; y < r.down; y++)
+        for (uint32_t x = 0; x < r.across; x++)
             counts[r.first + y * across + x]++;
+    uint32_t last = r.first + (r.down - 1) * across + r.across - 1;
+    s->last = last > s->last ? last : s->last;
+    s->places += (uint64_t)r.across * r.down;
 }
 
 /* Most splats lie in one tile and few in more than 2 x 2, so four counts without a branch are
@@ -121,38 +125,46 @@ static void count_wide(reach r, uint32_t across, uint32_t *counts)
 static span count(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *counts)
 {
     span s = { UINT32_MAX, 0, 0 };
+    uint32_t places = 0, last = 0;
     for (uint32_t i = 0; i < n; i++) {
-        reach r = reach_of(&splats[i], across);
-        uint32_t last = r.first + r.down * across + r.across;
-        s.first = r.first < s.first ? r.first : s.first;
-        s.last = last > s.last ? last : s.last;
-        s.places += (uint64_t)(r.across + 1) * (r.down + 1);
-        if ((r.across | r.down) > 1) {
-            count_wide(r, across, counts);
+        uint32_t tiles = splats[i].tiles, first = tiles & TRIP_CPU_TILES_FIRST;
+        uint32_t right = tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+        uint32_t below = tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+        s.first = first < s.first ? first : s.first;
+        last = first > last ? first : last;
+        if (tiles & TRIP_CPU_TILES_MORE) {
+            count_wide(&splats[i], across, counts, &s);
             continue;
         }
-        uint32_t *c = counts + r.first;
+        uint32_t *c = counts + first;
         c[0]++;
-        c[1] += r.across;
-        c[across] += r.down;
-        c[across + 1] += r.across & r.down;
+        c[1] += right;
+        c[across] += below;
+        c[across + 1] += right & below;
+        places += (right + 1) * (below + 1);
     }
+    last += across + 1;
+    s.last = last > s.last ? last : s.last;
+    s.places += places;
     return s;
 }
 
-static void place_wide(reach r, uint32_t across, uint32_t *next, uint16_t *order, uint16_t splat)
+static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *next,
+                       uint16_t *order, uint16_t index)
 {
-    for (uint32_t y = 0; y <= r.down; y++)
-        for (uint32_t x = 0; x <= r.across; x++)
-            order[next[r.first + y * across + x]++] = splat;
+    reach r = reach_of(splat);
+    for (uint32_t y = 0; y < r.down; y++)
+        for (uint32_t x = 0; x < r.across; x++)
+            order[next[r.first + y * across + x]++] = index;
 }
 
 /* The next place of a tile when `wanted`, else `sink`. */
 static inline void put(uint16_t *order, uint32_t *next, uint32_t wanted, uint32_t sink,
                        uint16_t splat)
 {
-    order[wanted ? *next : sink] = splat;
-    *next += wanted;
+    uint32_t at = *next;
+    order[wanted ? at : sink] = splat;
+    *next = at + wanted;
 }
 
 /* `next` holds where each tile's next place is; what is written to order[sink] is not used. */
@@ -160,17 +172,18 @@ static void place(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uin
                   uint16_t *order, uint32_t sink)
 {
     for (uint32_t i = 0; i < n; i++) {
-        reach r = reach_of(&splats[i], across);
-        uint16_t splat = (uint16_t)i;
-        if ((r.across | r.down) > 1) {
-            place_wide(r, across, next, order, splat);
+        uint32_t tiles = splats[i].tiles;
+        uint32_t right = tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+        uint32_t below = tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+        uint32_t *c = next + (tiles & TRIP_CPU_TILES_FIRST);
+        if (tiles & TRIP_CPU_TILES_MORE) {
+            place_wide(&splats[i], across, next, order, (uint16_t)i);
             continue;
         }
-        uint32_t *c = next + r.first;
-        put(order, c, 1, sink, splat);
-        put(order, c + 1, r.across, sink, splat);
-        put(order, c + across, r.down, sink, splat);
-        put(order, c + across + 1, r.across & r.down, sink, splat);
+        put(order, c, 1, sink, (uint16_t)i);
+        put(order, c + 1, right, sink, (uint16_t)i);
+        put(order, c + across, below, sink, (uint16_t)i);
+        put(order, c + across + 1, right & below, sink, (uint16_t)i);
     }
 }
 

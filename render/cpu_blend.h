@@ -13,6 +13,7 @@
 #define BLOCKS_DOWN (TRIP_CPU_TILE / BLOCK_ROWS)
 #define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
 #define BLOCK_FLOATS (4 * V)
+#define BLOCK_BYTES (4 * BLOCK_FLOATS)
 
 /* ---- exponentials ---- */
 
@@ -76,21 +77,21 @@ INLINE vf kept(vf a, trip_target target)
 /* ---- blending ---- */
 
 /* Optical depth of a splat at the pixels of a block, where `inside`. */
-INLINE vf optical_depth(const trip_cpu_scratch *s, const trip_cpu_splat *splat, unsigned block,
-                        trip_cpu_rays rays, vm *inside)
+INLINE vf optical_depth(const float *geometry, const trip_cpu_splat *splat, trip_cpu_rays rays,
+                        vm *inside)
 {
-    vf dx = v_load(s->columns + 16 * (block & (BLOCKS_ACROSS - 1))) - v_set(splat->x);
-    vf dy = v_load(s->rows + 16 * (block / BLOCKS_ACROSS)) - v_set(splat->y);
+    vf dx = v_load(geometry) - v_set(splat->x);
+    vf dy = v_load(geometry + V) - v_set(splat->y);
     vf a = v_fma(dy, v_set(splat->l21), dx * v_set(splat->l11));
     vf b = dy * v_set(splat->l22);
     vf y;
     if (rays == TRIP_CPU_PARALLEL)
         y = v_fnma(b, b, v_fnma(a, a, v_set(splat->peak)));
     else
-        y = v_fnma(v_load(s->rays + V * block), v_fma(b, b, a * a), v_set(splat->peak));
+        y = v_fnma(v_load(geometry + 2 * V), v_fma(b, b, a * a), v_set(splat->peak));
     *inside = v_ge(y, v_set(splat->least));
     if (rays == TRIP_CPU_STRETCHED)
-        y = y + v_load(s->stretch + V * block);
+        y = y + v_load(geometry + 3 * V);
     return exp2_biased(y);
 }
 
@@ -137,16 +138,19 @@ INLINE void put_over(float *pixels, const trip_cpu_splat *splat, vf depth, vm in
 INLINE void blend_pairs(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
                         trip_target target)
 {
-    for (uint32_t i = 0; i < s->pair_count; i++) {
-        unsigned block = s->pairs[i] & 255;
-        const trip_cpu_splat *splat = &s->local[s->pairs[i] >> 8];
-        float *pixels = s->pixels + BLOCK_FLOATS * block;
+    const uint32_t *end = s->pairs + s->pair_count;
+    char *pixels = (char *)s->pixels;
+    for (const uint32_t *pair = s->pairs; pair < end; pair++) {
+        uint32_t block = *pair & 0xffff, at = *pair >> 16;
+        const trip_cpu_splat *splat = (const void *)((const char *)s->local + at);
+        const float *geometry = (const void *)((const char *)s->geometry + block);
+        float *to = (void *)(pixels + block);
         vm inside;
-        vf depth = optical_depth(s, splat, block, rays, &inside);
+        vf depth = optical_depth(geometry, splat, rays, &inside);
         if (front_to_back)
-            put_behind(pixels, splat, depth, inside, target);
+            put_behind(to, splat, depth, inside, target);
         else
-            put_over(pixels, splat, depth, inside, target);
+            put_over(to, splat, depth, inside, target);
     }
 }
 
@@ -179,18 +183,31 @@ static void (*choose_blend(const trip_cpu_view *view))(trip_cpu_scratch *)
 
 /* ---- pairing ---- */
 
-/* Which blocks may still take light. Closed pixels never change, so asking late is no error. */
+/* Bits of the blocks of a row that hold a pixel which may still take light. */
+INLINE unsigned open_row(const float *pixels)
+{
+    unsigned bits = 0;
+    for (unsigned b = 0; b < BLOCKS_ACROSS; b++) {
+        vm open = v_ge(v_load(pixels + BLOCK_FLOATS * b + 3 * V), v_set((float)TRIP_SATURATION));
+        bits |= (unsigned)(vm_bits(open) != 0) << b;
+    }
+    return bits;
+}
+
+/* Which blocks are ours and open. Closed pixels never change, so asking late is no error. */
 static void find_open(trip_cpu_scratch *s)
 {
-    s->any_open = false;
-    for (unsigned b = 0; b < BLOCKS; b++) {
-        unsigned right = b % BLOCKS_ACROSS >= BLOCKS_ACROSS / 2, low = b >= BLOCKS / 2;
-        bool ours = s->quarters >> (right + 2 * low) & 1;
-        vf t = v_load(s->pixels + BLOCK_FLOATS * b + 3 * V);
-        bool open = !s->view->front_to_back || vm_bits(v_ge(t, v_set((float)TRIP_SATURATION))) != 0;
-        s->open[b] = ours && open;
-        s->any_open |= s->open[b];
+    static_assert(BLOCKS_ACROSS == 8, "four blocks to a quarter");
+    unsigned any = 0;
+    for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
+        unsigned half = s->quarters >> (row < BLOCKS_DOWN / 2 ? 0 : 2);
+        unsigned bits = (half & 1) * 0x0f + (half >> 1 & 1) * 0xf0;
+        if (s->view->front_to_back && bits)
+            bits &= open_row(s->pixels + BLOCK_FLOATS * BLOCKS_ACROSS * row);
+        s->open[row] = (uint8_t)bits;
+        any |= bits;
     }
+    s->any_open = any;
 }
 
 static void empty_pairs(trip_cpu_scratch *s)
@@ -200,49 +217,56 @@ static void empty_pairs(trip_cpu_scratch *s)
     find_open(s);
 }
 
-/* Rows of blocks that a small footprint, five pixels, may meet. */
-#define FEW_ROWS (V == 16 ? 2 : V == 8 ? 3 : 5)
+typedef int32_t int4 __attribute__((vector_size(16)));
+typedef uint16_t ushort4 __attribute__((vector_size(8)));
+typedef float float4 __attribute__((vector_size(16)));
 
-INLINE void add_pair(trip_cpu_scratch *s, uint32_t splat, unsigned block, unsigned wanted)
+/* A copy of a splat with its centre relative to the tile, where floats are finest. */
+INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, float4 origin)
 {
-    s->pairs[s->pair_count] = splat << 8 | block;
-    s->pair_count += s->open[block] & wanted;
+    float4 part, centre;
+    memcpy(&part, splat, sizeof part);
+    memcpy(local, splat, sizeof *local);
+    centre = part + (__builtin_shufflevector(part, part, 2, 3, 2, 3) - origin);
+    memcpy(local, &centre, 2 * sizeof(float));
 }
 
-INLINE int at_least(int a, int b)
+typedef struct block_range {
+    unsigned left, top, right, bottom; /* inclusive */
+} block_range;
+
+INLINE block_range blocks_of(const trip_cpu_splat *splat, int4 origin)
 {
-    return a > b ? a : b;
+    const int4 shift = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
+    const int4 edge = { TRIP_CPU_TILE - 1, TRIP_CPU_TILE - 1, TRIP_CPU_TILE - 1,
+                        TRIP_CPU_TILE - 1 };
+    ushort4 bounds;
+    memcpy(&bounds, &splat->x0, sizeof bounds);
+    int4 b = __builtin_convertvector(bounds, int4) - origin;
+    b &= b > 0;
+    b = (b & (b < edge)) | (edge & (b >= edge));
+    b >>= shift;
+    return (block_range){ (unsigned)b[0], (unsigned)b[1], (unsigned)b[2], (unsigned)b[3] };
 }
 
-INLINE int at_most(int a, int b)
+/* Pairs of splat `index` with the open blocks of a range, four rows at a time; their number. */
+INLINE uint32_t pair_up(const trip_cpu_scratch *s, uint32_t *pairs, uint32_t index, block_range r)
 {
-    return a < b ? a : b;
-}
-
-INLINE void pair_up(trip_cpu_scratch *s, const trip_cpu_splat *splat)
-{
-    uint32_t index = s->splats++;
-    trip_cpu_splat *local = &s->local[index];
-    *local = *splat;
-    local->x = splat->x + (splat->whole_x - (float)s->x);
-    local->y = splat->y + (splat->whole_y - (float)s->y);
-
-    unsigned left = (unsigned)at_least(splat->x0 - s->x, 0) / 4;
-    unsigned right = (unsigned)at_most(splat->x1 - s->x, TRIP_CPU_TILE - 1) / 4;
-    unsigned top = (unsigned)at_least(splat->y0 - s->y, 0) / BLOCK_ROWS;
-    unsigned bottom = (unsigned)at_most(splat->y1 - s->y, TRIP_CPU_TILE - 1) / BLOCK_ROWS;
-    if (right - left < 2 && bottom - top < FEW_ROWS) {
-        unsigned first = top * BLOCKS_ACROSS + left;
-        for (unsigned row = 0; row < FEW_ROWS; row++) {
-            add_pair(s, index, first + row * BLOCKS_ACROSS, top + row <= bottom);
-            add_pair(s, index, first + row * BLOCKS_ACROSS + 1,
-                     (right > left) & (top + row <= bottom));
-        }
-        return;
+    static const uint32_t rows[4] = { 0xff, 0xffff, 0xffffff, 0xffffffff };
+    uint32_t columns = (0xffu << r.left & 0xffu >> (BLOCKS_ACROSS - 1 - r.right)) * 0x01010101u;
+    uint32_t n = 0;
+    static_assert(sizeof *s->local == 64 && BLOCK_BYTES == TRIP_SIMD_STEP, "bytes in pairs");
+    for (unsigned row = r.top;; row += 4) {
+        unsigned more = r.bottom - row;
+        uint32_t blocks, first = index << 22 | row * BLOCKS_ACROSS * BLOCK_BYTES;
+        memcpy(&blocks, s->open + row, sizeof blocks);
+        blocks &= columns & rows[more < 3 ? more : 3];
+        for (unsigned i = 0; i < 32; i += APPENDED)
+            n += append_bits(pairs + n, first + i * BLOCK_BYTES,
+                             blocks >> i & ((1u << APPENDED) - 1));
+        if (more < 4)
+            return n;
     }
-    for (unsigned row = top; row <= bottom; row++)
-        for (unsigned column = left; column <= right; column++)
-            add_pair(s, index, row * BLOCKS_ACROSS + column, 1);
 }
 
 static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
@@ -251,17 +275,45 @@ static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
            splat->y0 < s->y + TRIP_CPU_TILE && splat->y1 >= s->y;
 }
 
+/* What tile_blend() keeps in registers. */
+typedef struct pairing {
+    uint32_t splats, pairs;
+    int4 corner;
+    float4 origin;
+} pairing;
+
+INLINE void add(trip_cpu_scratch *s, pairing *p, const trip_cpu_splat *splat)
+{
+    make_local(&s->local[p->splats], splat, p->origin);
+    p->pairs += pair_up(s, s->pairs + p->pairs, p->splats, blocks_of(splat, p->corner));
+    p->splats++;
+    if (p->splats == TRIP_CPU_LOCAL || p->pairs > TRIP_CPU_PAIRS - BLOCKS) {
+        s->pair_count = p->pairs;
+        empty_pairs(s);
+        p->splats = p->pairs = 0;
+    }
+}
+
+/* Splats to fetch ahead: they lie scattered among those of other tiles. */
+#define AHEAD 12
+
 static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
                        uint32_t count)
 {
-    for (uint32_t i = 0; i < count && s->any_open; i++) {
-        const trip_cpu_splat *splat = &splats[order ? order[i] : i];
-        if (!order && !meets(s, splat))
-            continue;
-        pair_up(s, splat);
-        if (s->splats == TRIP_CPU_LOCAL || s->pair_count > TRIP_CPU_PAIRS - BLOCKS)
-            empty_pairs(s);
+    const int4 corner = { s->x, s->y, s->x, s->y };
+    pairing p = { s->splats, s->pair_count, corner, __builtin_convertvector(corner, float4) };
+    if (order) {
+        for (uint32_t i = 0; i < count && s->any_open; i++) {
+            __builtin_prefetch(&splats[order[i + AHEAD < count ? i + AHEAD : i]]);
+            add(s, &p, &splats[order[i]]);
+        }
+    } else {
+        for (uint32_t i = 0; i < count && s->any_open; i++)
+            if (meets(s, &splats[i]))
+                add(s, &p, &splats[i]);
     }
+    s->splats = p.splats;
+    s->pair_count = p.pairs;
 }
 
 static bool tile_end(trip_cpu_scratch *s)
@@ -294,12 +346,13 @@ INLINE vf square_at(const square *q, vf x, vf y)
 
 static void set_pixel_centres(trip_cpu_scratch *s)
 {
-    for (int b = 0; b < BLOCKS_ACROSS; b++)
-        for (int i = 0; i < V; i++)
-            s->columns[16 * b + i] = (float)(4 * b + i % 4) + 0.5f;
-    for (int b = 0; b < BLOCKS_DOWN; b++)
-        for (int i = 0; i < V; i++)
-            s->rows[16 * b + i] = (float)(BLOCK_ROWS * b + i / 4) + 0.5f;
+    for (int b = 0; b < BLOCKS; b++) {
+        float *geometry = s->geometry + BLOCK_FLOATS * b;
+        for (int i = 0; i < V; i++) {
+            geometry[i] = (float)(4 * (b % BLOCKS_ACROSS) + i % 4) + 0.5f;
+            geometry[V + i] = (float)(BLOCK_ROWS * (b / BLOCKS_ACROSS) + i / 4) + 0.5f;
+        }
+    }
 }
 
 /* log2 a for the stretch, a in a modest range; by the library, since few views need it. */
@@ -321,16 +374,16 @@ static void set_rays_tables(trip_cpu_scratch *s)
                                  trip_affine_vector(world, ry));
     vf x0 = v_set((float)(s->x - 0.5 * c->width)), y0 = v_set((float)(s->y - 0.5 * c->height));
     for (int b = 0; b < BLOCKS; b++) {
-        vf x = x0 + v_load(s->columns + 16 * (b % BLOCKS_ACROSS));
-        vf y = y0 + v_load(s->rows + 16 * (b / BLOCKS_ACROSS));
+        float *geometry = s->geometry + BLOCK_FLOATS * b;
+        vf x = x0 + v_load(geometry), y = y0 + v_load(geometry + V);
         vf inverse = v_set(1) / square_at(&index, x, y);
-        v_store(s->rays + V * b, c->ortho ? v_set(1) : inverse);
+        v_store(geometry + 2 * V, c->ortho ? v_set(1) : inverse);
         vf log2_stretch = v_set(0);
         if (s->view->stretch_varies)
             log2_stretch = log2_each(square_at(&stretched, x, y) * inverse) *
                            v_set((float)(0.5 * TRIP_CPU_EXP_UNIT));
         if (s->view->rays == TRIP_CPU_STRETCHED)
-            v_store(s->stretch + V * b, log2_stretch);
+            v_store(geometry + 3 * V, log2_stretch);
     }
 }
 

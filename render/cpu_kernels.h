@@ -32,11 +32,18 @@ typedef struct trip_cpu_splat {
     float l11, l21, l22, peak;
     float r, g, b, least;
     uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
-    float thick;             /* 1 unless thin */
-    float spare;
+    uint32_t tiles;          /* those that it lies in, see below */
+    uint32_t thick;          /* not 0: the long form of 1 - exp(-x) is needed */
 } trip_cpu_splat;
 
 static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
+
+/* trip_cpu_splat.tiles: the number of the first tile (top left), and whether the splat also lies in
+ * the one to the right of it and in the one below it, or in more than these two by two. */
+#define TRIP_CPU_TILES_RIGHT_SHIFT 28
+#define TRIP_CPU_TILES_BELOW_SHIFT 29
+#define TRIP_CPU_TILES_MORE (1u << 30)
+#define TRIP_CPU_TILES_FIRST ((1u << 28) - 1)
 
 /* Where the rays of a view are alike, their tables are not needed. */
 typedef enum trip_cpu_rays {
@@ -54,7 +61,10 @@ typedef struct trip_cpu_view {
     bool stretch_varies;
     int axis, u_axis, v_axis;
     double gradient_full;
-    double stretch;                            /* where it is constant, else 1 */
+    double stretch;   /* where it is constant, else 1 */
+    float cutoff;     /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
+    float thick_log2; /* log2 of the largest optical depth, stretch aside, of thin splats */
+    int tiles_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double eye[3];                             /* [u, v, sheet] */
     double world[3][3];                        /* index_to_world's columns for u, v, sheet */
@@ -62,24 +72,37 @@ typedef struct trip_cpu_view {
 } trip_cpu_view;
 
 /* Voxels waiting to be projected: one entry a lane, from any runs. */
-#define TRIP_CPU_STAGED 512
+#define TRIP_CPU_STAGED 256
 typedef struct trip_cpu_staged {
     int32_t u[TRIP_CPU_STAGED + 16], v[TRIP_CPU_STAGED + 16], sheet[TRIP_CPU_STAGED + 16];
     int32_t code[TRIP_CPU_STAGED + 16], normal[TRIP_CPU_STAGED + 16];
 } trip_cpu_staged;
 
-/* Pairs of a splat and a block that it may touch: splat << 8 | block. */
+/* The same voxels on their way to splats: what one loop of the projection leaves to the next. */
+typedef struct trip_cpu_lanes {
+    float x[TRIP_CPU_STAGED], y[TRIP_CPU_STAGED]; /* as in trip_cpu_splat */
+    float whole_x[TRIP_CPU_STAGED], whole_y[TRIP_CPU_STAGED];
+    float z[TRIP_CPU_STAGED], inverse_z[TRIP_CPU_STAGED];
+    float l11[TRIP_CPU_STAGED], l21[TRIP_CPU_STAGED], l22[TRIP_CPU_STAGED];
+    float peak[TRIP_CPU_STAGED];
+    float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED];           /* two uint16 each */
+    float tiles[TRIP_CPU_STAGED];                                  /* uint32 */
+    uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
+} trip_cpu_lanes;
+
+/* Pairs of a splat and a block that it may touch: where the splat stands in `local`, in bytes,
+ * << 16, and where the block's floats stand in the tile's pixels, in bytes. */
 #define TRIP_CPU_LOCAL 128
 #define TRIP_CPU_PAIRS 2048
 
 /* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
-    _Alignas(64) float rays[TRIP_CPU_TILE_PIXELS];     /* G of each pixel, in block order */
-    _Alignas(64) float stretch[TRIP_CPU_TILE_PIXELS];  /* log2 stretch in TRIP_CPU_EXP_UNIT */
-    _Alignas(64) float columns[8 * 16], rows[32 * 16]; /* pixel centres of block columns and rows */
+    /* Of each block, at the same place as its pixels: pixel centres x[V], y[V] from the tile's
+     * corner, G[V], log2 stretch[V] in TRIP_CPU_EXP_UNIT. */
+    _Alignas(64) float geometry[4 * TRIP_CPU_TILE_PIXELS];
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL]; /* centres relative to the tile */
-    uint32_t pairs[TRIP_CPU_PAIRS];
-    uint8_t open[256 + 64]; /* 1: block may still take light */
+    uint32_t pairs[TRIP_CPU_PAIRS + 16];
+    uint8_t open[32 + 8]; /* rows of blocks, a bit for each block that may still take light */
     uint32_t splats, pair_count;
     unsigned quarters;
     bool any_open;
@@ -88,6 +111,7 @@ typedef struct trip_cpu_scratch {
     void (*blend)(struct trip_cpu_scratch *s); /* all pairs, in order */
     const trip_cpu_view *view;
     trip_cpu_staged staged;
+    trip_cpu_lanes lanes;
 } trip_cpu_scratch;
 
 typedef struct trip_cpu_kernels {
@@ -102,7 +126,7 @@ typedef struct trip_cpu_kernels {
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
      * order. `out` has room for count + 16. Returns how many. */
     uint32_t (*project)(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
-                        trip_cpu_splat *out);
+                        trip_cpu_lanes *lanes, trip_cpu_splat *out);
 
     /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere. */
     void (*tile_clear)(const trip_cpu_view *view, int x, int y, float *pixels);

@@ -130,19 +130,30 @@ static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pix
     }
 }
 
+/* Sum of the squares of the lists' weights at a block: 1 unless lists are merged. */
+INLINE vf weight_sum(const trip_cpu_view *view, int x, int y, int b)
+{
+    vf sum = v_set(0);
+    if (view->of->settings->method != TRIP_METHOD_MERGE)
+        return v_set(1);
+    for (int axis = 0; axis < 3; axis++) {
+        vf w = weight(view, axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
+        sum = v_fma(w, w, sum);
+    }
+    return sum;
+}
+
 /* The merged block over the background. */
 INLINE void finish_block(const trip_cpu_view *view, int x, int y, int b, const float *sum,
                          vf out[4])
 {
     const double *background = view->of->settings->background;
-    vf weights = v_set(0);
-    for (int axis = 0; axis < 3; axis++) {
-        vf w = weight(view, axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
-        weights = v_fma(w, w, weights);
+    vf merged[4] = { v_set(0), v_set(0), v_set(0), v_set(0) };
+    if (sum) {
+        vf inverse = v_set(1) / weight_sum(view, x, y, b);
+        for (int c = 0; c < 4; c++)
+            merged[c] = v_load(sum + BLOCK_FLOATS * b + c * V) * inverse;
     }
-    vf inverse = v_set(1) / weights, merged[4];
-    for (int c = 0; c < 4; c++)
-        merged[c] = sum ? v_load(sum + BLOCK_FLOATS * b + c * V) * inverse : v_set(0);
     vf through = v_set(1) - merged[3];
     for (int c = 0; c < 4; c++) {
         double behind = c == 3 ? background[3] : background[c] * background[3];
@@ -162,7 +173,7 @@ static void tile_finish(const trip_cpu_view *view, int x, int y, const float *su
         finish_block(view, x, y, b, sum, out);
         v_store_rows(block, row, out[0], out[1], out[2], out[3]);
         int first = x + 4 * (b % BLOCKS_ACROSS);
-        int count = at_most(4, camera->width - first);
+        int count = camera->width - first < 4 ? camera->width - first : 4;
         for (int r = 0; r < BLOCK_ROWS && count > 0; r++) {
             int line = y + BLOCK_ROWS * (b / BLOCKS_ACROSS) + r;
             if (line < camera->height)

@@ -6,11 +6,6 @@
 
 #define LOG2_E 1.44269504088896340736
 
-double trip_cpu_cutoff(const trip_splat_frame *f)
-{
-    return 0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * f->cutoff2;
-}
-
 /* Squared length of the longest column of a matrix bounds what it can stretch from below, their sum
  * from above. */
 static double most_stretch(const trip_affine *a)
@@ -22,10 +17,14 @@ static double most_stretch(const trip_affine *a)
     return sqrt(sum);
 }
 
-float trip_cpu_thick_log2(const trip_cpu_view *view)
+uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across)
 {
-    double most = view->stretch_varies ? most_stretch(&view->splat.camera.index_to_world) : 1;
-    return (float)(log2(TRIP_CPU_THIN) - log2(most));
+    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
+    uint32_t right = s->x1 / TRIP_CPU_TILE - x, below = s->y1 / TRIP_CPU_TILE - y;
+    uint32_t more = right > 1 || below > 1 ? TRIP_CPU_TILES_MORE : 0;
+    return (y * (uint32_t)tiles_across + x) | more |
+           (uint32_t)(right > 0) << TRIP_CPU_TILES_RIGHT_SHIFT |
+           (uint32_t)(below > 0) << TRIP_CPU_TILES_BELOW_SHIFT;
 }
 
 void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
@@ -71,8 +70,9 @@ bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, d
     trip_cpu_set_conic(&s, out);
     double depth = log2(extinction * s.amplitude * view->stretch);
     out->peak = (float)((depth + 127) * TRIP_CPU_EXP_UNIT);
-    out->least = (float)(out->peak - trip_cpu_cutoff(&view->splat));
-    out->thick = depth > trip_cpu_thick_log2(view);
+    out->least = out->peak - view->cutoff;
+    out->thick = depth > (double)view->thick_log2;
+    out->tiles = trip_cpu_tiles(out, view->tiles_across);
     return depth > -60;
 }
 
@@ -118,6 +118,14 @@ static void set_rays(trip_cpu_view *view)
         view->rays = TRIP_CPU_PERSPECTIVE;
 }
 
+static void set_limits(trip_cpu_view *view)
+{
+    double most = view->stretch_varies ? most_stretch(&view->splat.camera.index_to_world) : 1;
+    view->thick_log2 = (float)(log2(TRIP_CPU_THIN) - log2(most));
+    view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
+    view->tiles_across = (view->splat.camera.width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
+}
+
 /* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */
 static void set_parallel(trip_cpu_view *view)
 {
@@ -151,5 +159,6 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
     set_along(view->along_y, view, camera->to_y);
     set_along(view->along_z, view, camera->forward);
     set_rays(view);
+    set_limits(view);
     set_parallel(view);
 }

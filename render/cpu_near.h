@@ -15,10 +15,7 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);
 /* The constants of the list along `axis`; `shading` is set by whoever knows of normals. */
 void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back);
 
-/* How far below its peak a support ends, in TRIP_CPU_EXP_UNIT. */
-double trip_cpu_cutoff(const trip_splat_frame *f);
-
-/* log2 of the largest optical depth, stretch aside, from which on a splat is thick. */
-float trip_cpu_thick_log2(const trip_cpu_view *view);
+/* The tiles of a splat whose pixels are set, for an image so many tiles across. */
+uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across);
 
 #endif

@@ -54,13 +54,6 @@ static uint32_t stage(const trip_cpu_view *view, const trip_run *run, const uint
 
 /* ---- the centre ---- */
 
-typedef struct centre {
-    vf whole_x, whole_y; /* integers near it */
-    vf x, y;             /* its offset from them */
-    vf z;
-    vf inverse_z;
-} centre;
-
 INLINE vd_pair along(const double c[4], vd_pair u, vd_pair v, vd_pair s)
 {
     return (vd_pair){
@@ -88,21 +81,28 @@ INLINE void split(vd_pair p, vf *whole, vf *part)
     *part = v_narrow(p.lo - vd_low(*whole), p.hi - vd_high(*whole));
 }
 
-INLINE centre place(const trip_cpu_view *view, vi iu, vi iv, vi isheet)
+INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                  trip_cpu_lanes *lanes)
 {
-    vd_pair u = widen_int(iu), v = widen_int(iv), s = widen_int(isheet);
+    vd_pair u = widen_int(vi_load(staged->u + at)), v = widen_int(vi_load(staged->v + at));
+    vd_pair s = widen_int(vi_load(staged->sheet + at));
     vd_pair x = along(view->along_x, u, v, s), y = along(view->along_y, u, v, s);
-    vd_pair z = along(view->along_z, u, v, s);
-    centre c = { .z = v_narrow(z.lo, z.hi) };
+    vd_pair zs = along(view->along_z, u, v, s);
+    vf z = v_narrow(zs.lo, zs.hi), whole, part;
+    v_store(lanes->z + at, z);
     if (!view->splat.camera.ortho) {
-        c.inverse_z = v_set(1) / c.z;
-        vd lo = refine(z.lo, vd_low(c.inverse_z)), hi = refine(z.hi, vd_high(c.inverse_z));
+        vf inverse = v_set(1) / z;
+        vd lo = refine(zs.lo, vd_low(inverse)), hi = refine(zs.hi, vd_high(inverse));
         x = (vd_pair){ x.lo * lo, x.hi * hi };
         y = (vd_pair){ y.lo * lo, y.hi * hi };
+        v_store(lanes->inverse_z + at, inverse);
     }
-    split(x, &c.whole_x, &c.x);
-    split(y, &c.whole_y, &c.y);
-    return c;
+    split(x, &whole, &part);
+    v_store(lanes->whole_x + at, whole);
+    v_store(lanes->x + at, part);
+    split(y, &whole, &part);
+    v_store(lanes->whole_y + at, whole);
+    v_store(lanes->y + at, part);
 }
 
 /* ---- the footprint ---- */
@@ -155,15 +155,17 @@ INLINE void bound(footprint *f, vf cxx, vf cxy, vf cyy, vf lx, vf ly, vf k2)
 
 /* With D = r_c . rx x ry, constant over the image, S = (sigma / (D z))^2 adj [rx x r_c, ry x r_c]
  * and |S| = (sigma / (D z))^4 D^2 |r_c|^2. */
-INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f, const centre *c)
+INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
+                              const trip_cpu_lanes *lanes, uint32_t at)
 {
     footprint out;
     const vf low_pass = v_set((float)f->low_pass2), k2 = v_set((float)f->cutoff2);
-    vf x = (c->whole_x - p->middle_x) + c->x, y = (c->whole_y - p->middle_y) + c->y;
+    vf x = (v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at);
+    vf y = (v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at);
     vf rx = v_fma(x, p->rxrx, v_fma(y, p->rxry, p->rrx)); /* r_c . rx */
     vf ry = v_fma(x, p->rxry, v_fma(y, p->ryry, p->rry));
     vf rr = v_fma(x, p->rrx + rx, v_fma(y, p->rry + ry, p->rr)); /* |r_c|^2 */
-    vf s = p->scale * c->inverse_z;
+    vf s = p->scale * v_load(lanes->inverse_z + at);
     s = s * s;
     vf sxx = s * v_fnma(ry, ry, rr * p->ryry), syy = s * v_fnma(rx, rx, rr * p->rxrx);
     vf sxy = s * v_fnma(rr, p->rxry, rx * ry);
@@ -337,45 +339,51 @@ INLINE void pixels(vf whole, vf part, vf shift, vf half, int size, vi *first, vi
     *last = v_truncate(v_min(edge, v_max(zero, middle + reach + v_set(1)))) - 1;
 }
 
-typedef struct projected {
-    vf x, y, whole_x, whole_y;
-    vf l11, l21, l22, peak;
-    vf least, thick, first, last; /* first, last: two uint16 each */
-} projected;
-
 INLINE vm less_or_equal(vi a, vi b)
 {
     return v_ge(v_from_int(b), v_from_int(a));
 }
 
-INLINE vm complete(const trip_cpu_view *view, const centre *c, const footprint *f, vf extinction,
-                   projected *p)
+/* As trip_cpu_tiles(). */
+INLINE vi tiles_of(vi x0, vi y0, vi x1, vi y1, int across)
+{
+    const vi one = vi_set(1);
+    static_assert(TRIP_CPU_TILE == 32, "the shifts below");
+    vi x = x0 >> 5, y = y0 >> 5, right = (x1 >> 5) - x, below = (y1 >> 5) - y;
+    vi more = v_shift_right((one - right) | (one - below), 31); /* the sign: either is above 1 */
+    vi any_right = v_shift_right(-right, 31), any_below = v_shift_right(-below, 31);
+    return y * across + x + (any_right << TRIP_CPU_TILES_RIGHT_SHIFT) +
+           (any_below << TRIP_CPU_TILES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_TILES_MORE;
+}
+
+/* Everything but the colour; the bits of the lanes that have pixels. */
+INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extinction,
+                         trip_cpu_lanes *lanes, uint32_t at)
 {
     const trip_camera *camera = &view->splat.camera;
     const vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
     vf depth = extinction * v_set((float)(view->splat.amplitude * view->stretch));
     vf log2_depth = log2_of(depth * depth * f->spread) * v_set(0.5f);
     vi x0, x1, y0, y1;
-    pixels(c->whole_x, c->x, f->shift_x, f->half_x, camera->width, &x0, &x1);
-    pixels(c->whole_y, c->y, f->shift_y, f->half_y, camera->height, &y0, &y1);
-    *p = (projected){ .x = c->x, .y = c->y, .whole_x = c->whole_x, .whole_y = c->whole_y };
-    p->l11 = f->l11;
-    p->l21 = f->l21;
-    p->l22 = f->l22;
-    p->peak = v_fma(log2_depth, one, bias);
-    p->least = p->peak - v_set((float)trip_cpu_cutoff(&view->splat));
-    p->thick = v_select(v_gt(log2_depth, v_set(trip_cpu_thick_log2(view))), v_set(1), v_set(0));
-    p->first = v_from_bits(x0 | y0 << 16);
-    p->last = v_from_bits(x1 | y1 << 16);
-    vm seen = vm_and(v_gt(c->z, v_set(0)), v_gt(log2_depth, v_set(FAINTEST_LOG2)));
-    return vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1)));
+    pixels(v_load(lanes->whole_x + at), v_load(lanes->x + at), f->shift_x, f->half_x, camera->width,
+           &x0, &x1);
+    pixels(v_load(lanes->whole_y + at), v_load(lanes->y + at), f->shift_y, f->half_y,
+           camera->height, &y0, &y1);
+    v_store(lanes->l11 + at, f->l11);
+    v_store(lanes->l21 + at, f->l21);
+    v_store(lanes->l22 + at, f->l22);
+    v_store(lanes->peak + at, v_fma(log2_depth, one, bias));
+    vi_store(lanes->first + at, x0 | y0 << 16);
+    vi_store(lanes->last + at, x1 | y1 << 16);
+    vi_store(lanes->tiles + at, tiles_of(x0, y0, x1, y1, view->tiles_across));
+    vm seen = vm_and(v_gt(v_load(lanes->z + at), v_set(0)), v_gt(log2_depth, v_set(FAINTEST_LOG2)));
+    return vm_bits(vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1))));
 }
 
 /* Offsets in floats of the lanes' records in the output: a lane that is not kept is overwritten by
  * the next. */
-INLINE uint32_t rank(vm kept, uint32_t row[V])
+INLINE uint32_t rank(unsigned bits, uint32_t row[V])
 {
-    unsigned bits = vm_bits(kept);
     uint32_t n = 0;
     for (unsigned i = 0; i < V; i++) {
         row[i] = n * 16;
@@ -415,69 +423,78 @@ static void replace_near(trip_cpu_splat *out, const uint32_t row[V], unsigned la
     }
 }
 
-INLINE vm vm_of(unsigned bits)
+INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
-    vi lane, bit;
-    for (int i = 0; i < V; i++) {
-        lane[i] = (int32_t)(bits >> i & 1);
-        bit[i] = 1;
-    }
-    return less_or_equal(bit, lane);
+    const float *table = &view->of->table[0].r;
+    vi code = vi_load(staged->code + at);
+    colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
+                 v_gather(table + 2, code * 4) };
+    if (!view->shading)
+        return c;
+    v3 eye = towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),
+                         vi_load(staged->sheet + at));
+    return shaded(view, c, eye, vi_load(staged->normal + at));
 }
 
-INLINE void store(trip_cpu_splat *out, const uint32_t row[V], const projected *p, colour c)
+/* The lanes that are kept, as splats. */
+INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
+                  const uint32_t row[V], colour c, trip_cpu_splat *out)
 {
     float *base = &out->x;
-    v_store_rows(base, row, p->x, p->y, p->whole_x, p->whole_y);
-    v_store_rows(base + 4, row, p->l11, p->l21, p->l22, p->peak);
-    v_store_rows(base + 8, row, c.r, c.g, c.b, p->least);
-    v_store_rows(base + 12, row, p->first, p->last, p->thick, v_set(0));
+    const vf bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
+    vf peak = v_load(lanes->peak + at);
+    vf limit = v_fma(v_set(view->thick_log2), v_set((float)TRIP_CPU_EXP_UNIT), bias);
+    vf thick = v_select(v_gt(peak, limit), v_set(1), v_set(0));
+    v_store_rows(base, row, v_load(lanes->x + at), v_load(lanes->y + at),
+                 v_load(lanes->whole_x + at), v_load(lanes->whole_y + at));
+    v_store_rows(base + 4, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
+                 v_load(lanes->l22 + at), peak);
+    v_store_rows(base + 8, row, c.r, c.g, c.b, peak - v_set(view->cutoff));
+    v_store_rows(base + 12, row, v_load(lanes->first + at), v_load(lanes->last + at),
+                 v_load(lanes->tiles + at), thick);
 }
 
-INLINE uint32_t project_lanes(const trip_cpu_view *view, const perspective *persp,
-                              const footprint *parallel, const trip_cpu_staged *staged, uint32_t at,
-                              uint32_t lanes, trip_cpu_splat *out)
+static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                             const trip_cpu_lanes *lanes, trip_cpu_splat *out)
 {
-    vi u = vi_load(staged->u + at), v = vi_load(staged->v + at);
-    vi sheet = vi_load(staged->sheet + at);
-    vi code = vi_load(staged->code + at);
-    centre c = place(view, u, v, sheet);
-    footprint f = parallel ? *parallel : footprint_of(persp, &view->splat, &c);
-    const float *table = &view->of->table[0].r;
-    projected p;
-    vm valid = vm_first(lanes);
-    vm kept = vm_and(valid, complete(view, &c, &f, v_gather(table + 3, code * 4), &p));
-    trip_cpu_splat near[V];
-    unsigned close = vm_bits(vm_and(vm_and(valid, f.near), v_gt(c.z, v_set(0))));
-    if (__builtin_expect(close != 0, 0)) {
-        close = project_near(view, staged, at, close, near);
-        kept = vm_of((vm_bits(vm_and_not(kept, f.near))) | close);
-    }
-    if (vm_bits(kept) == 0)
-        return 0;
-
-    colour rgb = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
-                   v_gather(table + 2, code * 4) };
-    if (view->shading)
-        rgb = shaded(view, rgb, towards_eye(view, u, v, sheet), vi_load(staged->normal + at));
     uint32_t row[V];
+    unsigned kept = lanes->kept[at / V], near = lanes->near[at / V];
+    trip_cpu_splat replaced[V];
+    if (near)
+        near = project_near(view, staged, at, near, replaced);
+    kept |= near;
+    if (kept == 0)
+        return 0;
     uint32_t n = rank(kept, row);
-    store(out, row, &p, rgb);
-    if (__builtin_expect(close != 0, 0))
-        replace_near(out, row, close, near);
+    store(view, lanes, at, row, colour_of(view, staged, at), out);
+    if (near)
+        replace_near(out, row, near, replaced);
     return n;
 }
 
+/* In three loops, each short enough that the processor works on several vectors at a time: one
+ * loop's chain of divisions and roots would leave it waiting. */
 static uint32_t project(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
-                        trip_cpu_splat *out)
+                        trip_cpu_lanes *lanes, trip_cpu_splat *out)
 {
     uint32_t n = 0;
-    bool ortho = view->splat.camera.ortho;
+    const float *extinction = &view->of->table[0].extinction;
     footprint parallel = footprint_parallel(view);
     perspective persp = perspective_of(&view->splat);
     for (uint32_t i = 0; i < count; i += V)
-        n += project_lanes(view, &persp, ortho ? &parallel : NULL, staged, i,
-                           count - i < V ? count - i : V, out + n);
+        place(view, staged, i, lanes);
+    for (uint32_t i = 0; i < count; i += V) {
+        footprint f = parallel;
+        if (!view->splat.camera.ortho)
+            f = footprint_of(&persp, &view->splat, lanes, i);
+        unsigned valid = vm_bits(vm_first(count - i));
+        unsigned near = vm_bits(vm_and(f.near, v_gt(v_load(lanes->z + i), v_set(0)))) & valid;
+        vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
+        lanes->kept[i / V] = complete(view, &f, tau, lanes, i) & valid & ~near;
+        lanes->near[i / V] = near;
+    }
+    for (uint32_t i = 0; i < count; i += V)
+        n += store_splats(view, staged, i, lanes, out + n);
     return n;
 }
 

@@ -15,7 +15,7 @@
 #include "cpu_pool.h"
 #include "report.h"
 
-enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
+enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 16, MIN_SPLATS = 1 << 13 };
 
 /* What has become of a tile's pixels. */
 enum tile_state {
@@ -117,7 +117,8 @@ static bool run_is_hidden(const cpu *r, const trip_run *run)
 static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_t *staged)
 {
     trip_cpu_splat *out = r->filling->splats + chunk->splat + chunk->splats;
-    chunk->splats += r->kernels->project(&r->view, &w->scratch.staged, *staged, out);
+    chunk->splats +=
+        r->kernels->project(&r->view, &w->scratch.staged, *staged, &w->scratch.lanes, out);
     *staged = 0;
 }
 
