@@ -173,8 +173,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
                             "its tree without values");
         leaf_offsets_.reserve(check.leaves);
         is.seekg(start);
-        is.get_value<int32_t>(); /* number of buffers, as checked */
-        root_.readTopology(is, as_half);
+        read_tree(is);
         read_leaves(is);
         stream_ = *io::getStreamMetadataPtr(is);
         stream_.setSeekable(false);
@@ -207,6 +206,27 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
     using MiddleT = typename TopT::ChildNodeType;
     /* Leaves of truth values are bits and stay in memory with the tree. */
     static constexpr bool in_memory = std::is_same<ValueT, bool>::value;
+
+    /* The root by hand: the library's own would leak a node that turns out to be corrupt. */
+    void read_tree(trip_vdb_stream &is)
+    {
+        is.get_value<int32_t>(); /* number of buffers, as checked */
+        root_.setBackground(is.get_value<ValueT>(), false);
+        io::setGridBackgroundValuePtr(is, &root_.background());
+        openvdb::Index tiles = is.get_value<openvdb::Index>();
+        openvdb::Index children = is.get_value<openvdb::Index>();
+        for (openvdb::Index i = 0; i < tiles; i++) {
+            Coord origin = is.get_value<Coord>();
+            ValueT value = is.get_value<ValueT>();
+            root_.addTile(origin, value, is.get_value<bool>());
+        }
+        for (openvdb::Index i = 0; i < children; i++) {
+            auto child = std::make_unique<TopT>(openvdb::PartialCreate(), is.get_value<Coord>(),
+                                                root_.background());
+            child->readTopology(is, half_);
+            root_.addChild(child.release());
+        }
+    }
 
     /* Notes where each leaf lies, and checks that it can be read; or reads it. */
     void read_leaves(trip_vdb_stream &is)
