@@ -181,10 +181,14 @@ static void type_limits(trip_scalar type, double *lo, double *hi)
     *hi = *lo + size - 1;
 }
 
+/* Gradients are as steep as the range of values allows; it may be unknown. */
 static void set_quantiser(brick *b, double lo, double hi)
 {
-    b->quantiser = (trip_quantiser){ lo, hi > lo ? hi : lo + 1,
-                                     trip_gradient_bound(b->info, lo, hi > lo ? hi : lo + 1) };
+    double least = b->scanned ? b->tally->value_min : lo;
+    double most = b->scanned ? b->tally->value_max : hi;
+    b->quantiser =
+        (trip_quantiser){ lo, hi > lo ? hi : lo + 1,
+                          trip_gradient_bound(b->info, least, most > least ? most : least + 1) };
 }
 
 /* Codes stand for the type's values, or for the range if it is known; else that is for the end. */

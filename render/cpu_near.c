@@ -146,8 +146,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
         .axis = axis,
         .u_axis = (axis + 1) % 3,
         .v_axis = (axis + 2) % 3,
-        .gradient_full =
-            trip_shade_gradient_full(header->code_lo, header->code_hi, camera->voxel_world),
+        .gradient_full = trip_shade_gradient_full(header, camera->voxel_world),
     };
     const int axes[3] = { view->u_axis, view->v_axis, axis };
     for (int i = 0; i < 3; i++) {

@@ -79,7 +79,7 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, int axis
         const double(*m)[4] = c->index_to_world.m;
         *columns[i] = as_it_is(trip_v3(m[0][a], m[1][a], m[2][a]), 0);
     }
-    double full = trip_shade_gradient_full(header->code_lo, header->code_hi, c->voxel_world);
+    double full = trip_shade_gradient_full(header, c->voxel_world);
     f->light = as_it_is(frame->settings->light_direction, full);
     f->to_eye = as_it_is(trip_scale(c->world_forward, -1), header->gradient_scale);
 }

@@ -68,8 +68,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     const trip_file_header *header = &frame->data->header;
     r->frame = frame;
     r->constants = trip_splat_frame_make(frame->camera, frame->settings);
-    r->gradient_full =
-        trip_shade_gradient_full(header->code_lo, header->code_hi, frame->camera->voxel_world);
+    r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     r->axis = -1;
     memset(r->stats, 0, sizeof r->stats);
     return take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
