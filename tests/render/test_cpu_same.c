@@ -1,0 +1,275 @@
+/* What must not change a bit of the CPU renderer's picture: threads, memory, the data's tile and
+ * batch sizes, and whether what is hidden is left out. */
+#include "cpu_isa.h"
+#include "cpu_renderer.h"
+#include "cpu_scenes.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static trip_camera_params side_view(const scene *s)
+{
+    return scene_view(s, trip_v3(1, 0.7, 0.5), 48, 50, 150);
+}
+
+static void assert_same(const scene_picture *a, const scene_picture *b)
+{
+    assert_int_equal(a->width, b->width);
+    assert_memory_equal(a->rgba, b->rgba, 16 * (size_t)a->width * (size_t)a->height);
+}
+
+/* With every instruction set, the picture of `a` by one thread and that of `b` by another number of
+ * threads, from batches as `reader` says. */
+static void check_same(const scene *a, const scene *b, unsigned threads,
+                       const trip_reader_params *reader)
+{
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = side_view(a);
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+        cpu_scenes_threads = 1;
+        scene_picture p = scene_draw(a, &cpu_scenes_cpu, &view, &settings);
+        cpu_scenes_threads = threads;
+        scene_picture q = scene_draw_with(b, &cpu_scenes_cpu, &view, &settings, reader);
+        assert_same(&p, &q);
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+    }
+    unsetenv("TRIPTYCH_ISA");
+}
+
+static void any_number_of_threads_draws_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 32, NULL);
+    for (unsigned threads = 2; threads <= 8; threads++)
+        check_same(&s, &s, threads, &(trip_reader_params){ 0 });
+    scene_destroy(&s);
+}
+
+static void any_size_of_batch_draws_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 32, NULL);
+    for (unsigned slots = 2; slots <= 64; slots *= 4)
+        check_same(&s, &s, 3, &(trip_reader_params){ .slots = slots, .slot_bytes = 4096 });
+    scene_destroy(&s);
+}
+
+static void any_tile_of_the_data_draws_the_same(void **state)
+{
+    (void)state;
+    scene first;
+    cpu_scenes_blobs(&first, 16, NULL);
+    for (unsigned tile = 32; tile <= 128; tile *= 2) {
+        scene s;
+        cpu_scenes_blobs(&s, tile, NULL);
+        check_same(&first, &s, 4, &(trip_reader_params){ 0 });
+        scene_destroy(&s);
+    }
+    scene_destroy(&first);
+}
+
+/* Flushes are as large as the memory allows: here 8192 splats, a fraction of the scene's. */
+static void little_memory_draws_the_same(void **state)
+{
+    (void)state;
+    scene s, small;
+    cpu_scenes_blobs(&s, 32, NULL);
+    small = s;
+    assert_int_equal(trip_budget_create(&small.budget, UINT64_C(6) << 20), 0);
+    check_same(&s, &small, 4, &(trip_reader_params){ .slots = 4, .slot_bytes = 4096 });
+    trip_budget_destroy(small.budget);
+    scene_destroy(&s);
+}
+
+/* ---- batches by hand ---- */
+
+typedef struct frame_by_hand {
+    trip_camera camera;
+    trip_settings settings;
+    trip_plan plan;
+    trip_frame frame;
+    trip_renderer *renderer;
+    float *rgba;
+    uint64_t splats, hidden;
+} frame_by_hand;
+
+static void begin_by_hand(frame_by_hand *f, const scene *s, const trip_camera_params *view,
+                          unsigned threads)
+{
+    f->settings = trip_settings_default();
+    f->splats = f->hidden = 0;
+    assert_int_equal(trip_camera_make(&f->camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(
+        trip_plan_make(&f->plan, s->data, &f->camera, &f->settings, s->table, s->budget), 0);
+    assert_int_equal(trip_cpu_create(&f->renderer, s->budget, threads), 0);
+    f->frame = (trip_frame){ .data = s->data,
+                             .camera = &f->camera,
+                             .settings = &f->settings,
+                             .plan = &f->plan,
+                             .table = s->table };
+    f->rgba = calloc(4 * (size_t)view->width * (size_t)view->height, sizeof *f->rgba);
+    assert_non_null(f->rgba);
+    assert_int_equal(f->renderer->ops->begin_frame(f->renderer, &f->frame), 0);
+}
+
+static void end_by_hand(frame_by_hand *f, const scene *s)
+{
+    f->renderer->ops->destroy(f->renderer);
+    trip_plan_release(&f->plan, s->budget);
+    free(f->rgba);
+}
+
+/* Draws a batch run by run, in pieces of at most `piece` splats, leaving out covered bricks. */
+static void draw_pieces(frame_by_hand *f, const trip_batch *batch, uint32_t piece, bool skip)
+{
+    for (size_t i = 0; i < batch->run_count; i++) {
+        const trip_run *run = &batch->runs[i];
+        f->splats += run->count;
+        if (skip && trip_cpu_covered(f->renderer, batch->selection, run->brick)) {
+            f->hidden += run->count;
+            continue;
+        }
+        for (uint32_t done = 0; done < run->count; done += piece) {
+            trip_run part = *run;
+            part.count = run->count - done < piece ? run->count - done : piece;
+            part.first += batch->selection->descending ? run->count - done - part.count : done;
+            trip_batch one = *batch;
+            one.runs = &part;
+            one.run_count = 1;
+            assert_int_equal(f->renderer->ops->draw(f->renderer, &one, true), 0);
+        }
+    }
+}
+
+static void draw_by_hand(frame_by_hand *f, const scene *s, uint32_t piece, bool skip)
+{
+    trip_reader *reader;
+    trip_batch batch;
+    assert_int_equal(trip_reader_create(&reader, s->data,
+                                        &(trip_reader_params){ .planes = f->plan.planes },
+                                        s->budget),
+                     0);
+    for (int axis = 0; axis < 3; axis++) {
+        if (f->plan.lists[axis].pass_count == 0)
+            continue;
+        assert_int_equal(f->renderer->ops->begin_list(f->renderer, axis), 0);
+        for (int i = 0; i < f->plan.lists[axis].pass_count; i++) {
+            assert_int_equal(trip_reader_begin(reader, &f->plan.lists[axis].passes[i].selection),
+                             0);
+            while (trip_reader_next(reader, &batch) > 0) {
+                draw_pieces(f, &batch, piece, skip);
+                trip_reader_release(reader, &batch);
+            }
+        }
+    }
+    assert_int_equal(f->renderer->ops->end_frame(f->renderer, f->rgba), 0);
+    trip_reader_destroy(reader);
+}
+
+static void runs_cut_anywhere_draw_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 32, NULL);
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = side_view(&s);
+    scene_picture whole = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    const uint32_t pieces[3] = { 3, 17, 250 };
+    for (int i = 0; i < 3; i++) {
+        frame_by_hand f;
+        begin_by_hand(&f, &s, &view, 3);
+        draw_by_hand(&f, &s, pieces[i], false);
+        assert_memory_equal(f.rgba, whole.rgba, 16 * (size_t)view.width * (size_t)view.height);
+        end_by_hand(&f, &s);
+    }
+    scene_picture_free(&whole);
+    scene_destroy(&s);
+}
+
+static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)i;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = (unsigned)(i * 1000 + j * 300 + k);
+    return true;
+}
+
+/* A block of opaque voxels, filling the view: what lies behind its face is covered. */
+static void leaving_out_what_is_covered_draws_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    frame_by_hand all, some;
+    scene_create(&s,
+                 &(scene_params){
+                     .dims = { 48, 48, 48 }, .tile_voxels = 16, .slab_sheets = 4, .voxel = solid });
+    scene_colour(&s, 0, 65535, 0.4, 0.7, 0.2, 0.95);
+    scene_colour(&s, 0, 20000, 0.9, 0.3, 0.2, 0.9);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
+    begin_by_hand(&all, &s, &view, 1);
+    draw_by_hand(&all, &s, UINT32_MAX / 2, false);
+    /* Small flushes let tiles close early. */
+    for (unsigned threads = 1; threads <= 4; threads++) {
+        trip_budget *budget = s.budget;
+        assert_int_equal(trip_budget_create(&s.budget, UINT64_C(64) << 20), 0);
+        begin_by_hand(&some, &s, &view, threads);
+        draw_by_hand(&some, &s, 1000, true);
+        assert_memory_equal(all.rgba, some.rgba, 16 * (size_t)view.width * (size_t)view.height);
+        if (threads == 1)
+            print_message("%llu of %llu splats left out\n", (unsigned long long)some.hidden,
+                          (unsigned long long)some.splats);
+        assert_true(some.hidden > 0);
+        end_by_hand(&some, &s);
+        trip_budget_destroy(s.budget);
+        s.budget = budget;
+    }
+    end_by_hand(&all, &s);
+    scene_destroy(&s);
+}
+
+static void frames_follow_one_another_on_one_renderer(void **state)
+{
+    (void)state;
+    scene s;
+    frame_by_hand f;
+    cpu_scenes_blobs(&s, 32, NULL);
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = side_view(&s);
+    scene_picture alone = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    begin_by_hand(&f, &s, &view, 3);
+    draw_by_hand(&f, &s, 5000, false);
+    /* A frame given up half-way, with splats still on their way, leaves nothing behind. */
+    assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);
+    assert_int_equal(f.renderer->ops->begin_list(f.renderer, 1), 0);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);
+        memset(f.rgba, 0, 16 * (size_t)view.width * (size_t)view.height);
+        draw_by_hand(&f, &s, 5000, false);
+        assert_memory_equal(f.rgba, alone.rgba, 16 * (size_t)view.width * (size_t)view.height);
+    }
+    end_by_hand(&f, &s);
+    scene_picture_free(&alone);
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(any_number_of_threads_draws_the_same),
+        cmocka_unit_test(any_size_of_batch_draws_the_same),
+        cmocka_unit_test(any_tile_of_the_data_draws_the_same),
+        cmocka_unit_test(little_memory_draws_the_same),
+        cmocka_unit_test(runs_cut_anywhere_draw_the_same),
+        cmocka_unit_test(leaving_out_what_is_covered_draws_the_same),
+        cmocka_unit_test(frames_follow_one_another_on_one_renderer),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
