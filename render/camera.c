@@ -59,6 +59,14 @@ static double pixel_size(const trip_camera_params *p)
     return 2 * tan(p->fov_degrees * (PI / 360)) / p->height;
 }
 
+/* Along an axis of the grid but for rounding is along it: a list of weight 1e-9 shows nowhere, but
+ * would be read. */
+static double without_rounding(double component, trip_vec3 v)
+{
+    double most = fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+    return fabs(component) > 1e-9 * most ? component : 0;
+}
+
 static void set_rays(trip_camera *c, const basis *b, const trip_affine *world_to_index, double k)
 {
     trip_vec3 corner =
@@ -70,6 +78,9 @@ static void set_rays(trip_camera *c, const basis *b, const trip_affine *world_to
         r0 = trip_add(r0, corner);
     c->eye = trip_affine_point(world_to_index, eye);
     c->r0 = trip_affine_vector(world_to_index, r0);
+    if (c->ortho)
+        c->r0 = trip_v3(without_rounding(c->r0.x, c->r0), without_rounding(c->r0.y, c->r0),
+                        without_rounding(c->r0.z, c->r0));
     c->rx = trip_affine_vector(world_to_index, trip_scale(b->right, k));
     c->ry = trip_affine_vector(world_to_index, trip_scale(b->up, -k));
 }
