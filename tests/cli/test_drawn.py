@@ -1,0 +1,142 @@
+"""What others script against: the keys of `info --json` and `render --stats`, and what the papers'
+tables rest on, how many splats each method draws."""
+import os
+import random
+
+import numpy
+
+import program
+
+INFO_KEYS = {"format_version", "dims", "spacing", "index_to_world", "value_min", "value_max",
+             "voxels", "kept", "bytes"}
+STATS_KEYS = {"renderer", "device", "method", "size", "peak_rss_bytes", "frames"}
+FRAME_KEYS = {"ms", "read_ms", "draw_ms", "merge_ms", "lists"}
+LIST_KEYS = {"splats_read", "splats_projected", "splats_drawn", "bytes_read"}
+
+
+class Drawn(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.kept = {}
+        sources = {"tooth": ["tooth.nhdr", "--range=900:1300"],
+                   "heat": ["densityAndHeat.vdb", "--grid", "heat"]}
+        for name, (source, *options) in sources.items():
+            path = os.path.join(program.DATASETS, source)
+            cls.kept[name] = cls.brick(cls(), path, f"{name}.trip", *options)["kept"]
+        values = program.noise((9, 40, 70))
+        program.write_nifti("sheared.nii", values,
+                            numpy.array([[0, 0.5, 0.2, 3], [-2, 0.3, 0, 5], [0, 0, 4, -7],
+                                         [0, 0, 0, 1]]))
+        cls.kept["sheared"] = cls.brick(cls(), "sheared.nii", "sheared.trip")["kept"]
+
+    def middle(self, name):
+        """Of the grid, in the world; and half the diagonal."""
+        info = self.info(f"{name}.trip")
+        matrix = numpy.array(info["index_to_world"])
+        dims = numpy.array(info["dims"])
+        corners = [matrix[:, :3] @ ((dims - 1) * [a, b, c]) + matrix[:, 3]
+                   for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+        centre = numpy.mean(corners, axis=0)
+        return centre, max(numpy.linalg.norm(c - centre) for c in corners), matrix
+
+    def view_from(self, name, direction, *options):
+        """A perspective view that contains all of it."""
+        centre, radius, _ = self.middle(name)
+        eye = centre + numpy.array(direction) / numpy.linalg.norm(direction) * radius * 4.5
+        return ([f"{name}.trip", "--eye", ",".join(map(str, eye)), "--look",
+                 ",".join(map(str, centre)), "--fov", "30", "--size", "150x150",
+                 "--up", "0.31,0.2,0.9"] + list(options))
+
+    def drawn(self, *arguments):
+        return program.splats_drawn(self.stats(*arguments))
+
+    def test_info_has_the_fixed_keys(self):
+        for name in self.kept:
+            info = self.info(f"{name}.trip")
+            self.assertLessEqual(INFO_KEYS, info.keys())
+            self.assertEqual(info["format_version"], 1)
+            self.assertEqual([len(info["dims"]), len(info["spacing"])], [3, 3])
+            self.assertEqual(numpy.array(info["index_to_world"]).shape, (3, 4))
+            files = (os.path.join(f"{name}.trip", f) for f in os.listdir(f"{name}.trip"))
+            self.assertEqual(info["bytes"], sum(map(os.path.getsize, files)))
+
+    def test_stats_have_the_fixed_keys(self):
+        for renderer in "reference", "cpu", "auto":
+            for method in "merge", "clip", "axis":
+                stats = self.stats("heat.trip", "--renderer", renderer, "--method", method,
+                                   "--size", "50x40")
+                self.assertLessEqual(STATS_KEYS, stats.keys())
+                self.assertEqual(stats["size"], [50, 40])
+                self.assertEqual(stats["method"], method)
+                self.assertGreater(stats["peak_rss_bytes"], 1 << 20)
+                for frame in stats["frames"]:
+                    self.assertLessEqual(FRAME_KEYS, frame.keys())
+                    self.assertEqual(set(frame["lists"]), {"x", "y", "z"})
+                    for counts in frame["lists"].values():
+                        self.assertLessEqual(LIST_KEYS, counts.keys())
+                        self.assertLessEqual(counts["splats_drawn"], counts["splats_projected"])
+                        self.assertLessEqual(counts["splats_projected"], counts["splats_read"])
+                        self.assertEqual(counts["bytes_read"] > 0, counts["splats_read"] > 0)
+
+    def test_an_orbit_has_a_frame_of_stats_for_each_image(self):
+        stats = self.stats("heat.trip", "--orbit", "5", "--size", "30x30")
+        self.assertEqual(len(stats["frames"]), 5)
+
+    def test_with_h_0_a_view_of_everything_draws_thrice_what_was_kept(self):
+        directions = random.Random(3)
+        for name, kept in self.kept.items():
+            for renderer in "cpu", "reference":
+                direction = [directions.uniform(-1, 1) for _ in range(3)]
+                view = self.view_from(name, direction, "--h", "0", "--renderer", renderer)
+                self.assertEqual(self.drawn(*view), 3 * kept, view)
+
+    def test_a_parallel_view_along_an_axis_draws_it_once(self):
+        for name, kept in self.kept.items():
+            centre, radius, matrix = self.middle(name)
+            for axis in range(3):
+                along = matrix[:, axis] / numpy.linalg.norm(matrix[:, axis]) * radius * 3
+                for method in ("merge", "clip", "axis")[: 3 if name == "heat" else 1]:
+                    view = [f"{name}.trip", "--ortho", str(2.5 * radius), "--size", "120x120",
+                            "--eye", ",".join(map(str, centre - along)), "--look",
+                            ",".join(map(str, centre)), "--up", "0.3,0.4,0.5", "--method", method]
+                    stats = self.stats(*view, *(["--h", "0"] if method == "merge" else []))
+                    self.assertEqual(program.splats_drawn(stats), kept, view)
+                    read = [c["splats_read"] for c in stats["frames"][0]["lists"].values()]
+                    self.assertEqual(sorted(read), [0, 0, kept], view)
+
+    def test_drawn_falls_with_h_then_clip_then_axis(self):
+        for name, kept in self.kept.items():
+            for direction in (1, 0.9, 0.8), (-1, 0.5, 0.1):
+                view = self.view_from(name, direction)
+                counts = [self.drawn(*view, "--h", h) for h in (0, 0.5, 0.85, 0.99)]
+                counts.append(self.drawn(*view, "--method", "clip"))
+                counts.append(self.drawn(*view, "--method", "axis"))
+                self.assertEqual(counts, sorted(counts, reverse=True), view)
+                self.assertEqual(counts[-1], kept)
+                self.assertLess(counts[2], counts[0])
+                self.assertLessEqual(counts[-2], 3 * kept)
+
+    def test_all_renderers_count_alike(self):
+        view = self.view_from("sheared", (1, 2, 3), "--h", "0.7")
+        lists = [self.stats(*view, "--renderer", r)["frames"][0]["lists"]
+                 for r in ("cpu", "reference")]
+        for axis in "xyz":
+            self.assertEqual(lists[0][axis]["splats_drawn"], lists[1][axis]["splats_drawn"])
+
+    def test_only_what_the_view_sees_is_read(self):
+        """Looking past it, and at a corner of it close up."""
+        centre, radius, _ = self.middle("tooth")
+        away = ["tooth.trip", "--eye", ",".join(map(str, centre + 3 * radius)), "--look",
+                ",".join(map(str, centre + 9 * radius)), "--size", "50x50"]
+        stats = self.stats(*away)
+        self.assertEqual([c["bytes_read"] for c in stats["frames"][0]["lists"].values()], [0] * 3)
+        close = ["tooth.trip", "--eye", ",".join(map(str, centre + [0, 0, 3 * radius])), "--look",
+                 ",".join(map(str, centre)), "--up", "0,1,0", "--fov", "3", "--size", "50x50"]
+        lists = self.stats(*close)["frames"][0]["lists"]
+        self.assertLess(lists["z"]["splats_read"], 0.7 * self.kept["tooth"])
+        self.assertEqual(lists["x"]["splats_read"] + lists["y"]["splats_read"], 0)
+
+
+if __name__ == "__main__":
+    program.main()
