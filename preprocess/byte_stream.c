@@ -271,10 +271,10 @@ int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes)
     return last && s->source.encoding != TRIP_BYTES_PLAIN ? finish(s) : 0;
 }
 
-static int skip_decompressed(trip_byte_stream *s)
+static int skip_decompressed(trip_byte_stream *s, uint64_t bytes)
 {
     unsigned char waste[4096];
-    uint64_t left = s->source.skip_bytes;
+    uint64_t left = bytes;
     while (left > 0) {
         size_t n = left < sizeof waste ? (size_t)left : sizeof waste, got;
         int status = decompress(s, waste, n, &got);
@@ -282,10 +282,21 @@ static int skip_decompressed(trip_byte_stream *s)
             return status;
         if (got < n)
             return trip_fail(TRIP_ERROR, "read", s->path,
-                             "ends within the %" PRIu64 " bytes to skip", s->source.skip_bytes);
+                             "ends within the %" PRIu64 " bytes to skip", bytes);
         left -= n;
     }
     return 0;
+}
+
+int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes)
+{
+    int status = 0;
+    if (s->source.encoding == TRIP_BYTES_PLAIN)
+        s->position += bytes;
+    else
+        status = skip_decompressed(s, bytes);
+    s->done += bytes;
+    return status;
 }
 
 int trip_byte_stream_rewind(trip_byte_stream *s)
@@ -299,7 +310,7 @@ int trip_byte_stream_rewind(trip_byte_stream *s)
         return 0;
     }
     int status = codec_begin(s);
-    return status < 0 ? status : skip_decompressed(s);
+    return status < 0 ? status : skip_decompressed(s, s->source.skip_bytes);
 }
 
 /* A plain file's length is known before anything is read. */

@@ -38,6 +38,10 @@ int trip_byte_stream_rewind(trip_byte_stream *s);
  * is a reported failure. The read that reaches the end also checks the checksum of the encoding. */
 int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes);
 
+/* Passes over the next `bytes` bytes, which must be within the source's size and not reach its end:
+ * at no cost in a plain file, by decompression elsewhere. */
+int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes);
+
 /* Size of a regular file; anything else is a reported failure. */
 int trip_file_size(const char *path, uint64_t *bytes_out);
 

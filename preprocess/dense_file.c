@@ -103,23 +103,34 @@ int trip_dense_rewind(void *state)
     return trip_byte_stream_rewind(d->stream);
 }
 
-int trip_dense_read_slices(void *state, int64_t count, void *values)
+/* The next bytes, over the borders of files; to nowhere when `to` is NULL. */
+static int take_bytes(dense_file *d, uint64_t bytes, char *to)
 {
-    dense_file *d = state;
-    char *to = values;
-    uint64_t bytes = (uint64_t)count * d->slice_bytes;
     while (bytes > 0) {
         int status = d->left_bytes == 0 ? open_source(d, d->current + 1) : 0;
         uint64_t n = bytes < d->left_bytes ? bytes : d->left_bytes;
         if (status == 0)
-            status = trip_byte_stream_read(d->stream, to, (size_t)n);
+            status = to ? trip_byte_stream_read(d->stream, to, (size_t)n)
+                        : trip_byte_stream_skip(d->stream, n);
         if (status < 0)
             return status;
         d->left_bytes -= n;
         bytes -= n;
-        to += n;
+        to = to ? to + n : NULL;
     }
     return 0;
+}
+
+int trip_dense_read_slices(void *state, int64_t count, void *values)
+{
+    dense_file *d = state;
+    return take_bytes(d, (uint64_t)count * d->slice_bytes, values);
+}
+
+int trip_dense_skip_slices(void *state, int64_t count)
+{
+    dense_file *d = state;
+    return take_bytes(d, (uint64_t)count * d->slice_bytes, NULL);
 }
 
 bool trip_dense_swap(const void *state)

@@ -15,6 +15,7 @@ int trip_dense_open(void **state, const trip_byte_source *sources, int64_t count
 void trip_dense_close(void *state);
 int trip_dense_rewind(void *state);
 int trip_dense_read_slices(void *state, int64_t count, void *values);
+int trip_dense_skip_slices(void *state, int64_t count);
 bool trip_dense_swap(const void *state);
 
 /* Whether this machine stores the most significant byte first. */

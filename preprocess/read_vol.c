@@ -111,5 +111,6 @@ const trip_volume_reader trip_read_vol = {
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,
     .read_slices = trip_dense_read_slices,
+    .skip_slices = trip_dense_skip_slices,
     .swap = trip_dense_swap,
 };

@@ -327,6 +327,27 @@ int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block)
     return next_slab(v, slices_hint < 1 ? 1 : slices_hint, block);
 }
 
+int64_t trip_volume_skip(trip_volume *v, int64_t slices)
+{
+    int64_t depth = v->info.dims[2];
+    if (!v->reader->read_slices || !v->reader->skip_slices || v->broken < 0)
+        return 0;
+    int64_t left = depth - v->next_slice, count = slices < left ? slices : left;
+    int64_t first = v->next_slice + count - 1; /* the next block's neighbour */
+    if (first < v->read_slices)
+        return 0;
+    if (v->next_slice + count == depth) {
+        v->next_slice = depth;
+        return count;
+    }
+    int status = v->reader->skip_slices(v->state, first - v->read_slices);
+    if (status < 0)
+        return v->broken = status;
+    v->read_slices = first;
+    v->next_slice += count;
+    return count;
+}
+
 static int64_t clamp(int64_t v, int64_t lo, int64_t hi)
 {
     return v < lo ? lo : v > hi ? hi : v;

@@ -89,6 +89,10 @@ int trip_volume_rewind(trip_volume *v);
 /* 1: *block is filled; 0: no more; negative: reported failure. A dense block holds about
  * `slices_hint` slices (at least 1; 0 lets the reader choose) plus what neighbours need. */
 int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block);
+/* Passes over slices before the next block, without reading them where the file allows that. Returns
+ * how many it passed over: `slices`, fewer at the end, or 0 where slices have to be read or there
+ * are none. */
+int64_t trip_volume_skip(trip_volume *v, int64_t slices);
 /* Values of the box [lo, lo + size) as float32, i fastest, into values; `active`, when not NULL,
  * gets 1 where the voxel exists. The box may exceed the block by one voxel on every side: values
  * outside the volume repeat the edge voxel (dense) or are the background (sparse), active 0. */

@@ -26,6 +26,7 @@ typedef struct trip_volume_reader {
     /* Slice readers: the next `count` slices, each dims[0] * dims[1] values of the stored type, in
      * the file's byte order. Short data is a reported failure. */
     int (*read_slices)(void *state, int64_t count, void *values);
+    int (*skip_slices)(void *state, int64_t count); /* passes over them; NULL: they must be read */
     bool (*swap)(
         const void *state); /* slice readers: stored byte order differs from the machine's */
 
