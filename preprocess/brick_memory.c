@@ -14,13 +14,15 @@ enum { MOST_SLICES = 32 };
 #define LATE_BYTES ((uint64_t)2 << 20)
 /* Of the writer's index, for a tile of a sheet. */
 #define TILE_BYTES 400
+/* Of a splat that is alone in its pieces, in all lists. */
+#define LONE_SPLAT_BYTES (3 * 48)
 
 typedef struct needs {
     uint64_t slice_bytes;  /* as stored */
     uint64_t slice_splats; /* pieces of one slice, in one list, if all of it is kept */
     uint64_t opened_bytes; /* taken before the lists */
     uint64_t late_bytes;   /* taken after them */
-    uint64_t list_min_bytes;
+    uint64_t list_min_bytes, list_max_bytes;
 } needs;
 
 static uint64_t tiles_of_largest_sheet(const trip_volume_info *info, const trip_piece_format *f)
@@ -41,6 +43,10 @@ static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, 
     needs n = { .opened_bytes = OPENED_BYTES + threads * trip_splat_thread_bytes(f, info->sparse),
                 .late_bytes = LATE_BYTES + TILE_BYTES * tiles_of_largest_sheet(info, f),
                 .list_min_bytes = trip_list_builder_min_bytes(f, threads) };
+    if (__builtin_mul_overflow(slice * LONE_SPLAT_BYTES, (uint64_t)info->dims[2],
+                               &n.list_max_bytes) ||
+        __builtin_add_overflow(n.list_max_bytes, n.list_min_bytes, &n.list_max_bytes))
+        n.list_max_bytes = UINT64_MAX;
     if (info->sparse)
         return n;
     n.slice_bytes = slice * trip_scalar_bytes(info->type);
@@ -61,7 +67,8 @@ static bool share(trip_memory_plan *plan, const needs *n, uint64_t left)
     uint64_t used = n->late_bytes + reader_bytes(n, plan->slices, plan->read_ahead);
     if (used + n->list_min_bytes > left)
         return false;
-    plan->list_bytes = left - used;
+    plan->list_bytes = left - used < n->list_max_bytes ? left - used : n->list_max_bytes;
+    /* One batch is made while the one before is written. */
     uint64_t splats = 2 * (uint64_t)plan->slices * n->slice_splats;
     plan->in_order = splats > 0 && n->list_min_bytes + splats <= plan->list_bytes;
     return true;

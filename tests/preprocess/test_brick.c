@@ -37,6 +37,7 @@ static trip_brick_params params_for(const char *type, const char *output)
     return (trip_brick_params){ .input = input_path,
                                 .output = output_path,
                                 .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = type },
+                                .memory_bytes = (uint64_t)1 << 28,
                                 .threads = 2 };
 }
 
