@@ -88,6 +88,13 @@ unsigned get_count(DcmItem &item, const DcmTagKey &tag, unsigned missing)
     return item.findAndGetUint16(tag, v).good() ? v : missing;
 }
 
+/* DCMTK has no conversion from the text of a whole number to a float. */
+double get_integer(DcmItem &item, const DcmTagKey &tag, double missing)
+{
+    Sint32 v;
+    return item.findAndGetSint32(tag, v).good() ? v : missing;
+}
+
 /* A length between samples, or NAN. */
 double get_length(DcmItem &item, const DcmTagKey &tag, bool nested)
 {
@@ -117,7 +124,7 @@ void read_geometry(DcmItem &item, Header &h)
     if (!h.pixel_spacing.empty() && !(h.pixel_spacing[0] > 0 && h.pixel_spacing[1] > 0))
         h.pixel_spacing.clear();
     h.location = get_number(item, DCM_SliceLocation, false, NAN);
-    h.number = get_number(item, DCM_InstanceNumber, false, NAN);
+    h.number = get_integer(item, DCM_InstanceNumber, NAN);
     h.spacing = get_length(item, DCM_SpacingBetweenSlices, nested);
     if (std::isnan(h.spacing))
         h.spacing = get_length(item, DCM_SliceThickness, nested);
@@ -151,7 +158,7 @@ Header read_header(const std::string &file)
         h.series = series.c_str();
     h.width = get_count(set, DCM_Columns, 0);
     h.height = get_count(set, DCM_Rows, 0);
-    h.frames = (int64_t)get_number(set, DCM_NumberOfFrames, false, 1);
+    h.frames = (int64_t)get_integer(set, DCM_NumberOfFrames, 1);
     h.allocated = get_count(set, DCM_BitsAllocated, 0);
     h.stored = get_count(set, DCM_BitsStored, h.allocated);
     h.high = get_count(set, DCM_HighBit, h.stored - 1);

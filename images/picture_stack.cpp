@@ -1,4 +1,4 @@
-#include <cstring>
+#include <cstdlib>
 #include <vector>
 
 #include <OpenImageIO/imageio.h>
@@ -13,18 +13,17 @@ using Input = std::unique_ptr<OIIO::ImageInput>;
 
 /* What all slices must have in common. */
 struct Form {
-    int width, height, depth, channels, x, y;
+    int width, height, channels, x, y;
     OIIO::TypeDesc type;
 
     explicit Form(const OIIO::ImageSpec &s)
-        : width(s.width), height(s.height), depth(s.depth), channels(s.nchannels), x(s.x), y(s.y),
-          type(s.format)
+        : width(s.width), height(s.height), channels(s.nchannels), x(s.x), y(s.y), type(s.format)
     {
     }
     bool operator==(const Form &o) const
     {
-        return width == o.width && height == o.height && depth == o.depth &&
-               channels == o.channels && x == o.x && y == o.y && type == o.type;
+        return width == o.width && height == o.height && channels == o.channels && x == o.x &&
+               y == o.y && type == o.type;
     }
     std::string text() const
     {
@@ -70,8 +69,6 @@ class PictureStack : public trip_slice_stack
     void check_same(const std::string &what, const OIIO::ImageSpec &spec) const;
     void count_pages(OIIO::ImageInput &in);
     void choose_channels(trip_budget *budget);
-    void read_native(OIIO::ImageInput &in, int page, int z, int channels, void *to);
-    void read_slab(OIIO::ImageInput &in, int page, int z, int channels, void *to);
     void colour_to_luma(float *values) const;
 
     trip_slice_files files_;
@@ -80,8 +77,6 @@ class PictureStack : public trip_slice_stack
     Input current_;
     int64_t current_file_ = -1;
     trip_slice_buffer colour_; /* a slice with all channels, for colour */
-    trip_slice_buffer slab_;   /* a layer of tiles, for pictures with depth in tiles */
-    int slab_first_ = -1, slab_page_ = -1, tile_depth_ = 1;
 };
 
 Input PictureStack::open(const std::string &file) const
@@ -91,6 +86,8 @@ Input PictureStack::open(const std::string &file) const
     Input in = OIIO::ImageInput::open(file, &hints);
     if (!in)
         throw trip_slice_error(file, message(OIIO::geterror()));
+    if (in->spec().depth > 1 || in->spec().tile_depth > 1)
+        throw trip_slice_error(file, "is a picture with depth; slices must be its pages");
     return in;
 }
 
@@ -102,99 +99,76 @@ void PictureStack::check_same(const std::string &what, const OIIO::ImageSpec &sp
                                          form_->text());
 }
 
-/* Slices of a single file: the pages of a TIFF, each perhaps with depth. */
+/* ImageJ writes stacks beyond 4 GB as one page and the rest behind it, which no library reads. */
+void check_imagej(const std::string &file, const OIIO::ImageSpec &spec, int pages)
+{
+    const std::string text = spec.get_string_attribute("ImageDescription");
+    size_t at = text.find("images=");
+    if (text.compare(0, 7, "ImageJ=") != 0 || at == std::string::npos)
+        return;
+    long images = std::strtol(text.c_str() + at + 7, nullptr, 10);
+    if (pages == 1 && images > 1)
+        throw trip_slice_error(file, "holds " + std::to_string(images) +
+                                         " slices in ImageJ's own way; save it as raw data or as "
+                                         "an image sequence");
+}
+
+/* Slices of a single file: the pages of a TIFF. */
 void PictureStack::count_pages(OIIO::ImageInput &in)
 {
+    const std::string &file = files_.names[0];
+    const OIIO::ImageSpec first = in.spec();
     int pages = 1;
     while (in.seek_subimage(pages, 0)) {
         if (files_.kind != TRIP_IMAGE_TIFF) {
-            trip_warn(files_.names[0].c_str(), "has several parts; the first one is read");
+            trip_warn(file.c_str(), "has several parts; the first one is read");
             break;
         }
-        check_same(files_.names[0] + ": page " + std::to_string(pages + 1), in.spec());
+        check_same(file + ": page " + std::to_string(pages + 1), in.spec());
         pages++;
     }
-    in.geterror();
-    dims[2] = (int64_t)pages * form_->depth;
+    /* Past the last page the library has nothing to say but the file's name. */
+    std::string why = in.geterror();
+    if (files_.kind == TRIP_IMAGE_TIFF && !why.empty() && message(why) != file)
+        throw trip_slice_error(file, "after page " + std::to_string(pages) + ": " + message(why));
+    check_imagej(file, first, pages);
+    dims[2] = pages;
 }
 
 void PictureStack::choose_channels(trip_budget *budget)
 {
     const std::string &file = files_.names[0];
-    const uint64_t pixels = (uint64_t)form_->width * (uint64_t)form_->height;
     stored_ = type = scalar_of(file, form_->type);
     if (form_->channels > 4)
         throw trip_slice_error(file, "has " + std::to_string(form_->channels) +
                                          " channels; a slice has one, or colour");
     if (form_->channels == 2)
         trip_warn(file.c_str(), "has two channels; the first one is read");
-    if (form_->channels > 2) {
-        trip_warn(file.c_str(), "is in colour; its Rec. 709 luma is read");
-        type = TRIP_F32;
-        colour_.take(budget, file, pixels * (uint64_t)form_->channels * trip_scalar_bytes(stored_));
-    }
-    if (form_->depth > 1 && tile_depth_ > 1)
-        slab_.take(budget, file,
-                   pixels * (uint64_t)tile_depth_ * trip_scalar_bytes(stored_) *
-                       (form_->channels > 2 ? (uint64_t)form_->channels : 1));
+    if (form_->channels < 3)
+        return;
+    trip_warn(file.c_str(), "is in colour; its Rec. 709 luma is read");
+    type = TRIP_F32;
+    colour_.take(budget, file,
+                 (uint64_t)form_->width * (uint64_t)form_->height * (uint64_t)form_->channels *
+                     trip_scalar_bytes(stored_));
 }
 
 PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) : files_(files)
 {
     Input in = open(files.names[0]);
     form_ = std::make_unique<Form>(in->spec());
-    tile_depth_ = in->spec().tile_depth > 1 ? in->spec().tile_depth : 1;
     dims[0] = form_->width;
     dims[1] = form_->height;
     dims[2] = (int64_t)files.names.size();
     if (files.names.size() == 1)
         count_pages(*in);
-    else if (form_->depth > 1 || (files.kind == TRIP_IMAGE_TIFF && in->seek_subimage(1, 0)))
+    else if (files.kind == TRIP_IMAGE_TIFF && in->seek_subimage(1, 0))
         throw trip_slice_error(files.names[0], "holds several slices by itself, and is one of "
                                                "several files");
     in->geterror();
     choose_channels(budget);
     for (size_t i = 1; i < files.names.size(); i++)
         check_same(files.names[i], open(files.names[i])->spec());
-}
-
-/* One slice of a picture with depth whose tiles have depth too: the layer of tiles is kept. */
-void PictureStack::read_slab(OIIO::ImageInput &in, int page, int z, int channels, void *to)
-{
-    const OIIO::ImageSpec spec = in.spec(page, 0);
-    int first = z - z % tile_depth_;
-    size_t slice_bytes =
-        spec.image_pixels() / (size_t)spec.depth * (size_t)channels * spec.format.size();
-    if (first != slab_first_ || page != slab_page_) {
-        slab_first_ = -1;
-        int end = first + tile_depth_ < spec.depth ? first + tile_depth_ : spec.depth;
-        if (!in.read_tiles(page, 0, spec.x, spec.x + spec.width, spec.y, spec.y + spec.height,
-                           spec.z + first, spec.z + end, 0, channels, spec.format, slab_.data()))
-            throw trip_slice_error(files_.names[0], message(in.geterror()));
-        slab_first_ = first;
-        slab_page_ = page;
-    }
-    std::memcpy(to, slab_.data() + (size_t)(z - first) * slice_bytes, slice_bytes);
-}
-
-void PictureStack::read_native(OIIO::ImageInput &in, int page, int z, int channels, void *to)
-{
-    if (form_->depth > 1 && tile_depth_ > 1) {
-        read_slab(in, page, z, channels, to);
-        return;
-    }
-    const OIIO::ImageSpec spec = in.spec(page, 0);
-    bool good;
-    if (form_->depth == 1)
-        good = in.read_image(page, 0, 0, channels, spec.format, to);
-    else if (spec.tile_width > 0)
-        good = in.read_tiles(page, 0, spec.x, spec.x + spec.width, spec.y, spec.y + spec.height,
-                             spec.z + z, spec.z + z + 1, 0, channels, spec.format, to);
-    else
-        good = in.read_scanlines(page, 0, spec.y, spec.y + spec.height, spec.z + z, 0, channels,
-                                 spec.format, to);
-    if (!good)
-        throw trip_slice_error(files_.names[(size_t)current_file_], message(in.geterror()));
 }
 
 /* Luma of the stored numbers (Rec. ITU-R BT.709-6, 3.2); alpha is left out. */
@@ -216,21 +190,21 @@ void PictureStack::colour_to_luma(float *values) const
 void PictureStack::read(int64_t k, void *values)
 {
     bool single = files_.names.size() == 1;
-    int64_t file = single ? 0 : k;
-    int64_t in_file = single ? k : 0;
-    int page = (int)(in_file / form_->depth), z = (int)(in_file % form_->depth);
-    if (file != current_file_) {
+    int64_t index = single ? 0 : k;
+    int page = single ? (int)k : 0;
+    const std::string &file = files_.names[(size_t)index];
+    if (index != current_file_) {
         current_file_ = -1;
-        current_ = open(files_.names[(size_t)file]);
-        check_same(files_.names[(size_t)file], current_->spec());
-        current_file_ = file;
+        current_ = open(file);
+        check_same(file, current_->spec());
+        current_file_ = index;
     }
-    if (form_->channels > 2) {
-        read_native(*current_, page, z, form_->channels, colour_.data());
+    bool colour = form_->channels > 2;
+    if (!current_->read_image(page, 0, 0, colour ? form_->channels : 1, form_->type,
+                              colour ? (void *)colour_.data() : values))
+        throw trip_slice_error(file, message(current_->geterror()));
+    if (colour)
         colour_to_luma((float *)values);
-    } else {
-        read_native(*current_, page, z, 1, values);
-    }
 }
 
 } // namespace

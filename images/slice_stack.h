@@ -42,8 +42,8 @@ class trip_slice_stack
     trip_affine index_to_world = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
 };
 
-/* TIFF, PNG or EXR, through OpenImageIO: picture_stack.cpp. One file may hold
- * several slices: pages of a TIFF, or its depth. */
+/* TIFF, PNG or EXR, through OpenImageIO: picture_stack.cpp. The pages of one TIFF
+ * are slices, too. */
 std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
                                                      trip_budget *budget);
 /* DICOM, through DCMTK: dicom_stack.cpp. Slices are put in order of their place in space. */

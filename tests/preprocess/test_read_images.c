@@ -1,0 +1,344 @@
+#include "slice_files_by_hand.h"
+
+static void write_tiff(const char *name, trip_scalar type, int first, int count)
+{
+    bytes b = { .count = 0 };
+    append_tiff(&b, type, first, count, 0);
+    write_file(name, &b);
+}
+
+static void write_dicom(const char *name, const dicom *d, int first, int count)
+{
+    bytes b = { .count = 0 };
+    append_dicom(&b, d, first, count);
+    write_file(name, &b);
+}
+
+/* As assert_holds_sample, but in one reading and with values changed by slope and inter. */
+static trip_volume_info assert_sample(const char *path, trip_scalar type, trip_scalar read_as,
+                                      double slope, double inter, int expected_reports)
+{
+    float values[VOXELS];
+    trip_volume_info info;
+    catch_reports();
+    int status = read_volume(path, NULL, 2, values, VOXELS, &info);
+    trip_report_redirect(NULL, NULL);
+    if (status < 0 || reports != expected_reports)
+        fail_msg("%d reports: %s", reports, reported);
+    assert_int_equal(info.type, read_as);
+    assert_string_equal(info.format, "images");
+    for (int v = 0; v < VOXELS; v++) {
+        double expected = slope * sample(type, v % NX, v / NX % NY, v / NX / NY) + inter;
+        assert_true(values[v] == (float)expected);
+    }
+    return info;
+}
+
+static void pages_of_one_tiff_are_slices(void **state)
+{
+    (void)state;
+    write_tiff("pages.tif", TRIP_I16, 0, NZ);
+    assert_holds_sample(path_of("pages.tif"), NULL, TRIP_I16);
+}
+
+static void a_pattern_gives_the_slices_by_number(void **state)
+{
+    (void)state;
+    static const trip_scalar types[] = { TRIP_U8, TRIP_U16, TRIP_U32, TRIP_F32, TRIP_F64 };
+    for (size_t t = 0; t < sizeof types / sizeof types[0]; t++) {
+        for (int k = 0; k < NZ; k++) {
+            char name[32];
+            snprintf(name, sizeof name, "n%zu-%02d.tif", t, k + 8);
+            write_tiff(name, types[t], k, 1);
+        }
+        char pattern[32];
+        snprintf(pattern, sizeof pattern, "n%zu-%%02d.tif", t);
+        trip_volume_info info = assert_sample(path_of(pattern), types[t], types[t], 1, 0, 0);
+        const double identity[3][4] = { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } };
+        assert_map(&info.index_to_world, identity);
+    }
+}
+
+/* "s2" comes before "s10"; what is no picture is passed over. */
+static void a_folder_and_a_glob_are_read_in_natural_order(void **state)
+{
+    (void)state;
+    char name[64];
+    mkdir(path_of("stack"), 0777);
+    write_bytes("stack/notes.txt", "not a picture", 13);
+    for (int k = 0; k < NZ; k++) {
+        snprintf(name, sizeof name, "stack/s%d.png", 7 + k);
+        bytes b = { .count = 0 };
+        append_png(&b, TRIP_U16, k, 1);
+        write_file(name, &b);
+    }
+    assert_sample(path_of("stack"), TRIP_U16, TRIP_U16, 1, 0, 0);
+    assert_sample(path_of("stack/s*.png"), TRIP_U16, TRIP_U16, 1, 0, 0);
+    remove(path_of("stack/notes.txt"));
+    for (int k = 0; k < NZ; k++) {
+        snprintf(name, sizeof name, "stack/s%d.png", 7 + k);
+        remove(path_of(name));
+    }
+    assert_refused(path_of("stack"), "holds no TIFF, PNG, EXR or DICOM");
+    remove(path_of("stack"));
+}
+
+static void halves_and_floats_come_from_exr(void **state)
+{
+    (void)state;
+    static const trip_scalar types[] = { TRIP_F16, TRIP_F32 };
+    for (int t = 0; t < 2; t++) {
+        for (int k = 0; k < NZ; k++) {
+            char name[32];
+            bytes b = { .count = 0 };
+            snprintf(name, sizeof name, "e%d-%d.exr", t, k);
+            append_exr(&b, types[t], k);
+            write_file(name, &b);
+        }
+        assert_sample(path_of(t ? "e1-%d.exr" : "e0-%d.exr"), types[t], types[t], 1, 0, 0);
+    }
+}
+
+/* Not premultiplied by the alpha; luma of three equal channels is that value. */
+static void grey_is_taken_from_channels(void **state)
+{
+    (void)state;
+    for (int channels = 2; channels <= 4; channels++) {
+        char name[32];
+        for (int k = 0; k < NZ; k++) {
+            bytes b = { .count = 0 };
+            snprintf(name, sizeof name, "c%d-%d.png", channels, k);
+            append_png(&b, TRIP_U8, k, channels);
+            write_file(name, &b);
+        }
+        snprintf(name, sizeof name, "c%d-%%d.png", channels);
+        assert_sample(path_of(name), TRIP_U8, channels == 2 ? TRIP_U8 : TRIP_F32, 1, 0, 1);
+    }
+}
+
+static void a_tiff_with_depth_in_its_tiles_is_refused(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_deep_tiff(&b);
+    write_file("deep.tif", &b);
+    assert_refused(path_of("deep.tif"), "slices must be its pages");
+}
+
+/* Names say the reverse of what the positions do; slices lie along a tilted direction. */
+static void dicom_slices_are_ordered_and_placed_in_space(void **state)
+{
+    (void)state;
+    for (int k = 0; k < NZ; k++) {
+        char name[32], position[64];
+        snprintf(name, sizeof name, "d%d.dcm", NZ - k);
+        snprintf(position, sizeof position, "%d\\%g\\%g", -10, 20 - 1.5 * k, 5 + 0.25 * k);
+        const dicom d = { .type = TRIP_I16,
+                          .series = "1.2",
+                          .position = position,
+                          .orientation = "1\\0\\0\\0\\0\\1",
+                          .spacing = "0.5\\0.75",
+                          .slope = "2.5",
+                          .inter = "-1000" };
+        write_dicom(name, &d, k, 1);
+    }
+    trip_volume_info info = assert_sample(path_of("d%d.dcm"), TRIP_I16, TRIP_I16, 2.5, -1000, 0);
+    const double expected[3][4] = {
+        { 0.75, 0, 0, -10 },
+        { 0, 0, -1.5, 20 },
+        { 0, 0.5, 0.25, 5 },
+    };
+    assert_map(&info.index_to_world, expected);
+    assert_true(info.slope == 2.5 && info.inter == -1000);
+}
+
+static void dicom_without_positions_is_ordered_by_number(void **state)
+{
+    (void)state;
+    for (int k = 0; k < NZ; k++) {
+        char name[32], number[8];
+        snprintf(name, sizeof name, "i%d.dcm", (k * 3) % NZ);
+        snprintf(number, sizeof number, "%d", k + 5);
+        const dicom d = { .type = TRIP_U8, .number = number, .thickness = "3" };
+        write_dicom(name, &d, k, 1);
+    }
+    trip_volume_info info = assert_sample(path_of("i*.dcm"), TRIP_U8, TRIP_U8, 1, 0, 0);
+    assert_true(info.index_to_world.m[2][2] == 3);
+}
+
+/* 12 bits of 16, signed, not at the bottom, with rubbish around them. */
+static void dicom_bits_are_taken_from_where_they_are(void **state)
+{
+    (void)state;
+    const dicom d = { .type = TRIP_I16, .stored = 12, .shift = 2, .frames = "7" };
+    write_dicom("bits.dcm", &d, 0, NZ);
+    assert_sample(path_of("bits.dcm"), TRIP_I16, TRIP_I16, 1, 0, 0);
+}
+
+static void dicom_slices_rescaled_differently_become_floats(void **state)
+{
+    (void)state;
+    for (int k = 0; k < NZ; k++) {
+        char name[32], number[8];
+        snprintf(name, sizeof name, "r%d.dcm", k);
+        snprintf(number, sizeof number, "%d", k);
+        const dicom d = { .type = TRIP_U16,
+                          .number = number,
+                          .slope = k % 2 ? "3" : "1",
+                          .inter = k % 2 ? "0" : "7" };
+        write_dicom(name, &d, k, 1);
+    }
+    float values[VOXELS];
+    trip_volume_info info;
+    assert_int_equal(read_volume(path_of("r%d.dcm"), NULL, 2, values, VOXELS, &info), 0);
+    assert_int_equal(info.type, TRIP_F32);
+    for (int v = 0; v < VOXELS; v++) {
+        int k = v / NX / NY, stored = sample(TRIP_U16, v % NX, v / NX % NY, k);
+        assert_true(values[v] == (float)(k % 2 ? 3 * stored : stored + 7));
+    }
+}
+
+static void dicom_slices_that_do_not_belong_together_are_refused(void **state)
+{
+    (void)state;
+    dicom d = { .type = TRIP_U8, .series = "1.2", .number = "1" };
+    write_dicom("x1.dcm", &d, 0, 1);
+    write_dicom("x2.dcm", &d, 0, 1);
+    assert_refused(path_of("x%d.dcm"), "the same instance number");
+    d.series = "1.3";
+    write_dicom("x2.dcm", &d, 0, 1);
+    assert_refused(path_of("x%d.dcm"), "another series");
+    d.type = TRIP_U16;
+    write_dicom("x2.dcm", &d, 0, 1);
+    assert_refused(path_of("x%d.dcm"), "16 bits in 16, unlike");
+}
+
+static void slices_that_do_not_fit_or_are_missing_are_refused(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    write_tiff("h1.tif", TRIP_U8, 0, 1);
+    write_tiff("h2.tif", TRIP_U8, 1, 1);
+    write_tiff("h4.tif", TRIP_U8, 2, 1);
+    assert_refused(path_of("h%d.tif"), "slice 3 is missing");
+    append_tiff(&b, TRIP_U8, 2, 1, 3);
+    write_file("h3.tif", &b);
+    assert_refused(path_of("h%d.tif"), "h3.tif: is 8 x 4 uint8, unlike the first slice");
+    write_tiff("h3.tif", TRIP_I16, 2, 1);
+    assert_refused(path_of("h%d.tif"), "is 5 x 4 int16, unlike");
+    write_tiff("h3.tif", TRIP_U8, 2, 2);
+    assert_refused(path_of("h[34].tif"), "holds several slices");
+    write_bytes("h3.tif", "nothing", 7);
+    assert_refused(path_of("h%d.tif"), "h3.tif: is no TIFF");
+    b.count = 0;
+    append_png(&b, TRIP_U8, 0, 1);
+    write_file("h3.tif", &b);
+    assert_refused(path_of("h%d.tif"), "different kinds");
+}
+
+static void wrong_patterns_are_refused(void **state)
+{
+    (void)state;
+    assert_refused(path_of("nothing-%03d.tif"), "no file fits");
+    assert_refused(path_of("nothing-*.tif"), "no file fits");
+    assert_refused_as(TRIP_USAGE, path_of("a%d-%d.tif"), NULL, "one number");
+    assert_refused_as(TRIP_USAGE, path_of("a%s.tif"), NULL, "one number");
+    assert_refused_as(TRIP_USAGE, path_of("a%999999d.tif"), NULL, "one number");
+}
+
+static void truncated_slices_are_refused(void **state)
+{
+    (void)state;
+    bytes files[4] = { 0 };
+    append_tiff(&files[0], TRIP_F64, 0, 2, 0);
+    append_png(&files[1], TRIP_U16, 0, 1);
+    append_exr(&files[2], TRIP_F32, 0);
+    append_dicom(&files[3], &(dicom){ .type = TRIP_I16 }, 0, 1);
+    for (int f = 0; f < 4; f++)
+        for (int part = 1; part < 4; part += 2) {
+            write_bytes("cut", files[f].data, files[f].count * (size_t)part / 4);
+            if (!survives(path_of("cut"), NULL))
+                fail_msg("part %d of file %d is read", part, f);
+        }
+}
+
+static void corrupted_slices_do_no_harm(void **state)
+{
+    (void)state;
+    bytes files[4] = { 0 };
+    unsigned seed = 5;
+    append_tiff(&files[0], TRIP_U16, 0, 2, 0);
+    append_png(&files[1], TRIP_U8, 0, 3);
+    append_exr(&files[2], TRIP_F16, 0);
+    append_dicom(&files[3], &(dicom){ .type = TRIP_U8, .spacing = "1\\1" }, 0, 1);
+    for (int n = 0; n < 8; n++) {
+        bytes bad = files[n % 4];
+        for (int change = 0; change < 3; change++) {
+            seed = seed * 1103515245 + 12345;
+            bad.data[140 * (n % 4 == 3) + (seed >> 16) % (bad.count - 140)] = (unsigned char)seed;
+        }
+        write_file("bad", &bad);
+        survives(path_of("bad"), NULL);
+    }
+}
+
+static void slices_too_large_for_the_memory_are_refused(void **state)
+{
+    (void)state;
+    trip_budget *budget;
+    trip_volume *v;
+    write_tiff("pages.tif", TRIP_U8, 0, NZ);
+    assert_int_equal(trip_budget_create(&budget, 100), 0);
+    catch_reports();
+    assert_int_equal(trip_volume_open(&v, path_of("pages.tif"), NULL, budget), TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(reports, 1);
+    assert_non_null(strstr(reported, "--memory"));
+    trip_budget_destroy(budget);
+}
+
+static void a_stack_can_be_read_again(void **state)
+{
+    (void)state;
+    trip_budget *budget;
+    trip_volume *v;
+    trip_block block;
+    float values[2][VOXELS];
+    write_tiff("pages.tif", TRIP_U8, 0, NZ);
+    assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, path_of("pages.tif"), NULL, budget), 0);
+    for (int turn = 0; turn < 2; turn++) {
+        assert_int_equal(trip_volume_next(v, NZ, &block), 1);
+        assert_int_equal(trip_block_decode(v, &block, block.origin, block.size, values[turn], NULL),
+                         0);
+        trip_block_release(v, &block);
+        assert_int_equal(trip_volume_rewind(v), 0);
+    }
+    assert_memory_equal(values[0], values[1], sizeof values[0]);
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pages_of_one_tiff_are_slices),
+        cmocka_unit_test(a_pattern_gives_the_slices_by_number),
+        cmocka_unit_test(a_folder_and_a_glob_are_read_in_natural_order),
+        cmocka_unit_test(halves_and_floats_come_from_exr),
+        cmocka_unit_test(grey_is_taken_from_channels),
+        cmocka_unit_test(a_tiff_with_depth_in_its_tiles_is_refused),
+        cmocka_unit_test(dicom_slices_are_ordered_and_placed_in_space),
+        cmocka_unit_test(dicom_without_positions_is_ordered_by_number),
+        cmocka_unit_test(dicom_bits_are_taken_from_where_they_are),
+        cmocka_unit_test(dicom_slices_rescaled_differently_become_floats),
+        cmocka_unit_test(dicom_slices_that_do_not_belong_together_are_refused),
+        cmocka_unit_test(slices_that_do_not_fit_or_are_missing_are_refused),
+        cmocka_unit_test(wrong_patterns_are_refused),
+        cmocka_unit_test(truncated_slices_are_refused),
+        cmocka_unit_test(corrupted_slices_do_no_harm),
+        cmocka_unit_test(slices_too_large_for_the_memory_are_refused),
+        cmocka_unit_test(a_stack_can_be_read_again),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
