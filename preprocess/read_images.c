@@ -107,6 +107,12 @@ static int rewind_images(void *opaque)
     return 0;
 }
 
+static int skip_slices(void *opaque, int64_t count)
+{
+    ((state *)opaque)->next += count;
+    return 0;
+}
+
 static int read_slices(void *opaque, int64_t count, void *values)
 {
     state *s = opaque;
@@ -139,5 +145,6 @@ const trip_volume_reader trip_read_images = {
     .close = close_images,
     .rewind = rewind_images,
     .read_slices = read_slices,
+    .skip_slices = skip_slices,
     .swap = swap_images,
 };

@@ -229,5 +229,16 @@ void release_box(void *, trip_block *)
 
 } // namespace
 
-const trip_volume_reader trip_read_vdb = { "openvdb", probe,   open_vdb, close_vdb,  rewind_vdb,
-                                           nullptr,   nullptr, next_box, decode_box, release_box };
+const trip_volume_reader trip_read_vdb = {
+    .format = "openvdb",
+    .probe = probe,
+    .open = open_vdb,
+    .close = close_vdb,
+    .rewind = rewind_vdb,
+    .read_slices = nullptr,
+    .skip_slices = nullptr,
+    .swap = nullptr,
+    .next = next_box,
+    .decode = decode_box,
+    .release = release_box,
+};
