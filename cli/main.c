@@ -1,6 +1,7 @@
 /* triptych COMMAND ...: picks the command; everything else is the command's. */
 #include "commands.h"
 
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -32,6 +33,15 @@ static void print_help(void)
            "triptych-COMMAND(1). `triptych --version` shows the version.\n");
 }
 
+/* Where a standard stream is closed, its number must not go to a data file, which messages would
+ * then be written into. Read-only, so that writing still fails. */
+static void hold_standard_streams(void)
+{
+    for (int fd = 0; fd <= 2; fd++)
+        if (fcntl(fd, F_GETFD) < 0)
+            (void)!open("/dev/null", O_RDONLY);
+}
+
 /* Writes everything out, so that a full disk behind stdout is a failure and not silence. */
 static int finish(int exit_status)
 {
@@ -42,6 +52,7 @@ static int finish(int exit_status)
 
 int main(int argc, char **argv)
 {
+    hold_standard_streams();
     if (argc < 2)
         return trip_exit_status(
             trip_fail(TRIP_USAGE, "usage", "command", "none given; `triptych --help` lists them"));
