@@ -1,0 +1,162 @@
+/* Every renderer against the reference on real data: three volumes that come with the project,
+ * bricked here, from twelve views that are hard in different ways. No pixel may be off by more than
+ * 1/255, nor the mean by 0.05/255. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "brick.h"
+#include "dataset_text.h"
+#include "scenes.h"
+#include "test.h"
+
+enum { SIZE = 96, VIEWS = 12 };
+
+/* Bricks a volume of the project's and opens it as a scene, drawn as it would be by default. */
+static void open_volume(scene *s, const char *name)
+{
+    char input[512];
+    trip_brick_summary summary;
+    trip_dataset_text *text;
+    trip_tf *tf;
+    memset(s, 0, sizeof *s);
+    snprintf(s->folder, sizeof s->folder, "/tmp/trip-views-XXXXXX");
+    assert_non_null(mkdtemp(s->folder));
+    snprintf(s->path, sizeof s->path, "%s/v.trip", s->folder);
+    snprintf(input, sizeof input, "%s/datasets/%s", TRIP_SOURCE_DIR, name);
+    assert_int_equal(trip_brick(&(trip_brick_params){ .input = input,
+                                                      .output = s->path,
+                                                      .memory_bytes = UINT64_C(1) << 30 },
+                                &summary),
+                     0);
+    assert_int_equal(trip_budget_create(&s->budget, UINT64_C(1) << 30), 0);
+    assert_int_equal(trip_dataset_open(&s->data, s->path, s->budget), 0);
+    s->table = calloc(65536, sizeof *s->table);
+    assert_non_null(s->table);
+    assert_int_equal(trip_dataset_text_parse(&text, s->data), 0);
+    assert_int_equal(trip_dataset_text_tf(text, s->data, &tf), 0);
+    const trip_file_header *h = &s->data->header;
+    trip_tf_denormalise(tf, h->value_min, h->value_max);
+    double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel, s->table);
+    trip_tf_destroy(tf);
+    trip_dataset_text_destroy(text);
+}
+
+/* Half the diagonal of the volume in world units. */
+static double half_diagonal(const scene *s)
+{
+    const uint64_t *dims = s->data->header.dims;
+    trip_vec3 diagonal = { (double)dims[0], (double)dims[1], (double)dims[2] };
+    return 0.5 * trip_length(trip_affine_vector(&s->data->index_to_world, diagonal));
+}
+
+static const struct {
+    const char *name;
+    trip_vec3 direction; /* from the middle to the eye */
+    double distance;     /* in half diagonals */
+    double fov_degrees;
+    double ortho; /* height in half diagonals; 0: perspective */
+    int size;     /* pixels either way */
+} views[VIEWS] = {
+    { "along x", { 1, 0, 0 }, 4, 30, 0, SIZE },
+    { "along -y", { 0, -1, 0 }, 4, 30, 0, SIZE },
+    { "along z", { 0, 0, 1 }, 4, 30, 0, SIZE },
+    { "between x and y", { 1, 1, 0.2 }, 4, 30, 0, SIZE },
+    { "along the diagonal", { -1, -1, -1 }, 4, 30, 0, SIZE },
+    { "from near by, 100 degrees", { 0.3, 1, -0.7 }, 1, 100, 0, SIZE },
+    { "from inside, 90 degrees", { 0.2, 0.5, 1 }, 0.15, 90, 0, SIZE },
+    { "from inside, 160 degrees", { 1, -0.3, 0.4 }, 0.1, 160, 0, SIZE },
+    { "parallel, oblique", { 1, 0.8, -0.5 }, 3, 0, 2, SIZE },
+    { "parallel, along y", { 0, 1, 0 }, 3, 0, 2, SIZE },
+    { "magnified", { 0.6, -1, 0.4 }, 1.5, 1.2, 0, SIZE },
+    { "minified", { 1, 0.6, 0.9 }, 5, 30, 0, SIZE / 4 },
+};
+
+static trip_camera_params make_view(const scene *s, int i)
+{
+    double half = half_diagonal(s);
+    trip_camera_params p = scene_view(s, views[i].direction, views[i].distance * half,
+                                      views[i].fov_degrees, views[i].size);
+    p.width += p.width / 3; /* not square */
+    p.ortho_height = views[i].ortho * half;
+    return p;
+}
+
+typedef struct tally {
+    double most, sum, components;
+} tally;
+
+static void add(tally *t, const scene_picture *a, const scene_picture *b, const char *view)
+{
+    double sum = 0, most = scene_difference(a, b);
+    size_t n = 4 * (size_t)a->width * (size_t)a->height;
+    for (size_t i = 0; i < n; i++)
+        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
+    if (!(most <= 1.0 / 255 && sum / (double)n < 0.05 / 255))
+        fail_msg("%s: most %.4f, mean %.5f of 1/255", view, 255 * most, 255 * sum / (double)n);
+    t->most = fmax(t->most, most);
+    t->sum += sum;
+    t->components += (double)n;
+}
+
+static void check_view(const scene *s, int i, tally *tallies)
+{
+    trip_camera_params view = make_view(s, i);
+    trip_settings settings = trip_settings_default();
+    const scene_renderer *all = scene_renderers();
+    scene_picture expected = scene_draw(s, &all[0], &view, &settings);
+    for (int r = 1; all[r].name; r++) {
+        scene_picture p = scene_draw(s, &all[r], &view, &settings);
+        add(&tallies[r], &expected, &p, views[i].name);
+        for (int axis = 0; axis < 3; axis++) {
+            assert_int_equal(p.stats.lists[axis].splats_projected,
+                             expected.stats.lists[axis].splats_projected);
+            assert_int_equal(p.stats.lists[axis].splats_drawn,
+                             expected.stats.lists[axis].splats_drawn);
+        }
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&expected);
+}
+
+static void check_volume(const char *name)
+{
+    scene s;
+    tally tallies[4] = { { 0, 0, 0 } };
+    open_volume(&s, name);
+    for (int i = 0; i < VIEWS; i++)
+        check_view(&s, i, tallies);
+    for (int r = 1; scene_renderers()[r].name; r++)
+        print_message("%s, %llu splats, %d views: %s most %.4f mean %.5f of 1/255\n", name,
+                      (unsigned long long)s.data->header.kept, VIEWS, scene_renderers()[r].name,
+                      255 * tallies[r].most, 255 * tallies[r].sum / tallies[r].components);
+    scene_destroy(&s);
+}
+
+static void twelve_views_of_a_tooth_agree_with_the_reference(void **state)
+{
+    (void)state;
+    check_volume("tooth.nhdr");
+}
+
+static void twelve_views_of_a_stent_agree_with_the_reference(void **state)
+{
+    (void)state;
+    check_volume("stent.nrrd");
+}
+
+static void twelve_views_of_a_cloud_agree_with_the_reference(void **state)
+{
+    (void)state;
+    check_volume("wdas_cloud_sixteenth.vdb");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(twelve_views_of_a_tooth_agree_with_the_reference),
+        cmocka_unit_test(twelve_views_of_a_stent_agree_with_the_reference),
+        cmocka_unit_test(twelve_views_of_a_cloud_agree_with_the_reference),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
