@@ -1,0 +1,149 @@
+"""The programs compared, behind one face: `draw(view, size)` gives milliseconds, `picture(view,
+size, path)` writes what was timed. Triptych times views itself, `time_views`."""
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+
+from prepare import DENSITY_SCALE
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+class Unavailable(Exception):
+    """This program cannot draw this scene; says why."""
+
+
+def _run(command, **options):
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          errors="replace", **options)
+    if done.returncode:
+        last = (done.stdout.strip().splitlines() or ["exit status %d" % done.returncode])[-1]
+        raise Unavailable(last.strip())
+    return done.stdout
+
+
+def _numbers(values):
+    return ",".join(repr(float(v)) for v in values)
+
+
+class Triptych:
+    """`triptych bench renderers`: each frame in turn from the data set in memory."""
+
+    def __init__(self, prepared, renderer, threads):
+        self.prepared, self.renderer, self.threads = prepared, renderer, threads
+        self.name = "triptych-" + renderer
+        self.shading = [] if prepared.scene.shading else ["--no-shading"]
+        self.device = None
+
+    def time_views(self, size, views):
+        text = _run([self.prepared.triptych, "bench", "renderers", self.prepared.dataset,
+                     "--renderer", self.renderer, "--threads", str(self.threads), "--size",
+                     "%dx%d" % (size, size), "--views", str(views), "--json"] + self.shading)
+        report = json.loads(text[text.index("{"):])
+        rows = report["tables"]["renderers"]["rows"]
+        if not rows:
+            raise Unavailable(report["limits"][-1])
+        self.device = rows[0]["device"]
+        return rows[0]["each_view"], rows[0].get("splats_drawn")
+
+    def picture(self, view, size, path):
+        _run([self.prepared.triptych, "render", self.prepared.dataset, "-o", path, "--renderer",
+              self.renderer, "--threads", str(self.threads), "--size", "%dx%d" % (size, size),
+              "--eye=" + _numbers(view["eye"]), "--look=" + _numbers(view["look"]),
+              "--up=" + _numbers(view["up"]), "--fov", repr(view["fov_degrees"]), "--background",
+              "none"] + self.shading)
+
+    def close(self):
+        pass
+
+
+class Vtk:
+    """A process that keeps the volume and the window, vtk_worker.py."""
+
+    def __init__(self, prepared, mapper, threads):
+        self.name = "vtk-" + mapper
+        job = {"mapper": mapper, "volume": prepared.array(), "threads": threads,
+               "index_to_world": prepared.info["index_to_world"],
+               "function": prepared.function, "shading": prepared.scene.shading}
+        self.process = subprocess.Popen(
+            [sys.executable, os.path.join(HERE, "vtk_worker.py")], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, text=True, env=dict(os.environ, LP_NUM_THREADS=str(threads)))
+        about = self._ask(job)
+        self.version = about["version"]
+        self.device = about["device"] if mapper == "gpu" else "CPU, %d threads" % threads
+        self.display_ms = []
+
+    def _ask(self, what):
+        try:
+            print(json.dumps(what), file=self.process.stdin, flush=True)
+        except BrokenPipeError:
+            pass
+        return self._answer()
+
+    def _answer(self):
+        line = self.process.stdout.readline()
+        if not line:
+            raise Unavailable("VTK ended with status %d" % self.process.wait())
+        return json.loads(line)
+
+    def draw(self, view, size):
+        result = self._ask(dict(view, size=size))
+        self.display_ms.append(result["display_ms"])
+        return {"ms": result["ms"]}
+
+    def picture(self, view, size, path):
+        self._ask(dict(view, size=size, picture=path))
+        self._answer()
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait()
+
+
+class VdbRender:
+    """A process a picture; what it says of its own ray tracing is kept apart."""
+
+    def __init__(self, prepared, threads):
+        self.name = "vdb_render"
+        if not prepared.voxels_are_cubes():
+            raise Unavailable("draws only grids whose voxels are cubes")
+        self.grid, self.threads = prepared.grid(), threads
+        self.scratch = os.path.join(prepared.work, "vdb_render.png")
+        self.device = "CPU, %d threads" % threads
+
+    def _command(self, view, size, path):
+        # Scattering alone, in white light without shadows: the picture is the opacity. A shadow
+        # ray that steps 10^9 voxels at a time takes no sample.
+        scatter = _numbers([1 / DENSITY_SCALE] * 3)
+        return ["vdb_render", self.grid, path, "-translate", _numbers(view["eye"]), "-lookat",
+                _numbers(view["look"]), "-up", _numbers(view["up"]), "-fov",
+                repr(view["fov_degrees"]), "-res", "%dx%d" % (size, size), "-cpus",
+                str(self.threads), "-absorb", "0,0,0", "-scatter", scatter, "-light",
+                "0,0,1,1,1,1", "-shadowstep", "1e9", "-step", "1", "-v"]
+
+    def draw(self, view, size):
+        start = time.perf_counter()
+        text = _run(self._command(view, size, self.scratch))
+        whole = (time.perf_counter() - start) * 1e3
+        traced = re.search(r"ray-tracing.*?completed in ([0-9.e+-]+) sec", text, re.S)
+        return {"ms": whole, "own_ms": float(traced.group(1)) * 1e3 if traced else whole}
+
+    def picture(self, view, size, path):
+        _run(self._command(view, size, path))
+
+    def close(self):
+        pass
+
+
+NAMES = ["triptych-cpu", "triptych-gl", "vtk-cpu", "vtk-gpu", "vdb_render"]
+
+
+def make(name, prepared, threads):
+    if name.startswith("triptych-"):
+        return Triptych(prepared, name[len("triptych-"):], threads)
+    if name.startswith("vtk-"):
+        return Vtk(prepared, name[len("vtk-"):], threads)
+    return VdbRender(prepared, threads)

@@ -1,0 +1,42 @@
+"""What is compared: volumes by their usual file names, each with a transfer function in functions/."""
+import os
+from collections import namedtuple
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+INCLUDED = os.path.join(HERE, "..", "..", "datasets")
+
+# kind: "sparse" (most of the box is empty, or opaque so that little of it is seen) or "dense".
+Scene = namedtuple("Scene", "name file function shading kind shows")
+
+SCENES = [
+    Scene("tooth", "tooth.nhdr", "tooth", True, "dense", "dentine and enamel, translucent"),
+    Scene("enamel", "tooth.nhdr", "enamel", True, "sparse", "only the enamel, opaque"),
+    Scene("stent", "stent.nrrd", "stent", True, "sparse", "stent, bones and vessels"),
+    Scene("cloud", "wdas_cloud_sixteenth.vdb", "cloud", False, "sparse", "a cloud"),
+    Scene("aneurism", "aneurism_256x256x256_uint8.nhdr", "aneurism", True, "sparse", "vessels"),
+    Scene("engine-metal", "engine_256x256x128_uint8.nhdr", "engine-metal", True, "sparse",
+          "only the dense metal parts"),
+    Scene("brain", "ch2better.nii.gz", "brain", True, "sparse", "the surface of a brain"),
+    Scene("lucy", "lucy-1024.vol", "lucy", True, "sparse", "a statue, solid"),
+    Scene("smoke", "smoke.vdb", "smoke", False, "sparse", "a plume of smoke"),
+    Scene("engine", "engine_256x256x128_uint8.nhdr", "engine", True, "dense",
+          "all of it, translucent"),
+    Scene("bonsai", "bonsai.nii.gz", "bonsai", True, "dense", "tree and soil, translucent"),
+    Scene("head", "cthead_256x256x99_uint16.nhdr", "head", True, "dense", "skin and bone"),
+    Scene("chest", "lidc-idri-0314_512x512x275_int16.nhdr", "chest", True, "dense",
+          "lungs, flesh and bone, translucent"),
+]
+
+
+def function_path(scene):
+    return os.path.join(HERE, "functions", scene.function + ".tf")
+
+
+def find(scene, folders):
+    """The scene's file in the first of `folders`, or below it, that has one; else None."""
+    for folder in folders:
+        for root, below, files in os.walk(folder):
+            below.sort()
+            if scene.file in files:
+                return os.path.join(root, scene.file)
+    return None
