@@ -183,27 +183,31 @@ static void (*choose_blend(const trip_cpu_view *view))(trip_cpu_scratch *)
 
 /* ---- pairing ---- */
 
-/* Bits of the blocks of a row that hold a pixel which may still take light. */
-INLINE unsigned open_row(const float *pixels)
+/* Bits of the four blocks at `pixels` that hold a pixel which may still take light. */
+INLINE unsigned open_blocks(const float *pixels)
 {
     unsigned bits = 0;
-    for (unsigned b = 0; b < BLOCKS_ACROSS; b++) {
+    for (unsigned b = 0; b < 4; b++) {
         vm open = v_ge(v_load(pixels + BLOCK_FLOATS * b + 3 * V), v_set((float)TRIP_SATURATION));
         bits |= (unsigned)(vm_bits(open) != 0) << b;
     }
     return bits;
 }
 
-/* Which blocks are ours and open. Closed pixels never change, so asking late is no error. */
+/* Which blocks are ours and open: the others' pixels may be another thread's. Closed pixels never
+ * change, so asking late is no error. */
 static void find_open(trip_cpu_scratch *s)
 {
     static_assert(BLOCKS_ACROSS == 8, "four blocks to a quarter");
     unsigned any = 0;
     for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
-        unsigned half = s->quarters >> (row < BLOCKS_DOWN / 2 ? 0 : 2);
-        unsigned bits = (half & 1) * 0x0f + (half >> 1 & 1) * 0xf0;
-        if (s->view->front_to_back && bits)
-            bits &= open_row(s->pixels + BLOCK_FLOATS * BLOCKS_ACROSS * row);
+        const float *pixels = s->pixels + BLOCK_FLOATS * BLOCKS_ACROSS * row;
+        unsigned quarters = s->quarters >> (row < BLOCKS_DOWN / 2 ? 0 : 2), bits = 0;
+        for (unsigned half = 0; half < 2; half++)
+            if (quarters >> half & 1)
+                bits |=
+                    (s->view->front_to_back ? open_blocks(pixels + 4 * BLOCK_FLOATS * half) : 15u)
+                    << 4 * half;
         s->open[row] = (uint8_t)bits;
         any |= bits;
     }

@@ -335,8 +335,9 @@ INLINE void pixels(vf whole, vf part, vf shift, vf half, int size, vi *first, vi
     vf slack = v_fma(half + v_abs(shift), v_set(1e-3f), v_set(1e-3f));
     slack = v_fma(v_abs(middle), v_set(1e-6f), slack);
     vf reach = half + slack - v_set(0.5f);
-    *first = v_truncate(v_min(edge, v_max(zero, middle - reach)));
-    *last = v_truncate(v_min(edge, v_max(zero, middle + reach + v_set(1)))) - 1;
+    /* v_max gives its second argument where the first is not a number. */
+    *first = v_truncate(v_min(v_max(middle - reach, zero), edge));
+    *last = v_truncate(v_min(v_max(middle + reach + v_set(1), zero), edge)) - 1;
 }
 
 INLINE vm less_or_equal(vi a, vi b)

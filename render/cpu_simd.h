@@ -151,6 +151,7 @@ INLINE vf v_rsqrt_rough(vf a)
     return (vf)_mm512_rsqrt14_ps((__m512)a);
 }
 
+/* b where either is not a number; so in every set. */
 INLINE vf v_min(vf a, vf b)
 {
     return (vf)_mm512_min_ps((__m512)a, (__m512)b);
