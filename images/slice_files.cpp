@@ -9,6 +9,7 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <glob.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -174,13 +175,30 @@ std::vector<std::string> find_glob(const std::string &path)
     return names;
 }
 
+bool is_named_as_slice(const std::string &name)
+{
+    static const char *const extensions[] = { ".tif", ".tiff", ".png", ".exr", ".dcm" };
+    size_t dot = name.rfind('.');
+    return dot != std::string::npos &&
+           std::any_of(std::begin(extensions), std::end(extensions), [&](const char *extension) {
+               return strcasecmp(name.c_str() + dot, extension) == 0;
+           });
+}
+
+/* Passes over other files, but not over a damaged slice, which would bring its neighbours
+ * together. */
 std::vector<std::string> find_in_folder(const std::string &path)
 {
     std::vector<std::string> names;
     for (const std::string &name : list_folder(path)) {
         std::string file = path + (path.back() == '/' ? "" : "/") + name;
-        if (name != "DICOMDIR" && is_regular(file) && kind_of_file(file) != TRIP_IMAGE_OTHER)
+        if (name == "DICOMDIR" || !is_regular(file))
+            continue;
+        if (kind_of_file(file) != TRIP_IMAGE_OTHER)
             names.push_back(file);
+        else if (is_named_as_slice(name))
+            throw trip_slice_error(file,
+                                   "holds no TIFF, PNG, EXR or DICOM picture: is it damaged?");
     }
     if (names.empty())
         throw trip_slice_error(path, "holds no TIFF, PNG, EXR or DICOM files");
