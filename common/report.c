@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { LINE_BYTES = 4096 };
+enum { LINE_BYTES = 4096, WHERE_BYTES = 2560 };
 
 /* A line under construction; what does not fit is cut and marked. */
 typedef struct line {
@@ -60,6 +60,18 @@ static void put_visible(line *l, const char *text)
     }
 }
 
+/* The end of it where it is long: a path must not crowd out the cause. */
+static void put_where(line *l, const char *where)
+{
+    size_t length = strlen(where);
+    if (length > WHERE_BYTES) {
+        put(l, "...", 3);
+        where += length - WHERE_BYTES;
+    }
+    put_visible(l, where);
+    put(l, ": ", 2);
+}
+
 /* One write(2) a line, so that lines of several threads do not mix. */
 static void emit(line *l)
 {
@@ -93,10 +105,8 @@ __attribute__((format(printf, 3, 0))) static void report(const char *what, const
     put_visible(&l, "triptych: ");
     put_visible(&l, what);
     put_visible(&l, ": ");
-    if (where && *where) {
-        put_visible(&l, where);
-        put_visible(&l, ": ");
-    }
+    if (where && *where)
+        put_where(&l, where);
     put_visible(&l, text);
     emit(&l);
     errno = saved_errno;

@@ -51,9 +51,13 @@ static void overlong_line_is_cut_and_marked(void **state)
     memset(longname, 'x', sizeof longname - 1);
     longname[sizeof longname - 1] = 0;
     test_catch_reports();
-    trip_fail(TRIP_ERROR, "read", longname, "why");
+    trip_fail(TRIP_ERROR, "read", "a.raw", "%s", longname);
     assert_one_report("xxx...");
     assert_true(strlen(test_last_report) < 4096);
+    test_catch_reports();
+    trip_fail(TRIP_ERROR, "read", longname, "why");
+    assert_one_report("triptych: read: ...xxx");
+    assert_non_null(strstr(test_last_report, "xxx: why"));
 }
 
 static void errno_text_follows_the_action(void **state)
