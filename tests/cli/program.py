@@ -39,7 +39,7 @@ def call(*arguments, timeout=60, **options):
         process.kill()
         process.communicate()
         raise AssertionError(f"hangs: {arguments}")
-    return subprocess.CompletedProcess(arguments, process.returncode, out, err.decode())
+    return subprocess.CompletedProcess(arguments, process.returncode, out, err.decode(errors="replace"))
 
 
 class ProgramTest(unittest.TestCase):
