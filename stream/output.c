@@ -12,6 +12,8 @@
 
 static int fail_write(const trip_output *o, uint64_t offset, int error)
 {
+    if (o->failed && atomic_exchange_explicit(o->failed, true, memory_order_relaxed))
+        return TRIP_ERROR;
     if (error == ENOSPC || error == EDQUOT)
         return trip_fail(TRIP_ERROR, "write", o->path,
                          "no space left on the disk after %llu bytes: free some or write elsewhere",
@@ -57,6 +59,7 @@ int trip_output_create(trip_output *o, const trip_output_params *params, trip_bu
                         .budget = budget,
                         .buffer_bytes = params->buffer_bytes,
                         .flusher = params->flusher,
+                        .failed = params->failed,
                         .bytes = params->skip_bytes,
                         .page_bytes = params->page_bytes,
                         .checksums = params->checksums };

@@ -1,10 +1,13 @@
 /* A file being written in order, in large pieces, with a checksum for every page if wanted. Used by
- * the writer only; one thread at a time. Failures are reported here, once, with the file's name. */
+ * the writer only; one thread at a time. Failures are reported here with the file's name, and only
+ * the first one of outputs that share `failed`: what fills a disk fails in all of them. */
 #ifndef TRIP_OUTPUT_H
 #define TRIP_OUTPUT_H
 
 #include "budget.h"
 #include "flusher.h"
+
+#include <stdatomic.h>
 
 typedef struct trip_output {
     int fd; /* -1 when closed */
@@ -15,6 +18,7 @@ typedef struct trip_output {
     unsigned filling; /* which of the two */
     trip_flusher *flusher;
     trip_flush_job job;
+    atomic_bool *failed;
     uint64_t bytes;                /* appended so far */
     size_t page_bytes;             /* divides buffer_bytes; 0: no checksums */
     struct trip_output *checksums; /* gets the XXH64 of every page */
@@ -28,7 +32,8 @@ typedef struct trip_output_params {
     trip_flusher *flusher; /* full buffers are written by it, past the page cache where possible */
     size_t page_bytes;
     trip_output *checksums;
-    bool unnamed; /* the file is gone when closed, whatever happens */
+    atomic_bool *failed; /* set at the first failure to write, any thread */
+    bool unnamed;        /* the file is gone when closed, whatever happens */
 } trip_output_params;
 
 int trip_output_create(trip_output *o, const trip_output_params *params, trip_budget *budget);

@@ -35,6 +35,7 @@ struct trip_writer {
     trip_budget *budget;
     trip_folder folder;
     trip_flusher *flusher;
+    atomic_bool failed; /* of the outputs */
     trip_file_header header;
     unsigned planes;
     list_writer lists[3];
@@ -110,6 +111,7 @@ static int open_spool(trip_writer *w, trip_output *o)
                               &(trip_output_params){ .folder = w->folder.partial,
                                                      .name = TRIP_SPOOL_NAME,
                                                      .buffer_bytes = SPOOL_BUFFER_BYTES,
+                                                     .failed = &w->failed,
                                                      .unnamed = true },
                               w->budget);
 }
@@ -133,6 +135,7 @@ static int open_plane(trip_writer *w, int axis, int plane)
                                .name = trip_dataset_plane_name(axis, plane, name),
                                .buffer_bytes = larger(page, PLANE_BUFFER_BYTES),
                                .flusher = w->flusher,
+                               .failed = &w->failed,
                                .page_bytes = page,
                                .checksums = &l->checksums[plane] },
         w->budget);
