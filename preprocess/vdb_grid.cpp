@@ -150,14 +150,37 @@ void BoxList::finish()
     }
 }
 
-/* Bounds of the set bits of a leaf's mask, relative to the leaf. Bit z + 8 y + 64 x. */
+/* First and last set bit of a byte that is not 0. */
+int32_t first_bit(unsigned byte)
+{
+    return __builtin_ctz(byte);
+}
+
+int32_t last_bit(unsigned byte)
+{
+    return 31 - __builtin_clz(byte);
+}
+
+/* Bounds of the set bits of a leaf's mask, relative to the leaf. Bit z + 8 y + 64 x: a word of 64
+ * bits for each x, in it a byte for each y. */
 template <typename MaskT> CoordBBox mask_bounds(const MaskT &mask)
 {
-    CoordBBox box;
-    for (auto it = mask.beginOn(); it; ++it)
-        box.expand(
-            Coord((int32_t)(it.pos() >> 6), (int32_t)(it.pos() >> 3 & 7), (int32_t)(it.pos() & 7)));
-    return box;
+    uint64_t any = 0;
+    unsigned xs = 0, ys = 0, zs = 0;
+    for (unsigned x = 0; x < 8; x++) {
+        uint64_t word = mask.template getWord<uint64_t>(x);
+        any |= word;
+        xs |= (unsigned)(word != 0) << x;
+    }
+    for (unsigned y = 0; y < 8; y++) {
+        unsigned byte = any >> (8 * y) & 0xff;
+        zs |= byte;
+        ys |= (unsigned)(byte != 0) << y;
+    }
+    if (any == 0)
+        return CoordBBox();
+    return CoordBBox(first_bit(xs), first_bit(ys), first_bit(zs), last_bit(xs), last_bit(ys),
+                     last_bit(zs));
 }
 
 template <typename TreeT> class TypedGrid : public trip_vdb_grid
