@@ -12,8 +12,7 @@
 
 /* getopt prints its own line, "ARGV0: unrecognized option ...": with this argv[0] that line has our
  * form, and with no err_stream argp adds nothing to it. --help shows the command's own name. */
-static char error_prefix[] = "triptych: usage";
-static char help_name[64];
+static char error_prefix[64], help_name[64];
 
 enum { KEY_HELP = 1000 };
 
@@ -46,6 +45,7 @@ int trip_options_parse(const struct argp *argp, int argc, char **argv, void *inp
                                 .parser = parse_key,
                                 .children = children };
     snprintf(help_name, sizeof help_name, "triptych %s", argv[0]);
+    snprintf(error_prefix, sizeof error_prefix, "triptych: usage: %s", argv[0]);
     argv[0] = error_prefix;
     error_t status = argp_parse(&outer, argc, argv, ARGP_NO_HELP, NULL, input);
     if (status == ENOMEM)
