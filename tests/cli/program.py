@@ -20,7 +20,7 @@ GENERATE = os.environ["TRIP_GENERATE"]
 DATASETS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "datasets")
 SANITIZED = bool(os.environ.get("TRIP_SANITIZE"))
 
-LINE = re.compile(r"triptych: [^:\n]+: [^\n]+: [^\n]+\n")
+LINE = re.compile(r"triptych: ([^:\n]+: [^\n]+: [^\n]+|[^:\n]+: interrupted)\n")
 
 
 def start(*arguments, **options):
