@@ -37,7 +37,7 @@ static void print_line(const trip_progress *p, double share, double rate, double
     char time_text[16];
     fprintf(stderr, "\r\033[K%-6s %3.0f %%", p->stage, 100 * share);
     if (rate > 0)
-        fprintf(stderr, "  %.0f million %s/s  %s left", rate / 1e6, things,
+        fprintf(stderr, "  %.*f million %s/s  %s left", rate < 1e7, rate / 1e6, things,
                 format_time(left, time_text, sizeof time_text));
     fputc('\r', stderr); /* what is printed next stands in its place */
     fflush(stderr);

@@ -72,6 +72,17 @@ static void put_where(line *l, const char *where)
     put(l, ": ", 2);
 }
 
+/* A terminal may show progress where the line goes: its rest is cleared. */
+static void end_line(line *l, bool terminal)
+{
+    static const char clear[] = { 27, '[', 'K' };
+    if (terminal) {
+        memcpy(l->text + l->length, clear, sizeof clear);
+        l->length += sizeof clear;
+    }
+    l->text[l->length++] = '\n';
+}
+
 /* One write(2) a line, so that lines of several threads do not mix. */
 static void emit(line *l)
 {
@@ -84,7 +95,7 @@ static void emit(line *l)
         report_sink(l->text, report_user);
         return;
     }
-    l->text[l->length++] = '\n';
+    end_line(l, isatty(STDERR_FILENO) == 1);
     for (size_t done = 0; done < l->length;) {
         ssize_t n = write(STDERR_FILENO, l->text + done, l->length - done);
         if (n < 0 && errno == EINTR)
