@@ -124,11 +124,11 @@ static int draw_image(drawing *d, int index)
     if (status)
         return status;
     status = draw_planned(d, &camera, &plan, &stats);
+    if (!status && d->stats)
+        status = render_stats_add_frame(d->stats, &plan, &stats);
     trip_plan_release(&plan, s->budget);
     if (!status)
         status = trip_image_write(path, d->o.width, d->o.height, d->rgba, NULL);
-    if (!status && d->stats)
-        status = render_stats_add_frame(d->stats, &stats);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
         render_stats_summary(path, &d->o, &stats, stdout);
     return status;

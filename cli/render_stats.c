@@ -50,16 +50,27 @@ static void add_ms(cJSON *object, const char *name, double ms)
     cJSON_AddRawToObject(object, name, text);
 }
 
-static void add_list(cJSON *lists, int axis, const trip_list_stats *s)
+/* Bricks that are not selected are not read. */
+static void add_plan(cJSON *list, const trip_plan_list *p)
+{
+    cJSON_AddNumberToObject(list, "bricks", (double)p->bricks);
+    cJSON_AddNumberToObject(list, "bricks_selected", (double)p->bricks_selected);
+    cJSON_AddNumberToObject(list, "bricks_transparent", (double)p->bricks_transparent);
+    cJSON_AddNumberToObject(list, "bricks_outside", (double)p->bricks_outside);
+    cJSON_AddNumberToObject(list, "bricks_without_weight", (double)p->bricks_without_weight);
+}
+
+static void add_list(cJSON *lists, int axis, const trip_plan_list *p, const trip_list_stats *s)
 {
     cJSON *list = cJSON_AddObjectToObject(lists, axis_names[axis]);
+    add_plan(list, p);
     cJSON_AddNumberToObject(list, "splats_read", (double)s->splats_read);
     cJSON_AddNumberToObject(list, "splats_projected", (double)s->splats_projected);
     cJSON_AddNumberToObject(list, "splats_drawn", (double)s->splats_drawn);
     cJSON_AddNumberToObject(list, "bytes_read", (double)s->bytes_read);
 }
 
-int render_stats_add_frame(render_stats *s, const trip_frame_stats *frame)
+int render_stats_add_frame(render_stats *s, const trip_plan *plan, const trip_frame_stats *frame)
 {
     cJSON *f = cJSON_CreateObject();
     add_ms(f, "ms", frame->ms);
@@ -68,10 +79,11 @@ int render_stats_add_frame(render_stats *s, const trip_frame_stats *frame)
     add_ms(f, "merge_ms", frame->merge_ms);
     cJSON_AddNumberToObject(f, "reads", (double)frame->reader.reads);
     cJSON_AddNumberToObject(f, "bytes_cached", (double)frame->reader.bytes_cached);
+    cJSON_AddNumberToObject(f, "runs_skipped", (double)frame->reader.runs_skipped);
     cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame->reader.bytes_skipped);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     for (int axis = 0; axis < 3; axis++)
-        add_list(lists, axis, &frame->lists[axis]);
+        add_list(lists, axis, &plan->lists[axis], &frame->lists[axis]);
     return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
 }
 
