@@ -140,6 +140,8 @@ int trip_command_render(int argc, char **argv)
     int status = render_options_parse(&d.o, argc, argv);
     if (!status)
         status = open_drawing(&d);
+    if (!status)
+        status = trip_image_prepare(); /* it gets ready while the first image is drawn */
     for (int i = 0; !status && i < (d.o.orbit ? d.o.orbit : 1); i++)
         status = draw_image(&d, i);
     if (!status && d.stats)

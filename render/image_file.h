@@ -33,7 +33,7 @@ typedef struct trip_image_params {
 int trip_image_check_path(const char *path, const trip_image_params *params);
 
 /* Starts the helper, which needs a fifth of a second to get ready, so that the first picture need
- * not wait. Not needed. */
+ * not wait; a helper that is missing is noticed before any work is done. */
 int trip_image_prepare(void);
 
 /* Writes the picture in the format that the extension names (.png, .jpg, .jpeg, .tif, .tiff, .exr,
