@@ -17,7 +17,8 @@ from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkIOImage import vtkPNGWriter
-from vtkmodules.vtkRenderingCore import (vtkColorTransferFunction, vtkRenderer, vtkRenderWindow,
+from vtkmodules.vtkRenderingCore import (vtkColorTransferFunction, vtkLight, vtkRenderer,
+                                         vtkRenderWindow,
                                          vtkVolume, vtkVolumeProperty, vtkWindowToImageFilter)
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 
@@ -77,6 +78,14 @@ def make_mapper(job, voxel):
     return mapper
 
 
+def make_headlight():
+    """VTK's own has no ambient part, without which its ray caster draws darker than its GPU mapper."""
+    light = vtkLight()
+    light.SetLightTypeToHeadlight()
+    light.SetAmbientColor(1, 1, 1)
+    return light
+
+
 class Stage:
     def __init__(self, job):
         image, matrix, voxel, self.values = make_image(job)
@@ -88,6 +97,7 @@ class Stage:
         self.volume.SetUserMatrix(matrix)
         self.renderer = vtkRenderer()
         self.renderer.AddVolume(self.volume)
+        self.renderer.AddLight(make_headlight())
         self.window = vtkRenderWindow()
         self.window.SetOffScreenRendering(True)
         self.window.SetMultiSamples(0)
