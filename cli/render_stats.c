@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cjson/cJSON.h>
@@ -87,20 +88,33 @@ int render_stats_add_frame(render_stats *s, const trip_plan *plan, const trip_fr
     return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
 }
 
+static bool write_text(const char *path, const char *text)
+{
+    FILE *f = fopen(path, "w");
+    if (!f)
+        return false;
+    bool good = fputs(text, f) >= 0 && fputs("\n", f) >= 0;
+    return fclose(f) == 0 && good;
+}
+
+/* Devices, pipes and links are written to and stay what they are. */
+static bool is_special(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode);
+}
+
 static int write_file(const char *path, const char *text)
 {
     char partial[4096];
+    bool special = is_special(path);
     if (snprintf(partial, sizeof partial, "%s.partial", path) >= (int)sizeof partial)
         return trip_fail(TRIP_ERROR, "write", path, "the name is too long");
-    FILE *f = fopen(partial, "w");
-    if (!f)
-        return trip_fail_errno("write", partial, "cannot create");
-    bool good = fputs(text, f) >= 0 && fputs("\n", f) >= 0;
-    good = fclose(f) == 0 && good;
-    if (good && rename(partial, path) == 0)
+    if (write_text(special ? path : partial, text) && (special || rename(partial, path) == 0))
         return 0;
     int status = trip_fail_errno("write", path, "cannot write");
-    unlink(partial);
+    if (!special)
+        unlink(partial);
     return status;
 }
 
