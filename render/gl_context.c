@@ -2,9 +2,9 @@
 
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "report.h"
 
@@ -13,7 +13,7 @@ enum { MAX_DEVICES = 16, NEEDED_STORAGE_BLOCKS = 8 };
 struct trip_gl_context {
     EGLDisplay display;
     EGLContext context;
-    bool software, robust;
+    bool robust;
     trip_gl_limits limits;
     char device[256];
 };
@@ -137,8 +137,6 @@ static void describe(trip_gl_context *c)
     const char *renderer = (const char *)glGetString(GL_RENDERER);
     const char *version = (const char *)glGetString(GL_VERSION);
     snprintf(c->device, sizeof c->device, "%s, OpenGL %s", renderer, version);
-    c->software = strstr(renderer, "llvmpipe") || strstr(renderer, "softpipe") ||
-                  strstr(renderer, "swrast") || strstr(renderer, "SWR");
 }
 
 static void read_limits(trip_gl_limits *limits)
@@ -215,11 +213,6 @@ int trip_gl_context_use(trip_gl_context *c)
 const char *trip_gl_context_device(const trip_gl_context *c)
 {
     return c->device;
-}
-
-bool trip_gl_context_is_software(const trip_gl_context *c)
-{
-    return c->software;
 }
 
 const trip_gl_limits *trip_gl_context_limits(const trip_gl_context *c)

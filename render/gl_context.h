@@ -5,7 +5,6 @@
 #ifndef TRIP_GL_CONTEXT_H
 #define TRIP_GL_CONTEXT_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 typedef struct trip_gl_context trip_gl_context;
@@ -25,8 +24,6 @@ void trip_gl_context_destroy(trip_gl_context *c);
 int trip_gl_context_use(trip_gl_context *c);
 
 const char *trip_gl_context_device(const trip_gl_context *c);
-/* Whether GL is drawn by the processor (llvmpipe and the like). */
-bool trip_gl_context_is_software(const trip_gl_context *c);
 const trip_gl_limits *trip_gl_context_limits(const trip_gl_context *c);
 
 /* Reports what GL has recorded since the last check: out of memory, a lost context, or an error of

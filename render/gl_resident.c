@@ -240,8 +240,8 @@ int trip_gl_resident_load(trip_gl_resident *r, const trip_dataset *data, unsigne
     if (!status)
         status = take_arrays(&a, planes & 1u << TRIP_PLANE_NORMALS);
     if (!status)
-        status =
-            trip_reader_create(&reader, data, &(trip_reader_params){ .planes = planes }, r->budget);
+        status = trip_reader_create(
+            &reader, data, &(trip_reader_params){ .planes = planes, .slots = 2 }, r->budget);
     if (!status)
         status = load_lists(r, &a, reader);
     trip_reader_destroy(reader);
