@@ -1,0 +1,54 @@
+"""--memory is a promise: bricking a raw volume larger than it, and drawing the data set, stay within
+it and the program's own size."""
+import os
+import unittest
+
+import numpy
+
+import program
+
+MIB = 1 << 20
+PROGRAM_BYTES = 56 * MIB  # the program, its libraries, its threads' stacks
+
+
+def peak_rss(*arguments):
+    """Of a run that works, in bytes."""
+    process = program.start(*arguments)
+    err = process.stderr.read().decode()
+    process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    process.stdout.close()
+    process.stderr.close()
+    assert process.returncode == 0, err
+    return usage.ru_maxrss * 1024
+
+
+@unittest.skipIf(program.SANITIZED, "sanitizers take memory of their own")
+class Memory(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        slice_ = numpy.random.default_rng(1).integers(0, 256, (512, 512), "u1")
+        slice_[slice_ < 246] = 0
+        with open("large.raw", "wb") as f:
+            for z in range(1024):
+                f.write(numpy.roll(slice_, (z, 7 * z), (0, 1)).tobytes())
+        cls.raw = ("brick", "large.raw", "--size", "512,512,1024", "-q", "--force")
+
+    def test_bricking_and_drawing_a_volume_of_256_mib_with_64(self):
+        self.assertEqual(os.path.getsize("large.raw"), 256 * MIB)
+        for envelope in [], ["--range=250:255", "--no-normals"]:
+            rss = peak_rss(*self.raw, "-o", "a.trip", "--memory", "64M", *envelope)
+            self.assertLess(rss, 64 * MIB + PROGRAM_BYTES, envelope)
+        for output in "a.png", "a.exr":
+            rss = peak_rss("render", "a.trip", "-o", output, "--memory", "64M", "--size", "300x300")
+            self.assertLess(rss, 64 * MIB + PROGRAM_BYTES)
+
+    def test_a_small_volume_takes_little_however_much_it_may(self):
+        program.write_nrrd("small.nrrd", program.noise((30, 40, 50)))
+        self.assertLess(peak_rss("brick", "small.nrrd", "-o", "small.trip", "-q"), 120 * MIB)
+
+
+if __name__ == "__main__":
+    program.main()

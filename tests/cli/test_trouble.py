@@ -1,0 +1,197 @@
+"""A machine in the way: no rights, a full disk, too little memory, Ctrl-C, a closed standard output.
+One line, exit status 1, and nothing under the final name."""
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+import program
+
+NOBODY = 65534
+ROOT = os.getuid() == 0
+
+
+def leftovers():
+    return sorted(n for n in os.listdir(".") if "out" in n)
+
+
+class Trouble(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        os.chmod(".", 0o755)
+        subprocess.run([program.GENERATE, "cloud", "--size", "160", "-o", "cloud.nrrd"], check=True)
+        program.write_nrrd("small.nrrd", program.noise((20, 30, 40)))
+        for name in "cloud", "small":
+            run = program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--keep-all")
+            assert run.returncode == 0, run.stderr
+
+    # Rights
+
+    def as_nobody(self, *arguments):
+        """Like fails(1, ...), by a user who may not."""
+        identity = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if ROOT else {}
+        try:
+            run = program.call("--version", **identity)
+        except PermissionError:
+            run = None
+        if not run or run.returncode:
+            self.skipTest("another user cannot run the program where it lies")
+        self.fails(1, *arguments, **identity)
+
+    def test_unreadable_input(self):
+        shutil.copy("small.nrrd", "secret.nrrd")
+        shutil.copytree("small.trip", "secret.trip")
+        shutil.copytree("small.trip", "part.trip")
+        os.chmod("secret.nrrd", 0)
+        os.chmod("secret.trip", 0)
+        os.chmod("part.trip/y.voxels", 0)
+        folder = tempfile.mkdtemp(prefix="trip-cli-")
+        os.chmod(folder, 0o777)
+        try:
+            self.as_nobody("brick", "secret.nrrd", "-o", f"{folder}/a.trip", "-q")
+            self.as_nobody("render", "secret.trip", "-o", f"{folder}/a.png")
+            self.as_nobody("render", "part.trip", "-o", f"{folder}/a.png")
+            self.as_nobody("info", "--verify", "part.trip")
+            self.assertEqual(os.listdir(folder), [])
+        finally:
+            os.chmod("secret.trip", 0o755)
+            shutil.rmtree(folder)
+
+    def test_folder_that_may_not_be_written(self):
+        os.makedirs("locked", exist_ok=True)
+        os.chmod("locked", 0o555)
+        self.as_nobody("brick", "small.nrrd", "-o", "locked/out.trip", "-q")
+        self.as_nobody("render", "small.trip", "-o", "locked/out.png", "--size", "20x20")
+        self.assertEqual(os.listdir("locked"), [])
+
+    def test_outputs_that_cannot_be(self):
+        for output in "missing/out.trip", "small.nrrd/out.trip", "/proc/out.trip", "n" * 300 + ".trip", "/":
+            self.fails(1, "brick", "small.nrrd", "-o", output, "-q")
+        os.makedirs("folder.png", exist_ok=True)
+        for output in "missing/out.png", "small.nrrd/out.png", "/proc/out.png", "n" * 300 + ".png", \
+                "folder.png", "small.trip/x/out.png":
+            self.fails(1, "render", "small.trip", "-o", output, "--size", "20x20")
+        os.symlink("/dev/full", "a-link")
+        for stats in "missing/out.json", "a-link", "folder.png", "small.nrrd/s":
+            self.fails(1, "render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", stats)
+        self.assertTrue(os.path.islink("a-link"))
+
+    # Disk
+
+    def test_full_disk(self):
+        if not ROOT:
+            self.skipTest("only root can mount a small file system")
+        os.makedirs("disk", exist_ok=True)
+        mount = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", "disk"],
+                               capture_output=True, check=False)
+        if mount.returncode:
+            self.skipTest("this machine lets nobody mount a file system")
+        try:
+            self.fails(1, "brick", "cloud.nrrd", "-o", "disk/out.trip", "-q", says="space left on the d")
+            self.assertEqual(os.listdir("disk"), [])
+            with open("disk/filler", "wb") as f:
+                f.write(bytes((2 << 20) - 40000))
+            for extension in "png", "tif", "exr", "jpg":
+                self.fails(1, "render", "small.trip", "-o", f"disk/out.{extension}", "--size",
+                           "900x900", "--background", "0.3,0.5,0.7")
+            self.assertEqual(os.listdir("disk"), ["filler"])
+        finally:
+            subprocess.run(["umount", "disk"], check=True)
+
+    def test_standard_output_full_or_closed(self):
+        for arguments in ("info", "small.trip"), ("info", "--json", "small.trip"), ("--help",), \
+                ("render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", "-"), \
+                ("brick", "small.nrrd", "-o", "small2.trip", "--force"):
+            with open("/dev/full", "w") as full:
+                self.fails(1, *arguments, stdout=full, says="standard output")
+            self.fails(1, *arguments, stdout=None, preexec_fn=lambda: os.close(1),
+                       says="standard output")
+        self.works("info", "--verify", "small2.trip")
+
+    def test_closed_standard_error_does_not_end_in_the_data(self):
+        run = subprocess.run([program.PROGRAM, "brick", "small.nrrd", "-o", "quiet.trip"], check=False,
+                             preexec_fn=lambda: [os.close(fd) for fd in range(3)])
+        self.assertEqual(run.returncode, 1)
+        self.works("info", "--verify", "quiet.trip")
+
+    # Memory
+
+    def test_too_little_memory(self):
+        for size in "1", "1K", "1M", "4M":
+            self.fails(1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", size)
+        for renderer in "cpu", "reference":
+            self.fails(1, "render", "cloud.trip", "-o", "out.png", "--memory", "1M", "--renderer",
+                       renderer)
+        self.fails(1, "render", "cloud.trip", "-o", "out.png", "--memory", "64M", "--size",
+                   "60000x60000")
+        self.assertEqual(leftovers(), [])
+
+    def test_the_memory_that_is_asked_for_is_enough(self):
+        """The message says how much; with that it goes."""
+        run = self.fails(1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", "5M",
+                         "--threads", "2")
+        needed = run.stderr.split("--memory ")[1].split()[0]
+        self.works("brick", "cloud.nrrd", "-o", "enough.trip", "-q", "--memory", needed, "--threads",
+                   "2", "--keep-all")
+        self.works("info", "--verify", "enough.trip")
+        shutil.rmtree("enough.trip")
+
+    # Ctrl-C
+
+    def interrupt(self, delay, signals, *arguments):
+        process = program.start(*arguments)
+        time.sleep(delay)
+        for number in signals:
+            process.send_signal(number)
+        try:
+            _, err = process.communicate(timeout=20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            self.fail(f"goes on after Ctrl-C: {arguments}")
+        return process.returncode, err.decode()
+
+    def check_interrupted(self, signals, *arguments):
+        """At several moments; at least once it must have come before the end."""
+        met = 0
+        for delay in 0.03, 0.1, 0.2, 0.4, 0.8, 1.6:
+            status, err = self.interrupt(delay, signals, *arguments)
+            if status == 0:
+                break
+            if status == 1:
+                self.assertRegex(err, r"\Atriptych: [^\n]*interrupted[^\n]*\n\Z")
+            else:  # before the handler was there
+                self.assertEqual(status, -signals[0])
+                self.assertEqual(err, "")
+            self.assertFalse(os.path.exists(arguments[3]))
+            met += status == 1
+        self.assertGreater(met, 0)
+
+    def test_interrupted_bricking(self):
+        for number in signal.SIGINT, signal.SIGTERM:
+            self.check_interrupted([number], "brick", "cloud.nrrd", "-o", "out.trip", "--keep-all",
+                                   "--threads", "1")
+            shutil.rmtree("out.trip", ignore_errors=True)
+        self.works("brick", "cloud.nrrd", "-o", "out.trip", "-q")
+        self.works("info", "--verify", "out.trip")
+        self.assertEqual(leftovers(), ["out.trip"])
+        shutil.rmtree("out.trip")
+
+    def test_interrupted_drawing(self):
+        self.check_interrupted([signal.SIGINT], "render", "cloud.trip", "-o", "out.png", "--renderer",
+                               "reference", "--size", "600x600")
+        if os.path.exists("out.png"):
+            os.remove("out.png")
+        self.assertEqual(leftovers(), [])
+        self.check_interrupted([signal.SIGINT], "render", "cloud.trip", "-o", "turn.png", "--orbit",
+                               "400", "--size", "200x200")
+        for name in os.listdir("."):
+            self.assertNotRegex(name, r"\.tmp$|partial")
+
+
+if __name__ == "__main__":
+    program.main()
