@@ -1,0 +1,79 @@
+"""What a frame does not need is not read, and counted; the picture is the same to the bit."""
+import re
+
+import limits
+
+
+def bytes_read(stats):
+    return sum(axis["bytes_read"] for axis in stats["frames"][0]["lists"].values())
+
+
+class Hidden(limits.Test):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.tf = cls.path("solid.tf")
+        with open(cls.tf, "w") as f:
+            f.write("# value r g b opacity\n0 0.3 0.5 0.9 0.9\n255 1 0.8 0.4 0.999\n")
+
+    def test_at_least_half_of_an_opaque_scene_is_not_read(self):
+        n = limits.option("size", 192)
+        volume = self.generate("dense.nrrd", "marschner-lobb", n)
+        data = self.brick(volume, "dense.trip", "--keep-all", "--tf", self.tf)
+        view = ["--tf", self.tf]
+        if n <= 256:  # close by: the edges of what is so small, and the ring, are most of it
+            view += ["--fov", 60, "--look", f"{n / 2},{n / 2},{n / 2}", "--eye",
+                     f"{n / 2},{-n / 3},{n / 2}"]
+        drawn, wanted = self.stats(data, *view, "--hidden", "draw", size="512x512")
+        skipped, picture = self.stats(data, *view, "--hidden", "skip", size="512x512")
+        self.assertEqual(picture, wanted)
+        share = bytes_read(skipped) / bytes_read(drawn)
+        self.tell(f"{limits.text_bytes(bytes_read(drawn))} without, "
+                  f"{limits.text_bytes(bytes_read(skipped))} with skipping: {100 * share:.0f} %")
+        self.assertLessEqual(share, 0.5)
+        self.assertGreater(skipped["frames"][0]["bytes_skipped"], 0)
+        self.assertGreater(skipped["frames"][0]["runs_skipped"], 0)
+        self.assertEqual(drawn["frames"][0]["bytes_skipped"], 0)
+        r = self.works("triptych", "render", data, "-o", self.path("p.png"), "--size", "512x512",
+                       "--explain", "--hidden", "skip", *view)
+        self.assertRegex(r.out, r"hidden +[\d.]+ [kMG]?B in \d+ runs not read")
+
+    def explained(self, data, *arguments):
+        r = self.works("triptych", "render", data, "-o", self.path("p.png"), "--size", "160x120",
+                       "--explain", "--hidden", "draw", *arguments)
+        left_out = [0, 0, 0]
+        for found in re.finditer(r"left out: (\d+) transparent, (\d+) out of view, (\d+) without",
+                                 r.out):
+            left_out = [a + int(b) for a, b in zip(left_out, found.groups())]
+        return r.out, left_out
+
+    def test_transparent_bricks_and_those_out_of_view_are_not_read(self):
+        volume = self.generate("cloud.nrrd", "cloud", 96)
+        data = self.brick(volume, "cloud.trip", "--keep-all", "--tile", 16, "--tf", self.tf)
+        faint = self.path("faint.tf")
+        with open(faint, "w") as f:
+            f.write("0 0 0 0 0\n100 0 0 0 0\n101 1 1 1 0.5\n255 1 1 1 0.5\n")
+        everything = bytes_read(self.stats(data, "--tf", self.tf, "--h", "0.99")[0])
+        for arguments, which in [(["--tf", faint, "--h", "0.99"], 0),
+                                 (["--tf", self.tf, "--h", "0.99", "--fov", "10",
+                                   "--eye", "48,-200,48", "--look", "20,48,20"], 1)]:
+            left_out = self.explained(data, *arguments)[1]
+            self.assertGreater(left_out[which], 0)
+            stats = self.stats(data, *arguments)[0]
+            self.assertLess(bytes_read(stats), everything)
+            counted = stats["frames"][0]["lists"].values()
+            name = ["bricks_transparent", "bricks_outside"][which]
+            self.assertEqual(sum(axis[name] for axis in counted), left_out[which])
+
+    def test_normals_are_read_only_for_shading(self):
+        volume = self.generate("lobes.nrrd", "marschner-lobb", 64)
+        data = self.brick(volume, "lobes.trip", "--keep-all")
+        shaded = bytes_read(self.stats(data)[0])
+        plain = bytes_read(self.stats(data, "--no-shading")[0])
+        self.assertEqual(shaded, 2 * plain)
+        self.assertIn("normal planes are read", self.explained(data)[0])
+        self.assertNotIn("normal planes are read", self.explained(data, "--no-shading")[0])
+
+
+if __name__ == "__main__":
+    limits.main()

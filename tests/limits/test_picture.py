@@ -1,0 +1,86 @@
+"""The program's picture is the same to the bit for any memory, engine, tiles, threads and caches."""
+import os
+import random
+
+import limits
+
+TILES = [16, 32, 64, 128]
+
+
+class Picture(limits.Test):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.random = random.Random(1)
+
+    def combinations(self, renderer, count):
+        """One thing at a time, then all of them by chance."""
+        memory = ["64M", "100M", "1G", "100G"]
+        engines = ["io_uring", "pread", "null"]
+        threads = range(1, 9)
+        yield from (["--memory", m] for m in memory)
+        yield from (["--engine", e] for e in engines)
+        yield from (["--threads", n] for n in threads)
+        hidden = ["skip", "draw"] if renderer == "cpu" else []
+        yield from (["--hidden", h] for h in hidden)
+        for _ in range(count):
+            choice = ["--memory", self.random.choice(memory), "--engine",
+                      self.random.choice(engines), "--threads", self.random.choice(threads)]
+            yield choice + (["--hidden", self.random.choice(hidden)] if hidden else [])
+
+    def check(self, sets, renderer, view, count):
+        size = "90x70"
+        wanted = self.draw(sets[0], *view, renderer=renderer, size=size)
+        for data in sets[1:]:
+            self.assertEqual(self.draw(data, *view, renderer=renderer, size=size), wanted, data)
+        for arguments in self.combinations(renderer, count):
+            data = self.random.choice(sets)
+            if self.random.random() < 0.5:
+                limits.forget_pages(data)
+            self.assertEqual(self.draw(data, *view, *arguments, renderer=renderer, size=size),
+                             wanted, f"{renderer} {data} {view} {arguments}")
+
+    def check_volume(self, volume, name, view, *brick):
+        sets = [self.brick(volume, f"{name}{n}.trip", "--tile", n, *brick) for n in TILES]
+        slabs = self.brick(volume, f"{name}-slabs.trip", "--slab-sheets", 3, *brick)
+        for renderer, count in ("cpu", 16), ("reference", 1):
+            self.check(sets + [slabs], renderer, view, count)
+
+    def test_of_a_scan(self):
+        self.check_volume(os.path.join(limits.DATASETS, "tooth.nhdr"), "tooth", [])
+
+    def test_inside_shells_with_both_sides_of_every_list(self):
+        view = ["--h", "0.3", "--fov", "75", "--eye", "60,50,55", "--look", "30,40,50"]
+        volume = self.generate("shells.nrrd", "shells", "80x70x90", "--type", "uint16")
+        self.check_volume(volume, "shells", view, "--tf", "preset:bone", "--keep-all")
+
+    def test_of_later_frames_that_a_cache_serves(self):
+        data = self.brick(self.generate("cloud.nrrd", "cloud", "80"), "cloud.trip")
+        wanted = None
+        for engine in "io_uring", "pread", "null":
+            for memory in "64M", "4G":
+                self.works("triptych", "render", data, "-o", self.path("o.exr"), "--orbit", 5,
+                           "--size", "100x80", "--renderer", "cpu", "--engine", engine, "--memory",
+                           memory)
+                hashes = [limits.picture_hash(self.path(f"o-{i:03}.exr")) for i in range(5)]
+                wanted = wanted or hashes
+                self.assertEqual(hashes, wanted, f"{engine} {memory}")
+
+    def test_where_the_kernel_refuses_io_uring(self):
+        data = self.brick(os.path.join(limits.DATASETS, "tooth.nhdr"), "refused.trip")
+        refused = {"preexec_fn": limits.refuse_io_uring}
+        try:
+            limits.run("triptych", "--version", **refused)
+        except Exception as e:  # what subprocess makes of an error in preexec_fn
+            self.skipTest(f"system call filters are not allowed here: {e}")
+        self.assertEqual(self.draw(data, **refused), self.draw(data))
+        r = self.works("triptych", "render", data, "-o", self.path("p.exr"), "--size", "32x32",
+                       "--stats", "-", **refused)
+        self.assertIn('"engine":\t"pread', r.out)
+        self.fails("triptych", "render", data, "-o", self.path("q.exr"), "--engine", "io_uring",
+                   says=["io_uring", "another engine"], **refused)
+        self.assertFalse(os.path.exists(self.path("q.exr")))
+
+
+if __name__ == "__main__":
+    limits.main()

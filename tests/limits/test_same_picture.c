@@ -1,0 +1,191 @@
+/* The pictures of the reference and the CPU renderer have the same bits whatever tiles, slabs,
+ * rings, engines, caches and threads brought the bytes, in whatever order reads end. */
+#include "cpu_renderer.h"
+#include "renderer_choice.h"
+#include "scenes.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { SIZE = 64, VIEWS = 3, TRIALS = 12 };
+
+static const size_t picture_bytes = (size_t)SIZE * SIZE * 4 * sizeof(float);
+
+static uint64_t next_random(uint64_t *state)
+{
+    *state += 0x9e3779b97f4a7c15u;
+    uint64_t x = *state;
+    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
+    return x ^ x >> 31;
+}
+
+static unsigned pick(uint64_t *state, unsigned count)
+{
+    return (unsigned)(next_random(state) % count);
+}
+
+/* A solid core in a translucent, ragged cloud: some bricks hide others, some are transparent. */
+static bool cloudy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    double x = (i - 35) / 35.0, y = (j - 20) / 20.0, z = (k - 25) / 25.0;
+    uint32_t hash = scene_hash(i, j, k);
+    (void)user;
+    gradient[0] = x;
+    gradient[1] = y;
+    gradient[2] = z;
+    *code = x * x + y * y + z * z < 0.7 ? 65535 : hash % 50000;
+    return *code == 65535 || hash % 3 != 0;
+}
+
+static void create_scene(scene *s, unsigned tile, unsigned slab)
+{
+    scene_create(s, &(scene_params){ .dims = { 70, 40, 50 },
+                                     .tile_voxels = tile,
+                                     .slab_sheets = slab,
+                                     .normals = true,
+                                     .voxel = cloudy });
+    scene_colour(s, 10000, 49999, 1, 0.4, 0.1, 0.02);
+    scene_colour(s, 65535, 65535, 0.2, 0.6, 1, 0.99);
+}
+
+/* From far away, near by, and inside, where a list has two sides. */
+static trip_camera_params view_of(const scene *s, int view)
+{
+    static const struct {
+        trip_vec3 direction;
+        double distance, fov_degrees;
+    } views[VIEWS] = { { { 1, 0.9, -0.8 }, 110, 40 },
+                       { { -0.1, 1, 0.05 }, 45, 40 },
+                       { { 0.5, -0.4, 1 }, 21, 110 } };
+    return scene_view(s, views[view].direction, views[view].distance, views[view].fov_degrees,
+                      SIZE);
+}
+
+/* One in eight reads ends up to two milliseconds late. */
+static long delay(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    static _Atomic uint32_t calls;
+    uint64_t state = offset + bytes + calls++ + *(const uint64_t *)user;
+    (void)data;
+    if (next_random(&state) % 8 == 0)
+        nanosleep(&(struct timespec){ .tv_nsec = (long)(next_random(&state) % 2000000) }, NULL);
+    return result;
+}
+
+/* How one picture comes about. */
+typedef struct trial {
+    unsigned tile, slab, threads;
+    bool skip;
+    int frames; /* drawn one after the other by the same reader, the last counts */
+    trip_reader_params reader;
+} trial;
+
+static trial random_trial(uint64_t *random)
+{
+    static const unsigned tiles[] = { 16, 32, 64, 128 }, slabs[] = { 1, 5, 8, 64 };
+    static const unsigned slots[] = { 2, 3, 5, 8, 17, 64 };
+    static const trip_engine engines[] = { TRIP_ENGINE_AUTO, TRIP_ENGINE_PREAD, TRIP_ENGINE_NULL };
+    trial t = { .tile = tiles[pick(random, 4)],
+                .slab = slabs[pick(random, 4)],
+                .threads = 1 + pick(random, 8),
+                .skip = pick(random, 2),
+                .frames = 1 + (int)pick(random, 2) };
+    t.reader = (trip_reader_params){ .engine = engines[pick(random, 3)],
+                                     .slots = slots[pick(random, 6)],
+                                     .slot_bytes = (size_t)16384 << pick(random, 3),
+                                     .gap_bytes = (size_t)4096 << pick(random, 8),
+                                     .threads = 1 + pick(random, 8),
+                                     .buffered = pick(random, 2),
+                                     .cache_bytes = (size_t)pick(random, 3) << 20,
+                                     .fault = pick(random, 2) ? delay : NULL };
+    return t;
+}
+
+static void print_trial(const trial *t)
+{
+    const trip_reader_params *r = &t->reader;
+    print_message("tile %u slab %u, %u threads, skip %d, frames %d; engine %d, %u slots of %zu, "
+                  "gap %zu, %u threads, buffered %d, cache %zu, delays %d\n",
+                  t->tile, t->slab, t->threads, t->skip, t->frames, (int)r->engine, r->slots,
+                  r->slot_bytes, r->gap_bytes, r->threads, r->buffered, r->cache_bytes,
+                  r->fault != NULL);
+}
+
+static void draw(const scene *s, trip_renderer_kind kind, const trial *t, int view, float *rgba,
+                 trip_frame_stats *stats)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_renderer *renderer;
+    trip_reader *reader;
+    uint64_t random = t->slab + t->tile;
+    trip_reader_params params = t->reader;
+    trip_settings settings = trip_settings_default();
+    trip_camera_params looking = view_of(s, view);
+    settings.h = 0.4;
+    assert_int_equal(trip_camera_make(&camera, &looking, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
+    assert_int_equal(trip_renderer_create(&renderer, kind, t->threads, s->budget), 0);
+    params.planes = plan.planes;
+    params.skip = t->skip ? trip_cpu_covered : NULL;
+    params.skip_user = renderer;
+    params.fault_user = &random;
+    assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
+    trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
+    };
+    for (int i = 0; i < t->frames; i++)
+        assert_int_equal(trip_frame_draw(renderer, reader, &frame, rgba, stats), 0);
+    trip_reader_destroy(reader);
+    renderer->ops->destroy(renderer);
+    trip_plan_release(&plan, s->budget);
+}
+
+static void check_renderer(trip_renderer_kind kind)
+{
+    static float wanted[VIEWS][SIZE * SIZE * 4], rgba[SIZE * SIZE * 4];
+    trip_frame_stats stats;
+    uint64_t skipped = 0, random = (uint64_t)kind;
+    scene s;
+    create_scene(&s, 64, 8);
+    for (int view = 0; view < VIEWS; view++)
+        draw(&s, kind, &(trial){ .threads = 1, .frames = 1 }, view, wanted[view], &stats);
+    scene_destroy(&s);
+    for (int i = 0; i < TRIALS; i++) {
+        trial t = random_trial(&random);
+        create_scene(&s, t.tile, t.slab);
+        for (int view = 0; view < VIEWS; view++) {
+            draw(&s, kind, &t, view, rgba, &stats);
+            skipped += stats.reader.bytes_skipped;
+            if (memcmp(rgba, wanted[view], picture_bytes) != 0)
+                print_trial(&t);
+            assert_memory_equal(rgba, wanted[view], picture_bytes);
+        }
+        scene_destroy(&s);
+    }
+    assert_int_equal(skipped > 0, kind == TRIP_RENDERER_CPU);
+}
+
+static void the_reference_picture_does_not_depend_on_how_it_is_read(void **state)
+{
+    (void)state;
+    check_renderer(TRIP_RENDERER_REFERENCE);
+}
+
+static void the_cpu_picture_does_not_depend_on_how_it_is_read(void **state)
+{
+    (void)state;
+    check_renderer(TRIP_RENDERER_CPU);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_reference_picture_does_not_depend_on_how_it_is_read),
+        cmocka_unit_test(the_cpu_picture_does_not_depend_on_how_it_is_read),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,115 @@
+"""On a terminal: progress with rate and time left, and Ctrl-C, which stops cleanly."""
+import os
+import pty
+import re
+import signal
+import subprocess
+import threading
+
+import limits
+
+# An error clears what is left of the progress line in its place.
+END = r"\x1b\[K\r\n(\r\x1b\[K)?\Z"
+
+
+class Terminal(limits.Test):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.volume = cls.path("v.nrrd")
+        limits.run("triptych-generate", "marschner-lobb", "--size", "128", "-o", cls.volume)
+        cls.data = cls.path("d.trip")
+        limits.run("triptych", "brick", cls.volume, "-o", cls.data, "-q", "--keep-all", "--tf",
+                   "preset:xray")
+        cls.picture = cls.path("p.exr")
+        cls.work = cls.path("work")
+        os.mkdir(cls.work)
+
+    def on_terminal(self, arguments, until=None, keys=b""):
+        """Exit status and all that was shown; types `keys` once `until` is to be seen."""
+        child, terminal = pty.fork()
+        if child == 0:
+            os.execv(limits.program("triptych"), ["triptych", *map(str, arguments)])
+        watch = threading.Timer(limits.HANGS_SECONDS, os.kill, [child, signal.SIGKILL])
+        watch.start()
+        shown = b""
+        typed = until is None
+        while True:
+            try:
+                more = os.read(terminal, 65536)
+            except OSError:  # its end
+                break
+            if not more:
+                break
+            shown += more
+            if not typed and re.search(until, shown):
+                os.write(terminal, keys)
+                typed = True
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        watch.cancel()
+        os.close(terminal)
+        self.assertTrue(typed, shown)
+        return status, shown.decode()
+
+    def slow_frame(self):
+        """Takes many seconds with every ray near the splats' centres."""
+        return ["render", self.data, "-o", self.picture, "--renderer", "reference", "--size",
+                "1500x1500", "--kernel-radius", "3", "--tf", "preset:xray"]
+
+    def test_a_long_frame_shows_rate_and_time_left_and_ctrl_c_ends_it(self):
+        line = rb"draw +\d+ %  [\d.]+ million splats/s  \d+:\d\d left"
+        status, shown = self.on_terminal(self.slow_frame(), line, b"\x03")
+        self.assertEqual(status, 1, shown)
+        self.assertRegex(shown, r"triptych: render: [^\n]*interrupted" + END)
+        self.assertEqual([n for n in os.listdir(self.folder) if n.startswith("p.")], [])
+
+    def test_a_second_ctrl_c_ends_it_at_once(self):
+        status, shown = self.on_terminal(self.slow_frame(), rb"draw", b"\x03\x03")
+        self.assertIn(status, (1, -signal.SIGINT), shown)
+        self.assertFalse(os.path.exists(self.picture))
+
+    def test_terminated_like_interrupted(self):
+        child = subprocess.Popen([limits.program("triptych"), *self.slow_frame()],
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                 stderr=subprocess.PIPE, text=True)
+        try:
+            child.wait(1)
+            self.fail("the frame is not long enough")
+        except subprocess.TimeoutExpired:
+            child.terminate()
+        out, err = child.communicate()
+        self.assertEqual((child.returncode, out), (1, ""))
+        self.assertRegex(err, r"\Atriptych: render: [^\n]*interrupted\n\Z")
+        self.assertFalse(os.path.exists(self.picture))
+
+    def test_in_a_pipe_nothing_is_shown_on_the_way(self):
+        r = self.works("triptych", "render", self.data, "-o", self.picture, "--renderer",
+                       "reference", "--size", "300x300")
+        self.assertEqual(r.out.count("\n"), 1)
+        os.remove(self.picture)
+
+    def interrupt_brick(self, until):
+        name = os.path.join(self.work, "i.trip")
+        status, shown = self.on_terminal(["brick", self.volume, "-o", name, "--keep-all",
+                                          "--threads", 1], until, b"\x03")
+        if status == 0:  # was quicker
+            return False
+        self.assertEqual(status, 1, shown)
+        self.assertRegex(shown, r"triptych: [^\n]*interrupted[^\n]*" + END)
+        self.assertFalse(os.path.exists(name))
+        self.works("triptych", "brick", self.volume, "-o", name, "--keep-all", "-q", "--resume")
+        return True
+
+    def test_ctrl_c_ends_brick_and_resume_finishes_it(self):
+        name = os.path.join(self.work, "i.trip")
+        wanted = limits.folder_hashes(self.brick(self.volume, "w.trip", "--keep-all"))
+        for stage in rb"scan", rb"read", rb"merge":
+            if self.interrupt_brick(stage):
+                self.assertEqual(limits.folder_hashes(name), wanted)
+                self.assertEqual(os.listdir(self.work), ["i.trip"])
+            for left in os.listdir(self.work):
+                subprocess.run(["rm", "-r", os.path.join(self.work, left)], check=True)
+
+
+if __name__ == "__main__":
+    limits.main()
