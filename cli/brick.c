@@ -34,6 +34,7 @@ enum key {
     KEY_THREADS,
     KEY_FORCE,
     KEY_RESUME,
+    KEY_DRY_RUN,
     KEY_JSON,
 };
 
@@ -42,7 +43,7 @@ typedef struct options {
     const char *functions[MAX_FUNCTIONS];
     trip_value_range ranges[MAX_RANGES];
     char *default_output; /* freed at the end */
-    bool quiet, json;
+    bool quiet, json, dry_run;
 } options;
 
 static const struct argp_option option_table[] = {
@@ -71,6 +72,7 @@ static const struct argp_option option_table[] = {
     { "json", KEY_JSON, NULL, 0, "Print the summary as JSON", 3 },
     { "quiet", 'q', NULL, 0, "Print no progress and no summary", 3 },
     { NULL, 0, NULL, 0, "Resources:", 4 },
+    { "dry-run", KEY_DRY_RUN, NULL, 0, "Only estimate size and time, from parts of the input", 4 },
     { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
       4 },
     { "threads", KEY_THREADS, "N", 0, "Threads (default: one a processor)", 4 },
@@ -241,6 +243,8 @@ static error_t check_options(const options *o)
         return trip_option_fail("INPUT", "no volume given");
     if (p->keep_all && p->range_count)
         return trip_option_fail("--range", "says nothing beside --keep-all");
+    if (o->dry_run && p->resume)
+        return trip_option_fail("--resume", "says nothing beside --dry-run");
     if (o->quiet && o->json)
         return trip_option_fail("--json", "prints nothing beside --quiet");
     return 0;
@@ -256,6 +260,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return parse_range(o, argument);
     case KEY_KEEP_ALL:
         o->brick.keep_all = true;
+        return 0;
+    case KEY_DRY_RUN:
+        o->dry_run = true;
         return 0;
     case KEY_MEMORY:
         return trip_option_bytes("--memory", argument, &o->brick.memory_bytes);
@@ -312,6 +319,17 @@ static void add_number(cJSON *object, const char *name, double value)
     cJSON_AddItemToObject(object, name, cJSON_CreateRaw(trip_text_from_double(value, text)));
 }
 
+static int print_object(cJSON *root, const options *o)
+{
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (!text)
+        return trip_fail(TRIP_ERROR, "brick", o->brick.output, "out of memory");
+    puts(text);
+    free(text);
+    return 0;
+}
+
 static int print_json(const options *o, const trip_brick_summary *s)
 {
     cJSON *root = cJSON_CreateObject();
@@ -339,13 +357,7 @@ static int print_json(const options *o, const trip_brick_summary *s)
     add_number(root, "memory_bytes", (double)s->memory_bytes);
     add_number(root, "peak_memory_bytes", (double)s->peak_memory_bytes);
     add_number(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
-    char *text = cJSON_Print(root);
-    cJSON_Delete(root);
-    if (!text)
-        return trip_fail(TRIP_ERROR, "brick", o->brick.output, "out of memory");
-    puts(text);
-    free(text);
-    return 0;
+    return print_object(root, o);
 }
 
 static void print_text(const options *o, const trip_brick_summary *s)
@@ -371,22 +383,64 @@ static void print_text(const options *o, const trip_brick_summary *s)
            trip_format_bytes(s->memory_bytes, promise));
 }
 
-static int brick(options *o)
+static int print_estimate_json(const options *o, const trip_brick_estimate *e)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "output", o->brick.output);
+    add_number(root, "voxels", (double)e->voxels);
+    add_number(root, "kept", (double)e->kept);
+    add_number(root, "bytes", (double)e->bytes);
+    add_number(root, "temporary_bytes", (double)e->temporary_bytes);
+    add_number(root, "free_bytes", (double)e->free_bytes);
+    add_number(root, "seconds", e->seconds);
+    return print_object(root, o);
+}
+
+static void print_estimate(const options *o, const trip_brick_estimate *e)
+{
+    char bytes[32], temporary[32], there[32];
+    printf("%-9s %s\n", "data set", o->brick.output);
+    printf("%-9s about %.3g of %.3g voxels\n", "keeps", (double)e->kept, (double)e->voxels);
+    printf("%-9s about %s, %s of temporary data; %s are free\n", "takes",
+           trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),
+           trip_format_bytes(e->free_bytes, there));
+    printf("%-9s about %.3g s\n", "time", e->seconds);
+}
+
+static int dry_run(const options *o)
+{
+    trip_brick_estimate e;
+    int status = trip_brick_estimate_make(&o->brick, &e);
+    if (status < 0 || o->quiet)
+        return status;
+    if (o->json)
+        return print_estimate_json(o, &e);
+    print_estimate(o, &e);
+    return 0;
+}
+
+static int brick(const options *o)
 {
     trip_brick_summary summary;
-    trip_progress progress = trip_progress_start(o->quiet);
-    o->brick.functions = o->functions;
-    o->brick.ranges = o->ranges;
-    o->brick.progress = on_progress;
-    o->brick.progress_user = &progress;
     int status = trip_brick(&o->brick, &summary);
-    trip_progress_end(&progress);
     if (status < 0 || o->quiet)
         return status;
     if (o->json)
         return print_json(o, &summary);
     print_text(o, &summary);
     return 0;
+}
+
+static int run(options *o)
+{
+    trip_progress progress = trip_progress_start(o->quiet);
+    o->brick.functions = o->functions;
+    o->brick.ranges = o->ranges;
+    o->brick.progress = on_progress;
+    o->brick.progress_user = &progress;
+    int status = o->dry_run ? dry_run(o) : brick(o);
+    trip_progress_end(&progress);
+    return status;
 }
 
 int trip_command_brick(int argc, char **argv)
@@ -403,7 +457,7 @@ int trip_command_brick(int argc, char **argv)
     if (status == 0)
         status = choose_output(&o);
     if (status == 0)
-        status = brick(&o);
+        status = run(&o);
     free(o.default_output);
     return trip_exit_status(status);
 }

@@ -7,34 +7,23 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#include "brick_input.h"
 #include "brick_memory.h"
 #include "brick_text.h"
 #include "dataset.h"
+#include "estimate.h"
 #include "identity.h"
 #include "list_builder.h"
 #include "report.h"
 #include "resume.h"
-#include "scan.h"
 #include "splats.h"
 
 /* Everything of one run; zeroed at first, so that close() undoes any part of it. */
 typedef struct brick {
     const trip_brick_params *params;
     trip_brick_summary *summary;
-    trip_budget *budget;
-    trip_workers *workers;
-    trip_volume *volume;
-    const trip_volume_info *info;
-    uint64_t grid_voxels;  /* of the dims: what progress counts */
-    uint64_t memory_bytes; /* left once the input was opened */
-    uint64_t reader_bytes; /* that it keeps from the scan */
-
-    trip_tf **functions;
-    trip_envelope envelope;
-    bool scanned; /* the tally is of a pass before */
-    trip_tally *tally;
-    trip_histogram histogram;
-
+    trip_brick_input in;
+    uint64_t reader_bytes; /* that the volume keeps from the scan */
     trip_piece_format format;
     trip_quantiser quantiser;
     trip_memory_plan plan;
@@ -53,124 +42,26 @@ static double now_seconds(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-static void report_progress(const brick *b, const char *stage, uint64_t done, uint64_t total)
-{
-    if (b->params->progress)
-        b->params->progress(b->params->progress_user, stage, done, total);
-}
-
-static int check_dims(const brick *b)
-{
-    for (int a = 0; a < 3; a++)
-        if (b->info->dims[a] > 1 << 24)
-            return trip_fail(TRIP_ERROR, "brick", b->params->input,
-                             "more than 16777216 voxels along an axis");
-    return 0;
-}
-
-static int open_input(brick *b)
-{
-    const trip_brick_params *p = b->params;
-    int status = trip_budget_create(&b->budget, p->memory_bytes);
-    if (status == 0)
-        status = trip_workers_create(&b->workers, p->threads);
-    if (status == 0)
-        status = trip_volume_open(&b->volume, p->input, &p->volume, b->budget);
-    if (status < 0)
-        return status;
-    b->info = trip_volume_get_info(b->volume);
-    b->grid_voxels = (uint64_t)(b->info->dims[0] * b->info->dims[1] * b->info->dims[2]);
-    b->format.tile_log2 = p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6;
-    b->format.normals = !p->no_normals;
-    b->tally = trip_budget_take(b->budget, sizeof *b->tally);
-    if (!b->tally)
-        return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");
-    trip_tally_clear(b->tally);
-    b->memory_bytes = trip_budget_left_bytes(b->budget);
-    return check_dims(b);
-}
-
-static int load_functions(brick *b)
-{
-    size_t count = b->params->function_count;
-    b->functions = calloc(count + 1, sizeof *b->functions);
-    if (!b->functions)
-        return trip_fail(TRIP_ERROR, "brick", b->params->input, "out of memory");
-    int status = 0;
-    for (size_t i = 0; i < count && status == 0; i++)
-        status = trip_tf_load(&b->functions[i], b->params->functions[i]);
-    return status;
-}
-
 /* 8 and 16 bits: codes stand for all values of the type, without a look at the data. */
 static bool has_narrow_type(const brick *b)
 {
-    trip_scalar type = b->info->type;
+    trip_scalar type = b->in.info->type;
     return type == TRIP_U8 || type == TRIP_I8 || type == TRIP_U16 || type == TRIP_I16;
-}
-
-static bool is_envelope_automatic(const brick *b)
-{
-    const trip_brick_params *p = b->params;
-    return !p->keep_all && p->function_count == 0 && p->range_count == 0;
-}
-
-static bool needs_scan(const brick *b)
-{
-    bool normalised = false;
-    for (size_t i = 0; i < b->params->function_count; i++)
-        normalised = normalised || trip_tf_is_normalised(b->functions[i]);
-    return normalised || is_envelope_automatic(b);
-}
-
-static void on_scan_progress(void *user, uint64_t voxels)
-{
-    const brick *b = user;
-    report_progress(b, "scan", voxels, b->grid_voxels);
 }
 
 /* Once it was done, a run that goes on knows the result. */
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->journal);
-    uint64_t left = trip_budget_left_bytes(b->budget);
+    uint64_t left = trip_budget_left_bytes(b->in.budget);
     double begin = now_seconds();
     int status = 0;
     if (start)
-        *b->tally = start->tally;
+        trip_brick_input_set_tally(&b->in, &start->tally);
     else
-        status = trip_scan_volume(b->tally, b->volume, b->params->input, b->workers, b->plan.slices,
-                                  b->budget, on_scan_progress, b);
-    b->scanned = true;
-    b->reader_bytes = left - trip_budget_left_bytes(b->budget);
+        status = trip_brick_input_scan(&b->in, (trip_scan_params){ .slices = b->plan.slices });
+    b->reader_bytes = left - trip_budget_left_bytes(b->in.budget);
     b->summary->scan_seconds = now_seconds() - begin;
-    trip_tally_histogram(b->tally, &b->histogram);
-    for (size_t i = 0; i < b->params->function_count && status == 0; i++)
-        trip_tf_denormalise(b->functions[i], b->tally->value_min, b->tally->value_max);
-    return status;
-}
-
-static int add_automatic(brick *b)
-{
-    trip_tf *tf;
-    int status = trip_brick_automatic_tf(&tf, b->info, &b->histogram);
-    if (status < 0)
-        return status;
-    status = trip_envelope_add_tf(&b->envelope, tf);
-    trip_tf_destroy(tf);
-    return status;
-}
-
-static int make_envelope(brick *b)
-{
-    const trip_brick_params *p = b->params;
-    int status = is_envelope_automatic(b) ? add_automatic(b) : 0;
-    if (p->keep_all)
-        status = trip_envelope_add_all(&b->envelope);
-    for (size_t i = 0; i < p->range_count && status == 0; i++)
-        status = trip_envelope_add_range(&b->envelope, p->ranges[i].lo, p->ranges[i].hi);
-    for (size_t i = 0; i < p->function_count && status == 0; i++)
-        status = trip_envelope_add_tf(&b->envelope, b->functions[i]);
     return status;
 }
 
@@ -184,24 +75,25 @@ static void type_limits(trip_scalar type, double *lo, double *hi)
 /* Gradients are as steep as the range of values allows; it may be unknown. */
 static void set_quantiser(brick *b, double lo, double hi)
 {
-    double least = b->scanned ? b->tally->value_min : lo;
-    double most = b->scanned ? b->tally->value_max : hi;
+    double least = b->in.scanned ? b->in.tally->value_min : lo;
+    double most = b->in.scanned ? b->in.tally->value_max : hi;
     b->quantiser =
         (trip_quantiser){ lo, hi > lo ? hi : lo + 1,
-                          trip_gradient_bound(b->info, least, most > least ? most : least + 1) };
+                          trip_gradient_bound(b->in.info, least, most > least ? most : least + 1) };
 }
 
 /* Codes stand for the type's values, or for the range if it is known; else that is for the end. */
 static void choose_codes(brick *b)
 {
     double lo, hi;
-    type_limits(b->info->type, &lo, &hi);
-    double a = b->info->slope * lo + b->info->inter, c = b->info->slope * hi + b->info->inter;
-    b->format.quantised = has_narrow_type(b) || b->scanned;
+    type_limits(b->in.info->type, &lo, &hi);
+    double a = b->in.info->slope * lo + b->in.info->inter,
+           c = b->in.info->slope * hi + b->in.info->inter;
+    b->format.quantised = has_narrow_type(b) || b->in.scanned;
     if (has_narrow_type(b))
         set_quantiser(b, fmin(a, c), fmax(a, c));
-    else if (b->scanned)
-        set_quantiser(b, b->tally->value_min, b->tally->value_max);
+    else if (b->in.scanned)
+        set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
     else
         set_quantiser(b, 0, 1);
 }
@@ -209,8 +101,8 @@ static void choose_codes(brick *b)
 static int plan_memory(brick *b)
 {
     const trip_journal_start *start = b->journal ? trip_journal_get_start(b->journal) : NULL;
-    return trip_memory_plan_make(&b->plan, b->params->input, b->info, &b->format,
-                                 trip_workers_count(b->workers), b->memory_bytes,
+    return trip_memory_plan_make(&b->plan, b->params->input, b->in.info, &b->format,
+                                 trip_workers_count(b->in.workers), b->in.memory_bytes,
                                  start ? start->slices : b->params->slices);
 }
 
@@ -218,9 +110,9 @@ static int plan_memory(brick *b)
 static int settle_memory(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->journal);
-    int status =
-        trip_memory_plan_settle(&b->plan, b->params->input, b->info, &b->format,
-                                trip_workers_count(b->workers), trip_budget_left_bytes(b->budget));
+    int status = trip_memory_plan_settle(&b->plan, b->params->input, b->in.info, &b->format,
+                                         trip_workers_count(b->in.workers),
+                                         trip_budget_left_bytes(b->in.budget));
     b->plan.in_order = b->plan.in_order && b->format.quantised;
     if (status < 0 || !start)
         return status;
@@ -250,9 +142,10 @@ static int open_spill(brick *b)
     bool resume = b->params->resume;
     uint64_t identity;
     char *path = name_beside(b, ".spill"), *partial = name_beside(b, ".partial");
-    int status = path && partial ? trip_spill_open(&b->spill, path, resume, b->budget) : TRIP_ERROR;
+    int status =
+        path && partial ? trip_spill_open(&b->spill, path, resume, b->in.budget) : TRIP_ERROR;
     if (status == 0)
-        status = trip_brick_identity(b->params, b->functions, &identity);
+        status = trip_brick_identity(b->params, b->in.functions, &identity);
     if (status == 0 && resume)
         b->leftover = trip_leftover_take(b->spill, partial, b->format.normals);
     if (status == 0)
@@ -272,14 +165,14 @@ static int start_journal(brick *b)
     if (trip_journal_get_start(b->journal))
         return 0;
     trip_journal_start *start = calloc(1, sizeof *start);
-    if (!start || trip_brick_identity(b->params, b->functions, &start->identity) < 0) {
+    if (!start || trip_brick_identity(b->params, b->in.functions, &start->identity) < 0) {
         free(start);
         return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
     }
     start->slices = b->plan.slices;
     start->in_order = b->plan.in_order;
-    start->scanned = b->scanned;
-    start->tally = *b->tally;
+    start->scanned = b->in.scanned;
+    start->tally = *b->in.tally;
     int status = trip_journal_write_start(b->journal, start);
     free(start);
     return status;
@@ -291,12 +184,12 @@ static int open_writer(brick *b)
                              .normals = b->format.normals,
                              .tile_voxels = b->params->tile_voxels,
                              .slab_sheets = b->params->slab_sheets,
-                             .index_to_world = b->info->index_to_world,
+                             .index_to_world = b->in.info->index_to_world,
                              .code_lo = b->quantiser.lo,
                              .code_hi = b->quantiser.hi,
                              .gradient_scale = b->quantiser.gradient_scale };
-    memcpy(p.dims, b->info->dims, sizeof p.dims);
-    return trip_writer_open(&b->writer, b->params->output, &p, b->budget);
+    memcpy(p.dims, b->in.info->dims, sizeof p.dims);
+    return trip_writer_open(&b->writer, b->params->output, &p, b->in.budget);
 }
 
 static int open_builder(brick *b)
@@ -304,15 +197,15 @@ static int open_builder(brick *b)
     trip_list_builder_params p = {
         .format = b->format,
         .quantiser = b->quantiser,
-        .producers = trip_workers_count(b->workers),
+        .producers = trip_workers_count(b->in.workers),
         .in_order = b->plan.in_order,
         .memory_bytes = b->plan.list_bytes,
         .writer = b->writer,
         .spill = b->spill,
         .journal = b->journal,
     };
-    memcpy(p.dims, b->info->dims, sizeof p.dims);
-    return trip_list_builder_create(&b->builder, &p, b->budget);
+    memcpy(p.dims, b->in.info->dims, sizeof p.dims);
+    return trip_list_builder_create(&b->builder, &p, b->in.budget);
 }
 
 static void *reserve(void *user, unsigned thread, int axis, size_t bytes)
@@ -323,15 +216,15 @@ static void *reserve(void *user, unsigned thread, int axis, size_t bytes)
 
 static int open_splatter(brick *b)
 {
-    trip_splat_params p = { .info = b->info,
-                            .envelope = &b->envelope,
+    trip_splat_params p = { .info = b->in.info,
+                            .envelope = &b->in.envelope,
                             .format = b->format,
                             .quantiser = b->quantiser,
-                            .tally = !b->scanned,
-                            .threads = trip_workers_count(b->workers),
+                            .tally = !b->in.scanned,
+                            .threads = trip_workers_count(b->in.workers),
                             .reserve = reserve,
                             .user = b };
-    return trip_splatter_create(&b->splatter, &p, b->budget);
+    return trip_splatter_create(&b->splatter, &p, b->in.budget);
 }
 
 /* A run that was killed when all was done but for its temporary files. */
@@ -346,13 +239,13 @@ static bool is_done(const brick *b)
 static int summarise_done(brick *b)
 {
     trip_dataset *d;
-    int status = trip_dataset_open(&d, b->params->output, b->budget);
+    int status = trip_dataset_open(&d, b->params->output, b->in.budget);
     if (status < 0)
         return status;
-    trip_tally_clear(b->tally);
-    b->tally->voxels = b->tally->finite = d->header.voxels;
-    b->tally->value_min = d->header.value_min;
-    b->tally->value_max = d->header.value_max;
+    trip_tally_clear(b->in.tally);
+    b->in.tally->voxels = b->in.tally->finite = d->header.voxels;
+    b->in.tally->value_min = d->header.value_min;
+    b->in.tally->value_max = d->header.value_max;
     b->summary->kept = d->header.kept;
     b->summary->bytes = d->bytes - d->header.index_bytes;
     b->summary->resumed = true;
@@ -373,7 +266,7 @@ static int open_output(brick *b)
         status = open_builder(b);
     if (status == 0 && b->plan.in_order && b->summary->resumed)
         status = trip_leftover_replay(&b->leftover, b->journal,
-                                      trip_list_builder_ordered(b->builder), b->budget);
+                                      trip_list_builder_ordered(b->builder), b->in.budget);
     return status;
 }
 
@@ -388,7 +281,7 @@ static void add_up(const brick *b, trip_tally *tally, uint64_t *kept)
 {
     const trip_checkpoint *before = trip_journal_get_checkpoint(b->journal);
     *kept = trip_splatter_kept(b->splatter) + (before ? before->kept : 0);
-    if (b->scanned)
+    if (b->in.scanned)
         return;
     trip_splatter_tally(b->splatter, tally);
     if (before)
@@ -398,7 +291,7 @@ static void add_up(const brick *b, trip_tally *tally, uint64_t *kept)
 static int on_batch(void *user, uint64_t batches, uint64_t voxels)
 {
     const brick *b = user;
-    report_progress(b, "read", voxels, b->grid_voxels);
+    trip_brick_input_progress(&b->in, "read", voxels, b->in.grid_voxels);
     int full = trip_list_builder_end_batch(b->builder);
     if (full <= 0)
         return full;
@@ -412,7 +305,7 @@ static int on_batch(void *user, uint64_t batches, uint64_t voxels)
 
 static int check_tally(brick *b)
 {
-    const trip_tally *t = b->tally;
+    const trip_tally *t = b->in.tally;
     if (t->voxels == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input, "has no active voxels");
     if (t->finite == 0)
@@ -440,19 +333,19 @@ static int read_volume(brick *b)
                               .batch = on_batch,
                               .user = b };
     double begin = now_seconds();
-    int status = trip_walk(b->volume, b->workers, &walk);
+    int status = trip_walk(b->in.volume, b->in.workers, &walk);
     b->summary->read_seconds = now_seconds() - begin;
     if (status < 0)
         return status;
-    add_up(b, b->tally, &b->summary->kept);
-    trip_tally_histogram(b->tally, &b->histogram);
+    add_up(b, b->in.tally, &b->summary->kept);
+    trip_tally_histogram(b->in.tally, &b->in.histogram);
     return check_tally(b);
 }
 
 static void on_merge_progress(void *user, uint64_t splats)
 {
     const brick *b = user;
-    report_progress(b, "merge", splats, 3 * b->summary->kept);
+    trip_brick_input_progress(&b->in, "merge", splats, 3 * b->summary->kept);
 }
 
 static int merge_lists(brick *b)
@@ -460,13 +353,13 @@ static int merge_lists(brick *b)
     double begin = now_seconds();
     int status = 0;
     if (!b->format.quantised) {
-        set_quantiser(b, b->tally->value_min, b->tally->value_max);
+        set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
         status = trip_writer_set_codes(b->writer, b->quantiser.lo, b->quantiser.hi,
                                        b->quantiser.gradient_scale);
     }
     if (status == 0)
-        status =
-            trip_list_builder_finish(b->builder, &b->quantiser, b->workers, on_merge_progress, b);
+        status = trip_list_builder_finish(b->builder, &b->quantiser, b->in.workers,
+                                          on_merge_progress, b);
     b->summary->merge_seconds = now_seconds() - begin;
     return status;
 }
@@ -475,14 +368,15 @@ static int finish_output(brick *b)
 {
     double begin = now_seconds();
     char *text = trip_brick_text_make(&(trip_brick_text){ .params = b->params,
-                                                          .info = b->info,
-                                                          .envelope = &b->envelope,
-                                                          .functions = b->functions,
-                                                          .histogram = &b->histogram });
+                                                          .info = b->in.info,
+                                                          .envelope = &b->in.envelope,
+                                                          .functions = b->in.functions,
+                                                          .histogram = &b->in.histogram });
     if (!text)
         return TRIP_ERROR;
     b->summary->bytes = trip_writer_bytes(b->writer);
-    trip_writer_summary s = { b->tally->value_min, b->tally->value_max, b->tally->voxels, text };
+    trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
+                              text };
     int status = trip_writer_finish(b->writer, &s);
     if (status == 0)
         b->writer = NULL;
@@ -494,25 +388,26 @@ static int finish_output(brick *b)
 static void fill_summary(brick *b)
 {
     trip_brick_summary *s = b->summary;
-    const double(*m)[4] = b->info->index_to_world.m;
-    memcpy(s->dims, b->info->dims, sizeof s->dims);
+    const double(*m)[4] = b->in.info->index_to_world.m;
+    memcpy(s->dims, b->in.info->dims, sizeof s->dims);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
-    s->voxels = b->tally->voxels;
-    s->not_finite = b->tally->voxels - b->tally->finite;
-    s->value_min = b->tally->value_min;
-    s->value_max = b->tally->value_max;
-    s->input_bytes = s->voxels * trip_scalar_bytes(b->info->type);
+    s->voxels = b->in.tally->voxels;
+    s->not_finite = b->in.tally->voxels - b->in.tally->finite;
+    s->value_min = b->in.tally->value_min;
+    s->value_max = b->in.tally->value_max;
+    s->input_bytes = s->voxels * trip_scalar_bytes(b->in.info->type);
     s->temporary_bytes = trip_spill_bytes(b->spill);
-    s->memory_bytes = trip_budget_limit_bytes(b->budget);
-    s->peak_memory_bytes = trip_budget_peak_bytes(b->budget);
+    s->memory_bytes = trip_budget_limit_bytes(b->in.budget);
+    s->peak_memory_bytes = trip_budget_peak_bytes(b->in.budget);
 }
 
 static int prepare(brick *b)
 {
-    int status = open_input(b);
-    if (status == 0)
-        status = load_functions(b);
+    const trip_brick_params *p = b->params;
+    int status = trip_brick_input_open(&b->in, p);
+    b->format.tile_log2 = p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6;
+    b->format.normals = !p->no_normals;
     b->format.quantised = true; /* for a first plan; choose_codes() decides */
     if (status == 0)
         status = plan_memory(b);
@@ -521,13 +416,15 @@ static int prepare(brick *b)
 
 static int make(brick *b)
 {
-    int status = needs_scan(b) ? scan(b) : 0;
+    int status = trip_brick_input_needs_scan(&b->in) ? scan(b) : 0;
     if (status == 0)
-        status = make_envelope(b);
+        status = trip_brick_input_make_envelope(&b->in);
     if (status < 0)
         return status;
     choose_codes(b);
     status = plan_memory(b);
+    if (status == 0 && !trip_journal_get_start(b->journal))
+        status = trip_estimate_check_disk(&b->in, &b->format, &b->plan);
     if (status == 0)
         status = open_output(b);
     if (status == 0)
@@ -555,16 +452,7 @@ static void close_all(brick *b)
     trip_journal_close(b->journal);
     trip_leftover_close(&b->leftover);
     trip_spill_close(b->spill);
-    trip_envelope_destroy(&b->envelope);
-    for (size_t i = 0; b->functions && i < b->params->function_count; i++)
-        trip_tf_destroy(b->functions[i]);
-    free(b->functions);
-    if (b->tally)
-        trip_budget_release(b->budget, b->tally, sizeof *b->tally);
-    trip_volume_close(b->volume);
-    trip_workers_destroy(b->workers);
-    if (b->budget)
-        trip_budget_destroy(b->budget);
+    trip_brick_input_close(&b->in);
 }
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)

@@ -31,7 +31,7 @@ typedef struct trip_brick_params {
     unsigned threads;      /* default: one a processor */
     int64_t slices;        /* read at a time; default: by memory */
 
-    /* Hears how far a stage ("scan", "read", "merge") is, on the calling thread. */
+    /* Hears how far a stage ("sample", "scan", "read", "merge") is, on the calling thread. */
     void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);
     void *progress_user;
 } trip_brick_params;
@@ -50,5 +50,15 @@ typedef struct trip_brick_summary {
 } trip_brick_summary;
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary);
+
+/* What such a run will come to, from a look at parts of the input. */
+typedef struct trip_brick_estimate {
+    uint64_t voxels, kept;
+    uint64_t bytes, temporary_bytes; /* on the disk of the output */
+    uint64_t free_bytes;             /* there */
+    double seconds;
+} trip_brick_estimate;
+
+int trip_brick_estimate_make(const trip_brick_params *params, trip_brick_estimate *estimate);
 
 #endif

@@ -162,6 +162,7 @@ void trip_tally_add(trip_tally *t, const trip_tally *other)
 {
     t->voxels += other->voxels;
     t->finite += other->finite;
+    t->kept += other->kept;
     t->value_min = fmin(t->value_min, other->value_min);
     t->value_max = fmax(t->value_max, other->value_max);
     if (other->counted == 0)
@@ -199,9 +200,17 @@ typedef struct scan {
     trip_tally *tallies; /* one a thread */
     float *values;       /* SCAN_VOXELS a thread */
     uint8_t *active;
-    void (*progress)(void *user, uint64_t voxels);
-    void *user;
+    const trip_scan_params *params;
 } scan;
+
+static void count_kept(trip_tally *t, const trip_envelope *e, const float *values,
+                       const uint8_t *active, size_t count)
+{
+    uint8_t keep[SCAN_EDGE];
+    trip_envelope_keep_row(e, values, count, keep);
+    for (size_t i = 0; i < count; i++)
+        t->kept += keep[i] & (active ? active[i] : 1);
+}
 
 static int scan_box(void *user, unsigned thread, const trip_box *box)
 {
@@ -215,7 +224,10 @@ static int scan_box(void *user, unsigned thread, const trip_box *box)
     for (size_t r = 0; r < rows; r++) {
         const uint8_t *row_active = active ? active + r * row : NULL;
         trip_tally_range(&s->tallies[thread], values + r * row, row_active, row);
-        trip_tally_count(&s->tallies[thread], values + r * row, row_active, row);
+        if (s->params->envelope)
+            count_kept(&s->tallies[thread], s->params->envelope, values + r * row, row_active, row);
+        else
+            trip_tally_count(&s->tallies[thread], values + r * row, row_active, row);
     }
     return 0;
 }
@@ -224,9 +236,7 @@ static int scan_batch(void *user, uint64_t batches, uint64_t voxels)
 {
     const scan *s = user;
     (void)batches;
-    if (s->progress)
-        s->progress(s->user, voxels);
-    return 0;
+    return s->params->progress ? s->params->progress(s->params->user, voxels) : 0;
 }
 
 static int check_tally(const trip_tally *t, const char *path)
@@ -239,10 +249,12 @@ static int check_tally(const trip_tally *t, const char *path)
 }
 
 static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *path,
-                     trip_workers *workers, int64_t slices)
+                     trip_workers *workers)
 {
     unsigned threads = trip_workers_count(workers);
-    trip_walk_params walk = { .slices = slices,
+    trip_walk_params walk = { .slices = s->params->slices,
+                              .stride = s->params->stride,
+                              .passing_seconds = s->params->passing_seconds,
                               .read_ahead = true,
                               .edge = SCAN_EDGE,
                               .height = SCAN_HEIGHT,
@@ -261,11 +273,10 @@ static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *
 }
 
 int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, trip_workers *workers,
-                     int64_t slices, trip_budget *budget,
-                     void (*progress)(void *user, uint64_t voxels), void *user)
+                     const trip_scan_params *params, trip_budget *budget)
 {
     size_t threads = trip_workers_count(workers);
-    scan s = { .sparse = trip_volume_get_info(volume)->sparse, .progress = progress, .user = user };
+    scan s = { .sparse = trip_volume_get_info(volume)->sparse, .params = params };
     size_t tallies = threads * sizeof *s.tallies, values = threads * SCAN_VOXELS * sizeof *s.values;
     size_t active = s.sparse ? threads * SCAN_VOXELS : 0;
     int status;
@@ -273,7 +284,7 @@ int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, tri
     s.values = trip_budget_take(budget, values);
     s.active = active ? trip_budget_take(budget, active) : NULL;
     if (s.tallies && s.values && (s.active || !active))
-        status = scan_with(&s, out, volume, path, workers, slices);
+        status = scan_with(&s, out, volume, path, workers);
     else
         status = trip_fail(TRIP_ERROR, "brick", path,
                            "%zu threads need more memory than is allowed: give more with --memory, "

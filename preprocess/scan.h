@@ -5,6 +5,7 @@
 #ifndef TRIP_SCAN_H
 #define TRIP_SCAN_H
 
+#include "envelope.h"
 #include "transfer_function.h"
 #include "walk.h"
 
@@ -15,6 +16,7 @@ enum { TRIP_TALLY_BINS = 16384 };
 typedef struct trip_tally {
     uint64_t voxels; /* that exist */
     uint64_t finite; /* of them */
+    uint64_t kept;   /* of them, where an envelope says so */
     double value_min,
         value_max; /* of the finite ones; infinity and -infinity when there are none */
     uint64_t counted;
@@ -32,10 +34,20 @@ void trip_tally_add(trip_tally *t, const trip_tally *other);
 /* What was counted, in 1024 bins over the range. */
 void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram);
 
+/* Zero means the default. */
+typedef struct trip_scan_params {
+    int64_t slices;                /* of a block */
+    uint64_t stride;               /* look at every so many blocks only; default: at all */
+    const trip_envelope *envelope; /* counts what it keeps, instead of filling bins */
+    /* Hears of the voxels passed so far; other than 0 ends the pass with that status. */
+    int (*progress)(void *user, uint64_t voxels);
+    void *user;
+    double *passing_seconds; /* as of trip_walk_params */
+} trip_scan_params;
+
 /* One pass over the volume, which is rewound after it. All values not finite, or none at all, is a
- * reported failure. `progress`, when not NULL, hears of the voxels seen so far. */
+ * reported failure. */
 int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, trip_workers *workers,
-                     int64_t slices, trip_budget *budget,
-                     void (*progress)(void *user, uint64_t voxels), void *user);
+                     const trip_scan_params *params, trip_budget *budget);
 
 #endif

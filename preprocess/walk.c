@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "report.h"
 
@@ -20,6 +21,7 @@ typedef struct walk {
     const trip_walk_params *params;
     trip_volume *volume;
     const batch *at_work;
+    uint64_t batches, voxels; /* up to where the volume was read */
 } walk;
 
 /* Pieces that the grid of `step` cuts [lo, lo + size) into. */
@@ -101,6 +103,8 @@ static int read_batch(walk *w, batch *b)
     }
     if (more < 0)
         release(w, b);
+    w->batches += b->count > 0;
+    w->voxels += b->voxels;
     return more < 0 ? more : 0;
 }
 
@@ -115,40 +119,66 @@ static void start(walk *w, trip_workers *workers, const batch *b)
     trip_workers_start(workers, do_box, w, b->first_box[b->count]);
 }
 
-static int skip_batches(walk *w, batch *b, uint64_t *batches, uint64_t *voxels)
+/* Passes over batches, the slices of which need not be read if the format knows how. */
+static int pass_over(walk *w, batch *b, uint64_t count)
 {
-    int status = read_batch(w, b);
-    while (status == 0 && b->count > 0 && *batches < w->params->skip) {
-        *voxels += b->voxels;
-        ++*batches;
+    const int64_t *dims = trip_volume_get_info(w->volume)->dims;
+    int64_t slices, wanted;
+    if (__builtin_mul_overflow(count, w->params->slices, &wanted))
+        wanted = INT64_MAX;
+    slices = count ? trip_volume_skip(w->volume, wanted) : 0;
+    if (slices > 0) {
+        w->batches += count;
+        w->voxels += (uint64_t)(slices * dims[0] * dims[1]);
+    }
+    int status = slices < 0 ? (int)slices : 0;
+    for (uint64_t i = 0; i < count && slices == 0 && status == 0; i++) {
+        status = read_batch(w, b);
+        if (b->count == 0)
+            break;
         release(w, b);
-        status = check_interrupted();
         if (status == 0)
-            status = read_batch(w, b);
+            status = check_interrupted();
     }
     return status;
 }
 
-/* batches[0] is at work while batches[1] is being read. */
-static int walk_batches(walk *w, trip_workers *workers, batch *batches)
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static int read_next(walk *w, batch *b)
+{
+    double begin = now_seconds();
+    int status = w->params->stride > 1 ? pass_over(w, b, w->params->stride - 1) : 0;
+    if (w->params->passing_seconds)
+        *w->params->passing_seconds += now_seconds() - begin;
+    return status == 0 ? read_batch(w, b) : status;
+}
+
+/* One batch is at work while the next is being read. */
+static int walk_batches(walk *w, trip_workers *workers, batch *now, batch *ahead)
 {
     const trip_walk_params *p = w->params;
-    uint64_t done = 0, voxels = 0;
-    batch *now = &batches[0], *ahead = &batches[1];
-    int status = skip_batches(w, now, &done, &voxels);
+    int status = pass_over(w, now, p->skip);
+    if (status == 0)
+        status = read_batch(w, now);
     while (status == 0 && now->count > 0) {
+        uint64_t batches = w->batches, voxels = w->voxels;
         int read = 0;
         ahead->count = 0;
         start(w, workers, now);
         if (p->read_ahead)
-            read = read_batch(w, ahead);
+            read = read_next(w, ahead);
         trip_workers_wait(workers, 0, &status);
-        voxels += now->voxels;
         release(w, now);
         if (status == 0)
-            status = p->batch(p->user, ++done, voxels);
+            status = p->batch(p->user, batches, voxels);
         if (status == 0 && !p->read_ahead)
-            read = read_batch(w, ahead);
+            read = read_next(w, ahead);
         if (status == 0)
             status = read;
         if (status == 0)
@@ -158,6 +188,7 @@ static int walk_batches(walk *w, trip_workers *workers, batch *batches)
         ahead = other;
     }
     release(w, now);
+    release(w, ahead);
     return status;
 }
 
@@ -167,7 +198,7 @@ int trip_walk(trip_volume *volume, trip_workers *workers, const trip_walk_params
     batch *batches = calloc(2, sizeof *batches);
     if (!batches)
         return trip_fail(TRIP_ERROR, "brick", "blocks", "out of memory");
-    int status = walk_batches(&w, workers, batches);
+    int status = walk_batches(&w, workers, &batches[0], &batches[1]);
     free(batches);
     return status;
 }

@@ -1,0 +1,140 @@
+#include "brick_input.h"
+
+#include <stdlib.h>
+
+#include "brick_text.h"
+#include "report.h"
+
+static int check_dims(const trip_brick_input *in)
+{
+    for (int a = 0; a < 3; a++)
+        if (in->info->dims[a] > 1 << 24)
+            return trip_fail(TRIP_ERROR, "brick", in->params->input,
+                             "more than 16777216 voxels along an axis");
+    return 0;
+}
+
+static int open_volume(trip_brick_input *in)
+{
+    const trip_brick_params *p = in->params;
+    int status = trip_budget_create(&in->budget, p->memory_bytes);
+    if (status == 0)
+        status = trip_workers_create(&in->workers, p->threads);
+    if (status == 0)
+        status = trip_volume_open(&in->volume, p->input, &p->volume, in->budget);
+    if (status < 0)
+        return status;
+    in->info = trip_volume_get_info(in->volume);
+    in->grid_voxels = (uint64_t)(in->info->dims[0] * in->info->dims[1] * in->info->dims[2]);
+    in->tally = trip_budget_take(in->budget, sizeof *in->tally);
+    if (!in->tally)
+        return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");
+    trip_tally_clear(in->tally);
+    in->memory_bytes = trip_budget_left_bytes(in->budget);
+    return check_dims(in);
+}
+
+static int load_functions(trip_brick_input *in)
+{
+    size_t count = in->params->function_count;
+    in->functions = calloc(count + 1, sizeof *in->functions);
+    if (!in->functions)
+        return trip_fail(TRIP_ERROR, "brick", in->params->input, "out of memory");
+    int status = 0;
+    for (size_t i = 0; i < count && status == 0; i++)
+        status = trip_tf_load(&in->functions[i], in->params->functions[i]);
+    return status;
+}
+
+int trip_brick_input_open(trip_brick_input *in, const trip_brick_params *params)
+{
+    in->params = params;
+    int status = open_volume(in);
+    return status == 0 ? load_functions(in) : status;
+}
+
+void trip_brick_input_close(trip_brick_input *in)
+{
+    trip_envelope_destroy(&in->envelope);
+    for (size_t i = 0; in->functions && i < in->params->function_count; i++)
+        trip_tf_destroy(in->functions[i]);
+    free(in->functions);
+    if (in->tally)
+        trip_budget_release(in->budget, in->tally, sizeof *in->tally);
+    trip_volume_close(in->volume);
+    trip_workers_destroy(in->workers);
+    if (in->budget)
+        trip_budget_destroy(in->budget);
+}
+
+static bool is_envelope_automatic(const trip_brick_params *p)
+{
+    return !p->keep_all && p->function_count == 0 && p->range_count == 0;
+}
+
+bool trip_brick_input_needs_scan(const trip_brick_input *in)
+{
+    bool normalised = false;
+    for (size_t i = 0; i < in->params->function_count; i++)
+        normalised = normalised || trip_tf_is_normalised(in->functions[i]);
+    return normalised || is_envelope_automatic(in->params);
+}
+
+void trip_brick_input_progress(const trip_brick_input *in, const char *stage, uint64_t done,
+                               uint64_t total)
+{
+    if (in->params->progress)
+        in->params->progress(in->params->progress_user, stage, done, total);
+}
+
+static int on_scan_progress(void *user, uint64_t voxels)
+{
+    const trip_brick_input *in = user;
+    trip_brick_input_progress(in, "scan", voxels, in->grid_voxels);
+    return 0;
+}
+
+void trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known)
+{
+    if (known != in->tally)
+        *in->tally = *known;
+    in->scanned = true;
+    trip_tally_histogram(in->tally, &in->histogram);
+    for (size_t i = 0; i < in->params->function_count; i++)
+        trip_tf_denormalise(in->functions[i], in->tally->value_min, in->tally->value_max);
+}
+
+int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan)
+{
+    scan.progress = on_scan_progress;
+    scan.user = in;
+    int status =
+        trip_scan_volume(in->tally, in->volume, in->params->input, in->workers, &scan, in->budget);
+    if (status == 0)
+        trip_brick_input_set_tally(in, in->tally);
+    return status;
+}
+
+static int add_automatic(trip_brick_input *in)
+{
+    trip_tf *tf;
+    int status = trip_brick_automatic_tf(&tf, in->info, &in->histogram);
+    if (status < 0)
+        return status;
+    status = trip_envelope_add_tf(&in->envelope, tf);
+    trip_tf_destroy(tf);
+    return status;
+}
+
+int trip_brick_input_make_envelope(trip_brick_input *in)
+{
+    const trip_brick_params *p = in->params;
+    int status = is_envelope_automatic(p) ? add_automatic(in) : 0;
+    if (p->keep_all)
+        status = trip_envelope_add_all(&in->envelope);
+    for (size_t i = 0; i < p->range_count && status == 0; i++)
+        status = trip_envelope_add_range(&in->envelope, p->ranges[i].lo, p->ranges[i].hi);
+    for (size_t i = 0; i < p->function_count && status == 0; i++)
+        status = trip_envelope_add_tf(&in->envelope, in->functions[i]);
+    return status;
+}

@@ -1,0 +1,42 @@
+/* What `brick` reads: the opened volume with the memory and threads to work on it, and which of its
+ * values are kept. One thread. */
+#ifndef TRIP_BRICK_INPUT_H
+#define TRIP_BRICK_INPUT_H
+
+#include "brick.h"
+#include "envelope.h"
+#include "scan.h"
+
+/* Zeroed before it is opened. */
+typedef struct trip_brick_input {
+    const trip_brick_params *params;
+    trip_budget *budget;
+    trip_workers *workers;
+    trip_volume *volume;
+    const trip_volume_info *info;
+    uint64_t grid_voxels;  /* of the dims: what progress counts */
+    uint64_t memory_bytes; /* left once the input was opened */
+    trip_tf **functions;   /* params->function_count of them */
+    bool scanned;          /* the tally is of a pass over the volume before */
+    trip_tally *tally;
+    trip_histogram histogram;
+    trip_envelope envelope;
+} trip_brick_input;
+
+/* Opens the volume and loads the transfer functions. */
+int trip_brick_input_open(trip_brick_input *in, const trip_brick_params *params);
+/* Also after a failure to open. */
+void trip_brick_input_close(trip_brick_input *in);
+
+/* Whether the envelope needs to know the volume's values: it is automatic, or normalised. */
+bool trip_brick_input_needs_scan(const trip_brick_input *in);
+/* Fills the tally with `known`. */
+void trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known);
+/* Fills the tally from the volume, as slices, stride and passing_seconds of `scan` say. */
+int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan);
+int trip_brick_input_make_envelope(trip_brick_input *in);
+
+void trip_brick_input_progress(const trip_brick_input *in, const char *stage, uint64_t done,
+                               uint64_t total);
+
+#endif

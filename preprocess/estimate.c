@@ -1,0 +1,201 @@
+#include "estimate.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/statvfs.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "report.h"
+
+/* Blocks looked at, and slices of each. */
+enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
+/* A pass is stopped with this status when it has taken long enough. */
+enum { STOPPED = -100 };
+/* What is written to see how fast the disk is. */
+#define TRIAL_BYTES ((size_t)32 << 20)
+static const double check_seconds = 3;
+/* Estimates are from a sample: a run is only refused when even much less would not fit. */
+static const double surely = 0.7;
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static uint64_t stride_of(const trip_brick_input *in)
+{
+    uint64_t blocks = (uint64_t)in->info->dims[2] / SAMPLE_SLICES + 1;
+    if (in->info->sparse) /* blocks differ too much */
+        return 1;
+    return blocks > SAMPLES ? blocks / SAMPLES : 1;
+}
+
+typedef struct sampling {
+    const trip_brick_input *in;
+    double until;
+} sampling;
+
+static int on_progress(void *user, uint64_t voxels)
+{
+    const sampling *s = user;
+    trip_brick_input_progress(s->in, "sample", voxels, s->in->grid_voxels);
+    return now_seconds() > s->until ? STOPPED : 0;
+}
+
+static void scale_up(const trip_brick_input *in, const trip_tally *t, uint64_t *voxels,
+                     uint64_t *kept)
+{
+    double share = t->voxels ? (double)t->kept / (double)t->voxels : 0;
+    double all = in->info->sparse ? (double)t->voxels : (double)in->grid_voxels;
+    *voxels = (uint64_t)all;
+    *kept = (uint64_t)(share * all);
+}
+
+/* Kept voxels, by looking at blocks spread over the volume for `limit_seconds` at most (0: no
+ * limit); the input's envelope is made. 1: *kept and *voxels are filled; 0: it took too long. */
+static int estimate_kept(trip_brick_input *in, double limit_seconds, double *passing_seconds,
+                         uint64_t *voxels, uint64_t *kept)
+{
+    sampling s = { in, limit_seconds > 0 ? now_seconds() + limit_seconds : INFINITY };
+    const trip_scan_params scan = { .slices = SAMPLE_SLICES,
+                                    .stride = stride_of(in),
+                                    .envelope = &in->envelope,
+                                    .progress = on_progress,
+                                    .user = &s,
+                                    .passing_seconds = passing_seconds };
+    trip_tally *t = trip_budget_take(in->budget, sizeof *t);
+    if (!t)
+        return trip_fail(TRIP_ERROR, "brick", in->params->input, "needs more --memory");
+    int status = trip_scan_volume(t, in->volume, in->params->input, in->workers, &scan, in->budget);
+    if (status == 0)
+        scale_up(in, t, voxels, kept);
+    trip_budget_release(in->budget, t, sizeof *t);
+    if (status == STOPPED)
+        return trip_volume_rewind(in->volume);
+    return status < 0 ? status : 1;
+}
+
+/* The folder that the output will be in, for free(). */
+static char *folder_of(const char *path)
+{
+    char *copy = strdup(path), *folder = copy ? strdup(dirname(copy)) : NULL;
+    free(copy);
+    return folder;
+}
+
+static uint64_t free_bytes(const char *output)
+{
+    struct statvfs v;
+    char *folder = folder_of(output);
+    bool known = folder && statvfs(folder, &v) == 0;
+    free(folder);
+    return known ? (uint64_t)v.f_bavail * v.f_frsize : UINT64_MAX;
+}
+
+/* Bytes of a piece for each of its splats, where splats are many. */
+static double piece_bytes(const trip_piece_format *f)
+{
+    return (double)trip_piece_max_bytes(f) / (double)(1 << 2 * f->tile_log2);
+}
+
+/* Fills all but the seconds, from voxels and kept. */
+static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *format,
+                           const trip_memory_plan *plan, trip_brick_estimate *e)
+{
+    int lists = plan->in_order && format->quantised ? 2 : 3;
+    double pieces = (double)e->kept * lists * piece_bytes(format);
+    e->bytes = e->kept * 3 * (format->normals ? 8 : 4);
+    e->temporary_bytes = pieces > (double)plan->list_bytes / 2 ? (uint64_t)pieces : 0;
+    e->free_bytes = free_bytes(in->params->output);
+}
+
+/* Seconds to write a byte beside the output, as the writer does: an unnamed file's worth of it. */
+static double seconds_per_byte(const char *output)
+{
+    char *folder = folder_of(output);
+    void *data = aligned_alloc(4096, TRIAL_BYTES);
+    double seconds = 1e-9;
+    int fd = folder ? open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC | O_DIRECT, 0600) : -1;
+    if (fd >= 0 && data) {
+        memset(data, 1, TRIAL_BYTES);
+        double begin = now_seconds();
+        if (write(fd, data, TRIAL_BYTES) == (ssize_t)TRIAL_BYTES)
+            seconds = (now_seconds() - begin) / (double)TRIAL_BYTES;
+    }
+    if (fd >= 0)
+        close(fd);
+    free(data);
+    free(folder);
+    return seconds;
+}
+
+static int estimate(trip_brick_input *in, trip_brick_estimate *e)
+{
+    const trip_brick_params *p = in->params;
+    trip_piece_format format = { .tile_log2 =
+                                     p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6,
+                                 .quantised = true,
+                                 .normals = !p->no_normals };
+    trip_memory_plan plan;
+    bool scan = trip_brick_input_needs_scan(in);
+    double begin = now_seconds(), passing = 0;
+    int status =
+        trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
+                              in->memory_bytes, p->slices);
+    if (status == 0 && scan)
+        status = trip_brick_input_scan(in, (trip_scan_params){ .slices = SAMPLE_SLICES,
+                                                               .stride = stride_of(in),
+                                                               .passing_seconds = &passing });
+    if (status == 0)
+        status = trip_brick_input_make_envelope(in);
+    if (status == 0)
+        status = estimate_kept(in, 0, &passing, &e->voxels, &e->kept);
+    if (status < 0)
+        return status;
+    double looking = now_seconds() - begin - passing;
+    double all = looking * (double)stride_of(in) + passing;
+    format.quantised = scan || trip_scalar_bytes(in->info->type) <= 2;
+    estimate_sizes(in, &format, &plan, e);
+    e->seconds = all + (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
+    return 0;
+}
+
+int trip_brick_estimate_make(const trip_brick_params *params, trip_brick_estimate *e)
+{
+    trip_brick_input in = { 0 };
+    *e = (trip_brick_estimate){ 0 };
+    int status = trip_brick_input_open(&in, params);
+    if (status == 0)
+        status = estimate(&in, e);
+    trip_brick_input_close(&in);
+    return status;
+}
+
+int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *format,
+                             const trip_memory_plan *plan)
+{
+    char needed[32], there[32];
+    trip_brick_estimate e = { .voxels = in->grid_voxels, .kept = in->grid_voxels };
+    estimate_sizes(in, format, plan, &e);
+    if (e.bytes + e.temporary_bytes <= e.free_bytes)
+        return 0;
+    int status = estimate_kept(in, check_seconds, NULL, &e.voxels, &e.kept);
+    if (status <= 0)
+        return status;
+    estimate_sizes(in, format, plan, &e);
+    if (surely * (double)(e.bytes + e.temporary_bytes) <= (double)e.free_bytes)
+        return 0;
+    return trip_fail(TRIP_ERROR, "brick", in->params->output,
+                     "about %s are needed, temporary data included, and the disk has %s: free "
+                     "some, write elsewhere, or keep less",
+                     trip_format_bytes(e.bytes + e.temporary_bytes, needed),
+                     trip_format_bytes(e.free_bytes, there));
+}
