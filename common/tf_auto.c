@@ -1,8 +1,8 @@
 /* A transfer function from a histogram alone. Most voxels of most volumes are background: air, the
  * zeros around a simulation, the black of an angiogram. Everything up to the upper edge of that
- * peak gets opacity 0, so that it is culled. Above it, values are ranked: a value's rank is the
- * share of the foreground below it, and opacity grows with a power of the rank, so that what is
- * common stays a veil and what is rare and high stands out, whatever the histogram's shape. */
+ * peak gets opacity 0, so that it is culled. Above it, opacity grows with a power of a value's
+ * standing, half its rank (the share of the foreground below it) and half its place in the range,
+ * so that what is common stays a veil and what is rare and high stands out. */
 #include "tf_internal.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@ enum { BINS = 1024, GROUPS = 64, GROUP_BINS = BINS / GROUPS, LEVELS = 24 };
 
 static const double solid_opacity = 0.3;     /* of a volume of one value */
 static const double strongest_opacity = 0.7; /* at rank 1 */
-static const double invisible_rank = 0.15;   /* up to here opacity is 0: mostly noise */
+static const double invisible = 0.1;         /* up to this standing opacity is 0: mostly noise */
 /* The optical depth that the lower four fifths of the foreground may have along a typical ray. */
 static const double veil_depth = 1.2;
 
@@ -80,31 +80,44 @@ static double upper_edge(const analysis *a, int bin)
     return a->low + a->range * (bin + 1) / BINS;
 }
 
-static double rank_opacity(double rank, double power)
+/* Where a bin stands among the foreground, 0 to 1: mostly by its rank, the rest by its value, so
+ * that the noise within one peak of the histogram is not stretched over all opacities. */
+static double standing(const analysis *a, int bin, double rank)
 {
-    double r = (rank - invisible_rank) / (1 - invisible_rank);
-    return r > 0 ? strongest_opacity * pow(r, power) : 0;
+    return 0.65 * rank + 0.35 * (bin - a->end) / (BINS - 1 - a->end);
+}
+
+static double opacity_at(double standing_of_bin, double power)
+{
+    double t = (standing_of_bin - invisible) / (1 - invisible);
+    return t > 0 ? strongest_opacity * pow(t, power) : 0;
+}
+
+/* Mean extinction of the lower four fifths of the foreground. */
+static double veil_extinction(const analysis *a, double power)
+{
+    double sum = 0, below = 0;
+    for (int i = a->end + 1; i < BINS && below < 0.8 * a->foreground; i++) {
+        double middle = (below + 0.5 * a->counts[i]) / a->foreground;
+        sum += a->counts[i] * trip_extinction(opacity_at(standing(a, i, middle), power));
+        below += a->counts[i];
+    }
+    return sum / a->foreground;
 }
 
 /* The power that keeps the veil on a ray with so many foreground voxels at veil_depth or less. */
-static double choose_power(double foreground_voxels)
+static double choose_power(const analysis *a, double foreground_voxels)
 {
     double power = 2;
-    while (power < 8) {
-        double depth = 0;
-        for (int i = 0; i < 80; i++)
-            depth += 0.01 * trip_extinction(rank_opacity((i + 0.5) / 100, power));
-        if (depth * foreground_voxels <= veil_depth)
-            break;
+    while (power < 8 && veil_extinction(a, power) * foreground_voxels > veil_depth)
         power += 0.25;
-    }
     return power;
 }
 
 /* One point at the background's edge, one whenever the rank has grown by 1 / LEVELS. */
 static size_t make_points(const analysis *a, trip_tf_point points[LEVELS + 2])
 {
-    double power = choose_power(cbrt(a->total) * a->foreground / a->total);
+    double power = choose_power(a, cbrt(a->total) * a->foreground / a->total);
     double below = 0;
     size_t count = 0;
     int level = 1;
@@ -116,8 +129,8 @@ static size_t make_points(const analysis *a, trip_tf_point points[LEVELS + 2])
         if (a->counts[i] == 0 || rank * LEVELS < level)
             continue;
         level = (int)(rank * LEVELS) + 1;
-        double linear = (double)(i - a->end) / (BINS - 1 - a->end);
-        trip_rgba colour = colour_at((rank + linear) / 2, rank_opacity(rank, power));
+        double t = standing(a, i, rank);
+        trip_rgba colour = colour_at(t, opacity_at(t, power));
         points[count++] = (trip_tf_point){ upper_edge(a, i), colour };
     }
     return count;

@@ -129,7 +129,7 @@ static void fog_with_a_long_tail_shows_its_dense_part(void **state)
     trip_tf *tf = automatic();
     assert_true(opacity(tf, 1e-5) == 0);
     assert_true(opacity(tf, 1) > 0.02);
-    assert_true(opacity(tf, 3) > 0.3);
+    assert_true(opacity(tf, 3) > 0.2); /* ten voxels of it hide nine tenths of what is behind */
     trip_tf_destroy(tf);
 }
 
