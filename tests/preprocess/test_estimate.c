@@ -1,0 +1,93 @@
+#include "brick_files.h"
+
+/* Values that grow along Z, so that a look at the first slices alone would mislead. */
+enum { NX = 64, NY = 48, NZ = 512, N = NX * NY * NZ };
+
+static uint8_t values[N];
+
+static trip_brick_params make_volume(void)
+{
+    static char input[128], output[128];
+    for (int i = 0; i < N; i++)
+        values[i] = (uint8_t)(i / NX / NY / 2);
+    test_write("v.raw", values, sizeof values);
+    strcpy(input, test_path("v.raw"));
+    strcpy(output, test_path("v.trip"));
+    return (trip_brick_params){ .input = input,
+                                .output = output,
+                                .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" },
+                                .memory_bytes = (uint64_t)1 << 26,
+                                .threads = 2 };
+}
+
+static void a_sample_tells_what_will_be_kept_and_written(void **state)
+{
+    (void)state;
+    trip_brick_params p = make_volume();
+    trip_brick_estimate e;
+    trip_brick_summary s;
+    p.ranges = &(trip_value_range){ 128, 191 }; /* a quarter */
+    p.range_count = 1;
+    assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
+    assert_int_equal(e.voxels, N);
+    assert_true(e.kept > N / 4 * 0.8 && e.kept < N / 4 * 1.2);
+    assert_int_equal(e.bytes, 24 * e.kept);
+    assert_true(e.seconds > 0 && e.free_bytes > 0);
+    assert_false(test_exists("v.trip"));
+    assert_false(test_exists("v.trip.spill"));
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(s.kept, N / 4);
+}
+
+static void an_automatic_envelope_is_estimated_from_the_sample(void **state)
+{
+    (void)state;
+    trip_brick_params p = make_volume();
+    trip_brick_estimate e;
+    trip_brick_summary s;
+    assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true((double)e.kept > 0.8 * (double)s.kept && (double)e.kept < 1.2 * (double)s.kept);
+}
+
+static void temporary_data_is_foreseen_where_memory_is_short(void **state)
+{
+    (void)state;
+    trip_brick_params p = make_volume();
+    trip_brick_estimate e;
+    trip_brick_summary s;
+    p.keep_all = true;
+    p.threads = 1;
+    for (uint64_t memory = (uint64_t)1 << 25; memory <= (uint64_t)1 << 28; memory *= 8) {
+        p.memory_bytes = memory;
+        p.replace = true;
+        assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
+        assert_int_equal(e.kept, N);
+        assert_int_equal(trip_brick(&p, &s), 0);
+        assert_int_equal(e.temporary_bytes > 0, s.temporary_bytes > 0);
+    }
+}
+
+static void without_normals_half_is_written(void **state)
+{
+    (void)state;
+    trip_brick_params p = make_volume();
+    trip_brick_estimate e;
+    p.keep_all = p.no_normals = true;
+    assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
+    assert_int_equal(e.bytes, 12 * (uint64_t)N);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(a_sample_tells_what_will_be_kept_and_written, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(an_automatic_envelope_is_estimated_from_the_sample,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(temporary_data_is_foreseen_where_memory_is_short,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(without_normals_half_is_written, test_begin, test_end),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,113 @@
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <stdatomic.h>
+
+#include "workers.h"
+
+enum { ITEMS = 10000 };
+
+typedef struct work {
+    _Atomic unsigned times[ITEMS];
+    _Atomic unsigned threads_wrong;
+    unsigned threads;
+    uint64_t failing; /* item; ITEMS: none */
+} work;
+
+static int do_item(void *user, unsigned thread, uint64_t item)
+{
+    work *w = user;
+    if (thread >= w->threads)
+        w->threads_wrong++;
+    w->times[item]++;
+    return item == w->failing ? -5 : 0;
+}
+
+static void every_item_is_done_once(void **state)
+{
+    (void)state;
+    for (unsigned threads = 1; threads <= 8; threads *= 2) {
+        static work w;
+        trip_workers *pool;
+        assert_int_equal(trip_workers_create(&pool, threads), 0);
+        assert_int_equal(trip_workers_count(pool), threads);
+        for (unsigned round = 1; round <= 3; round++) {
+            w.threads = threads;
+            w.failing = ITEMS;
+            assert_int_equal(trip_workers_run(pool, do_item, &w, ITEMS), 0);
+            for (int i = 0; i < ITEMS; i++)
+                assert_int_equal(w.times[i], round);
+        }
+        assert_int_equal(w.threads_wrong, 0);
+        trip_workers_destroy(pool);
+        for (int i = 0; i < ITEMS; i++)
+            w.times[i] = 0;
+    }
+}
+
+static void a_failure_stops_the_loop_and_is_told(void **state)
+{
+    (void)state;
+    static work w = { .threads = 1, .failing = 100 };
+    trip_workers *pool;
+    unsigned done = 0;
+    assert_int_equal(trip_workers_create(&pool, 1), 0);
+    assert_int_equal(trip_workers_run(pool, do_item, &w, ITEMS), -5);
+    for (int i = 0; i < ITEMS; i++)
+        done += w.times[i];
+    assert_int_equal(done, 101);
+    /* The pool goes on to be used. */
+    w.failing = ITEMS;
+    assert_int_equal(trip_workers_run(pool, do_item, &w, 3), 0);
+    trip_workers_destroy(pool);
+}
+
+static void a_loop_of_nothing_is_over_at_once(void **state)
+{
+    (void)state;
+    trip_workers *pool;
+    int status = 1;
+    assert_int_equal(trip_workers_create(&pool, 3), 0);
+    trip_workers_start(pool, do_item, NULL, 0);
+    assert_true(trip_workers_wait(pool, 0, &status));
+    assert_int_equal(status, 0);
+    trip_workers_destroy(pool);
+}
+
+static int wait_for_flag(void *user, unsigned thread, uint64_t item)
+{
+    _Atomic int *flag = user;
+    (void)thread;
+    (void)item;
+    while (*flag == 0)
+        continue;
+    return 0;
+}
+
+static void waiting_may_be_cut_short(void **state)
+{
+    (void)state;
+    trip_workers *pool;
+    _Atomic int flag = 0;
+    int status;
+    assert_int_equal(trip_workers_create(&pool, 1), 0);
+    trip_workers_start(pool, wait_for_flag, &flag, 1);
+    assert_false(trip_workers_wait(pool, 1, &status));
+    flag = 1;
+    assert_true(trip_workers_wait(pool, 0, &status));
+    trip_workers_destroy(pool);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_item_is_done_once),
+        cmocka_unit_test(a_failure_stops_the_loop_and_is_told),
+        cmocka_unit_test(a_loop_of_nothing_is_over_at_once),
+        cmocka_unit_test(waiting_may_be_cut_short),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
