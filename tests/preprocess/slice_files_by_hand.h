@@ -117,7 +117,7 @@ static inline void append_png(bytes *b, trip_scalar type, int k, int channels)
     append(b, "\x89PNG\r\n\x1a\n", 8);
     append_png_chunk(b, "IHDR", header.data, header.count);
     append_png_chunk(b, "IDAT", packed.data, packed.count);
-    append_png_chunk(b, "IEND", NULL, 0);
+    append_png_chunk(b, "IEND", "", 0);
 }
 
 static inline void append_exr_attribute(bytes *b, const char *name, const char *type,
