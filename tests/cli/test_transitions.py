@@ -1,0 +1,70 @@
+"""Where one list gives way to the next: `merge` shows nothing there, neither in a picture nor from
+one picture of a turn to the next; `clip` shows lines on large kernels, `axis` pops."""
+import math
+
+import numpy
+
+import program
+
+SIZE, FOV = 300, 20
+EYE, LOOK = (25, -11, 29), (7, 7, 7)
+
+
+def dominant_axes():
+    """For each pixel the axis along which its ray is steepest: whose list alone has weight 1."""
+    forward = numpy.subtract(LOOK, EYE) / numpy.linalg.norm(numpy.subtract(LOOK, EYE))
+    right = numpy.cross(forward, (0, 0, 1))
+    right /= numpy.linalg.norm(right)
+    up = numpy.cross(right, forward)
+    at = (numpy.arange(SIZE) + 0.5 - SIZE / 2) * 2 * math.tan(math.radians(FOV / 2)) / SIZE
+    rays = forward + at[None, :, None] * right - at[:, None, None] * up
+    return abs(rays).argmax(axis=2)
+
+
+class Transitions(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        values = numpy.random.default_rng(4).integers(60, 250, (15, 15, 15)).astype("u1")
+        program.write_nrrd("a.nrrd", values)
+        program.write("a.tf", b"values data\n50 0 0.1 1 0\n120 1 0.2 0 0.5\n250 1 1 0.8 0.6\n")
+        cls.brick(cls(), "a.nrrd", "a.trip", "--tf", "a.tf")
+
+    def bends_at_borders(self, *method):
+        """How much sharper it bends from pixel to pixel where the dominant axis changes than beside
+        that."""
+        axes = dominant_axes()
+        self.assertEqual(len(numpy.unique(axes)), 3)
+        picture = self.picture("a.trip", "--size", f"{SIZE}x{SIZE}", "--fov", FOV, "--no-shading",
+                               "--eye", ",".join(map(str, EYE)), "--look", ",".join(map(str, LOOK)),
+                               "--up", "0,0,1", *method)
+        bends = abs(numpy.diff(picture[..., :3].astype(float), 2, axis=1)).sum(axis=2)
+        change = axes[:, 1:] != axes[:, :-1]
+        border = change[:, 1:] | change[:, :-1]
+        beside = numpy.roll(border, 5, 1) | numpy.roll(border, -5, 1)
+        return bends[border].mean() / bends[beside & ~border].mean()
+
+    def test_clip_shows_lines_where_merge_shows_none(self):
+        self.assertGreater(self.bends_at_borders("--method", "clip"), 10)
+        self.assertLess(self.bends_at_borders(), 1.5)
+        self.assertLess(self.bends_at_borders("--h", "0.5"), 1.5)
+
+    def change_at_45_degrees(self, *method):
+        """How much more a picture changes over a small turn past 45 degrees than by one before."""
+        pictures = []
+        for degrees in 44.85, 44.95, 45.05:
+            a = math.radians(degrees)
+            eye = 7 + 50 * math.cos(a), 7 + 50 * math.sin(a), 20
+            pictures.append(self.picture("a.trip", "--size", "100x100", "--ortho", 25, "--eye",
+                                         ",".join(map(repr, eye)), "--look", "7,7,7", *method))
+        before, past = (abs(pictures[i + 1] - pictures[i]).mean() for i in (0, 1))
+        return past / before
+
+    def test_axis_pops_where_merge_does_not(self):
+        self.assertGreater(self.change_at_45_degrees("--method", "axis"), 3)
+        for h in "0", "0.5", "0.85":
+            self.assertLess(self.change_at_45_degrees("--h", h), 1.5, h)
+
+
+if __name__ == "__main__":
+    program.main()
