@@ -193,10 +193,9 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
     estimate_sizes(in, format, plan, &e);
     if (surely * (double)(e.bytes + e.temporary_bytes) <= (double)e.free_bytes)
         return 0;
-    return trip_fail(
-        TRIP_ERROR, "brick", in->params->output,
-        "about %s are needed, temporary data included, and there is %s of space left on the "
-        "disk: free some, write elsewhere, or keep less",
-        trip_format_bytes(e.bytes + e.temporary_bytes, needed),
-        trip_format_bytes(e.free_bytes, there));
+    return trip_fail(TRIP_ERROR, "brick", in->params->output,
+                     "about %s are needed, temporary data included, and the disk has %s: free "
+                     "some, write elsewhere, or keep less",
+                     trip_format_bytes(e.bytes + e.temporary_bytes, needed),
+                     trip_format_bytes(e.free_bytes, there));
 }
