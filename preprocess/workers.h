@@ -13,10 +13,7 @@ typedef struct trip_workers trip_workers;
  * out. */
 typedef int (*trip_work)(void *user, unsigned thread, uint64_t item);
 
-/* Processors that the process may run on. */
-unsigned trip_workers_processors(void);
-
-/* threads 0: one for every processor. */
+/* threads 0: one for every processor that the process may run on. */
 int trip_workers_create(trip_workers **out, unsigned threads);
 void trip_workers_destroy(trip_workers *w);
 unsigned trip_workers_count(const trip_workers *w);

@@ -4,9 +4,9 @@
 
 #include "report.h"
 
-/* A segment holds at least so many splats on average, a chunk at least so many voxels; where they
- * hold fewer, a flush comes early. Any one chunk fits an empty buffer. */
-enum { SPLATS_PER_SEGMENT = 8, SMALLEST_CHUNK = 64 };
+/* Room for a splat's places in the tiles' orders, on average; splats that need more are wide, and
+ * their chunks are spread. */
+enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_SEGMENT = 4, SMALLEST_CHUNK = 64 };
 
 static void *part(char *memory, size_t *at, size_t bytes)
 {
@@ -19,20 +19,19 @@ static void *part(char *memory, size_t *at, size_t bytes)
 static size_t lay_out(trip_cpu_flush *f, char *memory)
 {
     size_t at = 0;
-    f->splats = part(memory, &at, ((size_t)f->capacity + f->spare) * sizeof *f->splats);
+    f->splats = part(memory, &at, (size_t)f->capacity * sizeof *f->splats);
+    f->order = part(memory, &at, (size_t)f->order_capacity * sizeof *f->order);
     f->segments = part(memory, &at, (size_t)f->segment_capacity * sizeof *f->segments);
     f->chunks = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->chunks);
-    f->wide_chunks = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->wide_chunks);
+    f->spread = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->spread);
     return at;
 }
 
-int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, uint32_t spare, trip_budget *budget)
+int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget)
 {
     f->capacity = capacity;
-    f->spare = spare;
+    f->order_capacity = capacity * ORDERS_PER_SPLAT;
     f->segment_capacity = capacity / SPLATS_PER_SEGMENT;
-    if (f->segment_capacity < TRIP_CPU_CHUNK_SPLATS)
-        f->segment_capacity = TRIP_CPU_CHUNK_SPLATS;
     f->chunk_capacity = capacity / SMALLEST_CHUNK;
     f->bytes = lay_out(f, NULL);
     char *memory = trip_budget_take(budget, f->bytes);
@@ -71,129 +70,169 @@ int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
 
 void trip_cpu_flush_empty(trip_cpu_flush *f)
 {
-    f->chunk_count = f->wide_chunk_count = f->wide_splats = 0;
-    atomic_store_explicit(&f->splats_used, 0, memory_order_relaxed);
+    f->used = f->chunk_count = f->spread_count = 0;
+    atomic_store_explicit(&f->orders_used, 0, memory_order_relaxed);
     atomic_store_explicit(&f->segments_used, 0, memory_order_relaxed);
+}
+
+uint32_t trip_cpu_flush_room(const trip_cpu_flush *f)
+{
+    if (f->chunk_count == f->chunk_capacity || f->capacity - f->used < 2)
+        return 0;
+    return f->capacity - f->used - 1;
 }
 
 trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f, uint32_t voxels)
 {
-    if (f->chunk_count == f->chunk_capacity)
+    if (voxels > trip_cpu_flush_room(f))
         return NULL;
     trip_cpu_chunk *chunk = &f->chunks[f->chunk_count++];
-    *chunk = (trip_cpu_chunk){ .voxels = voxels };
+    *chunk = (trip_cpu_chunk){ .voxels = voxels, .splat = f->used };
+    f->used += voxels + 1;
     return chunk;
 }
 
-/* Of the tiles that are open and have splats. */
-typedef struct extent {
-    uint32_t first, last; /* of all that have splats, inclusive */
-    uint32_t splats, segments;
-} extent;
+typedef struct span {
+    uint32_t first, last; /* tiles counted, inclusive */
+    uint64_t places;
+} span;
 
-/* Closed tiles' splats are forgotten. */
-static extent measure(trip_cpu_basket *b, uint32_t tiles, const _Atomic uint8_t *closed)
+/* Tiles of a splat that lies in many. */
+typedef struct reach {
+    uint32_t first, across, down;
+} reach;
+
+static reach reach_of(const trip_cpu_splat *s)
 {
-    extent e = { tiles, 0, 0, 0 };
-    for (uint32_t i = 0; i < b->count; i++) {
-        uint32_t t = b->tiles[i];
-        e.first = t < e.first ? t : e.first;
-        e.last = t > e.last ? t : e.last;
-    }
-    for (uint32_t t = e.first; t <= e.last; t++) {
-        if (b->counts[t] && atomic_load_explicit(&closed[t], memory_order_relaxed))
-            b->counts[t] = 0;
-        e.splats += b->counts[t];
-        e.segments += b->counts[t] != 0;
-    }
-    return e;
+    return (reach){ s->tiles & TRIP_CPU_TILES_FIRST,
+                    s->x1 / TRIP_CPU_TILE - s->x0 / TRIP_CPU_TILE + 1,
+                    s->y1 / TRIP_CPU_TILE - s->y0 / TRIP_CPU_TILE + 1 };
 }
 
-/* Turns counts into the place of each tile's first splat, or TRIP_CPU_NONE, and makes a segment of
- * every tile that has some. */
-static void make_segments(trip_cpu_flush *f, trip_cpu_chunk *chunk, const extent *e, uint32_t place,
-                          uint32_t tiles, uint32_t *counts)
+static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *counts, span *s)
 {
-    trip_cpu_segment *made = f->segments + chunk->first_segment;
-    for (uint32_t t = e->first; t <= e->last; t++) {
+    reach r = reach_of(splat);
+    for (uint32_t y = 0; y < r.down; y++)
+        for (uint32_t x = 0; x < r.across; x++)
+            counts[r.first + y * across + x]++;
+    uint32_t last = r.first + (r.down - 1) * across + r.across - 1;
+    s->last = last > s->last ? last : s->last;
+    s->places += (uint64_t)r.across * r.down;
+}
+
+/* Most splats lie in one tile and few in more than 2 x 2, so four counts without a branch are
+ * cheaper than a loop whose length the processor cannot guess. */
+static span count(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *counts)
+{
+    span s = { UINT32_MAX, 0, 0 };
+    uint32_t places = 0, last = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t tiles = splats[i].tiles, first = tiles & TRIP_CPU_TILES_FIRST;
+        uint32_t right = tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+        uint32_t below = tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+        s.first = first < s.first ? first : s.first;
+        last = first > last ? first : last;
+        if (tiles & TRIP_CPU_TILES_MORE) {
+            count_wide(&splats[i], across, counts, &s);
+            continue;
+        }
+        uint32_t *c = counts + first;
+        c[0]++;
+        c[1] += right;
+        c[across] += below;
+        c[across + 1] += right & below;
+        places += (right + 1) * (below + 1);
+    }
+    last += across + 1;
+    s.last = last > s.last ? last : s.last;
+    s.places += places;
+    return s;
+}
+
+static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *next,
+                       uint16_t *order, uint16_t index)
+{
+    reach r = reach_of(splat);
+    for (uint32_t y = 0; y < r.down; y++)
+        for (uint32_t x = 0; x < r.across; x++)
+            order[next[r.first + y * across + x]++] = index;
+}
+
+/* The next place of a tile when `wanted`, else `sink`. */
+static inline void put(uint16_t *order, uint32_t *next, uint32_t wanted, uint32_t sink,
+                       uint16_t splat)
+{
+    uint32_t at = *next;
+    order[wanted ? at : sink] = splat;
+    *next = at + wanted;
+}
+
+/* `next` holds where each tile's next place is; what is written to order[sink] is not used. */
+static void place(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *next,
+                  uint16_t *order, uint32_t sink)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t tiles = splats[i].tiles;
+        uint32_t right = tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+        uint32_t below = tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+        uint32_t *c = next + (tiles & TRIP_CPU_TILES_FIRST);
+        if (tiles & TRIP_CPU_TILES_MORE) {
+            place_wide(&splats[i], across, next, order, (uint16_t)i);
+            continue;
+        }
+        put(order, c, 1, sink, (uint16_t)i);
+        put(order, c + 1, right, sink, (uint16_t)i);
+        put(order, c + across, below, sink, (uint16_t)i);
+        put(order, c + across + 1, right & below, sink, (uint16_t)i);
+    }
+}
+
+/* Turns counts into places and makes a segment of every tile that has some. */
+static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, const span *s,
+                              uint32_t place_at, uint32_t *counts)
+{
+    uint32_t made = chunk->first_segment;
+    for (uint32_t t = s->first; t <= s->last; t++) {
         uint32_t n = counts[t];
-        counts[t] = n ? place : TRIP_CPU_NONE;
         if (n == 0)
             continue;
-        if (t == tiles) {
-            chunk->wide = place;
-            chunk->wide_count = n;
-        } else {
-            *made++ = (trip_cpu_segment){
-                .tile = t,
-                .chunk = (uint32_t)(chunk - f->chunks),
-                .first = place,
-                .count = n,
-            };
-            chunk->segments++;
-        }
-        place += n;
+        f->segments[made++] = (trip_cpu_segment){
+            .tile = t,
+            .chunk = (uint32_t)(chunk - f->chunks),
+            .first = place_at,
+            .count = n,
+        };
+        counts[t] = place_at;
+        place_at += n;
     }
+    return made - chunk->first_segment;
 }
 
-static void copy(trip_cpu_splat *to, const trip_cpu_basket *b)
+static uint32_t occupied(const uint32_t *counts, const span *s)
 {
-    for (uint32_t i = 0; i < b->count; i++) {
-        uint32_t first = b->counts[b->tiles[i]];
-        if (first != TRIP_CPU_NONE)
-            to[first + b->ranks[i]] = b->splats[i];
-    }
+    uint32_t n = 0;
+    for (uint32_t t = s->first; t <= s->last; t++)
+        n += counts[t] != 0;
+    return n;
 }
 
-static uint16_t less(uint16_t a, uint16_t b)
+void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid, uint32_t *counts)
 {
-    return a < b ? a : b;
-}
-
-static uint16_t more(uint16_t a, uint16_t b)
-{
-    return a > b ? a : b;
-}
-
-static void bound_wide(const trip_cpu_flush *f, trip_cpu_chunk *chunk)
-{
-    chunk->wide_x0 = chunk->wide_y0 = UINT16_MAX;
-    for (uint32_t i = 0; i < chunk->wide_count; i++) {
-        const trip_cpu_splat *s = &f->splats[chunk->wide + i];
-        chunk->wide_x0 = less(chunk->wide_x0, s->x0);
-        chunk->wide_y0 = less(chunk->wide_y0, s->y0);
-        chunk->wide_x1 = more(chunk->wide_x1, s->x1);
-        chunk->wide_y1 = more(chunk->wide_y1, s->y1);
-    }
-}
-
-void trip_cpu_sort(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
-                   const _Atomic uint8_t *closed, trip_cpu_basket *basket)
-{
-    uint32_t tiles = grid.across * grid.down;
-    if (basket->count == 0)
+    const trip_cpu_splat *splats = f->splats + chunk->splat;
+    if (chunk->splats == 0)
         return;
-    extent e = measure(basket, tiles, closed);
-    uint64_t segment =
-        atomic_fetch_add_explicit(&f->segments_used, e.segments, memory_order_relaxed);
-    uint64_t place = atomic_fetch_add_explicit(&f->splats_used, e.splats, memory_order_relaxed);
-    chunk->full = segment + e.segments > f->segment_capacity || place + e.splats > f->capacity;
-    if (!chunk->full) {
+    span s = count(splats, chunk->splats, grid.across, counts);
+    uint32_t segments = occupied(counts, &s);
+    uint64_t segment = atomic_fetch_add_explicit(&f->segments_used, segments, memory_order_relaxed);
+    uint64_t at = atomic_fetch_add_explicit(&f->orders_used, s.places + 1, memory_order_relaxed);
+    chunk->spread =
+        segment + segments > f->segment_capacity || at + s.places + 1 > f->order_capacity;
+    if (!chunk->spread) {
         chunk->first_segment = (uint32_t)segment;
-        make_segments(f, chunk, &e, (uint32_t)place, tiles, basket->counts);
-        copy(f->splats, basket);
-        bound_wide(f, chunk);
+        chunk->segments = make_segments(f, chunk, &s, (uint32_t)at, counts);
+        place(splats, chunk->splats, grid.across, counts, f->order, (uint32_t)(at + s.places));
     }
-    memset(basket->counts + e.first, 0, (e.last - e.first + 1) * sizeof *basket->counts);
-}
-
-uint32_t trip_cpu_flush_cut(trip_cpu_flush *f)
-{
-    uint32_t first = 0;
-    while (first < f->chunk_count && !f->chunks[first].full)
-        first++;
-    f->chunk_count = first;
-    return first;
+    memset(counts + s.first, 0, (s.last - s.first + 1) * sizeof *counts);
 }
 
 static void append(trip_cpu_flush *f, uint32_t segment)
@@ -208,64 +247,40 @@ static void append(trip_cpu_flush *f, uint32_t segment)
     share->splats += f->segments[segment].count;
 }
 
-void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid)
+void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid, const _Atomic uint8_t *closed)
 {
-    for (uint32_t t = 0; t < grid.across * grid.down; t++)
+    uint32_t tiles = grid.across * grid.down;
+    for (uint32_t t = 0; t < tiles; t++)
         f->shares[t] = (trip_cpu_share){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
     for (uint32_t c = 0; c < f->chunk_count; c++) {
         const trip_cpu_chunk *chunk = &f->chunks[c];
-        for (uint32_t i = 0; i < chunk->segments; i++)
-            append(f, chunk->first_segment + i);
-        if (chunk->wide_count)
-            f->wide_chunks[f->wide_chunk_count++] = c;
+        if (chunk->spread)
+            f->spread[f->spread_count++] = c;
+        for (uint32_t i = 0; i < chunk->segments; i++) {
+            uint32_t segment = chunk->first_segment + i;
+            if (!atomic_load_explicit(&closed[f->segments[segment].tile], memory_order_relaxed))
+                append(f, segment);
+        }
     }
+    for (uint32_t i = 0; i < f->spread_count; i++)
+        for (uint32_t t = 0; t < tiles; t++)
+            f->shares[t].splats += f->chunks[f->spread[i]].splats;
 }
 
-/* A chunk's splats of one tile between its wide ones, by their sequence. */
-static void interleave(const trip_cpu_flush *f, const trip_cpu_chunk *chunk, uint32_t first,
-                       uint32_t count, const trip_cpu_taker *taker)
+void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
+                         void (*take)(void *user, const trip_cpu_splat *splats,
+                                      const uint16_t *order, uint32_t count),
+                         void *user)
 {
-    uint32_t end = first + count;
-    for (uint32_t w = chunk->wide; w < chunk->wide + chunk->wide_count; w++) {
-        uint32_t until = first;
-        while (until < end && f->splats[until].sequence < f->splats[w].sequence)
-            until++;
-        if (until > first)
-            taker->take(taker->user, first, until - first);
-        taker->take_wide(taker->user, w);
-        first = until;
-    }
-    if (first < end)
-        taker->take(taker->user, first, end - first);
-}
-
-/* The first splats of a segment, on their way from the cache of whoever projected them. */
-static void fetch(const trip_cpu_flush *f, const trip_cpu_segment *s)
-{
-    if (s->next == TRIP_CPU_NONE)
-        return;
-    const trip_cpu_segment *next = &f->segments[s->next];
-    for (uint32_t i = 0; i < next->count && i < 16; i++)
-        __builtin_prefetch(&f->splats[next->first + i]);
-}
-
-void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile, int x, int y,
-                         const trip_cpu_taker *taker)
-{
-    uint32_t segment = f->shares[tile].head, wide = 0;
-    while (segment != TRIP_CPU_NONE || wide < f->wide_chunk_count) {
+    uint32_t segment = f->shares[tile].head, spread = 0;
+    while (segment != TRIP_CPU_NONE || spread < f->spread_count) {
         const trip_cpu_segment *s = segment == TRIP_CPU_NONE ? NULL : &f->segments[segment];
-        uint32_t w = wide < f->wide_chunk_count ? f->wide_chunks[wide] : TRIP_CPU_NONE;
-        uint32_t chunk = s && s->chunk < w ? s->chunk : w;
-        bool mine = s && s->chunk == chunk;
-        if (mine)
-            fetch(f, s);
-        uint32_t first = mine ? s->first : 0, count = mine ? s->count : 0;
-        if (chunk == w && trip_cpu_wide_meets(&f->chunks[chunk], x, y))
-            interleave(f, &f->chunks[chunk], first, count, taker);
-        else if (count)
-            taker->take(taker->user, first, count);
-        wide += chunk == w;
-        segment = mine ? s->next : segment;
+        if (spread < f->spread_count && (!s || f->spread[spread] < s->chunk)) {
+            const trip_cpu_chunk *chunk = &f->chunks[f->spread[spread++]];
+            take(user, f->splats + chunk->splat, NULL, chunk->splats);
+        } else {
+            take(user, f->splats + f->chunks[s->chunk].splat, f->order + s->first, s->count);
+            segment = s->next;
+        }
     }
 }

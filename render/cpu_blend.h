@@ -13,35 +13,20 @@
 #define BLOCKS_DOWN (TRIP_CPU_TILE / BLOCK_ROWS)
 #define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
 #define BLOCK_FLOATS (4 * V)
-
-/* So many pairs are worked on at a time. A pair is one long chain of dependent operations, and the
- * processor does not look far enough ahead to find the next ones: so they are written side by
- * side. The numbers are those of one pair at a time. */
-#define GROUP 2
-
-#define EACH(i, n) for (int i = 0; i < (n); i++)
+#define BLOCK_BYTES (4 * BLOCK_FLOATS)
 
 /* ---- exponentials ---- */
 
-/* 2^(y / TRIP_CPU_EXP_UNIT - 127) of n vectors within 7.5e-5 of itself, for y in [0, 254
- * TRIP_CPU_EXP_UNIT]. The integer part becomes the float's exponent; a cubic does the mantissa. */
-INLINE void exp2_biased(const vf y[], int n, vf out[])
+/* 2^(y / TRIP_CPU_EXP_UNIT - 127) within 7.5e-5 of itself, for y in [0, 254 TRIP_CPU_EXP_UNIT]. The
+ * integer part becomes the float's exponent; a cubic does the mantissa. */
+INLINE vf exp2_biased(vf y)
 {
-    vf m[GROUP], p[GROUP];
-    vi power[GROUP];
-    EACH(i, n)
-    {
-        power[i] = v_truncate(y[i]);
-        m[i] = v_from_bits(vi_low_or(power[i], 0x7fffff, 0x3f800000));
-    }
-    EACH(i, n)
-    p[i] = v_fma(v_set(0.0780245233f), m[i], v_set(-0.00800641098f));
-    EACH(i, n)
-    p[i] = v_fma(p[i], m[i], v_set(0.477772789f));
-    EACH(i, n)
-    p[i] = v_fma(p[i], m[i], v_set(0.452134318f));
-    EACH(i, n)
-    out[i] = v_from_bits(power[i] & 0x7f800000) * p[i];
+    vi i = v_truncate(y);
+    vf m = v_from_bits(vi_low_or(i, 0x7fffff, 0x3f800000));
+    vf p = v_fma(v_set(0.0780245233f), m, v_set(-0.00800641098f));
+    p = v_fma(p, m, v_set(0.477772789f));
+    p = v_fma(p, m, v_set(0.452134318f));
+    return v_from_bits(i & 0x7f800000) * p;
 }
 
 /* exp(-x), x >= 0, within 1.1e-4 of itself and exact at 0, so that the faint rims of many splats
@@ -58,16 +43,11 @@ INLINE vf exp_minus(vf x)
     return v_from_bits(i & 0x7f800000) * p;
 }
 
-/* 1 - exp(-x) of n vectors within 8e-5 of itself, for 0 <= x <= TRIP_CPU_THIN. */
-INLINE void thin_opacity(const vf x[], int n, vf out[])
+/* (1 - exp(-x)) / x within 8e-5 of itself, for 0 <= x <= TRIP_CPU_THIN. */
+INLINE vf thin_ratio(vf x)
 {
-    vf p[GROUP];
-    EACH(i, n)
-    p[i] = v_fma(v_set(0.143569535f), x[i], v_set(-0.496570851f));
-    EACH(i, n)
-    p[i] = v_fma(p[i], x[i], v_set(0.999921664f));
-    EACH(i, n)
-    out[i] = p[i] * x[i];
+    vf p = v_fma(v_set(0.143569535f), x, v_set(-0.496570851f));
+    return v_fma(p, x, v_set(0.999921664f));
 }
 
 /* ---- what a target keeps ---- */
@@ -96,79 +76,39 @@ INLINE vf kept(vf a, trip_target target)
 
 /* ---- blending ---- */
 
-/* The pairs of a group, unpacked. */
-typedef struct group {
-    const trip_cpu_splat *splat[GROUP];
-    const float *geometry[GROUP];
-    float *pixels[GROUP];
-} group;
-
-INLINE group unpack(const trip_cpu_scratch *s, const uint32_t *pairs, int n)
+/* Optical depth of a splat at the pixels of a block, where `inside`. */
+INLINE vf optical_depth(const float *geometry, const trip_cpu_splat *splat, trip_cpu_rays rays,
+                        vm *inside)
 {
-    group g;
-    EACH(i, n)
-    {
-        size_t block = BLOCK_FLOATS * (size_t)(pairs[i] & 255);
-        g.splat[i] = &s->splats[pairs[i] >> 8];
-        g.geometry[i] = s->geometry + block;
-        g.pixels[i] = s->pixels + block;
-    }
-    return g;
-}
-
-/* Optical depths of splats at the pixels of their blocks, where `inside`. */
-INLINE void optical_depths(const group *g, int n, trip_cpu_rays rays, vf depth[], vm inside[])
-{
-    vf a[GROUP], b[GROUP], y[GROUP];
-    EACH(i, n)
-    {
-        vf py = v_load(g->geometry[i] + V);
-        a[i] = v_fma(py, v_set(g->splat[i]->l21), v_set(g->splat[i]->u));
-        b[i] = v_fma(py, v_set(g->splat[i]->l22), v_set(g->splat[i]->w));
-    }
-    EACH(i, n)
-    a[i] = v_fma(v_load(g->geometry[i]), v_set(g->splat[i]->l11), a[i]);
-    EACH(i, n)
-    y[i] = v_fma(b[i], b[i], a[i] * a[i]);
-    EACH(i, n)
-    {
-        vf scale = rays == TRIP_CPU_PARALLEL ? v_set(1) : v_load(g->geometry[i] + 2 * V);
-        y[i] = v_fnma(scale, y[i], v_set(g->splat[i]->peak));
-    }
-    EACH(i, n)
-    inside[i] = v_ge(y[i], v_set(g->splat[i]->least));
+    vf dx = v_load(geometry) - v_set(splat->x);
+    vf dy = v_load(geometry + V) - v_set(splat->y);
+    vf a = v_fma(dy, v_set(splat->l21), dx * v_set(splat->l11));
+    vf b = dy * v_set(splat->l22);
+    vf y;
+    if (rays == TRIP_CPU_PARALLEL)
+        y = v_fnma(b, b, v_fnma(a, a, v_set(splat->peak)));
+    else
+        y = v_fnma(v_load(geometry + 2 * V), v_fma(b, b, a * a), v_set(splat->peak));
+    *inside = v_ge(y, v_set(splat->least));
     if (rays == TRIP_CPU_STRETCHED)
-        EACH(i, n)
-    y[i] = y[i] + v_load(g->geometry[i] + 3 * V);
-    exp2_biased(y, n, depth);
-}
-
-/* Opacities 1 - exp(-depth). */
-INLINE void opacities(const group *g, int n, const vf depth[], vf alpha[])
-{
-    uint32_t thick = 0;
-    EACH(i, n)
-    thick |= g->splat[i]->thick;
-    if (thick == 0) {
-        thin_opacity(depth, n, alpha);
-        return;
-    }
-    EACH(i, n)
-    {
-        if (g->splat[i]->thick)
-            alpha[i] = v_set(1) - exp_minus(depth[i]);
-        else
-            thin_opacity(depth + i, 1, alpha + i);
-    }
+        y = y + v_load(geometry + 3 * V);
+    return exp2_biased(y);
 }
 
 /* Front to back: `splat` goes behind what the pixels hold. */
-INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf alpha, vm inside,
+INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf depth, vm inside,
                        trip_target target)
 {
     vf t = v_load(pixels + 3 * V);
     vm open = v_ge_and(inside, t, v_set((float)TRIP_SATURATION));
-    vf taken = v_mul_or_zero(open, t, alpha), left = t - taken;
+    vf taken, left;
+    if (splat->thick != 0) {
+        left = v_mul_where(open, t, exp_minus(depth));
+        taken = t - left;
+    } else {
+        taken = v_mul_or_zero(open, t * depth, thin_ratio(depth));
+        left = t - taken;
+    }
     for (int c = 0; c < 3; c++) {
         vf colour = v_fma(taken, v_set((&splat->r)[c]), v_load(pixels + c * V));
         v_store(pixels + c * V, kept(colour, target));
@@ -179,47 +119,39 @@ INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf alpha, vm 
 }
 
 /* Back to front: `splat` goes over what the pixels hold. */
-INLINE void put_over(float *pixels, const trip_cpu_splat *splat, vf alpha, vm inside,
+INLINE void put_over(float *pixels, const trip_cpu_splat *splat, vf depth, vm inside,
                      trip_target target)
 {
-    vf t = v_load(pixels + 3 * V);
-    alpha = v_select(inside, alpha, v_set(0));
+    vf keep = v_select(inside, exp_minus(depth), v_set(1));
     for (int c = 0; c < 3; c++) {
-        vf under = v_load(pixels + c * V);
-        vf colour = v_fma(alpha, v_set((&splat->r)[c]) - under, under);
-        v_store(pixels + c * V, kept(colour, target));
+        vf colour = v_set((&splat->r)[c]);
+        colour = v_fma(v_load(pixels + c * V) - colour, keep, colour);
+        colour = v_select(inside, kept(colour, target), v_load(pixels + c * V));
+        v_store(pixels + c * V, colour);
     }
-    vf left = v_fnma(t, alpha, t);
+    vf left = v_load(pixels + 3 * V) * keep;
     if (target != TRIP_TARGET_RGBA32F)
         left = v_set(1) - kept(v_set(1) - left, target);
     v_store(pixels + 3 * V, left);
 }
 
-INLINE void blend_group(const trip_cpu_scratch *s, const uint32_t *pairs, int n, trip_cpu_rays rays,
-                        bool front_to_back, trip_target target)
-{
-    vf depth[GROUP], alpha[GROUP];
-    vm inside[GROUP];
-    group g = unpack(s, pairs, n);
-    optical_depths(&g, n, rays, depth, inside);
-    opacities(&g, n, depth, alpha);
-    EACH(i, n)
-    {
-        if (front_to_back)
-            put_behind(g.pixels[i], g.splat[i], alpha[i], inside[i], target);
-        else
-            put_over(g.pixels[i], g.splat[i], alpha[i], inside[i], target);
-    }
-}
-
-INLINE void blend_pairs(const trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
+INLINE void blend_pairs(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
                         trip_target target)
 {
-    uint32_t i = 0;
-    for (; i + GROUP <= s->pair_count; i += GROUP)
-        blend_group(s, s->pairs + i, GROUP, rays, front_to_back, target);
-    for (; i < s->pair_count; i++)
-        blend_group(s, s->pairs + i, 1, rays, front_to_back, target);
+    const uint32_t *end = s->pairs + s->pair_count;
+    char *pixels = (char *)s->pixels;
+    for (const uint32_t *pair = s->pairs; pair < end; pair++) {
+        uint32_t block = *pair & 0xffff, at = *pair >> 16;
+        const trip_cpu_splat *splat = (const void *)((const char *)s->local + at);
+        const float *geometry = (const void *)((const char *)s->geometry + block);
+        float *to = (void *)(pixels + block);
+        vm inside;
+        vf depth = optical_depth(geometry, splat, rays, &inside);
+        if (front_to_back)
+            put_behind(to, splat, depth, inside, target);
+        else
+            put_over(to, splat, depth, inside, target);
+    }
 }
 
 #define BLEND(name, rays, front_to_back, target)                                                   \
@@ -285,75 +217,60 @@ static void find_open(trip_cpu_scratch *s)
 static void empty_pairs(trip_cpu_scratch *s)
 {
     s->blend(s);
-    s->local_count = s->pair_count = 0;
+    s->splats = s->pair_count = 0;
     find_open(s);
 }
 
-/* Pairs of a splat's place with the open blocks of some columns, from row `top` on and `more` rows
- * further, four rows at a time. Returns the end of the pairs. */
-INLINE uint32_t *pair_up(const trip_cpu_scratch *s, uint32_t *pairs, uint32_t place,
-                         unsigned columns, unsigned top, unsigned more)
+typedef int32_t int4 __attribute__((vector_size(16)));
+typedef uint16_t ushort4 __attribute__((vector_size(8)));
+typedef float float4 __attribute__((vector_size(16)));
+
+/* A copy of a splat with its centre relative to the tile, where floats are finest. */
+INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, float4 origin)
+{
+    float4 part, centre;
+    memcpy(&part, splat, sizeof part);
+    memcpy(local, splat, sizeof *local);
+    centre = part + (__builtin_shufflevector(part, part, 2, 3, 2, 3) - origin);
+    memcpy(local, &centre, 2 * sizeof(float));
+}
+
+typedef struct block_range {
+    unsigned left, top, right, bottom; /* inclusive */
+} block_range;
+
+INLINE block_range blocks_of(const trip_cpu_splat *splat, int4 origin)
+{
+    const int4 shift = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
+    const int4 edge = { TRIP_CPU_TILE - 1, TRIP_CPU_TILE - 1, TRIP_CPU_TILE - 1,
+                        TRIP_CPU_TILE - 1 };
+    ushort4 bounds;
+    memcpy(&bounds, &splat->x0, sizeof bounds);
+    int4 b = __builtin_convertvector(bounds, int4) - origin;
+    b &= b > 0;
+    b = (b & (b < edge)) | (edge & (b >= edge));
+    b >>= shift;
+    return (block_range){ (unsigned)b[0], (unsigned)b[1], (unsigned)b[2], (unsigned)b[3] };
+}
+
+/* Pairs of splat `index` with the open blocks of a range, four rows at a time; their number. */
+INLINE uint32_t pair_up(const trip_cpu_scratch *s, uint32_t *pairs, uint32_t index, block_range r)
 {
     static const uint32_t rows[4] = { 0xff, 0xffff, 0xffffff, 0xffffffff };
-    uint32_t first = place << 8 | top * BLOCKS_ACROSS;
-    columns *= 0x01010101u;
-    for (;; top += 4, more -= 4, first += 4 * BLOCKS_ACROSS) {
-        uint32_t blocks;
-        memcpy(&blocks, s->open + top, sizeof blocks);
+    uint32_t columns = (0xffu << r.left & 0xffu >> (BLOCKS_ACROSS - 1 - r.right)) * 0x01010101u;
+    uint32_t n = 0;
+    static_assert(sizeof *s->local == 64 && BLOCK_BYTES == TRIP_SIMD_STEP, "bytes in pairs");
+    for (unsigned row = r.top;; row += 4) {
+        unsigned more = r.bottom - row;
+        uint32_t blocks, first = index << 22 | row * BLOCKS_ACROSS * BLOCK_BYTES;
+        memcpy(&blocks, s->open + row, sizeof blocks);
         blocks &= columns & rows[more < 3 ? more : 3];
         for (unsigned i = 0; i < 32; i += APPENDED)
-            pairs += append_bits(pairs, first + i, blocks >> i & ((1u << APPENDED) - 1));
+            n += append_bits(pairs + n, first + i * BLOCK_BYTES,
+                             blocks >> i & ((1u << APPENDED) - 1));
         if (more < 4)
-            return pairs;
+            return n;
     }
-}
-
-/* What part of [first, last] lies in the tile's 32 pixels from `corner` on. */
-INLINE void clip(int corner, int *first, int *last)
-{
-    *first = *first > corner ? *first - corner : 0;
-    *last = *last - corner < TRIP_CPU_TILE - 1 ? *last - corner : TRIP_CPU_TILE - 1;
-}
-
-/* A wide splat: a copy of it, with its centre from this tile's corner. */
-static uint32_t *pair_copy(trip_cpu_scratch *s, uint32_t *pairs, uint32_t place)
-{
-    uint32_t copy = s->local + s->local_count++;
-    trip_cpu_splat *c = &s->splats[copy];
-    *c = s->splats[place];
-    int x0 = c->x0, x1 = c->x1, y0 = c->y0, y1 = c->y1;
-    float dx = (float)(s->x - x0 / TRIP_CPU_TILE * TRIP_CPU_TILE);
-    float dy = (float)(s->y - y0 / TRIP_CPU_TILE * TRIP_CPU_TILE);
-    c->u += c->l11 * dx + c->l21 * dy;
-    c->w += c->l22 * dy;
-    clip(s->x, &x0, &x1);
-    clip(s->y, &y0, &y1);
-    unsigned columns = 0xffu << x0 / 4 & 0xffu >> (BLOCKS_ACROSS - 1 - x1 / 4);
-    unsigned top = (unsigned)y0 / BLOCK_ROWS, bottom = (unsigned)y1 / BLOCK_ROWS;
-    return pair_up(s, pairs, copy, columns, top, bottom - top);
-}
-
-/* Blends where there might be no room for another splat's pairs. */
-INLINE uint32_t *make_room(trip_cpu_scratch *s, uint32_t *pairs)
-{
-    if (pairs - s->pairs <= TRIP_CPU_PAIRS - BLOCKS)
-        return pairs;
-    s->pair_count = (uint32_t)(pairs - s->pairs);
-    empty_pairs(s);
-    return s->pairs;
-}
-
-static void tile_blend(trip_cpu_scratch *s, uint32_t first, uint32_t count)
-{
-    uint32_t *pairs = s->pairs + s->pair_count;
-    for (uint32_t i = first; i < first + count && s->any_open; i++) {
-        uint32_t blocks = s->splats[i].blocks;
-        __builtin_prefetch(&s->splats[i + 16]);
-        pairs = pair_up(s, pairs, i, blocks & 255, blocks >> TRIP_CPU_BLOCKS_TOP_SHIFT & 255,
-                        blocks >> TRIP_CPU_BLOCKS_MORE_SHIFT);
-        pairs = make_room(s, pairs);
-    }
-    s->pair_count = (uint32_t)(pairs - s->pairs);
 }
 
 static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
@@ -362,14 +279,45 @@ static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
            splat->y0 < s->y + TRIP_CPU_TILE && splat->y1 >= s->y;
 }
 
-static void tile_blend_wide(trip_cpu_scratch *s, uint32_t splat)
+/* What tile_blend() keeps in registers. */
+typedef struct pairing {
+    uint32_t splats, pairs;
+    int4 corner;
+    float4 origin;
+} pairing;
+
+INLINE void add(trip_cpu_scratch *s, pairing *p, const trip_cpu_splat *splat)
 {
-    if (!s->any_open || !meets(s, &s->splats[splat]))
-        return;
-    uint32_t *pairs = make_room(s, pair_copy(s, s->pairs + s->pair_count, splat));
-    s->pair_count = (uint32_t)(pairs - s->pairs);
-    if (s->local_count == TRIP_CPU_LOCAL)
+    make_local(&s->local[p->splats], splat, p->origin);
+    p->pairs += pair_up(s, s->pairs + p->pairs, p->splats, blocks_of(splat, p->corner));
+    p->splats++;
+    if (p->splats == TRIP_CPU_LOCAL || p->pairs > TRIP_CPU_PAIRS - BLOCKS) {
+        s->pair_count = p->pairs;
         empty_pairs(s);
+        p->splats = p->pairs = 0;
+    }
+}
+
+/* Splats to fetch ahead: they lie scattered among those of other tiles. */
+#define AHEAD 12
+
+static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count)
+{
+    const int4 corner = { s->x, s->y, s->x, s->y };
+    pairing p = { s->splats, s->pair_count, corner, __builtin_convertvector(corner, float4) };
+    if (order) {
+        for (uint32_t i = 0; i < count && s->any_open; i++) {
+            __builtin_prefetch(&splats[order[i + AHEAD < count ? i + AHEAD : i]]);
+            add(s, &p, &splats[order[i]]);
+        }
+    } else {
+        for (uint32_t i = 0; i < count && s->any_open; i++)
+            if (meets(s, &splats[i]))
+                add(s, &p, &splats[i]);
+    }
+    s->splats = p.splats;
+    s->pair_count = p.pairs;
 }
 
 static bool tile_end(trip_cpu_scratch *s)
@@ -402,9 +350,6 @@ INLINE vf square_at(const square *q, vf x, vf y)
 
 static void set_pixel_centres(trip_cpu_scratch *s)
 {
-    if (s->placed)
-        return;
-    s->placed = true;
     for (int b = 0; b < BLOCKS; b++) {
         float *geometry = s->geometry + BLOCK_FLOATS * b;
         for (int i = 0; i < V; i++) {
@@ -454,7 +399,7 @@ static void tile_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, in
     s->y = y;
     s->quarters = quarters;
     s->pixels = pixels;
-    s->local_count = s->pair_count = 0;
+    s->splats = s->pair_count = 0;
     s->blend = choose_blend(view);
     set_pixel_centres(s);
     if (view->rays != TRIP_CPU_PARALLEL)

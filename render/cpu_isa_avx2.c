@@ -18,7 +18,6 @@ const trip_cpu_kernels trip_cpu_avx2 = {
     .tile_clear = tile_clear,
     .tile_begin = tile_begin,
     .tile_blend = tile_blend,
-    .tile_blend_wide = tile_blend_wide,
     .tile_end = tile_end,
     .tile_merge = tile_merge,
     .tile_finish = tile_finish,

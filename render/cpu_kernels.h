@@ -23,33 +23,27 @@
 /* Splats whose largest optical depth is below this use the short form of 1 - exp(-x). */
 #define TRIP_CPU_THIN 0.4f
 
-/* One splat, ready to blend; 64 bytes, a cache line. With q a pixel's offset from its centre, the
- * exponent of the optical depth at the pixel is
+/* One splat, ready to blend; 64 bytes, a cache line. Its centre is (x + whole_x, y + whole_y). With
+ * q the pixel's offset from it, the exponent of the optical depth at a pixel is
  *     peak - G(p) ((l11 qx + l21 qy)^2 + (l22 qy)^2)
- * G as in trip_cpu_rays, and nothing is drawn where that is below `least`. With p the pixel from
- * the tile's corner and c the centre, l11 qx + l21 qy = l11 px + l21 py + u and l22 qy = l22 py +
- * w, where u = -(l11 cx + l21 cy),  w = -l22 cy A splat that lies in up to two by two tiles is made
- * once for each, with its centre from the tile's corner, where floats are finest, and its blocks
- * there. One that lies in more, a wide one, is made once, with its centre from the corner of the
- * first, top left. */
+ * G as in trip_cpu_rays, and nothing is drawn where that is below `least`. */
 typedef struct trip_cpu_splat {
-    float u, w;
-    float l11, l21, l22;
-    float peak, least;
-    uint32_t thick; /* not 0: the long form of 1 - exp(-x) is needed */
-    float r, g, b;
-    uint32_t blocks;         /* that it may touch, see below */
+    float x, y, whole_x, whole_y;
+    float l11, l21, l22, peak;
+    float r, g, b, least;
     uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
-    uint32_t sequence;       /* its place among the voxels of the chunk */
-    uint32_t spare;
+    uint32_t tiles;          /* those that it lies in, see below */
+    uint32_t thick;          /* not 0: the long form of 1 - exp(-x) is needed */
 } trip_cpu_splat;
 
 static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
 
-/* trip_cpu_splat.blocks: in bits 0 to 7 the columns of blocks, from bit 8 on the first row, from
- * bit 16 on how many rows follow. */
-#define TRIP_CPU_BLOCKS_TOP_SHIFT 8
-#define TRIP_CPU_BLOCKS_MORE_SHIFT 16
+/* trip_cpu_splat.tiles: the number of the first tile (top left), and whether the splat also lies in
+ * the one to the right of it and in the one below it, or in more than these two by two. */
+#define TRIP_CPU_TILES_RIGHT_SHIFT 28
+#define TRIP_CPU_TILES_BELOW_SHIFT 29
+#define TRIP_CPU_TILES_MORE (1u << 30)
+#define TRIP_CPU_TILES_FIRST ((1u << 28) - 1)
 
 /* Where the rays of a view are alike, their tables are not needed. */
 typedef enum trip_cpu_rays {
@@ -67,14 +61,14 @@ typedef struct trip_cpu_view {
     bool stretch_varies;
     int axis, u_axis, v_axis;
     double gradient_full;
-    double stretch;          /* where it is constant, else 1 */
-    float cutoff;            /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
-    float thick_log2;        /* log2 of the largest optical depth, stretch aside, of thin splats */
-    int tiles_across, tiles; /* of the screen; `tiles` stands for all of a wide splat */
+    double stretch;   /* where it is constant, else 1 */
+    float cutoff;     /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
+    float thick_log2; /* log2 of the largest optical depth, stretch aside, of thin splats */
+    int tiles_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
-    trip_vec3 to_eye[3]; /* world space, from a splat to the eye: [0] + x [1] + y [2], about the
-                            image's middle and not normalised */
-    trip_splat parallel; /* the footprint of all, in parallel views */
+    double eye[3];                             /* [u, v, sheet] */
+    double world[3][3];                        /* index_to_world's columns for u, v, sheet */
+    trip_splat parallel;                       /* the footprint of all, in parallel views */
 } trip_cpu_view;
 
 /* Voxels waiting to be projected: one entry a lane, from any runs. */
@@ -91,51 +85,34 @@ typedef struct trip_cpu_lanes {
     float z[TRIP_CPU_STAGED], inverse_z[TRIP_CPU_STAGED];
     float l11[TRIP_CPU_STAGED], l21[TRIP_CPU_STAGED], l22[TRIP_CPU_STAGED];
     float peak[TRIP_CPU_STAGED];
-    float r[TRIP_CPU_STAGED], g[TRIP_CPU_STAGED], b[TRIP_CPU_STAGED];
-    uint32_t first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED]; /* pixels: two uint16 each */
-    /* Bits of a vector's lanes: with pixels in the image; near the plane of the eye; beyond the
-     * first tile to the right, below, and beyond two by two. */
-    uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4];
-    uint32_t right[TRIP_CPU_STAGED / 4], below[TRIP_CPU_STAGED / 4], wide[TRIP_CPU_STAGED / 4];
+    float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED];           /* two uint16 each */
+    float tiles[TRIP_CPU_STAGED];                                  /* uint32 */
+    uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
 } trip_cpu_lanes;
 
-/* Wide splats are copied for the tile at hand, so many at a time. */
+/* Pairs of a splat and a block that it may touch: where the splat stands in `local`, in bytes,
+ * << 16, and where the block's floats stand in the tile's pixels, in bytes. */
 #define TRIP_CPU_LOCAL 128
 #define TRIP_CPU_PAIRS 2048
 
-/* What one thread needs while it projects or blends. */
+/* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
     /* Of each block, at the same place as its pixels: pixel centres x[V], y[V] from the tile's
      * corner, G[V], log2 stretch[V] in TRIP_CPU_EXP_UNIT. */
     _Alignas(64) float geometry[4 * TRIP_CPU_TILE_PIXELS];
-    /* Splats and blocks that they may touch: place in `splats` << 8 | block. */
+    _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL]; /* centres relative to the tile */
     uint32_t pairs[TRIP_CPU_PAIRS + 16];
     uint8_t open[32 + 8]; /* rows of blocks, a bit for each block that may still take light */
-    uint32_t pair_count;
-    trip_cpu_splat *splats;      /* of the flush; those from `local` on are this thread's */
-    uint32_t local, local_count; /* copies made for the tile at hand */
+    uint32_t splats, pair_count;
     unsigned quarters;
-    bool any_open, placed; /* placed: the pixel centres are there */
-    int x, y;              /* of the tile's first pixel */
+    bool any_open;
+    int x, y; /* of the tile's first pixel */
     float *pixels;
     void (*blend)(struct trip_cpu_scratch *s); /* all pairs, in order */
     const trip_cpu_view *view;
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;
 } trip_cpu_scratch;
-
-/* What a projecting thread fills, chunk by chunk, and then sorts by tile. */
-typedef struct trip_cpu_basket {
-    trip_cpu_splat *splats; /* TRIP_CPU_CHUNK_SPLATS and 16 */
-    uint32_t *tiles;        /* as many: the splats' tiles; view->tiles for wide ones */
-    uint16_t *ranks;        /* as many: how many splats of that tile came before */
-    uint32_t *counts;       /* by tile, and one for wide ones */
-    uint32_t count;
-} trip_cpu_basket;
-
-/* Most voxels of a chunk, and splats that they may become: one for each of two by two tiles. */
-#define TRIP_CPU_CHUNK 2048
-#define TRIP_CPU_CHUNK_SPLATS (4 * TRIP_CPU_CHUNK)
 
 typedef struct trip_cpu_kernels {
     const char *isa;
@@ -146,21 +123,19 @@ typedef struct trip_cpu_kernels {
     uint32_t (*stage)(const trip_cpu_view *view, const trip_run *run, const uint32_t *voxels,
                       const uint32_t *normals, uint32_t count, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
-    /* Projects the first `count` staged voxels, the first of which is number `sequence` of the
-     * chunk; those with pixels in the image become splats of the basket, in order. */
-    void (*project)(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
-                    uint32_t sequence, trip_cpu_lanes *lanes, trip_cpu_basket *basket);
+    /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
+     * order. `out` has room for count + 16. Returns how many. */
+    uint32_t (*project)(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
+                        trip_cpu_lanes *lanes, trip_cpu_splat *out);
 
     /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere. */
     void (*tile_clear)(const trip_cpu_view *view, int x, int y, float *pixels);
-    /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. The
-     * scratch's splats and local are set. */
+    /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. */
     void (*tile_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
                        unsigned quarters, float *pixels);
-    /* Blends splats[first] to splats[first + count - 1], which are this tile's. */
-    void (*tile_blend)(trip_cpu_scratch *s, uint32_t first, uint32_t count);
-    /* Blends one wide splat. */
-    void (*tile_blend_wide)(trip_cpu_scratch *s, uint32_t splat);
+    /* Blends splats[order[i]] in order, or splats[i] where order is NULL. */
+    void (*tile_blend)(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count);
     /* Ends with every splat in the pixels; true when some pixel may still take light. */
     bool (*tile_end)(trip_cpu_scratch *s);
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */

@@ -17,6 +17,16 @@ static double most_stretch(const trip_affine *a)
     return sqrt(sum);
 }
 
+uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across)
+{
+    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
+    uint32_t right = s->x1 / TRIP_CPU_TILE - x, below = s->y1 / TRIP_CPU_TILE - y;
+    uint32_t more = right > 1 || below > 1 ? TRIP_CPU_TILES_MORE : 0;
+    return (y * (uint32_t)tiles_across + x) | more |
+           (uint32_t)(right > 0) << TRIP_CPU_TILES_RIGHT_SHIFT |
+           (uint32_t)(below > 0) << TRIP_CPU_TILES_BELOW_SHIFT;
+}
+
 void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
 {
     double unit = 0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * s->ray2;
@@ -52,15 +62,17 @@ bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, d
         !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
+    /* Centres far outside the image need no more than a float; their splats are as wide. */
+    out->whole_x = (float)trunc(s.x);
+    out->whole_y = (float)trunc(s.y);
+    out->x = (float)(s.x - (double)out->whole_x);
+    out->y = (float)(s.y - (double)out->whole_y);
     trip_cpu_set_conic(&s, out);
-    double x = s.x - out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    double y = s.y - out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    out->u = (float)-((double)out->l11 * x + (double)out->l21 * y);
-    out->w = (float)-((double)out->l22 * y);
     double depth = log2(extinction * s.amplitude * view->stretch);
     out->peak = (float)((depth + 127) * TRIP_CPU_EXP_UNIT);
     out->least = out->peak - view->cutoff;
     out->thick = depth > (double)view->thick_log2;
+    out->tiles = trip_cpu_tiles(out, view->tiles_across);
     return depth > -60;
 }
 
@@ -112,8 +124,6 @@ static void set_limits(trip_cpu_view *view)
     view->thick_log2 = (float)(log2(TRIP_CPU_THIN) - log2(most));
     view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
     view->tiles_across = (view->splat.camera.width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
-    view->tiles =
-        view->tiles_across * ((view->splat.camera.height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE);
 }
 
 /* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */
@@ -124,22 +134,11 @@ static void set_parallel(trip_cpu_view *view)
         trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
 }
 
-/* A splat's ray, turned round. */
-static void set_to_eye(trip_cpu_view *view)
-{
-    const trip_camera *c = &view->splat.camera;
-    trip_vec3 middle = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
-    const trip_vec3 rays[3] = { middle, c->rx, c->ry };
-    for (int i = 0; i < 3; i++)
-        view->to_eye[i] = trip_affine_vector(&c->index_to_world, trip_scale(rays[i], -1));
-    if (c->ortho)
-        view->to_eye[1] = view->to_eye[2] = trip_v3(0, 0, 0);
-}
-
 void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back)
 {
     const trip_file_header *header = &frame->data->header;
     const trip_camera *camera = frame->camera;
+    const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
     *view = (trip_cpu_view){
         .of = frame,
         .splat = trip_splat_frame_make(camera, frame->settings),
@@ -149,7 +148,12 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
         .v_axis = (axis + 2) % 3,
         .gradient_full = trip_shade_gradient_full(header, camera->voxel_world),
     };
-    set_to_eye(view);
+    const int axes[3] = { view->u_axis, view->v_axis, axis };
+    for (int i = 0; i < 3; i++) {
+        view->eye[i] = eye[axes[i]];
+        for (int k = 0; k < 3; k++)
+            view->world[k][i] = camera->index_to_world.m[k][axes[i]];
+    }
     set_along(view->along_x, view, camera->to_x);
     set_along(view->along_y, view, camera->to_y);
     set_along(view->along_z, view, camera->forward);

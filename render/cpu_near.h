@@ -5,8 +5,7 @@
 
 #include "cpu_kernels.h"
 
-/* A splat by trip_splat_project(), made as a wide one; colours and sequence are left unset. False
- * when nothing of it is drawn. */
+/* A splat by trip_splat_project(); colours are left unset. False when nothing of it is drawn. */
 bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
                            trip_cpu_splat *out);
 
@@ -15,5 +14,8 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);
 
 /* The constants of the list along `axis`; `shading` is set by whoever knows of normals. */
 void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back);
+
+/* The tiles of a splat whose pixels are set, for an image so many tiles across. */
+uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across);
 
 #endif

@@ -175,13 +175,12 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     syy = syy + low_pass;
 
     /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
-    vf root_syy = v_inverse_sqrt(syy, 3), root_det = v_inverse_sqrt(det, 3); /* inverse roots */
-    vf inverse_det = root_det * root_det, inverse_syy = root_syy * root_syy;
+    vf inverse = v_set(1) / (det * syy);
+    vf inverse_det = syy * inverse, inverse_syy = det * inverse;
     vf unit = rr * v_set((float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT));
-    vf root_unit = unit * v_inverse_sqrt(unit, 3);
-    out.l22 = root_unit * root_syy;
-    out.l11 = syy * out.l22 * root_det;
+    out.l11 = v_sqrt(unit * syy * inverse_det);
     out.l21 = -(sxy * inverse_syy) * out.l11;
+    out.l22 = v_sqrt(unit * inverse_syy);
     out.spread = det_s * inverse_det;
 
     /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. */
@@ -228,7 +227,7 @@ INLINE vf dot(v3 a, v3 b)
 
 INLINE v3 unit(v3 a)
 {
-    vf inverse = v_inverse_sqrt(v_max(dot(a, a), v_set(1e-30f)), 2);
+    vf inverse = v_set(1) / v_sqrt(v_max(dot(a, a), v_set(1e-30f)));
     return (v3){ a.x * inverse, a.y * inverse, a.z * inverse };
 }
 
@@ -237,19 +236,25 @@ INLINE v3 v3_of(trip_vec3 a)
     return (v3){ v_set((float)a.x), v_set((float)a.y), v_set((float)a.z) };
 }
 
-/* From the splat to the eye, world space, not normalised. */
-INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at)
+INLINE vf offset(vi index, double eye)
+{
+    vd_pair a = widen_int(index);
+    return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
+}
+
+/* From the voxel to the eye, world space, not normalised. */
+INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
 {
     const trip_camera *camera = &view->splat.camera;
-    v3 middle = v3_of(view->to_eye[0]);
-    v3 across = v3_of(view->to_eye[1]), down = v3_of(view->to_eye[2]);
-    vf x =
-        (v_load(lanes->whole_x + at) - v_set((float)(0.5 * camera->width))) + v_load(lanes->x + at);
-    vf y = (v_load(lanes->whole_y + at) - v_set((float)(0.5 * camera->height))) +
-           v_load(lanes->y + at);
-    return (v3){ v_fma(x, across.x, v_fma(y, down.x, middle.x)),
-                 v_fma(x, across.y, v_fma(y, down.y, middle.y)),
-                 v_fma(x, across.z, v_fma(y, down.z, middle.z)) };
+    if (camera->ortho)
+        return v3_of(trip_scale(camera->world_forward, -1));
+    vf c[3] = { offset(u, view->eye[0]), offset(v, view->eye[1]), offset(sheet, view->eye[2]) };
+    vf w[3];
+    for (int i = 0; i < 3; i++)
+        w[i] = -v_fma(
+            v_set((float)view->world[i][0]), c[0],
+            v_fma(v_set((float)view->world[i][1]), c[1], v_set((float)view->world[i][2]) * c[2]));
+    return (v3){ w[0], w[1], w[2] };
 }
 
 /* As trip_normal_unpack(): the direction, and the magnitude over gradient_scale. */
@@ -340,16 +345,16 @@ INLINE vm less_or_equal(vi a, vi b)
     return v_ge(v_from_int(b), v_from_int(a));
 }
 
-INLINE vm above(vi a, int32_t b)
+/* As trip_cpu_tiles(). */
+INLINE vi tiles_of(vi x0, vi y0, vi x1, vi y1, int across)
 {
-    return v_gt(v_from_int(a), v_set((float)b));
-}
-
-/* The centre from the corner of the first tile. */
-INLINE vf from_corner(const float *whole, const float *part, vi first)
-{
-    vf corner = v_from_int(first & -TRIP_CPU_TILE);
-    return v_load(part) + (v_load(whole) - corner);
+    const vi one = vi_set(1);
+    static_assert(TRIP_CPU_TILE == 32, "the shifts below");
+    vi x = x0 >> 5, y = y0 >> 5, right = (x1 >> 5) - x, below = (y1 >> 5) - y;
+    vi more = v_shift_right((one - right) | (one - below), 31); /* the sign: either is above 1 */
+    vi any_right = v_shift_right(-right, 31), any_below = v_shift_right(-below, 31);
+    return y * across + x + (any_right << TRIP_CPU_TILES_RIGHT_SHIFT) +
+           (any_below << TRIP_CPU_TILES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_TILES_MORE;
 }
 
 /* Everything but the colour; the bits of the lanes that have pixels. */
@@ -371,15 +376,21 @@ INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extin
     v_store(lanes->peak + at, v_fma(log2_depth, one, bias));
     vi_store(lanes->first + at, x0 | y0 << 16);
     vi_store(lanes->last + at, x1 | y1 << 16);
-    v_store(lanes->x + at, from_corner(lanes->whole_x + at, lanes->x + at, x0));
-    v_store(lanes->y + at, from_corner(lanes->whole_y + at, lanes->y + at, y0));
-    static_assert(TRIP_CPU_TILE == 32, "the shifts below");
-    vi right = (x1 >> 5) - (x0 >> 5), below = (y1 >> 5) - (y0 >> 5);
-    lanes->right[at / V] = vm_bits(above(right, 0));
-    lanes->below[at / V] = vm_bits(above(below, 0));
-    lanes->wide[at / V] = vm_bits(above(right, 1)) | vm_bits(above(below, 1));
+    vi_store(lanes->tiles + at, tiles_of(x0, y0, x1, y1, view->tiles_across));
     vm seen = vm_and(v_gt(v_load(lanes->z + at), v_set(0)), v_gt(log2_depth, v_set(FAINTEST_LOG2)));
     return vm_bits(vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1))));
+}
+
+/* Offsets in floats of the lanes' records in the output: a lane that is not kept is overwritten by
+ * the next. */
+INLINE uint32_t rank(unsigned bits, uint32_t row[V])
+{
+    uint32_t n = 0;
+    for (unsigned i = 0; i < V; i++) {
+        row[i] = n * 16;
+        n += bits >> i & 1;
+    }
+    return n;
 }
 
 /* The lanes near the plane of the eye, one by one; returns those that are drawn. */
@@ -398,202 +409,81 @@ static unsigned project_near(const trip_cpu_view *view, const trip_cpu_staged *s
     return drawn;
 }
 
-INLINE void set_colours(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                        trip_cpu_lanes *lanes)
-{
-    const float *table = &view->of->table[0].r;
-    vi code = vi_load(staged->code + at);
-    colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
-                 v_gather(table + 2, code * 4) };
-    if (view->shading) {
-        v3 eye = towards_eye(view, lanes, at);
-        c = shaded(view, c, eye, vi_load(staged->normal + at));
-    }
-    v_store(lanes->r + at, c.r);
-    v_store(lanes->g + at, c.g);
-    v_store(lanes->b + at, c.b);
-}
-
-/* ---- splats, once for each tile ---- */
-
-INLINE vf load_bits(const uint32_t *p)
-{
-    return v_from_bits(vi_load(p));
-}
-
-/* What the splats of a vector's lanes have in common wherever they are stored. */
-typedef struct record {
-    vf x, y, l11, l21, l22, peak, least, thick, r, g, b, first, last, sequence;
-    vi x0, y0, x1, y1; /* pixels from the corner of the first tile */
-    vi tile;
-} record;
-
-INLINE record load_record(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
-                          uint32_t sequence)
-{
-    const vf bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
-    const vi mask = vi_set(TRIP_CPU_TILE - 1), low = vi_set(0xffff);
-    vi first = vi_load(lanes->first + at), last = vi_load(lanes->last + at);
-    vi x0 = first & low, y0 = v_shift_right(first, 16);
-    vf peak = v_load(lanes->peak + at);
-    vf limit = v_fma(v_set(view->thick_log2), v_set((float)TRIP_CPU_EXP_UNIT), bias);
-    return (record){
-        .x = v_load(lanes->x + at),
-        .y = v_load(lanes->y + at),
-        .l11 = v_load(lanes->l11 + at),
-        .l21 = v_load(lanes->l21 + at),
-        .l22 = v_load(lanes->l22 + at),
-        .peak = peak,
-        .least = peak - v_set(view->cutoff),
-        .thick = v_select(v_gt(peak, limit), v_set(1), v_set(0)),
-        .r = v_load(lanes->r + at),
-        .g = v_load(lanes->g + at),
-        .b = v_load(lanes->b + at),
-        .first = v_from_bits(first),
-        .last = v_from_bits(last),
-        .sequence = v_from_bits(vi_count() + (int32_t)(sequence + at)),
-        .x0 = x0 & mask,
-        .y0 = y0 & mask,
-        .x1 = (last & low) - (x0 & ~mask),
-        .y1 = v_shift_right(last, 16) - (y0 & ~mask),
-        .tile = (y0 >> 5) * view->tiles_across + (x0 >> 5),
-    };
-}
-
-INLINE vi vi_clamp(vi a)
-{
-    return v_truncate(v_min(v_max(v_from_int(a), v_set(0)), v_set(TRIP_CPU_TILE - 1)));
-}
-
-/* trip_cpu_splat.blocks in the tile `across` and `down` from the first. */
-INLINE vi blocks_in(const record *r, int across, int down)
-{
-    const vi rows = vi_set(V == 16 ? 2 : V == 8);
-    const int32_t dx = across * TRIP_CPU_TILE, dy = down * TRIP_CPU_TILE;
-    vi left = vi_clamp(r->x0 - dx) >> 2, right = vi_clamp(r->x1 - dx) >> 2;
-    vi top = vi_clamp(r->y0 - dy) >> rows, bottom = vi_clamp(r->y1 - dy) >> rows;
-    vi columns = (vi_set(0xff) << left) & (vi_set(0xff) >> (vi_set(7) - right));
-    return columns | top << TRIP_CPU_BLOCKS_TOP_SHIFT |
-           (bottom - top) << TRIP_CPU_BLOCKS_MORE_SHIFT;
-}
-
-/* The lanes as splats of a tile, each to the row of the output that it is given in floats. */
-INLINE void store(const record *r, int across, int down, const uint32_t row[V], trip_cpu_splat *out)
-{
-    float *base = &out->u;
-    vf x = r->x - v_set((float)(across * TRIP_CPU_TILE));
-    vf y = r->y - v_set((float)(down * TRIP_CPU_TILE));
-    vf u = -v_fma(x, r->l11, y * r->l21), w = -(y * r->l22);
-    v_store_rows(base, row, u, w, r->l11, r->l21);
-    v_store_rows(base + 4, row, r->l22, r->peak, r->least, r->thick);
-    v_store_rows(base + 8, row, r->r, r->g, r->b, v_from_bits(blocks_in(r, across, down)));
-    v_store_rows(base + 12, row, r->first, r->last, r->sequence, r->sequence);
-}
-
-INLINE void count_splat(trip_cpu_basket *b, uint32_t at, uint32_t tile)
-{
-    b->tiles[at] = tile;
-    b->ranks[at] = (uint16_t)b->counts[tile]++;
-}
-
-/* A vector whose lanes all lie in one tile each. */
-INLINE void store_plain(const record *r, const uint32_t rows[V], trip_cpu_basket *b)
-{
-    uint32_t tiles[V];
-    vi_store(tiles, r->tile);
-    store(r, 0, 0, rows, b->splats + b->count);
-    for (uint32_t i = 0; i < V; i++)
-        count_splat(b, b->count + i, tiles[i]);
-    b->count += V;
-}
-
-/* Which lanes are drawn, and in which tiles beside the first. */
-typedef struct lane_bits {
-    unsigned kept, near, wide, right, below;
-} lane_bits;
-
-/* Rows for the lanes' splats in order: that of a lane's splat in the first tile; those in the tile
- * to the right, below and diagonally below follow it. Lanes that are not kept are overwritten by
- * the next. Counts the splats, and returns their number. */
-INLINE uint32_t rank(const trip_cpu_view *view, const lane_bits *bits, const record *r,
-                     uint32_t row[V], trip_cpu_basket *b)
-{
-    uint32_t tiles[V], n = 0, below = (uint32_t)view->tiles_across;
-    vi_store(tiles, vi_select(vm_of(bits->wide), vi_set(view->tiles), r->tile));
-    for (unsigned i = 0; i < V; i++) {
-        row[i] = n;
-        if (!(bits->kept >> i & 1))
-            continue;
-        bool is_right = bits->right >> i & 1, is_below = bits->below >> i & 1;
-        count_splat(b, b->count + n++, tiles[i]);
-        if (is_right)
-            count_splat(b, b->count + n++, tiles[i] + 1);
-        if (is_below)
-            count_splat(b, b->count + n++, tiles[i] + below);
-        if (is_right && is_below)
-            count_splat(b, b->count + n++, tiles[i] + below + 1);
-    }
-    return n;
-}
-
-/* The splats of the lanes in `some` in a further tile, `skip` rows after the first. The other lanes
- * go to a row behind all. */
-INLINE void store_further(const record *r, int across, int down, unsigned some, vi skip, vi row,
-                          uint32_t behind, trip_cpu_splat *out)
-{
-    uint32_t floats[V];
-    if (!some)
-        return;
-    vi_store(floats, vi_select(vm_of(some), row + skip, vi_set((int32_t)behind)) << 4);
-    store(r, across, down, floats, out);
-}
-
+/* Puts the geometry of near splats over what the lanes computed; their colours stay. */
 static void replace_near(trip_cpu_splat *out, const uint32_t row[V], unsigned lanes,
                          const trip_cpu_splat near[V])
 {
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
-        trip_cpu_splat *s = out + row[i];
+        trip_cpu_splat *s = out + row[i] / 16;
         trip_cpu_splat n = near[i];
         n.r = s->r;
         n.g = s->g;
         n.b = s->b;
-        n.sequence = s->sequence;
         *s = n;
     }
 }
 
-/* A vector of which some lanes are left out, lie in several tiles or near the plane of the eye. */
-static void store_mixed(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                        const trip_cpu_lanes *lanes, const record *r, trip_cpu_basket *b)
+INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
-    uint32_t row[V], floats[V];
-    trip_cpu_splat near[V], *out = b->splats + b->count;
-    lane_bits bits = { .kept = lanes->kept[at / V], .near = lanes->near[at / V] };
-    if (bits.near)
-        bits.near = project_near(view, staged, at, bits.near, near);
-    bits.kept |= bits.near;
-    bits.wide = lanes->wide[at / V] | bits.near;
-    bits.right = bits.kept & lanes->right[at / V] & ~bits.wide;
-    bits.below = bits.kept & lanes->below[at / V] & ~bits.wide;
-    uint32_t n = rank(view, &bits, r, row, b);
-    vi rows = vi_load(row), one = vi_set(1);
-    vi_store(floats, rows << 4);
-    store(r, 0, 0, floats, out);
-    store_further(r, 1, 0, bits.right, one, rows, n, out);
-    store_further(r, 0, 1, bits.below, vi_select(vm_of(bits.right), one + one, one), rows, n, out);
-    store_further(r, 1, 1, bits.right & bits.below, vi_set(3), rows, n, out);
-    if (bits.near)
-        replace_near(out, row, bits.near, near);
-    b->count += n;
+    const float *table = &view->of->table[0].r;
+    vi code = vi_load(staged->code + at);
+    colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
+                 v_gather(table + 2, code * 4) };
+    if (!view->shading)
+        return c;
+    v3 eye = towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),
+                         vi_load(staged->sheet + at));
+    return shaded(view, c, eye, vi_load(staged->normal + at));
 }
 
-static void project_footprints(const trip_cpu_view *view, const trip_cpu_staged *staged,
-                               uint32_t count, trip_cpu_lanes *lanes)
+/* The lanes that are kept, as splats. */
+INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
+                  const uint32_t row[V], colour c, trip_cpu_splat *out)
 {
+    float *base = &out->x;
+    const vf bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
+    vf peak = v_load(lanes->peak + at);
+    vf limit = v_fma(v_set(view->thick_log2), v_set((float)TRIP_CPU_EXP_UNIT), bias);
+    vf thick = v_select(v_gt(peak, limit), v_set(1), v_set(0));
+    v_store_rows(base, row, v_load(lanes->x + at), v_load(lanes->y + at),
+                 v_load(lanes->whole_x + at), v_load(lanes->whole_y + at));
+    v_store_rows(base + 4, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
+                 v_load(lanes->l22 + at), peak);
+    v_store_rows(base + 8, row, c.r, c.g, c.b, peak - v_set(view->cutoff));
+    v_store_rows(base + 12, row, v_load(lanes->first + at), v_load(lanes->last + at),
+                 v_load(lanes->tiles + at), thick);
+}
+
+static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                             const trip_cpu_lanes *lanes, trip_cpu_splat *out)
+{
+    uint32_t row[V];
+    unsigned kept = lanes->kept[at / V], near = lanes->near[at / V];
+    trip_cpu_splat replaced[V];
+    if (near)
+        near = project_near(view, staged, at, near, replaced);
+    kept |= near;
+    if (kept == 0)
+        return 0;
+    uint32_t n = rank(kept, row);
+    store(view, lanes, at, row, colour_of(view, staged, at), out);
+    if (near)
+        replace_near(out, row, near, replaced);
+    return n;
+}
+
+/* In three loops, each short enough that the processor works on several vectors at a time: one
+ * loop's chain of divisions and roots would leave it waiting. */
+static uint32_t project(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
+                        trip_cpu_lanes *lanes, trip_cpu_splat *out)
+{
+    uint32_t n = 0;
     const float *extinction = &view->of->table[0].extinction;
     footprint parallel = footprint_parallel(view);
     perspective persp = perspective_of(&view->splat);
+    for (uint32_t i = 0; i < count; i += V)
+        place(view, staged, i, lanes);
     for (uint32_t i = 0; i < count; i += V) {
         footprint f = parallel;
         if (!view->splat.camera.ortho)
@@ -604,30 +494,9 @@ static void project_footprints(const trip_cpu_view *view, const trip_cpu_staged 
         lanes->kept[i / V] = complete(view, &f, tau, lanes, i) & valid & ~near;
         lanes->near[i / V] = near;
     }
-}
-
-/* In four loops, each short enough that the processor works on several vectors at a time: in one,
- * the chain of divisions and roots would leave it waiting. */
-static void project(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
-                    uint32_t sequence, trip_cpu_lanes *lanes, trip_cpu_basket *basket)
-{
-    const unsigned every = (1u << V) - 1;
-    uint32_t rows[V];
-    for (uint32_t i = 0; i < V; i++)
-        rows[i] = 16 * i;
     for (uint32_t i = 0; i < count; i += V)
-        place(view, staged, i, lanes);
-    for (uint32_t i = 0; i < count; i += V)
-        set_colours(view, staged, i, lanes);
-    project_footprints(view, staged, count, lanes);
-    for (uint32_t i = 0; i < count; i += V) {
-        uint32_t k = i / V;
-        record r = load_record(view, lanes, i, sequence);
-        if (lanes->kept[k] == every && !(lanes->right[k] | lanes->below[k]))
-            store_plain(&r, rows, basket);
-        else if (lanes->kept[k] | lanes->near[k])
-            store_mixed(view, staged, i, lanes, &r, basket);
-    }
+        n += store_splats(view, staged, i, lanes, out + n);
+    return n;
 }
 
 #endif

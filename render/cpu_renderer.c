@@ -17,9 +17,6 @@
 
 enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 16, MIN_SPLATS = 1 << 13 };
 
-/* Fewer voxels are not worth a chunk: the buffer counts as full. */
-enum { MIN_CHUNK = 256 };
-
 /* What has become of a tile's pixels. */
 enum tile_state {
     TILE_BEGUN = 1,  /* in the list being drawn */
@@ -29,10 +26,8 @@ enum tile_state {
 /* One thread's own memory. */
 typedef struct worker {
     trip_cpu_scratch scratch;
-    uint32_t tiles[TRIP_CPU_CHUNK_SPLATS + 16];
-    uint16_t ranks[TRIP_CPU_CHUNK_SPLATS + 16];
-    _Alignas(64) trip_cpu_splat splats[TRIP_CPU_CHUNK_SPLATS + 16];
-    trip_cpu_basket basket; /* of the three above, and counts that grow with the image */
+    trip_list_stats counts;
+    uint32_t *tile_counts;
 } worker;
 
 /* A tile to blend, or a quarter of one. */
@@ -58,6 +53,7 @@ typedef struct cpu {
     _Atomic uint8_t *closed; /* no pixel can take more light; set by whoever blends the tile */
     _Atomic uint8_t *open_quarters;
     portion *portions;
+    uint32_t *tile_counts;
 
     const trip_frame *frame;
     trip_cpu_view view;
@@ -67,8 +63,7 @@ typedef struct cpu {
     trip_cpu_flush flushes[2];
     trip_cpu_flush *filling, *blending;
     const trip_batch *batch;
-    uint32_t first_chunk;    /* of the job */
-    double splats_per_voxel; /* of late */
+    uint32_t first_chunk; /* of the job */
     uint32_t portion_count;
     float *rgba;
     trip_cpu_job project_job, blend_job, tile_job;
@@ -103,11 +98,11 @@ static void close_tile(cpu *r, uint32_t tile)
 
 /* ---- projecting a batch ---- */
 
-static void count_piece(const cpu *r, trip_cpu_chunk *chunk, const trip_run *run,
-                        const uint32_t *voxels, uint32_t count)
+static void count_piece(worker *w, const cpu *r, const trip_run *run, const uint32_t *voxels,
+                        uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++)
-        trip_cpu_count(&r->view, run, voxels[i], &chunk->counts);
+        trip_cpu_count(&r->view, run, voxels[i], &w->counts);
 }
 
 static bool run_is_hidden(const cpu *r, const trip_run *run)
@@ -118,39 +113,35 @@ static bool run_is_hidden(const cpu *r, const trip_run *run)
     return trip_cpu_box_is_hidden(&r->view, r->grid, r->closed, &box);
 }
 
-/* What a thread has of a chunk so far. */
-typedef struct progress {
-    uint32_t staged, projected; /* voxels */
-} progress;
-
-static void project_staged(const cpu *r, worker *w, progress *p)
+/* Projects what is staged to the end of the chunk. */
+static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_t *staged)
 {
-    r->kernels->project(&r->view, &w->scratch.staged, p->staged, p->projected, &w->scratch.lanes,
-                        &w->basket);
-    p->projected += p->staged;
-    p->staged = 0;
+    trip_cpu_splat *out = r->filling->splats + chunk->splat + chunk->splats;
+    chunk->splats +=
+        r->kernels->project(&r->view, &w->scratch.staged, *staged, &w->scratch.lanes, out);
+    *staged = 0;
 }
 
 /* The voxels of a run from `skip` in draw order. */
 static void project_piece(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_run *run,
-                          uint32_t skip, uint32_t count, progress *p)
+                          uint32_t skip, uint32_t count, uint32_t *staged)
 {
     const trip_batch *batch = r->batch;
     bool reversed = batch->selection->descending;
     uint64_t at = run->first + (reversed ? run->count - skip - count : skip);
     if (r->frame->count)
-        count_piece(r, chunk, run, batch->voxels + at, count);
+        count_piece(w, r, run, batch->voxels + at, count);
     if (run_is_hidden(r, run))
         return;
     for (uint32_t done = 0; done < count;) {
-        uint32_t n = count - done, room = TRIP_CPU_STAGED - p->staged;
+        uint32_t n = count - done, room = TRIP_CPU_STAGED - *staged;
         n = n < room ? n : room;
         uint64_t from = at + (reversed ? count - done - n : done);
-        p->staged = r->kernels->stage(&r->view, run, batch->voxels + from,
-                                      r->view.shading ? batch->normals + from : NULL, n, reversed,
-                                      &w->scratch.staged, p->staged);
-        if (p->staged == TRIP_CPU_STAGED)
-            project_staged(r, w, p);
+        *staged = r->kernels->stage(&r->view, run, batch->voxels + from,
+                                    r->view.shading ? batch->normals + from : NULL, n, reversed,
+                                    &w->scratch.staged, *staged);
+        if (*staged == TRIP_CPU_STAGED)
+            empty_staged(r, w, chunk, staged);
         done += n;
     }
 }
@@ -160,18 +151,16 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
     cpu *r = context;
     worker *w = &r->workers[thread];
     trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
-    uint32_t skip = chunk->skip, left = chunk->voxels;
-    progress p = { 0, 0 };
-    w->basket.count = 0;
+    uint32_t staged = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
         const trip_run *run = &r->batch->runs[i];
         uint32_t n = run->count - skip < left ? run->count - skip : left;
-        project_piece(r, w, chunk, run, skip, n, &p);
+        project_piece(r, w, chunk, run, skip, n, &staged);
         left -= n;
         skip = 0;
     }
-    project_staged(r, w, &p);
-    trip_cpu_sort(r->filling, chunk, r->grid, r->closed, &w->basket);
+    empty_staged(r, w, chunk, &staged);
+    trip_cpu_bin(r->filling, chunk, r->grid, w->tile_counts);
 }
 
 /* ---- blending a flush ---- */
@@ -181,16 +170,11 @@ typedef struct blend_context {
     trip_cpu_scratch *scratch;
 } blend_context;
 
-static void blend_some(void *user, uint32_t first, uint32_t count)
+static void blend_some(void *user, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count)
 {
     blend_context *c = user;
-    c->kernels->tile_blend(c->scratch, first, count);
-}
-
-static void blend_wide(void *user, uint32_t splat)
-{
-    blend_context *c = user;
-    c->kernels->tile_blend_wide(c->scratch, splat);
+    c->kernels->tile_blend(c->scratch, splats, order, count);
 }
 
 /* The tile is closed once every quarter is. */
@@ -212,13 +196,8 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
         r->kernels->tile_clear(&r->view, x, y, tile_pixels(r, p->tile));
         r->states[p->tile] |= TILE_BEGUN;
     }
-    s->splats = r->blending->splats;
-    s->local = r->blending->capacity + thread * TRIP_CPU_LOCAL;
     r->kernels->tile_begin(&r->view, s, x, y, p->quarters, tile_pixels(r, p->tile));
-    trip_cpu_share_each(r->blending, p->tile, x, y,
-                        &(trip_cpu_taker){ .take = blend_some,
-                                           .take_wide = blend_wide,
-                                           .user = &(blend_context){ r->kernels, s } });
+    trip_cpu_share_each(r->blending, p->tile, blend_some, &(blend_context){ r->kernels, s });
     if (!r->kernels->tile_end(s))
         close_quarters(r, p->tile, p->quarters);
 }
@@ -229,40 +208,26 @@ static int most_first(const void *a, const void *b)
     return p->splats < q->splats ? 1 : p->splats > q->splats ? -1 : 0;
 }
 
-/* A tile's splats, wide ones that it looks at included. */
-static uint32_t tile_work(const cpu *r, const trip_cpu_flush *f, uint32_t tile)
-{
-    uint32_t splats = f->shares[tile].splats;
-    for (uint32_t i = 0; i < f->wide_chunk_count; i++) {
-        const trip_cpu_chunk *chunk = &f->chunks[f->wide_chunks[i]];
-        if (trip_cpu_wide_meets(chunk, tile_x(r, tile), tile_y(r, tile)))
-            splats += chunk->wide_count;
-    }
-    return splats;
-}
-
-static void add_portions(cpu *r, uint32_t tile, uint32_t splats, bool divide)
-{
-    if (!divide) {
-        r->portions[r->portion_count++] = (portion){ tile, 15, splats };
-        return;
-    }
-    for (unsigned q = 0; q < 4; q++)
-        r->portions[r->portion_count++] = (portion){ tile, 1u << q, splats / 3 };
-}
-
 /* Tiles with work, those with most of it first. One that holds so much that a thread would still be
  * at it when the others are done is given out in quarters; not when it is new, since then one
  * thread has to clear it. */
 static void make_portions(cpu *r, const trip_cpu_flush *f)
 {
-    unsigned threads = trip_cpu_pool_threads(r->pool);
-    uint64_t large = atomic_load_explicit(&f->splats_used, memory_order_relaxed) / threads / 2;
+    uint64_t all = 0;
     r->portion_count = 0;
+    for (uint32_t t = 0; t < tile_count(r); t++)
+        all += f->shares[t].splats;
+    uint64_t large = all / trip_cpu_pool_threads(r->pool) / 2;
     for (uint32_t t = 0; t < tile_count(r); t++) {
-        uint32_t splats = tile_work(r, f, t);
-        if (splats && !atomic_load_explicit(&r->closed[t], memory_order_relaxed))
-            add_portions(r, t, splats, splats > large && threads > 1 && r->states[t] & TILE_BEGUN);
+        uint32_t n = f->shares[t].splats;
+        if (n == 0 || atomic_load_explicit(&r->closed[t], memory_order_relaxed))
+            continue;
+        if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TILE_BEGUN) {
+            for (unsigned q = 0; q < 4; q++)
+                r->portions[r->portion_count++] = (portion){ t, 1u << q, n / 3 };
+        } else {
+            r->portions[r->portion_count++] = (portion){ t, 15, n };
+        }
     }
     qsort(r->portions, r->portion_count, sizeof *r->portions, most_first);
 }
@@ -273,7 +238,7 @@ static void flush(cpu *r)
     trip_cpu_flush *full = r->filling;
     if (full->chunk_count == 0)
         return;
-    trip_cpu_link(full, r->grid);
+    trip_cpu_link(full, r->grid, r->closed);
     trip_cpu_pool_wait(r->pool, &r->blend_job);
     make_portions(r, full);
     r->filling = full == &r->flushes[0] ? &r->flushes[1] : &r->flushes[0];
@@ -298,86 +263,43 @@ typedef struct cursor {
     uint32_t skip;
 } cursor;
 
-/* Voxels that the buffer will still take, by how many splats they became of late; a few at least
- * when it is empty. */
-static uint32_t room(const cpu *r, uint32_t reserved)
+/* Reserves the next chunk; false when the batch is through or the buffer full. */
+static bool reserve_chunk(cpu *r, const trip_batch *batch, cursor *at)
 {
-    const trip_cpu_flush *f = r->filling;
-    uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
-    double left = ((double)f->capacity - (double)used) / (1.1 * r->splats_per_voxel) - reserved;
-    if (f->chunk_count == 0)
-        left = fmax(left, TRIP_CPU_CHUNK);
-    return left < MIN_CHUNK ? 0 : left < TRIP_CPU_CHUNK ? (uint32_t)left : TRIP_CPU_CHUNK;
-}
-
-/* Reserves the next chunk, of `most` voxels; false when the batch is through or there are no more
- * chunks. */
-static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor *at)
-{
-    uint32_t voxels = 0;
+    uint32_t room = trip_cpu_flush_room(r->filling), voxels = 0;
     cursor start = *at;
-    while (at->run < batch->run_count && voxels < most) {
+    room = room < TRIP_CPU_CHUNK ? room : TRIP_CPU_CHUNK;
+    while (at->run < batch->run_count && voxels < room) {
         uint32_t left = batch->runs[at->run].count - at->skip;
-        if (left > most - voxels) {
-            at->skip += most - voxels;
-            voxels = most;
+        if (left > room - voxels) {
+            at->skip += room - voxels;
+            voxels = room;
         } else {
             voxels += left;
             *at = (cursor){ at->run + 1, 0 };
         }
     }
-    trip_cpu_chunk *chunk = voxels ? trip_cpu_flush_reserve(r->filling, voxels) : NULL;
-    if (!chunk) {
-        *at = start;
+    if (voxels == 0)
         return false;
-    }
+    trip_cpu_chunk *chunk = trip_cpu_flush_reserve(r->filling, voxels);
     chunk->run = start.run;
     chunk->skip = start.skip;
+    r->stats[r->view.axis].splats_read += voxels;
     return true;
-}
-
-/* Drops the chunks that the buffer had no room for, and goes back to the first of them. */
-static void keep_chunks(cpu *r, cursor *at)
-{
-    trip_cpu_flush *f = r->filling;
-    trip_list_stats *stats = &r->stats[r->view.axis];
-    uint32_t reserved = f->chunk_count, kept = trip_cpu_flush_cut(f);
-    uint64_t voxels = 0;
-    if (kept < reserved)
-        *at = (cursor){ f->chunks[kept].run, f->chunks[kept].skip };
-    for (uint32_t i = r->first_chunk; i < kept; i++) {
-        voxels += f->chunks[i].voxels;
-        stats->splats_projected += f->chunks[i].counts.splats_projected;
-        stats->splats_drawn += f->chunks[i].counts.splats_drawn;
-    }
-    stats->splats_read += voxels;
-}
-
-/* Splats that each voxel became, from which room() knows how many more will fit. */
-static void learn(cpu *r, uint64_t used_before, uint32_t voxels)
-{
-    uint64_t used = atomic_load_explicit(&r->filling->splats_used, memory_order_relaxed);
-    double now = (double)(used - used_before) / fmax(1, voxels);
-    r->splats_per_voxel = fmin(4, fmax(0.25, now));
 }
 
 /* As much of the batch as the buffer takes. */
 static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
 {
-    trip_cpu_flush *f = r->filling;
-    uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
-    uint32_t reserved = 0, most;
     r->batch = batch;
-    r->first_chunk = f->chunk_count;
-    while ((most = room(r, reserved)) > 0 && reserve_chunk(r, batch, most, at))
-        reserved += f->chunks[f->chunk_count - 1].voxels;
+    r->first_chunk = r->filling->chunk_count;
+    while (reserve_chunk(r, batch, at))
+        continue;
     r->project_job = (trip_cpu_job){ .run = project_chunk,
                                      .context = r,
-                                     .tasks = f->chunk_count - r->first_chunk };
+                                     .tasks = r->filling->chunk_count - r->first_chunk };
     trip_cpu_pool_start(r->pool, &r->project_job);
     trip_cpu_pool_wait(r->pool, &r->project_job);
-    learn(r, used, reserved);
-    keep_chunks(r, at);
 }
 
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
@@ -428,12 +350,24 @@ static void for_each_tile(cpu *r, void (*run)(void *, unsigned, unsigned))
     trip_cpu_pool_wait(r->pool, &r->tile_job);
 }
 
+/* What the threads counted in the list. */
+static void take_counts(cpu *r)
+{
+    trip_list_stats *list = &r->stats[r->view.axis];
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++) {
+        list->splats_projected += r->workers[i].counts.splats_projected;
+        list->splats_drawn += r->workers[i].counts.splats_drawn;
+        r->workers[i].counts = (trip_list_stats){ 0 };
+    }
+}
+
 static void end_list(cpu *r)
 {
     if (!r->in_list)
         return;
     settle(r);
     for_each_tile(r, merge_tile);
+    take_counts(r);
     r->in_list = false;
 }
 
@@ -464,16 +398,13 @@ static size_t lay_out(cpu *r, char *memory)
     r->pixels = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->pixels);
     r->sums = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->sums);
     r->states = part(memory, &at, tiles);
-    r->closed = part(memory, &at, tiles + 1); /* the last stands for wide splats and stays 0 */
+    r->closed = part(memory, &at, tiles);
     r->open_quarters = part(memory, &at, tiles);
     r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
-    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++) {
-        worker *w = &r->workers[i];
-        w->basket.splats = w->splats;
-        w->basket.tiles = w->tiles;
-        w->basket.ranks = w->ranks;
-        w->basket.counts = part(memory, &at, (tiles + 1) * sizeof *w->basket.counts);
-    }
+    /* Bins look one tile beyond the last, diagonally. */
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        r->workers[i].tile_counts =
+            part(memory, &at, (tiles + r->grid.across + 2) * sizeof *r->tile_counts);
     return at;
 }
 
@@ -519,6 +450,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_cpu_flush_empty(r->filling);
     r->in_list = false;
     r->frame = frame;
+    take_counts(r);
     memset(r->stats, 0, sizeof r->stats);
     int status = fit_tiles(r, frame->camera->width, frame->camera->height);
     if (status)
@@ -607,10 +539,8 @@ static int create_parts(cpu *r, unsigned threads)
                          threads);
     }
     for (int i = 0; i < 2 && !status; i++)
-        status = trip_cpu_flush_create(&r->flushes[i], flush_capacity(r->budget),
-                                       threads * TRIP_CPU_LOCAL, r->budget);
+        status = trip_cpu_flush_create(&r->flushes[i], flush_capacity(r->budget), r->budget);
     r->filling = &r->flushes[0];
-    r->splats_per_voxel = 1.5;
     snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->kernels->isa, threads,
              threads == 1 ? "" : "s");
     return status;

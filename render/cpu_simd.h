@@ -68,15 +68,6 @@ INLINE vd vd_set(double x)
     return x - (vd){ 0 };
 }
 
-/* 0, 1, 2, ... */
-INLINE vi vi_count(void)
-{
-    vi a;
-    for (int i = 0; i < V; i++)
-        a[i] = i;
-    return a;
-}
-
 INLINE vf v_load(const float *p)
 {
     vf r;
@@ -233,16 +224,6 @@ INLINE vm vm_first(unsigned lanes)
     return (vm)(lanes >= 16 ? 0xffffu : (1u << lanes) - 1);
 }
 
-INLINE vm vm_of(unsigned bits)
-{
-    return (vm)bits;
-}
-
-INLINE vi vi_select(vm m, vi a, vi b)
-{
-    return (vi)_mm512_mask_blend_epi32(m, (__m512i)b, (__m512i)a);
-}
-
 /* (a & low bits) | bits of b elsewhere */
 INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
 {
@@ -293,11 +274,17 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, (__m512i)a));
 }
 
-/* first + i for each set bit i of 16, in order, to `out`, where 16 may be overwritten; how many. */
+/* first + i * TRIP_SIMD_STEP for each set bit i of 16, in order, to `out`, where 16 may be
+ * overwritten; how many. */
 #define APPENDED 16
+#define TRIP_SIMD_STEP (16 * V)
 INLINE uint32_t append_bits(uint32_t *out, uint32_t first, unsigned bits)
 {
-    const __m512i step = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
+#define S TRIP_SIMD_STEP
+    const __m512i step =
+        _mm512_set_epi32(15 * S, 14 * S, 13 * S, 12 * S, 11 * S, 10 * S, 9 * S, 8 * S, 7 * S, 6 * S,
+                         5 * S, 4 * S, 3 * S, 2 * S, 1 * S, 0);
+#undef S
     __m512i all = _mm512_add_epi32(step, _mm512_set1_epi32((int)first));
     _mm512_storeu_si512(out, _mm512_maskz_compress_epi32((__mmask16)bits, all));
     return (uint32_t)__builtin_popcount(bits);
@@ -374,19 +361,6 @@ INLINE vm vm_first(unsigned lanes)
     for (unsigned i = 0; i < V; i++)
         m[i] = i < lanes ? -1 : 0;
     return m;
-}
-
-INLINE vm vm_of(unsigned bits)
-{
-    vi bit;
-    for (int i = 0; i < V; i++)
-        bit[i] = 1 << i;
-    return (vm)((vi_set((int32_t)bits) & bit) != 0);
-}
-
-INLINE vi vi_select(vm m, vi a, vi b)
-{
-    return (m & a) | (~m & b);
 }
 
 INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
@@ -642,8 +616,9 @@ INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf
 
 #endif
 
-/* The numbers of the set bits of a byte, in order, and how many there are. */
-static uint16_t bit_numbers[256][8];
+/* i * TRIP_SIMD_STEP for each set bit i of a byte, in order, and how many there are. */
+#define TRIP_SIMD_STEP (16 * V)
+static uint16_t bit_places[256][8];
 static uint8_t bit_counts[256];
 
 __attribute__((constructor)) static void list_bits(void)
@@ -651,22 +626,22 @@ __attribute__((constructor)) static void list_bits(void)
     for (unsigned bits = 0; bits < 256; bits++)
         for (unsigned i = 0; i < 8; i++)
             if (bits >> i & 1)
-                bit_numbers[bits][bit_counts[bits]++] = (uint16_t)i;
+                bit_places[bits][bit_counts[bits]++] = (uint16_t)(i * TRIP_SIMD_STEP);
 }
 
 #define APPENDED 8
 INLINE uint32_t append_bits(uint32_t *out, uint32_t first, unsigned bits)
 {
-    const uint16_t *numbers = bit_numbers[bits];
+    const uint16_t *places = bit_places[bits];
 #if TRIP_SIMD == TRIP_SIMD_AVX2
-    __m256i wide = _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(const void *)numbers));
+    __m256i wide = _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(const void *)places));
     _mm256_storeu_si256((__m256i *)(void *)out,
                         _mm256_add_epi32(wide, _mm256_set1_epi32((int)first)));
 #else
     typedef uint16_t half8 __attribute__((vector_size(16)));
     const half8 zero = { 0 };
     half8 p;
-    memcpy(&p, numbers, sizeof p);
+    memcpy(&p, places, sizeof p);
     vu low = (vu)__builtin_shufflevector(p, zero, 0, 8, 1, 9, 2, 10, 3, 11) + first;
     vu high = (vu)__builtin_shufflevector(p, zero, 4, 12, 5, 13, 6, 14, 7, 15) + first;
     memcpy(out, &low, sizeof low);
@@ -688,17 +663,5 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
 }
 
 #endif
-
-/* 1 / sqrt(a), a > 0 and normal, by Newton steps from a guess made of a's bits: cheaper than a root
- * and a division, and the same on every processor. Two steps are within 5e-6 of it, three within
- * 3e-7. */
-INLINE vf v_inverse_sqrt(vf a, int steps)
-{
-    vf half = a * v_set(0.5f);
-    vf y = v_from_bits(vi_set(0x5f375a86) - v_shift_right(v_bits(a), 1));
-    for (int i = 0; i < steps; i++)
-        y = y * v_fnma(half, y * y, v_set(1.5f));
-    return y;
-}
 
 #endif
