@@ -9,7 +9,8 @@ set -eu
 
 build="cmake ninja-build gcc g++ pkg-config libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev
  libgl1-mesa-dri libegl1 libgbm1 liburing-dev libcjson-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
-tests="libcmocka-dev python3 python3-numpy python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14"
+tests="libcmocka-dev python3 python3-numpy python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
+ valgrind"
 compare="libopenvdb-tools python3-numpy python3-openvdb python3-pil python3-vtk9 xauth xvfb"
 
 wanted=$build

@@ -1,0 +1,169 @@
+"""instructions: what a frame of the CPU renderer costs in instructions, stage by stage, by callgrind.
+Started by ./instructions."""
+import argparse
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+
+# Instruction sets that valgrind can run; it has no AVX-512.
+ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain"]
+
+# Of each stage, the functions whose cost, with all they call, is its own; and those within them
+# that are another stage's.
+STAGES = {
+    "projection": (["stage", "project"], []),
+    "binning": (["project_chunk", "trip_cpu_link"], ["stage", "project"]),
+    "blend": (["blend_portion"], []),
+    "merge": (["merge_tile", "finish_tile"], []),
+}
+
+CALL = re.compile(r"calls=")
+COST = re.compile(r"[+*\-\d]\S* (\d+)$")
+NAME = re.compile(r"(c?fn)=\((\d+)\)(?: (.*))?")
+
+
+def fail(text):
+    sys.exit("instructions: " + text)
+
+
+def run(command, **how):
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          check=False, **how)
+    if done.returncode:
+        fail("%s: %s" % (" ".join(command[:2]), done.stderr.strip()[-400:]))
+    return done.stdout
+
+
+def function_costs(lines):
+    """Instructions of each function of a callgrind file with all that it calls; and of all."""
+    names, costs, own, called, total = {}, {}, None, False, 0
+    for line in lines:
+        name = NAME.match(line)
+        if name:
+            # Names of functions and of those called are numbered together.
+            if name.group(3):
+                names[name.group(2)] = name.group(3)
+            if name.group(1) == "fn":
+                own = names[name.group(2)]
+            continue
+        if CALL.match(line):
+            called = True
+            continue
+        cost = COST.match(line)
+        if cost and own:
+            n = int(cost.group(1))
+            costs[own] = costs.get(own, 0) + n
+            total += 0 if called else n
+            called = False
+    return costs, total
+
+
+def stage_costs(costs, total):
+    missing = [name for take, leave in STAGES.values() for name in take + leave if name not in costs]
+    if missing:
+        fail("no function %s in the program's profile; is it stripped, or has render/cpu_renderer.c "
+             "changed?" % ", ".join(missing))
+    stages = {stage: sum(costs[name] for name in take) - sum(costs[name] for name in leave)
+              for stage, (take, leave) in STAGES.items()}
+    stages["rest"] = total - sum(stages.values())
+    return stages
+
+
+def view_options(view):
+    def point(name):
+        return "%.17g,%.17g,%.17g" % tuple(view[name])
+    return ["--eye=" + point("eye"), "--look=" + point("look"), "--up=" + point("up"),
+            "--fov=%.17g" % view["fov_degrees"]]
+
+
+class Frames:
+    """The views of `bench renderers` round a data set, and what they have in splats and pixels."""
+
+    def __init__(self, options):
+        self.options = options
+        text = run([options.triptych, "bench", "renderers", options.dataset, "--renderer=cpu",
+                    "--threads=1", "--hidden=draw", "--json", "--size=" + options.size,
+                    "--views=%d" % options.views] + options.look)
+        row = json.loads(text)["tables"]["renderers"]["rows"][0]
+        self.views = row["each_view"]
+        self.splats = row["splats_drawn"] * len(self.views)
+        self.pixels = self.splats * row.get("pixels_per_splat", 0)
+        if not self.splats:
+            fail("%s: nothing to draw" % options.dataset)
+
+    def count(self, isa, folder):
+        """Instructions of each stage, all views together."""
+        sums = {}
+        for view in self.views:
+            for stage, n in self._count_view(isa, view, folder).items():
+                sums[stage] = sums.get(stage, 0) + n
+        return sums
+
+    def _count_view(self, isa, view, folder):
+        profile = os.path.join(folder, "callgrind.out")
+        run(["valgrind", "--tool=callgrind", "--callgrind-out-file=" + profile,
+             self.options.triptych, "render", self.options.dataset, "--output",
+             os.path.join(folder, "frame.tif"), "--renderer=cpu", "--threads=1", "--hidden=draw",
+             "--engine=pread", "--size=" + self.options.size] + view_options(view)
+            + self.options.look, env=dict(os.environ, TRIPTYCH_ISA=isa))
+        with open(profile, encoding="utf-8", errors="replace") as file:
+            return stage_costs(*function_costs(file))
+
+
+def print_table(frames, counts):
+    print("%s, %s, %d view%s: %d splats, %.1f pixels each\n" % (
+        os.path.basename(frames.options.dataset), frames.options.size, len(frames.views),
+        "" if len(frames.views) == 1 else "s", frames.splats, frames.pixels / frames.splats))
+    print("%-8s %-11s %16s %12s %12s" % ("set", "stage", "instructions", "per splat", "per pixel"))
+    for isa, stages in counts.items():
+        for stage, n in stages.items():
+            print("%-8s %-11s %16d %12.1f %12.2f" % (isa, stage, n, n / frames.splats,
+                                                     n / frames.pixels))
+    print("\nSplats and pixels are those of `triptych bench renderers`, hidden ones too. The rest is "
+          "reading,\nchecking, planning, sharing out the tiles and writing the picture. valgrind has "
+          "no AVX-512, so that is not\ncounted.")
+
+
+def as_json(frames, counts):
+    return {"data_set": frames.options.dataset, "size": frames.options.size,
+            "views": len(frames.views), "splats": frames.splats, "pixels": frames.pixels,
+            "instructions": counts}
+
+
+def parse():
+    parser = argparse.ArgumentParser(
+        prog="instructions", description="Instructions per splat and per covered pixel of a frame "
+        "by one thread, for projection, binning, blend and merge, counted by callgrind.")
+    parser.add_argument("dataset", help="made by `triptych brick`")
+    parser.add_argument("--triptych", default="triptych", help="the program (default: built)")
+    parser.add_argument("--size", default="512x512", help="pixels (default: 512x512)")
+    parser.add_argument("--views", type=int, default=1, help="round the object (default: 1)")
+    parser.add_argument("--isa", choices=ISAS, action="append",
+                        help="instruction set; may be repeated (default: both)")
+    parser.add_argument("--no-shading", action="store_true", help="as in `triptych render`")
+    parser.add_argument("--kernel-radius", help="as in `triptych render`")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    options = parser.parse_args()
+    options.look = ["--no-shading"] if options.no_shading else []
+    if options.kernel_radius:
+        options.look.append("--kernel-radius=" + options.kernel_radius)
+    return options
+
+
+def main():
+    options = parse()
+    frames = Frames(options)
+    with tempfile.TemporaryDirectory() as folder:
+        counts = {isa: frames.count(isa, folder) for isa in options.isa or ISAS}
+    if options.json:
+        print(json.dumps(as_json(frames, counts), indent=2))
+    else:
+        print_table(frames, counts)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""instructions.py: what it makes of a callgrind file, and that it still finds its way in the program."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import instructions
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+# main (5 itself) calls sum twice (100 together); sum has 40 itself and calls leaf for 60.
+PROFILE = """\
+events: Ir
+fn=(1) main
+16 2
++1 3
+cfn=(2) sum
+calls=2 30
+* 100
+
+fn=(2)
+30 40
+cfn=(3) leaf
+calls=6 50
++2 60
+
+fn=(3)
+50 60
+totals: 105
+"""
+
+
+class InstructionsTest(unittest.TestCase):
+    def test_a_function_costs_what_it_and_all_it_calls_cost(self):
+        costs, total = instructions.function_costs(PROFILE.splitlines())
+        self.assertEqual(costs, {"main": 105, "sum": 100, "leaf": 60})
+        self.assertEqual(total, 105)
+
+    def test_a_stage_does_not_contain_another(self):
+        costs = dict(stage=10, project=20, project_chunk=37, trip_cpu_link=1, blend_portion=50,
+                     merge_tile=4, finish_tile=3)
+        stages = instructions.stage_costs(costs, 100)
+        self.assertEqual(stages, {"projection": 30, "binning": 8, "blend": 50, "merge": 7, "rest": 5})
+
+    @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
+    @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
+    def test_every_stage_of_a_frame_is_counted(self):
+        with tempfile.TemporaryDirectory() as folder:
+            volume, data = os.path.join(folder, "v.raw"), os.path.join(folder, "v.trip")
+            with open(volume, "wb") as file:
+                file.write(bytes(200 if 4 < i % 16 < 12 else 0 for i in range(16 ** 3)))
+            program = os.environ["TRIP_PROGRAM"]
+            subprocess.run([program, "brick", volume, "-o", data, "--size=16,16,16", "--type=uint8",
+                            "-q"], check=True)
+            done = subprocess.run([sys.executable, "-B", os.path.join(HERE, "instructions.py"), data,
+                                   "--triptych=" + program, "--isa=plain", "--size=64x64", "--json"],
+                                  check=True, stdout=subprocess.PIPE)
+        result = json.loads(done.stdout)
+        self.assertGreater(result["splats"], 1000)
+        self.assertGreater(result["pixels"], result["splats"])
+        for stage, n in result["instructions"]["plain"].items():
+            self.assertGreater(n, result["splats"] if stage != "merge" else 64 * 64, stage)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
