@@ -5,6 +5,7 @@
 #ifndef TRIP_CPU_BLEND_H
 #define TRIP_CPU_BLEND_H
 
+#include "cpu_exp.h"
 #include "cpu_kernels.h"
 #include "cpu_simd.h"
 
@@ -14,41 +15,6 @@
 #define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
 #define BLOCK_FLOATS (4 * V)
 #define BLOCK_BYTES (4 * BLOCK_FLOATS)
-
-/* ---- exponentials ---- */
-
-/* 2^(y / TRIP_CPU_EXP_UNIT - 127) within 7.5e-5 of itself, for y in [0, 254 TRIP_CPU_EXP_UNIT]. The
- * integer part becomes the float's exponent; a cubic does the mantissa. */
-INLINE vf exp2_biased(vf y)
-{
-    vi i = v_truncate(y);
-    vf m = v_from_bits(vi_low_or(i, 0x7fffff, 0x3f800000));
-    vf p = v_fma(v_set(0.0780245233f), m, v_set(-0.00800641098f));
-    p = v_fma(p, m, v_set(0.477772789f));
-    p = v_fma(p, m, v_set(0.452134318f));
-    return v_from_bits(i & 0x7f800000) * p;
-}
-
-/* exp(-x), x >= 0, within 1.1e-4 of itself and exact at 0, so that the faint rims of many splats
- * add up to nothing wrong. */
-INLINE vf exp_minus(vf x)
-{
-    const float unit = (float)(1.44269504088896340736 * TRIP_CPU_EXP_UNIT);
-    vf y = v_fnma(x, v_set(unit), v_set((float)(127 * TRIP_CPU_EXP_UNIT)));
-    vi i = v_truncate(v_max(y, v_set(0)));
-    vf m = v_from_bits(vi_low_or(i, 0x7fffff, 0x3f800000));
-    vf p = v_fma(v_set(0.0782679702f), m, v_set(-0.0084962282f));
-    p = v_fma(p, m, v_set(0.477612893f));
-    p = v_fma(p, m, v_set(0.452615365f));
-    return v_from_bits(i & 0x7f800000) * p;
-}
-
-/* (1 - exp(-x)) / x within 8e-5 of itself, for 0 <= x <= TRIP_CPU_THIN. */
-INLINE vf thin_ratio(vf x)
-{
-    vf p = v_fma(v_set(0.143569535f), x, v_set(-0.496570851f));
-    return v_fma(p, x, v_set(0.999921664f));
-}
 
 /* ---- what a target keeps ---- */
 
@@ -76,10 +42,10 @@ INLINE vf kept(vf a, trip_target target)
 
 /* ---- blending ---- */
 
-/* Optical depth of a splat at the pixels of a block, where `inside`. */
-INLINE vf optical_depth(const float *geometry, const trip_cpu_splat *splat, trip_cpu_rays rays,
-                        vm *inside)
+/* Optical depth of a splat at the pixels of a block: 0 outside its support. */
+INLINE vf optical_depth(const float *geometry, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
+    const vf zero = v_set(0);
     vf dx = v_load(geometry) - v_set(splat->x);
     vf dy = v_load(geometry + V) - v_set(splat->y);
     vf a = v_fma(dy, v_set(splat->l21), dx * v_set(splat->l11));
@@ -89,18 +55,15 @@ INLINE vf optical_depth(const float *geometry, const trip_cpu_splat *splat, trip
         y = v_fnma(b, b, v_fnma(a, a, v_set(splat->peak)));
     else
         y = v_fnma(v_load(geometry + 2 * V), v_fma(b, b, a * a), v_set(splat->peak));
-    *inside = v_ge(y, v_set(splat->least));
-    if (rays == TRIP_CPU_STRETCHED)
-        y = y + v_load(geometry + 3 * V);
-    return exp2_biased(y);
+    vf depth = v_max(exp2_biased(v_max(y, zero)) - v_set(splat->edge), zero);
+    return rays == TRIP_CPU_STRETCHED ? depth * v_load(geometry + 3 * V) : depth;
 }
 
 /* Front to back: `splat` goes behind what the pixels hold. */
-INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf depth, vm inside,
-                       trip_target target)
+INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf depth, trip_target target)
 {
     vf t = v_load(pixels + 3 * V);
-    vm open = v_ge_and(inside, t, v_set((float)TRIP_SATURATION));
+    vm open = v_ge(t, v_set((float)TRIP_SATURATION));
     vf taken, left;
     if (splat->thick != 0) {
         left = v_mul_where(open, t, exp_minus(depth));
@@ -119,9 +82,9 @@ INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf depth, vm 
 }
 
 /* Back to front: `splat` goes over what the pixels hold. */
-INLINE void put_over(float *pixels, const trip_cpu_splat *splat, vf depth, vm inside,
-                     trip_target target)
+INLINE void put_over(float *pixels, const trip_cpu_splat *splat, vf depth, trip_target target)
 {
+    vm inside = v_gt(depth, v_set(0));
     vf keep = v_select(inside, exp_minus(depth), v_set(1));
     for (int c = 0; c < 3; c++) {
         vf colour = v_set((&splat->r)[c]);
@@ -145,12 +108,11 @@ INLINE void blend_pairs(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_b
         const trip_cpu_splat *splat = (const void *)((const char *)s->local + at);
         const float *geometry = (const void *)((const char *)s->geometry + block);
         float *to = (void *)(pixels + block);
-        vm inside;
-        vf depth = optical_depth(geometry, splat, rays, &inside);
+        vf depth = optical_depth(geometry, splat, rays);
         if (front_to_back)
-            put_behind(to, splat, depth, inside, target);
+            put_behind(to, splat, depth, target);
         else
-            put_over(to, splat, depth, inside, target);
+            put_over(to, splat, depth, target);
     }
 }
 
@@ -359,14 +321,6 @@ static void set_pixel_centres(trip_cpu_scratch *s)
     }
 }
 
-/* log2 a for the stretch, a in a modest range; by the library, since few views need it. */
-static vf log2_each(vf a)
-{
-    for (int i = 0; i < V; i++)
-        a[i] = log2f(a[i]);
-    return a;
-}
-
 static void set_rays_tables(trip_cpu_scratch *s)
 {
     const trip_camera *c = &s->view->splat.camera;
@@ -382,12 +336,12 @@ static void set_rays_tables(trip_cpu_scratch *s)
         vf x = x0 + v_load(geometry), y = y0 + v_load(geometry + V);
         vf inverse = v_set(1) / square_at(&index, x, y);
         v_store(geometry + 2 * V, c->ortho ? v_set(1) : inverse);
-        vf log2_stretch = v_set(0);
+        if (s->view->rays != TRIP_CPU_STRETCHED)
+            continue;
+        vf stretch = v_set(1);
         if (s->view->stretch_varies)
-            log2_stretch = log2_each(square_at(&stretched, x, y) * inverse) *
-                           v_set((float)(0.5 * TRIP_CPU_EXP_UNIT));
-        if (s->view->rays == TRIP_CPU_STRETCHED)
-            v_store(geometry + 3 * V, log2_stretch);
+            stretch = v_sqrt(square_at(&stretched, x, y) * inverse);
+        v_store(geometry + 3 * V, stretch);
     }
 }
 

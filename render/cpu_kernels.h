@@ -24,13 +24,13 @@
 #define TRIP_CPU_THIN 0.4f
 
 /* One splat, ready to blend; 64 bytes, a cache line. Its centre is (x + whole_x, y + whole_y). With
- * q the pixel's offset from it, the exponent of the optical depth at a pixel is
- *     peak - G(p) ((l11 qx + l21 qy)^2 + (l22 qy)^2)
- * G as in trip_cpu_rays, and nothing is drawn where that is below `least`. */
+ * q the pixel's offset from it, the optical depth at a pixel is what
+ *     2^(peak - G(p) ((l11 qx + l21 qy)^2 + (l22 qy)^2)) exceeds `edge` by,
+ * G as in trip_cpu_rays, times the stretch where it varies. */
 typedef struct trip_cpu_splat {
     float x, y, whole_x, whole_y;
     float l11, l21, l22, peak;
-    float r, g, b, least;
+    float r, g, b, edge;
     uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
     uint32_t tiles;          /* those that it lies in, see below */
     uint32_t thick;          /* not 0: the long form of 1 - exp(-x) is needed */
@@ -98,7 +98,7 @@ typedef struct trip_cpu_lanes {
 /* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
     /* Of each block, at the same place as its pixels: pixel centres x[V], y[V] from the tile's
-     * corner, G[V], log2 stretch[V] in TRIP_CPU_EXP_UNIT. */
+     * corner, G[V], stretch[V]. */
     _Alignas(64) float geometry[4 * TRIP_CPU_TILE_PIXELS];
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL]; /* centres relative to the tile */
     uint32_t pairs[TRIP_CPU_PAIRS + 16];

@@ -70,7 +70,7 @@ bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, d
     trip_cpu_set_conic(&s, out);
     double depth = log2(extinction * s.amplitude * view->stretch);
     out->peak = (float)((depth + 127) * TRIP_CPU_EXP_UNIT);
-    out->least = out->peak - view->cutoff;
+    out->edge = (float)(exp2(depth) * view->splat.edge);
     out->thick = depth > (double)view->thick_log2;
     out->tiles = trip_cpu_tiles(out, view->tiles_across);
     return depth > -60;

@@ -6,6 +6,7 @@
 #ifndef TRIP_CPU_PROJECT_H
 #define TRIP_CPU_PROJECT_H
 
+#include "cpu_exp.h"
 #include "cpu_kernels.h"
 #include "cpu_near.h"
 #include "cpu_simd.h"
@@ -450,7 +451,7 @@ INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32
                  v_load(lanes->whole_x + at), v_load(lanes->whole_y + at));
     v_store_rows(base + 4, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
                  v_load(lanes->l22 + at), peak);
-    v_store_rows(base + 8, row, c.r, c.g, c.b, peak - v_set(view->cutoff));
+    v_store_rows(base + 8, row, c.r, c.g, c.b, exp2_biased(peak - v_set(view->cutoff)));
     v_store_rows(base + 12, row, v_load(lanes->first + at), v_load(lanes->last + at),
                  v_load(lanes->tiles + at), thick);
 }

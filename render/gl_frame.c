@@ -100,6 +100,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int 
     out->kernel =
         (trip_gl_double4){ { constants.sigma * constants.sigma, constants.cutoff2,
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
+    out->edge.v[0] = constants.edge;
     double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
     out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };
     const double *b = s->background;

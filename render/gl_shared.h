@@ -34,6 +34,7 @@
     R4 to_eye;        /* xyz: towards the eye in parallel views; w: gradient scale */              \
     R4 screen;        /* xy: the image's centre, pixels; zw: width, height */                      \
     R4 kernel;        /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */       \
+    R4 edge;          /* x: what every footprint is lowered by, exp(-cutoff^2 / 2) */              \
     R4 parallel;      /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */      \
     R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \
     R4 weight;        /* h, sqrt(1 + h^2), list axis, axis of view */                              \

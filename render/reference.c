@@ -143,7 +143,7 @@ static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3
             if (!(p->weight > 0 && m <= r->constants.cutoff2))
                 continue;
             touched = true;
-            double footprint = s->amplitude * exp(-m / 2);
+            double footprint = s->amplitude * (exp(-m / 2) - r->constants.edge);
             double alpha = -expm1(-extinction * p->stretch * footprint);
             composite(p->layer, rgb, alpha, front_to_back);
         }

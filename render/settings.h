@@ -8,8 +8,8 @@
 #include "geometry.h"
 
 /* Standard deviation of the reconstruction Gaussian is kernel_radius / TRIP_CUTOFF, and every
- * footprint, low-pass included, is cut at TRIP_CUTOFF standard deviations: there it has fallen to
- * exp(-TRIP_CUTOFF^2 / 2) = 0.39 % of its peak. */
+ * footprint, low-pass included, ends at TRIP_CUTOFF standard deviations, where the Gaussian has
+ * fallen to exp(-TRIP_CUTOFF^2 / 2) = 0.39 % of its peak; it is lowered by as much, to end at 0. */
 #define TRIP_CUTOFF (10.0 / 3.0)
 #define TRIP_KERNEL_RADIUS_VOXELS 2.0
 /* Standard deviation of the low-pass Gaussian in pixels (the h of Zwicker et al. 2001, EWA volume

@@ -5,12 +5,14 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
     double sigma = settings->kernel_radius / TRIP_CUTOFF;
     double cutoff2 = TRIP_CUTOFF * TRIP_CUTOFF;
     double two_pi = 6.28318530717958647692;
+    double edge = exp(-cutoff2 / 2);
     return (trip_splat_frame){
         .camera = *camera,
         .sigma = sigma,
         .cutoff2 = cutoff2,
         .low_pass2 = TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX,
-        .amplitude = 1 / (two_pi * sigma * sigma) / (1 - exp(-cutoff2 / 2)),
+        .amplitude = 1 / (two_pi * sigma * sigma) / (1 - edge * (1 + cutoff2 / 2)),
+        .edge = edge,
         .rxrx = trip_dot(camera->rx, camera->rx),
         .rxry = trip_dot(camera->rx, camera->ry),
         .ryry = trip_dot(camera->ry, camera->ry),

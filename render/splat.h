@@ -16,9 +16,11 @@
  * the integral:
  *     S' = S + TRIP_LOW_PASS_PX^2 I
  *     m(p)       = g(p) q^T S'^-1 q                                    squared radius, in std devs
- *     amplitude  = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) / (1 - exp(-TRIP_CUTOFF^2 / 2))
- *     footprint' = amplitude exp(-m(p) / 2)    where m(p) <= TRIP_CUTOFF^2, else nothing
- * (the last factor of the amplitude gives back the mass that the cut-off takes). A ray covers
+ *     edge       = exp(-TRIP_CUTOFF^2 / 2)
+ *     amplitude  = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) / (1 - edge (1 + TRIP_CUTOFF^2 / 2))
+ *     footprint' = amplitude (exp(-m(p) / 2) - edge)    where m(p) <= TRIP_CUTOFF^2, else nothing
+ * (the footprint ends at zero, so that rounding at its edge shows nowhere; the last factor of the
+ * amplitude gives back the mass that the cut-off takes). A ray covers
  * stretch(p) = |J r(p)| / |r(p)| world units per index length, J being the linear part of
  * index_to_world, so
  *     alpha(p) = 1 - exp(-tau * stretch(p) * footprint').
@@ -44,7 +46,8 @@ typedef struct trip_splat_frame {
     double sigma;     /* index space */
     double cutoff2;   /* TRIP_CUTOFF^2 */
     double low_pass2; /* px^2 */
-    double amplitude; /* 1 / (2 pi sigma^2) / (1 - exp(-cutoff2 / 2)) */
+    double edge;      /* exp(-cutoff2 / 2) */
+    double amplitude; /* 1 / (2 pi sigma^2) / (1 - edge (1 + cutoff2 / 2)) */
     double rxrx, rxry, ryry;
 } trip_splat_frame;
 

@@ -1,6 +1,6 @@
 // A splat's colour and opacity at a pixel. In: the footprint, flat. Out: premultiplied colour, for
-// blending in list order. Mirrors trip_splat_radius2() and the opacity in render/splat.h; where
-// m(p) exceeds the cut-off nothing is added.
+// blending in list order. Mirrors trip_splat_radius2() and the opacity in render/splat.h; beyond the
+// cut-off nothing is added.
 #include "real.glsl"
 
 layout(location = 0) flat in vec4 footprint;
@@ -28,6 +28,7 @@ void main()
 #elif !defined(PARALLEL)
     m /= 1.0 + ray2_a.w * dot(p, p);
 #endif
-    float alpha = m <= kernel.y ? opacity(colour.a * stretch * exp(-0.5 * m)) : 0.0;
+    float falloff = max(exp(-0.5 * m) - edge.x, 0.0);
+    float alpha = opacity(colour.a * stretch * falloff);
     fragment = vec4(colour.rgb * alpha, alpha);
 }

@@ -119,11 +119,26 @@ static void check_view(const scene *s, int i, tally *tallies)
     scene_picture_free(&expected);
 }
 
-static void check_volume(const char *name)
+/* All that shows becomes nearly opaque, black and white by turns of 256 codes. */
+static void set_hard_contrast(scene *s)
+{
+    double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    for (unsigned code = 0; code < 65536; code++) {
+        if (!(s->table[code].extinction > 0))
+            continue;
+        float grey = code >> 8 & 1 ? 1 : 0;
+        s->table[code] =
+            (trip_tf_entry){ grey, grey, grey, (float)(trip_extinction(0.9999) / voxel) };
+    }
+}
+
+static void check_volume(const char *name, bool hard)
 {
     scene s;
     tally tallies[4] = { { 0, 0, 0 } };
     open_volume(&s, name);
+    if (hard)
+        set_hard_contrast(&s);
     for (int i = 0; i < VIEWS; i++)
         check_view(&s, i, tallies);
     for (int r = 1; scene_renderers()[r].name; r++)
@@ -136,19 +151,25 @@ static void check_volume(const char *name)
 static void twelve_views_of_a_tooth_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("tooth.nhdr");
+    check_volume("tooth.nhdr", false);
 }
 
 static void twelve_views_of_a_stent_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("stent.nrrd");
+    check_volume("stent.nrrd", false);
 }
 
 static void twelve_views_of_a_cloud_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("wdas_cloud_sixteenth.vdb");
+    check_volume("wdas_cloud_sixteenth.vdb", false);
+}
+
+static void nearly_opaque_black_and_white_agrees_with_the_reference(void **state)
+{
+    (void)state;
+    check_volume("tooth.nhdr", true);
 }
 
 int main(void)
@@ -157,6 +178,7 @@ int main(void)
         cmocka_unit_test(twelve_views_of_a_tooth_agree_with_the_reference),
         cmocka_unit_test(twelve_views_of_a_stent_agree_with_the_reference),
         cmocka_unit_test(twelve_views_of_a_cloud_agree_with_the_reference),
+        cmocka_unit_test(nearly_opaque_black_and_white_agrees_with_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

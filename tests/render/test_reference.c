@@ -478,8 +478,10 @@ static void two_splats_in_line_composite_front_over_back_over_background(void **
                                 .width = 401,
                                 .height = 401 };
     /* On the line through both centres, 100 px to a voxel: the low-pass hardly matters. */
-    double sigma = 2 / TRIP_CUTOFF, full = 1 - exp(-TRIP_CUTOFF * TRIP_CUTOFF / 2);
-    double peak = 1 / (6.28318530717958647692 * sigma * sigma) / full;
+    double sigma = 2 / TRIP_CUTOFF, k2 = TRIP_CUTOFF * TRIP_CUTOFF, edge = exp(-k2 / 2);
+    /* The Gaussian of which a disk of radius k sigma is cut and lowered to 0 at its rim. */
+    double volume = 6.28318530717958647692 * sigma * sigma * (1 - edge * (1 + k2 / 2));
+    double peak = (1 - edge) / volume;
     double red = 1 - pow(0.3, peak), green = 1 - pow(0.1, peak);
     for (const scene_renderer *r = scene_renderers(); r->name; r++) {
         scene_picture p = scene_draw(&s, r, &view, &settings);
@@ -489,10 +491,10 @@ static void two_splats_in_line_composite_front_over_back_over_background(void **
         assert_close(c[1], (1 - red) * green, 1e-4);
         assert_close(c[2], behind * 0.5 * 0.8, 1e-4);
         assert_close(c[3], 1 - behind + behind * 0.8, 1e-4);
-        /* One voxel's radius off: exp(-1 / (2 sigma^2)) of the peak. */
+        /* One voxel's radius off. */
         c = scene_pixel(&p, 300, 200);
-        double fall = exp(-1 / (2 * sigma * sigma));
-        assert_close(c[0], 1 - pow(0.3, peak * fall), 1e-3);
+        double beside = (exp(-1 / (2 * sigma * sigma)) - edge) / volume;
+        assert_close(c[0], 1 - pow(0.3, beside), 1e-3);
         assert_close(scene_pixel(&p, 0, 0)[0], 0, 0);
         scene_picture_free(&p);
     }

@@ -111,7 +111,7 @@ static void the_footprint_integrates_to_one_voxel_at_any_zoom(void **state)
             double x = s.x0 + (j % n + 0.5) * sx, y = s.y0 + ((double)(j / n) + 0.5) * sy;
             double m = trip_splat_radius2(&f, &s, x, y);
             if (m <= f.cutoff2)
-                sum += s.amplitude * exp(-m / 2) * sx * sy;
+                sum += s.amplitude * (exp(-m / 2) - exp(-f.cutoff2 / 2)) * sx * sy;
         }
         /* Index-space area of a pixel, perpendicular to the ray. */
         trip_vec3 pixel = trip_cross(f.camera.rx, f.camera.ry);
