@@ -1,5 +1,5 @@
-/* triptych-generate: writes a volume of any size whose every value is known in closed form, slice
- * by slice, so that a terabyte needs no more memory than a megabyte. */
+/* triptych-generate: writes a volume of any size whose every value is known in closed form, a few
+ * slices or one cube at a time, so that a terabyte needs no more memory than they take. */
 #include <argp.h>
 #include <errno.h>
 #include <pthread.h>
@@ -12,7 +12,7 @@
 #include "report.h"
 #include "write_vdb.h"
 
-enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, LEAF = 8 };
+enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, SLICES = 8 };
 
 typedef enum sample_type { SAMPLE_U8, SAMPLE_U16, SAMPLE_F32 } sample_type;
 
@@ -30,13 +30,14 @@ typedef struct job {
     long threads;
 } job;
 
-/* LEAF slices at a time; threads take rows from `next`. */
-typedef struct slab {
+/* A part of the volume; threads take its rows from `next`. */
+typedef struct box {
     const job *job;
-    long first, slices;
+    long first[3], size[3];
     long next;
-    void *values;
-} slab;
+    void *values; /* i fastest; the first of row r is number r * stride */
+    size_t stride;
+} box;
 
 /* Index to the cube: the longest axis spans [-1, 1] between its first and last voxel centres. */
 static trip_vec3 position(const job *j, long x, long y, long z)
@@ -50,79 +51,81 @@ static trip_vec3 position(const job *j, long x, long y, long z)
                    ((double)z - (double)(j->dims[2] - 1) / 2) * step);
 }
 
-static void sample_row(const slab *s, long row)
+static void sample_row(const box *b, long row)
 {
-    const job *j = s->job;
-    long y = row % j->dims[1], z = s->first + row / j->dims[1];
-    size_t start = (size_t)row * (size_t)j->dims[0];
-    for (long x = 0; x < j->dims[0]; x++) {
-        double v = j->field->sample(position(j, x, y, z), j->detail, NULL);
+    const job *j = b->job;
+    long y = b->first[1] + row % b->size[1], z = b->first[2] + row / b->size[1];
+    size_t start = (size_t)row * b->stride;
+    for (long x = 0; x < b->size[0]; x++) {
+        double v = j->field->sample(position(j, b->first[0] + x, y, z), j->detail, NULL);
         size_t at = start + (size_t)x;
         if (j->type == SAMPLE_U8)
-            ((uint8_t *)s->values)[at] = (uint8_t)lrint(v * 255);
+            ((uint8_t *)b->values)[at] = (uint8_t)lrint(v * 255);
         else if (j->type == SAMPLE_U16)
-            ((uint16_t *)s->values)[at] = (uint16_t)lrint(v * 65535);
+            ((uint16_t *)b->values)[at] = (uint16_t)lrint(v * 65535);
         else
-            ((float *)s->values)[at] = (float)v;
+            ((float *)b->values)[at] = (float)v;
     }
 }
 
 static void *sample_rows(void *user)
 {
-    slab *s = user;
-    long rows = s->job->dims[1] * s->slices;
+    box *b = user;
+    long rows = b->size[1] * b->size[2];
     for (;;) {
-        long first = __atomic_fetch_add(&s->next, ROWS_PER_TASK, __ATOMIC_RELAXED);
+        long first = __atomic_fetch_add(&b->next, ROWS_PER_TASK, __ATOMIC_RELAXED);
         if (first >= rows)
             return NULL;
         for (long row = first; row < rows && row < first + ROWS_PER_TASK; row++)
-            sample_row(s, row);
+            sample_row(b, row);
     }
 }
 
-static void sample_slab(slab *s)
+static int sample_box(box *b)
 {
     pthread_t threads[MAX_THREADS];
     long started = 0;
-    s->next = 0;
-    while (started < s->job->threads - 1 &&
-           pthread_create(&threads[started], NULL, sample_rows, s) == 0)
+    if (trip_interrupted())
+        return trip_fail(TRIP_INTERRUPTED, "generate", b->job->output, "interrupted");
+    b->next = 0;
+    while (started < b->job->threads - 1 &&
+           pthread_create(&threads[started], NULL, sample_rows, b) == 0)
         started++;
-    sample_rows(s);
+    sample_rows(b);
     for (long t = 0; t < started; t++)
         pthread_join(threads[t], NULL);
-}
-
-typedef int slab_consumer(const slab *s, void *user);
-
-/* Gives every slab of the volume to `consume` in order. */
-static int for_each_slab(const job *j, slab_consumer *consume, void *user)
-{
-    size_t slice_values = (size_t)j->dims[0] * (size_t)j->dims[1];
-    slab s = { .job = j, .values = malloc(slice_values * LEAF * sample_types[j->type].bytes) };
-    int status =
-        s.values ? TRIP_OK
-                 : trip_fail(TRIP_ERROR, "generate", j->output, "no memory for %d slices", LEAF);
-    for (s.first = 0; status == TRIP_OK && s.first < j->dims[2]; s.first += LEAF) {
-        long left = j->dims[2] - s.first;
-        s.slices = left < LEAF ? left : LEAF;
-        if (trip_interrupted())
-            status = trip_fail(TRIP_INTERRUPTED, "generate", j->output, "interrupted");
-        else {
-            sample_slab(&s);
-            status = consume(&s, user);
-        }
-    }
-    free(s.values);
-    return status;
-}
-
-static int write_slab(const slab *s, void *user)
-{
-    size_t count = (size_t)s->job->dims[0] * (size_t)s->job->dims[1] * (size_t)s->slices;
-    if (fwrite(s->values, sample_types[s->job->type].bytes, count, user) != count)
-        return trip_fail_errno("generate", s->job->output, "cannot write");
     return TRIP_OK;
+}
+
+static int write_box(const box *b, FILE *file)
+{
+    size_t count = (size_t)b->size[0] * (size_t)b->size[1] * (size_t)b->size[2];
+    if (fwrite(b->values, sample_types[b->job->type].bytes, count, file) != count)
+        return trip_fail_errno("generate", b->job->output, "cannot write");
+    return TRIP_OK;
+}
+
+/* A few whole slices at a time. */
+static int write_slices(const job *j, FILE *file)
+{
+    const long *dims = j->dims;
+    size_t slice_values = (size_t)dims[0] * (size_t)dims[1];
+    box b = { .job = j,
+              .size = { dims[0], dims[1], SLICES },
+              .stride = (size_t)dims[0],
+              .values = malloc(slice_values * SLICES * sample_types[j->type].bytes) };
+    int status =
+        b.values ? TRIP_OK
+                 : trip_fail(TRIP_ERROR, "generate", j->output, "no memory for %d slices", SLICES);
+    for (; status == TRIP_OK && b.first[2] < dims[2]; b.first[2] += SLICES) {
+        long left = dims[2] - b.first[2];
+        b.size[2] = left < SLICES ? left : SLICES;
+        status = sample_box(&b);
+        if (status == TRIP_OK)
+            status = write_box(&b, file);
+    }
+    free(b.values);
+    return status;
 }
 
 static int write_dense(const job *j, const char *path, bool header)
@@ -136,47 +139,25 @@ static int write_dense(const job *j, const char *path, bool header)
                 "spacings: 1 1 1\nendian: little\nencoding: raw\n\n",
                 j->field->name, j->detail, sample_types[j->type].name, j->dims[0], j->dims[1],
                 j->dims[2]);
-    int status = for_each_slab(j, write_slab, file);
+    int status = write_slices(j, file);
     if (fclose(file) != 0 && status == TRIP_OK)
         status = trip_fail_errno("generate", path, "cannot write");
     return status;
 }
 
-/* One leaf of a slab of floats, zero where it reaches beyond the volume. */
-static void copy_leaf(const slab *s, long x0, long y0, float leaf[LEAF * LEAF * LEAF])
+static int sample_cube(void *user, const int64_t first[3], const int64_t size[3], float *values)
 {
-    const long *dims = s->job->dims;
-    const float *values = s->values;
-    memset(leaf, 0, LEAF * LEAF * LEAF * sizeof *leaf);
-    for (long z = 0; z < s->slices; z++)
-        for (long y = 0; y < LEAF && y0 + y < dims[1]; y++)
-            for (long x = 0; x < LEAF && x0 + x < dims[0]; x++)
-                leaf[(z * LEAF + y) * LEAF + x] = values[(z * dims[1] + y0 + y) * dims[0] + x0 + x];
-}
-
-static int add_leaves(const slab *s, void *user)
-{
-    float leaf[LEAF * LEAF * LEAF];
-    int status = TRIP_OK;
-    for (long y = 0; status == TRIP_OK && y < s->job->dims[1]; y += LEAF) {
-        for (long x = 0; status == TRIP_OK && x < s->job->dims[0]; x += LEAF) {
-            copy_leaf(s, x, y, leaf);
-            status = trip_vdb_writer_leaf(user, (int64_t[3]){ x, y, s->first }, leaf);
-        }
+    box b = { .job = user, .values = values, .stride = TRIP_VDB_CUBE };
+    for (int a = 0; a < 3; a++) {
+        b.first[a] = (long)first[a];
+        b.size[a] = (long)size[a];
     }
-    return status;
+    return sample_box(&b);
 }
 
-static int write_sparse(const job *j, const char *path)
+static int write_sparse(job *j, const char *path)
 {
-    trip_vdb_writer *writer = NULL;
-    int status = trip_vdb_writer_create(&writer, 1.0);
-    if (status == TRIP_OK)
-        status = for_each_slab(j, add_leaves, writer);
-    if (status == TRIP_OK)
-        status = trip_vdb_writer_save(writer, path);
-    trip_vdb_writer_destroy(writer);
-    return status;
+    return trip_vdb_write(path, (int64_t[3]){ j->dims[0], j->dims[1], j->dims[2] }, sample_cube, j);
 }
 
 static bool ends_with(const char *text, const char *end)
@@ -272,8 +253,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option options[] = {
-    { "output", 'o', "FILE", 0,
-      "What to write: .nrrd, .raw (both streamed) or .vdb (sparse, in memory)", 0 },
+    { "output", 'o', "FILE", 0, "What to write: .nrrd, .raw or .vdb (sparse)", 0 },
     { "size", 's', "N|NXxNYxNZ", 0, "Voxels (default 256)", 0 },
     { "type", 't', "TYPE", 0, "uint8 (default), uint16 or float; .vdb is always float", 0 },
     { "detail", 'd', "X", 0, "Fineness of the structure (default: longest side / 256)", 0 },

@@ -1,5 +1,7 @@
-/* Writes a fog-volume VDB leaf by leaf: 8 x 8 x 8 boxes in any order, empty ones left out. The tree
- * is in memory until it is saved, about 1.2 KB per 512 voxels that are not empty. */
+/* Writes a fog-volume VDB of any size in bounded memory: it holds one cube of 128^3 voxels, a node
+ * of the tree above the leaves, and asks for each cube twice, once to write which voxels are there
+ * and once for their values. What is zero is left out. Single-threaded; the source may use threads.
+ */
 #ifndef TRIP_WRITE_VDB_H
 #define TRIP_WRITE_VDB_H
 
@@ -9,13 +11,15 @@
 extern "C" {
 #endif
 
-typedef struct trip_vdb_writer trip_vdb_writer;
+enum { TRIP_VDB_CUBE = 128 };
 
-int trip_vdb_writer_create(trip_vdb_writer **out, double voxel_size);
-/* values: 512 floats, i fastest, of the leaf whose first voxel is `origin` (multiples of 8). */
-int trip_vdb_writer_leaf(trip_vdb_writer *w, const int64_t origin[3], const float *values);
-int trip_vdb_writer_save(trip_vdb_writer *w, const char *path);
-void trip_vdb_writer_destroy(trip_vdb_writer *w);
+/* Fills in the values of the `size` voxels from `first` on, none beyond a cube: that of (i, j, k)
+ * goes to values[(k * size[1] + j) * TRIP_VDB_CUBE + i]. Returns a status that ends the writing
+ * when it is negative; the same values every time. */
+typedef int trip_vdb_source(void *user, const int64_t first[3], const int64_t size[3],
+                            float *values);
+
+int trip_vdb_write(const char *path, const int64_t dims[3], trip_vdb_source *source, void *user);
 
 #ifdef __cplusplus
 }
