@@ -28,6 +28,11 @@ def program(name):
     return _paths[name]
 
 
+def use_programs(*paths):
+    for path in paths:
+        _paths[os.path.basename(path)] = os.path.abspath(path)
+
+
 class Outcome:
     def __init__(self, status, out, err, peak_bytes, seconds):
         self.status, self.out, self.err = status, out, err
@@ -183,8 +188,7 @@ def main():
     arguments = iter(sys.argv[1:])
     for argument in arguments:
         if argument == "--program":
-            path = os.path.abspath(next(arguments))
-            _paths[os.path.basename(path)] = path
+            use_programs(next(arguments))
         elif argument == "--set":
             name, value = next(arguments).split("=")
             options[name] = value

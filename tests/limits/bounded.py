@@ -1,0 +1,95 @@
+"""Bricking and drawing a volume many times the size of a memory cgroup, each in one of its own: what
+test_memory.py does at a small scale and large.py at any."""
+import json
+import os
+
+import limits
+from memory_group import Group
+
+SLACK_BYTES = 64 * 2**20  # the program itself: code, stacks, libraries
+RANGE = "0.18:"  # of the shells' values: at every size a little more than a tenth of the voxels
+
+
+class Stage:
+    """One program's run and what the kernel says it took."""
+
+    def __init__(self, what, outcome, group, promise_bytes, driver):
+        self.what, self.outcome, self.driver = what, outcome, driver
+        self.seconds, self.peak_bytes = outcome.seconds, outcome.peak_bytes
+        self.group_peak_bytes, self.limit_bytes = group.peak_bytes(), group.limit_bytes
+        self.promise_bytes = promise_bytes
+
+    def problem(self):
+        """None when it worked within its promise."""
+        if self.outcome.status or self.outcome.err:
+            return f"{self.what}: exit status {self.outcome.status}: {self.outcome.err.strip()}"
+        if not self.driver and self.peak_bytes > self.promise_bytes + SLACK_BYTES:
+            return f"{self.what}: more was resident than promised"
+        return None
+
+    def line(self, moved_bytes):
+        return (f"{self.what:<24}{self.seconds:8.1f} s {moved_bytes / 1e9 / self.seconds:6.2f} GB/s"
+                f"   resident {limits.text_bytes(self.peak_bytes):>10} of "
+                f"{limits.text_bytes(self.promise_bytes)} + {limits.text_bytes(SLACK_BYTES)}"
+                f"{' and the driver' if self.driver else ''}   group with page cache "
+                f"{limits.text_bytes(self.group_peak_bytes):>10} of "
+                f"{limits.text_bytes(self.limit_bytes)}")
+
+
+class Bounded:
+    """Gives each line of the report to `tell` and stops at the first stage that fails: AssertionError."""
+
+    def __init__(self, folder, limit_bytes, memory_bytes, tell):
+        self.folder, self.tell = folder, tell
+        self.limit_bytes, self.memory_bytes = limit_bytes, memory_bytes
+        self.data = os.path.join(folder, "bounded.trip")
+
+    def stage(self, what, *arguments, driver=False):
+        with Group(self.limit_bytes) as group:
+            outcome = limits.run("triptych", *arguments, "--memory", self.memory_bytes,
+                                 preexec_fn=group.enter)
+            return Stage(what, outcome, group, self.memory_bytes, driver)
+
+    def judge(self, stage, moved_bytes=0):
+        if moved_bytes:
+            self.tell(stage.line(moved_bytes))
+        problem = stage.problem()
+        assert problem is None, problem
+
+    def generate(self, volume_bytes):
+        """A volume of floats of that size or a little more, outside the group; kept if there."""
+        n = 2
+        while n**3 * 4 < volume_bytes:
+            n += 1
+        path = os.path.join(self.folder, f"shells-{n}.nrrd")
+        if not os.path.exists(path):
+            r = limits.run("triptych-generate", "shells", "--size", n, "--type", "float", "-o", path)
+            assert r.status == 0, r.err
+            self.tell(f"{'generate':<24}{r.seconds:8.1f} s "
+                      f"{os.path.getsize(path) / 1e9 / r.seconds:6.2f} GB/s   resident "
+                      f"{limits.text_bytes(r.peak_bytes):>10}")
+        return path
+
+    def brick(self, volume):
+        stage = self.stage("brick", "brick", volume, "-o", self.data, "--json", "--range", RANGE)
+        self.judge(stage)  # before there is something to parse
+        made = json.loads(stage.outcome.out)
+        self.judge(stage, made["input_bytes"] + made["bytes"])
+        share = 100 * made["kept"] / made["voxels"]
+        self.tell(f"    {limits.text_bytes(made['input_bytes'])} read, {share:.1f} % of the voxels "
+                  f"kept, {limits.text_bytes(made['temporary_bytes'])} spilled, "
+                  f"{limits.text_bytes(made['bytes'])} written")
+        assert made["kept"] >= 0.1 * made["voxels"], "less than a tenth of the voxels is kept"
+        return made
+
+    def render(self, renderer, size, *arguments):
+        """From the disk, not from the page cache. What a graphics driver holds is not promised."""
+        limits.forget_pages(self.data)
+        what = " ".join(["render", renderer, *map(str, arguments)])
+        stage = self.stage(what, "render", self.data, "-o",
+                           os.path.join(self.folder, "bounded.png"), "--renderer", renderer,
+                           "--size", size, "--stats", "-", *arguments, driver=renderer == "gl")
+        self.judge(stage)
+        frames = json.loads(stage.outcome.out)["frames"]
+        self.judge(stage, sum(axis["bytes_read"] for f in frames for axis in f["lists"].values()))
+        return frames

@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""At full size what test_memory.py does small: generates a volume, bricks it and draws it with
+--memory in a memory cgroup, and prints for each stage time, throughput, promise, and what the kernel
+says was resident. Fails when a stage fails or takes more than it promised.
+
+    cmake --preset release && cmake --build --preset release
+    sudo tests/limits/large.py --work /a/folder/on/a/disk
+
+Needs root or a cgroup of one's own, and 2.5 times the volume's size of disk. brick's throughput is
+of input and output, render's of what it reads. What a graphics driver holds is no part of the
+promise but counts as resident, all of it where the driver is software (llvmpipe): with --renderers
+gl it is printed and not judged."""
+import argparse
+import os
+import sys
+
+import limits
+from bounded import Bounded
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+
+
+def size_bytes(text):
+    units = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
+    return int(float(text[:-1]) * units[text[-1]]) if text[-1] in units else int(text)
+
+
+def parse():
+    p = argparse.ArgumentParser(description=__doc__.split("\n\n")[0],
+                                formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    p.add_argument("--work", default=".", help="folder for the files, on a disk")
+    p.add_argument("--build", default=os.path.join(ROOT, "build", "release"), help="build folder")
+    p.add_argument("--volume", type=size_bytes, default="8G", help="bytes of voxels")
+    p.add_argument("--limit", type=size_bytes, default="512M", help="of the memory cgroup")
+    p.add_argument("--memory", type=size_bytes, default="256M", help="what brick and render promise")
+    p.add_argument("--size", default="1024x1024", help="of the picture")
+    p.add_argument("--renderers", default="cpu", help="cpu, gl, reference, with commas")
+    p.add_argument("--orbit", type=int, default=3, help="frames of the sequence drawn besides")
+    p.add_argument("--keep", action="store_true", help="leave the files, and use the volume if there")
+    return p.parse_args()
+
+
+def clear(folder):
+    for name in os.listdir(folder):
+        os.remove(os.path.join(folder, name))
+    os.rmdir(folder)
+
+
+def work(o, tell):
+    bounded = Bounded(o.work, o.limit, o.memory, tell)
+    if os.path.exists(bounded.data):
+        clear(bounded.data)
+    volume = bounded.generate(o.volume)
+    try:
+        bounded.brick(volume)
+        for renderer in o.renderers.split(","):
+            bounded.render(renderer, o.size)
+            if o.orbit > 1 and renderer != "reference":
+                bounded.render(renderer, o.size, "--orbit", o.orbit)
+    finally:
+        if not o.keep:
+            os.remove(volume)
+            if os.path.exists(bounded.data):
+                clear(bounded.data)
+
+
+def main():
+    o = parse()
+    limits.use_programs(os.path.join(o.build, "triptych"),
+                        os.path.join(o.build, "triptych-generate"))
+    limits.options["patience"] = 24 * 3600
+    try:
+        work(o, lambda line: print(line, flush=True))
+    except (AssertionError, OSError) as e:
+        sys.exit(f"large.py: {e}")
+
+
+if __name__ == "__main__":
+    main()
