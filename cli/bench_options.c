@@ -18,6 +18,7 @@ enum {
     KEY_HIDDEN,
     KEY_ENGINE,
     KEY_MEMORY,
+    KEY_NO_COUNTS,
     KEY_JSON,
 };
 
@@ -42,6 +43,8 @@ static const struct argp_option options[] = {
     { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (default: auto); stream only", 0 },
     { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
       0 },
+    { "no-counts", KEY_NO_COUNTS, NULL, 0,
+      "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -58,7 +61,7 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused = BIT(KEY_VIEWS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
+        .refused = BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -68,8 +71,8 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = BIT(KEY_VIEWS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) |
-                   BIT(KEY_THREADS),
+        .refused = BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) |
+                   BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -79,7 +82,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = BIT(KEY_VIEWS),
+        .refused = BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 1024 },
@@ -190,6 +193,9 @@ static int parse_option(int key, char *arg, bench_options *o)
         return parse_engine(arg, o);
     case KEY_MEMORY:
         return trip_option_bytes("--memory", arg, &o->memory_bytes);
+    case KEY_NO_COUNTS:
+        o->no_counts = true;
+        return 0;
     case KEY_JSON:
         o->json = true;
         return 0;

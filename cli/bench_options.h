@@ -21,6 +21,7 @@ typedef struct bench_options {
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
     bool draw_hidden;      /* bricks behind what is opaque */
+    bool no_counts;        /* times only */
     bool json;
 } bench_options;
 

@@ -106,7 +106,8 @@ static int draw_view(race *c, bench_frame frame, int view)
 {
     int repeat = c->options->repeat, status = 0;
     frame.renderer = c->contenders[0].renderer;
-    status = measure_load(frame, &c->loads[view]);
+    if (!c->options->no_counts)
+        status = measure_load(frame, &c->loads[view]);
     for (int run = 0; run < repeat; run++)
         for (int i = 0; i < c->count && !status; i++) {
             frame.renderer = c->contenders[i].renderer;
@@ -120,7 +121,7 @@ static int warm_up(race *c, bench_frame frame)
 {
     bench_cost cost;
     int status = 0;
-    for (int i = 1; i < c->count && !status; i++) {
+    for (int i = 0; i < c->count && !status; i++) {
         frame.renderer = c->contenders[i].renderer;
         status = bench_frame_draw(&frame, false, &cost);
     }
@@ -200,11 +201,13 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
     cJSON_AddNumberToObject(row, "ms_min", values[0]);
     cJSON_AddNumberToObject(row, "ms_max", values[frames - 1]);
     cJSON_AddNumberToObject(row, "fps", 1e3 / median);
-    cJSON_AddNumberToObject(row, "splats_drawn", splats / frames);
-    cJSON_AddNumberToObject(row, "msplats_per_s", splats / ms * 1e-3);
+    if (!c->options->no_counts) {
+        cJSON_AddNumberToObject(row, "splats_drawn", splats / frames);
+        cJSON_AddNumberToObject(row, "msplats_per_s", splats / ms * 1e-3);
+        cJSON_AddNumberToObject(row, "mpixels_per_s", pixels / ms * 1e-3);
+    }
     if (splats > 0)
         cJSON_AddNumberToObject(row, "pixels_per_splat", pixels / splats);
-    cJSON_AddNumberToObject(row, "mpixels_per_s", pixels / ms * 1e-3);
     add_views(c, own, row);
     cJSON_AddItemToArray(rows, row);
 }

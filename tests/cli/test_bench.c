@@ -174,6 +174,26 @@ static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void *
     cJSON_Delete(root);
 }
 
+static void renderers_says_what_each_view_was_and_took_counted_or_not(void **state)
+{
+    (void)state;
+    cJSON *root = bench("renderers block.trip --renderer cpu --size 32x32 --views 4 --repeat 2 "
+                        "--no-counts");
+    const cJSON *row = cJSON_GetArrayItem(rows_of(root, "renderers"), 0), *view;
+    check_times(row);
+    assert_null(cJSON_GetObjectItem(row, "splats_drawn"));
+    assert_null(cJSON_GetObjectItem(row, "msplats_per_s"));
+    const cJSON *views = cJSON_GetObjectItem(row, "each_view");
+    assert_int_equal(cJSON_GetArraySize(views), 4);
+    cJSON_ArrayForEach(view, views)
+    {
+        assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(view, "ms")), 2);
+        assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(view, "eye")), 3);
+        assert_true(number(view, "fov_degrees") == 30);
+    }
+    cJSON_Delete(root);
+}
+
 static void submit_compares_forms_where_there_is_gl(void **state)
 {
     (void)state;
@@ -218,6 +238,7 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench sideways block.trip",
         "bench orders block.trip block.trip",
         "bench orders block.trip --views 3",
+        "bench orders block.trip --no-counts",
         "bench orders block.trip --engine pread",
         "bench orders block.trip --size 32x32,64x64",
         "bench orders block.trip --renderer cpu,gl",
@@ -253,6 +274,7 @@ int main(void)
         cmocka_unit_test(orders_draws_thrice_at_h_0_and_once_from_the_side),
         cmocka_unit_test(stream_reads_the_files_of_all_lists),
         cmocka_unit_test(renderers_gives_a_row_for_each_renderer_size_and_thread_count),
+        cmocka_unit_test(renderers_says_what_each_view_was_and_took_counted_or_not),
         cmocka_unit_test(submit_compares_forms_where_there_is_gl),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
