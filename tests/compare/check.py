@@ -79,7 +79,7 @@ def cameras_agree(options, log):
         prepared = Prepared(_Scene("alignment", "alignment", False, "balls"), _write(folder),
                             folder, options.triptych)
         ours = contenders.Triptych(prepared, "cpu", options.threads)
-        views = ours.time_views(SIZE_PX, 3)[0]
+        views = ours.time_views(SIZE_PX, 3)
         for name in options.programs[1:]:
             try:
                 other = contenders.make(name, prepared, options.threads)

@@ -77,7 +77,7 @@ class Race:
     def __init__(self, options, size, field):
         self.options, self.size, self.field = options, size, field
         self.times = {one.name: [] for one in field}
-        self.own, self.splats, self.views = {}, None, None
+        self.own, self.views = {}, None
 
     def run(self):
         for turn in range(self.options.rounds):
@@ -101,10 +101,9 @@ class Race:
             del self.times[one.name]
 
     def _time_triptych(self, one):
-        views, splats = one.time_views(self.size, self.options.views)
+        views = one.time_views(self.size, self.options.views)
         self.views = self.views or [{key: view[key] for key in ("eye", "look", "up", "fov_degrees")}
                                     for view in views]
-        self.splats = self.splats or splats
         times = self.times[one.name]
         times.extend([] for _ in range(len(views) - len(times)))
         for view, took in zip(times, views):
@@ -191,7 +190,7 @@ def draw_pictures(options, prepared, field, view, path):
 
 def views_of(prepared, options):
     triptych = contenders.Triptych(prepared, "cpu", options.threads)
-    return triptych.time_views(64, options.views)[0]
+    return triptych.time_views(64, options.views)
 
 
 def run_scene(options, scene, volume):
@@ -208,7 +207,6 @@ def run_scene(options, scene, volume):
             race = Race(options, size, list(field))
             race.run()
             result["rows"].extend(race.rows())
-            result["splats_drawn_%d" % size] = race.splats
         path = os.path.join(options.out, scene.name + ".png")
         view = views_of(prepared, options)[1 % options.views]
         result["pictures"] = path

@@ -25,6 +25,11 @@ def _run(command, **options):
     return done.stdout
 
 
+def _environment(threads):
+    """Mesa's software OpenGL takes its threads from here."""
+    return dict(os.environ, LP_NUM_THREADS=str(threads))
+
+
 def _numbers(values):
     return ",".join(repr(float(v)) for v in values)
 
@@ -41,13 +46,14 @@ class Triptych:
     def time_views(self, size, views):
         text = _run([self.prepared.triptych, "bench", "renderers", self.prepared.dataset,
                      "--renderer", self.renderer, "--threads", str(self.threads), "--size",
-                     "%dx%d" % (size, size), "--views", str(views), "--json"] + self.shading)
+                     "%dx%d" % (size, size), "--views", str(views), "--no-counts", "--json"] +
+                    self.shading, env=_environment(self.threads))
         report = json.loads(text[text.index("{"):])
         rows = report["tables"]["renderers"]["rows"]
         if not rows:
             raise Unavailable(report["limits"][-1])
         self.device = rows[0]["device"]
-        return rows[0]["each_view"], rows[0].get("splats_drawn")
+        return rows[0]["each_view"]
 
     def picture(self, view, size, path):
         _run([self.prepared.triptych, "render", self.prepared.dataset, "-o", path, "--renderer",
@@ -70,7 +76,7 @@ class Vtk:
                "function": prepared.function, "shading": prepared.scene.shading}
         self.process = subprocess.Popen(
             [sys.executable, os.path.join(HERE, "vtk_worker.py")], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, text=True, env=dict(os.environ, LP_NUM_THREADS=str(threads)))
+            stdout=subprocess.PIPE, text=True, env=_environment(threads))
         about = self._ask(job)
         self.version = about["version"]
         self.device = about["device"] if mapper == "gpu" else "CPU, %d threads" % threads
