@@ -39,7 +39,9 @@ def call(*arguments, timeout=60, **options):
         process.kill()
         process.communicate()
         raise AssertionError(f"hangs: {arguments}")
-    return subprocess.CompletedProcess(arguments, process.returncode, out, err.decode(errors="replace"))
+    return subprocess.CompletedProcess(
+        arguments, process.returncode, out, err.decode(errors="replace")
+    )
 
 
 class ProgramTest(unittest.TestCase):
@@ -143,8 +145,16 @@ def exr_unpack(packed, size):
 
 # Volumes: arrays have the shape (z, y, x), as the values stand in the file.
 
-NRRD_TYPES = {"u1": "uint8", "i1": "int8", "u2": "uint16", "i2": "int16", "u4": "uint32",
-              "i4": "int32", "f4": "float", "f8": "double"}
+NRRD_TYPES = {
+    "u1": "uint8",
+    "i1": "int8",
+    "u2": "uint16",
+    "i2": "int16",
+    "u4": "uint32",
+    "i4": "int32",
+    "f4": "float",
+    "f8": "double",
+}
 NIFTI_TYPES = {"u1": 2, "i2": 4, "i4": 8, "f4": 16, "f8": 64, "i1": 256, "u2": 512, "u4": 768}
 
 
@@ -163,9 +173,11 @@ def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little")
         packer = zlib.compressobj(wbits=31)
         data = packer.compress(data) + packer.flush()
     z, y, x = volume.shape
-    header = (f"NRRD0004\ntype: {NRRD_TYPES[volume.dtype.str[1:]]}\ndimension: 3\n"
-              f"sizes: {x} {y} {z}\nspacings: {spacing[0]} {spacing[1]} {spacing[2]}\n"
-              f"endian: {endian}\nencoding: {encoding}\n\n")
+    header = (
+        f"NRRD0004\ntype: {NRRD_TYPES[volume.dtype.str[1:]]}\ndimension: 3\n"
+        f"sizes: {x} {y} {z}\nspacings: {spacing[0]} {spacing[1]} {spacing[2]}\n"
+        f"endian: {endian}\nencoding: {encoding}\n\n"
+    )
     write(path, header.encode() + data)
 
 
@@ -175,8 +187,9 @@ def write_nifti(path, volume, affine=None, packed=False, slope=1, inter=0):
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
     struct.pack_into("<8h", header, 40, 3, x, y, z, 1, 1, 1, 1)
-    struct.pack_into("<2h", header, 70, NIFTI_TYPES[volume.dtype.str[1:]],
-                     8 * volume.dtype.itemsize)
+    struct.pack_into(
+        "<2h", header, 70, NIFTI_TYPES[volume.dtype.str[1:]], 8 * volume.dtype.itemsize
+    )
     struct.pack_into("<8f", header, 76, 1, *numpy.linalg.norm(affine[:3, :3], axis=0), 0, 0, 0, 0)
     struct.pack_into("<3f", header, 108, 352, slope, inter)
     struct.pack_into("<2h", header, 252, 0, 1)
@@ -191,8 +204,10 @@ def write_nifti(path, volume, affine=None, packed=False, slope=1, inter=0):
 
 def write_vol(path, volume, version=3):
     z, y, x = volume.shape
-    header = (f"Center-X: 0\nCenter-Y: 0\nCenter-Z: 0\nX: {x}\nY: {y}\nZ: {z}\nVoxel-Size: 1\n"
-              f"Alpha-Color: 0\nVoxel-Endian: 0\nInt-Endian: 0123\nVersion: {version}\n.\n")
+    header = (
+        f"Center-X: 0\nCenter-Y: 0\nCenter-Z: 0\nX: {x}\nY: {y}\nZ: {z}\nVoxel-Size: 1\n"
+        f"Alpha-Color: 0\nVoxel-Endian: 0\nInt-Endian: 0123\nVersion: {version}\n.\n"
+    )
     data = volume.tobytes()
     write(path, header.encode() + (zlib.compress(data) if version == 3 else data))
 
@@ -201,21 +216,46 @@ def write_tiff(path, image):
     """One grey strip."""
     height, width = image.shape
     data = image.tobytes()
-    tags = [(256, width), (257, height), (258, 8 * image.dtype.itemsize), (259, 1), (262, 1),
-            (273, 8), (277, 1), (278, height), (279, len(data))]
+    tags = [
+        (256, width),
+        (257, height),
+        (258, 8 * image.dtype.itemsize),
+        (259, 1),
+        (262, 1),
+        (273, 8),
+        (277, 1),
+        (278, height),
+        (279, len(data)),
+    ]
     folder = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags)
-    write(path, struct.pack("<2sHI", b"II", 42, 8 + len(data)) + data +
-          struct.pack("<H", len(tags)) + folder + struct.pack("<I", 0))
+    write(
+        path,
+        struct.pack("<2sHI", b"II", 42, 8 + len(data))
+        + data
+        + struct.pack("<H", len(tags))
+        + folder
+        + struct.pack("<I", 0),
+    )
 
 
 def write_png(path, image):
     height, width = image.shape
     rows = b"".join(b"\0" + row.astype(">" + image.dtype.str[1:]).tobytes() for row in image)
+
     def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-    write(path, b"\x89PNG\r\n\x1a\n" +
-          chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, 0, 0, 0, 0)) +
-          chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+        return (
+            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        )
+
+    write(
+        path,
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(
+            b"IHDR", struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, 0, 0, 0, 0)
+        )
+        + chunk(b"IDAT", zlib.compress(rows))
+        + chunk(b"IEND", b""),
+    )
 
 
 def write_stack(folder, volume, write_image, extension):
@@ -235,29 +275,40 @@ def write_dicom(path, image, z, spacing=(1, 1, 1)):
     """Explicit VR little endian, 16 bits."""
     e, rows, columns = dicom_element, *image.shape
     us = lambda value: struct.pack("<H", value)
-    meta = (e(2, 0x0001, b"OB", b"\0\1") + e(2, 0x0002, b"UI", b"1.2.840.10008.5.1.4.1.1.2") +
-            e(2, 0x0003, b"UI", f"1.2.3.{z + 1}".encode()) +
-            e(2, 0x0010, b"UI", b"1.2.840.10008.1.2.1") + e(2, 0x0012, b"UI", b"1.2.3"))
-    data = (e(8, 0x0016, b"UI", b"1.2.840.10008.5.1.4.1.1.2") +
-            e(8, 0x0018, b"UI", f"1.2.3.{z + 1}".encode()) +
-            e(0x20, 0x000E, b"UI", b"1.2.3.4") +
-            e(0x20, 0x0013, b"IS", str(z + 1).encode()) +
-            e(0x20, 0x0032, b"DS", f"0\\0\\{z * spacing[2]}".encode()) +
-            e(0x20, 0x0037, b"DS", b"1\\0\\0\\0\\1\\0") +
-            e(0x28, 0x0002, b"US", us(1)) + e(0x28, 0x0004, b"CS", b"MONOCHROME2") +
-            e(0x28, 0x0010, b"US", us(rows)) + e(0x28, 0x0011, b"US", us(columns)) +
-            e(0x28, 0x0030, b"DS", f"{spacing[1]}\\{spacing[0]}".encode()) +
-            e(0x28, 0x0100, b"US", us(16)) + e(0x28, 0x0101, b"US", us(16)) +
-            e(0x28, 0x0102, b"US", us(15)) + e(0x28, 0x0103, b"US", us(0)) +
-            e(0x7FE0, 0x0010, b"OW", image.astype("<u2").tobytes()))
+    meta = (
+        e(2, 0x0001, b"OB", b"\0\1")
+        + e(2, 0x0002, b"UI", b"1.2.840.10008.5.1.4.1.1.2")
+        + e(2, 0x0003, b"UI", f"1.2.3.{z + 1}".encode())
+        + e(2, 0x0010, b"UI", b"1.2.840.10008.1.2.1")
+        + e(2, 0x0012, b"UI", b"1.2.3")
+    )
+    data = (
+        e(8, 0x0016, b"UI", b"1.2.840.10008.5.1.4.1.1.2")
+        + e(8, 0x0018, b"UI", f"1.2.3.{z + 1}".encode())
+        + e(0x20, 0x000E, b"UI", b"1.2.3.4")
+        + e(0x20, 0x0013, b"IS", str(z + 1).encode())
+        + e(0x20, 0x0032, b"DS", f"0\\0\\{z * spacing[2]}".encode())
+        + e(0x20, 0x0037, b"DS", b"1\\0\\0\\0\\1\\0")
+        + e(0x28, 0x0002, b"US", us(1))
+        + e(0x28, 0x0004, b"CS", b"MONOCHROME2")
+        + e(0x28, 0x0010, b"US", us(rows))
+        + e(0x28, 0x0011, b"US", us(columns))
+        + e(0x28, 0x0030, b"DS", f"{spacing[1]}\\{spacing[0]}".encode())
+        + e(0x28, 0x0100, b"US", us(16))
+        + e(0x28, 0x0101, b"US", us(16))
+        + e(0x28, 0x0102, b"US", us(15))
+        + e(0x28, 0x0103, b"US", us(0))
+        + e(0x7FE0, 0x0010, b"OW", image.astype("<u2").tobytes())
+    )
     write(path, bytes(128) + b"DICM" + e(2, 0, b"UL", struct.pack("<I", len(meta))) + meta + data)
 
 
 def ball(shape, spacing=(1, 1, 1), dtype="u1", radius=0.8):
     """A soft ball about the middle, its radius a share of half the shortest world side."""
     half = [(n - 1) / 2 * s for n, s in zip(shape[::-1], spacing)]
-    z, y, x = numpy.meshgrid(*((numpy.arange(n) - (n - 1) / 2) * s
-                               for n, s in zip(shape, spacing[::-1])), indexing="ij")
+    z, y, x = numpy.meshgrid(
+        *((numpy.arange(n) - (n - 1) / 2) * s for n, s in zip(shape, spacing[::-1])), indexing="ij"
+    )
     inside = radius * min(half) - numpy.sqrt(x * x + y * y + z * z)
     top = 200 if dtype == "u1" else 1 if dtype[0] == "f" else 20000
     soft = numpy.clip(inside / max(spacing) + 0.5, 0, 1) * top

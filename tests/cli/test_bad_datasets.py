@@ -20,8 +20,12 @@ class BadDatasets(program.ProgramTest):
         program.write_nrrd("a.nrrd", program.noise((20, 30, 40)))
         program.write_nrrd("b.nrrd", program.noise((20, 30, 40), seed=2))
         for name in "a", "b":
-            assert program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q",
-                                "--range=100:255").returncode == 0
+            assert (
+                program.call(
+                    "brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=100:255"
+                ).returncode
+                == 0
+            )
         cls.good = cls.draw(cls, "a.trip")[1]
 
     def draw(self, path):
@@ -51,7 +55,9 @@ class BadDatasets(program.ProgramTest):
 
     def check_all(self, changes):
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            waiting = [pool.submit(self.check, f"{i:03d}", change) for i, change in enumerate(changes)]
+            waiting = [
+                pool.submit(self.check, f"{i:03d}", change) for i, change in enumerate(changes)
+            ]
         faults = [str(w.exception()) for w in waiting if w.exception()]
         self.assertEqual(faults, [], "\n".join(faults))
 
@@ -72,26 +78,32 @@ class BadDatasets(program.ProgramTest):
             if name == "index.trip":
                 places += [chance.randrange(300) for _ in range(15)]
             for place in places:
+
                 def change(path, n=name, p=place, bit=1 << chance.randrange(8)):
                     with open(f"{path}/{n}", "r+b") as f:
                         f.seek(p)
                         byte = f.read(1)[0]
                         f.seek(p)
                         f.write(bytes([byte ^ bit]))
+
                 changes.append(change)
         self.check_all(changes)
 
     def test_missing_exchanged_or_of_another_kind(self):
         changes = []
         for name in FILES:
+
             def swap(path, n=name):
                 shutil.copy(f"b.trip/{n}", f"{path}/{n}")
+
             def folder(path, n=name):
                 os.remove(f"{path}/{n}")
                 os.mkdir(f"{path}/{n}")
+
             def dangling(path, n=name):
                 os.remove(f"{path}/{n}")
                 os.symlink("nowhere", f"{path}/{n}")
+
             changes += [lambda path, n=name: os.remove(f"{path}/{n}"), swap, folder, dangling]
         changes.append(lambda path: os.replace(f"{path}/x.voxels", f"{path}/y.voxels"))
         self.check_all(changes)
@@ -102,8 +114,20 @@ class BadDatasets(program.ProgramTest):
         for name in FILES:
             program.write(f"zeros.trip/{name}", bytes(4096))
         program.write("file.trip", b"TRIPTYCH" + bytes(2000))
-        for path in "empty.trip", "zeros.trip", "file.trip", "missing.trip", "a.trip/index.trip", ".", \
-                "/", "/dev/null", "a.trip/x.voxels", "a.nrrd", "a.nrrd/x.trip", "y" * 4090:
+        for path in (
+            "empty.trip",
+            "zeros.trip",
+            "file.trip",
+            "missing.trip",
+            "a.trip/index.trip",
+            ".",
+            "/",
+            "/dev/null",
+            "a.trip/x.voxels",
+            "a.nrrd",
+            "a.nrrd/x.trip",
+            "y" * 4090,
+        ):
             self.fails(1, "info", path)
             self.fails(1, "info", "--verify", "--json", path)
             self.fails(1, "render", path, "-o", "no.png")

@@ -34,8 +34,19 @@ def read(path):
 
 def lengths(data, header):
     """Where to cut: nothing, the magic, within and after the header, within and before the end."""
-    return sorted({0, 1, 5, header // 2, header - 1, header, header + 1,
-                   (header + len(data)) // 2, len(data) - 1})
+    return sorted(
+        {
+            0,
+            1,
+            5,
+            header // 2,
+            header - 1,
+            header,
+            header + 1,
+            (header + len(data)) // 2,
+            len(data) - 1,
+        }
+    )
 
 
 class BadVolumes(program.ProgramTest):
@@ -63,7 +74,9 @@ class BadVolumes(program.ProgramTest):
 
     def refused(self, source, *options, status=(1,)):
         """Exactly one line and no data set."""
-        run = program.call("brick", source, "-o", f"{source}.trip".replace("/", "-"), "-q", *options)
+        run = program.call(
+            "brick", source, "-o", f"{source}.trip".replace("/", "-"), "-q", *options
+        )
         about = f"{source[:60]}: {options}: exit status {run.returncode}, stderr: {run.stderr!r}"
         self.assertTrue(run.returncode in status and program.LINE.fullmatch(run.stderr), about)
         return run.stderr
@@ -77,7 +90,9 @@ class BadVolumes(program.ProgramTest):
         """Refused, or read as what it may still be; no more than one line."""
         source = self.name(extension)
         program.write(source, data)
-        run = program.call("brick", source, "-o", f"{source}.trip", "-q", "--memory", "256M", *options)
+        run = program.call(
+            "brick", source, "-o", f"{source}.trip", "-q", "--memory", "256M", *options
+        )
         about = f"{source}: exit status {run.returncode}, stderr: {run.stderr!r}"
         self.assertIn(run.returncode, (0, 1, 2), about)
         if run.returncode:
@@ -106,16 +121,43 @@ class BadVolumes(program.ProgramTest):
     def test_raw(self):
         program.write_raw("good.raw", VALUES)
         size = "--size=14,12,10"
-        for bad in "0,12,10", "-14,12,10", "14,12", "14,12,10,1", "14x12", "a,b,c", "", \
-                "nan,12,10", "99999999999999999999,1,1", "14,12,10.5":
+        for bad in (
+            "0,12,10",
+            "-14,12,10",
+            "14,12",
+            "14,12,10,1",
+            "14x12",
+            "a,b,c",
+            "",
+            "nan,12,10",
+            "99999999999999999999,1,1",
+            "14,12,10.5",
+        ):
             self.later(self.refused, "good.raw", f"--size={bad}", status=(2,))
-        for large in "14,12,11", "2147483647,2147483647,2147483647", "16777216,16777216,1", \
-                "9223372036854775807,2,1", "1,1,2147483647":
+        for large in (
+            "14,12,11",
+            "2147483647,2147483647,2147483647",
+            "16777216,16777216,1",
+            "9223372036854775807,2,1",
+            "1,1,2147483647",
+        ):
             self.later(self.refused, "good.raw", f"--size={large}", status=(1, 2))
-        for option in "--type=int7", "--type=", "--type=rgb", "--endian=middle", "--endian=", \
-                "--offset=-1", "--offset=x", "--offset=99999999999999999999", "--spacing=0,1,1", \
-                "--spacing=-1,1,1", "--spacing=nan,1,1", "--spacing=inf,1,1", "--spacing=1,1", \
-                "--spacing=1e400,1,1":
+        for option in (
+            "--type=int7",
+            "--type=",
+            "--type=rgb",
+            "--endian=middle",
+            "--endian=",
+            "--offset=-1",
+            "--offset=x",
+            "--offset=99999999999999999999",
+            "--spacing=0,1,1",
+            "--spacing=-1,1,1",
+            "--spacing=nan,1,1",
+            "--spacing=inf,1,1",
+            "--spacing=1,1",
+            "--spacing=1e400,1,1",
+        ):
             self.later(self.refused, "good.raw", size, option, status=(2,))
         self.later(self.refused, "good.raw", size, "--offset=1")
         self.later(self.refused, "good.raw", size, "--offset=18446744073709551615", status=(1, 2))
@@ -138,32 +180,64 @@ class BadVolumes(program.ProgramTest):
 
     def test_nrrd_headers(self):
         good = {"type": "uint8", "dimension": "3", "sizes": "14 12 10", "encoding": "raw"}
-        bad = [{"type": "block"}, {"type": "uint7"}, {"type": ""}, {"dimension": "0"},
-               {"dimension": "2"}, {"dimension": "17"}, {"dimension": "-3"}, {"dimension": "x"},
-               {"sizes": "0 12 10"}, {"sizes": "14 12"}, {"sizes": "-14 12 10"},
-               {"sizes": "14 12 10 10"}, {"sizes": "9223372036854775807 9223372036854775807 2"},
-               {"sizes": "4294967296 4294967296 1"}, {"sizes": "14 12 99999999999999999999"},
-               {"sizes": "14 12 nan"}, {"sizes": "14 12 100000000"},
-               {"encoding": "rot13"}, {"encoding": "gzip"}, {"encoding": "bzip2"},
-               {"type": "uint16", "endian": "middle"}, {"spacings": "0 1 1"},
-               {"spacings": "nan 1 inf"}, {"spacings": "1 1"}, {"spacings": "1e999 1 1"},
-               {"space dimension": "3", "space directions": "(1,0,0) (0,1,0) (0,2,0)"},
-               {"space dimension": "3", "space directions": "(1,0,0) (0,1,0) (0,0,nan)"},
-               {"space dimension": "3", "space directions": "(1,0,0) (0,1,0)"},
-               {"space dimension": "3", "space directions": "(1,0) (0,1) (0,0)"},
-               {"space dimension": "3", "space directions": "(1,0,0) (0,1,0) (0,0,1)",
-                "space origin": "(inf,0,0)"},
-               {"data file": "missing.raw"}, {"data file": "."}, {"data file": "LIST\nmissing"},
-               {"data file": "slice%03d.raw 1 3 0"}, {"data file": "slice%s%s%s%n.raw 1 3 1"},
-               {"byte skip": "-2"}, {"byte skip": "99999999999"}, {"line skip": "5"},
-               {"line skip": "-1"}]
+        bad = [
+            {"type": "block"},
+            {"type": "uint7"},
+            {"type": ""},
+            {"dimension": "0"},
+            {"dimension": "2"},
+            {"dimension": "17"},
+            {"dimension": "-3"},
+            {"dimension": "x"},
+            {"sizes": "0 12 10"},
+            {"sizes": "14 12"},
+            {"sizes": "-14 12 10"},
+            {"sizes": "14 12 10 10"},
+            {"sizes": "9223372036854775807 9223372036854775807 2"},
+            {"sizes": "4294967296 4294967296 1"},
+            {"sizes": "14 12 99999999999999999999"},
+            {"sizes": "14 12 nan"},
+            {"sizes": "14 12 100000000"},
+            {"encoding": "rot13"},
+            {"encoding": "gzip"},
+            {"encoding": "bzip2"},
+            {"type": "uint16", "endian": "middle"},
+            {"spacings": "0 1 1"},
+            {"spacings": "nan 1 inf"},
+            {"spacings": "1 1"},
+            {"spacings": "1e999 1 1"},
+            {"space dimension": "3", "space directions": "(1,0,0) (0,1,0) (0,2,0)"},
+            {"space dimension": "3", "space directions": "(1,0,0) (0,1,0) (0,0,nan)"},
+            {"space dimension": "3", "space directions": "(1,0,0) (0,1,0)"},
+            {"space dimension": "3", "space directions": "(1,0) (0,1) (0,0)"},
+            {
+                "space dimension": "3",
+                "space directions": "(1,0,0) (0,1,0) (0,0,1)",
+                "space origin": "(inf,0,0)",
+            },
+            {"data file": "missing.raw"},
+            {"data file": "."},
+            {"data file": "LIST\nmissing"},
+            {"data file": "slice%03d.raw 1 3 0"},
+            {"data file": "slice%s%s%s%n.raw 1 3 1"},
+            {"byte skip": "-2"},
+            {"byte skip": "99999999999"},
+            {"line skip": "5"},
+            {"line skip": "-1"},
+        ]
         for change in bad:
             fields = "".join(f"{k}: {v}\n" for k, v in {**good, **change}.items())
             data = b"NRRD0004\n" + fields.encode() + b"\n" + VALUES.tobytes()
             self.later(self.refused_bytes, data, ".nrrd")
-        for data in b"NRRD", b"NRRD0009\n" + b"\n" * 5, b"NRRD0004\n\n", b"NRRD0004\n" + b"a" * 100000, \
-                b"NRRD0004\ntype: uint8\n" + b"# no end\n" * 10000, b"NRRD0004\r\n\0\0\0\r\n\r\n", \
-                b"NRRD0004\ndimension: 3\ntype: uint8\nencoding: raw\n\n":
+        for data in (
+            b"NRRD",
+            b"NRRD0009\n" + b"\n" * 5,
+            b"NRRD0004\n\n",
+            b"NRRD0004\n" + b"a" * 100000,
+            b"NRRD0004\ntype: uint8\n" + b"# no end\n" * 10000,
+            b"NRRD0004\r\n\0\0\0\r\n\r\n",
+            b"NRRD0004\ndimension: 3\ntype: uint8\nencoding: raw\n\n",
+        ):
             self.later(self.refused_bytes, data, ".nrrd")
         self.finish()
 
@@ -180,17 +254,37 @@ class BadVolumes(program.ProgramTest):
     def test_nifti_headers(self):
         program.write_nifti("made.nii", VALUES)
         good = read("made.nii")
-        bad = [("<h", 40, 0), ("<h", 40, 8), ("<h", 40, -1), ("<h", 42, 0), ("<h", 42, -5),
-               ("<h", 46, 32767), ("<4h", 42, 32767, 32767, 32767, 32767), ("<h", 70, 0),
-               ("<h", 70, 128), ("<h", 70, 9999), ("<f", 108, float("nan")),
-               ("<f", 108, 1e30), ("<f", 108, -8), ("<f", 108, 0), ("<i", 0, 349)]
+        bad = [
+            ("<h", 40, 0),
+            ("<h", 40, 8),
+            ("<h", 40, -1),
+            ("<h", 42, 0),
+            ("<h", 42, -5),
+            ("<h", 46, 32767),
+            ("<4h", 42, 32767, 32767, 32767, 32767),
+            ("<h", 70, 0),
+            ("<h", 70, 128),
+            ("<h", 70, 9999),
+            ("<f", 108, float("nan")),
+            ("<f", 108, 1e30),
+            ("<f", 108, -8),
+            ("<f", 108, 0),
+            ("<i", 0, 349),
+        ]
         for form, at, *values in bad:
             changed = bytearray(good)
             struct.pack_into(form, changed, at, *values)
             self.later(self.refused_bytes, bytes(changed), ".nii")
-        for form, at, *values in ("<2f", 112, float("nan"), 0), ("<2f", 112, float("inf"), 0), \
-                ("<2f", 112, 1, float("nan")), ("<2f", 112, 1e38, 1e38), ("<f", 280, float("nan")), \
-                ("<f", 292, float("inf")), ("<12f", 280, *[0] * 12), ("<h", 72, 7):
+        for form, at, *values in (
+            ("<2f", 112, float("nan"), 0),
+            ("<2f", 112, float("inf"), 0),
+            ("<2f", 112, 1, float("nan")),
+            ("<2f", 112, 1e38, 1e38),
+            ("<f", 280, float("nan")),
+            ("<f", 292, float("inf")),
+            ("<12f", 280, *[0] * 12),
+            ("<h", 72, 7),
+        ):
             changed = bytearray(good)
             struct.pack_into(form, changed, at, *values)
             self.later(self.endured, bytes(changed), ".nii")
@@ -207,11 +301,21 @@ class BadVolumes(program.ProgramTest):
             self.damage(data, ".vol", last=header)
         header = b"X: 14\nY: 12\nZ: 10\nVersion: 3\n.\n"
         packed = zlib.compress(VALUES.tobytes())
-        for change in (b"X: 14", b"X: 0"), (b"X: 14", b"X: -14"), (b"X: 14", b"X: 99999999999999999999"), \
-                (b"X: 14", b"X: 1e2"), (b"Y: 12\n", b""), (b"Z: 10", b"Z: 11"), (b"Version: 3", b"Version: 9"), \
-                (b"Z: 10", b"Z: 2000000000"), (b"\n.\n", b"\n"), (b"X: 14", b"X 14"), \
-                (b"Version", b"Voxel-Size: 0\nVersion"), (b"Version", b"Voxel-Size: nan\nVersion"), \
-                (b"X: 14", b"X: " + b"1" * 300):
+        for change in (
+            (b"X: 14", b"X: 0"),
+            (b"X: 14", b"X: -14"),
+            (b"X: 14", b"X: 99999999999999999999"),
+            (b"X: 14", b"X: 1e2"),
+            (b"Y: 12\n", b""),
+            (b"Z: 10", b"Z: 11"),
+            (b"Version: 3", b"Version: 9"),
+            (b"Z: 10", b"Z: 2000000000"),
+            (b"\n.\n", b"\n"),
+            (b"X: 14", b"X 14"),
+            (b"Version", b"Voxel-Size: 0\nVersion"),
+            (b"Version", b"Voxel-Size: nan\nVersion"),
+            (b"X: 14", b"X: " + b"1" * 300),
+        ):
             self.later(self.refused_bytes, header.replace(*change) + packed, ".vol")
         self.later(self.refused_bytes, header + b"\x78\x9c\0\0\0", ".vol")
         self.finish()
@@ -241,15 +345,30 @@ class BadVolumes(program.ProgramTest):
                 else:
                     program.write_tiff(f"{name}/{i}.tif", image)
             return name
+
         flat = VALUES[0]
         good = read_tiff(flat)
-        for name in (stack("different-sizes", flat, flat[:5]), stack("different-types", flat, flat.astype("u2")),
-                     stack("empty-folder"), stack("with-an-empty-file", flat, b"", flat),
-                     stack("with-a-text", flat, b"hello\n"), stack("with-half", flat, good[: len(good) // 2])):
+        for name in (
+            stack("different-sizes", flat, flat[:5]),
+            stack("different-types", flat, flat.astype("u2")),
+            stack("empty-folder"),
+            stack("with-an-empty-file", flat, b"", flat),
+            stack("with-a-text", flat, b"hello\n"),
+            stack("with-half", flat, good[: len(good) // 2]),
+        ):
             self.later(self.refused, name)
         os.makedirs("only-folders/inside")
-        for name in "only-folders", "missing-%03d.tif", "missing*.png", "missing-folder", "%s%s%n.tif", \
-                "different-sizes/%d.tif", "/dev/null", "/dev/zero", "":
+        for name in (
+            "only-folders",
+            "missing-%03d.tif",
+            "missing*.png",
+            "missing-folder",
+            "%s%s%n.tif",
+            "different-sizes/%d.tif",
+            "/dev/null",
+            "/dev/zero",
+            "",
+        ):
             self.later(self.refused, name, status=(1, 2))
         self.finish()
 
@@ -295,8 +414,18 @@ class BadVolumes(program.ProgramTest):
         os.symlink("loop", "loop")
         os.symlink("nowhere", "dangling.nrrd")
         os.mkfifo("fifo.nrrd")
-        for source in "text.txt", "zeros", "folder.nrrd", "loop", "dangling.nrrd", "missing.nrrd", \
-                "missing/a.nrrd", "text.txt/a.nrrd", "x" * 5000, os.path.join(program.DATASETS, "tooth.raw"):
+        for source in (
+            "text.txt",
+            "zeros",
+            "folder.nrrd",
+            "loop",
+            "dangling.nrrd",
+            "missing.nrrd",
+            "missing/a.nrrd",
+            "text.txt/a.nrrd",
+            "x" * 5000,
+            os.path.join(program.DATASETS, "tooth.raw"),
+        ):
             self.later(self.refused_named, source)
         self.later(self.refused_named, "fifo.nrrd")
         self.finish()

@@ -36,7 +36,9 @@ class DefaultView(program.ProgramTest):
             self.check(name)
 
     def test_wide_and_tall_pictures(self):
-        self.works("brick", os.path.join(program.DATASETS, "tooth.nhdr"), "-o", "a.trip", "-q", "--force")
+        self.works(
+            "brick", os.path.join(program.DATASETS, "tooth.nhdr"), "-o", "a.trip", "-q", "--force"
+        )
         for size in "400x100", "100x400", "64x64":
             picture = brightness(self.picture("a.trip", "--size", size, "--background", "0,0,0"))
             rim = numpy.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
@@ -44,7 +46,9 @@ class DefaultView(program.ProgramTest):
             self.assertGreater((picture > 0.03).mean(), 0.03, size)
 
     def test_no_image_of_a_turntable_is_cropped(self):
-        self.works("brick", os.path.join(program.DATASETS, "stent.nrrd"), "-o", "a.trip", "-q", "--force")
+        self.works(
+            "brick", os.path.join(program.DATASETS, "stent.nrrd"), "-o", "a.trip", "-q", "--force"
+        )
         self.works("render", "a.trip", "-o", "turn.exr", "--size", "120x120", "--orbit", "6")
         for i in range(6):
             alpha = program.read_exr(f"turn-{i:03d}.exr")[..., 3]

@@ -7,8 +7,17 @@ import numpy
 
 import program
 
-INFO_KEYS = {"format_version", "dims", "spacing", "index_to_world", "value_min", "value_max",
-             "voxels", "kept", "bytes"}
+INFO_KEYS = {
+    "format_version",
+    "dims",
+    "spacing",
+    "index_to_world",
+    "value_min",
+    "value_max",
+    "voxels",
+    "kept",
+    "bytes",
+}
 STATS_KEYS = {"renderer", "device", "method", "size", "peak_rss_bytes", "frames"}
 FRAME_KEYS = {"ms", "read_ms", "draw_ms", "merge_ms", "lists"}
 LIST_KEYS = {"splats_read", "splats_projected", "splats_drawn", "bytes_read"}
@@ -19,15 +28,19 @@ class Drawn(program.ProgramTest):
     def setUpClass(cls):
         super().setUpClass()
         cls.kept = {}
-        sources = {"tooth": ["tooth.nhdr", "--range=900:1300"],
-                   "heat": ["densityAndHeat.vdb", "--grid", "heat"]}
+        sources = {
+            "tooth": ["tooth.nhdr", "--range=900:1300"],
+            "heat": ["densityAndHeat.vdb", "--grid", "heat"],
+        }
         for name, (source, *options) in sources.items():
             path = os.path.join(program.DATASETS, source)
             cls.kept[name] = cls.brick(cls(), path, f"{name}.trip", *options)["kept"]
         values = program.noise((9, 40, 70))
-        program.write_nifti("sheared.nii", values,
-                            numpy.array([[0, 0.5, 0.2, 3], [-2, 0.3, 0, 5], [0, 0, 4, -7],
-                                         [0, 0, 0, 1]]))
+        program.write_nifti(
+            "sheared.nii",
+            values,
+            numpy.array([[0, 0.5, 0.2, 3], [-2, 0.3, 0, 5], [0, 0, 4, -7], [0, 0, 0, 1]]),
+        )
         cls.kept["sheared"] = cls.brick(cls(), "sheared.nii", "sheared.trip")["kept"]
 
     def middle(self, name):
@@ -35,8 +48,12 @@ class Drawn(program.ProgramTest):
         info = self.info(f"{name}.trip")
         matrix = numpy.array(info["index_to_world"])
         dims = numpy.array(info["dims"])
-        corners = [matrix[:, :3] @ ((dims - 1) * [a, b, c]) + matrix[:, 3]
-                   for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+        corners = [
+            matrix[:, :3] @ ((dims - 1) * [a, b, c]) + matrix[:, 3]
+            for a in (0, 1)
+            for b in (0, 1)
+            for c in (0, 1)
+        ]
         centre = numpy.mean(corners, axis=0)
         return centre, max(numpy.linalg.norm(c - centre) for c in corners), matrix
 
@@ -44,9 +61,19 @@ class Drawn(program.ProgramTest):
         """A perspective view that contains all of it."""
         centre, radius, _ = self.middle(name)
         eye = centre + numpy.array(direction) / numpy.linalg.norm(direction) * radius * 4.5
-        return ([f"{name}.trip", "--eye", ",".join(map(str, eye)), "--look",
-                 ",".join(map(str, centre)), "--fov", "30", "--size", "150x150",
-                 "--up", "0.31,0.2,0.9"] + list(options))
+        return [
+            f"{name}.trip",
+            "--eye",
+            ",".join(map(str, eye)),
+            "--look",
+            ",".join(map(str, centre)),
+            "--fov",
+            "30",
+            "--size",
+            "150x150",
+            "--up",
+            "0.31,0.2,0.9",
+        ] + list(options)
 
     def drawn(self, *arguments):
         return program.splats_drawn(self.stats(*arguments))
@@ -64,8 +91,9 @@ class Drawn(program.ProgramTest):
     def test_stats_have_the_fixed_keys(self):
         for renderer in "reference", "cpu", "auto":
             for method in "merge", "clip", "axis":
-                stats = self.stats("heat.trip", "--renderer", renderer, "--method", method,
-                                   "--size", "50x40")
+                stats = self.stats(
+                    "heat.trip", "--renderer", renderer, "--method", method, "--size", "50x40"
+                )
                 self.assertLessEqual(STATS_KEYS, stats.keys())
                 self.assertEqual(stats["size"], [50, 40])
                 self.assertEqual(stats["method"], method)
@@ -97,9 +125,21 @@ class Drawn(program.ProgramTest):
             for axis in range(3):
                 along = matrix[:, axis] / numpy.linalg.norm(matrix[:, axis]) * radius * 3
                 for method in ("merge", "clip", "axis")[: 3 if name == "heat" else 1]:
-                    view = [f"{name}.trip", "--ortho", str(2.5 * radius), "--size", "120x120",
-                            "--eye", ",".join(map(str, centre - along)), "--look",
-                            ",".join(map(str, centre)), "--up", "0.3,0.4,0.5", "--method", method]
+                    view = [
+                        f"{name}.trip",
+                        "--ortho",
+                        str(2.5 * radius),
+                        "--size",
+                        "120x120",
+                        "--eye",
+                        ",".join(map(str, centre - along)),
+                        "--look",
+                        ",".join(map(str, centre)),
+                        "--up",
+                        "0.3,0.4,0.5",
+                        "--method",
+                        method,
+                    ]
                     stats = self.stats(*view, *(["--h", "0"] if method == "merge" else []))
                     self.assertEqual(program.splats_drawn(stats), kept, view)
                     read = [c["splats_read"] for c in stats["frames"][0]["lists"].values()]
@@ -119,20 +159,39 @@ class Drawn(program.ProgramTest):
 
     def test_all_renderers_count_alike(self):
         view = self.view_from("sheared", (1, 2, 3), "--h", "0.7")
-        lists = [self.stats(*view, "--renderer", r)["frames"][0]["lists"]
-                 for r in ("cpu", "reference")]
+        lists = [
+            self.stats(*view, "--renderer", r)["frames"][0]["lists"] for r in ("cpu", "reference")
+        ]
         for axis in "xyz":
             self.assertEqual(lists[0][axis]["splats_drawn"], lists[1][axis]["splats_drawn"])
 
     def test_only_what_the_view_sees_is_read(self):
         """Looking past it, and at a corner of it close up."""
         centre, radius, _ = self.middle("tooth")
-        away = ["tooth.trip", "--eye", ",".join(map(str, centre + 3 * radius)), "--look",
-                ",".join(map(str, centre + 9 * radius)), "--size", "50x50"]
+        away = [
+            "tooth.trip",
+            "--eye",
+            ",".join(map(str, centre + 3 * radius)),
+            "--look",
+            ",".join(map(str, centre + 9 * radius)),
+            "--size",
+            "50x50",
+        ]
         stats = self.stats(*away)
         self.assertEqual([c["bytes_read"] for c in stats["frames"][0]["lists"].values()], [0] * 3)
-        close = ["tooth.trip", "--eye", ",".join(map(str, centre + [0, 0, 3 * radius])), "--look",
-                 ",".join(map(str, centre)), "--up", "0,1,0", "--fov", "3", "--size", "50x50"]
+        close = [
+            "tooth.trip",
+            "--eye",
+            ",".join(map(str, centre + [0, 0, 3 * radius])),
+            "--look",
+            ",".join(map(str, centre)),
+            "--up",
+            "0,1,0",
+            "--fov",
+            "3",
+            "--size",
+            "50x50",
+        ]
         lists = self.stats(*close)["frames"][0]["lists"]
         self.assertLess(lists["z"]["splats_read"], 0.7 * self.kept["tooth"])
         self.assertEqual(lists["x"]["splats_read"] + lists["y"]["splats_read"], 0)

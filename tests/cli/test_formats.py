@@ -16,8 +16,18 @@ TRANSFER_FUNCTION = "values data\n20 0.2 0.3 0.9 0\n120 0.9 0.5 0.2 0.05\n255 1 
 
 def look_from(eye, size="96x80"):
     """The whole of a grid of 40 x 36 x 28 voxels, or of one as large."""
-    return ["--size", size, "--look", "20,18,14", "--up", "0.1,0.2,1", "--renderer", "reference",
-            "--eye", ",".join(map(str, eye))]
+    return [
+        "--size",
+        size,
+        "--look",
+        "20,18,14",
+        "--up",
+        "0.1,0.2,1",
+        "--renderer",
+        "reference",
+        "--eye",
+        ",".join(map(str, eye)),
+    ]
 
 
 VIEW = look_from((75, -60, 50))
@@ -44,8 +54,10 @@ class Formats(program.ProgramTest):
 
     def same(self, source, *options):
         picture = self.draw(source, *options)
-        self.assertTrue(numpy.array_equal(picture, self.plain),
-                        f"{source}: differs by {abs(picture - self.plain).max()}")
+        self.assertTrue(
+            numpy.array_equal(picture, self.plain),
+            f"{source}: differs by {abs(picture - self.plain).max()}",
+        )
 
     def alike(self, source, *options, most=1 / 100, mean=1 / 5000):
         """Gradients are stored in 8 bits over the range of the type, so shading differs a little."""
@@ -68,8 +80,11 @@ class Formats(program.ProgramTest):
         self.same("packed.nrrd")
 
     def test_nhdr_with_detached_slices_of_raw(self):
-        program.write("detached.nhdr", b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 40 36 28\n"
-                      b"encoding: raw\ndata file: plain.raw\n")
+        program.write(
+            "detached.nhdr",
+            b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 40 36 28\n"
+            b"encoding: raw\ndata file: plain.raw\n",
+        )
         self.same("detached.nhdr")
 
     def test_big_and_little_endian_words(self):
@@ -81,8 +96,9 @@ class Formats(program.ProgramTest):
         words = self.draw("big.raw", "--size=40,36,28", "--type=uint16", "--endian=big")
         self.assertTrue(numpy.array_equal(big, words))
         program.write("shifted.raw", b"a header" + self.values.astype("<u2").tobytes())
-        words = self.draw("shifted.raw", "--size=40,36,28", "--type=uint16", "--endian=little",
-                          "--offset=8")
+        words = self.draw(
+            "shifted.raw", "--size=40,36,28", "--type=uint16", "--endian=little", "--offset=8"
+        )
         self.assertTrue(numpy.array_equal(big, words))
         self.alike("big.nrrd", most=0.1, mean=0.005)
 
@@ -93,8 +109,12 @@ class Formats(program.ProgramTest):
         self.same("packed.nii.gz")
 
     def test_nifti_slope_and_intercept(self):
-        program.write_nifti("scaled.nii", ((self.values.astype("f4") + 100) * 4).astype("i2"),
-                            slope=0.25, inter=-100)
+        program.write_nifti(
+            "scaled.nii",
+            ((self.values.astype("f4") + 100) * 4).astype("i2"),
+            slope=0.25,
+            inter=-100,
+        )
         self.alike("scaled.nii", most=0.1, mean=0.005)
 
     def test_vol(self):
@@ -111,9 +131,12 @@ class Formats(program.ProgramTest):
         self.same("pngs/slice-*.png")
 
     def test_stack_of_dicom(self):
-        program.write_stack("dicoms", self.values.astype("u2"),
-                            lambda path, image: program.write_dicom(path, image,
-                                                                    int(path[-8:-4])), "dcm")
+        program.write_stack(
+            "dicoms",
+            self.values.astype("u2"),
+            lambda path, image: program.write_dicom(path, image, int(path[-8:-4])),
+            "dcm",
+        )
         program.write_nrrd("words.nrrd", self.values.astype("u2"))
         self.assertTrue(numpy.array_equal(self.draw("dicoms"), self.draw("words.nrrd")))
 
@@ -136,8 +159,15 @@ class Formats(program.ProgramTest):
         self.assertLess(difference.mean(), 1 / 5000)
 
     def test_names_of_any_kind(self):
-        for name in "with space.raw", "new\nline.raw", "-dash.raw", "ünïcödé.raw", "per%cent%s.raw", \
-                "a.b.c", "[x]*?.raw":
+        for name in (
+            "with space.raw",
+            "new\nline.raw",
+            "-dash.raw",
+            "ünïcödé.raw",
+            "per%cent%s.raw",
+            "a.b.c",
+            "[x]*?.raw",
+        ):
             program.write_raw(name, self.values)
             source = "./" + name if name.startswith("-") else name
             output = source.replace(".raw", "") + ".trip"
@@ -164,8 +194,17 @@ class World(program.ProgramTest):
             for direction in (5, -3, 2), (0.1, 0.2, 6), (6, 1, 0.5):
                 eye = [m + 40 * min(spacing) * d for m, d in zip(middle, direction)]
                 across, down = self.silhouette(
-                    "--size", "200x200", "--look", ",".join(map(str, middle)), "--eye",
-                    ",".join(map(str, eye)), "--up", "0,1,0.3", "--fov", "20")
+                    "--size",
+                    "200x200",
+                    "--look",
+                    ",".join(map(str, middle)),
+                    "--eye",
+                    ",".join(map(str, eye)),
+                    "--up",
+                    "0,1,0.3",
+                    "--fov",
+                    "20",
+                )
                 self.assertGreater(across, 30)
                 self.assertLess(abs(across - down), 0.1 * across, (spacing, direction))
 
@@ -187,8 +226,18 @@ class World(program.ProgramTest):
     def test_an_affine_moves_voxels_where_it_says(self):
         """The same voxels at the same places of the world, stored along other axes."""
         values = program.noise((20, 24, 28))
-        view = ["--size", "90x90", "--renderer", "reference", "--eye", "60,-50,45", "--look",
-                "14,12,10", "--up", "0,0,1"]
+        view = [
+            "--size",
+            "90x90",
+            "--renderer",
+            "reference",
+            "--eye",
+            "60,-50,45",
+            "--look",
+            "14,12,10",
+            "--up",
+            "0,0,1",
+        ]
         plain = self.turned(values, numpy.eye(4), view)
         self.assertGreater(plain[..., 3].max(), 0.5)
         # i along -y, j along z, k along x
@@ -208,8 +257,20 @@ class World(program.ProgramTest):
         affine[0, 2] = 1
         program.write_nifti("sheared.nii", values, affine)
         self.brick("sheared.nii", "a.trip", "--range=100:255")
-        picture = self.picture("a.trip", "--size", "120x120", "--ortho", "60", "--eye", "30,-100,20",
-                               "--look", "30,0,20", "--up", "0,0,1", "--no-shading")
+        picture = self.picture(
+            "a.trip",
+            "--size",
+            "120x120",
+            "--ortho",
+            "60",
+            "--eye",
+            "30,-100,20",
+            "--look",
+            "30,0,20",
+            "--up",
+            "0,0,1",
+            "--no-shading",
+        )
         alpha = picture[..., 3]
         rows, columns = numpy.indices(alpha.shape)
         solid = alpha > 0.2

@@ -57,8 +57,11 @@ def opacity_positive(points, values):
     above = numpy.searchsorted(at, values, side="right")
     low, high = numpy.clip(above - 1, 0, len(at) - 1), numpy.clip(above, 0, len(at) - 1)
     exactly = at[low] == values
-    return numpy.where(exactly | (above == 0) | (above == len(at)), opacity[low] > 0,
-                       (opacity[low] > 0) | (opacity[high] > 0))
+    return numpy.where(
+        exactly | (above == 0) | (above == len(at)),
+        opacity[low] > 0,
+        (opacity[low] > 0) | (opacity[high] > 0),
+    )
 
 
 def parse_points(text):
@@ -79,7 +82,11 @@ class Counts(program.ProgramTest):
         self.assertEqual(numpy.float32(info["value_min"]), finite.min())
         self.assertEqual(numpy.float32(info["value_max"]), finite.max())
 
-        for ranges in [(high, 1e30)], [(low, middle), (middle, high)], [(middle, middle), (-1e30, low)]:
+        for ranges in (
+            [(high, 1e30)],
+            [(low, middle), (middle, high)],
+            [(middle, middle), (-1e30, low)],
+        ):
             wanted = numpy.zeros(finite.size, bool)
             for a, b in ranges:
                 wanted |= (finite >= a) & (finite <= b)
@@ -87,8 +94,9 @@ class Counts(program.ProgramTest):
             kept = self.brick(source, "a.trip", *texts, *options)["kept"]
             self.assertEqual(kept, wanted.sum(), texts)
 
-        text = TRANSFER_FUNCTION.format(*numpy.quantile(finite.astype(float),
-                                                        [0.2, 0.35, 0.5, 0.75, 0.95]))
+        text = TRANSFER_FUNCTION.format(
+            *numpy.quantile(finite.astype(float), [0.2, 0.35, 0.5, 0.75, 0.95])
+        )
         with open("a.tf", "w") as f:
             f.write(text)
         wanted = opacity_positive(parse_points(text), finite)
@@ -137,8 +145,13 @@ class Counts(program.ProgramTest):
     def test_tiles_memory_and_threads_do_not_change_the_count(self):
         source = os.path.join(program.DATASETS, "tooth.nhdr")
         wanted = self.brick(source, "a.trip")["kept"]
-        for options in ("--tile=16", "--slab-sheets=1"), ("--tile=128", "--slab-sheets=64"), \
-                ("--threads=1",), ("--memory=64M", "--threads=2"), ("--no-normals",):
+        for options in (
+            ("--tile=16", "--slab-sheets=1"),
+            ("--tile=128", "--slab-sheets=64"),
+            ("--threads=1",),
+            ("--memory=64M", "--threads=2"),
+            ("--no-normals",),
+        ):
             self.assertEqual(self.brick(source, "a.trip", *options)["kept"], wanted, options)
             self.works("info", "--verify", "a.trip")
 

@@ -14,27 +14,65 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 
 # Option: wrong values; None where it takes none.
 BRICK = {
-    "--endian": NAMES, "--level-set": NAMES, "--offset": ["", "-1", "x", "1.5", "9" * 30],
+    "--endian": NAMES,
+    "--level-set": NAMES,
+    "--offset": ["", "-1", "x", "1.5", "9" * 30],
     "--size": ["", "1", "1,2", "0,1,1", "-1,1,1", "a,b,c", "1,2,3,4", "nan,1,1"],
-    "--spacing": POINTS + ["0,1,1", "-1,1,1"], "--type": ["", "nonsense", "uint7", "block"],
+    "--spacing": POINTS + ["0,1,1", "-1,1,1"],
+    "--type": ["", "nonsense", "uint7", "block"],
     "--range": ["", "1", "2:1", "a:b", "nan:1", "1:2:3", ":x"],
-    "--tf": ["preset:nonsense", "preset:"], "--memory": SIZES, "--threads": COUNTS + ["100000"],
-    "--tile": COUNTS + ["17", "8", "256"], "--slab-sheets": COUNTS + ["65"],
-    "--keep-all": None, "--force": None, "--json": None, "--no-normals": None, "--quiet": None,
-    "--resume": None, "--dry-run": None, "--grid": [], "--output": [],
+    "--tf": ["preset:nonsense", "preset:"],
+    "--memory": SIZES,
+    "--threads": COUNTS + ["100000"],
+    "--tile": COUNTS + ["17", "8", "256"],
+    "--slab-sheets": COUNTS + ["65"],
+    "--keep-all": None,
+    "--force": None,
+    "--json": None,
+    "--no-normals": None,
+    "--quiet": None,
+    "--resume": None,
+    "--dry-run": None,
+    "--grid": [],
+    "--output": [],
 }
 RENDER = {
-    "--size": ["", "10", "10x", "x10", "0x10", "10x0", "-1x10", "10x10x10", "99999999999x1", "1.5x2",
-               "10 x 10"],
-    "--eye": POINTS, "--look": POINTS, "--up": POINTS + ["0,0,0"], "--fov": NUMBERS + ["0", "-5", "180"],
-    "--ortho": NUMBERS + ["0", "-5"], "--orbit": COUNTS + ["1000000"],
+    "--size": [
+        "",
+        "10",
+        "10x",
+        "x10",
+        "0x10",
+        "10x0",
+        "-1x10",
+        "10x10x10",
+        "99999999999x1",
+        "1.5x2",
+        "10 x 10",
+    ],
+    "--eye": POINTS,
+    "--look": POINTS,
+    "--up": POINTS + ["0,0,0"],
+    "--fov": NUMBERS + ["0", "-5", "180"],
+    "--ortho": NUMBERS + ["0", "-5"],
+    "--orbit": COUNTS + ["1000000"],
     "--background": POINTS[:2] + ["1,2", "white", "2,0,0", "-1,0,0", "0,0,0,2", "nan,0,0"],
-    "--tf": ["preset:nonsense", "preset:"], "--light": POINTS + ["0,0,0", "heads"],
-    "--h": NUMBERS + ["1", "-0.1", "1.5"], "--kernel-radius": NUMBERS + ["0", "-1", "1e9"],
-    "--target": NAMES, "--renderer": NAMES, "--method": NAMES,
+    "--tf": ["preset:nonsense", "preset:"],
+    "--light": POINTS + ["0,0,0", "heads"],
+    "--h": NUMBERS + ["1", "-0.1", "1.5"],
+    "--kernel-radius": NUMBERS + ["0", "-1", "1e9"],
+    "--target": NAMES,
+    "--renderer": NAMES,
+    "--method": NAMES,
     "--submit": NAMES + ["sprites,", ",", "sprites,triangles", "sprites,sprites"],
-    "--traversal": NAMES, "--hidden": NAMES, "--memory": SIZES, "--engine": NAMES,
-    "--threads": COUNTS + ["100000"], "--no-shading": None, "--explain": None, "--output": [],
+    "--traversal": NAMES,
+    "--hidden": NAMES,
+    "--memory": SIZES,
+    "--engine": NAMES,
+    "--threads": COUNTS + ["100000"],
+    "--no-shading": None,
+    "--explain": None,
+    "--output": [],
     "--stats": [],
 }
 INFO = {"--verify": None, "--json": None}
@@ -57,8 +95,11 @@ class Options(program.ProgramTest):
         before = set(os.listdir("."))
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
             runs = list(pool.map(lambda a: program.call(*a), arguments))
-        faults = [f"{r.args}: {r.returncode}: {r.stderr!r}" for r in runs
-                  if r.returncode != 2 or not program.LINE.fullmatch(r.stderr) or r.stdout]
+        faults = [
+            f"{r.args}: {r.returncode}: {r.stderr!r}"
+            for r in runs
+            if r.returncode != 2 or not program.LINE.fullmatch(r.stderr) or r.stdout
+        ]
         self.assertEqual(faults, [], "\n".join(faults))
         self.assertEqual(set(os.listdir(".")), before)
 
@@ -69,16 +110,24 @@ class Options(program.ProgramTest):
     def test_wrong_values(self):
         wrong = []
         for command, table in ("brick", BRICK), ("render", RENDER), ("info", INFO):
-            start = {"brick": ["brick", self.source, "-o", "b.trip"], "info": ["info", "a.trip"],
-                     "render": ["render", "a.trip", "-o", "a.png", "--size", "16x16"]}[command]
+            start = {
+                "brick": ["brick", self.source, "-o", "b.trip"],
+                "info": ["info", "a.trip"],
+                "render": ["render", "a.trip", "-o", "a.png", "--size", "16x16"],
+            }[command]
             for option in sorted(options_of(command)):
                 if table[option] is None:
                     wrong.append(start + [f"{option}=yes"])
                     continue
                 wrong += [start + [f"{option}={value}"] for value in table[option]]
                 wrong.append(start + [option])
-            wrong += [start + ["--nonsense"], start + ["-z"], start + ["--=3"],
-                      start + ["second", "third"], [command]]
+            wrong += [
+                start + ["--nonsense"],
+                start + ["-z"],
+                start + ["--=3"],
+                start + ["second", "third"],
+                [command],
+            ]
         self.all_fail(wrong)
 
     def test_commands(self):
@@ -90,35 +139,69 @@ class Options(program.ProgramTest):
 
     def test_wrong_combinations(self):
         brick, render = ["brick", self.source, "-o", "b.trip"], ["render", "a.trip", "-o", "a.png"]
-        self.all_fail([brick + ["--keep-all", "--range=1:2"], brick + ["--quiet", "--json"],
-                       render + ["--ortho=5", "--fov=30"], render + ["--h=0.5", "--method=clip"],
-                       render + ["--target=rgba8", "--renderer=cpu"],
-                       render + ["--submit=indexed", "--renderer=reference"],
-                       render + ["--hidden=skip", "--renderer=gl"],
-                       render + ["--eye=1,2,3", "--look=1,2,3"],
-                       render + ["--eye=0,0,0", "--look=0,0,9", "--up=0,0,1"],
-                       ["render", "a.trip", "-o", "a"], ["render", "a.trip", "-o", "a.gif"],
-                       ["render", "a.trip", "-o", ".png"],
-                       ["render", "a.trip", "-o", "folder/"]])
+        self.all_fail(
+            [
+                brick + ["--keep-all", "--range=1:2"],
+                brick + ["--quiet", "--json"],
+                render + ["--ortho=5", "--fov=30"],
+                render + ["--h=0.5", "--method=clip"],
+                render + ["--target=rgba8", "--renderer=cpu"],
+                render + ["--submit=indexed", "--renderer=reference"],
+                render + ["--hidden=skip", "--renderer=gl"],
+                render + ["--eye=1,2,3", "--look=1,2,3"],
+                render + ["--eye=0,0,0", "--look=0,0,9", "--up=0,0,1"],
+                ["render", "a.trip", "-o", "a"],
+                ["render", "a.trip", "-o", "a.gif"],
+                ["render", "a.trip", "-o", ".png"],
+                ["render", "a.trip", "-o", "folder/"],
+            ]
+        )
 
     def test_every_value_works(self):
         render = ["--size=24x20"]
-        values = {"--method": ["merge", "clip", "axis"], "--traversal": ["outward", "ascending"],
-                  "--renderer": ["cpu", "reference", "auto"], "--h": ["0", "0.5", "0.9999"],
-                  "--kernel-radius": ["0.5", "3"], "--light": ["head", "1,2,3", "-1e9,0,0"],
-                  "--background": ["none", "1,0,0", "0,0.5,1,0.25"], "--hidden": ["skip", "draw"],
-                  "--engine": ["auto", "io_uring", "pread"], "--threads": ["1", "3"],
-                  "--memory": ["64M", "1G"], "--fov": ["0.5", "90", "179"], "--ortho": ["1e-3", "20"],
-                  "--size": ["1x1", "1x50", "50x1", "333x7"], "--orbit": ["1", "2"],
-                  "--tf": ["preset:" + name for name in ("grey", "bone", "hot-metal", "viridis", "fog",
-                                                         "vessels", "xray")]}
+        values = {
+            "--method": ["merge", "clip", "axis"],
+            "--traversal": ["outward", "ascending"],
+            "--renderer": ["cpu", "reference", "auto"],
+            "--h": ["0", "0.5", "0.9999"],
+            "--kernel-radius": ["0.5", "3"],
+            "--light": ["head", "1,2,3", "-1e9,0,0"],
+            "--background": ["none", "1,0,0", "0,0.5,1,0.25"],
+            "--hidden": ["skip", "draw"],
+            "--engine": ["auto", "io_uring", "pread"],
+            "--threads": ["1", "3"],
+            "--memory": ["64M", "1G"],
+            "--fov": ["0.5", "90", "179"],
+            "--ortho": ["1e-3", "20"],
+            "--size": ["1x1", "1x50", "50x1", "333x7"],
+            "--orbit": ["1", "2"],
+            "--tf": [
+                "preset:" + name
+                for name in ("grey", "bone", "hot-metal", "viridis", "fog", "vessels", "xray")
+            ],
+        }
         runs = [[f"{option}={value}"] for option, all_of in values.items() for value in all_of]
-        runs += [["--no-shading"], ["--explain"], ["--stats=-"], ["--stats=s.json"], ["--stats", "./s.json"]]
+        runs += [
+            ["--no-shading"],
+            ["--explain"],
+            ["--stats=-"],
+            ["--stats=s.json"],
+            ["--stats", "./s.json"],
+        ]
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            done = list(pool.map(lambda n: program.call("render", "a.trip", "-o", f"v{n}.png", *render,
-                                                        *runs[n]), range(len(runs))))
-        faults = [f"{r.args}: {r.returncode}: {r.stderr!r}" for r in done
-                  if r.returncode or any("warning" not in l for l in r.stderr.splitlines())]
+            done = list(
+                pool.map(
+                    lambda n: program.call(
+                        "render", "a.trip", "-o", f"v{n}.png", *render, *runs[n]
+                    ),
+                    range(len(runs)),
+                )
+            )
+        faults = [
+            f"{r.args}: {r.returncode}: {r.stderr!r}"
+            for r in done
+            if r.returncode or any("warning" not in l for l in r.stderr.splitlines())
+        ]
         self.assertEqual(faults, [], "\n".join(faults))
         for extension in "png", "PNG", "jpg", "jpeg", "tif", "tiff", "exr":
             self.works("render", "a.trip", "-o", f"e.{extension}", *render)

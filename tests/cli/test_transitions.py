@@ -35,9 +35,21 @@ class Transitions(program.ProgramTest):
         that."""
         axes = dominant_axes()
         self.assertEqual(len(numpy.unique(axes)), 3)
-        picture = self.picture("a.trip", "--size", f"{SIZE}x{SIZE}", "--fov", FOV, "--no-shading",
-                               "--eye", ",".join(map(str, EYE)), "--look", ",".join(map(str, LOOK)),
-                               "--up", "0,0,1", *method)
+        picture = self.picture(
+            "a.trip",
+            "--size",
+            f"{SIZE}x{SIZE}",
+            "--fov",
+            FOV,
+            "--no-shading",
+            "--eye",
+            ",".join(map(str, EYE)),
+            "--look",
+            ",".join(map(str, LOOK)),
+            "--up",
+            "0,0,1",
+            *method,
+        )
         bends = abs(numpy.diff(picture[..., :3].astype(float), 2, axis=1)).sum(axis=2)
         change = axes[:, 1:] != axes[:, :-1]
         border = change[:, 1:] | change[:, :-1]
@@ -55,8 +67,20 @@ class Transitions(program.ProgramTest):
         for degrees in 44.85, 44.95, 45.05:
             a = math.radians(degrees)
             eye = 7 + 50 * math.cos(a), 7 + 50 * math.sin(a), 20
-            pictures.append(self.picture("a.trip", "--size", "100x100", "--ortho", 25, "--eye",
-                                         ",".join(map(repr, eye)), "--look", "7,7,7", *method))
+            pictures.append(
+                self.picture(
+                    "a.trip",
+                    "--size",
+                    "100x100",
+                    "--ortho",
+                    25,
+                    "--eye",
+                    ",".join(map(repr, eye)),
+                    "--look",
+                    "7,7,7",
+                    *method,
+                )
+            )
         before, past = (abs(pictures[i + 1] - pictures[i]).mean() for i in (0, 1))
         return past / before
 

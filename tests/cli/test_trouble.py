@@ -69,15 +69,29 @@ class Trouble(program.ProgramTest):
         self.assertEqual(os.listdir("locked"), [])
 
     def test_outputs_that_cannot_be(self):
-        for output in "missing/out.trip", "small.nrrd/out.trip", "/proc/out.trip", "n" * 300 + ".trip", "/":
+        for output in (
+            "missing/out.trip",
+            "small.nrrd/out.trip",
+            "/proc/out.trip",
+            "n" * 300 + ".trip",
+            "/",
+        ):
             self.fails(1, "brick", "small.nrrd", "-o", output, "-q")
         os.makedirs("folder.png", exist_ok=True)
-        for output in "missing/out.png", "small.nrrd/out.png", "/proc/out.png", "n" * 300 + ".png", \
-                "folder.png", "small.trip/x/out.png":
+        for output in (
+            "missing/out.png",
+            "small.nrrd/out.png",
+            "/proc/out.png",
+            "n" * 300 + ".png",
+            "folder.png",
+            "small.trip/x/out.png",
+        ):
             self.fails(1, "render", "small.trip", "-o", output, "--size", "20x20")
         os.symlink("/dev/full", "a-link")
         for stats in "missing/out.json", "a-link", "folder.png", "small.nrrd/s":
-            self.fails(1, "render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", stats)
+            self.fails(
+                1, "render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", stats
+            )
         self.assertTrue(os.path.islink("a-link"))
 
     # Disk
@@ -86,8 +100,11 @@ class Trouble(program.ProgramTest):
         if not ROOT:
             self.skipTest("only root can mount a small file system")
         os.makedirs("disk", exist_ok=True)
-        mount = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", "disk"],
-                               capture_output=True, check=False)
+        mount = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", "disk"],
+            capture_output=True,
+            check=False,
+        )
         if mount.returncode:
             self.skipTest("this machine lets nobody mount a file system")
         try:
@@ -96,25 +113,42 @@ class Trouble(program.ProgramTest):
             with open("disk/filler", "wb") as f:
                 f.write(bytes((2 << 20) - 40000))
             for extension in "png", "tif", "exr", "jpg":
-                self.fails(1, "render", "small.trip", "-o", f"disk/out.{extension}", "--size",
-                           "900x900", "--background", "0.3,0.5,0.7")
+                self.fails(
+                    1,
+                    "render",
+                    "small.trip",
+                    "-o",
+                    f"disk/out.{extension}",
+                    "--size",
+                    "900x900",
+                    "--background",
+                    "0.3,0.5,0.7",
+                )
             self.assertEqual(os.listdir("disk"), ["filler"])
         finally:
             subprocess.run(["umount", "disk"], check=True)
 
     def test_standard_output_full_or_closed(self):
-        for arguments in ("info", "small.trip"), ("info", "--json", "small.trip"), ("--help",), \
-                ("render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", "-"), \
-                ("brick", "small.nrrd", "-o", "small2.trip", "--force"):
+        for arguments in (
+            ("info", "small.trip"),
+            ("info", "--json", "small.trip"),
+            ("--help",),
+            ("render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", "-"),
+            ("brick", "small.nrrd", "-o", "small2.trip", "--force"),
+        ):
             with open("/dev/full", "w") as full:
                 self.fails(1, *arguments, stdout=full, says="standard output")
-            self.fails(1, *arguments, stdout=None, preexec_fn=lambda: os.close(1),
-                       says="standard output")
+            self.fails(
+                1, *arguments, stdout=None, preexec_fn=lambda: os.close(1), says="standard output"
+            )
         self.works("info", "--verify", "small2.trip")
 
     def test_closed_standard_error_does_not_end_in_the_data(self):
-        run = subprocess.run([program.PROGRAM, "brick", "small.nrrd", "-o", "quiet.trip"], check=False,
-                             preexec_fn=lambda: [os.close(fd) for fd in range(3)])
+        run = subprocess.run(
+            [program.PROGRAM, "brick", "small.nrrd", "-o", "quiet.trip"],
+            check=False,
+            preexec_fn=lambda: [os.close(fd) for fd in range(3)],
+        )
         self.assertEqual(run.returncode, 1)
         self.works("info", "--verify", "quiet.trip")
 
@@ -124,19 +158,32 @@ class Trouble(program.ProgramTest):
         for size in "1", "1K", "1M", "4M":
             self.fails(1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", size)
         for renderer in "cpu", "reference":
-            self.fails(1, "render", "cloud.trip", "-o", "out.png", "--memory", "1M", "--renderer",
-                       renderer)
-        self.fails(1, "render", "cloud.trip", "-o", "out.png", "--memory", "64M", "--size",
-                   "60000x60000")
+            self.fails(
+                1, "render", "cloud.trip", "-o", "out.png", "--memory", "1M", "--renderer", renderer
+            )
+        self.fails(
+            1, "render", "cloud.trip", "-o", "out.png", "--memory", "64M", "--size", "60000x60000"
+        )
         self.assertEqual(leftovers(), [])
 
     def test_the_memory_that_is_asked_for_is_enough(self):
         """The message says how much; with that it goes."""
-        run = self.fails(1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", "5M",
-                         "--threads", "2")
+        run = self.fails(
+            1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", "5M", "--threads", "2"
+        )
         needed = run.stderr.split("--memory ")[1].split()[0]
-        self.works("brick", "cloud.nrrd", "-o", "enough.trip", "-q", "--memory", needed, "--threads",
-                   "2", "--keep-all")
+        self.works(
+            "brick",
+            "cloud.nrrd",
+            "-o",
+            "enough.trip",
+            "-q",
+            "--memory",
+            needed,
+            "--threads",
+            "2",
+            "--keep-all",
+        )
         self.works("info", "--verify", "enough.trip")
         shutil.rmtree("enough.trip")
 
@@ -173,8 +220,9 @@ class Trouble(program.ProgramTest):
 
     def test_interrupted_bricking(self):
         for number in signal.SIGINT, signal.SIGTERM:
-            self.check_interrupted([number], "brick", "cloud.nrrd", "-o", "out.trip", "--keep-all",
-                                   "--threads", "1")
+            self.check_interrupted(
+                [number], "brick", "cloud.nrrd", "-o", "out.trip", "--keep-all", "--threads", "1"
+            )
             shutil.rmtree("out.trip", ignore_errors=True)
         self.works("brick", "cloud.nrrd", "-o", "out.trip", "-q")
         self.works("info", "--verify", "out.trip")
@@ -182,13 +230,31 @@ class Trouble(program.ProgramTest):
         shutil.rmtree("out.trip")
 
     def test_interrupted_drawing(self):
-        self.check_interrupted([signal.SIGINT], "render", "cloud.trip", "-o", "out.png", "--renderer",
-                               "reference", "--size", "600x600")
+        self.check_interrupted(
+            [signal.SIGINT],
+            "render",
+            "cloud.trip",
+            "-o",
+            "out.png",
+            "--renderer",
+            "reference",
+            "--size",
+            "600x600",
+        )
         if os.path.exists("out.png"):
             os.remove("out.png")
         self.assertEqual(leftovers(), [])
-        self.check_interrupted([signal.SIGINT], "render", "cloud.trip", "-o", "turn.png", "--orbit",
-                               "400", "--size", "200x200")
+        self.check_interrupted(
+            [signal.SIGINT],
+            "render",
+            "cloud.trip",
+            "-o",
+            "turn.png",
+            "--orbit",
+            "400",
+            "--size",
+            "200x200",
+        )
         for name in os.listdir("."):
             self.assertNotRegex(name, r"\.tmp$|partial")
 
