@@ -70,26 +70,39 @@ int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
 
 void trip_cpu_flush_empty(trip_cpu_flush *f)
 {
-    f->used = f->chunk_count = f->spread_count = 0;
+    f->chunk_count = f->spread_count = 0;
+    atomic_store_explicit(&f->splats_used, 0, memory_order_relaxed);
     atomic_store_explicit(&f->orders_used, 0, memory_order_relaxed);
     atomic_store_explicit(&f->segments_used, 0, memory_order_relaxed);
 }
 
-uint32_t trip_cpu_flush_room(const trip_cpu_flush *f)
+trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f)
 {
-    if (f->chunk_count == f->chunk_capacity || f->capacity - f->used < 2)
-        return 0;
-    return f->capacity - f->used - 1;
-}
-
-trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f, uint32_t voxels)
-{
-    if (voxels > trip_cpu_flush_room(f))
+    if (f->chunk_count == f->chunk_capacity || (f->one_by_one && f->chunk_count == 1))
         return NULL;
     trip_cpu_chunk *chunk = &f->chunks[f->chunk_count++];
-    *chunk = (trip_cpu_chunk){ .voxels = voxels, .splat = f->used };
-    f->used += voxels + 1;
+    *chunk = (trip_cpu_chunk){ 0 };
     return chunk;
+}
+
+bool trip_cpu_flush_claim(trip_cpu_flush *f, trip_cpu_chunk *chunk, uint32_t splats)
+{
+    uint64_t first = atomic_fetch_add_explicit(&f->splats_used, splats + 1, memory_order_relaxed);
+    chunk->splat = (uint32_t)first;
+    chunk->full = first + splats + 1 > f->capacity;
+    return !chunk->full;
+}
+
+uint32_t trip_cpu_flush_cut(trip_cpu_flush *f)
+{
+    uint32_t first = 0;
+    while (first < f->chunk_count && !f->chunks[first].full)
+        first++;
+    f->one_by_one = first == 0 && f->chunk_count > 0;
+    f->chunk_count = first;
+    if (first == 0)
+        trip_cpu_flush_empty(f);
+    return first;
 }
 
 typedef struct span {
@@ -247,9 +260,9 @@ static void append(trip_cpu_flush *f, uint32_t segment)
     share->splats += f->segments[segment].count;
 }
 
-void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid, const _Atomic uint8_t *closed)
+void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask)
 {
-    uint32_t tiles = grid.across * grid.down;
+    uint32_t tiles = mask->grid.across * mask->grid.down;
     for (uint32_t t = 0; t < tiles; t++)
         f->shares[t] = (trip_cpu_share){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
     for (uint32_t c = 0; c < f->chunk_count; c++) {
@@ -258,7 +271,7 @@ void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid, const _Atomic uint8_t 
             f->spread[f->spread_count++] = c;
         for (uint32_t i = 0; i < chunk->segments; i++) {
             uint32_t segment = chunk->first_segment + i;
-            if (!atomic_load_explicit(&closed[f->segments[segment].tile], memory_order_relaxed))
+            if (!trip_cpu_tile_is_closed(mask, f->segments[segment].tile))
                 append(f, segment);
         }
     }

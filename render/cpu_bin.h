@@ -2,14 +2,16 @@
  * the projecting threads, sorts each chunk's by tile without disturbing their order, and then links
  * every tile's share of the chunks, in order, for the blending threads.
  *
- * Chunks are reserved and linked by the renderer's thread; each is filled by one projecting thread;
- * a linked buffer is read-only. */
+ * Chunks are reserved, cut and linked by the renderer's thread. Each is filled by one projecting
+ * thread, which claims room for what it finds visible; where there is none, the chunk and those
+ * after it are done again in the next flush. A linked buffer is read-only. */
 #ifndef TRIP_CPU_BIN_H
 #define TRIP_CPU_BIN_H
 
 #include <stdatomic.h>
 
 #include "budget.h"
+#include "cpu_cover.h"
 #include "cpu_kernels.h"
 
 /* Splats of one chunk in one tile: order[first ...] of them, counted from the chunk's first. */
@@ -26,10 +28,12 @@ typedef struct trip_cpu_chunk {
     size_t run;      /* the first, in the batch */
     uint32_t skip;   /* of its voxels, in draw order */
     uint32_t voxels; /* in all */
-    uint32_t splat;  /* first one in the buffer; room for `voxels` and one more */
+    uint32_t splat;  /* first one in the buffer */
     uint32_t splats;
     uint32_t first_segment, segments;
-    bool spread; /* not sorted: every tile looks through all its splats */
+    bool spread;            /* not sorted: every tile looks through all its splats */
+    bool full;              /* the buffer had no room for it */
+    trip_list_stats counts; /* where the frame counts */
 } trip_cpu_chunk;
 
 /* A tile's share of a flush. */
@@ -47,15 +51,11 @@ typedef struct trip_cpu_flush {
     trip_cpu_chunk *chunks;
     trip_cpu_share *shares; /* by tile */
     uint32_t *spread;       /* chunks that are spread */
-    uint32_t used, chunk_count, spread_count;
-    _Atomic uint64_t orders_used, segments_used;
+    uint32_t chunk_count, spread_count;
+    bool one_by_one; /* of late not even the first chunk found room beside others */
+    _Atomic uint64_t splats_used, orders_used, segments_used;
     size_t bytes, share_bytes;
 } trip_cpu_flush;
-
-/* Tiles across the image and down. */
-typedef struct trip_cpu_grid {
-    uint32_t across, down;
-} trip_cpu_grid;
 
 /* Most voxels of a chunk. */
 #define TRIP_CPU_CHUNK 4096
@@ -66,18 +66,24 @@ void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget);
 int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget);
 void trip_cpu_flush_empty(trip_cpu_flush *f);
 
-/* The next chunk, or NULL when there is no room for so many voxels. */
-trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f, uint32_t voxels);
+/* The next chunk, or NULL when there can be no more for now. */
+trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f);
 
-/* Voxels that another chunk may still have. */
-uint32_t trip_cpu_flush_room(const trip_cpu_flush *f);
+/* Room for so many splats of a chunk and one more; false when it is full. At most TRIP_CPU_CHUNK
+ * always fit an empty buffer. */
+bool trip_cpu_flush_claim(trip_cpu_flush *f, trip_cpu_chunk *chunk, uint32_t splats);
+
+/* The first chunk that found the buffer full, or chunk_count. It and those after it are forgotten:
+ * whoever claimed first has the room. Where that leaves none, the buffer is empty again and its
+ * next chunk is reserved alone, so that it fits. */
+uint32_t trip_cpu_flush_cut(trip_cpu_flush *f);
 
 /* Sorts a filled chunk by tile. `counts` has an entry for each tile and across + 2 more, zero, and
  * is left so. */
 void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid, uint32_t *counts);
 
 /* Links the chunks' segments by tile, leaving out closed tiles. */
-void trip_cpu_link(trip_cpu_flush *f, trip_cpu_grid grid, const _Atomic uint8_t *closed);
+void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask);
 
 /* Calls `take` with a tile's splats, piece by piece in their order; order NULL: all of them are to
  * be looked through. */

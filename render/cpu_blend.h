@@ -282,10 +282,13 @@ static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const 
     s->pair_count = p.pairs;
 }
 
-static bool tile_end(trip_cpu_scratch *s)
+static uint64_t tile_end(trip_cpu_scratch *s)
 {
+    uint64_t open = 0;
     empty_pairs(s);
-    return s->any_open;
+    for (unsigned row = 0; row < BLOCKS_DOWN; row++)
+        open |= (uint64_t)s->open[row] << 8 * (row * BLOCK_ROWS / 4);
+    return open;
 }
 
 /* ---- taking up a tile ---- */

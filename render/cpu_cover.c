@@ -3,95 +3,100 @@
 /* The support of a splat whose kernel lies in a box lies in the box's projection, widened by the
  * low-pass: k TRIP_LOW_PASS_PX = 1.33 px in parallel views. In perspective that much is divided by
  * sqrt(G(p) |r_c|^2) >= 1 / 1.29 where the kernel is at least eight radii of depth away (a pixel of
- * the support is at most 9/8 as far as the centre, and at least 7/8 as deep). */
-#define MARGIN_PX 2.5
+ * the support is at most 9/8 as far as the centre, and at least 7/8 as deep). A little more, since
+ * the splats are computed in floats. */
+#define MARGIN_PX 1.8
 #define NEAREST_RADII 8.0
 
-/* Half extents and centre of a box along one of the projections. */
-typedef struct slope {
-    double middle, half[3];
-} slope;
+enum { BLOCK = 4, BLOCKS = TRIP_CPU_TILE / BLOCK };
 
-static slope slope_of(const double along[4], const double middle[3], const double half[3])
+static double dot(const double along[3], const double at[3])
 {
-    slope s = { .middle = along[3] };
-    for (int i = 0; i < 3; i++) {
-        s.middle += along[i] * middle[i];
-        s.half[i] = along[i] * half[i];
-    }
-    return s;
+    return along[0] * at[0] + along[1] * at[1] + along[2] * at[2];
 }
 
-static double reach(const slope *s)
+static double reach(const double along[3], const double half[3])
 {
-    return fabs(s->half[0]) + fabs(s->half[1]) + fabs(s->half[2]);
+    return fabs(along[0]) * half[0] + fabs(along[1]) * half[1] + fabs(along[2]) * half[2];
 }
 
-static double at_corner(const slope *s, int corner)
-{
-    double sum = s->middle;
-    for (int i = 0; i < 3; i++)
-        sum += corner >> i & 1 ? s->half[i] : -s->half[i];
-    return sum;
-}
-
+/* Pixels, inclusive; none when first > last. */
 typedef struct range {
-    double lo, hi;
+    int first, last;
 } range;
 
-/* Of x over the box; perspective views divide by z > 0. */
-static range range_of(const slope *x, const slope *z, bool ortho)
+static range pixels(double middle, double reach, int size)
 {
-    range r = { INFINITY, -INFINITY };
-    for (int corner = 0; corner < 8; corner++) {
-        double p = at_corner(x, corner);
-        if (!ortho)
-            p /= at_corner(z, corner);
-        r.lo = fmin(r.lo, p);
-        r.hi = fmax(r.hi, p);
-    }
-    return (range){ r.lo - MARGIN_PX, r.hi + MARGIN_PX };
+    double lo = middle - reach - MARGIN_PX - 0.5, hi = middle + reach + MARGIN_PX - 0.5;
+    if (hi < 0 || lo > size - 1)
+        return (range){ 0, -1 };
+    return (range){ lo > 0 ? (int)lo : 0, hi < size - 1 ? (int)hi : size - 1 };
 }
 
-/* Tiles that hold the pixels of a range; none when first > last. */
-static void tiles_of(range r, int size, int *first, int *last)
+/* Of x = X / z over a box whose middle has depth z and whose nearest point `nearest`: with x0 that
+ * of the middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. */
+static range range_of(const double along_x[4], const double along_z[4], const trip_cpu_box *box,
+                      const double half[3], double z, double nearest, int size)
 {
-    *first = (int)(fmax(0, fmin(size, r.lo))) / TRIP_CPU_TILE;
-    *last = r.hi < 0 || r.lo >= size ? -1 : (int)(fmin(size - 1, r.hi)) / TRIP_CPU_TILE;
+    double x = (dot(along_x, box->middle) + along_x[3]) / z, slope[3];
+    for (int i = 0; i < 3; i++)
+        slope[i] = along_x[i] - x * along_z[i];
+    return pixels(x, reach(slope, half) / nearest, size);
 }
 
-static bool all_closed(const trip_cpu_view *view, trip_cpu_grid grid, const _Atomic uint8_t *closed,
-                       range x, range y)
+static uint64_t bits_of(int left, int right, int top, int bottom)
 {
-    const trip_camera *camera = &view->splat.camera;
-    int x0, x1, y0, y1;
-    tiles_of(x, camera->width, &x0, &x1);
-    tiles_of(y, camera->height, &y0, &y1);
-    for (int ty = y0; ty <= y1; ty++)
-        for (int tx = x0; tx <= x1; tx++)
-            if (!atomic_load_explicit(&closed[(uint32_t)ty * grid.across + (uint32_t)tx],
-                                      memory_order_relaxed))
-                return false;
-    return true;
+    uint64_t columns = (0xffu << left & 0xffu >> (7 - right)) * UINT64_C(0x0101010101010101);
+    return columns & UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
 }
 
-bool trip_cpu_box_is_hidden(const trip_cpu_view *view, trip_cpu_grid grid,
-                            const _Atomic uint8_t *closed, const trip_cpu_box *box)
+/* What of the blocks [first, last] lies in a tile, counted from its first. */
+static range in_tile(range blocks, int tile)
 {
+    int first = blocks.first - tile * BLOCKS, last = blocks.last - tile * BLOCKS;
+    return (range){ first > 0 ? first : 0, last < BLOCKS - 1 ? last : BLOCKS - 1 };
+}
+
+static trip_cpu_cover cover_of(const trip_cpu_mask *mask, range px, range py)
+{
+    static_assert(BLOCKS == 8, "a byte for a row");
+    range x = { px.first / BLOCK, px.last / BLOCK }, y = { py.first / BLOCK, py.last / BLOCK };
+    bool open = false, closed = false;
+    if (px.first > px.last || py.first > py.last)
+        return TRIP_CPU_HIDDEN;
+    for (int ty = y.first / BLOCKS; ty <= y.last / BLOCKS; ty++)
+        for (int tx = x.first / BLOCKS; tx <= x.last / BLOCKS; tx++) {
+            range h = in_tile(x, tx), v = in_tile(y, ty);
+            uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
+            uint64_t rest =
+                bits &
+                atomic_load_explicit(&mask->tiles[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
+                                     memory_order_relaxed);
+            open |= rest != 0;
+            closed |= rest != bits;
+            if (open && closed)
+                return TRIP_CPU_PARTLY;
+        }
+    return open ? TRIP_CPU_SHOWN : TRIP_CPU_HIDDEN;
+}
+
+trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
+                                  const trip_cpu_box *box)
+{
+    const double none[4] = { 0, 0, 0, 0 };
     const trip_camera *camera = &view->splat.camera;
     double radius = view->of->settings->kernel_radius;
-    double middle[3], half[3];
-    for (int i = 0; i < 3; i++) {
-        middle[i] = 0.5 * (box->lo[i] + box->hi[i]);
-        half[i] = 0.5 * (box->hi[i] - box->lo[i]) + radius;
-    }
-    slope z = slope_of(view->along_z, middle, half);
-    double near = camera->ortho ? 0 : NEAREST_RADII * radius * trip_length(camera->forward);
-    if (z.middle - reach(&z) < near)
-        return z.middle + reach(&z) <= 0;
-    slope x = slope_of(view->along_x, middle, half), y = slope_of(view->along_y, middle, half);
-    return all_closed(view, grid, closed, range_of(&x, &z, camera->ortho),
-                      range_of(&y, &z, camera->ortho));
+    double half[3] = { box->half[0] + radius, box->half[1] + radius, box->half[2] + radius };
+    double z = dot(view->along_z, box->middle) + view->along_z[3];
+    double deep = reach(view->along_z, half), nearest = z - deep;
+    double near = camera->ortho ? 0 : NEAREST_RADII * radius * view->forward_length;
+    if (nearest < near)
+        return z + deep <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
+    if (camera->ortho)
+        z = nearest = 1;
+    const double *along_z = camera->ortho ? none : view->along_z;
+    return cover_of(mask, range_of(view->along_x, along_z, box, half, z, nearest, camera->width),
+                    range_of(view->along_y, along_z, box, half, z, nearest, camera->height));
 }
 
 static const trip_file_slab *slab_of(const trip_list *list, uint64_t brick)
@@ -116,10 +121,42 @@ trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64
     double u = (double)((uint64_t)b->tile_u << header->tile_log2);
     double v = (double)((uint64_t)b->tile_v << header->tile_log2);
     double sheet = (double)((uint64_t)slab_of(list, brick)->slab * header->slab_sheets);
-    return (trip_cpu_box){
-        .lo = { u + b->u_min, v + b->v_min, fmax(sheet + b->sheet_min, (double)first_sheet) },
-        .hi = { u + b->u_max, v + b->v_max, fmin(sheet + b->sheet_max, (double)last_sheet) },
-    };
+    double lo[3] = { u + b->u_min, v + b->v_min, fmax(sheet + b->sheet_min, (double)first_sheet) };
+    double hi[3] = { u + b->u_max, v + b->v_max, fmin(sheet + b->sheet_max, (double)last_sheet) };
+    trip_cpu_box box;
+    for (int i = 0; i < 3; i++) {
+        box.middle[i] = 0.5 * (lo[i] + hi[i]);
+        box.half[i] = 0.5 * (hi[i] - lo[i]);
+    }
+    return box;
+}
+
+trip_cpu_box trip_cpu_square_box(const trip_run *run, uint32_t voxel)
+{
+    const double half = 0.5 * (TRIP_CPU_SQUARE - 1);
+    int u = run->u + (int)(trip_voxel_u(voxel) & ~(TRIP_CPU_SQUARE - 1u));
+    int v = run->v + (int)(trip_voxel_v(voxel) & ~(TRIP_CPU_SQUARE - 1u));
+    return (trip_cpu_box){ { u + half, v + half, run->sheet }, { half, half, 0 } };
+}
+
+static uint32_t square_of(uint32_t voxel)
+{
+    return voxel & (0x0101u * (256 - TRIP_CPU_SQUARE));
+}
+
+/* Full squares are found at the first look, others by halving. */
+uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, bool reversed)
+{
+    const uint32_t *first = reversed ? voxels + count - 1 : voxels;
+    uint32_t square = square_of(*first), most = TRIP_CPU_SQUARE * TRIP_CPU_SQUARE;
+    uint32_t in = 1, beyond = count < most ? count + 1 : most + 1;
+    for (uint32_t look = beyond - 1; look > in; look = (in + beyond) / 2) {
+        if (square_of(reversed ? first[-(int64_t)(look - 1)] : first[look - 1]) == square)
+            in = look;
+        else
+            beyond = look;
+    }
+    return in;
 }
 
 /* Components of r are linear over the tile: their extremes are at its corners. */

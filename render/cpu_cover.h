@@ -1,26 +1,58 @@
 /* Whether anything of a box of voxels can still show: asked before runs are projected and bricks
- * are read. Any thread may ask while others blend; tiles only ever close. */
+ * are read. Any thread may ask while others blend; blocks of pixels only ever close. */
 #ifndef TRIP_CPU_COVER_H
 #define TRIP_CPU_COVER_H
 
 #include <stdatomic.h>
 
-#include "cpu_bin.h"
 #include "cpu_kernels.h"
+
+/* Tiles across the image and down. */
+typedef struct trip_cpu_grid {
+    uint32_t across, down;
+} trip_cpu_grid;
+
+/* Blocks of 4 x 4 pixels that may still take light: of each tile eight rows of eight, a bit each,
+ * the first row lowest. */
+typedef struct trip_cpu_mask {
+    trip_cpu_grid grid;
+    _Atomic uint64_t *tiles;
+} trip_cpu_mask;
+
+static inline bool trip_cpu_tile_is_closed(const trip_cpu_mask *mask, uint32_t tile)
+{
+    return atomic_load_explicit(&mask->tiles[tile], memory_order_relaxed) == 0;
+}
 
 /* A box of index space by the list's own coordinates: [u, v, sheet]. */
 typedef struct trip_cpu_box {
-    double lo[3], hi[3];
+    double middle[3], half[3];
 } trip_cpu_box;
 
-/* True only when no splat of a voxel in the box can change a pixel: every pixel of its support lies
- * in a closed tile or outside the image. */
-bool trip_cpu_box_is_hidden(const trip_cpu_view *view, trip_cpu_grid grid,
-                            const _Atomic uint8_t *closed, const trip_cpu_box *box);
+typedef enum trip_cpu_cover {
+    TRIP_CPU_HIDDEN, /* no splat of a voxel in the box can change a pixel: every pixel of its
+                        support lies in a closed block or outside the image */
+    TRIP_CPU_PARTLY, /* who looks closer may find something hidden */
+    TRIP_CPU_SHOWN,  /* nothing is closed there */
+} trip_cpu_cover;
+
+trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
+                                  const trip_cpu_box *box);
 
 /* The voxels of a brick of the view's list; `sheets` as a range cuts it, inclusive. */
 trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
                                 int64_t last_sheet);
+
+/* Aligned squares of a run's voxels: since voxels lie in Morton order, those of a square follow one
+ * another. */
+#define TRIP_CPU_SQUARE 8
+
+/* The square that a voxel lies in. */
+trip_cpu_box trip_cpu_square_box(const trip_run *run, uint32_t voxel);
+
+/* How many voxels lie in the square of the first: of those in memory order, or of the last when
+ * `reversed`. */
+uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, bool reversed);
 
 /* True only when no pixel of the tile at (x, y) has weight in the view's list. */
 bool trip_cpu_tile_without_weight(const trip_cpu_view *view, int x, int y);

@@ -66,6 +66,7 @@ typedef struct trip_cpu_view {
     float thick_log2; /* log2 of the largest optical depth, stretch aside, of thin splats */
     int tiles_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
+    double forward_length;                     /* most that z changes by over an index length */
     double eye[3];                             /* [u, v, sheet] */
     double world[3][3];                        /* index_to_world's columns for u, v, sheet */
     trip_splat parallel;                       /* the footprint of all, in parallel views */
@@ -136,8 +137,9 @@ typedef struct trip_cpu_kernels {
     /* Blends splats[order[i]] in order, or splats[i] where order is NULL. */
     void (*tile_blend)(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
                        uint32_t count);
-    /* Ends with every splat in the pixels; true when some pixel may still take light. */
-    bool (*tile_end)(trip_cpu_scratch *s);
+    /* Ends with every splat in the pixels. Returns which blocks of 4 x 4 pixels of the quarters
+     * hold a pixel that may still take light: eight rows of eight bits, the first lowest. */
+    uint64_t (*tile_end)(trip_cpu_scratch *s);
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
     void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum);

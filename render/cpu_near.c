@@ -157,6 +157,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
     set_along(view->along_x, view, camera->to_x);
     set_along(view->along_y, view, camera->to_y);
     set_along(view->along_z, view, camera->forward);
+    view->forward_length = trip_length(camera->forward);
     set_rays(view);
     set_limits(view);
     set_parallel(view);

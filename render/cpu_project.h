@@ -310,7 +310,7 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
 /* log2 of a positive number; error below 3e-7. The polynomial is Cephes' logf(). */
 INLINE vf log2_of(vf a)
 {
-    vi t = v_bits(a) - 0x3f3504f3; /* sqrt(1/2) */
+    vi t = (vi)((vu)v_bits(a) - 0x3f3504f3u); /* sqrt(1/2); wraps in lanes without a splat */
     vf e = v_from_int(t >> 23);
     vf f = v_from_bits((t & 0x7fffff) + 0x3f3504f3) - v_set(1);
     vf p = v_set(7.0376836292e-2f);

@@ -23,10 +23,17 @@ enum tile_state {
     TILE_MERGED = 2, /* the sum holds earlier lists */
 };
 
+/* Voxels of a run that may show, one after the other in memory. */
+typedef struct span {
+    const trip_run *run;
+    uint64_t first;
+    uint32_t count;
+} span;
+
 /* One thread's own memory. */
 typedef struct worker {
     trip_cpu_scratch scratch;
-    trip_list_stats counts;
+    span spans[TRIP_CPU_CHUNK];
     uint32_t *tile_counts;
 } worker;
 
@@ -46,14 +53,11 @@ typedef struct cpu {
     worker *workers;
     size_t workers_bytes;
 
-    trip_cpu_grid grid;
-    size_t tiles_bytes; /* of everything below that grows with the image */
+    trip_cpu_mask mask; /* bits are cleared by whoever blends the tile */
+    size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
     float *pixels, *sums;
     uint8_t *states;
-    _Atomic uint8_t *closed; /* no pixel can take more light; set by whoever blends the tile */
-    _Atomic uint8_t *open_quarters;
     portion *portions;
-    uint32_t *tile_counts;
 
     const trip_frame *frame;
     trip_cpu_view view;
@@ -63,7 +67,8 @@ typedef struct cpu {
     trip_cpu_flush flushes[2];
     trip_cpu_flush *filling, *blending;
     const trip_batch *batch;
-    uint32_t first_chunk; /* of the job */
+    uint32_t first_chunk;   /* of the job */
+    double shown_per_voxel; /* of late */
     uint32_t portion_count;
     float *rgba;
     trip_cpu_job project_job, blend_job, tile_job;
@@ -73,17 +78,17 @@ typedef struct cpu {
 
 static uint32_t tile_count(const cpu *r)
 {
-    return r->grid.across * r->grid.down;
+    return r->mask.grid.across * r->mask.grid.down;
 }
 
 static int tile_x(const cpu *r, uint32_t tile)
 {
-    return (int)(tile % r->grid.across) * TRIP_CPU_TILE;
+    return (int)(tile % r->mask.grid.across) * TRIP_CPU_TILE;
 }
 
 static int tile_y(const cpu *r, uint32_t tile)
 {
-    return (int)(tile / r->grid.across) * TRIP_CPU_TILE;
+    return (int)(tile / r->mask.grid.across) * TRIP_CPU_TILE;
 }
 
 static float *tile_pixels(const cpu *r, uint32_t tile)
@@ -91,26 +96,89 @@ static float *tile_pixels(const cpu *r, uint32_t tile)
     return r->pixels + (size_t)tile * FLOATS_PER_TILE;
 }
 
-static void close_tile(cpu *r, uint32_t tile)
-{
-    atomic_store_explicit(&r->closed[tile], 1, memory_order_relaxed);
-}
-
 /* ---- projecting a batch ---- */
 
-static void count_piece(worker *w, const cpu *r, const trip_run *run, const uint32_t *voxels,
-                        uint32_t count)
+/* Voxels in draw order: every voxel of a run from `skip` on. */
+typedef struct piece {
+    const trip_run *run;
+    uint64_t first; /* in memory */
+    uint32_t count;
+} piece;
+
+static piece piece_of(const cpu *r, const trip_run *run, uint32_t skip, uint32_t count)
 {
-    for (uint32_t i = 0; i < count; i++)
-        trip_cpu_count(&r->view, run, voxels[i], &w->counts);
+    bool reversed = r->batch->selection->descending;
+    return (piece){ run, run->first + (reversed ? run->count - skip - count : skip), count };
 }
 
-static bool run_is_hidden(const cpu *r, const trip_run *run)
+/* The part of a piece `done` voxels after its beginning. */
+static span span_of(const cpu *r, const piece *p, uint32_t done, uint32_t count)
+{
+    bool reversed = r->batch->selection->descending;
+    return (span){ p->run, p->first + (reversed ? p->count - done - count : done), count };
+}
+
+static trip_cpu_cover run_cover(const cpu *r, const trip_run *run)
 {
     if (!r->view.front_to_back)
-        return false;
+        return TRIP_CPU_SHOWN;
     trip_cpu_box box = trip_cpu_brick_box(&r->view, run->brick, run->sheet, run->sheet);
-    return trip_cpu_box_is_hidden(&r->view, r->grid, r->closed, &box);
+    return trip_cpu_box_cover(&r->view, &r->mask, &box);
+}
+
+/* Appends the squares of a piece that are not hidden. */
+static uint32_t show_squares(const cpu *r, const piece *p, span *spans)
+{
+    bool reversed = r->batch->selection->descending;
+    uint32_t n = 0, from = 0;
+    for (uint32_t at = 0; at < p->count;) {
+        span rest = span_of(r, p, at, p->count - at);
+        const uint32_t *voxels = r->batch->voxels + rest.first;
+        uint32_t count = trip_cpu_square_count(voxels, rest.count, reversed);
+        trip_cpu_box box = trip_cpu_square_box(p->run, voxels[reversed ? rest.count - 1 : 0]);
+        if (trip_cpu_box_cover(&r->view, &r->mask, &box) == TRIP_CPU_HIDDEN) {
+            if (from < at)
+                spans[n++] = span_of(r, p, from, at - from);
+            from = at + count;
+        }
+        at += count;
+    }
+    if (from < p->count)
+        spans[n++] = span_of(r, p, from, p->count - from);
+    return n;
+}
+
+/* Appends what of a piece may show. */
+static uint32_t show(const cpu *r, const piece *p, span *spans)
+{
+    trip_cpu_cover cover = run_cover(r, p->run);
+    if (cover == TRIP_CPU_PARTLY)
+        return show_squares(r, p, spans);
+    if (cover == TRIP_CPU_SHOWN)
+        *spans = span_of(r, p, 0, p->count);
+    return cover == TRIP_CPU_SHOWN;
+}
+
+static void count_piece(const cpu *r, trip_cpu_chunk *chunk, const piece *p)
+{
+    for (uint32_t i = 0; i < p->count; i++)
+        trip_cpu_count(&r->view, p->run, r->batch->voxels[p->first + i], &chunk->counts);
+}
+
+/* What of a chunk may show: at most a span a voxel. */
+static uint32_t show_chunk(const cpu *r, trip_cpu_chunk *chunk, span *spans)
+{
+    uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
+    for (size_t i = chunk->run; left > 0; i++) {
+        const trip_run *run = &r->batch->runs[i];
+        piece p = piece_of(r, run, skip, run->count - skip < left ? run->count - skip : left);
+        if (r->frame->count)
+            count_piece(r, chunk, &p);
+        n += show(r, &p, spans + n);
+        left -= p.count;
+        skip = 0;
+    }
+    return n;
 }
 
 /* Projects what is staged to the end of the chunk. */
@@ -122,24 +190,18 @@ static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_
     *staged = 0;
 }
 
-/* The voxels of a run from `skip` in draw order. */
-static void project_piece(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_run *run,
-                          uint32_t skip, uint32_t count, uint32_t *staged)
+static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const span *s,
+                         uint32_t *staged)
 {
     const trip_batch *batch = r->batch;
-    bool reversed = batch->selection->descending;
-    uint64_t at = run->first + (reversed ? run->count - skip - count : skip);
-    if (r->frame->count)
-        count_piece(w, r, run, batch->voxels + at, count);
-    if (run_is_hidden(r, run))
-        return;
-    for (uint32_t done = 0; done < count;) {
-        uint32_t n = count - done, room = TRIP_CPU_STAGED - *staged;
+    const piece p = { s->run, s->first, s->count };
+    for (uint32_t done = 0; done < s->count;) {
+        uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
         n = n < room ? n : room;
-        uint64_t from = at + (reversed ? count - done - n : done);
-        *staged = r->kernels->stage(&r->view, run, batch->voxels + from,
-                                    r->view.shading ? batch->normals + from : NULL, n, reversed,
-                                    &w->scratch.staged, *staged);
+        uint64_t from = span_of(r, &p, done, n).first;
+        *staged = r->kernels->stage(&r->view, s->run, batch->voxels + from,
+                                    r->view.shading ? batch->normals + from : NULL, n,
+                                    batch->selection->descending, &w->scratch.staged, *staged);
         if (*staged == TRIP_CPU_STAGED)
             empty_staged(r, w, chunk, staged);
         done += n;
@@ -151,16 +213,15 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
     cpu *r = context;
     worker *w = &r->workers[thread];
     trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
-    uint32_t staged = 0, skip = chunk->skip, left = chunk->voxels;
-    for (size_t i = chunk->run; left > 0; i++) {
-        const trip_run *run = &r->batch->runs[i];
-        uint32_t n = run->count - skip < left ? run->count - skip : left;
-        project_piece(r, w, chunk, run, skip, n, &staged);
-        left -= n;
-        skip = 0;
-    }
+    uint32_t staged = 0, spans = show_chunk(r, chunk, w->spans), voxels = 0;
+    for (uint32_t i = 0; i < spans; i++)
+        voxels += w->spans[i].count;
+    if (voxels == 0 || !trip_cpu_flush_claim(r->filling, chunk, voxels))
+        return;
+    for (uint32_t i = 0; i < spans; i++)
+        project_span(r, w, chunk, &w->spans[i], &staged);
     empty_staged(r, w, chunk, &staged);
-    trip_cpu_bin(r->filling, chunk, r->grid, w->tile_counts);
+    trip_cpu_bin(r->filling, chunk, r->mask.grid, w->tile_counts);
 }
 
 /* ---- blending a flush ---- */
@@ -177,13 +238,12 @@ static void blend_some(void *user, const trip_cpu_splat *splats, const uint16_t 
     c->kernels->tile_blend(c->scratch, splats, order, count);
 }
 
-/* The tile is closed once every quarter is. */
-static void close_quarters(cpu *r, uint32_t tile, unsigned quarters)
+/* The mask's bits of some quarters of a tile. */
+static uint64_t bits_of_quarters(unsigned quarters)
 {
-    unsigned before = atomic_fetch_and_explicit(&r->open_quarters[tile], (uint8_t)~quarters,
-                                                memory_order_relaxed);
-    if ((before & ~quarters) == 0)
-        close_tile(r, tile);
+    static const uint64_t quarter = 0x0f0f0f0f;
+    return (quarters & 1 ? quarter : 0) | (quarters & 2 ? quarter << 4 : 0) |
+           (quarters & 4 ? quarter << 32 : 0) | (quarters & 8 ? quarter << 36 : 0);
 }
 
 static void blend_portion(void *context, unsigned task, unsigned thread)
@@ -198,8 +258,8 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
     }
     r->kernels->tile_begin(&r->view, s, x, y, p->quarters, tile_pixels(r, p->tile));
     trip_cpu_share_each(r->blending, p->tile, blend_some, &(blend_context){ r->kernels, s });
-    if (!r->kernels->tile_end(s))
-        close_quarters(r, p->tile, p->quarters);
+    uint64_t open = r->kernels->tile_end(s) | ~bits_of_quarters(p->quarters);
+    atomic_fetch_and_explicit(&r->mask.tiles[p->tile], open, memory_order_relaxed);
 }
 
 static int most_first(const void *a, const void *b)
@@ -220,7 +280,7 @@ static void make_portions(cpu *r, const trip_cpu_flush *f)
     uint64_t large = all / trip_cpu_pool_threads(r->pool) / 2;
     for (uint32_t t = 0; t < tile_count(r); t++) {
         uint32_t n = f->shares[t].splats;
-        if (n == 0 || atomic_load_explicit(&r->closed[t], memory_order_relaxed))
+        if (n == 0 || trip_cpu_tile_is_closed(&r->mask, t))
             continue;
         if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TILE_BEGUN) {
             for (unsigned q = 0; q < 4; q++)
@@ -238,7 +298,7 @@ static void flush(cpu *r)
     trip_cpu_flush *full = r->filling;
     if (full->chunk_count == 0)
         return;
-    trip_cpu_link(full, r->grid, r->closed);
+    trip_cpu_link(full, &r->mask);
     trip_cpu_pool_wait(r->pool, &r->blend_job);
     make_portions(r, full);
     r->filling = full == &r->flushes[0] ? &r->flushes[1] : &r->flushes[0];
@@ -263,43 +323,75 @@ typedef struct cursor {
     uint32_t skip;
 } cursor;
 
-/* Reserves the next chunk; false when the batch is through or the buffer full. */
-static bool reserve_chunk(cpu *r, const trip_batch *batch, cursor *at)
+/* Voxels for the buffer's next chunk, by how many of them showed of late; 0 when it counts as full.
+ * `reserved` are on their way into it. */
+static uint32_t room(const cpu *r, uint64_t reserved)
 {
-    uint32_t room = trip_cpu_flush_room(r->filling), voxels = 0;
-    cursor start = *at;
-    room = room < TRIP_CPU_CHUNK ? room : TRIP_CPU_CHUNK;
-    while (at->run < batch->run_count && voxels < room) {
-        uint32_t left = batch->runs[at->run].count - at->skip;
-        if (left > room - voxels) {
-            at->skip += room - voxels;
-            voxels = room;
+    const trip_cpu_flush *f = r->filling;
+    uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
+    double left = ((double)f->capacity - (double)used) / (1.1 * r->shown_per_voxel);
+    if (f->chunk_count > 0 && left < (double)reserved + TRIP_CPU_CHUNK)
+        return 0;
+    return TRIP_CPU_CHUNK;
+}
+
+/* Reserves the next chunk, of `most` voxels; false when the batch is through or there are no more
+ * chunks. */
+static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor *at)
+{
+    trip_cpu_chunk *chunk =
+        at->run < batch->run_count && most > 0 ? trip_cpu_flush_reserve(r->filling) : NULL;
+    if (!chunk)
+        return false;
+    chunk->run = at->run;
+    chunk->skip = at->skip;
+    while (at->run < batch->run_count && chunk->voxels < most) {
+        uint32_t left = batch->runs[at->run].count - at->skip, wanted = most - chunk->voxels;
+        if (left > wanted) {
+            at->skip += wanted;
+            chunk->voxels = most;
         } else {
-            voxels += left;
+            chunk->voxels += left;
             *at = (cursor){ at->run + 1, 0 };
         }
     }
-    if (voxels == 0)
-        return false;
-    trip_cpu_chunk *chunk = trip_cpu_flush_reserve(r->filling, voxels);
-    chunk->run = start.run;
-    chunk->skip = start.skip;
-    r->stats[r->view.axis].splats_read += voxels;
     return true;
+}
+
+/* Goes back to the first of the chunks that the buffer had no room for. */
+static void keep_chunks(cpu *r, cursor *at)
+{
+    trip_cpu_flush *f = r->filling;
+    trip_list_stats *stats = &r->stats[r->view.axis];
+    uint32_t reserved = f->chunk_count, kept = trip_cpu_flush_cut(f);
+    if (kept < reserved)
+        *at = (cursor){ f->chunks[kept].run, f->chunks[kept].skip };
+    for (uint32_t i = r->first_chunk; i < kept; i++) {
+        stats->splats_read += f->chunks[i].voxels;
+        stats->splats_projected += f->chunks[i].counts.splats_projected;
+        stats->splats_drawn += f->chunks[i].counts.splats_drawn;
+    }
 }
 
 /* As much of the batch as the buffer takes. */
 static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
 {
+    trip_cpu_flush *f = r->filling;
+    uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed), reserved = 0;
     r->batch = batch;
-    r->first_chunk = r->filling->chunk_count;
-    while (reserve_chunk(r, batch, at))
-        continue;
+    r->first_chunk = f->chunk_count;
+    while (reserve_chunk(r, batch, room(r, reserved), at))
+        reserved += f->chunks[f->chunk_count - 1].voxels;
+    if (reserved == 0)
+        return;
     r->project_job = (trip_cpu_job){ .run = project_chunk,
                                      .context = r,
-                                     .tasks = r->filling->chunk_count - r->first_chunk };
+                                     .tasks = f->chunk_count - r->first_chunk };
     trip_cpu_pool_start(r->pool, &r->project_job);
     trip_cpu_pool_wait(r->pool, &r->project_job);
+    used = atomic_load_explicit(&f->splats_used, memory_order_relaxed) - used;
+    r->shown_per_voxel = fmax(0.02, (double)used / (double)reserved);
+    keep_chunks(r, at);
 }
 
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
@@ -350,24 +442,12 @@ static void for_each_tile(cpu *r, void (*run)(void *, unsigned, unsigned))
     trip_cpu_pool_wait(r->pool, &r->tile_job);
 }
 
-/* What the threads counted in the list. */
-static void take_counts(cpu *r)
-{
-    trip_list_stats *list = &r->stats[r->view.axis];
-    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++) {
-        list->splats_projected += r->workers[i].counts.splats_projected;
-        list->splats_drawn += r->workers[i].counts.splats_drawn;
-        r->workers[i].counts = (trip_list_stats){ 0 };
-    }
-}
-
 static void end_list(cpu *r)
 {
     if (!r->in_list)
         return;
     settle(r);
     for_each_tile(r, merge_tile);
-    take_counts(r);
     r->in_list = false;
 }
 
@@ -378,8 +458,7 @@ static int begin_list(trip_renderer *base, int axis)
     trip_cpu_view_make(&r->view, r->frame, axis, true);
     for (uint32_t t = 0; t < tile_count(r); t++) {
         bool none = trip_cpu_tile_without_weight(&r->view, tile_x(r, t), tile_y(r, t));
-        atomic_store_explicit(&r->closed[t], none, memory_order_relaxed);
-        atomic_store_explicit(&r->open_quarters[t], 15, memory_order_relaxed);
+        atomic_store_explicit(&r->mask.tiles[t], none ? 0 : UINT64_MAX, memory_order_relaxed);
     }
     r->in_list = true;
     return 0;
@@ -398,13 +477,12 @@ static size_t lay_out(cpu *r, char *memory)
     r->pixels = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->pixels);
     r->sums = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->sums);
     r->states = part(memory, &at, tiles);
-    r->closed = part(memory, &at, tiles);
-    r->open_quarters = part(memory, &at, tiles);
+    r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
     r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
     /* Bins look one tile beyond the last, diagonally. */
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
-        r->workers[i].tile_counts =
-            part(memory, &at, (tiles + r->grid.across + 2) * sizeof *r->tile_counts);
+        r->workers[i].tile_counts = part(
+            memory, &at, (tiles + r->mask.grid.across + 2) * sizeof *r->workers[i].tile_counts);
     return at;
 }
 
@@ -413,21 +491,21 @@ static void release_tiles(cpu *r)
     trip_budget_release(r->budget, r->pixels, r->tiles_bytes);
     r->pixels = NULL;
     r->tiles_bytes = 0;
-    r->grid = (trip_cpu_grid){ 0, 0 };
+    r->mask.grid = (trip_cpu_grid){ 0, 0 };
 }
 
 static int fit_tiles(cpu *r, int width, int height)
 {
     trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE,
                            ((uint32_t)height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE };
-    if (grid.across == r->grid.across && grid.down == r->grid.down)
+    if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down)
         return 0;
     release_tiles(r);
-    r->grid = grid;
+    r->mask.grid = grid;
     size_t bytes = lay_out(r, NULL);
     char *memory = trip_budget_take(r->budget, bytes);
     if (!memory) {
-        r->grid = (trip_cpu_grid){ 0, 0 };
+        r->mask.grid = (trip_cpu_grid){ 0, 0 };
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                          "%zu bytes of pixels do not fit the memory given; raise --memory or draw "
                          "a smaller image",
@@ -450,7 +528,6 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_cpu_flush_empty(r->filling);
     r->in_list = false;
     r->frame = frame;
-    take_counts(r);
     memset(r->stats, 0, sizeof r->stats);
     int status = fit_tiles(r, frame->camera->width, frame->camera->height);
     if (status)
@@ -512,7 +589,7 @@ bool trip_cpu_covered(void *renderer, const trip_selection *selection, uint32_t 
         return false;
     trip_cpu_box box =
         trip_cpu_brick_box(&r->view, brick, selection->sheet_first, selection->sheet_last);
-    return trip_cpu_box_is_hidden(&r->view, r->grid, r->closed, &box);
+    return trip_cpu_box_cover(&r->view, &r->mask, &box) == TRIP_CPU_HIDDEN;
 }
 
 /* ---- creation ---- */
@@ -541,6 +618,7 @@ static int create_parts(cpu *r, unsigned threads)
     for (int i = 0; i < 2 && !status; i++)
         status = trip_cpu_flush_create(&r->flushes[i], flush_capacity(r->budget), r->budget);
     r->filling = &r->flushes[0];
+    r->shown_per_voxel = 1;
     snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->kernels->isa, threads,
              threads == 1 ? "" : "s");
     return status;

@@ -1,0 +1,141 @@
+/* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
+ * first, and in which order tiles get their splats back. */
+#include "cpu_bin.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { ACROSS = 4, TILES = ACROSS * ACROSS, CAPACITY = 2 * TRIP_CPU_CHUNK };
+
+typedef struct fixture {
+    trip_budget *budget;
+    trip_cpu_flush flush;
+    uint32_t counts[TILES + ACROSS + 2];
+    _Atomic uint64_t open[TILES];
+    trip_cpu_mask mask;
+} fixture;
+
+static int set_up(void **state)
+{
+    fixture *f = calloc(1, sizeof *f);
+    assert_non_null(f);
+    assert_int_equal(trip_budget_create(&f->budget, UINT64_C(1) << 24), 0);
+    assert_int_equal(trip_cpu_flush_create(&f->flush, CAPACITY, f->budget), 0);
+    assert_int_equal(trip_cpu_flush_fit(&f->flush, TILES, f->budget), 0);
+    trip_cpu_flush_empty(&f->flush);
+    f->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, f->open };
+    for (int i = 0; i < TILES; i++)
+        f->open[i] = UINT64_MAX;
+    *state = f;
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    fixture *f = *state;
+    trip_cpu_flush_destroy(&f->flush, f->budget);
+    trip_budget_destroy(f->budget);
+    free(f);
+    return 0;
+}
+
+/* Reserves `count` chunks, or fewer. */
+static uint32_t reserve(fixture *f, uint32_t count)
+{
+    uint32_t reserved = 0;
+    while (reserved < count && trip_cpu_flush_reserve(&f->flush))
+        reserved++;
+    return reserved;
+}
+
+/* Fills a chunk with `count` splats, the i-th in tile i mod TILES; `mark` tells them from others'.
+ */
+static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
+{
+    trip_cpu_chunk *chunk = &f->flush.chunks[number];
+    if (!trip_cpu_flush_claim(&f->flush, chunk, count))
+        return;
+    chunk->splats = count;
+    for (uint32_t i = 0; i < count; i++)
+        f->flush.splats[chunk->splat + i] =
+            (trip_cpu_splat){ .x = mark, .y = (float)i, .tiles = i % TILES };
+    trip_cpu_bin(&f->flush, chunk, f->mask.grid, f->counts);
+}
+
+static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state)
+{
+    fixture *f = *state;
+    assert_int_equal(reserve(f, 4), 4);
+    fill(f, 1, CAPACITY / 2, 1);
+    fill(f, 3, CAPACITY / 4, 3);
+    fill(f, 0, CAPACITY / 8, 0);
+    fill(f, 2, CAPACITY / 2, 2);
+    assert_int_equal(trip_cpu_flush_cut(&f->flush), 2);
+    assert_int_equal(reserve(f, 1), 1);
+}
+
+/* Over and over the first chunk comes last: it must find room all the same, or a frame would never
+ * end. */
+static void a_first_chunk_that_always_comes_last_finds_room_in_the_end(void **state)
+{
+    fixture *f = *state;
+    uint32_t kept = 0, rounds = 0;
+    while (kept == 0 && rounds++ < 10) {
+        uint32_t reserved = reserve(f, 5);
+        assert_true(reserved > 0);
+        for (uint32_t i = reserved; i-- > 0;)
+            fill(f, i, TRIP_CPU_CHUNK, 0);
+        kept = trip_cpu_flush_cut(&f->flush);
+    }
+    assert_int_equal(kept, 1);
+    assert_int_equal(rounds, 2);
+    trip_cpu_flush_empty(&f->flush);
+    assert_int_equal(reserve(f, 5), 5);
+}
+
+typedef struct taken {
+    uint32_t tile, count;
+    float mark, number;
+} taken;
+
+static void take(void *user, const trip_cpu_splat *splats, const uint16_t *order, uint32_t count)
+{
+    taken *t = user;
+    for (uint32_t i = 0; i < count; i++, t->count++) {
+        const trip_cpu_splat *s = &splats[order ? order[i] : i];
+        assert_int_equal(s->tiles, t->tile);
+        assert_true(t->count == 0 || s->x > t->mark || (s->x >= t->mark && s->y > t->number));
+        t->mark = s->x;
+        t->number = s->y;
+    }
+}
+
+static void tiles_get_their_splats_in_the_chunks_order_whoever_came_first(void **state)
+{
+    fixture *f = *state;
+    const uint32_t order[3] = { 2, 0, 1 };
+    f->open[5] = 0;
+    assert_int_equal(reserve(f, 3), 3);
+    for (int i = 0; i < 3; i++)
+        fill(f, order[i], 100, (float)order[i]);
+    assert_int_equal(trip_cpu_flush_cut(&f->flush), 3);
+    trip_cpu_link(&f->flush, &f->mask);
+    for (uint32_t tile = 0; tile < TILES; tile++) {
+        taken t = { .tile = tile };
+        trip_cpu_share_each(&f->flush, tile, take, &t);
+        uint32_t each = 100 / TILES + (tile < 100 % TILES);
+        assert_int_equal(t.count, tile == 5 ? 0 : 3 * each);
+    }
+}
+
+int main(void)
+{
+#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+    const struct CMUnitTest tests[] = {
+        TEST(the_chunks_before_the_first_that_found_no_room_are_kept),
+        TEST(a_first_chunk_that_always_comes_last_finds_room_in_the_end),
+        TEST(tiles_get_their_splats_in_the_chunks_order_whoever_came_first),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,156 @@
+/* What counts as hidden: never a voxel with a pixel of its support in an open block, by the
+ * definition of splats in double precision. */
+#include "cpu_cover.h"
+#include "cpu_near.h"
+#include "scenes.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { SIZE = 96, ACROSS = 3 };
+
+typedef struct looks {
+    trip_camera camera;
+    trip_settings settings;
+    trip_plan plan;
+    trip_frame frame;
+    trip_cpu_view view;
+    _Atomic uint64_t open[ACROSS * ACROSS];
+    trip_cpu_mask mask;
+} looks;
+
+static void look(looks *l, const scene *s, const trip_camera_params *params, int axis)
+{
+    memset(l, 0, sizeof *l);
+    l->settings = trip_settings_default();
+    assert_int_equal(trip_camera_make(&l->camera, params, &s->data->index_to_world), 0);
+    l->frame = (trip_frame){ .data = s->data,
+                             .camera = &l->camera,
+                             .settings = &l->settings,
+                             .plan = &l->plan,
+                             .table = s->table };
+    trip_cpu_view_make(&l->view, &l->frame, axis, true);
+    l->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, l->open };
+}
+
+static void open_only(looks *l, unsigned block_x, unsigned block_y)
+{
+    for (int i = 0; i < ACROSS * ACROSS; i++)
+        l->open[i] = 0;
+    l->open[block_y / 8 * ACROSS + block_x / 8] = UINT64_C(1) << (8 * (block_y % 8) + block_x % 8);
+}
+
+static bool reaches(const looks *l, const double at[3], unsigned block_x, unsigned block_y)
+{
+    double p[3];
+    trip_splat s;
+    p[l->view.u_axis] = at[0];
+    p[l->view.v_axis] = at[1];
+    p[l->view.axis] = at[2];
+    if (!trip_splat_project(&l->view.splat, trip_v3(p[0], p[1], p[2]), &s))
+        return false;
+    for (unsigned i = 0; i < 16; i++)
+        if (trip_splat_radius2(&l->view.splat, &s, 4 * block_x + i % 4 + 0.5,
+                               4 * block_y + i / 4 + 0.5) <= l->view.splat.cutoff2)
+            return true;
+    return false;
+}
+
+/* The box's voxels, each by itself; true when some reaches the block. */
+static bool any_reaches(const looks *l, const trip_cpu_box *box, unsigned x, unsigned y)
+{
+    for (double u = -box->half[0]; u <= box->half[0]; u++)
+        for (double v = -box->half[1]; v <= box->half[1]; v++)
+            for (double s = -box->half[2]; s <= box->half[2]; s++) {
+                const double at[3] = { box->middle[0] + u, box->middle[1] + v, box->middle[2] + s };
+                if (reaches(l, at, x, y))
+                    return true;
+            }
+    return false;
+}
+
+static void check_boxes(looks *l, unsigned seed, unsigned *hidden, unsigned *reaching)
+{
+    for (unsigned i = 0; i < 60; i++) {
+        uint32_t h = scene_hash((int)i, (int)seed, l->view.axis);
+        unsigned x = h % (SIZE / 4), y = h / 64 % (SIZE / 4);
+        trip_run run = { .sheet = (int32_t)(h / 4096 % 32), .u = (int32_t)(h / 131072 % 3) * 16 };
+        trip_cpu_box box = trip_cpu_square_box(&run, h >> 24 & 15);
+        open_only(l, x, y);
+        bool is_hidden = trip_cpu_box_cover(&l->view, &l->mask, &box) == TRIP_CPU_HIDDEN;
+        bool reached = any_reaches(l, &box, x, y);
+        assert_false(is_hidden && reached);
+        *hidden += is_hidden;
+        *reaching += reached;
+    }
+}
+
+static void what_is_hidden_reaches_no_open_block(void **state)
+{
+    (void)state;
+    scene s;
+    looks l;
+    unsigned hidden = 0, reaching = 0;
+    scene_create(&s, &(scene_params){ .dims = { 32, 32, 32 }, .tile_voxels = 32 });
+    for (int i = 0; i < 12; i++) {
+        trip_vec3 from = { cos(1.1 * i), sin(1.1 * i), 0.5 * sin(3.3 * i) };
+        trip_camera_params view = scene_view(&s, from, 90 - 8 * i, 60, SIZE);
+        view.ortho_height = i % 3 == 2 ? 40 : 0;
+        look(&l, &s, &view, i % 3);
+        check_boxes(&l, (unsigned)i, &hidden, &reaching);
+    }
+    assert_true(hidden > 100);
+    assert_true(reaching > 20);
+    scene_destroy(&s);
+}
+
+static void without_closed_blocks_all_is_shown(void **state)
+{
+    (void)state;
+    scene s;
+    looks l;
+    scene_create(&s, &(scene_params){ .dims = { 32, 32, 32 }, .tile_voxels = 32 });
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.2, 0.1), 90, 40, SIZE);
+    look(&l, &s, &view, 0);
+    for (int i = 0; i < ACROSS * ACROSS; i++)
+        l.open[i] = UINT64_MAX;
+    trip_run run = { .sheet = 16 };
+    trip_cpu_box box = trip_cpu_square_box(&run, 0x1010);
+    assert_int_equal(trip_cpu_box_cover(&l.view, &l.mask, &box), TRIP_CPU_SHOWN);
+    l.open[4] = 1;
+    assert_int_equal(trip_cpu_box_cover(&l.view, &l.mask, &box), TRIP_CPU_PARTLY);
+    scene_destroy(&s);
+}
+
+/* Voxels in Morton order of 16 x 16, without every third. */
+static void squares_hold_the_voxels_that_share_their_high_bits(void **state)
+{
+    (void)state;
+    uint32_t voxels[256], n = 0;
+    for (uint32_t i = 0; i < 256; i++) {
+        uint32_t u = 0, v = 0;
+        for (unsigned bit = 0; bit < 4; bit++) {
+            u |= (i >> 2 * bit & 1) << bit;
+            v |= (i >> (2 * bit + 1) & 1) << bit;
+        }
+        if (i >= 64 ? i % 3 != 0 : true)
+            voxels[n++] = u | v << 8 | scene_hash((int)i, 0, 0) << 16;
+    }
+    assert_int_equal(trip_cpu_square_count(voxels, n, false), 64);
+    assert_int_equal(trip_cpu_square_count(voxels + 60, n - 60, false), 4);
+    assert_int_equal(trip_cpu_square_count(voxels, 10, false), 10);
+    assert_int_equal(trip_cpu_square_count(voxels + 64, n - 64, false), 43);
+    assert_int_equal(trip_cpu_square_count(voxels, 64, true), 64);
+    assert_int_equal(trip_cpu_square_count(voxels, 65, true), 1);
+    assert_int_equal(trip_cpu_square_count(voxels, 64 + 43, true), 43);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_hidden_reaches_no_open_block),
+        cmocka_unit_test(without_closed_blocks_all_is_shown),
+        cmocka_unit_test(squares_hold_the_voxels_that_share_their_high_bits),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
