@@ -11,9 +11,15 @@ static double fold(double a, double b)
     return copysign(1 - fabs(b), a);
 }
 
+/* Comparisons, since calls of fmin and fmax take a third of the time. */
+static inline double clamp(double x)
+{
+    return x > 0 ? x < 1 ? x : 1 : 0; /* 0 for NaN */
+}
+
 static uint32_t quantise(double x)
 {
-    return (uint32_t)(fmin(fmax(x * 0.5 + 0.5, 0), 1) * COORDINATE_MAX + 0.5);
+    return (uint32_t)(clamp(x * 0.5 + 0.5) * COORDINATE_MAX + 0.5);
 }
 
 static double dequantise(uint32_t q)
@@ -26,7 +32,7 @@ static uint32_t quantise_magnitude(double magnitude, double gradient_scale)
 {
     if (!(magnitude > 0) || !(gradient_scale > 0))
         return 0;
-    return (uint32_t)(sqrt(fmin(magnitude / gradient_scale, 1)) * MAGNITUDE_MAX + 0.5);
+    return (uint32_t)(sqrt(clamp(magnitude / gradient_scale)) * MAGNITUDE_MAX + 0.5);
 }
 
 uint32_t trip_normal_pack(const double gradient[3], double gradient_scale)
