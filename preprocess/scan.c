@@ -120,6 +120,8 @@ static void fit(trip_tally *t)
 {
     int exponent = exponent_for(t->value_min, t->value_max);
     int64_t first = bin_of(t->value_min, exponent);
+    t->fit_min = t->value_min;
+    t->fit_max = t->value_max;
     if (t->counted == 0) {
         t->exponent = exponent;
         t->first = first;
@@ -131,31 +133,38 @@ static void fit(trip_tally *t)
         move_bins(t, first);
 }
 
-static bool fits(const trip_tally *t)
+static bool is_fitted(const trip_tally *t)
 {
-    return t->counted > 0 && bin_of(t->value_min, t->exponent) >= t->first &&
-           bin_of(t->value_max, t->exponent) < t->first + TRIP_TALLY_BINS &&
-           exponent_for(t->value_min, t->value_max) == t->exponent;
+    return t->counted > 0 && t->fit_min == t->value_min && t->fit_max == t->value_max;
 }
 
 void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active, size_t count)
 {
     if (t->finite == 0)
         return;
-    if (!fits(t))
+    if (!is_fitted(t))
         fit(t);
     const double per_value = ldexp(1, -t->exponent);
-    uint64_t counted = 0;
+    uint64_t none = 0, *bin = &none; /* of the value before */
+    uint64_t run = 0;                /* of that value; long ones are common */
+    float last = NAN;
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(values[i]) || (active && !active[i]))
             continue;
-        double scaled = values[i] * per_value; /* exact; within 2^24, see last_bit() */
-        int64_t bin = (int64_t)scaled;
-        bin -= scaled < (double)bin;
-        t->counts[bin - t->first]++;
-        counted++;
+        if (values[i] != last) {
+            double scaled = values[i] * per_value; /* exact; within 2^24, see last_bit() */
+            int64_t at = (int64_t)scaled;
+            at -= scaled < (double)at;
+            *bin += run;
+            t->counted += run;
+            bin = &t->counts[at - t->first];
+            last = values[i];
+            run = 0;
+        }
+        run++;
     }
-    t->counted += counted;
+    *bin += run;
+    t->counted += run;
 }
 
 void trip_tally_add(trip_tally *t, const trip_tally *other)

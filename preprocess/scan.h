@@ -20,6 +20,7 @@ typedef struct trip_tally {
     double value_min,
         value_max; /* of the finite ones; infinity and -infinity when there are none */
     uint64_t counted;
+    double fit_min, fit_max; /* the range that the bins were last fitted to */
     int exponent;
     int64_t first;
     uint64_t counts[TRIP_TALLY_BINS];

@@ -23,7 +23,7 @@ typedef struct workspace {
 struct trip_splatter {
     trip_splat_params params;
     trip_budget *budget;
-    trip_affine to_index; /* inverse of index_to_world */
+    double to_world[3][3]; /* of gradients: the inverse transpose of index_to_world */
     int64_t edge;
     unsigned words;       /* of the bitmap of an edge x edge square */
     uint16_t spread[128]; /* bits of a coordinate at the even places */
@@ -95,6 +95,15 @@ static void fill_tables(trip_splatter *s)
         }
 }
 
+static void fill_map(trip_splatter *s)
+{
+    trip_affine to_index;
+    trip_affine_invert(&s->params.info->index_to_world, &to_index);
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            s->to_world[row][column] = to_index.m[column][row];
+}
+
 static void fill_workspaces(trip_splatter *s)
 {
     const trip_splat_params *p = &s->params;
@@ -124,7 +133,7 @@ int trip_splatter_create(trip_splatter **out, const trip_splat_params *params, t
     s->memory = (unsigned char *)s + own;
     s->edge = trip_splat_edge(&params->format);
     s->words = (unsigned)(s->edge * s->edge / 64);
-    trip_affine_invert(&params->info->index_to_world, &s->to_index);
+    fill_map(s);
     fill_tables(s);
     fill_workspaces(s);
     return 0;
@@ -162,32 +171,37 @@ static int decode(const view *v)
                              v->s->params.info->sparse ? v->w->active : NULL);
 }
 
-/* A neighbour that is not a number is replaced by the voxel's own value. */
-static double neighbour(const float *at, int64_t step)
+/* A neighbour that is not finite is replaced by the voxel's own value. */
+static inline double neighbour(const float *at, int64_t step)
 {
     float value = at[step];
     return isfinite(value) ? value : *at;
 }
 
-/* World-space gradient by central differences: J^-T times the differences of index space. */
-static trip_vec3 gradient(const view *v, const float *at)
+static inline double difference(const float *at, int64_t step)
 {
-    trip_vec3 g = { 0.5 * (neighbour(at, 1) - neighbour(at, -1)),
-                    0.5 * (neighbour(at, v->pitch) - neighbour(at, -v->pitch)),
-                    0.5 * (neighbour(at, v->slice) - neighbour(at, -v->slice)) };
-    return trip_affine_transpose_vector(&v->s->to_index, g);
+    return 0.5 * (neighbour(at, step) - neighbour(at, -step));
+}
+
+/* World-space gradient: J^-T times the central differences of index space. */
+static inline void gradient(const view *v, const float *at, double g[3])
+{
+    const double x = difference(at, 1), y = difference(at, v->pitch), z = difference(at, v->slice);
+    const double(*m)[3] = v->s->to_world;
+    for (int row = 0; row < 3; row++)
+        g[row] = m[row][0] * x + m[row][1] * y + m[row][2] * z;
 }
 
 static void put_normal(const view *v, const float *at, size_t index)
 {
     const trip_splat_params *p = &v->s->params;
-    trip_vec3 world = gradient(v, at);
-    double g[3] = { world.x, world.y, world.z };
+    double g[3];
+    gradient(v, at, g);
     if (p->format.quantised) {
         v->w->normals[index] = trip_normal_pack(g, p->quantiser.gradient_scale);
         return;
     }
-    double magnitude = trip_length(world);
+    double magnitude = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     v->w->normals[index] = trip_normal_pack(g, magnitude) & 0xffffff;
     v->w->magnitudes[index] = (float)magnitude;
 }
