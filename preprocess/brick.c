@@ -42,13 +42,6 @@ static double now_seconds(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-/* 8 and 16 bits: codes stand for all values of the type, without a look at the data. */
-static bool has_narrow_type(const brick *b)
-{
-    trip_scalar type = b->in.info->type;
-    return type == TRIP_U8 || type == TRIP_I8 || type == TRIP_U16 || type == TRIP_I16;
-}
-
 /* Once it was done, a run that goes on knows the result. */
 static int scan(brick *b)
 {
@@ -89,8 +82,8 @@ static void choose_codes(brick *b)
     type_limits(b->in.info->type, &lo, &hi);
     double a = b->in.info->slope * lo + b->in.info->inter,
            c = b->in.info->slope * hi + b->in.info->inter;
-    b->format.quantised = has_narrow_type(b) || b->in.scanned;
-    if (has_narrow_type(b))
+    b->format.quantised = trip_brick_has_narrow_type(&b->in) || b->in.scanned;
+    if (trip_brick_has_narrow_type(&b->in))
         set_quantiser(b, fmin(a, c), fmax(a, c));
     else if (b->in.scanned)
         set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
@@ -406,8 +399,7 @@ static int prepare(brick *b)
 {
     const trip_brick_params *p = b->params;
     int status = trip_brick_input_open(&b->in, p);
-    b->format.tile_log2 = p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6;
-    b->format.normals = !p->no_normals;
+    b->format = trip_brick_format(p);
     b->format.quantised = true; /* for a first plan; choose_codes() decides */
     if (status == 0)
         status = plan_memory(b);

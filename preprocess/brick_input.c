@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "brick_memory.h"
 #include "brick_text.h"
 #include "report.h"
 
@@ -14,12 +15,25 @@ static int check_dims(const trip_brick_input *in)
     return 0;
 }
 
+trip_piece_format trip_brick_format(const trip_brick_params *p)
+{
+    return (trip_piece_format){ .tile_log2 =
+                                    p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6,
+                                .normals = !p->no_normals };
+}
+
+static unsigned choose_threads(const trip_brick_input *in)
+{
+    trip_piece_format format = trip_brick_format(in->params);
+    return trip_memory_plan_threads(&format, trip_budget_limit_bytes(in->budget));
+}
+
 static int open_volume(trip_brick_input *in)
 {
     const trip_brick_params *p = in->params;
     int status = trip_budget_create(&in->budget, p->memory_bytes);
     if (status == 0)
-        status = trip_workers_create(&in->workers, p->threads);
+        status = trip_workers_create(&in->workers, p->threads ? p->threads : choose_threads(in));
     if (status == 0)
         status = trip_volume_open(&in->volume, p->input, &p->volume, in->budget);
     if (status < 0)
@@ -65,6 +79,12 @@ void trip_brick_input_close(trip_brick_input *in)
     trip_workers_destroy(in->workers);
     if (in->budget)
         trip_budget_destroy(in->budget);
+}
+
+bool trip_brick_has_narrow_type(const trip_brick_input *in)
+{
+    trip_scalar type = in->info->type;
+    return type == TRIP_U8 || type == TRIP_I8 || type == TRIP_U16 || type == TRIP_I16;
 }
 
 static bool is_envelope_automatic(const trip_brick_params *p)

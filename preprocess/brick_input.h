@@ -5,6 +5,7 @@
 
 #include "brick.h"
 #include "envelope.h"
+#include "piece.h"
 #include "scan.h"
 
 /* Zeroed before it is opened. */
@@ -23,11 +24,16 @@ typedef struct trip_brick_input {
     trip_envelope envelope;
 } trip_brick_input;
 
+/* The format of pieces that the parameters ask for, not quantised yet. */
+trip_piece_format trip_brick_format(const trip_brick_params *p);
+
 /* Opens the volume and loads the transfer functions. */
 int trip_brick_input_open(trip_brick_input *in, const trip_brick_params *params);
 /* Also after a failure to open. */
 void trip_brick_input_close(trip_brick_input *in);
 
+/* 8 and 16 bit integers: codes stand for all values of the type, without a look at the data. */
+bool trip_brick_has_narrow_type(const trip_brick_input *in);
 /* Whether the envelope needs to know the volume's values: it is automatic, or normalised. */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
 /* Fills the tally with `known`. */

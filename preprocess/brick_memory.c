@@ -94,9 +94,19 @@ static int refuse(const char *path, const trip_volume_info *info, const needs *n
     uint64_t least =
         n->opened_bytes + n->late_bytes + reader_bytes(n, slices, false) + n->list_min_bytes;
     return trip_fail(TRIP_ERROR, "brick", path,
-                     "slices of %" PRId64 " x %" PRId64 " with %u threads need --memory %" PRIu64
-                     "M at least; fewer --threads need less",
-                     info->dims[0], info->dims[1], threads, (least >> 20) + 1);
+                     "slices of %" PRId64 " x %" PRId64 " and %u threads need --memory %" PRIu64
+                     "M at least%s",
+                     info->dims[0], info->dims[1], threads, (least >> 20) + 1,
+                     threads > 1 ? "; fewer --threads need less" : "");
+}
+
+unsigned trip_memory_plan_threads(const trip_piece_format *format, uint64_t memory_bytes)
+{
+    uint64_t each = trip_splat_thread_bytes(format, true) + trip_list_builder_min_bytes(format, 2) -
+                    trip_list_builder_min_bytes(format, 1);
+    uint64_t fixed = OPENED_BYTES + LATE_BYTES, processors = trip_workers_processors();
+    uint64_t most = memory_bytes > fixed ? (memory_bytes - fixed) / 2 / each : 0;
+    return (unsigned)(most < 1 ? 1 : most < processors ? most : processors);
 }
 
 int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_volume_info *info,

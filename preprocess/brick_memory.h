@@ -12,6 +12,10 @@ typedef struct trip_memory_plan {
     uint64_t list_bytes; /* for pieces of splats */
 } trip_memory_plan;
 
+/* Threads to take where nobody said how many: one a processor, but no more than leave half of the
+ * memory for other things. */
+unsigned trip_memory_plan_threads(const trip_piece_format *format, uint64_t memory_bytes);
+
 /* Refuses, with the least that would do, what cannot be done in `memory_bytes`. `slices` 0 leaves
  * that choice to the plan. */
 int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_volume_info *info,

@@ -140,13 +140,11 @@ static double seconds_per_byte(const char *output)
 static int estimate(trip_brick_input *in, trip_brick_estimate *e)
 {
     const trip_brick_params *p = in->params;
-    trip_piece_format format = { .tile_log2 =
-                                     p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6,
-                                 .quantised = true,
-                                 .normals = !p->no_normals };
+    trip_piece_format format = trip_brick_format(p);
     trip_memory_plan plan;
     bool scan = trip_brick_input_needs_scan(in);
     double begin = now_seconds(), passing = 0;
+    format.quantised = true; /* until more is known */
     int status =
         trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
                               in->memory_bytes, p->slices);
@@ -162,7 +160,7 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
         return status;
     double looking = now_seconds() - begin - passing;
     double all = looking * (double)stride_of(in) + passing;
-    format.quantised = scan || trip_scalar_bytes(in->info->type) <= 2;
+    format.quantised = scan || trip_brick_has_narrow_type(in);
     estimate_sizes(in, &format, &plan, e);
     e->seconds = all + (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
     return 0;

@@ -31,7 +31,7 @@ typedef struct seat {
     unsigned thread;
 } seat;
 
-static unsigned processors(void)
+unsigned trip_workers_processors(void)
 {
     cpu_set_t set;
     if (sched_getaffinity(0, sizeof set, &set) != 0)
@@ -116,7 +116,7 @@ int trip_workers_create(trip_workers **out, unsigned threads)
     pthread_cond_init(&w->finished, &clock);
     pthread_condattr_destroy(&clock);
     if (threads == 0)
-        threads = processors();
+        threads = trip_workers_processors();
     int status = 0;
     while (status == 0 && w->count < threads && w->count < MAX_THREADS)
         status = start_thread(w);

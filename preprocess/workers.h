@@ -13,7 +13,10 @@ typedef struct trip_workers trip_workers;
  * out. */
 typedef int (*trip_work)(void *user, unsigned thread, uint64_t item);
 
-/* threads 0: one for every processor that the process may run on. */
+/* Processors that the process may run on. */
+unsigned trip_workers_processors(void);
+
+/* threads 0: one for every processor. */
 int trip_workers_create(trip_workers **out, unsigned threads);
 void trip_workers_destroy(trip_workers *w);
 unsigned trip_workers_count(const trip_workers *w);
