@@ -1,5 +1,6 @@
 #include "scan.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -14,50 +15,44 @@ void trip_tally_clear(trip_tally *t)
     t->value_max = -INFINITY;
 }
 
-/* Bits of a float as an integer that sorts like it: minimum and maximum are then integer ones,
- * which vectorise although there are NaNs about. */
-static inline int32_t sortable(int32_t bits)
-{
-    return bits ^ (bits >> 31 & 0x7fffffff);
-}
+/* Four values side by side; compilers do not find these by themselves. */
+typedef float four_floats __attribute__((vector_size(16)));
+typedef int32_t four_ints __attribute__((vector_size(16)));
 
-static inline bool is_finite_bits(int32_t bits)
+/* Whether all values lie within the range so far, which most rows do; NaN lies in none. */
+static bool are_known(const trip_tally *t, const float *values, size_t count)
 {
-    return (bits & 0x7f800000) != 0x7f800000;
-}
-
-static float float_of_sortable(int32_t s)
-{
-    int32_t bits = sortable(s);
-    float f;
-    memcpy(&f, &bits, sizeof f);
-    return f;
+    const float lo = (float)t->value_min, hi = (float)t->value_max;
+    four_ints all = { -1, -1, -1, -1 };
+    bool rest = true;
+    size_t i = 0;
+    for (; i + 4 <= count; i += 4) {
+        four_floats v;
+        memcpy(&v, values + i, sizeof v);
+        all &= (v >= lo) & (v <= hi);
+    }
+    for (; i < count; i++)
+        rest &= (values[i] >= lo) & (values[i] <= hi);
+    return rest & (all[0] & all[1] & all[2] & all[3]);
 }
 
 void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active, size_t count)
 {
-    int32_t lo = INT32_MAX, hi = INT32_MIN;
-    uint32_t finite = 0, exist = (uint32_t)count;
-    if (active) {
-        exist = 0;
-        for (size_t i = 0; i < count; i++)
-            exist += active[i];
+    if (!active && are_known(t, values, count)) {
+        t->voxels += count;
+        t->finite += count;
+        return;
     }
     for (size_t i = 0; i < count; i++) {
-        int32_t bits;
-        memcpy(&bits, &values[i], sizeof bits);
-        bool use = is_finite_bits(bits) & (!active || active[i]);
-        int32_t s = sortable(bits);
-        int32_t for_lo = use ? s : INT32_MAX, for_hi = use ? s : INT32_MIN;
-        lo = for_lo < lo ? for_lo : lo;
-        hi = for_hi > hi ? for_hi : hi;
-        finite += use;
-    }
-    t->voxels += exist;
-    t->finite += finite;
-    if (finite) {
-        t->value_min = fmin(t->value_min, float_of_sortable(lo));
-        t->value_max = fmax(t->value_max, float_of_sortable(hi));
+        double value = values[i] + 0.0; /* -0 and 0 are one */
+        if (active && !active[i])
+            continue;
+        t->voxels++;
+        if (!isfinite(value))
+            continue;
+        t->finite++;
+        t->value_min = value < t->value_min ? value : t->value_min;
+        t->value_max = value > t->value_max ? value : t->value_max;
     }
 }
 
@@ -138,33 +133,69 @@ static bool is_fitted(const trip_tally *t)
     return t->counted > 0 && t->fit_min == t->value_min && t->fit_max == t->value_max;
 }
 
+/* Bins of finite values, from the first one. Scaling by a power of two is exact, and what comes out
+ * is within 2^24, see last_bit(). The count is a multiple of 4. */
+static void find_bins(const trip_tally *t, const float *values, size_t count, int32_t *bins)
+{
+    const float per_value = ldexpf(1, -t->exponent);
+    const int32_t first = (int32_t)t->first;
+    for (size_t i = 0; i < count; i += 4) {
+        four_floats v;
+        memcpy(&v, values + i, sizeof v);
+        four_floats scaled = v * per_value;
+        four_ints at = __builtin_convertvector(scaled, four_ints);
+        at += (scaled < __builtin_convertvector(at, four_floats)) - first; /* true is -1 */
+        memcpy(bins + i, &at, sizeof at);
+    }
+}
+
+/* Neighbours are often alike, and additions to one bin have to wait for each other. The count is a
+ * multiple of 4. */
+static void add_bins(trip_tally *t, const int32_t *bins, size_t count)
+{
+    for (size_t i = 0; i < count; i += 4) {
+        const int32_t *b = bins + i;
+        if ((b[0] == b[1]) & (b[2] == b[3]) & (b[0] == b[2])) {
+            t->counts[b[0]] += 4;
+            continue;
+        }
+        for (int k = 0; k < 4; k++)
+            t->counts[b[k]]++;
+    }
+    t->counted += count;
+}
+
+static void add_one_by_one(trip_tally *t, const float *values, const uint8_t *active, size_t count)
+{
+    const double per_value = ldexp(1, -t->exponent);
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(values[i]) || (active && !active[i]))
+            continue;
+        double scaled = values[i] * per_value;
+        int64_t at = (int64_t)scaled;
+        at -= scaled < (double)at;
+        t->counts[at - t->first]++;
+        t->counted++;
+    }
+}
+
 void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active, size_t count)
 {
+    enum { CHUNK = 128 };
+    int32_t bins[CHUNK];
     if (t->finite == 0)
         return;
     if (!is_fitted(t))
         fit(t);
-    const double per_value = ldexp(1, -t->exponent);
-    uint64_t none = 0, *bin = &none; /* of the value before */
-    uint64_t run = 0;                /* of that value; long ones are common */
-    float last = NAN;
-    for (size_t i = 0; i < count; i++) {
-        if (!isfinite(values[i]) || (active && !active[i]))
-            continue;
-        if (values[i] != last) {
-            double scaled = values[i] * per_value; /* exact; within 2^24, see last_bit() */
-            int64_t at = (int64_t)scaled;
-            at -= scaled < (double)at;
-            *bin += run;
-            t->counted += run;
-            bin = &t->counts[at - t->first];
-            last = values[i];
-            run = 0;
+    bool scalable = -t->exponent >= FLT_MIN_EXP && -t->exponent < FLT_MAX_EXP;
+    size_t i = 0;
+    if (scalable && !active && are_known(t, values, count))
+        for (size_t n; i + 4 <= count; i += n) {
+            n = count - i < CHUNK ? (count - i) & ~(size_t)3 : CHUNK;
+            find_bins(t, values + i, n, bins);
+            add_bins(t, bins, n);
         }
-        run++;
-    }
-    *bin += run;
-    t->counted += run;
+    add_one_by_one(t, values + i, active ? active + i : NULL, count - i);
 }
 
 void trip_tally_add(trip_tally *t, const trip_tally *other)
