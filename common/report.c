@@ -123,6 +123,9 @@ __attribute__((format(printf, 3, 0))) static void report(const char *what, const
     errno = saved_errno;
 }
 
+#undef trip_fail
+#undef trip_fail_errno
+
 int trip_fail(int status, const char *what, const char *where, const char *why, ...)
 {
     va_list args;

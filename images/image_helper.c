@@ -77,18 +77,18 @@ int trip_image_helper_start(trip_image_helper **out, const char *what)
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fds) != 0)
         return trip_fail_errno(what, program, "cannot connect");
     trip_image_helper *h = calloc(1, sizeof *h);
-    errno = h ? spawn(program, fds[1], &h->pid) : ENOMEM;
+    int error = h ? spawn(program, fds[1], &h->pid) : ENOMEM;
     close(fds[1]);
-    if (errno) {
-        trip_fail_errno(what, program, "cannot start");
-        close(fds[0]);
-        free(h);
-        return TRIP_ERROR;
+    if (h && error == 0) {
+        h->what = what;
+        h->fd = fds[0];
+        *out = h;
+        return 0;
     }
-    h->what = what;
-    h->fd = fds[0];
-    *out = h;
-    return 0;
+    close(fds[0]);
+    free(h);
+    errno = error;
+    return trip_fail_errno(what, program, "cannot start");
 }
 
 void trip_image_helper_stop(trip_image_helper *h)

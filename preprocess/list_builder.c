@@ -247,13 +247,15 @@ static int create_parts(trip_list_builder *b, trip_budget *budget)
         status = trip_list_output_create(&b->outputs[axis], axis, &p->format, p->writer, budget);
     b->outputs[ORDERED_AXIS].run = p->in_order ? note_run : NULL;
     b->outputs[ORDERED_AXIS].run_user = p->journal;
+    if (status < 0)
+        return status;
     b->open = calloc(p->producers, sizeof *b->open);
-    if (status == 0 && !b->open)
-        status = trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
-    for (unsigned i = 0; status == 0 && i < p->producers; i++)
+    if (!b->open)
+        return trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
+    for (unsigned i = 0; i < p->producers; i++)
         for (int axis = 0; axis < 3; axis++)
             b->open[i][axis] = TRIP_NO_CHUNK;
-    return status;
+    return 0;
 }
 
 static int start_thread(trip_list_builder *b)

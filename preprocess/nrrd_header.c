@@ -186,7 +186,10 @@ static int split_lines(parser *p, bool ends)
 
 static int require(const parser *p, enum field f, const char *name)
 {
-    return p->values[f] ? 0 : fail_line(p, 0, "the header has no \"%s\"", name);
+    if (p->values[f])
+        return 0;
+    fail_line(p, 0, "the header has no \"%s\"", name);
+    return TRIP_ERROR;
 }
 
 static bool parse_integer(char **text, int64_t *value)

@@ -80,7 +80,7 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
         return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
     memcpy(s->path, path, path_bytes);
     s->budget = budget;
-    trip_image_stack stack;
+    trip_image_stack stack = { 0 };
     int status = open_stack(s, &stack);
     if (status == 0)
         status = reserve_memory(s, &stack);

@@ -295,7 +295,7 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
     vf diffuse = v_abs(dot(normal, light));
     vf h2 = dot(normal, half) * dot(normal, half);
     vf h8 = (h2 * h2) * (h2 * h2);
-    static_assert(TRIP_SHININESS == 24, "the power below");
+    static_assert((int)TRIP_SHININESS == 24, "the power below");
     vf gloss = strength * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
     vf matt = v_fma(diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
     matt = v_fma(strength, matt, v_set(1));

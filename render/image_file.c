@@ -148,7 +148,7 @@ static int receive_picture(const char *path, trip_image_size *size, float **rgba
 
 int trip_image_read(const char *path, int *width_out, int *height_out, float **rgba_out)
 {
-    trip_image_size size;
+    trip_image_size size = { 0 };
     pthread_mutex_lock(&helper_lock);
     int status = start_helper("read");
     if (status == 0)
