@@ -11,24 +11,15 @@ static double now_ms(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-static void add_reader_stats(trip_reader_stats *sum, const trip_reader_stats *s)
-{
-    sum->bytes_read += s->bytes_read;
-    sum->reads += s->reads;
-    sum->bytes_cached += s->bytes_cached;
-    sum->splats += s->splats;
-    sum->runs_skipped += s->runs_skipped;
-    sum->bytes_skipped += s->bytes_skipped;
-    sum->wait_ns += s->wait_ns;
-}
-
 /* A frame being drawn. */
 typedef struct drawing {
     trip_renderer *renderer;
     trip_reader *reader;
     const trip_frame *frame;
     trip_frame_stats *stats;
-    uint64_t splats; /* drawn so far */
+    int next_axis;       /* lists before this one were begun */
+    uint64_t splats;     /* drawn so far */
+    uint64_t bytes_read; /* counted so far */
 } drawing;
 
 static void tell_progress(drawing *d, const trip_batch *batch)
@@ -43,49 +34,61 @@ static void tell_progress(drawing *d, const trip_batch *batch)
     d->frame->progress(d->frame->progress_user, d->splats, total);
 }
 
-static int draw_batches(drawing *d, bool front_to_back)
+/* Passes are read one behind the other, so that the next is on its way while the last batches of
+ * one are drawn. */
+static int begin_reading(drawing *d)
 {
-    trip_batch batch;
-    int status;
-    while ((status = trip_reader_next(d->reader, &batch)) > 0) {
-        double start = now_ms();
-        status = d->renderer->ops->draw(d->renderer, &batch, front_to_back);
-        d->stats->draw_ms += now_ms() - start;
-        tell_progress(d, &batch);
-        trip_reader_release(d->reader, &batch);
-        if (status)
-            return status;
-        if (trip_interrupted())
-            return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
+    int status = trip_reader_begin(d->reader, NULL);
+    for (int axis = 0; axis < 3; axis++) {
+        const trip_plan_list *list = &d->frame->plan->lists[axis];
+        for (int i = 0; i < list->pass_count && !status; i++)
+            status = trip_reader_then(d->reader, &list->passes[i].selection);
     }
     return status;
 }
 
-static int draw_pass(drawing *d, const trip_plan_pass *pass)
+/* The lists up to `last` that have passes, in order. */
+static int begin_lists(drawing *d, int last)
 {
-    int status = trip_reader_begin(d->reader, &pass->selection);
+    int status = 0;
+    for (; d->next_axis <= last && !status; d->next_axis++)
+        if (d->frame->plan->lists[d->next_axis].pass_count)
+            status = d->renderer->ops->begin_list(d->renderer, d->next_axis);
+    return status;
+}
+
+static bool is_front_to_back(const drawing *d, const trip_batch *batch)
+{
+    const trip_plan_pass *passes = d->frame->plan->lists[batch->selection->axis].passes;
+    return passes[batch->selection != &passes[0].selection].front_to_back;
+}
+
+static int draw_batch(drawing *d, const trip_batch *batch)
+{
+    uint64_t bytes = trip_reader_get_stats(d->reader).bytes_read;
+    d->stats->lists[batch->selection->axis].bytes_read += bytes - d->bytes_read;
+    d->bytes_read = bytes;
+    int status = begin_lists(d, batch->selection->axis);
     if (status)
         return status;
-    status = draw_batches(d, pass->front_to_back);
-    trip_reader_stats read = trip_reader_get_stats(d->reader);
-    add_reader_stats(&d->stats->reader, &read);
-    d->stats->lists[pass->selection.axis].bytes_read += read.bytes_read;
+    double start = now_ms();
+    status = d->renderer->ops->draw(d->renderer, batch, is_front_to_back(d, batch));
+    d->stats->draw_ms += now_ms() - start;
+    tell_progress(d, batch);
     return status;
 }
 
 static int draw_lists(drawing *d)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        const trip_plan_list *list = &d->frame->plan->lists[axis];
-        if (list->pass_count == 0)
-            continue;
-        int status = d->renderer->ops->begin_list(d->renderer, axis);
-        for (int i = 0; i < list->pass_count && !status; i++)
-            status = draw_pass(d, &list->passes[i]);
-        if (status)
-            return status;
+    trip_batch batch;
+    int status = begin_reading(d);
+    while (!status && (status = trip_reader_next(d->reader, &batch)) > 0) {
+        status = draw_batch(d, &batch);
+        trip_reader_release(d->reader, &batch);
+        if (!status && trip_interrupted())
+            status = trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
     }
-    return 0;
+    return status ? status : begin_lists(d, 2);
 }
 
 /* The renderer's counts; bytes were counted here. */
@@ -108,6 +111,7 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
     int status = renderer->ops->begin_frame(renderer, frame);
     if (!status)
         status = draw_lists(&d);
+    stats->reader = trip_reader_get_stats(reader);
     double merge_start = now_ms();
     if (!status)
         status = renderer->ops->end_frame(renderer, rgba);

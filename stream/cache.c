@@ -6,11 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    STALE_PASSES =
-        12,         /* two frames of three lists with two sides: a page unused for longer may go */
-    SEARCH_MAX = 8, /* entries looked at for one that may go */
-};
+enum { SEARCH_MAX = 8 /* entries looked at for one that may go */ };
 
 typedef struct entry {
     uint32_t page; /* reader's thread */
@@ -24,6 +20,7 @@ struct trip_cache {
     uint32_t first_page[3][TRIP_PLANES];
     unsigned page_log2;
     uint32_t page_count, entry_count, used, hand, pass;
+    uint32_t settled; /* nothing of this pass and those before it is under way */
     /* Of a page: position + 1, 0 = not here. Written by the reader's thread, release; acquire in
      * engine threads. */
     _Atomic uint32_t *entry_of;
@@ -91,6 +88,11 @@ uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offs
     return c->first_page[axis][plane] + (uint32_t)(offset >> c->page_log2);
 }
 
+void trip_cache_settle(trip_cache *c)
+{
+    c->settled = c->pass;
+}
+
 void trip_cache_begin_pass(trip_cache *c)
 {
     c->pass++;
@@ -114,14 +116,14 @@ static entry *find_room(trip_cache *c, uint32_t page)
     uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_relaxed);
     if (position) {
         entry *own = &c->entries[position - 1];
-        return own->last_pass == c->pass ? NULL : own;
+        return own->last_pass > c->settled ? NULL : own; /* else it may be being filled */
     }
     if (c->used < c->entry_count)
         return &c->entries[c->used++];
     for (int i = 0; i < SEARCH_MAX && c->entry_count > 0; i++) {
         entry *e = &c->entries[c->hand];
         c->hand = (c->hand + 1) % c->entry_count;
-        if (c->pass - e->last_pass > STALE_PASSES) {
+        if (c->pass - e->last_pass > TRIP_CACHE_STALE_PASSES) {
             atomic_store_explicit(&c->entry_of[e->page], 0, memory_order_relaxed);
             return e;
         }

@@ -3,11 +3,14 @@
  * end, where replacing the page unused for longest would always drop the one needed next.
  *
  * The reader's thread looks up and reserves; engine threads store and copy the pages of requests
- * under way, which stay where they are until the pass is over. */
+ * under way, which stay where they are: for TRIP_CACHE_STALE_PASSES passes at least. */
 #ifndef TRIP_CACHE_H
 #define TRIP_CACHE_H
 
 #include "dataset.h"
+
+/* Two frames of three lists with two sides: a page unused for longer may go. */
+#define TRIP_CACHE_STALE_PASSES 12
 
 typedef struct trip_cache trip_cache;
 
@@ -19,6 +22,8 @@ uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes);
 uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offset);
 
 /* Reader's thread: nothing is under way. */
+void trip_cache_settle(trip_cache *c);
+/* Reader's thread: requests of at most TRIP_CACHE_STALE_PASSES passes before may be under way. */
 void trip_cache_begin_pass(trip_cache *c);
 /* Reader's thread: whether the page is there; if so it stays for this pass. */
 bool trip_cache_find(trip_cache *c, uint32_t page);

@@ -15,7 +15,6 @@ void trip_planner_begin(trip_planner *p, const trip_selection *s)
     p->it = trip_run_begin(s);
     p->has_run = false;
     p->open = false;
-    p->runs_skipped = p->splats_skipped = 0;
 }
 
 /* The segment's place is known only now; its runs so far count from the file's start. */

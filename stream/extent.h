@@ -39,7 +39,8 @@ typedef struct trip_planner {
     size_t first_run;
 } trip_planner;
 
-/* slot_bytes is a multiple of page_bytes, gap_bytes at least page_bytes. */
+/* slot_bytes is a multiple of page_bytes, gap_bytes at least page_bytes. What was skipped adds up
+ * over selections. */
 void trip_planner_begin(trip_planner *p, const trip_selection *s);
 /* Fills the extent, whose runs and run_room are set; false when no run is left. */
 bool trip_planner_fill(trip_planner *p, trip_extent *e);

@@ -135,6 +135,24 @@ static int create_engine(trip_reader *r)
                                                        : "cannot start threads");
 }
 
+static void set_sources(trip_reader *r)
+{
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            r->sources[axis][plane] = (trip_source){
+                .fd = r->data->plane_fd[axis][plane],
+                .direct_fd = r->direct_fd[axis][plane],
+                .direct_refused = &r->direct_refused,
+                .file_bytes = r->data->lists[axis].splats * TRIP_RECORD_BYTES,
+                .page_log2 = r->data->header.page_log2,
+                .checksums = r->data->lists[axis].page_checksums[plane],
+                .cache = r->cache,
+                .first_page = r->cache ? trip_cache_page(r->cache, axis, plane, 0) : 0,
+                .fault = r->params.fault,
+                .fault_user = r->params.fault_user,
+            };
+}
+
 static int create_cache(trip_reader *r)
 {
     size_t bytes = r->params.cache_bytes;
@@ -195,6 +213,7 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
         status = take_memory(r);
     if (status == TRIP_OK)
         status = create_cache(r);
+    set_sources(r);
     if (status == TRIP_OK)
         status = create_engine(r);
     if (status == TRIP_OK && r->params.engine == TRIP_ENGINE_NULL)

@@ -1,4 +1,4 @@
-/* Streams the selected runs of a list from disk into slots of a ring and hands them out in draw
+/* Streams the selected runs of lists from disk into slots of a ring and hands them out in draw
  * order. Every page is checked against its checksum before it is handed out. One thread calls
  * begin, next and release; the engine's own threads meet it at the ring only. The picture must not
  * depend on anything set here. */
@@ -6,6 +6,8 @@
 #define TRIP_READER_H
 
 #include "selection.h"
+
+#define TRIP_READER_PASSES_MAX 8
 
 typedef enum trip_engine {
     TRIP_ENGINE_AUTO,  /* io_uring where the kernel allows it, else pread */
@@ -55,7 +57,7 @@ typedef struct trip_batch {
 } trip_batch;
 
 typedef struct trip_reader_stats {
-    uint64_t bytes_read, reads;           /* from the disk */
+    uint64_t bytes_read, reads;           /* from the disk, of slots handed out */
     uint64_t bytes_cached;                /* instead from the cache */
     uint64_t splats;                      /* handed out */
     uint64_t runs_skipped, bytes_skipped; /* by the skip callback; gaps read through count too */
@@ -67,13 +69,17 @@ typedef struct trip_reader trip_reader;
 int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_reader_params *params,
                        trip_budget *budget);
 void trip_reader_destroy(trip_reader *r);
-/* Starts reading; the selection must outlive the pass. A pass that is not over is given up; all its
- * batches must have been released. */
+/* Starts reading a pass (NULL: none yet); the selection must outlive it. Passes that are not over
+ * are given up; all batches must have been released. */
 int trip_reader_begin(trip_reader *r, const trip_selection *s);
-/* 1: *batch is filled and its slot held until released; 0: the pass is over; negative: failed. */
+/* Another pass behind those begun, up to TRIP_READER_PASSES_MAX: it is read ahead while the last
+ * batches of the one before it are drawn. */
+int trip_reader_then(trip_reader *r, const trip_selection *s);
+/* 1: *batch is filled and its slot held until released; 0: all passes are over; negative: failed.
+ */
 int trip_reader_next(trip_reader *r, trip_batch *batch);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
-/* Of the current or last pass. */
+/* Since trip_reader_begin(). */
 trip_reader_stats trip_reader_get_stats(const trip_reader *r);
 /* "io_uring", "io_uring+O_DIRECT", "pread", "pread+O_DIRECT" or "null". */
 const char *trip_reader_engine_name(const trip_reader *r);

@@ -1,4 +1,4 @@
-/* A pass: extents are planned and requested as slots become free, and handed out in draw order. */
+/* Passes: extents are planned and requested as slots become free, and handed out in draw order. */
 #include "reader.h"
 
 #include "reader_state.h"
@@ -23,7 +23,7 @@ static void request_done(trip_request *q)
 static trip_request *add_request(trip_reader *r, trip_slot *s, int plane, uint64_t offset,
                                  size_t bytes, unsigned char *data)
 {
-    const trip_source *source = &r->sources[plane];
+    const trip_source *source = &r->sources[s->selection->axis][plane];
     trip_request *q = &s->requests[s->request_count++];
     uint64_t left = source->file_bytes - offset;
     q->source = source;
@@ -61,7 +61,7 @@ static void reserve_pages(trip_reader *r, const trip_request *q)
 static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment, int plane,
                          unsigned char *data)
 {
-    const trip_source *source = &r->sources[plane];
+    const trip_source *source = &r->sources[s->selection->axis][plane];
     unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX * TRIP_PLANES;
     for (size_t at = 0; at < segment->bytes;) {
         uint64_t offset = segment->offset + at;
@@ -101,17 +101,37 @@ static void submit(trip_reader *r, trip_slot *s)
     r->ops->submit(r->engine, s->requests);
 }
 
+static void enter_pass(trip_reader *r)
+{
+    if (r->pass == r->pass_count)
+        return;
+    trip_planner_begin(&r->planner, r->passes[r->pass]);
+    if (r->cache)
+        trip_cache_begin_pass(r->cache);
+}
+
+/* What the slot will hold, of the pass being planned or else of those behind it; false when no runs
+ * are left. */
+static bool plan_slot(trip_reader *r, trip_slot *s)
+{
+    for (; r->pass < r->pass_count; r->pass++, enter_pass(r)) {
+        s->selection = r->passes[r->pass];
+        if (trip_planner_fill(&r->planner, &s->extent))
+            return true;
+    }
+    return false;
+}
+
 /* Plans and requests as much as there are free slots for. */
 static void fill_slots(trip_reader *r)
 {
-    for (unsigned i = 0; i < r->params.slots && !r->planned; i++) {
+    for (unsigned i = 0; i < r->params.slots; i++) {
         trip_slot *s = &r->slots[i];
         if (s->state != TRIP_SLOT_FREE)
             continue;
-        if (trip_planner_fill(&r->planner, &s->extent))
-            submit(r, s);
-        else
-            r->planned = true;
+        if (!plan_slot(r, s))
+            break;
+        submit(r, s);
     }
 }
 
@@ -155,51 +175,42 @@ void trip_reader_drain(trip_reader *r)
         wait_first(r)->state = TRIP_SLOT_FREE;
 }
 
-static void set_sources(trip_reader *r, int axis)
-{
-    for (int plane = 0; plane < TRIP_PLANES; plane++)
-        r->sources[plane] = (trip_source){
-            .fd = r->data->plane_fd[axis][plane],
-            .direct_fd = r->direct_fd[axis][plane],
-            .direct_refused = &r->direct_refused,
-            .file_bytes = r->data->lists[axis].splats * TRIP_RECORD_BYTES,
-            .page_log2 = r->data->header.page_log2,
-            .checksums = r->data->lists[axis].page_checksums[plane],
-            .cache = r->cache,
-            .first_page = r->cache ? trip_cache_page(r->cache, axis, plane, 0) : 0,
-            .fault = r->params.fault,
-            .fault_user = r->params.fault_user,
-        };
-}
-
 int trip_reader_begin(trip_reader *r, const trip_selection *s)
 {
     trip_reader_drain(r);
     for (unsigned i = 0; i < r->params.slots; i++)
         assert(r->slots[i].state == TRIP_SLOT_FREE);
     r->stats = (trip_reader_stats){ 0 };
-    r->selection = s;
-    r->planned = false;
+    r->pass = r->pass_count = 0;
     r->failed = 0;
     r->planner = (trip_planner){ .page_bytes = (size_t)1 << r->data->header.page_log2,
                                  .slot_bytes = r->params.slot_bytes,
                                  .gap_bytes = r->params.gap_bytes,
                                  .skip = r->params.skip,
                                  .skip_user = r->params.skip_user };
-    trip_planner_begin(&r->planner, s);
-    set_sources(r, s->axis);
     if (r->cache)
-        trip_cache_begin_pass(r->cache);
+        trip_cache_settle(r->cache);
+    return s ? trip_reader_then(r, s) : TRIP_OK;
+}
+
+int trip_reader_then(trip_reader *r, const trip_selection *s)
+{
+    if (r->pass_count == TRIP_READER_PASSES_MAX)
+        return trip_fail(TRIP_ERROR, "read", r->data->path, "more than %d passes at a time",
+                         TRIP_READER_PASSES_MAX);
+    r->passes[r->pass_count++] = s;
+    if (r->pass == r->pass_count - 1)
+        enter_pass(r);
     fill_slots(r);
     return TRIP_OK;
 }
 
-static int report_fault(const trip_reader *r, const trip_request *q)
+static int report_fault(const trip_reader *r, const trip_slot *s, const trip_request *q)
 {
     char name[32], where[4096];
     unsigned long long at = q->fault_at;
     snprintf(where, sizeof where, "%s/%s", r->data->path,
-             trip_dataset_plane_name(r->selection->axis, q->plane, name));
+             trip_dataset_plane_name(s->selection->axis, q->plane, name));
     if (q->fault == TRIP_REQUEST_CHECKSUM)
         return trip_fail(TRIP_ERROR, "read", where,
                          "byte %llu: the page that starts here is damaged (checksum): make the "
@@ -215,7 +226,7 @@ static int check_slot(const trip_reader *r, const trip_slot *s)
 {
     for (unsigned i = 0; i < s->request_count; i++)
         if (s->requests[i].fault != TRIP_REQUEST_OK)
-            return report_fault(r, &s->requests[i]);
+            return report_fault(r, s, &s->requests[i]);
     return TRIP_OK;
 }
 
@@ -223,7 +234,7 @@ static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
     bool normals = r->read_planes[TRIP_PLANE_NORMALS];
     *batch = (trip_batch){
-        .selection = r->selection,
+        .selection = s->selection,
         .voxels = (const uint32_t *)(const void *)s->memory,
         .normals =
             normals ? (const uint32_t *)(const void *)(s->memory + r->params.slot_bytes) : NULL,
@@ -240,11 +251,11 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     if (r->failed)
         return r->failed;
     fill_slots(r);
-    if (r->queue_count == 0 && !r->planned)
+    if (r->queue_count == 0 && r->pass == r->pass_count)
+        return 0;
+    if (r->queue_count == 0)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "all %u slots of the ring are held: release one first", r->params.slots);
-    if (r->queue_count == 0)
-        return 0;
     trip_slot *s = wait_first(r);
     r->failed = check_slot(r, s);
     if (r->failed) {

@@ -22,6 +22,7 @@ typedef struct trip_slot {
     trip_slot_state state;
     unsigned pending; /* under the reader's lock: requests not done */
     unsigned char *memory;
+    const trip_selection *selection; /* of its pass */
     trip_extent extent;
     trip_request requests[TRIP_SLOT_REQUESTS_MAX];
     unsigned request_count;
@@ -37,12 +38,12 @@ struct trip_reader {
     unsigned plane_count;
     int direct_fd[3][TRIP_PLANES];
     _Atomic bool direct_refused;
-    trip_source sources[TRIP_PLANES]; /* of the pass */
-    trip_cache *cache;                /* or NULL */
-    const trip_selection *selection;
+    trip_source sources[3][TRIP_PLANES];
+    trip_cache *cache; /* or NULL */
+    const trip_selection *passes[TRIP_READER_PASSES_MAX];
+    unsigned pass_count, pass; /* pass: the one being planned; pass_count when all are planned */
     trip_planner planner;
-    bool planned; /* no runs are left to plan */
-    int failed;   /* status that ended the pass */
+    int failed; /* status that ended the passes */
     trip_reader_stats stats;
     trip_slot *slots;
     unsigned char *slot_memory; /* NULL where it is the caller's */

@@ -9,7 +9,7 @@
 
 #include "cache.h"
 
-/* A plane file being read; the same for all requests of a pass. */
+/* A plane file being read. */
 typedef struct trip_source {
     int fd;
     int direct_fd;                /* the same file with O_DIRECT; -1 where that is refused */

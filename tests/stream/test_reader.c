@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <semaphore.h>
 #include <stdio.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
@@ -40,8 +41,9 @@ static size_t expect(const fixture *f, const trip_selection *s, fixture_voxel *o
     return n;
 }
 
-static size_t decode(const trip_batch *batch, int axis, fixture_voxel *out)
+static size_t decode(const trip_batch *batch, fixture_voxel *out)
 {
+    int axis = batch->selection->axis;
     size_t n = 0;
     for (size_t r = 0; r < batch->run_count; r++) {
         const trip_run *run = &batch->runs[r];
@@ -59,15 +61,18 @@ static size_t decode(const trip_batch *batch, int axis, fixture_voxel *out)
     return n;
 }
 
-/* One pass; batches are held for a while, up to one less than there are slots. */
-static int read_pass(trip_reader *r, const trip_selection *s, unsigned hold, fixture_voxel *out,
-                     size_t *count)
+/* Passes one behind the other; batches are held for a while, up to one less than there are slots.
+ */
+static int read_passes(trip_reader *r, const trip_selection *s, int passes, unsigned hold,
+                       fixture_voxel *out, size_t *count)
 {
     trip_batch held[64] = { 0 };
     unsigned first = 0, n = 0;
     int status;
     *count = 0;
-    assert_int_equal(trip_reader_begin(r, s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
+    for (int i = 0; i < passes; i++)
+        assert_int_equal(trip_reader_then(r, &s[i]), TRIP_OK);
     do {
         if (n > hold) {
             trip_reader_release(r, &held[first++ % 64]);
@@ -75,11 +80,17 @@ static int read_pass(trip_reader *r, const trip_selection *s, unsigned hold, fix
         }
         status = trip_reader_next(r, &held[(first + n) % 64]);
         if (status == 1)
-            *count += decode(&held[(first + n++) % 64], s->axis, out + *count);
+            *count += decode(&held[(first + n++) % 64], out + *count);
     } while (status == 1);
     while (n-- > 0)
         trip_reader_release(r, &held[first++ % 64]);
     return status;
+}
+
+static int read_pass(trip_reader *r, const trip_selection *s, unsigned hold, fixture_voxel *out,
+                     size_t *count)
+{
+    return read_passes(r, s, 1, hold, out, count);
 }
 
 static void select_some(trip_selection *s, const trip_dataset *d, uint64_t *state)
@@ -113,24 +124,30 @@ static long disturb(void *user, void *data, uint64_t offset, size_t bytes, long 
 }
 
 static void check_random_passes(const fixture *f, const trip_dataset *d,
-                                const trip_reader_params *params, unsigned hold, int passes)
+                                const trip_reader_params *params, unsigned hold, int rounds)
 {
+    enum { PASSES = 3 };
     trip_reader *r;
-    fixture_voxel *wanted = calloc(f->count + 1, sizeof *wanted);
-    fixture_voxel *got = calloc(f->count + 1, sizeof *got);
+    fixture_voxel *wanted = calloc(PASSES * f->count + 1, sizeof *wanted);
+    fixture_voxel *got = calloc(PASSES * f->count + 1, sizeof *got);
     uint64_t state = 5;
     assert_int_equal(trip_reader_create(&r, d, params, f->budget), TRIP_OK);
-    for (int i = 0; i < passes; i++) {
-        trip_selection s;
-        size_t n;
-        select_some(&s, d, &state);
-        size_t n_wanted = expect(f, &s, wanted);
-        assert_int_equal(read_pass(r, &s, hold, got, &n), 0);
+    for (int i = 0; i < rounds; i++) {
+        trip_selection s[PASSES];
+        size_t n, n_wanted = 0;
+        int passes = 1 + i % PASSES;
+        for (int k = 0; k < passes; k++) {
+            select_some(&s[k], d, &state);
+            n_wanted += expect(f, &s[k], wanted + n_wanted);
+        }
+        assert_int_equal(read_passes(r, s, passes, hold, got, &n), 0);
         assert_int_equal(n, n_wanted);
+        assert_int_equal(trip_reader_get_stats(r).splats, n);
         for (size_t k = 0; k < n && !(params->planes & 2); k++)
             wanted[k].normal = 0;
         assert_memory_equal(got, wanted, n * sizeof *got);
-        trip_selection_destroy(&s, f->budget);
+        for (int k = 0; k < passes; k++)
+            trip_selection_destroy(&s[k], f->budget);
     }
     trip_reader_destroy(r);
     free(wanted);
@@ -234,6 +251,74 @@ static void the_callers_own_memory_is_read_into(void **state)
     trip_reader_destroy(r);
     for (int i = 0; i < 3; i++)
         free(memory[i]);
+    close_fixture(&f, d);
+}
+
+/* Tells that a read has ended. */
+static long tell(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    (void)data;
+    (void)offset;
+    (void)bytes;
+    sem_post(user);
+    return result;
+}
+
+static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    trip_reader *r;
+    trip_selection s[3];
+    trip_batch batch;
+    sem_t reads;
+    (void)state;
+    open_fixture(&f, &d);
+    sem_init(&reads, 0, 0);
+    trip_reader_params params = { .slots = 3, .fault = tell, .fault_user = &reads };
+    assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
+    for (int i = 0; i < 3; i++)
+        select_all(&s[i], d, i, i == 1);
+    assert_int_equal(trip_reader_begin(r, &s[0]), TRIP_OK);
+    assert_int_equal(trip_reader_then(r, &s[1]), TRIP_OK);
+    assert_int_equal(trip_reader_then(r, &s[2]), TRIP_OK);
+    assert_int_equal(trip_reader_next(r, &batch), 1);
+    assert_ptr_equal(batch.selection, &s[0]);
+    for (int i = 0; i < 3; i++) /* every list is one slot; the first one is still held */
+        sem_wait(&reads);
+    trip_reader_release(r, &batch);
+    for (int i = 1; i < 3; i++) {
+        assert_int_equal(trip_reader_next(r, &batch), 1);
+        assert_ptr_equal(batch.selection, &s[i]);
+        assert_int_equal(trip_reader_get_stats(r).bytes_read, (i + 1) * f.count * 4);
+        trip_reader_release(r, &batch);
+    }
+    assert_int_equal(trip_reader_next(r, &batch), 0);
+    trip_reader_destroy(r);
+    for (int i = 0; i < 3; i++)
+        trip_selection_destroy(&s[i], f.budget);
+    sem_destroy(&reads);
+    close_fixture(&f, d);
+}
+
+static void more_passes_than_there_is_room_for_are_refused(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    trip_reader *r;
+    trip_selection s;
+    (void)state;
+    open_fixture(&f, &d);
+    assert_int_equal(trip_reader_create(&r, d, &(trip_reader_params){ 0 }, f.budget), TRIP_OK);
+    select_all(&s, d, 0, false);
+    assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
+    for (int i = 0; i < TRIP_READER_PASSES_MAX; i++)
+        assert_int_equal(trip_reader_then(r, &s), TRIP_OK);
+    fixture_catch_reports();
+    assert_int_equal(trip_reader_then(r, &s), TRIP_ERROR);
+    assert_non_null(strstr(fixture_reports(), "passes"));
+    trip_reader_destroy(r);
+    trip_selection_destroy(&s, f.budget);
     close_fixture(&f, d);
 }
 
@@ -606,6 +691,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_engine_and_ring_hands_out_the_same_runs),
         cmocka_unit_test(the_callers_own_memory_is_read_into),
+        cmocka_unit_test(a_pass_is_read_while_the_one_before_it_is_drawn),
+        cmocka_unit_test(more_passes_than_there_is_room_for_are_refused),
         cmocka_unit_test(a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line),
         cmocka_unit_test(refused_direct_reads_go_on_through_the_page_cache),
         cmocka_unit_test(a_second_pass_reads_only_what_the_cache_has_no_room_for),
