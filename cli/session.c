@@ -67,7 +67,7 @@ void session_close(session *s)
 
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
 {
-    enum { SLOTS = 8, MAX_SLOT_BYTES = 1 << 20 };
+    enum { SLOTS = 8, MAX_SLOT_BYTES = 512 << 10 };
     uint64_t left = trip_budget_left_bytes(s->budget);
     size_t page = (size_t)1 << s->data->header.page_log2;
     size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;

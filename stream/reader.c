@@ -11,10 +11,9 @@
 
 enum {
     DEFAULT_SLOTS = 8,
-    DEFAULT_SLOT_BYTES = 1 << 20,
+    DEFAULT_SLOT_BYTES = 512 << 10,
     DEFAULT_GAP_BYTES = 32 << 10,
-    DEFAULT_PREAD_THREADS = 4,
-    DEFAULT_URING_THREADS = 2,
+    DEFAULT_THREADS = 4,
     SLOT_BYTES_PER_RUN = 64, /* room for runs; where they are shorter, slots are not filled */
 };
 
@@ -110,10 +109,10 @@ static void release_memory(trip_reader *r)
     trip_budget_release(r->budget, r->slot_memory, n * slot_total_bytes(r));
 }
 
-static int start_engine(trip_reader *r, const trip_engine_ops *ops, unsigned threads)
+static int start_engine(trip_reader *r, const trip_engine_ops *ops)
 {
     int status = ops->create(&r->engine, r->params.slots * TRIP_SLOT_REQUESTS_MAX,
-                             r->params.threads ? r->params.threads : threads);
+                             r->params.threads ? r->params.threads : DEFAULT_THREADS);
     if (status == 0)
         r->ops = ops;
     return status;
@@ -124,9 +123,9 @@ static int create_engine(trip_reader *r)
     int status = -ENOSYS;
     trip_engine engine = r->params.engine;
     if (engine == TRIP_ENGINE_AUTO || engine == TRIP_ENGINE_URING)
-        status = start_engine(r, &trip_engine_uring, DEFAULT_URING_THREADS);
+        status = start_engine(r, &trip_engine_uring);
     if (status < 0 && engine != TRIP_ENGINE_URING)
-        status = start_engine(r, &trip_engine_pread, DEFAULT_PREAD_THREADS);
+        status = start_engine(r, &trip_engine_pread);
     if (status == 0)
         return TRIP_OK;
     errno = -status;

@@ -22,9 +22,9 @@ typedef struct trip_reader_params {
     trip_engine engine;
     unsigned planes;   /* bit per trip_plane; voxels always */
     unsigned slots;    /* ring length, 2 or more, default 8 */
-    size_t slot_bytes; /* per plane, a multiple of the page size; default 1 MiB or one page */
+    size_t slot_bytes; /* per plane, a multiple of the page size; default 512 KiB or one page */
     size_t gap_bytes;  /* gaps up to this are read through; default 32 KiB, at least a page */
-    unsigned threads;  /* that read (pread) and check; default 4, io_uring 2 */
+    unsigned threads;  /* that read (pread) and check; default 4 */
     bool buffered;     /* through the page cache, not O_DIRECT */
     /* Of verified pages kept in memory between passes, from the budget; 0 = none. */
     size_t cache_bytes;
