@@ -24,7 +24,7 @@
 #define TRIP_BUDGET_ON_HEAP 0
 #endif
 
-enum { ALIGNMENT_BYTES = 4096 };
+enum { ALIGNMENT_BYTES = 4096, LARGE_BYTES = 2 << 20 };
 
 struct trip_budget {
     uint64_t limit_bytes;
@@ -62,7 +62,8 @@ uint64_t trip_budget_peak_bytes(const trip_budget *b)
     return atomic_load_explicit(&b->peak_bytes, memory_order_relaxed);
 }
 
-/* Pages straight from the system: zeroed without being touched, and given back on release. Under
+/* Pages straight from the system: zeroed without being touched, and given back on release; large
+ * ones where it has them, since direct reads into these take far fewer pieces. Under
  * AddressSanitizer heap memory, so that it watches the borders and finds what is not released. */
 static void *map_pages(size_t bytes)
 {
@@ -71,7 +72,11 @@ static void *map_pages(size_t bytes)
         return memory ? memset(memory, 0, bytes) : NULL;
     }
     void *memory = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    return memory == MAP_FAILED ? NULL : memory;
+    if (memory == MAP_FAILED)
+        return NULL;
+    if (bytes >= LARGE_BYTES)
+        madvise(memory, bytes, MADV_HUGEPAGE);
+    return memory;
 }
 
 static void unmap_pages(void *memory, size_t bytes)
