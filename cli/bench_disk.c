@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -110,10 +111,36 @@ static int read_plane(const session *s, int axis, int plane, job *j, bool *direc
     return status;
 }
 
-int bench_files_read(const session *s, bench_files files, bench_disk_read *out)
+/* The budget's memory is in large pages. */
+static void *take_memory(const session *s, size_t bytes, bool large_pages)
+{
+    if (large_pages) {
+        void *large = trip_budget_take(s->budget, bytes);
+        return large ? memset(large, 0, bytes) : NULL;
+    }
+    if (!trip_budget_charge(s->budget, bytes))
+        return NULL;
+    void *memory = aligned_alloc(BLOCK_BYTES, bytes);
+    if (memory)
+        return memset(memory, 0, bytes);
+    trip_budget_discharge(s->budget, bytes);
+    return NULL;
+}
+
+static void release_memory(const session *s, void *memory, size_t bytes, bool large_pages)
+{
+    if (large_pages) {
+        trip_budget_release(s->budget, memory, bytes);
+        return;
+    }
+    free(memory);
+    trip_budget_discharge(s->budget, bytes);
+}
+
+int bench_files_read(const session *s, bench_files files, bool large_pages, bench_disk_read *out)
 {
     const size_t memory_bytes = (size_t)READERS * BLOCK_BYTES;
-    job j = { .memory = trip_budget_take(s->budget, memory_bytes) };
+    job j = { .memory = take_memory(s, memory_bytes, large_pages) };
     int status = 0;
     if (!j.memory)
         return trip_fail(TRIP_ERROR, "bench", s->input,
@@ -126,6 +153,54 @@ int bench_files_read(const session *s, bench_files files, bench_disk_read *out)
             status = read_plane(s, i / TRIP_PLANES, i % TRIP_PLANES, &j, &out->direct);
     out->ms = bench_now_ms() - start;
     out->bytes = atomic_load(&j.bytes);
-    trip_budget_release(s->budget, j.memory, memory_bytes);
+    release_memory(s, j.memory, memory_bytes, large_pages);
+    return status;
+}
+
+static bool has_list(bench_files files, int axis)
+{
+    return files >> axis * TRIP_PLANES & ((1u << TRIP_PLANES) - 1);
+}
+
+static int select_list(const session *s, int axis, trip_selection *all)
+{
+    const trip_list *list = &s->data->lists[axis];
+    int status = trip_selection_create(all, s->data, axis, false, 0, INT64_MAX, s->budget);
+    for (uint64_t i = 0; i < list->brick_count && !status; i++)
+        trip_selection_add(all, i);
+    return status;
+}
+
+static int stream_lists(trip_reader *reader, const trip_selection lists[3], bench_files files)
+{
+    trip_batch batch;
+    int status = trip_reader_begin(reader, NULL);
+    for (int axis = 0; axis < 3 && !status; axis++)
+        if (has_list(files, axis))
+            status = trip_reader_then(reader, &lists[axis]);
+    while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
+        trip_reader_release(reader, &batch);
+        status =
+            trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "bench", "lists", "interrupted") : 0;
+    }
+    return status;
+}
+
+int bench_files_stream(const session *s, bench_files files, trip_reader *reader,
+                       bench_disk_read *out)
+{
+    trip_selection lists[3] = { 0 };
+    int status = 0;
+    for (int axis = 0; axis < 3 && !status; axis++)
+        if (has_list(files, axis))
+            status = select_list(s, axis, &lists[axis]);
+    double start = bench_now_ms();
+    if (!status)
+        status = stream_lists(reader, lists, files);
+    out->ms = bench_now_ms() - start;
+    out->bytes = trip_reader_get_stats(reader).bytes_read;
+    out->direct = strstr(trip_reader_engine_name(reader), "O_DIRECT");
+    for (int axis = 0; axis < 3; axis++)
+        trip_selection_destroy(&lists[axis], s->budget);
     return status;
 }

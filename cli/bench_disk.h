@@ -21,6 +21,13 @@ typedef struct bench_disk_read {
     bool direct; /* O_DIRECT was not refused */
 } bench_disk_read;
 
-int bench_files_read(const session *s, bench_files files, bench_disk_read *out);
+/* Into memory as the system gives it to any program, or into large pages, which the reader's ring
+ * is in where the system has them. */
+int bench_files_read(const session *s, bench_files files, bool large_pages, bench_disk_read *out);
+
+/* The same bytes as the reader streams them: every splat of the files' lists, checked against its
+ * checksum and handed out, and not drawn. The reader reads the files' planes and skips nothing. */
+int bench_files_stream(const session *s, bench_files files, trip_reader *reader,
+                       bench_disk_read *out);
 
 #endif
