@@ -38,6 +38,7 @@ static void tell_progress(drawing *d, const trip_batch *batch)
  * one are drawn. */
 static int begin_reading(drawing *d)
 {
+    trip_reader_set_runs_only(d->reader, d->renderer->resident);
     int status = trip_reader_begin(d->reader, NULL);
     for (int axis = 0; axis < 3; axis++) {
         const trip_plan_list *list = &d->frame->plan->lists[axis];

@@ -122,6 +122,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                        trip_gl_context_limits(r->context)->storage_block_bytes);
     if (status)
         return status;
+    r->base.resident = frame->settings->indexed;
     r->frame = frame;
     r->layers = 0;
     r->quads = 0;

@@ -52,6 +52,7 @@ typedef struct trip_renderer_ops {
 /* Every renderer's first member. */
 struct trip_renderer {
     const trip_renderer_ops *ops;
+    bool resident; /* since begin_frame: it has the frame's splats, and takes runs alone */
 };
 
 int trip_reference_create(trip_renderer **out, trip_budget *budget);

@@ -48,8 +48,8 @@ typedef struct trip_reader_params {
  * drawn last splat to first. A run may be split between two batches. */
 typedef struct trip_batch {
     const trip_selection *selection;
-    const uint32_t *voxels;
-    const uint32_t *normals; /* NULL when that plane is not read */
+    const uint32_t *voxels;  /* NULL when only runs are asked for */
+    const uint32_t *normals; /* NULL also when that plane is not read */
     size_t splats;           /* length of the arrays above, holes included */
     const trip_run *runs;
     size_t run_count;
@@ -69,6 +69,9 @@ typedef struct trip_reader trip_reader;
 int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_reader_params *params,
                        trip_budget *budget);
 void trip_reader_destroy(trip_reader *r);
+/* For a renderer that has the splats already: nothing is read, and batches hold runs only,
+ * from the next trip_reader_begin() on, which must follow. */
+void trip_reader_set_runs_only(trip_reader *r, bool runs_only);
 /* Starts reading a pass (NULL: none yet); the selection must outlive it. Passes that are not over
  * are given up; all batches must have been released. */
 int trip_reader_begin(trip_reader *r, const trip_selection *s);

@@ -80,10 +80,16 @@ static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segme
     }
 }
 
+static void enqueue(trip_reader *r, trip_slot *s)
+{
+    s->state = TRIP_SLOT_READING;
+    s->pending = s->request_count;
+    r->queue[(r->queue_first + r->queue_count++) % r->params.slots] = s;
+}
+
 /* The planes of a segment are requested side by side. */
 static void submit(trip_reader *r, trip_slot *s)
 {
-    s->request_count = 0;
     for (unsigned i = 0; i < s->extent.segment_count; i++) {
         const trip_segment *segment = &s->extent.segments[i];
         unsigned char *data = s->memory + segment->slot_offset;
@@ -95,9 +101,7 @@ static void submit(trip_reader *r, trip_slot *s)
     }
     for (unsigned i = 0; i < s->request_count; i++)
         s->requests[i].next = i + 1 < s->request_count ? &s->requests[i + 1] : NULL;
-    s->state = TRIP_SLOT_READING;
-    s->pending = s->request_count;
-    r->queue[(r->queue_first + r->queue_count++) % r->params.slots] = s;
+    enqueue(r, s);
     r->ops->submit(r->engine, s->requests);
 }
 
@@ -131,7 +135,11 @@ static void fill_slots(trip_reader *r)
             continue;
         if (!plan_slot(r, s))
             break;
-        submit(r, s);
+        s->request_count = 0;
+        if (r->runs_only)
+            enqueue(r, s);
+        else
+            submit(r, s);
     }
 }
 
@@ -173,6 +181,12 @@ void trip_reader_drain(trip_reader *r)
 {
     while (r->queue_count > 0)
         wait_first(r)->state = TRIP_SLOT_FREE;
+}
+
+void trip_reader_set_runs_only(trip_reader *r, bool runs_only)
+{
+    trip_reader_drain(r);
+    r->runs_only = runs_only;
 }
 
 int trip_reader_begin(trip_reader *r, const trip_selection *s)
@@ -232,12 +246,11 @@ static int check_slot(const trip_reader *r, const trip_slot *s)
 
 static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
-    bool normals = r->read_planes[TRIP_PLANE_NORMALS];
+    const void *voxels = s->memory, *normals = s->memory + r->params.slot_bytes;
     *batch = (trip_batch){
         .selection = s->selection,
-        .voxels = (const uint32_t *)(const void *)s->memory,
-        .normals =
-            normals ? (const uint32_t *)(const void *)(s->memory + r->params.slot_bytes) : NULL,
+        .voxels = r->runs_only ? NULL : voxels,
+        .normals = r->runs_only || !r->read_planes[TRIP_PLANE_NORMALS] ? NULL : normals,
         .splats = s->extent.bytes / TRIP_RECORD_BYTES,
         .runs = s->extent.runs,
         .run_count = s->extent.run_count,

@@ -44,6 +44,7 @@ struct trip_reader {
     unsigned pass_count, pass; /* pass: the one being planned; pass_count when all are planned */
     trip_planner planner;
     int failed; /* status that ended the passes */
+    bool runs_only;
     trip_reader_stats stats;
     trip_slot *slots;
     unsigned char *slot_memory; /* NULL where it is the caller's */

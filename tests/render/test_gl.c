@@ -109,6 +109,7 @@ static void every_form_of_submission_gives_the_same_picture_and_counts(void **st
         scene_picture p = scene_draw(&s, &gl, &view, &settings);
         assert_agrees(names[form], &expected, &p);
         assert_same_counts(&expected, &p);
+        assert_true((p.stats.reader.bytes_read == 0) == settings.indexed); /* resident lists */
         scene_picture_free(&p);
     }
     scene_picture_free(&expected);

@@ -301,6 +301,53 @@ static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
     close_fixture(&f, d);
 }
 
+static void with_runs_alone_nothing_is_read(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    trip_reader *r;
+    trip_selection s;
+    trip_batch batch;
+    trip_run run;
+    sem_t reads;
+    int ended;
+    (void)state;
+    open_fixture(&f, &d);
+    sem_init(&reads, 0, 0);
+    trip_reader_params params = { .planes = 3, .slots = 3, .fault = tell, .fault_user = &reads };
+    fixture_voxel *out = calloc(f.count, sizeof *out);
+    size_t n;
+    assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
+    select_all(&s, d, 1, true);
+    trip_run_iterator it = trip_run_begin(&s);
+    trip_reader_set_runs_only(r, true);
+    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    while (trip_reader_next(r, &batch) == 1) {
+        assert_null(batch.voxels);
+        assert_null(batch.normals);
+        for (size_t i = 0; i < batch.run_count; i++) { /* a list is one slot: runs are whole */
+            assert_true(trip_run_next(&it, &run));
+            assert_int_equal(batch.runs[i].brick, run.brick);
+            assert_int_equal(batch.runs[i].sheet, run.sheet);
+            assert_int_equal(batch.runs[i].count, run.count);
+        }
+        trip_reader_release(r, &batch);
+    }
+    assert_false(trip_run_next(&it, &run));
+    assert_int_equal(trip_reader_get_stats(r).bytes_read, 0);
+    assert_int_equal(trip_reader_get_stats(r).splats, f.count);
+    sem_getvalue(&reads, &ended);
+    assert_int_equal(ended, 0);
+    trip_reader_set_runs_only(r, false);
+    assert_int_equal(read_pass(r, &s, 0, out, &n), 0);
+    assert_int_equal(n, f.count);
+    trip_selection_destroy(&s, f.budget);
+    trip_reader_destroy(r);
+    sem_destroy(&reads);
+    free(out);
+    close_fixture(&f, d);
+}
+
 static void more_passes_than_there_is_room_for_are_refused(void **state)
 {
     fixture f;
@@ -692,6 +739,7 @@ int main(void)
         cmocka_unit_test(every_engine_and_ring_hands_out_the_same_runs),
         cmocka_unit_test(the_callers_own_memory_is_read_into),
         cmocka_unit_test(a_pass_is_read_while_the_one_before_it_is_drawn),
+        cmocka_unit_test(with_runs_alone_nothing_is_read),
         cmocka_unit_test(more_passes_than_there_is_room_for_are_refused),
         cmocka_unit_test(a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line),
         cmocka_unit_test(refused_direct_reads_go_on_through_the_page_cache),
