@@ -1,24 +1,46 @@
 #include "cpu_pool.h"
 
+#include <assert.h>
 #include <pthread.h>
 #include <sched.h>
+#include <stdatomic.h>
+#include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "report.h"
 
-enum { MAX_JOBS = 2, MAX_THREADS = 256 };
+enum { SLOTS = 2, MAX_THREADS = 256 };
+
+/* How often a thread looks for work before it sleeps: some 50 microseconds. */
+enum { LOOKS = 1000 };
+
+/* A job's tickets in one word, so that taking a task and knowing that its job is still the same are
+ * one step: tasks, tasks given out, and a number that tells one job in the slot from the next. */
+#define TICKET_BITS 20
+#define TICKET_MASK ((UINT64_C(1) << TICKET_BITS) - 1)
+#define NUMBER_ONE (UINT64_C(1) << 2 * TICKET_BITS)
+
+typedef struct slot {
+    _Atomic uint64_t tickets; /* tasks << TICKET_BITS | given out; release by the starter */
+    /* Written before `tickets` is released, read by who took a ticket. */
+    void (*run)(void *context, unsigned task, unsigned thread);
+    void *context;
+    _Atomic unsigned finished; /* each task's release, the waiter's acquire */
+    bool taken;                /* the starter's */
+} slot;
 
 struct trip_cpu_pool {
     unsigned threads;
     pthread_t *workers;
-    unsigned started;
+    unsigned started, looks;
+    slot slots[SLOTS];
+    _Atomic unsigned oldest;   /* slot to look at first */
+    _Atomic unsigned version;  /* counts starts: who has seen them all may sleep */
+    _Atomic unsigned sleepers; /* changed under the lock */
+    _Atomic bool waiting;      /* the starter sleeps; changed under the lock */
+    _Atomic bool stop;
     pthread_mutex_t lock;
-    /* Under the lock. */
     pthread_cond_t work, done;
-    trip_cpu_job *jobs[MAX_JOBS]; /* active ones, oldest first */
-    unsigned job_count;
-    bool stop;
 };
 
 typedef struct worker {
@@ -26,45 +48,86 @@ typedef struct worker {
     unsigned thread;
 } worker;
 
-/* Under the lock: the next task of the oldest job that has one. */
-static trip_cpu_job *take_task(trip_cpu_pool *pool, unsigned *task)
+static void pause_a_little(void)
 {
-    for (unsigned i = 0; i < pool->job_count; i++) {
-        trip_cpu_job *job = pool->jobs[i];
-        if (job->next < job->tasks) {
-            *task = job->next++;
-            return job;
-        }
-    }
-    return NULL;
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    __asm__ volatile("yield");
+#endif
 }
 
-/* Under the lock, which is given up while the task runs. */
-static void run_task(trip_cpu_pool *pool, trip_cpu_job *job, unsigned task, unsigned thread)
+static unsigned tasks_of(uint64_t tickets)
 {
-    pthread_mutex_unlock(&pool->lock);
-    job->run(job->context, task, thread);
-    pthread_mutex_lock(&pool->lock);
-    if (++job->finished == job->tasks)
+    return (unsigned)(tickets >> TICKET_BITS & TICKET_MASK);
+}
+
+/* Runs a task of a slot's job, if it has one left. */
+static bool run_task(trip_cpu_pool *pool, slot *s, unsigned thread)
+{
+    uint64_t tickets = atomic_load_explicit(&s->tickets, memory_order_acquire);
+    do {
+        if ((tickets & TICKET_MASK) >= tasks_of(tickets))
+            return false;
+    } while (!atomic_compare_exchange_weak_explicit(&s->tickets, &tickets, tickets + 1,
+                                                    memory_order_acquire, memory_order_acquire));
+    s->run(s->context, (unsigned)(tickets & TICKET_MASK), thread);
+    if (atomic_fetch_add(&s->finished, 1) + 1 == tasks_of(tickets) && atomic_load(&pool->waiting)) {
+        pthread_mutex_lock(&pool->lock);
         pthread_cond_signal(&pool->done);
+        pthread_mutex_unlock(&pool->lock);
+    }
+    return true;
+}
+
+static bool run_any(trip_cpu_pool *pool, unsigned thread)
+{
+    unsigned oldest = atomic_load_explicit(&pool->oldest, memory_order_relaxed);
+    for (unsigned i = 0; i < SLOTS; i++)
+        if (run_task(pool, &pool->slots[(oldest + i) % SLOTS], thread))
+            return true;
+    return false;
+}
+
+/* Until something is started after `seen`. */
+static void await_start(trip_cpu_pool *pool, unsigned seen)
+{
+    for (unsigned i = 0; i < pool->looks; i++) {
+        if (atomic_load_explicit(&pool->version, memory_order_relaxed) != seen)
+            return;
+        pause_a_little();
+    }
+    pthread_mutex_lock(&pool->lock);
+    atomic_fetch_add(&pool->sleepers, 1);
+    while (atomic_load(&pool->version) == seen)
+        pthread_cond_wait(&pool->work, &pool->lock);
+    atomic_fetch_sub(&pool->sleepers, 1);
+    pthread_mutex_unlock(&pool->lock);
 }
 
 static void *work(void *argument)
 {
     worker self = *(worker *)argument;
-    trip_cpu_pool *pool = self.pool;
     free(argument);
-    pthread_mutex_lock(&pool->lock);
-    while (!pool->stop) {
-        unsigned task;
-        trip_cpu_job *job = take_task(pool, &task);
-        if (job)
-            run_task(pool, job, task, self.thread);
-        else
-            pthread_cond_wait(&pool->work, &pool->lock);
+    for (;;) {
+        unsigned seen = atomic_load(&self.pool->version);
+        if (atomic_load(&self.pool->stop))
+            return NULL;
+        while (run_any(self.pool, self.thread))
+            continue;
+        await_start(self.pool, seen);
     }
+}
+
+/* Lets everyone know that there is something new. */
+static void announce(trip_cpu_pool *pool)
+{
+    atomic_fetch_add(&pool->version, 1);
+    if (atomic_load(&pool->sleepers) == 0)
+        return;
+    pthread_mutex_lock(&pool->lock);
+    pthread_cond_broadcast(&pool->work);
     pthread_mutex_unlock(&pool->lock);
-    return NULL;
 }
 
 static unsigned processors(void)
@@ -99,6 +162,7 @@ int trip_cpu_pool_create(trip_cpu_pool **out, unsigned threads)
     pool->threads = threads ? threads : processors();
     if (pool->threads > MAX_THREADS)
         pool->threads = MAX_THREADS;
+    pool->looks = pool->threads <= processors() ? LOOKS : 0;
     pthread_mutex_init(&pool->lock, NULL);
     pthread_cond_init(&pool->work, NULL);
     pthread_cond_init(&pool->done, NULL);
@@ -118,10 +182,8 @@ void trip_cpu_pool_destroy(trip_cpu_pool *pool)
 {
     if (!pool)
         return;
-    pthread_mutex_lock(&pool->lock);
-    pool->stop = true;
-    pthread_cond_broadcast(&pool->work);
-    pthread_mutex_unlock(&pool->lock);
+    atomic_store(&pool->stop, true);
+    announce(pool);
     for (unsigned i = 0; i < pool->started; i++)
         pthread_join(pool->workers[i], NULL);
     pthread_cond_destroy(&pool->done);
@@ -138,34 +200,50 @@ unsigned trip_cpu_pool_threads(const trip_cpu_pool *pool)
 
 void trip_cpu_pool_start(trip_cpu_pool *pool, trip_cpu_job *job)
 {
-    pthread_mutex_lock(&pool->lock);
-    job->next = job->finished = 0;
-    job->active = true;
-    pool->jobs[pool->job_count++] = job;
-    pthread_cond_broadcast(&pool->work);
-    pthread_mutex_unlock(&pool->lock);
+    unsigned at = pool->slots[0].taken;
+    slot *s = &pool->slots[at];
+    assert(!s->taken && job->tasks <= TICKET_MASK);
+    job->slot = at;
+    job->active = s->taken = true;
+    s->run = job->run;
+    s->context = job->context;
+    atomic_store_explicit(&s->finished, 0, memory_order_relaxed);
+    atomic_store_explicit(&pool->oldest, pool->slots[1 - at].taken ? 1 - at : at,
+                          memory_order_relaxed);
+    uint64_t number = atomic_load_explicit(&s->tickets, memory_order_relaxed) / NUMBER_ONE + 1;
+    atomic_store_explicit(&s->tickets, number * NUMBER_ONE | (uint64_t)job->tasks << TICKET_BITS,
+                          memory_order_release);
+    announce(pool);
 }
 
-/* Under the lock. */
-static void retire(trip_cpu_pool *pool, trip_cpu_job *job)
+/* Until every task of a slot's job is done. */
+static void await_finish(trip_cpu_pool *pool, const slot *s, unsigned tasks)
 {
-    unsigned kept = 0;
-    for (unsigned i = 0; i < pool->job_count; i++)
-        if (pool->jobs[i] != job)
-            pool->jobs[kept++] = pool->jobs[i];
-    pool->job_count = kept;
-    job->active = false;
+    for (unsigned i = 0; i < pool->looks; i++) {
+        if (atomic_load_explicit(&s->finished, memory_order_acquire) == tasks)
+            return;
+        pause_a_little();
+    }
+    pthread_mutex_lock(&pool->lock);
+    atomic_store(&pool->waiting, true);
+    while (atomic_load(&s->finished) != tasks)
+        pthread_cond_wait(&pool->done, &pool->lock);
+    atomic_store(&pool->waiting, false);
+    pthread_mutex_unlock(&pool->lock);
 }
 
 void trip_cpu_pool_wait(trip_cpu_pool *pool, trip_cpu_job *job)
 {
     if (!job->active)
         return;
-    pthread_mutex_lock(&pool->lock);
-    while (job->next < job->tasks)
-        run_task(pool, job, job->next++, 0);
-    while (job->finished < job->tasks)
-        pthread_cond_wait(&pool->done, &pool->lock);
-    retire(pool, job);
-    pthread_mutex_unlock(&pool->lock);
+    slot *s = &pool->slots[job->slot];
+    while (run_task(pool, s, 0))
+        continue;
+    /* The last tasks run elsewhere: what the other job has is done meanwhile. */
+    while (atomic_load_explicit(&s->finished, memory_order_acquire) != job->tasks &&
+           run_any(pool, 0))
+        continue;
+    await_finish(pool, s, job->tasks);
+    job->active = s->taken = false;
+    atomic_store_explicit(&pool->oldest, 1 - job->slot, memory_order_relaxed);
 }

@@ -1,7 +1,10 @@
 /* Threads of the CPU renderer, made once: jobs of independent tasks, run by the workers and by
  * whoever waits for them. Jobs are started and waited for by one thread, the renderer's; tasks of
  * the job started first are taken first. Everything the starter wrote before the start is seen by
- * the tasks, and everything they wrote is seen after the wait. */
+ * the tasks, and everything they wrote is seen after the wait.
+ *
+ * A frame has many short jobs, and waking a thread can take longer than one of them: so threads
+ * look for work a little while before they sleep. */
 #ifndef TRIP_CPU_POOL_H
 #define TRIP_CPU_POOL_H
 
@@ -13,9 +16,9 @@ typedef struct trip_cpu_job {
     /* `thread` is below trip_cpu_pool_threads(), and no two run with the same at a time. */
     void (*run)(void *context, unsigned task, unsigned thread);
     void *context;
-    unsigned tasks;
-    /* The pool's, under its lock. */
-    unsigned next, finished;
+    unsigned tasks; /* below 2^20 */
+    /* The pool's, on the renderer's thread. */
+    unsigned slot;
     bool active;
 } trip_cpu_job;
 
