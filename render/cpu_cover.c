@@ -162,26 +162,33 @@ uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, bool reve
 /* Components of r are linear over the tile: their extremes are at its corners. */
 static void magnitudes(const trip_camera *c, int x, int y, double least[3], double most[3])
 {
-    for (int axis = 0; axis < 3; axis++) {
-        double lo = INFINITY, hi = -INFINITY;
-        for (int corner = 0; corner < 4; corner++) {
-            trip_vec3 r = trip_camera_ray(c, x + (corner & 1 ? TRIP_CPU_TILE : 0),
-                                          y + (corner & 2 ? TRIP_CPU_TILE : 0));
-            lo = fmin(lo, trip_component(r, axis));
-            hi = fmax(hi, trip_component(r, axis));
+    double lo[3] = { INFINITY, INFINITY, INFINITY }, hi[3] = { -INFINITY, -INFINITY, -INFINITY };
+    for (int corner = 0; corner < 4; corner++) {
+        trip_vec3 ray = trip_camera_ray(c, x + (corner & 1 ? TRIP_CPU_TILE : 0),
+                                        y + (corner & 2 ? TRIP_CPU_TILE : 0));
+        for (int axis = 0; axis < 3; axis++) {
+            double r = trip_component(ray, axis);
+            lo[axis] = r < lo[axis] ? r : lo[axis];
+            hi[axis] = r > hi[axis] ? r : hi[axis];
         }
-        most[axis] = fmax(fabs(lo), fabs(hi));
-        least[axis] = lo <= 0 && hi >= 0 ? 0 : fmin(fabs(lo), fabs(hi));
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        most[axis] = fmax(fabs(lo[axis]), fabs(hi[axis]));
+        least[axis] = lo[axis] <= 0 && hi[axis] >= 0 ? 0 : fmin(fabs(lo[axis]), fabs(hi[axis]));
     }
 }
 
-bool trip_cpu_tile_without_weight(const trip_cpu_view *view, int x, int y)
+unsigned trip_cpu_tile_axes(const trip_cpu_view *view, int x, int y)
 {
     const trip_settings *s = view->of->settings;
     double least[3], most[3], h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    unsigned axes = 0;
     if (s->method == TRIP_METHOD_AXIS)
-        return view->axis != view->of->plan->axis_of_view;
+        return 1u << view->of->plan->axis_of_view;
     magnitudes(&view->splat.camera, x, y, least, most);
     double largest = fmax(least[0], fmax(least[1], least[2]));
-    return most[view->axis] < h * largest * (1 - 1e-12);
+    for (int axis = 0; axis < 3; axis++)
+        if (!(most[axis] < h * largest * (1 - 1e-12)))
+            axes |= 1u << axis;
+    return axes;
 }

@@ -54,7 +54,8 @@ trip_cpu_box trip_cpu_square_box(const trip_run *run, uint32_t voxel);
  * `reversed`. */
 uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, bool reversed);
 
-/* True only when no pixel of the tile at (x, y) has weight in the view's list. */
-bool trip_cpu_tile_without_weight(const trip_cpu_view *view, int x, int y);
+/* The axes, a bit each, whose lists may have weight in the tile at (x, y). Where there is but one,
+ * its weight is 1 all over the tile. */
+unsigned trip_cpu_tile_axes(const trip_cpu_view *view, int x, int y);
 
 #endif

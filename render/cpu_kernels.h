@@ -115,6 +115,13 @@ typedef struct trip_cpu_scratch {
     trip_cpu_lanes lanes;
 } trip_cpu_scratch;
 
+/* What a tile holds when all lists are drawn. */
+typedef enum trip_cpu_content {
+    TRIP_CPU_NOTHING,
+    TRIP_CPU_LAYER, /* of the only list with weight there, as blended */
+    TRIP_CPU_SUM,   /* of several lists, as merged */
+} trip_cpu_content;
+
 typedef struct trip_cpu_kernels {
     const char *isa;
     unsigned lanes;
@@ -129,8 +136,9 @@ typedef struct trip_cpu_kernels {
     uint32_t (*project)(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
                         trip_cpu_lanes *lanes, trip_cpu_splat *out);
 
-    /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere. */
-    void (*tile_clear)(const trip_cpu_view *view, int x, int y, float *pixels);
+    /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere; `alone`
+     * says that its weight is 1 all over the tile. */
+    void (*tile_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
     /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. */
     void (*tile_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
                        unsigned quarters, float *pixels);
@@ -143,8 +151,9 @@ typedef struct trip_cpu_kernels {
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
     void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum);
-    /* The finished picture of a tile into an image; sum NULL: nothing was drawn there. */
-    void (*tile_finish)(const trip_cpu_view *view, int x, int y, const float *sum, float *rgba);
+    /* The finished picture of a tile into an image, from what the lists came to there. */
+    void (*tile_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
+                        const float *pixels, float *rgba);
 } trip_cpu_kernels;
 
 #endif

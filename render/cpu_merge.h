@@ -96,15 +96,16 @@ INLINE vm in_image(const trip_camera *camera, int x, int y, int column, int row)
     return vm_and(v_gt(v_set((float)camera->width), px), v_gt(v_set((float)camera->height), py));
 }
 
-static void tile_clear(const trip_cpu_view *view, int x, int y, float *pixels)
+static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, float *pixels)
 {
     for (int b = 0; b < BLOCKS; b++) {
         float *block = pixels + BLOCK_FLOATS * b;
         int column = b % BLOCKS_ACROSS, row = b / BLOCKS_ACROSS;
         vf t = v_set(1);
         if (view->front_to_back) {
-            vf w = weight(view, view->axis, x, y, column, row);
-            vm open = vm_and(v_gt(w, v_set(0)), in_image(&view->splat.camera, x, y, column, row));
+            vm open = in_image(&view->splat.camera, x, y, column, row);
+            if (!alone)
+                open = vm_and(open, v_gt(weight(view, view->axis, x, y, column, row), v_set(0)));
             t = v_select(open, t, v_set(0));
         }
         for (int c = 0; c < 3; c++)
@@ -143,17 +144,25 @@ INLINE vf weight_sum(const trip_cpu_view *view, int x, int y, int b)
     return sum;
 }
 
-/* The merged block over the background. */
-INLINE void finish_block(const trip_cpu_view *view, int x, int y, int b, const float *sum,
-                         vf out[4])
+/* Block b of the picture before the background. */
+INLINE void merged_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
+                         const float *pixels, vf out[4])
+{
+    vf inverse = content == TRIP_CPU_SUM ? v_set(1) / weight_sum(view, x, y, b) : v_set(1);
+    for (int c = 0; c < 4; c++)
+        out[c] = v_load(pixels + BLOCK_FLOATS * b + c * V) * inverse;
+    if (content == TRIP_CPU_LAYER)
+        out[3] = v_set(1) - out[3];
+}
+
+/* The block over the background. */
+INLINE void finish_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
+                         const float *pixels, vf out[4])
 {
     const double *background = view->of->settings->background;
     vf merged[4] = { v_set(0), v_set(0), v_set(0), v_set(0) };
-    if (sum) {
-        vf inverse = v_set(1) / weight_sum(view, x, y, b);
-        for (int c = 0; c < 4; c++)
-            merged[c] = v_load(sum + BLOCK_FLOATS * b + c * V) * inverse;
-    }
+    if (content != TRIP_CPU_NOTHING)
+        merged_block(view, x, y, b, content, pixels, merged);
     vf through = v_set(1) - merged[3];
     for (int c = 0; c < 4; c++) {
         double behind = c == 3 ? background[3] : background[c] * background[3];
@@ -161,7 +170,8 @@ INLINE void finish_block(const trip_cpu_view *view, int x, int y, int b, const f
     }
 }
 
-static void tile_finish(const trip_cpu_view *view, int x, int y, const float *sum, float *rgba)
+static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
+                        const float *pixels, float *rgba)
 {
     const trip_camera *camera = &view->splat.camera;
     uint32_t row[V];
@@ -170,7 +180,7 @@ static void tile_finish(const trip_cpu_view *view, int x, int y, const float *su
         row[i] = 4 * i;
     for (int b = 0; b < BLOCKS; b++) {
         vf out[4];
-        finish_block(view, x, y, b, sum, out);
+        finish_block(view, x, y, b, content, pixels, out);
         v_store_rows(block, row, out[0], out[1], out[2], out[3]);
         int first = x + 4 * (b % BLOCKS_ACROSS);
         int count = camera->width - first < 4 ? camera->width - first : 4;

@@ -57,6 +57,7 @@ typedef struct cpu {
     size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
     float *pixels, *sums;
     uint8_t *states;
+    uint8_t *axes; /* whose lists may have weight in a tile, a bit each */
     portion *portions;
 
     const trip_frame *frame;
@@ -94,6 +95,12 @@ static int tile_y(const cpu *r, uint32_t tile)
 static float *tile_pixels(const cpu *r, uint32_t tile)
 {
     return r->pixels + (size_t)tile * FLOATS_PER_TILE;
+}
+
+/* Whether one list alone has weight in a tile, and so it is 1 all over. */
+static bool is_alone(const cpu *r, uint32_t tile)
+{
+    return (r->axes[tile] & (r->axes[tile] - 1)) == 0;
 }
 
 /* ---- projecting a batch ---- */
@@ -253,7 +260,7 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
     trip_cpu_scratch *s = &r->workers[thread].scratch;
     int x = tile_x(r, p->tile), y = tile_y(r, p->tile);
     if (!(r->states[p->tile] & TILE_BEGUN)) {
-        r->kernels->tile_clear(&r->view, x, y, tile_pixels(r, p->tile));
+        r->kernels->tile_clear(&r->view, x, y, is_alone(r, p->tile), tile_pixels(r, p->tile));
         r->states[p->tile] |= TILE_BEGUN;
     }
     r->kernels->tile_begin(&r->view, s, x, y, p->quarters, tile_pixels(r, p->tile));
@@ -414,30 +421,58 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
 
 /* ---- lists and frames ---- */
 
-static void merge_tile(void *context, unsigned task, unsigned thread)
+static float *tile_sum(const cpu *r, uint32_t tile)
+{
+    return r->sums + (size_t)tile * FLOATS_PER_TILE;
+}
+
+/* What is alone in its tile stays as it is. */
+static bool is_to_merge(const cpu *r, uint32_t tile)
+{
+    return r->states[tile] & TILE_BEGUN && !is_alone(r, tile);
+}
+
+static void merge_tile(cpu *r, uint32_t tile)
+{
+    bool first = !(r->states[tile] & TILE_MERGED);
+    r->kernels->tile_merge(&r->view, tile_x(r, tile), tile_y(r, tile), tile_pixels(r, tile), first,
+                           tile_sum(r, tile));
+    r->states[tile] = TILE_MERGED;
+}
+
+static void finish_tile(cpu *r, uint32_t tile)
+{
+    trip_cpu_content content = TRIP_CPU_NOTHING;
+    if (r->states[tile] & TILE_MERGED)
+        content = TRIP_CPU_SUM;
+    else if (r->states[tile] & TILE_BEGUN)
+        content = TRIP_CPU_LAYER;
+    r->kernels->tile_finish(&r->view, tile_x(r, tile), tile_y(r, tile), content,
+                            content == TRIP_CPU_SUM ? tile_sum(r, tile) : tile_pixels(r, tile),
+                            r->rgba);
+}
+
+/* Tasks of whole rows of tiles. */
+static void merge_row(void *context, unsigned task, unsigned thread)
 {
     cpu *r = context;
     (void)thread;
-    if (!(r->states[task] & TILE_BEGUN))
-        return;
-    bool first = !(r->states[task] & TILE_MERGED);
-    r->kernels->tile_merge(&r->view, tile_x(r, task), tile_y(r, task), tile_pixels(r, task), first,
-                           r->sums + (size_t)task * FLOATS_PER_TILE);
-    r->states[task] = TILE_MERGED;
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
+        if (is_to_merge(r, t))
+            merge_tile(r, t);
 }
 
-static void finish_tile(void *context, unsigned task, unsigned thread)
+static void finish_row(void *context, unsigned task, unsigned thread)
 {
     cpu *r = context;
     (void)thread;
-    const float *sum =
-        r->states[task] & TILE_MERGED ? r->sums + (size_t)task * FLOATS_PER_TILE : NULL;
-    r->kernels->tile_finish(&r->view, tile_x(r, task), tile_y(r, task), sum, r->rgba);
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
+        finish_tile(r, t);
 }
 
-static void for_each_tile(cpu *r, void (*run)(void *, unsigned, unsigned))
+static void for_each_row(cpu *r, void (*run)(void *, unsigned, unsigned))
 {
-    r->tile_job = (trip_cpu_job){ .run = run, .context = r, .tasks = tile_count(r) };
+    r->tile_job = (trip_cpu_job){ .run = run, .context = r, .tasks = r->mask.grid.down };
     trip_cpu_pool_start(r->pool, &r->tile_job);
     trip_cpu_pool_wait(r->pool, &r->tile_job);
 }
@@ -446,8 +481,12 @@ static void end_list(cpu *r)
 {
     if (!r->in_list)
         return;
+    bool merge = false;
     settle(r);
-    for_each_tile(r, merge_tile);
+    for (uint32_t t = 0; t < tile_count(r) && !merge; t++)
+        merge = is_to_merge(r, t);
+    if (merge)
+        for_each_row(r, merge_row);
     r->in_list = false;
 }
 
@@ -456,10 +495,9 @@ static int begin_list(trip_renderer *base, int axis)
     cpu *r = (cpu *)base;
     end_list(r);
     trip_cpu_view_make(&r->view, r->frame, axis, true);
-    for (uint32_t t = 0; t < tile_count(r); t++) {
-        bool none = trip_cpu_tile_without_weight(&r->view, tile_x(r, t), tile_y(r, t));
-        atomic_store_explicit(&r->mask.tiles[t], none ? 0 : UINT64_MAX, memory_order_relaxed);
-    }
+    for (uint32_t t = 0; t < tile_count(r); t++)
+        atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> axis & 1 ? UINT64_MAX : 0,
+                              memory_order_relaxed);
     r->in_list = true;
     return 0;
 }
@@ -477,6 +515,7 @@ static size_t lay_out(cpu *r, char *memory)
     r->pixels = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->pixels);
     r->sums = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->sums);
     r->states = part(memory, &at, tiles);
+    r->axes = part(memory, &at, tiles);
     r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
     r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
     /* Bins look one tile beyond the last, diagonally. */
@@ -534,6 +573,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         return status;
     trip_cpu_view_make(&r->view, frame, frame->plan->axis_of_view, true);
     memset(r->states, 0, tile_count(r));
+    for (uint32_t t = 0; t < tile_count(r); t++)
+        r->axes[t] = (uint8_t)trip_cpu_tile_axes(&r->view, tile_x(r, t), tile_y(r, t));
     return 0;
 }
 
@@ -542,7 +583,7 @@ static int end_frame(trip_renderer *base, float *rgba)
     cpu *r = (cpu *)base;
     end_list(r);
     r->rgba = rgba;
-    for_each_tile(r, finish_tile);
+    for_each_row(r, finish_row);
     return 0;
 }
 
