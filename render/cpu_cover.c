@@ -33,15 +33,15 @@ static range pixels(double middle, double reach, int size)
     return (range){ lo > 0 ? (int)lo : 0, hi < size - 1 ? (int)hi : size - 1 };
 }
 
-/* Of x = X / z over a box whose middle has depth z and whose nearest point `nearest`: with x0 that
- * of the middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. */
+/* Of x = X / z over a box, given 1 / z at its middle and at its nearest point: with x0 that of the
+ * middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. */
 static range range_of(const double along_x[4], const double along_z[4], const trip_cpu_box *box,
-                      const double half[3], double z, double nearest, int size)
+                      const double half[3], double inverse, double inverse_nearest, int size)
 {
-    double x = (dot(along_x, box->middle) + along_x[3]) / z, slope[3];
+    double x = (dot(along_x, box->middle) + along_x[3]) * inverse, slope[3];
     for (int i = 0; i < 3; i++)
         slope[i] = along_x[i] - x * along_z[i];
-    return pixels(x, reach(slope, half) / nearest, size);
+    return pixels(x, reach(slope, half) * inverse_nearest, size);
 }
 
 static uint64_t bits_of(int left, int right, int top, int bottom)
@@ -92,11 +92,11 @@ trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask
     double near = camera->ortho ? 0 : NEAREST_RADII * radius * view->forward_length;
     if (nearest < near)
         return z + deep <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
-    if (camera->ortho)
-        z = nearest = 1;
     const double *along_z = camera->ortho ? none : view->along_z;
-    return cover_of(mask, range_of(view->along_x, along_z, box, half, z, nearest, camera->width),
-                    range_of(view->along_y, along_z, box, half, z, nearest, camera->height));
+    double inverse = camera->ortho ? 1 : 1 / z, inverse_nearest = camera->ortho ? 1 : 1 / nearest;
+    range x = range_of(view->along_x, along_z, box, half, inverse, inverse_nearest, camera->width);
+    range y = range_of(view->along_y, along_z, box, half, inverse, inverse_nearest, camera->height);
+    return cover_of(mask, x, y);
 }
 
 static const trip_file_slab *slab_of(const trip_list *list, uint64_t brick)
@@ -129,34 +129,6 @@ trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64
         box.half[i] = 0.5 * (hi[i] - lo[i]);
     }
     return box;
-}
-
-trip_cpu_box trip_cpu_square_box(const trip_run *run, uint32_t voxel)
-{
-    const double half = 0.5 * (TRIP_CPU_SQUARE - 1);
-    int u = run->u + (int)(trip_voxel_u(voxel) & ~(TRIP_CPU_SQUARE - 1u));
-    int v = run->v + (int)(trip_voxel_v(voxel) & ~(TRIP_CPU_SQUARE - 1u));
-    return (trip_cpu_box){ { u + half, v + half, run->sheet }, { half, half, 0 } };
-}
-
-static uint32_t square_of(uint32_t voxel)
-{
-    return voxel & (0x0101u * (256 - TRIP_CPU_SQUARE));
-}
-
-/* Full squares are found at the first look, others by halving. */
-uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, bool reversed)
-{
-    const uint32_t *first = reversed ? voxels + count - 1 : voxels;
-    uint32_t square = square_of(*first), most = TRIP_CPU_SQUARE * TRIP_CPU_SQUARE;
-    uint32_t in = 1, beyond = count < most ? count + 1 : most + 1;
-    for (uint32_t look = beyond - 1; look > in; look = (in + beyond) / 2) {
-        if (square_of(reversed ? first[-(int64_t)(look - 1)] : first[look - 1]) == square)
-            in = look;
-        else
-            beyond = look;
-    }
-    return in;
 }
 
 /* Components of r are linear over the tile: their extremes are at its corners. */

@@ -43,17 +43,6 @@ trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask
 trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
                                 int64_t last_sheet);
 
-/* Aligned squares of a run's voxels: since voxels lie in Morton order, those of a square follow one
- * another. */
-#define TRIP_CPU_SQUARE 8
-
-/* The square that a voxel lies in. */
-trip_cpu_box trip_cpu_square_box(const trip_run *run, uint32_t voxel);
-
-/* How many voxels lie in the square of the first: of those in memory order, or of the last when
- * `reversed`. */
-uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, bool reversed);
-
 /* The axes, a bit each, whose lists may have weight in the tile at (x, y). Where there is but one,
  * its weight is 1 all over the tile. */
 unsigned trip_cpu_tile_axes(const trip_cpu_view *view, int x, int y);

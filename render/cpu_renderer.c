@@ -13,6 +13,7 @@
 #include "cpu_isa.h"
 #include "cpu_near.h"
 #include "cpu_pool.h"
+#include "cpu_show.h"
 #include "report.h"
 
 enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 16, MIN_SPLATS = 1 << 13 };
@@ -23,17 +24,10 @@ enum tile_state {
     TILE_MERGED = 2, /* the sum holds earlier lists */
 };
 
-/* Voxels of a run that may show, one after the other in memory. */
-typedef struct span {
-    const trip_run *run;
-    uint64_t first;
-    uint32_t count;
-} span;
-
 /* One thread's own memory. */
 typedef struct worker {
     trip_cpu_scratch scratch;
-    span spans[TRIP_CPU_CHUNK];
+    trip_cpu_span shown[TRIP_CPU_CHUNK];
     uint32_t *tile_counts;
 } worker;
 
@@ -105,84 +99,26 @@ static bool is_alone(const cpu *r, uint32_t tile)
 
 /* ---- projecting a batch ---- */
 
-/* Voxels in draw order: every voxel of a run from `skip` on. */
-typedef struct piece {
-    const trip_run *run;
-    uint64_t first; /* in memory */
-    uint32_t count;
-} piece;
-
-static piece piece_of(const cpu *r, const trip_run *run, uint32_t skip, uint32_t count)
+static void count_span(const cpu *r, trip_cpu_chunk *chunk, const trip_cpu_span *s)
 {
-    bool reversed = r->batch->selection->descending;
-    return (piece){ run, run->first + (reversed ? run->count - skip - count : skip), count };
-}
-
-/* The part of a piece `done` voxels after its beginning. */
-static span span_of(const cpu *r, const piece *p, uint32_t done, uint32_t count)
-{
-    bool reversed = r->batch->selection->descending;
-    return (span){ p->run, p->first + (reversed ? p->count - done - count : done), count };
-}
-
-static trip_cpu_cover run_cover(const cpu *r, const trip_run *run)
-{
-    if (!r->view.front_to_back)
-        return TRIP_CPU_SHOWN;
-    trip_cpu_box box = trip_cpu_brick_box(&r->view, run->brick, run->sheet, run->sheet);
-    return trip_cpu_box_cover(&r->view, &r->mask, &box);
-}
-
-/* Appends the squares of a piece that are not hidden. */
-static uint32_t show_squares(const cpu *r, const piece *p, span *spans)
-{
-    bool reversed = r->batch->selection->descending;
-    uint32_t n = 0, from = 0;
-    for (uint32_t at = 0; at < p->count;) {
-        span rest = span_of(r, p, at, p->count - at);
-        const uint32_t *voxels = r->batch->voxels + rest.first;
-        uint32_t count = trip_cpu_square_count(voxels, rest.count, reversed);
-        trip_cpu_box box = trip_cpu_square_box(p->run, voxels[reversed ? rest.count - 1 : 0]);
-        if (trip_cpu_box_cover(&r->view, &r->mask, &box) == TRIP_CPU_HIDDEN) {
-            if (from < at)
-                spans[n++] = span_of(r, p, from, at - from);
-            from = at + count;
-        }
-        at += count;
-    }
-    if (from < p->count)
-        spans[n++] = span_of(r, p, from, p->count - from);
-    return n;
-}
-
-/* Appends what of a piece may show. */
-static uint32_t show(const cpu *r, const piece *p, span *spans)
-{
-    trip_cpu_cover cover = run_cover(r, p->run);
-    if (cover == TRIP_CPU_PARTLY)
-        return show_squares(r, p, spans);
-    if (cover == TRIP_CPU_SHOWN)
-        *spans = span_of(r, p, 0, p->count);
-    return cover == TRIP_CPU_SHOWN;
-}
-
-static void count_piece(const cpu *r, trip_cpu_chunk *chunk, const piece *p)
-{
-    for (uint32_t i = 0; i < p->count; i++)
-        trip_cpu_count(&r->view, p->run, r->batch->voxels[p->first + i], &chunk->counts);
+    for (uint32_t i = 0; i < s->count; i++)
+        trip_cpu_count(&r->view, s->run, r->batch->voxels[s->first + i], &chunk->counts);
 }
 
 /* What of a chunk may show: at most a span a voxel. */
-static uint32_t show_chunk(const cpu *r, trip_cpu_chunk *chunk, span *spans)
+static uint32_t show_chunk(const cpu *r, trip_cpu_chunk *chunk, trip_cpu_span *shown)
 {
+    bool reversed = r->batch->selection->descending;
     uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
         const trip_run *run = &r->batch->runs[i];
-        piece p = piece_of(r, run, skip, run->count - skip < left ? run->count - skip : left);
+        trip_cpu_span all = { run, run->first, run->count };
+        uint32_t count = run->count - skip < left ? run->count - skip : left;
+        trip_cpu_span part = trip_cpu_span_part(&all, reversed, skip, count);
         if (r->frame->count)
-            count_piece(r, chunk, &p);
-        n += show(r, &p, spans + n);
-        left -= p.count;
+            count_span(r, chunk, &part);
+        n += trip_cpu_show(&r->view, &r->mask, r->batch, &part, shown + n);
+        left -= count;
         skip = 0;
     }
     return n;
@@ -197,18 +133,18 @@ static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_
     *staged = 0;
 }
 
-static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const span *s,
+static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s,
                          uint32_t *staged)
 {
     const trip_batch *batch = r->batch;
-    const piece p = { s->run, s->first, s->count };
+    bool reversed = batch->selection->descending;
     for (uint32_t done = 0; done < s->count;) {
         uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
         n = n < room ? n : room;
-        uint64_t from = span_of(r, &p, done, n).first;
+        uint64_t from = trip_cpu_span_part(s, reversed, done, n).first;
         *staged = r->kernels->stage(&r->view, s->run, batch->voxels + from,
-                                    r->view.shading ? batch->normals + from : NULL, n,
-                                    batch->selection->descending, &w->scratch.staged, *staged);
+                                    r->view.shading ? batch->normals + from : NULL, n, reversed,
+                                    &w->scratch.staged, *staged);
         if (*staged == TRIP_CPU_STAGED)
             empty_staged(r, w, chunk, staged);
         done += n;
@@ -220,13 +156,13 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
     cpu *r = context;
     worker *w = &r->workers[thread];
     trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
-    uint32_t staged = 0, spans = show_chunk(r, chunk, w->spans), voxels = 0;
-    for (uint32_t i = 0; i < spans; i++)
-        voxels += w->spans[i].count;
+    uint32_t staged = 0, shown = show_chunk(r, chunk, w->shown), voxels = 0;
+    for (uint32_t i = 0; i < shown; i++)
+        voxels += w->shown[i].count;
     if (voxels == 0 || !trip_cpu_flush_claim(r->filling, chunk, voxels))
         return;
-    for (uint32_t i = 0; i < spans; i++)
-        project_span(r, w, chunk, &w->spans[i], &staged);
+    for (uint32_t i = 0; i < shown; i++)
+        project_span(r, w, chunk, &w->shown[i], &staged);
     empty_staged(r, w, chunk, &staged);
     trip_cpu_bin(r->filling, chunk, r->mask.grid, w->tile_counts);
 }
