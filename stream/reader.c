@@ -58,10 +58,7 @@ static int check_params(const trip_reader *r)
     return TRIP_OK;
 }
 
-/* The same open file once more, with O_DIRECT; by its descriptor, so that it is the same file even
- * when another has taken its name. -1 where the file system, or a missing /proc, does not allow it:
- * then reads go through the page cache. */
-static int open_direct(int fd)
+int trip_reader_open_direct(int fd)
 {
     char path[32];
     snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
@@ -72,9 +69,10 @@ static void open_direct_files(trip_reader *r)
 {
     for (int axis = 0; axis < 3; axis++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            r->direct_fd[axis][plane] = r->read_planes[plane] && !r->params.buffered
-                                            ? open_direct(r->data->plane_fd[axis][plane])
-                                            : -1;
+            r->direct_fd[axis][plane] =
+                r->read_planes[plane] && !r->params.buffered
+                    ? trip_reader_open_direct(r->data->plane_fd[axis][plane])
+                    : -1;
 }
 
 static int take_memory(trip_reader *r)
@@ -109,29 +107,32 @@ static void release_memory(trip_reader *r)
     trip_budget_release(r->budget, r->slot_memory, n * slot_total_bytes(r));
 }
 
-static int start_engine(trip_reader *r, const trip_engine_ops *ops)
+int trip_reader_start_engine(trip_engine engine, unsigned depth, unsigned threads,
+                             const trip_engine_ops **ops, void **state)
 {
-    int status = ops->create(&r->engine, r->params.slots * TRIP_SLOT_REQUESTS_MAX,
-                             r->params.threads ? r->params.threads : DEFAULT_THREADS);
-    if (status == 0)
-        r->ops = ops;
+    int status = -ENOSYS;
+    if (engine == TRIP_ENGINE_AUTO || engine == TRIP_ENGINE_URING)
+        status = (*ops = &trip_engine_uring)->create(state, depth, threads);
+    if (status < 0 && engine != TRIP_ENGINE_URING)
+        status = (*ops = &trip_engine_pread)->create(state, depth, threads);
     return status;
 }
 
 static int create_engine(trip_reader *r)
 {
-    int status = -ENOSYS;
-    trip_engine engine = r->params.engine;
-    if (engine == TRIP_ENGINE_AUTO || engine == TRIP_ENGINE_URING)
-        status = start_engine(r, &trip_engine_uring);
-    if (status < 0 && engine != TRIP_ENGINE_URING)
-        status = start_engine(r, &trip_engine_pread);
-    if (status == 0)
+    const trip_engine_ops *ops;
+    int status = trip_reader_start_engine(
+        r->params.engine, r->params.slots * TRIP_SLOT_REQUESTS_MAX,
+        r->params.threads ? r->params.threads : DEFAULT_THREADS, &ops, &r->engine);
+    if (status == 0) {
+        r->ops = ops;
         return TRIP_OK;
+    }
     errno = -status;
     return trip_fail_errno("read", r->data->path,
-                           engine == TRIP_ENGINE_URING ? "io_uring is refused, use another engine"
-                                                       : "cannot start threads");
+                           r->params.engine == TRIP_ENGINE_URING
+                               ? "io_uring is refused, use another engine"
+                               : "cannot start threads");
 }
 
 static void set_sources(trip_reader *r)
@@ -223,6 +224,16 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
     }
     *out = r;
     return TRIP_OK;
+}
+
+unsigned trip_reader_slots(const trip_reader *r)
+{
+    return r->params.slots;
+}
+
+bool trip_reader_in_place(const trip_reader *r)
+{
+    return r->params.slot_memory;
 }
 
 trip_reader_stats trip_reader_get_stats(const trip_reader *r)

@@ -64,6 +64,12 @@ typedef struct trip_reader_stats {
     uint64_t wait_ns;                     /* time next() waited for the disk */
 } trip_reader_stats;
 
+/* Whether reads by the engine land in memory that is not the process's own, as a driver's mapping,
+ * and can be read back from there: tried with the data set's first page, past the page cache where
+ * files can be read so. The memory has room for a page and is aligned to 4096 bytes. Nothing is
+ * reported. */
+bool trip_reader_probe(const trip_dataset *d, trip_engine engine, void *memory);
+
 typedef struct trip_reader trip_reader;
 
 int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_reader_params *params,
@@ -82,6 +88,10 @@ int trip_reader_then(trip_reader *r, const trip_selection *s);
  */
 int trip_reader_next(trip_reader *r, trip_batch *batch);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
+/* Ring length. */
+unsigned trip_reader_slots(const trip_reader *r);
+/* Whether the slots are the caller's memory. */
+bool trip_reader_in_place(const trip_reader *r);
 /* Since trip_reader_begin(). */
 trip_reader_stats trip_reader_get_stats(const trip_reader *r);
 /* "io_uring", "io_uring+O_DIRECT", "pread", "pread+O_DIRECT" or "null". */

@@ -56,6 +56,13 @@ struct trip_reader {
     pthread_cond_t ready; /* a slot has nothing pending any more */
 };
 
+/* Starts the engine, or one that takes its place; 0 or -errno, which is not reported. */
+int trip_reader_start_engine(trip_engine engine, unsigned depth, unsigned threads,
+                             const trip_engine_ops **ops, void **state);
+/* The same open file once more, with O_DIRECT; by its descriptor, so that it is the same file even
+ * when another has taken its name. -1 where the file system, or a missing /proc, does not allow it:
+ * then reads go through the page cache. */
+int trip_reader_open_direct(int fd);
 /* Waits until nothing is being read. */
 void trip_reader_drain(trip_reader *r);
 

@@ -5,6 +5,7 @@
 #include <linux/seccomp.h>
 #include <semaphore.h>
 #include <stdio.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -251,6 +252,32 @@ static void the_callers_own_memory_is_read_into(void **state)
     trip_reader_destroy(r);
     for (int i = 0; i < 3; i++)
         free(memory[i]);
+    close_fixture(&f, d);
+}
+
+static void memory_that_reads_do_not_land_in_is_found_out(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    (void)state;
+    open_fixture(&f, &d);
+    bool uring = uring_works(d);
+    void *memory = mmap(NULL, 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    assert_ptr_not_equal(memory, MAP_FAILED);
+    fixture_catch_reports();
+    for (int engine = TRIP_ENGINE_AUTO; engine <= TRIP_ENGINE_NULL; engine++) {
+        if (engine == TRIP_ENGINE_URING && !uring)
+            continue;
+        assert_true(trip_reader_probe(d, (trip_engine)engine, memory));
+        mprotect(memory, 4096, PROT_READ);
+        assert_false(trip_reader_probe(d, (trip_engine)engine, memory));
+        mprotect(memory, 4096, PROT_READ | PROT_WRITE);
+    }
+    fixture_run_command("printf x | dd of=%s/x.voxels bs=1 seek=99 conv=notrunc 2>/dev/null",
+                        f.path);
+    assert_false(trip_reader_probe(d, TRIP_ENGINE_PREAD, memory)); /* what lands is not the page */
+    assert_string_equal(fixture_reports(), "");
+    munmap(memory, 4096);
     close_fixture(&f, d);
 }
 
@@ -738,6 +765,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_engine_and_ring_hands_out_the_same_runs),
         cmocka_unit_test(the_callers_own_memory_is_read_into),
+        cmocka_unit_test(memory_that_reads_do_not_land_in_is_found_out),
         cmocka_unit_test(a_pass_is_read_while_the_one_before_it_is_drawn),
         cmocka_unit_test(with_runs_alone_nothing_is_read),
         cmocka_unit_test(more_passes_than_there_is_room_for_are_refused),
