@@ -40,12 +40,13 @@ static bool is_covered(void *user, const trip_selection *selection, uint32_t bri
 }
 
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
-                        trip_engine engine, trip_renderer **covering)
+                        trip_engine engine, trip_renderer *renderer, trip_renderer **covering)
 {
     return session_make_reader(s, out,
                                &(session_reader){ .engine = engine,
                                                   .planes = bench_planes(s, &o->settings),
                                                   .threads = o->threads[0],
+                                                  .renderer = renderer,
                                                   .skip = covering ? is_covered : NULL,
                                                   .skip_user = covering });
 }
@@ -196,7 +197,7 @@ int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, b
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
     if (!status)
-        status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, NULL);
+        status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, f->renderer, NULL);
     if (status)
         return status;
     cJSON *machine = bench_report_machine(r);

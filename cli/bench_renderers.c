@@ -258,7 +258,7 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
     add_limits(r, o->draw_hidden);
     int status = add_contenders(c, r);
     if (!status)
-        status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, covering(c));
+        status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, covering(c));
     if (!status)
         status = run(c, r);
     if (c->reader)

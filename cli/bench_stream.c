@@ -130,7 +130,7 @@ static int open_frame(stream *t)
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
     if (!status)
-        status = bench_reader_create(s, &f->reader, o, o->engine, f->covering);
+        status = bench_reader_create(s, &f->reader, o, o->engine, f->renderer, f->covering);
     if (!status)
         status = find_files(t);
     if (!status)
@@ -155,7 +155,7 @@ static int open_in_memory(stream *t, bench_report *r)
         return status;
     other.budget = t->whole;
     bench_keep_report(why);
-    status = bench_reader_create(&other, &t->in_memory.reader, t->options, TRIP_ENGINE_NULL,
+    status = bench_reader_create(&other, &t->in_memory.reader, t->options, TRIP_ENGINE_NULL, NULL,
                                  t->frame.covering);
     bench_keep_report(NULL);
     if (!status || trip_interrupted())

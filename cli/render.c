@@ -58,6 +58,7 @@ static int make_reader(drawing *d, unsigned planes)
         .planes = planes,
         .threads = d->o.threads,
         .cache = d->o.orbit > 1,
+        .renderer = d->renderer,
         .skip = d->o.hidden == RENDER_HIDDEN_SKIP ? trip_cpu_covered : NULL,
         .skip_user = d->renderer,
     };
@@ -104,7 +105,7 @@ static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *
         status = trip_frame_draw(d->renderer, d->reader, &frame, d->rgba, stats);
     trip_progress_end(&d->progress);
     if (!status && d->o.explain)
-        render_stats_explain(stats, stdout);
+        render_stats_explain(stats, d->renderer, d->reader, stdout);
     return status;
 }
 

@@ -118,6 +118,17 @@ static int write_file(const char *path, const char *text)
     return status;
 }
 
+/* Where reads land, and how the renderer gets at it. */
+static const char *ring_text(const trip_renderer *renderer, const trip_reader *reader)
+{
+    if (renderer->resident)
+        return "not used: the renderer holds the data";
+    if (trip_reader_in_place(reader))
+        return "mapped: reads land in the renderer's memory";
+    return renderer->ops->take_slots ? "copied: batches go to the renderer's memory"
+                                     : "shared: the renderer draws from the ring";
+}
+
 int render_stats_write(render_stats *s, const render_options *o, const trip_renderer *renderer,
                        const trip_reader *reader, const trip_budget *budget)
 {
@@ -127,6 +138,7 @@ int render_stats_write(render_stats *s, const render_options *o, const trip_rend
     cJSON_AddStringToObject(root, "device", renderer->ops->device(renderer));
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", trip_reader_engine_name(reader));
+    cJSON_AddStringToObject(root, "ring", ring_text(renderer, reader));
     cJSON_AddItemToObject(root, "size", cJSON_CreateIntArray(size, 2));
     cJSON_AddNumberToObject(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
     cJSON_AddNumberToObject(root, "memory_limit_bytes", (double)trip_budget_limit_bytes(budget));
@@ -145,7 +157,8 @@ int render_stats_write(render_stats *s, const render_options *o, const trip_rend
     return status;
 }
 
-void render_stats_explain(const trip_frame_stats *frame, FILE *out)
+void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *renderer,
+                          const trip_reader *reader, FILE *out)
 {
     char bytes[32];
     for (int axis = 0; axis < 3; axis++) {
@@ -160,6 +173,7 @@ void render_stats_explain(const trip_frame_stats *frame, FILE *out)
     if (frame->reader.bytes_skipped)
         fprintf(out, "hidden      %s in %" PRIu64 " runs not read: behind what is opaque\n",
                 trip_format_bytes(frame->reader.bytes_skipped, bytes), frame->reader.runs_skipped);
+    fprintf(out, "ring        %s\n", ring_text(renderer, reader));
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame->ms, frame->read_ms, frame->draw_ms, frame->merge_ms);
 }

@@ -16,7 +16,8 @@ int render_stats_write(render_stats *s, const render_options *o, const trip_rend
                        const trip_reader *reader, const trip_budget *budget);
 
 /* What the parts of a plan cost, a line each. */
-void render_stats_explain(const trip_frame_stats *frame, FILE *out);
+void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *renderer,
+                          const trip_reader *reader, FILE *out);
 /* "image.png: 1024 x 1024, 1.2 million splats, 34 MB read, 0.32 s" */
 void render_stats_summary(const char *path, const render_options *o, const trip_frame_stats *frame,
                           FILE *out);

@@ -65,6 +65,18 @@ void session_close(session *s)
     *s = (session){ 0 };
 }
 
+/* Memory of the renderer's for the ring; NULL where it has none, or none that reads land in. */
+static void *const *take_slots(const session *s, const session_reader *wanted, unsigned count,
+                               size_t bytes)
+{
+    trip_renderer *r = wanted->renderer;
+    void *const *slots = r && r->ops->take_slots ? r->ops->take_slots(r, count, bytes) : NULL;
+    if (!slots || trip_reader_probe(s->data, wanted->engine, slots[0]))
+        return slots;
+    r->ops->drop_slots(r);
+    return NULL;
+}
+
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
 {
     enum { SLOTS = 8, MAX_SLOT_BYTES = 512 << 10 };
@@ -83,6 +95,7 @@ int session_make_reader(const session *s, trip_reader **out, const session_reade
         .skip_user = wanted->skip_user,
         .cache_bytes = wanted->cache ? (size_t)(left / 2) : 0,
     };
+    params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes * plane_count);
     return trip_reader_create(out, s->data, &params, s->budget);
 }
 

@@ -6,6 +6,7 @@
 #include "dataset_text.h"
 #include "plan.h"
 #include "reader.h"
+#include "renderer.h"
 #include "transfer_function.h"
 
 typedef struct session {
@@ -26,12 +27,14 @@ typedef struct session_reader {
     trip_engine engine;
     unsigned planes; /* bit per trip_plane */
     int threads;
-    bool cache; /* keep pages for the frames to come */
+    bool cache;              /* keep pages for the frames to come */
+    trip_renderer *renderer; /* whose memory the ring lies in where it has such; NULL: in none's */
     bool (*skip)(void *user, const trip_selection *selection, uint32_t brick);
     void *skip_user;
 } session_reader;
 
-/* Its ring takes at most a quarter of the memory that is left, its cache half. */
+/* Its ring takes at most a quarter of the memory that is left, its cache half. The renderer must
+ * outlive it. */
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted);
 
 /* width * height * 4 floats; release with session_release_image(). */

@@ -11,6 +11,8 @@ static double now_ms(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
+enum { HELD_MAX = 16 };
+
 /* A frame being drawn. */
 typedef struct drawing {
     trip_renderer *renderer;
@@ -20,6 +22,9 @@ typedef struct drawing {
     int next_axis;       /* lists before this one were begun */
     uint64_t splats;     /* drawn so far */
     uint64_t bytes_read; /* counted so far */
+    /* Drawn, but perhaps not done with: held[held_first % HELD_MAX] is the oldest. */
+    trip_batch held[HELD_MAX];
+    unsigned held_first, held_count;
 } drawing;
 
 static void tell_progress(drawing *d, const trip_batch *batch)
@@ -79,13 +84,44 @@ static int draw_batch(drawing *d, const trip_batch *batch)
     return status;
 }
 
+static int is_done(const drawing *d, const trip_batch *batch, bool wait)
+{
+    return d->renderer->ops->is_done ? d->renderer->ops->is_done(d->renderer, batch, wait) : 1;
+}
+
+static void release_oldest(drawing *d)
+{
+    trip_reader_release(d->reader, &d->held[d->held_first++ % HELD_MAX]);
+    d->held_count--;
+}
+
+/* Gives back the slots of batches that the renderer is done with, oldest first; where more than
+ * `most` are held it is waited for. */
+static int release_drawn(drawing *d, unsigned most)
+{
+    int done = 1;
+    while (d->held_count > 0 &&
+           (done = is_done(d, &d->held[d->held_first % HELD_MAX], d->held_count > most)) > 0)
+        release_oldest(d);
+    return done < 0 ? done : 0;
+}
+
+/* A renderer may hold up to half of the ring, so that the disk is busy with the other half. */
+static unsigned may_hold(const drawing *d)
+{
+    unsigned half = trip_reader_slots(d->reader) / 2;
+    return half < HELD_MAX ? half : HELD_MAX - 1;
+}
+
 static int draw_lists(drawing *d)
 {
     trip_batch batch;
     int status = begin_reading(d);
     while (!status && (status = trip_reader_next(d->reader, &batch)) > 0) {
         status = draw_batch(d, &batch);
-        trip_reader_release(d->reader, &batch);
+        d->held[(d->held_first + d->held_count++) % HELD_MAX] = batch;
+        if (!status)
+            status = release_drawn(d, may_hold(d));
         if (!status && trip_interrupted())
             status = trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
     }
@@ -116,6 +152,8 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
     double merge_start = now_ms();
     if (!status)
         status = renderer->ops->end_frame(renderer, rgba);
+    while (d.held_count > 0) /* the image is there, or is given up */
+        release_oldest(&d);
     if (status)
         return status;
     stats->merge_ms = now_ms() - merge_start;

@@ -30,14 +30,37 @@ static trip_gl_part next_part(size_t *end, size_t bytes)
     return part;
 }
 
-static int take_slot(trip_gl_batch *b, trip_gl_ring *ring, const trip_batch *batch, bool copy)
+/* Where records that lie in GL memory are. */
+static trip_gl_part part_in(const trip_gl_slot *slot, const uint32_t *records, size_t bytes)
 {
-    size_t end = 0, record_bytes = copy ? batch->splats * TRIP_RECORD_BYTES : 0;
-    b->voxels = next_part(&end, record_bytes);
-    b->normals = next_part(&end, batch->normals ? record_bytes : 0);
+    const unsigned char *at = (const unsigned char *)records;
+    return records ? (trip_gl_part){ (size_t)(at - slot->memory), bytes } : (trip_gl_part){ 0 };
+}
+
+static int take_slot(trip_gl_batch *b, trip_gl_ring *ring, const trip_batch *batch,
+                     trip_gl_slot *records)
+{
+    size_t end = 0, bytes = batch->splats * TRIP_RECORD_BYTES;
+    if (records) {
+        b->voxels = part_in(records, batch->voxels, bytes);
+        b->normals = part_in(records, batch->normals, bytes);
+    } else {
+        b->voxels = next_part(&end, batch->voxels ? bytes : 0);
+        b->normals = next_part(&end, batch->normals ? bytes : 0);
+    }
     b->runs = next_part(&end, batch->run_count * sizeof(struct trip_gl_run));
     b->run_of = next_part(&end, b->positions * sizeof(uint32_t));
-    return trip_gl_ring_take(ring, end, &b->slot);
+    int status = trip_gl_ring_take(ring, end, &b->slot);
+    b->records = records ? records : b->slot;
+    return status;
+}
+
+static void copy_records(trip_gl_batch *b, const trip_batch *batch)
+{
+    if (b->voxels.bytes)
+        memcpy(b->slot->memory + b->voxels.offset, batch->voxels, b->voxels.bytes);
+    if (b->normals.bytes)
+        memcpy(b->slot->memory + b->normals.offset, batch->normals, b->normals.bytes);
 }
 
 /* One piece for each run at most. */
@@ -129,19 +152,17 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *p, const trip_bat
 }
 
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placing,
-                       const trip_batch *batch, const uint64_t *list_firsts)
+                       const trip_batch *batch, trip_gl_slot *records, const uint64_t *list_firsts)
 {
     int status = count_positions(b, batch);
     if (!status)
         status = make_room(b, batch->run_count);
     if (!status)
-        status = take_slot(b, ring, batch, !list_firsts);
+        status = take_slot(b, ring, batch, records);
     if (status)
         return status;
-    if (b->voxels.bytes)
-        memcpy(b->slot->memory + b->voxels.offset, batch->voxels, b->voxels.bytes);
-    if (b->normals.bytes)
-        memcpy(b->slot->memory + b->normals.offset, batch->normals, b->normals.bytes);
+    if (!records)
+        copy_records(b, batch);
     fill_runs(b, placing, batch, list_firsts);
     return TRIP_OK;
 }

@@ -15,6 +15,7 @@
 #include "gl_frame.h"
 #include "gl_resident.h"
 #include "gl_ring.h"
+#include "gl_slots.h"
 #include "gl_target.h"
 #include "gl_variant.h"
 #include "report.h"
@@ -35,6 +36,8 @@ typedef struct gl_renderer {
     trip_gl_variants variants;
     trip_gl_target target;
     trip_gl_ring ring;
+    trip_gl_slots slots; /* of a reader that reads into GL memory */
+    bool copies;         /* readers are given none: batches are copied */
     trip_gl_batch batch;
     trip_gl_resident resident; /* submission form "indexed" only */
     GLuint vertex_array, quad_indices;
@@ -61,6 +64,7 @@ static void destroy(trip_renderer *base)
         trip_gl_variants_release(&r->variants);
         trip_gl_target_release(&r->target);
         trip_gl_ring_release(&r->ring);
+        trip_gl_slots_release(&r->slots);
         trip_gl_resident_release(&r->resident);
     }
     trip_gl_batch_release(&r->batch);
@@ -196,19 +200,19 @@ static int begin_list(trip_renderer *base, int axis)
     return trip_gl_check(r->context, "list");
 }
 
-static void bind_part(const trip_gl_batch *b, GLuint binding, trip_gl_part part)
+static void bind_part(const trip_gl_slot *slot, GLuint binding, trip_gl_part part)
 {
     if (part.bytes)
-        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, b->slot->buffer, (GLintptr)part.offset,
+        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, slot->buffer, (GLintptr)part.offset,
                           (GLsizeiptr)part.bytes);
 }
 
 static void bind_batch(const trip_gl_batch *b)
 {
-    bind_part(b, TRIP_GL_VOXELS, b->voxels);
-    bind_part(b, TRIP_GL_NORMALS, b->normals);
-    bind_part(b, TRIP_GL_RUNS, b->runs);
-    bind_part(b, TRIP_GL_RUN_OF, b->run_of);
+    bind_part(b->records, TRIP_GL_VOXELS, b->voxels);
+    bind_part(b->records, TRIP_GL_NORMALS, b->normals);
+    bind_part(b->slot, TRIP_GL_RUNS, b->runs);
+    bind_part(b->slot, TRIP_GL_RUN_OF, b->run_of);
 }
 
 /* Quads share one list of vertex numbers: two triangles over corners 0 to 3 of each. */
@@ -295,7 +299,8 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     if (!status && r->frame->settings->indexed)
         status = trip_gl_resident_find(&r->resident, batch, &list_firsts);
     if (!status)
-        status = trip_gl_batch_fill(&r->batch, &r->ring, &r->placing, batch, list_firsts);
+        status = trip_gl_batch_fill(&r->batch, &r->ring, &r->placing, batch,
+                                    trip_gl_slots_find(&r->slots, batch->voxels), list_firsts);
     if (status)
         return status;
     r->stats[r->placing.axis].splats_read += r->batch.positions;
@@ -303,8 +308,36 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     status = draw_pieces(r, front_to_back);
     if (!status && r->frame->count)
         status = count_batch(r);
-    trip_gl_ring_give(r->batch.slot);
+    trip_gl_slot_fence(r->batch.slot);
+    if (r->batch.records != r->batch.slot)
+        trip_gl_slot_fence(r->batch.records);
     return status;
+}
+
+static void *const *take_slots(trip_renderer *base, unsigned count, size_t bytes)
+{
+    gl_renderer *r = (gl_renderer *)base;
+    if (r->copies || bytes > trip_gl_context_limits(r->context)->storage_block_bytes ||
+        trip_gl_context_use(r->context) || !trip_gl_slots_take(&r->slots, count, bytes))
+        return NULL;
+    return r->slots.memory;
+}
+
+static void drop_slots(trip_renderer *base)
+{
+    gl_renderer *r = (gl_renderer *)base;
+    if (trip_gl_context_use(r->context) == TRIP_OK)
+        trip_gl_slots_release(&r->slots);
+}
+
+static int is_done(trip_renderer *base, const trip_batch *batch, bool wait)
+{
+    gl_renderer *r = (gl_renderer *)base;
+    trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->voxels);
+    if (!slot)
+        return 1;
+    int status = trip_gl_context_use(r->context);
+    return status ? status : trip_gl_slot_is_done(slot, wait);
 }
 
 static int merge(gl_renderer *r)
@@ -373,6 +406,9 @@ static const trip_renderer_ops gl_ops = {
     .begin_frame = begin_frame,
     .begin_list = begin_list,
     .draw = draw,
+    .take_slots = take_slots,
+    .drop_slots = drop_slots,
+    .is_done = is_done,
     .end_frame = end_frame,
     .stats = stats,
 };
@@ -391,6 +427,16 @@ static int make_buffers(gl_renderer *r)
     return trip_gl_check(r->context, "buffers");
 }
 
+static int choose_slots(gl_renderer *r)
+{
+    const char *slots = getenv("TRIPTYCH_GL_SLOTS");
+    r->copies = slots && !strcmp(slots, "copy");
+    if (!slots || r->copies || !strcmp(slots, "mapped"))
+        return TRIP_OK;
+    return trip_fail(TRIP_USAGE, "gl", "TRIPTYCH_GL_SLOTS", "'%s' is neither mapped nor copy",
+                     slots);
+}
+
 int trip_gl_create(trip_renderer **out, trip_budget *budget)
 {
     gl_renderer *r = calloc(1, sizeof *r);
@@ -399,7 +445,10 @@ int trip_gl_create(trip_renderer **out, trip_budget *budget)
         return trip_fail(TRIP_ERROR, "gl", "renderer", "out of memory");
     r->base.ops = &gl_ops;
     r->budget = r->ring.budget = r->target.budget = r->resident.budget = budget;
-    int status = trip_gl_context_create(&r->context);
+    r->slots.budget = budget;
+    int status = choose_slots(r);
+    if (!status)
+        status = trip_gl_context_create(&r->context);
     if (!status)
         status = make_buffers(r);
     if (status) {

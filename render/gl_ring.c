@@ -4,72 +4,87 @@
 
 static const GLuint64 wait_ns = 1000000000;
 
-static int wait_for(trip_gl_slot *slot)
+bool trip_gl_slot_make(trip_gl_slot *slot, size_t bytes, bool readable, trip_budget *budget)
 {
-    GLenum result = GL_ALREADY_SIGNALED;
-    if (!slot->fence)
-        return TRIP_OK;
-    do
-        result = glClientWaitSync(slot->fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait_ns);
-    while (result == GL_TIMEOUT_EXPIRED);
-    glDeleteSync(slot->fence);
-    slot->fence = NULL;
-    if (result == GL_WAIT_FAILED)
-        return trip_fail(TRIP_ERROR, "gl", "buffer", "waiting for the GPU failed: OpenGL error %#x",
-                         glGetError());
-    return TRIP_OK;
+    GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    access |= readable ? GL_MAP_READ_BIT : 0;
+    if (!trip_budget_charge(budget, bytes))
+        return false;
+    slot->bytes = bytes;
+    glCreateBuffers(1, &slot->buffer);
+    glNamedBufferStorage(slot->buffer, (GLsizeiptr)bytes, NULL,
+                         access | (readable ? GL_CLIENT_STORAGE_BIT : 0));
+    slot->memory = glMapNamedBufferRange(slot->buffer, 0, (GLsizeiptr)bytes, access);
+    if (slot->memory)
+        return true;
+    trip_gl_slot_release(slot, budget);
+    glGetError(); /* what it recorded is told by the result */
+    return false;
 }
 
-static void empty(trip_gl_ring *r, trip_gl_slot *slot)
+void trip_gl_slot_release(trip_gl_slot *slot, trip_budget *budget)
 {
     if (slot->fence)
         glDeleteSync(slot->fence);
     if (slot->buffer) {
         glDeleteBuffers(1, &slot->buffer); /* unmaps it */
-        trip_budget_discharge(r->budget, slot->bytes);
+        trip_budget_discharge(budget, slot->bytes);
     }
     *slot = (trip_gl_slot){ 0 };
 }
 
-static int fill(trip_gl_ring *r, trip_gl_slot *slot, size_t bytes)
+void trip_gl_slot_fence(trip_gl_slot *slot)
 {
-    const GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-    if (!trip_budget_charge(r->budget, bytes))
+    if (slot->fence)
+        glDeleteSync(slot->fence);
+    slot->fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+}
+
+int trip_gl_slot_is_done(trip_gl_slot *slot, bool wait)
+{
+    GLenum result;
+    if (!slot->fence)
+        return 1;
+    do
+        result = glClientWaitSync(slot->fence, wait ? GL_SYNC_FLUSH_COMMANDS_BIT : 0,
+                                  wait ? wait_ns : 0);
+    while (wait && result == GL_TIMEOUT_EXPIRED);
+    if (result == GL_TIMEOUT_EXPIRED)
+        return 0;
+    glDeleteSync(slot->fence);
+    slot->fence = NULL;
+    if (result == GL_WAIT_FAILED)
+        return trip_fail(TRIP_ERROR, "gl", "buffer", "waiting for the GPU failed: OpenGL error %#x",
+                         glGetError());
+    return 1;
+}
+
+static int no_room(const trip_gl_ring *r, size_t bytes)
+{
+    if (trip_budget_left_bytes(r->budget) < bytes)
         return trip_fail(TRIP_ERROR, "gl", "buffer",
                          "%zu bytes do not fit the memory given; raise --memory", bytes);
-    slot->bytes = bytes;
-    glCreateBuffers(1, &slot->buffer);
-    glNamedBufferStorage(slot->buffer, (GLsizeiptr)bytes, NULL, access);
-    slot->memory = glMapNamedBufferRange(slot->buffer, 0, (GLsizeiptr)bytes, access);
-    if (slot->memory)
-        return TRIP_OK;
-    empty(r, slot);
-    return trip_fail(TRIP_ERROR, "gl", "buffer",
-                     "the driver has no %zu bytes left: OpenGL error %#x", bytes, glGetError());
+    return trip_fail(TRIP_ERROR, "gl", "buffer", "the driver has no %zu bytes left", bytes);
 }
 
 int trip_gl_ring_take(trip_gl_ring *r, size_t bytes, trip_gl_slot **slot)
 {
     trip_gl_slot *s = &r->slots[r->next];
-    int status = wait_for(s);
-    if (!status && s->bytes < bytes) {
-        empty(r, s);
-        status = fill(r, s, bytes);
-    }
-    if (status)
+    int status = trip_gl_slot_is_done(s, true);
+    if (status < 0)
         return status;
+    if (s->bytes < bytes) {
+        trip_gl_slot_release(s, r->budget);
+        if (!trip_gl_slot_make(s, bytes, false, r->budget))
+            return no_room(r, bytes);
+    }
     r->next = (r->next + 1) % TRIP_GL_RING_SLOTS;
     *slot = s;
     return TRIP_OK;
 }
 
-void trip_gl_ring_give(trip_gl_slot *slot)
-{
-    slot->fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
-}
-
 void trip_gl_ring_release(trip_gl_ring *r)
 {
     for (int i = 0; i < TRIP_GL_RING_SLOTS; i++)
-        empty(r, &r->slots[i]);
+        trip_gl_slot_release(&r->slots[i], r->budget);
 }

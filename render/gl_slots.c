@@ -5,32 +5,32 @@
 
 enum { DIRECT_ALIGNMENT_BYTES = 4096 };
 
-/* A mapping starts where the driver likes: room to begin at a page. */
-static bool make(trip_gl_slots *s, unsigned i, GLint alignment)
+/* One buffer for all, with room to begin at a page: a mapping starts where the driver likes. */
+static bool make_whole(trip_gl_slots *s, unsigned count, size_t bytes)
 {
-    size_t bytes = s->bytes + DIRECT_ALIGNMENT_BYTES;
-    trip_gl_slot *slot = &s->slots[i];
-    if (!trip_gl_slot_make(slot, bytes, true, s->budget))
+    GLint alignment = 1;
+    glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
+    if (!trip_gl_slot_make(&s->whole, count * bytes + DIRECT_ALIGNMENT_BYTES, true, s->budget))
         return false;
-    size_t before = (size_t)(-(uintptr_t)slot->memory % DIRECT_ALIGNMENT_BYTES);
-    s->memory[i] = slot->memory + before;
-    return before % (size_t)alignment == 0;
+    s->before_bytes = (size_t)(-(uintptr_t)s->whole.memory % DIRECT_ALIGNMENT_BYTES);
+    return s->before_bytes % (size_t)alignment == 0;
 }
 
 bool trip_gl_slots_take(trip_gl_slots *s, unsigned count, size_t bytes)
 {
-    GLint alignment = 1;
     trip_gl_slots_release(s);
     s->slots = calloc(count, sizeof *s->slots);
     s->memory = calloc(count, sizeof *s->memory);
-    s->bytes = bytes;
-    glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
-    bool made = s->slots && s->memory;
-    while (made && s->count < count)
-        made = make(s, s->count++, alignment);
-    if (!made)
+    if (!s->slots || !s->memory || !make_whole(s, count, bytes)) {
         trip_gl_slots_release(s);
-    return made;
+        return false;
+    }
+    s->count = count;
+    for (unsigned i = 0; i < count; i++) {
+        s->slots[i] = s->whole;
+        s->memory[i] = s->whole.memory + s->before_bytes + i * bytes;
+    }
+    return true;
 }
 
 trip_gl_slot *trip_gl_slots_find(const trip_gl_slots *s, const void *memory)
@@ -44,7 +44,9 @@ trip_gl_slot *trip_gl_slots_find(const trip_gl_slots *s, const void *memory)
 void trip_gl_slots_release(trip_gl_slots *s)
 {
     for (unsigned i = 0; i < s->count; i++)
-        trip_gl_slot_release(&s->slots[i], s->budget);
+        if (s->slots[i].fence)
+            glDeleteSync(s->slots[i].fence);
+    trip_gl_slot_release(&s->whole, s->budget);
     free(s->slots);
     free(s->memory);
     *s = (trip_gl_slots){ .budget = s->budget };

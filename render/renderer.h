@@ -42,6 +42,16 @@ typedef struct trip_renderer_ops {
     int (*begin_list)(trip_renderer *r, int axis);
     /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
     int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
+    /* Memory of the renderer's own for a reader's ring: `count` slots of `bytes`, aligned to 4096;
+     * batches that lie there are drawn in place. NULL where it has none to give. It stays the
+     * renderer's, who must outlive the reader. NULL: batches may lie anywhere, and are done with
+     * when draw() returns. */
+    void *const *(*take_slots)(trip_renderer *r, unsigned count, size_t bytes);
+    /* Takes that memory back. */
+    void (*drop_slots)(trip_renderer *r);
+    /* 1: the batch is done with, and its slot may be read into; 0: not yet, only when not told to
+     * wait; negative: failed. NULL where take_slots is. */
+    int (*is_done)(trip_renderer *r, const trip_batch *batch, bool wait);
     /* Merges the layers, puts the background behind, and gives width * height * 4 floats,
      * premultiplied, row 0 at the top. */
     int (*end_frame)(trip_renderer *r, float *rgba);

@@ -195,6 +195,110 @@ static void without_memory_for_its_pixels_the_reference_says_so(void **state)
     scene_destroy(&s);
 }
 
+/* A renderer that is done with a batch only when it is waited for, and looks then whether the batch
+ * is still what it was. */
+typedef struct lazy {
+    trip_renderer base;
+    unsigned most, drawn, done; /* batches: that may be held, drawn, done with */
+    unsigned fail_at;           /* the draw that fails; 0: none */
+    uint32_t sums[64];          /* of batches, by their number modulo 64 */
+} lazy;
+
+static uint32_t sum_of(const trip_batch *batch)
+{
+    uint32_t sum = (uint32_t)batch->run_count;
+    for (size_t i = 0; i < batch->run_count; i++)
+        for (uint32_t k = 0; k < batch->runs[i].count; k++) {
+            uint64_t at = batch->runs[i].first + k;
+            sum = sum * 31 + batch->voxels[at] + 7 * batch->normals[at];
+        }
+    return sum;
+}
+
+static int lazy_begin_frame(trip_renderer *r, const trip_frame *frame)
+{
+    (void)frame;
+    ((lazy *)r)->drawn = ((lazy *)r)->done = 0;
+    return 0;
+}
+
+static int lazy_begin_list(trip_renderer *r, int axis)
+{
+    (void)r;
+    (void)axis;
+    return 0;
+}
+
+static int lazy_draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
+{
+    lazy *l = (lazy *)r;
+    (void)front_to_back;
+    l->sums[l->drawn++ % 64] = sum_of(batch);
+    assert_true(l->drawn - l->done <= l->most + 1);
+    return l->drawn == l->fail_at ? trip_fail(TRIP_ERROR, "test", "draw", "fails") : 0;
+}
+
+static int lazy_is_done(trip_renderer *r, const trip_batch *batch, bool wait)
+{
+    lazy *l = (lazy *)r;
+    if (!wait)
+        return 0;
+    assert_int_equal(l->sums[l->done++ % 64], sum_of(batch));
+    return 1;
+}
+
+static int lazy_end_frame(trip_renderer *r, float *rgba)
+{
+    (void)r;
+    (void)rgba;
+    return 0;
+}
+
+static void lazy_stats(const trip_renderer *r, trip_list_stats lists[3])
+{
+    (void)r;
+    memset(lists, 0, 3 * sizeof *lists);
+}
+
+static const trip_renderer_ops lazy_ops = {
+    .name = "lazy",
+    .begin_frame = lazy_begin_frame,
+    .begin_list = lazy_begin_list,
+    .draw = lazy_draw,
+    .is_done = lazy_is_done,
+    .end_frame = lazy_end_frame,
+    .stats = lazy_stats,
+};
+
+static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_frame_stats stats;
+    float rgba[16 * 16 * 4];
+    trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
+    const unsigned slots[] = { 2, 3, 8, 64 }, held[] = { 1, 1, 4, 15 };
+    for (int i = 0; i < 4; i++) {
+        lazy l = { .base = { .ops = &lazy_ops }, .most = held[i] };
+        trip_reader *reader =
+            make_reader(&s, (trip_reader_params){ .slots = slots[i], .slot_bytes = 16384 });
+        assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), 0);
+        assert_int_equal(l.drawn - l.done, l.drawn < held[i] ? l.drawn : held[i]);
+        uint64_t splats = stats.reader.splats;
+        assert_true(l.drawn > 1 && splats > 0);
+        l.fail_at = l.drawn / 2 + 1; /* a frame given up leaves no slot behind */
+        test_expect_report();
+        assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), TRIP_ERROR);
+        assert_int_equal(test_reports(), 1);
+        l.fail_at = 0;
+        assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), 0);
+        assert_int_equal(stats.reader.splats, splats);
+        trip_reader_destroy(reader);
+    }
+    scene_destroy(&s);
+}
+
 /* The last test: nothing takes the signal back. */
 static void an_interrupt_ends_the_frame(void **state)
 {
@@ -225,6 +329,7 @@ int main(void)
         cmocka_unit_test(progress_rises_to_the_number_of_splats),
         cmocka_unit_test(a_failed_or_damaged_read_ends_the_frame_with_one_report),
         cmocka_unit_test(without_memory_for_its_pixels_the_reference_says_so),
+        cmocka_unit_test(batches_stay_as_they_are_until_the_renderer_is_done_with_them),
         cmocka_unit_test(an_interrupt_ends_the_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

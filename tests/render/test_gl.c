@@ -225,6 +225,72 @@ static void the_size_of_batches_makes_no_difference(void **state)
     scene_destroy(&s);
 }
 
+/* A few frames by one renderer, its reader's ring in GL memory where there is such and reads land
+ * there; true if so. The last frame goes to rgba. */
+static bool draw_in_place(const scene *s, const trip_camera_params *view, trip_reader_params params,
+                          float *rgba)
+{
+    trip_renderer *r;
+    trip_reader *reader;
+    trip_camera camera;
+    trip_plan plan;
+    trip_frame_stats stats;
+    trip_settings settings = trip_settings_default();
+    assert_int_equal(trip_gl_create(&r, s->budget), 0);
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
+    params.planes = plan.planes;
+    assert_int_equal(plan.planes, 3);
+    params.slot_memory = r->ops->take_slots(r, params.slots, 2 * params.slot_bytes);
+    if (params.slot_memory && !trip_reader_probe(s->data, params.engine, params.slot_memory[0])) {
+        r->ops->drop_slots(r);
+        params.slot_memory = NULL;
+    }
+    assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
+    trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
+    };
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, &stats), 0);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s->budget);
+    r->ops->destroy(r);
+    return params.slot_memory;
+}
+
+static void reads_into_gl_memory_give_the_same_picture_as_copies(void **state)
+{
+    enum { SIZE = 64 };
+    static float rgba[SIZE * SIZE * 4];
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 40, SIZE);
+    trip_settings settings = trip_settings_default();
+    scene_picture copied = scene_draw(&s, &gl, &view, &settings);
+    const unsigned slots[] = { 2, 3, 8 };
+    const size_t slot_bytes[] = { 16384, 4096, 65536 };
+    for (int i = 0; i < 12; i++) {
+        trip_reader_params params = { .slots = slots[i % 3],
+                                      .slot_bytes = slot_bytes[i % 3],
+                                      .engine = (trip_engine)(i / 3) };
+        if (params.engine == TRIP_ENGINE_URING)
+            continue; /* what `auto` takes, or refused */
+        bool copy = i % 2;
+        if (copy)
+            setenv("TRIPTYCH_GL_SLOTS", "copy", 1);
+        bool in_place = draw_in_place(&s, &view, params, rgba);
+        unsetenv("TRIPTYCH_GL_SLOTS");
+        if (copy)
+            assert_false(in_place);
+        else if (!in_place)
+            print_message("this driver's memory takes no reads: batches are copied\n");
+        assert_memory_equal(rgba, copied.rgba, sizeof rgba);
+    }
+    scene_picture_free(&copied);
+    scene_destroy(&s);
+}
+
 static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
 {
     (void)state;
@@ -417,6 +483,7 @@ int main(void)
         cmocka_unit_test(supports_larger_than_sprites_are_drawn_as_triangles),
         cmocka_unit_test(splats_with_centres_out_of_view_are_drawn),
         cmocka_unit_test(the_size_of_batches_makes_no_difference),
+        cmocka_unit_test(reads_into_gl_memory_give_the_same_picture_as_copies),
         cmocka_unit_test(coarser_targets_stay_close_and_their_errors_are_known),
         cmocka_unit_test(what_does_not_fit_is_refused_and_the_next_frame_draws),
         cmocka_unit_test(a_shader_that_does_not_compile_is_named_with_its_line),
