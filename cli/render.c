@@ -126,7 +126,7 @@ static int draw_image(drawing *d, int index)
         return status;
     status = draw_planned(d, &camera, &plan, &stats);
     if (!status && d->stats)
-        status = render_stats_add_frame(d->stats, &plan, &stats);
+        status = render_stats_add_frame(d->stats, s->data, &plan, &stats);
     trip_plan_release(&plan, s->budget);
     if (!status)
         status = trip_image_write(path, d->o.width, d->o.height, d->rgba, NULL);

@@ -71,7 +71,8 @@ static void add_list(cJSON *lists, int axis, const trip_plan_list *p, const trip
     cJSON_AddNumberToObject(list, "bytes_read", (double)s->bytes_read);
 }
 
-int render_stats_add_frame(render_stats *s, const trip_plan *plan, const trip_frame_stats *frame)
+int render_stats_add_frame(render_stats *s, const trip_dataset *data, const trip_plan *plan,
+                           const trip_frame_stats *frame)
 {
     cJSON *f = cJSON_CreateObject();
     add_ms(f, "ms", frame->ms);
@@ -80,6 +81,8 @@ int render_stats_add_frame(render_stats *s, const trip_plan *plan, const trip_fr
     add_ms(f, "merge_ms", frame->merge_ms);
     cJSON_AddNumberToObject(f, "reads", (double)frame->reader.reads);
     cJSON_AddNumberToObject(f, "bytes_cached", (double)frame->reader.bytes_cached);
+    cJSON_AddNumberToObject(f, "bytes_of_planes_left_out",
+                            (double)trip_plan_bytes_left_out(plan, data));
     cJSON_AddNumberToObject(f, "runs_skipped", (double)frame->reader.runs_skipped);
     cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame->reader.bytes_skipped);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
@@ -170,6 +173,9 @@ void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *re
                 s->splats_projected);
         fprintf(out, ", %" PRIu64 " drawn\n", s->splats_drawn);
     }
+    if (frame->reader.bytes_cached)
+        fprintf(out, "cache       %s from memory\n",
+                trip_format_bytes(frame->reader.bytes_cached, bytes));
     if (frame->reader.bytes_skipped)
         fprintf(out, "hidden      %s in %" PRIu64 " runs not read: behind what is opaque\n",
                 trip_format_bytes(frame->reader.bytes_skipped, bytes), frame->reader.runs_skipped);

@@ -10,7 +10,8 @@ typedef struct render_stats render_stats;
 int render_stats_create(render_stats **out);
 void render_stats_destroy(render_stats *s);
 /* `plan` as drawn, not yet released. */
-int render_stats_add_frame(render_stats *s, const trip_plan *plan, const trip_frame_stats *frame);
+int render_stats_add_frame(render_stats *s, const trip_dataset *data, const trip_plan *plan,
+                           const trip_frame_stats *frame);
 /* Writes the JSON to the file of --stats, by another name and a rename, or to stdout. */
 int render_stats_write(render_stats *s, const render_options *o, const trip_renderer *renderer,
                        const trip_reader *reader, const trip_budget *budget);

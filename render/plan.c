@@ -251,16 +251,27 @@ static void explain_list(const trip_plan *plan, int axis, FILE *out)
         explain_passes(list, out);
 }
 
+uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *data)
+{
+    uint64_t splats = 0;
+    for (int axis = 0; axis < 3; axis++)
+        splats += plan->lists[axis].splats_selected;
+    unsigned left_out = data->header.planes & ~plan->planes & 1u << TRIP_PLANE_NORMALS;
+    return left_out ? splats * TRIP_RECORD_BYTES : 0;
+}
+
 static void explain_shading(const trip_plan *plan, const trip_dataset *data, const trip_settings *s,
                             FILE *out)
 {
     const char *light = s->headlight ? "from the eye" : "from the direction given";
+    char bytes[32];
     if (plan->planes & 1u << TRIP_PLANE_NORMALS)
         fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))
         fprintf(out, "shading     does not run: the data set has no normals\n");
     else
-        fprintf(out, "shading     does not run: not asked for; normal planes are not read\n");
+        fprintf(out, "shading     does not run: not asked for; normal planes are not read, %s\n",
+                trip_format_bytes(trip_plan_bytes_left_out(plan, data), bytes));
 }
 
 void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,

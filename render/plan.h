@@ -36,6 +36,9 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget);
 void trip_plan_release(trip_plan *plan, trip_budget *budget);
 
+/* Of the selected splats, in the data set's planes that the plan does not call for. */
+uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *data);
+
 /* The plan in words, an effect a line: whether it runs and why. */
 void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
                        const trip_settings *settings, FILE *out);

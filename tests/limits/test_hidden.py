@@ -1,4 +1,5 @@
 """What a frame does not need is not read, and counted; the picture is the same to the bit."""
+import json
 import re
 
 import limits
@@ -68,11 +69,34 @@ class Hidden(limits.Test):
     def test_normals_are_read_only_for_shading(self):
         volume = self.generate("lobes.nrrd", "marschner-lobb", 64)
         data = self.brick(volume, "lobes.trip", "--keep-all")
-        shaded = bytes_read(self.stats(data)[0])
-        plain = bytes_read(self.stats(data, "--no-shading")[0])
-        self.assertEqual(shaded, 2 * plain)
+        shaded = self.stats(data)[0]
+        plain = self.stats(data, "--no-shading")[0]
+        self.assertEqual(bytes_read(shaded), 2 * bytes_read(plain))
+        self.assertEqual(shaded["frames"][0]["bytes_of_planes_left_out"], 0)
+        splats = sum(axis["splats_read"] for axis in plain["frames"][0]["lists"].values())
+        self.assertEqual(plain["frames"][0]["bytes_of_planes_left_out"], 4 * splats)
         self.assertIn("normal planes are read", self.explained(data)[0])
-        self.assertNotIn("normal planes are read", self.explained(data, "--no-shading")[0])
+        said = re.search(r"normal planes are not read, ([\d.]+) MB",
+                         self.explained(data, "--no-shading")[0])
+        self.assertAlmostEqual(float(said[1]), 4e-6 * splats, delta=0.01)
+
+    def test_a_sequence_reads_less_where_bricks_find_room_in_memory(self):
+        data = self.brick(self.generate("turned.nrrd", "marschner-lobb", 144), "turned.trip",
+                          "--keep-all")
+        frames = {}
+        for memory in "24M", "1G":
+            r = self.works("triptych", "render", data, "-o", self.path("t.exr"), "--orbit", 4, "--size",
+                           "100x80", "--renderer", "cpu", "--hidden", "draw", "--memory", memory,
+                           "--stats", "-")
+            frames[memory] = json.loads(r.out)["frames"]
+        read = {memory: [sum(axis["bytes_read"] for axis in frame["lists"].values())
+                         for frame in drawn] for memory, drawn in frames.items()}
+        self.tell(f"bytes read by each frame: {read}")
+        self.assertEqual(read["1G"][0], read["24M"][0])
+        self.assertLess(sum(read["1G"]), 0.7 * sum(read["24M"]))
+        self.assertEqual(read["1G"][2:], [0, 0])  # from behind: the lists of the first two
+        for frame in frames["1G"][2:]:
+            self.assertGreater(frame["bytes_cached"], 0)
 
 
 if __name__ == "__main__":
