@@ -1,0 +1,306 @@
+/* Whatever happens to a data set's bytes, on disk or on their way, a frame is the same picture or
+ * ends with one line that names the file; and the next frame is whole. */
+#include "renderer_choice.h"
+#include "rounds.h"
+#include "scenes.h"
+#include "test.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { SIZE = 32, FLIPS = 1000, CUTS = 140, MAX_FILES = 8 };
+
+static const size_t picture_bytes = (size_t)SIZE * SIZE * 4 * sizeof(float);
+
+static struct {
+    scene scene;
+    char files[MAX_FILES][400];
+    unsigned file_count;
+    float wanted[SIZE * SIZE * 4];
+} shared;
+
+static unsigned random_below(unsigned count)
+{
+    return (unsigned)(test_random() * count);
+}
+
+static bool cloudy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    uint32_t hash = scene_hash(i, j, k);
+    (void)user;
+    gradient[0] = i - 15;
+    gradient[1] = j - 12;
+    gradient[2] = k - 10;
+    *code = hash % 60000;
+    return hash % 3 != 0;
+}
+
+/* Everything that takes part in drawing frames, from the disk on. */
+typedef struct drawing {
+    trip_budget *budget;
+    trip_dataset *data;
+    trip_camera camera;
+    trip_settings settings;
+    trip_plan plan;
+    trip_renderer *renderer;
+    trip_reader *reader;
+} drawing;
+
+static void close_drawing(drawing *d)
+{
+    trip_reader_destroy(d->reader);
+    if (d->renderer)
+        d->renderer->ops->destroy(d->renderer);
+    trip_plan_release(&d->plan, d->budget);
+    trip_dataset_close(d->data);
+    trip_budget_destroy(d->budget);
+}
+
+static int open_drawing(drawing *d, trip_renderer_kind kind, trip_reader_params params)
+{
+    memset(d, 0, sizeof *d);
+    assert_int_equal(trip_budget_create(&d->budget, UINT64_C(1) << 28), 0);
+    int status = trip_dataset_open(&d->data, shared.scene.path, d->budget);
+    if (status)
+        return status;
+    trip_camera_params view = scene_view(&shared.scene, trip_v3(1, 0.8, -0.3), 45, 45, SIZE);
+    d->settings = trip_settings_default();
+    d->settings.h = 0.8;
+    assert_int_equal(trip_camera_make(&d->camera, &view, &d->data->index_to_world), 0);
+    status =
+        trip_plan_make(&d->plan, d->data, &d->camera, &d->settings, shared.scene.table, d->budget);
+    params.planes = d->plan.planes;
+    if (!status)
+        status = trip_renderer_create(&d->renderer, kind, 2, d->budget);
+    return status ? status : trip_reader_create(&d->reader, d->data, &params, d->budget);
+}
+
+static int draw_frame(drawing *d, float *rgba)
+{
+    trip_frame_stats stats;
+    trip_frame frame = { .data = d->data,
+                         .camera = &d->camera,
+                         .settings = &d->settings,
+                         .plan = &d->plan,
+                         .table = shared.scene.table };
+    return trip_frame_draw(d->renderer, d->reader, &frame, rgba, &stats);
+}
+
+static void find_files(void)
+{
+    DIR *folder = opendir(shared.scene.path);
+    assert_non_null(folder);
+    for (struct dirent *e = readdir(folder); e; e = readdir(folder)) {
+        if (e->d_name[0] == '.')
+            continue;
+        assert_true(shared.file_count < MAX_FILES);
+        snprintf(shared.files[shared.file_count++], sizeof shared.files[0], "%s/%s",
+                 shared.scene.path, e->d_name);
+    }
+    closedir(folder);
+    assert_int_equal(shared.file_count, 7);
+}
+
+static int set_up(void **state)
+{
+    drawing d;
+    (void)state;
+    scene_create(&shared.scene, &(scene_params){ .dims = { 30, 24, 20 },
+                                                 .tile_voxels = 16,
+                                                 .slab_sheets = 5,
+                                                 .normals = true,
+                                                 .voxel = cloudy });
+    scene_colour(&shared.scene, 10000, 49999, 1, 0.4, 0.1, 0.1);
+    scene_colour(&shared.scene, 50000, 65535, 0.2, 0.6, 1, 0.9);
+    find_files();
+    assert_int_equal(open_drawing(&d, TRIP_RENDERER_CPU, (trip_reader_params){ 0 }), 0);
+    assert_int_equal(draw_frame(&d, shared.wanted), 0);
+    close_drawing(&d);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scene_destroy(&shared.scene);
+    return 0;
+}
+
+static char reported[1024];
+
+static void keep_report(const char *line, void *user)
+{
+    (void)user;
+    test_report_count++;
+    snprintf(reported, sizeof reported, "%s", line);
+}
+
+static const trip_engine engines[] = { TRIP_ENGINE_AUTO, TRIP_ENGINE_PREAD, TRIP_ENGINE_NULL };
+
+/* One frame by any engine from what is on disk; true when it was drawn. */
+static bool judge(const char *file)
+{
+    static float rgba[SIZE * SIZE * 4];
+    drawing d;
+    test_report_count = 0;
+    trip_report_redirect(keep_report, NULL);
+    trip_reader_params params = { .engine = engines[random_below(3)] };
+    int status = open_drawing(&d, TRIP_RENDERER_CPU, params);
+    if (!status)
+        status = draw_frame(&d, rgba);
+    trip_report_redirect(NULL, NULL);
+    close_drawing(&d);
+    if (status == 0) {
+        assert_int_equal(test_report_count, 0);
+        assert_memory_equal(rgba, shared.wanted, picture_bytes);
+        return true;
+    }
+    assert_int_equal(test_report_count, 1);
+    if (!strstr(reported, file))
+        fail_msg("%s is damaged, but: %s", file, reported);
+    return false;
+}
+
+static long file_bytes(const char *file)
+{
+    struct stat st;
+    assert_int_equal(stat(file, &st), 0);
+    return (long)st.st_size;
+}
+
+static void change(const char *file, long at, unsigned char bits)
+{
+    unsigned char byte;
+    int fd = open(file, O_RDWR);
+    assert_int_equal(pread(fd, &byte, 1, at), 1);
+    byte ^= bits;
+    assert_int_equal(pwrite(fd, &byte, 1, at), 1);
+    close(fd);
+}
+
+static void a_flipped_byte_ends_the_frame_or_leaves_the_picture_as_it_is(void **state)
+{
+    int flips = limits_rounds(FLIPS), drawn = 0;
+    (void)state;
+    for (int i = 0; i < flips; i++) {
+        const char *file = shared.files[random_below(shared.file_count)];
+        long at = (long)(test_random() * (double)file_bytes(file));
+        unsigned char bits = (unsigned char)(1 + random_below(255));
+        change(file, at, bits);
+        drawn += judge(file);
+        change(file, at, bits);
+    }
+    print_message("%d bytes changed: %d errors, %d same pictures\n", flips, flips - drawn, drawn);
+    assert_true(drawn < flips);
+    assert_true(judge(""));
+}
+
+static void cut_to(const char *file, long length)
+{
+    char copy[512], command[1200];
+    snprintf(copy, sizeof copy, "%s/copy", shared.scene.folder);
+    snprintf(command, sizeof command, "cp '%s' '%s'", file, copy);
+    assert_int_equal(system(command), 0);
+    assert_int_equal(truncate(file, length), 0);
+    assert_false(judge(file));
+    assert_int_equal(rename(copy, file), 0);
+}
+
+static void a_file_of_any_other_length_ends_the_frame(void **state)
+{
+    (void)state;
+    for (int i = 0; i < limits_rounds(CUTS); i++) {
+        const char *file = shared.files[(unsigned)i % shared.file_count];
+        long whole = file_bytes(file), length = (long)(test_random() * 1.1 * (double)whole);
+        cut_to(file, length == whole ? whole + 1 : length);
+    }
+    assert_true(judge(""));
+}
+
+/* What happens to the n-th read of a frame. */
+typedef struct mishap {
+    enum { FAILS, ENDS, COMES_SHORT, COMES_CHANGED, IS_INTERRUPTED, MISHAPS } kind;
+    _Atomic int countdown;
+} mishap;
+
+static long happen(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    mishap *m = user;
+    long somewhere = result > 0 ? (long)(offset / 7 + bytes) % result : 0;
+    if (m->countdown-- != 0 || result <= 0)
+        return result;
+    switch (m->kind) {
+    case FAILS:
+        return -EIO;
+    case ENDS:
+        return 0;
+    case COMES_SHORT:
+        return 1 + somewhere;
+    case COMES_CHANGED:
+        ((unsigned char *)data)[somewhere] ^= 4;
+        return result;
+    default:
+        return -EINTR;
+    }
+}
+
+/* Every third read of the frame in turn. A frame gets over what is short or interrupted. */
+static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
+                          const float *wanted)
+{
+    static float rgba[SIZE * SIZE * 4];
+    mishap m = { .countdown = -1 };
+    drawing d;
+    m.kind = what;
+    trip_reader_params params = {
+        .engine = engine, .slots = 3, .slot_bytes = 8192, .fault = happen, .fault_user = &m
+    };
+    assert_int_equal(open_drawing(&d, kind, params), 0);
+    for (int at = 0;; at += 3) {
+        m.countdown = at;
+        test_expect_report();
+        int status = draw_frame(&d, rgba);
+        bool happened = m.countdown < 0;
+        bool fatal = what == FAILS || what == ENDS || what == COMES_CHANGED;
+        assert_int_equal(test_reports(), fatal && happened);
+        assert_int_equal(status < 0, fatal && happened);
+        if (status == 0)
+            assert_memory_equal(rgba, wanted, picture_bytes);
+        if (!happened)
+            break;
+        m.countdown = -1;
+        assert_int_equal(draw_frame(&d, rgba), 0);
+        assert_memory_equal(rgba, wanted, picture_bytes);
+    }
+    close_drawing(&d);
+}
+
+static void a_read_that_fails_comes_short_or_damaged_in_mid_frame(void **state)
+{
+    static float wanted[SIZE * SIZE * 4];
+    const trip_renderer_kind kinds[] = { TRIP_RENDERER_CPU, TRIP_RENDERER_REFERENCE };
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        drawing d;
+        assert_int_equal(open_drawing(&d, kinds[k], (trip_reader_params){ 0 }), 0);
+        assert_int_equal(draw_frame(&d, wanted), 0);
+        close_drawing(&d);
+        for (int what = 0; what < MISHAPS; what++)
+            for (int engine = 0; engine < 2; engine++)
+                check_mishaps(kinds[k], engines[engine], what, wanted);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_flipped_byte_ends_the_frame_or_leaves_the_picture_as_it_is),
+        cmocka_unit_test(a_file_of_any_other_length_ends_the_frame),
+        cmocka_unit_test(a_read_that_fails_comes_short_or_damaged_in_mid_frame),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
