@@ -23,7 +23,6 @@ typedef struct brick {
     const trip_brick_params *params;
     trip_brick_summary *summary;
     trip_brick_input in;
-    uint64_t reader_bytes; /* that the volume keeps from the scan */
     trip_piece_format format;
     trip_quantiser quantiser;
     trip_memory_plan plan;
@@ -46,14 +45,14 @@ static double now_seconds(void)
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->journal);
-    uint64_t left = trip_budget_left_bytes(b->in.budget);
     double begin = now_seconds();
     int status = 0;
     if (start)
         trip_brick_input_set_tally(&b->in, &start->tally);
     else
-        status = trip_brick_input_scan(&b->in, (trip_scan_params){ .slices = b->plan.slices });
-    b->reader_bytes = left - trip_budget_left_bytes(b->in.budget);
+        status =
+            trip_brick_input_scan(&b->in, (trip_scan_params){ .slices = b->plan.slices,
+                                                              .read_ahead = b->plan.read_ahead });
     b->summary->scan_seconds = now_seconds() - begin;
     return status;
 }

@@ -8,6 +8,8 @@
 
 enum { MOST_SLICES = 32 };
 
+/* What the input took before there is a plan. */
+#define TAKEN_BYTES ((uint64_t)1 << 20)
 /* What the writer and the spill take. */
 #define OPENED_BYTES ((uint64_t)18 << 20)
 /* What the builder takes beside its pieces, and readers for themselves. */
@@ -91,8 +93,8 @@ static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_
 static int refuse(const char *path, const trip_volume_info *info, const needs *n, unsigned threads,
                   int64_t slices)
 {
-    uint64_t least =
-        n->opened_bytes + n->late_bytes + reader_bytes(n, slices, false) + n->list_min_bytes;
+    uint64_t least = TAKEN_BYTES + n->opened_bytes + n->late_bytes +
+                     reader_bytes(n, slices, false) + n->list_min_bytes;
     return trip_fail(TRIP_ERROR, "brick", path,
                      "slices of %" PRId64 " x %" PRId64 " and %u threads need --memory %" PRIu64
                      "M at least%s",

@@ -13,13 +13,14 @@
 
 #include "report.h"
 
-/* Blocks looked at, and slices of each. */
+/* Blocks looked at, and slices of each where memory is not short. */
 enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
 /* A pass is stopped with this status when it has taken long enough. */
 enum { STOPPED = -100 };
 /* What is written to see how fast the disk is. */
 #define TRIAL_BYTES ((size_t)32 << 20)
-static const double check_seconds = 3;
+/* How long a run may look at the volume before it begins: longer at one that takes hours. */
+static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
 /* Estimates are from a sample: a run is only refused when even much less would not fit. */
 static const double surely = 0.7;
 
@@ -30,9 +31,14 @@ static double now_seconds(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-static uint64_t stride_of(const trip_brick_input *in)
+static int64_t slices_of(const trip_memory_plan *plan)
 {
-    uint64_t blocks = (uint64_t)in->info->dims[2] / SAMPLE_SLICES + 1;
+    return plan->slices < SAMPLE_SLICES ? plan->slices : SAMPLE_SLICES;
+}
+
+static uint64_t stride_of(const trip_brick_input *in, const trip_memory_plan *plan)
+{
+    uint64_t blocks = (uint64_t)(in->info->dims[2] / slices_of(plan)) + 1;
     if (in->info->sparse) /* blocks differ too much */
         return 1;
     return blocks > SAMPLES ? blocks / SAMPLES : 1;
@@ -61,12 +67,13 @@ static void scale_up(const trip_brick_input *in, const trip_tally *t, uint64_t *
 
 /* Kept voxels, by looking at blocks spread over the volume for `limit_seconds` at most (0: no
  * limit); the input's envelope is made. 1: *kept and *voxels are filled; 0: it took too long. */
-static int estimate_kept(trip_brick_input *in, double limit_seconds, double *passing_seconds,
-                         uint64_t *voxels, uint64_t *kept)
+static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
+                         double *passing_seconds, uint64_t *voxels, uint64_t *kept)
 {
     sampling s = { in, limit_seconds > 0 ? now_seconds() + limit_seconds : INFINITY };
-    const trip_scan_params scan = { .slices = SAMPLE_SLICES,
-                                    .stride = stride_of(in),
+    const trip_scan_params scan = { .slices = slices_of(plan),
+                                    .read_ahead = plan->read_ahead,
+                                    .stride = stride_of(in, plan),
                                     .envelope = &in->envelope,
                                     .progress = on_progress,
                                     .user = &s,
@@ -149,17 +156,18 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
         trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
                               in->memory_bytes, p->slices);
     if (status == 0 && scan)
-        status = trip_brick_input_scan(in, (trip_scan_params){ .slices = SAMPLE_SLICES,
-                                                               .stride = stride_of(in),
+        status = trip_brick_input_scan(in, (trip_scan_params){ .slices = slices_of(&plan),
+                                                               .read_ahead = plan.read_ahead,
+                                                               .stride = stride_of(in, &plan),
                                                                .passing_seconds = &passing });
     if (status == 0)
         status = trip_brick_input_make_envelope(in);
     if (status == 0)
-        status = estimate_kept(in, 0, &passing, &e->voxels, &e->kept);
+        status = estimate_kept(in, &plan, 0, &passing, &e->voxels, &e->kept);
     if (status < 0)
         return status;
     double looking = now_seconds() - begin - passing;
-    double all = looking * (double)stride_of(in) + passing;
+    double all = looking * (double)stride_of(in, &plan) + passing;
     format.quantised = scan || trip_brick_has_narrow_type(in);
     estimate_sizes(in, &format, &plan, e);
     e->seconds = all + (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
@@ -185,7 +193,9 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
     estimate_sizes(in, format, plan, &e);
     if (e.bytes + e.temporary_bytes <= e.free_bytes)
         return 0;
-    int status = estimate_kept(in, check_seconds, NULL, &e.voxels, &e.kept);
+    double seconds = check_seconds + check_seconds_per_voxel * (double)in->grid_voxels;
+    bool all = in->params->keep_all && !in->info->sparse;
+    int status = all ? 1 : estimate_kept(in, plan, seconds, NULL, &e.voxels, &e.kept);
     if (status <= 0)
         return status;
     estimate_sizes(in, format, plan, &e);

@@ -295,7 +295,7 @@ static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *
     trip_walk_params walk = { .slices = s->params->slices,
                               .stride = s->params->stride,
                               .passing_seconds = s->params->passing_seconds,
-                              .read_ahead = true,
+                              .read_ahead = s->params->read_ahead,
                               .edge = SCAN_EDGE,
                               .height = SCAN_HEIGHT,
                               .box = scan_box,

@@ -38,6 +38,7 @@ void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram);
 /* Zero means the default. */
 typedef struct trip_scan_params {
     int64_t slices;                /* of a block */
+    bool read_ahead;               /* as of trip_walk_params */
     uint64_t stride;               /* look at every so many blocks only; default: at all */
     const trip_envelope *envelope; /* counts what it keeps, instead of filling bins */
     /* Hears of the voxels passed so far; other than 0 ends the pass with that status. */

@@ -215,6 +215,15 @@ static void drop_spare(trip_volume *v)
     slab_free(v, atomic_exchange(&v->spare, NULL));
 }
 
+/* What is kept from one block to the next. */
+static void drop_memory(trip_volume *v)
+{
+    drop_spare(v);
+    if (v->carry)
+        trip_budget_release(v->budget, v->carry, 2 * v->slice_bytes);
+    v->carry = NULL;
+}
+
 static slab *slab_take(trip_volume *v, int64_t first, int64_t count)
 {
     size_t bytes;
@@ -255,9 +264,7 @@ void trip_volume_close(trip_volume *v)
 {
     if (!v)
         return;
-    drop_spare(v);
-    if (v->carry)
-        trip_budget_release(v->budget, v->carry, 2 * v->slice_bytes);
+    drop_memory(v);
     if (v->state)
         v->reader->close(v->state);
     free(v->path);
@@ -266,6 +273,7 @@ void trip_volume_close(trip_volume *v)
 
 int trip_volume_rewind(trip_volume *v)
 {
+    drop_memory(v);
     v->next_slice = v->read_slices = 0;
     v->broken = 0;
     return v->reader->rewind(v->state);
