@@ -177,6 +177,11 @@ def refuse_io_uring():
         raise OSError(ctypes.get_errno(), "seccomp")
 
 
+def rounds(count):
+    """How often something random is tried: more by the environment, for a night."""
+    return count * int(os.environ.get("TRIP_LIMITS_ROUNDS", 1))
+
+
 def option(name, default):
     """What --set gave, of the default's type."""
     return type(default)(options.get(name, default))

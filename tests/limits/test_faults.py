@@ -9,6 +9,7 @@ import subprocess
 import limits
 
 SIZE = "48x40"
+FLIPS = 60  # many more in test_broken.c, without a process each
 
 
 class Faults(limits.Test):
@@ -60,7 +61,7 @@ class Faults(limits.Test):
 
     def test_flipped_bits(self):
         found = 0
-        count = limits.option("flips", 150)
+        count = limits.rounds(FLIPS)
         for _ in range(count):
             name = self.random_file()
             path = os.path.join(self.data, name)
@@ -77,7 +78,7 @@ class Faults(limits.Test):
         self.tell(f"{count} bytes flipped: {found} errors, {count - found} same pictures")
 
     def test_overwritten_and_moved_parts(self):
-        for i in range(limits.option("flips", 150) // 5):
+        for i in range(limits.rounds(FLIPS) // 5):
             name = self.random_file()
             path = os.path.join(self.data, name)
             data = bytearray(limits.read_bytes(path))
@@ -99,7 +100,7 @@ class Faults(limits.Test):
             path = os.path.join(self.data, name)
             size = os.path.getsize(path)
             lengths = {0, 1, 1023, 1024, 4096, size // 2, size - 4, size - 1, size + 1, size + 4096}
-            lengths |= {self.random.randrange(size) for _ in range(limits.option("cuts", 5))}
+            lengths |= {self.random.randrange(size) for _ in range(limits.rounds(3))}
             for length in sorted(lengths):
                 os.truncate(path, length)
                 self.judge(name, f"{name} cut to {length} bytes", must_fail=True)

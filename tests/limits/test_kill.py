@@ -55,7 +55,7 @@ class Kill(limits.Test):
             self.assertEqual(limits.folder_hashes(self.name), self.wanted)
 
     def test_killed_any_number_of_times_and_resumed(self):
-        moments = limits.option("moments", 60)
+        moments = limits.rounds(100)
         killed = resumed = complete = 0
         while killed < moments:
             if self.kill_at(self.random.uniform(0, 1.1 * self.seconds), "--resume"):
@@ -78,7 +78,7 @@ class Kill(limits.Test):
         self.works("triptych", "brick", self.volume, "-o", other, "-q", "--range", "30000:")
         old = limits.folder_hashes(other)
         seen = set()
-        for _ in range(limits.option("moments", 60) // 4):
+        for _ in range(limits.rounds(15)):
             if not os.path.exists(self.name):
                 shutil.copytree(other, self.name)
             self.kill_at(self.random.uniform(0, 1.1 * self.seconds), "--force")

@@ -43,7 +43,7 @@ class Picture(limits.Test):
     def check_volume(self, volume, name, view, *brick):
         sets = [self.brick(volume, f"{name}{n}.trip", "--tile", n, *brick) for n in TILES]
         slabs = self.brick(volume, f"{name}-slabs.trip", "--slab-sheets", 3, *brick)
-        for renderer, count in ("cpu", 16), ("reference", 1):
+        for renderer, count in ("cpu", limits.rounds(12)), ("reference", limits.rounds(1)):
             self.check(sets + [slabs], renderer, view, count)
 
     def test_of_a_scan(self):

@@ -54,7 +54,7 @@ class Together(limits.Test):
         seen = set()
         failures = 0
         path = self.path("r.exr")
-        for _ in range(limits.option("pictures", 60)):
+        for _ in range(limits.rounds(30)):
             r = limits.run("triptych", "render", data, "-o", path, "--size", "60x60", "--renderer",
                            "cpu")
             if r.status == 0:
@@ -66,7 +66,7 @@ class Together(limits.Test):
         thread.join()
         self.assertEqual(said, [])
         self.assertLessEqual(seen, wanted)
-        self.tell(f"{failures} of {limits.option('pictures', 60)} came upon the moment of change")
+        self.tell(f"{failures} of {limits.rounds(30)} came upon the moment of change")
         self.works("triptych", "info", "--verify", data)
 
     def test_two_that_make_the_same_data_set(self):
