@@ -140,6 +140,8 @@ static void stream_reads_the_files_of_all_lists(void **state)
                     file_bytes("block.trip/z.voxels") + file_bytes("block.trip/x.normals") +
                     file_bytes("block.trip/y.normals") + file_bytes("block.trip/z.normals");
     assert_true(number(stage(rows, "plain"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "plain_large"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "streamed"), "bytes_read") == planes);
     assert_true(number(stage(rows, "read"), "bytes_read") == planes);
     assert_true(number(stage(rows, "frame"), "bytes_read") == planes);
     assert_true(number(summary, "dataset_bytes") == planes + file_bytes("block.trip/index.trip"));
@@ -147,6 +149,8 @@ static void stream_reads_the_files_of_all_lists(void **state)
     assert_true(number(summary, "memory_peak_bytes") <= 64.0 * (1 << 20));
     assert_close(number(summary, "frame_of_disk"),
                  number(summary, "gb_per_s") / number(summary, "disk_gb_per_s"));
+    assert_close(number(summary, "streamed_of_disk"),
+                 number(stage(rows, "streamed"), "gb_per_s") / number(summary, "disk_gb_per_s"));
     assert_close(number(summary, "seconds_per_frame") * 1000, number(stage(rows, "frame"), "ms"));
     assert_close(number(summary, "frame_of_bound"),
                  number(stage(rows, "frame"), "ms") /

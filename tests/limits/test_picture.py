@@ -1,4 +1,5 @@
 """The program's picture is the same to the bit for any memory, engine, tiles, threads and caches."""
+import json
 import os
 import random
 
@@ -65,6 +66,31 @@ class Picture(limits.Test):
                 hashes = [limits.picture_hash(self.path(f"o-{i:03}.exr")) for i in range(5)]
                 wanted = wanted or hashes
                 self.assertEqual(hashes, wanted, f"{engine} {memory}")
+
+    def test_whether_reads_land_in_gl_memory_or_are_copied_there(self):
+        data = self.brick(os.path.join(limits.DATASETS, "tooth.nhdr"), "gl.trip")
+        picture = self.path("gl.exr")
+        arguments = ["triptych", "render", data, "-o", picture, "--size", "48x48", "--renderer",
+                     "gl", "--memory", "128M"]
+        if limits.run(*arguments).status:
+            self.skipTest("no OpenGL 4.5 here")
+        rings, hashes = [], []
+        for slots in "mapped", "copy":
+            env = {**os.environ, "TRIPTYCH_GL_SLOTS": slots}
+            stats = json.loads(self.works(*arguments, "--stats", "-", env=env).out)
+            rings.append(stats["ring"].split(":")[0])
+            hashes.append(limits.picture_hash(picture))
+            explained = self.works(*arguments, "--explain", env=env).out
+            self.assertIn(f"ring        {rings[-1]}: ", explained)
+        self.tell(f"reads into GL memory: {rings[0]}")
+        self.assertIn(rings[0], ["mapped", "copied"])
+        self.assertEqual(rings[1], "copied")
+        self.assertEqual(hashes[0], hashes[1])
+        stats = json.loads(self.works(*arguments, "--stats", "-", "--submit", "indexed").out)
+        self.assertEqual(stats["ring"].split(":")[0], "not used")
+        self.assertEqual(sum(x["bytes_read"] for x in stats["frames"][0]["lists"].values()), 0)
+        self.fails(*arguments, env={**os.environ, "TRIPTYCH_GL_SLOTS": "some"},
+                   says=["TRIPTYCH_GL_SLOTS", "neither mapped nor copy"])
 
     def test_where_the_kernel_refuses_io_uring(self):
         data = self.brick(os.path.join(limits.DATASETS, "tooth.nhdr"), "refused.trip")
