@@ -1,7 +1,7 @@
 /* Kernels that blend projected splats into the pixels of a tile: included by each cpu_isa_*.c after
- * cpu_simd.h. Splats are first paired with the blocks they may touch, so that the loop that blends
- * is one flat loop over pairs, whatever the footprints' sizes; each pixel still meets the splats in
- * their order. */
+ * cpu_simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the blocks of
+ * pixels that they may touch, in their order; then block after block takes its splats, its pixels
+ * all the while in registers. */
 #ifndef TRIP_CPU_BLEND_H
 #define TRIP_CPU_BLEND_H
 
@@ -14,7 +14,10 @@
 #define BLOCKS_DOWN (TRIP_CPU_TILE / BLOCK_ROWS)
 #define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
 #define BLOCK_FLOATS (4 * V)
-#define BLOCK_BYTES (4 * BLOCK_FLOATS)
+/* Eight rows of blocks, a bit each. */
+#define BANDS (BLOCKS / 64)
+
+static_assert(BLOCKS_ACROSS == 8 && BANDS >= 1 && BANDS <= TRIP_CPU_BANDS, "64 blocks to a band");
 
 /* ---- what a target keeps ---- */
 
@@ -40,86 +43,226 @@ INLINE vf kept(vf a, trip_target target)
     return a;
 }
 
+/* ---- where pixels lie ---- */
+
+/* Pixel centres of a block from the tile's corner. */
+INLINE vf block_x(unsigned number)
+{
+    vf x;
+    for (int i = 0; i < V; i++)
+        x[i] = (float)(i % 4) + 0.5f;
+    return x + v_set((float)(4 * (number % BLOCKS_ACROSS)));
+}
+
+INLINE vf block_y(unsigned number)
+{
+    vf y;
+    for (int i = 0; i < V; i++)
+        y[i] = (float)(i / 4) + 0.5f;
+    return y + v_set((float)(BLOCK_ROWS * (number / BLOCKS_ACROSS)));
+}
+
 /* ---- blending ---- */
 
-/* Optical depth of a splat at the pixels of a block: 0 outside its support. */
-INLINE vf optical_depth(const float *geometry, const trip_cpu_splat *splat, trip_cpu_rays rays)
+/* Where transpose() leaves a word. */
+INLINE unsigned place_of(unsigned word)
 {
-    const vf zero = v_set(0);
-    vf dx = v_load(geometry) - v_set(splat->x);
-    vf dy = v_load(geometry + V) - v_set(splat->y);
-    vf a = v_fma(dy, v_set(splat->l21), dx * v_set(splat->l11));
-    vf b = dy * v_set(splat->l22);
+    return word % 8 * 8 + word / 8;
+}
+
+/* A block's pixels and where they lie. */
+typedef struct patch {
+    vf r, g, b, t;
+    vf x, y; /* pixel centres from the tile's corner */
+    vf ray;  /* G */
+    vf stretch;
+} patch;
+
+/* Optical depth of a splat at the pixels of a block: 0 outside its support. */
+INLINE vf optical_depth(const patch *p, const trip_cpu_local *splat, trip_cpu_rays rays)
+{
+    vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
+    vf b = v_fma(p->y, v_set(splat->l22), v_set(splat->l2));
     vf y;
     if (rays == TRIP_CPU_PARALLEL)
         y = v_fnma(b, b, v_fnma(a, a, v_set(splat->peak)));
     else
-        y = v_fnma(v_load(geometry + 2 * V), v_fma(b, b, a * a), v_set(splat->peak));
-    vf depth = v_max(exp2_biased(v_max(y, zero)) - v_set(splat->edge), zero);
-    return rays == TRIP_CPU_STRETCHED ? depth * v_load(geometry + 3 * V) : depth;
+        y = v_fnma(p->ray, v_fma(b, b, a * a), v_set(splat->peak));
+    vf depth = exp2_biased_less(v_max(y, v_set(splat->least)), v_set(splat->edge));
+    return rays == TRIP_CPU_STRETCHED ? depth * p->stretch : depth;
+}
+
+/* put_behind() for thin splats where every pixel is open and stays so. */
+INLINE void put_behind_open(patch *p, const trip_cpu_local *splat, vf depth)
+{
+    vf left = v_fnma(p->t, depth * thin_ratio(depth), p->t), taken = p->t - left;
+    p->r = v_fma(taken, v_set(splat->r), p->r);
+    p->g = v_fma(taken, v_set(splat->g), p->g);
+    p->b = v_fma(taken, v_set(splat->b), p->b);
+    p->t = left;
 }
 
 /* Front to back: `splat` goes behind what the pixels hold. */
-INLINE void put_behind(float *pixels, const trip_cpu_splat *splat, vf depth, trip_target target)
+INLINE void put_behind(patch *p, const trip_cpu_local *splat, vf depth, trip_target target)
 {
-    vf t = v_load(pixels + 3 * V);
-    vm open = v_ge(t, v_set((float)TRIP_SATURATION));
-    vf taken, left;
-    if (splat->thick != 0) {
-        left = v_mul_where(open, t, exp_minus(depth));
-        taken = t - left;
-    } else {
-        taken = v_mul_or_zero(open, t * depth, thin_ratio(depth));
-        left = t - taken;
-    }
-    for (int c = 0; c < 3; c++) {
-        vf colour = v_fma(taken, v_set((&splat->r)[c]), v_load(pixels + c * V));
-        v_store(pixels + c * V, kept(colour, target));
-    }
-    if (target != TRIP_TARGET_RGBA32F)
-        left = v_set(1) - kept(v_set(1) - left, target);
-    v_store(pixels + 3 * V, left);
+    vm open = v_ge(p->t, v_set((float)TRIP_SATURATION));
+    vf left;
+    if (splat->thick)
+        left = v_mul_where(open, p->t, exp_minus(depth));
+    else
+        left = v_fnma_where(open, p->t, depth * thin_ratio(depth), p->t);
+    vf taken = p->t - left;
+    p->r = kept(v_fma(taken, v_set(splat->r), p->r), target);
+    p->g = kept(v_fma(taken, v_set(splat->g), p->g), target);
+    p->b = kept(v_fma(taken, v_set(splat->b), p->b), target);
+    p->t = target == TRIP_TARGET_RGBA32F ? left : v_set(1) - kept(v_set(1) - left, target);
+}
+
+INLINE vf over(vf behind, float colour, vf keep, trip_target target)
+{
+    vf front = v_set(colour);
+    return kept(v_fma(behind - front, keep, front), target);
 }
 
 /* Back to front: `splat` goes over what the pixels hold. */
-INLINE void put_over(float *pixels, const trip_cpu_splat *splat, vf depth, trip_target target)
+INLINE void put_over(patch *p, const trip_cpu_local *splat, vf depth, trip_target target)
 {
     vm inside = v_gt(depth, v_set(0));
-    vf keep = v_select(inside, exp_minus(depth), v_set(1));
-    for (int c = 0; c < 3; c++) {
-        vf colour = v_set((&splat->r)[c]);
-        colour = v_fma(v_load(pixels + c * V) - colour, keep, colour);
-        colour = v_select(inside, kept(colour, target), v_load(pixels + c * V));
-        v_store(pixels + c * V, colour);
-    }
-    vf left = v_load(pixels + 3 * V) * keep;
+    vf keep = exp_minus(depth), left = p->t * keep;
+    p->r = v_select(inside, over(p->r, splat->r, keep, target), p->r);
+    p->g = v_select(inside, over(p->g, splat->g, keep, target), p->g);
+    p->b = v_select(inside, over(p->b, splat->b, keep, target), p->b);
     if (target != TRIP_TARGET_RGBA32F)
         left = v_set(1) - kept(v_set(1) - left, target);
-    v_store(pixels + 3 * V, left);
+    p->t = v_select(inside, left, p->t);
 }
 
-INLINE void blend_pairs(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
+INLINE bool any_open(vf t)
+{
+    return vm_any(v_ge(t, v_set((float)TRIP_SATURATION)));
+}
+
+INLINE bool all_open(vf t)
+{
+    return vm_all(v_ge(t, v_set((float)TRIP_SATURATION)));
+}
+
+static void set_rays(trip_cpu_scratch *s, unsigned number);
+
+INLINE patch load_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays)
+{
+    const float *pixels = s->pixels + BLOCK_FLOATS * number;
+    patch p = {
+        .r = v_load(pixels),
+        .g = v_load(pixels + V),
+        .b = v_load(pixels + 2 * V),
+        .t = v_load(pixels + 3 * V),
+        .x = block_x(number),
+        .y = block_y(number),
+    };
+    if (rays != TRIP_CPU_PARALLEL) {
+        const float *of = s->rays + 2 * V * number;
+        if (!(s->rays_known[number / 64] >> number % 64 & 1))
+            set_rays(s, number);
+        p.ray = v_load(of);
+        p.stretch = v_load(of + V);
+    }
+    return p;
+}
+
+INLINE void store_block(trip_cpu_scratch *s, unsigned number, const patch *p)
+{
+    float *pixels = s->pixels + BLOCK_FLOATS * number;
+    v_store(pixels, p->r);
+    v_store(pixels + V, p->g);
+    v_store(pixels + 2 * V, p->b);
+    v_store(pixels + 3 * V, p->t);
+}
+
+/* The splat of the lowest bit. Its address is kept in one register: sums of two in every operand
+ * would cost the processor an operation each. */
+INLINE const trip_cpu_local *first_of(const trip_cpu_local *local, uint64_t splats)
+{
+    local += __builtin_ctzll(splats);
+    __asm__("" : "+r"(local));
+    return local;
+}
+
+/* Some of the splats from `local` on, in order, where none is thick and no pixel closes; false,
+ * with nothing done, when one would. */
+INLINE bool blend_open(patch *p, const trip_cpu_local *local, uint64_t splats, trip_cpu_rays rays)
+{
+    patch q = *p;
+    if (!all_open(q.t))
+        return false;
+    /* Two at a time where the registers suffice: while one waits, the other goes on. */
+    while (V == 16 && (splats & (splats - 1))) {
+        const trip_cpu_local *one = first_of(local, splats);
+        const trip_cpu_local *two = first_of(local, splats &= splats - 1);
+        vf depth_one = optical_depth(&q, one, rays), depth_two = optical_depth(&q, two, rays);
+        put_behind_open(&q, one, depth_one);
+        put_behind_open(&q, two, depth_two);
+        splats &= splats - 1;
+    }
+    for (; splats; splats &= splats - 1) {
+        const trip_cpu_local *splat = first_of(local, splats);
+        put_behind_open(&q, splat, optical_depth(&q, splat, rays));
+    }
+    if (!all_open(q.t))
+        return false;
+    *p = q;
+    return true;
+}
+
+INLINE void blend_any(patch *p, const trip_cpu_local *local, uint64_t splats, trip_cpu_rays rays,
+                      bool front_to_back, trip_target target)
+{
+    do {
+        const trip_cpu_local *splat = first_of(local, splats);
+        vf depth = optical_depth(p, splat, rays);
+        if (front_to_back)
+            put_behind(p, splat, depth, target);
+        else
+            put_over(p, splat, depth, target);
+    } while (splats &= splats - 1);
+}
+
+/* All splats of the group that may touch a block, in order; false when its pixels take no more
+ * light. Closed pixels never change, so asking late is no error. */
+INLINE bool blend_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
+                        bool front_to_back, trip_target target)
+{
+    patch p = load_block(s, number, rays);
+    for (uint32_t first = 0; first < s->splats; first += 64) {
+        uint64_t splats = s->touched[number / 64][first / 64][place_of(number % 64)];
+        if (splats == 0)
+            continue;
+        if (front_to_back && target == TRIP_TARGET_RGBA32F && !(splats & s->thick[first / 64]) &&
+            blend_open(&p, s->local + first, splats, rays))
+            continue;
+        if (front_to_back && !any_open(p.t))
+            break;
+        blend_any(&p, s->local + first, splats, rays, front_to_back, target);
+    }
+    store_block(s, number, &p);
+    return !front_to_back || any_open(p.t);
+}
+
+INLINE void blend_group(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
                         trip_target target)
 {
-    const uint32_t *end = s->pairs + s->pair_count;
-    char *pixels = (char *)s->pixels;
-    for (const uint32_t *pair = s->pairs; pair < end; pair++) {
-        uint32_t block = *pair & 0xffff, at = *pair >> 16;
-        const trip_cpu_splat *splat = (const void *)((const char *)s->local + at);
-        const float *geometry = (const void *)((const char *)s->geometry + block);
-        float *to = (void *)(pixels + block);
-        vf depth = optical_depth(geometry, splat, rays);
-        if (front_to_back)
-            put_behind(to, splat, depth, target);
-        else
-            put_over(to, splat, depth, target);
-    }
+    for (unsigned band = 0; band < BANDS; band++)
+        for (uint64_t rest = s->any[band] & s->open[band]; rest; rest &= rest - 1) {
+            unsigned bit = (unsigned)__builtin_ctzll(rest);
+            if (!blend_block(s, 64 * band + bit, rays, front_to_back, target))
+                s->open[band] &= ~(UINT64_C(1) << bit);
+        }
 }
 
 #define BLEND(name, rays, front_to_back, target)                                                   \
     static void name(trip_cpu_scratch *s)                                                          \
     {                                                                                              \
-        blend_pairs(s, rays, front_to_back, target);                                               \
+        blend_group(s, rays, front_to_back, target);                                               \
     }
 BLEND(behind_parallel, TRIP_CPU_PARALLEL, true, TRIP_TARGET_RGBA32F)
 BLEND(behind_perspective, TRIP_CPU_PERSPECTIVE, true, TRIP_TARGET_RGBA32F)
@@ -143,58 +286,87 @@ static void (*choose_blend(const trip_cpu_view *view))(trip_cpu_scratch *)
     return (view->front_to_back ? behind : over)[view->of->settings->target];
 }
 
-/* ---- pairing ---- */
+/* ---- sorting a group by blocks ---- */
 
-/* Bits of the four blocks at `pixels` that hold a pixel which may still take light. */
-INLINE unsigned open_blocks(const float *pixels)
+typedef uint64_t words8 __attribute__((vector_size(64)));
+
+/* Swaps the bits that `low` names in b with those `step` higher in a, so that of each pair of words
+ * (a, b) the blocks of step x step bits off the diagonal change places. */
+INLINE void exchange(words8 *a, words8 *b, unsigned step, uint64_t low)
 {
-    unsigned bits = 0;
-    for (unsigned b = 0; b < 4; b++) {
-        vm open = v_ge(v_load(pixels + BLOCK_FLOATS * b + 3 * V), v_set((float)TRIP_SATURATION));
-        bits |= (unsigned)(vm_bits(open) != 0) << b;
-    }
-    return bits;
+    words8 swap = (*a >> step ^ *b) & low;
+    *a ^= swap << step;
+    *b ^= swap;
 }
 
-/* Which blocks are ours and open: the others' pixels may be another thread's. Closed pixels never
- * change, so asking late is no error. */
-static void find_open(trip_cpu_scratch *s)
+INLINE void exchange_all(words8 rows[8], unsigned step, uint64_t low4, uint64_t low2, uint64_t low1)
 {
-    static_assert(BLOCKS_ACROSS == 8, "four blocks to a quarter");
-    unsigned any = 0;
-    for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
-        const float *pixels = s->pixels + BLOCK_FLOATS * BLOCKS_ACROSS * row;
-        unsigned quarters = s->quarters >> (row < BLOCKS_DOWN / 2 ? 0 : 2), bits = 0;
-        for (unsigned half = 0; half < 2; half++)
-            if (quarters >> half & 1)
-                bits |=
-                    (s->view->front_to_back ? open_blocks(pixels + 4 * BLOCK_FLOATS * half) : 15u)
-                    << 4 * half;
-        s->open[row] = (uint8_t)bits;
-        any |= bits;
-    }
-    s->any_open = any;
+    for (int i = 0; i < 4; i++)
+        exchange(&rows[i], &rows[i + 4], 4 * step, low4);
+    for (int i = 0; i < 8; i += i % 2 ? 3 : 1)
+        exchange(&rows[i], &rows[i + 2], 2 * step, low2);
+    for (int i = 0; i < 8; i += 2)
+        exchange(&rows[i], &rows[i + 1], step, low1);
 }
 
-static void empty_pairs(trip_cpu_scratch *s)
+/* Bit i of word k becomes bit k of word i, which then lies at place_of(i): steps of 32, 16 and 8
+ * words are between vectors of eight, and so are the smaller ones once the vectors are transposed
+ * themselves. */
+static void transpose(uint64_t words[64])
 {
+    words8 rows[8], columns[8];
+    memcpy(rows, words, sizeof rows);
+    exchange_all(rows, 8, UINT64_C(0x00000000ffffffff), UINT64_C(0x0000ffff0000ffff),
+                 UINT64_C(0x00ff00ff00ff00ff));
+    for (int i = 0; i < 8; i++)
+        for (int k = 0; k < 8; k++)
+            columns[i][k] = rows[k][i];
+    exchange_all(columns, 1, UINT64_C(0x0f0f0f0f0f0f0f0f), UINT64_C(0x3333333333333333),
+                 UINT64_C(0x5555555555555555));
+    memcpy(words, columns, sizeof columns);
+}
+
+static void empty_group(trip_cpu_scratch *s)
+{
+    for (unsigned band = 0; band < BANDS; band++)
+        for (uint32_t first = 0; first < s->splats; first += 64) {
+            uint64_t *words = s->touched[band][first / 64];
+            if (s->splats - first < 64)
+                memset(words + (s->splats - first), 0, (64 - (s->splats - first)) * sizeof *words);
+            transpose(words);
+        }
     s->blend(s);
-    s->splats = s->pair_count = 0;
-    find_open(s);
+    s->splats = 0;
+    memset(s->any, 0, sizeof s->any);
+    memset(s->thick, 0, sizeof s->thick);
+}
+
+static bool takes_light(const trip_cpu_scratch *s)
+{
+    uint64_t any = 0;
+    for (unsigned band = 0; band < BANDS; band++)
+        any |= s->open[band];
+    return any != 0;
 }
 
 typedef int32_t int4 __attribute__((vector_size(16)));
 typedef uint16_t ushort4 __attribute__((vector_size(8)));
 typedef float float4 __attribute__((vector_size(16)));
 
-/* A copy of a splat with its centre relative to the tile, where floats are finest. */
-INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, float4 origin)
+INLINE void make_local(trip_cpu_local *local, const trip_cpu_splat *splat, float4 origin,
+                       float cutoff)
 {
-    float4 part, centre;
+    float4 part, form, colour;
     memcpy(&part, splat, sizeof part);
-    memcpy(local, splat, sizeof *local);
-    centre = part + (__builtin_shufflevector(part, part, 2, 3, 2, 3) - origin);
-    memcpy(local, &centre, 2 * sizeof(float));
+    memcpy(&form, &splat->l11, sizeof form);
+    memcpy(&colour, &splat->r, sizeof colour);
+    float4 centre = part + (__builtin_shufflevector(part, part, 2, 3, 2, 3) - origin);
+    memcpy(&local->l11, &form, sizeof form);
+    memcpy(&local->r, &colour, sizeof colour);
+    local->l1 = -(splat->l11 * centre[0] + splat->l21 * centre[1]);
+    local->l2 = -(splat->l22 * centre[1]);
+    local->least = splat->peak - cutoff;
+    local->thick = splat->thick;
 }
 
 typedef struct block_range {
@@ -215,24 +387,16 @@ INLINE block_range blocks_of(const trip_cpu_splat *splat, int4 origin)
     return (block_range){ (unsigned)b[0], (unsigned)b[1], (unsigned)b[2], (unsigned)b[3] };
 }
 
-/* Pairs of splat `index` with the open blocks of a range, four rows at a time; their number. */
-INLINE uint32_t pair_up(const trip_cpu_scratch *s, uint32_t *pairs, uint32_t index, block_range r)
+/* The bits of a band's blocks from row `top` to `bottom`, counted from the tile's first. */
+INLINE uint64_t rows_of_band(unsigned band, unsigned top, unsigned bottom)
 {
-    static const uint32_t rows[4] = { 0xff, 0xffff, 0xffffff, 0xffffffff };
-    uint32_t columns = (0xffu << r.left & 0xffu >> (BLOCKS_ACROSS - 1 - r.right)) * 0x01010101u;
-    uint32_t n = 0;
-    static_assert(sizeof *s->local == 64 && BLOCK_BYTES == TRIP_SIMD_STEP, "bytes in pairs");
-    for (unsigned row = r.top;; row += 4) {
-        unsigned more = r.bottom - row;
-        uint32_t blocks, first = index << 22 | row * BLOCKS_ACROSS * BLOCK_BYTES;
-        memcpy(&blocks, s->open + row, sizeof blocks);
-        blocks &= columns & rows[more < 3 ? more : 3];
-        for (unsigned i = 0; i < 32; i += APPENDED)
-            n += append_bits(pairs + n, first + i * BLOCK_BYTES,
-                             blocks >> i & ((1u << APPENDED) - 1));
-        if (more < 4)
-            return n;
+    if (BANDS > 1) {
+        if (top > 8 * band + 7 || bottom < 8 * band)
+            return 0;
+        top = top > 8 * band ? top - 8 * band : 0;
+        bottom = bottom < 8 * band + 7 ? bottom - 8 * band : 7;
     }
+    return UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
 }
 
 static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
@@ -242,21 +406,30 @@ static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
 }
 
 /* What tile_blend() keeps in registers. */
-typedef struct pairing {
-    uint32_t splats, pairs;
+typedef struct gathering {
+    uint32_t splats;
     int4 corner;
     float4 origin;
-} pairing;
+    float cutoff;
+    uint64_t any[BANDS];
+} gathering;
 
-INLINE void add(trip_cpu_scratch *s, pairing *p, const trip_cpu_splat *splat)
+INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 {
-    make_local(&s->local[p->splats], splat, p->origin);
-    p->pairs += pair_up(s, s->pairs + p->pairs, p->splats, blocks_of(splat, p->corner));
-    p->splats++;
-    if (p->splats == TRIP_CPU_LOCAL || p->pairs > TRIP_CPU_PAIRS - BLOCKS) {
-        s->pair_count = p->pairs;
-        empty_pairs(s);
-        p->splats = p->pairs = 0;
+    uint32_t at = g->splats++;
+    block_range r = blocks_of(splat, g->corner);
+    uint64_t columns = (0xffu << r.left & 0xffu >> (7 - r.right)) * UINT64_C(0x0101010101010101);
+    make_local(&s->local[at], splat, g->origin, g->cutoff);
+    s->thick[at / 64] |= (uint64_t)(splat->thick != 0) << at % 64;
+    for (unsigned band = 0; band < BANDS; band++) {
+        uint64_t blocks = columns & rows_of_band(band, r.top, r.bottom);
+        s->touched[band][at / 64][at % 64] = blocks;
+        s->any[band] |= blocks;
+    }
+    if (g->splats == TRIP_CPU_LOCAL) {
+        s->splats = g->splats;
+        empty_group(s);
+        g->splats = 0;
     }
 }
 
@@ -267,84 +440,79 @@ static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const 
                        uint32_t count)
 {
     const int4 corner = { s->x, s->y, s->x, s->y };
-    pairing p = { s->splats, s->pair_count, corner, __builtin_convertvector(corner, float4) };
-    if (order) {
-        for (uint32_t i = 0; i < count && s->any_open; i++) {
+    gathering g = {
+        s->splats, corner, __builtin_convertvector(corner, float4), s->view->cutoff, { 0 }
+    };
+    for (uint32_t i = 0; i < count && takes_light(s); i++) {
+        if (order) {
             __builtin_prefetch(&splats[order[i + AHEAD < count ? i + AHEAD : i]]);
-            add(s, &p, &splats[order[i]]);
+            add(s, &g, &splats[order[i]]);
+        } else if (meets(s, &splats[i])) {
+            add(s, &g, &splats[i]);
         }
-    } else {
-        for (uint32_t i = 0; i < count && s->any_open; i++)
-            if (meets(s, &splats[i]))
-                add(s, &p, &splats[i]);
     }
-    s->splats = p.splats;
-    s->pair_count = p.pairs;
+    s->splats = g.splats;
 }
 
 static uint64_t tile_end(trip_cpu_scratch *s)
 {
     uint64_t open = 0;
-    empty_pairs(s);
-    for (unsigned row = 0; row < BLOCKS_DOWN; row++)
-        open |= (uint64_t)s->open[row] << 8 * (row * BLOCK_ROWS / 4);
+    empty_group(s);
+    for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
+        uint64_t bits = s->open[row / 8] >> 8 * (row % 8) & 255;
+        open |= bits << 8 * (row * BLOCK_ROWS / 4);
+    }
     return open;
 }
 
 /* ---- taking up a tile ---- */
 
-/* A quadratic form over the image, |a + x b + y c|^2 about its middle. */
-typedef struct square {
-    vf aa, ab, ac, bb, bc, cc;
-} square;
-
-INLINE square square_of(trip_vec3 a, trip_vec3 b, trip_vec3 c)
+INLINE vf form_at(const float form[6], vf x, vf y)
 {
-    return (square){
-        v_set((float)trip_dot(a, a)), v_set((float)trip_dot(a, b)), v_set((float)trip_dot(a, c)),
-        v_set((float)trip_dot(b, b)), v_set((float)trip_dot(b, c)), v_set((float)trip_dot(c, c)),
-    };
+    vf fx = v_fma(x, v_set(form[3]), v_fma(y, v_set(form[4]), v_set(form[1])));
+    vf fy = v_fma(y, v_set(form[5]), v_set(form[2]));
+    return v_fma(x, fx, v_fma(y, fy, v_set(form[0])));
 }
 
-INLINE vf square_at(const square *q, vf x, vf y)
+/* G and the stretch at a block's pixels. */
+static void set_rays(trip_cpu_scratch *s, unsigned number)
 {
-    vf ab = v_fma(x, q->bb, v_fma(y + y, q->bc, q->ab + q->ab));
-    vf ac = v_fma(y, q->cc, q->ac + q->ac);
-    return v_fma(x, ab, v_fma(y, ac, q->aa));
+    const trip_cpu_view *view = s->view;
+    float *of = s->rays + 2 * V * number;
+    vf x = v_set((float)(s->x - 0.5 * view->splat.camera.width)) + block_x(number);
+    vf y = v_set((float)(s->y - 0.5 * view->splat.camera.height)) + block_y(number);
+    vf inverse = v_set(1) / form_at(view->ray2, x, y), stretch = v_set(1);
+    if (view->stretch_varies)
+        stretch = v_sqrt(form_at(view->world2, x, y) * inverse);
+    v_store(of, view->splat.camera.ortho ? v_set(1) : inverse);
+    v_store(of + V, stretch);
+    s->rays_known[number / 64] |= UINT64_C(1) << number % 64;
 }
 
-static void set_pixel_centres(trip_cpu_scratch *s)
+/* The blocks of the quarters that are ours: the others' pixels may be another thread's. */
+static uint64_t blocks_of_quarters(unsigned quarters, unsigned band)
 {
-    for (int b = 0; b < BLOCKS; b++) {
-        float *geometry = s->geometry + BLOCK_FLOATS * b;
-        for (int i = 0; i < V; i++) {
-            geometry[i] = (float)(4 * (b % BLOCKS_ACROSS) + i % 4) + 0.5f;
-            geometry[V + i] = (float)(BLOCK_ROWS * (b / BLOCKS_ACROSS) + i / 4) + 0.5f;
-        }
+    uint64_t blocks = 0;
+    for (unsigned row = 0; row < 8; row++) {
+        unsigned below = 8 * band + row >= BLOCKS_DOWN / 2, pair = quarters >> 2 * below & 3;
+        uint64_t bits = (pair & 1 ? 0x0fu : 0) | (pair & 2 ? 0xf0u : 0);
+        blocks |= bits << 8 * row;
     }
+    return blocks;
 }
 
-static void set_rays_tables(trip_cpu_scratch *s)
+/* Which blocks are ours and hold a pixel that may still take light. */
+static void find_open(trip_cpu_scratch *s, unsigned quarters)
 {
-    const trip_camera *c = &s->view->splat.camera;
-    const trip_affine *world = &c->index_to_world;
-    trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
-    trip_vec3 rx = c->ortho ? trip_v3(0, 0, 0) : c->rx, ry = c->ortho ? trip_v3(0, 0, 0) : c->ry;
-    square index = square_of(r, rx, ry);
-    square stretched = square_of(trip_affine_vector(world, r), trip_affine_vector(world, rx),
-                                 trip_affine_vector(world, ry));
-    vf x0 = v_set((float)(s->x - 0.5 * c->width)), y0 = v_set((float)(s->y - 0.5 * c->height));
-    for (int b = 0; b < BLOCKS; b++) {
-        float *geometry = s->geometry + BLOCK_FLOATS * b;
-        vf x = x0 + v_load(geometry), y = y0 + v_load(geometry + V);
-        vf inverse = v_set(1) / square_at(&index, x, y);
-        v_store(geometry + 2 * V, c->ortho ? v_set(1) : inverse);
-        if (s->view->rays != TRIP_CPU_STRETCHED)
+    for (unsigned band = 0; band < BANDS; band++) {
+        s->open[band] = blocks_of_quarters(quarters, band);
+        if (!s->view->front_to_back)
             continue;
-        vf stretch = v_set(1);
-        if (s->view->stretch_varies)
-            stretch = v_sqrt(square_at(&stretched, x, y) * inverse);
-        v_store(geometry + 3 * V, stretch);
+        for (uint64_t rest = s->open[band]; rest; rest &= rest - 1) {
+            unsigned bit = (unsigned)__builtin_ctzll(rest);
+            if (!any_open(v_load(s->pixels + BLOCK_FLOATS * (64 * band + bit) + 3 * V)))
+                s->open[band] &= ~(UINT64_C(1) << bit);
+        }
     }
 }
 
@@ -354,14 +522,13 @@ static void tile_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, in
     s->view = view;
     s->x = x;
     s->y = y;
-    s->quarters = quarters;
     s->pixels = pixels;
-    s->splats = s->pair_count = 0;
+    s->splats = 0;
     s->blend = choose_blend(view);
-    set_pixel_centres(s);
-    if (view->rays != TRIP_CPU_PARALLEL)
-        set_rays_tables(s);
-    find_open(s);
+    memset(s->rays_known, 0, sizeof s->rays_known);
+    memset(s->any, 0, sizeof s->any);
+    memset(s->thick, 0, sizeof s->thick);
+    find_open(s, quarters);
 }
 
 #endif

@@ -18,6 +18,17 @@ INLINE vf exp2_biased(vf y)
     return v_from_bits(i & 0x7f800000) * p;
 }
 
+/* The same less `edge`, fused: 0 where the edge is that of the same y. */
+INLINE vf exp2_biased_less(vf y, vf edge)
+{
+    vi i = v_truncate(y);
+    vf m = v_from_bits(vi_low_or(i, 0x7fffff, 0x3f800000));
+    vf p = v_fma(v_set(0.0780245233f), m, v_set(-0.00800641098f));
+    p = v_fma(p, m, v_set(0.477772789f));
+    p = v_fma(p, m, v_set(0.452134318f));
+    return v_fms(v_from_bits(i & 0x7f800000), p, edge);
+}
+
 /* exp(-x), x >= 0, within 1.1e-4 of itself and exact at 0, so that the faint rims of many splats
  * add up to nothing wrong. */
 INLINE vf exp_minus(vf x)

@@ -1,4 +1,4 @@
-/* The kernels for AVX2 and FMA. */
+/* The kernels for AVX2, FMA and BMI. */
 #if defined(__x86_64__)
 
 #define TRIP_SIMD TRIP_SIMD_AVX2

@@ -1,4 +1,4 @@
-/* The kernels for AVX-512 (F, DQ, BW, VL). */
+/* The kernels for AVX-512 (F, DQ, BW, VL), with FMA and BMI. */
 #if defined(__x86_64__)
 
 #define TRIP_SIMD TRIP_SIMD_AVX512

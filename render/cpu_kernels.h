@@ -61,7 +61,10 @@ typedef struct trip_cpu_view {
     bool stretch_varies;
     int axis, u_axis, v_axis;
     double gradient_full;
-    double stretch;   /* where it is constant, else 1 */
+    double stretch; /* where it is constant, else 1 */
+    /* |r|^2 and |J r|^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2 times
+     * these. */
+    float ray2[6], world2[6];
     float cutoff;     /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
     float thick_log2; /* log2 of the largest optical depth, stretch aside, of thin splats */
     int tiles_across;
@@ -91,25 +94,34 @@ typedef struct trip_cpu_lanes {
     uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
 } trip_cpu_lanes;
 
-/* Pairs of a splat and a block that it may touch: where the splat stands in `local`, in bytes,
- * << 16, and where the block's floats stand in the tile's pixels, in bytes. */
-#define TRIP_CPU_LOCAL 128
-#define TRIP_CPU_PAIRS 2048
+/* Splats that are sorted by blocks of a tile together, and bands of 64 blocks at most. */
+#define TRIP_CPU_LOCAL 256
+#define TRIP_CPU_BANDS 4
+
+/* What blending needs of a splat at pixel position (x, y) from the tile's corner: with
+ * a = l11 x + l21 y + l1, b = l22 y + l2, the optical depth is 2^(peak - G (a^2 + b^2)), or 2^least
+ * where that is more, less `edge`. */
+typedef struct trip_cpu_local {
+    float l11, l21, l22, peak;
+    float r, g, b, edge;
+    float l1, l2, least;
+    uint32_t thick;
+} trip_cpu_local;
 
 /* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
-    /* Of each block, at the same place as its pixels: pixel centres x[V], y[V] from the tile's
-     * corner, G[V], stretch[V]. */
-    _Alignas(64) float geometry[4 * TRIP_CPU_TILE_PIXELS];
-    _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL]; /* centres relative to the tile */
-    uint32_t pairs[TRIP_CPU_PAIRS + 16];
-    uint8_t open[32 + 8]; /* rows of blocks, a bit for each block that may still take light */
-    uint32_t splats, pair_count;
-    unsigned quarters;
-    bool any_open;
+    _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by block: G[V], stretch[V] */
+    _Alignas(64) trip_cpu_local local[TRIP_CPU_LOCAL];
+    /* By band and 64 splats: first each splat's blocks, then each block's splats. */
+    uint64_t touched[TRIP_CPU_BANDS][TRIP_CPU_LOCAL / 64][64];
+    uint64_t any[TRIP_CPU_BANDS];        /* blocks that some splat may touch */
+    uint64_t open[TRIP_CPU_BANDS];       /* ours that may still take light */
+    uint64_t rays_known[TRIP_CPU_BANDS]; /* those whose `rays` are filled in */
+    uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats need the long form of 1 - exp(-x) */
+    uint32_t splats;
     int x, y; /* of the tile's first pixel */
     float *pixels;
-    void (*blend)(struct trip_cpu_scratch *s); /* all pairs, in order */
+    void (*blend)(struct trip_cpu_scratch *s); /* the group, in order */
     const trip_cpu_view *view;
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;

@@ -101,6 +101,28 @@ static bool is_similarity(const trip_affine *a)
     return true;
 }
 
+/* |a + x b + y c|^2, as ray2 in trip_cpu_view. */
+static void set_form(float out[6], trip_vec3 a, trip_vec3 b, trip_vec3 c)
+{
+    out[0] = (float)trip_dot(a, a);
+    out[1] = (float)(2 * trip_dot(a, b));
+    out[2] = (float)(2 * trip_dot(a, c));
+    out[3] = (float)trip_dot(b, b);
+    out[4] = (float)(2 * trip_dot(b, c));
+    out[5] = (float)trip_dot(c, c);
+}
+
+static void set_forms(trip_cpu_view *view)
+{
+    const trip_camera *c = &view->splat.camera;
+    const trip_affine *world = &c->index_to_world;
+    trip_vec3 zero = trip_v3(0, 0, 0), r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    trip_vec3 rx = c->ortho ? zero : c->rx, ry = c->ortho ? zero : c->ry;
+    set_form(view->ray2, r, rx, ry);
+    set_form(view->world2, trip_affine_vector(world, r), trip_affine_vector(world, rx),
+             trip_affine_vector(world, ry));
+}
+
 /* Tables of G and stretch where they vary, and always in the rarer ways of blending. */
 static void set_rays(trip_cpu_view *view)
 {
@@ -159,6 +181,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
     set_along(view->along_z, view, camera->forward);
     view->forward_length = trip_length(camera->forward);
     set_rays(view);
+    set_forms(view);
     set_limits(view);
     set_parallel(view);
 }

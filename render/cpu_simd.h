@@ -13,6 +13,7 @@
 #define TRIP_CPU_SIMD_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -126,6 +127,11 @@ INLINE vf v_fma(vf a, vf b, vf c)
     return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
 }
 
+INLINE vf v_fms(vf a, vf b, vf c)
+{
+    return (vf)_mm512_fmsub_ps((__m512)a, (__m512)b, (__m512)c);
+}
+
 INLINE vf v_fnma(vf a, vf b, vf c)
 {
     return (vf)_mm512_fnmadd_ps((__m512)a, (__m512)b, (__m512)c);
@@ -208,15 +214,25 @@ INLINE vf v_mul_where(vm m, vf a, vf b)
     return (vf)_mm512_mask_mul_ps((__m512)a, m, (__m512)a, (__m512)b);
 }
 
-/* m ? a * b : 0 */
-INLINE vf v_mul_or_zero(vm m, vf a, vf b)
+/* m ? c - a * b : a */
+INLINE vf v_fnma_where(vm m, vf a, vf b, vf c)
 {
-    return (vf)_mm512_maskz_mul_ps(m, (__m512)a, (__m512)b);
+    return (vf)_mm512_mask_fnmadd_ps((__m512)a, m, (__m512)b, (__m512)c);
 }
 
 INLINE unsigned vm_bits(vm m)
 {
     return m;
+}
+
+INLINE bool vm_any(vm m)
+{
+    return m != 0;
+}
+
+INLINE bool vm_all(vm m)
+{
+    return m == 0xffff;
 }
 
 INLINE vm vm_first(unsigned lanes)
@@ -272,22 +288,6 @@ INLINE vi vi_reverse(vi a)
 INLINE void vi_store_packed(void *p, vm m, vi a)
 {
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, (__m512i)a));
-}
-
-/* first + i * TRIP_SIMD_STEP for each set bit i of 16, in order, to `out`, where 16 may be
- * overwritten; how many. */
-#define APPENDED 16
-#define TRIP_SIMD_STEP (16 * V)
-INLINE uint32_t append_bits(uint32_t *out, uint32_t first, unsigned bits)
-{
-#define S TRIP_SIMD_STEP
-    const __m512i step =
-        _mm512_set_epi32(15 * S, 14 * S, 13 * S, 12 * S, 11 * S, 10 * S, 9 * S, 8 * S, 7 * S, 6 * S,
-                         5 * S, 4 * S, 3 * S, 2 * S, 1 * S, 0);
-#undef S
-    __m512i all = _mm512_add_epi32(step, _mm512_set1_epi32((int)first));
-    _mm512_storeu_si512(out, _mm512_maskz_compress_epi32((__mmask16)bits, all));
-    return (uint32_t)__builtin_popcount(bits);
 }
 
 /* Lane i of (a, b, c, d) to the four floats at out + row[i]; later lanes over earlier ones. */
@@ -350,11 +350,6 @@ INLINE vf v_mul_where(vm m, vf a, vf b)
     return v_select(m, a * b, a);
 }
 
-INLINE vf v_mul_or_zero(vm m, vf a, vf b)
-{
-    return (vf)(m & (vi)(a * b));
-}
-
 INLINE vm vm_first(unsigned lanes)
 {
     vm m;
@@ -373,6 +368,11 @@ INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
 INLINE vf v_fma(vf a, vf b, vf c)
 {
     return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+}
+
+INLINE vf v_fms(vf a, vf b, vf c)
+{
+    return (vf)_mm256_fmsub_ps((__m256)a, (__m256)b, (__m256)c);
 }
 
 INLINE vf v_fnma(vf a, vf b, vf c)
@@ -423,6 +423,16 @@ INLINE vf v_from_int(vi a)
 INLINE unsigned vm_bits(vm m)
 {
     return (unsigned)_mm256_movemask_ps((__m256)m);
+}
+
+INLINE bool vm_any(vm m)
+{
+    return vm_bits(m) != 0;
+}
+
+INLINE bool vm_all(vm m)
+{
+    return vm_bits(m) == 0xff;
 }
 
 INLINE vf v_gather(const float *base, vi index)
@@ -489,6 +499,11 @@ INLINE vf v_fma(vf a, vf b, vf c)
     return (vf)vfmaq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
 }
 
+INLINE vf v_fms(vf a, vf b, vf c)
+{
+    return (vf)vfmaq_f32((float32x4_t)-c, (float32x4_t)a, (float32x4_t)b);
+}
+
 INLINE vf v_fnma(vf a, vf b, vf c)
 {
     return (vf)vfmsq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
@@ -517,6 +532,11 @@ INLINE vf v_fma(vf a, vf b, vf c)
     return a * b + c;
 }
 
+INLINE vf v_fms(vf a, vf b, vf c)
+{
+    return a * b - c;
+}
+
 INLINE vf v_fnma(vf a, vf b, vf c)
 {
     return c - a * b;
@@ -538,6 +558,18 @@ INLINE unsigned vm_bits(vm m)
 }
 
 #endif
+
+typedef int64_t vl2 __attribute__((vector_size(16)));
+
+INLINE bool vm_any(vm m)
+{
+    return (((vl2)m)[0] | ((vl2)m)[1]) != 0;
+}
+
+INLINE bool vm_all(vm m)
+{
+    return (((vl2)m)[0] & ((vl2)m)[1]) == -1;
+}
 
 INLINE vf v_rcp_rough(vf a)
 {
@@ -616,38 +648,9 @@ INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf
 
 #endif
 
-/* i * TRIP_SIMD_STEP for each set bit i of a byte, in order, and how many there are. */
-#define TRIP_SIMD_STEP (16 * V)
-static uint16_t bit_places[256][8];
-static uint8_t bit_counts[256];
-
-__attribute__((constructor)) static void list_bits(void)
+INLINE vf v_fnma_where(vm m, vf a, vf b, vf c)
 {
-    for (unsigned bits = 0; bits < 256; bits++)
-        for (unsigned i = 0; i < 8; i++)
-            if (bits >> i & 1)
-                bit_places[bits][bit_counts[bits]++] = (uint16_t)(i * TRIP_SIMD_STEP);
-}
-
-#define APPENDED 8
-INLINE uint32_t append_bits(uint32_t *out, uint32_t first, unsigned bits)
-{
-    const uint16_t *places = bit_places[bits];
-#if TRIP_SIMD == TRIP_SIMD_AVX2
-    __m256i wide = _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(const void *)places));
-    _mm256_storeu_si256((__m256i *)(void *)out,
-                        _mm256_add_epi32(wide, _mm256_set1_epi32((int)first)));
-#else
-    typedef uint16_t half8 __attribute__((vector_size(16)));
-    const half8 zero = { 0 };
-    half8 p;
-    memcpy(&p, places, sizeof p);
-    vu low = (vu)__builtin_shufflevector(p, zero, 0, 8, 1, 9, 2, 10, 3, 11) + first;
-    vu high = (vu)__builtin_shufflevector(p, zero, 4, 12, 5, 13, 6, 14, 7, 15) + first;
-    memcpy(out, &low, sizeof low);
-    memcpy(out + 4, &high, sizeof high);
-#endif
-    return bit_counts[bits];
+    return v_select(m, v_fnma(a, b, c), a);
 }
 
 INLINE void vi_store_packed(void *p, vm m, vi a)
