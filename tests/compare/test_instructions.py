@@ -39,11 +39,15 @@ class InstructionsTest(unittest.TestCase):
         self.assertEqual(costs, {"main": 105, "sum": 100, "leaf": 60})
         self.assertEqual(total, 105)
 
-    def test_a_stage_does_not_contain_another(self):
-        costs = dict(stage=10, project=20, project_chunk=37, trip_cpu_link=1, blend_portion=50,
-                     merge_tile=4, finish_tile=3)
+    def test_a_stage_is_the_sum_of_its_functions(self):
+        costs = dict(stage=10, project=20, trip_cpu_bin=7, trip_cpu_link=1, tile_begin=2,
+                     tile_blend=40, tile_end=8, tile_finish=7, other=5)
         stages = instructions.stage_costs(costs, 100)
         self.assertEqual(stages, {"projection": 30, "binning": 8, "blend": 50, "merge": 7, "rest": 5})
+
+    def test_a_stage_without_functions_is_an_error(self):
+        with self.assertRaises(SystemExit):
+            instructions.stage_costs(dict(stage=10, trip_cpu_bin=7, tile_blend=40), 100)
 
     @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
     @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
