@@ -1,11 +1,14 @@
 #include "cpu_pool.h"
 
 #include <assert.h>
+#include <linux/futex.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include "report.h"
 
@@ -25,7 +28,7 @@ typedef struct slot {
     /* Written before `tickets` is released, read by who took a ticket. */
     void (*run)(void *context, unsigned task, unsigned thread);
     void *context;
-    _Atomic unsigned finished; /* each task's release, the waiter's acquire */
+    _Atomic uint32_t finished; /* each task's release, the waiter's acquire */
     bool taken;                /* the starter's */
 } slot;
 
@@ -34,19 +37,29 @@ struct trip_cpu_pool {
     pthread_t *workers;
     unsigned started, looks;
     slot slots[SLOTS];
-    _Atomic unsigned oldest;   /* slot to look at first */
-    _Atomic unsigned version;  /* counts starts: who has seen them all may sleep */
-    _Atomic unsigned sleepers; /* changed under the lock */
-    _Atomic bool waiting;      /* the starter sleeps; changed under the lock */
+    _Atomic unsigned oldest; /* slot to look at first */
+    /* Words that threads sleep on. */
+    _Atomic uint32_t version; /* counts starts: who has seen them all may sleep */
+    _Atomic uint32_t sleepers;
+    _Atomic bool waiting; /* the starter sleeps */
     _Atomic bool stop;
-    pthread_mutex_t lock;
-    pthread_cond_t work, done;
 };
 
 typedef struct worker {
     trip_cpu_pool *pool;
     unsigned thread;
 } worker;
+
+/* Sleeps if the word is still `seen`: until woken, or a little less. */
+static void sleep_on(_Atomic uint32_t *word, uint32_t seen)
+{
+    syscall(SYS_futex, word, FUTEX_WAIT_PRIVATE, seen, NULL, NULL, 0);
+}
+
+static void wake_one(_Atomic uint32_t *word)
+{
+    syscall(SYS_futex, word, FUTEX_WAKE_PRIVATE, 1, NULL, NULL, 0);
+}
 
 static void pause_a_little(void)
 {
@@ -72,11 +85,8 @@ static bool run_task(trip_cpu_pool *pool, slot *s, unsigned thread)
     } while (!atomic_compare_exchange_weak_explicit(&s->tickets, &tickets, tickets + 1,
                                                     memory_order_acquire, memory_order_acquire));
     s->run(s->context, (unsigned)(tickets & TICKET_MASK), thread);
-    if (atomic_fetch_add(&s->finished, 1) + 1 == tasks_of(tickets) && atomic_load(&pool->waiting)) {
-        pthread_mutex_lock(&pool->lock);
-        pthread_cond_signal(&pool->done);
-        pthread_mutex_unlock(&pool->lock);
-    }
+    if (atomic_fetch_add(&s->finished, 1) + 1 == tasks_of(tickets) && atomic_load(&pool->waiting))
+        wake_one(&s->finished);
     return true;
 }
 
@@ -89,20 +99,20 @@ static bool run_any(trip_cpu_pool *pool, unsigned thread)
     return false;
 }
 
-/* Until something is started after `seen`. */
-static void await_start(trip_cpu_pool *pool, unsigned seen)
+/* Until something is started after `seen`. Who wakes wakes the next, so that the starter does not
+ * have to wake them all. */
+static void await_start(trip_cpu_pool *pool, uint32_t seen)
 {
     for (unsigned i = 0; i < pool->looks; i++) {
         if (atomic_load_explicit(&pool->version, memory_order_relaxed) != seen)
             return;
         pause_a_little();
     }
-    pthread_mutex_lock(&pool->lock);
     atomic_fetch_add(&pool->sleepers, 1);
     while (atomic_load(&pool->version) == seen)
-        pthread_cond_wait(&pool->work, &pool->lock);
-    atomic_fetch_sub(&pool->sleepers, 1);
-    pthread_mutex_unlock(&pool->lock);
+        sleep_on(&pool->version, seen);
+    if (atomic_fetch_sub(&pool->sleepers, 1) > 1)
+        wake_one(&pool->version);
 }
 
 static void *work(void *argument)
@@ -110,7 +120,7 @@ static void *work(void *argument)
     worker self = *(worker *)argument;
     free(argument);
     for (;;) {
-        unsigned seen = atomic_load(&self.pool->version);
+        uint32_t seen = atomic_load(&self.pool->version);
         if (atomic_load(&self.pool->stop))
             return NULL;
         while (run_any(self.pool, self.thread))
@@ -123,11 +133,8 @@ static void *work(void *argument)
 static void announce(trip_cpu_pool *pool)
 {
     atomic_fetch_add(&pool->version, 1);
-    if (atomic_load(&pool->sleepers) == 0)
-        return;
-    pthread_mutex_lock(&pool->lock);
-    pthread_cond_broadcast(&pool->work);
-    pthread_mutex_unlock(&pool->lock);
+    if (atomic_load(&pool->sleepers) > 0)
+        wake_one(&pool->version);
 }
 
 static unsigned processors(void)
@@ -163,9 +170,6 @@ int trip_cpu_pool_create(trip_cpu_pool **out, unsigned threads)
     if (pool->threads > MAX_THREADS)
         pool->threads = MAX_THREADS;
     pool->looks = pool->threads <= processors() ? LOOKS : 0;
-    pthread_mutex_init(&pool->lock, NULL);
-    pthread_cond_init(&pool->work, NULL);
-    pthread_cond_init(&pool->done, NULL);
     pool->workers = calloc(pool->threads, sizeof *pool->workers);
     for (unsigned i = 1; i < pool->threads; i++) {
         if (!pool->workers || start_worker(pool, i)) {
@@ -186,9 +190,6 @@ void trip_cpu_pool_destroy(trip_cpu_pool *pool)
     announce(pool);
     for (unsigned i = 0; i < pool->started; i++)
         pthread_join(pool->workers[i], NULL);
-    pthread_cond_destroy(&pool->done);
-    pthread_cond_destroy(&pool->work);
-    pthread_mutex_destroy(&pool->lock);
     free(pool->workers);
     free(pool);
 }
@@ -217,19 +218,18 @@ void trip_cpu_pool_start(trip_cpu_pool *pool, trip_cpu_job *job)
 }
 
 /* Until every task of a slot's job is done. */
-static void await_finish(trip_cpu_pool *pool, const slot *s, unsigned tasks)
+static void await_finish(trip_cpu_pool *pool, slot *s, uint32_t tasks)
 {
+    uint32_t finished;
     for (unsigned i = 0; i < pool->looks; i++) {
         if (atomic_load_explicit(&s->finished, memory_order_acquire) == tasks)
             return;
         pause_a_little();
     }
-    pthread_mutex_lock(&pool->lock);
     atomic_store(&pool->waiting, true);
-    while (atomic_load(&s->finished) != tasks)
-        pthread_cond_wait(&pool->done, &pool->lock);
+    while ((finished = atomic_load(&s->finished)) != tasks)
+        sleep_on(&s->finished, finished);
     atomic_store(&pool->waiting, false);
-    pthread_mutex_unlock(&pool->lock);
 }
 
 void trip_cpu_pool_wait(trip_cpu_pool *pool, trip_cpu_job *job)
