@@ -18,6 +18,9 @@
 
 enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 16, MIN_SPLATS = 1 << 13 };
 
+/* Fewer voxels are not worth a chunk. */
+enum { LEAST_CHUNK = 512 };
+
 /* What has become of a tile's pixels. */
 enum tile_state {
     TILE_BEGUN = 1,  /* in the list being drawn */
@@ -266,24 +269,41 @@ typedef struct cursor {
     uint32_t skip;
 } cursor;
 
-/* Voxels for the buffer's next chunk, by how many of them showed of late; 0 when it counts as full.
- * `reserved` are on their way into it. */
-static uint32_t room(const cpu *r, uint64_t reserved)
+/* Voxels that the buffer will still take, by how many of them showed of late; some when it is
+ * empty.
+ */
+static uint64_t room(const cpu *r)
 {
     const trip_cpu_flush *f = r->filling;
     uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
     double left = ((double)f->capacity - (double)used) / (1.1 * r->shown_per_voxel);
-    if (f->chunk_count > 0 && left < (double)reserved + TRIP_CPU_CHUNK)
-        return 0;
-    return TRIP_CPU_CHUNK;
+    if (f->chunk_count == 0)
+        left = fmax(left, TRIP_CPU_CHUNK);
+    return left < LEAST_CHUNK ? 0 : (uint64_t)left;
+}
+
+static uint64_t voxels_from(const trip_batch *batch, const cursor *at)
+{
+    uint64_t voxels = 0;
+    for (size_t i = at->run; i < batch->run_count; i++)
+        voxels += batch->runs[i].count;
+    return voxels - at->skip;
+}
+
+/* Of a chunk, when so many are left: fewer towards the end, so that the threads end together. */
+static uint32_t chunk_voxels(const cpu *r, uint64_t left)
+{
+    uint64_t each = left / trip_cpu_pool_threads(r->pool) / 2;
+    return each < LEAST_CHUNK      ? LEAST_CHUNK
+           : each > TRIP_CPU_CHUNK ? TRIP_CPU_CHUNK
+                                   : (uint32_t)each;
 }
 
 /* Reserves the next chunk, of `most` voxels; false when the batch is through or there are no more
  * chunks. */
 static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor *at)
 {
-    trip_cpu_chunk *chunk =
-        at->run < batch->run_count && most > 0 ? trip_cpu_flush_reserve(r->filling) : NULL;
+    trip_cpu_chunk *chunk = at->run < batch->run_count ? trip_cpu_flush_reserve(r->filling) : NULL;
     if (!chunk)
         return false;
     chunk->run = at->run;
@@ -323,7 +343,9 @@ static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
     uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed), reserved = 0;
     r->batch = batch;
     r->first_chunk = f->chunk_count;
-    while (reserve_chunk(r, batch, room(r, reserved), at))
+    uint64_t wanted = voxels_from(batch, at), most = room(r);
+    wanted = wanted < most ? wanted : most;
+    while (reserved < wanted && reserve_chunk(r, batch, chunk_voxels(r, wanted - reserved), at))
         reserved += f->chunks[f->chunk_count - 1].voxels;
     if (reserved == 0)
         return;
