@@ -98,7 +98,8 @@ int64_t trip_volume_skip(trip_volume *v, int64_t slices);
  * outside the volume repeat the edge voxel (dense) or are the background (sparse), active 0. */
 int trip_block_decode(const trip_volume *v, const trip_block *block, const int64_t lo[3],
                       const int64_t size[3], float *values, uint8_t *active);
-/* The memory of one released slab stays with the volume, for the next block, until it is closed. */
+/* The memory of one released slab stays with the volume, for the next block, until it is rewound or
+ * closed. */
 void trip_block_release(trip_volume *v, trip_block *block);
 
 #ifdef __cplusplus
