@@ -21,6 +21,9 @@ enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 16, MIN_SPL
 /* Fewer voxels are not worth a chunk. */
 enum { LEAST_CHUNK = 512 };
 
+/* Much is hidden where fewer voxels than this share show. */
+#define MUCH_HIDDEN 0.75
+
 /* What has become of a tile's pixels. */
 enum tile_state {
     TILE_BEGUN = 1,  /* in the list being drawn */
@@ -270,13 +273,14 @@ typedef struct cursor {
 } cursor;
 
 /* Voxels that the buffer will still take, by how many of them showed of late; some when it is
- * empty.
- */
+ * empty. Where much is hidden it counts as full sooner: the sooner splats are blended, the sooner
+ * they hide what lies behind them. */
 static uint64_t room(const cpu *r)
 {
     const trip_cpu_flush *f = r->filling;
     uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
-    double left = ((double)f->capacity - (double)used) / (1.1 * r->shown_per_voxel);
+    uint32_t capacity = r->shown_per_voxel < MUCH_HIDDEN ? f->capacity / 4 : f->capacity;
+    double left = ((double)capacity - (double)used) / (1.1 * r->shown_per_voxel);
     if (f->chunk_count == 0)
         left = fmax(left, TRIP_CPU_CHUNK);
     return left < LEAST_CHUNK ? 0 : (uint64_t)left;
@@ -336,6 +340,14 @@ static void keep_chunks(cpu *r, cursor *at)
     }
 }
 
+/* How many voxels show, from which room() knows how many more will fit. Few voxels tell little. */
+static void learn(cpu *r, uint64_t shown, uint64_t voxels)
+{
+    double known = TRIP_CPU_CHUNK;
+    double now = ((double)shown + known * r->shown_per_voxel) / ((double)voxels + known);
+    r->shown_per_voxel = fmax(0.02, now);
+}
+
 /* As much of the batch as the buffer takes. */
 static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
 {
@@ -354,8 +366,7 @@ static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
                                      .tasks = f->chunk_count - r->first_chunk };
     trip_cpu_pool_start(r->pool, &r->project_job);
     trip_cpu_pool_wait(r->pool, &r->project_job);
-    used = atomic_load_explicit(&f->splats_used, memory_order_relaxed) - used;
-    r->shown_per_voxel = fmax(0.02, (double)used / (double)reserved);
+    learn(r, atomic_load_explicit(&f->splats_used, memory_order_relaxed) - used, reserved);
     keep_chunks(r, at);
 }
 
@@ -457,6 +468,7 @@ static int begin_list(trip_renderer *base, int axis)
         atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> axis & 1 ? UINT64_MAX : 0,
                               memory_order_relaxed);
     r->in_list = true;
+    r->shown_per_voxel = 1;
     return 0;
 }
 
@@ -617,7 +629,6 @@ static int create_parts(cpu *r, unsigned threads)
     for (int i = 0; i < 2 && !status; i++)
         status = trip_cpu_flush_create(&r->flushes[i], flush_capacity(r->budget), r->budget);
     r->filling = &r->flushes[0];
-    r->shown_per_voxel = 1;
     snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->kernels->isa, threads,
              threads == 1 ? "" : "s");
     return status;
