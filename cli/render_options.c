@@ -64,7 +64,7 @@ static const struct argp_option options[] = {
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu, reference or auto (default: auto: gl on graphics hardware, else cpu)", 4 },
     { "target", KEY_TARGET, "NAME", 0,
-      "Layers of rgba32f, rgba16f or rgba8 (default: rgba32f); gl only", 4 },
+      "Layers of rgba32f, rgba16f or rgba8 (default: rgba32f); not for reference", 4 },
     { "submit", KEY_SUBMIT, "FORM", 0,
       "replicated or indexed lists, sprites or triangles (default: replicated,sprites); gl only",
       4 },
@@ -272,10 +272,11 @@ static int check(parse *p)
         return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
     if (p->h && o->settings.method != TRIP_METHOD_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
-    bool gl_only = p->target || p->lists || p->forms;
+    if (p->target && o->renderer == TRIP_RENDERER_REFERENCE)
+        return trip_option_fail("--target", "does not apply to --renderer reference");
+    bool gl_only = p->lists || p->forms;
     if (gl_only && o->renderer != TRIP_RENDERER_AUTO && o->renderer != TRIP_RENDERER_GL)
-        return trip_option_fail(p->target ? "--target" : "--submit",
-                                "applies to --renderer gl only");
+        return trip_option_fail("--submit", "applies to --renderer gl only");
     if (gl_only)
         o->renderer = TRIP_RENDERER_GL;
     if (o->hidden && o->renderer != TRIP_RENDERER_AUTO && o->renderer != TRIP_RENDERER_CPU)

@@ -21,13 +21,16 @@ static_assert(BLOCKS_ACROSS == 8 && BANDS >= 1 && BANDS <= TRIP_CPU_BANDS, "64 b
 
 /* ---- what a target keeps ---- */
 
-/* To the nearest half float (normal range), ties to even. */
+/* The nearest half float to a, 0 <= a < 65504, ties to even: eleven bits, or below 2^-14 multiples
+ * of 2^-24, which is the step of floats between 1/2 and 1. */
 INLINE vf to_half(vf a)
 {
     vi bits = v_bits(a);
-    return v_from_bits((bits + 0xfff + (v_shift_right(bits, 13) & 1)) & ~0x1fff);
+    vf normal = v_from_bits((bits + 0xfff + (v_shift_right(bits, 13) & 1)) & ~0x1fff);
+    return v_select(v_gt(v_set(0x1p-14f), a), (a + v_set(0.5f)) - v_set(0.5f), normal);
 }
 
+/* The nearest multiple of 1/255. */
 INLINE vf to_unorm8(vf a)
 {
     vf steps = v_fma(v_min(v_set(1), v_max(v_set(0), a)), v_set(255), v_set(0.5f));

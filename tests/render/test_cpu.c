@@ -16,10 +16,15 @@ static double mean_difference(const scene_picture *a, const scene_picture *b)
     return sum / (double)n;
 }
 
-/* Within 1/255 everywhere, 0.05/255 on average, and the same counts, with every instruction set. */
+/* What instruction sets may differ by: they round alike but for fused products and the rough
+ * reciprocals, which only bound footprints. */
+#define SETS_DIFFER (0.05 / 255)
+
+/* Within 1/255 everywhere, 0.05/255 on average, and the same counts, with every instruction set;
+ * and these like one another. */
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
-    scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings);
+    scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings), first = { 0 };
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
         scene_picture p = scene_draw(s, &cpu_scenes_cpu, view, settings);
@@ -29,8 +34,17 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
         for (int axis = 0; axis < 3; axis++)
             assert_memory_equal(&expected.stats.lists[axis], &p.stats.lists[axis],
                                 sizeof p.stats.lists[axis]);
-        scene_picture_free(&p);
+        if (first.rgba) {
+            double apart = scene_difference(&first, &p);
+            if (!(apart <= SETS_DIFFER))
+                fail_msg("%s: %.4f of 1/255 from %s", (*isa)->isa, 255 * apart,
+                         trip_cpu_isas()[0]->isa);
+            scene_picture_free(&p);
+        } else {
+            first = p;
+        }
     }
+    scene_picture_free(&first);
     unsetenv("TRIPTYCH_ISA");
     scene_picture_free(&expected);
 }
@@ -145,29 +159,6 @@ static void images_of_any_size_are_filled_to_their_edges(void **state)
     scene_destroy(&s);
 }
 
-/* GL's smaller targets round each blend to what they hold; so do ours, to a step or two. */
-static void smaller_targets_differ_by_their_steps(void **state)
-{
-    (void)state;
-    scene s;
-    cpu_scenes_blobs(&s, 16, NULL);
-    trip_camera_params view = scene_view(&s, trip_v3(1, 0.4, 0.6), 60, 45, 64);
-    trip_settings settings = trip_settings_default();
-    scene_picture full = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
-    settings.target = TRIP_TARGET_RGBA16F;
-    scene_picture half = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
-    settings.target = TRIP_TARGET_RGBA8;
-    scene_picture byte = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
-    double halves = scene_difference(&full, &half), bytes = scene_difference(&full, &byte);
-    print_message("rgba16f differs by %.3f, rgba8 by %.3f of 1/255\n", 255 * halves, 255 * bytes);
-    assert_true(halves > 0 && halves < 3.0 / 255);
-    assert_true(bytes > halves && bytes < 40.0 / 255);
-    scene_picture_free(&full);
-    scene_picture_free(&half);
-    scene_picture_free(&byte);
-    scene_destroy(&s);
-}
-
 static void an_instruction_set_this_machine_lacks_is_refused(void **state)
 {
     (void)state;
@@ -207,7 +198,6 @@ int main(void)
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
         cmocka_unit_test(kernels_light_and_background_agree_with_the_reference),
         cmocka_unit_test(images_of_any_size_are_filled_to_their_edges),
-        cmocka_unit_test(smaller_targets_differ_by_their_steps),
         cmocka_unit_test(an_instruction_set_this_machine_lacks_is_refused),
         cmocka_unit_test(too_little_memory_is_refused),
     };

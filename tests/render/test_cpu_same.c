@@ -19,8 +19,8 @@ static void assert_same(const scene_picture *a, const scene_picture *b)
     assert_memory_equal(a->rgba, b->rgba, 16 * (size_t)a->width * (size_t)a->height);
 }
 
-/* With every instruction set, the picture of `a` by one thread and that of `b` by another number of
- * threads, from batches as `reader` says. */
+/* With every instruction set and target, the picture of `a` by one thread and that of `b` by
+ * another number of threads, from batches as `reader` says. */
 static void check_same(const scene *a, const scene *b, unsigned threads,
                        const trip_reader_params *reader)
 {
@@ -28,13 +28,16 @@ static void check_same(const scene *a, const scene *b, unsigned threads,
     trip_camera_params view = side_view(a);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
-        cpu_scenes_threads = 1;
-        scene_picture p = scene_draw(a, &cpu_scenes_cpu, &view, &settings);
-        cpu_scenes_threads = threads;
-        scene_picture q = scene_draw_with(b, &cpu_scenes_cpu, &view, &settings, reader);
-        assert_same(&p, &q);
-        scene_picture_free(&p);
-        scene_picture_free(&q);
+        for (int target = TRIP_TARGET_RGBA32F; target <= TRIP_TARGET_RGBA8; target++) {
+            settings.target = (trip_target)target;
+            cpu_scenes_threads = 1;
+            scene_picture p = scene_draw(a, &cpu_scenes_cpu, &view, &settings);
+            cpu_scenes_threads = threads;
+            scene_picture q = scene_draw_with(b, &cpu_scenes_cpu, &view, &settings, reader);
+            assert_same(&p, &q);
+            scene_picture_free(&p);
+            scene_picture_free(&q);
+        }
     }
     unsetenv("TRIPTYCH_ISA");
 }
