@@ -284,7 +284,7 @@ static int on_batch(void *user, uint64_t batches, uint64_t voxels)
 {
     const brick *b = user;
     trip_brick_input_progress(&b->in, "read", voxels, b->in.grid_voxels);
-    int full = trip_list_builder_end_batch(b->builder);
+    int full = trip_list_builder_end_batch(b->builder, (double)voxels / (double)b->in.grid_voxels);
     if (full <= 0)
         return full;
     trip_checkpoint *c = calloc(1, sizeof *c);

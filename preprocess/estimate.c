@@ -120,7 +120,7 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     int lists = plan->in_order && format->quantised ? 2 : 3;
     double pieces = (double)e->kept * lists * piece_bytes(format);
     e->bytes = e->kept * 3 * (format->normals ? 8 : 4);
-    e->temporary_bytes = pieces > (double)plan->list_bytes / 2 ? (uint64_t)pieces : 0;
+    e->temporary_bytes = pieces > 0.9 * (double)plan->list_bytes ? (uint64_t)pieces : 0;
     e->free_bytes = free_bytes(in->params->output);
 }
 

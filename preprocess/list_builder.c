@@ -31,7 +31,7 @@ struct trip_list_builder {
     pthread_mutex_t lock; /* guards all below; a chunk goes with the chain that it is in */
     pthread_cond_t work, freed;
     trip_piece_pool pool;
-    bool stopping;
+    bool stopping, has_spilled;
     int status;
     trip_chain filled[3];
     job *first_job, *last_job;
@@ -123,6 +123,7 @@ static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkp
         return b->status = trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
     }
     *j = (job){ .ordered = ordered, .checkpoint = checkpoint };
+    b->has_spilled |= !ordered;
     for (int axis = 0; axis < 3; axis++) {
         bool goes = is_spilled(b, axis) != ordered;
         j->chains[axis] = goes ? b->filled[axis] : trip_chain_empty();
@@ -202,8 +203,16 @@ void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, int axi
     return at;
 }
 
-/* Half of the memory is spilled in the background while producers fill the other. */
-int trip_list_builder_end_batch(trip_list_builder *b)
+/* Under the lock. Half of the memory is spilled in the background while producers fill the other,
+ * unless all there will be seems to fit. */
+static bool is_time_to_spill(const trip_list_builder *b, double done)
+{
+    const double most = 0.9 * (double)b->pool.chunk_count, now = spillable(b);
+    bool fits = !b->has_spilled && now <= most * done;
+    return now >= (fits ? most : (double)b->pool.chunk_count / 2);
+}
+
+int trip_list_builder_end_batch(trip_list_builder *b, double done)
 {
     pthread_mutex_lock(&b->lock);
     if (b->params.in_order) {
@@ -212,7 +221,7 @@ int trip_list_builder_end_batch(trip_list_builder *b)
             queue_job(b, true, NULL);
     }
     int status = b->status;
-    bool full = spillable(b) >= b->pool.chunk_count / 2;
+    bool full = is_time_to_spill(b, done);
     pthread_mutex_unlock(&b->lock);
     return status < 0 ? status : full;
 }
@@ -273,6 +282,7 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
     if (!b)
         return trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
     b->params = *params;
+    b->has_spilled = trip_spill_count(params->spill) > 0;
     pthread_mutex_init(&b->lock, NULL);
     pthread_cond_init(&b->work, NULL);
     pthread_cond_init(&b->freed, NULL);

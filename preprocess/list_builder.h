@@ -45,9 +45,9 @@ trip_list_output *trip_list_builder_ordered(trip_list_builder *b);
  * failed, which was reported. */
 void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, int axis, size_t bytes);
 
-/* All pieces of a batch are there, and no producer is at work. Returns 1 when it is time for
- * trip_list_builder_spill(). */
-int trip_list_builder_end_batch(trip_list_builder *b);
+/* All pieces of a batch are there, and no producer is at work; `done` of all, 0 to 1, went by.
+ * Returns 1 when it is time for trip_list_builder_spill(). */
+int trip_list_builder_end_batch(trip_list_builder *b, double done);
 /* Right after a batch: spills all there is in the background; then the journal gets the checkpoint,
  * which is the builder's to free() from now on. */
 int trip_list_builder_spill(trip_list_builder *b, trip_checkpoint *checkpoint);

@@ -157,7 +157,7 @@ static int run(const char *name, const run_params *p, uint64_t *spilled)
         /* In order or, without it, from the last slab to the first. */
         slab s = { &b, (p->in_order ? batch : BATCHES - 1 - batch) * (NZ / BATCHES) };
         assert_int_equal(trip_workers_run(producers, put_slab_slice, &s, NZ / BATCHES), 0);
-        int full = trip_list_builder_end_batch(b.builder);
+        int full = trip_list_builder_end_batch(b.builder, (batch + 1.0) / BATCHES);
         assert_true(full >= 0);
         if (full && p->checkpoints)
             assert_int_equal(trip_list_builder_spill(b.builder, calloc(1, sizeof(trip_checkpoint))),
