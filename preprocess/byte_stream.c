@@ -12,10 +12,13 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include "file_pieces.h"
 #include "report.h"
 
 /* One read of compressed bytes; plain files are read straight into the caller's memory. */
 #define PIECE_BYTES ((size_t)1 << 20)
+/* Plain data from this size on is read in pieces, several at once. */
+#define LARGE_BYTES ((uint64_t)4 << 20)
 /* The decompressors count in 32 bits. */
 #define OUTPUT_BYTES_MAX ((size_t)1 << 30)
 
@@ -24,8 +27,9 @@ struct trip_byte_stream {
     char *path;
     int fd;
     uint64_t file_bytes;
-    uint64_t position; /* in the file, of the next byte to read */
-    uint64_t done;     /* bytes of the source delivered */
+    uint64_t position;        /* in the file, of the next byte to read */
+    uint64_t done;            /* bytes of the source delivered */
+    trip_file_pieces *pieces; /* of a plain file, where that is of use */
 
     unsigned char *piece; /* compressed bytes read but not used yet: */
     size_t piece_used, piece_bytes;
@@ -257,10 +261,19 @@ static int read_compressed(trip_byte_stream *s, unsigned char *to, size_t bytes)
     return 0;
 }
 
+static int read_plain(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
+{
+    if (!s->pieces || !trip_file_pieces_read(s->pieces, s->position, to, bytes))
+        return read_file(s, to, bytes, got_out);
+    s->position += bytes;
+    *got_out = bytes;
+    return 0;
+}
+
 int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes)
 {
     size_t got = bytes;
-    int status = s->source.encoding == TRIP_BYTES_PLAIN ? read_file(s, to, bytes, &got)
+    int status = s->source.encoding == TRIP_BYTES_PLAIN ? read_plain(s, to, bytes, &got)
                                                         : read_compressed(s, to, bytes);
     if (status < 0)
         return status;
@@ -345,6 +358,8 @@ static int prepare(trip_byte_stream *s)
     if (s->source.encoding != TRIP_BYTES_PLAIN && !(s->piece = malloc(PIECE_BYTES)))
         return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress");
     posix_fadvise(s->fd, 0, 0, POSIX_FADV_SEQUENTIAL);
+    if (s->source.encoding == TRIP_BYTES_PLAIN && s->source.size_bytes >= LARGE_BYTES)
+        s->pieces = trip_file_pieces_create(s->path, s->fd, s->file_bytes);
     return trip_byte_stream_rewind(s);
 }
 
@@ -374,6 +389,7 @@ void trip_byte_stream_close(trip_byte_stream *s)
     if (!s)
         return;
     codec_end(s);
+    trip_file_pieces_destroy(s->pieces);
     if (s->fd >= 0)
         close(s->fd);
     free(s->piece);
