@@ -1,30 +1,15 @@
 #include "bench_disk.h"
 
-#include <errno.h>
 #include <fcntl.h>
-#include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "bench_frame.h"
+#include "plain_disk.h"
 #include "report.h"
 
-enum { READERS = 8, BLOCK_BYTES = 1 << 20, FILES = 3 * TRIP_PLANES };
-
-/* One file at a time, its blocks shared out among threads. */
-typedef struct job {
-    int fd;
-    uint64_t blocks;
-    atomic_uint_fast64_t next;
-    atomic_uint_fast64_t bytes;
-    atomic_int error; /* errno of the first fault */
-    unsigned char *memory;
-    atomic_uint taken; /* parts of the memory */
-} job;
+enum { FILES = 3 * TRIP_PLANES };
 
 bench_files bench_files_of_plan(const trip_plan *plan)
 {
@@ -53,62 +38,13 @@ void bench_files_forget(const session *s, bench_files files)
                           POSIX_FADV_DONTNEED);
 }
 
-static void *read_blocks(void *argument)
-{
-    job *j = argument;
-    unsigned char *block = j->memory + (size_t)BLOCK_BYTES * atomic_fetch_add(&j->taken, 1);
-    uint64_t i;
-    while ((i = atomic_fetch_add(&j->next, 1)) < j->blocks && !atomic_load(&j->error)) {
-        ssize_t n = pread(j->fd, block, BLOCK_BYTES, (off_t)(i * BLOCK_BYTES));
-        if (n < 0)
-            atomic_store(&j->error, errno);
-        else
-            atomic_fetch_add(&j->bytes, (uint64_t)n);
-    }
-    return NULL;
-}
-
-static int read_file(job *j, const char *path)
-{
-    struct stat file;
-    pthread_t threads[READERS];
-    int started = 0, error = 0;
-    if (fstat(j->fd, &file) != 0)
-        return trip_fail_errno("read", path, NULL);
-    j->blocks = ((uint64_t)file.st_size + BLOCK_BYTES - 1) / BLOCK_BYTES;
-    atomic_store(&j->next, 0);
-    atomic_store(&j->taken, 0);
-    for (; started < READERS && !error; started += !error)
-        error = pthread_create(&threads[started], NULL, read_blocks, j);
-    for (int i = 0; i < started; i++)
-        pthread_join(threads[i], NULL);
-    errno = error ? error : atomic_load(&j->error);
-    return errno ? trip_fail_errno("read", path, NULL) : 0;
-}
-
-/* With O_DIRECT, or without where that is refused. */
-static int open_file(const char *path, bool *direct)
-{
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_DIRECT);
-    if (fd < 0 && errno == EINVAL) {
-        *direct = false;
-        fd = open(path, O_RDONLY | O_CLOEXEC);
-    }
-    return fd < 0 ? trip_fail_errno("read", path, "cannot open") : fd;
-}
-
-static int read_plane(const session *s, int axis, int plane, job *j, bool *direct)
+static int read_plane(const session *s, int axis, int plane, plain_disk *d, void *memory)
 {
     char path[4096], name[32];
     if (snprintf(path, sizeof path, "%s/%s", s->data->path,
                  trip_dataset_plane_name(axis, plane, name)) >= (int)sizeof path)
         return trip_fail(TRIP_ERROR, "read", s->data->path, "the name is too long");
-    j->fd = open_file(path, direct);
-    if (j->fd < 0)
-        return j->fd;
-    int status = read_file(j, path);
-    close(j->fd);
-    return status;
+    return plain_disk_read(d, path, memory);
 }
 
 /* The budget's memory is in large pages. */
@@ -120,7 +56,7 @@ static void *take_memory(const session *s, size_t bytes, bool large_pages)
     }
     if (!trip_budget_charge(s->budget, bytes))
         return NULL;
-    void *memory = aligned_alloc(BLOCK_BYTES, bytes);
+    void *memory = aligned_alloc(PLAIN_DISK_BLOCK_BYTES, bytes);
     if (memory)
         return memset(memory, 0, bytes);
     trip_budget_discharge(s->budget, bytes);
@@ -139,21 +75,18 @@ static void release_memory(const session *s, void *memory, size_t bytes, bool la
 
 int bench_files_read(const session *s, bench_files files, bool large_pages, bench_disk_read *out)
 {
-    const size_t memory_bytes = (size_t)READERS * BLOCK_BYTES;
-    job j = { .memory = take_memory(s, memory_bytes, large_pages) };
+    plain_disk d = { .direct = true };
+    void *memory = take_memory(s, PLAIN_DISK_MEMORY_BYTES, large_pages);
     int status = 0;
-    if (!j.memory)
+    if (!memory)
         return trip_fail(TRIP_ERROR, "bench", s->input,
                          "%zu bytes to read into do not fit the memory given; raise --memory",
-                         memory_bytes);
-    out->direct = true;
-    double start = bench_now_ms();
+                         PLAIN_DISK_MEMORY_BYTES);
     for (int i = 0; i < FILES && !status; i++)
         if (files >> i & 1)
-            status = read_plane(s, i / TRIP_PLANES, i % TRIP_PLANES, &j, &out->direct);
-    out->ms = bench_now_ms() - start;
-    out->bytes = atomic_load(&j.bytes);
-    release_memory(s, j.memory, memory_bytes, large_pages);
+            status = read_plane(s, i / TRIP_PLANES, i % TRIP_PLANES, &d, memory);
+    *out = (bench_disk_read){ d.seconds * 1e3, d.bytes, d.direct };
+    release_memory(s, memory, PLAIN_DISK_MEMORY_BYTES, large_pages);
     return status;
 }
 

@@ -8,8 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "brick.h"
+#include "brick_limits.h"
 #include "options.h"
+#include "plain_disk.h"
 #include "progress.h"
 #include "report.h"
 #include "text.h"
@@ -35,6 +36,7 @@ enum key {
     KEY_FORCE,
     KEY_RESUME,
     KEY_DRY_RUN,
+    KEY_LIMITS,
     KEY_JSON,
 };
 
@@ -43,7 +45,7 @@ typedef struct options {
     const char *functions[MAX_FUNCTIONS];
     trip_value_range ranges[MAX_RANGES];
     char *default_output; /* freed at the end */
-    bool quiet, json, dry_run;
+    bool quiet, json, dry_run, limits;
 } options;
 
 static const struct argp_option option_table[] = {
@@ -69,6 +71,8 @@ static const struct argp_option option_table[] = {
     { "no-normals", KEY_NO_NORMALS, NULL, 0, "Leave out what only shading needs", 3 },
     { "tile", KEY_TILE, "N", 0, "Tile edge in voxels: 16, 32, 64 or 128 (default: 64)", 3 },
     { "slab-sheets", KEY_SLAB_SHEETS, "N", 0, "Sheets of a brick, 1 to 64 (default: 8)", 3 },
+    { "limits", KEY_LIMITS, NULL, 0,
+      "Print each stage beside the disk's limits, measured by a plain read and a plain write", 3 },
     { "json", KEY_JSON, NULL, 0, "Print the summary as JSON", 3 },
     { "quiet", 'q', NULL, 0, "Print no progress and no summary", 3 },
     { NULL, 0, NULL, 0, "Resources:", 4 },
@@ -225,6 +229,9 @@ static error_t parse_output_option(int key, char *argument, options *o)
         return parse_tile(argument, &o->brick.tile_voxels);
     case KEY_SLAB_SHEETS:
         return parse_unsigned("--slab-sheets", argument, 64, &o->brick.slab_sheets);
+    case KEY_LIMITS:
+        o->limits = true;
+        return 0;
     case KEY_JSON:
         o->json = true;
         return 0;
@@ -245,6 +252,8 @@ static error_t check_options(const options *o)
         return trip_option_fail("--range", "says nothing beside --keep-all");
     if (o->dry_run && p->resume)
         return trip_option_fail("--resume", "says nothing beside --dry-run");
+    if (o->limits && (o->quiet || o->dry_run))
+        return trip_option_fail("--limits", "prints nothing beside --quiet or --dry-run");
     if (o->quiet && o->json)
         return trip_option_fail("--json", "prints nothing beside --quiet");
     return 0;
@@ -308,11 +317,6 @@ static void on_progress(void *user, const char *stage, uint64_t done, uint64_t t
     trip_progress_show(user, stage, done, total, strcmp(stage, "merge") ? "voxels" : "splats");
 }
 
-static double seconds_of(const trip_brick_summary *s)
-{
-    return s->scan_seconds + s->read_seconds + s->merge_seconds + s->finish_seconds;
-}
-
 static void add_number(cJSON *object, const char *name, double value)
 {
     char text[32];
@@ -330,7 +334,7 @@ static int print_object(cJSON *root, const options *o)
     return 0;
 }
 
-static int print_json(const options *o, const trip_brick_summary *s)
+static int print_json(const options *o, const trip_brick_summary *s, const brick_limits *limits)
 {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "output", o->brick.output);
@@ -349,21 +353,23 @@ static int print_json(const options *o, const trip_brick_summary *s)
     add_number(root, "bytes", (double)s->bytes);
     add_number(root, "temporary_bytes", (double)s->temporary_bytes);
     cJSON_AddBoolToObject(root, "resumed", s->resumed);
-    add_number(root, "scan_seconds", s->scan_seconds);
-    add_number(root, "read_seconds", s->read_seconds);
-    add_number(root, "merge_seconds", s->merge_seconds);
-    add_number(root, "finish_seconds", s->finish_seconds);
-    add_number(root, "seconds", seconds_of(s));
+    add_number(root, "scan_seconds", s->stages[TRIP_BRICK_SCAN].seconds);
+    add_number(root, "read_seconds", s->stages[TRIP_BRICK_READ].seconds);
+    add_number(root, "merge_seconds", s->stages[TRIP_BRICK_MERGE].seconds);
+    add_number(root, "finish_seconds", s->stages[TRIP_BRICK_FINISH].seconds);
+    add_number(root, "seconds", brick_seconds(s));
     add_number(root, "memory_bytes", (double)s->memory_bytes);
     add_number(root, "peak_memory_bytes", (double)s->peak_memory_bytes);
     add_number(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
+    if (o->limits)
+        cJSON_AddItemToObject(root, "limits", brick_limits_to_json(limits, s));
     return print_object(root, o);
 }
 
 static void print_text(const options *o, const trip_brick_summary *s)
 {
     char bytes[32], temporary[32], peak[32], promise[32];
-    double seconds = seconds_of(s), kept = (double)s->kept, voxels = (double)s->voxels;
+    double seconds = brick_seconds(s), kept = (double)s->kept, voxels = (double)s->voxels;
     printf("%-9s %s\n", "data set", o->brick.output);
     printf("%-9s %lld x %lld x %lld, spacing %.6g x %.6g x %.6g\n", "grid", (long long)s->dims[0],
            (long long)s->dims[1], (long long)s->dims[2], s->spacing[0], s->spacing[1],
@@ -376,7 +382,8 @@ static void print_text(const options *o, const trip_brick_summary *s)
     if (s->temporary_bytes)
         printf("%-9s %s\n", "spilled", trip_format_bytes(s->temporary_bytes, temporary));
     printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, finish %.2f), %.0f MB/s of input\n",
-           "time", seconds, s->scan_seconds, s->read_seconds, s->merge_seconds, s->finish_seconds,
+           "time", seconds, s->stages[TRIP_BRICK_SCAN].seconds, s->stages[TRIP_BRICK_READ].seconds,
+           s->stages[TRIP_BRICK_MERGE].seconds, s->stages[TRIP_BRICK_FINISH].seconds,
            (double)s->input_bytes / 1e6 / (seconds > 0 ? seconds : 1));
     printf("%-9s %s resident at most, %s promised for data\n", "memory",
            trip_format_bytes(trip_memory_peak_rss_bytes(), peak),
@@ -422,12 +429,19 @@ static int dry_run(const options *o)
 static int brick(const options *o)
 {
     trip_brick_summary summary;
+    brick_limits limits;
+    if (o->limits)
+        plain_disk_forget(o->brick.input);
     int status = trip_brick(&o->brick, &summary);
+    if (status == 0 && o->limits)
+        status = brick_limits_measure(&limits, &o->brick, &summary);
     if (status < 0 || o->quiet)
         return status;
     if (o->json)
-        return print_json(o, &summary);
+        return print_json(o, &summary, &limits);
     print_text(o, &summary);
+    if (o->limits)
+        brick_limits_print(&limits, &summary);
     return 0;
 }
 

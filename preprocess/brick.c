@@ -32,6 +32,7 @@ typedef struct brick {
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
+    uint64_t written_before; /* the present stage */
 } brick;
 
 static double now_seconds(void)
@@ -41,11 +42,35 @@ static double now_seconds(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
+static uint64_t input_bytes(const brick *b)
+{
+    return b->in.tally->voxels * trip_scalar_bytes(b->in.info->type);
+}
+
+/* Data set and spill so far. */
+static uint64_t bytes_written(const brick *b)
+{
+    return (b->writer ? trip_writer_bytes(b->writer) : 0) + trip_spill_bytes(b->spill);
+}
+
+static double begin_stage(brick *b)
+{
+    b->written_before = bytes_written(b);
+    return now_seconds();
+}
+
+static void end_stage(brick *b, trip_brick_stage stage, double begin)
+{
+    trip_brick_cost *c = &b->summary->stages[stage];
+    c->seconds = now_seconds() - begin;
+    c->bytes_written = bytes_written(b) - b->written_before;
+}
+
 /* Once it was done, a run that goes on knows the result. */
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->journal);
-    double begin = now_seconds();
+    double begin = begin_stage(b);
     int status = 0;
     if (start)
         trip_brick_input_set_tally(&b->in, &start->tally);
@@ -53,7 +78,9 @@ static int scan(brick *b)
         status =
             trip_brick_input_scan(&b->in, (trip_scan_params){ .slices = b->plan.slices,
                                                               .read_ahead = b->plan.read_ahead });
-    b->summary->scan_seconds = now_seconds() - begin;
+    if (!start)
+        b->summary->stages[TRIP_BRICK_SCAN].bytes_read = input_bytes(b);
+    end_stage(b, TRIP_BRICK_SCAN, begin);
     return status;
 }
 
@@ -324,9 +351,9 @@ static int read_volume(brick *b)
                               .box = on_box,
                               .batch = on_batch,
                               .user = b };
-    double begin = now_seconds();
+    double begin = begin_stage(b);
     int status = trip_walk(b->in.volume, b->in.workers, &walk);
-    b->summary->read_seconds = now_seconds() - begin;
+    end_stage(b, TRIP_BRICK_READ, begin);
     if (status < 0)
         return status;
     add_up(b, b->in.tally, &b->summary->kept);
@@ -342,7 +369,7 @@ static void on_merge_progress(void *user, uint64_t splats)
 
 static int merge_lists(brick *b)
 {
-    double begin = now_seconds();
+    double begin = begin_stage(b);
     int status = 0;
     if (!b->format.quantised) {
         set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
@@ -352,7 +379,7 @@ static int merge_lists(brick *b)
     if (status == 0)
         status = trip_list_builder_finish(b->builder, &b->quantiser, b->in.workers,
                                           on_merge_progress, b);
-    b->summary->merge_seconds = now_seconds() - begin;
+    end_stage(b, TRIP_BRICK_MERGE, begin);
     return status;
 }
 
@@ -373,7 +400,7 @@ static int finish_output(brick *b)
     if (status == 0)
         b->writer = NULL;
     free(text);
-    b->summary->finish_seconds = now_seconds() - begin;
+    b->summary->stages[TRIP_BRICK_FINISH].seconds = now_seconds() - begin;
     return status;
 }
 
@@ -388,8 +415,10 @@ static void fill_summary(brick *b)
     s->not_finite = b->in.tally->voxels - b->in.tally->finite;
     s->value_min = b->in.tally->value_min;
     s->value_max = b->in.tally->value_max;
-    s->input_bytes = s->voxels * trip_scalar_bytes(b->in.info->type);
+    s->input_bytes = input_bytes(b);
     s->temporary_bytes = trip_spill_bytes(b->spill);
+    s->stages[TRIP_BRICK_READ].bytes_read = s->input_bytes;
+    s->stages[TRIP_BRICK_MERGE].bytes_read = s->temporary_bytes;
     s->memory_bytes = trip_budget_limit_bytes(b->in.budget);
     s->peak_memory_bytes = trip_budget_peak_bytes(b->in.budget);
 }

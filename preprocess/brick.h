@@ -36,6 +36,21 @@ typedef struct trip_brick_params {
     void *progress_user;
 } trip_brick_params;
 
+/* One stage of a run; those overlap with nothing. */
+typedef enum trip_brick_stage {
+    TRIP_BRICK_SCAN,   /* a pass over the input, where the envelope depends on all values */
+    TRIP_BRICK_READ,   /* the pass that makes splats; writes what is in order, spills what is not */
+    TRIP_BRICK_MERGE,  /* spilled and remembered splats to the lists */
+    TRIP_BRICK_FINISH, /* the index, and everything onto the disk */
+    TRIP_BRICK_STAGES
+} trip_brick_stage;
+
+/* What a stage took, and the bytes it moved; the index is not counted. */
+typedef struct trip_brick_cost {
+    double seconds;
+    uint64_t bytes_read, bytes_written;
+} trip_brick_cost;
+
 typedef struct trip_brick_summary {
     int64_t dims[3];
     double spacing[3];
@@ -45,7 +60,7 @@ typedef struct trip_brick_summary {
     uint64_t bytes;           /* of the data set's splats */
     uint64_t temporary_bytes; /* spilled */
     bool resumed;
-    double scan_seconds, read_seconds, merge_seconds, finish_seconds;
+    trip_brick_cost stages[TRIP_BRICK_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* promised and taken from the budget */
 } trip_brick_summary;
 

@@ -33,6 +33,7 @@ BRICK = {
     "--quiet": None,
     "--resume": None,
     "--dry-run": None,
+    "--limits": None,
     "--grid": [],
     "--output": [],
 }

@@ -1,0 +1,128 @@
+#include "plain_disk.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "report.h"
+
+/* One file at a time, its blocks shared out among threads. */
+typedef struct job {
+    int fd;
+    bool write;
+    uint64_t blocks;
+    atomic_uint_fast64_t next;
+    atomic_uint_fast64_t bytes;
+    atomic_int error; /* errno of the first fault */
+    unsigned char *memory;
+    atomic_uint taken; /* parts of the memory */
+} job;
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static ssize_t move_block(const job *j, unsigned char *block, uint64_t i)
+{
+    off_t offset = (off_t)(i * PLAIN_DISK_BLOCK_BYTES);
+    ssize_t n = j->write ? pwrite(j->fd, block, PLAIN_DISK_BLOCK_BYTES, offset)
+                         : pread(j->fd, block, PLAIN_DISK_BLOCK_BYTES, offset);
+    if (j->write && n >= 0 && n < PLAIN_DISK_BLOCK_BYTES) {
+        errno = ENOSPC;
+        return -1;
+    }
+    return n;
+}
+
+static void *move_blocks(void *argument)
+{
+    job *j = argument;
+    unsigned char *block =
+        j->memory + (size_t)PLAIN_DISK_BLOCK_BYTES * atomic_fetch_add(&j->taken, 1);
+    uint64_t i;
+    while ((i = atomic_fetch_add(&j->next, 1)) < j->blocks && !atomic_load(&j->error)) {
+        ssize_t n = move_block(j, block, i);
+        if (n < 0)
+            atomic_store(&j->error, errno);
+        else
+            atomic_fetch_add(&j->bytes, (uint64_t)n);
+    }
+    return NULL;
+}
+
+/* An errno, 0 when all is done. */
+static int share_out(job *j)
+{
+    pthread_t threads[PLAIN_DISK_THREADS];
+    int started = 0, error = 0;
+    for (; started < PLAIN_DISK_THREADS && !error; started += !error)
+        error = pthread_create(&threads[started], NULL, move_blocks, j);
+    for (int i = 0; i < started; i++)
+        pthread_join(threads[i], NULL);
+    return error ? error : atomic_load(&j->error);
+}
+
+/* Moves `bytes` of an open file, which is closed. */
+static int move_file(plain_disk *d, int fd, bool write, uint64_t bytes, const char *path,
+                     void *memory)
+{
+    job j = { .fd = fd,
+              .write = write,
+              .blocks = (bytes + PLAIN_DISK_BLOCK_BYTES - 1) / PLAIN_DISK_BLOCK_BYTES,
+              .memory = memory };
+    double begin = now_seconds();
+    int error = share_out(&j);
+    if (!error && write && fsync(fd) < 0)
+        error = errno;
+    d->seconds += now_seconds() - begin;
+    d->bytes += atomic_load(&j.bytes);
+    close(fd);
+    errno = error;
+    return error ? trip_fail_errno(write ? "write" : "read", path, NULL) : 0;
+}
+
+/* With O_DIRECT, or without where that is refused. */
+static int open_file(plain_disk *d, const char *path, int flags)
+{
+    int fd = open(path, flags | O_CLOEXEC | O_DIRECT, 0600);
+    d->direct = fd >= 0;
+    return fd < 0 && errno == EINVAL ? open(path, flags | O_CLOEXEC, 0600) : fd;
+}
+
+int plain_disk_read(plain_disk *d, const char *path, void *memory)
+{
+    struct stat file;
+    int fd = open_file(d, path, O_RDONLY);
+    if (fd < 0)
+        return trip_fail_errno("read", path, "cannot open");
+    if (fstat(fd, &file) == 0)
+        return move_file(d, fd, false, (uint64_t)file.st_size, path, memory);
+    int status = trip_fail_errno("read", path, NULL);
+    close(fd);
+    return status;
+}
+
+int plain_disk_write(plain_disk *d, const char *folder, uint64_t bytes, void *memory)
+{
+    int fd = open_file(d, folder, O_TMPFILE | O_WRONLY);
+    if (fd < 0)
+        return trip_fail_errno("write", folder, "cannot create an unnamed file");
+    return move_file(d, fd, true, bytes, folder, memory);
+}
+
+void plain_disk_forget(const char *path)
+{
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0)
+        return;
+    fsync(fd); /* only clean pages are let go */
+    posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
+    close(fd);
+}
