@@ -171,101 +171,113 @@ static int decode(const view *v)
                              v->s->params.info->sparse ? v->w->active : NULL);
 }
 
-/* A neighbour that is not finite is replaced by the voxel's own value. */
-static inline double neighbour(const float *at, int64_t step)
-{
-    float value = at[step];
-    return isfinite(value) ? value : *at;
-}
-
 static inline double difference(const float *at, int64_t step)
 {
-    return 0.5 * (neighbour(at, step) - neighbour(at, -step));
+    return 0.5 * ((double)at[step] - (double)at[-step]);
+}
+
+/* A neighbour that is not finite is replaced by the voxel's own value. */
+static double careful_difference(const float *at, int64_t step)
+{
+    double after = isfinite(at[step]) ? at[step] : *at;
+    double before = isfinite(at[-step]) ? at[-step] : *at;
+    return 0.5 * (after - before);
 }
 
 /* World-space gradient: J^-T times the central differences of index space. */
 static inline void gradient(const view *v, const float *at, double g[3])
 {
-    const double x = difference(at, 1), y = difference(at, v->pitch), z = difference(at, v->slice);
+    double x = difference(at, 1), y = difference(at, v->pitch), z = difference(at, v->slice);
+    if (!isfinite(x + y + z)) { /* as soon as one neighbour is not */
+        x = careful_difference(at, 1);
+        y = careful_difference(at, v->pitch);
+        z = careful_difference(at, v->slice);
+    }
     const double(*m)[3] = v->s->to_world;
     for (int row = 0; row < 3; row++)
         g[row] = m[row][0] * x + m[row][1] * y + m[row][2] * z;
 }
 
-static void put_normal(const view *v, const float *at, size_t index)
-{
-    const trip_splat_params *p = &v->s->params;
-    double g[3];
-    gradient(v, at, g);
-    if (p->format.quantised) {
-        v->w->normals[index] = trip_normal_pack(g, p->quantiser.gradient_scale);
-        return;
-    }
-    double magnitude = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    v->w->normals[index] = trip_normal_pack(g, magnitude) & 0xffffff;
-    v->w->magnitudes[index] = (float)magnitude;
-}
+/* The kept voxels of a row of the box. Local coordinates in `x`, ascending. */
+typedef struct kept_row {
+    const float *values; /* decoded, of local x `first` */
+    unsigned first;
+    int64_t y, z; /* local */
+    size_t index; /* in the arrays of voxels, of local x 0 */
+    unsigned count;
+    uint8_t x[128];
+} kept_row;
 
-static void put_value(const view *v, float value, size_t index)
+static void put_values(const view *v, const kept_row *r)
 {
+    uint32_t *to = v->w->values + r->index;
+    const trip_quantiser q = v->s->params.quantiser;
     if (v->s->params.format.quantised)
-        v->w->values[index] = trip_quantise(&v->s->params.quantiser, value);
+        for (unsigned i = 0; i < r->count; i++)
+            to[r->x[i]] = trip_quantise(&q, r->values[r->x[i] - r->first]);
     else
-        memcpy(&v->w->values[index], &value, sizeof value);
+        for (unsigned i = 0; i < r->count; i++)
+            memcpy(&to[r->x[i]], &r->values[r->x[i] - r->first], sizeof *to);
 }
 
-static inline void set_bit(uint64_t *sheet, unsigned place)
+static void put_normals(const view *v, const kept_row *r)
 {
-    sheet[place / 64] |= UINT64_C(1) << (place % 64);
+    uint32_t *to = v->w->normals + r->index;
+    const trip_splat_params *p = &v->s->params;
+    for (unsigned i = 0; i < r->count; i++) {
+        unsigned x = r->x[i];
+        double g[3];
+        gradient(v, r->values + (x - r->first), g);
+        if (p->format.quantised) {
+            to[x] = trip_normal_pack(g, p->quantiser.gradient_scale);
+            continue;
+        }
+        double magnitude = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+        to[x] = trip_normal_pack(g, magnitude) & 0xffffff;
+        v->w->magnitudes[r->index + x] = (float)magnitude;
+    }
 }
 
-/* Marks a voxel in the sheets of the three lists; c are its local coordinates, and z_place its
- * third coordinate counted from a multiple of the edge. */
-static inline void mark(const view *v, const int64_t c[3], int64_t z_place)
+/* Marks the voxels in the sheets of the three lists. The place in a sheet counts the third
+ * coordinate from a multiple of the edge. */
+static void mark(const view *v, const kept_row *r)
 {
     const uint16_t *spread = v->s->spread;
-    size_t words = v->s->words;
-    unsigned x = spread[c[0]], y = spread[c[1]], z = spread[z_place];
-    set_bit(v->w->bits[0] + (size_t)c[0] * words, y | z << 1);
-    set_bit(v->w->bits[1] + (size_t)c[1] * words, z | x << 1);
-    set_bit(v->w->bits[2] + (size_t)c[2] * words, x | y << 1);
+    const size_t words = v->s->words;
+    const unsigned y = spread[r->y], z = spread[(v->box->lo[2] + r->z) & (v->s->edge - 1)];
+    const unsigned place = y | z << 1; /* in all sheets along X */
+    uint64_t *x_words = v->w->bits[0] + place / 64;
+    uint64_t *y_sheet = v->w->bits[1] + (size_t)r->y * words;
+    uint64_t *z_sheet = v->w->bits[2] + (size_t)r->z * words;
+    const uint64_t x_bit = UINT64_C(1) << (place % 64);
+    for (unsigned i = 0; i < r->count; i++) {
+        unsigned x = spread[r->x[i]], in_y = z | x << 1, in_z = x | y << 1;
+        x_words[r->x[i] * words] |= x_bit;
+        y_sheet[in_y / 64] |= UINT64_C(1) << (in_y % 64);
+        z_sheet[in_z / 64] |= UINT64_C(1) << (in_z % 64);
+    }
 }
 
-static bool none(const uint8_t *keep, int64_t count)
+/* Places of the ones in `keep`, each counted from `first`; returns how many. */
+static unsigned find_kept(const uint8_t *keep, int64_t count, int64_t first, uint8_t *places)
 {
-    uint64_t any = 0, eight;
-    int64_t i = 0;
-    for (; i + 8 <= count; i += 8) {
+    unsigned n = 0;
+    for (int64_t i = 0; i < count; i += 8) {
+        uint64_t eight;
         memcpy(&eight, keep + i, sizeof eight);
-        any |= eight;
-    }
-    for (; i < count; i++)
-        any |= keep[i];
-    return any == 0;
-}
-
-static unsigned put_kept(const view *v, const uint8_t *keep, const float *row, int64_t y, int64_t z)
-{
-    const int64_t edge = v->s->edge, z_place = (v->box->lo[2] + z) & (edge - 1);
-    int64_t c[3] = { 0, v->from[1] + y, z };
-    unsigned kept = 0;
-    for (int64_t x = 0; x < v->box->size[0]; x++) {
-        if (!keep[x])
+        if (eight == 0)
             continue;
-        c[0] = v->from[0] + x;
-        size_t index = (size_t)((z * edge + c[1]) * edge + c[0]);
-        mark(v, c, z_place);
-        put_value(v, row[x], index);
-        if (v->s->params.format.normals)
-            put_normal(v, row + x, index);
-        kept++;
+        for (int64_t k = i; k < i + 8 && k < count; k++) {
+            places[n] = (uint8_t)(first + k);
+            n += keep[k];
+        }
     }
-    return kept;
+    return n;
 }
 
 static unsigned do_row(const view *v, int64_t y, int64_t z)
 {
-    uint8_t keep[128];
+    uint8_t keep[128 + 8] = { 0 }; /* looked at eight at a time */
     const float *row = v->first + z * v->slice + y * v->pitch;
     const trip_splat_params *p = &v->s->params;
     const uint8_t *active = p->info->sparse ? v->w->active + (row - v->w->decoded) : NULL;
@@ -277,7 +289,19 @@ static unsigned do_row(const view *v, int64_t y, int64_t z)
     trip_envelope_keep_row(p->envelope, row, count, keep);
     for (size_t i = 0; active && i < count; i++)
         keep[i] &= active[i];
-    return none(keep, v->box->size[0]) ? 0 : put_kept(v, keep, row, y, z);
+    kept_row r = { .values = row,
+                   .first = (unsigned)v->from[0],
+                   .y = v->from[1] + y,
+                   .z = z,
+                   .index = (size_t)((z * v->s->edge + v->from[1] + y) * v->s->edge) };
+    r.count = find_kept(keep, v->box->size[0], v->from[0], r.x);
+    if (r.count == 0)
+        return 0;
+    mark(v, &r);
+    put_values(v, &r);
+    if (p->format.normals)
+        put_normals(v, &r);
+    return r.count;
 }
 
 static void clear_bits(const view *v)
