@@ -219,6 +219,20 @@ static void memory_producers_and_order_make_no_difference(void **state)
     assert_false(test_exists("spill"));
 }
 
+static void what_fits_is_not_spilled(void **state)
+{
+    (void)state;
+    uint64_t all, spilled;
+    run_params p = { trip_list_builder_min_bytes(&format, 1), 1, false, true, false };
+    assert_int_equal(run("a.trip", &p, &all), 0);
+    p.memory_bytes = all / 4 * 3;
+    assert_int_equal(run("b.trip", &p, &spilled), 0);
+    assert_int_equal(spilled, 0);
+    p.memory_bytes = all / 2;
+    assert_int_equal(run("c.trip", &p, &spilled), 0);
+    assert_true(spilled > 0);
+}
+
 static void damaged_temporary_data_is_a_failure(void **state)
 {
     (void)state;
@@ -252,6 +266,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(lists_hold_the_splats_in_order, test_begin, test_end),
         cmocka_unit_test_setup_teardown(memory_producers_and_order_make_no_difference, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(what_fits_is_not_spilled, test_begin, test_end),
         cmocka_unit_test_setup_teardown(damaged_temporary_data_is_a_failure, test_begin, test_end),
         cmocka_unit_test_setup_teardown(a_spill_in_use_is_refused, test_begin, test_end),
     };
