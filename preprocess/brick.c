@@ -32,7 +32,7 @@ typedef struct brick {
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
-    uint64_t written_before; /* the present stage */
+    uint64_t written_before; /* up to the end of the last stage */
 } brick;
 
 static double now_seconds(void)
@@ -53,24 +53,19 @@ static uint64_t bytes_written(const brick *b)
     return (b->writer ? trip_writer_bytes(b->writer) : 0) + trip_spill_bytes(b->spill);
 }
 
-static double begin_stage(brick *b)
-{
-    b->written_before = bytes_written(b);
-    return now_seconds();
-}
-
 static void end_stage(brick *b, trip_brick_stage stage, double begin)
 {
     trip_brick_cost *c = &b->summary->stages[stage];
     c->seconds = now_seconds() - begin;
     c->bytes_written = bytes_written(b) - b->written_before;
+    b->written_before += c->bytes_written;
 }
 
 /* Once it was done, a run that goes on knows the result. */
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->journal);
-    double begin = begin_stage(b);
+    double begin = now_seconds();
     int status = 0;
     if (start)
         trip_brick_input_set_tally(&b->in, &start->tally);
@@ -351,7 +346,7 @@ static int read_volume(brick *b)
                               .box = on_box,
                               .batch = on_batch,
                               .user = b };
-    double begin = begin_stage(b);
+    double begin = now_seconds();
     int status = trip_walk(b->in.volume, b->in.workers, &walk);
     end_stage(b, TRIP_BRICK_READ, begin);
     if (status < 0)
@@ -369,7 +364,7 @@ static void on_merge_progress(void *user, uint64_t splats)
 
 static int merge_lists(brick *b)
 {
-    double begin = begin_stage(b);
+    double begin = now_seconds();
     int status = 0;
     if (!b->format.quantised) {
         set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);

@@ -1,0 +1,58 @@
+"""`brick --limits`: its figures agree with each other and with the files. How fast anything is does not
+matter here."""
+import json
+import os
+
+import program
+
+
+class Limits(program.ProgramTest):
+    def limits(self, source, *options):
+        run = self.works("brick", source, "-o", "a.trip", "--force", "--limits", "--json", *options)
+        summary = json.loads(run.stdout)
+        stages = {s["stage"]: s for s in summary["limits"]["stages"]}
+        own = [stages[name] for name in ("scan", "read", "merge", "finish")]
+        planes = sum(os.path.getsize(os.path.join("a.trip", name)) for name in os.listdir("a.trip")
+                     if name != "index.trip")
+        self.assertAlmostEqual(sum(s["seconds"] for s in own), summary["seconds"], 6)
+        self.assertEqual(sum(s["bytes_written"] for s in own), planes + summary["temporary_bytes"])
+        self.assertEqual(stages["plain write"]["bytes_written"], planes)
+        self.assertGreater(stages["plain write"]["seconds"], 0)
+        return summary, stages
+
+    def test_the_ratio_is_that_of_the_times(self):
+        source = os.path.join(program.DATASETS, "stent.nrrd")
+        with open("block.raw", "wb") as f:
+            f.write(bytes(range(256)) * 4096)
+        options = "--size=128,128,64", "--type=uint8"
+        summary, stages = self.limits("block.raw", *options, "--range=10:200")
+        plain = stages["plain read"]["seconds"] + stages["plain write"]["seconds"]
+        self.assertAlmostEqual(summary["limits"]["ratio"], summary["seconds"] / plain, 6)
+        self.assertEqual(stages["plain read"]["bytes_read"], 1 << 20)
+        self.assertEqual(stages["read"]["bytes_read"], 1 << 20)
+        self.assertIn("ratio", self.limits(source)[0]["limits"])
+
+    def test_only_an_envelope_that_depends_on_all_values_takes_a_second_pass(self):
+        with open("ramp.raw", "wb") as f:
+            f.write(b"".join(i.to_bytes(2, "little") for i in range(1 << 15)))
+        options = "--size=32,32,32", "--type=uint16", "--endian=little"
+        for envelope, passes in (["--range=9:900"], 1), (["--keep-all"], 1), ([], 2), \
+                (["--tf=preset:grey"], 2):
+            stages = self.limits("ramp.raw", *options, *envelope)[1]
+            self.assertEqual(stages["scan"]["bytes_read"], (passes - 1) << 16, envelope)
+            self.assertEqual(stages["read"]["bytes_read"], 1 << 16)
+
+    def test_a_header_beside_its_data_has_no_plain_read(self):
+        summary, stages = self.limits(os.path.join(program.DATASETS, "tooth.nhdr"))
+        self.assertNotIn("plain read", stages)
+        self.assertNotIn("ratio", summary["limits"])
+
+    def test_a_table_for_people(self):
+        run = self.works("brick", os.path.join(program.DATASETS, "stent.nrrd"), "-o", "a.trip",
+                         "--force", "--limits")
+        for word in b"scan", b"read", b"merge", b"finish", b"plain read", b"plain write", b"times":
+            self.assertIn(word, run.stdout)
+
+
+if __name__ == "__main__":
+    program.main()
