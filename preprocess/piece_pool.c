@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 #include "report.h"
 
@@ -50,6 +51,9 @@ int trip_piece_pool_create(trip_piece_pool *pool, const trip_piece_format *f, co
     if (!pool->memory || !pool->chunks)
         return trip_fail(TRIP_ERROR, "brick", "lists",
                          "the memory allowed cannot be had: try less --memory");
+    /* Filled once, from the front: large pages are harder to get than small ones and gain nothing.
+     */
+    madvise(pool->memory, pool->chunk_count * pool->chunk_bytes, MADV_NOHUGEPAGE);
     for (size_t i = pool->chunk_count; i-- > 0;)
         trip_chain_push(pool, &pool->free, (uint32_t)i);
     return 0;
