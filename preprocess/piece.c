@@ -139,10 +139,14 @@ bool trip_piece_check(const trip_piece *p, const trip_piece_format *f, size_t ro
     return p->words ? check_bitmap(p, f) : check_list(p, f);
 }
 
-/* One entry a place in the tile, written where pieces have a splat. */
+/* One entry a place in the tile, written where pieces have a splat. While there is one piece alone,
+ * its splats stand in order in the arrays of records: many tiles have no other. */
 struct trip_tile {
     trip_piece_format format;
     trip_budget *budget;
+    bool started;   /* something was added */
+    uint32_t alone; /* splats of the one piece; 0 when there are more */
+    uint16_t alone_positions[TRIP_TILE_MAX_SPLATS];
     uint64_t bits[TRIP_TILE_MAX_WORDS];
     uint16_t positions[TRIP_TILE_MAX_SPLATS];
     uint16_t uv[TRIP_TILE_MAX_SPLATS]; /* bytes u and v of a place */
@@ -173,6 +177,31 @@ void trip_tile_destroy(trip_tile *t)
         trip_budget_release(t->budget, t, sizeof *t);
 }
 
+static void add_first(trip_tile *t, const trip_piece *p)
+{
+    const unsigned char *base = (const unsigned char *)p;
+    trip_piece_parts parts = trip_piece_get_parts(&t->format, p);
+    const uint16_t *codes = (const void *)(base + parts.values);
+    t->alone = expand(p, &t->format, t->alone_positions);
+    for (uint32_t i = 0; i < t->alone; i++)
+        t->voxel_records[i] = codes[i];
+    if (parts.normals)
+        memcpy(t->normal_records, base + parts.normals, t->alone * sizeof *t->normal_records);
+}
+
+/* Puts the splats of the first piece where those of others go. */
+static void scatter_first(trip_tile *t)
+{
+    for (uint32_t i = 0; i < t->alone; i++) {
+        unsigned position = t->alone_positions[i];
+        t->bits[position / 64] |= UINT64_C(1) << (position % 64);
+        t->values[position] = t->voxel_records[i];
+    }
+    for (uint32_t i = 0; t->format.normals && i < t->alone; i++)
+        t->normals[t->alone_positions[i]] = t->normal_records[i];
+    t->alone = 0;
+}
+
 static void scatter_values(trip_tile *t, const void *from, uint32_t splats)
 {
     const uint16_t *codes = from;
@@ -185,7 +214,7 @@ static void scatter_values(trip_tile *t, const void *from, uint32_t splats)
             t->values[t->positions[i]] = floats[i];
 }
 
-void trip_tile_add(trip_tile *t, const trip_piece *p)
+static void scatter_piece(trip_tile *t, const trip_piece *p)
 {
     const unsigned char *base = (const unsigned char *)p;
     trip_piece_parts parts = trip_piece_get_parts(&t->format, p);
@@ -201,6 +230,17 @@ void trip_tile_add(trip_tile *t, const trip_piece *p)
     if (parts.magnitudes)
         for (uint32_t i = 0; i < splats; i++)
             t->magnitudes[t->positions[i]] = magnitudes[i];
+}
+
+void trip_tile_add(trip_tile *t, const trip_piece *p)
+{
+    if (!t->started && t->format.quantised) {
+        add_first(t, p);
+    } else {
+        scatter_first(t);
+        scatter_piece(t, p);
+    }
+    t->started = true;
 }
 
 static uint32_t take_positions(trip_tile *t)
@@ -231,8 +271,16 @@ static uint32_t normal_of(const trip_tile *t, const trip_quantiser *q, unsigned 
     return magnitude ? t->normals[position] | magnitude << 24 : 0;
 }
 
-uint32_t trip_tile_take(trip_tile *t, const trip_quantiser *q, const uint32_t **voxels,
-                        const uint32_t **normals)
+static uint32_t take_alone(trip_tile *t)
+{
+    uint32_t splats = t->alone;
+    for (uint32_t i = 0; i < splats; i++)
+        t->voxel_records[i] = t->uv[t->alone_positions[i]] | t->voxel_records[i] << 16;
+    t->alone = 0;
+    return splats;
+}
+
+static uint32_t take_scattered(trip_tile *t, const trip_quantiser *q)
 {
     uint32_t splats = take_positions(t);
     for (uint32_t i = 0; i < splats; i++) {
@@ -241,7 +289,14 @@ uint32_t trip_tile_take(trip_tile *t, const trip_quantiser *q, const uint32_t **
     }
     for (uint32_t i = 0; t->format.normals && i < splats; i++)
         t->normal_records[i] = normal_of(t, q, t->positions[i]);
+    return splats;
+}
+
+uint32_t trip_tile_take(trip_tile *t, const trip_quantiser *q, const uint32_t **voxels,
+                        const uint32_t **normals)
+{
+    t->started = false;
     *voxels = t->voxel_records;
     *normals = t->format.normals ? t->normal_records : NULL;
-    return splats;
+    return t->alone ? take_alone(t) : take_scattered(t, q);
 }
