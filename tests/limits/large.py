@@ -12,6 +12,7 @@ promise but counts as resident, all of it where the driver is software (llvmpipe
 gl it is printed and not judged."""
 import argparse
 import os
+import shutil
 import sys
 
 import limits
@@ -40,16 +41,17 @@ def parse():
     return p.parse_args()
 
 
-def clear(folder):
-    for name in os.listdir(folder):
-        os.remove(os.path.join(folder, name))
-    os.rmdir(folder)
+def remove_made(o, bounded, volume):
+    pictures = [os.path.join(o.work, name) for name in os.listdir(o.work)
+                if name.startswith("bounded") and name.endswith(".png")]
+    for path in [volume, *pictures]:
+        os.remove(path)
+    shutil.rmtree(bounded.data, ignore_errors=True)
 
 
 def work(o, tell):
     bounded = Bounded(o.work, o.limit, o.memory, tell)
-    if os.path.exists(bounded.data):
-        clear(bounded.data)
+    shutil.rmtree(bounded.data, ignore_errors=True)  # of an earlier run
     volume = bounded.generate(o.volume)
     try:
         bounded.brick(volume)
@@ -59,9 +61,7 @@ def work(o, tell):
                 bounded.render(renderer, o.size, "--orbit", o.orbit)
     finally:
         if not o.keep:
-            os.remove(volume)
-            if os.path.exists(bounded.data):
-                clear(bounded.data)
+            remove_made(o, bounded, volume)
 
 
 def main():
