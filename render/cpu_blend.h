@@ -417,19 +417,26 @@ typedef struct gathering {
     uint64_t any[BANDS];
 } gathering;
 
+/* Splats whose blocks are all closed are left out. */
 INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 {
-    uint32_t at = g->splats++;
+    uint32_t at = g->splats;
     block_range r = blocks_of(splat, g->corner);
     uint64_t columns = (0xffu << r.left & 0xffu >> (7 - r.right)) * UINT64_C(0x0101010101010101);
+    uint64_t blocks[BANDS], any = 0;
+    for (unsigned band = 0; band < BANDS; band++) {
+        blocks[band] = columns & rows_of_band(band, r.top, r.bottom) & s->open[band];
+        any |= blocks[band];
+    }
+    if (any == 0)
+        return;
     make_local(&s->local[at], splat, g->origin, g->cutoff);
     s->thick[at / 64] |= (uint64_t)(splat->thick != 0) << at % 64;
     for (unsigned band = 0; band < BANDS; band++) {
-        uint64_t blocks = columns & rows_of_band(band, r.top, r.bottom);
-        s->touched[band][at / 64][at % 64] = blocks;
-        s->any[band] |= blocks;
+        s->touched[band][at / 64][at % 64] = blocks[band];
+        s->any[band] |= blocks[band];
     }
-    if (g->splats == TRIP_CPU_LOCAL) {
+    if (++g->splats == TRIP_CPU_LOCAL) {
         s->splats = g->splats;
         empty_group(s);
         g->splats = 0;
