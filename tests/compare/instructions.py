@@ -13,8 +13,9 @@ import tempfile
 ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain"]
 
 # The functions whose cost, with all they call, is a stage's: those of the kernels' table
-# (render/cpu_kernels.h) and of render/cpu_bin.h, which no compiler can hide.
+# (render/cpu_kernels.h), of render/cpu_show.h and of render/cpu_bin.h, which no compiler can hide.
 STAGES = {
+    "hiding": ["trip_cpu_show"],
     "projection": ["stage", "project"],
     "binning": ["trip_cpu_bin", "trip_cpu_link"],
     "blend": ["tile_clear", "tile_begin", "tile_blend", "tile_end"],
