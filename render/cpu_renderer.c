@@ -16,7 +16,7 @@
 #include "cpu_show.h"
 #include "report.h"
 
-enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 16, MIN_SPLATS = 1 << 13 };
+enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
 
 /* Fewer voxels are not worth a chunk. */
 enum { LEAST_CHUNK = 512 };
