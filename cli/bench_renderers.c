@@ -102,28 +102,21 @@ static int measure_load(bench_frame frame, load *out)
     return status;
 }
 
+/* A contender's turn begins with a frame that is not timed: shaders are compiled and buffers grown
+ * in its first one, and threads that slept through the others' turns have yet to spread over the
+ * processors. */
 static int draw_view(race *c, bench_frame frame, int view)
 {
     int repeat = c->options->repeat, status = 0;
     frame.renderer = c->contenders[0].renderer;
     if (!c->options->no_counts)
         status = measure_load(frame, &c->loads[view]);
-    for (int run = 0; run < repeat; run++)
-        for (int i = 0; i < c->count && !status; i++) {
-            frame.renderer = c->contenders[i].renderer;
-            status = bench_frame_draw(&frame, false, &c->contenders[i].costs[view * repeat + run]);
-        }
-    return status;
-}
-
-/* Shaders are compiled and buffers grown before anything is timed. */
-static int warm_up(race *c, bench_frame frame)
-{
-    bench_cost cost;
-    int status = 0;
     for (int i = 0; i < c->count && !status; i++) {
+        bench_cost untimed, *costs = &c->contenders[i].costs[view * repeat];
         frame.renderer = c->contenders[i].renderer;
-        status = bench_frame_draw(&frame, false, &cost);
+        status = bench_frame_draw(&frame, false, &untimed);
+        for (int run = 0; run < repeat && !status; run++)
+            status = bench_frame_draw(&frame, false, &costs[run]);
     }
     return status;
 }
@@ -137,10 +130,7 @@ static int draw_views(race *c, const int size[2])
     int status = session_take_image(c->session, size[0], size[1], &frame.rgba);
     for (int view = 0; view < c->options->views && !status; view++) {
         frame.view = c->views[view] = bench_view_round(c->session, size, view, c->options->views);
-        if (view == 0)
-            status = warm_up(c, frame);
-        if (!status)
-            status = draw_view(c, frame, view);
+        status = draw_view(c, frame, view);
     }
     session_release_image(c->session, size[0], size[1], frame.rgba);
     return status;
@@ -244,7 +234,9 @@ static void add_limits(bench_report *r, bool draw_hidden)
     if (!draw_hidden)
         bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
                               "same.");
-    bench_report_limit(r, "Times are over views; renderers take turns at each view.");
+    bench_report_limit(
+        r, "Times are over views; at each view renderers take turns, the first frame of each "
+           "turn untimed.");
 }
 
 int bench_renderers(const session *s, const bench_options *o, bench_report *r)
