@@ -130,15 +130,6 @@ static int tear_down(void **state)
     return 0;
 }
 
-static char reported[1024];
-
-static void keep_report(const char *line, void *user)
-{
-    (void)user;
-    test_report_count++;
-    snprintf(reported, sizeof reported, "%s", line);
-}
-
 static const trip_engine engines[] = { TRIP_ENGINE_AUTO, TRIP_ENGINE_PREAD, TRIP_ENGINE_NULL };
 
 /* One frame by any engine from what is on disk; true when it was drawn. */
@@ -146,22 +137,21 @@ static bool judge(const char *file)
 {
     static float rgba[SIZE * SIZE * 4];
     drawing d;
-    test_report_count = 0;
-    trip_report_redirect(keep_report, NULL);
+    test_catch_reports();
     trip_reader_params params = { .engine = engines[random_below(3)] };
     int status = open_drawing(&d, TRIP_RENDERER_CPU, params);
     if (!status)
         status = draw_frame(&d, rgba);
-    trip_report_redirect(NULL, NULL);
+    int reports = test_caught_reports();
     close_drawing(&d);
     if (status == 0) {
-        assert_int_equal(test_report_count, 0);
+        assert_int_equal(reports, 0);
         assert_memory_equal(rgba, shared.wanted, picture_bytes);
         return true;
     }
-    assert_int_equal(test_report_count, 1);
-    if (!strstr(reported, file))
-        fail_msg("%s is damaged, but: %s", file, reported);
+    assert_int_equal(reports, 1);
+    if (!strstr(test_last_report, file))
+        fail_msg("%s is damaged, but: %s", file, test_last_report);
     return false;
 }
 
@@ -262,11 +252,11 @@ static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
     assert_int_equal(open_drawing(&d, kind, params), 0);
     for (int at = 0;; at += 3) {
         m.countdown = at;
-        test_expect_report();
+        test_catch_reports();
         int status = draw_frame(&d, rgba);
         bool happened = m.countdown < 0;
         bool fatal = what == FAILS || what == ENDS || what == COMES_CHANGED;
-        assert_int_equal(test_reports(), fatal && happened);
+        assert_int_equal(test_caught_reports(), fatal && happened);
         assert_int_equal(status < 0, fatal && happened);
         if (status == 0)
             assert_memory_equal(rgba, wanted, picture_bytes);

@@ -43,9 +43,9 @@ static void text_that_is_no_object_is_refused(void **state)
     for (int i = 0; i < 5; i++) {
         trip_dataset d = with_text(bad[i]);
         trip_dataset_text *t;
-        test_expect_report();
+        test_catch_reports();
         assert_int_equal(trip_dataset_text_parse(&t, &d), TRIP_ERROR);
-        assert_int_equal(test_reports(), 1);
+        assert_one_report("");
         assert_null(t);
     }
 }

@@ -167,9 +167,9 @@ static void a_failed_or_damaged_read_ends_the_frame_with_one_report(void **state
         float rgba[16 * 16 * 4];
         assert_int_equal(trip_reference_create(&r, s.budget), 0);
         trip_reader *reader = make_reader(&s, (trip_reader_params){ .fault = faults[i] });
-        test_expect_report();
+        test_catch_reports();
         assert_true(draw(&s, r, reader, &view, rgba, &stats) < 0);
-        assert_int_equal(test_reports(), 1);
+        assert_one_report("");
         trip_reader_destroy(reader);
         r->ops->destroy(r);
     }
@@ -187,9 +187,9 @@ static void without_memory_for_its_pixels_the_reference_says_so(void **state)
     trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 8000);
     assert_int_equal(trip_reference_create(&r, s.budget), 0);
     trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
-    test_expect_report();
+    test_catch_reports();
     assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_ERROR);
-    assert_int_equal(test_reports(), 1);
+    assert_one_report("");
     trip_reader_destroy(reader);
     r->ops->destroy(r);
     scene_destroy(&s);
@@ -288,9 +288,9 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
         uint64_t splats = stats.reader.splats;
         assert_true(l.drawn > 1 && splats > 0);
         l.fail_at = l.drawn / 2 + 1; /* a frame given up leaves no slot behind */
-        test_expect_report();
+        test_catch_reports();
         assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), TRIP_ERROR);
-        assert_int_equal(test_reports(), 1);
+        assert_one_report("");
         l.fail_at = 0;
         assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), 0);
         assert_int_equal(stats.reader.splats, splats);
@@ -313,9 +313,9 @@ static void an_interrupt_ends_the_frame(void **state)
     trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
     trip_interrupt_install();
     raise(SIGINT);
-    test_expect_report();
+    test_catch_reports();
     assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_INTERRUPTED);
-    assert_int_equal(test_reports(), 1);
+    assert_one_report("");
     trip_reader_destroy(reader);
     r->ops->destroy(r);
     scene_destroy(&s);

@@ -1,5 +1,5 @@
-/* What the tests of this folder share: cmocka with its headers, comparing within a tolerance, a
- * repeatable random sequence, and counting reports instead of printing them. */
+/* What tests share: cmocka with its headers, comparing within a tolerance, a
+ * repeatable random sequence, and catching reports instead of printing them. */
 #ifndef TEST_H
 #define TEST_H
 
@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -37,26 +39,41 @@ static inline double test_random(void)
 }
 
 static int test_report_count;
+static char test_last_report[4200];
 
-static inline void test_count_report(const char *line, void *user)
+static inline void test_catch(const char *line, void *user)
 {
-    (void)line;
     (void)user;
     test_report_count++;
+    snprintf(test_last_report, sizeof test_last_report, "%s", line);
 }
 
-/* Reports are counted from here on instead of printed. */
-static inline void test_expect_report(void)
+/* Reports are kept from here on instead of printed. */
+static inline void test_catch_reports(void)
 {
     test_report_count = 0;
-    trip_report_redirect(test_count_report, NULL);
+    test_last_report[0] = 0;
+    trip_report_redirect(test_catch, NULL);
 }
 
-/* How many there were; further ones are printed again. */
-static inline int test_reports(void)
+/* How many reports there were since test_catch_reports(); further ones are printed. */
+static inline int test_caught_reports(void)
 {
     trip_report_redirect(NULL, NULL);
     return test_report_count;
+}
+
+/* Exactly one report since test_catch_reports(), with `part` in it. */
+#define assert_one_report(part) test_one_report((part), __FILE__, __LINE__)
+
+static inline void test_one_report(const char *part, const char *file, int line)
+{
+    int count = test_caught_reports();
+    if (count == 1 && strstr(test_last_report, part))
+        return;
+    print_error("%d reports, expected one with `%s`; the last: %s\n", count, part,
+                test_last_report);
+    _fail(file, line);
 }
 
 #endif
