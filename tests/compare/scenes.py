@@ -1,4 +1,5 @@
-"""What is compared: volumes by their usual file names, each with a transfer function in functions/."""
+"""What is compared: volumes by their usual file names, each with a transfer function in functions/
+or beside the included volumes."""
 import os
 from collections import namedtuple
 
@@ -22,14 +23,15 @@ SCENES = [
     Scene("engine", "engine_256x256x128_uint8.nhdr", "engine", True, "dense",
           "all of it, translucent"),
     Scene("bonsai", "bonsai.nii.gz", "bonsai", True, "dense", "tree and soil, translucent"),
-    Scene("head", "cthead_256x256x99_uint16.nhdr", "head", True, "dense", "skin and bone"),
+    Scene("head", "cthead_256x256x99_uint16.nhdr", "cthead", True, "dense", "skin and bone"),
     Scene("chest", "lidc-idri-0314_512x512x275_int16.nhdr", "chest", True, "dense",
           "lungs, flesh and bone, translucent"),
 ]
 
 
 def function_path(scene):
-    return os.path.join(HERE, "functions", scene.function + ".tf")
+    own = os.path.join(HERE, "functions", scene.function + ".tf")
+    return own if os.path.exists(own) else os.path.join(INCLUDED, scene.function + ".tf")
 
 
 def find(scene, folders):
