@@ -2,22 +2,29 @@
 # Installs the Debian packages Triptych is built from, when any is missing. Works as root or with
 # sudo; asks for nothing and uses no network when everything is there already.
 #
-#   scripts/install-dependencies.sh [--tests] [--compare]
+#   scripts/install-dependencies.sh [--tests] [--compare] [--arm64]
+#   scripts/install-dependencies.sh --libraries
 #
-# --tests adds what the tests use, --compare the programs that the benchmark compares with.
+# --tests adds what the tests use, --compare the programs that the benchmark compares with, --arm64
+# what scripts/arm64.sh needs. --libraries installs nothing and names the libraries that the program
+# and its tests are linked with.
 set -eu
 
-build="cmake ninja-build gcc g++ pkg-config libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev
- libgl1-mesa-dri libegl1 libgbm1 liburing-dev libcjson-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
+libraries="libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev
+ liburing-dev libcjson-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
+build="cmake ninja-build gcc g++ pkg-config libgl1-mesa-dri libegl1 libgbm1 $libraries"
 tests="libcmocka-dev python3 python3-numpy python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
  valgrind"
 compare="libopenvdb-tools python3-numpy python3-openvdb python3-pil python3-vtk9 xauth xvfb"
+arm64="gcc-aarch64-linux-gnu g++-aarch64-linux-gnu mmdebstrap qemu-user-static"
 
 wanted=$build
 for option in "$@"; do
     case $option in
     --tests) wanted="$wanted $tests" ;;
     --compare) wanted="$wanted $compare" ;;
+    --arm64) wanted="$wanted $arm64" ;;
+    --libraries) echo "$libraries libcmocka-dev" | tr '\n' ' '; exit 0 ;;
     *) echo "install-dependencies: unknown option: $option" >&2; exit 2 ;;
     esac
 done
