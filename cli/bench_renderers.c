@@ -224,7 +224,7 @@ static int run(race *c, bench_report *r)
 static void add_limits(bench_report *r, bool draw_hidden)
 {
     bench_report_limit(r, "The data set is in memory (null engine): no figure contains the disk. A "
-                          "frame is planning, copying from memory, drawing and merging, and ends "
+                          "frame is planning, drawing from memory and merging, and ends "
                           "with the picture in the program's memory.");
     bench_report_limit(r, "Msplats/s: splats with a pixel centre in their footprint where their "
                           "list has weight, all views together, over the time of all views. Those "

@@ -2,6 +2,7 @@
 
 #include "report.h"
 
+#include <assert.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,18 +46,27 @@ static size_t memory_bytes(const trip_cache *c)
     return (size_t)c->entry_count << c->page_log2;
 }
 
-int trip_cache_create(trip_cache **out, const trip_dataset *d, size_t bytes, trip_budget *budget)
+/* Numbers the pages of the planes that are read. */
+static void number_pages(trip_cache *c, const trip_dataset *d, unsigned planes)
+{
+    uint64_t first = 0;
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++) {
+            c->first_page[axis][plane] = (uint32_t)first;
+            first += planes >> plane & 1 ? plane_pages(d) : 0;
+        }
+}
+
+int trip_cache_create(trip_cache **out, const trip_dataset *d, unsigned planes, size_t bytes,
+                      trip_budget *budget)
 {
     *out = NULL;
-    uint64_t pages = 3 * TRIP_PLANES * plane_pages(d);
+    uint64_t pages = trip_cache_full_bytes(d, planes) >> d->header.page_log2;
     uint64_t entries = bytes >> d->header.page_log2;
     trip_cache *c = calloc(1, sizeof *c);
     if (!c)
         return trip_fail(TRIP_ERROR, "read", d->path, "out of memory");
-    for (int axis = 0; axis < 3; axis++)
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            c->first_page[axis][plane] =
-                (uint32_t)((uint64_t)(axis * TRIP_PLANES + plane) * plane_pages(d));
+    number_pages(c, d, planes);
     c->budget = budget;
     c->page_log2 = d->header.page_log2;
     c->page_count = (uint32_t)(pages < UINT32_MAX ? pages : 0);
@@ -88,6 +98,23 @@ uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offs
     return c->first_page[axis][plane] + (uint32_t)(offset >> c->page_log2);
 }
 
+static unsigned char *memory_of(const trip_cache *c, uint32_t position)
+{
+    return c->memory + ((size_t)(position - 1) << c->page_log2);
+}
+
+/* Every page has its own place. */
+static bool holds_all(const trip_cache *c)
+{
+    return c->entry_count == c->page_count;
+}
+
+const unsigned char *trip_cache_bytes(const trip_cache *c, int axis, int plane, uint64_t offset)
+{
+    assert(holds_all(c));
+    return memory_of(c, c->first_page[axis][plane] + 1) + offset;
+}
+
 void trip_cache_settle(trip_cache *c)
 {
     c->settled = c->pass;
@@ -110,7 +137,7 @@ bool trip_cache_find(trip_cache *c, uint32_t page)
     return true;
 }
 
-/* An entry for the page: its own from a pass that failed, an empty one, or one that may go. */
+/* An entry for the page: its own, an empty one, or one that may go. */
 static entry *find_room(trip_cache *c, uint32_t page)
 {
     uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_relaxed);
@@ -118,6 +145,8 @@ static entry *find_room(trip_cache *c, uint32_t page)
         entry *own = &c->entries[position - 1];
         return own->last_pass > c->settled ? NULL : own; /* else it may be being filled */
     }
+    if (holds_all(c))
+        return &c->entries[page];
     if (c->used < c->entry_count)
         return &c->entries[c->used++];
     for (int i = 0; i < SEARCH_MAX && c->entry_count > 0; i++) {
@@ -141,11 +170,6 @@ void trip_cache_reserve(trip_cache *c, uint32_t page, const void *filler)
     e->filler = filler;
     atomic_store_explicit(&e->valid, false, memory_order_relaxed);
     atomic_store_explicit(&c->entry_of[page], (uint32_t)(e - c->entries) + 1, memory_order_release);
-}
-
-static unsigned char *memory_of(const trip_cache *c, uint32_t position)
-{
-    return c->memory + ((size_t)(position - 1) << c->page_log2);
 }
 
 const void *trip_cache_get(const trip_cache *c, uint32_t page)

@@ -1,6 +1,7 @@
 /* Verified pages kept in memory between passes, so that views of the same data one after another
  * read less. A page stays as long as passes keep asking for it: frames read their lists from end to
- * end, where replacing the page unused for longest would always drop the one needed next.
+ * end, where replacing the page unused for longest would always drop the one needed next. Where
+ * there is room for all of them, each has its own place, and the pages of a plane lie in order.
  *
  * The reader's thread looks up and reserves; engine threads store and copy the pages of requests
  * under way, which stay where they are: for TRIP_CACHE_STALE_PASSES passes at least. */
@@ -14,12 +15,16 @@
 
 typedef struct trip_cache trip_cache;
 
-/* A page is named by its number in a table of all pages of all planes. */
-int trip_cache_create(trip_cache **out, const trip_dataset *d, size_t bytes, trip_budget *budget);
+/* For the planes that are read, a bit each. A page is named by its number in a table of all pages
+ * of these. */
+int trip_cache_create(trip_cache **out, const trip_dataset *d, unsigned planes, size_t bytes,
+                      trip_budget *budget);
 void trip_cache_destroy(trip_cache *c);
 /* Bytes that hold everything. */
 uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes);
 uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offset);
+/* Bytes of a plane from `offset` on, where there is room for all: valid where its pages are. */
+const unsigned char *trip_cache_bytes(const trip_cache *c, int axis, int plane, uint64_t offset);
 
 /* Reader's thread: nothing is under way. */
 void trip_cache_settle(trip_cache *c);

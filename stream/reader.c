@@ -158,7 +158,8 @@ static int create_cache(trip_reader *r)
     size_t bytes = r->params.cache_bytes;
     if (r->params.engine == TRIP_ENGINE_NULL)
         bytes = trip_cache_full_bytes(r->data, r->params.planes);
-    return bytes ? trip_cache_create(&r->cache, r->data, bytes, r->budget) : TRIP_OK;
+    return bytes ? trip_cache_create(&r->cache, r->data, r->params.planes, bytes, r->budget)
+                 : TRIP_OK;
 }
 
 static int load_list(trip_reader *r, int axis)
@@ -191,6 +192,7 @@ static int load_lists(trip_reader *r)
     for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
         status = load_list(r, axis);
     r->params.skip = skip;
+    r->in_memory = status == TRIP_OK && !r->params.slot_memory;
     return status;
 }
 

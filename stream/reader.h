@@ -13,8 +13,9 @@ typedef enum trip_engine {
     TRIP_ENGINE_AUTO,  /* io_uring where the kernel allows it, else pread */
     TRIP_ENGINE_URING, /* refused where the kernel does not allow it */
     TRIP_ENGINE_PREAD, /* threads */
-    TRIP_ENGINE_NULL,  /* everything is read into memory at creation and copied from there: the same
-                          picture without the disk, to find what drawing alone can reach */
+    TRIP_ENGINE_NULL,  /* everything is read into memory at creation, and batches lie there, or are
+                          copied from there to slots of the caller's: the same picture without the
+                          disk, to find what drawing alone can reach */
 } trip_engine;
 
 /* Zero means the default. */

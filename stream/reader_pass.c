@@ -126,17 +126,18 @@ static bool plan_slot(trip_reader *r, trip_slot *s)
     return false;
 }
 
-/* Plans and requests as much as there are free slots for. */
+/* Plans and requests as much as there are free slots for; where nothing has to be on its way, the
+ * next alone, since later more may be skipped. */
 static void fill_slots(trip_reader *r)
 {
-    for (unsigned i = 0; i < r->params.slots; i++) {
+    for (unsigned i = 0; i < r->params.slots && !(r->in_memory && r->queue_count); i++) {
         trip_slot *s = &r->slots[i];
         if (s->state != TRIP_SLOT_FREE)
             continue;
         if (!plan_slot(r, s))
             break;
         s->request_count = 0;
-        if (r->runs_only)
+        if (r->runs_only || r->in_memory)
             enqueue(r, s);
         else
             submit(r, s);
@@ -199,7 +200,7 @@ int trip_reader_begin(trip_reader *r, const trip_selection *s)
     r->failed = 0;
     r->planner = (trip_planner){ .page_bytes = (size_t)1 << r->data->header.page_log2,
                                  .slot_bytes = r->params.slot_bytes,
-                                 .gap_bytes = r->params.gap_bytes,
+                                 .gap_bytes = r->in_memory ? SIZE_MAX : r->params.gap_bytes,
                                  .skip = r->params.skip,
                                  .skip_user = r->params.skip_user };
     if (r->cache)
@@ -244,13 +245,23 @@ static int check_slot(const trip_reader *r, const trip_slot *s)
     return TRIP_OK;
 }
 
+/* Where a slot's splats lie in a plane. In memory an extent is one segment, since no gap ends it.
+ */
+static const void *records(const trip_reader *r, const trip_slot *s, int plane)
+{
+    if (r->runs_only || !r->read_planes[plane])
+        return NULL;
+    if (r->in_memory)
+        return trip_cache_bytes(r->cache, s->selection->axis, plane, s->extent.segments[0].offset);
+    return s->memory + (plane == TRIP_PLANE_NORMALS ? r->params.slot_bytes : 0);
+}
+
 static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
-    const void *voxels = s->memory, *normals = s->memory + r->params.slot_bytes;
     *batch = (trip_batch){
         .selection = s->selection,
-        .voxels = r->runs_only ? NULL : voxels,
-        .normals = r->runs_only || !r->read_planes[TRIP_PLANE_NORMALS] ? NULL : normals,
+        .voxels = records(r, s, TRIP_PLANE_VOXELS),
+        .normals = records(r, s, TRIP_PLANE_NORMALS),
         .splats = s->extent.bytes / TRIP_RECORD_BYTES,
         .runs = s->extent.runs,
         .run_count = s->extent.run_count,

@@ -45,6 +45,7 @@ struct trip_reader {
     trip_planner planner;
     int failed; /* status that ended the passes */
     bool runs_only;
+    bool in_memory; /* batches lie in the cache: nothing is requested, and slots hold only runs */
     trip_reader_stats stats;
     trip_slot *slots;
     unsigned char *slot_memory; /* NULL where it is the caller's */

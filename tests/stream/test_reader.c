@@ -281,6 +281,55 @@ static void memory_that_reads_do_not_land_in_is_found_out(void **state)
     close_fixture(&f, d);
 }
 
+/* Counts the bricks asked about, and skips none. */
+static bool ask(void *user, const trip_selection *s, uint32_t brick)
+{
+    (void)s;
+    (void)brick;
+    ++*(unsigned *)user;
+    return false;
+}
+
+static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    trip_reader *r;
+    trip_selection s;
+    trip_batch batch, next;
+    unsigned asked = 0;
+    (void)state;
+    open_fixture(&f, &d);
+    trip_reader_params params = { .engine = TRIP_ENGINE_NULL,
+                                  .slots = 3,
+                                  .slot_bytes = 4096,
+                                  .planes = 1u << TRIP_PLANE_NORMALS,
+                                  .skip = ask,
+                                  .skip_user = &asked };
+    assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
+    assert_int_equal(asked, 0);
+    select_all(&s, d, 1, false);
+    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_next(r, &batch), 1);
+    unsigned first = asked;
+    assert_int_equal(trip_reader_next(r, &next), 1);
+    assert_true(asked > first); /* only now: by then more may be hidden */
+    size_t splats = (size_t)(next.voxels - batch.voxels);
+    assert_true(splats > 0 && splats <= batch.splats); /* they may share a page */
+    assert_ptr_equal(next.normals, batch.normals + splats);
+    const uint32_t *voxels = batch.voxels;
+    trip_reader_release(r, &next);
+    trip_reader_release(r, &batch);
+    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_next(r, &batch), 1);
+    assert_ptr_equal(batch.voxels, voxels);
+    assert_int_equal(trip_reader_get_stats(r).bytes_read, 0);
+    trip_reader_release(r, &batch);
+    trip_reader_destroy(r);
+    trip_selection_destroy(&s, f.budget);
+    close_fixture(&f, d);
+}
+
 /* Tells that a read has ended. */
 static long tell(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
@@ -772,6 +821,7 @@ int main(void)
         cmocka_unit_test(a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line),
         cmocka_unit_test(refused_direct_reads_go_on_through_the_page_cache),
         cmocka_unit_test(a_second_pass_reads_only_what_the_cache_has_no_room_for),
+        cmocka_unit_test(a_data_set_in_memory_is_handed_out_where_it_lies),
         cmocka_unit_test(a_cache_follows_when_other_lists_are_read),
         cmocka_unit_test(skipped_bricks_are_left_out_and_counted),
         cmocka_unit_test(gaps_are_read_through_only_when_they_are_small),
