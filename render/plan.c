@@ -123,7 +123,7 @@ static void select_brick(trip_plan_list *list, uint64_t index, const trip_file_b
     list->splats_selected += brick->splats;
 }
 
-static void select_bricks(trip_plan_list *list, const trip_list *source, const trip_cull *cull,
+static void select_bricks(trip_plan_list *list, const trip_list *source, trip_cull *cull,
                           uint32_t slab_sheets)
 {
     list->bricks = source->brick_count;
@@ -169,13 +169,13 @@ static void drop_empty_passes(trip_plan_list *list, trip_budget *budget)
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
-    trip_cull cull = { 0 };
+    int status = 0;
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .planes = 1u << TRIP_PLANE_VOXELS };
     if (settings->shading)
         plan->planes |= data->header.planes & 1u << TRIP_PLANE_NORMALS;
 
-    int status = trip_cull_create(&cull, data, camera, settings, plan->axis_of_view, table, budget);
+    trip_cull cull = trip_cull_make(data, camera, settings, plan->axis_of_view, table);
     for (int axis = 0; axis < 3 && !status; axis++) {
         trip_plan_list *list = &plan->lists[axis];
         list->used = list_is_used(camera, settings, plan->axis_of_view, axis);
@@ -187,7 +187,6 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
         select_bricks(list, &data->lists[axis], &cull, data->header.slab_sheets);
         drop_empty_passes(list, budget);
     }
-    trip_cull_destroy(&cull, budget);
     if (status)
         trip_plan_release(plan, budget);
     return status;

@@ -1,10 +1,9 @@
 #include "plan_cull.h"
 
-#include "report.h"
-#include "weight.h"
+enum { BLOCK_CODES = 256 };
 
-enum { CODES = 65536 };
-static const size_t visible_bytes = (CODES + 1) * sizeof(uint32_t);
+/* What is known of a block of codes. */
+enum { UNKNOWN, TRANSPARENT, VISIBLE };
 
 /* Bounds of the voxel positions of a brick, from the eye. */
 typedef struct box {
@@ -19,12 +18,12 @@ static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, do
                               c->ortho ? sign * pixel / length : 0 };
 }
 
-int trip_cull_create(trip_cull *cull, const trip_dataset *data, const trip_camera *camera,
-                     const trip_settings *settings, int axis_of_view, const trip_tf_entry *table,
-                     trip_budget *budget)
+trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, int axis_of_view,
+                         const trip_tf_entry *table)
 {
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
-    *cull = (trip_cull){
+    return (trip_cull){
         .camera = camera,
         .settings = settings,
         .tile_log2 = data->header.tile_log2,
@@ -36,21 +35,32 @@ int trip_cull_create(trip_cull *cull, const trip_dataset *data, const trip_camer
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
         .spread2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
-        .visible = trip_budget_take(budget, visible_bytes),
+        .table = table,
     };
-    if (!cull->visible)
-        return trip_fail(TRIP_ERROR, "render", "plan", "%zu bytes do not fit the memory given",
-                         visible_bytes);
-    for (int i = 0; i < CODES; i++)
-        cull->visible[i + 1] = cull->visible[i] + (table[i].extinction > 0);
-    return 0;
 }
 
-void trip_cull_destroy(trip_cull *cull, trip_budget *budget)
+static bool block_is_visible(trip_cull *cull, unsigned block)
 {
-    if (cull->visible)
-        trip_budget_release(budget, cull->visible, visible_bytes);
-    cull->visible = NULL;
+    const trip_tf_entry *codes = cull->table + block * BLOCK_CODES;
+    if (cull->blocks[block] == UNKNOWN) {
+        int i = 0;
+        while (i < BLOCK_CODES && !(codes[i].extinction > 0))
+            i++;
+        cull->blocks[block] = i < BLOCK_CODES ? VISIBLE : TRANSPARENT;
+    }
+    return cull->blocks[block] == VISIBLE;
+}
+
+/* Whether some code of [first, last] has extinction. The first mostly has: it was kept. */
+static bool some_visible(trip_cull *cull, unsigned first, unsigned last)
+{
+    for (unsigned code = first; code <= last;) {
+        bool whole = code % BLOCK_CODES == 0 && last - code >= BLOCK_CODES - 1;
+        if (whole ? block_is_visible(cull, code / BLOCK_CODES) : cull->table[code].extinction > 0)
+            return true;
+        code += whole ? BLOCK_CODES : 1;
+    }
+    return false;
 }
 
 static box brick_box(const trip_cull *cull, int axis, const trip_file_brick *b, int64_t slab_sheet)
@@ -118,10 +128,10 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
     return true;
 }
 
-trip_cull_reason trip_cull_brick(const trip_cull *cull, int axis, const trip_file_brick *brick,
+trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  int64_t slab_sheet)
 {
-    if (cull->visible[brick->code_max + 1] == cull->visible[brick->code_min])
+    if (!some_visible(cull, brick->code_min, brick->code_max))
         return TRIP_CULL_TRANSPARENT;
     box b = brick_box(cull, axis, brick, slab_sheet);
     double depth = farthest_along(&b, cull->camera->forward);

@@ -28,16 +28,17 @@ typedef struct trip_cull {
     int axis_of_view;
     trip_cull_plane sides[4]; /* through the outermost pixel centres */
     double radius2, spread2;  /* radius of a splat at depth z: sqrt(radius2 + spread2 z^2) */
-    uint32_t *visible;        /* [65537]: codes below this one with extinction */
+    const trip_tf_entry *table;
+    uint8_t blocks[256]; /* of 256 codes each, as far as looked at: whether some have extinction */
 } trip_cull;
 
-int trip_cull_create(trip_cull *cull, const trip_dataset *data, const trip_camera *camera,
-                     const trip_settings *settings, int axis_of_view, const trip_tf_entry *table,
-                     trip_budget *budget);
-void trip_cull_destroy(trip_cull *cull, trip_budget *budget);
+/* What it is made from outlives it. */
+trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, int axis_of_view,
+                         const trip_tf_entry *table);
 
 /* `slab_sheet` is the first sheet of the brick's slab. */
-trip_cull_reason trip_cull_brick(const trip_cull *cull, int axis, const trip_file_brick *brick,
+trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  int64_t slab_sheet);
 
 #endif

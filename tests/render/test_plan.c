@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "plan.h"
+#include "plan_cull.h"
 #include "splat.h"
 #include "weight.h"
 
@@ -254,6 +255,34 @@ static void bricks_that_the_transfer_function_hides_are_not_read(void **state)
     scene_destroy(&s);
 }
 
+/* A few codes with extinction, and ranges of all lengths about them. */
+static void a_brick_is_transparent_when_no_code_of_its_range_has_extinction(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    static const int shown[] = { 255, 256, 3000, 3001, 40000, 65535 };
+    scene_colour(&s, 0, 65535, 1, 1, 1, 0);
+    for (int i = 0; i < 6; i++)
+        scene_colour(&s, shown[i], shown[i], 1, 1, 1, 0.5);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 0.4, 0.3), 150, 40, 32);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_AXIS, 0);
+    trip_cull cull = trip_cull_make(s.data, &c, &settings, 0, s.table);
+    trip_file_brick brick = s.data->lists[0].bricks[0];
+    for (unsigned i = 0; i < 20000; i++) {
+        unsigned first = i * 40503u % 65536, length = i * 7919u % (i % 3 ? 600 : 30000);
+        unsigned last = first + length < 65536 ? first + length : 65535;
+        bool visible = false;
+        for (int k = 0; k < 6; k++)
+            visible |= (int)first <= shown[k] && shown[k] <= (int)last;
+        brick.code_min = (uint16_t)first;
+        brick.code_max = (uint16_t)last;
+        assert_int_equal(trip_cull_brick(&cull, 0, &brick, 0) == TRIP_CULL_TRANSPARENT, !visible);
+    }
+    scene_destroy(&s);
+}
+
 static void normals_are_planned_only_for_shading(void **state)
 {
     (void)state;
@@ -316,6 +345,7 @@ int main(void)
         cmocka_unit_test(ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze),
         cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
         cmocka_unit_test(bricks_that_the_transfer_function_hides_are_not_read),
+        cmocka_unit_test(a_brick_is_transparent_when_no_code_of_its_range_has_extinction),
         cmocka_unit_test(normals_are_planned_only_for_shading),
         cmocka_unit_test(the_plan_explains_what_runs_and_why),
     };
