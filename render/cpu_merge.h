@@ -1,7 +1,7 @@
 /* Kernels that begin and finish the pixels of a tile: weights of the lists, the merge (equation 3
  * of Hofsetz, Max & Bastos 2008) and the picture. Included by each cpu_isa_*.c after cpu_blend.h.
- * The weights are computed in double precision by the operations of weight.c in their order, so
- * that where a list begins does not depend on who asks. */
+ * Where a list begins the weights are computed in double precision by the operations of weight.c in
+ * their order, so that it does not depend on who asks. */
 #ifndef TRIP_CPU_MERGE_H
 #define TRIP_CPU_MERGE_H
 
@@ -131,65 +131,101 @@ static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pix
     }
 }
 
-/* Sum of the squares of the lists' weights at a block: 1 unless lists are merged. */
-INLINE vf weight_sum(const trip_cpu_view *view, int x, int y, int b)
+/* 1 / the sum of the squares of the lists' weights at a block, all but one factor of them taken
+ * out: (1 - h)^2 m^2 / sum max(0, |r_a| - h m)^2, m = max |r_a|. 1 unless lists are merged. No list
+ * begins or ends here, so single precision will do. */
+INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
 {
-    vf sum = v_set(0);
-    if (view->of->settings->method != TRIP_METHOD_MERGE)
+    const trip_camera *c = &view->splat.camera;
+    const trip_settings *s = view->of->settings;
+    const vf h = v_set((float)s->h), rest = v_set(1) - h;
+    if (s->method != TRIP_METHOD_MERGE)
         return v_set(1);
-    for (int axis = 0; axis < 3; axis++) {
-        vf w = weight(view, axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
+    vf px = block_x((unsigned)b) + v_set((float)x), py = block_y((unsigned)b) + v_set((float)y);
+    vf r[3], sum = v_set(0);
+    for (int a = 0; a < 3; a++) {
+        vf across = v_set(c->ortho ? 0 : (float)trip_component(c->rx, a));
+        vf down = v_set(c->ortho ? 0 : (float)trip_component(c->ry, a));
+        r[a] = v_abs(v_fma(px, across, v_fma(py, down, v_set((float)trip_component(c->r0, a)))));
+    }
+    vf most = v_max(r[0], v_max(r[1], r[2]));
+    for (int a = 0; a < 3; a++) {
+        vf w = v_max(v_set(0), v_fnma(h, most, r[a]));
         sum = v_fma(w, w, sum);
     }
-    return sum;
+    vf all = rest * most;
+    return all * all / sum;
 }
 
 /* Block b of the picture before the background. */
 INLINE void merged_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
                          const float *pixels, vf out[4])
 {
-    vf inverse = content == TRIP_CPU_SUM ? v_set(1) / weight_sum(view, x, y, b) : v_set(1);
     for (int c = 0; c < 4; c++)
-        out[c] = v_load(pixels + BLOCK_FLOATS * b + c * V) * inverse;
-    if (content == TRIP_CPU_LAYER)
+        out[c] = v_load(pixels + BLOCK_FLOATS * b + c * V);
+    if (content == TRIP_CPU_LAYER) {
         out[3] = v_set(1) - out[3];
+        return;
+    }
+    vf inverse = inverse_weight(view, x, y, b);
+    for (int c = 0; c < 4; c++)
+        out[c] = out[c] * inverse;
 }
 
-/* The block over the background. */
-INLINE void finish_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
-                         const float *pixels, vf out[4])
+/* The background, premultiplied. */
+INLINE float behind(const trip_cpu_view *view, int channel)
 {
     const double *background = view->of->settings->background;
-    vf merged[4] = { v_set(0), v_set(0), v_set(0), v_set(0) };
-    if (content != TRIP_CPU_NOTHING)
-        merged_block(view, x, y, b, content, pixels, merged);
-    vf through = v_set(1) - merged[3];
-    for (int c = 0; c < 4; c++) {
-        double behind = c == 3 ? background[3] : background[c] * background[3];
-        out[c] = v_fma(through, v_set((float)behind), merged[c]);
-    }
+    return (float)(channel == 3 ? background[3] : background[channel] * background[3]);
+}
+
+/* A block's pixels, `line_floats` from line to line; the first `count` columns of the first `lines`
+ * lines lie in the image. */
+INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, const vf out[4])
+{
+    uint32_t row[V];
+    bool whole = count >= 4 && lines >= BLOCK_ROWS;
+    float block[BLOCK_FLOATS];
+    for (uint32_t i = 0; i < V; i++)
+        row[i] = 4 * (i % 4) + i / 4 * (whole ? (uint32_t)line_floats : 16);
+    v_store_rows(whole ? rgba : block, row, out[0], out[1], out[2], out[3]);
+    if (whole)
+        return;
+    for (int r = 0; r < BLOCK_ROWS && r < lines && count > 0; r++)
+        memcpy(rgba + (size_t)r * line_floats, block + 16 * r,
+               16 * (size_t)(count < 4 ? count : 4));
+}
+
+/* A tile where no list has drawn. */
+static void tile_background(const trip_cpu_view *view, float *rgba, size_t line_floats, int count,
+                            int lines)
+{
+    const float pixel[4] = { behind(view, 0), behind(view, 1), behind(view, 2), behind(view, 3) };
+    count = count < TRIP_CPU_TILE ? count : TRIP_CPU_TILE;
+    for (int r = 0; r < lines && r < TRIP_CPU_TILE; r++)
+        for (int i = 0; i < count; i++)
+            memcpy(rgba + (size_t)r * line_floats + 4 * i, pixel, sizeof pixel);
 }
 
 static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
                         const float *pixels, float *rgba)
 {
     const trip_camera *camera = &view->splat.camera;
-    uint32_t row[V];
-    float block[BLOCK_FLOATS];
-    for (uint32_t i = 0; i < V; i++)
-        row[i] = 4 * i;
+    size_t line_floats = 4 * (size_t)camera->width;
+    rgba += (size_t)y * line_floats + 4 * (size_t)x;
+    if (content == TRIP_CPU_NOTHING) {
+        tile_background(view, rgba, line_floats, camera->width - x, camera->height - y);
+        return;
+    }
     for (int b = 0; b < BLOCKS; b++) {
+        int column = 4 * (b % BLOCKS_ACROSS), line = BLOCK_ROWS * (b / BLOCKS_ACROSS);
         vf out[4];
-        finish_block(view, x, y, b, content, pixels, out);
-        v_store_rows(block, row, out[0], out[1], out[2], out[3]);
-        int first = x + 4 * (b % BLOCKS_ACROSS);
-        int count = camera->width - first < 4 ? camera->width - first : 4;
-        for (int r = 0; r < BLOCK_ROWS && count > 0; r++) {
-            int line = y + BLOCK_ROWS * (b / BLOCKS_ACROSS) + r;
-            if (line < camera->height)
-                memcpy(rgba + 4 * ((size_t)line * (size_t)camera->width + (size_t)first),
-                       block + 16 * r, 16 * (size_t)count);
-        }
+        merged_block(view, x, y, b, content, pixels, out);
+        vf through = v_set(1) - out[3];
+        for (int c = 0; c < 4; c++)
+            out[c] = v_fma(through, v_set(behind(view, c)), out[c]);
+        store_pixels(rgba + (size_t)line * line_floats + 4 * column, line_floats,
+                     camera->width - x - column, camera->height - y - line, out);
     }
 }
 
