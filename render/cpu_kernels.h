@@ -20,29 +20,38 @@
  * 2^(y / TRIP_CPU_EXP_UNIT - 127). */
 #define TRIP_CPU_EXP_UNIT 8388608.0
 
-/* Splats whose largest optical depth is below this use the short form of 1 - exp(-x). */
-#define TRIP_CPU_THIN 0.4f
+/* Splats whose largest optical depth is at most this are thin: short forms give their opacity. */
+#define TRIP_CPU_THIN 0.3f
 
-/* One splat, ready to blend; 64 bytes, a cache line. Its centre is (x + whole_x, y + whole_y). With
- * q the pixel's offset from it, the optical depth at a pixel is what
- *     2^(peak - G(p) ((l11 qx + l21 qy)^2 + (l22 qy)^2)) exceeds `edge` by,
- * G as in trip_cpu_rays, times the stretch where it varies. */
+/* Opacities of thin splats in views with one stretch are u (c[0] + c[1] u + ... + c[4] u^4)^2. */
+#define TRIP_CPU_TERMS 5
+
+/* What is kept instead of c[] by a splat that is thick or in a view whose stretch varies. */
+enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE };
+
+/* One splat, ready to blend; 64 bytes, a cache line. With (x, y) a pixel's position from the corner
+ * of the tile at hand (of the first that the splat lies in, until tile_blend() takes it up),
+ *     a = l11 x + l21 y + l1,  b = l22 y + l2,  u = max(0, 1 - G (a^2 + b^2)),
+ * G as in trip_cpu_rays: u = 1 - m / k^2 of splat.h, 1 at the centre and 0 outside the support. Its
+ * opacity there is that of c[]; or its optical depth, times the stretch where it
+ * varies, is what 2^(least + u cutoff) exceeds `edge` by, `cutoff` as in trip_cpu_view. */
 typedef struct trip_cpu_splat {
-    float x, y, whole_x, whole_y;
-    float l11, l21, l22, peak;
-    float r, g, b, edge;
+    float l11, l21, l22, l1, l2;
+    float r, g, b;
+    float c[TRIP_CPU_TERMS];
     uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
     uint32_t tiles;          /* those that it lies in, see below */
-    uint32_t thick;          /* not 0: the long form of 1 - exp(-x) is needed */
 } trip_cpu_splat;
 
 static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
 
-/* trip_cpu_splat.tiles: the number of the first tile (top left), and whether the splat also lies in
- * the one to the right of it and in the one below it, or in more than these two by two. */
+/* trip_cpu_splat.tiles: the number of the first tile (top left); whether the splat also lies in the
+ * one to the right of it and in the one below it, or in more than these two by two; and whether it
+ * is not thin. */
 #define TRIP_CPU_TILES_RIGHT_SHIFT 28
 #define TRIP_CPU_TILES_BELOW_SHIFT 29
 #define TRIP_CPU_TILES_MORE (1u << 30)
+#define TRIP_CPU_TILES_THICK_SHIFT 31
 #define TRIP_CPU_TILES_FIRST ((1u << 28) - 1)
 
 /* Where the rays of a view are alike, their tables are not needed. */
@@ -65,8 +74,8 @@ typedef struct trip_cpu_view {
     /* |r|^2 and |J r|^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2 times
      * these. */
     float ray2[6], world2[6];
-    float cutoff;     /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
-    float thick_log2; /* log2 of the largest optical depth, stretch aside, of thin splats */
+    float cutoff; /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
+    float thin;   /* the largest optical depth, stretch aside, of thin splats */
     int tiles_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double forward_length;                     /* most that z changes by over an index length */
@@ -84,11 +93,13 @@ typedef struct trip_cpu_staged {
 
 /* The same voxels on their way to splats: what one loop of the projection leaves to the next. */
 typedef struct trip_cpu_lanes {
-    float x[TRIP_CPU_STAGED], y[TRIP_CPU_STAGED]; /* as in trip_cpu_splat */
+    /* The centre is (x + whole_x, y + whole_y). */
+    float x[TRIP_CPU_STAGED], y[TRIP_CPU_STAGED];
     float whole_x[TRIP_CPU_STAGED], whole_y[TRIP_CPU_STAGED];
     float z[TRIP_CPU_STAGED], inverse_z[TRIP_CPU_STAGED];
     float l11[TRIP_CPU_STAGED], l21[TRIP_CPU_STAGED], l22[TRIP_CPU_STAGED];
-    float peak[TRIP_CPU_STAGED];
+    float l1[TRIP_CPU_STAGED], l2[TRIP_CPU_STAGED];
+    float depth[TRIP_CPU_STAGED]; /* the largest optical depth, edge and all, stretch aside */
     float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED];           /* two uint16 each */
     float tiles[TRIP_CPU_STAGED];                                  /* uint32 */
     uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
@@ -98,26 +109,16 @@ typedef struct trip_cpu_lanes {
 #define TRIP_CPU_LOCAL 256
 #define TRIP_CPU_BANDS 4
 
-/* What blending needs of a splat at pixel position (x, y) from the tile's corner: with
- * a = l11 x + l21 y + l1, b = l22 y + l2, the optical depth is 2^(peak - G (a^2 + b^2)), or 2^least
- * where that is more, less `edge`. */
-typedef struct trip_cpu_local {
-    float l11, l21, l22, peak;
-    float r, g, b, edge;
-    float l1, l2, least;
-    uint32_t thick;
-} trip_cpu_local;
-
 /* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
     _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by block: G[V], stretch[V] */
-    _Alignas(64) trip_cpu_local local[TRIP_CPU_LOCAL];
+    _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
     /* By band and 64 splats: first each splat's blocks, then each block's splats. */
     uint64_t touched[TRIP_CPU_BANDS][TRIP_CPU_LOCAL / 64][64];
     uint64_t any[TRIP_CPU_BANDS];        /* blocks that some splat may touch */
     uint64_t open[TRIP_CPU_BANDS];       /* ours that may still take light */
     uint64_t rays_known[TRIP_CPU_BANDS]; /* those whose `rays` are filled in */
-    uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats need the long form of 1 - exp(-x) */
+    uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats are not thin */
     uint32_t splats;
     int x, y; /* of the tile's first pixel */
     float *pixels;

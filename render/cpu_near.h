@@ -12,6 +12,10 @@ bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, d
 /* l11, l21 and l22 of a projected splat. */
 void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);
 
+/* c[i] of a thin splat whose largest optical depth, edge and all, is A: sqrt(A) times the sum of
+ * [i][j] A^j. */
+extern const float trip_cpu_thin[TRIP_CPU_TERMS][4];
+
 /* The constants of the list along `axis`; `shading` is set by whoever knows of normals. */
 void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back);
 

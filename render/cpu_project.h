@@ -13,7 +13,7 @@
 #include "shade.h"
 
 /* Splats whose largest optical depth is below 2^-60 are left out: 10^18 of them would not show. */
-#define FAINTEST_LOG2 (-60.0f)
+#define FAINTEST 0x1p-60f
 
 #define LOG2_E 1.44269504088896340736
 
@@ -178,7 +178,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
     vf inverse = v_set(1) / (det * syy);
     vf inverse_det = syy * inverse, inverse_syy = det * inverse;
-    vf unit = rr * v_set((float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT));
+    vf unit = rr * v_set((float)(1 / f->cutoff2));
     out.l11 = v_sqrt(unit * syy * inverse_det);
     out.l21 = -(sxy * inverse_syy) * out.l11;
     out.l22 = v_sqrt(unit * inverse_syy);
@@ -358,27 +358,36 @@ INLINE vi tiles_of(vi x0, vi y0, vi x1, vi y1, int across)
            (any_below << TRIP_CPU_TILES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_TILES_MORE;
 }
 
-/* Everything but the colour; the bits of the lanes that have pixels. */
+/* Where the tile of a pixel begins. */
+INLINE vf first_of_tile(vi pixel)
+{
+    return v_from_int(pixel & ~(TRIP_CPU_TILE - 1));
+}
+
+/* Everything but colour and opacity; the bits of the lanes that have pixels. */
 INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extinction,
                          trip_cpu_lanes *lanes, uint32_t at)
 {
     const trip_camera *camera = &view->splat.camera;
-    const vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
     vf depth = extinction * v_set((float)(view->splat.amplitude * view->stretch));
-    vf log2_depth = log2_of(depth * depth * f->spread) * v_set(0.5f);
+    depth = depth * v_sqrt(f->spread);
     vi x0, x1, y0, y1;
     pixels(v_load(lanes->whole_x + at), v_load(lanes->x + at), f->shift_x, f->half_x, camera->width,
            &x0, &x1);
     pixels(v_load(lanes->whole_y + at), v_load(lanes->y + at), f->shift_y, f->half_y,
            camera->height, &y0, &y1);
+    vf x = v_load(lanes->x + at) + (v_load(lanes->whole_x + at) - first_of_tile(x0));
+    vf y = v_load(lanes->y + at) + (v_load(lanes->whole_y + at) - first_of_tile(y0));
     v_store(lanes->l11 + at, f->l11);
     v_store(lanes->l21 + at, f->l21);
     v_store(lanes->l22 + at, f->l22);
-    v_store(lanes->peak + at, v_fma(log2_depth, one, bias));
+    v_store(lanes->l1 + at, -v_fma(f->l11, x, f->l21 * y));
+    v_store(lanes->l2 + at, -(f->l22 * y));
+    v_store(lanes->depth + at, depth);
     vi_store(lanes->first + at, x0 | y0 << 16);
     vi_store(lanes->last + at, x1 | y1 << 16);
     vi_store(lanes->tiles + at, tiles_of(x0, y0, x1, y1, view->tiles_across));
-    vm seen = vm_and(v_gt(v_load(lanes->z + at), v_set(0)), v_gt(log2_depth, v_set(FAINTEST_LOG2)));
+    vm seen = vm_and(v_gt(v_load(lanes->z + at), v_set(0)), v_gt(depth, v_set(FAINTEST)));
     return vm_bits(vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1))));
 }
 
@@ -438,22 +447,46 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
     return shaded(view, c, eye, vi_load(staged->normal + at));
 }
 
+/* trip_cpu_splat.c of thin splats. */
+INLINE void thin_terms(vf depth, vf c[TRIP_CPU_TERMS])
+{
+    vf root = v_sqrt(depth);
+    for (int i = 0; i < TRIP_CPU_TERMS; i++) {
+        const float *by = trip_cpu_thin[i];
+        vf sum = v_fma(v_set(by[3]), depth, v_set(by[2]));
+        c[i] = v_fma(v_fma(sum, depth, v_set(by[1])), depth, v_set(by[0])) * root;
+    }
+}
+
+/* The same of the others. */
+INLINE void long_terms(const trip_cpu_view *view, vf depth, vm which, vf c[TRIP_CPU_TERMS])
+{
+    vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
+    vf least = v_fma(log2_of(depth), one, bias) - v_set(view->cutoff);
+    c[TRIP_CPU_LEAST] = v_select(which, least, c[TRIP_CPU_LEAST]);
+    c[TRIP_CPU_EDGE] = v_select(which, exp2_biased(least), c[TRIP_CPU_EDGE]);
+}
+
 /* The lanes that are kept, as splats. */
 INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
-                  const uint32_t row[V], colour c, trip_cpu_splat *out)
+                  const uint32_t row[V], colour light, trip_cpu_splat *out)
 {
-    float *base = &out->x;
-    const vf bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
-    vf peak = v_load(lanes->peak + at);
-    vf limit = v_fma(v_set(view->thick_log2), v_set((float)TRIP_CPU_EXP_UNIT), bias);
-    vf thick = v_select(v_gt(peak, limit), v_set(1), v_set(0));
-    v_store_rows(base, row, v_load(lanes->x + at), v_load(lanes->y + at),
-                 v_load(lanes->whole_x + at), v_load(lanes->whole_y + at));
-    v_store_rows(base + 4, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
-                 v_load(lanes->l22 + at), peak);
-    v_store_rows(base + 8, row, c.r, c.g, c.b, exp2_biased(peak - v_set(view->cutoff)));
-    v_store_rows(base + 12, row, v_load(lanes->first + at), v_load(lanes->last + at),
-                 v_load(lanes->tiles + at), thick);
+    float *base = &out->l11;
+    vf depth = v_load(lanes->depth + at), c[TRIP_CPU_TERMS];
+    vf tiles = v_load(lanes->tiles + at), limit = v_set(view->thin);
+    thin_terms(depth, c);
+    if (view->rays == TRIP_CPU_STRETCHED)
+        long_terms(view, depth, v_ge(depth, v_set(0)), c);
+    else if (vm_any(v_gt(depth, limit)))
+        long_terms(view, depth, v_gt(depth, limit), c);
+    const vi thick = vi_set(INT32_MIN);
+    static_assert(TRIP_CPU_TILES_THICK_SHIFT == 31, "the bit above");
+    tiles = v_select(v_gt(depth, limit), v_from_bits(v_bits(tiles) | thick), tiles);
+    v_store_rows(base, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
+                 v_load(lanes->l22 + at), v_load(lanes->l1 + at));
+    v_store_rows(base + 4, row, v_load(lanes->l2 + at), light.r, light.g, light.b);
+    v_store_rows(base + 8, row, c[0], c[1], c[2], c[3]);
+    v_store_rows(base + 12, row, c[4], v_load(lanes->first + at), v_load(lanes->last + at), tiles);
 }
 
 static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,

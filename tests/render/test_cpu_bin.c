@@ -59,7 +59,7 @@ static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
     chunk->splats = count;
     for (uint32_t i = 0; i < count; i++)
         f->flush.splats[chunk->splat + i] =
-            (trip_cpu_splat){ .x = mark, .y = (float)i, .tiles = i % TILES };
+            (trip_cpu_splat){ .r = mark, .g = (float)i, .tiles = i % TILES };
     trip_cpu_bin(&f->flush, chunk, f->mask.grid, f->counts);
 }
 
@@ -105,9 +105,9 @@ static void take(void *user, const trip_cpu_splat *splats, const uint16_t *order
     for (uint32_t i = 0; i < count; i++, t->count++) {
         const trip_cpu_splat *s = &splats[order ? order[i] : i];
         assert_int_equal(s->tiles, t->tile);
-        assert_true(t->count == 0 || s->x > t->mark || (s->x >= t->mark && s->y > t->number));
-        t->mark = s->x;
-        t->number = s->y;
+        assert_true(t->count == 0 || s->r > t->mark || (s->r >= t->mark && s->g > t->number));
+        t->mark = s->r;
+        t->number = s->g;
     }
 }
 
