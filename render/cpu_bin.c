@@ -8,6 +8,9 @@
  * their chunks are spread. */
 enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_SEGMENT = 4, SMALLEST_CHUNK = 64 };
 
+/* Places that are written together. */
+enum { AT_A_TIME = 16 };
+
 static void *part(char *memory, size_t *at, size_t bytes)
 {
     void *p = memory ? memory + *at : NULL;
@@ -105,6 +108,22 @@ uint32_t trip_cpu_flush_cut(trip_cpu_flush *f)
     return first;
 }
 
+/* Where the tiles' places begin is not known before all are counted, and a chunk's splats are many:
+ * so they are looked at once, and what follows is done for series of them. Splats come in the order
+ * of squares of voxels, five to ten to a series. */
+static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_series *series)
+{
+    uint32_t found = 0, before = splats[0].tiles;
+    series[0] = (trip_cpu_series){ before, 1 };
+    for (uint32_t i = 1; i < n; i++) {
+        uint32_t tiles = splats[i].tiles;
+        found += (tiles != before) | (tiles & TRIP_CPU_TILES_MORE) / TRIP_CPU_TILES_MORE;
+        before = tiles;
+        series[found] = (trip_cpu_series){ tiles, (uint16_t)(i + 1) };
+    }
+    return found + 1;
+}
+
 typedef struct span {
     uint32_t first, last; /* tiles counted, inclusive */
     uint64_t places;
@@ -133,28 +152,40 @@ static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *c
     s->places += (uint64_t)r.across * r.down;
 }
 
-/* Most splats lie in one tile and few in more than 2 x 2, so four counts without a branch are
- * cheaper than a loop whose length the processor cannot guess. */
-static span count(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *counts)
+/* Whether it also lies in the tile to the right, and in the one below: 0 or 1. */
+static uint32_t right_of(uint32_t tiles)
+{
+    return tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+}
+
+static uint32_t below_of(uint32_t tiles)
+{
+    return tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+}
+
+/* Few lie in more than 2 x 2, so four counts without a branch are cheaper than a loop whose length
+ * the processor cannot guess. */
+static span count(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
+                  uint32_t across, uint32_t *counts)
 {
     span s = { UINT32_MAX, 0, 0 };
-    uint32_t places = 0, last = 0;
+    uint32_t places = 0, last = 0, from = 0;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t tiles = splats[i].tiles, first = tiles & TRIP_CPU_TILES_FIRST;
-        uint32_t right = tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
-        uint32_t below = tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+        uint32_t tiles = series[i].tiles, first = tiles & TRIP_CPU_TILES_FIRST;
+        uint32_t right = right_of(tiles), below = below_of(tiles), here = series[i].end - from;
         s.first = first < s.first ? first : s.first;
         last = first > last ? first : last;
         if (tiles & TRIP_CPU_TILES_MORE) {
-            count_wide(&splats[i], across, counts, &s);
-            continue;
+            count_wide(&splats[from], across, counts, &s);
+        } else {
+            uint32_t *c = counts + first;
+            c[0] += here;
+            c[1] += here * right;
+            c[across] += here * below;
+            c[across + 1] += here * (right & below);
+            places += here * (right + 1) * (below + 1);
         }
-        uint32_t *c = counts + first;
-        c[0]++;
-        c[1] += right;
-        c[across] += below;
-        c[across + 1] += right & below;
-        places += (right + 1) * (below + 1);
+        from = series[i].end;
     }
     last += across + 1;
     s.last = last > s.last ? last : s.last;
@@ -171,36 +202,54 @@ static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *n
             order[next[r.first + y * across + x]++] = index;
 }
 
-/* The next place of a tile when `wanted`, else `sink`. */
-static inline void put(uint16_t *order, uint32_t *next, uint32_t wanted, uint32_t sink,
-                       uint16_t splat)
+typedef uint16_t places __attribute__((vector_size(2 * AT_A_TIME)));
+
+/* `count` splats from `first` on to the next places of a tile; more may be written behind them. */
+static inline void put(uint16_t *order, uint32_t *next, places first, uint32_t count)
 {
-    uint32_t at = *next;
-    order[wanted ? at : sink] = splat;
-    *next = at + wanted;
+    memcpy(order + *next, &first, sizeof first);
+    *next += count;
 }
 
-/* `next` holds where each tile's next place is; what is written to order[sink] is not used. */
-static void place(const trip_cpu_splat *splats, uint32_t n, uint32_t across, uint32_t *next,
-                  uint16_t *order, uint32_t sink)
+/* The next `count` places, of all tiles that the splats lie in. */
+static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uint32_t tiles,
+                           places first, uint32_t count)
 {
+    uint32_t *c = next + (tiles & TRIP_CPU_TILES_FIRST);
+    uint32_t right = right_of(tiles), below = below_of(tiles);
+    put(order, c, first, count);
+    if (right)
+        put(order, c + 1, first, count);
+    if (below)
+        put(order, c + across, first, count);
+    if (right & below)
+        put(order, c + across + 1, first, count);
+}
+
+/* `next` holds where each tile's next place is. */
+static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
+                  uint32_t across, uint32_t *next, uint16_t *order)
+{
+    places ahead;
+    uint32_t from = 0;
+    for (uint16_t i = 0; i < AT_A_TIME; i++)
+        ahead[i] = i;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t tiles = splats[i].tiles;
-        uint32_t right = tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
-        uint32_t below = tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
-        uint32_t *c = next + (tiles & TRIP_CPU_TILES_FIRST);
+        uint32_t tiles = series[i].tiles, end = series[i].end;
         if (tiles & TRIP_CPU_TILES_MORE) {
-            place_wide(&splats[i], across, next, order, (uint16_t)i);
+            place_wide(&splats[from], across, next, order, (uint16_t)from);
+            from = end;
             continue;
         }
-        put(order, c, 1, sink, (uint16_t)i);
-        put(order, c + 1, right, sink, (uint16_t)i);
-        put(order, c + across, below, sink, (uint16_t)i);
-        put(order, c + across + 1, right & below, sink, (uint16_t)i);
+        for (; end - from > AT_A_TIME; from += AT_A_TIME)
+            put_all(order, next, across, tiles, ahead + (uint16_t)from, AT_A_TIME);
+        put_all(order, next, across, tiles, ahead + (uint16_t)from, end - from);
+        from = end;
     }
 }
 
-/* Turns counts into places and makes a segment of every tile that has some. */
+/* Turns counts into places and makes a segment of every tile that has some. Behind each is room for
+ * what put() writes too much. */
 static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, const span *s,
                               uint32_t place_at, uint32_t *counts)
 {
@@ -216,7 +265,7 @@ static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, co
             .count = n,
         };
         counts[t] = place_at;
-        place_at += n;
+        place_at += n + AT_A_TIME;
     }
     return made - chunk->first_segment;
 }
@@ -229,21 +278,24 @@ static uint32_t occupied(const uint32_t *counts, const span *s)
     return n;
 }
 
-void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid, uint32_t *counts)
+void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
+                  trip_cpu_sorting *sorting)
 {
     const trip_cpu_splat *splats = f->splats + chunk->splat;
+    uint32_t *counts = sorting->counts;
     if (chunk->splats == 0)
         return;
-    span s = count(splats, chunk->splats, grid.across, counts);
+    uint32_t n = find_series(splats, chunk->splats, sorting->series);
+    span s = count(splats, sorting->series, n, grid.across, counts);
     uint32_t segments = occupied(counts, &s);
+    uint64_t room = s.places + segments * AT_A_TIME;
     uint64_t segment = atomic_fetch_add_explicit(&f->segments_used, segments, memory_order_relaxed);
-    uint64_t at = atomic_fetch_add_explicit(&f->orders_used, s.places + 1, memory_order_relaxed);
-    chunk->spread =
-        segment + segments > f->segment_capacity || at + s.places + 1 > f->order_capacity;
+    uint64_t at = atomic_fetch_add_explicit(&f->orders_used, room, memory_order_relaxed);
+    chunk->spread = segment + segments > f->segment_capacity || at + room > f->order_capacity;
     if (!chunk->spread) {
         chunk->first_segment = (uint32_t)segment;
         chunk->segments = make_segments(f, chunk, &s, (uint32_t)at, counts);
-        place(splats, chunk->splats, grid.across, counts, f->order, (uint32_t)(at + s.places));
+        place(splats, sorting->series, n, grid.across, counts, f->order);
     }
     memset(counts + s.first, 0, (s.last - s.first + 1) * sizeof *counts);
 }

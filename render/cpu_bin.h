@@ -78,9 +78,21 @@ bool trip_cpu_flush_claim(trip_cpu_flush *f, trip_cpu_chunk *chunk, uint32_t spl
  * next chunk is reserved alone, so that it fits. */
 uint32_t trip_cpu_flush_cut(trip_cpu_flush *f);
 
-/* Sorts a filled chunk by tile. `counts` has an entry for each tile and across + 2 more, zero, and
- * is left so. */
-void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid, uint32_t *counts);
+/* Consecutive splats of a chunk that lie in the same tiles; in many tiles, each is alone. */
+typedef struct trip_cpu_series {
+    uint32_t tiles; /* as in trip_cpu_splat */
+    uint16_t end;   /* splat of the chunk */
+} trip_cpu_series;
+
+/* What a thread needs to sort a chunk. */
+typedef struct trip_cpu_sorting {
+    uint32_t *counts; /* for each tile and across + 2 more: zero, and left so */
+    trip_cpu_series series[TRIP_CPU_CHUNK];
+} trip_cpu_sorting;
+
+/* Sorts a filled chunk by tile. */
+void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
+                  trip_cpu_sorting *sorting);
 
 /* Links the chunks' segments by tile, leaving out closed tiles. */
 void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask);

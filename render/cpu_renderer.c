@@ -34,7 +34,7 @@ enum tile_state {
 typedef struct worker {
     trip_cpu_scratch scratch;
     trip_cpu_span shown[TRIP_CPU_CHUNK];
-    uint32_t *tile_counts;
+    trip_cpu_sorting sorting;
 } worker;
 
 /* A tile to blend, or a quarter of one. */
@@ -170,7 +170,7 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
     for (uint32_t i = 0; i < shown; i++)
         project_span(r, w, chunk, &w->shown[i], &staged);
     empty_staged(r, w, chunk, &staged);
-    trip_cpu_bin(r->filling, chunk, r->mask.grid, w->tile_counts);
+    trip_cpu_bin(r->filling, chunk, r->mask.grid, &w->sorting);
 }
 
 /* ---- blending a flush ---- */
@@ -490,8 +490,8 @@ static size_t lay_out(cpu *r, char *memory)
     r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
     /* Bins look one tile beyond the last, diagonally. */
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
-        r->workers[i].tile_counts = part(
-            memory, &at, (tiles + r->mask.grid.across + 2) * sizeof *r->workers[i].tile_counts);
+        r->workers[i].sorting.counts = part(
+            memory, &at, (tiles + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
     return at;
 }
 

@@ -1,6 +1,7 @@
 /* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
  * first, and in which order tiles get their splats back. */
 #include "cpu_bin.h"
+#include "cpu_near.h"
 #include "test.h"
 
 #include <stdlib.h>
@@ -12,6 +13,7 @@ typedef struct fixture {
     trip_budget *budget;
     trip_cpu_flush flush;
     uint32_t counts[TILES + ACROSS + 2];
+    trip_cpu_sorting sorting;
     _Atomic uint64_t open[TILES];
     trip_cpu_mask mask;
 } fixture;
@@ -24,6 +26,7 @@ static int set_up(void **state)
     assert_int_equal(trip_cpu_flush_create(&f->flush, CAPACITY, f->budget), 0);
     assert_int_equal(trip_cpu_flush_fit(&f->flush, TILES, f->budget), 0);
     trip_cpu_flush_empty(&f->flush);
+    f->sorting.counts = f->counts;
     f->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, f->open };
     for (int i = 0; i < TILES; i++)
         f->open[i] = UINT64_MAX;
@@ -60,7 +63,7 @@ static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
     for (uint32_t i = 0; i < count; i++)
         f->flush.splats[chunk->splat + i] =
             (trip_cpu_splat){ .r = mark, .g = (float)i, .tiles = i % TILES };
-    trip_cpu_bin(&f->flush, chunk, f->mask.grid, f->counts);
+    trip_cpu_bin(&f->flush, chunk, f->mask.grid, &f->sorting);
 }
 
 static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state)
@@ -129,6 +132,68 @@ static void tiles_get_their_splats_in_the_chunks_order_whoever_came_first(void *
     }
 }
 
+/* Number `i` of a chunk of splats that lie in the same tiles for 1 to 40 at a time: in one tile,
+ * two, four or more. */
+static trip_cpu_splat mixed(uint32_t i)
+{
+    static const uint16_t sizes[][2] = { { 2, 2 }, { 34, 2 }, { 2, 34 }, { 34, 34 }, { 70, 2 } };
+    uint32_t series = 0, end = 1;
+    while (i >= end)
+        end += 1 + 7 * ++series % 40;
+    uint16_t x = (uint16_t)(series * 13 % 60), y = (uint16_t)(series * 29 % 90);
+    const uint16_t *size = sizes[series * 11 % 5];
+    trip_cpu_splat s = { .g = (float)i, .x0 = x, .y0 = y };
+    s.x1 = (uint16_t)(x + size[0] - 1);
+    s.y1 = (uint16_t)(y + size[1] - 1);
+    if (s.y1 >= ACROSS * TRIP_CPU_TILE)
+        s.y1 = ACROSS * TRIP_CPU_TILE - 1;
+    s.tiles = trip_cpu_tiles(&s, ACROSS);
+    return s;
+}
+
+static bool lies_in(const trip_cpu_splat *s, uint32_t tile)
+{
+    uint32_t x = tile % ACROSS, y = tile / ACROSS;
+    return s->x0 / TRIP_CPU_TILE <= x && x <= s->x1 / TRIP_CPU_TILE && s->y0 / TRIP_CPU_TILE <= y &&
+           y <= s->y1 / TRIP_CPU_TILE;
+}
+
+static void take_mixed(void *user, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count)
+{
+    taken *t = user;
+    assert_non_null(order);
+    for (uint32_t i = 0; i < count; i++, t->count++) {
+        const trip_cpu_splat *s = &splats[order[i]];
+        assert_true(lies_in(s, t->tile) && (t->count == 0 || s->g > t->number));
+        t->number = s->g;
+    }
+}
+
+static void every_tile_that_a_splat_lies_in_gets_it_once(void **state)
+{
+    fixture *f = *state;
+    enum { SPLATS = 3000 };
+    assert_int_equal(reserve(f, 1), 1);
+    trip_cpu_chunk *chunk = &f->flush.chunks[0];
+    assert_true(trip_cpu_flush_claim(&f->flush, chunk, SPLATS));
+    chunk->splats = SPLATS;
+    for (uint32_t i = 0; i < SPLATS; i++)
+        f->flush.splats[chunk->splat + i] = mixed(i);
+    trip_cpu_bin(&f->flush, chunk, f->mask.grid, &f->sorting);
+    trip_cpu_link(&f->flush, &f->mask);
+    for (uint32_t tile = 0; tile < TILES; tile++) {
+        taken t = { .tile = tile };
+        uint32_t expected = 0;
+        for (uint32_t i = 0; i < SPLATS; i++)
+            expected += lies_in(&f->flush.splats[chunk->splat + i], tile);
+        trip_cpu_share_each(&f->flush, tile, take_mixed, &t);
+        assert_int_equal(t.count, expected);
+    }
+    for (int i = 0; i < TILES + ACROSS + 2; i++)
+        assert_int_equal(f->counts[i], 0);
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
@@ -136,6 +201,7 @@ int main(void)
         TEST(the_chunks_before_the_first_that_found_no_room_are_kept),
         TEST(a_first_chunk_that_always_comes_last_finds_room_in_the_end),
         TEST(tiles_get_their_splats_in_the_chunks_order_whoever_came_first),
+        TEST(every_tile_that_a_splat_lies_in_gets_it_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
