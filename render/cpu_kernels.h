@@ -5,6 +5,7 @@
 #define TRIP_CPU_KERNELS_H
 
 #include <assert.h>
+#include <stdatomic.h>
 #include <stdint.h>
 
 #include "renderer.h"
@@ -145,9 +146,11 @@ typedef struct trip_cpu_kernels {
                       const uint32_t *normals, uint32_t count, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
-     * order. `out` has room for count + 16. Returns how many. */
-    uint32_t (*project)(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
-                        trip_cpu_lanes *lanes, trip_cpu_splat *out);
+     * order. With `open`, a word a tile as in trip_cpu_mask, those over closed blocks alone may be
+     * left out; NULL: none are. `out` has room for count + 16. Returns how many. */
+    uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
+                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
+                        trip_cpu_splat *out);
 
     /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere; `alone`
      * says that its weight is 1 all over the tile. */

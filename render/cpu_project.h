@@ -6,6 +6,7 @@
 #ifndef TRIP_CPU_PROJECT_H
 #define TRIP_CPU_PROJECT_H
 
+#include "cpu_closed.h"
 #include "cpu_exp.h"
 #include "cpu_kernels.h"
 #include "cpu_near.h"
@@ -508,9 +509,11 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
 }
 
 /* In three loops, each short enough that the processor works on several vectors at a time: one
- * loop's chain of divisions and roots would leave it waiting. */
-static uint32_t project(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t count,
-                        trip_cpu_lanes *lanes, trip_cpu_splat *out)
+ * loop's chain of divisions and roots would leave it waiting. What lies over closed blocks is left
+ * out before it is coloured, stored, sorted and gathered. */
+static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
+                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
+                        trip_cpu_splat *out)
 {
     uint32_t n = 0;
     const float *extinction = &view->of->table[0].extinction;
@@ -525,7 +528,10 @@ static uint32_t project(const trip_cpu_view *view, const trip_cpu_staged *staged
         unsigned valid = vm_bits(vm_first(count - i));
         unsigned near = vm_bits(vm_and(f.near, v_gt(v_load(lanes->z + i), v_set(0)))) & valid;
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
-        lanes->kept[i / V] = complete(view, &f, tau, lanes, i) & valid & ~near;
+        unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~near;
+        if (open && kept)
+            kept &= over_open_blocks(lanes, i, open, view->tiles_across);
+        lanes->kept[i / V] = kept;
         lanes->near[i / V] = near;
     }
     for (uint32_t i = 0; i < count; i += V)

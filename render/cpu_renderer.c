@@ -130,12 +130,18 @@ static uint32_t show_chunk(const cpu *r, trip_cpu_chunk *chunk, trip_cpu_span *s
     return n;
 }
 
+static bool much_is_hidden(const cpu *r)
+{
+    return r->shown_per_voxel < MUCH_HIDDEN;
+}
+
 /* Projects what is staged to the end of the chunk. */
 static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_t *staged)
 {
+    const _Atomic uint64_t *open = much_is_hidden(r) ? r->mask.tiles : NULL;
     trip_cpu_splat *out = r->filling->splats + chunk->splat + chunk->splats;
     chunk->splats +=
-        r->kernels->project(&r->view, &w->scratch.staged, *staged, &w->scratch.lanes, out);
+        r->kernels->project(&r->view, open, &w->scratch.staged, *staged, &w->scratch.lanes, out);
     *staged = 0;
 }
 
@@ -279,7 +285,7 @@ static uint64_t room(const cpu *r)
 {
     const trip_cpu_flush *f = r->filling;
     uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
-    uint32_t capacity = r->shown_per_voxel < MUCH_HIDDEN ? f->capacity / 4 : f->capacity;
+    uint32_t capacity = much_is_hidden(r) ? f->capacity / 4 : f->capacity;
     double left = ((double)capacity - (double)used) / (1.1 * r->shown_per_voxel);
     if (f->chunk_count == 0)
         left = fmax(left, TRIP_CPU_CHUNK);

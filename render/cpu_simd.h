@@ -4,6 +4,7 @@
  *
  *   vf, vi   V floats or 32-bit integers; + - * / and comparison-free arithmetic by operator
  *   vd       V / 2 doubles; a pair of them (lo, hi) goes with one vf
+ *   vw       V / 2 words of 64 bits; likewise
  *   vm       one truth value a lane
  *
  * Products and sums are fused only where v_fma, v_fnma or vd_fma says so, and all other operations
@@ -13,6 +14,7 @@
 #define TRIP_CPU_SIMD_H
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -40,6 +42,7 @@ typedef float vf __attribute__((vector_size(4 * V)));
 typedef int32_t vi __attribute__((vector_size(4 * V)));
 typedef uint32_t vu __attribute__((vector_size(4 * V)));
 typedef double vd __attribute__((vector_size(4 * V)));
+typedef uint64_t vw __attribute__((vector_size(4 * V)));
 
 /* The doubles of one vf's lanes. */
 typedef struct vd_pair {
@@ -67,6 +70,11 @@ INLINE vi vi_set(int32_t x)
 INLINE vd vd_set(double x)
 {
     return x - (vd){ 0 };
+}
+
+INLINE vw vw_set(uint64_t x)
+{
+    return x - (vw){ 0 };
 }
 
 INLINE vf v_load(const float *p)
@@ -284,6 +292,29 @@ INLINE vi vi_reverse(vi a)
     return (vi)_mm512_permutexvar_epi32(order, (__m512i)a);
 }
 
+/* Lanes from 0 on and from V / 2 on, as they are without a sign. */
+INLINE vw vw_low(vi a)
+{
+    return (vw)_mm512_cvtepu32_epi64(_mm512_castsi512_si256((__m512i)a));
+}
+
+INLINE vw vw_high(vi a)
+{
+    return (vw)_mm512_cvtepu32_epi64(_mm512_extracti32x8_epi32((__m512i)a, 1));
+}
+
+/* Each word as a relaxed load gives it. */
+INLINE vw vw_gather(const _Atomic uint64_t *base, vw index)
+{
+    return (vw)_mm512_i64gather_epi64((__m512i)index, (const void *)(uintptr_t)base, 8);
+}
+
+/* A bit each. */
+INLINE unsigned vw_not_0(vw a)
+{
+    return _mm512_test_epi64_mask((__m512i)a, (__m512i)a);
+}
+
 /* Lanes of a where m is set, packed to the front of p; V lanes of p may be overwritten. */
 INLINE void vi_store_packed(void *p, vm m, vi a)
 {
@@ -470,6 +501,26 @@ INLINE vi vi_reverse(vi a)
     return (vi)_mm256_permutevar8x32_epi32((__m256i)a, _mm256_set_epi32(0, 1, 2, 3, 4, 5, 6, 7));
 }
 
+INLINE vw vw_low(vi a)
+{
+    return (vw)_mm256_cvtepu32_epi64(_mm256_castsi256_si128((__m256i)a));
+}
+
+INLINE vw vw_high(vi a)
+{
+    return (vw)_mm256_cvtepu32_epi64(_mm256_extracti128_si256((__m256i)a, 1));
+}
+
+INLINE vw vw_gather(const _Atomic uint64_t *base, vw index)
+{
+    return (vw)_mm256_i64gather_epi64((const void *)(uintptr_t)base, (__m256i)index, 8);
+}
+
+INLINE unsigned vw_not_0(vw a)
+{
+    return (unsigned)_mm256_movemask_pd((__m256d)(a != 0));
+}
+
 INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
 {
     __m256 ab0 = _mm256_unpacklo_ps((__m256)a, (__m256)b);
@@ -636,6 +687,27 @@ INLINE vf v_narrow(vd lo, vd hi)
 INLINE vi vi_reverse(vi a)
 {
     return (vi){ a[3], a[2], a[1], a[0] };
+}
+
+INLINE vw vw_low(vi a)
+{
+    return (vw){ (uint32_t)a[0], (uint32_t)a[1] };
+}
+
+INLINE vw vw_high(vi a)
+{
+    return (vw){ (uint32_t)a[2], (uint32_t)a[3] };
+}
+
+INLINE vw vw_gather(const _Atomic uint64_t *base, vw index)
+{
+    return (vw){ atomic_load_explicit(&base[index[0]], memory_order_relaxed),
+                 atomic_load_explicit(&base[index[1]], memory_order_relaxed) };
+}
+
+INLINE unsigned vw_not_0(vw a)
+{
+    return (a[0] != 0) | (unsigned)(a[1] != 0) << 1;
 }
 
 INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
