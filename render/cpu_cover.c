@@ -1,12 +1,12 @@
 #include "cpu_cover.h"
 
-/* The support of a splat whose kernel lies in a box lies in the box's projection, widened by the
- * low-pass: k TRIP_LOW_PASS_PX = 1.33 px in parallel views. In perspective that much is divided by
- * sqrt(G(p) |r_c|^2) >= 1 / 1.29 where the kernel is at least eight radii of depth away (a pixel of
- * the support is at most 9/8 as far as the centre, and at least 7/8 as deep). A little more, since
- * the splats are computed in floats. */
-#define MARGIN_PX 1.8
+/* With b the half-size of a support at its centre's G, and |r(p)| within |p - c| |rx| of |r_c|, the
+ * support reaches b / (1 - b |rx| / |r_c|): that is worked out where it is less than 1.3 b, and
+ * where kernels are at least eight radii of depth away. The splats are computed in floats, which is
+ * what the slack is for. */
+#define SLACK_PX 0.05
 #define NEAREST_RADII 8.0
+#define MOST_GROWTH 0.23
 
 enum { BLOCK = 4, BLOCKS = TRIP_CPU_TILE / BLOCK };
 
@@ -27,21 +27,33 @@ typedef struct range {
 
 static range pixels(double middle, double reach, int size)
 {
-    double lo = middle - reach - MARGIN_PX - 0.5, hi = middle + reach + MARGIN_PX - 0.5;
+    double lo = middle - reach - SLACK_PX - 0.5, hi = middle + reach + SLACK_PX - 0.5;
     if (hi < 0 || lo > size - 1)
         return (range){ 0, -1 };
-    return (range){ lo > 0 ? (int)lo : 0, hi < size - 1 ? (int)hi : size - 1 };
+    return (range){ lo > 0 ? (int)lo + 1 : 0, hi < size - 1 ? (int)hi : size - 1 };
 }
 
+/* Of the splats of a box: where the centre of the middle one lies, how far from there the others'
+ * centres, and how far their supports reach from their centres at the centres' G. */
+typedef struct spread {
+    double middle, centres, support;
+} spread;
+
 /* Of x = X / z over a box, given 1 / z at its middle and at its nearest point: with x0 that of the
- * middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. */
-static range range_of(const double along_x[4], const double along_z[4], const trip_cpu_box *box,
-                      const double half[3], double inverse, double inverse_nearest, int size)
+ * middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. S is sigma^2 times the
+ * square of x's gradient (X - x z)' / z. */
+static spread spread_of(const trip_cpu_view *view, const double along_x[4], const double along_z[4],
+                        const trip_cpu_box *box, double inverse, double inverse_nearest)
 {
+    const double radius = view->of->settings->kernel_radius;
+    const double low_pass2 = view->splat.low_pass2 * view->splat.cutoff2;
     double x = (dot(along_x, box->middle) + along_x[3]) * inverse, slope[3];
     for (int i = 0; i < 3; i++)
         slope[i] = along_x[i] - x * along_z[i];
-    return pixels(x, reach(slope, half) * inverse_nearest, size);
+    double centres = reach(slope, box->half) * inverse_nearest;
+    double steepest = sqrt(dot(slope, slope)) + centres * sqrt(dot(along_z, along_z));
+    double kernel = radius * steepest * inverse_nearest;
+    return (spread){ x, centres, sqrt(kernel * kernel + low_pass2) };
 }
 
 static uint64_t bits_of(int left, int right, int top, int bottom)
@@ -80,23 +92,37 @@ static trip_cpu_cover cover_of(const trip_cpu_mask *mask, range px, range py)
     return open ? TRIP_CPU_SHOWN : TRIP_CPU_HIDDEN;
 }
 
+/* |rx| / |r_c|, or |ry| where that is more, is at most this. */
+static double most_turn(const trip_cpu_view *view)
+{
+    return sqrt(fmax(view->splat.rxrx, view->splat.ryry)) * view->forward_length;
+}
+
 trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
                                   const trip_cpu_box *box)
 {
     const double none[4] = { 0, 0, 0, 0 };
     const trip_camera *camera = &view->splat.camera;
-    double radius = view->of->settings->kernel_radius;
-    double half[3] = { box->half[0] + radius, box->half[1] + radius, box->half[2] + radius };
-    double z = dot(view->along_z, box->middle) + view->along_z[3];
-    double deep = reach(view->along_z, half), nearest = z - deep;
-    double near = camera->ortho ? 0 : NEAREST_RADII * radius * view->forward_length;
-    if (nearest < near)
-        return z + deep <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
     const double *along_z = camera->ortho ? none : view->along_z;
-    double inverse = camera->ortho ? 1 : 1 / z, inverse_nearest = camera->ortho ? 1 : 1 / nearest;
-    range x = range_of(view->along_x, along_z, box, half, inverse, inverse_nearest, camera->width);
-    range y = range_of(view->along_y, along_z, box, half, inverse, inverse_nearest, camera->height);
-    return cover_of(mask, x, y);
+    double inverse = 1, inverse_nearest = 1, growth = 0;
+    if (!camera->ortho) {
+        double radius = view->of->settings->kernel_radius * view->forward_length;
+        double z = dot(along_z, box->middle) + along_z[3], deep = reach(along_z, box->half);
+        if (z - deep < (NEAREST_RADII + 1) * radius)
+            return z + deep + radius <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
+        inverse = 1 / z;
+        inverse_nearest = 1 / (z - deep);
+    }
+    spread x = spread_of(view, view->along_x, along_z, box, inverse, inverse_nearest);
+    spread y = spread_of(view, view->along_y, along_z, box, inverse, inverse_nearest);
+    if (!camera->ortho) {
+        growth = sqrt(2) * (x.support > y.support ? x.support : y.support) * most_turn(view);
+        if (growth > MOST_GROWTH)
+            return TRIP_CPU_PARTLY;
+    }
+    double grown = 1 / (1 - growth);
+    return cover_of(mask, pixels(x.middle, x.centres + x.support * grown, camera->width),
+                    pixels(y.middle, y.centres + y.support * grown, camera->height));
 }
 
 static const trip_file_slab *slab_of(const trip_list *list, uint64_t brick)
