@@ -5,6 +5,8 @@
 #ifndef TRIP_CPU_BLEND_H
 #define TRIP_CPU_BLEND_H
 
+#include <stddef.h>
+
 #include "cpu_exp.h"
 #include "cpu_kernels.h"
 #include "cpu_simd.h"
@@ -381,47 +383,35 @@ static bool takes_light(const trip_cpu_scratch *s)
     return any != 0;
 }
 
-typedef int32_t int4 __attribute__((vector_size(16)));
-typedef uint16_t ushort4 __attribute__((vector_size(8)));
-
-/* The splat as seen from this tile's corner. */
-INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int x, int y)
+/* The splat as seen from this tile's corner, which is so far from its first tile's. */
+INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int4 from)
 {
-    float from_x = (float)(x - (splat->x0 & ~(TRIP_CPU_TILE - 1)));
-    float from_y = (float)(y - (splat->y0 & ~(TRIP_CPU_TILE - 1)));
+    float4 f = __builtin_convertvector(from, float4);
     *local = *splat;
-    local->l1 = splat->l1 + (splat->l11 * from_x + splat->l21 * from_y);
-    local->l2 = splat->l2 + splat->l22 * from_y;
+    local->l1 = splat->l1 + (splat->l11 * f[0] + splat->l21 * f[1]);
+    local->l2 = splat->l2 + splat->l22 * f[1];
 }
 
-typedef struct block_range {
-    unsigned left, top, right, bottom; /* inclusive */
-} block_range;
-
-INLINE block_range blocks_of(const trip_cpu_splat *splat, int4 origin)
+/* Bits of the blocks of a band that lie in a column or further right, in every row; none from the
+ * eighth on. */
+INLINE uint64_t from_column(uint32_t column)
 {
-    const int4 shift = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
-    const int4 edge = { TRIP_CPU_TILE - 1, TRIP_CPU_TILE - 1, TRIP_CPU_TILE - 1,
-                        TRIP_CPU_TILE - 1 };
-    ushort4 bounds;
-    memcpy(&bounds, &splat->x0, sizeof bounds);
-    int4 b = __builtin_convertvector(bounds, int4) - origin;
-    b &= b > 0;
-    b = (b & (b < edge)) | (edge & (b >= edge));
-    b >>= shift;
-    return (block_range){ (unsigned)b[0], (unsigned)b[1], (unsigned)b[2], (unsigned)b[3] };
+#define FROM(i) UINT64_C(0x0101010101010101) * (0xff << (i)&0xff)
+    static const uint64_t bits[9] = { FROM(0), FROM(1), FROM(2), FROM(3), FROM(4),
+                                      FROM(5), FROM(6), FROM(7), 0 };
+#undef FROM
+    return bits[column];
 }
 
-/* The bits of a band's blocks from row `top` to `bottom`, counted from the tile's first. */
-INLINE uint64_t rows_of_band(unsigned band, unsigned top, unsigned bottom)
+/* Bits of the blocks of a band that lie in a row of the tile's or further down, a byte a row. */
+INLINE uint64_t from_row(unsigned band, uint32_t row)
 {
-    if (BANDS > 1) {
-        if (top > 8 * band + 7 || bottom < 8 * band)
-            return 0;
-        top = top > 8 * band ? top - 8 * band : 0;
-        bottom = bottom < 8 * band + 7 ? bottom - 8 * band : 7;
-    }
-    return UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
+    static const uint8_t bits[64] = { [32 ... 63] = 0xff };
+    static_assert(BLOCKS_DOWN <= 32 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+                  "the bytes above");
+    uint64_t word;
+    memcpy(&word, bits + 32 + 8 * band - row, sizeof word);
+    return word;
 }
 
 static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
@@ -433,24 +423,29 @@ static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
 /* What tile_blend() keeps in registers. */
 typedef struct gathering {
     uint32_t splats;
-    int4 corner;
-    uint64_t any[BANDS];
+    int4 corner; /* of the tile: x, y, x, y */
 } gathering;
 
 /* Splats whose blocks are all closed are left out. */
 INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 {
     uint32_t at = g->splats;
-    block_range r = blocks_of(splat, g->corner);
-    uint64_t columns = (0xffu << r.left & 0xffu >> (7 - r.right)) * UINT64_C(0x0101010101010101);
-    uint64_t blocks[BANDS], any = 0;
+    const int4 to_block = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
+    uint64_t four;
+    memcpy(&four, (const char *)splat + offsetof(trip_cpu_splat, x0), sizeof four);
+    int4 bounds = int4_widened(four);
+    int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_TILE - 1) >> to_block;
+    uint32_t left = (uint32_t)in[0], right = (uint32_t)in[2];
+    uint32_t top = (uint32_t)in[1], bottom = (uint32_t)in[3];
+    uint64_t columns = from_column(left) & ~from_column(right + 1), blocks[BANDS], any = 0;
     for (unsigned band = 0; band < BANDS; band++) {
-        blocks[band] = columns & rows_of_band(band, r.top, r.bottom) & s->open[band];
+        blocks[band] = from_row(band, top) & ~from_row(band, bottom + 1);
+        blocks[band] &= columns & s->open[band];
         any |= blocks[band];
     }
     if (any == 0)
         return;
-    make_local(&s->local[at], splat, g->corner[0], g->corner[1]);
+    make_local(&s->local[at], splat, g->corner - (bounds & ~(TRIP_CPU_TILE - 1)));
     s->thick[at / 64] |= (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << at % 64;
     for (unsigned band = 0; band < BANDS; band++) {
         s->touched[band][at / 64][at % 64] = blocks[band];
@@ -464,21 +459,29 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 }
 
 /* Splats to fetch ahead: they lie scattered among those of other tiles. */
-#define AHEAD 12
+#define AHEAD 16
+
+INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
+                         const uint16_t *order, uint32_t count)
+{
+    for (uint32_t i = 0; i < AHEAD && i < count; i++)
+        __builtin_prefetch(&splats[order[i]]);
+    for (uint32_t i = 0; i < count && takes_light(s); i++) {
+        __builtin_prefetch(&splats[order[i + AHEAD < count ? i + AHEAD : i]]);
+        add(s, g, &splats[order[i]]);
+    }
+}
 
 static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
                        uint32_t count)
 {
-    const int4 corner = { s->x, s->y, s->x, s->y };
-    gathering g = { s->splats, corner, { 0 } };
-    for (uint32_t i = 0; i < count && takes_light(s); i++) {
-        if (order) {
-            __builtin_prefetch(&splats[order[i + AHEAD < count ? i + AHEAD : i]]);
-            add(s, &g, &splats[order[i]]);
-        } else if (meets(s, &splats[i])) {
-            add(s, &g, &splats[i]);
-        }
-    }
+    gathering g = { s->splats, { s->x, s->y, s->x, s->y } };
+    if (order)
+        add_in_order(s, &g, splats, order, count);
+    else
+        for (uint32_t i = 0; i < count && takes_light(s); i++)
+            if (meets(s, &splats[i]))
+                add(s, &g, &splats[i]);
     s->splats = g.splats;
 }
 

@@ -44,6 +44,10 @@ typedef uint32_t vu __attribute__((vector_size(4 * V)));
 typedef double vd __attribute__((vector_size(4 * V)));
 typedef uint64_t vw __attribute__((vector_size(4 * V)));
 
+/* Four of one splat. */
+typedef int32_t int4 __attribute__((vector_size(16)));
+typedef float float4 __attribute__((vector_size(16)));
+
 /* The doubles of one vf's lanes. */
 typedef struct vd_pair {
     vd lo, hi;
@@ -126,6 +130,35 @@ INLINE vf v_copysign(vf a, vf b)
 {
     return (vf)(((vi)a & 0x7fffffff) | ((vi)b & INT32_MIN));
 }
+
+/* Four numbers of 16 bits, the lowest first. */
+#if TRIP_SIMD == TRIP_SIMD_AVX512 || TRIP_SIMD == TRIP_SIMD_AVX2
+
+INLINE int4 int4_widened(uint64_t four)
+{
+    return (int4)_mm_cvtepu16_epi32(_mm_cvtsi64_si128((int64_t)four));
+}
+
+INLINE int4 int4_within(int4 a, int32_t least, int32_t most)
+{
+    return (int4)_mm_min_epi32(_mm_max_epi32((__m128i)a, _mm_set1_epi32(least)),
+                               _mm_set1_epi32(most));
+}
+
+#else
+
+INLINE int4 int4_widened(uint64_t four)
+{
+    return (int4){ four & 0xffff, four >> 16 & 0xffff, four >> 32 & 0xffff, four >> 48 };
+}
+
+INLINE int4 int4_within(int4 a, int32_t least, int32_t most)
+{
+    int4 low = a<least, high = a> most;
+    return (least & low) | (most & high) | (a & ~low & ~high);
+}
+
+#endif
 
 /* ---- AVX-512 ---- */
 #if TRIP_SIMD == TRIP_SIMD_AVX512
