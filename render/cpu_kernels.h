@@ -70,8 +70,8 @@ typedef struct trip_cpu_view {
     bool front_to_back, shading;
     bool stretch_varies;
     int axis, u_axis, v_axis;
-    double gradient_full;
-    double stretch; /* where it is constant, else 1 */
+    float gradient_most; /* the largest magnitude of a normal, over gradient_full of shade.h */
+    double stretch;      /* where it is constant, else 1 */
     /* |r|^2 and |J r|^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2 times
      * these. */
     float ray2[6], world2[6];

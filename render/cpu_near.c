@@ -188,6 +188,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
 {
     const trip_file_header *header = &frame->data->header;
     const trip_camera *camera = frame->camera;
+    const double full = trip_shade_gradient_full(header, camera->voxel_world);
     const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
     *view = (trip_cpu_view){
         .of = frame,
@@ -196,7 +197,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
         .axis = axis,
         .u_axis = (axis + 1) % 3,
         .v_axis = (axis + 2) % 3,
-        .gradient_full = trip_shade_gradient_full(header, camera->voxel_world),
+        .gradient_most = (float)fmin(header->gradient_scale / full, 1e30),
     };
     const int axes[3] = { view->u_axis, view->v_axis, axis };
     for (int i = 0; i < 3; i++) {

@@ -291,8 +291,7 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
         light = v3_of(s->light_direction);
         half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
     }
-    double full = view->of->data->header.gradient_scale / view->gradient_full;
-    vf strength = v_min(v_set(1), magnitude * v_set((float)fmin(full, 1e30)));
+    vf strength = v_min(v_set(1), magnitude * v_set(view->gradient_most));
     vf diffuse = v_abs(dot(normal, light));
     vf h2 = dot(normal, half) * dot(normal, half);
     vf h8 = (h2 * h2) * (h2 * h2);
