@@ -603,6 +603,11 @@ INLINE vf v_sqrt(vf a)
     return (vf)vsqrtq_f32((float32x4_t)a);
 }
 
+INLINE vi v_truncate(vf a)
+{
+    return (vi)vcvtq_s32_f32((float32x4_t)a);
+}
+
 INLINE unsigned vm_bits(vm m)
 {
     const uint32x4_t bit = { 1, 2, 4, 8 };
@@ -675,12 +680,14 @@ INLINE vf v_max(vf a, vf b)
     return v_select((vm)(a > b), a, b);
 }
 
+#if TRIP_SIMD == TRIP_SIMD_PLAIN
 /* Values beyond the integers give some integer, as the vector instructions do. */
 INLINE vi v_truncate(vf a)
 {
     return __builtin_convertvector(v_max(v_min(a, v_set(2147483520.0f)), v_set(-2147483648.0f)),
                                    vi);
 }
+#endif
 
 INLINE vf v_from_int(vi a)
 {
