@@ -10,6 +10,12 @@ typedef struct box {
     double lo[3], hi[3];
 } box;
 
+/* fmax() without the call: nothing here is not a number. */
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
 static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, double sign)
 {
     trip_vec3 normal = c->ortho ? to : trip_sub(to, trip_scale(c->forward, pixel));
@@ -87,7 +93,7 @@ static double farthest_along(const box *b, trip_vec3 n)
 {
     double sum = 0;
     for (int a = 0; a < 3; a++)
-        sum += fmax(trip_component(n, a) * b->lo[a], trip_component(n, a) * b->hi[a]);
+        sum += larger(trip_component(n, a) * b->lo[a], trip_component(n, a) * b->hi[a]);
     return sum;
 }
 
@@ -119,9 +125,9 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
     if (s->method == TRIP_METHOD_AXIS || cull->camera->ortho)
         return true; /* decided for the list as a whole */
     double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
-    double most = fmax(fabs(b->lo[axis] - radius), fabs(b->hi[axis] + radius));
+    double most = larger(fabs(b->lo[axis] - radius), fabs(b->hi[axis] + radius));
     for (int a = 0; a < 3; a++) {
-        double least = fmax(0, fmax(b->lo[a], -b->hi[a]) - radius);
+        double least = larger(0, larger(b->lo[a], -b->hi[a]) - radius);
         if (a != axis && most < h * least)
             return false;
     }
