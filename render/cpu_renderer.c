@@ -224,15 +224,16 @@ static int most_first(const void *a, const void *b)
 }
 
 /* Tiles with work, those with most of it first. One that holds so much that a thread would still be
- * at it when the others are done is given out in quarters; not when it is new, since then one
- * thread has to clear it. */
+ * at it when the others are done, with the next splats to project too, is given out in quarters,
+ * though each looks through all of its splats; not when it is new, since then one thread has to
+ * clear it. */
 static void make_portions(cpu *r, const trip_cpu_flush *f)
 {
     uint64_t all = 0;
     r->portion_count = 0;
     for (uint32_t t = 0; t < tile_count(r); t++)
         all += f->shares[t].splats;
-    uint64_t large = all / trip_cpu_pool_threads(r->pool) / 2;
+    uint64_t large = all / trip_cpu_pool_threads(r->pool) * 2;
     for (uint32_t t = 0; t < tile_count(r); t++) {
         uint32_t n = f->shares[t].splats;
         if (n == 0 || trip_cpu_tile_is_closed(&r->mask, t))

@@ -21,11 +21,10 @@ static void assert_same(const scene_picture *a, const scene_picture *b)
 
 /* With every instruction set and target, the picture of `a` by one thread and that of `b` by
  * another number of threads, from batches as `reader` says. */
-static void check_same(const scene *a, const scene *b, unsigned threads,
+static void check_view(const scene *a, const scene *b, trip_camera_params view, unsigned threads,
                        const trip_reader_params *reader)
 {
     trip_settings settings = trip_settings_default();
-    trip_camera_params view = side_view(a);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
         for (int target = TRIP_TARGET_RGBA32F; target <= TRIP_TARGET_RGBA8; target++) {
@@ -40,6 +39,12 @@ static void check_same(const scene *a, const scene *b, unsigned threads,
         }
     }
     unsetenv("TRIPTYCH_ISA");
+}
+
+static void check_same(const scene *a, const scene *b, unsigned threads,
+                       const trip_reader_params *reader)
+{
+    check_view(a, b, side_view(a), threads, reader);
 }
 
 static void any_number_of_threads_draws_the_same(void **state)
@@ -85,6 +90,22 @@ static void little_memory_draws_the_same(void **state)
     small = s;
     assert_int_equal(trip_budget_create(&small.budget, UINT64_C(6) << 20), 0);
     check_same(&s, &small, 4, &(trip_reader_params){ .slots = 4, .slot_bytes = 4096 });
+    trip_budget_destroy(small.budget);
+    scene_destroy(&s);
+}
+
+/* All of it in one tile of the screen, which threads share by quarters. */
+static void a_scene_in_one_tile_draws_the_same(void **state)
+{
+    (void)state;
+    scene s, small;
+    cpu_scenes_blobs(&s, 32, NULL);
+    small = s;
+    assert_int_equal(trip_budget_create(&small.budget, UINT64_C(6) << 20), 0);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.7, 0.5), 300, 50, 160);
+    for (unsigned threads = 3; threads <= 7; threads += 2)
+        check_view(&s, &small, view, threads,
+                   &(trip_reader_params){ .slots = 4, .slot_bytes = 4096 });
     trip_budget_destroy(small.budget);
     scene_destroy(&s);
 }
@@ -270,6 +291,7 @@ int main(void)
         cmocka_unit_test(any_size_of_batch_draws_the_same),
         cmocka_unit_test(any_tile_of_the_data_draws_the_same),
         cmocka_unit_test(little_memory_draws_the_same),
+        cmocka_unit_test(a_scene_in_one_tile_draws_the_same),
         cmocka_unit_test(runs_cut_anywhere_draw_the_same),
         cmocka_unit_test(leaving_out_what_is_covered_draws_the_same),
         cmocka_unit_test(frames_follow_one_another_on_one_renderer),
