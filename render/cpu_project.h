@@ -143,16 +143,15 @@ INLINE perspective perspective_of(const trip_splat_frame *f)
     };
 }
 
-/* Bounds of the support, the ellipse of E and l in splat.h: rough, to be widened by the caller. */
+/* Bounds of the support, the ellipse of E and l in splat.h, to be widened by the caller. */
 INLINE void bound(footprint *f, vf cxx, vf cxy, vf cyy, vf lx, vf ly, vf k2)
 {
-    vf inverse = v_rcp_rough(v_fnma(cxy, cxy, cxx * cyy));
+    vf inverse = v_set(1) / v_fnma(cxy, cxy, cxx * cyy);
     f->shift_x = v_fnma(cxy, ly, cyy * lx) * inverse;
     f->shift_y = v_fnma(cxy, lx, cxx * ly) * inverse;
     vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
-    vf x2 = size * cyy, y2 = size * cxx;
-    f->half_x = x2 * v_rsqrt_rough(x2);
-    f->half_y = y2 * v_rsqrt_rough(y2);
+    f->half_x = v_sqrt(size * cyy);
+    f->half_y = v_sqrt(size * cxx);
 }
 
 /* With D = r_c . rx x ry, constant over the image, S = (sigma / (D z))^2 adj [rx x r_c, ry x r_c]
@@ -188,7 +187,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. */
     vf trace = v_fma(p->rxrx, sxx, v_fma(p->ryry, syy, (p->rxry + p->rxry) * sxy));
     out.near = v_gt(trace * k2, rr * v_set(0.5f));
-    vf t = k2 * v_rcp_rough(rr);
+    vf t = k2 / rr;
     bound(&out, v_fnma(t, p->rxrx, syy * inverse_det), v_fnma(t, p->rxry, -sxy * inverse_det),
           v_fnma(t, p->ryry, sxx * inverse_det), t * rx, t * ry, k2);
     return out;

@@ -8,8 +8,7 @@
  *   vm       one truth value a lane
  *
  * Products and sums are fused only where v_fma, v_fnma or vd_fma says so, and all other operations
- * are the IEEE ones except v_rcp_rough and v_rsqrt_rough, so that a kernel's numbers are the same
- * on every processor that runs it. */
+ * are the IEEE ones, so that a kernel's numbers are the same on every processor that runs it. */
 #ifndef TRIP_CPU_SIMD_H
 #define TRIP_CPU_SIMD_H
 
@@ -186,16 +185,6 @@ INLINE vd vd_fma(vd a, vd b, vd c)
 INLINE vf v_sqrt(vf a)
 {
     return (vf)_mm512_sqrt_ps((__m512)a);
-}
-
-INLINE vf v_rcp_rough(vf a)
-{
-    return (vf)_mm512_rcp14_ps((__m512)a);
-}
-
-INLINE vf v_rsqrt_rough(vf a)
-{
-    return (vf)_mm512_rsqrt14_ps((__m512)a);
 }
 
 /* b where either is not a number; so in every set. */
@@ -454,16 +443,6 @@ INLINE vf v_sqrt(vf a)
     return (vf)_mm256_sqrt_ps((__m256)a);
 }
 
-INLINE vf v_rcp_rough(vf a)
-{
-    return (vf)_mm256_rcp_ps((__m256)a);
-}
-
-INLINE vf v_rsqrt_rough(vf a)
-{
-    return (vf)_mm256_rsqrt_ps((__m256)a);
-}
-
 INLINE vf v_min(vf a, vf b)
 {
     return (vf)_mm256_min_ps((__m256)a, (__m256)b);
@@ -658,16 +637,6 @@ INLINE bool vm_any(vm m)
 INLINE bool vm_all(vm m)
 {
     return (((vl2)m)[0] & ((vl2)m)[1]) == -1;
-}
-
-INLINE vf v_rcp_rough(vf a)
-{
-    return 1 / a;
-}
-
-INLINE vf v_rsqrt_rough(vf a)
-{
-    return 1 / v_sqrt(a);
 }
 
 INLINE vf v_min(vf a, vf b)
