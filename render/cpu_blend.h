@@ -1,4 +1,4 @@
-/* Kernels that blend projected splats into the pixels of a tile: included by each cpu_isa_*.c after
+/* Kernels that blend projected splats into the pixels of a tile: included by cpu_table.h after
  * cpu_simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the blocks of
  * pixels that they may touch, in their order; then block after block takes its splats, its pixels
  * all the while in registers. */

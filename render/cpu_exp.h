@@ -1,4 +1,4 @@
-/* Exponentials of a vector, as exactly as a footprint needs: included by each cpu_isa_*.c after
+/* Exponentials of a vector, as exactly as a footprint needs: included by cpu_table.h after
  * cpu_simd.h. */
 #ifndef TRIP_CPU_EXP_H
 #define TRIP_CPU_EXP_H

@@ -1,22 +1,5 @@
 /* The kernels for plain C, for any processor. */
 #define TRIP_SIMD TRIP_SIMD_PLAIN
-#include "cpu_simd.h"
+#include "cpu_table.h"
 
-#include "cpu_blend.h"
-#include "cpu_merge.h"
-#include "cpu_project.h"
-
-#include "cpu_isa.h"
-
-const trip_cpu_kernels trip_cpu_plain = {
-    .isa = "plain",
-    .lanes = V,
-    .stage = stage,
-    .project = project,
-    .tile_clear = tile_clear,
-    .tile_begin = tile_begin,
-    .tile_blend = tile_blend,
-    .tile_end = tile_end,
-    .tile_merge = tile_merge,
-    .tile_finish = tile_finish,
-};
+const trip_cpu_kernels trip_cpu_plain = TRIP_CPU_TABLE("plain");

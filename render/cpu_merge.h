@@ -1,5 +1,5 @@
 /* Kernels that begin and finish the pixels of a tile: weights of the lists, the merge (equation 3
- * of Hofsetz, Max & Bastos 2008) and the picture. Included by each cpu_isa_*.c after cpu_blend.h.
+ * of Hofsetz, Max & Bastos 2008) and the picture. Included by cpu_table.h after cpu_blend.h.
  * Where a list begins the weights are computed in double precision by the operations of weight.c in
  * their order, so that it does not depend on who asks. */
 #ifndef TRIP_CPU_MERGE_H

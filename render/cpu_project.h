@@ -1,5 +1,5 @@
-/* Kernels that turn the voxels of runs into projected splats, V at a time: included by each
- * cpu_isa_*.c after cpu_simd.h. Positions are computed in double precision from the voxel's
+/* Kernels that turn the voxels of runs into projected splats, V at a time: included by
+ * cpu_table.h after cpu_simd.h. Positions are computed in double precision from the voxel's
  * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
  * footprint in single. The few splats near the plane of the eye go through trip_cpu_project_near().
  */

@@ -1,0 +1,18 @@
+/* Every kernel for one instruction set: each cpu_isa_*.c includes it once TRIP_SIMD is defined. */
+#ifndef TRIP_CPU_TABLE_H
+#define TRIP_CPU_TABLE_H
+
+#include "cpu_blend.h"
+#include "cpu_isa.h"
+#include "cpu_merge.h"
+#include "cpu_project.h"
+#include "cpu_simd.h"
+
+#define TRIP_CPU_TABLE(name)                                                                       \
+    {                                                                                              \
+        .isa = name, .lanes = V, .stage = stage, .project = project, .tile_clear = tile_clear,     \
+        .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
+        .tile_merge = tile_merge, .tile_finish = tile_finish,                                      \
+    }
+
+#endif
