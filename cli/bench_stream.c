@@ -263,7 +263,8 @@ static void describe(const stream *t, bench_report *r)
                           "that takes batches and does nothing. Bricks that the plan leaves out "
                           "are not read, so that its bytes are fewer, with holes in between.");
     bench_report_limit(r, "Draw alone: the same frame with the data set in memory (null engine), "
-                          "from memory besides the promise; its copying is part of it.");
+                          "besides the promise; gl copies it to memory of its own, the others draw "
+                          "it where it lies.");
     if (t->frame.covering)
         bench_report_limit(r, "The frame leaves out bricks behind what is opaque, which reading "
                               "alone cannot.");

@@ -22,8 +22,8 @@ PICTURE_SIZE = 512
 NOTES = [
     "A frame is the wall time of one view from the volume in memory to the finished picture in "
     "memory. No figure contains a disk, except vdb_render's.",
-    "triptych-cpu, triptych-gl: planning, copying bricks from memory, drawing, merging, and for gl "
-    "reading the picture back (triptych bench renderers).",
+    "triptych-cpu, triptych-gl: planning, drawing, merging, and for gl copying bricks to its own "
+    "memory and reading the picture back (triptych bench renderers).",
     "vtk-cpu: Render() of a window that shows one volume by vtkFixedPointVolumeRayCastMapper, one "
     "sample a voxel, one ray a pixel, no automatic coarsening; showing the finished picture by "
     "OpenGL, the display time, is part of it.",
