@@ -21,9 +21,13 @@ typedef struct bench_disk_read {
     bool direct; /* O_DIRECT was not refused */
 } bench_disk_read;
 
-/* Into memory as the system gives it to any program, or into large pages, which the reader's ring
- * is in where the system has them. */
-int bench_files_read(const session *s, bench_files files, bool large_pages, bench_disk_read *out);
+typedef enum bench_plain {
+    BENCH_PLAIN,           /* into memory as the system gives it to any program */
+    BENCH_PLAIN_LARGE,     /* into large pages, which the ring is in where the system has them */
+    BENCH_PLAIN_LOOKED_AT, /* the same, and a byte of every cache line is looked at */
+} bench_plain;
+
+int bench_files_read(const session *s, bench_files files, bench_plain how, bench_disk_read *out);
 
 /* The same bytes as the reader streams them: every splat of the files' lists, checked against its
  * checksum and handed out, and not drawn. The reader reads the files' planes and skips nothing. */

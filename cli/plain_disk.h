@@ -15,6 +15,7 @@ typedef struct plain_disk {
     double seconds;
     uint64_t bytes;
     bool direct; /* the last file was opened with O_DIRECT */
+    bool look;   /* a byte of every cache line that is read is looked at */
 } plain_disk;
 
 /* `memory`: PLAIN_DISK_MEMORY_BYTES, aligned to 4096. */

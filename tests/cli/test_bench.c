@@ -141,6 +141,7 @@ static void stream_reads_the_files_of_all_lists(void **state)
                     file_bytes("block.trip/y.normals") + file_bytes("block.trip/z.normals");
     assert_true(number(stage(rows, "plain"), "bytes_read") == planes);
     assert_true(number(stage(rows, "plain_large"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "plain_looked_at"), "bytes_read") == planes);
     assert_true(number(stage(rows, "streamed"), "bytes_read") == planes);
     assert_true(number(stage(rows, "read"), "bytes_read") == planes);
     assert_true(number(stage(rows, "frame"), "bytes_read") == planes);
