@@ -52,7 +52,7 @@ INLINE vw rows_of_below(vw bottom)
 INLINE unsigned open_in(const _Atomic uint64_t *open, vi tile, vi columns, vw rows_low,
                         vw rows_high)
 {
-    vi bytes = (columns & 0xff) * 0x01010101;
+    vi bytes = (vi)((vu)(columns & 0xff) * 0x01010101u);
     vw low = vw_low(bytes), high = vw_high(bytes);
     low = (low | low << 32) & rows_low & vw_gather(open, vw_low(tile));
     high = (high | high << 32) & rows_high & vw_gather(open, vw_high(tile));
