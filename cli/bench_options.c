@@ -274,7 +274,7 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"
                "  stream     reading and drawing against the disk's bandwidth\n"
                "  renderers  the renderers there are, over views round the object\v"
-               "Runs of what is compared take turns, so that a machine "
+               "What is compared takes turns, so that a machine "
                "busy for a while slows all of them.",
     };
     *o = (bench_options){ .views = 20, .settings = trip_settings_default() };

@@ -85,14 +85,15 @@ static int take(stream *t, int stage, sample *out)
     const bench_frame *frames[STAGES] = {
         [READ] = &t->unread, [DRAW] = &t->in_memory, [FRAME] = &t->frame
     };
+    static const bench_plain plain[] = {
+        [PLAIN] = BENCH_PLAIN, [LARGE] = BENCH_PLAIN_LARGE, [LOOKED_AT] = BENCH_PLAIN_LOOKED_AT
+    };
     bench_cost cost;
     if (stage == DRAW && !t->in_memory.renderer)
         return 0;
     bench_files_forget(t->session, t->files);
-    if (stage == PLAIN)
-        return take_plain(t, BENCH_PLAIN, out);
-    if (stage == LARGE || stage == LOOKED_AT)
-        return take_plain(t, stage == LARGE ? BENCH_PLAIN_LARGE : BENCH_PLAIN_LOOKED_AT, out);
+    if (stage <= LOOKED_AT)
+        return take_plain(t, plain[stage], out);
     if (stage == STREAMED)
         return take_streamed(t, out);
     int status = bench_frame_draw(frames[stage], false, &cost);

@@ -1,7 +1,8 @@
 /* Kernels that begin and finish the pixels of a tile: weights of the lists, the merge (equation 3
  * of Hofsetz, Max & Bastos 2008) and the picture. Included by cpu_table.h after cpu_blend.h.
- * Where a list begins the weights are computed in double precision by the operations of weight.c in
- * their order, so that it does not depend on who asks. */
+ * The weights are computed in double precision by the operations of weight.c in their order, so
+ * that where a list begins does not depend on who asks, and what is near there is exact for any h.
+ */
 #ifndef TRIP_CPU_MERGE_H
 #define TRIP_CPU_MERGE_H
 
@@ -131,30 +132,17 @@ static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pix
     }
 }
 
-/* 1 / the sum of the squares of the lists' weights at a block, all but one factor of them taken
- * out: (1 - h)^2 m^2 / sum max(0, |r_a| - h m)^2, m = max |r_a|. 1 unless lists are merged. No list
- * begins or ends here, so single precision will do. */
+/* 1 / the sum of the squares of the lists' weights at a block: 1 unless lists are merged. */
 INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
 {
-    const trip_camera *c = &view->splat.camera;
-    const trip_settings *s = view->of->settings;
-    const vf h = v_set((float)s->h), rest = v_set(1) - h;
-    if (s->method != TRIP_METHOD_MERGE)
+    vf sum = v_set(0);
+    if (view->of->settings->method != TRIP_METHOD_MERGE)
         return v_set(1);
-    vf px = block_x((unsigned)b) + v_set((float)x), py = block_y((unsigned)b) + v_set((float)y);
-    vf r[3], sum = v_set(0);
-    for (int a = 0; a < 3; a++) {
-        vf across = v_set(c->ortho ? 0 : (float)trip_component(c->rx, a));
-        vf down = v_set(c->ortho ? 0 : (float)trip_component(c->ry, a));
-        r[a] = v_abs(v_fma(px, across, v_fma(py, down, v_set((float)trip_component(c->r0, a)))));
-    }
-    vf most = v_max(r[0], v_max(r[1], r[2]));
-    for (int a = 0; a < 3; a++) {
-        vf w = v_max(v_set(0), v_fnma(h, most, r[a]));
+    for (int axis = 0; axis < 3; axis++) {
+        vf w = weight(view, axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
         sum = v_fma(w, w, sum);
     }
-    vf all = rest * most;
-    return all * all / sum;
+    return v_set(1) / sum;
 }
 
 /* Block b of the picture before the background. */

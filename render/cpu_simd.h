@@ -218,30 +218,14 @@ INLINE vm v_gt(vf a, vf b)
     return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_GT_OQ);
 }
 
-INLINE vm v_ge_and(vm m, vf a, vf b)
-{
-    return _mm512_mask_cmp_ps_mask(m, (__m512)a, (__m512)b, _CMP_GE_OQ);
-}
-
 INLINE vm vm_and(vm a, vm b)
 {
     return (vm)(a & b);
 }
 
-INLINE vm vm_and_not(vm a, vm b)
-{
-    return (vm)(a & ~b);
-}
-
 INLINE vf v_select(vm m, vf a, vf b)
 {
     return (vf)_mm512_mask_blend_ps(m, (__m512)b, (__m512)a);
-}
-
-/* m ? a * b : a */
-INLINE vf v_mul_where(vm m, vf a, vf b)
-{
-    return (vf)_mm512_mask_mul_ps((__m512)a, m, (__m512)a, (__m512)b);
 }
 
 /* m ? c - a * b : a */
@@ -378,29 +362,14 @@ INLINE vm v_gt(vf a, vf b)
     return (vm)(a > b);
 }
 
-INLINE vm v_ge_and(vm m, vf a, vf b)
-{
-    return m & (vm)(a >= b);
-}
-
 INLINE vm vm_and(vm a, vm b)
 {
     return a & b;
 }
 
-INLINE vm vm_and_not(vm a, vm b)
-{
-    return a & ~b;
-}
-
 INLINE vf v_select(vm m, vf a, vf b)
 {
     return (vf)((m & (vi)a) | (~m & (vi)b));
-}
-
-INLINE vf v_mul_where(vm m, vf a, vf b)
-{
-    return v_select(m, a * b, a);
 }
 
 INLINE vm vm_first(unsigned lanes)

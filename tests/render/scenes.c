@@ -206,16 +206,9 @@ void scene_picture_free(scene_picture *p)
 
 double scene_difference(const scene_picture *a, const scene_picture *b)
 {
-    double most = 0;
     assert_int_equal(a->width, b->width);
     assert_int_equal(a->height, b->height);
-    for (size_t i = 0; i < 4 * (size_t)a->width * (size_t)a->height; i++) {
-        /* Not fmax(): GCC 12 for 64-bit ARM fails with an internal error on this loop with it. */
-        double apart = fabs((double)a->rgba[i] - (double)b->rgba[i]);
-        if (apart > most)
-            most = apart;
-    }
-    return most;
+    return test_most_apart(a->rgba, b->rgba, 4 * (size_t)a->width * (size_t)a->height);
 }
 
 trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distance,

@@ -16,8 +16,7 @@ static double mean_difference(const scene_picture *a, const scene_picture *b)
     return sum / (double)n;
 }
 
-/* What instruction sets may differ by: they round alike but for fused products and the rough
- * reciprocals, which only bound footprints. */
+/* What instruction sets may differ by: they round alike but for fused products. */
 #define SETS_DIFFER (0.05 / 255)
 
 /* Within 1/255 everywhere, 0.05/255 on average, and the same counts, with every instruction set;
@@ -123,6 +122,23 @@ static void every_method_and_traversal_agrees_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
+/* Weights are differences from h: here half of what is left between h and 1. */
+static void lists_that_begin_next_to_1_merge_as_in_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 16, NULL);
+    for (int i = 3; i <= 6; i++) {
+        double left = pow(10, -i);
+        trip_settings settings = trip_settings_default();
+        trip_camera_params view = scene_view(&s, trip_v3(1, 1 - 0.5 * left, 0.6), 60, 50, 70);
+        view.ortho_height = 50;
+        settings.h = 1 - left;
+        compare(&s, &view, &settings);
+    }
+    scene_destroy(&s);
+}
+
 static void kernels_light_and_background_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -196,6 +212,7 @@ int main(void)
         cmocka_unit_test(the_eye_may_be_inside_and_the_view_wide),
         cmocka_unit_test(a_voxel_may_cover_many_tiles_and_many_voxels_a_pixel),
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
+        cmocka_unit_test(lists_that_begin_next_to_1_merge_as_in_the_reference),
         cmocka_unit_test(kernels_light_and_background_agree_with_the_reference),
         cmocka_unit_test(images_of_any_size_are_filled_to_their_edges),
         cmocka_unit_test(an_instruction_set_this_machine_lacks_is_refused),
