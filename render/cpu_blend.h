@@ -459,7 +459,7 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 }
 
 /* Splats to fetch ahead: they lie scattered among those of other tiles. */
-#define AHEAD 16
+#define AHEAD 32
 
 INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
                          const uint16_t *order, uint32_t count)

@@ -273,12 +273,7 @@ INLINE v3 unpack_normal(vi normal, vf *magnitude)
     return unit(n);
 }
 
-INLINE vf clamp01(vf a)
-{
-    return v_min(v_set(1), v_max(v_set(0), a));
-}
-
-/* As trip_shade(). */
+/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0. */
 INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
 {
     const trip_settings *s = view->of->settings;
@@ -292,16 +287,16 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
     }
     vf strength = v_min(v_set(1), magnitude * v_set(view->gradient_most));
     vf diffuse = v_abs(dot(normal, light));
-    vf h2 = dot(normal, half) * dot(normal, half);
+    /* Processors are slow with numbers below 2^-126, as a 24th power soon is. */
+    vf h2 = v_max(dot(normal, half) * dot(normal, half), v_set(0x1p-8f));
     vf h8 = (h2 * h2) * (h2 * h2);
     static_assert((int)TRIP_SHININESS == 24, "the power below");
     vf gloss = strength * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
     vf matt = v_fma(diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
     matt = v_fma(strength, matt, v_set(1));
-    vm flat = v_ge(v_set(0), magnitude);
-    return (colour){ v_select(flat, c.r, clamp01(v_fma(c.r, matt, gloss))),
-                     v_select(flat, c.g, clamp01(v_fma(c.g, matt, gloss))),
-                     v_select(flat, c.b, clamp01(v_fma(c.b, matt, gloss))) };
+    return (colour){ v_min(v_set(1), v_fma(c.r, matt, gloss)),
+                     v_min(v_set(1), v_fma(c.g, matt, gloss)),
+                     v_min(v_set(1), v_fma(c.b, matt, gloss)) };
 }
 
 /* ---- putting it together ---- */
