@@ -98,31 +98,86 @@ static double most_turn(const trip_cpu_view *view)
     return sqrt(fmax(view->splat.rxrx, view->splat.ryry)) * view->forward_length;
 }
 
-trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
-                                  const trip_cpu_box *box)
+/* A box on the screen. */
+typedef struct outline {
+    spread x, y;
+    double grown; /* supports, at most */
+    double z, inverse_nearest;
+} outline;
+
+static const double *depth_along(const trip_cpu_view *view)
 {
-    const double none[4] = { 0, 0, 0, 0 };
-    const trip_camera *camera = &view->splat.camera;
-    const double *along_z = camera->ortho ? none : view->along_z;
-    double inverse = 1, inverse_nearest = 1, growth = 0;
-    if (!camera->ortho) {
+    static const double none[4] = { 0, 0, 0, 0 };
+    return view->splat.camera.ortho ? none : view->along_z;
+}
+
+/* TRIP_CPU_SHOWN, or what is to be said of the box where nothing can be worked out. */
+static trip_cpu_cover find_outline(const trip_cpu_view *view, const trip_cpu_box *box, outline *out)
+{
+    const double *along_z = depth_along(view);
+    double inverse = 1, growth = 0;
+    out->z = out->inverse_nearest = 1;
+    if (!view->splat.camera.ortho) {
         double radius = view->of->settings->kernel_radius * view->forward_length;
         double z = dot(along_z, box->middle) + along_z[3], deep = reach(along_z, box->half);
         if (z - deep < (NEAREST_RADII + 1) * radius)
             return z + deep + radius <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
         inverse = 1 / z;
-        inverse_nearest = 1 / (z - deep);
+        out->z = z;
+        out->inverse_nearest = 1 / (z - deep);
     }
-    spread x = spread_of(view, view->along_x, along_z, box, inverse, inverse_nearest);
-    spread y = spread_of(view, view->along_y, along_z, box, inverse, inverse_nearest);
-    if (!camera->ortho) {
-        growth = sqrt(2) * (x.support > y.support ? x.support : y.support) * most_turn(view);
-        if (growth > MOST_GROWTH)
-            return TRIP_CPU_PARTLY;
+    out->x = spread_of(view, view->along_x, along_z, box, inverse, out->inverse_nearest);
+    out->y = spread_of(view, view->along_y, along_z, box, inverse, out->inverse_nearest);
+    if (!view->splat.camera.ortho) {
+        double most = out->x.support > out->y.support ? out->x.support : out->y.support;
+        growth = sqrt(2) * most * most_turn(view);
     }
-    double grown = 1 / (1 - growth);
-    return cover_of(mask, pixels(x.middle, x.centres + x.support * grown, camera->width),
-                    pixels(y.middle, y.centres + y.support * grown, camera->height));
+    out->grown = 1 / (1 - growth);
+    return growth > MOST_GROWTH ? TRIP_CPU_PARTLY : TRIP_CPU_SHOWN;
+}
+
+trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
+                                  const trip_cpu_box *box)
+{
+    const trip_camera *camera = &view->splat.camera;
+    outline o;
+    trip_cpu_cover cover = find_outline(view, box, &o);
+    if (cover != TRIP_CPU_SHOWN)
+        return cover;
+    return cover_of(mask, pixels(o.x.middle, o.x.centres + o.x.support * o.grown, camera->width),
+                    pixels(o.y.middle, o.y.centres + o.y.support * o.grown, camera->height));
+}
+
+/* With x that of a square's own middle, x - x0 is at most `centres` of the region, by which a slope
+ * (X - x z)' may differ. */
+static trip_cpu_line line_of(const double along[4], const double along_z[4], const spread *s,
+                             const outline *o)
+{
+    trip_cpu_line line = { .middle = s->middle };
+    double slopes = 0;
+    for (int i = 0; i < 2; i++) {
+        line.by[i] = along[i] - s->middle * along_z[i];
+        slopes += fabs(line.by[i]) + s->centres * fabs(along_z[i]);
+    }
+    double centres = 0.5 * (TRIP_CPU_SQUARE - 1) * slopes * o->inverse_nearest;
+    line.reach = centres + s->support * o->grown + SLACK_PX;
+    return line;
+}
+
+trip_cpu_cover trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int64_t sheet,
+                                    trip_cpu_region *region)
+{
+    const double half = 0.5 * (TRIP_CPU_REGION - 1), *along_z = depth_along(view);
+    trip_cpu_box box = { { u + half, v + half, (double)sheet }, { half, half, 0 } };
+    outline o;
+    trip_cpu_cover cover = find_outline(view, &box, &o);
+    if (cover != TRIP_CPU_SHOWN)
+        return cover;
+    *region = (trip_cpu_region){ .x = line_of(view->along_x, along_z, &o.x, &o),
+                                 .y = line_of(view->along_y, along_z, &o.y, &o),
+                                 .z = o.z,
+                                 .z_by = { along_z[0], along_z[1] } };
+    return TRIP_CPU_SHOWN;
 }
 
 static const trip_file_slab *slab_of(const trip_list *list, uint64_t brick)

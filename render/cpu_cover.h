@@ -39,6 +39,27 @@ typedef enum trip_cpu_cover {
 trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
                                   const trip_cpu_box *box);
 
+/* Squares of voxels of a sheet, and regions of 8 x 8 squares. */
+#define TRIP_CPU_SQUARE 8
+#define TRIP_CPU_REGION 64
+
+/* A screen coordinate of the middles of squares: middle + (by . d) / z, d the square's middle in
+ * (u, v) from the region's; and how far from there any support in the square reaches. */
+typedef struct trip_cpu_line {
+    double middle, by[2], reach;
+} trip_cpu_line;
+
+/* Squares of it lie in Morton order, u first. */
+typedef struct trip_cpu_region {
+    trip_cpu_line x, y;
+    double z, z_by[2]; /* depth: z + z_by . d; 1 in parallel views */
+} trip_cpu_region;
+
+/* The region whose first voxel is (u, v). TRIP_CPU_HIDDEN and TRIP_CPU_PARTLY: there are no numbers
+ * for it, it is behind the eye or may be anywhere. */
+trip_cpu_cover trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int64_t sheet,
+                                    trip_cpu_region *region);
+
 /* The voxels of a brick of the view's list; `sheets` as a range cuts it, inclusive. */
 trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
                                 int64_t last_sheet);

@@ -136,9 +136,16 @@ typedef enum trip_cpu_content {
     TRIP_CPU_SUM,   /* of several lists, as merged */
 } trip_cpu_content;
 
+struct trip_cpu_region;
+
 typedef struct trip_cpu_kernels {
     const char *isa;
     unsigned lanes;
+
+    /* Which squares of a region may show, by trip_cpu_mask's words: in Morton order, a bit each,
+     * the first lowest. */
+    uint64_t (*squares)(const trip_cpu_view *view, const struct trip_cpu_region *region,
+                        const _Atomic uint64_t *open, trip_cpu_lanes *lanes);
 
     /* Adds voxels of one run to `staged` in draw order, leaving out transparent ones; at most
      * TRIP_CPU_STAGED - `filled` voxels. Returns the new fill. */

@@ -112,8 +112,9 @@ static void count_span(const cpu *r, trip_cpu_chunk *chunk, const trip_cpu_span 
 }
 
 /* What of a chunk may show: at most a span a voxel. */
-static uint32_t show_chunk(const cpu *r, trip_cpu_chunk *chunk, trip_cpu_span *shown)
+static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
 {
+    const trip_cpu_asking asking = { r->kernels, &r->view, &r->mask, r->batch, &w->scratch.lanes };
     bool reversed = r->batch->selection->descending;
     uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
@@ -123,7 +124,7 @@ static uint32_t show_chunk(const cpu *r, trip_cpu_chunk *chunk, trip_cpu_span *s
         trip_cpu_span part = trip_cpu_span_part(&all, reversed, skip, count);
         if (r->frame->count)
             count_span(r, chunk, &part);
-        n += trip_cpu_show(&r->view, &r->mask, r->batch, &part, shown + n);
+        n += trip_cpu_show(&asking, &part, w->shown + n);
         left -= count;
         skip = 0;
     }
@@ -168,7 +169,7 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
     cpu *r = context;
     worker *w = &r->workers[thread];
     trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
-    uint32_t staged = 0, shown = show_chunk(r, chunk, w->shown), voxels = 0;
+    uint32_t staged = 0, shown = show_chunk(r, w, chunk), voxels = 0;
     for (uint32_t i = 0; i < shown; i++)
         voxels += w->shown[i].count;
     if (voxels == 0 || !trip_cpu_flush_claim(r->filling, chunk, voxels))

@@ -1,6 +1,6 @@
 /* Which voxels of a batch's runs may show: those whose squares are not hidden by closed blocks of
- * pixels. Voxels lie in Morton order, so that those of an aligned square follow one another. Any
- * thread may ask. */
+ * pixels. Voxels lie in Morton order, so that those of a square follow one another. Any thread may
+ * ask. */
 #ifndef TRIP_CPU_SHOW_H
 #define TRIP_CPU_SHOW_H
 
@@ -20,14 +20,18 @@ static inline trip_cpu_span trip_cpu_span_part(const trip_cpu_span *s, bool reve
     return (trip_cpu_span){ s->run, s->first + (reversed ? s->count - skip - count : skip), count };
 }
 
+/* Who asks. */
+typedef struct trip_cpu_asking {
+    const trip_cpu_kernels *kernels;
+    const trip_cpu_view *view;
+    const trip_cpu_mask *mask;
+    const trip_batch *batch;
+    trip_cpu_lanes *lanes; /* to work in */
+} trip_cpu_asking;
+
 /* Writes those of a span's voxels that may show to `shown`, in draw order, and returns how many
  * spans they are: at most one a voxel. */
-uint32_t trip_cpu_show(const trip_cpu_view *view, const trip_cpu_mask *mask,
-                       const trip_batch *batch, const trip_cpu_span *span, trip_cpu_span *shown);
-
-/* How many voxels lie in the same square of `edge` (a power of two) as the first: as the first in
- * memory, or the last when `reversed`. */
-uint32_t trip_cpu_square_count(const uint32_t *voxels, uint32_t count, unsigned edge,
-                               bool reversed);
+uint32_t trip_cpu_show(const trip_cpu_asking *asking, const trip_cpu_span *span,
+                       trip_cpu_span *shown);
 
 #endif

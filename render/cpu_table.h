@@ -7,12 +7,13 @@
 #include "cpu_merge.h"
 #include "cpu_project.h"
 #include "cpu_simd.h"
+#include "cpu_squares.h"
 
 #define TRIP_CPU_TABLE(name)                                                                       \
     {                                                                                              \
-        .isa = name, .lanes = V, .stage = stage, .project = project, .tile_clear = tile_clear,     \
-        .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
-        .tile_merge = tile_merge, .tile_finish = tile_finish,                                      \
+        .isa = name, .lanes = V, .squares = squares, .stage = stage, .project = project,           \
+        .tile_clear = tile_clear, .tile_begin = tile_begin, .tile_blend = tile_blend,              \
+        .tile_end = tile_end, .tile_merge = tile_merge, .tile_finish = tile_finish,                \
     }
 
 #endif

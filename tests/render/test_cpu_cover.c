@@ -1,10 +1,12 @@
 /* What counts as hidden: never a voxel with a pixel of its support in an open block, by the
  * definition of splats in double precision. */
-#include "cpu_cover.h"
+#include "cpu_isa.h"
 #include "cpu_near.h"
+#include "cpu_show.h"
 #include "scenes.h"
 #include "test.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum { SIZE = 96, ACROSS = 3 };
@@ -122,11 +124,106 @@ static void without_closed_blocks_all_is_shown(void **state)
     scene_destroy(&s);
 }
 
+/* ---- what a run shows ---- */
+
+/* Two by two regions. */
+enum { TILE = 128 };
+
+typedef struct run_looks {
+    looks looks;
+    trip_cpu_lanes lanes;
+    uint32_t voxels[TILE * TILE];
+    trip_cpu_span shown[TILE * TILE];
+    bool is_shown[TILE * TILE];
+    uint32_t count, hidden, left_in; /* left_in: that reach no open block */
+} run_looks;
+
+/* Every third voxel of a tile, in Morton order. */
+static void fill_run(run_looks *r)
+{
+    r->count = 0;
+    for (uint32_t i = 0; i < TILE * TILE; i++) {
+        uint32_t u = 0, v = 0;
+        for (unsigned bit = 0; bit < 7; bit++) {
+            u |= (i >> 2 * bit & 1) << bit;
+            v |= (i >> (2 * bit + 1) & 1) << bit;
+        }
+        if (scene_hash((int)i, 1, 2) % 3 == 0)
+            r->voxels[r->count++] = u | v << 8;
+    }
+}
+
+/* Spans are parts of the run in draw order. */
+static void mark_shown(run_looks *r, uint32_t spans, bool descending)
+{
+    uint64_t next = descending ? r->count : 0;
+    memset(r->is_shown, 0, sizeof r->is_shown);
+    for (uint32_t i = 0; i < spans; i++) {
+        const trip_cpu_span *s = &r->shown[i];
+        assert_true(s->count > 0);
+        if (descending)
+            assert_true(s->first + s->count <= next);
+        else
+            assert_true(s->first >= next && s->first + s->count <= r->count);
+        next = descending ? s->first : s->first + s->count;
+        for (uint32_t k = 0; k < s->count; k++)
+            r->is_shown[s->first + k] = true;
+    }
+}
+
+static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, unsigned x,
+                      unsigned y)
+{
+    for (int descending = 0; descending < 2; descending++) {
+        trip_selection selection = { .descending = descending };
+        trip_run run = { .count = r->count, .sheet = sheet };
+        trip_batch batch = { .selection = &selection, .voxels = r->voxels };
+        trip_cpu_asking asking = { kernels, &r->looks.view, &r->looks.mask, &batch, &r->lanes };
+        trip_cpu_span all = { &run, 0, r->count };
+        mark_shown(r, trip_cpu_show(&asking, &all, r->shown), descending);
+        for (uint32_t i = 0; i < r->count; i++) {
+            const double at[3] = { trip_voxel_u(r->voxels[i]), trip_voxel_v(r->voxels[i]), sheet };
+            bool reached = reaches(&r->looks, at, x, y);
+            assert_false(reached && !r->is_shown[i]);
+            r->hidden += !r->is_shown[i];
+            r->left_in += r->is_shown[i] && !reached;
+        }
+    }
+}
+
+static void runs_show_all_that_reaches_an_open_block(void **state)
+{
+    (void)state;
+    scene s;
+    run_looks *r = aligned_alloc(64, (sizeof *r + 63) / 64 * 64);
+    assert_non_null(r);
+    r->hidden = r->left_in = 0;
+    scene_create(&s, &(scene_params){ .dims = { TILE, TILE, 8 }, .tile_voxels = TILE });
+    fill_run(r);
+    for (int i = 0; i < 4; i++) {
+        trip_vec3 from = { 0.3 * i, -0.2 * i, i % 2 ? 1 : -1 };
+        trip_camera_params view = scene_view(&s, from, 300 - 50 * i, 30, SIZE);
+        view.ortho_height = i == 2 ? 110 : 0;
+        look(&r->looks, &s, &view, 2);
+        for (unsigned k = 0; k < 12; k++) {
+            unsigned x = 2 * k, y = (5 * k + 7) % 24;
+            open_only(&r->looks, x, y);
+            for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++)
+                check_run(r, *isa, (int)k % 8, x, y);
+        }
+    }
+    print_message("%u hidden, %u left in\n", r->hidden, r->left_in);
+    assert_true(r->hidden > 10 * r->left_in);
+    scene_destroy(&s);
+    free(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_hidden_reaches_no_open_block),
         cmocka_unit_test(without_closed_blocks_all_is_shown),
+        cmocka_unit_test(runs_show_all_that_reaches_an_open_block),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
