@@ -213,52 +213,71 @@ INLINE void store_block(trip_cpu_scratch *s, unsigned number, const patch *p)
     v_store(pixels + 3 * V, p->t);
 }
 
-/* The splat of the lowest bit. Its address is kept in one register: sums of two in every operand
- * would cost the processor an operation each. */
-INLINE const trip_cpu_splat *first_of(const trip_cpu_splat *local, uint64_t splats)
+/* Which splats of the group may touch a block, a bit each. */
+typedef struct touching {
+    const trip_cpu_splat *local;
+    uint64_t splats[TRIP_CPU_LOCAL / 64];
+} touching;
+
+typedef void blend_one(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
+                       bool front_to_back, trip_target target);
+
+/* In order. Where bits can be packed to a list at once, the processor has to guess but one end of a
+ * loop, not one for each word. The address is kept in one register: sums of two in every operand
+ * would cost an operation each. */
+INLINE void blend_each(patch *p, const touching *t, blend_one *one, trip_cpu_rays rays,
+                       bool front_to_back, trip_target target)
 {
-    local += __builtin_ctzll(splats);
-    __asm__("" : "+r"(local));
-    return local;
+#ifdef V_PACKS_BITS
+    uint8_t numbers[TRIP_CPU_LOCAL + 64];
+    uint32_t count = 0;
+    static_assert(TRIP_CPU_LOCAL <= 256, "numbers of a byte");
+    for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
+        count += v_pack_bits(numbers + count, t->splats[word], 64 * word);
+    for (uint32_t i = 0; i < count; i++) {
+        const trip_cpu_splat *splat = t->local + numbers[i];
+        __asm__("" : "+r"(splat));
+        one(p, splat, rays, front_to_back, target);
+    }
+#else
+    for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
+        for (uint64_t rest = t->splats[word]; rest; rest &= rest - 1) {
+            const trip_cpu_splat *splat = t->local + 64 * word + __builtin_ctzll(rest);
+            __asm__("" : "+r"(splat));
+            one(p, splat, rays, front_to_back, target);
+        }
+#endif
 }
 
-/* Some of the splats from `local` on, in order, where none is thick and no pixel closes; false,
- * with nothing done, when one would. */
-INLINE bool blend_open(patch *p, const trip_cpu_splat *local, uint64_t splats, trip_cpu_rays rays)
+INLINE void blend_thin_open(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
+                            bool front_to_back, trip_target target)
+{
+    (void)front_to_back;
+    (void)target;
+    put_behind_open(p, splat, opacity(p, splat, false, rays));
+}
+
+INLINE void blend_any(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays, bool front_to_back,
+                      trip_target target)
+{
+    bool thick = splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT;
+    if (front_to_back)
+        put_behind(p, splat, opacity(p, splat, thick, rays), target);
+    else
+        put_over(p, splat, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
+}
+
+/* The splats where none is thick; false, with nothing done, when a pixel is closed or would be. */
+INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 {
     patch q = *p;
     if (!all_open(q.t))
         return false;
-    /* Two at a time where the registers suffice: while one waits, the other goes on. */
-    while (V == 16 && (splats & (splats - 1))) {
-        const trip_cpu_splat *one = first_of(local, splats);
-        const trip_cpu_splat *two = first_of(local, splats &= splats - 1);
-        vf opacity_one = opacity(&q, one, false, rays), opacity_two = opacity(&q, two, false, rays);
-        put_behind_open(&q, one, opacity_one);
-        put_behind_open(&q, two, opacity_two);
-        splats &= splats - 1;
-    }
-    for (; splats; splats &= splats - 1) {
-        const trip_cpu_splat *splat = first_of(local, splats);
-        put_behind_open(&q, splat, opacity(&q, splat, false, rays));
-    }
+    blend_each(&q, t, blend_thin_open, rays, true, TRIP_TARGET_RGBA32F);
     if (!all_open(q.t))
         return false;
     *p = q;
     return true;
-}
-
-INLINE void blend_any(patch *p, const trip_cpu_splat *local, uint64_t splats, trip_cpu_rays rays,
-                      bool front_to_back, trip_target target)
-{
-    do {
-        const trip_cpu_splat *splat = first_of(local, splats);
-        bool thick = splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT;
-        if (front_to_back)
-            put_behind(p, splat, opacity(p, splat, thick, rays), target);
-        else
-            put_over(p, splat, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
-    } while (splats &= splats - 1);
 }
 
 /* All splats of the group that may touch a block, in order; false when its pixels take no more
@@ -267,17 +286,15 @@ INLINE bool blend_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
                         bool front_to_back, trip_target target)
 {
     patch p = load_block(s, number, rays);
-    for (uint32_t first = 0; first < s->splats; first += 64) {
-        uint64_t splats = s->touched[number / 64][first / 64][place_of(number % 64)];
-        if (splats == 0)
-            continue;
-        if (front_to_back && target == TRIP_TARGET_RGBA32F && !(splats & s->thick[first / 64]) &&
-            blend_open(&p, s->local + first, splats, rays))
-            continue;
-        if (front_to_back && !any_open(p.t))
-            break;
-        blend_any(&p, s->local + first, splats, rays, front_to_back, target);
+    touching t = { .local = s->local };
+    uint64_t thick = 0;
+    for (unsigned word = 0; word < (s->splats + 63) / 64; word++) {
+        t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
+        thick |= t.splats[word] & s->thick[word];
     }
+    bool simple = front_to_back && target == TRIP_TARGET_RGBA32F && !thick;
+    if (!simple || !blend_open(&p, &t, rays))
+        blend_each(&p, &t, blend_any, rays, front_to_back, target);
     store_block(s, number, &p);
     return !front_to_back || any_open(p.t);
 }

@@ -6,7 +6,7 @@
 #include "report.h"
 
 /* Once, so that the list below is complete when any thread sees it. */
-static const trip_cpu_kernels *runnable[4];
+static const trip_cpu_kernels *runnable[5];
 
 __attribute__((constructor)) static void find_runnable(void)
 {
@@ -14,9 +14,12 @@ __attribute__((constructor)) static void find_runnable(void)
 #if defined(__x86_64__)
     __builtin_cpu_init();
     bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                __builtin_cpu_supports("bmi");
-    if (avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
+                __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
+    bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                  __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+    if (avx512 && __builtin_cpu_supports("avx512vbmi2"))
+        runnable[n++] = &trip_cpu_avx512_vbmi2;
+    if (avx512)
         runnable[n++] = &trip_cpu_avx512;
     if (avx2)
         runnable[n++] = &trip_cpu_avx2;

@@ -1,5 +1,6 @@
 /* Which instruction set the CPU renderer runs on: the widest that both this build and the processor
- * have, or the one named by TRIPTYCH_ISA (plain, avx2, avx512, neon). */
+ * have, or the one named by TRIPTYCH_ISA (plain, avx2, avx512,
+ * avx512-vbmi2, neon). */
 #ifndef TRIP_CPU_ISA_H
 #define TRIP_CPU_ISA_H
 
@@ -7,7 +8,7 @@
 
 extern const trip_cpu_kernels trip_cpu_plain;
 #if defined(__x86_64__)
-extern const trip_cpu_kernels trip_cpu_avx2, trip_cpu_avx512;
+extern const trip_cpu_kernels trip_cpu_avx2, trip_cpu_avx512, trip_cpu_avx512_vbmi2;
 #elif defined(__aarch64__)
 extern const trip_cpu_kernels trip_cpu_neon;
 #endif

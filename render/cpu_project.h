@@ -273,7 +273,8 @@ INLINE v3 unpack_normal(vi normal, vf *magnitude)
     return unit(n);
 }
 
-/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0. */
+/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
+ */
 INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
 {
     const trip_settings *s = view->of->settings;

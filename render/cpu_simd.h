@@ -327,6 +327,23 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, (__m512i)a));
 }
 
+#ifdef __AVX512VBMI2__
+#define V_PACKS_BITS
+
+/* The places of a word's bits, from `first` on, to the front of `out`, of which 64 bytes may be
+ * overwritten; returns how many they are. */
+INLINE uint32_t v_pack_bits(uint8_t *out, uint64_t bits, unsigned first)
+{
+    typedef uint8_t bytes __attribute__((vector_size(64)));
+    bytes place;
+    for (int i = 0; i < 64; i++)
+        place[i] = (uint8_t)i;
+    place += (uint8_t)first;
+    _mm512_storeu_si512(out, _mm512_maskz_compress_epi8(bits, (__m512i)place));
+    return (uint32_t)__builtin_popcountll(bits);
+}
+#endif
+
 /* Lane i of (a, b, c, d) to the four floats at out + row[i]; later lanes over earlier ones. */
 INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
 {
