@@ -377,19 +377,28 @@ static void transpose(uint64_t words[64])
     memcpy(words, columns, sizeof columns);
 }
 
+static uint64_t union_of(const uint64_t words[64])
+{
+    uint64_t all = 0;
+    for (int i = 0; i < 64; i++)
+        all |= words[i];
+    return all;
+}
+
 static void empty_group(trip_cpu_scratch *s)
 {
-    for (unsigned band = 0; band < BANDS; band++)
+    for (unsigned band = 0; band < BANDS; band++) {
+        s->any[band] = 0;
         for (uint32_t first = 0; first < s->splats; first += 64) {
             uint64_t *words = s->touched[band][first / 64];
             if (s->splats - first < 64)
                 memset(words + (s->splats - first), 0, (64 - (s->splats - first)) * sizeof *words);
+            s->any[band] |= union_of(words);
             transpose(words);
         }
+    }
     s->blend(s);
     s->splats = 0;
-    memset(s->any, 0, sizeof s->any);
-    memset(s->thick, 0, sizeof s->thick);
 }
 
 static bool takes_light(const trip_cpu_scratch *s)
@@ -440,7 +449,8 @@ static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
 /* What tile_blend() keeps in registers. */
 typedef struct gathering {
     uint32_t splats;
-    int4 corner; /* of the tile: x, y, x, y */
+    uint64_t thick; /* which of the last 64 are, the last one highest */
+    int4 corner;    /* of the tile: x, y, x, y */
 } gathering;
 
 /* Splats whose blocks are all closed are left out. */
@@ -448,13 +458,13 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 {
     uint32_t at = g->splats;
     const int4 to_block = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
-    uint64_t four;
+    uint64_t four, blocks[BANDS], any = 0;
     memcpy(&four, (const char *)splat + offsetof(trip_cpu_splat, x0), sizeof four);
     int4 bounds = int4_widened(four);
     int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_TILE - 1) >> to_block;
     uint32_t left = (uint32_t)in[0], right = (uint32_t)in[2];
     uint32_t top = (uint32_t)in[1], bottom = (uint32_t)in[3];
-    uint64_t columns = from_column(left) & ~from_column(right + 1), blocks[BANDS], any = 0;
+    uint64_t columns = from_column(left) & ~from_column(right + 1);
     for (unsigned band = 0; band < BANDS; band++) {
         blocks[band] = from_row(band, top) & ~from_row(band, bottom + 1);
         blocks[band] &= columns & s->open[band];
@@ -463,13 +473,15 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
     if (any == 0)
         return;
     make_local(&s->local[at], splat, g->corner - (bounds & ~(TRIP_CPU_TILE - 1)));
-    s->thick[at / 64] |= (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << at % 64;
-    for (unsigned band = 0; band < BANDS; band++) {
+    g->thick = g->thick >> 1 | (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << 63;
+    for (unsigned band = 0; band < BANDS; band++)
         s->touched[band][at / 64][at % 64] = blocks[band];
-        s->any[band] |= blocks[band];
-    }
-    if (++g->splats == TRIP_CPU_LOCAL) {
-        s->splats = g->splats;
+    g->splats = ++at;
+    if (at % 64 != 0)
+        return;
+    s->thick[at / 64 - 1] = g->thick;
+    if (at == TRIP_CPU_LOCAL) {
+        s->splats = at;
         empty_group(s);
         g->splats = 0;
     }
@@ -481,30 +493,38 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
                          const uint16_t *order, uint32_t count)
 {
-    for (uint32_t i = 0; i < AHEAD && i < count; i++)
+    uint32_t i = 0;
+    for (; i < AHEAD && i < count; i++)
         __builtin_prefetch(&splats[order[i]]);
-    for (uint32_t i = 0; i < count && takes_light(s); i++) {
-        __builtin_prefetch(&splats[order[i + AHEAD < count ? i + AHEAD : i]]);
-        add(s, g, &splats[order[i]]);
+    for (; i < count; i++) {
+        __builtin_prefetch(&splats[order[i]]);
+        add(s, g, &splats[order[i - AHEAD]]);
     }
+    for (i = count < AHEAD ? 0 : count - AHEAD; i < count; i++)
+        add(s, g, &splats[order[i]]);
 }
 
 static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
                        uint32_t count)
 {
-    gathering g = { s->splats, { s->x, s->y, s->x, s->y } };
+    gathering g = { s->splats, s->thick[s->splats / 64], { s->x, s->y, s->x, s->y } };
+    if (!takes_light(s))
+        return;
     if (order)
         add_in_order(s, &g, splats, order, count);
     else
-        for (uint32_t i = 0; i < count && takes_light(s); i++)
+        for (uint32_t i = 0; i < count; i++)
             if (meets(s, &splats[i]))
                 add(s, &g, &splats[i]);
     s->splats = g.splats;
+    s->thick[g.splats / 64] = g.thick;
 }
 
 static uint64_t tile_end(trip_cpu_scratch *s)
 {
     uint64_t open = 0;
+    if (s->splats % 64 != 0)
+        s->thick[s->splats / 64] >>= 64 - s->splats % 64;
     empty_group(s);
     for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
         uint64_t bits = s->open[row / 8] >> 8 * (row % 8) & 255;
@@ -574,8 +594,6 @@ static void tile_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, in
     s->splats = 0;
     s->blend = choose_blend(view);
     memset(s->rays_known, 0, sizeof s->rays_known);
-    memset(s->any, 0, sizeof s->any);
-    memset(s->thick, 0, sizeof s->thick);
     find_open(s, quarters);
 }
 
