@@ -222,9 +222,17 @@ typedef struct touching {
 typedef void blend_one(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
                        bool front_to_back, trip_target target);
 
+/* Its address is kept in one register: sums of two in every operand would cost the processor an
+ * operation each. */
+INLINE const trip_cpu_splat *splat_at(const trip_cpu_splat *local, unsigned number)
+{
+    local += number;
+    __asm__("" : "+r"(local));
+    return local;
+}
+
 /* In order. Where bits can be packed to a list at once, the processor has to guess but one end of a
- * loop, not one for each word. The address is kept in one register: sums of two in every operand
- * would cost an operation each. */
+ * loop, not one for each word. */
 INLINE void blend_each(patch *p, const touching *t, blend_one *one, trip_cpu_rays rays,
                        bool front_to_back, trip_target target)
 {
@@ -234,18 +242,13 @@ INLINE void blend_each(patch *p, const touching *t, blend_one *one, trip_cpu_ray
     static_assert(TRIP_CPU_LOCAL <= 256, "numbers of a byte");
     for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
         count += v_pack_bits(numbers + count, t->splats[word], 64 * word);
-    for (uint32_t i = 0; i < count; i++) {
-        const trip_cpu_splat *splat = t->local + numbers[i];
-        __asm__("" : "+r"(splat));
-        one(p, splat, rays, front_to_back, target);
-    }
+    for (uint32_t i = 0; i < count; i++)
+        one(p, splat_at(t->local, numbers[i]), rays, front_to_back, target);
 #else
     for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
-        for (uint64_t rest = t->splats[word]; rest; rest &= rest - 1) {
-            const trip_cpu_splat *splat = t->local + 64 * word + __builtin_ctzll(rest);
-            __asm__("" : "+r"(splat));
-            one(p, splat, rays, front_to_back, target);
-        }
+        for (uint64_t rest = t->splats[word]; rest; rest &= rest - 1)
+            one(p, splat_at(t->local, 64 * word + (unsigned)__builtin_ctzll(rest)), rays,
+                front_to_back, target);
 #endif
 }
 

@@ -39,9 +39,10 @@ typedef enum trip_cpu_cover {
 trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
                                   const trip_cpu_box *box);
 
-/* Squares of voxels of a sheet, and regions of 8 x 8 squares. */
+/* Squares of voxels of a sheet, and regions of 8 x 8 squares, a bit of a word each. */
 #define TRIP_CPU_SQUARE 8
 #define TRIP_CPU_REGION 64
+#define TRIP_CPU_REGION_SQUARES 64
 
 /* A screen coordinate of the middles of squares: middle + (by . d) / z, d the square's middle in
  * (u, v) from the region's; and how far from there any support in the square reaches. */

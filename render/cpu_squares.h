@@ -7,8 +7,6 @@
 #include "cpu_cover.h"
 #include "cpu_project.h"
 
-enum { SQUARES = 64 };
-
 /* First and last pixel whose centre lies within `reach` of x; nothing when first > last. */
 INLINE void reached(vf x, vf reach, int size, vi *first, vi *last)
 {
@@ -40,7 +38,7 @@ static uint64_t squares(const trip_cpu_view *view, const trip_cpu_region *region
     vi lane;
     for (int i = 0; i < V; i++)
         lane[i] = i;
-    for (uint32_t i = 0; i < SQUARES; i += V) {
+    for (uint32_t i = 0; i < TRIP_CPU_REGION_SQUARES; i += V) {
         vi number = vi_set((int32_t)i) + lane;
         vf u = middles(number), v = middles(number >> 1);
         vf z = v_fma(v_set((float)region->z_by[0]), u,
