@@ -156,35 +156,10 @@ static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 
         *front = trip_v3(0, patient ? 1 : -1, 0);
 }
 
-/* Bounds of all splats in index space, from the bricks of one list. */
-static void splat_bounds(const trip_dataset *d, double lo[3], double hi[3])
-{
-    const trip_list *list = &d->lists[2];
-    for (int a = 0; a < 3; a++) {
-        lo[a] = list->brick_count ? INFINITY : 0;
-        hi[a] = list->brick_count ? -INFINITY : (double)d->header.dims[a] - 1;
-    }
-    for (uint64_t i = 0; i < list->slab_count; i++) {
-        const trip_file_slab *slab = &list->slabs[i];
-        double sheet = (double)slab->slab * d->header.slab_sheets;
-        for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {
-            const trip_file_brick *b = &list->bricks[j];
-            double u = (double)((uint64_t)b->tile_u << d->header.tile_log2);
-            double v = (double)((uint64_t)b->tile_v << d->header.tile_log2);
-            lo[0] = fmin(lo[0], u + b->u_min);
-            hi[0] = fmax(hi[0], u + b->u_max);
-            lo[1] = fmin(lo[1], v + b->v_min);
-            hi[1] = fmax(hi[1], v + b->v_max);
-            lo[2] = fmin(lo[2], sheet + b->sheet_min);
-            hi[2] = fmax(hi[2], sheet + b->sheet_max);
-        }
-    }
-}
-
 void trip_dataset_text_frame(const trip_dataset_text *t, const trip_dataset *d,
                              trip_camera_framing *framing)
 {
-    splat_bounds(d, framing->lo, framing->hi);
+    trip_dataset_kept_bounds(d, framing->lo, framing->hi);
     for (int a = 0; a < 3; a++) {
         framing->lo[a] -= TRIP_KERNEL_RADIUS_VOXELS;
         framing->hi[a] += TRIP_KERNEL_RADIUS_VOXELS;

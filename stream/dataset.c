@@ -225,3 +225,28 @@ void trip_dataset_close(trip_dataset *d)
     free(d->path);
     free(d);
 }
+
+/* From the bricks of one list: all three hold every splat. */
+void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3])
+{
+    const trip_list *list = &d->lists[2];
+    for (int a = 0; a < 3; a++) {
+        lo[a] = list->brick_count ? INFINITY : 0;
+        hi[a] = list->brick_count ? -INFINITY : (double)d->header.dims[a] - 1;
+    }
+    for (uint64_t i = 0; i < list->slab_count; i++) {
+        const trip_file_slab *slab = &list->slabs[i];
+        double sheet = (double)slab->slab * d->header.slab_sheets;
+        for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {
+            const trip_file_brick *b = &list->bricks[j];
+            double u = (double)((uint64_t)b->tile_u << d->header.tile_log2);
+            double v = (double)((uint64_t)b->tile_v << d->header.tile_log2);
+            lo[0] = fmin(lo[0], u + b->u_min);
+            hi[0] = fmax(hi[0], u + b->u_max);
+            lo[1] = fmin(lo[1], v + b->v_min);
+            hi[1] = fmax(hi[1], v + b->v_max);
+            lo[2] = fmin(lo[2], sheet + b->sheet_min);
+            hi[2] = fmax(hi[2], sheet + b->sheet_max);
+        }
+    }
+}

@@ -41,6 +41,9 @@ void trip_dataset_close(trip_dataset *d);
  * lists hold the same voxels). Reports the first fault. */
 int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
 
+/* The first and last voxel kept along each index axis; without any, those of the grid. */
+void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3]);
+
 /* Name of a plane file, "x.voxels"; `name` has room for 32 bytes. */
 const char *trip_dataset_plane_name(int axis, int plane, char *name);
 
