@@ -23,6 +23,7 @@ typedef struct drawing {
     trip_reader *reader;
     render_stats *stats;
     trip_progress progress;
+    bool counting; /* the frames are drawn once more, and everything of them */
 } drawing;
 
 static int open_drawing(drawing *d)
@@ -57,9 +58,9 @@ static int make_reader(drawing *d, unsigned planes)
         .engine = d->o.engine,
         .planes = planes,
         .threads = d->o.threads,
-        .cache = d->o.orbit > 1,
+        .cache = d->o.orbit > 1 && !d->counting,
         .renderer = d->renderer,
-        .skip = d->o.hidden == RENDER_HIDDEN_SKIP ? trip_cpu_covered : NULL,
+        .skip = d->o.hidden == RENDER_HIDDEN_DRAW || d->counting ? NULL : trip_cpu_covered,
         .skip_user = d->renderer,
     };
     return d->reader ? 0 : session_make_reader(&d->session, &d->reader, &wanted);
@@ -80,7 +81,7 @@ static int image_path(const drawing *d, int index, char *path, size_t bytes)
 static void show_progress(void *user, uint64_t splats, uint64_t total)
 {
     drawing *d = user;
-    trip_progress_show(&d->progress, "draw", splats, total, "splats");
+    trip_progress_show(&d->progress, d->counting ? "count" : "draw", splats, total, "splats");
 }
 
 static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *plan,
@@ -93,20 +94,26 @@ static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *
         .settings = &d->o.settings,
         .plan = plan,
         .table = s->table,
-        .count = d->o.stats || d->o.explain,
+        .count = d->counting,
         .progress = show_progress,
         .progress_user = d,
     };
-    if (d->o.explain)
-        trip_plan_explain(plan, s->data, &d->o.settings, stdout);
     int status = make_reader(d, plan->planes);
     d->progress = trip_progress_start(false);
     if (!status)
         status = trip_frame_draw(d->renderer, d->reader, &frame, d->rgba, stats);
     trip_progress_end(&d->progress);
-    if (!status && d->o.explain)
-        render_stats_explain(stats, d->renderer, d->reader, stdout);
     return status;
+}
+
+/* The camera and the plan of an image; the plan is released by the caller. */
+static int plan_image(const drawing *d, int index, trip_camera *camera, trip_plan *plan)
+{
+    const session *s = &d->session;
+    trip_camera_params view = render_view(&d->o, s->data, s->text, index);
+    int status = trip_camera_make(camera, &view, &s->data->index_to_world);
+    return status ? status
+                  : trip_plan_make(plan, s->data, camera, &d->o.settings, s->table, s->budget);
 }
 
 static int draw_image(drawing *d, int index)
@@ -116,15 +123,16 @@ static int draw_image(drawing *d, int index)
     trip_camera camera;
     trip_plan plan;
     trip_frame_stats stats;
-    trip_camera_params view = render_view(&d->o, s->data, s->text, index);
     int status = image_path(d, index, path, sizeof path);
     if (!status)
-        status = trip_camera_make(&camera, &view, &s->data->index_to_world);
-    if (!status)
-        status = trip_plan_make(&plan, s->data, &camera, &d->o.settings, s->table, s->budget);
+        status = plan_image(d, index, &camera, &plan);
     if (status)
         return status;
+    if (d->o.explain)
+        trip_plan_explain(&plan, s->data, &d->o.settings, stdout);
     status = draw_planned(d, &camera, &plan, &stats);
+    if (!status && d->o.explain)
+        render_stats_explain(&stats, d->renderer, d->reader, stdout);
     if (!status && d->stats)
         status = render_stats_add_frame(d->stats, s->data, &plan, &stats);
     trip_plan_release(&plan, s->budget);
@@ -132,6 +140,36 @@ static int draw_image(drawing *d, int index)
         status = trip_image_write(path, d->o.width, d->o.height, d->rgba, NULL);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
         render_stats_summary(path, &d->o, &stats, stdout);
+    return status;
+}
+
+static int count_image(drawing *d, int index)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_frame_stats counted;
+    int status = plan_image(d, index, &camera, &plan);
+    if (status)
+        return status;
+    status = draw_planned(d, &camera, &plan, &counted);
+    trip_plan_release(&plan, d->session.budget);
+    if (!status && d->stats)
+        status = render_stats_add_count(d->stats, index, &counted);
+    if (!status && d->o.explain)
+        render_stats_explain_count(&counted, stdout);
+    return status;
+}
+
+/* Counting comes after all pictures are there, with a reader of its own, so that nothing that was
+ * timed saw it. */
+static int count_images(drawing *d, int images)
+{
+    int status = 0;
+    trip_reader_destroy(d->reader);
+    d->reader = NULL;
+    d->counting = true;
+    for (int i = 0; i < images && !status; i++)
+        status = count_image(d, i);
     return status;
 }
 
@@ -143,10 +181,15 @@ int trip_command_render(int argc, char **argv)
         status = open_drawing(&d);
     if (!status)
         status = trip_image_prepare(); /* it gets ready while the first image is drawn */
-    for (int i = 0; !status && i < (d.o.orbit ? d.o.orbit : 1); i++)
+    int images = d.o.orbit ? d.o.orbit : 1;
+    for (int i = 0; i < images && !status; i++)
         status = draw_image(&d, i);
     if (!status && d.stats)
-        status = render_stats_write(d.stats, &d.o, d.renderer, d.reader, d.session.budget);
+        status = render_stats_describe(d.stats, &d.o, d.renderer, d.reader, d.session.budget);
+    if (!status && d.o.count)
+        status = count_images(&d, images);
+    if (!status && d.stats)
+        status = render_stats_write(d.stats, &d.o);
     close_drawing(&d);
     return trip_exit_status(status);
 }

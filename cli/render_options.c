@@ -29,6 +29,7 @@ enum {
     KEY_TRAVERSAL,
     KEY_STATS,
     KEY_EXPLAIN,
+    KEY_COUNT,
     KEY_HIDDEN,
     KEY_MEMORY,
     KEY_ENGINE,
@@ -69,8 +70,8 @@ static const struct argp_option options[] = {
       "replicated or indexed lists, sprites or triangles (default: replicated,sprites); gl only",
       4 },
     { "hidden", KEY_HIDDEN, "skip|draw", 0,
-      "Whether bricks behind what is opaque are read (default: skip; with --stats draw, so that "
-      "it counts all splats of the view); the picture is the same; cpu only",
+      "Whether bricks behind what is opaque are read (default: skip); the picture is the same; "
+      "cpu only",
       4 },
     { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
       4 },
@@ -79,6 +80,10 @@ static const struct argp_option options[] = {
     { NULL, 0, NULL, 0, "Results:", 5 },
     { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
     { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
+    { "count", KEY_COUNT, NULL, 0,
+      "With --stats or --explain: draw everything once more, untimed, hidden bricks too, and count "
+      "the splats",
+      5 },
     { 0 },
 };
 
@@ -283,8 +288,8 @@ static int check(parse *p)
         return trip_option_fail("--hidden", "applies to --renderer cpu only");
     if (o->hidden)
         o->renderer = TRIP_RENDERER_CPU;
-    else
-        o->hidden = o->stats ? RENDER_HIDDEN_DRAW : RENDER_HIDDEN_SKIP;
+    if (o->count && !o->stats && !o->explain)
+        return trip_option_fail("--count", "adds to --stats or --explain; give one of them");
     const char *extension = strrchr(o->output, '.');
     if (!p->background && extension && !strcasecmp(extension, ".exr"))
         memset(o->settings.background, 0, sizeof o->settings.background);
@@ -303,6 +308,9 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         return 0;
     case KEY_EXPLAIN:
         p->o->explain = true;
+        return 0;
+    case KEY_COUNT:
+        p->o->count = true;
         return 0;
     case ARGP_KEY_ARG:
         if (p->o->input)

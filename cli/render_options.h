@@ -6,7 +6,7 @@
 #include "renderer_choice.h"
 #include "settings.h"
 
-/* What becomes of bricks behind what is already opaque. */
+/* What becomes of bricks behind what is already opaque; skipped where nothing is said. */
 typedef enum render_hidden {
     RENDER_HIDDEN_UNSET,
     RENDER_HIDDEN_SKIP,
@@ -28,7 +28,7 @@ typedef struct render_options {
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
     int threads;           /* 0: the default */
-    bool explain;
+    bool explain, count;
 } render_options;
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */

@@ -61,14 +61,17 @@ static void add_plan(cJSON *list, const trip_plan_list *p)
     cJSON_AddNumberToObject(list, "bricks_without_weight", (double)p->bricks_without_weight);
 }
 
-static void add_list(cJSON *lists, int axis, const trip_plan_list *p, const trip_list_stats *s)
+/* What was not counted is left out. */
+static cJSON *add_list(cJSON *lists, int axis, const trip_frame_stats *frame)
 {
+    const trip_list_stats *s = &frame->lists[axis];
     cJSON *list = cJSON_AddObjectToObject(lists, axis_names[axis]);
-    add_plan(list, p);
     cJSON_AddNumberToObject(list, "splats_read", (double)s->splats_read);
-    cJSON_AddNumberToObject(list, "splats_projected", (double)s->splats_projected);
-    cJSON_AddNumberToObject(list, "splats_drawn", (double)s->splats_drawn);
-    cJSON_AddNumberToObject(list, "bytes_read", (double)s->bytes_read);
+    if (frame->counted) {
+        cJSON_AddNumberToObject(list, "splats_projected", (double)s->splats_projected);
+        cJSON_AddNumberToObject(list, "splats_drawn", (double)s->splats_drawn);
+    }
+    return list;
 }
 
 int render_stats_add_frame(render_stats *s, const trip_dataset *data, const trip_plan *plan,
@@ -86,9 +89,20 @@ int render_stats_add_frame(render_stats *s, const trip_dataset *data, const trip
     cJSON_AddNumberToObject(f, "runs_skipped", (double)frame->reader.runs_skipped);
     cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame->reader.bytes_skipped);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
-    for (int axis = 0; axis < 3; axis++)
-        add_list(lists, axis, &plan->lists[axis], &frame->lists[axis]);
+    for (int axis = 0; axis < 3; axis++) {
+        cJSON *list = add_list(lists, axis, frame);
+        add_plan(list, &plan->lists[axis]);
+        cJSON_AddNumberToObject(list, "bytes_read", (double)frame->lists[axis].bytes_read);
+    }
     return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
+}
+
+int render_stats_add_count(render_stats *s, int index, const trip_frame_stats *counted)
+{
+    cJSON *lists = cJSON_AddObjectToObject(cJSON_GetArrayItem(s->frames, index), "counted");
+    for (int axis = 0; axis < 3; axis++)
+        add_list(lists, axis, counted);
+    return lists ? 0 : out_of_memory();
 }
 
 static bool write_text(const char *path, const char *text)
@@ -132,8 +146,8 @@ static const char *ring_text(const trip_renderer *renderer, const trip_reader *r
                                      : "shared: the renderer draws from the ring";
 }
 
-int render_stats_write(render_stats *s, const render_options *o, const trip_renderer *renderer,
-                       const trip_reader *reader, const trip_budget *budget)
+int render_stats_describe(render_stats *s, const render_options *o, const trip_renderer *renderer,
+                          const trip_reader *reader, const trip_budget *budget)
 {
     cJSON *root = s->root;
     const int size[2] = { o->width, o->height };
@@ -145,10 +159,17 @@ int render_stats_write(render_stats *s, const render_options *o, const trip_rend
     cJSON_AddItemToObject(root, "size", cJSON_CreateIntArray(size, 2));
     cJSON_AddNumberToObject(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
     cJSON_AddNumberToObject(root, "memory_limit_bytes", (double)trip_budget_limit_bytes(budget));
-    cJSON_AddNumberToObject(root, "memory_peak_bytes", (double)trip_budget_peak_bytes(budget));
-    cJSON_AddItemToObject(root, "frames", s->frames);
+    return cJSON_AddNumberToObject(root, "memory_peak_bytes",
+                                   (double)trip_budget_peak_bytes(budget))
+               ? 0
+               : out_of_memory();
+}
+
+int render_stats_write(render_stats *s, const render_options *o)
+{
+    cJSON_AddItemToObject(s->root, "frames", s->frames);
     s->frames = NULL;
-    char *text = cJSON_Print(root);
+    char *text = cJSON_Print(s->root);
     if (!text)
         return out_of_memory();
     int status = 0;
@@ -168,10 +189,8 @@ void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *re
         const trip_list_stats *s = &frame->lists[axis];
         if (s->splats_read == 0)
             continue;
-        fprintf(out, "cost %s      %s read, %" PRIu64 " splats read, %" PRIu64 " projected",
-                axis_names[axis], trip_format_bytes(s->bytes_read, bytes), s->splats_read,
-                s->splats_projected);
-        fprintf(out, ", %" PRIu64 " drawn\n", s->splats_drawn);
+        fprintf(out, "cost %s      %s read, %" PRIu64 " splats\n", axis_names[axis],
+                trip_format_bytes(s->bytes_read, bytes), s->splats_read);
     }
     if (frame->reader.bytes_cached)
         fprintf(out, "cache       %s from memory\n",
@@ -182,6 +201,17 @@ void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *re
     fprintf(out, "ring        %s\n", ring_text(renderer, reader));
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame->ms, frame->read_ms, frame->draw_ms, frame->merge_ms);
+}
+
+void render_stats_explain_count(const trip_frame_stats *counted, FILE *out)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const trip_list_stats *s = &counted->lists[axis];
+        if (s->splats_read)
+            fprintf(out,
+                    "count %s     %" PRIu64 " splats, %" PRIu64 " projected, %" PRIu64 " drawn\n",
+                    axis_names[axis], s->splats_read, s->splats_projected, s->splats_drawn);
+    }
 }
 
 void render_stats_summary(const char *path, const render_options *o, const trip_frame_stats *frame,

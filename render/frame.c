@@ -143,7 +143,7 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
                     float *rgba, trip_frame_stats *stats)
 {
     double start = now_ms();
-    *stats = (trip_frame_stats){ 0 };
+    *stats = (trip_frame_stats){ .counted = frame->count };
     drawing d = { .renderer = renderer, .reader = reader, .frame = frame, .stats = stats };
     int status = renderer->ops->begin_frame(renderer, frame);
     if (!status)

@@ -6,6 +6,7 @@
 
 typedef struct trip_frame_stats {
     double ms, read_ms, draw_ms, merge_ms;
+    bool counted; /* splats projected and drawn; else those counts say nothing */
     trip_list_stats lists[3];
     trip_reader_stats reader; /* summed over the passes */
 } trip_frame_stats;

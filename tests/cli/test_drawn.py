@@ -20,7 +20,8 @@ INFO_KEYS = {
 }
 STATS_KEYS = {"renderer", "device", "method", "size", "peak_rss_bytes", "frames"}
 FRAME_KEYS = {"ms", "read_ms", "draw_ms", "merge_ms", "lists"}
-LIST_KEYS = {"splats_read", "splats_projected", "splats_drawn", "bytes_read"}
+LIST_KEYS = {"splats_read", "bytes_read"}
+COUNTED_KEYS = {"splats_read", "splats_projected", "splats_drawn"}
 
 
 class Drawn(program.ProgramTest):
@@ -76,7 +77,7 @@ class Drawn(program.ProgramTest):
         ] + list(options)
 
     def drawn(self, *arguments):
-        return program.splats_drawn(self.stats(*arguments))
+        return program.splats_drawn(self.stats(*arguments, "--count"))
 
     def test_info_has_the_fixed_keys(self):
         for name in self.kept:
@@ -92,7 +93,8 @@ class Drawn(program.ProgramTest):
         for renderer in "reference", "cpu", "auto":
             for method in "merge", "clip", "axis":
                 stats = self.stats(
-                    "heat.trip", "--renderer", renderer, "--method", method, "--size", "50x40"
+                    "heat.trip", "--renderer", renderer, "--method", method, "--size", "50x40",
+                    "--count",
                 )
                 self.assertLessEqual(STATS_KEYS, stats.keys())
                 self.assertEqual(stats["size"], [50, 40])
@@ -103,9 +105,12 @@ class Drawn(program.ProgramTest):
                     self.assertEqual(set(frame["lists"]), {"x", "y", "z"})
                     for counts in frame["lists"].values():
                         self.assertLessEqual(LIST_KEYS, counts.keys())
+                        self.assertEqual(counts["bytes_read"] > 0, counts["splats_read"] > 0)
+                    self.assertEqual(set(frame["counted"]), {"x", "y", "z"})
+                    for counts in frame["counted"].values():
+                        self.assertEqual(COUNTED_KEYS, counts.keys())
                         self.assertLessEqual(counts["splats_drawn"], counts["splats_projected"])
                         self.assertLessEqual(counts["splats_projected"], counts["splats_read"])
-                        self.assertEqual(counts["bytes_read"] > 0, counts["splats_read"] > 0)
 
     def test_an_orbit_has_a_frame_of_stats_for_each_image(self):
         stats = self.stats("heat.trip", "--orbit", "5", "--size", "30x30")
@@ -140,7 +145,8 @@ class Drawn(program.ProgramTest):
                         "--method",
                         method,
                     ]
-                    stats = self.stats(*view, *(["--h", "0"] if method == "merge" else []))
+                    view += ["--h", "0"] if method == "merge" else []
+                    stats = self.stats(*view, "--count", "--hidden", "draw")
                     self.assertEqual(program.splats_drawn(stats), kept, view)
                     read = [c["splats_read"] for c in stats["frames"][0]["lists"].values()]
                     self.assertEqual(sorted(read), [0, 0, kept], view)
@@ -160,7 +166,8 @@ class Drawn(program.ProgramTest):
     def test_all_renderers_count_alike(self):
         view = self.view_from("sheared", (1, 2, 3), "--h", "0.7")
         lists = [
-            self.stats(*view, "--renderer", r)["frames"][0]["lists"] for r in ("cpu", "reference")
+            self.stats(*view, "--renderer", r, "--count")["frames"][0]["counted"]
+            for r in ("cpu", "reference")
         ]
         for axis in "xyz":
             self.assertEqual(lists[0][axis]["splats_drawn"], lists[1][axis]["splats_drawn"])

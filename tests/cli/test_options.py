@@ -73,6 +73,7 @@ RENDER = {
     "--threads": COUNTS + ["100000"],
     "--no-shading": None,
     "--explain": None,
+    "--count": None,
     "--output": [],
     "--stats": [],
 }
@@ -186,6 +187,7 @@ class Options(program.ProgramTest):
         runs += [
             ["--no-shading"],
             ["--explain"],
+            ["--explain", "--count"],
             ["--stats=-"],
             ["--stats=s.json"],
             ["--stats", "./s.json"],

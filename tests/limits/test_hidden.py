@@ -54,13 +54,14 @@ class Hidden(limits.Test):
         faint = self.path("faint.tf")
         with open(faint, "w") as f:
             f.write("0 0 0 0 0\n100 0 0 0 0\n101 1 1 1 0.5\n255 1 1 1 0.5\n")
-        everything = bytes_read(self.stats(data, "--tf", self.tf, "--h", "0.99")[0])
+        everything = bytes_read(self.stats(data, "--tf", self.tf, "--h", "0.99", "--hidden",
+                                           "draw")[0])
         for arguments, which in [(["--tf", faint, "--h", "0.99"], 0),
                                  (["--tf", self.tf, "--h", "0.99", "--fov", "10",
                                    "--eye", "48,-200,48", "--look", "20,48,20"], 1)]:
             left_out = self.explained(data, *arguments)[1]
             self.assertGreater(left_out[which], 0)
-            stats = self.stats(data, *arguments)[0]
+            stats = self.stats(data, *arguments, "--hidden", "draw")[0]
             self.assertLess(bytes_read(stats), everything)
             counted = stats["frames"][0]["lists"].values()
             name = ["bricks_transparent", "bricks_outside"][which]
@@ -69,8 +70,8 @@ class Hidden(limits.Test):
     def test_normals_are_read_only_for_shading(self):
         volume = self.generate("lobes.nrrd", "marschner-lobb", 64)
         data = self.brick(volume, "lobes.trip", "--keep-all")
-        shaded = self.stats(data)[0]
-        plain = self.stats(data, "--no-shading")[0]
+        shaded = self.stats(data, "--hidden", "draw")[0]
+        plain = self.stats(data, "--no-shading", "--hidden", "draw")[0]
         self.assertEqual(bytes_read(shaded), 2 * bytes_read(plain))
         self.assertEqual(shaded["frames"][0]["bytes_of_planes_left_out"], 0)
         splats = sum(axis["splats_read"] for axis in plain["frames"][0]["lists"].values())

@@ -1,0 +1,101 @@
+"""Measuring a frame does not change it: what `render` says of a frame is of the one that is drawn
+without being measured, and exact counts come from a frame of their own."""
+import json
+import re
+
+import program
+
+# One thread, so that what lies behind what is opaque is found in the same order in every run.
+VIEW = ["--tf", "solid.tf", "--renderer", "cpu", "--threads", "1", "--size", "256x256", "--fov",
+        "60", "--look", "64,64,64", "--eye", "64,-43,64"]
+COUNTS = ("splats_projected", "splats_drawn")
+
+
+def bytes_read(frame):
+    return sum(axis["bytes_read"] for axis in frame["lists"].values())
+
+
+def splats_read(lists):
+    return sum(axis["splats_read"] for axis in lists.values())
+
+
+class Measured(program.ProgramTest):
+    """A nearly opaque cube of 128 voxels a side, from close by: much of it is hidden."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nifti("cube.nii", program.noise((128, 128, 128)))
+        with open("solid.tf", "w") as f:
+            f.write("# value r g b opacity\n0 0.3 0.5 0.9 0.9\n255 1 0.8 0.4 0.999\n")
+        cls.brick(cls(), "cube.nii", "cube.trip", "--keep-all", "--tf", "solid.tf")
+
+    def render(self, *arguments):
+        """What it says of the frame, without the time, and the picture."""
+        said = self.works("render", "cube.trip", "-o", "a.exr", *VIEW, *arguments).stdout.decode()
+        summary = re.search(r"^a\.exr: .*, (.*) million splats, (.*) read, [\d.]+ s$", said, re.M)
+        with open("a.exr", "rb") as f:
+            return said, summary.groups(), f.read()
+
+    def frame(self, *arguments):
+        self.render("--stats", "s.json", *arguments)
+        with open("s.json") as f:
+            return json.load(f)["frames"][0]
+
+    def test_a_measured_frame_reads_and_draws_what_one_that_is_not_does(self):
+        _, plain, picture = self.render()
+        for measured in (["--stats", "s.json"], ["--explain"], ["--stats", "s.json", "--count"],
+                         ["--explain", "--count"]):
+            _, summary, same = self.render(*measured)
+            self.assertEqual(summary, plain, measured)
+            self.assertTrue(same == picture, measured)
+        self.assertNotEqual(self.render("--hidden", "draw")[1], plain)
+
+    def test_hidden_bricks_are_left_out_of_what_is_measured(self):
+        frame = self.frame()
+        self.assertGreater(frame["bytes_skipped"], 0)
+        self.assertEqual(bytes_read(frame), bytes_read(self.frame("--hidden", "skip")))
+        self.assertLess(bytes_read(frame), bytes_read(self.frame("--hidden", "draw")))
+
+    def test_what_was_not_counted_is_not_there(self):
+        frame = self.frame()
+        self.assertNotIn("counted", frame)
+        for axis in frame["lists"].values():
+            for key in COUNTS:
+                self.assertNotIn(key, axis)
+        said = self.render("--explain")[0]
+        self.assertIn("cost y ", said)
+        self.assertNotRegex(said, "projected|drawn|count ")
+
+    def test_counts_are_of_everything_and_beside_the_frame_that_is_timed(self):
+        plain, counted, whole = self.frame(), self.frame("--count"), self.frame("--hidden", "draw")
+        for axis in counted["lists"].values():  # the timed frame did not count
+            for key in COUNTS:
+                self.assertNotIn(key, axis)
+        for key in "reads", "runs_skipped", "bytes_skipped":
+            self.assertEqual(counted[key], plain[key])
+        self.assertEqual(bytes_read(counted), bytes_read(plain))
+        self.assertEqual(splats_read(counted["counted"]), splats_read(whole["lists"]))
+        for axis in counted["counted"].values():
+            self.assertLessEqual(axis["splats_drawn"], axis["splats_projected"])
+            self.assertLessEqual(axis["splats_projected"], axis["splats_read"])
+        said = self.render("--explain", "--count")[0]
+        found = re.findall(r"^count \w +(\d+) splats, \d+ projected, \d+ drawn$", said, re.M)
+        self.assertEqual(sum(map(int, found)), splats_read(counted["counted"]))
+
+    def test_counting_an_orbit_leaves_the_timed_frames_as_they_are(self):
+        """The reader keeps bricks for the frames to come; the counting pass fills no such cache."""
+        def frames(*more):
+            stats = self.stats("cube.trip", *VIEW[:8], "--orbit", "3", "--hidden", "draw", *more)
+            return stats["frames"]
+        plain, counted = frames(), frames("--count")
+        for a, b in zip(plain, counted):
+            self.assertEqual((a["lists"], a["bytes_cached"]), (b["lists"], b["bytes_cached"]))
+            self.assertEqual(splats_read(b["counted"]), splats_read(a["lists"]))
+
+    def test_count_alone_is_refused(self):
+        self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", says="--stats or --explain")
+
+
+if __name__ == "__main__":
+    program.main()
