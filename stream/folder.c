@@ -49,6 +49,33 @@ static bool is_empty(int fd)
     return empty;
 }
 
+static bool is_dataset_file(const char *name)
+{
+    char plane_name[32];
+    bool known =
+        strcmp(name, TRIP_INDEX_NAME) == 0 || strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
+    for (int axis = 0; axis < 3; axis++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            known = known || strcmp(name, trip_dataset_plane_name(axis, plane, plane_name)) == 0;
+    return known;
+}
+
+/* What stands in a data set's folder and is not a data set's could neither be kept nor removed. */
+static int check_all_known(const char *path)
+{
+    DIR *dir = opendir(path);
+    int status = dir ? TRIP_OK : trip_fail_errno("write", path, "cannot look into it");
+    for (struct dirent *e; status == TRIP_OK && (e = readdir(dir));)
+        if (!is_dataset_file(e->d_name))
+            status = trip_fail(TRIP_ERROR, "write", path,
+                               "holds %s, which is not a data set's, so it is not replaced: move "
+                               "that elsewhere",
+                               e->d_name);
+    if (dir)
+        closedir(dir);
+    return status;
+}
+
 static bool is_dataset(const char *path)
 {
     char *index;
@@ -83,7 +110,70 @@ static int check_target(const trip_folder *f)
     if (!is_dataset(f->path))
         return trip_fail(TRIP_ERROR, "write", f->path,
                          "exists and is not a data set, so it is not replaced");
+    return check_all_known(f->path);
+}
+
+static int check_own(int fd, const char *path, const char *what)
+{
+    struct stat st;
+    if (fstat(fd, &st) < 0)
+        return trip_fail_errno(what, path, "cannot open");
+    if (st.st_uid != geteuid())
+        return trip_fail(TRIP_ERROR, what, path,
+                         "belongs to another user: remove it, or write elsewhere");
     return TRIP_OK;
+}
+
+/* What was made just now is not checked: some file servers give it to another user. */
+int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *what, const char *busy)
+{
+    bool made = mkdir(path, mode) == 0;
+    if (!made && errno != EEXIST)
+        return trip_fail_errno(what, path, "cannot create");
+    *fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (*fd < 0)
+        return trip_fail_errno(what, path, "cannot open");
+    int status = made ? TRIP_OK : check_own(*fd, path, what);
+    if (status == TRIP_OK && flock(*fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)
+        status = trip_fail(TRIP_ERROR, what, path, "%s", busy);
+    if (status < 0) {
+        close(*fd);
+        *fd = -1;
+    }
+    return status;
+}
+
+static int check_file(int fd, const char *where, const char *what)
+{
+    struct stat st;
+    int status = check_own(fd, where, what);
+    if (status == TRIP_OK && (fstat(fd, &st) < 0 || !S_ISREG(st.st_mode) || st.st_nlink != 1))
+        status = trip_fail(TRIP_ERROR, what, where, "is not a file of this program's: remove it");
+    return status;
+}
+
+int trip_folder_open_file(int *fd, int folder, const char *path, const char *name, int flags,
+                          const char *what)
+{
+    char where[4096];
+    snprintf(where, sizeof where, "%s/%s", path, name);
+    flags |= O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
+    *fd = flags & O_CREAT ? openat(folder, name, flags | O_EXCL, 0666) : -1;
+    if (*fd >= 0)
+        return TRIP_OK;
+    *fd = openat(folder, name, flags & ~O_CREAT);
+    if (*fd < 0 && errno == ENOENT && !(flags & O_CREAT))
+        return TRIP_OK;
+    if (*fd < 0 && errno == ELOOP)
+        return trip_fail(TRIP_ERROR, what, where, "is a link, which is not followed: remove it");
+    if (*fd < 0)
+        return trip_fail_errno(what, where, "cannot open");
+    int status = check_file(*fd, where, what);
+    if (status < 0) {
+        close(*fd);
+        *fd = -1;
+    }
+    return status;
 }
 
 static bool same_folder(int fd, const char *path)
@@ -100,13 +190,10 @@ static int open_partial(trip_folder *f)
     do {
         if (f->fd >= 0)
             close(f->fd);
-        if (mkdir(f->partial, 0777) < 0 && errno != EEXIST)
-            return trip_fail_errno("write", f->partial, "cannot create");
-        f->fd = open(f->partial, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-        if (f->fd < 0)
-            return trip_fail_errno("write", f->partial, "cannot open");
-        if (flock(f->fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)
-            return trip_fail(TRIP_ERROR, "write", f->partial, "another process is writing it");
+        int status = trip_folder_open_own(&f->fd, f->partial, 0777, "write",
+                                          "another process is writing it");
+        if (status < 0)
+            return status;
     } while (!same_folder(f->fd, f->partial));
     remove_files(f->fd);
     if (!is_empty(f->fd))

@@ -100,17 +100,17 @@ static void widen(trip_file_brick *b, const uint32_t *voxels, uint32_t count)
     b->code_max = (uint16_t)code_max;
 }
 
-int trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
-                  const uint32_t *voxels, uint32_t count)
+const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
+                                     const uint32_t *voxels, uint32_t count)
 {
     trip_slab_brick *b = find(s, sheet, tile_u, tile_v);
     if (!b)
-        return TRIP_ERROR;
+        return NULL;
     b->brick.splats += count;
     b->brick.sheet_max = (uint8_t)sheet;
     s->counts[(size_t)(b - s->bricks) * s->sheets + sheet] = (uint16_t)count;
     widen(&b->brick, voxels, count);
-    return TRIP_OK;
+    return &b->brick;
 }
 
 static void move(trip_slab *s, size_t to, size_t from)

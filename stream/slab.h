@@ -23,9 +23,10 @@ typedef struct trip_slab {
 
 void trip_slab_init(trip_slab *s, unsigned sheets, trip_budget *budget);
 void trip_slab_free(trip_slab *s);
-/* Runs of a sheet come by ascending tile; call end_sheet after the last one of each sheet. */
-int trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
-                  const uint32_t *voxels, uint32_t count);
+/* Runs of a sheet come by ascending tile; call end_sheet after the last one of each sheet. Returns
+ * the run's brick as it is now; NULL after a reported failure. */
+const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
+                                     const uint32_t *voxels, uint32_t count);
 void trip_slab_end_sheet(trip_slab *s);
 void trip_slab_clear(trip_slab *s);
 

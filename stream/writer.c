@@ -240,6 +240,27 @@ static int check_run(const trip_writer *w, int axis, uint32_t sheet, uint32_t ti
                      count, tile_u, tile_v, sheet, inside ? "out of order" : "outside the grid");
 }
 
+/* A tile at the border reaches beyond the grid; its splats do not. */
+static int check_bounds(const trip_writer *w, int axis, uint32_t sheet, const trip_file_brick *b)
+{
+    const int64_t *dims = w->params.dims;
+    unsigned log2 = w->header.tile_log2;
+    if (((int64_t)b->tile_u << log2) + b->u_max < dims[(axis + 1) % 3] &&
+        ((int64_t)b->tile_v << log2) + b->v_max < dims[(axis + 2) % 3])
+        return TRIP_OK;
+    return trip_fail(TRIP_ERROR, "write", w->folder.path,
+                     "list %c: splats of tile (%u, %u) of sheet %u are outside the grid",
+                     'x' + axis, b->tile_u, b->tile_v, sheet);
+}
+
+static int add_to_slab(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u, uint32_t tile_v,
+                       const uint32_t *voxels, uint32_t count)
+{
+    const trip_file_brick *b = trip_slab_add(&w->lists[axis].slab, sheet % w->params.slab_sheets,
+                                             tile_u, tile_v, voxels, count);
+    return b ? check_bounds(w, axis, sheet, b) : TRIP_ERROR;
+}
+
 int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u, uint32_t tile_v,
                        const uint32_t *voxels, const uint32_t *normals, uint32_t count)
 {
@@ -252,8 +273,7 @@ int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u
     if (status == TRIP_OK)
         status = enter_sheet(w, l, sheet, trip_morton(tile_u, tile_v));
     if (status == TRIP_OK)
-        status =
-            trip_slab_add(&l->slab, sheet % w->params.slab_sheets, tile_u, tile_v, voxels, count);
+        status = add_to_slab(w, axis, sheet, tile_u, tile_v, voxels, count);
     if (status == TRIP_OK)
         status = trip_output_append(&l->planes[TRIP_PLANE_VOXELS], voxels, bytes);
     if (status == TRIP_OK && normals)
@@ -273,6 +293,12 @@ int trip_writer_set_codes(trip_writer *w, double code_lo, double code_hi, double
     return check_codes(&w->params, w->folder.path);
 }
 
+static double grid_voxels(const trip_writer *w)
+{
+    const int64_t *dims = w->params.dims;
+    return (double)dims[0] * (double)dims[1] * (double)dims[2];
+}
+
 static int check_summary(const trip_writer *w, const trip_writer_summary *s)
 {
     uint64_t kept = w->lists[0].splats;
@@ -284,10 +310,10 @@ static int check_summary(const trip_writer *w, const trip_writer_summary *s)
     if (!isfinite(s->value_min) || !isfinite(s->value_max) || s->value_min > s->value_max)
         return trip_fail(TRIP_ERROR, "write", w->folder.path, "value range %g to %g", s->value_min,
                          s->value_max);
-    if (s->voxels < kept)
+    if (s->voxels < kept || (double)s->voxels > grid_voxels(w))
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "%llu splats kept of %llu voxels read", (unsigned long long)kept,
-                         (unsigned long long)s->voxels);
+                         "%llu splats kept of %llu voxels read, of %.0f in the grid",
+                         (unsigned long long)kept, (unsigned long long)s->voxels, grid_voxels(w));
     return TRIP_OK;
 }
 
