@@ -1,5 +1,6 @@
 #include "brick.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,6 +30,9 @@ typedef struct brick {
     trip_spill *spill;
     trip_leftover leftover;
     trip_journal *journal;
+    uint64_t identity;
+    char *partial_path; /* of the data set */
+    bool begun;         /* what an interrupted run left is taken over, or was not wanted */
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
@@ -114,27 +118,30 @@ static void choose_codes(brick *b)
 
 static int plan_memory(brick *b)
 {
-    const trip_journal_start *start = b->journal ? trip_journal_get_start(b->journal) : NULL;
     return trip_memory_plan_make(&b->plan, b->params->input, b->in.info, &b->format,
                                  trip_workers_count(b->in.workers), b->in.memory_bytes,
-                                 start ? start->slices : b->params->slices);
+                                 b->params->slices);
 }
 
-/* When all but the lists is open. */
+/* Whether pieces of the Z list were spilled before the run was killed: then what follows cannot be
+ * appended before they are merged. */
+static bool has_spilled_order(const brick *b)
+{
+    for (size_t i = 0; i < trip_spill_count(b->spill); i++)
+        if (trip_spill_segment(b->spill, i)->axis == TRIP_ORDERED_AXIS)
+            return true;
+    return false;
+}
+
+/* When all but the lists is open. A run that goes on with less memory than the killed one had
+ * spills the rest of a list that was written in order: all of it comes after what was written. */
 static int settle_memory(brick *b)
 {
-    const trip_journal_start *start = trip_journal_get_start(b->journal);
     int status = trip_memory_plan_settle(&b->plan, b->params->input, b->in.info, &b->format,
                                          trip_workers_count(b->in.workers),
                                          trip_budget_left_bytes(b->in.budget));
-    b->plan.in_order = b->plan.in_order && b->format.quantised;
-    if (status < 0 || !start)
-        return status;
-    if (start->in_order && !b->plan.in_order)
-        return trip_fail(TRIP_ERROR, "brick", b->params->input,
-                         "to go on takes as much --memory as the interrupted run had");
-    b->plan.in_order = start->in_order;
-    return 0;
+    b->plan.in_order = b->plan.in_order && b->format.quantised && !has_spilled_order(b);
+    return status;
 }
 
 /* The output's name and a suffix, for free(); NULL after a reported failure. */
@@ -154,37 +161,40 @@ static char *name_beside(const brick *b, const char *suffix)
 static int open_spill(brick *b)
 {
     bool resume = b->params->resume;
-    uint64_t identity;
-    char *path = name_beside(b, ".spill"), *partial = name_beside(b, ".partial");
-    int status =
-        path && partial ? trip_spill_open(&b->spill, path, resume, b->in.budget) : TRIP_ERROR;
+    const int64_t *dims = b->in.info->dims;
+    char *path = name_beside(b, ".spill");
+    b->partial_path = name_beside(b, ".partial");
+    int status = path && b->partial_path ? trip_spill_open(&b->spill, path, resume, b->in.budget)
+                                         : TRIP_ERROR;
     if (status == 0)
-        status = trip_brick_identity(b->params, b->in.functions, &identity);
+        status = trip_brick_identity(b->params, b->in.functions, &b->identity);
     if (status == 0 && resume)
-        b->leftover = trip_leftover_take(b->spill, partial, b->format.normals);
+        status = trip_leftover_take(&b->leftover, b->spill, b->partial_path, b->format.normals);
     if (status == 0)
-        status = trip_journal_open(&b->journal, b->spill, resume, identity, b->leftover.splats);
+        status = trip_journal_open(
+            &b->journal, b->spill,
+            &(trip_journal_params){ .resume = resume,
+                                    .identity = b->identity,
+                                    .scanned = trip_brick_input_needs_scan(&b->in),
+                                    .voxels = b->in.grid_voxels,
+                                    .slice_voxels =
+                                        b->in.info->sparse ? 0 : (uint64_t)(dims[0] * dims[1]),
+                                    .ordered_splats = b->leftover.splats },
+            b->in.budget);
     free(path);
-    free(partial);
     return status;
 }
 
 /* Notes how this run works, or takes over how far the killed one was. */
 static int start_journal(brick *b)
 {
-    const trip_checkpoint *c = trip_journal_get_checkpoint(b->journal);
-    b->summary->resumed = c != NULL;
-    if (c)
-        return trip_spill_restore(b->spill, trip_journal_get_segments(b->journal), c->segments);
+    b->summary->resumed = trip_journal_get_checkpoint(b->journal) != NULL;
     if (trip_journal_get_start(b->journal))
         return 0;
     trip_journal_start *start = calloc(1, sizeof *start);
-    if (!start || trip_brick_identity(b->params, b->in.functions, &start->identity) < 0) {
-        free(start);
+    if (!start)
         return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
-    }
-    start->slices = b->plan.slices;
-    start->in_order = b->plan.in_order;
+    start->identity = b->identity;
     start->scanned = b->in.scanned;
     start->tally = *b->in.tally;
     int status = trip_journal_write_start(b->journal, start);
@@ -278,9 +288,10 @@ static int open_output(brick *b)
         status = start_journal(b);
     if (status == 0)
         status = open_builder(b);
-    if (status == 0 && b->plan.in_order && b->summary->resumed)
-        status = trip_leftover_replay(&b->leftover, b->journal,
-                                      trip_list_builder_ordered(b->builder), b->in.budget);
+    if (status == 0 && b->summary->resumed)
+        status =
+            trip_leftover_replay(&b->leftover, b->journal, trip_list_builder_ordered(b->builder),
+                                 b->format.tile_log2, b->in.budget);
     return status;
 }
 
@@ -302,7 +313,7 @@ static void add_up(const brick *b, trip_tally *tally, uint64_t *kept)
         trip_tally_add(tally, &before->tally);
 }
 
-static int on_batch(void *user, uint64_t batches, uint64_t voxels)
+static int on_batch(void *user, uint64_t done, uint64_t voxels)
 {
     const brick *b = user;
     trip_brick_input_progress(&b->in, "read", voxels, b->in.grid_voxels);
@@ -312,7 +323,7 @@ static int on_batch(void *user, uint64_t batches, uint64_t voxels)
     trip_checkpoint *c = calloc(1, sizeof *c);
     if (!c)
         return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
-    c->batches = batches;
+    c->done = done;
     add_up(b, &c->tally, &c->kept);
     return trip_list_builder_spill(b->builder, c);
 }
@@ -342,7 +353,7 @@ static int read_volume(brick *b)
                               .read_ahead = b->plan.read_ahead,
                               .edge = trip_splat_edge(&b->format),
                               .height = TRIP_SPLAT_HEIGHT,
-                              .skip = before ? before->batches : 0,
+                              .skip = before ? before->done : 0,
                               .box = on_box,
                               .batch = on_batch,
                               .user = b };
@@ -378,6 +389,20 @@ static int merge_lists(brick *b)
     return status;
 }
 
+/* What was written is what was counted: a journal may have counted otherwise. */
+static int check_kept(brick *b)
+{
+    b->summary->bytes = trip_writer_bytes(b->writer);
+    uint64_t record_bytes = (uint64_t)TRIP_RECORD_BYTES * (b->format.normals ? 6 : 3);
+    if (b->summary->bytes / record_bytes == b->summary->kept)
+        return 0;
+    return trip_fail(TRIP_ERROR, "brick", b->params->output,
+                     "%" PRIu64 " voxels were kept and %" PRIu64
+                     " written: what the interrupted run left is damaged, without --resume it "
+                     "starts again",
+                     b->summary->kept, b->summary->bytes / record_bytes);
+}
+
 static int finish_output(brick *b)
 {
     double begin = now_seconds();
@@ -388,10 +413,11 @@ static int finish_output(brick *b)
                                                           .histogram = &b->in.histogram });
     if (!text)
         return TRIP_ERROR;
-    b->summary->bytes = trip_writer_bytes(b->writer);
     trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
                               text };
-    int status = trip_writer_finish(b->writer, &s);
+    int status = check_kept(b);
+    if (status == 0)
+        status = trip_writer_finish(b->writer, &s);
     if (status == 0)
         b->writer = NULL;
     free(text);
@@ -442,6 +468,7 @@ static int make(brick *b)
         status = trip_estimate_check_disk(&b->in, &b->format, &b->plan);
     if (status == 0)
         status = open_output(b);
+    b->begun = status == 0;
     if (status == 0)
         status = read_volume(b);
     if (status == 0)
@@ -459,15 +486,30 @@ static int run(brick *b)
     return status;
 }
 
-static void close_all(brick *b)
+/* Who resumes and interrupts will want to resume again. Other failures leave nothing, nor does an
+ * end; a run that was refused before it began leaves all that it found. */
+static void settle_leftovers(brick *b, int status)
+{
+    trip_leftover now = { .fd = { -1, -1 } };
+    bool keep = b->params->resume && status == TRIP_INTERRUPTED;
+    if (b->spill && (b->begun || status == 0))
+        trip_spill_keep(b->spill, keep);
+    if (b->spill && b->begun && keep)
+        trip_leftover_take(&now, b->spill, b->partial_path, b->format.normals);
+    trip_leftover_close(&now);
+}
+
+static void close_all(brick *b, int status)
 {
     trip_list_builder_destroy(b->builder);
     trip_splatter_destroy(b->splatter);
+    settle_leftovers(b, status);
     trip_writer_abort(b->writer);
     trip_journal_close(b->journal);
     trip_leftover_close(&b->leftover);
     trip_spill_close(b->spill);
     trip_brick_input_close(&b->in);
+    free(b->partial_path);
 }
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
@@ -475,6 +517,6 @@ int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
     brick b = { .params = params, .summary = summary, .leftover = { .fd = { -1, -1 } } };
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);
-    close_all(&b);
+    close_all(&b, status);
     return status;
 }

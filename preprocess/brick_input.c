@@ -6,6 +6,16 @@
 #include "brick_text.h"
 #include "report.h"
 
+/* Saturated: the grids of sparse volumes may have more. */
+static uint64_t count_voxels(const int64_t dims[3])
+{
+    uint64_t voxels = 1;
+    for (int a = 0; a < 3; a++)
+        if (__builtin_mul_overflow(voxels, (uint64_t)dims[a], &voxels))
+            return UINT64_MAX;
+    return voxels;
+}
+
 static int check_dims(const trip_brick_input *in)
 {
     for (int a = 0; a < 3; a++)
@@ -39,7 +49,7 @@ static int open_volume(trip_brick_input *in)
     if (status < 0)
         return status;
     in->info = trip_volume_get_info(in->volume);
-    in->grid_voxels = (uint64_t)(in->info->dims[0] * in->info->dims[1] * in->info->dims[2]);
+    in->grid_voxels = count_voxels(in->info->dims);
     in->tally = trip_budget_take(in->budget, sizeof *in->tally);
     if (!in->tally)
         return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,9 +10,11 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "folder.h"
 #include "report.h"
 
-enum { RUN_BUFFER = 4096 };
+/* No checkpoint has so many new segments that its record would be longer. */
+enum { RUN_BUFFER = 4096, RECORD_MOST_BYTES = 4 << 20 };
 
 enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2 };
 
@@ -23,14 +26,15 @@ typedef struct record_head {
 } record_head;
 
 struct trip_journal {
+    trip_journal_params params;
     char *path; /* of the journal, for messages */
+    trip_budget *budget;
     int file, runs_file;
     uint64_t offset; /* end of what is valid */
     bool has_start, has_checkpoint;
     trip_journal_start start;
     trip_checkpoint checkpoint;
-    trip_segment *segments; /* those of the checkpoint */
-    uint64_t noted;         /* segments in the journal so far */
+    uint64_t noted; /* segments in the journal so far */
     uint64_t runs, ordered_splats;
     trip_run_record buffer[RUN_BUFFER];
     size_t buffered;
@@ -85,111 +89,189 @@ static int append_record(trip_journal *j, enum record_kind kind, const void *rec
     return status;
 }
 
-/* The record at `offset`, for free(); NULL where no sound one is. */
-static void *read_record(const trip_journal *j, uint64_t offset, record_head *head)
+/* Room for the longest record, from the budget; the caller gives it back. */
+static void *take_room(const trip_journal *j)
 {
-    struct stat st;
-    if (fstat(j->file, &st) != 0 || !read_at(j->file, offset, head, sizeof *head) ||
-        head->bytes > (uint64_t)st.st_size)
-        return NULL;
-    void *record = malloc(head->bytes + 1);
-    if (record && read_at(j->file, offset + sizeof *head, record, head->bytes) &&
-        XXH64(record, head->bytes, head->kind) == head->checksum)
-        return record;
-    free(record);
-    return NULL;
+    void *room = trip_budget_take(j->budget, RECORD_MOST_BYTES);
+    if (!room)
+        trip_fail(TRIP_ERROR, "brick", j->path,
+                  "needs more memory than is allowed: give more with --memory");
+    return room;
 }
 
-/* A checkpoint and the segments that are new with it. Returns 1 when it was taken over. */
-static int take_checkpoint(trip_journal *j, const void *record, uint64_t bytes,
-                           uint64_t ordered_splats)
+/* The record at `offset` into `record`; false where no sound one is. */
+static bool read_record(const trip_journal *j, uint64_t offset, record_head *head, void *record)
 {
-    trip_checkpoint c;
-    if (bytes < sizeof c)
-        return 0;
-    memcpy(&c, record, sizeof c);
-    uint64_t fresh = c.segments - j->noted;
-    if (c.ordered_splats > ordered_splats || bytes != sizeof c + fresh * sizeof(trip_segment))
-        return 0;
-    trip_segment *larger = realloc(j->segments, (c.segments + 1) * sizeof *larger);
-    if (!larger)
-        return fail_memory(j);
-    memcpy(larger + j->noted, (const char *)record + sizeof c, fresh * sizeof *larger);
-    j->segments = larger;
-    j->noted = c.segments;
-    j->checkpoint = c;
-    j->has_checkpoint = true;
-    return 1;
+    return read_at(j->file, offset, head, sizeof *head) && head->bytes <= RECORD_MOST_BYTES &&
+           read_at(j->file, offset + sizeof *head, record, head->bytes) &&
+           XXH64(record, head->bytes, head->kind) == head->checksum;
 }
 
-/* Reads checkpoints until one is cut off or needs more than there is. */
-static int read_checkpoints(trip_journal *j, uint64_t ordered_splats)
+/* Checksums are right where somebody made them so, too. */
+static int fail_false(const trip_journal *j, const char *what)
 {
-    for (int taken = 1; taken == 1;) {
-        record_head head;
-        void *record = read_record(j, j->offset, &head);
-        if (!record)
-            return 0;
-        taken = head.kind == RECORD_CHECKPOINT
-                    ? take_checkpoint(j, record, head.bytes, ordered_splats)
-                    : 0;
-        free(record);
-        if (taken < 0)
-            return taken;
-        if (taken == 1)
-            j->offset += sizeof head + head.bytes;
-    }
-    return 0;
+    return trip_fail(TRIP_ERROR, "brick", j->path,
+                     "%s is not what such a run writes: without --resume it starts again", what);
 }
 
-static int read_journal(trip_journal *j, uint64_t identity, uint64_t ordered_splats)
+static int check_start(const trip_journal *j, const trip_journal_start *s)
 {
-    record_head head;
-    void *record = read_record(j, 0, &head);
-    if (!record || head.kind != RECORD_START || head.bytes != sizeof j->start) {
-        free(record);
-        return 0;
-    }
-    memcpy(&j->start, record, sizeof j->start);
-    free(record);
-    if (j->start.identity != identity)
+    const trip_journal_params *p = &j->params;
+    if (s->identity != p->identity)
         return trip_fail(TRIP_ERROR, "brick", j->path,
                          "the interrupted run had another input or other options: without --resume "
                          "it starts again");
-    j->has_start = true;
-    j->offset = sizeof head + head.bytes;
-    int status = read_checkpoints(j, ordered_splats);
+    if (s->scanned != p->scanned)
+        return fail_false(j, "its kind");
+    if (!s->scanned)
+        return 0;
+    if (!trip_tally_check(&s->tally) || s->tally.finite == 0 || s->tally.voxels > p->voxels ||
+        (p->slice_voxels && s->tally.voxels != p->voxels))
+        return fail_false(j, "its count of values");
+    return 0;
+}
+
+/* Against the checkpoint before, which is clear at first. Differences cannot overflow then. */
+static bool goes_on(const trip_checkpoint *before, const trip_checkpoint *c)
+{
+    return c->done >= before->done && c->kept >= before->kept && c->runs >= before->runs &&
+           c->segments >= before->segments && c->ordered_splats >= before->ordered_splats;
+}
+
+/* The voxels that exist in what was done, in *voxels: all of them, or, of sparse volumes, at most
+ * so many. */
+static bool done_voxels(const trip_journal_params *p, uint64_t done, uint64_t *voxels)
+{
+    *voxels = p->voxels;
+    if (p->slice_voxels && __builtin_mul_overflow(done, p->slice_voxels, voxels))
+        return false;
+    return *voxels <= p->voxels;
+}
+
+static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
+{
+    const trip_journal_params *p = &j->params;
+    const trip_tally *t = p->scanned ? &j->start.tally : &c->tally;
+    uint64_t voxels;
+    if (!goes_on(&j->checkpoint, c))
+        return fail_false(j, "the order of its checkpoints");
+    if (!done_voxels(p, c->done, &voxels))
+        return fail_false(j, "how far it came");
+    if (!p->scanned &&
+        (!trip_tally_check(t) || t->voxels > voxels || (p->slice_voxels && t->voxels != voxels)))
+        return fail_false(j, "its count of values");
+    if (c->kept > t->finite || c->kept > voxels)
+        return fail_false(j, "its count of kept voxels");
+    if (c->ordered_splats > c->kept || c->runs > c->ordered_splats)
+        return fail_false(j, "its count of runs");
+    return 0;
+}
+
+static bool has_runs(const trip_journal *j, uint64_t runs)
+{
+    struct stat st;
+    return fstat(j->runs_file, &st) == 0 && runs <= (uint64_t)st.st_size / sizeof(trip_run_record);
+}
+
+/* A checkpoint and the segments that are new with it. Returns 1 when it was taken over, 0 when what
+ * it counts on is no longer there. */
+static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *record, uint64_t bytes)
+{
+    trip_checkpoint *c = malloc(sizeof *c);
+    if (!c)
+        return fail_memory(j);
+    const trip_segment *segments = (const void *)((const char *)record + sizeof *c);
+    uint64_t fresh = bytes < sizeof *c ? 0 : (bytes - sizeof *c) / sizeof *segments;
+    if (bytes >= sizeof *c)
+        memcpy(c, record, sizeof *c);
+    int taken = 0;
+    if (bytes != sizeof *c + fresh * sizeof *segments || c->segments != j->noted + fresh)
+        taken = fail_false(j, "a record");
+    else
+        taken = check_checkpoint(j, c);
+    if (taken == 0 && c->ordered_splats <= j->params.ordered_splats && has_runs(j, c->runs))
+        taken = trip_spill_restore(spill, segments, fresh);
+    if (taken == 1) {
+        j->checkpoint = *c;
+        j->has_checkpoint = true;
+        j->noted = c->segments;
+    }
+    free(c);
+    return taken;
+}
+
+/* Reads checkpoints until one is cut off or needs more than there is. */
+static int read_checkpoints(trip_journal *j, trip_spill *spill, void *record)
+{
+    record_head head;
+    int taken = 1;
+    while (taken == 1 && read_record(j, j->offset, &head, record)) {
+        taken = head.kind == RECORD_CHECKPOINT ? take_checkpoint(j, spill, record, head.bytes)
+                                               : fail_false(j, "a record");
+        if (taken == 1)
+            j->offset += sizeof head + head.bytes;
+    }
     j->runs = j->checkpoint.runs;
     j->ordered_splats = j->checkpoint.ordered_splats;
+    return taken < 0 ? taken : 0;
+}
+
+static int read_records(trip_journal *j, trip_spill *spill, void *record)
+{
+    record_head head;
+    if (!read_record(j, 0, &head, record))
+        return 0;
+    if (head.kind != RECORD_START || head.bytes != sizeof j->start)
+        return fail_false(j, "its first record");
+    memcpy(&j->start, record, sizeof j->start);
+    int status = check_start(j, &j->start);
+    if (status < 0)
+        return status;
+    j->has_start = true;
+    j->offset = sizeof head + head.bytes;
+    return read_checkpoints(j, spill, record);
+}
+
+static int read_journal(trip_journal *j, trip_spill *spill)
+{
+    void *record = take_room(j);
+    int status = record ? read_records(j, spill, record) : TRIP_ERROR;
+    if (record)
+        trip_budget_release(j->budget, record, RECORD_MOST_BYTES);
     return status;
 }
 
-static int open_files(trip_journal *j, const char *folder, bool resume)
+static int open_file(const trip_journal *j, const trip_spill *spill, const char *name, int *fd)
 {
-    char *runs = NULL;
-    int flags = O_RDWR | O_CREAT | O_CLOEXEC | (resume ? 0 : O_TRUNC);
-    if (asprintf(&j->path, "%s/journal", folder) < 0) {
-        j->path = NULL;
-        return trip_fail(TRIP_ERROR, "brick", folder, "out of memory");
-    }
-    if (asprintf(&runs, "%s/runs", folder) < 0)
-        return fail_memory(j);
-    j->file = open(j->path, flags, 0666);
-    j->runs_file = open(runs, flags, 0666);
-    free(runs);
-    return j->file < 0 || j->runs_file < 0 ? trip_fail_errno("brick", j->path, "cannot create") : 0;
+    int status = trip_folder_open_file(fd, trip_spill_folder(spill), trip_spill_path(spill), name,
+                                       O_RDWR | O_CREAT, "brick");
+    if (status == 0 && !j->params.resume && ftruncate(*fd, 0) < 0)
+        status = trip_fail_errno("brick", j->path, "cannot shorten");
+    return status;
 }
 
-int trip_journal_open(trip_journal **out, const trip_spill *spill, bool resume, uint64_t identity,
-                      uint64_t ordered_splats)
+static int open_files(trip_journal *j, const trip_spill *spill)
+{
+    if (asprintf(&j->path, "%s/journal", trip_spill_path(spill)) < 0) {
+        j->path = NULL;
+        return trip_fail(TRIP_ERROR, "brick", trip_spill_path(spill), "out of memory");
+    }
+    int status = open_file(j, spill, "journal", &j->file);
+    return status == 0 ? open_file(j, spill, "runs", &j->runs_file) : status;
+}
+
+int trip_journal_open(trip_journal **out, trip_spill *spill, const trip_journal_params *params,
+                      trip_budget *budget)
 {
     trip_journal *j = *out = calloc(1, sizeof *j);
     if (!j)
         return trip_fail(TRIP_ERROR, "brick", trip_spill_path(spill), "out of memory");
+    j->params = *params;
+    j->budget = budget;
     j->file = j->runs_file = -1;
-    int status = open_files(j, trip_spill_path(spill), resume);
-    if (status == 0 && resume)
-        status = read_journal(j, identity, ordered_splats);
+    int status = open_files(j, spill);
+    if (status == 0 && params->resume)
+        status = read_journal(j, spill);
     if (status == 0 && ftruncate(j->file, (off_t)j->offset) < 0)
         status = trip_fail_errno("brick", j->path, "cannot shorten");
     return status;
@@ -203,7 +285,6 @@ void trip_journal_close(trip_journal *j)
         close(j->file);
     if (j->runs_file >= 0)
         close(j->runs_file);
-    free(j->segments);
     free(j->path);
     free(j);
 }
@@ -216,11 +297,6 @@ const trip_journal_start *trip_journal_get_start(const trip_journal *j)
 const trip_checkpoint *trip_journal_get_checkpoint(const trip_journal *j)
 {
     return j->has_checkpoint ? &j->checkpoint : NULL;
-}
-
-const trip_segment *trip_journal_get_segments(const trip_journal *j)
-{
-    return j->segments;
 }
 
 int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_record *runs,

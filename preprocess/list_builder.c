@@ -10,7 +10,7 @@
 #include "piece_pool.h"
 #include "report.h"
 
-enum { ORDERED_AXIS = 2 };
+enum { ORDERED_AXIS = TRIP_ORDERED_AXIS };
 
 /* What the background thread is to do with chunks: append the list in order, or spill the others.
  */

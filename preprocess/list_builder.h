@@ -13,6 +13,9 @@
 #include "spill.h"
 #include "workers.h"
 
+/* The list whose sheets arrive in order where a volume is read slice by slice. */
+enum { TRIP_ORDERED_AXIS = 2 };
+
 typedef struct trip_list_builder_params {
     trip_piece_format format;
     trip_quantiser quantiser; /* of a list in order; the others get theirs at the end */

@@ -33,7 +33,7 @@ typedef struct trip_quantiser {
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
 {
     double code = (value - q->lo) * (65535 / (q->hi - q->lo)) + 0.5;
-    return code <= 0 ? 0 : code >= 65535 ? 65535 : (uint32_t)code;
+    return !(code > 0) ? 0 : code >= 65535 ? 65535 : (uint32_t)code; /* NaN: 0 */
 }
 
 /* The same for all pieces of a run of the program. */

@@ -3,56 +3,53 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "dataset.h"
+#include "folder.h"
 #include "report.h"
 
 enum { ORDERED_AXIS = 2, RUNS_AT_A_TIME = 256 };
 
-static off_t size_of(const char *path)
+static off_t size_in(int folder, const char *name)
 {
     struct stat st;
-    return stat(path, &st) == 0 && S_ISREG(st.st_mode) ? st.st_size : -1;
+    bool found = folder >= 0 && fstatat(folder, name, &st, AT_SYMLINK_NOFOLLOW) == 0 &&
+                 S_ISREG(st.st_mode) && st.st_uid == geteuid();
+    return found ? st.st_size : -1;
 }
 
 /* Opens the longer of the two files of a plane, under its name in the spill. Both begin alike. */
-static int take_plane(const trip_spill *spill, const char *partial_path, int plane)
+static int take_plane(const trip_spill *spill, int partial, int plane, int *fd)
 {
-    char name[32], *from = NULL, *to = NULL;
-    int fd = -1;
+    char name[32];
+    int folder = trip_spill_folder(spill);
     trip_dataset_plane_name(ORDERED_AXIS, plane, name);
-    if (asprintf(&from, "%s/%s", partial_path, name) < 0)
-        from = NULL;
-    if (asprintf(&to, "%s/%s", trip_spill_path(spill), name) < 0)
-        to = NULL;
-    if (from && to) {
-        if (size_of(from) > size_of(to))
-            rename(from, to);
-        fd = open(to, O_RDONLY | O_CLOEXEC);
-    }
-    free(from);
-    free(to);
-    return fd;
+    if (size_in(partial, name) > size_in(folder, name))
+        renameat(partial, name, folder, name);
+    return trip_folder_open_file(fd, folder, trip_spill_path(spill), name, O_RDONLY, "brick");
 }
 
-trip_leftover trip_leftover_take(const trip_spill *spill, const char *partial_path, bool normals)
+int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *partial_path,
+                       bool normals)
 {
-    trip_leftover l = { .splats = UINT64_MAX };
-    for (int plane = 0; plane < TRIP_PLANES; plane++) {
+    trip_leftover *l = out;
+    int partial = open(partial_path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC), status = 0;
+    *l = (trip_leftover){ .fd = { -1, -1 }, .splats = UINT64_MAX };
+    for (int plane = 0; plane < TRIP_PLANES && status == 0; plane++) {
         struct stat st;
-        l.fd[plane] = -1;
         if (plane == TRIP_PLANE_NORMALS && !normals)
             continue;
-        l.fd[plane] = take_plane(spill, partial_path, plane);
-        uint64_t splats = l.fd[plane] >= 0 && fstat(l.fd[plane], &st) == 0
+        status = take_plane(spill, partial, plane, &l->fd[plane]);
+        uint64_t splats = l->fd[plane] >= 0 && fstat(l->fd[plane], &st) == 0
                               ? (uint64_t)st.st_size / TRIP_RECORD_BYTES
                               : 0;
-        l.splats = splats < l.splats ? splats : l.splats;
+        l->splats = splats < l->splats ? splats : l->splats;
     }
-    return l;
+    if (partial >= 0)
+        close(partial);
+    return status;
 }
 
 void trip_leftover_close(trip_leftover *l)
@@ -85,17 +82,32 @@ static int read_records(int fd, uint64_t first, uint32_t *records, uint32_t coun
     return 0;
 }
 
+/* Inside the tile and in its order: nothing later looks at each record. */
+static bool are_sound(const uint32_t *voxels, uint32_t count, unsigned tile_log2)
+{
+    uint64_t next = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        unsigned u = trip_voxel_u(voxels[i]), v = trip_voxel_v(voxels[i]);
+        uint64_t place = trip_morton(u, v);
+        if (u >> tile_log2 || v >> tile_log2 || place < next)
+            return false;
+        next = place + 1;
+    }
+    return true;
+}
+
 /* One run out of the leftover planes; records has room for two. */
 static int replay_run(const trip_leftover *l, const trip_run_record *run, uint64_t first,
-                      trip_list_output *output, uint32_t *records)
+                      trip_list_output *output, unsigned tile_log2, uint32_t *records)
 {
     uint32_t *normals = l->fd[TRIP_PLANE_NORMALS] >= 0 ? records + TRIP_TILE_MAX_SPLATS : NULL;
-    if (run->splats > TRIP_TILE_MAX_SPLATS)
+    if (run->splats == 0 || run->splats > 1u << 2 * tile_log2)
         return fail_damaged();
     int status = read_records(l->fd[TRIP_PLANE_VOXELS], first, records, run->splats);
     if (status == 0 && normals)
         status = read_records(l->fd[TRIP_PLANE_NORMALS], first, normals, run->splats);
-    if (status == 0 && trip_run_checksum(records, normals, run->splats) != run->checksum)
+    if (status == 0 && (trip_run_checksum(records, normals, run->splats) != run->checksum ||
+                        !are_sound(records, run->splats, tile_log2)))
         status = fail_damaged();
     if (status == 0 && trip_interrupted())
         status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
@@ -104,7 +116,7 @@ static int replay_run(const trip_leftover *l, const trip_run_record *run, uint64
 }
 
 int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_output *output,
-                         trip_budget *budget)
+                         unsigned tile_log2, trip_budget *budget)
 {
     const size_t bytes = 2 * TRIP_TILE_MAX_SPLATS * sizeof(uint32_t);
     const trip_checkpoint *c = trip_journal_get_checkpoint(j);
@@ -118,10 +130,10 @@ int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_outp
         size_t n = c->runs - i < RUNS_AT_A_TIME ? (size_t)(c->runs - i) : RUNS_AT_A_TIME;
         status = trip_journal_read_runs(j, i, runs, n);
         for (size_t r = 0; r < n && status == 0; r++) {
-            status = replay_run(l, &runs[r], first, output, records);
+            status = replay_run(l, &runs[r], first, output, tile_log2, records);
             first += runs[r].splats;
         }
     }
     trip_budget_release(budget, records, bytes);
-    return status;
+    return status == 0 && first != c->ordered_splats ? fail_damaged() : status;
 }

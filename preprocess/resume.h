@@ -12,12 +12,15 @@ typedef struct trip_leftover {
 } trip_leftover;
 
 /* Moves the Z list's planes of the partial data set into the spill's folder, unless as much of them
- * is there already, and opens them. The caller holds the spill's lock. */
-trip_leftover trip_leftover_take(const trip_spill *spill, const char *partial_path, bool normals);
+ * is there already, and opens them. The caller holds the spill's lock. Links and files of other
+ * users are a reported failure. */
+int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *partial_path,
+                       bool normals);
 void trip_leftover_close(trip_leftover *l);
 
-/* Appends the runs of the journal's checkpoint. */
+/* Appends the runs of the journal's checkpoint. Records that lie outside their tile or are out of
+ * order are a reported failure, as are runs that are not as many as the checkpoint says. */
 int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_output *output,
-                         trip_budget *budget);
+                         unsigned tile_log2, trip_budget *budget);
 
 #endif

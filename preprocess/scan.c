@@ -217,6 +217,41 @@ void trip_tally_add(trip_tally *t, const trip_tally *other)
     t->counted += other->counted;
 }
 
+static bool check_range(double lo, double hi)
+{
+    return fabs(lo) <= FLT_MAX && fabs(hi) <= FLT_MAX && lo <= hi;
+}
+
+/* Bins of values in [lo, hi] only, none wider than such a range needs: adding to a tally of a wider
+ * range then stays within its bins. */
+static bool check_bins(const trip_tally *t)
+{
+    const int64_t most = INT64_C(1) << 26; /* see last_bit() */
+    uint64_t sum = 0;
+    if (!check_range(t->value_min, t->value_max) || t->exponent < -149 || t->first < -most ||
+        t->first > most || t->exponent > exponent_for(t->value_min, t->value_max))
+        return false;
+    double first = floor(ldexp(t->value_min, -t->exponent));
+    double last = floor(ldexp(t->value_max, -t->exponent));
+    for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
+        double bin = (double)(t->first + b);
+        if (t->counts[b] > 0 && (bin < first || bin > last))
+            return false;
+        if (__builtin_add_overflow(sum, t->counts[b], &sum))
+            return false;
+    }
+    return sum == t->counted;
+}
+
+bool trip_tally_check(const trip_tally *t)
+{
+    if (t->finite > t->voxels || t->counted > t->finite || t->kept > t->voxels)
+        return false;
+    if (t->finite == 0)
+        return t->value_min == INFINITY && t->value_max == -INFINITY;
+    return t->counted > 0 ? check_bins(t) : check_range(t->value_min, t->value_max);
+}
+
 void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
 {
     const int bins = sizeof histogram->counts / sizeof *histogram->counts;
@@ -272,10 +307,10 @@ static int scan_box(void *user, unsigned thread, const trip_box *box)
     return 0;
 }
 
-static int scan_batch(void *user, uint64_t batches, uint64_t voxels)
+static int scan_batch(void *user, uint64_t done, uint64_t voxels)
 {
     const scan *s = user;
-    (void)batches;
+    (void)done;
     return s->params->progress ? s->params->progress(s->params->user, voxels) : 0;
 }
 

@@ -32,6 +32,8 @@ void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active,
 /* Counts the row's finite values into the fine bins; after trip_tally_range() of the same row. */
 void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active, size_t count);
 void trip_tally_add(trip_tally *t, const trip_tally *other);
+/* Whether a tally from a file can have come about: then it is safe to add and to use. */
+bool trip_tally_check(const trip_tally *t);
 /* What was counted, in 1024 bins over the range. */
 void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram);
 

@@ -1,16 +1,15 @@
 #include "spill.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "folder.h"
 #include "report.h"
 
 enum { BLOCK_BYTES = 4096, BUFFER_BYTES = 1 << 20 };
@@ -22,6 +21,8 @@ struct trip_spill {
     trip_budget *budget;
     int folder; /* holds the lock */
     int file;
+    bool keep;
+    bool cut; /* nothing is left in the file of what an interrupted run wrote behind `offset` */
     unsigned char *buffer;
     size_t used;
     uint64_t offset; /* in the file, of the buffer */
@@ -46,16 +47,12 @@ static void remove_files(int folder)
 
 static int open_folder(trip_spill *s, bool resume)
 {
-    if (mkdir(s->path, 0777) < 0 && errno != EEXIST)
-        return trip_fail_errno("brick", s->path, "cannot create");
-    s->folder = open(s->path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (s->folder < 0)
-        return trip_fail_errno("brick", s->path, "cannot open");
-    if (flock(s->folder, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)
-        return trip_fail(TRIP_ERROR, "brick", s->path, "another process is at work there");
-    if (!resume)
+    int status = trip_folder_open_own(&s->folder, s->path, 0700, "brick",
+                                      "another process is at work there");
+    if (status == 0 && !resume)
         remove_files(s->folder);
-    return 0;
+    s->keep = status == 0 && resume && faccessat(s->folder, "journal", F_OK, 0) == 0;
+    return status;
 }
 
 int trip_spill_open(trip_spill **out, const char *path, bool resume, trip_budget *budget)
@@ -72,13 +69,15 @@ int trip_spill_open(trip_spill **out, const char *path, bool resume, trip_budget
     s->hash = XXH64_createState();
     int status = s->buffer && s->hash ? open_folder(s, resume) : fail_memory(s);
     if (status < 0) {
-        if (s->folder >= 0)
-            close(s->folder);
-        s->folder = -1; /* another's: not to be removed */
         trip_spill_close(s);
         *out = NULL;
     }
     return status;
+}
+
+void trip_spill_keep(trip_spill *s, bool keep)
+{
+    s->keep = keep;
 }
 
 void trip_spill_close(trip_spill *s)
@@ -87,11 +86,12 @@ void trip_spill_close(trip_spill *s)
         return;
     if (s->file >= 0)
         close(s->file);
-    if (s->folder >= 0) {
+    if (s->folder >= 0 && !s->keep) {
         remove_files(s->folder);
         rmdir(s->path);
-        close(s->folder);
     }
+    if (s->folder >= 0)
+        close(s->folder);
     trip_budget_release(s->budget, s->buffer, BUFFER_BYTES);
     XXH64_freeState(s->hash);
     free(s->segments);
@@ -104,18 +104,18 @@ const char *trip_spill_path(const trip_spill *s)
     return s->path;
 }
 
-/* Opens the data file, as long as what is valid of it. */
+int trip_spill_folder(const trip_spill *s)
+{
+    return s->folder;
+}
+
 static int open_file(trip_spill *s)
 {
-    int flags = O_RDWR | O_CREAT | O_CLOEXEC;
-    s->file = openat(s->folder, DATA_NAME, flags | O_DIRECT, 0666);
-    if (s->file < 0 && errno == EINVAL) /* the file system knows no direct I/O */
-        s->file = openat(s->folder, DATA_NAME, flags, 0666);
-    if (s->file < 0)
-        return trip_fail_errno("brick", s->path, "cannot create " DATA_NAME);
-    return ftruncate(s->file, (off_t)s->offset) < 0
-               ? trip_fail_errno("brick", s->path, "cannot cut " DATA_NAME)
-               : 0;
+    int status =
+        trip_folder_open_file(&s->file, s->folder, s->path, DATA_NAME, O_RDWR | O_CREAT, "brick");
+    if (status == 0)
+        fcntl(s->file, F_SETFL, O_DIRECT); /* where refused, through the page cache */
+    return status;
 }
 
 static int make_room(trip_spill *s, size_t count)
@@ -130,16 +130,44 @@ static int make_room(trip_spill *s, size_t count)
     return 0;
 }
 
+/* Whether a segment can be the next one, from `offset` on: its end, in whole blocks; 0 if not. */
+static uint64_t end_of_segment(const trip_segment *t, uint64_t offset)
+{
+    uint64_t end;
+    bool sound = t->offset == offset && t->axis < 3 && t->retired == 0 &&
+                 t->bytes >= sizeof(trip_piece) && t->bytes % 8 == 0 &&
+                 !__builtin_add_overflow(t->offset, t->bytes, &end) &&
+                 !__builtin_add_overflow(end, BLOCK_BYTES - 1, &end) && end <= INT64_MAX;
+    return sound ? end & ~((uint64_t)BLOCK_BYTES - 1) : 0;
+}
+
 int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count)
 {
-    int status = make_room(s, count);
-    if (status < 0 || count == 0)
+    struct stat st;
+    uint64_t offset = s->offset;
+    int status = s->file < 0 && count ? open_file(s) : 0;
+    for (size_t i = 0; i < count && status == 0; i++) {
+        offset = end_of_segment(&segments[i], offset);
+        if (offset == 0)
+            status = trip_fail(TRIP_ERROR, "brick", s->path,
+                               "its journal tells of temporary data that no run writes: without "
+                               "--resume it starts again");
+    }
+    if (status == 0 && count && fstat(s->file, &st) < 0)
+        status = trip_fail_errno("brick", s->path, "cannot look at " DATA_NAME);
+    if (status == 0 && count && offset > (uint64_t)st.st_size)
+        return 0;
+    if (status == 0 && count > trip_budget_left_bytes(s->budget) / (4 * sizeof *segments))
+        status = fail_memory(s); /* a file can tell of any number of them */
+    if (status == 0)
+        status = make_room(s, s->count + count);
+    if (status < 0)
         return status;
-    memcpy(s->segments, segments, count * sizeof *segments);
-    s->count = count;
-    s->offset = (segments[count - 1].offset + segments[count - 1].bytes + BLOCK_BYTES - 1) &
-                ~((uint64_t)BLOCK_BYTES - 1);
-    return open_file(s);
+    if (count)
+        memcpy(s->segments + s->count, segments, count * sizeof *segments);
+    s->count += count;
+    s->offset = offset;
+    return 1;
 }
 
 static int write_buffer(trip_spill *s, size_t bytes)
@@ -166,6 +194,9 @@ int trip_spill_begin(trip_spill *s, int axis)
 {
     if (s->file < 0 && open_file(s) < 0)
         return TRIP_ERROR;
+    if (!s->cut && ftruncate(s->file, (off_t)s->offset) < 0)
+        return trip_fail_errno("brick", s->path, "cannot cut " DATA_NAME);
+    s->cut = true;
     if (make_room(s, s->count + 1) < 0)
         return TRIP_ERROR;
     s->segments[s->count] = (trip_segment){ .offset = s->offset, .axis = (uint32_t)axis };

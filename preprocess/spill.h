@@ -21,13 +21,19 @@ typedef struct trip_spill trip_spill;
  * process at work there is a reported failure. What an interrupted run left in it is removed,
  * unless `resume`. */
 int trip_spill_open(trip_spill **out, const char *path, bool resume, trip_budget *budget);
-/* After opening with `resume`: takes over these segments of the interrupted run, the first ones of
- * its file, and cuts off what is after them. */
+/* After opening with `resume`: takes over these segments of the interrupted run, which follow those
+ * taken over before. Returns 1; 0, with nothing taken over, when the file does not reach as far as
+ * they do; a negative status after reporting segments that no run writes. */
 int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count);
-/* Removes the folder and what this program put into it. */
+/* Whether what is in the folder outlives closing. At first it does where an interrupted run is to
+ * be gone on with: a refusal must not cost what that run did. */
+void trip_spill_keep(trip_spill *s, bool keep);
+/* Removes the folder and what this program put into it, unless that is to be kept. */
 void trip_spill_close(trip_spill *s);
 
 const char *trip_spill_path(const trip_spill *s);
+/* A descriptor of the folder. */
+int trip_spill_folder(const trip_spill *s);
 
 /* Pieces of a segment are appended by ascending key. */
 int trip_spill_begin(trip_spill *s, int axis);

@@ -21,7 +21,7 @@ typedef struct walk {
     const trip_walk_params *params;
     trip_volume *volume;
     const batch *at_work;
-    uint64_t batches, voxels; /* up to where the volume was read */
+    uint64_t done, voxels; /* up to where the volume was read */
 } walk;
 
 /* Pieces that the grid of `step` cuts [lo, lo + size) into. */
@@ -84,17 +84,22 @@ static void release(walk *w, batch *b)
     b->count = 0;
 }
 
-/* Fills a batch; an empty one is the end. A slab of slices is a batch by itself. */
-static int read_batch(walk *w, batch *b)
+static bool has_slices(const walk *w)
 {
-    bool slabs = !trip_volume_get_info(w->volume)->sparse;
+    return !trip_volume_get_info(w->volume)->sparse;
+}
+
+/* Fills a batch; an empty one is the end. A slab of at most `slices` is a batch by itself. */
+static int read_batch(walk *w, batch *b, int64_t slices)
+{
+    bool slabs = has_slices(w);
     int more = 1;
     b->voxels = 0;
     b->count = 0;
     b->first_box[0] = 0;
     while (b->count < (slabs ? 1 : BATCH_BLOCKS) && b->voxels < BATCH_VOXELS) {
         trip_block *block = &b->blocks[b->count];
-        more = trip_volume_next(w->volume, w->params->slices, block);
+        more = trip_volume_next(w->volume, slices, block);
         if (more <= 0)
             break;
         b->count++;
@@ -103,7 +108,8 @@ static int read_batch(walk *w, batch *b)
     }
     if (more < 0)
         release(w, b);
-    w->batches += b->count > 0;
+    if (b->count > 0)
+        w->done += slabs ? (uint64_t)b->blocks[0].size[2] : 1;
     w->voxels += b->voxels;
     return more < 0 ? more : 0;
 }
@@ -119,28 +125,46 @@ static void start(walk *w, trip_workers *workers, const batch *b)
     trip_workers_start(workers, do_box, w, b->first_box[b->count]);
 }
 
-/* Passes over batches, the slices of which need not be read if the format knows how. */
-static int pass_over(walk *w, batch *b, uint64_t count)
+/* Passes over slices that need not be read, if the format knows how; *count becomes what is left.
+ */
+static int skip_slices(walk *w, uint64_t *count)
 {
     const int64_t *dims = trip_volume_get_info(w->volume)->dims;
-    int64_t slices, wanted;
-    if (__builtin_mul_overflow(count, w->params->slices, &wanted))
-        wanted = INT64_MAX;
-    slices = count ? trip_volume_skip(w->volume, wanted) : 0;
-    if (slices > 0) {
-        w->batches += count;
-        w->voxels += (uint64_t)(slices * dims[0] * dims[1]);
-    }
-    int status = slices < 0 ? (int)slices : 0;
-    for (uint64_t i = 0; i < count && slices == 0 && status == 0; i++) {
-        status = read_batch(w, b);
+    int64_t slices = trip_volume_skip(w->volume, *count < INT64_MAX ? (int64_t)*count : INT64_MAX);
+    if (slices <= 0)
+        return (int)slices;
+    w->done += (uint64_t)slices;
+    w->voxels += (uint64_t)(slices * dims[0] * dims[1]);
+    *count = 0;
+    return 0;
+}
+
+/* Passes over slices, or over batches of sparse formats. */
+static int pass_over(walk *w, batch *b, uint64_t count)
+{
+    int64_t slices = w->params->slices < 1 ? 1 : w->params->slices;
+    int status = count && has_slices(w) ? skip_slices(w, &count) : 0;
+    while (count > 0 && status == 0) {
+        uint64_t before = w->done;
+        status = read_batch(w, b, (uint64_t)slices < count ? slices : (int64_t)count);
         if (b->count == 0)
             break;
+        count -= w->done - before;
         release(w, b);
         if (status == 0)
             status = check_interrupted();
     }
     return status;
+}
+
+/* What to pass over for only every so many batches to be looked at. */
+static int pass_stride(walk *w, batch *b)
+{
+    uint64_t count = w->params->stride > 1 ? w->params->stride - 1 : 0;
+    uint64_t slices = w->params->slices < 1 ? 1 : (uint64_t)w->params->slices;
+    if (has_slices(w) && __builtin_mul_overflow(count, slices, &count))
+        count = UINT64_MAX;
+    return pass_over(w, b, count);
 }
 
 static double now_seconds(void)
@@ -153,10 +177,10 @@ static double now_seconds(void)
 static int read_next(walk *w, batch *b)
 {
     double begin = now_seconds();
-    int status = w->params->stride > 1 ? pass_over(w, b, w->params->stride - 1) : 0;
+    int status = pass_stride(w, b);
     if (w->params->passing_seconds)
         *w->params->passing_seconds += now_seconds() - begin;
-    return status == 0 ? read_batch(w, b) : status;
+    return status == 0 ? read_batch(w, b, w->params->slices) : status;
 }
 
 /* One batch is at work while the next is being read. */
@@ -165,9 +189,9 @@ static int walk_batches(walk *w, trip_workers *workers, batch *now, batch *ahead
     const trip_walk_params *p = w->params;
     int status = pass_over(w, now, p->skip);
     if (status == 0)
-        status = read_batch(w, now);
+        status = read_batch(w, now, p->slices);
     while (status == 0 && now->count > 0) {
-        uint64_t batches = w->batches, voxels = w->voxels;
+        uint64_t done = w->done, voxels = w->voxels;
         int read = 0;
         ahead->count = 0;
         start(w, workers, now);
@@ -176,7 +200,7 @@ static int walk_batches(walk *w, trip_workers *workers, batch *now, batch *ahead
         trip_workers_wait(workers, 0, &status);
         release(w, now);
         if (status == 0)
-            status = p->batch(p->user, batches, voxels);
+            status = p->batch(p->user, done, voxels);
         if (status == 0 && !p->read_ahead)
             read = read_next(w, ahead);
         if (status == 0)

@@ -20,12 +20,13 @@ typedef struct trip_walk_params {
     bool read_ahead; /* read the next blocks while boxes are at work */
     int64_t edge;    /* of a box along i and j and of the grid: a power of two */
     int64_t height;  /* of a box along k: a power of two, at most `edge` */
-    uint64_t skip;   /* batches passed over at the start, without boxes */
+    uint64_t skip;   /* of the volume, passed over at the start without boxes: see `batch` */
     uint64_t stride; /* then only every so many batches are looked at; default: all */
     int (*box)(void *user, unsigned thread, const trip_box *box); /* on any thread */
-    /* A batch of blocks is done: on the calling thread, while no box is at work. `batches` and
-     * `voxels` count from the start of the volume, what was passed over included. */
-    int (*batch)(void *user, uint64_t batches, uint64_t voxels);
+    /* A batch of blocks is done: on the calling thread, while no box is at work. `done` (slices, or
+     * batches of sparse formats: the same whatever a run's memory is) and `voxels` count from the
+     * start of the volume, what was passed over included. */
+    int (*batch)(void *user, uint64_t done, uint64_t voxels);
     void *user;
     double *passing_seconds; /* gets what passing over took; or NULL */
 } trip_walk_params;

@@ -43,7 +43,9 @@ static void open_building(building *b, const char *name, const run_params *p)
     assert_int_equal(trip_budget_create(&b->budget, (uint64_t)1 << 28), 0);
     assert_int_equal(trip_writer_open(&b->writer, test_path(name), &w, b->budget), 0);
     assert_int_equal(trip_spill_open(&b->spill, test_path("spill"), false, b->budget), 0);
-    assert_int_equal(trip_journal_open(&b->journal, b->spill, false, 1, 0), 0);
+    assert_int_equal(trip_journal_open(&b->journal, b->spill,
+                                       &(trip_journal_params){ .identity = 1 }, b->budget),
+                     0);
     assert_int_equal(trip_workers_create(&b->workers, 3), 0);
     l.writer = b->writer;
     l.spill = b->spill;

@@ -9,10 +9,10 @@ enum { NX = 70, NY = 66, NZ = 50, N = NX * NY * NZ };
 /* What a walk met: how often each voxel, and that its value was right. */
 typedef struct seen {
     uint8_t times[N];
-    uint64_t batches, voxels; /* as last told */
+    uint64_t done, batches, voxels; /* as last told */
     int64_t edge, height;
     bool wrong;
-    int stop_after; /* batches; 0: never */
+    int stop_after; /* slices; 0: never */
 } seen;
 
 static uint8_t value_at(size_t i)
@@ -58,13 +58,14 @@ static int see_box(void *user, unsigned thread, const trip_box *box)
     return 0;
 }
 
-static int see_batch(void *user, uint64_t batches, uint64_t voxels)
+static int see_batch(void *user, uint64_t done, uint64_t voxels)
 {
     seen *s = user;
-    s->wrong = s->wrong || batches <= s->batches || voxels <= s->voxels;
-    s->batches = batches;
+    s->wrong = s->wrong || done <= s->done || voxels <= s->voxels;
+    s->done = done;
+    s->batches++;
     s->voxels = voxels;
-    return s->stop_after && batches >= (uint64_t)s->stop_after ? -77 : 0;
+    return s->stop_after && done >= (uint64_t)s->stop_after ? -77 : 0;
 }
 
 static int walk_volume(const char *name, trip_walk_params p, seen *s)
@@ -104,12 +105,13 @@ static void every_voxel_is_met_once(void **state)
             assert_false(s.wrong);
             assert_int_equal(s.voxels, N);
             assert_int_equal(s.batches, (NZ + slices - 1) / slices);
+            assert_int_equal(s.done, NZ);
             for (size_t i = 0; i < N; i++)
                 assert_int_equal(s.times[i], 1);
         }
 }
 
-/* Block b of `slices` slices is looked at if it comes after `skip`, and then each stride-th. */
+/* After `skip` slices, each stride-th block of `slices` is looked at. */
 static void check_passing(const char *name)
 {
     static const struct {
@@ -129,8 +131,9 @@ static void check_passing(const char *name)
         assert_int_equal(walk_volume(name, p, &s), 0);
         assert_false(s.wrong);
         for (size_t i = 0; i < N; i++) {
-            uint64_t block = i / (NX * NY) / (uint64_t)ways[w].slices;
-            bool looked_at = block >= ways[w].skip && (block - ways[w].skip) % stride == 0;
+            uint64_t slice = i / (NX * NY), skip = ways[w].skip;
+            bool looked_at =
+                slice >= skip && (slice - skip) / (uint64_t)ways[w].slices % stride == 0;
             assert_int_equal(s.times[i], looked_at);
         }
     }
@@ -153,11 +156,12 @@ static void compressed_blocks_can_be_passed_over(void **state)
 static void a_batch_may_end_the_walk(void **state)
 {
     (void)state;
-    seen s = { .stop_after = 3 };
+    seen s = { .stop_after = 6 };
     make_volume(false);
     trip_walk_params p = { .slices = 2, .read_ahead = true, .edge = 64, .height = 16 };
     assert_int_equal(walk_volume("v.raw", p, &s), -77);
     assert_int_equal(s.batches, 3);
+    assert_int_equal(s.done, 6);
 }
 
 int main(void)

@@ -1,0 +1,564 @@
+/* Journals of interrupted runs: a run of `brick` is killed, its journal rewritten with right
+ * checksums, and gone on with. */
+#include "brick_files.h"
+
+#include <math.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <xxhash.h>
+
+#include "journal.h"
+
+enum { NX = 128, NY = 96, NZ = 128, N = NX * NY * NZ };
+enum { START = 1, CHECKPOINT = 2, MOST_RECORDS = 16 };
+
+/* As journal.c lays it out. */
+typedef struct record {
+    uint64_t kind, bytes, checksum;
+    unsigned char *body;
+} record;
+
+static record records[MOST_RECORDS];
+static size_t record_count;
+
+static uint8_t values[N];
+static char input[128], output[128], journal_path[160];
+
+static void make_volume(void)
+{
+    uint64_t random = 11;
+    for (int i = 0; i < N; i++) {
+        double x = i % NX - NX / 2, y = i / NX % NY - NY / 2, z = i / NX / NY - NZ / 2;
+        values[i] =
+            (uint8_t)(120 + 100 * cos(sqrt(x * x + y * y + z * z) / 4) + test_random(&random) % 20);
+    }
+    test_write("v.raw", values, sizeof values);
+    strcpy(input, test_path("v.raw"));
+    strcpy(output, test_path("a.trip"));
+    snprintf(journal_path, sizeof journal_path, "%s.spill/journal", output);
+}
+
+static trip_brick_params params(void)
+{
+    return (trip_brick_params){ .input = input,
+                                .output = output,
+                                .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" },
+                                .memory_bytes = 28 << 20,
+                                .threads = 1,
+                                .slices = 2,
+                                .keep_all = true };
+}
+
+static void kill_at(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    const double *share = user;
+    if (strcmp(stage, "read") == 0 && (double)done >= *share * (double)total)
+        raise(SIGKILL);
+}
+
+/* Killed when this share of the volume was read. */
+static void leave_killed_at(double share, trip_brick_params p)
+{
+    pid_t child = fork();
+    int how;
+    assert_true(child >= 0);
+    if (child == 0) {
+        trip_brick_summary s;
+        p.progress = kill_at;
+        p.progress_user = &share;
+        trip_brick(&p, &s);
+        _exit(0);
+    }
+    assert_int_equal(waitpid(child, &how, 0), child);
+    assert_true(WIFSIGNALED(how));
+}
+
+static void leave_killed_run(trip_brick_params p)
+{
+    leave_killed_at(0.9, p);
+}
+
+static void read_journal(void)
+{
+    FILE *f = fopen(journal_path, "rb");
+    assert_non_null(f);
+    record_count = 0;
+    for (record *r = records; fread(r, 8, 3, f) == 3; r++, record_count++) {
+        assert_true(record_count < MOST_RECORDS);
+        r->body = malloc(r->bytes);
+        assert_int_equal(fread(r->body, 1, r->bytes, f), r->bytes);
+    }
+    fclose(f);
+    assert_true(record_count >= 2);
+    assert_int_equal(records[0].kind, START);
+    assert_int_equal(records[0].bytes, sizeof(trip_journal_start));
+}
+
+static void write_journal(void)
+{
+    FILE *f = fopen(journal_path, "wb");
+    assert_non_null(f);
+    for (record *r = records; r < records + record_count; r++) {
+        r->checksum = XXH64(r->body, r->bytes, r->kind);
+        assert_int_equal(fwrite(r, 8, 3, f), 3);
+        assert_int_equal(fwrite(r->body, 1, r->bytes, f), r->bytes);
+    }
+    assert_int_equal(fclose(f), 0);
+}
+
+static long journal_bytes;
+
+/* All of its bytes, for restore_journal(). */
+static unsigned char *copy_journal(void)
+{
+    FILE *f = fopen(journal_path, "rb");
+    assert_non_null(f);
+    fseek(f, 0, SEEK_END);
+    journal_bytes = ftell(f);
+    rewind(f);
+    unsigned char *copy = malloc((size_t)journal_bytes);
+    assert_int_equal(fread(copy, 1, (size_t)journal_bytes, f), journal_bytes);
+    fclose(f);
+    return copy;
+}
+
+static void restore_journal(unsigned char *copy)
+{
+    FILE *f = fopen(journal_path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(copy, 1, (size_t)journal_bytes, f), journal_bytes);
+    fclose(f);
+    free(copy);
+}
+
+static void free_records(void)
+{
+    for (size_t i = 0; i < record_count; i++)
+        free(records[i].body);
+    record_count = 0;
+}
+
+static trip_journal_start *start(void)
+{
+    return (void *)records[0].body;
+}
+
+static trip_checkpoint *checkpoint(void)
+{
+    return (void *)records[record_count - 1].body;
+}
+
+/* The first of those that came with the first checkpoint. */
+static trip_segment *segments(void)
+{
+    return (void *)(records[1].body + sizeof(trip_checkpoint));
+}
+
+static void check_one_line(void)
+{
+    assert_ptr_equal(strchr(test_report, '\n'), test_report + strlen(test_report) - 1);
+}
+
+static void expect_refused(trip_brick_params p, const char *attack, const char *why)
+{
+    trip_brick_summary s;
+    test_report[0] = 0;
+    p.resume = true;
+    if (trip_brick(&p, &s) >= 0)
+        fail_msg("%s: not refused", attack);
+    if (!strstr(test_report, why))
+        fail_msg("%s: \"%s\" does not say \"%s\"", attack, test_report, why);
+    check_one_line();
+    assert_false(test_exists("a.trip"));
+}
+
+typedef struct attack {
+    const char *name;
+    void (*change)(void);
+} attack;
+
+/* What the killed run left outlives each refusal, so that its journal may be changed again. */
+static void check_attacks(const attack *attacks, size_t count, const char *why, bool automatic)
+{
+    trip_brick_params p = params();
+    make_volume();
+    p.keep_all = !automatic;
+    leave_killed_run(p);
+    for (size_t i = 0; i < count; i++) {
+        read_journal();
+        unsigned char *sound = copy_journal();
+        attacks[i].change();
+        write_journal();
+        free_records();
+        expect_refused(p, attacks[i].name, why);
+        restore_journal(sound);
+    }
+}
+
+#define CHECK_ATTACKS(attacks, why, automatic)                                                     \
+    check_attacks((attacks), sizeof(attacks) / sizeof *(attacks), (why), (automatic))
+
+/* A change of the start, of the last checkpoint, or of the first segment. */
+#define ATTACK(name, change)                                                                       \
+    static void name(void)                                                                         \
+    {                                                                                              \
+        change;                                                                                    \
+    }
+
+ATTACK(exponent_far_below, checkpoint()->tally.exponent = -100000)
+ATTACK(exponent_far_above, checkpoint()->tally.exponent = 100000)
+ATTACK(exponent_wider_than_the_range, checkpoint()->tally.exponent += 1)
+ATTACK(exponent_least, checkpoint()->tally.exponent = INT32_MIN)
+ATTACK(first_bin_elsewhere, checkpoint()->tally.first += 100)
+ATTACK(first_bin_least, checkpoint()->tally.first = INT64_MIN)
+ATTACK(bin_behind_the_range, checkpoint()->tally.counts[TRIP_TALLY_BINS - 1] = 1)
+ATTACK(bins_overflowing, checkpoint()->tally.counts[0] = UINT64_MAX)
+ATTACK(value_not_a_number, checkpoint()->tally.value_min = NAN)
+ATTACK(value_beyond_floats, checkpoint()->tally.value_max = 1e300)
+ATTACK(range_upside_down, checkpoint()->tally.value_max = checkpoint()->tally.value_min - 1)
+ATTACK(none_finite_but_counted, checkpoint()->tally.finite = 0)
+ATTACK(a_voxel_more, checkpoint()->tally.voxels++)
+ATTACK(a_voxel_less, checkpoint()->tally.voxels--)
+ATTACK(most_voxels, checkpoint()->tally.voxels = UINT64_MAX)
+ATTACK(more_finite_than_voxels, checkpoint()->tally.finite++)
+ATTACK(scanned_voxel_more, start()->tally.voxels++)
+ATTACK(scanned_exponent, start()->tally.exponent = 1 << 20)
+ATTACK(not_scanned, start()->scanned = 0)
+ATTACK(scanned, start()->scanned = 1)
+ATTACK(another_identity, start()->identity++)
+ATTACK(done_beyond_the_end, checkpoint()->done = NZ + 1)
+ATTACK(most_done, checkpoint()->done = UINT64_MAX)
+ATTACK(done_before, checkpoint()->done = 0)
+ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
+ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
+ATTACK(most_segments, checkpoint()->segments = UINT64_MAX)
+ATTACK(segments_that_wrap, checkpoint()->segments += UINT64_C(1) << 59)
+ATTACK(fewer_segments, checkpoint()->segments--)
+ATTACK(segment_of_no_axis, segments()->axis = 3)
+ATTACK(segment_elsewhere, segments()->offset = 4096)
+ATTACK(segment_that_wraps, segments()->bytes = UINT64_MAX - 4095)
+ATTACK(segment_of_nothing, segments()->bytes = 0)
+ATTACK(segment_of_odd_length, segments()->bytes += 1)
+ATTACK(segment_retired, segments()->retired = 1)
+ATTACK(record_of_another_kind, records[record_count - 1].kind = 77)
+ATTACK(start_twice, records[record_count - 1].kind = START)
+ATTACK(start_cut_short, records[0].bytes -= 8)
+ATTACK(checkpoint_cut_short, records[record_count - 1].bytes = 16)
+ATTACK(a_kept_voxel_less, checkpoint()->kept--)
+
+static void numbers_that_no_run_writes_are_refused(void **state)
+{
+    (void)state;
+    static const attack attacks[] = {
+        { "exponent far below", exponent_far_below },
+        { "exponent far above", exponent_far_above },
+        { "exponent wider than the range", exponent_wider_than_the_range },
+        { "exponent least", exponent_least },
+        { "first bin elsewhere", first_bin_elsewhere },
+        { "first bin least", first_bin_least },
+        { "bin behind the range", bin_behind_the_range },
+        { "bins overflowing", bins_overflowing },
+        { "value not a number", value_not_a_number },
+        { "value beyond floats", value_beyond_floats },
+        { "range upside down", range_upside_down },
+        { "none finite but counted", none_finite_but_counted },
+        { "a voxel more", a_voxel_more },
+        { "a voxel less", a_voxel_less },
+        { "most voxels", most_voxels },
+        { "more finite than voxels", more_finite_than_voxels },
+        { "scanned", scanned },
+        { "done beyond the end", done_beyond_the_end },
+        { "most done", most_done },
+        { "done before", done_before },
+        { "more kept than there are", more_kept_than_there_are },
+        { "most runs", most_runs },
+        { "most segments", most_segments },
+        { "segments that wrap", segments_that_wrap },
+        { "fewer segments", fewer_segments },
+        { "record of another kind", record_of_another_kind },
+        { "start twice", start_twice },
+        { "start cut short", start_cut_short },
+        { "checkpoint cut short", checkpoint_cut_short },
+    };
+    CHECK_ATTACKS(attacks, "is not what such a run writes", false);
+}
+
+static void segments_that_no_run_writes_are_refused(void **state)
+{
+    (void)state;
+    static const attack attacks[] = {
+        { "segment of no axis", segment_of_no_axis },
+        { "segment elsewhere", segment_elsewhere },
+        { "segment that wraps", segment_that_wraps },
+        { "segment of nothing", segment_of_nothing },
+        { "segment of odd length", segment_of_odd_length },
+        { "segment retired", segment_retired },
+    };
+    CHECK_ATTACKS(attacks, "temporary data that no run writes", false);
+}
+
+static void a_false_tally_of_all_values_is_refused(void **state)
+{
+    (void)state;
+    static const attack attacks[] = {
+        { "scanned voxel more", scanned_voxel_more },
+        { "scanned exponent", scanned_exponent },
+        { "not scanned", not_scanned },
+    };
+    CHECK_ATTACKS(attacks, "is not what such a run writes", true);
+}
+
+static void another_identity_is_refused(void **state)
+{
+    (void)state;
+    static const attack attacks[] = {
+        { "another identity", another_identity },
+    };
+    CHECK_ATTACKS(attacks, "another input or other options", false);
+}
+
+static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    make_volume();
+    p.slices = 20; /* the list in order is spilled, too, and says nothing of the count */
+    leave_killed_run(p);
+    read_journal();
+    a_kept_voxel_less();
+    write_journal();
+    free_records();
+    expect_refused(p, "a kept voxel less", "what the interrupted run left is damaged");
+    assert_false(test_exists("a.trip.partial"));
+}
+
+/* The last record of the first run of the list in order, with a right checksum. */
+static void change_leftover(uint32_t voxel)
+{
+    char path[192];
+    trip_run_record run;
+    uint32_t voxels[TRIP_TILE_MAX_SPLATS], normals[TRIP_TILE_MAX_SPLATS];
+    FILE *planes[2], *runs;
+    snprintf(path, sizeof path, "%s.partial/z.voxels", output);
+    planes[0] = fopen(path, "r+b");
+    snprintf(path, sizeof path, "%s.partial/z.normals", output);
+    planes[1] = fopen(path, "rb");
+    snprintf(path, sizeof path, "%s.spill/runs", output);
+    runs = fopen(path, "r+b");
+    assert_true(planes[0] && planes[1] && runs);
+    assert_int_equal(fread(&run, sizeof run, 1, runs), 1);
+    assert_int_equal(fread(voxels, 4, run.splats, planes[0]), run.splats);
+    assert_int_equal(fread(normals, 4, run.splats, planes[1]), run.splats);
+    voxels[run.splats - 1] = voxel;
+    run.checksum = trip_run_checksum(voxels, normals, run.splats);
+    rewind(planes[0]);
+    rewind(runs);
+    assert_int_equal(fwrite(voxels, 4, run.splats, planes[0]), run.splats);
+    assert_int_equal(fwrite(&run, sizeof run, 1, runs), 1);
+    fclose(planes[0]);
+    fclose(planes[1]);
+    fclose(runs);
+}
+
+static void false_records_of_the_list_in_order_are_refused(void **state)
+{
+    (void)state;
+    const uint32_t outside_its_tile = 64 | 63 << 8, out_of_order = 0;
+    trip_brick_params p = params();
+    make_volume();
+    leave_killed_run(p);
+    change_leftover(outside_its_tile);
+    expect_refused(p, "outside its tile", "what the interrupted run left is damaged");
+    leave_killed_run(p);
+    change_leftover(out_of_order);
+    expect_refused(p, "out of order", "what the interrupted run left is damaged");
+}
+
+static void links_and_what_is_no_file_are_not_followed(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "journal", "runs", "pieces", "z.voxels" };
+    static const char victim_text[] = "not to be touched";
+    make_volume();
+    for (size_t i = 0; i < 2 * sizeof names / sizeof *names; i++) {
+        char path[192], text[sizeof victim_text] = "";
+        trip_brick_params p = params();
+        trip_brick_summary s;
+        bool fifo = i % 2;
+        p.replace = true;
+        leave_killed_run(p);
+        test_write("victim", victim_text, sizeof victim_text);
+        snprintf(path, sizeof path, "%s.partial/z.voxels", output);
+        unlink(path);
+        snprintf(path, sizeof path, "%s.spill/%s", output, names[i / 2]);
+        unlink(path);
+        assert_int_equal(fifo ? mkfifo(path, 0600) : symlink(test_path("victim"), path), 0);
+        p.resume = true;
+        test_report[0] = 0;
+        assert_true(trip_brick(&p, &s) < 0);
+        assert_non_null(
+            strstr(test_report, fifo ? "is not a file of this program's" : "is a link"));
+        check_one_line();
+        FILE *f = fopen(test_path("victim"), "rb");
+        assert_int_equal(fread(text, 1, sizeof text, f), sizeof text);
+        fclose(f);
+        assert_string_equal(text, victim_text);
+    }
+}
+
+static void check_foreign(const char *suffix)
+{
+    char path[160];
+    trip_brick_params p = params();
+    trip_brick_summary s;
+    snprintf(path, sizeof path, "%s.%s", output, suffix);
+    leave_killed_run(p);
+    assert_int_equal(chown(path, 12345, 12345), 0);
+    for (int resume = 0; resume < 2; resume++) {
+        p.resume = resume;
+        test_report[0] = 0;
+        assert_true(trip_brick(&p, &s) < 0);
+        assert_non_null(strstr(test_report, "belongs to another user"));
+        check_one_line();
+        assert_true(test_exists("a.trip.spill") || strcmp(suffix, "spill") != 0);
+    }
+    assert_int_equal(chown(path, geteuid(), getegid()), 0);
+    p.resume = false;
+    assert_int_equal(trip_brick(&p, &s), 0);
+}
+
+static void folders_of_another_user_are_refused(void **state)
+{
+    (void)state;
+    if (geteuid() != 0)
+        skip(); /* only root can give a folder away */
+    make_volume();
+    check_foreign("spill");
+}
+
+static void partial_folders_of_another_user_are_refused(void **state)
+{
+    (void)state;
+    if (geteuid() != 0)
+        skip(); /* only root can give a folder away */
+    make_volume();
+    check_foreign("partial");
+}
+
+/* Lost to a power failure, say: the run goes back to a checkpoint that has all it needs. */
+static void what_is_no_longer_at_hand_is_made_again(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "spill/pieces", "spill/runs", "partial/z.voxels" };
+    trip_brick_params p = params();
+    trip_brick_summary s;
+    make_volume();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(rename(output, test_path("wanted.trip")), 0);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char path[192];
+        struct stat st;
+        leave_killed_run(p);
+        snprintf(path, sizeof path, "%s.%s", output, names[i]);
+        assert_int_equal(stat(path, &st), 0);
+        assert_int_equal(truncate(path, st.st_size / 2), 0);
+        p.resume = true;
+        assert_int_equal(trip_brick(&p, &s), 0);
+        test_same_dataset("a.trip", "wanted.trip");
+        assert_int_equal(rename(output, test_path(i ? i > 1 ? "3" : "2" : "1")), 0);
+        p.resume = false;
+    }
+}
+
+static void a_journal_as_it_was_written_is_gone_on_with(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    trip_brick_summary s;
+    make_volume();
+    for (int automatic = 0; automatic < 2; automatic++) {
+        p.keep_all = !automatic;
+        leave_killed_run(p);
+        read_journal();
+        write_journal();
+        free_records();
+        p.resume = true;
+        assert_int_equal(trip_brick(&p, &s), 0);
+        assert_true(s.resumed);
+        assert_int_equal(rename(output, test_path(automatic ? "2" : "1")), 0);
+        p.resume = false;
+    }
+}
+
+/* Blocks of 16 slices leave no room for the Z list to be written as it comes, which it is with
+ * blocks of 2. */
+static void a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    trip_brick_summary s;
+    make_volume();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(rename(output, test_path("wanted.trip")), 0);
+    p.resume = true;
+    leave_killed_at(0.6, p);
+    read_journal();
+    assert_true(checkpoint()->runs > 0 && checkpoint()->ordered_splats == checkpoint()->kept);
+    free_records();
+    p.slices = 16;
+    leave_killed_at(0.9, p);
+    p.slices = 3;
+    p.threads = 2;
+    p.memory_bytes = 64 << 20;
+    leave_killed_at(0.95, p);
+    read_journal();
+    assert_true(checkpoint()->runs > 0 && checkpoint()->ordered_splats < checkpoint()->kept);
+    free_records();
+    p.memory_bytes = 40 << 20;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(s.resumed);
+    test_same_dataset("a.trip", "wanted.trip");
+    assert_false(test_exists("a.trip.spill"));
+}
+
+static void what_an_interrupted_run_did_outlives_a_refusal_to_go_on(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    trip_brick_summary s;
+    make_volume();
+    leave_killed_run(p);
+    p.tile_voxels = 32;
+    expect_refused(p, "other options", "another input or other options");
+    p.tile_voxels = 0;
+    p.memory_bytes = 4 << 20;
+    expect_refused(p, "less memory than any run takes", "need --memory ");
+    p.memory_bytes = 28 << 20;
+    p.resume = true;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(s.resumed);
+    assert_false(test_exists("a.trip.spill"));
+}
+
+#define TEST(f) cmocka_unit_test_setup_teardown(f, test_begin, test_end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_journal_as_it_was_written_is_gone_on_with),
+        TEST(numbers_that_no_run_writes_are_refused),
+        TEST(segments_that_no_run_writes_are_refused),
+        TEST(a_false_tally_of_all_values_is_refused),
+        TEST(another_identity_is_refused),
+        TEST(a_false_count_of_kept_voxels_is_found_at_the_end),
+        TEST(false_records_of_the_list_in_order_are_refused),
+        TEST(links_and_what_is_no_file_are_not_followed),
+        TEST(folders_of_another_user_are_refused),
+        TEST(partial_folders_of_another_user_are_refused),
+        TEST(what_is_no_longer_at_hand_is_made_again),
+        TEST(a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more),
+        TEST(what_an_interrupted_run_did_outlives_a_refusal_to_go_on),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
