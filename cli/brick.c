@@ -14,6 +14,7 @@
 #include "progress.h"
 #include "report.h"
 #include "text.h"
+#include "volume_options.h"
 
 enum { MAX_FUNCTIONS = 64, MAX_RANGES = 64 };
 
@@ -50,9 +51,10 @@ typedef struct options {
 
 static const struct argp_option option_table[] = {
     { NULL, 0, NULL, 0, "Input:", 1 },
-    { "grid", KEY_GRID, "NAME", 0, "OpenVDB grid (default: the first one of scalars)", 1 },
+    { "grid", KEY_GRID, "NAME", 0,
+      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 1 },
     { "level-set", KEY_LEVEL_SET, "HOW", 0,
-      "What to make of an OpenVDB level set: filled or band (default: refuse)", 1 },
+      "What to make of an OpenVDB level set: filled or band (default: filled)", 1 },
     { "size", KEY_SIZE, "X,Y,Z", 0, "Raw data: voxels along each axis, the fastest first", 1 },
     { "type", KEY_TYPE, "TYPE", 0, "Raw data: uint8, int16, float, ...", 1 },
     { "endian", KEY_ENDIAN, "little|big", 0, "Raw data: byte order (default: this machine's)", 1 },
@@ -98,16 +100,6 @@ static int parse_size(const char *text, int64_t dims[3])
             return trip_option_fail("--size", "takes three whole numbers, each 1 or more");
         dims[a] = (int64_t)numbers[a];
     }
-    return status;
-}
-
-static int parse_spacing(const char *text, double spacing[3])
-{
-    int count;
-    int status = trip_option_numbers("--spacing", text, 3, 3, spacing, &count);
-    for (int a = 0; a < 3 && status == 0; a++)
-        if (!(spacing[a] > 0))
-            return trip_option_fail("--spacing", "takes three positive lengths");
     return status;
 }
 
@@ -175,23 +167,13 @@ static int parse_endian(const char *text, int *endian)
     return status;
 }
 
-static int parse_level_set(const char *text, trip_level_set_mode *mode)
-{
-    static const char *const names[] = { "refuse", "filled", "band", NULL };
-    int choice = 0;
-    int status = trip_option_choice("--level-set", text, names, &choice);
-    *mode = (trip_level_set_mode)choice;
-    return status;
-}
-
 static error_t parse_input_option(int key, char *argument, trip_volume_params *v)
 {
     switch (key) {
     case KEY_GRID:
-        v->grid = argument;
-        return 0;
+        return trip_option_grid(argument, &v->grid);
     case KEY_LEVEL_SET:
-        return parse_level_set(argument, &v->level_set);
+        return trip_option_level_set(argument, &v->level_set);
     case KEY_SIZE:
         return parse_size(argument, v->raw_dims);
     case KEY_TYPE:
@@ -200,7 +182,7 @@ static error_t parse_input_option(int key, char *argument, trip_volume_params *v
                    ? trip_option_fail("--type", "no such type; for example uint8, int16 or float")
                    : 0;
     case KEY_SPACING:
-        return parse_spacing(argument, v->spacing);
+        return trip_option_spacing(argument, v->spacing);
     case KEY_ENDIAN:
         return parse_endian(argument, &v->raw_endian);
     case KEY_OFFSET:
@@ -247,7 +229,7 @@ static error_t check_options(const options *o)
 {
     const trip_brick_params *p = &o->brick;
     if (!p->input)
-        return trip_option_fail("INPUT", "no volume given");
+        return trip_option_fail("INPUT", "no volume given: `triptych brick VOLUME -o NAME.trip`");
     if (p->keep_all && p->range_count)
         return trip_option_fail("--range", "says nothing beside --keep-all");
     if (o->dry_run && p->resume)
@@ -437,6 +419,8 @@ static int brick(const options *o)
         status = brick_limits_measure(&limits, &o->brick, &summary);
     if (status < 0 || o->quiet)
         return status;
+    if (summary.note[0])
+        trip_note(o->brick.input, "%s", summary.note);
     if (o->json)
         return print_json(o, &summary, &limits);
     print_text(o, &summary);

@@ -39,7 +39,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         o->path = argument;
         return 0;
     case ARGP_KEY_END:
-        return o->path ? 0 : trip_option_fail("NAME.trip", "no data set given");
+        return o->path
+                   ? 0
+                   : trip_option_fail("NAME.trip", "no data set given: `triptych info NAME.trip`");
     default:
         return ARGP_ERR_UNKNOWN;
     }

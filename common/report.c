@@ -152,6 +152,14 @@ void trip_warn(const char *where, const char *why, ...)
     va_end(args);
 }
 
+void trip_note(const char *where, const char *what, ...)
+{
+    va_list args;
+    va_start(args, what);
+    report("note", where, what, args);
+    va_end(args);
+}
+
 static void on_signal(int number)
 {
     (void)number;

@@ -33,6 +33,9 @@ int trip_fail_errno(const char *what, const char *where, const char *action);
 /* Prints "triptych: warning: WHERE: why". */
 __attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const char *why, ...);
 
+/* Prints "triptych: note: WHERE: what": a choice made for the user, and how to make another. */
+__attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *what, ...);
+
 /* Where lines go instead of stderr, for tests; NULL restores stderr. Not thread-safe to change. */
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
 

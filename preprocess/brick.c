@@ -13,6 +13,7 @@
 #include "brick_text.h"
 #include "dataset.h"
 #include "estimate.h"
+#include "folder.h"
 #include "identity.h"
 #include "list_builder.h"
 #include "report.h"
@@ -430,6 +431,7 @@ static void fill_summary(brick *b)
     trip_brick_summary *s = b->summary;
     const double(*m)[4] = b->in.info->index_to_world.m;
     memcpy(s->dims, b->in.info->dims, sizeof s->dims);
+    memcpy(s->note, b->in.info->note, sizeof s->note);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
     s->voxels = b->in.tally->voxels;
@@ -447,7 +449,9 @@ static void fill_summary(brick *b)
 static int prepare(brick *b)
 {
     const trip_brick_params *p = b->params;
-    int status = trip_brick_input_open(&b->in, p);
+    int status = p->resume ? 0 : trip_folder_check(p->output, p->replace);
+    if (status == 0)
+        status = trip_brick_input_open(&b->in, p);
     b->format = trip_brick_format(p);
     b->format.quantised = true; /* for a first plan; choose_codes() decides */
     if (status == 0)

@@ -60,6 +60,7 @@ typedef struct trip_brick_summary {
     uint64_t bytes;           /* of the data set's splats */
     uint64_t temporary_bytes; /* spilled */
     bool resumed;
+    char note[512]; /* as trip_volume_info has it */
     trip_brick_cost stages[TRIP_BRICK_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* promised and taken from the budget */
 } trip_brick_summary;

@@ -68,13 +68,13 @@ static int no_size(const char *path)
         snprintf(header, sizeof header, "%.*s.nhdr", (int)(stem - 4), path);
         if (access(header, R_OK) == 0)
             return trip_fail(TRIP_USAGE, "read", path,
-                             "has no header of its own: open %s instead, or give --size X Y Z and "
-                             "--type",
+                             "has no header of its own: open %s instead, or give --size X,Y,Z and "
+                             "--type to `triptych brick`",
                              header);
     }
     return trip_fail(TRIP_USAGE, "read", path,
-                     "has no header: give --size X Y Z and --type (and --spacing, --endian, "
-                     "--offset if needed)");
+                     "has no header: `triptych brick FILE --size X,Y,Z --type uint8` says what it "
+                     "holds (also --spacing, --endian and --offset)");
 }
 
 /* Options first; the name fills what they leave open. */

@@ -58,22 +58,49 @@ std::string list_grids(const trip_vdb_contents &contents)
     return list + (contents.grids.size() > 20 ? ", ..." : "");
 }
 
-const trip_vdb_entry &choose_grid(const trip_vdb_contents &contents, const char *wanted)
+const trip_vdb_entry &find_grid(const trip_vdb_contents &contents, const char *wanted)
 {
     for (const trip_vdb_entry &entry : contents.grids) {
-        if (wanted ? entry.name != wanted : !trip_vdb_is_scalar(entry))
+        if (entry.name != wanted)
             continue;
         if (!trip_vdb_is_scalar(entry))
             throw trip_vdb_error("grid \"" + entry.name + "\" holds " + entry.type +
                                  ", which is no scalar; it holds: " + list_grids(contents));
         return entry;
     }
-    if (wanted)
-        throw trip_vdb_error(std::string("has no grid \"") + wanted +
-                                 "\"; it holds: " + list_grids(contents) +
-                                 (contents.has_offsets ? "" : " and, as a stream, perhaps more"),
-                             TRIP_USAGE);
-    throw trip_vdb_error("has no scalar grid; it holds: " + list_grids(contents));
+    throw trip_vdb_error(std::string("has no grid \"") + wanted +
+                             "\"; it holds: " + list_grids(contents) +
+                             (contents.has_offsets ? "" : " and, as a stream, perhaps more"),
+                         TRIP_USAGE);
+}
+
+/* A grid that is broken is no fog: whether that matters shows when it is opened. */
+bool is_fog(trip_vdb_stream &is, const trip_vdb_contents &contents, const trip_vdb_entry &entry)
+try {
+    return trip_vdb_read_head(is, contents, entry).grid_class == "fog volume";
+} catch (const std::exception &) {
+    is.clear();
+    return false;
+}
+
+/* "density", the name that all writers of smoke and clouds give what is seen; else the first fog
+ * volume; else the first grid of scalars. */
+const trip_vdb_entry &choose_grid(trip_vdb_stream &is, const trip_vdb_contents &contents)
+{
+    const trip_vdb_entry *first = nullptr, *fog = nullptr;
+    for (const trip_vdb_entry &entry : contents.grids) {
+        if (!trip_vdb_is_scalar(entry))
+            continue;
+        if (entry.name == "density" || entry.name == "density[0]")
+            return entry;
+        if (!fog && is_fog(is, contents, entry))
+            fog = &entry;
+        if (!first)
+            first = &entry;
+    }
+    if (!first)
+        throw trip_vdb_error("has no scalar grid; it holds: " + list_grids(contents));
+    return fog ? *fog : *first;
 }
 
 openvdb::math::Transform::Ptr read_transform(trip_vdb_stream &is)
@@ -111,11 +138,12 @@ trip_vdb_conversion choose_conversion(const trip_vdb_head &head, const trip_vdb_
     bool real = entry.type == "float" || entry.type == "double";
     bool is_set = head.grid_class == "level set";
     const std::string grid = "grid \"" + entry.name + "\" ";
-    if (is_set && wanted == TRIP_LEVEL_SET_REFUSE)
-        throw trip_vdb_error(grid + "is a level set, distances rather than densities: choose "
-                                    "--level-set filled or --level-set band",
-                             TRIP_USAGE);
-    if (wanted != TRIP_LEVEL_SET_REFUSE && (head.grid_class == "fog volume" || !real))
+    if (wanted == TRIP_LEVEL_SET_UNSET && is_set)
+        wanted = TRIP_LEVEL_SET_FILLED;
+    if (wanted != TRIP_LEVEL_SET_UNSET && is_set && !real)
+        throw trip_vdb_error(grid + "is a level set of " + entry.type +
+                             "; only those of float and double are read");
+    if (wanted != TRIP_LEVEL_SET_UNSET && (head.grid_class == "fog volume" || !real))
         throw trip_vdb_error(grid + "is no level set, so that --level-set does not apply",
                              TRIP_USAGE);
     double volume = std::fabs(transform.baseMap()->getAffineMap()->determinant());
@@ -139,6 +167,27 @@ void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const tri
         }
     throw trip_vdb_error("is corrupt: grid \"" + entry.name +
                          "\" shares the tree of a grid that is not there");
+}
+
+/* What was chosen where the file leaves a choice and the options do not make it. */
+void write_note(const trip_vdb_contents &contents, const trip_vdb_entry &entry,
+                const trip_vdb_conversion &conversion, const trip_volume_params &params,
+                trip_volume_info *info)
+{
+    std::string note, others;
+    if (!params.grid && contents.grids.size() > 1) {
+        for (const trip_vdb_entry &other : contents.grids)
+            if (&other != &entry && trip_vdb_is_scalar(other))
+                others += (others.empty() ? "" : ", ") + other.name;
+        if (others.size() > 200)
+            others.replace(200, std::string::npos, "...");
+        if (!others.empty())
+            note = "grid \"" + entry.name + "\" is taken; --grid takes another: " + others;
+    }
+    if (params.level_set == TRIP_LEVEL_SET_UNSET && conversion.mode == TRIP_LEVEL_SET_FILLED)
+        note += (note.empty() ? "grid \"" + entry.name + "\"" : "; it") +
+                " is a level set, filled inside; --level-set band makes it a shell";
+    snprintf(info->note, sizeof info->note, "%s", note.c_str());
 }
 
 void fill_info(const State &state, const trip_vdb_entry &entry,
@@ -165,15 +214,17 @@ int open_vdb(const char *path, const trip_volume_params *params, trip_budget *bu
         (void)initialized;
         auto state = std::make_unique<State>(path);
         const trip_vdb_contents contents = trip_vdb_read_contents(state->fd);
-        const trip_vdb_entry &entry = choose_grid(contents, params->grid);
         trip_vdb_stream is(state->fd);
         openvdb::io::setVersion(is, { contents.library[0], contents.library[1] }, contents.version);
+        const trip_vdb_entry &entry =
+            params->grid ? find_grid(contents, params->grid) : choose_grid(is, contents);
         trip_vdb_head head = trip_vdb_read_head(is, contents, entry);
         auto transform = read_transform(is);
         auto conversion = choose_conversion(head, entry, params->level_set, *transform);
         seek_tree(is, contents, entry, head);
         state->grid = trip_vdb_load(state->fd, is, contents, head, entry, conversion, budget);
         fill_info(*state, entry, *transform, info);
+        write_note(contents, entry, conversion, *params, info);
         *out = state.release();
         return 0;
     });

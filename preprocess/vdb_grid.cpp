@@ -48,7 +48,7 @@ class Converter
     }
 
   private:
-    trip_level_set_mode mode_ = TRIP_LEVEL_SET_REFUSE;
+    trip_level_set_mode mode_ = TRIP_LEVEL_SET_UNSET;
     double scale_ = 1;
 };
 
@@ -284,7 +284,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
     void set_conversion(const trip_vdb_conversion &conversion)
     {
         double stored = (double)root_.background();
-        bool converts = conversion.mode != TRIP_LEVEL_SET_REFUSE;
+        bool converts = conversion.mode != TRIP_LEVEL_SET_UNSET;
         if (converts && !(stored > 0 && std::isfinite(stored)))
             throw trip_vdb_error("is a level set whose band has no width");
         convert_ = Converter(conversion, stored);

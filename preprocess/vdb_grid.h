@@ -37,7 +37,7 @@ class trip_vdb_reservation
 
 /* How stored values become densities. */
 struct trip_vdb_conversion {
-    trip_level_set_mode mode; /* TRIP_LEVEL_SET_REFUSE: as they are */
+    trip_level_set_mode mode; /* TRIP_LEVEL_SET_UNSET: as they are */
     double voxel_world;       /* a voxel's side; distances are in world units */
 };
 

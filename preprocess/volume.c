@@ -112,7 +112,8 @@ static int choose_reader(trip_volume *v, const trip_volume_params *params)
     }
     return trip_fail(TRIP_ERROR, "read", v->path,
                      "neither its content nor its name is of a known format (VDB, NRRD, NIfTI, "
-                     ".vol, images); raw data needs --size X Y Z and --type");
+                     ".vol, images); for raw data, `triptych brick FILE --size X,Y,Z --type uint8` "
+                     "says what it is");
 }
 
 /* Gives the index axes the wanted lengths in world space and keeps their directions. */
@@ -148,7 +149,7 @@ static int check_info(const trip_volume *v)
         return status;
     if (!trip_affine_invert(&info->index_to_world, &inverse))
         return trip_fail(TRIP_ERROR, "read", v->path,
-                         "its map from voxels to space is singular or not finite; --spacing X Y Z "
+                         "its map from voxels to space is singular or not finite; --spacing X,Y,Z "
                          "may give the axes other lengths");
     if (!isfinite(info->slope) || info->slope == 0 || !isfinite(info->inter))
         return trip_fail(TRIP_ERROR, "read", v->path,

@@ -48,17 +48,19 @@ typedef struct trip_volume_info {
     double background;
     const char *format; /* "nrrd", "openvdb", ... */
     char name[128];     /* grid name where the format has one */
+    char note[512];     /* for people: what was chosen where the file leaves a choice, or "" */
 } trip_volume_info;
 
 typedef enum trip_level_set_mode {
-    TRIP_LEVEL_SET_REFUSE = 0, /* say that it is one and name the options */
+    TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
     TRIP_LEVEL_SET_FILLED, /* density 1 inside, 0 outside, a ramp one voxel wide at the surface */
     TRIP_LEVEL_SET_BAND,   /* density max(0, 1 - |distance| / half band width) */
 } trip_level_set_mode;
 
 /* Zero means the default everywhere. */
 typedef struct trip_volume_params {
-    const char *grid; /* OpenVDB grid name; default: the first scalar grid */
+    const char *grid; /* OpenVDB grid name; default: "density", else the first fog volume,
+                       * else the first scalar grid */
     trip_level_set_mode level_set;
     int64_t raw_dims[3];       /* headerless raw only: --size */
     const char *raw_type;      /* --type; default: from the file's name, else uint8 */
@@ -89,9 +91,9 @@ int trip_volume_rewind(trip_volume *v);
 /* 1: *block is filled; 0: no more; negative: reported failure. A dense block holds about
  * `slices_hint` slices (at least 1; 0 lets the reader choose) plus what neighbours need. */
 int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block);
-/* Passes over slices before the next block, without reading them where the file allows that. Returns
- * how many it passed over: `slices`, fewer at the end, or 0 where slices have to be read or there
- * are none. */
+/* Passes over slices before the next block, without reading them where the file allows that.
+ * Returns how many it passed over: `slices`, fewer at the end, or 0 where slices have to be read or
+ * there are none. */
 int64_t trip_volume_skip(trip_volume *v, int64_t slices);
 /* Values of the box [lo, lo + size) as float32, i fastest, into values; `active`, when not NULL,
  * gets 1 where the voxel exists. The box may exceed the block by one voxel on every side: values

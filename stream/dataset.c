@@ -44,7 +44,8 @@ static int open_file(const trip_dataset *d, int folder, const char *name, int *f
         return REPLACED;
     if (*fd < 0 && errno == ENOENT)
         return trip_fail(TRIP_ERROR, "open", where,
-                         "the file is missing: not a data set, or an incomplete one");
+                         "the file is missing, so this is no data set: `triptych brick` makes one "
+                         "of a volume");
     if (*fd < 0 || fstat(*fd, &st) < 0)
         return trip_fail_errno("open", where, "cannot open");
     if (!S_ISREG(st.st_mode))
@@ -187,7 +188,7 @@ static int open_once(trip_dataset **out, const char *path, trip_budget *budget)
     int status = TRIP_OK;
     if (folder < 0 && errno == ENOTDIR)
         status = trip_fail(TRIP_ERROR, "open", path,
-                           "not a data set, which is a folder made by triptych brick");
+                           "is not a data set: `triptych brick` makes one of a volume, NAME.trip");
     else if (folder < 0)
         status = trip_fail_errno("open", path, "cannot open");
     else

@@ -106,7 +106,7 @@ static int check_target(const trip_folder *f)
         return TRIP_OK;
     if (!f->replace)
         return trip_fail(TRIP_ERROR, "write", f->path,
-                         "exists already: remove it, or allow that it is replaced");
+                         "exists already: --force replaces it, -o gives another name");
     if (!is_dataset(f->path))
         return trip_fail(TRIP_ERROR, "write", f->path,
                          "exists and is not a data set, so it is not replaced");
@@ -245,6 +245,31 @@ static void free_folder(trip_folder *f)
     free(f->partial);
     free(f->aside);
     *f = (trip_folder){ .fd = -1 };
+}
+
+static int check_parent(const trip_folder *f)
+{
+    struct stat st;
+    char *copy = strdup(f->path);
+    const char *parent = copy ? dirname(copy) : "";
+    int status = TRIP_OK;
+    if (copy && stat(parent, &st) < 0 && errno == ENOENT)
+        status =
+            trip_fail(TRIP_ERROR, "write", f->path, "there is no folder %s to put it in", parent);
+    free(copy);
+    return status;
+}
+
+int trip_folder_check(const char *path, bool replace)
+{
+    trip_folder f = { .fd = -1, .replace = replace };
+    int status = set_paths(&f, path);
+    if (status == TRIP_OK)
+        status = check_parent(&f);
+    if (status == TRIP_OK)
+        status = check_target(&f);
+    free_folder(&f);
+    return status;
 }
 
 int trip_folder_begin(trip_folder *f, const char *path, bool replace)

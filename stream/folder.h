@@ -28,6 +28,8 @@ typedef struct trip_folder {
     int fd; /* of the partial folder; holds the lock that keeps other writers out */
 } trip_folder;
 
+/* Whether a data set may be written there, before any work is done; writing finds out again. */
+int trip_folder_check(const char *path, bool replace);
 /* Makes the partial folder, empty: what an interrupted run left there is removed. */
 int trip_folder_begin(trip_folder *f, const char *path, bool replace);
 /* The partial folder becomes the data set. Under the name stands the old or the new one, complete,

@@ -393,15 +393,30 @@ class BadVolumes(program.ProgramTest):
         self.later(self.refused, "points-only.vdb")
         self.finish()
 
-    def test_level_set_has_to_be_asked_for(self):
+    def test_level_set_is_filled_with_a_line_that_says_so(self):
         if not pyopenvdb:
             self.skipTest("python3-openvdb is not installed")
         ball = pyopenvdb.createLevelSetSphere(radius=5.0)
         pyopenvdb.write("ball.vdb", ball)
-        self.assertIn("--level-set", self.refused("ball.vdb", status=(1, 2)))
+        run = self.works("brick", "ball.vdb", "-o", "default.trip")
+        self.assertRegex(run.stderr, r"^triptych: note: ball.vdb: [^\n]*--level-set band[^\n]*\n$")
         for how in "filled", "band":
-            self.works("brick", "ball.vdb", "-o", f"{how}.trip", "-q", "--level-set", how)
+            run = self.works("brick", "ball.vdb", "-o", f"{how}.trip", "--level-set", how)
+            self.assertEqual(run.stderr, "")
+        kept = [self.info(f"{how}.trip")["kept"] for how in ("default", "filled", "band")]
+        self.assertEqual(kept[0], kept[1])
+        self.assertNotEqual(kept[0], kept[2])
+        for how in "default", "filled", "band":
             program.shutil.rmtree(f"{how}.trip")
+
+    def test_the_grid_taken_and_the_others_are_named(self):
+        run = self.works("brick", os.path.join(program.DATASETS, "densityAndHeat.vdb"), "-o", "chosen.trip")
+        self.assertRegex(run.stderr, r'^triptych: note: [^\n]*"density" is taken[^\n]*: heat\n$')
+        self.assertEqual(self.info("chosen.trip")["source"]["grid"], "density")
+        program.shutil.rmtree("chosen.trip")
+        self.fails(
+            2, "brick", os.path.join(program.DATASETS, "densityAndHeat.vdb"), "--grid", "heat", "--grid", "density", says="one grid"
+        )
 
     # Anything
 

@@ -15,7 +15,7 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 # Option: wrong values; None where it takes none.
 BRICK = {
     "--endian": NAMES,
-    "--level-set": NAMES,
+    "--level-set": NAMES + ["refuse"],
     "--offset": ["", "-1", "x", "1.5", "9" * 30],
     "--size": ["", "1", "1,2", "0,1,1", "-1,1,1", "a,b,c", "1,2,3,4", "nan,1,1"],
     "--spacing": POINTS + ["0,1,1", "-1,1,1"],

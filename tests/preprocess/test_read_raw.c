@@ -99,8 +99,8 @@ static void without_size_the_options_are_named(void **state)
     static const char *const names[] = { "x.raw", "x_5x4_uint8.raw", "x_5x4x7x_uint8.raw",
                                          "x_5x4x7_complex.raw", "x_-5x4x7_uint8.raw" };
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
-        assert_refused_as(TRIP_USAGE, write_file(names[i], &b), NULL, "give --size X Y Z");
-    assert_refused(write_file("unknown.xyz", &b), "--size X Y Z");
+        assert_refused_as(TRIP_USAGE, write_file(names[i], &b), NULL, "--size X,Y,Z");
+    assert_refused(write_file("unknown.xyz", &b), "--size X,Y,Z");
 }
 
 static void a_header_beside_it_is_pointed_at(void **state)

@@ -374,6 +374,39 @@ void a_grid_is_chosen_by_name_or_is_the_first_scalar_one(void **)
     assert_one_line("no scalar");
 }
 
+openvdb::FloatGrid::Ptr fog_voxel(const char *name, float value)
+{
+    openvdb::FloatGrid::Ptr grid = one_voxel(name, value);
+    grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    return grid;
+}
+
+/* Files of smoke and fire hold several grids, in any order. */
+void density_comes_before_other_fog_and_fog_before_other_scalars(void **)
+{
+    File named({ fog_voxel("flame", 1), fog_voxel("temperature", 2), one_voxel("density", 3) });
+    assert_true(only_value(Volume(named)) == 3);
+    File fog({ one_voxel("temperature", 1), fog_voxel("smoke", 2), fog_voxel("flame", 3) });
+    assert_true(only_value(Volume(fog)) == 2);
+    File plain({ one_voxel("temperature", 1), one_voxel("heat", 2) });
+    assert_true(only_value(Volume(plain)) == 1);
+    File twice({ one_voxel("heat", 1), one_voxel("density", 2), one_voxel("density", 3) });
+    assert_true(only_value(Volume(twice)) == 2);
+}
+
+void a_choice_among_grids_is_said(void **)
+{
+    File file({ fog_voxel("flame", 1), one_voxel("density", 3), one_voxel("heat", 3) });
+    Volume v(file);
+    assert_non_null(std::strstr(v.info.note, "\"density\" is taken"));
+    assert_non_null(std::strstr(v.info.note, ": flame, heat"));
+    trip_volume_params params = {};
+    params.grid = "heat";
+    assert_string_equal(Volume(file, params).info.note, "");
+    File alone({ one_voxel("heat", 3) });
+    assert_string_equal(Volume(alone).info.note, "");
+}
+
 void grids_that_share_a_tree_have_their_own_transforms(void **)
 {
     openvdb::FloatGrid::Ptr a = one_voxel("a", 4);
@@ -413,22 +446,30 @@ openvdb::FloatGrid::Ptr sphere()
     return grid;
 }
 
-void a_level_set_is_refused_unless_an_option_says_how(void **)
+void level_set_options_are_for_level_sets(void **)
 {
-    File file({ sphere() });
-    expect_line();
-    assert_int_equal(Volume(file).status, TRIP_USAGE);
-    assert_one_line("--level-set filled or --level-set band");
-    File fog({ [] {
-        auto grid = one_voxel("fog", 1);
-        grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-        return grid;
-    }() });
+    File fog({ fog_voxel("fog", 1) });
     trip_volume_params params = {};
     params.level_set = TRIP_LEVEL_SET_BAND;
     expect_line();
     assert_int_equal(Volume(fog, params).status, TRIP_USAGE);
     assert_one_line("does not apply");
+}
+
+void a_level_set_is_filled_by_default_and_says_so(void **)
+{
+    File file({ sphere() });
+    Volume by_default(file);
+    trip_volume_params params = {};
+    params.level_set = TRIP_LEVEL_SET_FILLED;
+    Volume filled(file, params);
+    assert_int_equal(by_default.status, 0);
+    std::vector<trip_block> blocks = by_default.blocks(), same = filled.blocks();
+    assert_int_equal(blocks.size(), same.size());
+    for (size_t i = 0; i < blocks.size(); i++)
+        assert_true(Decoded(by_default, blocks[i]).values == Decoded(filled, same[i]).values);
+    assert_non_null(std::strstr(by_default.info.note, "--level-set band"));
+    assert_string_equal(filled.info.note, "");
 }
 
 /* Inside 1, outside 0, a ramp of one voxel's width between; the interior has no active voxels in
@@ -619,9 +660,12 @@ int main()
         cmocka_unit_test(active_tiles_of_any_level_become_boxes),
         cmocka_unit_test(rotation_shear_and_offset_reach_world_space),
         cmocka_unit_test(a_grid_is_chosen_by_name_or_is_the_first_scalar_one),
+        cmocka_unit_test(density_comes_before_other_fog_and_fog_before_other_scalars),
+        cmocka_unit_test(a_choice_among_grids_is_said),
         cmocka_unit_test(grids_that_share_a_tree_have_their_own_transforms),
         cmocka_unit_test(a_file_written_as_a_stream_gives_its_first_grid),
-        cmocka_unit_test(a_level_set_is_refused_unless_an_option_says_how),
+        cmocka_unit_test(level_set_options_are_for_level_sets),
+        cmocka_unit_test(a_level_set_is_filled_by_default_and_says_so),
         cmocka_unit_test(a_filled_level_set_is_a_ball),
         cmocka_unit_test(a_band_is_one_at_the_surface),
         cmocka_unit_test(what_cannot_be_drawn_is_refused),

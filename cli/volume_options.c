@@ -1,0 +1,30 @@
+#include "volume_options.h"
+
+#include "options.h"
+
+int trip_option_grid(const char *name, const char **grid)
+{
+    if (*grid)
+        return trip_option_fail("--grid", "takes one grid");
+    *grid = name;
+    return 0;
+}
+
+int trip_option_level_set(const char *text, trip_level_set_mode *mode)
+{
+    static const char *const names[] = { "filled", "band", NULL };
+    int choice = 0;
+    int status = trip_option_choice("--level-set", text, names, &choice);
+    *mode = choice ? TRIP_LEVEL_SET_BAND : TRIP_LEVEL_SET_FILLED;
+    return status;
+}
+
+int trip_option_spacing(const char *text, double spacing[3])
+{
+    int count;
+    int status = trip_option_numbers("--spacing", text, 3, 3, spacing, &count);
+    for (int a = 0; a < 3 && status == 0; a++)
+        if (!(spacing[a] > 0))
+            return trip_option_fail("--spacing", "takes three positive lengths");
+    return status;
+}

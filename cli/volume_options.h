@@ -1,0 +1,15 @@
+/* Options that say how a volume is read, which `brick` and `render` share. Each reports a bad
+ * value, naming the option, and returns TRIP_USAGE. Main thread only. */
+#ifndef TRIP_CLI_VOLUME_OPTIONS_H
+#define TRIP_CLI_VOLUME_OPTIONS_H
+
+#include "volume.h"
+
+/* A grid's name; a second one is refused. */
+int trip_option_grid(const char *name, const char **grid);
+/* "filled" or "band". */
+int trip_option_level_set(const char *text, trip_level_set_mode *mode);
+/* "X,Y,Z", each above 0. */
+int trip_option_spacing(const char *text, double spacing[3]);
+
+#endif
