@@ -254,8 +254,8 @@ static int check_parent(const trip_folder *f)
     const char *parent = copy ? dirname(copy) : "";
     int status = TRIP_OK;
     if (copy && stat(parent, &st) < 0 && errno == ENOENT)
-        status =
-            trip_fail(TRIP_ERROR, "write", f->path, "there is no folder %s to put it in", parent);
+        status = trip_fail(TRIP_ERROR, "write", f->path,
+                           "the folder %s is not there: No such file or directory", parent);
     free(copy);
     return status;
 }
