@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdbool.h>
@@ -11,20 +12,39 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "report.h"
 
 #define PROGRAM "triptych-images"
-enum { TEXT_BYTES = 4096 };
+enum {
+    TEXT_BYTES = 4096,
+    MOST_WARNINGS = 64,   /* of one request */
+    MOST_SIGNS = 1 << 20, /* of life in one request; they come a second apart */
+    PATIENCE_MS = 120000, /* without a byte from the helper */
+    WAIT_MS = 100,        /* between looks at the interrupt flag */
+    REAP_MS = 1000,
+};
 
 struct trip_image_helper {
     const char *what;
     char path[PATH_MAX]; /* of the last request */
-    pid_t pid;
+    pid_t pid;           /* 0: gone */
     int fd;
+    int patience_ms;
     bool broken;
 };
+
+/* What stands in for the program in tests. */
+static trip_image_stand_in stand_in;
+static int stand_in_patience_ms;
+
+void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms)
+{
+    stand_in = peer;
+    stand_in_patience_ms = patience_ms;
+}
 
 /* Beside this program, where it is installed, or where it was built. */
 static bool find_program(char path[PATH_MAX])
@@ -68,20 +88,22 @@ static int spawn(const char *program, int fd, pid_t *pid)
 
 int trip_image_helper_start(trip_image_helper **out, const char *what)
 {
-    char program[PATH_MAX];
-    int fds[2];
-    if (!find_program(program))
+    char program[PATH_MAX] = "";
+    int fds[2], error = ENOMEM;
+    if (!stand_in && !find_program(program))
         return trip_fail(TRIP_ERROR, what, PROGRAM,
                          "is not beside this program nor in ../libexec/triptych; it reads and "
                          "writes pictures");
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fds) != 0)
         return trip_fail_errno(what, program, "cannot connect");
     trip_image_helper *h = calloc(1, sizeof *h);
-    int error = h ? spawn(program, fds[1], &h->pid) : ENOMEM;
+    if (h)
+        error = stand_in ? stand_in(fds[1]) : spawn(program, fds[1], &h->pid);
     close(fds[1]);
     if (h && error == 0) {
         h->what = what;
         h->fd = fds[0];
+        h->patience_ms = stand_in ? stand_in_patience_ms : PATIENCE_MS;
         *out = h;
         return 0;
     }
@@ -91,28 +113,36 @@ int trip_image_helper_start(trip_image_helper **out, const char *what)
     return trip_fail_errno(what, program, "cannot start");
 }
 
+/* Ends the process and returns its status. One that the kernel cannot end at once, in the middle of
+ * a read from a dead network disk, is left to it. */
+static int end_process(trip_image_helper *h)
+{
+    int status = 0;
+    if (h->pid > 0)
+        kill(h->pid, SIGKILL);
+    for (int ms = 0; h->pid > 0 && ms < REAP_MS; ms++) {
+        if (waitpid(h->pid, &status, WNOHANG) != 0)
+            break;
+        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    }
+    h->pid = 0;
+    return status;
+}
+
 void trip_image_helper_stop(trip_image_helper *h)
 {
     if (!h)
         return;
     close(h->fd);
-    if (h->pid > 0) {
-        kill(h->pid, SIGKILL);
-        waitpid(h->pid, NULL, 0);
-    }
+    end_process(h);
     free(h);
 }
 
 /* The connection is gone: the helper is, too. */
 static int helper_lost(trip_image_helper *h)
 {
-    int status = 0;
+    int status = end_process(h);
     h->broken = true;
-    if (h->pid > 0) {
-        kill(h->pid, SIGKILL);
-        waitpid(h->pid, &status, 0);
-    }
-    h->pid = 0;
     if (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL)
         return trip_fail(TRIP_ERROR, h->what, h->path,
                          "brought the decoder down (%s): corrupt, or of an unusual kind",
@@ -120,8 +150,105 @@ static int helper_lost(trip_image_helper *h)
     return trip_fail(TRIP_ERROR, h->what, h->path, PROGRAM " ended before it was done");
 }
 
+int trip_image_helper_distrust(trip_image_helper *h, const char *why)
+{
+    end_process(h);
+    h->broken = true;
+    return trip_fail(TRIP_ERROR, h->what, h->path, PROGRAM " gives an answer that cannot be: %s",
+                     why);
+}
+
+/* Until the connection can be read or written. 0, or a reported failure, after which the helper is
+ * gone. */
+static int wait_for(trip_image_helper *h, short events)
+{
+    for (int waited_ms = 0; waited_ms < h->patience_ms;) {
+        struct pollfd p = { .fd = h->fd, .events = events };
+        if (trip_interrupted()) {
+            end_process(h);
+            h->broken = true;
+            return trip_fail(TRIP_INTERRUPTED, h->what, h->path, "interrupted");
+        }
+        int ms = h->patience_ms < WAIT_MS ? h->patience_ms : WAIT_MS;
+        int ready = poll(&p, 1, ms);
+        if (ready > 0)
+            return 0;
+        if (ready == 0)
+            waited_ms += ms;
+    }
+    end_process(h);
+    h->broken = true;
+    return trip_fail(TRIP_ERROR, h->what, h->path,
+                     PROGRAM " has not answered for %g s: corrupt, or of an unusual kind",
+                     h->patience_ms / 1e3);
+}
+
+static bool has_to_wait(ssize_t n)
+{
+    return n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
+}
+
+int trip_image_helper_send(trip_image_helper *h, const void *data, size_t bytes)
+{
+    for (size_t done = 0; done < bytes;) {
+        int status = wait_for(h, POLLOUT);
+        if (status < 0)
+            return status;
+        ssize_t n =
+            send(h->fd, (const char *)data + done, bytes - done, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (n < 0 && !has_to_wait(n))
+            return helper_lost(h);
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return 0;
+}
+
+int trip_image_helper_receive(trip_image_helper *h, void *data, size_t bytes)
+{
+    for (size_t done = 0; done < bytes;) {
+        int status = wait_for(h, POLLIN);
+        if (status < 0)
+            return status;
+        ssize_t n = recv(h->fd, (char *)data + done, bytes - done, MSG_DONTWAIT);
+        if (n == 0 || (n < 0 && !has_to_wait(n)))
+            return helper_lost(h);
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return 0;
+}
+
+/* One byte, with the descriptor beside it where there is one. */
+static int send_descriptor(trip_image_helper *h, int fd)
+{
+    union {
+        struct cmsghdr header;
+        char bytes[CMSG_SPACE(sizeof(int))];
+    } control = { .bytes = { 0 } };
+    struct iovec one = { .iov_base = (char[]){ 0 }, .iov_len = 1 };
+    struct msghdr message = { .msg_iov = &one, .msg_iovlen = 1 };
+    if (fd >= 0) {
+        message.msg_control = &control;
+        message.msg_controllen = sizeof control;
+        struct cmsghdr *c = CMSG_FIRSTHDR(&message);
+        *c = (struct cmsghdr){ .cmsg_len = CMSG_LEN(sizeof fd),
+                               .cmsg_level = SOL_SOCKET,
+                               .cmsg_type = SCM_RIGHTS };
+        memcpy(CMSG_DATA(c), &fd, sizeof fd);
+    }
+    for (;;) {
+        int status = wait_for(h, POLLOUT);
+        if (status < 0)
+            return status;
+        ssize_t n = sendmsg(h->fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (n == 1)
+            return 0;
+        if (!has_to_wait(n))
+            return helper_lost(h);
+    }
+}
+
 int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, const char *path,
-                              const int64_t numbers[5])
+                              const int64_t numbers[5], int fd)
 {
     trip_image_request request = { .task = task, .path_bytes = (uint32_t)strlen(path) };
     if (numbers)
@@ -131,40 +258,70 @@ int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, c
     memcpy(h->path, path, request.path_bytes + 1);
     if (h->broken)
         return helper_lost(h);
-    if (!trip_image_send_all(h->fd, &request, sizeof request) ||
-        !trip_image_send_all(h->fd, path, request.path_bytes))
-        return helper_lost(h);
+    int status = send_descriptor(h, fd);
+    if (status == 0)
+        status = trip_image_helper_send(h, &request, sizeof request);
+    return status < 0 ? status : trip_image_helper_send(h, path, request.path_bytes);
+}
+
+/* A reply and its texts, all of which can be. */
+static int receive_reply(trip_image_helper *h, trip_image_reply *reply, char where[TEXT_BYTES],
+                         char why[TEXT_BYTES])
+{
+    int status = trip_image_helper_receive(h, reply, sizeof *reply);
+    if (status < 0)
+        return status;
+    if (reply->where_bytes >= TEXT_BYTES || reply->why_bytes >= TEXT_BYTES)
+        return trip_image_helper_distrust(h, "a text without end");
+    status = trip_image_helper_receive(h, where, reply->where_bytes);
+    if (status == 0)
+        status = trip_image_helper_receive(h, why, reply->why_bytes);
+    if (status < 0)
+        return status;
+    where[reply->where_bytes] = why[reply->why_bytes] = 0;
+    bool done = reply->outcome == TRIP_IMAGE_DONE, failed = reply->outcome == TRIP_IMAGE_FAILED;
+    if (!done && reply->data_bytes > 0)
+        return trip_image_helper_distrust(h, "data where there is none");
+    if (failed && reply->status != TRIP_ERROR && reply->status != TRIP_USAGE)
+        return trip_image_helper_distrust(h, "an unknown status");
     return 0;
-}
-
-int trip_image_helper_send(trip_image_helper *h, const void *data, size_t bytes)
-{
-    return trip_image_send_all(h->fd, data, bytes) ? 0 : helper_lost(h);
-}
-
-int trip_image_helper_receive(trip_image_helper *h, void *data, size_t bytes)
-{
-    return trip_image_receive_all(h->fd, data, bytes) ? 0 : helper_lost(h);
 }
 
 int trip_image_helper_outcome(trip_image_helper *h, uint64_t *data_bytes_out)
 {
+    int warnings = 0, signs = 0;
     for (;;) {
         trip_image_reply reply;
         char where[TEXT_BYTES], why[TEXT_BYTES];
-        if (!trip_image_receive_all(h->fd, &reply, sizeof reply) ||
-            reply.where_bytes >= sizeof where || reply.why_bytes >= sizeof why ||
-            !trip_image_receive_all(h->fd, where, reply.where_bytes) ||
-            !trip_image_receive_all(h->fd, why, reply.why_bytes))
-            return helper_lost(h);
-        where[reply.where_bytes] = why[reply.why_bytes] = 0;
-        if (reply.outcome == TRIP_IMAGE_DONE) {
+        int status = receive_reply(h, &reply, where, why);
+        if (status < 0)
+            return status;
+        switch (reply.outcome) {
+        case TRIP_IMAGE_DONE:
             *data_bytes_out = reply.data_bytes;
             return 0;
+        case TRIP_IMAGE_FAILED:
+            return trip_fail(reply.status, h->what, where, "%s", why);
+        case TRIP_IMAGE_WARNING:
+            if (++warnings > MOST_WARNINGS)
+                return trip_image_helper_distrust(h, "warnings without end");
+            trip_warn(where, "%s", why);
+            break;
+        case TRIP_IMAGE_WORKING:
+            if (++signs > MOST_SIGNS)
+                return trip_image_helper_distrust(h, "work without end");
+            break;
+        default:
+            return trip_image_helper_distrust(h, "an unknown outcome");
         }
-        if (reply.outcome == TRIP_IMAGE_FAILED)
-            return trip_fail(reply.status < 0 ? reply.status : TRIP_ERROR, h->what, where, "%s",
-                             why);
-        trip_warn(where, "%s", why);
     }
+}
+
+int trip_image_helper_expect(trip_image_helper *h, uint64_t data_bytes)
+{
+    uint64_t bytes;
+    int status = trip_image_helper_outcome(h, &bytes);
+    if (status == 0 && bytes != data_bytes)
+        return trip_image_helper_distrust(h, "data of another size than it has to be");
+    return status;
 }

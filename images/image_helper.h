@@ -4,7 +4,12 @@
  * towards the memory that the renderer promises. A decoder that a broken file brings down takes
  * nobody with it, and what the libraries print goes nowhere.
  *
- * A helper is one process and one connection; it is used by one thread at a time. */
+ * Nor is a decoder that a hostile file has taken over trusted: the helper may read files, use the
+ * memory it is given and write to the descriptor it is given, and no more (sandbox.h); whatever it
+ * answers is checked; and every wait for it ends when it is silent for two minutes, or by Ctrl-C.
+ *
+ * A helper is one process and one connection; it is used by one thread at a time. The kernel ends
+ * it with the thread that started it. */
 #ifndef TRIP_IMAGE_HELPER_H
 #define TRIP_IMAGE_HELPER_H
 
@@ -29,27 +34,37 @@ trip_image_kind trip_image_kind_of(const unsigned char *head, size_t bytes);
 const char *trip_image_kind_name(trip_image_kind kind);
 
 enum trip_image_task {
-    /* A picture to a file. numbers: width, height, depth (trip_image_depth), 1 to drop alpha, JPEG
-     * quality. Then float RGBA rows from the top; then the reply. */
+    /* A picture to the descriptor, which is open for writing; the path says its format. numbers:
+     * width, height, depth (trip_image_depth), 1 to drop alpha, JPEG quality. Then float RGBA rows
+     * from the top; then the reply. */
     TRIP_IMAGE_WRITE = 1,
-    /* A picture from a file. The reply's data: trip_image_size, then float RGBA rows. */
+    /* A picture from a file. numbers: bytes the helper may use. The reply's data: trip_image_size,
+     * then float RGBA rows. */
     TRIP_IMAGE_READ,
-    /* Opens a stack of slices. numbers: bytes the helper may use. Data: trip_image_stack. */
+    /* Opens a stack of slices. numbers: bytes the helper may use, 1 to go on where slices are
+     * missing. Data: trip_image_stack. */
     TRIP_IMAGE_OPEN_STACK,
     /* numbers: k. Data: the slice's values as stored, in this machine's byte order. */
     TRIP_IMAGE_READ_SLICE,
 };
 
-/* Followed by the path, without a zero at its end. */
+/* After one byte of any value, with which a descriptor may come; before the path, without a zero at
+ * its end. */
 typedef struct trip_image_request {
     uint32_t task;
     uint32_t path_bytes;
     int64_t numbers[5];
 } trip_image_request;
 
-enum trip_image_outcome { TRIP_IMAGE_DONE = 1, TRIP_IMAGE_FAILED, TRIP_IMAGE_WARNING };
+enum trip_image_outcome {
+    TRIP_IMAGE_DONE = 1,
+    TRIP_IMAGE_FAILED,
+    TRIP_IMAGE_WARNING,
+    TRIP_IMAGE_WORKING, /* a sign of life in a long task, at most one a second */
+};
 
-/* Followed by where and why, for people, and by data. Warnings come before the outcome. */
+/* Followed by where and why, for people, and by data. Warnings and signs of life come before the
+ * outcome. */
 typedef struct trip_image_reply {
     uint32_t outcome;
     int32_t status; /* of a failure */
@@ -78,18 +93,27 @@ int trip_image_helper_start(trip_image_helper **out, const char *what);
 /* Ends it, also in the middle of something. NULL is fine. */
 void trip_image_helper_stop(trip_image_helper *h);
 
+/* The functions below return 0 or a reported failure. After one that is not an answer of the helper
+ * itself (it is lost, silent or lies, or the user wants to stop), the helper is gone, and every
+ * further request fails. */
+
+/* `fd` goes along with the request unless it is -1, and stays the caller's. */
 int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, const char *path,
-                              const int64_t numbers[5]);
+                              const int64_t numbers[5], int fd);
 int trip_image_helper_send(trip_image_helper *h, const void *data, size_t bytes);
 /* Passes warnings on and waits for the outcome: 0 and how many bytes of data follow, or a failure,
  * which is reported. */
 int trip_image_helper_outcome(trip_image_helper *h, uint64_t *data_bytes_out);
+/* The same where exactly `data_bytes` must follow. */
+int trip_image_helper_expect(trip_image_helper *h, uint64_t data_bytes);
 int trip_image_helper_receive(trip_image_helper *h, void *data, size_t bytes);
+/* What it sent cannot be, and `why` says what: ends the helper, reports, returns TRIP_ERROR. */
+int trip_image_helper_distrust(trip_image_helper *h, const char *why);
 
-/* All of `bytes` bytes over the connection; false when it ended before. errno is 0 at its end. For
- * both sides. */
-int trip_image_send_all(int fd, const void *data, size_t bytes);
-int trip_image_receive_all(int fd, void *data, size_t bytes);
+/* For tests: what takes the program's place from the next start on, NULL for the program again. It
+ * gets the helper's end of the connection, which is closed when it returns; 0, or an errno. */
+typedef int (*trip_image_stand_in)(int fd);
+void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms);
 
 /* The helper's connection in its own process. */
 #define TRIP_IMAGE_HELPER_FD 3

@@ -1,55 +1,27 @@
 /* triptych-images: answers the requests of image_helper.h on descriptor 3, one after another, until
  * the connection ends. Every exception of the libraries ends up in a reply. */
+#include <algorithm>
 #include <csignal>
 #include <cstring>
-#include <functional>
 #include <memory>
 #include <new>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include <pthread.h>
+#include <strings.h>
 #include <unistd.h>
 
-#include "image_helper.h"
+#include <OpenImageIO/imageio.h>
+
+#include "connection.h"
 #include "picture_file.h"
+#include "sandbox.h"
 #include "slice_stack.h"
 
 namespace
 {
-
-constexpr int connection = TRIP_IMAGE_HELPER_FD;
-
-/* Nobody is there any more. */
-struct Gone {
-};
-
-void send_bytes(const void *data, size_t bytes)
-{
-    if (!trip_image_send_all(connection, data, bytes))
-        throw Gone();
-}
-
-void receive_bytes(void *data, size_t bytes)
-{
-    if (!trip_image_receive_all(connection, data, bytes))
-        throw Gone();
-}
-
-void reply(uint32_t outcome, int status, std::string where, std::string why, uint64_t data_bytes)
-{
-    where.resize(std::min<size_t>(where.size(), 4000));
-    why.resize(std::min<size_t>(why.size(), 4000));
-    trip_image_reply r = { outcome, status, (uint32_t)where.size(), (uint32_t)why.size(),
-                           data_bytes };
-    send_bytes(&r, sizeof r);
-    send_bytes(where.data(), where.size());
-    send_bytes(why.data(), why.size());
-}
-
-void reply_data(uint64_t bytes)
-{
-    reply(TRIP_IMAGE_DONE, 0, "", "", bytes);
-}
 
 /* A line that common/report would print, "triptych: warning: WHERE: why". */
 void pass_warning(const char *line, void *)
@@ -62,26 +34,43 @@ void pass_warning(const char *line, void *)
         text.pop_back();
     size_t colon = text.find(": ");
     bool parts = colon != std::string::npos;
-    reply(TRIP_IMAGE_WARNING, 0, parts ? text.substr(0, colon) : "",
-          parts ? text.substr(colon + 2) : text, 0);
+    trip_connection_reply(TRIP_IMAGE_WARNING, 0, parts ? text.substr(0, colon) : "",
+                          parts ? text.substr(colon + 2) : text, 0);
 }
+
+void reply_data(uint64_t bytes)
+{
+    trip_connection_reply(TRIP_IMAGE_DONE, 0, "", "", bytes);
+}
+
+/* A descriptor that came with a request. */
+class Descriptor
+{
+  public:
+    ~Descriptor()
+    {
+        if (fd >= 0)
+            ::close(fd);
+    }
+    int fd = -1;
+};
 
 class Session
 {
   public:
-    void answer(const trip_image_request &request, const std::string &path)
+    void answer(const trip_image_request &request, const std::string &path, int fd)
     {
         switch (request.task) {
         case TRIP_IMAGE_WRITE:
-            return write_picture(request, path);
+            return write_picture(request, path, fd);
         case TRIP_IMAGE_READ:
-            return read_picture(path);
+            return read_picture(request, path);
         case TRIP_IMAGE_OPEN_STACK:
             return open_stack(request, path);
         case TRIP_IMAGE_READ_SLICE:
             return read_slice(request);
         default:
-            throw Gone();
+            throw trip_connection_gone();
         }
     }
     ~Session()
@@ -92,17 +81,17 @@ class Session
     }
 
   private:
-    void write_picture(const trip_image_request &request, const std::string &path)
+    void write_picture(const trip_image_request &request, const std::string &path, int fd)
     {
         const int64_t *n = request.numbers;
         const trip_picture picture = {
-            path, (int)n[0], (int)n[1], { (trip_image_depth)n[2], n[3] != 0, (int)n[4] }
+            path, fd, (int)n[0], (int)n[1], { (trip_image_depth)n[2], n[3] != 0, (int)n[4] }
         };
         std::vector<float> row((size_t)n[0] * 4);
         int64_t left = n[1];
         auto next_row = [&](float *rgba) {
             left--;
-            receive_bytes(rgba, row.size() * sizeof(float));
+            trip_connection_receive(rgba, row.size() * sizeof(float));
             return true;
         };
         auto drain = [&] {
@@ -111,7 +100,7 @@ class Session
         };
         try {
             trip_picture_write(picture, next_row);
-        } catch (const Gone &) {
+        } catch (const trip_connection_gone &) {
             throw;
         } catch (...) {
             drain();
@@ -120,14 +109,15 @@ class Session
         reply_data(0);
     }
 
-    void read_picture(const std::string &path)
+    void read_picture(const trip_image_request &request, const std::string &path)
     {
+        trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
         int width, height;
         std::vector<float> rgba = trip_picture_read(path, width, height);
         trip_image_size size = { width, height };
         reply_data(sizeof size + rgba.size() * sizeof(float));
-        send_bytes(&size, sizeof size);
-        send_bytes(rgba.data(), rgba.size() * sizeof(float));
+        trip_connection_send(&size, sizeof size);
+        trip_connection_send(rgba.data(), rgba.size() * sizeof(float));
     }
 
     void open_stack(const trip_image_request &request, const std::string &path)
@@ -135,6 +125,7 @@ class Session
         stack_.reset();
         if (!budget_ && trip_budget_create(&budget_, (uint64_t)request.numbers[0]) < 0)
             throw std::bad_alloc();
+        trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
         trip_slice_files files = trip_slice_find(path);
         stack_ = files.kind == TRIP_IMAGE_DICOM ? trip_dicom_stack(files, budget_)
                                                 : trip_picture_stack(files, budget_);
@@ -146,19 +137,19 @@ class Session
         std::memcpy(s.index_to_world, stack_->index_to_world.m, sizeof s.index_to_world);
         s.helper_bytes = trip_budget_peak_bytes(budget_);
         reply_data(sizeof s);
-        send_bytes(&s, sizeof s);
+        trip_connection_send(&s, sizeof s);
     }
 
     void read_slice(const trip_image_request &request)
     {
         if (!stack_)
-            throw Gone();
+            throw trip_connection_gone();
         size_t bytes =
             (size_t)stack_->dims[0] * (size_t)stack_->dims[1] * trip_scalar_bytes(stack_->type);
         slice_.resize(bytes);
         stack_->read(request.numbers[0], slice_.data());
         reply_data(bytes);
-        send_bytes(slice_.data(), bytes);
+        trip_connection_send(slice_.data(), bytes);
     }
 
     trip_budget *budget_ = nullptr;
@@ -166,21 +157,62 @@ class Session
     std::vector<char> slice_;
 };
 
+/* Set where memory was refused, whatever the libraries make of that. */
+bool memory_refused;
+
+void on_memory_refused()
+{
+    memory_refused = true;
+    throw std::bad_alloc();
+}
+
+/* The libraries say it in many ways. */
+bool speaks_of_memory(const std::string &why)
+{
+    static const char *const words[] = { "bad_alloc", "memory", "allocat" };
+    return std::any_of(std::begin(words), std::end(words),
+                       [&](const char *word) { return strcasestr(why.c_str(), word) != nullptr; });
+}
+
+void reply_failure(const std::string &where, const std::string &why, int status)
+{
+    bool ours = why.find("--memory") != std::string::npos;
+    if (!ours && (memory_refused || speaks_of_memory(why)))
+        trip_connection_reply(
+            TRIP_IMAGE_FAILED, TRIP_ERROR, where,
+            "needs more memory to decode than is allowed: a larger --memory would "
+            "do, unless it is corrupt",
+            0);
+    else
+        trip_connection_reply(TRIP_IMAGE_FAILED, status, where, why, 0);
+}
+
 void answer_one(Session &session)
 {
-    trip_image_request request;
-    receive_bytes(&request, sizeof request);
-    std::string path(request.path_bytes, 0);
-    receive_bytes(&path[0], path.size());
+    std::string path;
+    Descriptor file;
+    const trip_image_request request = trip_connection_next(path, file.fd);
+    memory_refused = false;
     try {
-        session.answer(request, path);
+        session.answer(request, path, file.fd);
     } catch (const trip_slice_error &e) {
-        reply(TRIP_IMAGE_FAILED, e.status, e.where, e.what(), 0);
-    } catch (const std::bad_alloc &) {
-        reply(TRIP_IMAGE_FAILED, TRIP_ERROR, path, "no memory for it", 0);
+        reply_failure(e.where, e.what(), e.status);
     } catch (const std::exception &e) {
-        reply(TRIP_IMAGE_FAILED, TRIP_ERROR, path, e.what(), 0);
+        reply_failure(path, e.what(), TRIP_ERROR);
     }
+}
+
+/* Threads count towards the memory that the helper may use, and decode one slice at a time. */
+void set_up_threads()
+{
+    const int threads = (int)std::min(8u, std::max(1u, std::thread::hardware_concurrency()));
+    pthread_attr_t attributes;
+    pthread_attr_init(&attributes);
+    pthread_attr_setstacksize(&attributes, (size_t)1 << 20);
+    pthread_setattr_default_np(&attributes);
+    pthread_attr_destroy(&attributes);
+    OIIO::attribute("threads", threads);
+    OIIO::attribute("exr_threads", threads);
 }
 
 } // namespace
@@ -191,12 +223,16 @@ int main()
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN); /* a write that fails says so itself */
+    trip_sandbox_end_with_parent();
+    (void)trip_sandbox_enter(); /* where the kernel can */
+    set_up_threads();
+    std::set_new_handler(on_memory_refused);
     trip_report_redirect(pass_warning, nullptr);
     Session session;
     try {
         for (;;)
             answer_one(session);
-    } catch (const Gone &) {
-        return 0;
+    } catch (const trip_connection_gone &) {
+        return 0; /* also of a parent that ended before this process could be told to end with it */
     }
 }

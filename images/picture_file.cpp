@@ -3,11 +3,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <memory>
 
-#include <fcntl.h>
 #include <strings.h>
 #include <unistd.h>
 
@@ -20,24 +18,12 @@ namespace
 {
 
 /* Bytes go to the file by write(2) as the encoder hands them over, so that a full disk is seen with
- * its errno whatever the encoder makes of it. Unless renamed, the file goes with this object. */
+ * its errno whatever the encoder makes of it. */
 class FileSink : public OIIO::Filesystem::IOProxy
 {
   public:
-    explicit FileSink(const std::string &path) : IOProxy(path, Write)
+    FileSink(const std::string &path, int fd) : IOProxy(path, Write), fd_(fd)
     {
-        fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        created_ = fd_ >= 0;
-        if (!created_)
-            errno_ = errno;
-    }
-    FileSink(const FileSink &) = delete;
-    FileSink &operator=(const FileSink &) = delete;
-    ~FileSink() override
-    {
-        finish();
-        if (created_)
-            ::unlink(m_filename.c_str());
     }
 
     const char *proxytype() const override
@@ -68,29 +54,13 @@ class FileSink : public OIIO::Filesystem::IOProxy
         return (size_t)size_;
     }
 
-    /* Closes the file; returns the first error of all, as errno. */
-    int finish()
-    {
-        if (fd_ >= 0 && ::close(fd_) != 0 && errno_ == 0)
-            errno_ = errno;
-        fd_ = -1;
-        return errno_;
-    }
-    int rename_to(const char *path)
-    {
-        if (::rename(m_filename.c_str(), path) != 0)
-            return errno;
-        created_ = false;
-        return 0;
-    }
     int error_number() const
     {
         return errno_;
     }
 
   private:
-    int fd_ = -1, errno_ = 0;
-    bool created_ = false;
+    int fd_, errno_ = 0;
     int64_t size_ = 0;
 };
 
@@ -219,13 +189,6 @@ void encode(const trip_picture &p, const trip_picture_row &next_row, FileSink &s
         fail_encoding(p, sink, *out);
 }
 
-std::string temporary_name(const std::string &path)
-{
-    size_t slash = path.rfind('/');
-    return path.substr(0, slash == std::string::npos ? 0 : slash + 1) + ".triptych-" +
-           std::to_string(getpid()) + ".tmp";
-}
-
 /* `channels` values as RGBA, premultiplied. */
 void spread(const float *from, int channels, bool premultiplied, float rgba[4])
 {
@@ -241,17 +204,11 @@ void spread(const float *from, int channels, bool premultiplied, float rgba[4])
 
 void trip_picture_write(const trip_picture &p, const trip_picture_row &next_row)
 {
-    FileSink sink(temporary_name(p.path));
-    int error = sink.error_number();
-    if (error)
-        throw trip_slice_error(p.path, std::string("cannot create a file beside it: ") +
-                                           std::strerror(error));
+    FileSink sink(p.path, p.fd);
     encode(p, next_row, sink);
-    error = sink.finish();
-    if (error == 0)
-        error = sink.rename_to(p.path.c_str());
-    if (error)
-        throw trip_slice_error(p.path, std::string("cannot write: ") + std::strerror(error));
+    if (sink.error_number())
+        throw trip_slice_error(p.path,
+                               std::string("cannot write: ") + std::strerror(sink.error_number()));
 }
 
 std::vector<float> trip_picture_read(const std::string &path, int &width, int &height)

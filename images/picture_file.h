@@ -10,7 +10,8 @@
 #include "image_file.h"
 
 struct trip_picture {
-    std::string path;
+    std::string path; /* says the format; what is wrong is said of it */
+    int fd;           /* open for writing, empty */
     int width, height;
     trip_image_params params;
 };
@@ -18,8 +19,8 @@ struct trip_picture {
 /* Fills one row of float RGBA; false when no more come, which abandons the picture. */
 using trip_picture_row = std::function<bool(float *rgba)>;
 
-/* As trip_image_write(), for a path and params that are known to be right; asks for all rows from
- * the top, and only for those that it has use for. */
+/* As trip_image_write(), for a path and params that are known to be right, to the descriptor; asks
+ * for all rows from the top, and only for those that it has use for. */
 void trip_picture_write(const trip_picture &picture, const trip_picture_row &next_row);
 
 /* Premultiplied RGBA rows of a picture of one to four channels. */

@@ -3,8 +3,9 @@
  *
  * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. Without metadata
  * voxels are 1 apart; DICOM says how far, and where. */
-#include <string.h>
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "image_helper.h"
 #include "report.h"
@@ -37,16 +38,28 @@ static void close_images(void *opaque)
 
 static int open_stack(state *s, trip_image_stack *stack)
 {
-    uint64_t bytes;
     const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget) };
     int status = trip_image_helper_start(&s->helper, "read");
     if (status == 0)
-        status = trip_image_helper_request(s->helper, TRIP_IMAGE_OPEN_STACK, s->path, numbers);
+        status = trip_image_helper_request(s->helper, TRIP_IMAGE_OPEN_STACK, s->path, numbers, -1);
     if (status == 0)
-        status = trip_image_helper_outcome(s->helper, &bytes);
+        status = trip_image_helper_expect(s->helper, sizeof *stack);
     if (status == 0)
         status = trip_image_helper_receive(s->helper, stack, sizeof *stack);
     return status;
+}
+
+/* What of it cannot be, or NULL; sizes that no memory holds are refused later. */
+static const char *fault_of(const trip_image_stack *stack)
+{
+    bool finite = isfinite(stack->slope) && isfinite(stack->inter);
+    for (int i = 0; i < 12; i++)
+        finite = finite && isfinite(stack->index_to_world[i / 4][i % 4]);
+    if (stack->type < 0 || stack->type >= TRIP_SCALARS || stack->reserved != 0)
+        return "slices of an unknown type";
+    if (stack->dims[0] < 1 || stack->dims[1] < 1 || stack->dims[2] < 1)
+        return "slices of no size";
+    return finite ? NULL : "a map that is not finite";
 }
 
 /* The helper holds one slice, besides what it reports. */
@@ -82,6 +95,9 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
     s->budget = budget;
     trip_image_stack stack = { 0 };
     int status = open_stack(s, &stack);
+    const char *fault = status == 0 ? fault_of(&stack) : NULL;
+    if (fault)
+        status = trip_image_helper_distrust(s->helper, fault);
     if (status == 0)
         status = reserve_memory(s, &stack);
     if (status < 0) {
@@ -117,11 +133,11 @@ static int read_slices(void *opaque, int64_t count, void *values)
 {
     state *s = opaque;
     for (int64_t i = 0; i < count; i++) {
-        uint64_t bytes;
         const int64_t numbers[5] = { s->next++ };
-        int status = trip_image_helper_request(s->helper, TRIP_IMAGE_READ_SLICE, s->path, numbers);
+        int status =
+            trip_image_helper_request(s->helper, TRIP_IMAGE_READ_SLICE, s->path, numbers, -1);
         if (status == 0)
-            status = trip_image_helper_outcome(s->helper, &bytes);
+            status = trip_image_helper_expect(s->helper, s->slice_bytes);
         if (status == 0)
             status = trip_image_helper_receive(
                 s->helper, (char *)values + (size_t)i * s->slice_bytes, s->slice_bytes);

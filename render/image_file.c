@@ -1,5 +1,6 @@
 #include "image_file.h"
 
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -7,7 +8,9 @@
 #include <string.h>
 #include <strings.h>
 
+#include "budget.h"
 #include "image_helper.h"
+#include "new_file.h"
 #include "report.h"
 
 /* One helper for all pictures of this process, started when first wanted and kept. */
@@ -92,19 +95,24 @@ static int check_finite(const char *path, int width, int height, const float *rg
 static int write_locked(const char *path, int width, int height, const float *rgba,
                         const trip_image_params *params)
 {
-    uint64_t none;
+    trip_new_file file;
     const int64_t numbers[5] = { width, height, params->depth, params->drop_alpha,
                                  params->jpeg_quality };
-    int status = start_helper("write");
+    int status = trip_new_file_begin(&file, "write", path);
+    if (status < 0)
+        return status;
+    status = start_helper("write");
     if (status == 0)
-        status = trip_image_helper_request(helper, TRIP_IMAGE_WRITE, path, numbers);
+        status = trip_image_helper_request(helper, TRIP_IMAGE_WRITE, path, numbers, file.fd);
     if (status == 0)
         status = trip_image_helper_send(helper, rgba,
                                         (size_t)width * (size_t)height * 4 * sizeof(float));
     if (status == 0)
-        status = trip_image_helper_outcome(helper, &none);
-    if (status < 0)
-        drop_helper();
+        status = trip_image_helper_expect(helper, 0);
+    if (status == 0)
+        return trip_new_file_finish(&file);
+    drop_helper();
+    trip_new_file_abandon(&file);
     return status;
 }
 
@@ -127,12 +135,27 @@ int trip_image_write(const char *path, int width, int height, const float *rgba,
     return status;
 }
 
+/* The size that comes first must be that of a picture which fills the data. */
+static bool is_size_of(const trip_image_size *size, uint64_t data_bytes)
+{
+    uint64_t bytes = 4 * sizeof(float);
+    return size->width >= 1 && size->width <= INT_MAX && size->height >= 1 &&
+           size->height <= INT_MAX &&
+           !__builtin_mul_overflow(bytes, (uint64_t)size->width, &bytes) &&
+           !__builtin_mul_overflow(bytes, (uint64_t)size->height, &bytes) &&
+           !__builtin_add_overflow(bytes, sizeof *size, &bytes) && bytes == data_bytes;
+}
+
 static int receive_picture(const char *path, trip_image_size *size, float **rgba_out)
 {
     uint64_t bytes;
     int status = trip_image_helper_outcome(helper, &bytes);
+    if (status == 0 && bytes < sizeof *size)
+        status = trip_image_helper_distrust(helper, "a picture without a size");
     if (status == 0)
         status = trip_image_helper_receive(helper, size, sizeof *size);
+    if (status == 0 && !is_size_of(size, bytes))
+        status = trip_image_helper_distrust(helper, "a picture of another size than it says");
     if (status < 0)
         return status;
     float *rgba = malloc(bytes - sizeof *size);
@@ -149,10 +172,11 @@ static int receive_picture(const char *path, trip_image_size *size, float **rgba
 int trip_image_read(const char *path, int *width_out, int *height_out, float **rgba_out)
 {
     trip_image_size size = { 0 };
+    const int64_t numbers[5] = { (int64_t)(trip_memory_available_bytes() / 4) };
     pthread_mutex_lock(&helper_lock);
     int status = start_helper("read");
     if (status == 0)
-        status = trip_image_helper_request(helper, TRIP_IMAGE_READ, path, NULL);
+        status = trip_image_helper_request(helper, TRIP_IMAGE_READ, path, numbers, -1);
     if (status == 0)
         status = receive_picture(path, &size, rgba_out);
     if (status < 0)

@@ -1,33 +1,6 @@
-/* What both sides of the connection have in common. */
-#include <errno.h>
-#include <stdbool.h>
 #include <string.h>
-#include <sys/socket.h>
 
 #include "image_helper.h"
-
-int trip_image_send_all(int fd, const void *data, size_t bytes)
-{
-    for (size_t done = 0; done < bytes;) {
-        ssize_t n = send(fd, (const char *)data + done, bytes - done, MSG_NOSIGNAL);
-        if (n < 0 && errno != EINTR)
-            return false;
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
-int trip_image_receive_all(int fd, void *data, size_t bytes)
-{
-    for (size_t done = 0; done < bytes;) {
-        errno = 0;
-        ssize_t n = recv(fd, (char *)data + done, bytes - done, 0);
-        if (n == 0 || (n < 0 && errno != EINTR))
-            return false;
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
 
 trip_image_kind trip_image_kind_of(const unsigned char *head, size_t bytes)
 {

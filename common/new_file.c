@@ -1,0 +1,72 @@
+#include "new_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "report.h"
+
+enum { TRIES = 100 };
+
+/* Another name beside `path` at every call; false when it is too long. */
+static bool choose_name(trip_new_file *f)
+{
+    uint64_t number = 0;
+    const char *slash = strrchr(f->path, '/');
+    int folder = slash ? (int)(slash + 1 - f->path) : 0;
+    if (getrandom(&number, sizeof number, 0) != sizeof number)
+        number = (uint64_t)getpid();
+    int length = snprintf(f->temporary, sizeof f->temporary, "%.*s.triptych-%016" PRIx64 ".tmp",
+                          folder, f->path, number);
+    return length < (int)sizeof f->temporary;
+}
+
+/* The mode of a file that is to be replaced; others get what the umask leaves. */
+static void keep_mode(const trip_new_file *f)
+{
+    struct stat old;
+    if (lstat(f->path, &old) == 0 && S_ISREG(old.st_mode))
+        (void)!fchmod(f->fd, old.st_mode & 0777);
+}
+
+int trip_new_file_begin(trip_new_file *f, const char *what, const char *path)
+{
+    *f = (trip_new_file){ .what = what, .path = path, .fd = -1 };
+    errno = EEXIST;
+    for (int i = 0; i < TRIES && f->fd < 0 && errno == EEXIST; i++) {
+        if (!choose_name(f))
+            return trip_fail(TRIP_ERROR, what, path, "the name is too long");
+        f->fd = open(f->temporary, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    }
+    if (f->fd < 0)
+        return trip_fail_errno(what, path, "cannot create a file beside it");
+    keep_mode(f);
+    return 0;
+}
+
+int trip_new_file_finish(trip_new_file *f)
+{
+    int closed = close(f->fd);
+    f->fd = -1;
+    if (closed == 0 && rename(f->temporary, f->path) == 0)
+        return 0;
+    int status = trip_fail_errno(f->what, f->path, "cannot write");
+    unlink(f->temporary);
+    return status;
+}
+
+void trip_new_file_abandon(trip_new_file *f)
+{
+    if (f->fd < 0)
+        return;
+    close(f->fd);
+    f->fd = -1;
+    unlink(f->temporary);
+}

@@ -1,0 +1,134 @@
+#include "new_file.h"
+
+#include <dirent.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "test.h"
+
+static char folder[] = "new_file-XXXXXX";
+
+static int enter_folder(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) ? chdir(folder) : -1;
+}
+
+static int leave_folder(void **state)
+{
+    (void)state;
+    return chdir("..") == 0 ? rmdir(folder) : -1;
+}
+
+static int count_files(void)
+{
+    DIR *d = opendir(".");
+    int count = -2;
+    while (readdir(d))
+        count++;
+    closedir(d);
+    return count;
+}
+
+static void write_new(const char *path, const char *text)
+{
+    trip_new_file f;
+    assert_int_equal(trip_new_file_begin(&f, "write", path), 0);
+    assert_int_equal(write(f.fd, text, strlen(text)), strlen(text));
+    assert_int_equal(trip_new_file_finish(&f), 0);
+}
+
+static void assert_holds(const char *path, const char *text)
+{
+    char read_back[64] = "";
+    FILE *f = fopen(path, "r");
+    assert_non_null(f);
+    assert_int_equal(fread(read_back, 1, 63, f), strlen(text));
+    fclose(f);
+    assert_string_equal(read_back, text);
+}
+
+static void a_file_is_there_only_once_it_is_finished(void **state)
+{
+    (void)state;
+    trip_new_file f;
+    assert_int_equal(trip_new_file_begin(&f, "write", "a"), 0);
+    assert_int_not_equal(access("a", F_OK), 0);
+    trip_new_file_abandon(&f);
+    trip_new_file_abandon(&f);
+    assert_int_equal(count_files(), 0);
+    write_new("a", "one");
+    assert_holds("a", "one");
+    assert_int_equal(unlink("a"), 0);
+    assert_int_equal(count_files(), 0);
+}
+
+static void what_is_replaced_hands_on_its_mode_and_stays_until_then(void **state)
+{
+    (void)state;
+    struct stat st;
+    trip_new_file f;
+    write_new("a", "one");
+    assert_int_equal(chmod("a", 0600), 0);
+    assert_int_equal(trip_new_file_begin(&f, "write", "a"), 0);
+    trip_new_file_abandon(&f);
+    assert_holds("a", "one");
+    write_new("a", "two");
+    assert_holds("a", "two");
+    assert_int_equal(stat("a", &st), 0);
+    assert_int_equal(st.st_mode & 0777, 0600);
+    unlink("a");
+}
+
+static void a_link_is_replaced_and_what_it_points_to_stays(void **state)
+{
+    (void)state;
+    struct stat st;
+    write_new("goal", "one");
+    assert_int_equal(symlink("goal", "link"), 0);
+    write_new("link", "two");
+    assert_holds("goal", "one");
+    assert_int_equal(lstat("link", &st), 0);
+    assert_true(S_ISREG(st.st_mode));
+    unlink("goal");
+    unlink("link");
+}
+
+static void files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way(void **state)
+{
+    (void)state;
+    trip_new_file one, two;
+    assert_int_equal(trip_new_file_begin(&one, "write", "a"), 0);
+    assert_int_equal(trip_new_file_begin(&two, "write", "a"), 0);
+    assert_string_not_equal(one.temporary, two.temporary);
+    trip_new_file_abandon(&one);
+    trip_new_file_abandon(&two);
+}
+
+static void what_cannot_be_written_is_one_report_and_leaves_nothing(void **state)
+{
+    (void)state;
+    trip_new_file f;
+    test_catch_reports();
+    assert_int_equal(trip_new_file_begin(&f, "write", "missing/a"), TRIP_ERROR);
+    assert_one_report("missing/a: cannot create a file beside it: No such file");
+    assert_int_equal(mkdir("a", 0777), 0);
+    assert_int_equal(trip_new_file_begin(&f, "write", "a"), 0);
+    test_catch_reports();
+    assert_int_equal(trip_new_file_finish(&f), TRIP_ERROR);
+    assert_one_report("a: cannot write: Is a directory");
+    assert_int_equal(rmdir("a"), 0);
+    assert_int_equal(count_files(), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_file_is_there_only_once_it_is_finished),
+        cmocka_unit_test(what_is_replaced_hands_on_its_mode_and_stays_until_then),
+        cmocka_unit_test(a_link_is_replaced_and_what_it_points_to_stays),
+        cmocka_unit_test(files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way),
+        cmocka_unit_test(what_cannot_be_written_is_one_report_and_leaves_nothing),
+    };
+    return cmocka_run_group_tests(tests, enter_folder, leave_folder);
+}
