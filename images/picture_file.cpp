@@ -70,19 +70,20 @@ struct Encoding {
     trip_image_depth depth;
     int channels;
     bool associated; /* alpha, where there are four channels */
+    bool linear;     /* light, where others hold display values */
 };
 
 Encoding choose_encoding(const trip_picture &p)
 {
     const char *extension = std::strrchr(p.path.c_str(), '.') + 1;
     bool alpha = !p.params.drop_alpha;
-    Encoding e = { "png", TRIP_IMAGE_U8, alpha ? 4 : 3, false };
+    Encoding e = { "png", TRIP_IMAGE_U8, alpha ? 4 : 3, false, false };
     if (strcasecmp(extension, "exr") == 0)
-        e = { "openexr", TRIP_IMAGE_FLOAT, alpha ? 4 : 3, true };
+        e = { "openexr", TRIP_IMAGE_FLOAT, alpha ? 4 : 3, true, true };
     else if (strncasecmp(extension, "tif", 3) == 0)
-        e = { "tiff", TRIP_IMAGE_U16, alpha ? 4 : 3, true };
+        e = { "tiff", TRIP_IMAGE_U16, alpha ? 4 : 3, true, false };
     else if (strcasecmp(extension, "png") != 0)
-        e = { "jpeg", TRIP_IMAGE_U8, 3, false };
+        e = { "jpeg", TRIP_IMAGE_U8, 3, false, false };
     if (p.params.depth != TRIP_IMAGE_DEPTH_DEFAULT)
         e.depth = p.params.depth;
     return e;
@@ -94,6 +95,31 @@ void unpremultiply(float rgba[4])
     float alpha = rgba[3] < 0 ? 0 : rgba[3] > 1 ? 1 : rgba[3];
     for (int c = 0; c < 3; c++)
         rgba[c] = alpha > 0 ? rgba[c] / alpha : 0;
+}
+
+/* The sRGB transfer function (IEC 61966-2-1) and its inverse; negative numbers mirror positive
+ * ones, so that none is lost. */
+float linear_of_display(float v)
+{
+    double x = std::fabs((double)v);
+    double y = x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
+    return (float)std::copysign(y, (double)v);
+}
+
+float display_of_linear(float v)
+{
+    double x = std::fabs((double)v);
+    double y = x <= 0.04045 / 12.92 ? x * 12.92 : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
+    return (float)std::copysign(y, (double)v);
+}
+
+/* A curve is for colours as they are, not for what alpha leaves of them. Colour without alpha is
+ * light that is added, and taken as it is. */
+template <typename Curve> void apply_curve(const Curve &curve, float rgba[4], bool associated)
+{
+    float alpha = associated && rgba[3] > 0 ? rgba[3] : 1;
+    for (int c = 0; c < 3; c++)
+        rgba[c] = curve(rgba[c] / alpha) * alpha;
 }
 
 template <typename T> void quantise(const float *from, int channels, T *to)
@@ -114,6 +140,8 @@ void convert_row(const Encoding &e, int width, const float *from, void *to)
         std::memcpy(rgba, from, sizeof rgba);
         if (e.channels == 4 && !e.associated)
             unpremultiply(rgba);
+        if (e.linear)
+            apply_curve(linear_of_display, rgba, e.channels == 4);
         if (e.depth == TRIP_IMAGE_U8)
             quantise(rgba, e.channels, (uint8_t *)to + at);
         else if (e.depth == TRIP_IMAGE_U16)
@@ -224,12 +252,16 @@ std::vector<float> trip_picture_read(const std::string &path, int &width, int &h
     std::vector<float> row((size_t)spec.width * (size_t)spec.nchannels);
     std::vector<float> rgba((size_t)spec.width * (size_t)spec.height * 4);
     bool premultiplied = !spec.get_int_attribute("oiio:UnassociatedAlpha", 0);
+    bool linear = std::strcmp(in->format_name(), "openexr") == 0;
     for (int y = 0; y < spec.height; y++) {
         if (!in->read_scanline(y + spec.y, 0, OIIO::TypeDesc::FLOAT, row.data()))
             throw trip_slice_error(path, trim(in->geterror()));
-        for (int x = 0; x < spec.width; x++)
-            spread(&row[(size_t)x * (size_t)spec.nchannels], spec.nchannels, premultiplied,
-                   &rgba[((size_t)y * (size_t)spec.width + (size_t)x) * 4]);
+        for (int x = 0; x < spec.width; x++) {
+            float *pixel = &rgba[((size_t)y * (size_t)spec.width + (size_t)x) * 4];
+            spread(&row[(size_t)x * (size_t)spec.nchannels], spec.nchannels, premultiplied, pixel);
+            if (linear)
+                apply_curve(display_of_linear, pixel, true);
+        }
     }
     width = spec.width;
     height = spec.height;

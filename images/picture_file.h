@@ -23,7 +23,7 @@ using trip_picture_row = std::function<bool(float *rgba)>;
  * for all rows from the top, and only for those that it has use for. */
 void trip_picture_write(const trip_picture &picture, const trip_picture_row &next_row);
 
-/* Premultiplied RGBA rows of a picture of one to four channels. */
+/* Premultiplied RGBA rows of a picture of one to four channels, display values in any format. */
 std::vector<float> trip_picture_read(const std::string &path, int &width, int &height);
 
 #endif

@@ -2,8 +2,9 @@
  * Any thread may call these; they take turns.
  *
  * In memory a picture is float RGBA, premultiplied (associated) alpha, `height` rows of `width`
- * pixels, row 0 at the top. Colours are display values: what is written is what the transfer
- * function says, without a curve; EXR holds the same numbers. */
+ * pixels, row 0 at the top. Colours are display values (sRGB): PNG, JPEG and TIFF get what the
+ * transfer function says, without a curve. EXR is linear light by convention: its colours, without
+ * their alpha, go through the sRGB transfer function, and come back through its inverse. */
 #ifndef TRIP_IMAGE_FILE_H
 #define TRIP_IMAGE_FILE_H
 

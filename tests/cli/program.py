@@ -110,6 +110,17 @@ def main():
 
 
 def read_exr(path):
+    """What read_linear_exr() reads, as display values: by the sRGB curve for colours without their
+    alpha, in double precision."""
+    picture = read_linear_exr(path).astype(float)
+    alpha = picture[..., 3:]
+    straight = picture[..., :3] / numpy.where(alpha > 0, alpha, 1)
+    curve = 1.055 * numpy.maximum(straight, 1e-9) ** (1 / 2.4) - 0.055
+    display = numpy.where(straight <= 0.0031308, 12.92 * straight, curve)
+    return numpy.concatenate([display * numpy.where(alpha > 0, alpha, 1), alpha], axis=-1)
+
+
+def read_linear_exr(path):
     """An OpenEXR file of scan lines, floats by zip: height x width x RGBA."""
     with open(path, "rb") as f:
         data = f.read()
