@@ -75,8 +75,8 @@ static void release_memory(const session *s, void *memory, size_t bytes, bool la
 
 int bench_files_read(const session *s, bench_files files, bench_plain how, bench_disk_read *out)
 {
-    plain_disk d = { .direct = true, .look = how == BENCH_PLAIN_LOOKED_AT };
-    bool large_pages = how != BENCH_PLAIN;
+    plain_disk d = { .direct = true, .look = how == BENCH_PLAIN };
+    bool large_pages = how != BENCH_PLAIN_SMALL;
     void *memory = take_memory(s, PLAIN_DISK_MEMORY_BYTES, large_pages);
     int status = 0;
     if (!memory)

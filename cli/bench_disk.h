@@ -21,10 +21,12 @@ typedef struct bench_disk_read {
     bool direct; /* O_DIRECT was not refused */
 } bench_disk_read;
 
+/* What is compared with the ring has the same kind of pages and the same work. */
 typedef enum bench_plain {
-    BENCH_PLAIN,           /* into memory as the system gives it to any program */
-    BENCH_PLAIN_LARGE,     /* into large pages, which the ring is in where the system has them */
-    BENCH_PLAIN_LOOKED_AT, /* the same, and a byte of every cache line is looked at */
+    BENCH_PLAIN, /* into large pages, which the ring is in where the system has them, and a byte
+                    of every cache line is loaded, as by whoever checks or draws it */
+    BENCH_PLAIN_BLIND, /* the same, and nothing is loaded */
+    BENCH_PLAIN_SMALL, /* nothing loaded, into memory as the system gives it to any program */
 } bench_plain;
 
 int bench_files_read(const session *s, bench_files files, bench_plain how, bench_disk_read *out);

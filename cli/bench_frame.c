@@ -81,9 +81,17 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     return status;
 }
 
+static void show_step(const bench_frame *f, bool count)
+{
+    char text[48];
+    snprintf(text, sizeof text, "frame of %s%s", f->renderer->ops->name, count ? ", counted" : "");
+    bench_progress_step(f->progress, text);
+}
+
 int bench_frame_draw(const bench_frame *f, bool count, bench_cost *cost)
 {
     trip_camera camera;
+    show_step(f, count);
     int status = trip_camera_make(&camera, &f->view, &f->session->data->index_to_world);
     return status ? status : draw_planned(f, &camera, count, cost);
 }
@@ -190,12 +198,13 @@ void bench_renderer_destroy(trip_renderer *r)
 int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bench_report *r)
 {
     char why[256];
-    *b = (bench_scene){ .frame = { .session = s, .settings = o->settings },
+    *b = (bench_scene){ .frame = { .session = s, .settings = o->settings, .progress = o->progress },
                         .size = { o->sizes[0][0], o->sizes[0][1] } };
     bench_frame *f = &b->frame;
     int status = session_take_image(s, b->size[0], b->size[1], &f->rgba);
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
+    bench_progress_step(o->progress, "data set to memory");
     if (!status)
         status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, f->renderer, NULL);
     if (status)

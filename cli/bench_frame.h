@@ -16,6 +16,7 @@ typedef struct bench_frame {
     float *rgba;
     /* The reader leaves out what lies behind what this one has drawn; NULL: reads everything. */
     trip_renderer **covering;
+    bench_progress *progress; /* a step of it is each frame; may be NULL */
 } bench_frame;
 
 /* What most tables draw with: the first renderer, size and number of threads of the options, and

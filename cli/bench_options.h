@@ -3,6 +3,7 @@
 #ifndef TRIP_BENCH_OPTIONS_H
 #define TRIP_BENCH_OPTIONS_H
 
+#include "bench_progress.h"
 #include "reader.h"
 #include "renderer_choice.h"
 #include "settings.h"
@@ -10,8 +11,10 @@
 enum { BENCH_LIST_MAX = 16 };
 
 typedef struct bench_options {
-    const char *table, *input;
-    const char *tf; /* file or preset; NULL: the function kept in the data set */
+    const char *table; /* always one of bench_tables[] */
+    const char *input; /* NULL: the included volume */
+    bool in_short;     /* no table was named: one that takes less than a minute */
+    const char *tf;    /* file or preset; NULL: the function kept in the data set */
     int sizes[BENCH_LIST_MAX][2], size_count;
     trip_renderer_kind renderers[BENCH_LIST_MAX];
     int renderer_count;
@@ -23,7 +26,15 @@ typedef struct bench_options {
     bool draw_hidden;      /* bricks behind what is opaque */
     bool no_counts;        /* times only */
     bool json;
+    bench_progress *progress; /* no option: where it is shown how far the table is; may be NULL */
 } bench_options;
+
+/* The tables there are, a line each. */
+#define BENCH_TABLES                                                                               \
+    "  orders     the list methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
+    "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                \
+    "  stream     reading and drawing against the disk's bandwidth\n"                              \
+    "  renderers  the renderers there are, over views round the object\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

@@ -136,6 +136,7 @@ static void add_limits(bench_report *r)
 int bench_orders(const session *s, const bench_options *o, bench_report *r)
 {
     bench_scene scene;
+    bench_progress_expect(o->progress, 1 + VIEWS * METHODS * (1 + o->repeat));
     int status = bench_scene_open(&scene, s, o, r);
     if (!status)
         add_limits(r);

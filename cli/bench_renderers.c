@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bench_probe.h"
 #include "bench_view.h"
@@ -126,7 +127,8 @@ static int draw_views(race *c, const int size[2])
     bench_frame frame = { .session = c->session,
                           .reader = c->reader,
                           .covering = covering(c),
-                          .settings = c->options->settings };
+                          .settings = c->options->settings,
+                          .progress = c->options->progress };
     int status = session_take_image(c->session, size[0], size[1], &frame.rgba);
     for (int view = 0; view < c->options->views && !status; view++) {
         frame.view = c->views[view] = bench_view_round(c->session, size, view, c->options->views);
@@ -221,7 +223,15 @@ static int run(race *c, bench_report *r)
     return status;
 }
 
-static void add_limits(bench_report *r, bool draw_hidden)
+static bool leaves_out_hidden(const race *c)
+{
+    for (int i = 0; i < c->count; i++)
+        if (!c->options->draw_hidden && !strcmp(c->contenders[i].renderer->ops->name, "cpu"))
+            return true;
+    return false;
+}
+
+static void add_limits(const race *c, bench_report *r)
 {
     bench_report_limit(r, "The data set is in memory (null engine): no figure contains the disk. A "
                           "frame is planning, drawing from memory and merging, and ends "
@@ -231,7 +241,7 @@ static void add_limits(bench_report *r, bool draw_hidden)
                           "behind saturated pixels count too, though a renderer may skip them.");
     bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
                        SAMPLE_EVERY);
-    if (!draw_hidden)
+    if (leaves_out_hidden(c))
         bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
                               "same.");
     bench_report_limit(
@@ -247,8 +257,11 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
     c->session = s;
     c->options = o;
     cJSON_AddNumberToObject(bench_report_settings(r), "views", o->views);
-    add_limits(r, o->draw_hidden);
     int status = add_contenders(c, r);
+    add_limits(c, r);
+    int frames = c->count * (1 + o->repeat) + (o->no_counts ? 0 : 2); /* of a view */
+    bench_progress_expect(o->progress, 1 + frames * o->views * o->size_count);
+    bench_progress_step(o->progress, "data set to memory");
     if (!status)
         status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, covering(c));
     if (!status)

@@ -10,7 +10,17 @@
 #include "bench_view.h"
 #include "report.h"
 
-enum { PLAIN, LARGE, LOOKED_AT, STREAMED, READ, DRAW, FRAME, STAGES };
+enum { PLAIN, BLIND, SMALL, STREAMED, READ, DRAW, FRAME, STAGES };
+
+static const char *const names[STAGES] = { "plain read",
+                                           "the same, not looked at",
+                                           "into small pages, not looked at",
+                                           "lists streamed",
+                                           "read alone",
+                                           "draw alone",
+                                           "frame" };
+static const char *const keys[STAGES] = { "plain", "plain_blind", "plain_small", "streamed",
+                                          "read",  "draw",        "frame" };
 
 static const double gigabyte = 1e9, second_ms = 1e3;
 
@@ -22,6 +32,7 @@ static const bench_column stage_columns[] = {
     { "bytes_read", "GB read", 3, gigabyte },
     { "gb_per_s", "GB/s", 3, 0 },
     { "of_plain", "of plain read", 3, 0 },
+    { "of_blind", "of it not looked at", 3, 0 },
 };
 
 static const bench_column summary_columns[] = {
@@ -86,13 +97,14 @@ static int take(stream *t, int stage, sample *out)
         [READ] = &t->unread, [DRAW] = &t->in_memory, [FRAME] = &t->frame
     };
     static const bench_plain plain[] = {
-        [PLAIN] = BENCH_PLAIN, [LARGE] = BENCH_PLAIN_LARGE, [LOOKED_AT] = BENCH_PLAIN_LOOKED_AT
+        [PLAIN] = BENCH_PLAIN, [BLIND] = BENCH_PLAIN_BLIND, [SMALL] = BENCH_PLAIN_SMALL
     };
     bench_cost cost;
+    bench_progress_step(t->options->progress, names[stage]);
     if (stage == DRAW && !t->in_memory.renderer)
         return 0;
     bench_files_forget(t->session, t->files);
-    if (stage <= LOOKED_AT)
+    if (stage <= SMALL)
         return take_plain(t, plain[stage], out);
     if (stage == STREAMED)
         return take_streamed(t, out);
@@ -189,20 +201,10 @@ static double gb_per_s(sample s)
 
 static void add_stages(const stream *t, bench_report *r)
 {
-    static const char *const names[] = { "plain read",
-                                         "plain read, large pages",
-                                         "the same, looked at",
-                                         "lists streamed",
-                                         "read alone",
-                                         "draw alone",
-                                         "frame" };
-    static const char *const keys[] = { "plain",    "plain_large", "plain_looked_at",
-                                        "streamed", "read",        "draw",
-                                        "frame" };
     cJSON *rows = bench_report_table(r, "stages", "One frame's parts alone and together",
                                      stage_columns, sizeof stage_columns / sizeof stage_columns[0]);
     for (int stage = 0; stage < STAGES; stage++) {
-        sample own = middle(t, stage), plain = middle(t, PLAIN);
+        sample own = middle(t, stage), plain = middle(t, PLAIN), blind = middle(t, BLIND);
         const sample *runs = &t->samples[stage * t->options->repeat];
         cJSON *row = cJSON_CreateObject();
         cJSON_AddStringToObject(row, "key", keys[stage]);
@@ -216,6 +218,7 @@ static void add_stages(const stream *t, bench_report *r)
             cJSON_AddNumberToObject(row, "bytes_read", own.bytes);
             cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(own));
             cJSON_AddNumberToObject(row, "of_plain", gb_per_s(own) / gb_per_s(plain));
+            cJSON_AddNumberToObject(row, "of_blind", gb_per_s(own) / gb_per_s(blind));
         }
         cJSON_AddItemToArray(rows, row);
     }
@@ -257,14 +260,14 @@ static void describe(const stream *t, bench_report *r)
                                       : "8 threads, blocks of 1 MiB, through the page cache "
                                         "(O_DIRECT refused), dropped before each run");
     bench_report_limit(r, "Plain read: the plane files of the lists that the view needs, each from "
-                          "end to end, into memory as the system gives it to any program. It "
-                          "neither looks at the bytes nor draws. The machine under a virtual "
-                          "disk may hold the files in its own memory, for every stage alike.");
-    bench_report_limit(r,
-                       "Plain read, large pages: the same into memory as the ring's, in pages "
-                       "of 2 MiB where the system has them, which spares a virtual disk much "
-                       "of its work; looked at: a byte of every cache line is loaded, as whoever "
-                       "draws or checks what comes must, which can slow the disk itself.");
+                          "end to end, into the same kind of memory as the ring's (pages of 2 MiB "
+                          "where the system has them), and a byte of every cache line is loaded, "
+                          "as whoever checks or draws what comes must. All fractions of disk are "
+                          "of this read. The machine under a virtual disk may hold the files in "
+                          "its own memory, for every stage alike.");
+    bench_report_limit(r, "Not looked at: nothing is loaded, and the processor never sees what was "
+                          "read. Into small pages: besides, into memory as the system gives it to "
+                          "any program, which costs a virtual disk more.");
     bench_report_limit(r, "Lists streamed: the same bytes as the plain read, nothing left out, "
                           "through the frame's ring: checked and handed out in draw order, not "
                           "drawn.");
@@ -312,7 +315,10 @@ static void close_stream(stream *t)
 int bench_stream(const session *s, const bench_options *o, bench_report *r)
 {
     stream t = { .session = s, .options = o };
+    bench_progress_expect(o->progress, 2 + STAGES * o->repeat);
+    bench_progress_step(o->progress, "first frame");
     int status = open_frame(&t);
+    bench_progress_step(o->progress, "data set to memory");
     if (!status)
         status = open_in_memory(&t, r);
     if (!status)

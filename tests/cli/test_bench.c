@@ -140,14 +140,19 @@ static void stream_reads_the_files_of_all_lists(void **state)
                     file_bytes("block.trip/z.voxels") + file_bytes("block.trip/x.normals") +
                     file_bytes("block.trip/y.normals") + file_bytes("block.trip/z.normals");
     assert_true(number(stage(rows, "plain"), "bytes_read") == planes);
-    assert_true(number(stage(rows, "plain_large"), "bytes_read") == planes);
-    assert_true(number(stage(rows, "plain_looked_at"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "plain_blind"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "plain_small"), "bytes_read") == planes);
     assert_true(number(stage(rows, "streamed"), "bytes_read") == planes);
     assert_true(number(stage(rows, "read"), "bytes_read") == planes);
     assert_true(number(stage(rows, "frame"), "bytes_read") == planes);
     assert_true(number(summary, "dataset_bytes") == planes + file_bytes("block.trip/index.trip"));
     assert_true(number(summary, "memory_limit_bytes") == 64.0 * (1 << 20));
     assert_true(number(summary, "memory_peak_bytes") <= 64.0 * (1 << 20));
+    /* Like with like: the read that has the ring's kind of memory and loads what it reads. */
+    assert_close(number(summary, "disk_gb_per_s"), number(stage(rows, "plain"), "gb_per_s"));
+    assert_close(number(stage(rows, "streamed"), "of_blind"),
+                 number(stage(rows, "streamed"), "gb_per_s") /
+                     number(stage(rows, "plain_blind"), "gb_per_s"));
     assert_close(number(summary, "frame_of_disk"),
                  number(summary, "gb_per_s") / number(summary, "disk_gb_per_s"));
     assert_close(number(summary, "streamed_of_disk"),
@@ -222,6 +227,35 @@ static void submit_compares_forms_where_there_is_gl(void **state)
     cJSON_Delete(root);
 }
 
+static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "orders", "submit", "stream", "renderers" };
+    program_run r;
+    assert_int_equal(mkdir("temporary", 0700), 0);
+    assert_int_equal(setenv("TMPDIR", "temporary", 1), 0);
+    program_call(&r, "bench --renderer cpu --size 32x32 --views 1");
+    assert_works(&r);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        char line[32];
+        snprintf(line, sizeof line, "\n  %s ", names[i]);
+        assert_non_null(strstr(r.out, line));
+    }
+    assert_non_null(strstr(r.out, "\n| cpu "));
+    assert_non_null(strstr(r.out, "\n- grid: 103 x 94 x 161\n")); /* the tooth's header says so */
+    assert_string_equal(r.err, "");
+    cJSON_Delete(bench("--renderer cpu --size 32x32 --views 1"));
+    cJSON *root = bench("orders --renderer cpu --size 32x32 --repeat 1");
+    assert_int_equal(cJSON_GetArraySize(rows_of(root, "lateral")), 5);
+    cJSON_Delete(root);
+    program_call(&r, "bench orders --renderer cpu --memory 1M");
+    assert_fails(&r, 1);
+    assert_int_equal(rmdir("temporary"), 0); /* nothing was left in it */
+    unsetenv("TMPDIR");
+    program_call(&r, "bench --no-counts --engine pread");
+    assert_fails(&r, 2);
+}
+
 static void tables_for_people_name_the_command_and_their_limits(void **state)
 {
     (void)state;
@@ -238,8 +272,6 @@ static void wrong_usage_is_refused_in_one_line(void **state)
 {
     (void)state;
     static const char *const wrong[] = {
-        "bench",
-        "bench orders",
         "bench sideways block.trip",
         "bench orders block.trip block.trip",
         "bench orders block.trip --views 3",
@@ -251,6 +283,9 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench renderers block.trip --engine pread",
         "bench renderers block.trip --renderer none",
         "bench stream block.trip --views 2",
+        "bench stream block.trip --hidden skip --renderer gl",
+        "bench stream block.trip --hidden skip --renderer reference",
+        "bench renderers block.trip --hidden skip --renderer gl,reference",
         "bench orders block.trip --repeat 0",
         "bench orders block.trip --size 0x32",
         "bench orders block.trip --threads 1,2",
@@ -281,6 +316,8 @@ int main(void)
         cmocka_unit_test(renderers_gives_a_row_for_each_renderer_size_and_thread_count),
         cmocka_unit_test(renderers_says_what_each_view_was_and_took_counted_or_not),
         cmocka_unit_test(submit_compares_forms_where_there_is_gl),
+        cmocka_unit_test(
+            without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
         cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),

@@ -1,0 +1,134 @@
+#include "bench_progress.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { INTERVAL_MS = 250 };
+
+struct bench_progress {
+    const char *name;
+    struct timespec begin;
+    pthread_t thread;
+    pthread_mutex_t lock;
+    pthread_cond_t stop;
+    /* Under the lock. */
+    bool stopped;
+    int begun, expected; /* steps */
+    char what[48];
+};
+
+static unsigned seconds_since(const struct timespec *begin)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (unsigned)(now.tv_sec - begin->tv_sec - (now.tv_nsec < begin->tv_nsec));
+}
+
+/* What is printed next stands in the line's place. */
+static void print_line(const bench_progress *p)
+{
+    unsigned s = seconds_since(&p->begin);
+    fprintf(stderr, "\r\033[K%s  %u:%02u", p->name, s / 60, s % 60);
+    if (p->begun)
+        fprintf(stderr, "  step %d of %d: %s", p->begun, p->expected, p->what);
+    fputc('\r', stderr);
+    fflush(stderr);
+}
+
+static struct timespec time_of_next_line(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    t.tv_nsec += INTERVAL_MS * 1000000L;
+    t.tv_sec += t.tv_nsec / 1000000000L;
+    t.tv_nsec %= 1000000000L;
+    return t;
+}
+
+static void *show(void *argument)
+{
+    bench_progress *p = argument;
+    pthread_mutex_lock(&p->lock);
+    do {
+        struct timespec next = time_of_next_line();
+        print_line(p);
+        while (!p->stopped && pthread_cond_timedwait(&p->stop, &p->lock, &next) == 0)
+            ;
+    } while (!p->stopped);
+    pthread_mutex_unlock(&p->lock);
+    return NULL;
+}
+
+/* Signals go to the main thread, as without this one. */
+static bool start_thread(bench_progress *p)
+{
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    bool started = pthread_create(&p->thread, NULL, show, p) == 0;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    return started;
+}
+
+static void release(bench_progress *p)
+{
+    pthread_cond_destroy(&p->stop);
+    pthread_mutex_destroy(&p->lock);
+    free(p);
+}
+
+bench_progress *bench_progress_start(const char *name)
+{
+    bench_progress *p = isatty(STDERR_FILENO) == 1 ? calloc(1, sizeof *p) : NULL;
+    if (!p)
+        return NULL;
+    pthread_condattr_t attributes;
+    pthread_condattr_init(&attributes);
+    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+    pthread_cond_init(&p->stop, &attributes);
+    pthread_condattr_destroy(&attributes);
+    pthread_mutex_init(&p->lock, NULL);
+    p->name = name;
+    clock_gettime(CLOCK_MONOTONIC, &p->begin);
+    if (start_thread(p))
+        return p;
+    release(p);
+    return NULL;
+}
+
+void bench_progress_expect(bench_progress *p, int steps)
+{
+    if (!p)
+        return;
+    pthread_mutex_lock(&p->lock);
+    p->expected += steps;
+    pthread_mutex_unlock(&p->lock);
+}
+
+void bench_progress_step(bench_progress *p, const char *what)
+{
+    if (!p)
+        return;
+    pthread_mutex_lock(&p->lock);
+    p->begun++;
+    snprintf(p->what, sizeof p->what, "%s", what);
+    pthread_mutex_unlock(&p->lock);
+}
+
+void bench_progress_end(bench_progress *p)
+{
+    if (!p)
+        return;
+    pthread_mutex_lock(&p->lock);
+    p->stopped = true;
+    pthread_cond_signal(&p->stop);
+    pthread_mutex_unlock(&p->lock);
+    pthread_join(p->thread, NULL);
+    fputs("\r\033[K", stderr);
+    release(p);
+}
