@@ -1,0 +1,86 @@
+#include "anatomy.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define DEGREES_PER_RADIAN 57.29577951308232
+
+bool trip_anatomy_known(const char *space)
+{
+    return space && (strcmp(space, "LPS") == 0 || strcmp(space, "RAS") == 0);
+}
+
+static char opposite(char end)
+{
+    static const char pairs[] = "RLAPSI";
+    const char *at = end ? strchr(pairs, end) : NULL;
+    return at ? pairs[(at - pairs) ^ 1] : '\0';
+}
+
+trip_vec3 trip_anatomy_direction(const char *space, char end)
+{
+    double v[3] = { 0, 0, 0 };
+    for (int a = 0; a < 3 && trip_anatomy_known(space); a++)
+        v[a] = space[a] == end ? 1 : space[a] == opposite(end) ? -1 : 0;
+    return trip_v3(v[0], v[1], v[2]);
+}
+
+const char *trip_anatomy_end_name(char end)
+{
+    switch (end) {
+    case 'R':
+        return "right";
+    case 'L':
+        return "left";
+    case 'A':
+        return "anterior";
+    case 'P':
+        return "posterior";
+    case 'S':
+        return "superior";
+    case 'I':
+        return "inferior";
+    default:
+        return "";
+    }
+}
+
+const char *trip_anatomy_ends(const char *space, trip_vec3 v, char ends[4])
+{
+    double length = trip_length(v), most[3] = { 0, 0, 0 };
+    int count = 0;
+    ends[0] = '\0';
+    if (!trip_anatomy_known(space) || !(length > 0 && isfinite(length)))
+        return ends;
+    for (int a = 0; a < 3; a++) {
+        double part = trip_component(v, a) / length;
+        if (fabs(part) < TRIP_ANATOMY_LEAST)
+            continue;
+        int at = count++;
+        for (; at > 0 && most[at - 1] < fabs(part); at--) {
+            most[at] = most[at - 1];
+            ends[at] = ends[at - 1];
+        }
+        most[at] = fabs(part);
+        ends[at] = part > 0 ? space[a] : opposite(space[a]);
+    }
+    ends[count] = '\0';
+    return ends;
+}
+
+const char *trip_anatomy_words(const char *space, trip_vec3 v, char words[TRIP_ANATOMY_WORDS])
+{
+    char ends[4];
+    trip_anatomy_ends(space, v, ends);
+    const char *first = trip_anatomy_end_name(ends[0]);
+    if (!ends[0] || !ends[1]) {
+        snprintf(words, TRIP_ANATOMY_WORDS, "%s", first);
+        return words;
+    }
+    double along = trip_dot(trip_anatomy_direction(space, ends[0]), v) / trip_length(v);
+    double degrees = acos(fmin(along, 1)) * DEGREES_PER_RADIAN;
+    snprintf(words, TRIP_ANATOMY_WORDS, "%s, %.3g degrees to %s%s%s", first, degrees,
+             trip_anatomy_end_name(ends[1]), ends[2] ? " and " : "",
+             trip_anatomy_end_name(ends[2]));
+    return words;
+}
