@@ -3,6 +3,7 @@
  * patient's, in millimetres: x to the left, y to the back, z to the head. */
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <mutex>
 #include <vector>
@@ -30,10 +31,22 @@ struct Header {
     unsigned allocated = 0, stored = 0, high = 0; /* bits */
     bool is_signed = false;
     double slope = 1, inter = 0;
-    std::vector<double> position, last_position; /* first and last frame */
-    std::vector<double> rows;                    /* directions of i, then j */
-    std::vector<double> pixel_spacing;           /* between rows, then between columns */
+    trip_vec3 origin = { 0, 0, 0 };
+    std::vector<trip_vec3> places;     /* of the first pixel, for every frame, or none */
+    std::vector<double> rows;          /* directions of i, then j */
+    std::vector<double> pixel_spacing; /* between rows, then between columns */
     double location = NAN, number = NAN, spacing = NAN;
+    bool biped = true; /* x, y and z are left, back and head, as they are in a man */
+
+    bool placed() const
+    {
+        return !places.empty() && rows.size() == 6;
+    }
+    trip_vec3 normal() const
+    {
+        return trip_normalize(
+            trip_cross(trip_v3(rows[0], rows[1], rows[2]), trip_v3(rows[3], rows[4], rows[5])));
+    }
 
     bool same_pixels(const Header &o) const
     {
@@ -102,24 +115,67 @@ double get_length(DcmItem &item, const DcmTagKey &tag, bool nested)
     return v > 0 ? v : NAN;
 }
 
-/* Place of the last of several frames. */
-std::vector<double> get_last_position(DcmItem &item, unsigned long frames)
+trip_vec3 vector_of(const std::vector<double> &v, size_t at)
 {
-    DcmItem *last = nullptr;
-    if (item.findAndGetSequenceItem(DCM_PerFrameFunctionalGroupsSequence, last, (long)frames - 1)
-            .bad())
-        return {};
-    return get_numbers(*last, DCM_ImagePositionPatient, 3, true);
+    return trip_v3(v[at], v[at + 1], v[at + 2]);
 }
 
-/* Several frames keep their geometry in nested items. */
+bool are_alike(const std::vector<double> &rows, const std::vector<double> &others)
+{
+    return std::equal(rows.begin(), rows.end(), others.begin(), others.end(),
+                      [](double a, double b) { return std::fabs(a - b) <= 1e-3; });
+}
+
+/* Of several frames each has an item of its own; there is nothing to go by unless all say where
+ * they are. */
+std::vector<trip_vec3> get_frame_places(DcmItem &item, const Header &h)
+{
+    DcmSequenceOfItems *frames = nullptr;
+    std::vector<trip_vec3> places;
+    if (item.findAndGetSequence(DCM_PerFrameFunctionalGroupsSequence, frames).bad() ||
+        (int64_t)frames->card() != h.frames)
+        return {};
+    for (DcmObject *o = frames->nextInContainer(nullptr); o; o = frames->nextInContainer(o)) {
+        DcmItem *frame = dynamic_cast<DcmItem *>(o);
+        if (!frame)
+            return {};
+        std::vector<double> rows = get_numbers(*frame, DCM_ImageOrientationPatient, 6, true);
+        if (!rows.empty() && !are_alike(rows, h.rows))
+            throw trip_slice_error(h.file, "has frames that are oriented differently");
+        std::vector<double> place = get_numbers(*frame, DCM_ImagePositionPatient, 3, true);
+        if (place.empty())
+            return {};
+        places.push_back(vector_of(place, 0));
+    }
+    return places;
+}
+
+/* The directions of rows and columns are given together, and at right angles. */
+void check_rows(const Header &h)
+{
+    if (h.rows.empty())
+        return;
+    trip_vec3 i = trip_normalize(vector_of(h.rows, 0)), j = trip_normalize(vector_of(h.rows, 3));
+    if (!(trip_length(trip_cross(i, j)) > 0.999))
+        throw trip_slice_error(h.file,
+                               "has rows and columns that are not at right angles in the patient");
+}
+
+/* Files that may hold several frames keep their geometry in nested items. */
 void read_geometry(DcmItem &item, Header &h)
 {
-    bool nested = h.frames > 1;
-    h.position = get_numbers(item, DCM_ImagePositionPatient, 3, nested);
-    if (nested)
-        h.last_position = get_last_position(item, (unsigned long)h.frames);
+    bool nested = h.frames > 1 || item.tagExists(DCM_SharedFunctionalGroupsSequence);
+    OFString body;
     h.rows = get_numbers(item, DCM_ImageOrientationPatient, 6, nested);
+    check_rows(h);
+    std::vector<double> place = get_numbers(item, DCM_ImagePositionPatient, 3, nested);
+    if (h.frames > 1)
+        h.places = get_frame_places(item, h);
+    else if (!place.empty())
+        h.places.push_back(vector_of(place, 0));
+    h.origin = place.empty() ? trip_v3(0, 0, 0) : vector_of(place, 0);
+    h.biped = item.findAndGetOFString(DCM_AnatomicalOrientationType, body).bad() || body.empty() ||
+              body == "BIPED";
     h.pixel_spacing = get_numbers(item, DCM_PixelSpacing, 2, nested);
     if (!h.pixel_spacing.empty() && !(h.pixel_spacing[0] > 0 && h.pixel_spacing[1] > 0))
         h.pixel_spacing.clear();
@@ -168,11 +224,6 @@ Header read_header(const std::string &file)
     return h;
 }
 
-trip_vec3 vector_of(const std::vector<double> &v, size_t at)
-{
-    return trip_v3(v[at], v[at + 1], v[at + 2]);
-}
-
 template <typename Has> bool all_have(const std::vector<Header> &headers, const Has &has)
 {
     return std::all_of(headers.begin(), headers.end(), has);
@@ -190,22 +241,24 @@ template <typename Key> void sort_by(std::vector<Header> &headers, const Key &ke
                                                         ": several series in one folder?");
 }
 
+bool all_placed(const std::vector<Header> &headers)
+{
+    return all_have(headers, [](const Header &h) { return h.placed(); });
+}
+
 /* By place along the slices' normal, else by the location or the number that they state, else as
  * the names are ordered. */
 void sort_slices(std::vector<Header> &headers)
 {
-    bool placed = all_have(
-        headers, [&](const Header &h) { return h.position.size() == 3 && h.rows.size() == 6; });
-    if (placed) {
+    if (all_placed(headers)) {
         const std::vector<double> rows = headers[0].rows;
-        trip_vec3 normal = trip_cross(vector_of(rows, 0), vector_of(rows, 3));
+        const std::string first = headers[0].file;
+        trip_vec3 normal = headers[0].normal();
         for (const Header &h : headers)
-            for (int i = 0; i < 6; i++)
-                if (std::fabs(h.rows[(size_t)i] - rows[(size_t)i]) > 1e-3)
-                    throw trip_slice_error(h.file, "is oriented unlike " + headers[0].file);
+            if (!are_alike(h.rows, rows))
+                throw trip_slice_error(h.file, "is oriented unlike " + first);
         sort_by(
-            headers, [&](const Header &h) { return trip_dot(vector_of(h.position, 0), normal); },
-            "place");
+            headers, [&](const Header &h) { return trip_dot(h.places[0], normal); }, "place");
     } else if (all_have(headers, [](const Header &h) { return std::isfinite(h.location); })) {
         sort_by(
             headers, [](const Header &h) { return h.location; }, "location");
@@ -215,37 +268,74 @@ void sort_slices(std::vector<Header> &headers)
     }
 }
 
-void warn_if_uneven(const std::vector<Header> &headers, double mean)
+/* The frames of one file in order of their place; none where places are not known. */
+std::vector<Uint32> sort_frames(Header &h)
 {
-    double least = INFINITY, most = 0;
-    for (size_t i = 1; i < headers.size(); i++) {
-        double d = trip_length(
-            trip_sub(vector_of(headers[i].position, 0), vector_of(headers[i - 1].position, 0)));
-        least = std::min(least, d);
-        most = std::max(most, d);
+    std::vector<Uint32> order(h.placed() ? h.places.size() : 0);
+    std::vector<trip_vec3> sorted;
+    std::vector<double> depths;
+    for (size_t i = 0; i < order.size(); i++) {
+        order[i] = (Uint32)i;
+        depths.push_back(trip_dot(h.places[i], h.normal()));
     }
-    if (most - least > 0.02 * mean)
-        trip_warn(headers[0].file.c_str(),
-                  "slices are %g to %g apart, perhaps some are missing; drawn %g apart", least,
-                  most, mean);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](Uint32 a, Uint32 b) { return depths[a] < depths[b]; });
+    for (size_t i = 0; i < order.size(); i++) {
+        if (i > 0 && !(depths[order[i]] - depths[order[i - 1]] > 1e-6))
+            throw trip_slice_error(h.file, "has several frames at one place: of several times?");
+        sorted.push_back(h.places[order[i]]);
+    }
+    if (!sorted.empty()) {
+        h.places = sorted;
+        h.origin = sorted[0];
+    }
+    return order;
 }
 
-/* The step from slice to slice in space. */
-trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal)
+/* Slices are the sheets of one grid, sheared where the gantry was tilted, if they all lie on one
+ * straight line; half a pixel beside it is refused. Steps of several lengths are a grid still, with
+ * slices missing perhaps, and draw a warning. */
+void check_line(const std::string &file, const std::vector<trip_vec3> &places, trip_vec3 normal,
+                trip_vec3 step, double pixel)
+{
+    double along = trip_dot(step, normal), least = INFINITY, most = 0, before = 0;
+    for (size_t i = 1; i < places.size(); i++) {
+        trip_vec3 way = trip_sub(places[i], places[0]);
+        double steps = trip_dot(way, normal) / along;
+        double aside = trip_length(trip_sub(way, trip_scale(step, steps)));
+        if (!(aside <= 0.5 * pixel)) {
+            char text[200];
+            std::snprintf(text, sizeof text,
+                          "slice %zu of its series lies %.3g beside the line through the first and "
+                          "the last: no grid holds such slices",
+                          i + 1, aside);
+            throw trip_slice_error(file, text);
+        }
+        least = std::min(least, steps - before);
+        most = std::max(most, steps - before);
+        before = steps;
+    }
+    if (most - least > 0.02)
+        trip_warn(file.c_str(),
+                  "slices are %g to %g apart, perhaps some are missing; drawn %g apart",
+                  least * trip_length(step), most * trip_length(step), trip_length(step));
+}
+
+/* The step from slice to slice in space, from where they are, else from what they state. */
+trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal, double pixel)
 {
     const Header &first = headers.front(), &last = headers.back();
-    bool frames = first.frames > 1;
-    const std::vector<double> &end = frames ? first.last_position : last.position;
-    double gaps = (double)(frames ? first.frames : (int64_t)headers.size()) - 1;
-    if (gaps > 0 && first.position.size() == 3 && end.size() == 3 && first.rows.size() == 6) {
+    std::vector<trip_vec3> places;
+    if (all_placed(headers))
+        for (const Header &h : headers)
+            places.insert(places.end(), h.places.begin(), h.places.end());
+    if (places.size() > 1) {
         trip_vec3 step =
-            trip_scale(trip_sub(vector_of(end, 0), vector_of(first.position, 0)), 1 / gaps);
-        if (!frames)
-            warn_if_uneven(headers, trip_length(step));
-        if (trip_length(step) > 0)
-            return step;
+            trip_scale(trip_sub(places.back(), places.front()), 1 / ((double)places.size() - 1));
+        check_line(first.file, places, normal, step, pixel);
+        return step;
     }
-    double length = (last.location - first.location) / gaps;
+    double length = (last.location - first.location) / ((double)headers.size() - 1);
     if (!(std::isfinite(length) && length > 0))
         length = std::isfinite(first.spacing) ? first.spacing : 1;
     return trip_scale(normal, length);
@@ -259,14 +349,13 @@ trip_affine make_map(const std::vector<Header> &headers)
     double dj = h.pixel_spacing.empty() ? 1 : h.pixel_spacing[0];
     trip_vec3 i = oriented ? trip_normalize(vector_of(h.rows, 0)) : trip_v3(1, 0, 0);
     trip_vec3 j = oriented ? trip_normalize(vector_of(h.rows, 3)) : trip_v3(0, 1, 0);
-    trip_vec3 k = slice_step(headers, trip_cross(i, j));
-    trip_vec3 origin = h.position.size() == 3 ? vector_of(h.position, 0) : trip_v3(0, 0, 0);
+    trip_vec3 k = slice_step(headers, trip_normalize(trip_cross(i, j)), std::max(di, dj));
     trip_affine map;
     for (int r = 0; r < 3; r++) {
         map.m[r][0] = trip_component(i, r) * di;
         map.m[r][1] = trip_component(j, r) * dj;
         map.m[r][2] = trip_component(k, r);
-        map.m[r][3] = trip_component(origin, r);
+        map.m[r][3] = trip_component(h.origin, r);
     }
     return map;
 }
@@ -311,12 +400,13 @@ class DicomStack : public trip_slice_stack
     void read_frame(const Header &h, Uint32 frame);
 
     std::vector<Header> headers_;
+    std::vector<Uint32> frames_; /* of one file, in order of their place; none: as they come */
     trip_scalar stored_ = TRIP_U8;
     trip_slice_buffer frame_;
     uint64_t frame_bytes_ = 0;
     std::unique_ptr<DcmFileFormat> format_; /* of the slice that was read last */
     std::string loaded_;
-    Uint32 fragment_ = 0;
+    Uint32 next_frame_ = 0, fragment_ = 0; /* where the frame after the last one read begins */
 };
 
 DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget)
@@ -336,8 +426,13 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget)
         rescaled_alike = rescaled_alike && h.slope == first.slope && h.inter == first.inter;
     }
     sort_slices(headers_);
+    if (headers_[0].frames > 1)
+        frames_ = sort_frames(headers_[0]);
     const Header &h = headers_[0];
     index_to_world = make_map(headers_);
+    oriented = all_have(headers_, [](const Header &o) { return o.rows.size() == 6; });
+    if (all_placed(headers_) && h.biped)
+        std::strcpy(space, "LPS");
     dims[0] = h.width;
     dims[1] = h.height;
     dims[2] = h.frames > 1 ? h.frames : (int64_t)headers_.size();
@@ -356,7 +451,7 @@ void DicomStack::load(const std::string &file)
     if (file == loaded_)
         return;
     loaded_.clear();
-    fragment_ = 0;
+    next_frame_ = fragment_ = 0;
     format_ = std::make_unique<DcmFileFormat>();
     require(file, format_->loadFile(file.c_str(), EXS_Unknown, EGL_noChange, lazy_bytes));
     loaded_ = file;
@@ -370,6 +465,8 @@ void DicomStack::read_frame(const Header &h, Uint32 frame)
     OFString colours;
     Uint32 bytes = 0;
     DcmDataset *set = format_->getDataset();
+    if (frame != next_frame_)
+        fragment_ = 0; /* to be looked for */
     require(h.file, set->findAndGetElement(DCM_PixelData, element));
     DcmPixelData *pixels = dynamic_cast<DcmPixelData *>(element);
     if (!pixels || pixels->getUncompressedFrameSize(set, bytes).bad() ||
@@ -378,13 +475,14 @@ void DicomStack::read_frame(const Header &h, Uint32 frame)
     require(h.file,
             pixels->getUncompressedFrame(set, frame, fragment_, frame_.data(),
                                          (Uint32)((frame_bytes_ + 1) & ~(uint64_t)1), colours));
+    next_frame_ = frame + 1;
 }
 
 void DicomStack::read(int64_t k, void *values)
 {
     const Header &h = headers_[headers_.size() > 1 ? (size_t)k : 0];
     size_t count = (size_t)(dims[0] * dims[1]);
-    read_frame(h, headers_.size() > 1 ? 0 : (Uint32)k);
+    read_frame(h, headers_.size() > 1 ? 0 : frames_.empty() ? (Uint32)k : frames_[(size_t)k]);
     align_values(h, stored_, frame_.data(), count);
     if (type == stored_)
         std::memcpy(values, frame_.data(), frame_bytes_);

@@ -78,10 +78,11 @@ typedef struct trip_image_size {
 
 typedef struct trip_image_stack {
     int64_t dims[3];
-    int32_t type; /* trip_scalar */
-    int32_t reserved;
+    int32_t type;     /* trip_scalar */
+    int32_t oriented; /* the map's directions are the file's */
     double slope, inter;
     double index_to_world[3][4];
+    char space[8];         /* anatomical, as in anatomy.h; terminated */
     uint64_t helper_bytes; /* of the allowed memory that it uses until it ends */
 } trip_image_stack;
 

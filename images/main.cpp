@@ -135,6 +135,8 @@ class Session
         s.slope = stack_->slope;
         s.inter = stack_->inter;
         std::memcpy(s.index_to_world, stack_->index_to_world.m, sizeof s.index_to_world);
+        std::memcpy(s.space, stack_->space, sizeof s.space);
+        s.oriented = stack_->oriented;
         s.helper_bytes = trip_budget_peak_bytes(budget_);
         reply_data(sizeof s);
         trip_connection_send(&s, sizeof s);

@@ -112,6 +112,10 @@ char *trip_brick_text_make(const trip_brick_text *t)
     cJSON_AddStringToObject(root, "format", t->info->format);
     if (t->info->name[0])
         cJSON_AddStringToObject(root, "grid", t->info->name);
+    if (t->info->space[0])
+        cJSON_AddStringToObject(root, "space", t->info->space);
+    if (t->info->oriented)
+        cJSON_AddTrueToObject(root, "oriented");
     cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
     cJSON_AddBoolToObject(root, "keep_all", t->params->keep_all);
     add_envelope(root, t);

@@ -28,6 +28,7 @@ enum field {
     CENTERS,
     DIRECTIONS,
     ORIGIN,
+    SPACE,
     KINDS,
     LINE_SKIP,
     BYTE_SKIP,
@@ -75,10 +76,10 @@ static const struct {
     { "centerings", CENTERS },
     { "labels", FIELDS },
     { "units", FIELDS },
-    { "space", FIELDS }, /* the world is the file's own, whatever its axes are called */
-    { "space dimension", FIELDS },
+    { "space", SPACE },
+    { "space dimension", FIELDS }, /* the vectors show it */
     { "space units", FIELDS },
-    { "measurement frame", FIELDS },
+    { "measurement frame", FIELDS }, /* of vectors and tensors; scalars have none */
 };
 
 /* The lines of a header while it is taken apart. */
@@ -342,12 +343,60 @@ static int parse_skips(const parser *p, trip_nrrd_header *h)
     return 0;
 }
 
-/* "(x,y,z)" into v. */
-static bool parse_vector(char **text, double v[3])
+/* What the header's `space` says of the axes of world space. */
+typedef struct space {
+    const char *name;       /* without what separates its words */
+    const char *convention; /* as in anatomy.h, when it is right-handed */
+    bool left_handed;
+    bool has_time; /* vectors have a fourth part */
+} space;
+
+static const space spaces[] = {
+    { "rightanteriorsuperior", "RAS", false, false },
+    { "RAS", "RAS", false, false },
+    { "leftposteriorsuperior", "LPS", false, false },
+    { "LPS", "LPS", false, false },
+    { "leftanteriorsuperior", "RAS", true, false },
+    { "LAS", "RAS", true, false },
+    { "scannerxyz", "", false, false },
+    { "3Drighthanded", "", false, false },
+    { "3Dlefthanded", "", true, false },
+};
+
+/* `text` in one of its spellings: words apart or together, in any case, with "time" or "t" after
+ * them. NULL as name where the header has none that is known. */
+static space find_space(const parser *p)
+{
+    char name[64] = "";
+    size_t length = 0;
+    const char *text = p->values[SPACE] ? p->values[SPACE] : "";
+    for (; *text && length + 1 < sizeof name; text++)
+        if (!strchr("- _", *text))
+            name[length++] = *text;
+    for (size_t i = 0; i < sizeof spaces / sizeof spaces[0] && !*text; i++) {
+        space s = spaces[i];
+        const char *rest = name + strlen(s.name);
+        if (strncasecmp(name, s.name, strlen(s.name)) != 0)
+            continue;
+        s.has_time = strcasecmp(rest, "time") == 0 || strcasecmp(rest, "t") == 0;
+        if (!*rest || s.has_time)
+            return s;
+    }
+    if (p->values[SPACE]) {
+        char where[4200];
+        snprintf(where, sizeof where, "%s: line %d", p->path, p->lines[SPACE]);
+        trip_warn(where, "unknown space \"%.40s\" is ignored", p->values[SPACE]);
+    }
+    return (space){ 0 };
+}
+
+/* "(x,y,z)", or "(x,y,z,t)" where the space has time, into v. */
+static bool parse_vector(char **text, const space *s, double v[4])
 {
     char *at = *text + strspn(*text, " \t");
-    for (int i = 0; i < 3; i++) {
-        if (*at != "(,,"[i])
+    v[3] = 0;
+    for (int i = 0; i < (s->has_time ? 4 : 3); i++) {
+        if (*at != "(,,,"[i])
             return false;
         char *end, *number = at + 1;
         v[i] = strtod(number, &end);
@@ -361,25 +410,29 @@ static bool parse_vector(char **text, double v[3])
     return true;
 }
 
-static int parse_directions(const parser *p, trip_nrrd_header *h)
+static int parse_directions(const parser *p, const space *s, trip_nrrd_header *h)
 {
     char *text = p->values[DIRECTIONS];
     for (int axis = 0; axis < p->axes; axis++) {
-        double v[3];
+        double v[4];
         text += strspn(text, " \t");
         bool none = strncasecmp(text, "none", 4) == 0;
         if (none)
             text += 4;
-        else if (!parse_vector(&text, v))
+        else if (!parse_vector(&text, s, v))
             return fail_line(p, p->lines[DIRECTIONS],
-                             "\"space directions\" must be \"(x,y,z)\" or \"none\" for each of %d "
-                             "axes",
-                             p->axes);
+                             "\"space directions\" must be \"(x,y,z%s)\" or \"none\" for each of "
+                             "%d axes",
+                             s->has_time ? ",t" : "", p->axes);
         for (int a = 0; a < 3; a++) {
             if (axis == p->kept[a] && none)
                 return fail_line(p, p->lines[DIRECTIONS],
                                  "axis %d has no direction in space: only scalar volumes can be "
                                  "read",
+                                 axis);
+            if (axis == p->kept[a] && v[3] != 0)
+                return fail_line(p, p->lines[DIRECTIONS],
+                                 "axis %d goes through time: only volumes of one time can be read",
                                  axis);
             for (int row = 0; axis == p->kept[a] && row < 3; row++)
                 h->index_to_world.m[row][a] = v[row];
@@ -438,18 +491,30 @@ static int parse_spacings(const parser *p, trip_nrrd_header *h)
     return 0;
 }
 
+/* World space is right-handed: x of a left-handed one is counted the other way. */
+static void take_space(trip_nrrd_header *h, const space *s)
+{
+    snprintf(h->space, sizeof h->space, "%s", s->name ? s->convention : "");
+    for (int column = 0; column < 4 && s->left_handed; column++)
+        h->index_to_world.m[0][column] = 0 - h->index_to_world.m[0][column];
+}
+
 static int parse_geometry(const parser *p, trip_nrrd_header *h)
 {
-    double origin[3];
+    double origin[4];
     char *text = p->values[ORIGIN];
+    const space s = find_space(p);
     h->index_to_world = trip_affine_identity();
-    int status = p->values[DIRECTIONS] ? parse_directions(p, h) : parse_spacings(p, h);
-    if (status < 0 || !text)
+    h->oriented = s.name || p->values[DIRECTIONS];
+    int status = p->values[DIRECTIONS] ? parse_directions(p, &s, h) : parse_spacings(p, h);
+    if (status < 0)
         return status;
-    if (!parse_vector(&text, origin) || *text)
-        return fail_line(p, p->lines[ORIGIN], "\"space origin\" must be \"(x,y,z)\"");
-    for (int row = 0; row < 3; row++)
+    if (text && (!parse_vector(&text, &s, origin) || *text))
+        return fail_line(p, p->lines[ORIGIN], "\"space origin\" must be \"(x,y,z%s)\"",
+                         s.has_time ? ",t" : "");
+    for (int row = 0; row < 3 && p->values[ORIGIN]; row++)
         h->index_to_world.m[row][3] = origin[row];
+    take_space(h, &s);
     return 0;
 }
 

@@ -15,6 +15,8 @@
 typedef struct trip_nrrd_header {
     int64_t dims[3]; /* of the three axes kept; axes of size 1 beyond them are dropped */
     trip_affine index_to_world;
+    char space[8]; /* anatomical, as in anatomy.h; "" where the header names no such space */
+    bool oriented; /* it says how the axes lie in space */
     trip_scalar type;
     bool big_endian; /* of no meaning for one-byte types */
     trip_byte_encoding encoding;

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "anatomy.h"
 #include "image_helper.h"
 #include "report.h"
 #include "volume_reader.h"
@@ -55,10 +56,13 @@ static const char *fault_of(const trip_image_stack *stack)
     bool finite = isfinite(stack->slope) && isfinite(stack->inter);
     for (int i = 0; i < 12; i++)
         finite = finite && isfinite(stack->index_to_world[i / 4][i % 4]);
-    if (stack->type < 0 || stack->type >= TRIP_SCALARS || stack->reserved != 0)
+    if (stack->type < 0 || stack->type >= TRIP_SCALARS)
         return "slices of an unknown type";
     if (stack->dims[0] < 1 || stack->dims[1] < 1 || stack->dims[2] < 1)
         return "slices of no size";
+    if (!memchr(stack->space, '\0', sizeof stack->space) || (stack->oriented & ~1) ||
+        (stack->space[0] && !trip_anatomy_known(stack->space)))
+        return "a space of no known kind";
     return finite ? NULL : "a map that is not finite";
 }
 
@@ -106,6 +110,8 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
     }
     memcpy(info->dims, stack.dims, sizeof info->dims);
     memcpy(info->index_to_world.m, stack.index_to_world, sizeof info->index_to_world.m);
+    memcpy(info->space, stack.space, sizeof info->space);
+    info->oriented = stack.oriented != 0;
     info->type = (trip_scalar)stack.type;
     info->slope = stack.slope;
     info->inter = stack.inter;

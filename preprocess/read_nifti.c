@@ -252,15 +252,19 @@ static trip_affine from_qform(const nifti_2_header *n)
     return a;
 }
 
-static trip_affine find_map(const char *path, const nifti_2_header *n)
+/* The sform is preferred; without sform and qform nothing is said of left, front and head. */
+static void set_map(const char *path, const nifti_2_header *n, trip_volume_info *info)
 {
-    trip_affine a = from_sform(n), inverse;
-    if (n->sform_code <= 0)
-        return from_qform(n);
-    if (trip_affine_invert(&a, &inverse))
-        return a;
-    trip_warn(path, "its sform is singular or not finite; the qform or the voxel sizes are used");
-    return from_qform(n);
+    trip_affine sform = from_sform(n), inverse;
+    bool has_sform = n->sform_code > 0;
+    if (has_sform && !trip_affine_invert(&sform, &inverse)) {
+        trip_warn(path,
+                  "its sform is singular or not finite; the qform or the voxel sizes are used");
+        has_sform = false;
+    }
+    info->index_to_world = has_sform ? sform : from_qform(n);
+    info->oriented = has_sform || n->qform_code > 0;
+    snprintf(info->space, sizeof info->space, "%s", info->oriented ? "RAS" : "");
 }
 
 static void set_scaling(const nifti_2_header *n, trip_volume_info *info)
@@ -307,7 +311,7 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
     if (status == 0 && (status = set_dims(header_path, &h.n, info)) == 0)
         status = set_type(header_path, &h.n, info);
     if (status == 0) {
-        info->index_to_world = find_map(header_path, &h.n);
+        set_map(header_path, &h.n, info);
         set_scaling(&h.n, info);
         status = open_values(header_path, &h, info, state);
     }

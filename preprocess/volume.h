@@ -5,7 +5,8 @@
  * content, then name.
  *
  * Voxel (i, j, k) has its centre at index coordinates (i, j, k), i fastest in memory, the first
- * voxel at (0, 0, 0) whatever the file calls it. index_to_world takes those to world space. */
+ * voxel at (0, 0, 0) whatever the file calls it. index_to_world takes those to world space: the
+ * file's own, but right-handed (a file whose space is left-handed has its x negated). */
 #ifndef TRIP_VOLUME_H
 #define TRIP_VOLUME_H
 
@@ -47,6 +48,8 @@ typedef struct trip_volume_info {
     bool sparse;         /* only active voxels exist; the others hold `background` */
     double background;
     const char *format; /* "nrrd", "openvdb", ... */
+    char space[8];      /* how world space lies in the patient, as in anatomy.h; "" : not said */
+    bool oriented;      /* the file says how its axes lie in world space: nothing to be guessed */
     char name[128];     /* grid name where the format has one */
     char note[512];     /* for people: what was chosen where the file leaves a choice, or "" */
 } trip_volume_info;

@@ -2,6 +2,7 @@
  * relies on. */
 #include "fuzz.h"
 
+#include "anatomy.h"
 #include "nrrd_header.h"
 
 #include <string.h>
@@ -12,6 +13,7 @@ static void check(const trip_nrrd_header *h, size_t size)
     FUZZ_PROMISE(h->dims[0] >= 1 && h->dims[1] >= 1 && h->dims[2] >= 1);
     FUZZ_PROMISE(!__builtin_mul_overflow(h->dims[0], h->dims[1], &values) &&
                  !__builtin_mul_overflow(values, h->dims[2], &values));
+    FUZZ_PROMISE(!h->space[0] || trip_anatomy_known(h->space));
     FUZZ_PROMISE((unsigned)h->type < TRIP_SCALARS);
     FUZZ_PROMISE(h->line_skip >= 0 && h->byte_skip >= -1);
     FUZZ_PROMISE(h->byte_skip >= 0 || h->encoding == TRIP_BYTES_PLAIN);

@@ -150,6 +150,8 @@ static void dicom_slices_are_ordered_and_placed_in_space(void **state)
     };
     assert_map(&info.index_to_world, expected);
     assert_true(info.slope == 2.5 && info.inter == -1000);
+    assert_string_equal(info.space, "LPS");
+    assert_true(info.oriented);
 }
 
 static void dicom_without_positions_is_ordered_by_number(void **state)
@@ -164,6 +166,72 @@ static void dicom_without_positions_is_ordered_by_number(void **state)
     }
     trip_volume_info info = assert_sample(path_of("i*.dcm"), TRIP_U8, TRIP_U8, 1, 0, 0);
     assert_true(info.index_to_world.m[2][2] == 3);
+    assert_string_equal(info.space, "");
+    assert_false(info.oriented);
+}
+
+/* Writes slices of these places, opens them, and gives the first report, if any. */
+static const char *report_of_places(const char *const places[NZ], const char *orientation,
+                                    int expected_status)
+{
+    static float values[VOXELS];
+    for (int k = 0; k < NZ; k++) {
+        char name[32];
+        snprintf(name, sizeof name, "p%d.dcm", k);
+        const dicom d = { .type = TRIP_U8,
+                          .position = places[k],
+                          .orientation = orientation,
+                          .spacing = "0.5\\0.5" };
+        write_dicom(name, &d, k, 1);
+    }
+    catch_reports();
+    int status = read_volume(path_of("p%d.dcm"), NULL, 2, values, VOXELS, NULL);
+    trip_report_redirect(NULL, NULL);
+    if (status != expected_status)
+        fail_msg("status %d: %s", status, reported);
+    return reported;
+}
+
+/* 0.25 aside is half a pixel. */
+static void dicom_slices_beside_their_line_are_refused(void **state)
+{
+    (void)state;
+    const char *const straight[NZ] = { "0\\0\\0", "0\\1\\2",  "0.2\\2\\4", "0\\3\\6",
+                                       "0\\4\\8", "0\\5\\10", "0\\6\\12" };
+    const char *const crooked[NZ] = { "0\\0\\0", "0\\1\\2",  "0\\2\\4", "0.3\\3\\6",
+                                      "0\\4\\8", "0\\5\\10", "0\\6\\12" };
+    const char *const gap[NZ] = { "0\\0\\0",  "0\\1\\2",  "0\\2\\4", "0\\3\\6",
+                                  "0\\5\\10", "0\\6\\12", "0\\7\\14" };
+    const char *axial = "1\\0\\0\\0\\1\\0";
+    assert_string_equal(report_of_places(straight, axial, 0), "");
+    assert_non_null(strstr(report_of_places(crooked, axial, TRIP_ERROR),
+                           "p0.dcm: slice 4 of its series lies 0.3 beside the line"));
+    assert_non_null(strstr(report_of_places(gap, axial, 0), "perhaps some are missing"));
+    assert_int_equal(reports, 1);
+    assert_non_null(strstr(report_of_places(straight, "1\\0\\0\\0.5\\1\\0", TRIP_ERROR),
+                           "not at right angles"));
+    assert_non_null(
+        strstr(report_of_places(straight, "0\\0\\0\\0\\0\\0", TRIP_ERROR), "not at right angles"));
+}
+
+/* Their order along the patient is a guess, and so are left and right. */
+static void dicom_without_positions_says_nothing_of_the_patient(void **state)
+{
+    (void)state;
+    for (int k = 0; k < NZ; k++) {
+        char name[32], number[8];
+        snprintf(name, sizeof name, "q%d.dcm", k);
+        snprintf(number, sizeof number, "%d", k);
+        const dicom d = {
+            .type = TRIP_U8, .number = number, .orientation = "1\\0\\0\\0\\0\\-1", .thickness = "3"
+        };
+        write_dicom(name, &d, k, 1);
+    }
+    trip_volume_info info = assert_sample(path_of("q%d.dcm"), TRIP_U8, TRIP_U8, 1, 0, 0);
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 0, 3, 0 }, { 0, -1, 0, 0 } });
+    assert_string_equal(info.space, "");
+    assert_true(info.oriented);
 }
 
 /* 12 bits of 16, signed, not at the bottom, with rubbish around them. */
@@ -330,6 +398,8 @@ int main(void)
         cmocka_unit_test(a_tiff_with_depth_in_its_tiles_is_refused),
         cmocka_unit_test(dicom_slices_are_ordered_and_placed_in_space),
         cmocka_unit_test(dicom_without_positions_is_ordered_by_number),
+        cmocka_unit_test(dicom_slices_beside_their_line_are_refused),
+        cmocka_unit_test(dicom_without_positions_says_nothing_of_the_patient),
         cmocka_unit_test(dicom_bits_are_taken_from_where_they_are),
         cmocka_unit_test(dicom_slices_rescaled_differently_become_floats),
         cmocka_unit_test(dicom_slices_that_do_not_belong_together_are_refused),

@@ -219,6 +219,7 @@ static void the_sform_is_preferred(void **state)
         memcpy(n.srow, rows, sizeof rows);
         trip_volume_info info = info_of(&n);
         assert_map(&info.index_to_world, rows);
+        assert_string_equal(info.space, "RAS");
     }
 }
 
@@ -234,6 +235,7 @@ static void the_qform_turns_and_scales(void **state)
     trip_volume_info info = info_of(&n);
     assert_map(&info.index_to_world,
                (const double[3][4]){ { 0, -3, 0, 5 }, { 2, 0, 0, 6 }, { 0, 0, 4, 7 } });
+    assert_string_equal(info.space, "RAS");
     n.pixdim[0] = -1; /* qfac: the third axis the other way */
     info = info_of(&n);
     assert_map(&info.index_to_world,
@@ -248,6 +250,8 @@ static void without_forms_the_voxel_sizes_count(void **state)
     trip_volume_info info = info_of(&n);
     assert_map(&info.index_to_world,
                (const double[3][4]){ { 0.5, 0, 0, 0 }, { 0, 3, 0, 0 }, { 0, 0, 1, 0 } });
+    assert_string_equal(info.space, "");
+    assert_false(info.oriented);
 }
 
 static void a_singular_sform_gives_way_with_a_warning(void **state)
@@ -262,6 +266,7 @@ static void a_singular_sform_gives_way_with_a_warning(void **state)
     assert_int_equal(reports, 1);
     assert_map(&info.index_to_world,
                (const double[3][4]){ { 2, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+    assert_string_equal(info.space, "");
 }
 
 static void of_several_volumes_the_first_is_read_with_a_warning(void **state)

@@ -34,12 +34,17 @@ static const char *write_with_lines(const char *name, const char *more)
     return write_file(name, &b);
 }
 
-static trip_affine map_of(const char *path)
+static trip_volume_info info_of(const char *path)
 {
     float values[VOXELS];
     trip_volume_info info;
     assert_int_equal(read_volume(path, NULL, 3, values, VOXELS, &info), 0);
-    return info.index_to_world;
+    return info;
+}
+
+static trip_affine map_of(const char *path)
+{
+    return info_of(path).index_to_world;
 }
 
 static void every_type_is_read_in_both_byte_orders(void **state)
@@ -409,6 +414,115 @@ static void any_byte_of_the_header_may_be_wrong(void **state)
         }
 }
 
+/* The spellings that the format lists. */
+static void the_space_says_how_the_world_lies_in_the_patient(void **state)
+{
+    (void)state;
+    static const char *const lines[][5] = {
+        { "RAS", "space: right-anterior-superior\n", "space: RAS\n",
+          "space: rightanteriorsuperior\n", "space: Right Anterior Superior\n" },
+        { "LPS", "space: left-posterior-superior\n", "space: lps\n",
+          "space: left posterior superior\n", "space: LEFTPOSTERIORSUPERIOR\n" },
+        { "", "space: scanner-xyz\n", "space: 3D-right-handed\n", "space: 3d right handed\n",
+          "space: 3Drighthanded\n" },
+        { "", "", "spacings: 1 1 5\n", "space dimension: 3\n", "axis mins: 1 2 3\n" },
+    };
+    for (int row = 0; row < 4; row++)
+        for (int i = 1; i < 5; i++) {
+            catch_reports();
+            trip_volume_info info = info_of(write_with_lines("space.nrrd", lines[row][i]));
+            trip_report_redirect(NULL, NULL);
+            assert_int_equal(reports, 0);
+            assert_string_equal(info.space, lines[row][0]);
+            assert_int_equal(info.oriented, row < 3);
+        }
+    trip_volume_info info =
+        info_of(write_with_lines("axes.nrrd", "space directions: (1,0,0) (0,1,0) (0,0,5)\n"));
+    assert_string_equal(info.space, "");
+    assert_true(info.oriented);
+}
+
+static void an_unknown_space_is_warned_of(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "left-of-here",
+                                         "RASX",
+                                         "",
+                                         "ra",
+                                         "times",
+                                         "right-anterior-superior-right-anterior-superior-right-"
+                                         "anterior-superior" };
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        char line[200];
+        snprintf(line, sizeof line, "space: %s\n", names[i]);
+        catch_reports();
+        trip_volume_info info = info_of(write_with_lines("space.nrrd", line));
+        trip_report_redirect(NULL, NULL);
+        assert_int_equal(reports, 1);
+        assert_non_null(strstr(reported, "space.nrrd: line 8: unknown space"));
+        assert_string_equal(info.space, "");
+        assert_false(info.oriented);
+    }
+}
+
+static void left_handed_spaces_are_turned_right_handed(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "left-anterior-superior", "LAS", "3D-left-handed" };
+    for (int i = 0; i < 3; i++) {
+        char lines[200];
+        snprintf(lines, sizeof lines,
+                 "space: %s\nspace directions: (1,2,3) (-4,1,0) (0,0.5,2)\n"
+                 "space origin: (10,20,30)\n",
+                 names[i]);
+        trip_volume_info info = info_of(write_with_lines("left.nrrd", lines));
+        assert_string_equal(info.space, i < 2 ? "RAS" : "");
+        assert_map(&info.index_to_world,
+                   (const double[3][4]){ { -1, 4, 0, -10 }, { 2, 1, 0.5, 20 }, { 3, 0, 2, 30 } });
+    }
+}
+
+static void vectors_with_time_give_their_place_in_space(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "right-anterior-superior-time", "RAST",
+                                         "left-posterior-superior-time", "lpst" };
+    for (int i = 0; i < 4; i++) {
+        char text[400];
+        snprintf(text, sizeof text,
+                 "NRRD0004\ntype: uint16\ndimension: 4\nsizes: 5 4 7 1\nendian: little\n"
+                 "encoding: raw\nspace: %s\n"
+                 "space directions: (1,0,0,0) (0,2,0,0) (0,0,3,0) (0,0,0,1)\n"
+                 "space origin: (10,20,30,40)\n\n",
+                 names[i]);
+        trip_volume_info info = info_of(write_with_header("time.nrrd", text));
+        assert_string_equal(info.space, i < 2 ? "RAS" : "LPS");
+        assert_map(&info.index_to_world,
+                   (const double[3][4]){ { 1, 0, 0, 10 }, { 0, 2, 0, 20 }, { 0, 0, 3, 30 } });
+    }
+    assert_refused(write_with_lines("time.nrrd",
+                                    "space: RAST\n"
+                                    "space directions: (1,0,0,0) (0,1,0,0) (0,0,1,1)\n"),
+                   "line 9: axis 2 goes through time");
+    assert_refused(
+        write_with_lines("time.nrrd", "space: RAST\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"),
+        "line 9: \"space directions\" must be \"(x,y,z,t)\"");
+    assert_refused(write_with_lines("time.nrrd", "space: RAS\nspace origin: (1,0,0,0)\n"),
+                   "line 9: \"space origin\" must be \"(x,y,z)\"");
+}
+
+/* It is about vectors and tensors. */
+static void the_measurement_frame_changes_nothing(void **state)
+{
+    (void)state;
+    trip_volume_info info = info_of(
+        write_with_lines("frame.nrrd", "space: RAS\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n"
+                                       "measurement frame: (0,1,0) (1,0,0) (0,0,-1)\n"));
+    assert_string_equal(info.space, "RAS");
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 2, 0, 0 }, { 0, 0, 3, 0 } });
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -423,6 +537,11 @@ int main(void)
         cmocka_unit_test(lines_and_bytes_are_skipped),
         cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
         cmocka_unit_test(spacings_and_directions_become_the_map),
+        cmocka_unit_test(the_space_says_how_the_world_lies_in_the_patient),
+        cmocka_unit_test(an_unknown_space_is_warned_of),
+        cmocka_unit_test(left_handed_spaces_are_turned_right_handed),
+        cmocka_unit_test(vectors_with_time_give_their_place_in_space),
+        cmocka_unit_test(the_measurement_frame_changes_nothing),
         cmocka_unit_test(axes_of_size_one_are_dropped),
         cmocka_unit_test(what_is_no_scalar_volume_is_refused),
         cmocka_unit_test(wrong_fields_are_refused_with_their_line),
