@@ -5,6 +5,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "anatomy.h"
 #include "report.h"
 #include "settings.h"
 
@@ -124,8 +125,9 @@ static trip_vec3 direction_at(const trip_dataset_text *t, const char *key)
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
 }
 
-/* No orientation was given, and sheets lie further apart than the voxels in them: a scan, and scans
- * are mostly stored from the top of the head down, with the face in the first rows. */
+/* Sheets that lie further apart than the voxels in them are those of a scan, and where no
+ * orientation was given, scans are mostly stored from the top of the head down, with the face in
+ * the first rows. */
 static bool is_scan_from_above(const trip_affine *m)
 {
     double least = INFINITY, most = 0;
@@ -139,18 +141,26 @@ static bool is_scan_from_above(const trip_affine *m)
     return least > 0 && most >= 1.5 * least;
 }
 
-/* Which way is up and where the front is, from the text or by the format's convention. */
+/* Which way is up and where the front is: as the text has it, else as the patient stands, else by
+ * the format's custom, else by a guess. */
 static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 *up,
                    trip_vec3 *front)
 {
     const char *format = string_at(t, "format");
+    const char *space = string_at(t, "space");
+    bool oriented = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(t->root, "oriented"));
     bool y_up = format && !strcmp(format, "openvdb");
     bool patient = format && !strcmp(format, "nifti"); /* +y is anterior, +z superior */
     *up = direction_at(t, "up");
     *front = direction_at(t, "front");
     if (trip_length(*up) > 0)
         return;
-    bool scan = !y_up && !patient && is_scan_from_above(&d->index_to_world);
+    if (trip_anatomy_known(space)) {
+        *up = trip_anatomy_direction(space, 'S');
+        *front = trip_anatomy_direction(space, 'A');
+        return;
+    }
+    bool scan = !oriented && !y_up && !patient && is_scan_from_above(&d->index_to_world);
     *up = y_up ? trip_v3(0, 1, 0) : trip_v3(0, 0, scan ? -1 : 1);
     if (!(trip_length(*front) > 0) && (patient || scan))
         *front = trip_v3(0, patient ? 1 : -1, 0);

@@ -2,7 +2,10 @@
  * missing or of another kind is taken as not given, so that data sets made by other programs draw.
  *
  *   "format"             "openvdb", "nrrd", ... : where the volume came from
- *   "up", "front"        "+x" ... "-z": the world direction that is up, and that the object faces
+ *   "space"              "LPS" or "RAS": how world space lies in the patient (anatomy.h)
+ *   "oriented"           true: the file gave the directions of its axes, so none are guessed
+ *   "up", "front"        "+x" ... "-z": the world direction that is up, whatever else is said, and
+ *                        that the object faces
  *   "transfer_function"  a function as `.tf` text, in data units: drawn when none is given
  *   "envelope"           [[lo, hi], ...]: the values that were kept, closed intervals, ascending
  *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: of all finite values,

@@ -93,6 +93,54 @@ static void each_kind_of_data_is_shown_the_right_way_up(void **state)
     assert_true(up.x == -1 && d.z > 0.5 && d.x < 0);
 }
 
+/* With the right-hand rule for what is on the right of the picture: up x (towards the eye). */
+static void patients_are_seen_from_the_front_with_their_right_on_the_left(void **state)
+{
+    (void)state;
+    static const struct {
+        char *text;
+        double anterior, left; /* along y and x */
+    } spaces[] = {
+        { "{\"space\": \"LPS\", \"format\": \"images\"}", -1, 1 },
+        { "{\"space\": \"LPS\", \"format\": \"nifti\"}", -1, 1 },
+        { "{\"space\": \"RAS\", \"format\": \"nrrd\"}", 1, -1 },
+    };
+    for (int i = 0; i < 3; i++) {
+        trip_vec3 up, d = view_from(spaces[i].text, &up);
+        trip_vec3 right = trip_cross(up, d);
+        assert_true(up.z == 1 && up.x == 0 && up.y == 0);
+        assert_true(d.y * spaces[i].anterior > fabs(d.x) && d.z > 0);
+        assert_true(right.x * spaces[i].left > 0.5);
+    }
+}
+
+static void a_space_that_is_none_counts_as_not_given(void **state)
+{
+    (void)state;
+    char *const texts[] = { "{\"space\": \"LAS\"}", "{\"space\": \"\"}", "{\"space\": 7}",
+                            "{\"space\": \"RASRASRASRASRASRAS\"}", "{\"oriented\": \"yes\"}" };
+    for (int i = 0; i < 5; i++) {
+        trip_vec3 up, d = view_from(texts[i], &up), expected = view_from("{}", &up);
+        assert_true(d.x == expected.x && d.y == expected.y && d.z == expected.z);
+    }
+}
+
+static void thick_slices_of_a_known_orientation_are_not_turned_over(void **state)
+{
+    (void)state;
+    char *const texts[] = { "{\"space\": \"LPS\"}", "{\"space\": \"RAS\"}",
+                            "{\"format\": \"nrrd\", \"oriented\": true}" };
+    for (int i = 0; i < 3; i++) {
+        trip_dataset d = with_text(texts[i]);
+        trip_dataset_text *t = parse(&d);
+        trip_camera_framing f = { 0 };
+        d.index_to_world.m[2][2] = 5;
+        trip_dataset_text_frame(t, &d, &f);
+        assert_close(f.up.z, 1, 0);
+        trip_dataset_text_destroy(t);
+    }
+}
+
 static void thick_slices_without_an_orientation_are_a_scan_from_above(void **state)
 {
     (void)state;
@@ -141,6 +189,9 @@ int main(void)
         cmocka_unit_test(keys_of_another_kind_are_taken_as_missing),
         cmocka_unit_test(the_stored_function_is_drawn),
         cmocka_unit_test(each_kind_of_data_is_shown_the_right_way_up),
+        cmocka_unit_test(patients_are_seen_from_the_front_with_their_right_on_the_left),
+        cmocka_unit_test(a_space_that_is_none_counts_as_not_given),
+        cmocka_unit_test(thick_slices_of_a_known_orientation_are_not_turned_over),
         cmocka_unit_test(thick_slices_without_an_orientation_are_a_scan_from_above),
         cmocka_unit_test(voxels_shown_but_left_out_are_counted_from_the_histogram),
     };
