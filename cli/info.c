@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "anatomy.h"
 #include "dataset.h"
 #include "options.h"
 #include "report.h"
@@ -47,10 +48,51 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     }
 }
 
-static double spacing(const trip_dataset *d, int axis)
+/* Along index axis `axis`, of world space. */
+static trip_vec3 direction(const trip_dataset *d, int axis)
 {
     const double(*m)[4] = d->index_to_world.m;
-    return sqrt(m[0][axis] * m[0][axis] + m[1][axis] * m[1][axis] + m[2][axis] * m[2][axis]);
+    return trip_v3(m[0][axis], m[1][axis], m[2][axis]);
+}
+
+/* The anatomical convention of world space; NULL where the data set gives none. */
+static const char *space_of(const cJSON *text)
+{
+    const char *space = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "space"));
+    return trip_anatomy_known(space) ? space : NULL;
+}
+
+/* The box of world space about voxels lo to hi, from edge to edge. */
+static void world_bounds(const trip_dataset *d, const double lo[3], const double hi[3],
+                         double bounds[2][3])
+{
+    for (int corner = 0; corner < 8; corner++) {
+        trip_vec3 p =
+            trip_v3(corner & 1 ? hi[0] + 0.5 : lo[0] - 0.5, corner & 2 ? hi[1] + 0.5 : lo[1] - 0.5,
+                    corner & 4 ? hi[2] + 0.5 : lo[2] - 0.5);
+        p = trip_affine_point(&d->index_to_world, p);
+        for (int a = 0; a < 3; a++) {
+            double v = trip_component(p, a);
+            bounds[0][a] = corner ? fmin(bounds[0][a], v) : v;
+            bounds[1][a] = corner ? fmax(bounds[1][a], v) : v;
+        }
+    }
+}
+
+static void grid_bounds(const trip_dataset *d, double bounds[2][3])
+{
+    const double lo[3] = { 0, 0, 0 };
+    double hi[3];
+    for (int a = 0; a < 3; a++)
+        hi[a] = (double)d->header.dims[a] - 1;
+    world_bounds(d, lo, hi, bounds);
+}
+
+static void kept_bounds(const trip_dataset *d, double bounds[2][3])
+{
+    double lo[3], hi[3];
+    trip_dataset_kept_bounds(d, lo, hi);
+    world_bounds(d, lo, hi, bounds);
 }
 
 /* Every byte count below is exact in a double: files are far smaller than 2^53 bytes. */
@@ -87,19 +129,47 @@ static void add_matrix(cJSON *root, const trip_dataset *d)
         cJSON_AddItemToArray(rows, numbers(d->index_to_world.m[row], 4));
 }
 
+static void add_bounds(cJSON *root, const char *name, double bounds[2][3])
+{
+    cJSON *corners = cJSON_AddArrayToObject(root, name);
+    cJSON_AddItemToArray(corners, numbers(bounds[0], 3));
+    cJSON_AddItemToArray(corners, numbers(bounds[1], 3));
+}
+
+/* Where the volume lies: its map, its bounds and, of a patient, the ends that its axes point to. */
+static void add_world(cJSON *root, const trip_dataset *d, const cJSON *text)
+{
+    const char *space = space_of(text);
+    double bounds[2][3];
+    add_matrix(root, d);
+    grid_bounds(d, bounds);
+    add_bounds(root, "bounds", bounds);
+    kept_bounds(d, bounds);
+    add_bounds(root, "kept_bounds", bounds);
+    if (!space)
+        return;
+    cJSON_AddStringToObject(root, "space", space);
+    cJSON *axes = cJSON_AddArrayToObject(root, "axes");
+    for (int a = 0; a < 3; a++) {
+        char ends[4];
+        trip_anatomy_ends(space, direction(d, a), ends);
+        cJSON_AddItemToArray(axes, cJSON_CreateString(ends));
+    }
+}
+
 static cJSON *to_json(const trip_dataset *d, bool verified)
 {
     const trip_file_header *h = &d->header;
     double dims[3], steps[3];
-    cJSON *root = cJSON_CreateObject();
+    cJSON *root = cJSON_CreateObject(), *source = cJSON_Parse(d->text);
     for (int a = 0; a < 3; a++) {
         dims[a] = (double)h->dims[a];
-        steps[a] = spacing(d, a);
+        steps[a] = trip_length(direction(d, a));
     }
     cJSON_AddItemToObject(root, "format_version", number(h->version));
     cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
     cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
-    add_matrix(root, d);
+    add_world(root, d, source);
     cJSON_AddItemToObject(root, "value_min", number(h->value_min));
     cJSON_AddItemToObject(root, "value_max", number(h->value_max));
     cJSON_AddItemToObject(root, "code_lo", number(h->code_lo));
@@ -116,7 +186,6 @@ static cJSON *to_json(const trip_dataset *d, bool verified)
     if (verified)
         cJSON_AddTrueToObject(root, "verified");
     add_lists(root, d);
-    cJSON *source = cJSON_Parse(d->text);
     cJSON_AddItemToObject(root, "source", source ? source : cJSON_CreateString(d->text));
     return root;
 }
@@ -145,38 +214,65 @@ static void print_range(const char *label, double lo, double hi)
     printf("%-12s %s to %s\n", label, shortest(lo, a), shortest(hi, b));
 }
 
+static void print_bounds(const char *label, double bounds[2][3])
+{
+    char lo[32], hi[32];
+    printf("%-12s", label);
+    for (int a = 0; a < 3; a++)
+        printf("%s %c %s to %s", a ? "," : "", 'x' + a, shortest(bounds[0][a], lo),
+               shortest(bounds[1][a], hi));
+    putchar('\n');
+}
+
 static void print_world(const trip_dataset *d)
 {
     char a[32], b[32], c[32], t[32];
-    printf("%-12s %s x %s x %s\n", "spacing", shortest(spacing(d, 0), a),
-           shortest(spacing(d, 1), b), shortest(spacing(d, 2), c));
+    double bounds[2][3];
+    printf("%-12s %s x %s x %s\n", "spacing", shortest(trip_length(direction(d, 0)), a),
+           shortest(trip_length(direction(d, 1)), b), shortest(trip_length(direction(d, 2)), c));
     for (int row = 0; row < 3; row++) {
         const double *m = d->index_to_world.m[row];
         printf("%-12s %12s %12s %12s %12s\n", row ? "" : "to world", shortest(m[0], a),
                shortest(m[1], b), shortest(m[2], c), shortest(m[3], t));
     }
+    grid_bounds(d, bounds);
+    print_bounds("bounds", bounds);
+    kept_bounds(d, bounds);
+    print_bounds("kept in", bounds);
+}
+
+/* Where x, y and z of the world, and i, j and k of the grid point in the patient. */
+static void print_anatomy(const trip_dataset *d, const char *space)
+{
+    char words[TRIP_ANATOMY_WORDS];
+    printf("%-12s %s: x to %s, y to %s, z to %s\n", "space", space, trip_anatomy_end_name(space[0]),
+           trip_anatomy_end_name(space[1]), trip_anatomy_end_name(space[2]));
+    for (int a = 0; a < 3; a++)
+        printf("%c %-10s %s\n", 'i' + a, "points to",
+               trip_anatomy_words(space, direction(d, a), words));
 }
 
 /* The top-level texts and numbers of the notes that brick left. */
-static void print_notes(const trip_dataset *d)
+static void print_notes(const cJSON *root)
 {
-    cJSON *root = cJSON_Parse(d->text);
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
         if (cJSON_IsString(item) && strlen(item->valuestring) < 200 &&
-            !strchr(item->valuestring, '\n'))
+            !strchr(item->valuestring, '\n') && strcmp(item->string, "space") != 0)
             printf("%-12s %s\n", item->string, item->valuestring);
-    cJSON_Delete(root);
 }
 
 static void print_text(const trip_dataset *d)
 {
     const trip_file_header *h = &d->header;
+    cJSON *notes = cJSON_Parse(d->text);
     char bytes[32], index[32];
     double kept = h->kept ? (double)h->kept : 1, voxels = h->voxels ? (double)h->voxels : 1;
     printf("%-12s %s (format version %u)\n", "data set", d->path, h->version);
     printf("%-12s %llu x %llu x %llu\n", "grid", (unsigned long long)h->dims[0],
            (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
     print_world(d);
+    if (space_of(notes))
+        print_anatomy(d, space_of(notes));
     print_range("values", h->value_min, h->value_max);
     print_range("stored as", h->code_lo, h->code_hi);
     printf("%-12s %llu\n", "voxels", (unsigned long long)h->voxels);
@@ -191,7 +287,8 @@ static void print_text(const trip_dataset *d)
            1u << h->tile_log2, 1u << h->tile_log2, h->slab_sheets,
            (unsigned long long)d->lists[0].brick_count, (unsigned long long)d->lists[1].brick_count,
            (unsigned long long)d->lists[2].brick_count);
-    print_notes(d);
+    print_notes(notes);
+    cJSON_Delete(notes);
 }
 
 static int show(const options *o, trip_budget *budget)
