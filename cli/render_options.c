@@ -172,7 +172,7 @@ static int parse_view(int key, char *arg, render_options *o)
     case KEY_UP:
         return parse_point("--up", arg, &o->up, &o->up_given);
     case KEY_FOV:
-        return trip_option_number("--fov", arg, 0.001, 179.999, &o->fov_degrees);
+        return trip_option_number("--fov", arg, 1e-6, 179.999, &o->fov_degrees);
     case KEY_ORTHO:
         return trip_option_number("--ortho", arg, 1e-100, 1e100, &o->ortho_height);
     case KEY_ORBIT:

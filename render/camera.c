@@ -67,35 +67,71 @@ static double without_rounding(double component, trip_vec3 v)
     return fabs(component) > 1e-9 * most ? component : 0;
 }
 
-static void set_rays(trip_camera *c, const basis *b, const trip_affine *world_to_index, double k)
+/* The power of two that takes a length to [sqrt(1/2), sqrt(2)): 1 for what is 1 but for rounding.
+ */
+static double power_of_two_for(double length)
 {
+    int exponent;
+    frexp(length * sqrt(2), &exponent);
+    return ldexp(1, 1 - exponent);
+}
+
+/* Differences from the first voxel are taken before anything else: far from the world's origin they
+ * are exact, products are not. Returns by what directions were scaled; in parallel views rx and ry
+ * are lengths, and keep theirs. */
+static double set_rays(trip_camera *c, const basis *b, const trip_affine *world_to_index, double k)
+{
+    const double(*m)[4] = c->index_to_world.m;
+    trip_vec3 first_voxel = trip_v3(m[0][3], m[1][3], m[2][3]);
     trip_vec3 corner =
         trip_add(trip_scale(b->right, -0.5 * c->width * k), trip_scale(b->up, 0.5 * c->height * k));
-    trip_vec3 eye = c->world_eye, r0 = b->forward;
+    trip_vec3 eye = trip_sub(c->params.eye, first_voxel), r0 = b->forward;
     if (c->ortho)
         eye = trip_add(eye, corner);
     else
         r0 = trip_add(r0, corner);
-    c->eye = trip_affine_point(world_to_index, eye);
-    c->r0 = trip_affine_vector(world_to_index, r0);
+    double scale = power_of_two_for(trip_length(trip_affine_vector(world_to_index, b->forward)));
+    double across = c->ortho ? 1 : scale;
+    c->eye = trip_affine_vector(world_to_index, eye);
+    c->r0 = trip_scale(trip_affine_vector(world_to_index, r0), scale);
     if (c->ortho)
         c->r0 = trip_v3(without_rounding(c->r0.x, c->r0), without_rounding(c->r0.y, c->r0),
                         without_rounding(c->r0.z, c->r0));
-    c->rx = trip_affine_vector(world_to_index, trip_scale(b->right, k));
-    c->ry = trip_affine_vector(world_to_index, trip_scale(b->up, -k));
+    c->rx = trip_scale(trip_affine_vector(world_to_index, trip_scale(b->right, k)), across);
+    c->ry = trip_scale(trip_affine_vector(world_to_index, trip_scale(b->up, -k)), across);
+    return scale;
 }
 
-/* The inverse of set_rays, taken from the same world-space basis rather than by inverting it. */
-static void set_projection(trip_camera *c, const basis *b, double k)
+/* The inverse of set_rays, taken from the same world-space basis rather than by inverting it. A
+ * depth is 1 / `scale` of a distance in the world, and so is to_x . c in perspective. */
+static void set_projection(trip_camera *c, const basis *b, double k, double scale)
 {
     trip_vec3 x = trip_scale(b->right, 1 / k), y = trip_scale(b->up, -1 / k);
     if (!c->ortho) {
         x = trip_add(x, trip_scale(b->forward, 0.5 * c->width));
         y = trip_add(y, trip_scale(b->forward, 0.5 * c->height));
     }
-    c->forward = trip_affine_transpose_vector(&c->index_to_world, b->forward);
-    c->to_x = trip_affine_transpose_vector(&c->index_to_world, x);
-    c->to_y = trip_affine_transpose_vector(&c->index_to_world, y);
+    double across = c->ortho ? 1 : 1 / scale;
+    c->forward =
+        trip_scale(trip_affine_transpose_vector(&c->index_to_world, b->forward), 1 / scale);
+    c->to_x = trip_scale(trip_affine_transpose_vector(&c->index_to_world, x), across);
+    c->to_y = trip_scale(trip_affine_transpose_vector(&c->index_to_world, y), across);
+}
+
+/* What the renderers' numbers have room for; written so that what is not a number fails. */
+static int check_range(const trip_camera *c)
+{
+    double far = trip_length(c->eye), x = trip_length(c->rx), y = trip_length(c->ry);
+    const double most = TRIP_CAMERA_PIXEL_VOXELS;
+    if (!(x >= 1 / most && y >= 1 / most && x <= most && y <= most))
+        return trip_fail(TRIP_USAGE, "camera", c->ortho ? "ortho height" : "fov",
+                         "a pixel would be %.3g x %.3g voxels; %.3g to %.3g can be computed with",
+                         x, y, 1 / most, most);
+    if (!(far <= TRIP_CAMERA_FARTHEST_VOXELS))
+        return trip_fail(TRIP_USAGE, "camera", "eye",
+                         "lies %.3g voxels from the first voxel; at most %.3g can be computed with",
+                         far, TRIP_CAMERA_FARTHEST_VOXELS);
+    return 0;
 }
 
 int trip_camera_make(trip_camera *c, const trip_camera_params *params,
@@ -119,12 +155,10 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
         .ortho = params->ortho_height > 0,
         .index_to_world = *index_to_world,
         .voxel_world = cbrt(fabs(trip_affine_determinant(index_to_world))),
-        .world_eye = params->eye,
         .world_forward = b.forward,
     };
-    set_rays(c, &b, &world_to_index, k);
-    set_projection(c, &b, k);
-    return 0;
+    set_projection(c, &b, k, set_rays(c, &b, &world_to_index, k));
+    return check_range(c);
 }
 
 static trip_vec3 box_corner(const double lo[3], const double hi[3], int corner)

@@ -1,11 +1,14 @@
 /* The view, taken to the data's index space, where kernels are round and sheets are planes whatever
- * the spacing, rotation or shear. Plain values; nothing here changes during a frame.
+ * the spacing, rotation or shear. Lengths are in voxels there, so that no number of a projection
+ * grows or shrinks with the unit of the world: scaled by a power of two together with the camera, a
+ * volume gives the same picture bit for bit. Plain values; nothing here changes during a frame.
  *
  * Pixel coordinates: x to the right, y down, in pixels, (0, 0) the image's top left corner, so
  * pixel centres lie at + 0.5. The ray of pixel position p = (x, y) in index space is perspective:
  * origin eye,                    direction r(p) = r0 + x rx + y ry parallel:     origin eye + x rx
- * + y ry,      direction r0 Directions are scaled so that the depth z of a point (distance along
- * the viewing direction, world units) satisfies  point = origin + z * direction. */
+ * + y ry,      direction r0 The depth z of a point satisfies  point = origin + z * direction;
+ * directions are scaled by a power of two so that the one at the image's centre has a length in
+ * [sqrt(1/2), sqrt(2)), and depths are about the distance in voxels. */
 #ifndef TRIP_CAMERA_H
 #define TRIP_CAMERA_H
 
@@ -30,12 +33,19 @@ typedef struct trip_camera {
     trip_vec3 to_x, to_y;      /* index-space covectors: perspective x = to_x . c / z with
                                   c = point - eye; parallel x = to_x . c; y alike */
     trip_affine index_to_world;
-    double voxel_world; /* cube root of |det index_to_world|: the length of one voxel */
-    trip_vec3 world_eye, world_forward; /* for lighting; world_forward of unit length */
+    double voxel_world;      /* cube root of |det index_to_world|: the length of one voxel */
+    trip_vec3 world_forward; /* for lighting; of unit length */
 } trip_camera;
 
-/* Fails (usage) for views that are none: eye equals look, up along the view, angles or sizes out of
- * range, not finite. */
+/* Farther from the first voxel (in voxels) an eye cannot be: there the numbers of a projection, in
+ * double precision, are off by a hundredth of a voxel. */
+#define TRIP_CAMERA_FARTHEST_VOXELS 0x1p46
+/* A pixel may be as many voxels wide or high (at depth 1 in perspective), or one part of as many.
+ */
+#define TRIP_CAMERA_PIXEL_VOXELS 1e15
+
+/* Fails (usage) for views that are none: eye equals look, up along the view, angles, sizes or
+ * distances out of range, not finite. */
 int trip_camera_make(trip_camera *c, const trip_camera_params *params,
                      const trip_affine *index_to_world);
 

@@ -71,9 +71,9 @@ typedef struct trip_cpu_view {
     bool stretch_varies;
     int axis, u_axis, v_axis;
     float gradient_most; /* the largest magnitude of a normal, over gradient_full of shade.h */
-    double stretch;      /* where it is constant, else 1 */
-    /* |r|^2 and |J r|^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2 times
-     * these. */
+    double stretch;      /* world units per index length; the cube root of |J| where it varies */
+    /* |r|^2 and |J r|^2 / stretch^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2
+     * times these. */
     float ray2[6], world2[6];
     float cutoff; /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
     float thin;   /* the largest optical depth, stretch aside, of thin splats */
@@ -81,8 +81,8 @@ typedef struct trip_cpu_view {
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double forward_length;                     /* most that z changes by over an index length */
     double eye[3];                             /* [u, v, sheet] */
-    double world[3][3];                        /* index_to_world's columns for u, v, sheet */
-    trip_splat parallel;                       /* the footprint of all, in parallel views */
+    double world[3][3];  /* index_to_world's columns for u, v, sheet, over voxel_world */
+    trip_splat parallel; /* the footprint of all, in parallel views */
 } trip_cpu_view;
 
 /* Voxels waiting to be projected: one entry a lane, from any runs. */
@@ -97,13 +97,14 @@ typedef struct trip_cpu_lanes {
     /* The centre is (x + whole_x, y + whole_y). */
     float x[TRIP_CPU_STAGED], y[TRIP_CPU_STAGED];
     float whole_x[TRIP_CPU_STAGED], whole_y[TRIP_CPU_STAGED];
-    float z[TRIP_CPU_STAGED], inverse_z[TRIP_CPU_STAGED];
+    float z[TRIP_CPU_STAGED];
     float l11[TRIP_CPU_STAGED], l21[TRIP_CPU_STAGED], l22[TRIP_CPU_STAGED];
     float l1[TRIP_CPU_STAGED], l2[TRIP_CPU_STAGED];
     float depth[TRIP_CPU_STAGED]; /* the largest optical depth, edge and all, stretch aside */
     float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED];           /* two uint16 each */
     float tiles[TRIP_CPU_STAGED];                                  /* uint32 */
     uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
+    bool broken; /* set for good when the numbers of some splat are not finite */
 } trip_cpu_lanes;
 
 /* Splats that are sorted by blocks of a tile together, and bands of 64 blocks at most. */

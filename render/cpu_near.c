@@ -80,7 +80,7 @@ static void set_opacity(const trip_cpu_view *view, double depth, trip_cpu_splat 
 }
 
 bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
-                           trip_cpu_splat *out)
+                           trip_cpu_splat *out, bool *broken)
 {
     const trip_camera *camera = &view->splat.camera;
     double position[3];
@@ -89,8 +89,11 @@ bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, d
     position[view->axis] = sheet;
     trip_splat s;
     memset(out, 0, sizeof *out);
-    if (!trip_splat_project(&view->splat, trip_v3(position[0], position[1], position[2]), &s) ||
-        !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
+    bool drawn =
+        trip_splat_project(&view->splat, trip_v3(position[0], position[1], position[2]), &s);
+    if (trip_splat_is_broken(&s))
+        *broken = true;
+    if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
     trip_cpu_set_conic(&s, out);
@@ -146,9 +149,11 @@ static void set_forms(trip_cpu_view *view)
     const trip_affine *world = &c->index_to_world;
     trip_vec3 zero = trip_v3(0, 0, 0), r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
     trip_vec3 rx = c->ortho ? zero : c->rx, ry = c->ortho ? zero : c->ry;
+    double unit = 1 / view->stretch;
     set_form(view->ray2, r, rx, ry);
-    set_form(view->world2, trip_affine_vector(world, r), trip_affine_vector(world, rx),
-             trip_affine_vector(world, ry));
+    set_form(view->world2, trip_scale(trip_affine_vector(world, r), unit),
+             trip_scale(trip_affine_vector(world, rx), unit),
+             trip_scale(trip_affine_vector(world, ry), unit));
 }
 
 /* Tables of G and stretch where they vary, and always in the rarer ways of blending. */
@@ -157,10 +162,9 @@ static void set_rays(trip_cpu_view *view)
     const trip_camera *camera = &view->splat.camera;
     bool alike = is_similarity(&camera->index_to_world);
     bool usual = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
-    view->stretch = 1;
-    if (camera->ortho || alike)
-        view->stretch = trip_splat_stretch(&view->splat, 0, 0);
     view->stretch_varies = !(camera->ortho || alike);
+    view->stretch =
+        view->stretch_varies ? camera->voxel_world : trip_splat_stretch(&view->splat, 0, 0);
     view->rays = TRIP_CPU_STRETCHED;
     if (usual && camera->ortho)
         view->rays = TRIP_CPU_PARALLEL;
@@ -170,10 +174,13 @@ static void set_rays(trip_cpu_view *view)
 
 static void set_limits(trip_cpu_view *view)
 {
-    double most = view->stretch_varies ? most_stretch(&view->splat.camera.index_to_world) : 1;
+    const trip_camera *camera = &view->splat.camera;
+    double most = 1;
+    if (view->stretch_varies)
+        most = most_stretch(&camera->index_to_world) / view->stretch;
     view->thin = (float)((double)TRIP_CPU_THIN / most);
     view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
-    view->tiles_across = (view->splat.camera.width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
+    view->tiles_across = (camera->width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
 }
 
 /* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */
@@ -203,7 +210,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
     for (int i = 0; i < 3; i++) {
         view->eye[i] = eye[axes[i]];
         for (int k = 0; k < 3; k++)
-            view->world[k][i] = camera->index_to_world.m[k][axes[i]];
+            view->world[k][i] = camera->index_to_world.m[k][axes[i]] / camera->voxel_world;
     }
     set_along(view->along_x, view, camera->to_x);
     set_along(view->along_y, view, camera->to_y);

@@ -5,9 +5,10 @@
 
 #include "cpu_kernels.h"
 
-/* A splat by trip_splat_project(); colours are left unset. False when nothing of it is drawn. */
+/* A splat by trip_splat_project(); colours are left unset. False when nothing of it is drawn; sets
+ * `broken` when its numbers are not finite, so that nobody can tell. */
 bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
-                           trip_cpu_splat *out);
+                           trip_cpu_splat *out, bool *broken);
 
 /* l11, l21 and l22 of a projected splat. */
 void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);

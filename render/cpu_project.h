@@ -1,8 +1,8 @@
 /* Kernels that turn the voxels of runs into projected splats, V at a time: included by
  * cpu_table.h after cpu_simd.h. Positions are computed in double precision from the voxel's
  * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
- * footprint in single. The few splats near the plane of the eye go through trip_cpu_project_near().
- */
+ * footprint in single. The few splats for whose numbers single does not do, near the plane of the
+ * eye above all, go through trip_cpu_project_near(), which tells when they cannot be drawn. */
 #ifndef TRIP_CPU_PROJECT_H
 #define TRIP_CPU_PROJECT_H
 
@@ -97,7 +97,6 @@ INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint
         vd lo = refine(zs.lo, vd_low(inverse)), hi = refine(zs.hi, vd_high(inverse));
         x = (vd_pair){ x.lo * lo, x.hi * hi };
         y = (vd_pair){ y.lo * lo, y.hi * hi };
-        v_store(lanes->inverse_z + at, inverse);
     }
     split(x, &whole, &part);
     v_store(lanes->whole_x + at, whole);
@@ -113,64 +112,81 @@ typedef struct footprint {
     vf l11, l21, l22;                    /* as in trip_cpu_splat */
     vf spread;                           /* |S| / |S'| */
     vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
-    vm near;                             /* too near the plane of the eye for these numbers */
+    vm usual;                            /* the numbers are good */
 } footprint;
 
-/* Constants of a perspective view as floats; rays relative to the image's middle. */
+/* Constants of a perspective view as floats; rays relative to the image's middle, pixel steps X =
+ * rx / step and Y = ry / step of a length about 1, so that no square of theirs leaves a float's
+ * range however narrow the view. */
 typedef struct perspective {
-    vf middle_x, middle_y;
-    vf rr, rrx, rry, rxrx, rxry, ryry; /* of r at the middle, rx and ry */
-    vf scale;                          /* sigma / (r . rx x ry) */
-    vf det;                            /* (r . rx x ry)^2 */
+    vf middle_x, middle_y, step;
+    vf rr, rX, rY, XX, XY, YY; /* of r at the middle, X and Y */
+    vf det;                    /* (r . X x Y)^2 */
+    vf inverse_sigma;          /* of a splat at depth 1, in pixels: step (r . X x Y) / sigma */
+    vf reach, inverse_step;    /* cutoff^2 step; 1 / step */
+    vf near;                   /* 2 cutoff^2 step^2 */
 } perspective;
+
+/* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
+ */
+#define FARTHEST 1e12f
 
 INLINE perspective perspective_of(const trip_splat_frame *f)
 {
     const trip_camera *c = &f->camera;
     trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
-    double volume = trip_dot(r, trip_cross(c->rx, c->ry));
+    double step = sqrt(fmax(f->rxrx, f->ryry));
+    trip_vec3 x = trip_scale(c->rx, 1 / step), y = trip_scale(c->ry, 1 / step);
+    double volume = trip_dot(r, trip_cross(x, y));
     return (perspective){
         .middle_x = v_set((float)(0.5 * c->width)),
         .middle_y = v_set((float)(0.5 * c->height)),
+        .step = v_set((float)step),
         .rr = v_set((float)trip_dot(r, r)),
-        .rrx = v_set((float)trip_dot(r, c->rx)),
-        .rry = v_set((float)trip_dot(r, c->ry)),
-        .rxrx = v_set((float)f->rxrx),
-        .rxry = v_set((float)f->rxry),
-        .ryry = v_set((float)f->ryry),
-        .scale = v_set((float)(f->sigma / volume)),
+        .rX = v_set((float)trip_dot(r, x)),
+        .rY = v_set((float)trip_dot(r, y)),
+        .XX = v_set((float)trip_dot(x, x)),
+        .XY = v_set((float)trip_dot(x, y)),
+        .YY = v_set((float)trip_dot(y, y)),
         .det = v_set((float)(volume * volume)),
+        .inverse_sigma = v_set((float)(step * volume / f->sigma)),
+        .reach = v_set((float)(f->cutoff2 * step)),
+        .inverse_step = v_set((float)(1 / step)),
+        .near = v_set((float)(2 * f->cutoff2 * step * step)),
     };
 }
 
-/* Bounds of the support, the ellipse of E and l in splat.h, to be widened by the caller. */
-INLINE void bound(footprint *f, vf cxx, vf cxy, vf cyy, vf lx, vf ly, vf k2)
+/* Bounds of the support, the ellipse of E and l in splat.h over u of footprint_of(), to be widened
+ * by the caller; k2 is cutoff^2 / u. */
+INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
 {
-    vf inverse = v_set(1) / v_fnma(cxy, cxy, cxx * cyy);
-    f->shift_x = v_fnma(cxy, ly, cyy * lx) * inverse;
-    f->shift_y = v_fnma(cxy, lx, cxx * ly) * inverse;
+    vf inverse = v_set(1) / v_fnma(exy, exy, exx * eyy);
+    f->shift_x = v_fnma(exy, ly, eyy * lx) * inverse;
+    f->shift_y = v_fnma(exy, lx, exx * ly) * inverse;
     vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
-    f->half_x = v_sqrt(size * cyy);
-    f->half_y = v_sqrt(size * cxx);
+    f->half_x = v_sqrt(size * eyy);
+    f->half_y = v_sqrt(size * exx);
 }
 
-/* With D = r_c . rx x ry, constant over the image, S = (sigma / (D z))^2 adj [rx x r_c, ry x r_c]
- * and |S| = (sigma / (D z))^4 D^2 |r_c|^2. */
+/* With D = r_c . X x Y, constant over the image, and u = (step D z / sigma)^2,
+ * u S = adj [X x r_c, Y x r_c] and |u S| = D^2 |r_c|^2: u alone carries the size of a splat in
+ * pixels, and all else is about 1. */
 INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
                               const trip_cpu_lanes *lanes, uint32_t at)
 {
     footprint out;
-    const vf low_pass = v_set((float)f->low_pass2), k2 = v_set((float)f->cutoff2);
-    vf x = (v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at);
-    vf y = (v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at);
-    vf rx = v_fma(x, p->rxrx, v_fma(y, p->rxry, p->rrx)); /* r_c . rx */
-    vf ry = v_fma(x, p->rxry, v_fma(y, p->ryry, p->rry));
-    vf rr = v_fma(x, p->rrx + rx, v_fma(y, p->rry + ry, p->rr)); /* |r_c|^2 */
-    vf s = p->scale * v_load(lanes->inverse_z + at);
-    s = s * s;
-    vf sxx = s * v_fnma(ry, ry, rr * p->ryry), syy = s * v_fnma(rx, rx, rr * p->rxrx);
-    vf sxy = s * v_fnma(rr, p->rxry, rx * ry);
-    vf det_s = s * s * p->det * rr;
+    vf x = ((v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at)) * p->step;
+    vf y = ((v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at)) * p->step;
+    vf rx = v_fma(x, p->XX, v_fma(y, p->XY, p->rX)); /* r_c . X */
+    vf ry = v_fma(x, p->XY, v_fma(y, p->YY, p->rY));
+    vf rr = v_fma(x, p->rX + rx, v_fma(y, p->rY + ry, p->rr)); /* |r_c|^2 */
+    vf u = p->inverse_sigma * v_load(lanes->z + at);
+    u = u * u;
+    /* From here on S, S' and the low-pass times u. */
+    vf low_pass = v_set((float)f->low_pass2) * u;
+    vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
+    vf sxy = v_fnma(rr, p->XY, rx * ry);
+    vf det_s = p->det * rr;
     vf det = v_fma(low_pass, sxx + syy + low_pass, det_s);
     sxx = sxx + low_pass;
     syy = syy + low_pass;
@@ -178,18 +194,19 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
     vf inverse = v_set(1) / (det * syy);
     vf inverse_det = syy * inverse, inverse_syy = det * inverse;
-    vf unit = rr * v_set((float)(1 / f->cutoff2));
-    out.l11 = v_sqrt(unit * syy * inverse_det);
+    vf rr_u = rr * u, unit = rr_u * v_set((float)(1 / f->cutoff2));
+    out.l11 = v_sqrt(unit * (syy * inverse_det));
     out.l21 = -(sxy * inverse_syy) * out.l11;
     out.l22 = v_sqrt(unit * inverse_syy);
     out.spread = det_s * inverse_det;
 
-    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. */
-    vf trace = v_fma(p->rxrx, sxx, v_fma(p->ryry, syy, (p->rxry + p->rxry) * sxy));
-    out.near = v_gt(trace * k2, rr * v_set(0.5f));
-    vf t = k2 / rr;
-    bound(&out, v_fnma(t, p->rxrx, syy * inverse_det), v_fnma(t, p->rxry, -sxy * inverse_det),
-          v_fnma(t, p->ryry, sxx * inverse_det), t * rx, t * ry, k2);
+    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. What is
+     * not a number is not usual. */
+    vf trace = v_fma(p->XX, sxx, v_fma(p->YY, syy, (p->XY + p->XY) * sxy));
+    out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
+    vf t = p->reach / rr_u, t_step = t * p->step;
+    bound(&out, v_fnma(t_step, p->XX, syy * inverse_det), v_fnma(t_step, p->XY, -sxy * inverse_det),
+          v_fnma(t_step, p->YY, sxx * inverse_det), t * rx, t * ry, t * rr * p->inverse_step);
     return out;
 }
 
@@ -207,7 +224,7 @@ INLINE footprint footprint_parallel(const trip_cpu_view *view)
         .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
         .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
         .half_y = v_set((float)(0.5 * (s->y1 - s->y0))),
-        .near = v_gt(v_set(0), v_set(1)),
+        .usual = vm_first(V),
     };
 }
 
@@ -400,7 +417,7 @@ INLINE uint32_t rank(unsigned bits, uint32_t row[V])
 
 /* The lanes near the plane of the eye, one by one; returns those that are drawn. */
 static unsigned project_near(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                             unsigned lanes, trip_cpu_splat near[V])
+                             unsigned lanes, trip_cpu_splat near[V], bool *broken)
 {
     unsigned drawn = 0;
     for (; lanes; lanes &= lanes - 1) {
@@ -408,7 +425,7 @@ static unsigned project_near(const trip_cpu_view *view, const trip_cpu_staged *s
         uint32_t k = at + i;
         double extinction = (double)view->of->table[staged->code[k]].extinction;
         if (trip_cpu_project_near(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
-                                  &near[i]))
+                                  &near[i], broken))
             drawn |= 1u << i;
     }
     return drawn;
@@ -485,13 +502,13 @@ INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32
 }
 
 static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                             const trip_cpu_lanes *lanes, trip_cpu_splat *out)
+                             trip_cpu_lanes *lanes, trip_cpu_splat *out)
 {
     uint32_t row[V];
     unsigned kept = lanes->kept[at / V], near = lanes->near[at / V];
     trip_cpu_splat replaced[V];
     if (near)
-        near = project_near(view, staged, at, near, replaced);
+        near = project_near(view, staged, at, near, replaced, &lanes->broken);
     kept |= near;
     if (kept == 0)
         return 0;
@@ -520,7 +537,8 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
         if (!view->splat.camera.ortho)
             f = footprint_of(&persp, &view->splat, lanes, i);
         unsigned valid = vm_bits(vm_first(count - i));
-        unsigned near = vm_bits(vm_and(f.near, v_gt(v_load(lanes->z + i), v_set(0)))) & valid;
+        unsigned behind = vm_bits(v_ge(v_set(0), v_load(lanes->z + i)));
+        unsigned near = valid & ~behind & ~vm_bits(f.usual);
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
         unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~near;
         if (open && kept)

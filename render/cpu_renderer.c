@@ -1,7 +1,8 @@
 /* The CPU renderer: its threads project the voxels of a batch into splats, sort them by screen tile
  * and blend each tile's splats in list order, while the next batch is projected. What a pixel gets
  * depends on the order of the splats alone, never on where a batch, chunk or flush ends, so the
- * picture is the same bit for bit for any number of threads, memory, tile and batch size. */
+ * picture is the same bit for bit for any number of threads, memory, tile and batch size. Once the
+ * program is interrupted no task does anything, and what waits for them returns at once. */
 #include "cpu_renderer.h"
 
 #include <stdlib.h>
@@ -167,6 +168,8 @@ static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const t
 static void project_chunk(void *context, unsigned task, unsigned thread)
 {
     cpu *r = context;
+    if (trip_interrupted())
+        return;
     worker *w = &r->workers[thread];
     trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
     uint32_t staged = 0, shown = show_chunk(r, w, chunk), voxels = 0;
@@ -205,6 +208,8 @@ static uint64_t bits_of_quarters(unsigned quarters)
 static void blend_portion(void *context, unsigned task, unsigned thread)
 {
     cpu *r = context;
+    if (trip_interrupted())
+        return;
     const portion *p = &r->portions[task];
     trip_cpu_scratch *s = &r->workers[thread].scratch;
     int x = tile_x(r, p->tile), y = tile_y(r, p->tile);
@@ -333,6 +338,15 @@ static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor
     return true;
 }
 
+/* Fails when some splat's numbers were not finite. */
+static int check_splats(const cpu *r)
+{
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        if (r->workers[i].scratch.lanes.broken)
+            return trip_splat_fail();
+    return 0;
+}
+
 /* Goes back to the first of the chunks that the buffer had no room for. */
 static void keep_chunks(cpu *r, cursor *at)
 {
@@ -357,7 +371,7 @@ static void learn(cpu *r, uint64_t shown, uint64_t voxels)
 }
 
 /* As much of the batch as the buffer takes. */
-static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
+static int project_batch(cpu *r, const trip_batch *batch, cursor *at)
 {
     trip_cpu_flush *f = r->filling;
     uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed), reserved = 0;
@@ -368,7 +382,7 @@ static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
     while (reserved < wanted && reserve_chunk(r, batch, chunk_voxels(r, wanted - reserved), at))
         reserved += f->chunks[f->chunk_count - 1].voxels;
     if (reserved == 0)
-        return;
+        return 0;
     r->project_job = (trip_cpu_job){ .run = project_chunk,
                                      .context = r,
                                      .tasks = f->chunk_count - r->first_chunk };
@@ -376,6 +390,7 @@ static void project_batch(cpu *r, const trip_batch *batch, cursor *at)
     trip_cpu_pool_wait(r->pool, &r->project_job);
     learn(r, atomic_load_explicit(&f->splats_used, memory_order_relaxed) - used, reserved);
     keep_chunks(r, at);
+    return check_splats(r);
 }
 
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
@@ -383,17 +398,20 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     cpu *r = (cpu *)base;
     bool shading = r->frame->settings->shading && batch->normals;
     cursor at = { 0, 0 };
+    int status = 0;
     if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
         settle(r);
         trip_cpu_view_make(&r->view, r->frame, r->view.axis, front_to_back);
         r->view.shading = shading;
     }
-    while (at.run < batch->run_count) {
-        project_batch(r, batch, &at);
+    while (at.run < batch->run_count && !status) {
+        status = project_batch(r, batch, &at);
         if (at.run < batch->run_count)
             flush(r);
+        if (!status)
+            status = trip_frame_poll();
     }
-    return 0;
+    return status;
 }
 
 /* ---- lists and frames ---- */
@@ -435,7 +453,7 @@ static void merge_row(void *context, unsigned task, unsigned thread)
     cpu *r = context;
     (void)thread;
     for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
-        if (is_to_merge(r, t))
+        if (!trip_interrupted() && is_to_merge(r, t))
             merge_tile(r, t);
 }
 
@@ -444,7 +462,8 @@ static void finish_row(void *context, unsigned task, unsigned thread)
     cpu *r = context;
     (void)thread;
     for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
-        finish_tile(r, t);
+        if (!trip_interrupted())
+            finish_tile(r, t);
 }
 
 static void for_each_row(cpu *r, void (*run)(void *, unsigned, unsigned))
@@ -454,10 +473,10 @@ static void for_each_row(cpu *r, void (*run)(void *, unsigned, unsigned))
     trip_cpu_pool_wait(r->pool, &r->tile_job);
 }
 
-static void end_list(cpu *r)
+static int end_list(cpu *r)
 {
     if (!r->in_list)
-        return;
+        return 0;
     bool merge = false;
     settle(r);
     for (uint32_t t = 0; t < tile_count(r) && !merge; t++)
@@ -465,12 +484,15 @@ static void end_list(cpu *r)
     if (merge)
         for_each_row(r, merge_row);
     r->in_list = false;
+    return trip_frame_poll();
 }
 
 static int begin_list(trip_renderer *base, int axis)
 {
     cpu *r = (cpu *)base;
-    end_list(r);
+    int status = end_list(r);
+    if (status)
+        return status;
     trip_cpu_view_make(&r->view, r->frame, axis, true);
     for (uint32_t t = 0; t < tile_count(r); t++)
         atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> axis & 1 ? UINT64_MAX : 0,
@@ -546,6 +568,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->in_list = false;
     r->frame = frame;
     memset(r->stats, 0, sizeof r->stats);
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        r->workers[i].scratch.lanes.broken = false;
     int status = fit_tiles(r, frame->camera->width, frame->camera->height);
     if (status)
         return status;
@@ -559,10 +583,12 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
 static int end_frame(trip_renderer *base, float *rgba)
 {
     cpu *r = (cpu *)base;
-    end_list(r);
+    int status = end_list(r);
+    if (status)
+        return status;
     r->rgba = rgba;
     for_each_row(r, finish_row);
-    return 0;
+    return trip_frame_poll();
 }
 
 static void stats(const trip_renderer *base, trip_list_stats lists[3])

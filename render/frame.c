@@ -3,6 +3,7 @@
 #include <time.h>
 
 #include "report.h"
+#include "splat.h"
 
 static double now_ms(void)
 {
@@ -122,8 +123,8 @@ static int draw_lists(drawing *d)
         d->held[(d->held_first + d->held_count++) % HELD_MAX] = batch;
         if (!status)
             status = release_drawn(d, may_hold(d));
-        if (!status && trip_interrupted())
-            status = trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
+        if (!status)
+            status = trip_frame_poll();
     }
     return status ? status : begin_lists(d, 2);
 }
@@ -139,13 +140,25 @@ static void take_counts(const trip_renderer *renderer, trip_frame_stats *stats)
     }
 }
 
+/* Nothing is seen by a camera whose numbers are none, and no renderer could tell. */
+static int check_camera(const trip_camera *c)
+{
+    const trip_vec3 all[] = { c->eye, c->r0, c->rx, c->ry, c->forward, c->to_x, c->to_y };
+    double sum = c->voxel_world;
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        sum += 0 * (all[i].x + all[i].y + all[i].z);
+    return isfinite(sum) ? 0 : trip_splat_fail();
+}
+
 int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_frame *frame,
                     float *rgba, trip_frame_stats *stats)
 {
     double start = now_ms();
     *stats = (trip_frame_stats){ .counted = frame->count };
     drawing d = { .renderer = renderer, .reader = reader, .frame = frame, .stats = stats };
-    int status = renderer->ops->begin_frame(renderer, frame);
+    int status = check_camera(frame->camera);
+    if (!status)
+        status = renderer->ops->begin_frame(renderer, frame);
     if (!status)
         status = draw_lists(&d);
     stats->reader = trip_reader_get_stats(reader);

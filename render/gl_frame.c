@@ -28,9 +28,22 @@ static void square(trip_gl_double4 *a, trip_gl_double4 *b, trip_vec3 r0, trip_ve
     *b = (trip_gl_double4){ { scale * 2 * trip_dot(rx, ry), scale * trip_dot(ry, ry), 0, 0 } };
 }
 
+/* Pixel steps of a length about 1, so that no square of theirs leaves a float's range however
+ * narrow the view. */
+static void set_steps(trip_gl_frame_double *f, int axis, trip_vec3 forward, trip_vec3 r0,
+                      trip_vec3 rx, trip_vec3 ry, double sigma)
+{
+    double step = fmax(trip_length(rx), trip_length(ry));
+    trip_vec3 x = trip_scale(rx, 1 / step), y = trip_scale(ry, 1 / step);
+    double volume = trip_dot(r0, trip_cross(x, y));
+    f->forward = in_list_axes(forward, axis, step * volume / sigma);
+    f->ray_x = in_list_axes(x, axis, step);
+    f->ray_y = in_list_axes(y, axis, volume * volume);
+}
+
 /* Rays from the image's centre, scaled so that the one there has length 1: projected numbers do not
  * depend on the scale, and floats keep far from their limits whatever the world's unit. */
-static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis)
+static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis, double sigma)
 {
     double px = 0.5 * c->width, py = 0.5 * c->height;
     f->screen = (trip_gl_double4){ { px, py, c->width, c->height } };
@@ -44,11 +57,9 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
         to_x = trip_sub(to_x, trip_scale(forward, px));
         to_y = trip_sub(to_y, trip_scale(forward, py));
     }
-    f->forward = in_list_axes(forward, axis, trip_dot(r0, trip_cross(rx, ry)));
+    set_steps(f, axis, forward, r0, rx, ry, sigma);
     f->to_x = in_list_axes(to_x, axis, 0);
     f->to_y = in_list_axes(to_y, axis, 0);
-    f->ray_x = in_list_axes(rx, axis, 0);
-    f->ray_y = in_list_axes(ry, axis, 0);
     square(&f->ray2_a, &f->ray2_b, r0, rx, ry, 1);
 
     const trip_affine *j = &c->index_to_world;
@@ -77,11 +88,13 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, int axis
     for (int i = 0; i < 3; i++) {
         int a = (axis + i) % 3;
         const double(*m)[4] = c->index_to_world.m;
-        *columns[i] = as_it_is(trip_v3(m[0][a], m[1][a], m[2][a]), 0);
+        *columns[i] =
+            as_it_is(trip_scale(trip_v3(m[0][a], m[1][a], m[2][a]), 1 / c->voxel_world), 0);
     }
     double full = trip_shade_gradient_full(header, c->voxel_world);
-    f->light = as_it_is(frame->settings->light_direction, full);
-    f->to_eye = as_it_is(trip_scale(c->world_forward, -1), header->gradient_scale);
+    f->light = as_it_is(frame->settings->light_direction, 0);
+    f->to_eye =
+        as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_scale / full, 1e30));
 }
 
 void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int axis)
@@ -91,7 +104,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int 
     trip_splat_frame constants = trip_splat_frame_make(c, s);
     trip_vec3 none = { 0, 0, 0 };
     *out = (trip_gl_frame_double){ 0 };
-    set_projection(out, c, axis);
+    set_projection(out, c, axis, constants.sigma);
     set_parallel(out, &constants);
     set_world(out, frame, axis);
     out->camera_r0 = as_it_is(c->r0, 0);

@@ -23,15 +23,17 @@
 
 /* Constants of one list of a frame; R is float for drawing, double for counting and weights. */
 #define TRIP_GL_FRAME_FIELDS(R4)                                                                   \
-    R4 forward;        /* xyz: depth = forward . c; w: K = r . (rx x ry), the same for all rays */ \
+    R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */   \
     R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective) */                          \
-    R4 ray_x, ray_y;   /* xyz: d ray / d pixel, rays scaled to length 1 at the image's centre */   \
+    R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's       \
+                          centre; w: step, and (r . ray_x x ray_y)^2 */                            \
     R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */               \
     R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                      \
     R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                \
-    R4 world_0, world_1, world_2;       /* xyz: columns of J */                                    \
-    R4 light;         /* xyz: towards the light, world space; w: gradient at full shading */       \
-    R4 to_eye;        /* xyz: towards the eye in parallel views; w: gradient scale */              \
+    R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                      \
+    R4 light;                           /* xyz: towards the light, world space */                  \
+    R4 to_eye;        /* xyz: towards the eye in parallel views; w: the largest magnitude of a     \
+                         gradient over that at full shading */                                     \
     R4 screen;        /* xy: the image's centre, pixels; zw: width, height */                      \
     R4 kernel;        /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */       \
     R4 edge;          /* x: what every footprint is lowered by, exp(-cutoff^2 / 2) */              \

@@ -82,13 +82,16 @@ int trip_image_prepare(void)
 
 static int check_finite(const char *path, int width, int height, const float *rgba)
 {
-    for (int y = 0; y < height; y++)
+    for (int y = 0; y < height; y++) {
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "write", path, "interrupted; nothing is written");
         for (int x = 0; x < width; x++)
             for (int c = 0; c < 4; c++)
                 if (!isfinite(rgba[((size_t)y * (size_t)width + (size_t)x) * 4 + (size_t)c]))
                     return trip_fail(TRIP_ERROR, "write", path,
                                      "pixel (%d, %d) is not a finite number; nothing is written", x,
                                      y);
+    }
     return 0;
 }
 

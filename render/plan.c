@@ -3,6 +3,7 @@
 #include <inttypes.h>
 
 #include "plan_cull.h"
+#include "report.h"
 #include "weight.h"
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
@@ -123,11 +124,13 @@ static void select_brick(trip_plan_list *list, uint64_t index, const trip_file_b
     list->splats_selected += brick->splats;
 }
 
-static void select_bricks(trip_plan_list *list, const trip_list *source, trip_cull *cull,
-                          uint32_t slab_sheets)
+static int select_bricks(trip_plan_list *list, const trip_list *source, trip_cull *cull,
+                         uint32_t slab_sheets)
 {
     list->bricks = source->brick_count;
     for (uint64_t i = 0; i < source->slab_count; i++) {
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "render", "plan", "interrupted");
         const trip_file_slab *slab = &source->slabs[i];
         int64_t slab_sheet = (int64_t)slab->slab * slab_sheets;
         for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {
@@ -148,6 +151,7 @@ static void select_bricks(trip_plan_list *list, const trip_list *source, trip_cu
             }
         }
     }
+    return 0;
 }
 
 /* Passes that read nothing are left out. */
@@ -182,10 +186,10 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
         if (!list->used)
             continue;
         status = add_passes(list, data, camera, settings, axis, budget);
-        if (status)
-            break;
-        select_bricks(list, &data->lists[axis], &cull, data->header.slab_sheets);
-        drop_empty_passes(list, budget);
+        if (!status)
+            status = select_bricks(list, &data->lists[axis], &cull, data->header.slab_sheets);
+        if (!status)
+            drop_empty_passes(list, budget);
     }
     if (status)
         trip_plan_release(plan, budget);

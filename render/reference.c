@@ -25,7 +25,8 @@ typedef struct reference {
     double gradient_full;
     pixel *pixels;
     size_t pixels_bytes;
-    int axis; /* of the list being drawn; -1 before the first */
+    int axis;    /* of the list being drawn; -1 before the first */
+    bool broken; /* some splat's numbers are not finite */
     trip_list_stats stats[3];
 } reference;
 
@@ -43,7 +44,7 @@ static const char *device(const trip_renderer *base)
     return "CPU, double precision";
 }
 
-/* Ends with pixels for `count` of them, all zero. */
+/* Ends with pixels for `count` of them. */
 static int take_pixels(reference *r, size_t count)
 {
     size_t bytes = count * sizeof(pixel);
@@ -58,8 +59,12 @@ static int take_pixels(reference *r, size_t count)
                              bytes);
         r->pixels_bytes = bytes;
     }
-    memset(r->pixels, 0, bytes);
     return 0;
+}
+
+static pixel *row_of(const reference *r, int y)
+{
+    return &r->pixels[(size_t)y * (size_t)r->frame->camera->width];
 }
 
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
@@ -70,39 +75,50 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->constants = trip_splat_frame_make(frame->camera, frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     r->axis = -1;
+    r->broken = false;
     memset(r->stats, 0, sizeof r->stats);
-    return take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
+    int status = take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
+    for (int y = 0; y < frame->camera->height && !status; y++) {
+        memset(row_of(r, y), 0, (size_t)frame->camera->width * sizeof(pixel));
+        status = trip_frame_poll();
+    }
+    return status;
 }
 
 /* Adds the finished layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. */
-static void fold_layer(reference *r)
+static int fold_layer(reference *r)
 {
+    const trip_camera *camera = r->frame->camera;
+    int status = 0;
     if (r->axis < 0)
-        return;
-    size_t count = r->pixels_bytes / sizeof(pixel);
-    for (size_t i = 0; i < count; i++) {
-        pixel *p = &r->pixels[i];
-        for (int c = 0; c < 4; c++)
-            p->merged[c] += p->weight * p->weight * p->layer[c];
+        return 0;
+    for (int y = 0; y < camera->height && !status; y++) {
+        pixel *row = row_of(r, y);
+        for (int x = 0; x < camera->width; x++)
+            for (int c = 0; c < 4; c++)
+                row[x].merged[c] += row[x].weight * row[x].weight * row[x].layer[c];
+        status = trip_frame_poll();
     }
+    return status;
 }
 
 static int begin_list(trip_renderer *base, int axis)
 {
     reference *r = (reference *)base;
     const trip_camera *camera = r->frame->camera;
-    fold_layer(r);
+    int status = fold_layer(r);
     r->axis = axis;
-    for (int y = 0; y < camera->height; y++) {
+    for (int y = 0; y < camera->height && !status; y++) {
         for (int x = 0; x < camera->width; x++) {
-            pixel *p = &r->pixels[(size_t)y * (size_t)camera->width + (size_t)x];
+            pixel *p = &row_of(r, y)[x];
             trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
             memset(p->layer, 0, sizeof p->layer);
             p->weight = trip_weight(r->frame->settings, r->frame->plan->axis_of_view, ray, axis);
             p->stretch = trip_splat_stretch(&r->constants, x + 0.5, y + 0.5);
         }
+        status = trip_frame_poll();
     }
-    return 0;
+    return status;
 }
 
 /* Puts a fragment behind what is there (front to back) or over it. */
@@ -136,9 +152,9 @@ static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3
     bool touched = false;
     pixel_range(s->x0, s->x1, camera->width, &x0, &x1);
     pixel_range(s->y0, s->y1, camera->height, &y0, &y1);
-    for (int y = y0; y <= y1; y++) {
+    for (int y = y0; y <= y1 && !trip_interrupted(); y++) {
         for (int x = x0; x <= x1; x++) {
-            pixel *p = &r->pixels[(size_t)y * (size_t)camera->width + (size_t)x];
+            pixel *p = &row_of(r, y)[x];
             double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
             if (!(p->weight > 0 && m <= r->constants.cutoff2))
                 continue;
@@ -162,8 +178,7 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
         return;
     double gradient[3];
     trip_normal_unpack(*normal, frame->data->header.gradient_scale, gradient);
-    trip_shade(frame->settings, frame->camera, r->gradient_full,
-               trip_affine_point(&frame->camera->index_to_world, voxel), gradient, rgb);
+    trip_shade(frame->settings, frame->camera, r->gradient_full, voxel, gradient, rgb);
 }
 
 static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal,
@@ -173,9 +188,10 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     trip_list_stats *stats = &r->stats[r->axis];
     trip_splat s;
     stats->splats_read++;
-    if (!trip_splat_project(&r->constants, voxel, &s) ||
-        !trip_weight_may_reach(frame->settings, frame->camera, frame->plan->axis_of_view, r->axis,
-                               trip_sub(voxel, frame->camera->eye), s.radius))
+    bool seen = trip_splat_project(&r->constants, voxel, &s);
+    r->broken |= trip_splat_is_broken(&s);
+    if (!seen || !trip_weight_may_reach(frame->settings, frame->camera, frame->plan->axis_of_view,
+                                        r->axis, trip_sub(voxel, frame->camera->eye), s.radius))
         return;
     stats->splats_projected++;
 
@@ -200,7 +216,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     reference *r = (reference *)base;
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
-        for (uint32_t k = 0; k < run->count; k++) {
+        for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
             uint32_t in_run = batch->selection->descending ? run->count - 1 - k : k;
             size_t at = run->first + in_run;
             uint32_t record = batch->voxels[at];
@@ -208,7 +224,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
                        batch->normals ? &batch->normals[at] : NULL, front_to_back);
         }
     }
-    return 0;
+    return r->broken ? trip_splat_fail() : trip_frame_poll();
 }
 
 /* The merge's divisor: lists that were not drawn count too, as empty layers. */
@@ -231,18 +247,17 @@ static int end_frame(trip_renderer *base, float *rgba)
     const double *background = r->frame->settings->background;
     const double behind[4] = { background[0] * background[3], background[1] * background[3],
                                background[2] * background[3], background[3] };
-    fold_layer(r);
-    for (int y = 0; y < camera->height; y++) {
+    int status = fold_layer(r);
+    for (int y = 0; y < camera->height && !status; y++) {
         for (int x = 0; x < camera->width; x++) {
-            size_t at = (size_t)y * (size_t)camera->width + (size_t)x;
-            double sum = weight_sum(r, x, y);
-            double transmittance = 1 - r->pixels[at].merged[3] / sum;
+            const double *merged = row_of(r, y)[x].merged;
+            double sum = weight_sum(r, x, y), transmittance = 1 - merged[3] / sum;
             for (int c = 0; c < 4; c++)
-                rgba[4 * at + (size_t)c] =
-                    (float)(r->pixels[at].merged[c] / sum + transmittance * behind[c]);
+                *rgba++ = (float)(merged[c] / sum + transmittance * behind[c]);
         }
+        status = trip_frame_poll();
     }
-    return 0;
+    return status;
 }
 
 static void stats(const trip_renderer *base, trip_list_stats lists[3])

@@ -7,6 +7,7 @@
 #include "camera.h"
 #include "plan.h"
 #include "reader.h"
+#include "report.h"
 #include "settings.h"
 #include "transfer_function.h"
 
@@ -22,6 +23,15 @@ typedef struct trip_frame {
     void (*progress)(void *user, uint64_t splats, uint64_t total);
     void *progress_user;
 } trip_frame;
+
+/* Asked between pieces of work that take less than about a tenth of a second: fails (reported) once
+ * the program is interrupted. */
+static inline int trip_frame_poll(void)
+{
+    if (!trip_interrupted())
+        return TRIP_OK;
+    return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
+}
 
 typedef struct trip_list_stats {
     uint64_t splats_read;      /* handed to the renderer */

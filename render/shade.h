@@ -27,9 +27,9 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
     return TRIP_GRADIENT_FULL * range / voxel_world;
 }
 
-/* Lights the colour `rgb` (not premultiplied) of a splat at a world-space position with the given
+/* Lights the colour `rgb` (not premultiplied) of the splat of a voxel (index space) with the given
  * world-space gradient. */
-void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full,
-                trip_vec3 world_position, const double gradient[3], double rgb[3]);
+void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full, trip_vec3 voxel,
+                const double gradient[3], double rgb[3]);
 
 #endif

@@ -1,5 +1,7 @@
 #include "splat.h"
 
+#include "report.h"
+
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings)
 {
     double sigma = settings->kernel_radius / TRIP_CUTOFF;
@@ -102,6 +104,22 @@ bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *
         return false;
     set_footprint(f, ray, c, out);
     return set_bounds(f, ray, out);
+}
+
+/* In front of the eye by so little nothing is an ellipse, whatever overflows. */
+static const double nearest = 1e-30;
+
+bool trip_splat_is_broken(const trip_splat *s)
+{
+    if (s->z <= nearest)
+        return false;
+    return !isfinite(s->x + s->y + s->conic_xx + s->conic_xy + s->conic_yy + s->amplitude);
+}
+
+int trip_splat_fail(void)
+{
+    return trip_fail(TRIP_ERROR, "render", "projection",
+                     "numbers are not finite; the view or the grid is out of any range");
 }
 
 double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y)

@@ -66,6 +66,12 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
 /* False when the splat is not drawn (behind or across the plane of the eye). */
 bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out);
 
+/* Whether numbers of a splat just projected are not finite, so that it can neither be drawn nor be
+ * known not to show: the frame is to end with trip_splat_fail(). No view that trip_camera_make()
+ * accepts has such splats. */
+bool trip_splat_is_broken(const trip_splat *s);
+int trip_splat_fail(void);
+
 /* m(p) for a pixel position. */
 double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y);
 

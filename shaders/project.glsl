@@ -1,6 +1,7 @@
-// The projection of a splat. Mirrors trip_splat_project() in render/splat.c with the rays scaled
-// and A, B taken per unit of depth; see render/splat.h for the formulas. `c` and `place` are a
-// record's (fetch.glsl).
+// The projection of a splat. Mirrors trip_splat_project() in render/splat.c with the rays scaled,
+// A, B taken per unit of depth and of `step`, and all covariances times u, which alone carries the
+// size of a splat in pixels: no number leaves a float's range. See render/splat.h for the formulas.
+// `c` and `place` are a record's (fetch.glsl).
 #include "real.glsl"
 
 struct splat {
@@ -33,14 +34,15 @@ bool project(real3 c, real3 place, out splat s)
     s.centre = place.xy * inverse;
     s.ray2 = dot(ray, ray);
 
-    // S = t [b.b -a.b; -a.b a.a] with t = sigma^2 / (K depth)^2, |S| = (t K)^2 ray2.
+    // u S = [b.b -a.b; -a.b a.a]. Beyond 1e17 splats are 1e-8 pixels and only products would suffer.
     real3 a = cross(ray, ray_x.xyz), b = cross(ray, ray_y.xyz);
-    real low = kernel.z, scale = inverse / forward.w;
-    real t = kernel.x * scale * scale, tk = t * forward.w;
-    real sxx = t * dot(b, b), sxy = -t * dot(a, b), syy = t * dot(a, a);
-    real det_s = tk * tk * s.ray2;
+    real u = min(forward.w * forward.w * (place.z * place.z), real(1e17));
+    real low = kernel.z * u;
+    real sxx = dot(b, b), sxy = -dot(a, b), syy = dot(a, a);
+    real det_s = ray_y.w * s.ray2;
     real inverse_det = 1.0 / (det_s + low * (sxx + syy) + low * low);
-    s.conic = real3(syy + low, -sxy, sxx + low) * inverse_det;
+    real3 conic = real3(syy + low, -sxy, sxx + low) * inverse_det;
+    s.conic = conic * u;
     s.amplitude = kernel.w * sqrt(det_s * inverse_det);
 
     // The largest eigenvalue of S^-1 is that of S over |S|.
@@ -48,17 +50,18 @@ bool project(real3 c, real3 place, out splat s)
     real largest = 0.5 * (sxx + syy) + sqrt(half_difference * half_difference + sxy * sxy);
     s.radius = sqrt(kernel.x * kernel.y * (1.0 + low * largest / det_s));
 
-    real k = kernel.y / s.ray2;
-    real exx = s.conic.x - k * dot(ray_x.xyz, ray_x.xyz);
-    real exy = s.conic.y - k * dot(ray_x.xyz, ray_y.xyz);
-    real eyy = s.conic.z - k * dot(ray_y.xyz, ray_y.xyz);
+    // E and l over u.
+    real k = kernel.y * ray_x.w / (s.ray2 * u), k_step = k * ray_x.w;
+    real exx = conic.x - k_step * dot(ray_x.xyz, ray_x.xyz);
+    real exy = conic.y - k_step * dot(ray_x.xyz, ray_y.xyz);
+    real eyy = conic.z - k_step * dot(ray_y.xyz, ray_y.xyz);
     real lx = k * dot(ray, ray_x.xyz), ly = k * dot(ray, ray_y.xyz);
     real det = exx * eyy - exy * exy;
     if (!(exx > 0.0 && det > 0.0))
         return false;
     real inverse_e = 1.0 / det;
     real2 middle = real2(eyy * lx - exy * ly, exx * ly - exy * lx) * inverse_e;
-    real size = (kernel.y + lx * middle.x + ly * middle.y) * inverse_e;
+    real size = (kernel.y / u + lx * middle.x + ly * middle.y) * inverse_e;
     real2 half_size = real2(sqrt(size * eyy), sqrt(size * exx));
     s.bounds = real4(s.centre + middle - half_size, s.centre + middle + half_size);
     return true;

@@ -4,7 +4,7 @@
 
 #ifdef SHADED
 
-// World-space gradient direction and, in w, its magnitude.
+// World-space gradient direction and, in w, its magnitude over that at full shading.
 vec4 unpack_normal(uint normal)
 {
     vec2 p = vec2(normal & 4095u, normal >> 12 & 4095u) * (2.0 / 4095.0) - 1.0;
@@ -30,7 +30,7 @@ vec3 shade(vec3 colour, uint normal, vec3 from_eye)
     vec3 towards_light = light.xyz, middle = light.xyz + eye;
     middle /= max(length(middle), 1e-30);
 #endif
-    float strength = min(1.0, gradient.w / light.w);
+    float strength = min(1.0, gradient.w);
     float diffuse = abs(dot(gradient.xyz, towards_light));
     float specular = pow(abs(dot(gradient.xyz, middle)), SHININESS);
     float matt = 1.0 + strength * (AMBIENT + DIFFUSE * diffuse - 1.0);

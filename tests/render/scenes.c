@@ -65,7 +65,7 @@ static void write_dataset(const scene *s, const scene_params *p)
         .index_to_world = p->index_to_world,
         .code_lo = 0,
         .code_hi = 1,
-        .gradient_scale = 1,
+        .gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1,
     };
     bool given = false;
     for (int i = 0; i < 12; i++)

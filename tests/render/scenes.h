@@ -24,7 +24,8 @@ typedef struct scene_params {
     trip_affine index_to_world; /* all zero: the identity */
     unsigned tile_voxels, slab_sheets;
     bool normals;
-    scene_voxel voxel; /* NULL: every voxel is there with code 65535 */
+    double gradient_scale; /* the header's, by which gradients are multiplied; 0: 1 */
+    scene_voxel voxel;     /* NULL: every voxel is there with code 65535 */
     void *user;
 } scene_params;
 
