@@ -13,12 +13,13 @@ libraries=$(scripts/install-dependencies.sh --libraries)
 release=$(. /etc/os-release && echo "$VERSION_CODENAME")
 root=$(pwd)/build/arm64-sysroot
 if [ "$(cat "$root/packages" 2>/dev/null)" != "$release $libraries" ]; then
+    mirror=$(scripts/mirror.sh "$release")
     mkdir -p build
     rm -rf "$root"
     # shellcheck disable=SC2016
     mmdebstrap --quiet --mode=chrootless --variant=extract --arch=arm64 --include="libc6-dev $libraries" \
         --setup-hook='mkdir -p "$1/usr/lib" && ln -s usr/lib "$1/lib"' \
-        "$release" "$root" http://deb.debian.org/debian
+        "$release" "$root" "$mirror"
     # What would be installed with them: links that do not leave the folder, and the alternatives.
     find "$root/usr/lib" -lname '/*' | while read -r link; do
         ln -sfnr "$root$(readlink "$link")" "$link"

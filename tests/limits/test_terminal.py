@@ -91,17 +91,20 @@ class Terminal(limits.Test):
     def test_every_bench_shows_how_far_it_is(self):
         tiny = self.brick(self.generate("tiny.nrrd", "marschner-lobb", 12), "tiny.trip", "--keep-all")
         small = ["--size", "40x40", "--repeat", 1]
+        lacks = None
         for table, *more in (["orders", "--renderer", "cpu"], ["stream", "--renderer", "cpu"],
                              ["renderers", "--renderer", "cpu,reference", "--views", 2], ["submit"]):
             arguments = ["bench", table, tiny, *small, *more]
             r = limits.run("triptych", *arguments)
             if table == "submit" and r.status and "OpenGL" in r.err:
-                self.tell(f"submit is left out: {r.err.strip()}")
+                lacks = r.err.strip()
                 continue
             self.assertEqual((r.status, r.err), (0, ""))  # in a pipe nothing
             status, shown = self.on_terminal(arguments)
             self.assertEqual(status, 0, shown)
             self.assertRegex(shown, rf"\r\x1b\[K{table}  \d+:\d\d[^|]*\r[^|]*\r\x1b\[K[^\r]*bench")
+        if lacks:
+            self.skipTest(f"all but submit: {lacks}")
 
     def test_ctrl_c_ends_a_bench_of_the_included_volume_with_nothing_left(self):
         temporary = self.path("temporary")

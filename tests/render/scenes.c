@@ -142,7 +142,7 @@ static bool has_gl(void)
     if (has)
         gl->ops->destroy(gl);
     else
-        print_message("[  SKIPPED ] for gl: this machine has no OpenGL 4.5 by EGL\n");
+        test_lacks("OpenGL 4.5 by EGL");
     trip_budget_destroy(budget);
     return has;
 }

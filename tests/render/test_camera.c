@@ -121,11 +121,23 @@ static void views_that_are_none_are_refused_as_wrong_usage(void **state)
     bad[7].eye.x = NAN;
     bad[8].ortho_height = -1;
     bad[9].look.y = INFINITY;
+    static const char *const why[10] = {
+        "look: the point looked at must differ from the eye",
+        "up: is zero or lies along the view",
+        "up: is zero or lies along the view",
+        "fov: 180 is not between 0 and 180",
+        "fov: 0 is not between 0 and 180",
+        "size: 0 x ",
+        " x 100000 px is not between",
+        "eye, look, up: not finite",
+        "ortho height: -1 is not a positive length",
+        "eye, look, up: not finite",
+    };
     for (int i = 0; i < 10; i++) {
         trip_camera c;
         test_catch_reports();
         assert_int_equal(trip_camera_make(&c, &bad[i], &identity), TRIP_USAGE);
-        assert_one_report("");
+        assert_one_report(why[i]);
     }
 }
 

@@ -184,7 +184,7 @@ static void an_instruction_set_this_machine_lacks_is_refused(void **state)
     setenv("TRIPTYCH_ISA", "mmx", 1);
     test_catch_reports();
     assert_int_equal(trip_cpu_create(&r, budget, 1), TRIP_USAGE);
-    assert_one_report("");
+    assert_one_report("TRIPTYCH_ISA: 'mmx' does not run here; choose one of ");
     assert_null(r);
     unsetenv("TRIPTYCH_ISA");
     trip_budget_destroy(budget);
@@ -198,7 +198,7 @@ static void too_little_memory_is_refused(void **state)
     assert_int_equal(trip_budget_create(&budget, 100000), 0);
     test_catch_reports();
     assert_int_equal(trip_cpu_create(&r, budget, 2), TRIP_ERROR);
-    assert_one_report("");
+    assert_one_report("does not suffice for 2 threads; raise --memory");
     assert_null(r);
     assert_int_equal(trip_budget_left_bytes(budget), 100000);
     trip_budget_destroy(budget);

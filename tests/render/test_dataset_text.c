@@ -45,7 +45,7 @@ static void text_that_is_no_object_is_refused(void **state)
         trip_dataset_text *t;
         test_catch_reports();
         assert_int_equal(trip_dataset_text_parse(&t, &d), TRIP_ERROR);
-        assert_one_report("");
+        assert_one_report("its text is not a JSON object");
         assert_null(t);
     }
 }

@@ -161,6 +161,7 @@ static void a_failed_or_damaged_read_ends_the_frame_with_one_report(void **state
     make_scene(&s);
     trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
     long (*const faults[])(void *, void *, uint64_t, size_t, long) = { fail_reading, flip_a_bit };
+    static const char *const why[] = { "cannot read: Input/output error", "is damaged (checksum)" };
     for (int i = 0; i < 2; i++) {
         trip_renderer *r;
         trip_frame_stats stats;
@@ -169,7 +170,7 @@ static void a_failed_or_damaged_read_ends_the_frame_with_one_report(void **state
         trip_reader *reader = make_reader(&s, (trip_reader_params){ .fault = faults[i] });
         test_catch_reports();
         assert_true(draw(&s, r, reader, &view, rgba, &stats) < 0);
-        assert_one_report("");
+        assert_one_report(why[i]);
         trip_reader_destroy(reader);
         r->ops->destroy(r);
     }
@@ -189,7 +190,7 @@ static void without_memory_for_its_pixels_the_reference_says_so(void **state)
     trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
     test_catch_reports();
     assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_ERROR);
-    assert_one_report("");
+    assert_one_report("bytes of pixels do not fit the memory given; raise --memory");
     trip_reader_destroy(reader);
     r->ops->destroy(r);
     scene_destroy(&s);
@@ -290,7 +291,7 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
         l.fail_at = l.drawn / 2 + 1; /* a frame given up leaves no slot behind */
         test_catch_reports();
         assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), TRIP_ERROR);
-        assert_one_report("");
+        assert_one_report("test: draw: fails");
         l.fail_at = 0;
         assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), 0);
         assert_int_equal(stats.reader.splats, splats);
@@ -315,7 +316,7 @@ static void an_interrupt_ends_the_frame(void **state)
     raise(SIGINT);
     test_catch_reports();
     assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_INTERRUPTED);
-    assert_one_report("");
+    assert_one_report("frame: interrupted");
     trip_reader_destroy(reader);
     r->ops->destroy(r);
     scene_destroy(&s);

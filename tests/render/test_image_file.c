@@ -237,38 +237,42 @@ static void a_pixel_that_is_no_number_is_refused_and_the_old_file_stays(void **s
         rgba[5] = i ? NAN : -INFINITY;
         test_catch_reports();
         assert_int_equal(trip_image_write(path_of("n.exr"), 2, 1, rgba, NULL), TRIP_ERROR);
-        assert_one_report("");
+        assert_one_report("n.exr: pixel (1, 0) is not a finite number");
     }
     stat(path_of("n.exr"), &after);
     assert_int_equal(before.st_ino, after.st_ino);
 }
 
-static void expect_refusal(const char *path, trip_image_depth depth, int status)
+static void expect_refusal(const char *path, trip_image_depth depth, int status, const char *why)
 {
     const float rgba[4] = { 0, 0, 0, 1 };
     test_catch_reports();
     assert_int_equal(trip_image_write(path, 1, 1, rgba, &(trip_image_params){ .depth = depth }),
                      status);
-    assert_one_report("");
+    assert_one_report(why);
 }
 
 static void wrong_names_and_depths_are_wrong_usage(void **state)
 {
     (void)state;
-    expect_refusal(path_of("a.gif"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE);
-    expect_refusal(path_of("png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE);
-    expect_refusal(path_of(".png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE);
-    expect_refusal(path_of("a.png"), TRIP_IMAGE_FLOAT, TRIP_USAGE);
-    expect_refusal(path_of("a.jpg"), TRIP_IMAGE_U16, TRIP_USAGE);
-    expect_refusal(path_of("a.exr"), TRIP_IMAGE_U8, TRIP_USAGE);
+    expect_refusal(path_of("a.gif"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "are named .png");
+    expect_refusal(path_of("png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "are named .png");
+    expect_refusal(path_of(".png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "are named .png");
+    expect_refusal(path_of("a.png"), TRIP_IMAGE_FLOAT, TRIP_USAGE,
+                   "a.png: a .png file cannot hold that kind of number");
+    expect_refusal(path_of("a.jpg"), TRIP_IMAGE_U16, TRIP_USAGE,
+                   "a.jpg: a .jpg file cannot hold that kind of number");
+    expect_refusal(path_of("a.exr"), TRIP_IMAGE_U8, TRIP_USAGE,
+                   "a.exr: a .exr file cannot hold that kind of number");
 }
 
 static void a_place_that_cannot_be_written_is_a_failure(void **state)
 {
     (void)state;
-    expect_refusal(path_of("missing/a.png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_ERROR);
+    expect_refusal(path_of("missing/a.png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_ERROR,
+                   "No such file or directory");
     mkdir(path_of("folder.png"), 0777);
-    expect_refusal(path_of("folder.png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_ERROR);
+    expect_refusal(path_of("folder.png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_ERROR, "directory");
     rmdir(path_of("folder.png"));
 }
 
@@ -296,7 +300,7 @@ static void a_full_disk_is_reported_and_leaves_nothing(void **state)
         setrlimit(RLIMIT_FSIZE, &tight);
         int status = trip_image_write(path_of(names[i]), SIDE, SIDE, rgba, NULL);
         setrlimit(RLIMIT_FSIZE, &old);
-        assert_one_report("");
+        assert_one_report("File too large");
         assert_int_equal(status, TRIP_ERROR);
         assert_int_equal(count_files(), before);
     }
@@ -317,7 +321,7 @@ static void a_broken_picture_is_refused_when_read(void **state)
         assert_int_equal(truncate(path_of(names[i]), 5000), 0);
         test_catch_reports();
         assert_int_equal(trip_image_read(path_of(names[i]), &width, &height, &back), TRIP_ERROR);
-        assert_one_report("");
+        assert_one_report(names[i]);
     }
 }
 

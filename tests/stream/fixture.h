@@ -16,6 +16,7 @@
 #include "dataset.h"
 #include "reader.h"
 #include "report.h"
+#include "skips.h"
 #include "writer.h"
 
 typedef struct fixture_voxel {

@@ -165,7 +165,7 @@ static bool uring_works(const trip_dataset *d)
     if (status == TRIP_OK)
         trip_reader_destroy(r);
     else
-        print_message("io_uring is refused here: its cases are left out\n");
+        test_lacks("io_uring");
     return status == TRIP_OK;
 }
 
@@ -537,7 +537,7 @@ static void refused_direct_reads_go_on_through_the_page_cache(void **state)
             &r, d, &(trip_reader_params){ .fault = sabotage_read, .fault_user = &fault }, f.budget),
         TRIP_OK);
     if (!strstr(trip_reader_engine_name(r), "O_DIRECT"))
-        print_message("direct reads are refused by this file system in any case\n");
+        test_lacks("direct reads from this file system");
     select_all(&s, d, 0, false);
     if (strstr(trip_reader_engine_name(r), "O_DIRECT")) {
         assert_int_equal(read_pass(r, &s, 0, out, &n), 0);

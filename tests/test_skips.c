@@ -1,0 +1,88 @@
+/* What tests share keeps its word: what is skipped does not pass, and neither does a report that is
+ * not named. */
+#include "skips.h"
+#include "test.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+static void passes(void **state)
+{
+    (void)state;
+}
+
+static void is_skipped(void **state)
+{
+    (void)state;
+    skip();
+}
+
+static void lacks_a_part(void **state)
+{
+    (void)state;
+    test_lacks("a part");
+}
+
+static void does_fail(void **state)
+{
+    (void)state;
+    fail();
+}
+
+/* Exit status of a program with these two tests. What they print stays out of this one's. */
+static int status_of(CMUnitTestFunction first, CMUnitTestFunction second)
+{
+    const struct CMUnitTest tests[] = { cmocka_unit_test(first), cmocka_unit_test(second) };
+    fflush(NULL);
+    pid_t child = fork();
+    if (child == 0) {
+        if (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr))
+            _exit(99);
+        _exit(cmocka_run_group_tests(tests, NULL, NULL));
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+static void a_program_that_skipped_something_ends_with_77_unless_something_failed(void **state)
+{
+    (void)state;
+    assert_int_equal(status_of(passes, passes), 0);
+    assert_int_equal(status_of(passes, is_skipped), 77);
+    assert_int_equal(status_of(lacks_a_part, passes), 77);
+    assert_int_equal(status_of(is_skipped, does_fail), 1);
+    assert_int_equal(status_of(lacks_a_part, does_fail), 1);
+}
+
+static void expects_any_report(void **state)
+{
+    (void)state;
+    test_catch_reports();
+    trip_fail(TRIP_ERROR, "test", "here", "why");
+    assert_one_report("");
+}
+
+static void expects_this_report(void **state)
+{
+    (void)state;
+    test_catch_reports();
+    trip_fail(TRIP_ERROR, "test", "here", "why");
+    assert_one_report("here: why");
+}
+
+static void a_report_that_is_expected_has_to_be_named(void **state)
+{
+    (void)state;
+    assert_int_equal(status_of(passes, expects_this_report), 0);
+    assert_int_equal(status_of(passes, expects_any_report), 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_program_that_skipped_something_ends_with_77_unless_something_failed),
+        cmocka_unit_test(a_report_that_is_expected_has_to_be_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
