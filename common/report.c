@@ -8,12 +8,15 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "text.h"
+
 enum { LINE_BYTES = 4096, WHERE_BYTES = 2560 };
 
 /* A line under construction; what does not fit is cut and marked. */
 typedef struct line {
     char text[LINE_BYTES];
     size_t length;
+    bool cut;
 } line;
 
 static void (*report_sink)(const char *line, void *user);
@@ -28,35 +31,20 @@ void trip_report_redirect(void (*sink)(const char *line, void *user), void *user
 
 static void put(line *l, const char *bytes, size_t count)
 {
-    size_t room = LINE_BYTES - 8 - l->length;
-    if (count > room)
-        count = room;
+    l->cut = l->cut || count > LINE_BYTES - 8 - l->length;
+    if (l->cut)
+        return;
     memcpy(l->text + l->length, bytes, count);
     l->length += count;
 }
 
-/* Control characters, those of two bytes in UTF-8 (C2 80 to C2 9F) included. */
-static bool is_control(const unsigned char *p, const unsigned char *start)
-{
-    if (*p < 0x20 || *p == 0x7f)
-        return true;
-    if (*p == 0xc2)
-        return p[1] >= 0x80 && p[1] < 0xa0;
-    return p > start && p[-1] == 0xc2 && *p >= 0x80 && *p < 0xa0;
-}
-
-/* Control characters become \n, \t or \xNN. */
 static void put_visible(line *l, const char *text)
 {
-    const unsigned char *start = (const unsigned char *)text;
-    for (const unsigned char *p = start; *p; p++) {
-        char escape[5];
-        if (*p == '\n' || *p == '\t')
-            put(l, *p == '\n' ? "\\n" : "\\t", 2);
-        else if (is_control(p, start))
-            put(l, escape, (size_t)snprintf(escape, sizeof escape, "\\x%02x", *p));
-        else
-            put(l, (const char *)p, 1);
+    char shown[TRIP_TEXT_SHOWN_BYTES];
+    while (*text) {
+        trip_text_character c = trip_text_next(text);
+        put(l, shown, trip_text_show(text, c, shown));
+        text += c.bytes;
     }
 }
 
@@ -67,6 +55,8 @@ static void put_where(line *l, const char *where)
     if (length > WHERE_BYTES) {
         put(l, "...", 3);
         where += length - WHERE_BYTES;
+        while ((*where & 0xc0) == 0x80) /* not from the middle of a character */
+            where++;
     }
     put_visible(l, where);
     put(l, ": ", 2);
@@ -86,7 +76,7 @@ static void end_line(line *l, bool terminal)
 /* One write(2) a line, so that lines of several threads do not mix. */
 static void emit(line *l)
 {
-    if (l->length == LINE_BYTES - 8) {
+    if (l->cut) {
         memcpy(l->text + l->length, "...", 3);
         l->length += 3;
     }

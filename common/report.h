@@ -17,7 +17,7 @@ enum trip_status {
 
 /* Prints "triptych: WHAT: WHERE: why" and returns `status`. WHAT is the stage ("read", "brick",
  * "render", ...), WHERE the file and place ("a.nrrd: line 3"), why says cause and remedy. Control
- * characters from file names are made visible, so a message is always one line. */
+ * characters and bad UTF-8 from files are made visible, so a message is always one line. */
 __attribute__((format(printf, 4, 5))) int trip_fail(int status, const char *what, const char *where,
                                                     const char *why, ...);
 

@@ -47,3 +47,62 @@ const char *trip_text_from_double(double value, char *text)
     uselocale(before);
     return text;
 }
+
+/* The code that `count` bytes from *p on stand for, the first of them giving `bits`; 0 unless all
+ * that follow belong to it. */
+static uint32_t decode(const unsigned char *p, uint32_t bits, unsigned count)
+{
+    for (unsigned i = 1; i < count; i++) {
+        if ((p[i] & 0xc0) != 0x80) /* the zero at the end, too */
+            return 0;
+        bits = bits << 6 | (p[i] & 0x3f);
+    }
+    return bits;
+}
+
+static bool is_acted_on(uint32_t code)
+{
+    return code < 0x20 || (code >= 0x7f && code < 0xa0) || code == 0x61c ||
+           (code >= 0x200e && code <= 0x200f) || (code >= 0x2028 && code <= 0x202e) ||
+           (code >= 0x2066 && code <= 0x2069) || code == 0xfeff;
+}
+
+trip_text_character trip_text_next(const char *text)
+{
+    const unsigned char *p = (const unsigned char *)text;
+    static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
+    unsigned count = *p < 0x80             ? 1
+                     : (*p & 0xe0) == 0xc0 ? 2
+                     : (*p & 0xf0) == 0xe0 ? 3
+                     : (*p & 0xf8) == 0xf0 ? 4
+                                           : 0;
+    uint32_t code = count == 1 ? *p : count > 0 ? decode(p, *p & (0x7fu >> count), count) : 0;
+    bool surrogate = code >= 0xd800 && code < 0xe000;
+    if (count == 0 || code < least[count] || surrogate || code > 0x10ffff)
+        return (trip_text_character){ 0xfffd, 1, false };
+    return (trip_text_character){ code, (uint8_t)count, !is_acted_on(code) };
+}
+
+unsigned trip_text_show(const char *text, trip_text_character c, char *shown)
+{
+    unsigned length = c.bytes;
+    if (c.printable)
+        memcpy(shown, text, length);
+    else if (*text == '\n' || *text == '\t')
+        length = (unsigned)sprintf(shown, "%s", *text == '\n' ? "\\n" : "\\t");
+    else
+        for (unsigned i = length = 0; i < c.bytes; i++)
+            length += (unsigned)sprintf(shown + length, "\\x%02x", (unsigned char)text[i]);
+    shown[length] = 0;
+    return length;
+}
+
+void trip_text_write(FILE *f, const char *text)
+{
+    char shown[TRIP_TEXT_SHOWN_BYTES];
+    while (*text) {
+        trip_text_character c = trip_text_next(text);
+        fwrite(shown, 1, trip_text_show(text, c, shown), f);
+        text += c.bytes;
+    }
+}

@@ -44,6 +44,29 @@ static void letters_beyond_ascii_stay(void **state)
                       "e.tf");
 }
 
+static void bad_utf8_and_marks_of_direction_are_made_visible(void **state)
+{
+    (void)state;
+    test_catch_reports();
+    trip_fail(TRIP_ERROR, "read", "a\xff\xc3(", "\xe2\x80\xae%s\xed\xa0\x80\xc0\xaf\xe2\x82", "b");
+    assert_one_report("triptych: read: a\\xff\\xc3(: \\xe2\\x80\\xaeb\\xed\\xa0\\x80\\xc0\\xaf"
+                      "\\xe2\\x82");
+}
+
+static void a_cut_line_holds_whole_characters(void **state)
+{
+    (void)state;
+    for (int shift = 0; shift < 3; shift++) {
+        char text[9000] = "";
+        for (int i = 0; i < 2500; i++)
+            strcat(text, i < shift ? "x" : "\xe2\x82\xac");
+        test_catch_reports();
+        trip_fail(TRIP_ERROR, "read", text, "%s", text);
+        assert_one_report("\xe2\x82\xac...");
+        assert_null(strstr(test_last_report, "\\x"));
+    }
+}
+
 static void overlong_line_is_cut_and_marked(void **state)
 {
     (void)state;
@@ -136,6 +159,8 @@ int main(void)
         cmocka_unit_test(empty_place_is_left_out),
         cmocka_unit_test(control_characters_are_made_visible),
         cmocka_unit_test(letters_beyond_ascii_stay),
+        cmocka_unit_test(bad_utf8_and_marks_of_direction_are_made_visible),
+        cmocka_unit_test(a_cut_line_holds_whole_characters),
         cmocka_unit_test(overlong_line_is_cut_and_marked),
         cmocka_unit_test(errno_text_follows_the_action),
         cmocka_unit_test(reporting_leaves_errno_alone),

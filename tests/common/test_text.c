@@ -81,6 +81,47 @@ static void a_locale_with_decimal_commas_changes_nothing(void **state)
     assert_string_equal(text, "2.5");
 }
 
+static void check_character(const char *text, uint32_t code, unsigned bytes, bool printable)
+{
+    trip_text_character c = trip_text_next(text);
+    assert_int_equal(c.code, code);
+    assert_int_equal(c.bytes, bytes);
+    assert_int_equal(c.printable, printable);
+}
+
+/* The Unicode standard, table 3-7: well-formed byte sequences, and the first ones that are not. */
+static void utf8_is_told_from_other_bytes(void **state)
+{
+    (void)state;
+    check_character("a", 'a', 1, true);
+    check_character("\x7f", 0x7f, 1, false);
+    check_character("\xc2\x80", 0x80, 2, false);
+    check_character("\xc2\xa0", 0xa0, 2, true);
+    check_character("\xc1\xbf", 0xfffd, 1, false);
+    check_character("\xe0\xa0\x80", 0x800, 3, true);
+    check_character("\xe0\x9f\xbf", 0xfffd, 1, false);
+    check_character("\xed\x9f\xbf", 0xd7ff, 3, true);
+    check_character("\xed\xa0\x80", 0xfffd, 1, false);
+    check_character("\xf0\x90\x80\x80", 0x10000, 4, true);
+    check_character("\xf4\x8f\xbf\xbf", 0x10ffff, 4, true);
+    check_character("\xf4\x90\x80\x80", 0xfffd, 1, false);
+    check_character("\xf8\x88\x80\x80", 0xfffd, 1, false);
+    check_character("\x80", 0xfffd, 1, false);
+    check_character("\xe2\x82", 0xfffd, 1, false);
+    check_character("\xe2\x80\xae", 0x202e, 3, false);
+    check_character("\xe2\x81\xa6", 0x2066, 3, false);
+}
+
+static void what_is_not_printable_is_shown_as_bytes(void **state)
+{
+    (void)state;
+    char text[64] = "";
+    FILE *f = fmemopen(text, sizeof text, "w");
+    trip_text_write(f, "a\n\t\x1b\xc3\xbc\xc2\x9b\xff");
+    fclose(f);
+    assert_string_equal(text, "a\\n\\t\\x1b\xc3\xbc\\xc2\\x9b\\xff");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -88,6 +129,8 @@ int main(void)
         cmocka_unit_test(anything_else_is_refused),
         cmocka_unit_test(written_numbers_read_back_the_same),
         cmocka_unit_test(written_numbers_are_short),
+        cmocka_unit_test(utf8_is_told_from_other_bytes),
+        cmocka_unit_test(what_is_not_printable_is_shown_as_bytes),
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
