@@ -9,7 +9,9 @@
 #include <sys/utsname.h>
 
 #include "budget.h"
+#include "json.h"
 #include "report.h"
+#include "text.h"
 
 enum { MAX_TABLES = 8, CELL_BYTES = 96 };
 
@@ -190,6 +192,13 @@ static void print_table(const table *t)
     }
 }
 
+static void print_fact(const char *key, const char *text)
+{
+    printf("- %s: ", key);
+    trip_text_write(stdout, text);
+    putchar('\n');
+}
+
 static void print_facts(const char *heading, const cJSON *facts)
 {
     const cJSON *item;
@@ -198,7 +207,7 @@ static void print_facts(const char *heading, const cJSON *facts)
     cJSON_ArrayForEach(item, facts)
     {
         if (cJSON_IsString(item))
-            printf("- %s: %s\n", item->string, item->valuestring);
+            print_fact(item->string, item->valuestring);
         else if (cJSON_IsBool(item))
             printf("- %s: %s\n", item->string, cJSON_IsTrue(item) ? "yes" : "no");
         else if (strstr(item->string, "_bytes"))
@@ -211,7 +220,7 @@ static void print_facts(const char *heading, const cJSON *facts)
 
 static int print_json(const bench_report *r)
 {
-    char *text = cJSON_Print(r->root);
+    char *text = trip_json_print(r->root, true);
     if (!text)
         return out_of_memory();
     puts(text);
@@ -224,7 +233,8 @@ int bench_report_print(bench_report *r, int json)
     const cJSON *limit;
     if (json)
         return print_json(r);
-    printf("%s\n", cJSON_GetObjectItemCaseSensitive(r->root, "command")->valuestring);
+    trip_text_write(stdout, cJSON_GetObjectItemCaseSensitive(r->root, "command")->valuestring);
+    putchar('\n');
     for (int i = 0; i < r->table_count; i++)
         print_table(&r->shown[i]);
     printf("\nLimits of these figures\n\n");

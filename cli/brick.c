@@ -12,6 +12,7 @@
 #include "options.h"
 #include "plain_disk.h"
 #include "progress.h"
+#include "json.h"
 #include "report.h"
 #include "text.h"
 #include "volume_options.h"
@@ -307,7 +308,7 @@ static void add_number(cJSON *object, const char *name, double value)
 
 static int print_object(cJSON *root, const options *o)
 {
-    char *text = cJSON_Print(root);
+    char *text = trip_json_print(root, true);
     cJSON_Delete(root);
     if (!text)
         return trip_fail(TRIP_ERROR, "brick", o->brick.output, "out of memory");
@@ -348,11 +349,18 @@ static int print_json(const options *o, const trip_brick_summary *s, const brick
     return print_object(root, o);
 }
 
+static void print_name(const char *label, const char *name)
+{
+    printf("%-9s ", label);
+    trip_text_write(stdout, name);
+    putchar('\n');
+}
+
 static void print_text(const options *o, const trip_brick_summary *s)
 {
     char bytes[32], temporary[32], peak[32], promise[32];
     double seconds = brick_seconds(s), kept = (double)s->kept, voxels = (double)s->voxels;
-    printf("%-9s %s\n", "data set", o->brick.output);
+    print_name("data set", o->brick.output);
     printf("%-9s %lld x %lld x %lld, spacing %.6g x %.6g x %.6g\n", "grid", (long long)s->dims[0],
            (long long)s->dims[1], (long long)s->dims[2], s->spacing[0], s->spacing[1],
            s->spacing[2]);
@@ -388,7 +396,7 @@ static int print_estimate_json(const options *o, const trip_brick_estimate *e)
 static void print_estimate(const options *o, const trip_brick_estimate *e)
 {
     char bytes[32], temporary[32], there[32];
-    printf("%-9s %s\n", "data set", o->brick.output);
+    print_name("data set", o->brick.output);
     printf("%-9s about %.3g of %.3g voxels\n", "keeps", (double)e->kept, (double)e->voxels);
     printf("%-9s about %s, %s of temporary data; %s are free\n", "takes",
            trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),

@@ -9,6 +9,7 @@
 
 #include "anatomy.h"
 #include "dataset.h"
+#include "json.h"
 #include "options.h"
 #include "report.h"
 #include "text.h"
@@ -157,11 +158,11 @@ static void add_world(cJSON *root, const trip_dataset *d, const cJSON *text)
     }
 }
 
-static cJSON *to_json(const trip_dataset *d, bool verified)
+static cJSON *to_json(const trip_dataset *d, const trip_json *source, bool verified)
 {
     const trip_file_header *h = &d->header;
     double dims[3], steps[3];
-    cJSON *root = cJSON_CreateObject(), *source = cJSON_Parse(d->text);
+    cJSON *root = cJSON_CreateObject();
     for (int a = 0; a < 3; a++) {
         dims[a] = (double)h->dims[a];
         steps[a] = trip_length(direction(d, a));
@@ -169,7 +170,7 @@ static cJSON *to_json(const trip_dataset *d, bool verified)
     cJSON_AddItemToObject(root, "format_version", number(h->version));
     cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
     cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
-    add_world(root, d, source);
+    add_world(root, d, source->root);
     cJSON_AddItemToObject(root, "value_min", number(h->value_min));
     cJSON_AddItemToObject(root, "value_max", number(h->value_max));
     cJSON_AddItemToObject(root, "code_lo", number(h->code_lo));
@@ -186,14 +187,17 @@ static cJSON *to_json(const trip_dataset *d, bool verified)
     if (verified)
         cJSON_AddTrueToObject(root, "verified");
     add_lists(root, d);
-    cJSON_AddItemToObject(root, "source", source ? source : cJSON_CreateString(d->text));
+    if (source->root)
+        cJSON_AddItemReferenceToObject(root, "source", source->root);
+    else
+        cJSON_AddStringToObject(root, "source", d->text);
     return root;
 }
 
-static int print_json(const trip_dataset *d, bool verified)
+static int print_json(const trip_dataset *d, const trip_json *source, bool verified)
 {
-    cJSON *root = to_json(d, verified);
-    char *text = cJSON_Print(root);
+    cJSON *root = to_json(d, source, verified);
+    char *text = trip_json_print(root, true);
     cJSON_Delete(root);
     if (!text)
         return trip_fail(TRIP_ERROR, "info", d->path, "out of memory");
@@ -256,23 +260,30 @@ static void print_anatomy(const trip_dataset *d, const char *space)
 static void print_notes(const cJSON *root)
 {
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
-        if (cJSON_IsString(item) && strlen(item->valuestring) < 200 &&
-            !strchr(item->valuestring, '\n') && strcmp(item->string, "space") != 0)
-            printf("%-12s %s\n", item->string, item->valuestring);
+        if (cJSON_IsString(item) && strlen(item->valuestring) < 200 && strlen(item->string) < 200 &&
+            !strchr(item->valuestring, '\n') && strcmp(item->string, "space") != 0) {
+            trip_text_write(stdout, item->string);
+            for (size_t i = strlen(item->string); i < 12; i++)
+                putchar(' ');
+            putchar(' ');
+            trip_text_write(stdout, item->valuestring);
+            putchar('\n');
+        }
 }
 
-static void print_text(const trip_dataset *d)
+static void print_text(const trip_dataset *d, const trip_json *source)
 {
     const trip_file_header *h = &d->header;
-    cJSON *notes = cJSON_Parse(d->text);
     char bytes[32], index[32];
     double kept = h->kept ? (double)h->kept : 1, voxels = h->voxels ? (double)h->voxels : 1;
-    printf("%-12s %s (format version %u)\n", "data set", d->path, h->version);
+    printf("%-12s ", "data set");
+    trip_text_write(stdout, d->path);
+    printf(" (format version %u)\n", h->version);
     printf("%-12s %llu x %llu x %llu\n", "grid", (unsigned long long)h->dims[0],
            (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
     print_world(d);
-    if (space_of(notes))
-        print_anatomy(d, space_of(notes));
+    if (space_of(source->root))
+        print_anatomy(d, space_of(source->root));
     print_range("values", h->value_min, h->value_max);
     print_range("stored as", h->code_lo, h->code_hi);
     printf("%-12s %llu\n", "voxels", (unsigned long long)h->voxels);
@@ -287,22 +298,25 @@ static void print_text(const trip_dataset *d)
            1u << h->tile_log2, 1u << h->tile_log2, h->slab_sheets,
            (unsigned long long)d->lists[0].brick_count, (unsigned long long)d->lists[1].brick_count,
            (unsigned long long)d->lists[2].brick_count);
-    print_notes(notes);
-    cJSON_Delete(notes);
+    print_notes(source->root);
 }
 
 static int show(const options *o, trip_budget *budget)
 {
     trip_dataset *d;
+    trip_json source = { 0 };
     int status = trip_dataset_open(&d, o->path, budget);
     if (status == TRIP_OK && o->verify)
         status = trip_dataset_verify(d, budget);
+    if (status == TRIP_OK)
+        status = trip_json_parse(&source, d->text, d->path, budget);
     if (status == TRIP_OK && o->json)
-        status = print_json(d, o->verify);
+        status = print_json(d, &source, o->verify);
     else if (status == TRIP_OK)
-        print_text(d);
+        print_text(d, &source);
     if (status == TRIP_OK && o->verify && !o->json)
         printf("%-12s every page and record is as it was written\n", "verified");
+    trip_json_free(&source);
     trip_dataset_close(d);
     return status;
 }

@@ -9,7 +9,9 @@
 
 #include <cjson/cJSON.h>
 
+#include "json.h"
 #include "report.h"
+#include "text.h"
 
 struct render_stats {
     cJSON *root, *frames;
@@ -169,7 +171,7 @@ int render_stats_write(render_stats *s, const render_options *o)
 {
     cJSON_AddItemToObject(s->root, "frames", s->frames);
     s->frames = NULL;
-    char *text = cJSON_Print(s->root);
+    char *text = trip_json_print(s->root, true);
     if (!text)
         return out_of_memory();
     int status = 0;
@@ -223,6 +225,7 @@ void render_stats_summary(const char *path, const render_options *o, const trip_
         splats += frame->lists[axis].splats_read;
         bytes += frame->lists[axis].bytes_read;
     }
-    fprintf(out, "%s: %d x %d, %.2f million splats, %s read, %.2f s\n", path, o->width, o->height,
+    trip_text_write(out, path);
+    fprintf(out, ": %d x %d, %.2f million splats, %s read, %.2f s\n", o->width, o->height,
             (double)splats * 1e-6, trip_format_bytes(bytes, text), frame->ms * 1e-3);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "json.h"
 #include "report.h"
 #include "text.h"
 
@@ -122,7 +123,7 @@ char *trip_brick_text_make(const trip_brick_text *t)
     add_functions(root, t);
     int status = add_default_function(root, t);
     add_histogram(root, t->histogram);
-    char *text = status == 0 ? cJSON_PrintUnformatted(root) : NULL;
+    char *text = status == 0 ? trip_json_print(root, false) : NULL;
     cJSON_Delete(root);
     if (status == 0 && !text)
         trip_fail(TRIP_ERROR, "brick", t->params->output, "out of memory");

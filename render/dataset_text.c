@@ -6,13 +6,67 @@
 #include <cjson/cJSON.h>
 
 #include "anatomy.h"
+#include "json.h"
 #include "report.h"
 #include "settings.h"
 
+enum { MOST_BINS = 65536 };
+
+typedef struct interval {
+    double lo, hi; /* closed */
+} interval;
+
 struct trip_dataset_text {
-    cJSON *root;
-    const char *path; /* of the data set, for messages */
+    trip_json json;
+    const cJSON *root;
+    const char *path;   /* of the data set, for messages */
+    interval *envelope; /* ascending, apart from one another; NULL where the text tells of none */
+    size_t envelope_count;
 };
+
+static double number_of(const cJSON *item)
+{
+    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+static int by_lower_end(const void *a, const void *b)
+{
+    const interval *p = a, *q = b;
+    return (p->lo > q->lo) - (p->lo < q->lo);
+}
+
+/* Sorted, those that touch put together: one that holds a value is then found by bisection. */
+static size_t join(interval *ranges, size_t count)
+{
+    size_t joined = 0;
+    qsort(ranges, count, sizeof *ranges, by_lower_end);
+    for (size_t i = 0; i < count; i++) {
+        if (joined && ranges[i].lo <= ranges[joined - 1].hi)
+            ranges[joined - 1].hi = fmax(ranges[joined - 1].hi, ranges[i].hi);
+        else
+            ranges[joined++] = ranges[i];
+    }
+    return joined;
+}
+
+static int read_envelope(trip_dataset_text *t)
+{
+    const cJSON *list = cJSON_GetObjectItemCaseSensitive(t->root, "envelope"), *item;
+    if (!cJSON_IsArray(list))
+        return 0;
+    t->envelope = calloc((size_t)cJSON_GetArraySize(list) + 1, sizeof *t->envelope);
+    if (!t->envelope)
+        return trip_fail(TRIP_ERROR, "read", t->path, "out of memory");
+    cJSON_ArrayForEach(item, list)
+    {
+        interval range = { number_of(cJSON_GetArrayItem(item, 0)),
+                           number_of(cJSON_GetArrayItem(item, 1)) };
+        if (range.lo <= range.hi) /* both are numbers */
+            t->envelope[t->envelope_count++] = range;
+    }
+    t->envelope_count = join(t->envelope, t->envelope_count);
+    return 0;
+}
 
 int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d)
 {
@@ -21,31 +75,31 @@ int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d)
     if (!t)
         return trip_fail(TRIP_ERROR, "read", d->path, "out of memory");
     t->path = d->path;
-    t->root = cJSON_Parse(d->text);
-    if (!cJSON_IsObject(t->root)) {
+    int status = trip_json_parse(&t->json, d->text, d->path, d->budget);
+    t->root = t->json.root;
+    if (status == 0 && !cJSON_IsObject(t->root))
+        status = trip_fail(TRIP_ERROR, "read", d->path, "its text is not a JSON object");
+    if (status == 0)
+        status = read_envelope(t);
+    if (status < 0)
         trip_dataset_text_destroy(t);
-        return trip_fail(TRIP_ERROR, "read", d->path, "its text is not a JSON object");
-    }
-    *out = t;
-    return 0;
+    else
+        *out = t;
+    return status;
 }
 
 void trip_dataset_text_destroy(trip_dataset_text *t)
 {
     if (!t)
         return;
-    cJSON_Delete(t->root);
+    trip_json_free(&t->json);
+    free(t->envelope);
     free(t);
 }
 
 static const char *string_at(const trip_dataset_text *t, const char *key)
 {
     return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(t->root, key));
-}
-
-static double number_of(const cJSON *item)
-{
-    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
 }
 
 int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out)
@@ -61,42 +115,42 @@ int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip
 }
 
 /* Whether the envelope keeps all of [lo, hi]. */
-static bool envelope_holds(const cJSON *envelope, double lo, double hi)
+static bool envelope_holds(const trip_dataset_text *t, double lo, double hi)
 {
-    const cJSON *range;
-    cJSON_ArrayForEach(range, envelope)
-    {
-        if (number_of(cJSON_GetArrayItem(range, 0)) <= lo &&
-            number_of(cJSON_GetArrayItem(range, 1)) >= hi)
-            return true;
+    size_t begin = 0, end = t->envelope_count; /* the last one that starts at `lo` or before */
+    while (begin < end) {
+        size_t middle = begin + (end - begin) / 2;
+        if (t->envelope[middle].lo <= lo)
+            begin = middle + 1;
+        else
+            end = middle;
     }
-    return false;
+    return begin > 0 && t->envelope[begin - 1].hi >= hi;
 }
 
 /* Share of [lo, hi] that the function shows and the envelope leaves out, by samples. */
-static double culled_share(const cJSON *envelope, const trip_tf *tf, double lo, double hi)
+static double culled_share(const trip_dataset_text *t, const trip_tf *tf, double lo, double hi)
 {
     enum { SAMPLES = 16 };
     int culled = 0;
-    if (!trip_tf_visible_in(tf, lo, hi) || envelope_holds(envelope, lo, hi))
+    if (!trip_tf_visible_in(tf, lo, hi) || envelope_holds(t, lo, hi))
         return 0;
     for (int i = 0; i < SAMPLES; i++) {
         double value = lo + (hi - lo) * (i + 0.5) / SAMPLES;
-        culled +=
-            trip_tf_evaluate(tf, value).opacity > 0 && !envelope_holds(envelope, value, value);
+        culled += trip_tf_evaluate(tf, value).opacity > 0 && !envelope_holds(t, value, value);
     }
     return (double)culled / SAMPLES;
 }
 
 double trip_dataset_text_culled(const trip_dataset_text *t, const trip_tf *tf, double range[2])
 {
-    const cJSON *envelope = cJSON_GetObjectItemCaseSensitive(t->root, "envelope");
     const cJSON *histogram = cJSON_GetObjectItemCaseSensitive(t->root, "histogram");
     const cJSON *counts = cJSON_GetObjectItemCaseSensitive(histogram, "counts");
     double first = number_of(cJSON_GetObjectItemCaseSensitive(histogram, "value_min"));
     double last = number_of(cJSON_GetObjectItemCaseSensitive(histogram, "value_max"));
     double voxels = 0, lo = first;
-    if (!cJSON_IsArray(envelope) || !cJSON_IsArray(counts) || !(first <= last))
+    if (!t->envelope || !cJSON_IsArray(counts) || cJSON_GetArraySize(counts) > MOST_BINS ||
+        !(first <= last))
         return 0;
     double width = (last - first) / cJSON_GetArraySize(counts);
     const cJSON *count;
@@ -104,7 +158,7 @@ double trip_dataset_text_culled(const trip_dataset_text *t, const trip_tf *tf, d
     range[1] = -INFINITY;
     cJSON_ArrayForEach(count, counts)
     {
-        double share = count->valuedouble > 0 ? culled_share(envelope, tf, lo, lo + width) : 0;
+        double share = count->valuedouble > 0 ? culled_share(t, tf, lo, lo + width) : 0;
         if (share > 0) {
             voxels += share * count->valuedouble;
             range[0] = fmin(range[0], lo);

@@ -7,9 +7,9 @@
  *   "up", "front"        "+x" ... "-z": the world direction that is up, whatever else is said, and
  *                        that the object faces
  *   "transfer_function"  a function as `.tf` text, in data units: drawn when none is given
- *   "envelope"           [[lo, hi], ...]: the values that were kept, closed intervals, ascending
+ *   "envelope"           [[lo, hi], ...]: the values that were kept, closed intervals
  *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: of all finite values,
- *                        kept or not, in equal bins over [a, b] */
+ *                        kept or not, in at most 65536 equal bins over [a, b] */
 #ifndef TRIP_DATASET_TEXT_H
 #define TRIP_DATASET_TEXT_H
 
@@ -19,7 +19,8 @@
 
 typedef struct trip_dataset_text trip_dataset_text;
 
-/* Fails when the text is not a JSON object. */
+/* Fails when the text is not a JSON object, or takes more memory than the data set's budget has.
+ * The time that this and what follows take is in proportion to the length of the text. */
 int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d);
 void trip_dataset_text_destroy(trip_dataset_text *t);
 

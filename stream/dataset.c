@@ -122,8 +122,13 @@ static int set_lists(trip_dataset *d)
                 l->page_checksums[plane] = table(d, f->page_checksums_offset[plane]);
     }
     memcpy(d->index_to_world.m, d->header.index_to_world, sizeof d->index_to_world.m);
-    d->text = strndup(table(d, d->header.text_offset), d->header.text_bytes);
-    return d->text ? TRIP_OK : trip_fail(TRIP_ERROR, "open", d->path, "out of memory");
+    d->text = trip_budget_take(d->budget, d->header.text_bytes + 1); /* zeroed */
+    if (!d->text)
+        return trip_fail(TRIP_ERROR, "open", d->path,
+                         "no memory for its text of %llu bytes: give more with --memory",
+                         (unsigned long long)d->header.text_bytes);
+    memcpy(d->text, table(d, d->header.text_offset), d->header.text_bytes);
+    return TRIP_OK;
 }
 
 static int open_plane(trip_dataset *d, int folder, int axis, int plane)
@@ -222,7 +227,8 @@ void trip_dataset_close(trip_dataset *d)
             if (d->plane_fd[axis][plane] >= 0)
                 close(d->plane_fd[axis][plane]);
     trip_budget_release(d->budget, d->memory, d->memory_bytes);
-    free(d->text);
+    if (d->text)
+        trip_budget_release(d->budget, d->text, d->header.text_bytes + 1);
     free(d->path);
     free(d);
 }
