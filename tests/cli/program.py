@@ -188,7 +188,8 @@ def write_raw(path, volume):
     write(path, volume.tobytes())
 
 
-def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little"):
+def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little", geometry=None):
+    """`geometry` stands for the line of spacings."""
     data = volume.astype(volume.dtype.newbyteorder("<" if endian == "little" else ">")).tobytes()
     if encoding == "gzip":
         packer = zlib.compressobj(wbits=31)
@@ -196,7 +197,8 @@ def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little")
     z, y, x = volume.shape
     header = (
         f"NRRD0004\ntype: {NRRD_TYPES[volume.dtype.str[1:]]}\ndimension: 3\n"
-        f"sizes: {x} {y} {z}\nspacings: {spacing[0]} {spacing[1]} {spacing[2]}\n"
+        f"sizes: {x} {y} {z}\n"
+        f"{geometry or f'spacings: {spacing[0]} {spacing[1]} {spacing[2]}'}\n"
         f"endian: {endian}\nencoding: {encoding}\n\n"
     )
     write(path, header.encode() + data)
@@ -287,15 +289,46 @@ def write_stack(folder, volume, write_image, extension):
 
 def dicom_element(group, element, kind, value):
     value += b"" if len(value) % 2 == 0 else (b"\0" if kind == b"UI" else b" ")
-    if kind in (b"OW", b"OB"):
+    if kind in (b"OW", b"OB", b"SQ"):
         return struct.pack("<HH2sHI", group, element, kind, 0, len(value)) + value
     return struct.pack("<HH2sH", group, element, kind, len(value)) + value
 
 
-def write_dicom(path, image, z, spacing=(1, 1, 1)):
-    """Explicit VR little endian, 16 bits."""
-    e, rows, columns = dicom_element, *image.shape
+def dicom_numbers(group, element, numbers):
+    """Texts of at most 16 characters, as the standard wants them."""
+    text = "\\".join(f"{round(float(v), 9) + 0.0:.10g}" for v in numbers)
+    return dicom_element(group, element, b"DS", text.encode())
+
+
+def dicom_sequence(group, element, items):
+    data = b"".join(struct.pack("<HHI", 0xFFFE, 0xE000, len(item)) + item for item in items)
+    return dicom_element(group, element, b"SQ", data)
+
+
+def dicom_geometry(group, place, rows, spacing):
+    """The elements of one group of those that say where a slice lies: 0x20 or 0x28."""
+    if group == 0x20:
+        return dicom_numbers(0x20, 0x0032, place) + dicom_numbers(0x20, 0x0037, rows)
+    return dicom_numbers(0x28, 0x0030, spacing[1::-1])
+
+
+def write_dicom(path, image, z, spacing=(1, 1, 1), place=None, rows=(1, 0, 0, 0, 1, 0), frames=()):
+    """Explicit VR little endian, 16 bits. `place` is that of the first pixel, `rows` the directions
+    of rows and columns. `frames` holds the places of the slices of `image`, of three axes then: a
+    file of several frames that keeps its geometry in sequences."""
+    e, columns = dicom_element, image.shape[-1]
     us = lambda value: struct.pack("<H", value)
+    place = (0, 0, z * spacing[2]) if place is None else place
+    sequences = frames_count = b""
+    if len(frames):
+        shared = dicom_sequence(
+            0x28, 0x9110, [dicom_geometry(0x28, place, rows, spacing)]
+        )
+        shared = dicom_sequence(0x20, 0x9116, [dicom_numbers(0x20, 0x37, rows)]) + shared
+        places = [dicom_sequence(0x20, 0x9113, [dicom_numbers(0x20, 0x32, p)]) for p in frames]
+        sequences = dicom_sequence(0x5200, 0x9229, [shared])
+        sequences += dicom_sequence(0x5200, 0x9230, places)
+        frames_count = e(0x28, 0x0008, b"IS", str(len(frames)).encode())
     meta = (
         e(2, 0x0001, b"OB", b"\0\1")
         + e(2, 0x0002, b"UI", b"1.2.840.10008.5.1.4.1.1.2")
@@ -308,17 +341,18 @@ def write_dicom(path, image, z, spacing=(1, 1, 1)):
         + e(8, 0x0018, b"UI", f"1.2.3.{z + 1}".encode())
         + e(0x20, 0x000E, b"UI", b"1.2.3.4")
         + e(0x20, 0x0013, b"IS", str(z + 1).encode())
-        + e(0x20, 0x0032, b"DS", f"0\\0\\{z * spacing[2]}".encode())
-        + e(0x20, 0x0037, b"DS", b"1\\0\\0\\0\\1\\0")
+        + (b"" if sequences else dicom_geometry(0x20, place, rows, spacing))
         + e(0x28, 0x0002, b"US", us(1))
         + e(0x28, 0x0004, b"CS", b"MONOCHROME2")
-        + e(0x28, 0x0010, b"US", us(rows))
+        + frames_count
+        + e(0x28, 0x0010, b"US", us(image.shape[-2]))
         + e(0x28, 0x0011, b"US", us(columns))
-        + e(0x28, 0x0030, b"DS", f"{spacing[1]}\\{spacing[0]}".encode())
+        + (b"" if sequences else dicom_geometry(0x28, place, rows, spacing))
         + e(0x28, 0x0100, b"US", us(16))
         + e(0x28, 0x0101, b"US", us(16))
         + e(0x28, 0x0102, b"US", us(15))
         + e(0x28, 0x0103, b"US", us(0))
+        + sequences
         + e(0x7FE0, 0x0010, b"OW", image.astype("<u2").tobytes())
     )
     write(path, bytes(128) + b"DICM" + e(2, 0, b"UL", struct.pack("<I", len(meta))) + meta + data)

@@ -1,0 +1,288 @@
+"""One phantom, acquired in several ways and stored in several formats, gives the same picture, and
+left, right, front and head are where a reader of pictures of patients expects them.
+
+The phantom is a function of the place in the patient, in millimetres to the left, the back and the
+head: a body, a nose in front, and markers at its left and at its head. It has no symmetry.
+"""
+import os
+
+import numpy
+
+import program
+
+NOSE, LEFT, HEAD = (0, -24, 6), (24, 0, -10), (-6, 4, 34)
+SIZES = {NOSE: 6, LEFT: 7, HEAD: 5}
+TO_RAS, TO_LAS = numpy.diag([-1.0, -1, 1, 1]), numpy.diag([1.0, -1, 1, 1])
+SHOWS_MARKERS = b"values data\n119 1 1 1 0\n120 1 1 1 0.5\n200 1 1 1 0.9\n"
+SHOWS_ALL = b"values data\n20 0.9 0.6 0.4 0\n60 0.9 0.6 0.4 0.3\n100 0.9 0.6 0.4 0.3\n200 1 1 1 0.9\n"
+
+
+def phantom(p):
+    """80 in the body, 200 in the markers, with soft edges."""
+
+    def inside(distance, value):
+        return value * numpy.clip(0.5 - distance / 4, 0, 1)
+
+    axes = numpy.array([22.0, 18, 28])
+    stretched = numpy.linalg.norm(p / axes, axis=-1)
+    value = inside((stretched - 1) * 22, 80)
+    for centre, radius in SIZES.items():
+        value = numpy.maximum(value, inside(numpy.linalg.norm(p - centre, axis=-1) - radius, 200))
+    return numpy.rint(value).astype("u2")
+
+
+def turned(degrees, axis):
+    """The turn about an axis, by Rodrigues' formula."""
+    a, (x, y, z) = numpy.radians(degrees), axis / numpy.linalg.norm(axis)
+    k = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return numpy.eye(3) + numpy.sin(a) * k + (1 - numpy.cos(a)) * k @ k
+
+
+def acquisition(i, j, k, half=44, middle=(3, -5, 7), place=(0, 0, 0)):
+    """The affine from (i, j, k) to the patient, by steps from voxel to voxel, and the values: a box
+    of 2 * half across about `middle` of the phantom, which is moved to `place`."""
+    steps = numpy.array([i, j, k], float).T
+    sizes = [2 * int(half / n) + 1 for n in numpy.linalg.norm(steps, axis=0)]
+    affine = numpy.eye(4)
+    affine[:3, :3] = steps
+    corner = middle - steps @ ((numpy.array(sizes) - 1) / 2)
+    index = numpy.stack(numpy.meshgrid(*map(numpy.arange, sizes), indexing="ij"), axis=-1)
+    values = phantom(index @ steps.T + corner).transpose(2, 1, 0)
+    affine[:3, 3] = corner + place
+    return affine, numpy.ascontiguousarray(values)
+
+
+OBLIQUE = 2 * turned(25, (1, 0.3, 0)) @ turned(15, (0, 0, 1))
+TILT = numpy.radians(20)
+# Steps along i, j and k, and the ends of the body that these point to, by hand.
+ACQUISITIONS = {
+    "axial": ((2, 0, 0), (0, 2, 0), (0, 0, 2), ["L", "P", "S"]),
+    "coronal": ((2, 0, 0), (0, 0, -2), (0, 2, 0), ["L", "I", "P"]),
+    "sagittal": ((0, 2, 0), (0, 0, -2), (-2, 0, 0), ["P", "I", "R"]),
+    "oblique": (*OBLIQUE.T, ["LPI", "PSR", "SAL"]),
+    "gantry tilt": (
+        (2, 0, 0),
+        (0, 2 * numpy.cos(TILT), 2 * numpy.sin(TILT)),
+        (0, 0, 2),
+        ["L", "PS", "S"],
+    ),
+    "mirrored": ((-2, 0, 0), (0, 2, 0), (0, 0, 2), ["R", "P", "S"]),  # no scanner makes these
+}
+
+
+def nrrd_geometry(space, affine):
+    vector = lambda v: "(" + ",".join(repr(float(x)) for x in v) + ")"
+    directions = " ".join(vector(affine[:3, a]) for a in range(3))
+    return f"space: {space}\nspace directions: {directions}\nspace origin: {vector(affine[:3, 3])}"
+
+
+def write_series(folder, affine, values):
+    """A file a slice, whose names say nothing about their order."""
+    os.makedirs(folder, exist_ok=True)
+    spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
+    rows = (affine[:3, :2] / spacing[:2]).T.ravel()
+    for k, image in enumerate(values):
+        place = affine[:3, 3] + k * affine[:3, 2]
+        name = os.path.join(folder, f"{k * 7 % len(values):03d}.dcm")
+        program.write_dicom(name, image, k, spacing, place, rows)
+
+
+def write_frames(path, affine, values):
+    """All slices in one file, in a wild order."""
+    spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
+    rows = (affine[:3, :2] / spacing[:2]).T.ravel()
+    order = [k * 7 % len(values) for k in range(len(values))]
+    places = [affine[:3, 3] + k * affine[:3, 2] for k in order]
+    program.write_dicom(path, values[order], 0, spacing, places[0], rows, places)
+
+
+class Camera:
+    """A view of the patient from the front, from the left and from above, computed here; the
+    options for it in a world whose axes in the patient are the rows of `to_patient`."""
+
+    SIZE, FOV = 128, 30
+    EYE, LOOK, UP = (75, -180, 70), (0, 0, 4), (0, 0, 1)
+
+    def __init__(self):
+        self.scale = 0.5 * self.SIZE / numpy.tan(numpy.radians(self.FOV / 2))
+        self.forward = numpy.subtract(self.LOOK, self.EYE)
+        self.forward = self.forward / numpy.linalg.norm(self.forward)
+        self.right = numpy.cross(self.forward, self.UP)
+        self.right /= numpy.linalg.norm(self.right)
+        self.up = numpy.cross(self.right, self.forward)
+
+    def project(self, p):
+        """Pixel position, x to the right and y down."""
+        way = numpy.subtract(p, self.EYE)
+        depth = way @ self.forward
+        x, y = way @ self.right / depth, way @ self.up / depth
+        return numpy.array([self.SIZE / 2 + self.scale * x, self.SIZE / 2 - self.scale * y])
+
+    def options(self, to_patient):
+        point = lambda p: ",".join(repr(float(v)) for v in to_patient.T @ numpy.array(p))
+        size = f"{self.SIZE}x{self.SIZE}"
+        return ["--size", size, "--fov", self.FOV, "--up", point(self.UP)] + [
+            f"--{name}={point(p)}" for name, p in (("eye", self.EYE), ("look", self.LOOK))
+        ]
+
+
+def blobs(alpha):
+    """Middles (x, y) of what is seen in one piece, from left to right."""
+    left = {(int(y), int(x)) for y, x in zip(*numpy.nonzero(alpha > 0.3))}
+    middles = []
+    while left:
+        edge, piece = [left.pop()], []
+        while edge:
+            y, x = edge.pop()
+            piece.append((x, y))
+            near = {(y + a, x + b) for a in (-1, 0, 1) for b in (-1, 0, 1)} & left
+            left -= near
+            edge += near
+        middles.append(tuple(numpy.mean(piece, axis=0)))
+    return sorted(middles)
+
+
+class Orientation(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write("all.tf", SHOWS_ALL)
+        program.write("markers.tf", SHOWS_MARKERS)
+
+    def brick(self, source, *options):
+        """What info says of it."""
+        self.works("brick", source, "-o", "a.trip", "-q", "--force", "--tf", "all.tf", *options)
+        return self.info("a.trip")
+
+    def alike(self, picture, other, about, most, mean):
+        difference = abs(picture - other)
+        self.assertLess(difference.max(), most, about)
+        self.assertLess(difference.mean(), mean, about)
+
+    def check_default_view(self, about):
+        """As a reader of such pictures expects: the patient's left on the right and lowest, the
+        head at the top, the nose on the left, since the view is a little from the patient's left."""
+        picture = self.picture("a.trip", "--size=96x96", "--tf=markers.tf", "--no-shading")
+        seen = blobs(picture[..., 3])
+        self.assertEqual(len(seen), 3, about)
+        nose, head, left = seen
+        self.assertLess(nose[0] + 4, head[0], about)
+        self.assertLess(head[0] + 10, left[0], about)
+        self.assertLess(head[1] + 15, nose[1], about)
+        self.assertLess(nose[1] + 4, left[1], about)
+
+    def check_markers(self, camera, to_patient, about):
+        """Each is where it is projected, and nothing shows elsewhere."""
+        options = "a.trip", "--tf", "markers.tf", "--no-shading", *camera.options(to_patient)
+        alpha = self.picture(*options)[..., 3].astype(float)
+        rows, columns = numpy.indices(alpha.shape)
+        for marker in SIZES:
+            x, y = camera.project(marker)
+            near = numpy.hypot(columns + 0.5 - x, rows + 0.5 - y) < 15
+            weight = alpha * near
+            self.assertGreater(weight.sum(), 20, about)
+            middle = [((a + 0.5) * weight).sum() / weight.sum() for a in (columns, rows)]
+            self.assertLess(numpy.hypot(*(middle - numpy.array([x, y]))), 1, (about, marker))
+            alpha[near] = 0
+        self.assertLess(alpha.max(), 0.02, about)
+
+    def sources(self, affine, values, scanner):
+        """What the world is called, its axes in the patient, and the file."""
+        lps, ras = numpy.eye(3), TO_RAS[:3, :3]
+        for space, change in (
+            ("left-posterior-superior", numpy.eye(4)),
+            ("RAS", TO_RAS),
+            ("left-anterior-superior", TO_LAS),
+        ):
+            geometry = nrrd_geometry(space, change @ affine)
+            program.write_nrrd("a.nrrd", values, geometry=geometry)
+            is_lps = space.startswith("left-post")
+            yield "LPS" if is_lps else "RAS", lps if is_lps else ras, "a.nrrd"
+        program.write_nifti("a.nii", values, TO_RAS @ affine)
+        yield "RAS", ras, "a.nii"
+        if scanner:
+            write_series(f"{scanner}", affine, values)
+            yield "LPS", lps, scanner
+        if scanner == "gantry-tilt":
+            write_frames("frames.dcm", affine, values)
+            yield "LPS", lps, "frames.dcm"
+
+    def check_acquisition(self, name, scanner, first):
+        """Every format of it, and against the picture `first` of another; returns its own."""
+        affine, values = acquisition(*ACQUISITIONS[name][:3])
+        camera, own = Camera(), None
+        for space, to_patient, source in self.sources(affine, values, scanner):
+            about = f"{name}, {source}, {space}"
+            info = self.brick(source)
+            self.assertEqual((info["space"], info["axes"]), (space, ACQUISITIONS[name][3]), about)
+            picture = self.picture("a.trip", *camera.options(to_patient))
+            if own is None:
+                own = picture
+                self.check_markers(camera, to_patient, about)
+            self.check_default_view(about)
+            # The same grid: nothing but gradients along other axes, which are rounded.
+            self.alike(picture, own, about, most=0.005, mean=1e-4)
+            # Another grid: sampled at other places, so that edges differ a little.
+            self.alike(picture, own if first is None else first, about, most=0.5, mean=0.005)
+        return own
+
+    def test_every_acquisition_and_format_gives_the_same_picture(self):
+        first = None
+        for name in ACQUISITIONS:
+            scanner = None if name == "mirrored" else name.replace(" ", "-")
+            own = self.check_acquisition(name, scanner, first)
+            first = own if first is None else first
+
+    def test_every_renderer_draws_what_is_mirrored_or_sheared(self):
+        for name in "mirrored", "gantry tilt":
+            affine, values = acquisition(*ACQUISITIONS[name][:3])
+            program.write_nifti("a.nii", values, TO_RAS @ affine)
+            self.brick("a.nii")
+            options = Camera().options(TO_RAS[:3, :3])
+            expected = self.picture("a.trip", "--renderer=reference", *options)
+            for renderer in "cpu", "gl":
+                drawn = self.picture("a.trip", f"--renderer={renderer}", *options)
+                self.alike(drawn, expected, (name, renderer), most=1 / 255, mean=0.05 / 255)
+
+    def test_thick_slices_at_the_origin_are_not_taken_for_a_scan_without_orientation(self):
+        """The map is diagonal then, as it is where a file says nothing."""
+        steps = (2, 0, 0), (0, 2, 0), (0, 0, 5)
+        corner, _ = acquisition(*steps)
+        affine, values = acquisition(*steps, place=-corner[:3, 3])
+        self.assertTrue(numpy.array_equal(affine, numpy.diag([2, 2, 5, 1])))
+        for _, _, source in self.sources(affine, values, "thick"):
+            self.brick(source)
+            self.check_default_view(source)
+
+    def test_info_says_in_words_where_the_axes_point(self):
+        affine, values = acquisition(*ACQUISITIONS["gantry tilt"][:3])
+        program.write_nrrd("a.nrrd", values, geometry=nrrd_geometry("LPS", affine))
+        self.brick("a.nrrd")
+        words = self.works("info", "a.trip").stdout.decode()
+        self.assertIn("space        LPS: x to left, y to posterior, z to superior\n", words)
+        self.assertIn("i points to  left\n", words)
+        self.assertIn("j points to  posterior, 20 degrees to superior\n", words)
+        self.assertIn("k points to  superior\n", words)
+
+    def test_info_gives_the_bounds_of_the_grid_and_of_what_is_kept(self):
+        values = numpy.zeros((6, 7, 8), "u1")
+        values[2:5, 1:3, 4:8] = 9
+        affine = numpy.array([[0, -2.0, 0, 10], [3, 0, 0, 20], [0, 0, 0.5, -30], [0, 0, 0, 1]])
+        program.write_nifti("a.nii", values, affine)
+        self.brick("a.nii", "--range=5:10")
+        info = self.info("a.trip")
+        # i is y by 3, j is -x by 2, k is z by a half; half a voxel on each side.
+        self.assertEqual(info["bounds"], [[-3, 18.5, -30.25], [11, 42.5, -27.25]])
+        self.assertEqual(info["kept_bounds"], [[5, 30.5, -29.25], [9, 42.5, -27.75]])
+
+    def test_a_file_that_names_no_patient_has_no_convention(self):
+        values = program.noise((8, 9, 10))
+        for geometry in "spacings: 1 1 1", "space: 3D-right-handed\nspacings: 1 1 1":
+            program.write_nrrd("plain.nrrd", values, geometry=geometry)
+            self.works("brick", "plain.nrrd", "-o", "a.trip", "-q", "--force")
+            self.assertNotIn("space", self.info("a.trip"))
+            self.assertNotIn("axes", self.info("a.trip"))
+
+
+if __name__ == "__main__":
+    program.main()
