@@ -1,5 +1,5 @@
 #!/bin/sh
-# Sets up, builds, bricks an included data set, draws it, and says where the picture is.
+# Sets up, builds, draws an included volume, and says where the picture is.
 set -eu
 cd "$(dirname "$0")"
 
@@ -12,6 +12,5 @@ cmake --preset release -DBUILD_TESTING=OFF >build.log 2>&1 && cmake --build --pr
 
 triptych=build/release/triptych
 mkdir -p demo
-$triptych brick datasets/tooth.nhdr -o demo/tooth.trip --force
-$triptych render demo/tooth.trip -o demo/tooth.png --size 1024x1024
+$triptych render datasets/tooth.nhdr -o demo/tooth.png
 echo "The picture: $(pwd)/demo/tooth.png"

@@ -5,6 +5,7 @@
 
 int trip_command_bench(int argc, char **argv);  /* bench.c */
 int trip_command_brick(int argc, char **argv);  /* brick.c */
+int trip_command_cache(int argc, char **argv);  /* cache.c */
 int trip_command_info(int argc, char **argv);   /* info.c */
 int trip_command_render(int argc, char **argv); /* render.c */
 

@@ -13,7 +13,8 @@ static const struct command {
 } commands[] = {
     { "brick", "turn a volume into a data set that is drawn from disk", trip_command_brick },
     { "info", "show what is in a data set, and check it", trip_command_info },
-    { "render", "draw a data set into image files", trip_command_render },
+    { "render", "draw a volume or data set into image files", trip_command_render },
+    { "cache", "list or clear the data sets that render made of volumes", trip_command_cache },
     { "bench", "measure drawing and reading, as tables", trip_command_bench },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };

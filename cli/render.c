@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cached_volume.h"
 #include "cpu_renderer.h"
 #include "frame.h"
 #include "image_file.h"
@@ -17,6 +18,7 @@
 /* Everything that lives as long as the command. */
 typedef struct drawing {
     render_options o;
+    cached_volume volume; /* where the input is one */
     session session;
     float *rgba;
     trip_renderer *renderer;
@@ -26,10 +28,36 @@ typedef struct drawing {
     bool counting; /* the frames are drawn once more, and everything of them */
 } drawing;
 
+/* What the function shows is kept besides what is shown without one, so that nothing is missing. */
+static int brick_volume(drawing *d)
+{
+    enum { MOST_THREADS = 256 };
+    const render_options *o = &d->o;
+    const trip_brick_params wanted = {
+        .input = o->input,
+        .volume = o->volume,
+        .functions = &o->tf,
+        .function_count = o->tf ? 1 : 0,
+        .automatic = true,
+        .memory_bytes = o->memory_bytes,
+        .threads = (unsigned)(o->threads < MOST_THREADS ? o->threads : MOST_THREADS),
+    };
+    int status = cached_volume_open(&d->volume, &wanted);
+    if (status == 0 && d->volume.note[0])
+        trip_note(o->input, "%s", d->volume.note);
+    if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
+        printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
+    return status;
+}
+
 static int open_drawing(drawing *d)
 {
     const render_options *o = &d->o;
-    int status = session_open(&d->session, o->input, o->tf, o->memory_bytes);
+    bool volume = cached_volume_wanted(o->input);
+    int status = volume ? brick_volume(d) : 0;
+    if (!status)
+        status =
+            session_open(&d->session, volume ? d->volume.path : o->input, o->tf, o->memory_bytes);
     if (!status)
         status = session_take_image(&d->session, o->width, o->height, &d->rgba);
     if (!status)
@@ -49,6 +77,7 @@ static void close_drawing(drawing *d)
         d->renderer->ops->destroy(d->renderer);
     session_release_image(&d->session, d->o.width, d->o.height, d->rgba);
     session_close(&d->session);
+    cached_volume_close(&d->volume);
 }
 
 /* The reader is made when the first plan says which planes there are to read. */
@@ -190,6 +219,8 @@ int trip_command_render(int argc, char **argv)
         status = count_images(&d, images);
     if (!status && d.stats)
         status = render_stats_write(d.stats, &d.o);
+    if (status == TRIP_ERROR && d.volume.hold >= 0 && d.volume.path)
+        cached_volume_check(&d.volume, d.o.input);
     close_drawing(&d);
     return trip_exit_status(status);
 }

@@ -4,12 +4,17 @@
 #include <string.h>
 #include <strings.h>
 
+#include "cached_volume.h"
 #include "image_file.h"
 #include "options.h"
 #include "report.h"
+#include "volume_options.h"
 
 enum {
-    KEY_SIZE = 256,
+    KEY_GRID = 256,
+    KEY_LEVEL_SET,
+    KEY_SPACING,
+    KEY_SIZE,
     KEY_EYE,
     KEY_LOOK,
     KEY_UP,
@@ -38,6 +43,13 @@ enum {
 
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
+    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it settled):", 0 },
+    { "grid", KEY_GRID, "NAME", 0,
+      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 0 },
+    { "level-set", KEY_LEVEL_SET, "HOW", 0,
+      "What to make of an OpenVDB level set: filled or band (default: filled)", 0 },
+    { "spacing", KEY_SPACING, "X,Y,Z", 0,
+      "Distance of voxels along each axis (default: the file's, else 1)", 0 },
     { NULL, 0, NULL, 0, "View:", 1 },
     { "size", KEY_SIZE, "WxH", 0, "Pixels (default: 1024x1024)", 1 },
     { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
@@ -160,6 +172,20 @@ static int parse_submit(const char *text, parse *p)
     return 0;
 }
 
+static int parse_volume(int key, char *arg, trip_volume_params *v)
+{
+    switch (key) {
+    case KEY_GRID:
+        return trip_option_grid(arg, &v->grid);
+    case KEY_LEVEL_SET:
+        return trip_option_level_set(arg, &v->level_set);
+    case KEY_SPACING:
+        return trip_option_spacing(arg, v->spacing);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
 static int parse_view(int key, char *arg, render_options *o)
 {
     switch (key) {
@@ -270,9 +296,13 @@ static int check(parse *p)
 {
     render_options *o = p->o;
     if (!o->input)
-        return trip_option_fail("NAME.trip", "no data set given; `triptych render --help`");
+        return trip_option_fail("VOLUME", "none given: `triptych render VOLUME -o PICTURE.png`");
     if (!o->output)
-        return trip_option_fail("-o", "no image file given; `triptych render --help`");
+        return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
+    const trip_volume_params *v = &o->volume;
+    if ((v->grid || v->level_set || v->spacing[0] > 0) && !cached_volume_wanted(o->input))
+        return trip_option_fail(o->input,
+                                "is a data set: --grid, --level-set and --spacing are for volumes");
     if (o->ortho_height > 0 && o->fov_degrees > 0)
         return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
     if (p->h && o->settings.method != TRIP_METHOD_MERGE)
@@ -314,7 +344,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (p->o->input)
-            return trip_option_fail(arg, "one data set at a time");
+            return trip_option_fail(arg, "one volume at a time; -o names the picture");
         p->o->input = arg;
         return 0;
     case ARGP_KEY_END:
@@ -322,7 +352,9 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     default:
         break;
     }
-    int status = parse_view(key, arg, p->o);
+    int status = parse_volume(key, arg, &p->o->volume);
+    if (status == ARGP_ERR_UNKNOWN)
+        status = parse_view(key, arg, p->o);
     if (status == ARGP_ERR_UNKNOWN)
         status = parse_look(key, arg, p);
     if (status == ARGP_ERR_UNKNOWN)
@@ -335,9 +367,11 @@ int render_options_parse(render_options *o, int argc, char **argv)
     static const struct argp argp = {
         .options = options,
         .parser = parse_key,
-        .args_doc = "NAME.trip",
-        .doc = "Draws a data set made by `triptych brick` into an image file, reading it from disk "
-               "once.\vPoints and lengths are in the data's world units.",
+        .args_doc = "VOLUME|NAME.trip",
+        .doc = "Draws a volume, or a data set made of one by `triptych brick`, into an image file. "
+               "A volume is bricked into a cache first, which `triptych cache` lists and clears; "
+               "the next picture of it is drawn at once.\vPoints and lengths are in the data's "
+               "world units.",
     };
     *o = (render_options){ .width = 1024, .height = 1024, .settings = trip_settings_default() };
     parse p = { .o = o };

@@ -5,6 +5,7 @@
 #include "reader.h"
 #include "renderer_choice.h"
 #include "settings.h"
+#include "volume.h"
 
 /* What becomes of bricks behind what is already opaque; skipped where nothing is said. */
 typedef enum render_hidden {
@@ -14,9 +15,11 @@ typedef enum render_hidden {
 } render_hidden;
 
 typedef struct render_options {
-    const char *input, *output; /* the data set; an image file, its name's model in an orbit */
-    const char *tf;             /* file or preset; NULL: the function kept in the data set */
-    const char *stats;          /* file, "-" for stdout, or NULL */
+    const char *input,
+        *output;               /* data set or volume; an image file, its name's model in an orbit */
+    trip_volume_params volume; /* how a volume is read */
+    const char *tf;            /* file or preset; NULL: the function kept in the data set */
+    const char *stats;         /* file, "-" for stdout, or NULL */
     int width, height;
     bool eye_given, look_given, up_given;
     trip_vec3 eye, look, up;

@@ -21,6 +21,8 @@ typedef struct trip_brick_params {
     const trip_value_range *ranges;
     size_t range_count;
     bool keep_all; /* every finite voxel */
+    /* Besides the others also what trip_tf_from_histogram() shows, which is drawn by default. */
+    bool automatic;
 
     bool no_normals;
     bool replace; /* an existing data set */
@@ -29,6 +31,7 @@ typedef struct trip_brick_params {
     unsigned tile_voxels, slab_sheets;
     uint64_t memory_bytes; /* default: a quarter of what the process may use */
     unsigned threads;      /* default: one a processor */
+    uint64_t most_bytes;   /* of the cache that the output is for; 0: none. More is refused */
     int64_t slices;        /* read at a time; default: by memory */
 
     /* Hears how far a stage ("sample", "scan", "read", "merge") is, on the calling thread. */

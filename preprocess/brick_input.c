@@ -99,7 +99,7 @@ bool trip_brick_has_narrow_type(const trip_brick_input *in)
 
 static bool is_envelope_automatic(const trip_brick_params *p)
 {
-    return !p->keep_all && p->function_count == 0 && p->range_count == 0;
+    return p->automatic || (!p->keep_all && p->function_count == 0 && p->range_count == 0);
 }
 
 bool trip_brick_input_needs_scan(const trip_brick_input *in)

@@ -79,7 +79,9 @@ static int add_default_function(cJSON *root, const trip_brick_text *t)
 {
     trip_tf *made = NULL;
     int status = 0;
-    if (t->params->function_count == 0 && t->params->range_count > 0 && t->envelope->count > 0)
+    if (t->params->automatic)
+        status = trip_brick_automatic_tf(&made, t->info, t->histogram);
+    else if (t->params->function_count == 0 && t->params->range_count > 0 && t->envelope->count > 0)
         status = make_ramp(&made, t);
     else if (t->params->function_count == 0)
         status = trip_brick_automatic_tf(&made, t->info, t->histogram);

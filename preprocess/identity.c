@@ -15,12 +15,15 @@ enum { BRICKER_VERSION = 1 };
 /* A file is known by its name, length and time of change; of a pattern only the name is known. */
 static void write_input(FILE *f, const trip_brick_params *p)
 {
-    const trip_volume_params *v = &p->volume;
     struct stat st = { 0 };
     if (stat(p->input, &st) != 0)
         st.st_size = 0;
     fprintf(f, "%s %jd %jd %ld\n", p->input, (intmax_t)st.st_size, (intmax_t)st.st_mtim.tv_sec,
             st.st_mtim.tv_nsec);
+}
+
+static void write_volume_params(FILE *f, const trip_volume_params *v)
+{
     fprintf(f, "%s %d %s %d %" PRIu64 "\n", v->grid ? v->grid : "", (int)v->level_set,
             v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes);
     for (int a = 0; a < 3; a++)
@@ -29,8 +32,8 @@ static void write_input(FILE *f, const trip_brick_params *p)
 
 static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
 {
-    fprintf(f, "%d %d %d %d %u %u\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
-            p->no_normals, p->tile_voxels, p->slab_sheets);
+    fprintf(f, "%d %d %d %d %d %u %u\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
+            p->automatic, p->no_normals, p->tile_voxels, p->slab_sheets);
     for (size_t i = 0; i < p->range_count; i++)
         fprintf(f, "%a %a\n", p->ranges[i].lo, p->ranges[i].hi);
     for (size_t i = 0; i < p->function_count; i++) {
@@ -47,6 +50,7 @@ int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, u
     FILE *f = open_memstream(&text, &bytes);
     if (f) {
         write_input(f, p);
+        write_volume_params(f, &p->volume);
         write_params(f, p, functions);
     }
     if (!f || fclose(f) != 0) {
@@ -56,4 +60,35 @@ int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, u
     *out = XXH64(text, bytes, 0);
     free(text);
     return 0;
+}
+
+static int load_functions(const trip_brick_params *p, trip_tf **functions)
+{
+    int status = 0;
+    for (size_t i = 0; i < p->function_count && status == 0; i++)
+        status = trip_tf_load(&functions[i], p->functions[i]);
+    return status;
+}
+
+static int fail_memory(const trip_brick_params *p)
+{
+    return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
+}
+
+int trip_brick_options_text(const trip_brick_params *p, char **out)
+{
+    size_t bytes;
+    trip_tf **functions = calloc(p->function_count + 1, sizeof *functions);
+    int status = functions ? load_functions(p, functions) : fail_memory(p);
+    FILE *f = status == 0 ? open_memstream(out, &bytes) : NULL;
+    if (f) {
+        write_volume_params(f, &p->volume);
+        write_params(f, p, functions);
+    }
+    if (status == 0 && (!f || fclose(f) != 0))
+        status = fail_memory(p);
+    for (size_t i = 0; functions && i < p->function_count; i++)
+        trip_tf_destroy(functions[i]);
+    free(functions);
+    return status;
 }

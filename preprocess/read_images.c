@@ -3,9 +3,13 @@
  *
  * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. Without metadata
  * voxels are 1 apart; DICOM says how far, and where. */
+#include <dirent.h>
+#include <glob.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "anatomy.h"
 #include "image_helper.h"
@@ -160,9 +164,94 @@ static bool swap_images(const void *opaque)
     return false;
 }
 
+typedef int visit_file(void *user, const char *file);
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+/* Files of a folder but hidden ones; which of them are slices only their content says. */
+static int list_folder(const char *path, visit_file *visit, void *user)
+{
+    struct dirent **names;
+    int count = scandir(path, &names, NULL, NULL), status = 0;
+    char **files = count > 0 ? calloc((size_t)count, sizeof *files) : NULL;
+    if (count < 0 || !files)
+        return trip_fail_errno("read", path, "cannot list");
+    for (int i = 0; i < count; i++) {
+        if (asprintf(&files[i], "%s/%s", path, names[i]->d_name) < 0)
+            files[i] = NULL;
+        status = files[i] ? status : trip_fail(TRIP_ERROR, "read", path, "no memory to list");
+    }
+    if (status == 0)
+        qsort(files, (size_t)count, sizeof *files, by_name);
+    for (int i = 0; i < count && status == 0; i++) {
+        struct stat st;
+        if (strrchr(files[i], '/')[1] != '.' && stat(files[i], &st) == 0 && S_ISREG(st.st_mode))
+            status = visit(user, files[i]);
+    }
+    for (int i = 0; i < count; i++) {
+        free(files[i]);
+        free(names[i]);
+    }
+    free(files);
+    free(names);
+    return status;
+}
+
+/* "s%03d.tif" as the glob pattern "s*.tif", for free(); others as they are. */
+static char *glob_pattern(const char *path)
+{
+    const char *percent = strrchr(path, '%');
+    if (!percent || strchr(percent, '/'))
+        return strdup(path);
+    const char *after = percent + 1 + strspn(percent + 1, "0123456789");
+    size_t room = 2 * strlen(path) + 2, used = 0;
+    char *pattern = malloc(room);
+    for (const char *p = path; pattern && *p; p++) {
+        if (p == percent) {
+            pattern[used++] = '*';
+            p = *after ? after : after - 1;
+            continue;
+        }
+        if (strchr("*?[\\", *p))
+            pattern[used++] = '\\';
+        pattern[used++] = *p;
+    }
+    if (pattern)
+        pattern[used] = 0;
+    return pattern;
+}
+
+static int list_pattern(const char *path, visit_file *visit, void *user)
+{
+    glob_t found = { 0 };
+    char *pattern = glob_pattern(path);
+    int status = 0, failed = pattern ? glob(pattern, 0, NULL, &found) : GLOB_NOSPACE;
+    if (failed == GLOB_NOMATCH)
+        status = trip_fail(TRIP_ERROR, "read", path, "no file fits this pattern");
+    else if (failed)
+        status = trip_fail(TRIP_ERROR, "read", path, "cannot be searched for");
+    for (size_t i = 0; i < found.gl_pathc && status == 0; i++)
+        status = visit(user, found.gl_pathv[i]);
+    globfree(&found);
+    free(pattern);
+    return status;
+}
+
+static int list_images(const char *path, visit_file *visit, void *user)
+{
+    struct stat st;
+    if (stat(path, &st) != 0)
+        return list_pattern(path, visit, user);
+    return S_ISDIR(st.st_mode) ? list_folder(path, visit, user) : visit(user, path);
+}
+
 const trip_volume_reader trip_read_images = {
     .format = "images",
     .probe = probe,
+    .list = list_images,
     .open = open_images,
     .close = close_images,
     .rewind = rewind_images,

@@ -319,9 +319,23 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
     return status;
 }
 
+/* Of one file there is no partner, and of a pair one of these is `path` itself. */
+static int nifti_list(const char *path, int (*visit)(void *user, const char *file), void *user)
+{
+    char *head = partner(path, ".img", ".hdr"), *values = partner(path, ".hdr", ".img");
+    int status = head && values ? visit(user, head)
+                                : trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    if (status == 0 && strcmp(head, values))
+        status = visit(user, values);
+    free(head);
+    free(values);
+    return status;
+}
+
 const trip_volume_reader trip_read_nifti = {
     .format = "nifti",
     .probe = nifti_probe,
+    .list = nifti_list,
     .open = nifti_open,
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,

@@ -146,9 +146,26 @@ static int nrrd_open(const char *path, const trip_volume_params *params, trip_bu
     return status;
 }
 
+static int nrrd_list(const char *path, int (*visit)(void *user, const char *file), void *user)
+{
+    trip_nrrd_header h = { 0 };
+    int status = read_header(path, &h);
+    if (status == 0)
+        status = visit(user, path);
+    for (size_t i = 0; i < h.file_count && status == 0; i++) {
+        char *name = join(path, h.files[i]);
+        status = name ? visit(user, name)
+                      : trip_fail(TRIP_ERROR, "read", path, "no memory for its data files");
+        free(name);
+    }
+    trip_nrrd_header_free(&h);
+    return status;
+}
+
 const trip_volume_reader trip_read_nrrd = {
     .format = "nrrd",
     .probe = nrrd_probe,
+    .list = nrrd_list,
     .open = nrrd_open,
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,

@@ -283,6 +283,7 @@ void release_box(void *, trip_block *)
 const trip_volume_reader trip_read_vdb = {
     .format = "openvdb",
     .probe = probe,
+    .list = nullptr,
     .open = open_vdb,
     .close = close_vdb,
     .rewind = rewind_vdb,

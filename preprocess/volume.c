@@ -97,20 +97,21 @@ static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
     return status;
 }
 
-static int choose_reader(trip_volume *v, const trip_volume_params *params)
+int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
+                              const trip_volume_params *params)
 {
     unsigned char head[HEAD_BYTES];
     size_t bytes;
-    int status = read_head(v->path, head, &bytes);
+    int status = read_head(path, head, &bytes);
     if (status < 0)
         return status;
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
-        if (!readers[i]->probe(v->path, head, bytes, params))
+        if (!readers[i]->probe(path, head, bytes, params))
             continue;
-        v->reader = readers[i];
-        return check_options(v->path, v->reader->format, params);
+        *out = readers[i];
+        return check_options(path, readers[i]->format, params);
     }
-    return trip_fail(TRIP_ERROR, "read", v->path,
+    return trip_fail(TRIP_ERROR, "read", path,
                      "neither its content nor its name is of a known format (VDB, NRRD, NIfTI, "
                      ".vol, images); for raw data, `triptych brick FILE --size X,Y,Z --type uint8` "
                      "says what it is");
@@ -160,7 +161,7 @@ static int check_info(const trip_volume *v)
 
 static int open_with_reader(trip_volume *v, const trip_volume_params *params)
 {
-    int status = choose_reader(v, params);
+    int status = trip_volume_choose_reader(&v->reader, v->path, params);
     if (status < 0)
         return status;
     v->info = (trip_volume_info){ .index_to_world = trip_affine_identity(),

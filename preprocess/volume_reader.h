@@ -17,6 +17,9 @@ typedef struct trip_volume_reader {
      * folder or pattern). */
     bool (*probe)(const char *path, const unsigned char *head, size_t bytes,
                   const trip_volume_params *params);
+    /* Calls visit(user, FILE) for `path` and each further file that it refers to, and returns what
+     * it returned when that is negative. NULL: there are no others. */
+    int (*list)(const char *path, int (*visit)(void *user, const char *file), void *user);
     /* Fills *info; *state is passed to the other calls. Reports and returns negative on failure. */
     int (*open)(const char *path, const trip_volume_params *params, trip_budget *budget,
                 trip_volume_info *info, void **state);
@@ -37,6 +40,10 @@ typedef struct trip_volume_reader {
                   const int64_t size[3], float *values, uint8_t *active);
     void (*release)(void *state, trip_block *block);
 } trip_volume_reader;
+
+/* By content, then name; refuses options that are not for the format. */
+int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
+                              const trip_volume_params *params);
 
 /* Reports and returns negative unless each of dims is at least 1 and the volume's bytes can be
  * counted in an int64_t. volume.c asks it of every volume; readers that compute sizes ask first. */

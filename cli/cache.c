@@ -1,0 +1,209 @@
+/* triptych cache: the data sets that `render` made of volumes, listed and removed. */
+#include "commands.h"
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "cache_folder.h"
+#include "dataset.h"
+#include "options.h"
+#include "report.h"
+
+typedef struct options {
+    bool list, clear, json;
+} options;
+
+enum { KEY_JSON = 256 };
+
+static const struct argp_option option_table[] = {
+    { "json", KEY_JSON, NULL, 0, "Print the list as JSON", 0 },
+    { 0 },
+};
+
+static error_t check_options(const options *o)
+{
+    if (!o->list && !o->clear)
+        return trip_option_fail("ACTION", "none given: `triptych cache list` or `... clear`");
+    if (o->clear && o->json)
+        return trip_option_fail("--json", "applies to list only");
+    return 0;
+}
+
+static error_t parse_option(int key, char *argument, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case KEY_JSON:
+        o->json = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (o->list || o->clear)
+            return trip_option_fail(argument, "one action at a time");
+        o->list = !strcmp(argument, "list");
+        o->clear = !strcmp(argument, "clear");
+        return o->list || o->clear ? 0 : trip_option_fail(argument, "is neither list nor clear");
+    case ARGP_KEY_END:
+        return check_options(o);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* The volume's name, as the data set has it; for free(), NULL where it is damaged. */
+static char *source_name(const char *path)
+{
+    trip_budget *budget = NULL;
+    trip_dataset *data = NULL;
+    char *name = NULL;
+    if (trip_budget_create(&budget, 0) < 0)
+        return NULL;
+    if (trip_dataset_open(&data, path, budget) == 0) {
+        cJSON *text = cJSON_Parse(data->text);
+        const char *source = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "source"));
+        name = strdup(source ? source : "");
+        cJSON_Delete(text);
+    }
+    trip_dataset_close(data);
+    trip_budget_destroy(budget);
+    return name;
+}
+
+static const char *format_time(int64_t ns, bool for_people, char text[32])
+{
+    time_t seconds = (time_t)(ns / 1000000000);
+    struct tm t = { 0 };
+    if (for_people)
+        localtime_r(&seconds, &t);
+    else
+        gmtime_r(&seconds, &t);
+    strftime(text, 32, for_people ? "%Y-%m-%d %H:%M" : "%Y-%m-%dT%H:%M:%SZ", &t);
+    return text;
+}
+
+/* Names come from files: only what a terminal shows as itself goes to one. */
+static void print_visible(const char *text)
+{
+    for (; *text; text++)
+        putchar((unsigned char)*text < ' ' || *text == 127 ? '?' : *text);
+}
+
+static void print_text(const cache_folder *c, const cache_entry *entries, size_t count)
+{
+    char bytes[32], limit[32], used[32];
+    uint64_t total = 0;
+    for (size_t i = 0; i < count; i++)
+        total += entries[i].bytes;
+    printf("%-9s %s\n", "folder", c->path);
+    printf("%-9s %zu data set%s, %s", "holds", count, count == 1 ? "" : "s",
+           trip_format_bytes(total, bytes));
+    if (c->fd >= 0)
+        printf(" of at most %s (TRIPTYCH_CACHE_SIZE)", trip_format_bytes(c->limit_bytes, limit));
+    putchar('\n');
+    for (size_t i = count; i-- > 0;) {
+        char *path = cache_folder_path(c, &entries[i].key), *name = path ? source_name(path) : NULL;
+        printf("%9s  %s  ", trip_format_bytes(entries[i].bytes, bytes),
+               format_time(entries[i].used_ns, true, used));
+        print_visible(name ? name : "(damaged)");
+        printf("  %s\n", path ? path : "");
+        free(name);
+        free(path);
+    }
+}
+
+static cJSON *entry_to_json(const cache_folder *c, const cache_entry *e)
+{
+    char used[32], *path = cache_folder_path(c, &e->key), *name = path ? source_name(path) : NULL;
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddItemToObject(object, "source", name ? cJSON_CreateString(name) : cJSON_CreateNull());
+    cJSON_AddStringToObject(object, "path", path ? path : "");
+    cJSON_AddNumberToObject(object, "bytes", (double)e->bytes);
+    cJSON_AddStringToObject(object, "used", format_time(e->used_ns, false, used));
+    free(name);
+    free(path);
+    return object;
+}
+
+static int print_json(const cache_folder *c, const cache_entry *entries, size_t count)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "folder", c->path);
+    if (c->fd >= 0)
+        cJSON_AddNumberToObject(root, "limit_bytes", (double)c->limit_bytes);
+    cJSON *list = cJSON_AddArrayToObject(root, "data_sets");
+    for (size_t i = count; i-- > 0;)
+        cJSON_AddItemToArray(list, entry_to_json(c, &entries[i]));
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (!text)
+        return trip_fail(TRIP_ERROR, "cache", c->path, "out of memory");
+    puts(text);
+    free(text);
+    return 0;
+}
+
+static int list(const cache_folder *c, const options *o)
+{
+    cache_entry *entries = NULL;
+    size_t count = 0;
+    int status = c->fd < 0 ? 0 : cache_folder_list(c, &entries, &count);
+    if (status == 0 && o->json)
+        status = print_json(c, entries, count);
+    else if (status == 0)
+        print_text(c, entries, count);
+    free(entries);
+    return status;
+}
+
+static void count_entries(const cache_entry *entries, size_t count, uint64_t *bytes)
+{
+    *bytes = 0;
+    for (size_t i = 0; i < count; i++)
+        *bytes += entries[i].bytes;
+}
+
+static int clear(const cache_folder *c)
+{
+    cache_entry *before = NULL, *after = NULL;
+    size_t had = 0, has = 0;
+    uint64_t had_bytes, has_bytes;
+    char text[32];
+    int status = c->fd < 0 ? 0 : cache_folder_list(c, &before, &had);
+    if (status == 0 && c->fd >= 0)
+        status = cache_folder_shrink(c, 0);
+    if (status == 0 && c->fd >= 0)
+        status = cache_folder_list(c, &after, &has);
+    count_entries(before, had, &had_bytes);
+    count_entries(after, has, &has_bytes);
+    has = has < had ? has : had; /* others may be at work */
+    has_bytes = has_bytes < had_bytes ? has_bytes : had_bytes;
+    if (status == 0)
+        printf("removed %zu data set%s, %s\n", had - has, had - has == 1 ? "" : "s",
+               trip_format_bytes(had_bytes - has_bytes, text));
+    if (status == 0 && has > 0)
+        status = trip_fail(TRIP_ERROR, "cache", c->path, "%zu in use or not removable stay", has);
+    free(before);
+    free(after);
+    return status;
+}
+
+int trip_command_cache(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse_option,
+        .args_doc = "list|clear",
+        .doc = "Lists or removes the data sets that `triptych render` made of volumes.",
+    };
+    options o = { 0 };
+    cache_folder c = { .fd = -1 };
+    int status = trip_options_parse(&argp, argc, argv, &o);
+    if (status == 0)
+        status = cache_folder_open(&c, false);
+    if (status == 0)
+        status = o.clear ? clear(&c) : list(&c, &o);
+    cache_folder_close(&c);
+    return trip_exit_status(status);
+}

@@ -1,0 +1,420 @@
+#include "cache_folder.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "budget.h"
+#include "report.h"
+
+enum { KEY_LENGTH = sizeof(trip_digest) - 1, NAME_BYTES = 64 };
+static const uint64_t least_limit = UINT64_C(4) << 30;
+
+/* What a process that is no longer there may have left, besides its lock. */
+static const char *const leftovers[] = { ".trip.partial", ".trip.spill", ".trip.replaced",
+                                         ".gone" };
+enum { LEFTOVERS = sizeof leftovers / sizeof leftovers[0] };
+
+static const char *file_name(const trip_digest *key, const char *suffix, char name[NAME_BYTES])
+{
+    snprintf(name, NAME_BYTES, "%s%s", key->text, suffix);
+    return name;
+}
+
+/* KEY and what follows it; NULL for any other name. */
+static const char *parse_name(const char *name, trip_digest *key)
+{
+    if (strspn(name, "0123456789abcdef") != KEY_LENGTH)
+        return NULL;
+    memcpy(key->text, name, KEY_LENGTH);
+    key->text[KEY_LENGTH] = 0;
+    return name + KEY_LENGTH;
+}
+
+/* The folder */
+
+static int find_path(char **path)
+{
+    const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    int length = -1;
+    if (cache && cache[0] == '/') /* others are to be ignored, as its specification has it */
+        length = asprintf(path, "%s/triptych", cache);
+    else if (home && home[0] == '/')
+        length = asprintf(path, "%s/.cache/triptych", home);
+    else {
+        *path = NULL;
+        return trip_fail(TRIP_ERROR, "cache", "HOME",
+                         "is not set, so there is no folder for the cache: set XDG_CACHE_HOME to "
+                         "one, or use `triptych brick`");
+    }
+    if (length >= 0)
+        return 0;
+    *path = NULL;
+    return trip_fail(TRIP_ERROR, "cache", "", "out of memory");
+}
+
+static int fail_to_write(const char *path, const char *what)
+{
+    return trip_fail(TRIP_ERROR, "cache", path,
+                     "cannot be %s: %s; set XDG_CACHE_HOME to a folder that can be written, or use "
+                     "`triptych brick`",
+                     what, strerror(errno));
+}
+
+/* With the folder it is in, which need not be there on a new account. */
+static int make_folder(char *path)
+{
+    char *slash = strrchr(path, '/');
+    *slash = 0;
+    int made = slash == path ? 0 : mkdir(path, 0700);
+    *slash = '/';
+    if (made < 0 && errno != EEXIST && errno != EROFS)
+        return fail_to_write(path, "made");
+    return mkdir(path, 0700) < 0 && errno != EEXIST ? fail_to_write(path, "made") : 0;
+}
+
+/* Who else could write there could exchange what is drawn. */
+static int check_folder(const cache_folder *c)
+{
+    struct stat st;
+    if (fstat(c->fd, &st) < 0)
+        return trip_fail_errno("cache", c->path, "cannot look at");
+    if (st.st_uid != geteuid())
+        return trip_fail(TRIP_ERROR, "cache", c->path,
+                         "belongs to another user; set XDG_CACHE_HOME to a folder of your own");
+    if (st.st_mode & (S_IWGRP | S_IWOTH))
+        return trip_fail(TRIP_ERROR, "cache", c->path,
+                         "can be written by other users: `chmod 700` makes it yours alone");
+    return 0;
+}
+
+static int find_limit(cache_folder *c)
+{
+    const char *text = getenv("TRIPTYCH_CACHE_SIZE");
+    struct statvfs v;
+    if (text && *text) {
+        if (trip_parse_bytes(text, &c->limit_bytes) && c->limit_bytes > 0)
+            return 0;
+        return trip_fail(TRIP_USAGE, "usage", "TRIPTYCH_CACHE_SIZE",
+                         "\"%s\" is not a size like 512M or 20G", text);
+    }
+    uint64_t disk = fstatvfs(c->fd, &v) == 0 ? (uint64_t)v.f_blocks * v.f_frsize : 0;
+    c->limit_bytes = disk / 10 > least_limit ? disk / 10 : least_limit;
+    return 0;
+}
+
+int cache_folder_open(cache_folder *c, bool make)
+{
+    *c = (cache_folder){ .fd = -1 };
+    int status = find_path(&c->path);
+    if (status == 0 && make)
+        status = make_folder(c->path);
+    if (status < 0)
+        return status;
+    c->fd = open(c->path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (c->fd < 0 && !make && errno == ENOENT)
+        return 0;
+    if (c->fd < 0 && (errno == ELOOP || errno == ENOTDIR))
+        return trip_fail(TRIP_ERROR, "cache", c->path,
+                         "is a link or a file, not a folder: remove it, or set XDG_CACHE_HOME");
+    if (c->fd < 0)
+        return trip_fail_errno("cache", c->path, "cannot open");
+    status = check_folder(c);
+    return status == 0 ? find_limit(c) : status;
+}
+
+void cache_folder_close(cache_folder *c)
+{
+    if (c->fd >= 0)
+        close(c->fd);
+    free(c->path);
+    *c = (cache_folder){ .fd = -1 };
+}
+
+char *cache_folder_path(const cache_folder *c, const trip_digest *key)
+{
+    char *path;
+    if (asprintf(&path, "%s/%s.trip", c->path, key->text) >= 0)
+        return path;
+    trip_fail(TRIP_ERROR, "cache", c->path, "out of memory");
+    return NULL;
+}
+
+/* Data sets in use */
+
+static int open_folder(const cache_folder *c, const char *name)
+{
+    return openat(c->fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+}
+
+/* Between opening a data set's folder and locking it nobody may remove it, and the other way round:
+ * both happen under a lock on the cache's folder. */
+int cache_folder_hold(const cache_folder *c, const trip_digest *key)
+{
+    char name[NAME_BYTES];
+    flock(c->fd, LOCK_SH);
+    int fd = open_folder(c, file_name(key, ".trip", name));
+    if (fd >= 0) {
+        flock(fd, LOCK_SH | LOCK_NB);
+        futimens(fd, NULL);
+    }
+    flock(c->fd, LOCK_UN);
+    return fd;
+}
+
+/* Removes a folder of ours with the files in it; a folder inside stays, and so does this one. */
+static bool remove_folder(const cache_folder *c, const char *name)
+{
+    int fd = open_folder(c, name);
+    DIR *folder = fd < 0 ? NULL : fdopendir(fd);
+    if (!folder) {
+        if (fd >= 0)
+            close(fd);
+        return unlinkat(c->fd, name, 0) == 0;
+    }
+    for (struct dirent *e; (e = readdir(folder));)
+        if (strcmp(e->d_name, ".") && strcmp(e->d_name, ".."))
+            unlinkat(fd, e->d_name, 0);
+    closedir(folder);
+    return unlinkat(c->fd, name, AT_REMOVEDIR) == 0;
+}
+
+bool cache_folder_remove(const cache_folder *c, const trip_digest *key)
+{
+    char name[NAME_BYTES], gone[NAME_BYTES];
+    file_name(key, ".trip", name);
+    file_name(key, ".gone", gone);
+    flock(c->fd, LOCK_EX);
+    int fd = open_folder(c, name);
+    bool unused = fd < 0 || flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    bool renamed = unused && renameat(c->fd, name, c->fd, gone) == 0;
+    flock(c->fd, LOCK_UN);
+    bool removed = renamed && remove_folder(c, gone);
+    if (fd >= 0)
+        close(fd);
+    return removed;
+}
+
+/* What is remembered */
+
+bool cache_folder_recall(const cache_folder *c, const trip_digest *state, trip_digest *key)
+{
+    char name[NAME_BYTES], target[NAME_BYTES];
+    ssize_t n = readlinkat(c->fd, file_name(state, ".link", name), target, sizeof target - 1);
+    if (n < 0)
+        return false;
+    target[n] = 0;
+    const char *rest = parse_name(target, key);
+    return rest && !*rest;
+}
+
+/* In one step, so that another process sees the old one or the new one. */
+void cache_folder_remember(const cache_folder *c, const trip_digest *state, const trip_digest *key)
+{
+    char name[NAME_BYTES], made[NAME_BYTES];
+    snprintf(made, sizeof made, "%s.%ld.link", state->text, (long)getpid());
+    unlinkat(c->fd, made, 0);
+    if (symlinkat(key->text, c->fd, made) == 0 &&
+        renameat(c->fd, made, c->fd, file_name(state, ".link", name)) < 0)
+        unlinkat(c->fd, made, 0);
+}
+
+/* Locks */
+
+static bool is_named(const cache_folder *c, int fd, const char *name)
+{
+    struct stat a, b;
+    return fstat(fd, &a) == 0 && fstatat(c->fd, name, &b, AT_SYMLINK_NOFOLLOW) == 0 &&
+           a.st_dev == b.st_dev && a.st_ino == b.st_ino;
+}
+
+/* -1: another process holds it, or it cannot be opened, as errno says. */
+static int try_lock(const cache_folder *c, const trip_digest *key)
+{
+    char name[NAME_BYTES];
+    file_name(key, ".lock", name);
+    for (;;) {
+        int fd = openat(c->fd, name, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK, 0600);
+        if (fd < 0 || (flock(fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)) {
+            int saved_errno = errno;
+            if (fd >= 0)
+                close(fd);
+            errno = fd < 0 && saved_errno == EWOULDBLOCK ? EIO : saved_errno;
+            return -1;
+        }
+        if (is_named(c, fd, name))
+            return fd;
+        close(fd); /* who had it removed it with its work done */
+    }
+}
+
+int cache_folder_lock(const cache_folder *c, const trip_digest *key, void (*waiting)(void *user),
+                      void *user)
+{
+    for (;;) {
+        int fd = try_lock(c, key);
+        if (fd >= 0)
+            return fd;
+        if (errno != EWOULDBLOCK)
+            return fail_to_write(c->path, "written");
+        waiting(user);
+        nanosleep(&(struct timespec){ .tv_nsec = 50000000 }, NULL);
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "cache", "", "interrupted");
+    }
+}
+
+void cache_folder_unlock(const cache_folder *c, const trip_digest *key, int fd)
+{
+    char name[NAME_BYTES];
+    unlinkat(c->fd, file_name(key, ".lock", name), 0);
+    close(fd);
+}
+
+/* What there is */
+
+static uint64_t folder_bytes(int fd)
+{
+    uint64_t bytes = 0;
+    struct stat st;
+    int copy = openat(fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *folder = copy < 0 ? NULL : fdopendir(copy);
+    for (struct dirent *e; folder && (e = readdir(folder));)
+        if (fstatat(fd, e->d_name, &st, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(st.st_mode))
+            bytes += (uint64_t)st.st_size;
+    if (folder)
+        closedir(folder);
+    else if (copy >= 0)
+        close(copy);
+    return bytes;
+}
+
+static int fill_entry(const cache_folder *c, const char *name, cache_entry *e)
+{
+    struct stat st;
+    int fd = open_folder(c, name);
+    if (fd < 0 || fstat(fd, &st) < 0) {
+        if (fd >= 0)
+            close(fd);
+        return -1;
+    }
+    e->bytes = folder_bytes(fd);
+    e->used_ns = (int64_t)st.st_mtim.tv_sec * 1000000000 + st.st_mtim.tv_nsec;
+    close(fd);
+    return 0;
+}
+
+static int by_use(const void *a, const void *b)
+{
+    const cache_entry *x = a, *y = b;
+    return x->used_ns != y->used_ns ? x->used_ns < y->used_ns ? -1 : 1
+                                    : strcmp(x->key.text, y->key.text);
+}
+
+/* Calls visit() with the key and the rest of every name that may be ours. */
+static int visit_names(const cache_folder *c,
+                       int (*visit)(const cache_folder *c, const char *name, const trip_digest *key,
+                                    const char *rest, void *user),
+                       void *user)
+{
+    int copy = openat(c->fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC), status = 0;
+    DIR *folder = copy < 0 ? NULL : fdopendir(copy);
+    if (!folder) {
+        status = trip_fail_errno("cache", c->path, "cannot list");
+        if (copy >= 0)
+            close(copy);
+        return status;
+    }
+    trip_digest key;
+    for (struct dirent *e; status == 0 && (e = readdir(folder));) {
+        const char *rest = parse_name(e->d_name, &key);
+        status = rest ? visit(c, e->d_name, &key, rest, user) : 0;
+    }
+    closedir(folder);
+    return status;
+}
+
+typedef struct listing {
+    cache_entry *entries;
+    size_t count;
+} listing;
+
+static int list_entry(const cache_folder *c, const char *name, const trip_digest *key,
+                      const char *rest, void *user)
+{
+    listing *l = user;
+    cache_entry entry = { .key = *key };
+    if (strcmp(rest, ".trip") || fill_entry(c, name, &entry) < 0)
+        return 0;
+    cache_entry *entries = reallocarray(l->entries, l->count + 1, sizeof *entries);
+    if (!entries)
+        return trip_fail(TRIP_ERROR, "cache", c->path, "out of memory");
+    l->entries = entries;
+    entries[l->count++] = entry;
+    return 0;
+}
+
+int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count)
+{
+    listing l = { 0 };
+    int status = visit_names(c, list_entry, &l);
+    if (status == 0 && l.count)
+        qsort(l.entries, l.count, sizeof *l.entries, by_use);
+    if (status < 0)
+        free(l.entries);
+    *out = status < 0 ? NULL : l.entries;
+    *count = status < 0 ? 0 : l.count;
+    return status;
+}
+
+/* What nobody is at work on: leftovers of killed processes, links to what is gone. */
+static int clean_name(const cache_folder *c, const char *name, const trip_digest *key,
+                      const char *rest, void *user)
+{
+    struct stat st;
+    trip_digest target;
+    char entry[NAME_BYTES];
+    (void)user;
+    if (!strcmp(rest, ".link")) {
+        if (!cache_folder_recall(c, key, &target) ||
+            fstatat(c->fd, file_name(&target, ".trip", entry), &st, AT_SYMLINK_NOFOLLOW) < 0)
+            unlinkat(c->fd, name, 0);
+        return 0;
+    }
+    size_t length = strlen(rest);
+    if (length > 5 && !strcmp(rest + length - 5, ".link"))
+        unlinkat(c->fd, name, 0);
+    bool leftover = !strcmp(rest, ".lock");
+    for (int i = 0; i < LEFTOVERS; i++)
+        leftover = leftover || !strcmp(rest, leftovers[i]);
+    int lock = leftover ? try_lock(c, key) : -1;
+    if (lock < 0)
+        return 0;
+    if (strcmp(rest, ".lock"))
+        remove_folder(c, name);
+    cache_folder_unlock(c, key, lock);
+    return 0;
+}
+
+int cache_folder_shrink(const cache_folder *c, uint64_t bytes)
+{
+    cache_entry *entries;
+    size_t count;
+    uint64_t total = 0;
+    int status = cache_folder_list(c, &entries, &count);
+    for (size_t i = 0; i < count; i++)
+        total += entries[i].bytes;
+    for (size_t i = 0; i < count && (total > bytes || bytes == 0); i++)
+        if (cache_folder_remove(c, &entries[i].key))
+            total -= entries[i].bytes;
+    free(entries);
+    return status == 0 ? visit_names(c, clean_name, NULL) : status;
+}

@@ -1,0 +1,33 @@
+/* A volume's data set in the cache: found there, or bricked into it first. What it is kept under is
+ * the content of the volume's files and the options; so a changed file is another data set, and a
+ * copy the same. The files' content is read once and remembered for as long as their times do not
+ * change. Files of more than 1 GiB together are known by place, size and times alone. */
+#ifndef TRIP_CLI_CACHED_VOLUME_H
+#define TRIP_CLI_CACHED_VOLUME_H
+
+#include "brick.h"
+#include "cache_folder.h"
+
+/* Zeroed at first. */
+typedef struct cached_volume {
+    char *path; /* of the data set */
+    trip_digest key;
+    cache_folder folder;
+    int hold;       /* keeps the data set from being removed */
+    double seconds; /* that bricking took; 0 where it was there */
+    char note[512]; /* as trip_brick_summary has it */
+} cached_volume;
+
+/* Whether the input of a command that draws is to be bricked: it is no folder with a data set in
+ * it, and not named NAME.trip. */
+bool cached_volume_wanted(const char *input);
+
+/* `wanted` says all but the output. Progress is shown on a terminal. Close it also after a failure.
+ */
+int cached_volume_open(cached_volume *v, const trip_brick_params *wanted);
+void cached_volume_close(cached_volume *v);
+
+/* After drawing failed: looks whether the data set is damaged, and removes it then. */
+void cached_volume_check(cached_volume *v, const char *input);
+
+#endif

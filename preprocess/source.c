@@ -1,0 +1,216 @@
+#include "source.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "byte_stream.h"
+#include "report.h"
+#include "volume_reader.h"
+
+#define PIECE_BYTES ((size_t)1 << 20)
+/* The coarsest times of a file system are those of FAT. */
+static const int64_t settled_ns = INT64_C(2000000000);
+
+static int fail_memory(const char *path)
+{
+    return trip_fail(TRIP_ERROR, "read", path, "no memory to note its files");
+}
+
+static int64_t nanoseconds(struct timespec t)
+{
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+
+/* What is missing or no file is for the reader to report: it counts as empty. */
+static int add_file(void *user, const char *path)
+{
+    trip_source *s = user;
+    struct stat st = { 0 };
+    trip_source_file *files = reallocarray(s->files, s->count + 1, sizeof *files);
+    if (!files)
+        return fail_memory(path);
+    s->files = files;
+    if (stat(path, &st) != 0 || !S_ISREG(st.st_mode))
+        memset(&st, 0, sizeof st);
+    files[s->count] = (trip_source_file){ .path = strdup(path),
+                                          .inode = st.st_ino,
+                                          .bytes = (uint64_t)st.st_size,
+                                          .modified_ns = nanoseconds(st.st_mtim),
+                                          .changed_ns = nanoseconds(st.st_ctim) };
+    if (!files[s->count].path)
+        return fail_memory(path);
+    s->bytes += files[s->count++].bytes;
+    return 0;
+}
+
+int trip_source_find(trip_source *s, const char *path, const trip_volume_params *params)
+{
+    const trip_volume_reader *reader;
+    *s = (trip_source){ 0 };
+    int status = trip_volume_choose_reader(&reader, path, params);
+    if (status == 0) {
+        s->format = reader->format;
+        status = reader->list ? reader->list(path, add_file, s) : add_file(s, path);
+    }
+    if (status < 0)
+        trip_source_free(s);
+    return status;
+}
+
+void trip_source_free(trip_source *s)
+{
+    for (size_t i = 0; i < s->count; i++)
+        free(s->files[i].path);
+    free(s->files);
+    *s = (trip_source){ 0 };
+}
+
+bool trip_source_equal(const trip_source *a, const trip_source *b)
+{
+    bool equal = a->count == b->count;
+    for (size_t i = 0; equal && i < a->count; i++) {
+        const trip_source_file *x = &a->files[i], *y = &b->files[i];
+        equal = !strcmp(x->path, y->path) && x->inode == y->inode && x->bytes == y->bytes &&
+                x->modified_ns == y->modified_ns && x->changed_ns == y->changed_ns;
+    }
+    return equal;
+}
+
+bool trip_source_is_settled(const trip_source *s)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    for (size_t i = 0; i < s->count; i++)
+        if (s->files[i].changed_ns > nanoseconds(now) - settled_ns)
+            return false;
+    return true;
+}
+
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+static int begin(XXH3_state_t **hash, const trip_source *s, const char *text)
+{
+    *hash = XXH3_createState();
+    if (!*hash || XXH3_128bits_reset(*hash) != XXH_OK)
+        return fail_memory(s->files[0].path);
+    XXH3_128bits_update(*hash, s->format, strlen(s->format) + 1);
+    XXH3_128bits_update(*hash, text, strlen(text) + 1);
+    XXH3_128bits_update(*hash, &s->count, sizeof s->count);
+    return 0;
+}
+
+static void end(XXH3_state_t *hash, trip_digest *out)
+{
+    XXH128_hash_t h = XXH3_128bits_digest(hash);
+    snprintf(out->text, sizeof out->text, "%016llx%016llx", (unsigned long long)h.high64,
+             (unsigned long long)h.low64);
+    XXH3_freeState(hash);
+}
+
+static void add_state(XXH3_state_t *hash, const trip_source_file *f)
+{
+    char *place = realpath(f->path, NULL);
+    const char *name = place ? place : f->path;
+    const uint64_t numbers[] = { f->inode, f->bytes, (uint64_t)f->modified_ns,
+                                 (uint64_t)f->changed_ns };
+    XXH3_128bits_update(hash, name, strlen(name) + 1);
+    XXH3_128bits_update(hash, base_name(f->path), strlen(base_name(f->path)) + 1);
+    XXH3_128bits_update(hash, numbers, sizeof numbers);
+    free(place);
+}
+
+int trip_source_digest_state(const trip_source *s, const char *text, trip_digest *out)
+{
+    XXH3_state_t *hash;
+    int status = begin(&hash, s, text);
+    for (size_t i = 0; i < s->count && status == 0; i++)
+        add_state(hash, &s->files[i]);
+    if (hash)
+        end(hash, out);
+    return status;
+}
+
+/* Raw data has its size and type in the name, stacks their order; elsewhere the name says at most
+ * how the bytes are packed. */
+static void add_name(XXH3_state_t *hash, const trip_source *s, const trip_source_file *f)
+{
+    bool matters = !strcmp(s->format, "raw") || !strcmp(s->format, "images");
+    const char *name = matters ? base_name(f->path) : "";
+    const int encoding = (int)trip_byte_encoding_of(f->path);
+    XXH3_128bits_update(hash, name, strlen(name) + 1);
+    XXH3_128bits_update(hash, &encoding, sizeof encoding);
+    XXH3_128bits_update(hash, &f->bytes, sizeof f->bytes);
+}
+
+typedef struct reading {
+    XXH3_state_t *hash;
+    unsigned char *piece;
+    uint64_t done, total;
+    void (*progress)(void *user, uint64_t done, uint64_t total);
+    void *user;
+} reading;
+
+/* Exactly the bytes that the file had when it was found. */
+static int add_bytes(reading *r, const trip_source_file *f, int fd)
+{
+    for (uint64_t at = 0; at < f->bytes;) {
+        size_t want = f->bytes - at < PIECE_BYTES ? (size_t)(f->bytes - at) : PIECE_BYTES;
+        ssize_t n = pread(fd, r->piece, want, (off_t)at);
+        if (n < 0 && errno == EINTR && !trip_interrupted())
+            continue;
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "read", "", "interrupted");
+        if (n < 0)
+            return trip_fail_errno("read", f->path, "cannot read");
+        if (n == 0)
+            return trip_fail(TRIP_ERROR, "read", f->path, "became shorter while it was read");
+        XXH3_128bits_update(r->hash, r->piece, (size_t)n);
+        at += (uint64_t)n;
+        r->done += (uint64_t)n;
+        if (r->progress)
+            r->progress(r->user, r->done, r->total);
+    }
+    return 0;
+}
+
+static int add_content(reading *r, const trip_source_file *f)
+{
+    if (f->bytes == 0)
+        return 0;
+    int fd = open(f->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0)
+        return trip_fail_errno("read", f->path, "cannot open");
+    posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL);
+    int status = add_bytes(r, f, fd);
+    close(fd);
+    return status;
+}
+
+int trip_source_digest_content(const trip_source *s, const char *text, trip_digest *out,
+                               void (*progress)(void *user, uint64_t done, uint64_t total),
+                               void *user)
+{
+    reading r = {
+        .piece = malloc(PIECE_BYTES), .total = s->bytes, .progress = progress, .user = user
+    };
+    int status = r.piece ? begin(&r.hash, s, text) : fail_memory(s->files[0].path);
+    for (size_t i = 0; i < s->count && status == 0; i++) {
+        add_name(r.hash, s, &s->files[i]);
+        status = add_content(&r, &s->files[i]);
+    }
+    if (r.hash)
+        end(r.hash, out);
+    free(r.piece);
+    return status;
+}

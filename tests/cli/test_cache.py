@@ -1,0 +1,494 @@
+"""`render VOLUME` in one step, and the cache that it bricks into: found again, never stale, bounded,
+and harmless whatever lies in its folder."""
+import fcntl
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+import numpy
+
+import program
+
+ROOT = os.getuid() == 0
+SIZE = ["--size", "40x40", "--renderer", "cpu"]
+
+
+def tree(folder):
+    """Every path below it, with what files hold."""
+    found = {}
+    for base, folders, files in os.walk(folder):
+        for name in folders:
+            found[os.path.join(base, name)] = None
+        for name in files:
+            with open(os.path.join(base, name), "rb") as f:
+                found[os.path.join(base, name)] = f.read()
+    return found
+
+
+class Cache(program.ProgramTest):
+    def setUp(self):
+        self.home = os.path.join(self.folder, "home")
+        shutil.rmtree(self.home, ignore_errors=True)
+        os.makedirs(self.home)
+        os.environ["HOME"] = self.home
+        os.environ["XDG_CACHE_HOME"] = os.path.join(self.home, "cache")
+        os.environ.pop("TRIPTYCH_CACHE_SIZE", None)
+        self.cache = os.path.join(self.home, "cache", "triptych")
+
+    def entries(self):
+        if not os.path.isdir(self.cache):
+            return []
+        return sorted(n for n in os.listdir(self.cache) if n.endswith(".trip"))
+
+    def draw(self, volume, *options, bricked):
+        """The picture of a volume, which has to be bricked for it or is there."""
+        run = self.works("render", volume, "-o", "one.exr", *SIZE, *options)
+        self.assertEqual("bricked into the cache" in run.stdout.decode(), bricked, run)
+        return program.read_exr("one.exr")
+
+    def two_steps(self, volume, *options, brick=()):
+        self.brick(volume, "two.trip", *brick)
+        return self.picture("two.trip", *SIZE, *options)
+
+    def same(self, a, b):
+        self.assertTrue(numpy.array_equal(a, b))
+
+    def differ(self, a, b):
+        self.assertFalse(numpy.array_equal(a, b))
+
+    # Found again
+
+    def test_one_step_draws_what_two_do_and_the_next_picture_is_there(self):
+        program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
+        wanted = self.two_steps("ball.nrrd")
+        self.assertGreater(wanted[..., 3].max(), 0.5)
+        self.same(self.draw("ball.nrrd", bricked=True), wanted)
+        self.same(self.draw("ball.nrrd", bricked=False), wanted)
+        self.same(self.draw("./ball.nrrd", bricked=False), wanted)
+        self.assertEqual(len(self.entries()), 1)
+
+    def test_a_copy_is_the_same_volume(self):
+        program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
+        self.draw("ball.nrrd", bricked=True)
+        shutil.copy("ball.nrrd", "copy.nrrd")
+        self.draw("copy.nrrd", bricked=False)
+
+    def test_a_raw_file_of_another_shape_is_another_volume(self):
+        values = program.noise((8, 12, 16))
+        program.write_raw("a_16x12x8_uint8.raw", values)
+        program.write_raw("a_8x12x16_uint8.raw", values)
+        self.differ(
+            self.draw("a_16x12x8_uint8.raw", bricked=True),
+            self.draw("a_8x12x16_uint8.raw", bricked=True),
+        )
+
+    def test_each_kind_of_file(self):
+        values = program.ball((12, 14, 16))
+        program.write_nifti("v.nii", values)
+        program.write_nifti("v.nii.gz", values, packed=True)
+        program.write_vol("v.vol", values)
+        program.write_raw("v_16x14x12_uint8.raw", values)
+        program.write_stack("stack", values, program.write_tiff, "tif")
+        for z, image in enumerate(program.ball((12, 14, 16), dtype="u2")):
+            os.makedirs("scan", exist_ok=True)
+            program.write_dicom(f"scan/{z}.dcm", image, z)
+        vdb = os.path.join(program.DATASETS, "densityAndHeat.vdb")
+        for volume in (
+            "v.nii",
+            "v.nii.gz",
+            "v.vol",
+            "v_16x14x12_uint8.raw",
+            "stack",
+            "stack/slice-%04d.tif",
+            "stack/*.tif",
+            "scan",
+            vdb,
+        ):
+            with self.subTest(volume):
+                wanted = self.two_steps(volume)
+                first = volume not in ("stack/slice-%04d.tif", "stack/*.tif")
+                self.same(self.draw(volume, bricked=first), wanted)
+                self.same(self.draw(volume, bricked=False), wanted)
+
+    def test_options_make_other_data_sets(self):
+        vdb = os.path.join(program.DATASETS, "densityAndHeat.vdb")
+        self.draw(vdb, bricked=True)
+        heat = self.draw(vdb, "--grid", "heat", bricked=True)
+        self.same(heat, self.two_steps(vdb, brick=("--grid", "heat")))
+        wide = self.draw(vdb, "--spacing", "1,2,3", bricked=True)
+        self.same(wide, self.two_steps(vdb, brick=("--spacing", "1,2,3")))
+        self.assertEqual(len(self.entries()), 3)
+
+    def test_a_function_shows_what_the_automatic_one_leaves_out(self):
+        values = program.noise((16, 16, 16))
+        program.write_nrrd("noise.nrrd", values)
+        program.write("all.tf", b"0 1 0 0 0.1\n255 0 0 1 0.1\n")
+        drawn = self.draw("noise.nrrd", "--tf", "all.tf", bricked=True)
+        wanted = self.two_steps("noise.nrrd", "--tf", "all.tf", brick=["--keep-all"])
+        self.assertLess(abs(drawn - wanted).max(), 1 / 255)  # but for how normals are rounded
+        self.assertGreater(abs(drawn - self.two_steps("noise.nrrd", "--tf", "all.tf")).max(), 0.1)
+        self.same(self.draw("noise.nrrd", "--tf", "all.tf", bricked=False), drawn)
+        program.write("all.tf", b"0 0 1 0 0.1\n255 0 0 1 0.1\n")
+        self.differ(self.draw("noise.nrrd", "--tf", "all.tf", bricked=True), drawn)
+
+    # Never stale
+
+    def test_a_changed_file_is_drawn_anew(self):
+        """Also at the same size, at once, and with its time set back."""
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=1))
+        times = os.stat("v.nrrd")
+        old = self.draw("v.nrrd", bricked=True)
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=2))
+        os.utime("v.nrrd", ns=(times.st_atime_ns, times.st_mtime_ns))
+        new = self.draw("v.nrrd", bricked=True)
+        self.differ(new, old)
+        self.same(new, self.two_steps("v.nrrd"))
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=1))
+        self.same(self.draw("v.nrrd", bricked=False), old)
+
+    def test_a_file_that_was_remembered_and_changes_is_drawn_anew(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=1))
+        time.sleep(2.2)  # its times are certain only then
+        old = self.draw("v.nrrd", bricked=True)
+        links = [n for n in os.listdir(self.cache) if n.endswith(".link")]
+        self.assertEqual(len(links), 1)
+        self.same(self.draw("v.nrrd", bricked=False), old)
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=2))
+        self.differ(self.draw("v.nrrd", bricked=True), old)
+
+    def test_a_change_in_a_file_that_another_refers_to_counts(self):
+        values = [program.noise((12, 12, 12), seed=s) for s in (1, 2)]
+
+        def detached(v):
+            program.write("v.data", v.tobytes())
+
+        def pair(v):
+            program.write("p.img", v.tobytes())
+
+        def stack(v):
+            program.write_stack("s", v[:, :, :], program.write_png, "png")
+
+        header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 12 12 12\nencoding: raw\n"
+        program.write("v.nhdr", (header + "data file: v.data\n").encode())
+        program.write_nifti("p.nii", values[0])
+        with open("p.nii", "rb") as f:
+            head = bytearray(f.read(348))
+        head[344:348] = b"ni1\0"
+        head[108:112] = bytes(4)
+        program.write("p.hdr", bytes(head))
+        for volume, write in ("v.nhdr", detached), ("p.hdr", pair), ("p.img", pair), ("s", stack):
+            with self.subTest(volume):
+                shutil.rmtree(self.cache, ignore_errors=True)
+                write(values[0])
+                old = self.draw(volume, bricked=True)
+                self.draw(volume, bricked=False)
+                write(values[1])
+                new = self.draw(volume, bricked=True)
+                self.differ(new, old)
+                self.same(new, self.two_steps(volume))
+        os.remove("s/slice-0011.png")
+        self.draw("s", bricked=True)
+
+    # Several at once, interrupted, damaged
+
+    def cloud(self):
+        if not os.path.exists("cloud.nrrd"):
+            subprocess.run(
+                [program.GENERATE, "cloud", "--size", "192", "-o", "cloud.nrrd"], check=True
+            )
+
+    def test_two_at_once_brick_once(self):
+        self.cloud()
+        runs = [program.start("render", "cloud.nrrd", "-o", f"{i}.png", *SIZE) for i in range(3)]
+        said = [r.communicate(timeout=120) for r in runs]
+        self.assertEqual([r.returncode for r in runs], [0, 0, 0], said)
+        self.assertEqual(sum(b"bricked into" in out for out, _ in said), 1)
+        self.assertEqual(len(self.entries()), 1)
+        pictures = tree(".")
+        self.assertEqual(pictures["./0.png"], pictures["./1.png"])
+        self.assertEqual(pictures["./0.png"], pictures["./2.png"])
+
+    def stop_while_bricking(self, number):
+        run = program.start("render", "cloud.nrrd", "-o", "x.png", *SIZE)
+        for _ in range(2000):
+            names = os.listdir(self.cache) if os.path.isdir(self.cache) else []
+            if run.poll() is not None or any(n.endswith((".partial", ".spill")) for n in names):
+                break
+            time.sleep(0.002)
+        run.send_signal(number)
+        out, err = run.communicate(timeout=60)
+        return run.returncode, err.decode()
+
+    def test_an_interrupted_bricking_leaves_nothing(self):
+        self.cloud()
+        status, err = self.stop_while_bricking(signal.SIGINT)
+        if status == 0:
+            self.skipTest("it was done before it could be interrupted")
+        self.assertEqual(status, 1, err)
+        self.assertEqual(len(err.splitlines()), 1, err)
+        self.assertEqual([n for n in os.listdir(self.cache) if not n.endswith(".link")], [])
+
+    def test_a_killed_bricking_leaves_no_data_set_and_is_cleaned_up(self):
+        self.cloud()
+        status, _ = self.stop_while_bricking(signal.SIGKILL)
+        if status == 0:
+            self.skipTest("it was done before it could be killed")
+        self.assertEqual(self.entries(), [])
+        self.assertIn(b"0 data sets", self.works("cache", "list").stdout)
+        self.draw("cloud.nrrd", bricked=True)
+        self.assertEqual(len([n for n in os.listdir(self.cache) if not n.endswith(".link")]), 1)
+
+    def test_what_a_killed_process_left_goes_with_clear(self):
+        self.cloud()
+        status, _ = self.stop_while_bricking(signal.SIGKILL)
+        self.works("cache", "clear")
+        self.assertEqual(os.listdir(self.cache), [])
+
+    def damage(self, name, change):
+        path = os.path.join(self.cache, self.entries()[0], name)
+        with open(path, "rb") as f:
+            data = bytearray(f.read())
+        program.write(path, bytes(change(data)))
+
+    def test_a_damaged_data_set_is_made_anew_with_a_line(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        wanted = self.draw("v.nrrd", bricked=True)
+
+        def flip(data):
+            data[len(data) // 2] ^= 1
+            return data
+
+        changes = {
+            "flipped": lambda: self.damage("index.trip", flip),
+            "cut off": lambda: self.damage("index.trip", lambda d: d[:-1]),
+            "empty": lambda: self.damage("x.voxels", lambda d: b""),
+            "missing": lambda: os.remove(os.path.join(self.cache, self.entries()[0], "z.voxels")),
+            "no index": lambda: os.remove(
+                os.path.join(self.cache, self.entries()[0], "index.trip")
+            ),
+        }
+        for name, change in changes.items():
+            with self.subTest(name):
+                change()
+                run = self.works("render", "v.nrrd", "-o", "one.exr", *SIZE)
+                self.assertIn("is damaged and is made anew", run.stderr)
+                self.same(program.read_exr("one.exr"), wanted)
+                self.same(self.draw("v.nrrd", bricked=False), wanted)
+
+    def test_damage_that_shows_while_drawing_removes_the_data_set(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        wanted = self.draw("v.nrrd", bricked=True)
+        for list_name in "xyz":
+            self.damage(f"{list_name}.voxels", lambda d: bytes([d[0] ^ 255]) + d[1:])
+        run = program.call("render", "v.nrrd", "-o", "one.exr", *SIZE)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("the same command makes it anew", run.stderr)
+        self.same(self.draw("v.nrrd", bricked=True), wanted)
+
+    # Bounded
+
+    def size_of(self, name):
+        folder = os.path.join(self.cache, name)
+        return sum(os.path.getsize(os.path.join(folder, n)) for n in os.listdir(folder))
+
+    def test_what_was_used_least_recently_makes_room(self):
+        for i in range(4):
+            program.write_nrrd(f"v{i}.nrrd", program.noise((14, 14, 14), seed=i))
+        made = []
+        for i in range(3):
+            self.draw(f"v{i}.nrrd", bricked=True)
+            made += [n for n in self.entries() if n not in made]
+        for age, i in enumerate((0, 2, 1)):  # 1 was used least recently, then 2
+            used = time.time() - 100 - 10 * age
+            os.utime(os.path.join(self.cache, made[i]), (used, used))
+        room = sum(self.size_of(n) for n in made)
+        os.environ["TRIPTYCH_CACHE_SIZE"] = str(room + 1000)
+        self.draw("v3.nrrd", bricked=True)
+        self.assertNotIn(made[1], self.entries())
+        self.assertIn(made[0], self.entries())
+        self.assertLessEqual(sum(self.size_of(n) for n in self.entries()), room + 1000)
+        self.draw("v0.nrrd", bricked=False)
+        self.draw("v1.nrrd", bricked=True)
+
+    def test_a_data_set_larger_than_the_cache_is_refused_before_it_is_made(self):
+        program.write_nrrd("v.nrrd", program.noise((40, 40, 40)))
+        os.environ["TRIPTYCH_CACHE_SIZE"] = "4K"
+        self.fails(1, "render", "v.nrrd", "-o", "x.png", says="TRIPTYCH_CACHE_SIZE")
+        self.assertFalse(os.path.exists("x.png"))
+        self.assertEqual(self.entries(), [])
+        for size in "0", "x", "-1", "5Q":
+            os.environ["TRIPTYCH_CACHE_SIZE"] = size
+            self.fails(2, "render", "v.nrrd", "-o", "x.png", says="TRIPTYCH_CACHE_SIZE")
+
+    def test_a_data_set_in_use_stays(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        self.draw("v.nrrd", bricked=True)
+        name = self.entries()[0]
+        held = os.open(os.path.join(self.cache, name), os.O_RDONLY)
+        fcntl.flock(held, fcntl.LOCK_SH)
+        self.fails(1, "cache", "clear", says="in use")
+        self.assertEqual(self.entries(), [name])
+        os.close(held)
+        self.works("cache", "clear")
+        self.assertEqual(os.listdir(self.cache), [])
+
+    # The folder
+
+    def test_without_a_folder_to_write_to_a_line_says_so(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        del os.environ["XDG_CACHE_HOME"]
+        for home in None, "", "relative":
+            if home is None:
+                os.environ.pop("HOME", None)
+            else:
+                os.environ["HOME"] = home
+            self.leaves_nothing(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME")
+        os.environ["HOME"] = "/proc"
+        self.leaves_nothing(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME")
+        os.environ["HOME"] = self.home
+        os.environ["XDG_CACHE_HOME"] = "relative"  # to be ignored
+        self.works("render", "v.nrrd", "-o", "one.exr", *SIZE)
+        self.assertEqual(len(os.listdir(os.path.join(self.home, ".cache", "triptych"))), 1)
+        self.assertFalse(os.path.exists("relative/triptych"))
+
+    def test_a_home_that_is_read_only(self):
+        identity = {"user": 65534, "group": 65534, "extra_groups": []} if ROOT else {}
+        try:
+            able = program.call("--version", **identity).returncode == 0
+        except PermissionError:
+            able = False
+        if not able:
+            self.skipTest("another user cannot run the program where it lies")
+        os.chmod(self.folder, 0o755)
+        os.chmod(self.home, 0o555)
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        self.fails(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME", **identity)
+
+    def test_a_folder_of_another_or_open_to_others_is_refused(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        self.draw("v.nrrd", bricked=True)
+        self.assertEqual(os.stat(self.cache).st_mode & 0o777, 0o700)
+        for mode in 0o720, 0o702, 0o777:
+            os.chmod(self.cache, mode)
+            for command in ("render", "v.nrrd", "-o", "x.png"), ("cache", "list"), ("cache", "clear"):
+                self.fails(1, *command, says="chmod 700")
+        os.chmod(self.cache, 0o700)
+        if ROOT:
+            os.chown(self.cache, 65534, 65534)
+            self.fails(1, "render", "v.nrrd", "-o", "x.png", says="another user")
+            self.fails(1, "cache", "clear", says="another user")
+            os.chown(self.cache, 0, 0)
+        self.assertEqual(len(self.entries()), 1)
+
+    def test_a_link_or_file_in_its_place_is_refused(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        os.makedirs(os.path.dirname(self.cache))
+        other = os.path.join(self.home, "other")
+        os.makedirs(other)
+        os.symlink(other, self.cache)
+        for command in ("render", "v.nrrd", "-o", "x.png"), ("cache", "list"), ("cache", "clear"):
+            self.fails(1, *command, says="XDG_CACHE_HOME")
+        self.assertEqual(os.listdir(other), [])
+        os.remove(self.cache)
+        program.write(self.cache, b"file")
+        self.fails(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME")
+
+    def test_whatever_lies_in_the_folder_does_no_harm(self):
+        """Nothing outside is touched; what has no name of ours stays."""
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        wanted = self.draw("v.nrrd", bricked=True)
+        entry = self.entries()[0]
+        key = entry[:-5]
+        outside = os.path.join(self.home, "outside")
+        inside = lambda *names: os.path.join(self.cache, *names)
+        other = lambda digit: digit * 32
+
+        def hostile():
+            shutil.rmtree(self.cache)
+            shutil.rmtree(outside, ignore_errors=True)
+            os.makedirs(os.path.join(outside, "index.trip"))
+            program.write(os.path.join(outside, "x.voxels"), b"precious")
+            os.makedirs(self.cache, mode=0o700)
+            os.symlink(outside, inside(entry))
+            os.symlink(outside, inside(f"{key}.trip.partial"))
+            os.symlink(outside, inside(f"{other('1')}.trip"))
+            os.symlink(outside, inside(f"{other('1')}.gone"))
+            os.mkfifo(inside(f"{other('2')}.trip"))
+            os.mkfifo(inside(f"{other('2')}.lock"))
+            program.write(inside(f"{other('3')}.trip"), b"file")
+            os.makedirs(inside(f"{other('4')}.trip", "deep", "er"))
+            os.makedirs(inside(f"{other('5')}.trip"))
+            os.symlink(outside, inside(f"{other('5')}.trip", "link"))
+            os.symlink("../../outside", inside(f"{other('6')}.link"))
+            os.symlink(other("5") + "/../..", inside(f"{other('7')}.link"))
+            program.write(inside(f"{other('8')}.link"), b"file")
+            os.symlink(os.path.join(outside, "made"), inside(f"{other('9')}.lock"))
+            os.makedirs(inside(f"{other('a')}.link"))
+            program.write(inside("notes.txt"), b"mine")
+            os.makedirs(inside("mine.trip"))
+
+        hostile()
+        before = tree(outside)
+        for command in ("list",), ("list", "--json"), ("clear",), ("clear",), ("list",):
+            run = program.call("cache", *command)
+            self.assertIn(run.returncode, (0, 1), run)
+            self.assertEqual(tree(outside), before)
+        self.assertTrue(os.path.exists(inside("notes.txt")) and os.path.exists(inside("mine.trip")))
+        hostile()
+        for _ in range(2):
+            run = program.call("render", "v.nrrd", "-o", "one.exr", *SIZE)
+            self.assertIn(run.returncode, (0, 1), run)
+            self.assertEqual(tree(outside), before)
+            if run.returncode == 0:
+                self.same(program.read_exr("one.exr"), wanted)
+
+    # The command
+
+    def test_list_and_clear(self):
+        run = self.works("cache", "list")
+        self.assertIn(b"0 data sets", run.stdout)
+        self.assertIn(b"removed 0 data sets", self.works("cache", "clear").stdout)
+        self.assertFalse(os.path.exists(self.cache))
+        for name in "first", "second":
+            program.write_nrrd(f"{name}.nrrd", program.ball((12, 12, 12), radius=len(name) / 10))
+            self.draw(f"{name}.nrrd", bricked=True)
+        text = self.works("cache", "list").stdout.decode()
+        self.assertIn("2 data sets", text)
+        self.assertIn("first.nrrd", text)
+        found = json.loads(self.works("cache", "list", "--json").stdout)
+        self.assertEqual(found["folder"], self.cache)
+        self.assertEqual({d["source"] for d in found["data_sets"]}, {"first.nrrd", "second.nrrd"})
+        for d in found["data_sets"]:
+            self.assertEqual(d["bytes"], self.size_of(os.path.basename(d["path"])))
+            self.works("info", "--verify", d["path"])
+        self.assertIn(b"removed 2 data sets", self.works("cache", "clear").stdout)
+        self.assertEqual(os.listdir(self.cache), [])
+        for wrong in [], ["nonsense"], ["list", "clear"], ["clear", "--json"], ["list", "--x"]:
+            self.fails(2, "cache", *wrong)
+
+    # Messages
+
+    def test_what_is_no_volume_leaves_nothing(self):
+        program.write("text.txt", b"hello\n" * 100)
+        program.write("plain.raw", bytes(1000))
+        self.leaves_nothing(1, "render", "text.txt", "-o", "x.png", says="triptych brick FILE --size")
+        self.leaves_nothing(2, "render", "plain.raw", "-o", "x.png", says="triptych brick FILE --size")
+        self.leaves_nothing(1, "render", "missing.nii", "-o", "x.png", says="No such file")
+        self.leaves_nothing(1, "render", "missing.trip", "-o", "x.png", says="No such file")
+        self.assertEqual(self.entries(), [])
+
+    def test_options_of_volumes_are_refused_for_data_sets(self):
+        program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
+        self.brick("v.nrrd", "v.trip")
+        for option in ("--grid", "a"), ("--level-set", "band"), ("--spacing", "1,1,1"):
+            self.fails(2, "render", "v.trip", "-o", "x.png", *option, says="is a data set")
+        self.fails(2, "render", "v.nrrd", "-o", "x.png", "--grid", "a", says="for OpenVDB")
+
+
+if __name__ == "__main__":
+    program.main()
