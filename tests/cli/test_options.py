@@ -38,6 +38,9 @@ BRICK = {
     "--output": [],
 }
 RENDER = {
+    "--grid": [],
+    "--level-set": NAMES + ["refuse"],
+    "--spacing": POINTS + ["0,1,1", "-1,1,1"],
     "--size": [
         "",
         "10",
@@ -145,6 +148,10 @@ class Options(program.ProgramTest):
             [
                 brick + ["--keep-all", "--range=1:2"],
                 brick + ["--quiet", "--json"],
+                brick + ["--grid=density", "--grid=heat"],
+                render + ["--grid=density", "--grid=heat"],
+                render + ["--grid=density"],
+                render + ["--spacing=1,1,1"],
                 render + ["--ortho=5", "--fov=30"],
                 render + ["--h=0.5", "--method=clip"],
                 render + ["--target=rgba8", "--renderer=reference"],
