@@ -130,7 +130,8 @@ class BadDatasets(program.ProgramTest):
         ):
             self.fails(1, "info", path)
             self.fails(1, "info", "--verify", "--json", path)
-            self.fails(1, "render", path, "-o", "no.png")
+            if path not in (".", "a.nrrd"):  # a folder of pictures and a volume, which can be drawn
+                self.fails(1, "render", path, "-o", "no.png")
         self.assertFalse(os.path.exists("no.png"))
 
     def test_a_name_with_a_slash_is_the_same_data_set(self):
