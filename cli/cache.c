@@ -9,8 +9,10 @@
 
 #include "cache_folder.h"
 #include "dataset.h"
+#include "json.h"
 #include "options.h"
 #include "report.h"
+#include "text.h"
 
 typedef struct options {
     bool list, clear, json;
@@ -60,12 +62,14 @@ static char *source_name(const char *path)
     char *name = NULL;
     if (trip_budget_create(&budget, 0) < 0)
         return NULL;
-    if (trip_dataset_open(&data, path, budget) == 0) {
-        cJSON *text = cJSON_Parse(data->text);
-        const char *source = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "source"));
+    trip_json text = { 0 };
+    if (trip_dataset_open(&data, path, budget) == 0 &&
+        trip_json_parse(&text, data->text, path, budget) == 0) {
+        const char *source =
+            cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text.root, "source"));
         name = strdup(source ? source : "");
-        cJSON_Delete(text);
     }
+    trip_json_free(&text);
     trip_dataset_close(data);
     trip_budget_destroy(budget);
     return name;
@@ -81,13 +85,6 @@ static const char *format_time(int64_t ns, bool for_people, char text[32])
         gmtime_r(&seconds, &t);
     strftime(text, 32, for_people ? "%Y-%m-%d %H:%M" : "%Y-%m-%dT%H:%M:%SZ", &t);
     return text;
-}
-
-/* Names come from files: only what a terminal shows as itself goes to one. */
-static void print_visible(const char *text)
-{
-    for (; *text; text++)
-        putchar((unsigned char)*text < ' ' || *text == 127 ? '?' : *text);
 }
 
 static void print_text(const cache_folder *c, const cache_entry *entries, size_t count)
@@ -106,7 +103,7 @@ static void print_text(const cache_folder *c, const cache_entry *entries, size_t
         char *path = cache_folder_path(c, &entries[i].key), *name = path ? source_name(path) : NULL;
         printf("%9s  %s  ", trip_format_bytes(entries[i].bytes, bytes),
                format_time(entries[i].used_ns, true, used));
-        print_visible(name ? name : "(damaged)");
+        trip_text_write(stdout, name ? name : "(damaged)");
         printf("  %s\n", path ? path : "");
         free(name);
         free(path);
@@ -135,7 +132,7 @@ static int print_json(const cache_folder *c, const cache_entry *entries, size_t 
     cJSON *list = cJSON_AddArrayToObject(root, "data_sets");
     for (size_t i = count; i-- > 0;)
         cJSON_AddItemToArray(list, entry_to_json(c, &entries[i]));
-    char *text = cJSON_Print(root);
+    char *text = trip_json_print(root, true);
     cJSON_Delete(root);
     if (!text)
         return trip_fail(TRIP_ERROR, "cache", c->path, "out of memory");
