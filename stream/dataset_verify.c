@@ -1,5 +1,5 @@
-/* Checks a whole data set: every page by its checksum, through the reader, every record against the
- * index, and the three lists against one another. */
+/* Checks a whole data set: every page by its checksum and every record against its brick, through
+ * the reader, the order of records, and the three lists against one another. */
 #include "dataset.h"
 
 #include "reader.h"
@@ -45,14 +45,9 @@ static int fail_record(const list_verifier *v, const char *why)
                      (unsigned long long)v->splat * TRIP_RECORD_BYTES, why);
 }
 
-static int check_record(list_verifier *v, const trip_file_brick *b, uint32_t voxel)
+static int check_record(list_verifier *v, uint32_t voxel)
 {
-    unsigned i = trip_voxel_u(voxel), j = trip_voxel_v(voxel), code = trip_voxel_code(voxel);
-    int64_t order = (int64_t)trip_morton(i, j);
-    if (i < b->u_min || i > b->u_max || j < b->v_min || j > b->v_max)
-        return fail_record(v, "the splat is outside its brick's bounds");
-    if (code < b->code_min || code > b->code_max)
-        return fail_record(v, "the value is outside its brick's range");
+    int64_t order = (int64_t)trip_morton(trip_voxel_u(voxel), trip_voxel_v(voxel));
     if (order <= v->last_order)
         return fail_record(v, "the splats of the run are not in Morton order");
     v->last_order = order;
@@ -61,7 +56,6 @@ static int check_record(list_verifier *v, const trip_file_brick *b, uint32_t vox
 
 static int check_run(list_verifier *v, const trip_batch *batch, const trip_run *run)
 {
-    const trip_file_brick *b = &v->data->lists[v->axis].bricks[run->brick];
     const uint32_t *voxels = batch->voxels + run->first;
     const uint32_t *normals = batch->normals ? batch->normals + run->first : NULL;
     uint64_t p[3] = { 0 };
@@ -71,7 +65,7 @@ static int check_run(list_verifier *v, const trip_batch *batch, const trip_run *
     v->brick = run->brick;
     p[v->axis] = (uint64_t)run->sheet;
     for (uint32_t i = 0; i < run->count; i++) {
-        int status = check_record(v, b, voxels[i]);
+        int status = check_record(v, voxels[i]);
         if (status < 0)
             return status;
         p[(v->axis + 1) % 3] = (uint64_t)run->u + trip_voxel_u(voxels[i]);

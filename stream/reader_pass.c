@@ -2,6 +2,7 @@
 #include "reader.h"
 
 #include "reader_state.h"
+#include "record_check.h"
 #include "report.h"
 
 #include <assert.h>
@@ -256,6 +257,41 @@ static const void *records(const trip_reader *r, const trip_slot *s, int plane)
     return s->memory + (plane == TRIP_PLANE_NORMALS ? r->params.slot_bytes : 0);
 }
 
+/* Where a record that lies so far into a batch stands in its file. */
+static unsigned long long file_offset(const trip_slot *s, size_t record)
+{
+    size_t at = record * TRIP_RECORD_BYTES;
+    unsigned i = s->extent.segment_count - 1;
+    while (i > 0 && s->extent.segments[i].slot_offset > at)
+        i--;
+    return s->extent.segments[i].offset + (at - s->extent.segments[i].slot_offset);
+}
+
+static int report_record(const trip_reader *r, const trip_batch *b, size_t record, const char *why)
+{
+    char name[32], where[4096];
+    snprintf(where, sizeof where, "%s/%s", r->data->path,
+             trip_dataset_plane_name(b->selection->axis, TRIP_PLANE_VOXELS, name));
+    return trip_fail(TRIP_ERROR, "read", where, "byte %llu: %s: make the data set again",
+                     file_offset(b->slot, record), why);
+}
+
+/* What draws takes records as they are: those outside their bricks end here. */
+static int check_records(const trip_reader *r, const trip_batch *b)
+{
+    const trip_file_brick *bricks = r->data->lists[b->selection->axis].bricks;
+    for (size_t i = 0; i < b->run_count && b->voxels; i++) {
+        const trip_run *run = &b->runs[i];
+        const trip_file_brick *brick = &bricks[run->brick];
+        const uint32_t *records = b->voxels + run->first;
+        size_t sound = trip_record_check(brick, records, run->count);
+        if (sound < run->count)
+            return report_record(r, b, run->first + sound,
+                                 trip_record_fault(brick, records[sound]));
+    }
+    return TRIP_OK;
+}
+
 static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
     *batch = (trip_batch){
@@ -282,13 +318,12 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
                          "all %u slots of the ring are held: release one first", r->params.slots);
     trip_slot *s = wait_first(r);
     r->failed = check_slot(r, s);
-    if (r->failed) {
-        s->state = TRIP_SLOT_FREE;
-        return r->failed;
+    if (!r->failed) {
+        fill_batch(r, s, batch);
+        r->failed = check_records(r, batch);
     }
-    s->state = TRIP_SLOT_DRAWING;
-    fill_batch(r, s, batch);
-    return 1;
+    s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
+    return r->failed ? r->failed : 1;
 }
 
 void trip_reader_release(trip_reader *r, trip_batch *batch)
