@@ -47,6 +47,7 @@ typedef struct gl_renderer {
     trip_gl_placing placing;
     unsigned effects; /* of the list being drawn */
     unsigned layers;  /* bit a: list a was begun */
+    uint32_t step;    /* splats to draw before the program is asked whether it is interrupted */
     uint64_t quads;   /* splats of the frame drawn as quads though sprites were asked for */
     trip_list_stats stats[3];
     char device[320];
@@ -98,6 +99,39 @@ static void upload_constants(gl_renderer *r)
                              &r->lists[axis]);
     }
     glNamedBufferSubData(r->table, 0, TABLE_BYTES, r->frame->table);
+}
+
+/* What is drawn at once takes a tenth of a second or so where processors draw: a whole pass over
+ * the image is done in strips of so many pixels, and splats so many of whose pixels. */
+enum { PIXELS_AT_ONCE = 1 << 25, STRIP_PIXELS = 1 << 20 };
+
+/* As many splats as cover PIXELS_AT_ONCE by the size of one in the volume's middle. */
+static uint32_t splats_at_once(const trip_frame *frame)
+{
+    const trip_camera *c = frame->camera;
+    const uint64_t *dims = frame->data->header.dims;
+    trip_vec3 middle = { 0.5 * (double)dims[0], 0.5 * (double)dims[1], 0.5 * (double)dims[2] };
+    double depth = c->ortho ? 1 : trip_dot(c->forward, trip_sub(middle, c->eye));
+    double edge = 2 * frame->settings->kernel_radius / fmax(depth, 1e-30);
+    double area = edge / trip_length(c->rx) * (edge / trip_length(c->ry));
+    area = fmax(1, fmin(area, (double)c->width * c->height));
+    return (uint32_t)fmax(16, PIXELS_AT_ONCE / area);
+}
+
+/* A pass over the image, strip by strip. */
+static int draw_screen(const gl_renderer *r)
+{
+    int status = TRIP_OK, width = r->target.width, height = r->target.height;
+    int rows = STRIP_PIXELS / width + 1;
+    glEnable(GL_SCISSOR_TEST);
+    for (int y = 0; y < height && !status; y += rows) {
+        glScissor(0, y, width, rows);
+        glDrawArrays(GL_TRIANGLES, 0, 3);
+        if (rows < height)
+            status = trip_gl_await();
+    }
+    glDisable(GL_SCISSOR_TEST);
+    return status;
 }
 
 static int check_size(const gl_renderer *r, const trip_camera *camera)
@@ -161,11 +195,11 @@ static int mask_region(gl_renderer *r, int axis)
     glStencilFunc(GL_ALWAYS, 1, 1);
     glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
+    status = draw_screen(r);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glStencilFunc(GL_EQUAL, 1, 1);
     glStencilOp(GL_KEEP, GL_KEEP, GL_KEEP);
-    return TRIP_OK;
+    return status;
 }
 
 static int begin_list(trip_renderer *base, int axis)
@@ -185,6 +219,7 @@ static int begin_list(trip_renderer *base, int axis)
         return status;
     r->layers |= 1u << axis;
     r->effects = trip_gl_frame_effects(frame, axis);
+    r->step = splats_at_once(frame);
     r->placing = (trip_gl_placing){
         .camera = frame->camera,
         .constants = &r->lists[axis],
@@ -260,6 +295,21 @@ static int draw_sprites(gl_renderer *r, const trip_gl_piece *piece)
     return status;
 }
 
+/* In parts where its splats are large. */
+static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
+{
+    int status = TRIP_OK;
+    for (uint32_t done = 0; done < piece->count && !status;) {
+        uint32_t left = piece->count - done, count = left < r->step ? left : r->step;
+        const trip_gl_piece part = { piece->first + done, count, piece->quads };
+        status = part.quads ? draw_quads(r, &part) : draw_sprites(r, &part);
+        if (!status && count < piece->count)
+            status = trip_gl_await();
+        done += count;
+    }
+    return status;
+}
+
 static int draw_pieces(gl_renderer *r, bool front_to_back)
 {
     int status = TRIP_OK;
@@ -269,10 +319,8 @@ static int draw_pieces(gl_renderer *r, bool front_to_back)
         glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
     else
         glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-    for (size_t i = 0; i < r->batch.piece_count && !status; i++) {
-        const trip_gl_piece *piece = &r->batch.pieces[i];
-        status = piece->quads ? draw_quads(r, piece) : draw_sprites(r, piece);
-    }
+    for (size_t i = 0; i < r->batch.piece_count && !status; i++)
+        status = draw_piece(r, &r->batch.pieces[i]);
     return status;
 }
 
@@ -353,8 +401,19 @@ static int merge(gl_renderer *r)
     glBindVertexArray(r->vertex_array);
     for (unsigned axis = 0; axis < 3; axis++)
         glBindTextureUnit(TRIP_GL_LAYER + axis, r->target.layers[axis]);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-    return TRIP_OK;
+    return draw_screen(r);
+}
+
+static int read_image(const gl_renderer *r, float *rgba)
+{
+    int status = TRIP_OK, width = r->target.width, height = r->target.height;
+    int rows = STRIP_PIXELS / width + 1;
+    for (int y = 0; y < height && !status; y += rows) {
+        int count = height - y < rows ? height - y : rows;
+        trip_gl_target_read_rows(&r->target, y, count, rgba + (size_t)y * (size_t)width * 4);
+        status = trip_frame_poll();
+    }
+    return status;
 }
 
 static void read_counts(gl_renderer *r)
@@ -385,9 +444,10 @@ static int end_frame(trip_renderer *base, float *rgba)
     int status = trip_gl_context_use(r->context);
     if (!status)
         status = merge(r);
+    if (!status)
+        status = read_image(r, rgba);
     if (status)
         return status;
-    trip_gl_target_read_image(&r->target, rgba);
     if (r->frame->count)
         read_counts(r);
     describe(r);

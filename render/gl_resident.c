@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "gl_shared.h"
+#include "renderer.h"
 #include "report.h"
 
 enum { MAX_COORDINATE = 65536, Z = 2 };
@@ -148,6 +149,8 @@ static int read_batches(arrays *a, trip_reader *reader, int axis, fill_run *fill
                           batch.normals ? batch.normals + run->first : NULL);
         }
         trip_reader_release(reader, &batch);
+        if (!status)
+            status = trip_frame_poll();
         if (status)
             return status;
     }

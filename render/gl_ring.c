@@ -2,7 +2,7 @@
 
 #include "report.h"
 
-static const GLuint64 wait_ns = 1000000000;
+static const GLuint64 wait_ns = 50000000; /* between two looks whether the program is interrupted */
 
 bool trip_gl_slot_make(trip_gl_slot *slot, size_t bytes, bool readable, trip_budget *budget)
 {
@@ -48,7 +48,9 @@ int trip_gl_slot_is_done(trip_gl_slot *slot, bool wait)
     do
         result = glClientWaitSync(slot->fence, wait ? GL_SYNC_FLUSH_COMMANDS_BIT : 0,
                                   wait ? wait_ns : 0);
-    while (wait && result == GL_TIMEOUT_EXPIRED);
+    while (wait && result == GL_TIMEOUT_EXPIRED && !trip_interrupted());
+    if (wait && result == GL_TIMEOUT_EXPIRED)
+        return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
     if (result == GL_TIMEOUT_EXPIRED)
         return 0;
     glDeleteSync(slot->fence);
@@ -57,6 +59,16 @@ int trip_gl_slot_is_done(trip_gl_slot *slot, bool wait)
         return trip_fail(TRIP_ERROR, "gl", "buffer", "waiting for the GPU failed: OpenGL error %#x",
                          glGetError());
     return 1;
+}
+
+int trip_gl_await(void)
+{
+    trip_gl_slot nothing = { 0 };
+    trip_gl_slot_fence(&nothing);
+    int status = trip_gl_slot_is_done(&nothing, true);
+    if (nothing.fence)
+        glDeleteSync(nothing.fence);
+    return status < 0 ? status : TRIP_OK;
 }
 
 static int no_room(const trip_gl_ring *r, size_t bytes)

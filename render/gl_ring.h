@@ -33,6 +33,9 @@ void trip_gl_slot_release(trip_gl_slot *slot, trip_budget *budget);
 void trip_gl_slot_fence(trip_gl_slot *slot);
 /* 1: the GPU has done with the slot; 0: not yet, only when not told to wait; negative: failed. */
 int trip_gl_slot_is_done(trip_gl_slot *slot, bool wait);
+/* Until the GPU has done all that it was given; fails (reported) when the program is interrupted
+ * meanwhile, as does waiting for a slot. */
+int trip_gl_await(void);
 
 /* The next slot with room for `bytes`, waiting until the GPU has done with it. */
 int trip_gl_ring_take(trip_gl_ring *r, size_t bytes, trip_gl_slot **slot);

@@ -112,10 +112,10 @@ int trip_gl_target_begin_image(trip_gl_target *t)
     return bind_complete(t->framebuffer, "image");
 }
 
-void trip_gl_target_read_image(const trip_gl_target *t, float *rgba)
+void trip_gl_target_read_rows(const trip_gl_target *t, int first, int count, float *rgba)
 {
     glBindFramebuffer(GL_READ_FRAMEBUFFER, t->framebuffer);
-    glReadPixels(0, 0, t->width, t->height, GL_RGBA, GL_FLOAT, rgba);
+    glReadPixels(0, first, t->width, count, GL_RGBA, GL_FLOAT, rgba);
 }
 
 void trip_gl_target_release(trip_gl_target *t)

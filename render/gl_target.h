@@ -26,8 +26,8 @@ int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target 
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
 /* Binds the image for drawing; it holds rgba32f whatever the layers hold. */
 int trip_gl_target_begin_image(trip_gl_target *t);
-/* width * height * 4 floats, row 0 first. */
-void trip_gl_target_read_image(const trip_gl_target *t, float *rgba);
+/* Rows [first, first + count) of the image, width * 4 floats each. */
+void trip_gl_target_read_rows(const trip_gl_target *t, int first, int count, float *rgba);
 void trip_gl_target_release(trip_gl_target *t);
 
 #endif
