@@ -1,12 +1,12 @@
-/* The exact counts of a frame (trip_list_stats), in double precision and by the same functions as
- * the reference renderer's. Called by many threads at once. */
+/* What a voxel counts for before any kernel is asked (trip_list_stats): the bounds by which whole
+ * bricks are culled, taken for one splat. Called by many threads at once. */
 #ifndef TRIP_CPU_COUNT_H
 #define TRIP_CPU_COUNT_H
 
 #include "cpu_kernels.h"
 
-/* Counts the splat of a voxel of the view's list. */
-void trip_cpu_count(const trip_cpu_view *view, const trip_run *run, uint32_t voxel,
-                    trip_list_stats *stats);
+/* Whether the splat of a voxel of the view's list is projected: not culled by the list's weight or
+ * the plane of the eye. */
+bool trip_cpu_is_projected(const trip_cpu_view *view, const trip_run *run, uint32_t voxel);
 
 #endif

@@ -178,6 +178,11 @@ typedef struct trip_cpu_kernels {
     /* The finished picture of a tile into an image, from what the lists came to there. */
     void (*tile_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
                         const float *pixels, float *rgba);
+
+    /* How many of so many splats that project() made have a pixel centre of the image in their
+     * support where the list has weight. Uses `s` for itself. */
+    uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
+                      uint32_t count);
 } trip_cpu_kernels;
 
 #endif

@@ -17,6 +17,8 @@
 #include "cpu_show.h"
 #include "report.h"
 
+#define VISIBLE_BYTES (65536 * sizeof(trip_tf_entry))
+
 enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
 
 /* Fewer voxels are not worth a chunk. */
@@ -36,6 +38,7 @@ typedef struct worker {
     trip_cpu_scratch scratch;
     trip_cpu_span shown[TRIP_CPU_CHUNK];
     trip_cpu_sorting sorting;
+    _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
 } worker;
 
 /* A tile to blend, or a quarter of one. */
@@ -65,6 +68,10 @@ typedef struct cpu {
     trip_cpu_view view;
     bool in_list;
     trip_list_stats stats[3];
+    /* Where the frame counts: the same with every voxel visible, whatever its code. */
+    trip_frame counted_frame;
+    trip_cpu_view counted_view;
+    trip_tf_entry *visible; /* 65536 entries; NULL until wanted */
 
     trip_cpu_flush flushes[2];
     trip_cpu_flush *filling, *blending;
@@ -106,10 +113,19 @@ static bool is_alone(const cpu *r, uint32_t tile)
 
 /* ---- projecting a batch ---- */
 
-static void count_span(const cpu *r, trip_cpu_chunk *chunk, const trip_cpu_span *s)
+/* Counts by projecting for the count alone: what is hidden or transparent counts too. */
+static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s)
 {
+    const trip_cpu_view *view = &r->counted_view;
+    const uint32_t *voxels = r->batch->voxels + s->first;
     for (uint32_t i = 0; i < s->count; i++)
-        trip_cpu_count(&r->view, s->run, r->batch->voxels[s->first + i], &chunk->counts);
+        chunk->counts.splats_projected += trip_cpu_is_projected(view, s->run, voxels[i]);
+    for (uint32_t done = 0; done < s->count; done += TRIP_CPU_STAGED) {
+        uint32_t left = s->count - done, n = left < TRIP_CPU_STAGED ? left : TRIP_CPU_STAGED;
+        n = r->kernels->stage(view, s->run, voxels + done, NULL, n, false, &w->scratch.staged, 0);
+        n = r->kernels->project(view, NULL, &w->scratch.staged, n, &w->scratch.lanes, w->counted);
+        chunk->counts.splats_drawn += r->kernels->drawn(view, &w->scratch, w->counted, n);
+    }
 }
 
 /* What of a chunk may show: at most a span a voxel. */
@@ -124,7 +140,7 @@ static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
         uint32_t count = run->count - skip < left ? run->count - skip : left;
         trip_cpu_span part = trip_cpu_span_part(&all, reversed, skip, count);
         if (r->frame->count)
-            count_span(r, chunk, &part);
+            count_span(r, w, chunk, &part);
         n += trip_cpu_show(&asking, &part, w->shown + n);
         left -= count;
         skip = 0;
@@ -399,6 +415,8 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     bool shading = r->frame->settings->shading && batch->normals;
     cursor at = { 0, 0 };
     int status = 0;
+    if (r->frame->count)
+        trip_cpu_view_make(&r->counted_view, &r->counted_frame, r->view.axis, front_to_back);
     if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
         settle(r);
         trip_cpu_view_make(&r->view, r->frame, r->view.axis, front_to_back);
@@ -560,6 +578,22 @@ static int fit_tiles(cpu *r, int width, int height)
     return 0;
 }
 
+/* Any extinction will do that the kernels do not take for nothing. */
+static int begin_counting(cpu *r)
+{
+    const trip_camera *camera = r->frame->camera;
+    if (!r->visible)
+        r->visible = trip_budget_take(r->budget, VISIBLE_BYTES);
+    if (!r->visible)
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "the memory given does not suffice for counting; raise --memory");
+    for (int i = 0; i < 65536; i++)
+        r->visible[i] = (trip_tf_entry){ .extinction = (float)(0x1p20 / camera->voxel_world) };
+    r->counted_frame = *r->frame;
+    r->counted_frame.table = r->visible;
+    return 0;
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     cpu *r = (cpu *)base;
@@ -571,6 +605,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
     int status = fit_tiles(r, frame->camera->width, frame->camera->height);
+    if (!status && frame->count)
+        status = begin_counting(r);
     if (status)
         return status;
     trip_cpu_view_make(&r->view, frame, frame->plan->axis_of_view, true);
@@ -612,6 +648,7 @@ static void destroy(trip_renderer *base)
     for (int i = 0; i < 2; i++)
         trip_cpu_flush_destroy(&r->flushes[i], budget);
     trip_budget_release(budget, r->workers, r->workers_bytes);
+    trip_budget_release(budget, r->visible, VISIBLE_BYTES);
     trip_budget_release(budget, r, sizeof *r);
 }
 

@@ -3,6 +3,7 @@
 #define TRIP_CPU_TABLE_H
 
 #include "cpu_blend.h"
+#include "cpu_drawn.h"
 #include "cpu_isa.h"
 #include "cpu_merge.h"
 #include "cpu_project.h"
@@ -14,6 +15,7 @@
         .isa = name, .lanes = V, .squares = squares, .stage = stage, .project = project,           \
         .tile_clear = tile_clear, .tile_begin = tile_begin, .tile_blend = tile_blend,              \
         .tile_end = tile_end, .tile_merge = tile_merge, .tile_finish = tile_finish,                \
+        .drawn = drawn,                                                                            \
     }
 
 #endif
