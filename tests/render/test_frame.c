@@ -12,6 +12,9 @@ static void make_scene(scene *s)
     scene_colour(s, 0, 65535, 1, 0.8, 0.6, 0.2);
 }
 
+/* A signal to raise once the frame is planned; 0: none. */
+static int signal_when_planned;
+
 /* One frame with what is given; returns its status. */
 static int draw(const scene *s, trip_renderer *r, trip_reader *reader,
                 const trip_camera_params *view, float *rgba, trip_frame_stats *stats)
@@ -22,6 +25,8 @@ static int draw(const scene *s, trip_renderer *r, trip_reader *reader,
     settings.h = 0.2;
     assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
     assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
+    if (signal_when_planned)
+        raise(signal_when_planned);
     trip_frame frame = { .data = s->data,
                          .camera = &camera,
                          .settings = &settings,
@@ -301,7 +306,19 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
 }
 
 /* The last test: nothing takes the signal back. */
-static void an_interrupt_ends_the_frame(void **state)
+static void plan_is_interrupted(const scene *s, const trip_camera_params *view)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_settings settings = trip_settings_default();
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    test_catch_reports();
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget),
+                     TRIP_INTERRUPTED);
+    assert_one_report("plan: interrupted");
+}
+
+static void an_interrupt_ends_plan_and_frame(void **state)
 {
     (void)state;
     scene s;
@@ -313,10 +330,12 @@ static void an_interrupt_ends_the_frame(void **state)
     assert_int_equal(trip_reference_create(&r, s.budget), 0);
     trip_reader *reader = make_reader(&s, (trip_reader_params){ 0 });
     trip_interrupt_install();
-    raise(SIGINT);
+    signal_when_planned = SIGINT;
     test_catch_reports();
     assert_int_equal(draw(&s, r, reader, &view, rgba, &stats), TRIP_INTERRUPTED);
     assert_one_report("frame: interrupted");
+    signal_when_planned = 0;
+    plan_is_interrupted(&s, &view);
     trip_reader_destroy(reader);
     r->ops->destroy(r);
     scene_destroy(&s);
@@ -331,7 +350,7 @@ int main(void)
         cmocka_unit_test(a_failed_or_damaged_read_ends_the_frame_with_one_report),
         cmocka_unit_test(without_memory_for_its_pixels_the_reference_says_so),
         cmocka_unit_test(batches_stay_as_they_are_until_the_renderer_is_done_with_them),
-        cmocka_unit_test(an_interrupt_ends_the_frame),
+        cmocka_unit_test(an_interrupt_ends_plan_and_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
