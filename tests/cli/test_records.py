@@ -55,6 +55,14 @@ class Records(program.ProgramTest):
                 self.change_record(axis, place, bits), "the splat is outside its brick's bounds"
             )
 
+    def test_the_one_that_was_drawn_once(self):
+        path = os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests/regress/record_outside_brick.trip")
+        for name in self.renderers:
+            self.fails(
+                1, "render", path, "-o", "b.exr", f"--renderer={name}", "--size=40x40",
+                says="x.voxels: byte 12: the splat is outside its brick's bounds",
+            )
+
     def test_a_code_outside_the_bricks_range(self):
         for axis in "xz":
             data = craft.Dataset("a.trip")
