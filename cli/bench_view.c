@@ -1,7 +1,5 @@
 #include "bench_view.h"
 
-#include "render_view.h"
-
 static const double fov_degrees = 30, fill = 0.95, degree = 3.14159265358979323846 / 180;
 
 /* The box of all splats, kernels included, in world space, and a view's basis. */
@@ -44,18 +42,24 @@ static trip_camera_params params(const framing *f, const int size[2], double dis
     };
 }
 
-trip_camera_params bench_view_oblique(const session *s, const int size[2])
+/* How far off a perspective view of the middle has the whole box in the picture. */
+static double distance_needed(const framing *f, const int size[2])
 {
-    framing f = make_framing(s, trip_v3(-1, -1, -1), trip_v3(0, 0, 1));
     double slope_y = fill * tan(fov_degrees * degree / 2), distance = 0;
     double slope_x = slope_y * size[0] / size[1];
     for (int i = 0; i < 8; i++) {
-        trip_vec3 corner = trip_sub(f.corners[i], f.middle);
-        double needed =
-            fmax(fabs(trip_dot(corner, f.right)) / slope_x, fabs(trip_dot(corner, f.up)) / slope_y);
-        distance = fmax(distance, needed - trip_dot(corner, f.gaze));
+        trip_vec3 corner = trip_sub(f->corners[i], f->middle);
+        double needed = fmax(fabs(trip_dot(corner, f->right)) / slope_x,
+                             fabs(trip_dot(corner, f->up)) / slope_y);
+        distance = fmax(distance, needed - trip_dot(corner, f->gaze));
     }
-    trip_camera_params view = params(&f, size, distance);
+    return distance;
+}
+
+trip_camera_params bench_view_oblique(const session *s, const int size[2])
+{
+    framing f = make_framing(s, trip_v3(-1, -1, -1), trip_v3(0, 0, 1));
+    trip_camera_params view = params(&f, size, distance_needed(&f, size));
     view.fov_degrees = fov_degrees;
     return view;
 }
@@ -76,8 +80,31 @@ trip_camera_params bench_view_lateral(const session *s, const int size[2])
     return view;
 }
 
+/* The box seen as `render` would see it by default, turned by an angle about up. */
+static framing make_turned(const session *s, double azimuth_degrees)
+{
+    framing f;
+    trip_camera_params view;
+    trip_camera_framing box = { .width = 1, .height = 1, .azimuth_degrees = azimuth_degrees };
+    trip_dataset_text_frame(s->text, s->data, &box);
+    trip_camera_frame(&box, &s->data->index_to_world, &view);
+    frame_box(&f, s);
+    f.gaze = trip_normalize(trip_sub(view.look, view.eye));
+    f.right = trip_normalize(trip_cross(f.gaze, view.up));
+    f.up = trip_cross(f.right, f.gaze);
+    return f;
+}
+
 trip_camera_params bench_view_round(const session *s, const int size[2], int index, int count)
 {
-    const render_options o = { .width = size[0], .height = size[1], .orbit = count };
-    return render_view(&o, s->data, s->text, index);
+    framing f;
+    double distance = 0;
+    for (int i = 0; i < count; i++) {
+        f = make_turned(s, 360.0 * i / count);
+        distance = fmax(distance, distance_needed(&f, size));
+    }
+    f = make_turned(s, 360.0 * index / count);
+    trip_camera_params view = params(&f, size, distance);
+    view.fov_degrees = fov_degrees;
+    return view;
 }

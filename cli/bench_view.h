@@ -12,7 +12,8 @@ trip_camera_params bench_view_oblique(const session *s, const int size[2]);
  * the weight. */
 trip_camera_params bench_view_lateral(const session *s, const int size[2]);
 
-/* View `index` of `count` once round the object, as `render --orbit` draws them. */
+/* View `index` of `count` once round the object, from where `render` looks by default; perspective,
+ * all splats in each picture. */
 trip_camera_params bench_view_round(const session *s, const int size[2], int index, int count);
 
 #endif

@@ -20,6 +20,7 @@ typedef struct drawing {
     render_options o;
     cached_volume volume; /* where the input is one */
     session session;
+    render_views views;
     float *rgba;
     trip_renderer *renderer;
     trip_reader *reader;
@@ -60,6 +61,8 @@ static int open_drawing(drawing *d)
             session_open(&d->session, volume ? d->volume.path : o->input, o->tf, o->memory_bytes);
     if (!status)
         status = session_take_image(&d->session, o->width, o->height, &d->rgba);
+    if (!status)
+        status = render_views_make(&d->views, o, &d->session);
     if (!status)
         status = trip_renderer_create(&d->renderer, o->renderer, (unsigned)o->threads,
                                       d->session.budget);
@@ -139,7 +142,7 @@ static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *
 static int plan_image(const drawing *d, int index, trip_camera *camera, trip_plan *plan)
 {
     const session *s = &d->session;
-    trip_camera_params view = render_view(&d->o, s->data, s->text, index);
+    trip_camera_params view = render_views_get(&d->views, index);
     int status = trip_camera_make(camera, &view, &s->data->index_to_world);
     return status ? status
                   : trip_plan_make(plan, s->data, camera, &d->o.settings, s->table, s->budget);
@@ -157,13 +160,17 @@ static int draw_image(drawing *d, int index)
         status = plan_image(d, index, &camera, &plan);
     if (status)
         return status;
-    if (d->o.explain)
+    if (d->o.explain) {
+        render_stats_explain_camera(&camera.params, d->views.splats, stdout);
         trip_plan_explain(&plan, s->data, &d->o.settings, stdout);
+    }
     status = draw_planned(d, &camera, &plan, &stats);
     if (!status && d->o.explain)
         render_stats_explain(&stats, d->renderer, d->reader, stdout);
     if (!status && d->stats)
         status = render_stats_add_frame(d->stats, s->data, &plan, &stats);
+    if (!status && d->stats)
+        status = render_stats_add_camera(d->stats, &camera.params);
     trip_plan_release(&plan, s->budget);
     if (!status)
         status = trip_image_write(path, d->o.width, d->o.height, d->rgba, NULL);

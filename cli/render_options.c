@@ -21,6 +21,11 @@ enum {
     KEY_FOV,
     KEY_ORTHO,
     KEY_ORBIT,
+    KEY_VIEW,
+    KEY_AZIMUTH,
+    KEY_ELEVATION,
+    KEY_ROLL,
+    KEY_ZOOM,
     KEY_BACKGROUND,
     KEY_TF,
     KEY_LIGHT,
@@ -52,18 +57,30 @@ static const struct argp_option options[] = {
       "Distance of voxels along each axis (default: the file's, else 1)", 0 },
     { NULL, 0, NULL, 0, "View:", 1 },
     { "size", KEY_SIZE, "WxH", 0, "Pixels (default: 1024x1024)", 1 },
-    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
-    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (default: the middle)", 1 },
+    { "view", KEY_VIEW, "SIDE", 0,
+      "front, back, left, right, top, bottom or iso (default: front, a little from the left and "
+      "above). Left and right are the object's own: a patient's left, or, as of a person facing "
+      "you, what is on your right in front",
+      1 },
+    { "azimuth", KEY_AZIMUTH, "DEGREES", 0, "From there go round the object, to your right", 1 },
+    { "elevation", KEY_ELEVATION, "DEGREES", 0, "and up", 1 },
+    { "roll", KEY_ROLL, "DEGREES", 0, "Turn the picture clockwise", 1 },
+    { "zoom", KEY_ZOOM, "FACTOR", 0, "Magnify, as another lens would (default: 1)", 1 },
     { "up", KEY_UP, "X,Y,Z", 0,
-      "What is up (default: 0,0,1; OpenVDB 0,1,0; scans of thick slices 0,0,-1)", 1 },
+      "What is up; the sides follow it (default: 0,0,1; OpenVDB 0,1,0; scans of thick slices "
+      "0,0,-1)",
+      1 },
+    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
+    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (default: the middle of what is visible)", 1 },
     { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (default: 30)", 1 },
-    { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, HEIGHT world units high", 1 },
+    { "ortho", KEY_ORTHO, "HEIGHT|fit", 0,
+      "Parallel view, HEIGHT world units high, or so that all is in view", 1 },
     { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...", 1 },
     { NULL, 0, NULL, 0, "Look:", 2 },
     { "tf", KEY_TF, "FILE", 0,
       "Transfer function: .tf, ParaView JSON or preset:NAME (default: kept in the data set)", 2 },
     { "light", KEY_LIGHT, "X,Y,Z|head", 0,
-      "Direction to the light, or from the eye (default: head)", 2 },
+      "Direction to the light, or from the eye (default: head); not with --no-shading", 2 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
@@ -102,7 +119,7 @@ static const struct argp_option options[] = {
 /* While parsing: what was given, for the checks of combinations. */
 typedef struct parse {
     render_options *o;
-    bool h, target, background, lists, forms;
+    bool h, target, background, lists, forms, side, light;
 } parse;
 
 static int parse_size(const char *text, render_options *o)
@@ -186,8 +203,49 @@ static int parse_volume(int key, char *arg, trip_volume_params *v)
     }
 }
 
-static int parse_view(int key, char *arg, render_options *o)
+static int parse_up(const char *text, render_options *o)
 {
+    int status = parse_point("--up", text, &o->up, &o->up_given);
+    if (!status && !(trip_length(o->up) > 0))
+        return trip_option_fail("--up", "the direction is zero");
+    return status;
+}
+
+static int parse_ortho(const char *text, render_options *o)
+{
+    o->ortho_height = 0;
+    o->ortho_fit = !strcmp(text, "fit");
+    return o->ortho_fit ? 0 : trip_option_number("--ortho", text, 1e-100, 1e100, &o->ortho_height);
+}
+
+/* Which side is seen. */
+static int parse_side(int key, char *arg, parse *p)
+{
+    static const char *const views[] = { "front", "back",   "left", "right",
+                                         "top",   "bottom", "iso",  NULL };
+    render_options *o = p->o;
+    int which = 0, status;
+    switch (key) {
+    case KEY_VIEW:
+        status = trip_option_choice("--view", arg, views, &which);
+        o->view = (trip_view)(TRIP_VIEW_FRONT + which);
+        break;
+    case KEY_AZIMUTH:
+        status = trip_option_number("--azimuth", arg, -3600, 3600, &o->azimuth_degrees);
+        break;
+    case KEY_ELEVATION:
+        status = trip_option_number("--elevation", arg, -3600, 3600, &o->elevation_degrees);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    p->side = true;
+    return status;
+}
+
+static int parse_view(int key, char *arg, parse *p)
+{
+    render_options *o = p->o;
     switch (key) {
     case KEY_SIZE:
         return parse_size(arg, o);
@@ -196,15 +254,20 @@ static int parse_view(int key, char *arg, render_options *o)
     case KEY_LOOK:
         return parse_point("--look", arg, &o->look, &o->look_given);
     case KEY_UP:
-        return parse_point("--up", arg, &o->up, &o->up_given);
+        return parse_up(arg, o);
+    case KEY_ROLL:
+        return trip_option_number("--roll", arg, -3600, 3600, &o->roll_degrees);
+    case KEY_ZOOM:
+        return trip_option_number("--zoom", arg, 1e-6, 1e6, &o->zoom);
     case KEY_FOV:
-        return trip_option_number("--fov", arg, 1e-6, 179.999, &o->fov_degrees);
+        return trip_option_number("--fov", arg, RENDER_FOV_MIN_DEGREES, RENDER_FOV_MAX_DEGREES,
+                                  &o->fov_degrees);
     case KEY_ORTHO:
-        return trip_option_number("--ortho", arg, 1e-100, 1e100, &o->ortho_height);
+        return parse_ortho(arg, o);
     case KEY_ORBIT:
         return trip_option_integer("--orbit", arg, 1, 100000, &o->orbit);
     default:
-        return ARGP_ERR_UNKNOWN;
+        return parse_side(key, arg, p);
     }
 }
 
@@ -242,6 +305,7 @@ static int parse_look(int key, char *arg, parse *p)
         o->tf = arg;
         return 0;
     case KEY_LIGHT:
+        p->light = true;
         return parse_light(arg, &o->settings);
     case KEY_NO_SHADING:
         o->settings.shading = false;
@@ -291,6 +355,20 @@ static int parse_renderer(int key, char *arg, parse *p)
     }
 }
 
+static int check_view(const parse *p)
+{
+    const render_options *o = p->o;
+    bool parallel = o->ortho_height > 0 || o->ortho_fit;
+    if (parallel && o->fov_degrees > 0)
+        return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
+    if (o->eye_given && p->side)
+        return trip_option_fail("--eye", "says where to look from, and so do --view, --azimuth and "
+                                         "--elevation: give one or the other");
+    if (o->eye_given && o->ortho_fit)
+        return trip_option_fail("--ortho", "fit goes without --eye; give a height");
+    return 0;
+}
+
 /* Options that cannot apply together; what one implies for another. */
 static int check(parse *p)
 {
@@ -303,8 +381,11 @@ static int check(parse *p)
     if ((v->grid || v->level_set || v->spacing[0] > 0) && !cached_volume_wanted(o->input))
         return trip_option_fail(o->input,
                                 "is a data set: --grid, --level-set and --spacing are for volumes");
-    if (o->ortho_height > 0 && o->fov_degrees > 0)
-        return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
+    int status = check_view(p);
+    if (status)
+        return status;
+    if (p->light && !o->settings.shading)
+        return trip_option_fail("--light", "does not apply with --no-shading");
     if (p->h && o->settings.method != TRIP_METHOD_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     if (p->target && o->renderer == TRIP_RENDERER_REFERENCE)
@@ -354,7 +435,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     }
     int status = parse_volume(key, arg, &p->o->volume);
     if (status == ARGP_ERR_UNKNOWN)
-        status = parse_view(key, arg, p->o);
+        status = parse_view(key, arg, p);
     if (status == ARGP_ERR_UNKNOWN)
         status = parse_look(key, arg, p);
     if (status == ARGP_ERR_UNKNOWN)

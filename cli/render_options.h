@@ -2,6 +2,7 @@
 #ifndef TRIP_RENDER_OPTIONS_H
 #define TRIP_RENDER_OPTIONS_H
 
+#include "framing.h"
 #include "reader.h"
 #include "renderer_choice.h"
 #include "settings.h"
@@ -14,6 +15,9 @@ typedef enum render_hidden {
     RENDER_HIDDEN_DRAW,
 } render_hidden;
 
+#define RENDER_FOV_MIN_DEGREES 1e-6
+#define RENDER_FOV_MAX_DEGREES 179.999
+
 typedef struct render_options {
     const char *input,
         *output;               /* data set or volume; an image file, its name's model in an orbit */
@@ -23,8 +27,11 @@ typedef struct render_options {
     int width, height;
     bool eye_given, look_given, up_given;
     trip_vec3 eye, look, up;
-    double fov_degrees, ortho_height; /* 0: not given */
-    int orbit;                        /* images of a turntable; 0: one image */
+    trip_view view;
+    double azimuth_degrees, elevation_degrees, roll_degrees;
+    double zoom, fov_degrees, ortho_height; /* 0: not given */
+    bool ortho_fit;                         /* parallel, as high as needed */
+    int orbit;                              /* images of a turntable; 0: one image */
     trip_settings settings;
     trip_renderer_kind renderer;
     render_hidden hidden;

@@ -10,6 +10,7 @@
 #include <cjson/cJSON.h>
 
 #include "json.h"
+#include "render_view.h"
 #include "report.h"
 #include "text.h"
 
@@ -107,6 +108,15 @@ int render_stats_add_count(render_stats *s, int index, const trip_frame_stats *c
     return lists ? 0 : out_of_memory();
 }
 
+int render_stats_add_camera(render_stats *s, const trip_camera_params *view)
+{
+    char *options = render_view_options(view);
+    cJSON *last = cJSON_GetArrayItem(s->frames, cJSON_GetArraySize(s->frames) - 1);
+    bool added = options && cJSON_AddStringToObject(last, "camera", options);
+    free(options);
+    return added ? 0 : out_of_memory();
+}
+
 static bool write_text(const char *path, const char *text)
 {
     FILE *f = fopen(path, "w");
@@ -181,6 +191,15 @@ int render_stats_write(render_stats *s, const render_options *o)
         puts(text); /* main() says when stdout cannot be written */
     free(text);
     return status;
+}
+
+void render_stats_explain_camera(const trip_camera_params *view, uint64_t splats, FILE *out)
+{
+    char *options = render_view_options(view);
+    fprintf(out, "camera      %s\n", options ? options : "");
+    if (splats)
+        fprintf(out, "fitted      to what is visible, found among %" PRIu64 " splats\n", splats);
+    free(options);
 }
 
 void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *renderer,

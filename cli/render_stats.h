@@ -19,9 +19,13 @@ int render_stats_add_count(render_stats *s, int index, const trip_frame_stats *c
 /* What drew the frames and the memory it took: once they are drawn, before they are counted. */
 int render_stats_describe(render_stats *s, const render_options *o, const trip_renderer *renderer,
                           const trip_reader *reader, const trip_budget *budget);
+/* Adds the options that give the last frame's view again. */
+int render_stats_add_camera(render_stats *s, const trip_camera_params *view);
 /* Writes the JSON to the file of --stats, by another name and a rename, or to stdout. */
 int render_stats_write(render_stats *s, const render_options *o);
 
+/* The view as options, and how many splats were looked at to fit it. */
+void render_stats_explain_camera(const trip_camera_params *view, uint64_t splats, FILE *out);
 /* What the parts of a plan cost, a line each. */
 void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *renderer,
                           const trip_reader *reader, FILE *out);

@@ -3,10 +3,6 @@
 #include "report.h"
 
 #define PI 3.14159265358979323846
-#define DEFAULT_FOV_DEGREES 30.0
-#define DEFAULT_AZIMUTH_DEGREES 30.0
-#define DEFAULT_ELEVATION_DEGREES 20.0
-#define DEFAULT_FILL 0.95 /* of the image by the framed box */
 #define MAX_SIZE_PX 65536
 
 /* Orthonormal, right-handed with forward towards the scene: right x up = -forward. */
@@ -161,84 +157,19 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
     return check_range(c);
 }
 
-static trip_vec3 box_corner(const double lo[3], const double hi[3], int corner)
+static trip_vec3 turned(trip_vec3 v, trip_vec3 axis, double angle)
 {
-    return trip_v3(corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1],
-                   corner & 4 ? hi[2] : lo[2]);
+    trip_vec3 along = trip_scale(axis, trip_dot(axis, v)), across = trip_sub(v, along);
+    return trip_add(along, trip_add(trip_scale(across, cos(angle)),
+                                    trip_scale(trip_cross(axis, across), sin(angle))));
 }
 
-/* Unit vector from the scene to the eye. Without a given front it is -y for up +z, and +z for up
- * +y: in both +x is to the right. */
-static trip_vec3 direction_to_eye(const trip_camera_framing *f, trip_vec3 up)
-{
-    trip_vec3 right = fabs(up.x) < 0.9 ? trip_v3(1, 0, 0) : trip_v3(0, 1, 0);
-    if (trip_length(trip_cross(up, f->front)) > 0)
-        right = trip_cross(up, f->front);
-    trip_vec3 front = trip_normalize(trip_cross(right, up));
-    right = trip_cross(up, front);
-    double azimuth = (DEFAULT_AZIMUTH_DEGREES + f->azimuth_degrees) * (PI / 180);
-    double elevation = DEFAULT_ELEVATION_DEGREES * (PI / 180);
-    trip_vec3 level = trip_add(trip_scale(front, cos(azimuth)), trip_scale(right, sin(azimuth)));
-    return trip_add(trip_scale(level, cos(elevation)), trip_scale(up, sin(elevation)));
-}
-
-/* Where along `axis` the corners' middle lies as seen, and the smallest distance at which all of
- * them project within the half angle whose tangent is `half`: for a corner at (t, d), d the depth
- * beyond the middle of the box, |t - middle| <= half (distance + d). */
-typedef struct fit {
-    double middle, distance;
-} fit;
-
-static fit fit_along(const trip_camera_framing *f, const trip_affine *index_to_world,
-                     trip_vec3 centre, trip_vec3 axis, trip_vec3 forward, double half)
-{
-    double high = -INFINITY, low = INFINITY;
-    for (int i = 0; i < 8; i++) {
-        trip_vec3 p = trip_affine_point(index_to_world, box_corner(f->lo, f->hi, i));
-        double t = trip_dot(trip_sub(p, centre), axis);
-        double d = trip_dot(trip_sub(p, centre), forward);
-        high = fmax(high, t - half * d);
-        low = fmin(low, t + half * d);
-    }
-    if (f->turntable)
-        return (fit){ 0, fmax(high, -low) / half };
-    return (fit){ 0.5 * (high + low), 0.5 * (high - low) / half };
-}
-
-trip_camera_params trip_camera_frame(const trip_camera_framing *f,
-                                     const trip_affine *index_to_world)
-{
-    trip_vec3 up = trip_length(f->up) > 0 ? trip_normalize(f->up) : trip_v3(0, 0, 1);
-    trip_vec3 middle =
-        trip_scale(trip_add(box_corner(f->lo, f->hi, 0), box_corner(f->lo, f->hi, 7)), 0.5);
-    trip_camera_params p = { .up = up,
-                             .look = trip_affine_point(index_to_world, middle),
-                             .fov_degrees =
-                                 f->fov_degrees > 0 ? f->fov_degrees : DEFAULT_FOV_DEGREES,
-                             .width = f->width,
-                             .height = f->height };
-    trip_vec3 to_eye = direction_to_eye(f, up);
-    basis b = { .forward = trip_scale(to_eye, -1) };
-    b.right = trip_normalize(trip_cross(b.forward, up));
-    b.up = trip_cross(b.right, b.forward);
-    double half_y = DEFAULT_FILL * tan(p.fov_degrees * (PI / 360));
-    double half_x = half_y * f->width / f->height;
-    fit x = fit_along(f, index_to_world, p.look, b.right, b.forward, half_x);
-    fit y = fit_along(f, index_to_world, p.look, b.up, b.forward, half_y);
-    p.look = trip_add(p.look, trip_add(trip_scale(b.right, x.middle), trip_scale(b.up, y.middle)));
-    p.eye = trip_add(p.look, trip_scale(to_eye, fmax(x.distance, y.distance)));
-    return p;
-}
-
-trip_camera_params trip_camera_turn(const trip_camera_params *view, double azimuth_degrees)
+trip_camera_params trip_camera_turn(const trip_camera_params *view, trip_vec3 axis, double degrees)
 {
     trip_camera_params p = *view;
-    trip_vec3 axis = trip_normalize(view->up), arm = trip_sub(view->eye, view->look);
-    double angle = azimuth_degrees * (PI / 180);
-    trip_vec3 along = trip_scale(axis, trip_dot(axis, arm));
-    trip_vec3 across = trip_sub(arm, along);
-    trip_vec3 turned =
-        trip_add(trip_scale(across, cos(angle)), trip_scale(trip_cross(axis, across), sin(angle)));
-    p.eye = trip_add(view->look, trip_add(along, turned));
+    double angle = degrees * (PI / 180);
+    axis = trip_normalize(axis);
+    p.eye = trip_add(view->look, turned(trip_sub(view->eye, view->look), axis, angle));
+    p.up = turned(view->up, axis, angle);
     return p;
 }

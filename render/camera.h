@@ -49,25 +49,9 @@ typedef struct trip_camera {
 int trip_camera_make(trip_camera *c, const trip_camera_params *params,
                      const trip_affine *index_to_world);
 
-/* What trip_camera_frame() frames. Zero means the default. */
-typedef struct trip_camera_framing {
-    double lo[3], hi[3];    /* a box of index space */
-    int width, height;      /* pixels */
-    trip_vec3 up, front;    /* world directions: up (+z), and the one the object faces (-y; where +y
-                               is up, +z) */
-    double azimuth_degrees; /* about up, counted from the default view */
-    double fov_degrees;     /* 30 */
-    bool turntable;         /* look at the box's middle, which stays in place when the view turns;
-                               otherwise at what puts the box in the middle of the image */
-} trip_camera_framing;
-
-/* The view used when none is given: the whole box framed in perspective with a small margin, seen
- * from the front, a little from the right and from above. */
-trip_camera_params trip_camera_frame(const trip_camera_framing *f,
-                                     const trip_affine *index_to_world);
-
-/* The view turned by an angle about up, through the point looked at. */
-trip_camera_params trip_camera_turn(const trip_camera_params *view, double azimuth_degrees);
+/* The view turned about an axis through the point looked at, counterclockwise as seen from where
+ * the axis points to. */
+trip_camera_params trip_camera_turn(const trip_camera_params *view, trip_vec3 axis, double degrees);
 
 /* Direction (index space, not normalised) of the ray at a pixel position. */
 static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y)

@@ -13,8 +13,8 @@
 #ifndef TRIP_DATASET_TEXT_H
 #define TRIP_DATASET_TEXT_H
 
-#include "camera.h"
 #include "dataset.h"
+#include "framing.h"
 #include "transfer_function.h"
 
 typedef struct trip_dataset_text trip_dataset_text;

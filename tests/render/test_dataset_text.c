@@ -31,7 +31,8 @@ static trip_vec3 view_from(char *text, trip_vec3 *up)
     trip_camera_framing f = { .width = 100, .height = 100 };
     trip_dataset_text_frame(t, &d, &f);
     trip_dataset_text_destroy(t);
-    trip_camera_params p = trip_camera_frame(&f, &d.index_to_world);
+    trip_camera_params p;
+    assert_int_equal(trip_camera_frame(&f, &d.index_to_world, &p), 0);
     *up = p.up;
     return trip_normalize(trip_sub(p.eye, p.look));
 }

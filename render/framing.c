@@ -1,0 +1,277 @@
+#include "framing.h"
+
+#define DEGREE (3.14159265358979323846 / 180)
+#define DEFAULT_FOV_DEGREES 30.0
+#define ISO_ELEVATION_DEGREES 35.264389682754654 /* of a cube's diagonal: atan(1 / sqrt(2)) */
+
+typedef struct angles {
+    double azimuth, elevation; /* degrees; 0, 0 is the front */
+} angles;
+
+static const angles view_angles[] = {
+    [TRIP_VIEW_DEFAULT] = { 30, 20 }, [TRIP_VIEW_FRONT] = { 0, 0 },
+    [TRIP_VIEW_BACK] = { 180, 0 },    [TRIP_VIEW_LEFT] = { 90, 0 },
+    [TRIP_VIEW_RIGHT] = { -90, 0 },   [TRIP_VIEW_TOP] = { 0, 90 },
+    [TRIP_VIEW_BOTTOM] = { 0, -90 },  [TRIP_VIEW_ISO] = { 45, ISO_ELEVATION_DEGREES },
+};
+
+/* All that the fit works with. World space, lengths counted from the origin. */
+typedef struct fitting {
+    const trip_camera_framing *f;
+    const trip_affine *index_to_world;
+    trip_reach_origin origin;
+    trip_vec3 right, up, forward; /* of the picture, orthonormal: right x up = -forward */
+    double sin_elevation, cos_elevation, sin_roll, cos_roll;
+    double half[2]; /* of what may be filled, along right and up: tangents, or parallel lengths */
+} fitting;
+
+/* The sine and cosine of an angle in degrees, exact at right angles. */
+static void sine_cosine(double degrees, double *sine, double *cosine)
+{
+    double quarters = round(degrees / 90), rest = (degrees - 90 * quarters) * DEGREE;
+    int quarter = (int)fmod(fmod(quarters, 4) + 4, 4);
+    const double s = sin(rest), c = cos(rest);
+    const double sines[4] = { s, c, -s, -c };
+    *sine = sines[quarter];
+    *cosine = sines[(quarter + 1) % 4];
+}
+
+static trip_vec3 default_up(const trip_camera_framing *f)
+{
+    return trip_length(f->up) > 0 ? trip_normalize(f->up) : trip_v3(0, 0, 1);
+}
+
+/* The given front, made level. Without one it is -y for up +z, and +z for up +y: in both +x is to
+ * the viewer's right. */
+static trip_vec3 level_front(const trip_camera_framing *f, trip_vec3 up)
+{
+    trip_vec3 right = trip_cross(up, trip_normalize(f->front));
+    if (!(trip_length(right) > 1e-6))
+        right = fabs(up.x) < 0.9 ? trip_v3(1, 0, 0) : trip_v3(0, 1, 0);
+    return trip_normalize(trip_cross(right, up));
+}
+
+void trip_framing_set_up(trip_camera_framing *f, trip_vec3 up)
+{
+    trip_vec3 old = default_up(f), front = level_front(f, old);
+    up = trip_normalize(up);
+    if (!(trip_length(trip_cross(up, front)) > 1e-6))
+        front = trip_scale(old, trip_dot(up, front) > 0 ? -1 : 1);
+    f->up = up;
+    f->front = front;
+}
+
+/* The greatest values over the corners of the box. */
+static int reach_of_box(const fitting *t, const trip_reach *wanted, int count, double *values)
+{
+    for (int i = 0; i < count; i++)
+        values[i] = -INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        const double *lo = t->f->lo, *hi = t->f->hi;
+        trip_vec3 index = trip_v3(corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1],
+                                  corner & 4 ? hi[2] : lo[2]);
+        trip_vec3 p = trip_affine_vector(t->index_to_world, trip_sub(index, t->origin.index));
+        double from_axis = trip_length(trip_cross(t->origin.axis, p));
+        for (int i = 0; i < count; i++)
+            values[i] =
+                fmax(values[i], trip_dot(wanted[i].along, p) + wanted[i].around * from_axis);
+    }
+    return 0;
+}
+
+static int reach_of(const fitting *t, const trip_reach *wanted, int count, double *values)
+{
+    if (!t->f->reach)
+        return reach_of_box(t, wanted, count, values);
+    return t->f->reach(t->f->reach_user, &t->origin, wanted, count, values);
+}
+
+static trip_vec3 box_middle(const trip_camera_framing *f)
+{
+    return trip_v3(0.5 * f->lo[0] + 0.5 * f->hi[0], 0.5 * f->lo[1] + 0.5 * f->hi[1],
+                   0.5 * f->lo[2] + 0.5 * f->hi[2]);
+}
+
+trip_vec3 trip_framing_middle(const trip_camera_framing *f, const trip_affine *index_to_world)
+{
+    return trip_affine_point(index_to_world, box_middle(f));
+}
+
+/* The picture's axes, as seen from the view's side. */
+static void set_axes(fitting *t, trip_vec3 up)
+{
+    const trip_camera_framing *f = t->f;
+    double sine, cosine;
+    trip_vec3 front = level_front(f, up), left = trip_cross(up, front);
+    sine_cosine(view_angles[f->view].azimuth + f->azimuth_degrees, &sine, &cosine);
+    trip_vec3 level = trip_add(trip_scale(front, cosine), trip_scale(left, sine));
+    t->right = trip_cross(up, level);
+    sine_cosine(view_angles[f->view].elevation + f->elevation_degrees, &sine, &cosine);
+    t->sin_elevation = sine;
+    t->cos_elevation = cosine;
+    t->forward = trip_sub(trip_scale(level, -cosine), trip_scale(up, sine));
+    t->up = trip_sub(trip_scale(up, cosine), trip_scale(level, sine));
+}
+
+/* A picture turned clockwise has its up to the left of what was up. */
+static void roll(fitting *t)
+{
+    sine_cosine(t->f->roll_degrees, &t->sin_roll, &t->cos_roll);
+    trip_vec3 right = t->right, up = t->up;
+    t->right = trip_add(trip_scale(right, t->cos_roll), trip_scale(up, t->sin_roll));
+    t->up = trip_sub(trip_scale(up, t->cos_roll), trip_scale(right, t->sin_roll));
+}
+
+/* Along one axis of the picture: where what is framed has its middle as seen, and the smallest
+ * distance at which it is within the half angle whose tangent is `half`. For a point at t along the
+ * axis, d deeper than the origin: |t - middle| <= half (distance + d). In a parallel view half is 0
+ * and the distance stands for the half height or width needed. */
+typedef struct fit {
+    double half, middle, distance;
+} fit;
+
+static fit fit_of(double half, double high, double low)
+{
+    return (fit){ half, 0.5 * (high - low), 0.5 * (high + low) / (half > 0 ? half : 1) };
+}
+
+static void want_fit(const fitting *t, trip_vec3 axis, double half, trip_reach wanted[2])
+{
+    trip_vec3 nearer = trip_scale(t->forward, -half);
+    wanted[0] = (trip_reach){ .along = trip_add(axis, nearer) };
+    wanted[1] = (trip_reach){ .along = trip_sub(nearer, axis) };
+}
+
+/* From `distance`, which is more than this axis needs, the middle as seen is another: that of the
+ * half angle that would need it. As long as the same two points are the outermost, the distance is
+ * a linear function of 1 / half. */
+static int fit_from(const fitting *t, trip_vec3 axis, double distance, fit *own)
+{
+    enum { STEPS = 8 };
+    double slope = own->distance * own->half;
+    for (int i = 0; i < STEPS && own->distance > 0; i++) {
+        if (fabs(own->distance - distance) <= 1e-6 * distance)
+            break;
+        trip_reach wanted[2];
+        double values[2], inverse = 1 / own->half + (distance - own->distance) / slope;
+        want_fit(t, axis, 1 / inverse, wanted);
+        int status = reach_of(t, wanted, 2, values);
+        if (status)
+            return status;
+        const fit last = *own;
+        *own = fit_of(1 / inverse, values[0], values[1]);
+        slope = (own->distance - last.distance) / (inverse - 1 / last.half);
+    }
+    return 0;
+}
+
+/* Sets the point looked at, from the origin, and how far the eye is from there. */
+static int fit_perspective(const fitting *t, trip_vec3 *look, double *distance)
+{
+    const trip_vec3 axes[2] = { t->right, t->up };
+    trip_reach wanted[4];
+    double v[4];
+    want_fit(t, t->right, t->half[0], wanted);
+    want_fit(t, t->up, t->half[1], wanted + 2);
+    int status = reach_of(t, wanted, 4, v);
+    if (status)
+        return status;
+    fit fits[2] = { fit_of(t->half[0], v[0], v[1]), fit_of(t->half[1], v[2], v[3]) };
+    int tight = fits[1].distance > fits[0].distance;
+    *distance = fits[tight].distance;
+    status = fit_from(t, axes[!tight], *distance, &fits[!tight]);
+    *look = trip_add(trip_scale(t->right, fits[0].middle), trip_scale(t->up, fits[1].middle));
+    return status;
+}
+
+/* The eye of a parallel view is in front of everything. */
+static int fit_parallel(const fitting *t, trip_vec3 *look, double *distance, double *height)
+{
+    trip_reach wanted[6];
+    double v[6];
+    want_fit(t, t->right, 0, wanted);
+    want_fit(t, t->up, 0, wanted + 2);
+    wanted[4] = (trip_reach){ .along = t->forward };
+    wanted[5] = (trip_reach){ .along = trip_scale(t->forward, -1) };
+    int status = reach_of(t, wanted, 6, v);
+    if (status)
+        return status;
+    fit x = fit_of(0, v[0], v[1]), y = fit_of(0, v[2], v[3]);
+    *look = trip_add(trip_scale(t->right, x.middle), trip_scale(t->up, y.middle));
+    *height = 2 * fmax(x.distance / t->half[0], y.distance / t->half[1]);
+    *distance = v[5] + fmax(v[4] + v[5], x.distance + y.distance);
+    return 0;
+}
+
+/* What a point of a turning object needs at worst. With h its height above the middle and r its
+ * distance from the axis, both seen at angle a from the eye's side, a direction (qx, qy) of the
+ * level picture sees it at  qx r sin a + qy (h cos e - r cos a sin e),  r cos a cos e + h sin e
+ * nearer than the middle, e being the elevation. That it is within half times its depth, for all a:
+ *     distance >= h (sin e + qy cos e / half) + r sqrt((qx / half)^2 + (cos e - qy sin e / half)^2)
+ * and in a parallel view, with `half` 1 and without what comes from the depth, likewise. */
+static trip_reach turning(const fitting *t, trip_vec3 axis, double qx, double qy, double half)
+{
+    double e = t->sin_elevation, c = t->cos_elevation, depth = t->f->parallel ? 0 : 1;
+    return (trip_reach){
+        .along = trip_scale(axis, depth * e + qy * c / half),
+        .around = hypot(qx / half, depth * c - qy * e / half),
+    };
+}
+
+/* The point looked at moves along the axis so that as much is left above as below. */
+static int fit_turntable(const fitting *t, trip_vec3 *look, double *distance, double *height)
+{
+    const trip_vec3 axis = t->origin.axis;
+    const double q[2][2] = { { t->cos_roll, t->sin_roll }, { -t->sin_roll, t->cos_roll } };
+    trip_reach wanted[6];
+    double v[6], needed = 0;
+    for (int i = 0; i < 4; i++) {
+        double sign = i % 2 ? -1 : 1;
+        wanted[i] = turning(t, axis, sign * q[i / 2][0], sign * q[i / 2][1], t->half[i / 2]);
+    }
+    wanted[4] = (trip_reach){ .along = axis, .around = 1 };
+    wanted[5] = (trip_reach){ .along = trip_scale(axis, -1), .around = 1 };
+    int status = reach_of(t, wanted, 6, v);
+    if (status)
+        return status;
+    int pair = fabs(q[1][1]) >= fabs(q[0][1]) ? 2 : 0;
+    double per_shift = trip_dot(axis, trip_sub(wanted[pair].along, wanted[pair + 1].along));
+    double shift = fabs(per_shift) > 1e-9 ? (v[pair] - v[pair + 1]) / per_shift : 0;
+    for (int i = 0; i < 4; i++)
+        needed = fmax(needed, v[i] - shift * trip_dot(axis, wanted[i].along));
+    *look = trip_scale(axis, shift);
+    *height = 2 * needed;
+    *distance = t->f->parallel ? 2 * (v[4] + v[5]) : needed;
+    return 0;
+}
+
+int trip_camera_frame(const trip_camera_framing *f, const trip_affine *index_to_world,
+                      trip_camera_params *out)
+{
+    trip_vec3 up = default_up(f), look;
+    double distance, height = 0, fov = f->fov_degrees > 0 ? f->fov_degrees : DEFAULT_FOV_DEGREES;
+    fitting t = { .f = f, .index_to_world = index_to_world, .origin = { box_middle(f), up } };
+    set_axes(&t, up);
+    roll(&t);
+    t.half[1] = TRIP_FRAMING_FILL * (f->parallel ? 1 : tan(fov / 2 * DEGREE));
+    t.half[0] = t.half[1] * f->width / f->height;
+    int status = f->turntable  ? fit_turntable(&t, &look, &distance, &height)
+                 : f->parallel ? fit_parallel(&t, &look, &distance, &height)
+                               : fit_perspective(&t, &look, &distance);
+    if (status)
+        return status;
+    look = trip_add(trip_framing_middle(f, index_to_world), look);
+    bool upright = t.sin_roll == 0 && t.cos_roll > 0 && t.cos_elevation > 1e-3;
+    *out = (trip_camera_params){
+        .eye = trip_sub(look, trip_scale(t.forward, distance)),
+        .look = look,
+        .up = upright ? up : t.up,
+        .fov_degrees = fov,
+        .ortho_height = !f->parallel          ? 0
+                        : f->ortho_height > 0 ? f->ortho_height
+                                              : height,
+        .width = f->width,
+        .height = f->height,
+    };
+    return 0;
+}

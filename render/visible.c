@@ -1,0 +1,300 @@
+#include "visible.h"
+
+#include "report.h"
+
+enum { AXIS = 2 }; /* the list that is read; all hold the same voxels */
+
+#define LEAST_OPACITY (1.0 / 255.0)
+#define SHARE_OF_DEPTH (1.0 / 16.0)
+
+/* Of a wanted function in index space:
+ * normal . p + offset + around |(across[0] . p + from[0], across[1] . p + from[1])| */
+typedef struct form {
+    trip_vec3 normal;
+    double offset, around;
+    double per_voxel; /* how fast it grows at most */
+    double slack;     /* more than rounding makes of a bound; 0 where bounds are exact */
+    double best;      /* found so far */
+    double step;      /* bounds are looked at in steps, the largest first */
+    double read;      /* all bricks that may reach this were read */
+    double left;      /* the farthest that any other may reach */
+} form;
+
+typedef struct search {
+    trip_visible *visible;
+    trip_vec3 across[2];
+    double from[2];
+    int count;
+    form forms[TRIP_REACHES_MAX];
+} search;
+
+typedef struct box {
+    double lo[3], hi[3];
+} box;
+
+void trip_visible_start(trip_visible *v, const trip_tf_entry *table)
+{
+    trip_vec3 diagonal =
+        trip_v3(v->hi[0] - v->lo[0] + 1, v->hi[1] - v->lo[1] + 1, v->hi[2] - v->lo[2] + 1);
+    double depth =
+        SHARE_OF_DEPTH * trip_length(trip_affine_vector(&v->data->index_to_world, diagonal));
+    double least = -log1p(-LEAST_OPACITY) / depth;
+    for (unsigned code = 0; code < 65536; code++) {
+        uint64_t bit = UINT64_C(1) << (code % 64);
+        v->shown[code / 64] =
+            (v->shown[code / 64] & ~bit) | (table[code].extinction >= least ? bit : 0);
+    }
+    v->splats = 0;
+}
+
+static inline bool is_shown(const trip_visible *v, unsigned code)
+{
+    return v->shown[code / 64] >> (code % 64) & 1;
+}
+
+static bool some_shown(const trip_visible *v, unsigned first, unsigned last)
+{
+    for (unsigned code = first; code <= last;) {
+        uint64_t rest = v->shown[code / 64] >> (code % 64);
+        if (rest)
+            return code + (unsigned)__builtin_ctzll(rest) <= last;
+        code += 64 - code % 64;
+    }
+    return false;
+}
+
+/* Every operation rounds monotonically in x, y and z alone, so that the corners of a box bound the
+ * rounded values too. */
+static inline double linear(const form *f, double x, double y, double z)
+{
+    return f->normal.x * x + (f->normal.y * y + (f->normal.z * z + f->offset));
+}
+
+static double value_at(const search *s, const form *f, double x, double y, double z)
+{
+    double value = linear(f, x, y, z);
+    if (f->around == 0)
+        return value;
+    double a = trip_dot(s->across[0], trip_v3(x, y, z)) + s->from[0];
+    double b = trip_dot(s->across[1], trip_v3(x, y, z)) + s->from[1];
+    return value + f->around * sqrt(a * a + b * b);
+}
+
+/* A convex function is greatest at a corner. */
+static double bound(const search *s, const form *f, const box *b)
+{
+    double most = -INFINITY;
+    if (f->around == 0)
+        return linear(f, f->normal.x > 0 ? b->hi[0] : b->lo[0],
+                      f->normal.y > 0 ? b->hi[1] : b->lo[1], f->normal.z > 0 ? b->hi[2] : b->lo[2]);
+    for (int i = 0; i < 8; i++)
+        most = fmax(most, value_at(s, f, i & 1 ? b->hi[0] : b->lo[0], i & 2 ? b->hi[1] : b->lo[1],
+                                   i & 4 ? b->hi[2] : b->lo[2]));
+    return most + f->slack;
+}
+
+/* The longest image of a unit vector under the two rows. */
+static double longest(trip_vec3 a, trip_vec3 b)
+{
+    double aa = trip_dot(a, a), bb = trip_dot(b, b), ab = trip_dot(a, b);
+    return sqrt(0.5 * (aa + bb) + hypot(0.5 * (aa - bb), ab));
+}
+
+/* Two directions across the axis, unit lengths. */
+static void set_across(search *s, const trip_reach_origin *origin)
+{
+    const trip_affine *m = &s->visible->data->index_to_world;
+    trip_vec3 axis = origin->axis;
+    trip_vec3 other = fabs(axis.x) < 0.9 ? trip_v3(1, 0, 0) : trip_v3(0, 1, 0);
+    trip_vec3 a = trip_normalize(trip_cross(axis, other)), b = trip_cross(axis, a);
+    s->across[0] = trip_affine_transpose_vector(m, a);
+    s->across[1] = trip_affine_transpose_vector(m, b);
+    for (int i = 0; i < 2; i++)
+        s->from[i] = -trip_dot(s->across[i], origin->index);
+}
+
+static form make_form(const search *s, trip_vec3 normal, double offset, double around)
+{
+    double spread = around > 0 ? around * longest(s->across[0], s->across[1]) : 0;
+    double per_voxel = trip_length(normal) + spread;
+    return (form){
+        .normal = normal,
+        .offset = offset,
+        .around = around,
+        .per_voxel = per_voxel,
+        .slack = around > 0 ? 1e-5 * per_voxel : 0,
+        .best = -INFINITY,
+        .step = per_voxel * (double)(1u << s->visible->data->header.tile_log2) / 4,
+        .read = INFINITY,
+    };
+}
+
+static box brick_box(const trip_file_header *h, const trip_file_brick *b, uint32_t slab)
+{
+    double u = (double)((uint64_t)b->tile_u << h->tile_log2);
+    double v = (double)((uint64_t)b->tile_v << h->tile_log2);
+    double sheet = (double)slab * h->slab_sheets;
+    return (box){ { u + b->u_min, v + b->v_min, sheet + b->sheet_min },
+                  { u + b->u_max, v + b->v_max, sheet + b->sheet_max } };
+}
+
+/* The bounds of a brick that may matter: false when it holds nothing visible or was read. */
+static bool bound_brick(const search *s, const trip_file_brick *b, uint32_t slab, double *bounds)
+{
+    if (!some_shown(s->visible, b->code_min, b->code_max))
+        return false;
+    box place = brick_box(&s->visible->data->header, b, slab);
+    for (int i = 0; i < s->count; i++) {
+        bounds[i] = bound(s, &s->forms[i], &place);
+        if (bounds[i] >= s->forms[i].read)
+            return false;
+    }
+    return true;
+}
+
+/* How far bricks that were not read may reach. */
+static void look_ahead(search *s)
+{
+    const trip_list *list = &s->visible->data->lists[AXIS];
+    double bounds[TRIP_REACHES_MAX];
+    for (int i = 0; i < s->count; i++)
+        s->forms[i].left = -INFINITY;
+    for (const trip_file_slab *slab = list->slabs; slab < list->slabs + list->slab_count; slab++)
+        for (uint32_t b = 0; b < slab->brick_count; b++)
+            if (bound_brick(s, &list->bricks[slab->first_brick + b], slab->slab, bounds))
+                for (int i = 0; i < s->count; i++)
+                    s->forms[i].left = fmax(s->forms[i].left, bounds[i]);
+}
+
+/* Selects those that reach the farthest; false when none may reach farther than what was found. */
+static bool select_bricks(search *s, trip_selection *selection)
+{
+    const trip_list *list = &s->visible->data->lists[AXIS];
+    double from[TRIP_REACHES_MAX], bounds[TRIP_REACHES_MAX];
+    bool some = false;
+    for (int i = 0; i < s->count; i++) {
+        form *f = &s->forms[i];
+        bool open = f->left > f->best;
+        from[i] = open ? fmax(f->left - f->step, nextafter(f->best, INFINITY)) : f->read;
+        f->step *= 2;
+        some |= open;
+    }
+    for (uint64_t k = 0; some && k < list->slab_count; k++) {
+        const trip_file_slab *slab = &list->slabs[k];
+        for (uint32_t b = 0; b < slab->brick_count; b++) {
+            uint64_t index = slab->first_brick + b;
+            bool wanted = false;
+            if (bound_brick(s, &list->bricks[index], slab->slab, bounds))
+                for (int i = 0; i < s->count; i++)
+                    wanted |= bounds[i] >= from[i];
+            if (wanted)
+                trip_selection_add(selection, index);
+        }
+    }
+    for (int i = 0; i < s->count; i++)
+        s->forms[i].read = from[i];
+    return some;
+}
+
+static bool may_matter(const search *s, const trip_run *run)
+{
+    double last = (double)((1u << s->visible->data->header.tile_log2) - 1);
+    const box place = { { run->u, run->v, run->sheet },
+                        { run->u + last, run->v + last, run->sheet } };
+    for (int i = 0; i < s->count; i++)
+        if (bound(s, &s->forms[i], &place) > s->forms[i].best)
+            return true;
+    return false;
+}
+
+static void look_at_run(search *s, const trip_run *run, const uint32_t *voxels)
+{
+    s->visible->splats += run->count;
+    for (uint32_t n = 0; n < run->count; n++) {
+        if (!is_shown(s->visible, trip_voxel_code(voxels[n])))
+            continue;
+        double u = run->u + (double)trip_voxel_u(voxels[n]);
+        double v = run->v + (double)trip_voxel_v(voxels[n]);
+        for (int i = 0; i < s->count; i++) {
+            double value = value_at(s, &s->forms[i], u, v, run->sheet);
+            s->forms[i].best = value > s->forms[i].best ? value : s->forms[i].best;
+        }
+    }
+}
+
+static int read_selected(search *s, const trip_selection *selection)
+{
+    trip_reader *reader = s->visible->reader;
+    trip_batch batch;
+    int status = trip_reader_begin(reader, selection);
+    while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
+        for (size_t i = 0; i < batch.run_count; i++)
+            if (may_matter(s, &batch.runs[i]))
+                look_at_run(s, &batch.runs[i], batch.voxels + batch.runs[i].first);
+        trip_reader_release(reader, &batch);
+        status =
+            trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "render", "view", "interrupted") : 0;
+    }
+    return status;
+}
+
+/* The farthest first: most often what they hold reaches farther than all others may. */
+static int find(search *s)
+{
+    const trip_visible *v = s->visible;
+    trip_selection selection;
+    int status = 0;
+    for (bool more = true; more && !status;) {
+        status = trip_selection_create(&selection, v->data, AXIS, false, 0, INT32_MAX, v->budget);
+        if (status)
+            return status;
+        look_ahead(s);
+        more = select_bricks(s, &selection);
+        if (more)
+            status = read_selected(s, &selection);
+        trip_reader_begin(v->reader, NULL); /* the selection does not outlive the pass */
+        trip_selection_destroy(&selection, v->budget);
+    }
+    return status;
+}
+
+/* What was found, or the bounds of all splats. */
+static double result(const search *s, const form *f)
+{
+    const trip_visible *v = s->visible;
+    const box all = { { v->lo[0], v->lo[1], v->lo[2] }, { v->hi[0], v->hi[1], v->hi[2] } };
+    return f->best > -INFINITY ? f->best : bound(s, f, &all);
+}
+
+int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3])
+{
+    search s = { .visible = v, .count = 6 };
+    for (int i = 0; i < 6; i++) {
+        double sign = i < 3 ? -1 : 1;
+        trip_vec3 normal =
+            trip_v3(i % 3 == 0 ? sign : 0, i % 3 == 1 ? sign : 0, i % 3 == 2 ? sign : 0);
+        s.forms[i] = make_form(&s, normal, 0, 0);
+    }
+    int status = find(&s);
+    for (int a = 0; a < 3 && !status; a++) {
+        lo[a] = -result(&s, &s.forms[a]);
+        hi[a] = result(&s, &s.forms[a + 3]);
+    }
+    return status;
+}
+
+int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values)
+{
+    trip_visible *v = user;
+    search s = { .visible = v, .count = count };
+    set_across(&s, origin);
+    for (int i = 0; i < count; i++) {
+        trip_vec3 n = trip_affine_transpose_vector(&v->data->index_to_world, wanted[i].along);
+        s.forms[i] = make_form(&s, n, -trip_dot(n, origin->index), wanted[i].around);
+    }
+    int status = find(&s);
+    for (int i = 0; i < count; i++)
+        values[i] = result(&s, &s.forms[i]) + v->kernel_radius * s.forms[i].per_voxel;
+    return status;
+}

@@ -1,0 +1,38 @@
+/* How far the voxels that a transfer function shows reach in given directions: the greatest values
+ * of convex functions over all of them, exactly, whatever the tiles. Bricks that cannot reach
+ * farther than what was found are not read: mostly a small part of one list is. One thread.
+ *
+ * A voxel counts as visible when a ray that met its like along a sixteenth of the data set's
+ * diagonal would lose at least 1/255 of its light: fainter ones are seen where many lie behind one
+ * another only, which they do not at the rim. */
+#ifndef TRIP_VISIBLE_H
+#define TRIP_VISIBLE_H
+
+#include "framing.h"
+#include "reader.h"
+#include "transfer_function.h"
+
+typedef struct trip_visible {
+    /* Set by the caller, and outliving this. */
+    const trip_dataset *data;
+    trip_reader *reader; /* of voxels, no pass under way */
+    trip_budget *budget;
+    double kernel_radius; /* voxels: how far beyond their voxel splats count as reaching */
+    double lo[3], hi[3];  /* bounds of all splats in index space */
+
+    uint64_t splats;      /* looked at so far */
+    uint64_t shown[1024]; /* a bit a code: whether its voxels are visible */
+} trip_visible;
+
+/* After the caller's part is set. `table` as filled for the data set. */
+void trip_visible_start(trip_visible *v, const trip_tf_entry *table);
+
+/* Bounds of the visible voxels in index space, without kernels. */
+int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);
+
+/* For trip_camera_framing, `user` being the trip_visible. Where nothing is visible, the bounds of
+ * all splats take its place. */
+int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values);
+
+#endif

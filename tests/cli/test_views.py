@@ -1,0 +1,262 @@
+"""Which side is seen, how it is framed, and that the view that is printed is the view that was
+drawn. The volumes are made here, so that what has to be seen where is known."""
+import json
+import math
+import os
+import shlex
+
+import numpy
+
+import program
+
+# Opaque from 100 on; what is below is not there.
+FUNCTION = "unit voxel\n99 1 1 1 0\n100 1 1 1 0.9\n255 1 1 1 0.9\n"
+
+
+def ball(size, radius, middle=None):
+    """A solid ball of 200 in a cube of nothing; of its own middle, in voxels."""
+    middle = middle or ((size - 1) / 2,) * 3
+    k, j, i = numpy.indices((size, size, size))
+    r2 = (i - middle[0]) ** 2 + (j - middle[1]) ** 2 + (k - middle[2]) ** 2
+    return numpy.where(r2 <= radius**2, 200, 0).astype(numpy.uint8)
+
+
+def shown(picture):
+    return picture[..., 3] > 0.3
+
+
+def spans(picture):
+    """First and last row and column of what shows, as shares of the picture's height and width."""
+    rows, columns = numpy.nonzero(shown(picture))
+    height, width = picture.shape[:2]
+    return (
+        (rows.min() / height, (rows.max() + 1) / height),
+        (columns.min() / width, (columns.max() + 1) / width),
+    )
+
+
+class Views(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write("f.tf", FUNCTION.encode())
+
+    def volume(self, volume, *options, name="v.trip", spacing="1,1,1"):
+        z, y, x = volume.shape
+        program.write_raw("v.raw", volume)
+        self.works(
+            *("brick", "v.raw", "--size", f"{x},{y},{z}", "--type", "uint8", "-o", name),
+            *("--spacing", spacing, "--force", "-q", "--tf", "f.tf", *options),
+        )
+
+    def draw(self, *options, name="v.trip"):
+        return self.picture(name, "--size", "160x160", "--background", "none", *options)
+
+    def camera(self, *options, name="v.trip", size="160x160"):
+        """The options that --stats prints, of the one image or each of an orbit."""
+        run = self.works(
+            *("render", name, "-o", "c.exr", "--size", size, "--stats", "-", *options)
+        )
+        return [shlex.split(f["camera"]) for f in json.loads(run.stdout)["frames"]]
+
+    def assert_centred(self, picture, fill=None):
+        for low, high in spans(picture):
+            self.assertAlmostEqual(low, 1 - high, delta=0.02)
+        if fill:
+            self.assertAlmostEqual(
+                max(high - low for low, high in spans(picture)), fill, delta=0.05
+            )
+
+    def test_what_is_visible_fills_nine_tenths_and_is_in_the_middle(self):
+        # Far from the middle of the volume, among values that the function does not show.
+        volume = ball(64, 14, (44, 18, 40))
+        volume[volume == 0] = 50
+        self.volume(volume, "--keep-all")
+        for options in [], ["--ortho=fit"], ["--view=left"], ["--fov=60"], ["--up=1,2,3"]:
+            self.assert_centred(self.draw("--tf=f.tf", *options), 0.9)
+
+    def test_a_wide_picture_is_filled_in_height_and_a_tall_one_in_width(self):
+        self.volume(ball(48, 20))
+        for size in "320x100", "100x320":
+            picture = self.picture("v.trip", "--size", size, "--background", "none")
+            self.assert_centred(picture, 0.9)
+
+    def test_parallel_views_of_a_given_height_look_at_the_middle(self):
+        self.volume(ball(41, 18))
+        picture = self.draw("--ortho=41")
+        self.assert_centred(picture, 38 / 41)
+        alpha = picture[..., 3]
+        for side in alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]:
+            self.assertEqual(side.max(), 0)
+        # A ball of radius 1.5 in a volume like those of level sets.
+        self.volume(ball(64, 30), spacing="0.05,0.05,0.05")
+        self.assert_centred(self.draw("--ortho=6"), 0.5)
+
+    def test_from_a_given_eye_the_middle_of_what_is_visible_is_looked_at(self):
+        self.volume(ball(64, 8, (44, 18, 40)))
+        camera = self.camera("--eye=200,150,-90")[0]
+        look = [float(x) for x in camera[camera.index("--look") + 1].split(",")]
+        for got, expected in zip(look, (44, 18, 40)):
+            self.assertAlmostEqual(got, expected, delta=1e-6)
+        self.assert_centred(self.draw("--eye=200,150,-90"))
+
+    def test_up_moves_the_eye_too(self):
+        """A stick, whichever way it lies, stands upright for the --up along it."""
+        for axis, up in enumerate(("1,0,0", "0,1,0", "0,0,1")):
+            volume = numpy.zeros((48, 48, 48), numpy.uint8)
+            place = [slice(20, 28)] * 3
+            place[2 - axis] = slice(4, 44)
+            volume[tuple(place)] = 200
+            thick = [slice(16, 32)] * 3
+            thick[2 - axis] = slice(34, 44)
+            volume[tuple(thick)] = 200  # the thick end is where the axis points to
+            self.volume(volume)
+            for sign in "", "-":
+                picture = self.draw(f"--up={','.join(sign + x for x in up.split(','))}")
+                (top, bottom), (left, right) = spans(picture)
+                self.assertAlmostEqual(bottom - top, 0.9, delta=0.05)
+                self.assertGreater(bottom - top, 1.5 * (right - left))
+                upper, lower = numpy.array_split(shown(picture), 2)
+                if sign:
+                    upper, lower = lower, upper
+                self.assertGreater(upper.sum(), 1.2 * lower.sum(), up)
+
+    def test_views_show_the_side_they_name(self):
+        """A cross of three arms of different lengths about a ball; the front is at low y."""
+        volume = ball(64, 9)
+        volume[30:34, 30:34, 32:62] = 200  # the left: +x
+        volume[30:34, 12:32, 30:34] = 200  # the front
+        volume[32:50, 30:34, 30:34] = 200  # the top
+        self.volume(volume)
+        left, front, top = 30, 20, 18
+        expected = {  # arms to the right, left, top, bottom of the ball's middle
+            "front": (left, 9, top, 9),
+            "back": (9, left, top, 9),
+            "left": (9, front, top, 9),
+            "right": (front, 9, top, 9),
+            "top": (left, 9, 9, front),
+            "bottom": (left, 9, front, 9),
+        }
+        for view, arms in expected.items():
+            camera = self.camera(f"--view={view}", "--ortho=80")[0]
+            eye, look = (
+                [float(x) for x in camera[camera.index(o) + 1].split(",")]
+                for o in ("--eye", "--look")
+            )
+            picture = self.draw(
+                *("--ortho=80", "--up", camera[camera.index("--up") + 1]),
+                *("--eye", ",".join(str(e - l + 31.5) for e, l in zip(eye, look))),
+                *("--look", "31.5,31.5,31.5"),
+            )
+            rows, columns = numpy.nonzero(shown(picture))
+            voxel = 160 / 80
+            got = (columns.max() - 79.5, 79.5 - columns.min(), 79.5 - rows.min(), rows.max() - 79.5)
+            for have, want in zip(got, arms):
+                self.assertAlmostEqual(have / voxel, want, delta=2.5, msg=f"{view}: {got}")
+
+    def test_the_view_printed_gives_the_same_picture(self):
+        volume = ball(40, 9, (25, 12, 20))
+        volume[18:22, 10:14, 2:25] = 150
+        self.volume(volume, spacing="0.7,1.1,0.3")
+        for options in (
+            [],
+            ["--view=iso", "--zoom=1.7", "--roll=-33.3"],
+            ["--azimuth=17", "--elevation=-41", "--ortho=fit"],
+            ["--ortho=13.7", "--zoom=0.3", "--up=1,1,0.2"],
+            ["--eye=30,-20,9", "--roll=12", "--zoom=2"],
+            ["--look=3,2,1", "--fov=77"],
+            ["--orbit=3", "--view=top", "--azimuth=5"],
+            ["--orbit=3", "--ortho=fit", "--roll=90"],
+        ):
+            cameras = self.camera("--background=none", *options)
+            orbit = "--orbit=3" in options
+            for index, camera in enumerate(cameras):
+                self.works("render", "v.trip", "-o", "p.exr", "--background=none", *camera)
+                with open(f"c-{index:03d}.exr" if orbit else "c.exr", "rb") as f:
+                    expected = f.read()
+                with open("p.exr", "rb") as f:
+                    self.assertEqual(f.read(), expected, options)
+            self.assertEqual(len(cameras), 3 if orbit else 1)
+
+    def test_explain_prints_the_same_view_as_stats(self):
+        self.volume(ball(24, 9))
+        run = self.works("render", "v.trip", "-o", "p.exr", "--size=33x44", "--explain")
+        line = [l for l in run.stdout.decode().splitlines() if l.startswith("camera ")]
+        self.assertEqual(line[0].split()[1:], self.camera(size="33x44")[0])
+
+    def test_the_view_depends_on_the_data_and_the_function_only(self):
+        volume = ball(70, 17, (31, 40, 22))
+        volume[volume == 0] = (numpy.arange(volume.size) * 2654435761 % 99)[
+            (volume == 0).ravel()
+        ]
+        cameras = set()
+        for brick, render in (
+            ([], []),
+            (["--tile=16", "--slab-sheets=1"], []),
+            (["--tile=128", "--slab-sheets=64"], ["--threads=1"]),
+            (["--tile=32"], ["--memory=48M", "--engine=pread"]),
+            ([], ["--engine=null"]),
+            ([], ["--renderer=reference"]),
+        ):
+            self.volume(volume, "--keep-all", *brick)
+            cameras.add(str(self.camera("--tf=f.tf", "--view=iso", *render)))
+            cameras.add(str(self.camera("--tf=f.tf", "--view=iso", *render)))
+        self.assertEqual(len(cameras), 1)
+
+    def test_zoom_magnifies_about_the_middle(self):
+        self.volume(ball(40, 19))
+        for options in [], ["--ortho=fit"]:
+            for zoom in 0.5, 0.25:
+                self.assert_centred(self.draw(f"--zoom={zoom}", *options), 0.9 * zoom)
+
+    def test_azimuth_and_elevation_move_the_eye_from_the_named_side(self):
+        self.volume(ball(24, 10))
+        camera = self.camera("--view=front", "--azimuth=90", "--ortho=50")[0]
+        self.assertEqual(camera, self.camera("--view=left", "--ortho=50")[0])
+        camera = self.camera("--view=front", "--elevation=90", "--ortho=50")[0]
+        self.assertEqual(camera, self.camera("--view=top", "--ortho=50")[0])
+        # The default is 30 degrees to the right and 20 up.
+        camera = self.camera("--view=front", "--azimuth=30", "--elevation=20")[0]
+        self.assertEqual(camera, self.camera()[0])
+
+    def test_no_image_of_an_orbit_is_cut_off_and_the_middle_stays(self):
+        volume = numpy.zeros((30, 60, 20), numpy.uint8)
+        volume[3:27, 2:58, 2:18] = 200
+        self.volume(volume)
+        most = 0
+        for options in [], ["--ortho=fit", "--elevation=20"]:
+            cameras = self.camera("--orbit=12", "--background=none", *options)
+            looks = {c[c.index("--look") + 1] for c in cameras}
+            self.assertEqual(len(looks), 1)
+            for i in range(12):
+                picture = program.read_exr(f"c-{i:03d}.exr")
+                for low, high in spans(picture):
+                    self.assertGreater(low, 0.03)
+                    self.assertLess(high, 0.97)
+                most = max(most, *(high - low for low, high in spans(picture)))
+        self.assertGreater(most, 0.85)
+
+    def test_what_cannot_go_together_is_refused(self):
+        self.volume(ball(16, 5))
+        render = ["render", "v.trip", "-o", "no.png"]
+        for options, says in (
+            (["--eye=1,2,3", "--view=left"], "--eye"),
+            (["--eye=1,2,3", "--azimuth=5"], "--eye"),
+            (["--eye=1,2,3", "--elevation=5"], "--eye"),
+            (["--eye=90,2,3", "--ortho=fit"], "--ortho"),
+            (["--ortho=fit", "--fov=20"], "--fov"),
+            (["--zoom=1e-6"], "--zoom"),
+            (["--light=head", "--no-shading"], "--light"),
+            (["--no-shading", "--light=1,2,3"], "--light"),
+        ):
+            self.leaves_nothing(2, *render, *options, says=says)
+
+    def test_a_damaged_list_is_found_while_the_view_is_fitted(self):
+        self.volume(ball(16, 5), name="d.trip")
+        with open("d.trip/z.voxels", "r+b") as f:
+            f.write(b"\xff\xff\xff\xff")
+        self.leaves_nothing(1, "render", "d.trip", "-o", "no.png", says="z.voxels")
+
+
+if __name__ == "__main__":
+    program.main()

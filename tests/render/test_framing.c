@@ -1,0 +1,338 @@
+#include "test.h"
+
+#include "framing.h"
+
+#define DEGREE (3.14159265358979323846 / 180)
+
+/* Anisotropic, rotated and sheared. */
+static trip_affine sheared(void)
+{
+    return (trip_affine){ { { 0.5, 0.2, -0.1, 3 }, { -0.3, 1.5, 0.4, -2 }, { 0.1, 0.2, 2.5, 7 } } };
+}
+
+static trip_camera_params frame(const trip_camera_framing *f, trip_affine m)
+{
+    trip_camera_params p;
+    assert_int_equal(trip_camera_frame(f, &m, &p), 0);
+    return p;
+}
+
+/* The picture's axes in world space, worked out from the parameters alone. */
+static void axes_of(const trip_camera_params *p, trip_vec3 *right, trip_vec3 *up, trip_vec3 *gaze)
+{
+    *gaze = trip_normalize(trip_sub(p->look, p->eye));
+    *right = trip_normalize(trip_cross(*gaze, p->up));
+    *up = trip_cross(*right, *gaze);
+}
+
+/* Where a world point is in the picture: half widths to the right, half heights up. */
+static void place_of(const trip_camera_params *p, trip_vec3 point, double at[2])
+{
+    trip_vec3 right, up, gaze, d = trip_sub(point, p->eye);
+    axes_of(p, &right, &up, &gaze);
+    double depth = trip_dot(d, gaze);
+    double half = 0.5 * p->ortho_height;
+    assert_true(depth > 0);
+    if (!(half > 0))
+        half = depth * tan(p->fov_degrees / 2 * DEGREE);
+    at[0] = trip_dot(d, right) / (half * p->width / p->height);
+    at[1] = trip_dot(d, up) / half;
+}
+
+static trip_vec3 corner_of(const trip_camera_framing *f, trip_affine m, int corner)
+{
+    return trip_affine_point(&m, trip_v3(corner & 1 ? f->hi[0] : f->lo[0],
+                                         corner & 2 ? f->hi[1] : f->lo[1],
+                                         corner & 4 ? f->hi[2] : f->lo[2]));
+}
+
+static void box_bounds(const trip_camera_framing *f, trip_affine m, const trip_camera_params *p,
+                       double lo[2], double hi[2])
+{
+    lo[0] = lo[1] = INFINITY;
+    hi[0] = hi[1] = -INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        double at[2];
+        place_of(p, corner_of(f, m, corner), at);
+        for (int a = 0; a < 2; a++) {
+            lo[a] = fmin(lo[a], at[a]);
+            hi[a] = fmax(hi[a], at[a]);
+        }
+    }
+}
+
+/* Both ends of the tight direction at the margin, and the other direction in the middle. */
+static void assert_fits(const double lo[2], const double hi[2])
+{
+    int tight = hi[1] - lo[1] > hi[0] - lo[0];
+    assert_close(hi[tight], 0.9, 1e-9);
+    assert_close(lo[tight], -0.9, 1e-9);
+    assert_close(hi[!tight], -lo[!tight], 1e-4);
+    assert_true(hi[!tight] <= 0.9 + 1e-9);
+}
+
+static void a_box_fills_all_but_the_margins_and_is_in_the_middle(void **state)
+{
+    (void)state;
+    const double sizes[][3] = { { 100, 100, 100 }, { 10, 200, 30 }, { 1, 1, 1 } };
+    const trip_vec3 ups[] = { { 0, 0, 0 }, { 0, 1, 0 }, { 0, 0, -1 }, { 1, 2, 0.5 } };
+    for (int i = 0; i < 2 * 3 * 4 * 8; i++) {
+        const double *d = sizes[i % 3];
+        trip_camera_framing f = { .lo = { -3, 0, 5 },
+                                  .hi = { d[0] - 3, d[1], 5 + d[2] },
+                                  .width = i % 2 ? 300 : 100,
+                                  .height = 200,
+                                  .azimuth_degrees = 45.0 * (i / 12 % 8) + 3,
+                                  .elevation_degrees = i % 7 * 10,
+                                  .roll_degrees = i % 4 ? 0 : 25,
+                                  .up = ups[i / 3 % 4],
+                                  .fov_degrees = i % 5 ? 0 : 70,
+                                  .parallel = i >= 96 };
+        double lo[2], hi[2];
+        trip_camera_params p = frame(&f, sheared());
+        box_bounds(&f, sheared(), &p, lo, hi);
+        assert_fits(lo, hi);
+    }
+}
+
+/* A sphere of radius 4 about (1, -2, 3), in the identity's index space. */
+static int reach_of_sphere(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
+                           int count, double *values)
+{
+    trip_vec3 middle = trip_sub(trip_v3(1, -2, 3), origin->index);
+    (*(int *)user)++;
+    for (int i = 0; i < count; i++)
+        values[i] = trip_dot(wanted[i].along, middle) + 4 * trip_length(wanted[i].along);
+    return 0;
+}
+
+/* The cone about a sphere of radius r at distance d has half the angle asin(r / d). */
+static void a_sphere_is_as_far_off_as_its_cone_of_sight_calls_for(void **state)
+{
+    (void)state;
+    int calls = 0;
+    trip_camera_framing f = { .lo = { -9, -9, -9 },
+                              .hi = { 20, 9, 30 },
+                              .reach = reach_of_sphere,
+                              .reach_user = &calls,
+                              .width = 200,
+                              .height = 100,
+                              .fov_degrees = 50 };
+    trip_camera_params p = frame(&f, trip_affine_identity());
+    trip_vec3 to = trip_sub(trip_v3(1, -2, 3), p.eye), gaze = trip_sub(p.look, p.eye);
+    assert_true(calls > 0);
+    assert_close(trip_length(to), 4 / sin(atan(0.9 * tan(25 * DEGREE))), 1e-9);
+    assert_close(trip_dot(trip_normalize(to), trip_normalize(gaze)), 1, 1e-9);
+    f.parallel = true;
+    p = frame(&f, trip_affine_identity());
+    assert_close(p.ortho_height, 8 / 0.9, 1e-9);
+    to = trip_sub(trip_v3(1, -2, 3), p.eye);
+    gaze = trip_normalize(trip_sub(p.look, p.eye));
+    assert_close(trip_length(trip_cross(to, gaze)), 0, 1e-9);
+    assert_true(trip_dot(to, gaze) > 4); /* the eye is in front of it */
+}
+
+static int reach_fails(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values)
+{
+    (void)user, (void)origin, (void)wanted, (void)count, (void)values;
+    return TRIP_ERROR;
+}
+
+static void where_reaches_cannot_be_found_there_is_no_view(void **state)
+{
+    (void)state;
+    trip_affine identity = trip_affine_identity();
+    for (int i = 0; i < 3; i++) {
+        trip_camera_framing f = { .hi = { 9, 9, 9 },
+                                  .reach = reach_fails,
+                                  .width = 9,
+                                  .height = 9,
+                                  .parallel = i == 1,
+                                  .turntable = i == 2 };
+        trip_camera_params p;
+        assert_int_equal(trip_camera_frame(&f, &identity, &p), TRIP_ERROR);
+    }
+}
+
+static void a_given_height_of_a_parallel_view_stays_and_its_object_is_in_the_middle(void **state)
+{
+    (void)state;
+    trip_camera_framing f = {
+        .hi = { 40, 40, 40 }, .width = 100, .height = 100, .parallel = true, .ortho_height = 41
+    };
+    double lo[2], hi[2];
+    trip_camera_params p = frame(&f, sheared());
+    assert_close(p.ortho_height, 41, 0);
+    box_bounds(&f, sheared(), &p, lo, hi);
+    for (int a = 0; a < 2; a++)
+        assert_close(lo[a], -hi[a], 1e-9);
+}
+
+/* The corners turned once round in small steps touch a margin and never cross one. */
+static void an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margins(void **state)
+{
+    (void)state;
+    const double sizes[][3] = { { 100, 100, 100 }, { 10, 200, 30 }, { 5, 5, 300 } };
+    for (int i = 0; i < 3 * 2 * 3 * 2; i++) {
+        const double *d = sizes[i % 3];
+        trip_camera_framing f = { .hi = { d[0], d[1], d[2] },
+                                  .width = i / 3 % 2 ? 300 : 150,
+                                  .height = 200,
+                                  .elevation_degrees = i / 6 % 3 * 25,
+                                  .roll_degrees = i % 5 ? 0 : 30,
+                                  .parallel = i >= 18,
+                                  .turntable = true };
+        trip_affine m = trip_affine_identity();
+        m.m[2][2] = 0.7;
+        trip_camera_params first = frame(&f, m);
+        double lowest[2] = { 0, 0 }, highest[2] = { 0, 0 };
+        for (int step = 0; step < 1440; step++) {
+            double lo[2], hi[2];
+            trip_camera_params p = trip_camera_turn(&first, trip_v3(0, 0, 1), step * 0.25);
+            box_bounds(&f, m, &p, lo, hi);
+            for (int a = 0; a < 2; a++) {
+                lowest[a] = fmin(lowest[a], lo[a]);
+                highest[a] = fmax(highest[a], hi[a]);
+            }
+        }
+        double most = fmax(fmax(highest[0], -lowest[0]), fmax(highest[1], -lowest[1]));
+        assert_true(most <= 0.9 + 1e-9);
+        assert_close(most, 0.9, 1e-4);
+        /* Its axis goes through the middle of the box. */
+        assert_close(first.look.x, d[0] / 2, 1e-9);
+        assert_close(first.look.y, d[1] / 2, 1e-9);
+    }
+}
+
+/* From the middle to the eye, of the view that frames a cube. */
+static trip_vec3 seen_from(trip_camera_framing f, trip_camera_params *p)
+{
+    f.hi[0] = f.hi[1] = f.hi[2] = 9;
+    f.width = f.height = 10;
+    *p = frame(&f, trip_affine_identity());
+    return trip_normalize(trip_sub(p->eye, p->look));
+}
+
+static void assert_direction(trip_vec3 d, trip_vec3 expected)
+{
+    assert_close(trip_length(trip_sub(d, trip_normalize(expected))), 0, 1e-9);
+}
+
+static void the_default_view_is_from_the_front_right_and_above(void **state)
+{
+    (void)state;
+    trip_camera_params p;
+    trip_vec3 d = seen_from((trip_camera_framing){ 0 }, &p);
+    assert_true(-d.y > d.x && d.x > 0 && d.z > 0 && -d.y > d.z);
+    d = seen_from((trip_camera_framing){ .up = { 0, 1, 0 } }, &p);
+    assert_true(d.z > d.x && d.x > 0 && d.y > 0 && d.z > d.y);
+    d = seen_from((trip_camera_framing){ .front = { 0, 1, 0 } }, &p);
+    /* Facing +y with +z up, the viewer's right is -x. */
+    assert_true(d.y > -d.x && -d.x > 0 && d.z > 0);
+}
+
+static void sides_have_names(void **state)
+{
+    (void)state;
+    /* Of what faces -y, as patients do where y points to the back: their left is +x. */
+    const struct {
+        trip_view view;
+        trip_vec3 from, up;
+    } expected[] = {
+        { TRIP_VIEW_FRONT, { 0, -1, 0 }, { 0, 0, 1 } },
+        { TRIP_VIEW_BACK, { 0, 1, 0 }, { 0, 0, 1 } },
+        { TRIP_VIEW_LEFT, { 1, 0, 0 }, { 0, 0, 1 } },
+        { TRIP_VIEW_RIGHT, { -1, 0, 0 }, { 0, 0, 1 } },
+        { TRIP_VIEW_TOP, { 0, 0, 1 }, { 0, 1, 0 } },
+        { TRIP_VIEW_BOTTOM, { 0, 0, -1 }, { 0, -1, 0 } },
+    };
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+        trip_camera_params p;
+        trip_camera_framing f = { .view = expected[i].view };
+        assert_direction(seen_from(f, &p), expected[i].from);
+        assert_direction(p.up, expected[i].up);
+        /* Of what faces +y, as patients do where y points to the front: their left is -x. */
+        f.front = trip_v3(0, 1, 0);
+        trip_vec3 from = expected[i].from, up = expected[i].up;
+        assert_direction(seen_from(f, &p), trip_v3(-from.x, -from.y, from.z));
+        assert_direction(p.up, trip_v3(-up.x, -up.y, up.z));
+    }
+    trip_camera_params p;
+    assert_direction(seen_from((trip_camera_framing){ .view = TRIP_VIEW_ISO }, &p),
+                     trip_v3(1, -1, 1));
+}
+
+static void azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise(void **state)
+{
+    (void)state;
+    trip_camera_params p;
+    double at[2];
+    trip_camera_framing f = { .view = TRIP_VIEW_FRONT, .azimuth_degrees = 60 };
+    assert_direction(seen_from(f, &p), trip_v3(sin(60 * DEGREE), -cos(60 * DEGREE), 0));
+    f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .elevation_degrees = 30 };
+    assert_direction(seen_from(f, &p), trip_v3(0, -cos(30 * DEGREE), sin(30 * DEGREE)));
+    f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .elevation_degrees = 135 };
+    seen_from(f, &p); /* over the top: upside down, from behind */
+    assert_true(p.eye.y > 4.5 && p.eye.z > 4.5);
+    place_of(&p, trip_v3(4.5, 4.5, 9), at);
+    assert_true(at[1] < 0);
+    f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .roll_degrees = 90 };
+    seen_from(f, &p);
+    place_of(&p, trip_v3(4.5, 4.5, 9), at); /* what was at the top is on the right */
+    assert_true(at[0] > 0.5 && fabs(at[1]) < 1e-9);
+}
+
+static void any_direction_can_be_made_up(void **state)
+{
+    (void)state;
+    const trip_vec3 ups[] = { { 1, 0, 0 }, { -1, 0, 0 }, { 0, 1, 0 },   { 0, -1, 0 },
+                              { 0, 0, 1 }, { 0, 0, -1 }, { 0.3, 2, -1 } };
+    for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
+        trip_camera_params p;
+        trip_camera_framing f = { .view = TRIP_VIEW_FRONT };
+        trip_framing_set_up(&f, ups[i]);
+        trip_vec3 d = seen_from(f, &p), up = trip_normalize(ups[i]);
+        assert_close(trip_dot(d, up), 0, 1e-9); /* level: the eye moved */
+        assert_direction(p.up, up);
+        if (fabs(up.y) < 0.5) /* still from the front */
+            assert_direction(d, trip_v3(0, -1, 0));
+    }
+    /* The front turned up shows the bottom, turned down the top. */
+    trip_camera_params p;
+    trip_camera_framing f = { .view = TRIP_VIEW_FRONT };
+    trip_framing_set_up(&f, trip_v3(0, -1, 0));
+    assert_direction(seen_from(f, &p), trip_v3(0, 0, -1));
+    f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT };
+    trip_framing_set_up(&f, trip_v3(0, 3, 0));
+    assert_direction(seen_from(f, &p), trip_v3(0, 0, 1));
+}
+
+static void a_box_of_no_size_far_out_is_framed(void **state)
+{
+    (void)state;
+    trip_affine m = trip_affine_identity();
+    m.m[0][3] = 1e6;
+    trip_camera_framing f = { .lo = { -1, -1, 0 }, .hi = { 1, 1, 0 }, .width = 50, .height = 50 };
+    double lo[2], hi[2];
+    trip_camera_params p = frame(&f, m);
+    box_bounds(&f, m, &p, lo, hi);
+    assert_close(fmax(hi[0], hi[1]), 0.9, 1e-6);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_box_fills_all_but_the_margins_and_is_in_the_middle),
+        cmocka_unit_test(a_sphere_is_as_far_off_as_its_cone_of_sight_calls_for),
+        cmocka_unit_test(where_reaches_cannot_be_found_there_is_no_view),
+        cmocka_unit_test(a_given_height_of_a_parallel_view_stays_and_its_object_is_in_the_middle),
+        cmocka_unit_test(an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margins),
+        cmocka_unit_test(the_default_view_is_from_the_front_right_and_above),
+        cmocka_unit_test(sides_have_names),
+        cmocka_unit_test(azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise),
+        cmocka_unit_test(any_direction_can_be_made_up),
+        cmocka_unit_test(a_box_of_no_size_far_out_is_framed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
