@@ -86,13 +86,15 @@ static void close_drawing(drawing *d)
 /* The reader is made when the first plan says which planes there are to read. */
 static int make_reader(drawing *d, unsigned planes)
 {
+    bool finds_hidden = !strcmp(d->renderer->ops->name, "cpu");
+    bool draws_all = d->o.hidden == RENDER_HIDDEN_DRAW || d->counting;
     const session_reader wanted = {
         .engine = d->o.engine,
         .planes = planes,
         .threads = d->o.threads,
         .cache = d->o.orbit > 1 && !d->counting,
         .renderer = d->renderer,
-        .skip = d->o.hidden == RENDER_HIDDEN_DRAW || d->counting ? NULL : trip_cpu_covered,
+        .skip = finds_hidden && !draws_all ? trip_cpu_covered : NULL,
         .skip_user = d->renderer,
     };
     return d->reader ? 0 : session_make_reader(&d->session, &d->reader, &wanted);

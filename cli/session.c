@@ -77,18 +77,28 @@ static void *const *take_slots(const session *s, const session_reader *wanted, u
     return NULL;
 }
 
+enum { SLOTS = 8, MOST_SLOTS = 16, MAX_SLOT_BYTES = 512 << 10 };
+
+/* Slots are handed out in order, so that one late read holds up the others: the more are on their
+ * way, the less. But what is read ahead is read before it is known to be hidden. */
+static unsigned choose_slots(const session_reader *wanted, uint64_t ring_bytes, size_t plane_count)
+{
+    bool fit = ring_bytes / MOST_SLOTS / plane_count >= MAX_SLOT_BYTES;
+    return fit && !wanted->skip ? MOST_SLOTS : SLOTS;
+}
+
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
 {
-    enum { SLOTS = 8, MAX_SLOT_BYTES = 512 << 10 };
     uint64_t left = trip_budget_left_bytes(s->budget);
     size_t page = (size_t)1 << s->data->header.page_log2;
     size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
-    size_t slot = (size_t)(left / 4) / (SLOTS * plane_count) / page * page;
+    unsigned slots = choose_slots(wanted, left / 4, plane_count);
+    size_t slot = (size_t)(left / 4) / (slots * plane_count) / page * page;
     slot = slot < page ? page : slot;
     trip_reader_params params = {
         .engine = wanted->engine,
         .planes = wanted->planes,
-        .slots = SLOTS,
+        .slots = slots,
         .slot_bytes = slot < MAX_SLOT_BYTES || page > MAX_SLOT_BYTES ? slot : MAX_SLOT_BYTES,
         .threads = (unsigned)wanted->threads,
         .skip = wanted->skip,
