@@ -19,8 +19,8 @@
 #define PIECE_BYTES ((size_t)1 << 20)
 /* Plain data from this size on is read in pieces, several at once. */
 #define LARGE_BYTES ((uint64_t)4 << 20)
-/* The decompressors count in 32 bits. */
-#define OUTPUT_BYTES_MAX ((size_t)1 << 30)
+/* Between looks at the interrupt flag; the decompressors count in 32 bits. */
+#define STEP_BYTES ((size_t)4 << 20)
 
 struct trip_byte_stream {
     trip_byte_source source;
@@ -103,12 +103,25 @@ static int codec_begin(trip_byte_stream *s)
     return 0;
 }
 
+static size_t one_step(size_t bytes)
+{
+    return bytes < STEP_BYTES ? bytes : STEP_BYTES;
+}
+
+static int check_interrupt(const trip_byte_stream *s)
+{
+    return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "read", s->path, "interrupted") : 0;
+}
+
 /* Reads `bytes` bytes at the present position, fewer only at the end of the file. */
 static int read_file(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
 {
     size_t got = 0;
     while (got < bytes) {
-        ssize_t n = pread(s->fd, (char *)to + got, bytes - got, (off_t)s->position);
+        int status = check_interrupt(s);
+        if (status < 0)
+            return status;
+        ssize_t n = pread(s->fd, (char *)to + got, one_step(bytes - got), (off_t)s->position);
         if (n < 0 && errno == EINTR)
             continue;
         if (n < 0)
@@ -200,9 +213,10 @@ static int decompress(trip_byte_stream *s, unsigned char *to, size_t bytes, size
     int status = 0;
     size_t done = 0;
     while (done < bytes && !s->ended && status == 0) {
-        size_t want = bytes - done < OUTPUT_BYTES_MAX ? bytes - done : OUTPUT_BYTES_MAX, got = 0;
+        size_t want = one_step(bytes - done), got = 0;
         bool starved = false;
-        if (s->piece_used == s->piece_bytes) {
+        status = check_interrupt(s);
+        if (status == 0 && s->piece_used == s->piece_bytes) {
             status = fill_piece(s);
             starved = s->piece_bytes == 0;
         }

@@ -1,6 +1,7 @@
 /* The bytes of one file in order, decompressed on the way: what all headerless and dense formats
  * read their values from. The file is read by position in large pieces, so that nothing but the
- * piece is held. One thread at a time. */
+ * piece is held. Reading and passing over end soon when the user wants to stop. One thread at a
+ * time. */
 #ifndef TRIP_BYTE_STREAM_H
 #define TRIP_BYTE_STREAM_H
 

@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "report.h"
+
 enum { THREADS = 4, PIECE_BYTES = 512 << 10, ALIGNMENT_BYTES = 4096 };
 
 struct trip_file_pieces {
@@ -115,7 +117,7 @@ static void *read_pieces(void *user)
     unsigned char *memory = j->file->memory + (size_t)PIECE_BYTES * atomic_fetch_add(&j->seats, 1);
     uint64_t index;
     while ((index = atomic_fetch_add(&j->next, 1)) < j->pieces && !atomic_load(&j->failed))
-        if (!read_piece(j, index, memory))
+        if (trip_interrupted() || !read_piece(j, index, memory))
             atomic_store(&j->failed, true);
     return NULL;
 }

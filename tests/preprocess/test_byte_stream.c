@@ -1,5 +1,7 @@
 #include "volume_files.h"
 
+#include <signal.h>
+
 #include "byte_stream.h"
 
 enum { COUNT = 10000 };
@@ -215,9 +217,40 @@ static void what_is_no_file_is_refused(void **state)
     assert_fails(&(trip_byte_source){ .path = "/dev/zero", .size_bytes = 1 }, "not a regular file");
 }
 
+/* Reading and passing over, of every encoding. */
+static void a_signal_ends_reading_and_skipping(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    for (int e = TRIP_BYTES_PLAIN; e <= TRIP_BYTES_BZIP2; e++) {
+        trip_byte_stream *s;
+        unsigned char got[COUNT];
+        const char *path = write_encoded("stopped", (trip_byte_encoding)e, &b);
+        assert_int_equal(
+            trip_byte_stream_open(&s, &(trip_byte_source){ .path = path,
+                                                           .encoding = (trip_byte_encoding)e,
+                                                           .size_bytes = COUNT }),
+            0);
+        trip_interrupt_install();
+        raise(SIGTERM);
+        catch_reports();
+        int status = e == TRIP_BYTES_ZLIB ? trip_byte_stream_skip(s, COUNT / 2)
+                                          : trip_byte_stream_read(s, got, COUNT / 2);
+        trip_report_redirect(NULL, NULL);
+        assert_int_equal(status, TRIP_INTERRUPTED);
+        assert_int_equal(reports, 1);
+        assert_non_null(strstr(reported, "interrupted"));
+        trip_byte_stream_close(s);
+        trip_interrupt_install(); /* forgets the signal */
+        signal(SIGINT, SIG_DFL);
+        signal(SIGTERM, SIG_DFL);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_signal_ends_reading_and_skipping),
         cmocka_unit_test(all_encodings_deliver_the_same_bytes_in_any_pieces),
         cmocka_unit_test(bytes_can_be_skipped_before_and_after_decompression),
         cmocka_unit_test(members_one_after_the_other_are_one_stream),
