@@ -27,6 +27,7 @@ enum key {
     KEY_SPACING,
     KEY_ENDIAN,
     KEY_OFFSET,
+    KEY_ALLOW_GAPS,
     KEY_TF,
     KEY_RANGE,
     KEY_KEEP_ALL,
@@ -62,6 +63,8 @@ static const struct argp_option option_table[] = {
     { "offset", KEY_OFFSET, "BYTES", 0, "Raw data: where it starts in the file (default: 0)", 1 },
     { "spacing", KEY_SPACING, "X,Y,Z", 0,
       "Distance of voxels along each axis (default: the file's, else 1)", 1 },
+    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0,
+      "Stacks of slices: go on where some are missing, as if their neighbours touched", 1 },
     { NULL, 0, NULL, 0, "What is kept (default: what an automatic transfer function shows):", 2 },
     { "tf", KEY_TF, "FILE", 0, "What this transfer function shows; several add up", 2 },
     { "range", KEY_RANGE, "LO:HI", 0, "Values from LO to HI; several add up", 2 },
@@ -188,6 +191,9 @@ static error_t parse_input_option(int key, char *argument, trip_volume_params *v
         return parse_endian(argument, &v->raw_endian);
     case KEY_OFFSET:
         return parse_offset(argument, &v->raw_offset_bytes);
+    case KEY_ALLOW_GAPS:
+        v->allow_gaps = true;
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -262,7 +268,8 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return parse_unsigned("--threads", argument, 256, &o->brick.threads);
     case ARGP_KEY_ARG:
         if (o->brick.input)
-            return trip_option_fail(argument, "one volume at a time");
+            return trip_option_fail(argument, "one volume at a time; slices are given by their "
+                                              "folder, or a pattern in quotes, like \"*.tif\"");
         o->brick.input = argument;
         return 0;
     case ARGP_KEY_END:

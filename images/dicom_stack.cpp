@@ -14,6 +14,8 @@
 #include <dcmtk/dcmjpeg/djdecode.h>
 #include <dcmtk/dcmjpls/djdecode.h>
 
+#include "connection.h"
+#include "slice_gaps.h"
 #include "slice_stack.h"
 #include "volume_reader.h"
 
@@ -229,16 +231,23 @@ template <typename Has> bool all_have(const std::vector<Header> &headers, const 
     return std::all_of(headers.begin(), headers.end(), has);
 }
 
-/* Puts the slices in order of `key`, which must differ from slice to slice. */
-template <typename Key> void sort_by(std::vector<Header> &headers, const Key &key, const char *what)
+/* Puts the slices in order of `key`, which must differ from slice to slice and leave no gap unless
+ * that is allowed. Returns what trip_check_places() does. */
+template <typename Key>
+double sort_by(std::vector<Header> &headers, const Key &key, const char *what, bool allow_gaps)
 {
+    std::vector<double> keys;
+    std::vector<std::string> names;
     std::stable_sort(headers.begin(), headers.end(),
                      [&](const Header &a, const Header &b) { return key(a) < key(b); });
-    for (size_t i = 1; i < headers.size(); i++)
-        if (!(key(headers[i]) - key(headers[i - 1]) > 1e-6))
-            throw trip_slice_error(headers[i].file, std::string("has the same ") + what + " as " +
-                                                        headers[i - 1].file +
-                                                        ": several series in one folder?");
+    for (const Header &h : headers) {
+        if (!keys.empty() && !(key(h) - keys.back() > 1e-6))
+            throw trip_slice_error(h.file, std::string("has the same ") + what + " as " +
+                                               names.back() + ": several series in one folder?");
+        keys.push_back(key(h));
+        names.push_back(h.file);
+    }
+    return trip_check_places(keys, names, allow_gaps);
 }
 
 bool all_placed(const std::vector<Header> &headers)
@@ -248,7 +257,7 @@ bool all_placed(const std::vector<Header> &headers)
 
 /* By place along the slices' normal, else by the location or the number that they state, else as
  * the names are ordered. */
-void sort_slices(std::vector<Header> &headers)
+double sort_slices(std::vector<Header> &headers, bool allow_gaps)
 {
     if (all_placed(headers)) {
         const std::vector<double> rows = headers[0].rows;
@@ -257,15 +266,19 @@ void sort_slices(std::vector<Header> &headers)
         for (const Header &h : headers)
             if (!are_alike(h.rows, rows))
                 throw trip_slice_error(h.file, "is oriented unlike " + first);
-        sort_by(
-            headers, [&](const Header &h) { return trip_dot(h.places[0], normal); }, "place");
-    } else if (all_have(headers, [](const Header &h) { return std::isfinite(h.location); })) {
-        sort_by(
-            headers, [](const Header &h) { return h.location; }, "location");
-    } else if (all_have(headers, [](const Header &h) { return std::isfinite(h.number); })) {
-        sort_by(
-            headers, [](const Header &h) { return h.number; }, "instance number");
+        return sort_by(
+            headers, [&](const Header &h) { return trip_dot(h.places[0], normal); }, "place",
+            allow_gaps);
     }
+    if (all_have(headers, [](const Header &h) { return std::isfinite(h.location); })) {
+        return sort_by(
+            headers, [](const Header &h) { return h.location; }, "location", allow_gaps);
+    }
+    if (all_have(headers, [](const Header &h) { return std::isfinite(h.number); })) {
+        return sort_by(
+            headers, [](const Header &h) { return h.number; }, "instance number", allow_gaps);
+    }
+    return 1;
 }
 
 /* The frames of one file in order of their place; none where places are not known. */
@@ -316,9 +329,8 @@ void check_line(const std::string &file, const std::vector<trip_vec3> &places, t
         before = steps;
     }
     if (most - least > 0.02)
-        trip_warn(file.c_str(),
-                  "slices are %g to %g apart, perhaps some are missing; drawn %g apart",
-                  least * trip_length(step), most * trip_length(step), trip_length(step));
+        trip_warn(file.c_str(), "slices are %g to %g apart, perhaps some are missing; drawn evenly",
+                  least * trip_length(step), most * trip_length(step));
 }
 
 /* The step from slice to slice in space, from where they are, else from what they state. */
@@ -341,7 +353,8 @@ trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal, doubl
     return trip_scale(normal, length);
 }
 
-trip_affine make_map(const std::vector<Header> &headers)
+/* `squeeze` shortens the step from slice to slice where gaps are passed over. */
+trip_affine make_map(const std::vector<Header> &headers, double squeeze)
 {
     const Header &h = headers[0];
     bool oriented = h.rows.size() == 6;
@@ -354,7 +367,7 @@ trip_affine make_map(const std::vector<Header> &headers)
     for (int r = 0; r < 3; r++) {
         map.m[r][0] = trip_component(i, r) * di;
         map.m[r][1] = trip_component(j, r) * dj;
-        map.m[r][2] = trip_component(k, r);
+        map.m[r][2] = trip_component(k, r) * squeeze;
         map.m[r][3] = trip_component(h.origin, r);
     }
     return map;
@@ -392,7 +405,7 @@ void align_values(const Header &h, trip_scalar type, void *values, size_t count)
 class DicomStack : public trip_slice_stack
 {
   public:
-    DicomStack(const trip_slice_files &files, trip_budget *budget);
+    DicomStack(const trip_slice_files &files, trip_budget *budget, bool allow_gaps);
     void read(int64_t k, void *values) override;
 
   private:
@@ -409,12 +422,13 @@ class DicomStack : public trip_slice_stack
     Uint32 next_frame_ = 0, fragment_ = 0; /* where the frame after the last one read begins */
 };
 
-DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget)
+DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool allow_gaps)
 {
     set_up_once();
     bool rescaled_alike = true;
     for (const std::string &name : files.names) {
         headers_.push_back(read_header(name));
+        trip_connection_working();
         const Header &h = headers_.back(), &first = headers_.front();
         if (!h.same_pixels(first))
             throw trip_slice_error(name, "is " + h.text() + ", unlike " + first.file + ", " +
@@ -425,11 +439,11 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget)
             throw trip_slice_error(name, "holds several frames, and is one of several files");
         rescaled_alike = rescaled_alike && h.slope == first.slope && h.inter == first.inter;
     }
-    sort_slices(headers_);
+    double squeeze = sort_slices(headers_, allow_gaps);
     if (headers_[0].frames > 1)
         frames_ = sort_frames(headers_[0]);
     const Header &h = headers_[0];
-    index_to_world = make_map(headers_);
+    index_to_world = make_map(headers_, squeeze);
     oriented = all_have(headers_, [](const Header &o) { return o.rows.size() == 6; });
     if (all_placed(headers_) && h.biped)
         std::strcpy(space, "LPS");
@@ -493,7 +507,7 @@ void DicomStack::read(int64_t k, void *values)
 } // namespace
 
 std::unique_ptr<trip_slice_stack> trip_dicom_stack(const trip_slice_files &files,
-                                                   trip_budget *budget)
+                                                   trip_budget *budget, bool allow_gaps)
 {
-    return std::unique_ptr<trip_slice_stack>(new DicomStack(files, budget));
+    return std::unique_ptr<trip_slice_stack>(new DicomStack(files, budget, allow_gaps));
 }

@@ -126,8 +126,9 @@ class Session
         if (!budget_ && trip_budget_create(&budget_, (uint64_t)request.numbers[0]) < 0)
             throw std::bad_alloc();
         trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
-        trip_slice_files files = trip_slice_find(path);
-        stack_ = files.kind == TRIP_IMAGE_DICOM ? trip_dicom_stack(files, budget_)
+        bool allow_gaps = request.numbers[1] != 0;
+        trip_slice_files files = trip_slice_find(path, allow_gaps);
+        stack_ = files.kind == TRIP_IMAGE_DICOM ? trip_dicom_stack(files, budget_, allow_gaps)
                                                 : trip_picture_stack(files, budget_);
         trip_image_stack s = {};
         std::memcpy(s.dims, stack_->dims, sizeof s.dims);

@@ -3,6 +3,7 @@
 
 #include <OpenImageIO/imageio.h>
 
+#include "connection.h"
 #include "slice_stack.h"
 #include "volume_reader.h"
 
@@ -126,6 +127,7 @@ void PictureStack::count_pages(OIIO::ImageInput &in)
         }
         check_same(file + ": page " + std::to_string(pages + 1), in.spec());
         pages++;
+        trip_connection_working();
     }
     /* Past the last page the library has nothing to say but the file's name. */
     std::string why = in.geterror();
@@ -167,8 +169,16 @@ PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) :
                                                "several files");
     in->geterror();
     choose_channels(budget);
-    for (size_t i = 1; i < files.names.size(); i++)
+    for (size_t i = 1; i < files.names.size(); i++) {
         check_same(files.names[i], open(files.names[i])->spec());
+        trip_connection_working();
+    }
+}
+
+bool on_progress(void *, float)
+{
+    trip_connection_working();
+    return false; /* go on */
 }
 
 /* Luma of the stored numbers (Rec. ITU-R BT.709-6, 3.2); alpha is left out. */
@@ -201,7 +211,8 @@ void PictureStack::read(int64_t k, void *values)
     }
     bool colour = form_->channels > 2;
     if (!current_->read_image(page, 0, 0, colour ? form_->channels : 1, form_->type,
-                              colour ? (void *)colour_.data() : values))
+                              colour ? (void *)colour_.data() : values, OIIO::AutoStride,
+                              OIIO::AutoStride, OIIO::AutoStride, on_progress))
         throw trip_slice_error(file, message(current_->geterror()));
     if (colour)
         colour_to_luma((float *)values);

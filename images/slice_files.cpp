@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
+#include <set>
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -12,6 +13,8 @@
 #include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "slice_gaps.h"
 
 namespace
 {
@@ -44,24 +47,44 @@ bool natural_less(const std::string &a, const std::string &b)
     return a_ends != b_ends ? a_ends : a < b;
 }
 
+/* Not blocking, so that a FIFO is refused rather than waited for. */
 trip_image_kind kind_of_file(const std::string &name)
 {
     unsigned char head[132];
-    int fd = ::open(name.c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat st;
+    int fd = ::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0)
         throw trip_slice_error(name, std::string("cannot open: ") + std::strerror(errno));
-    ssize_t n = ::pread(fd, head, sizeof head, 0);
+    bool regular = ::fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
+    ssize_t n = regular ? ::pread(fd, head, sizeof head, 0) : 0;
     std::string why = n < 0 ? std::strerror(errno) : "";
     ::close(fd);
+    if (!regular)
+        throw trip_slice_error(name, "is not a regular file");
     if (n < 0)
         throw trip_slice_error(name, "cannot read: " + why);
     return trip_image_kind_of(head, (size_t)n);
 }
 
+/* Also of a link that leads nowhere: false. */
 bool is_regular(const std::string &name)
 {
     struct stat st;
     return ::stat(name.c_str(), &st) == 0 && S_ISREG(st.st_mode);
+}
+
+/* What stands where a slice should be. */
+std::string describe(const std::string &name)
+{
+    struct stat st;
+    if (::stat(name.c_str(), &st) != 0)
+        return ::lstat(name.c_str(), &st) == 0 && S_ISLNK(st.st_mode)
+                   ? "is a link that leads nowhere"
+                   : std::string("cannot be looked at: ") + std::strerror(errno);
+    return S_ISDIR(st.st_mode)    ? "is a folder"
+           : S_ISREG(st.st_mode)  ? "holds no TIFF, PNG, EXR or DICOM picture: is it damaged?"
+           : S_ISFIFO(st.st_mode) ? "is a pipe"
+                                  : "is not a regular file";
 }
 
 /* Names in a folder, without those that begin with a dot. */
@@ -146,15 +169,8 @@ std::vector<std::string> find_numbered(const std::string &path, const std::strin
     }
     std::sort(found.begin(), found.end());
     std::vector<std::string> names;
-    for (size_t i = 0; i < found.size(); i++) {
-        if (i > 0 && found[i].first != found[i - 1].first + 1)
-            throw trip_slice_error(path, "slice " + std::to_string(found[i - 1].first + 1) +
-                                             " is missing: there are " +
-                                             std::to_string(found[0].first) + " to " +
-                                             std::to_string(found[i - 1].first) + ", then " +
-                                             std::to_string(found[i].first));
-        names.push_back(found[i].second);
-    }
+    for (const auto &one : found)
+        names.push_back(one.second);
     if (names.empty())
         throw trip_slice_error(path, "no file fits this pattern");
     return names;
@@ -185,20 +201,29 @@ bool is_named_as_slice(const std::string &name)
            });
 }
 
-/* Passes over other files, but not over a damaged slice, which would bring its neighbours
- * together. */
+/* Passes over other files, but not over what is named as a slice, by its extension or as slices
+ * there are, and is none: that would bring its neighbours together. */
 std::vector<std::string> find_in_folder(const std::string &path)
 {
-    std::vector<std::string> names;
+    std::vector<std::string> names, others;
+    std::set<std::string> shapes;
     for (const std::string &name : list_folder(path)) {
         std::string file = path + (path.back() == '/' ? "" : "/") + name;
-        if (name == "DICOMDIR" || !is_regular(file))
+        if (name == "DICOMDIR")
             continue;
-        if (kind_of_file(file) != TRIP_IMAGE_OTHER)
+        if (is_regular(file) && kind_of_file(file) != TRIP_IMAGE_OTHER) {
             names.push_back(file);
-        else if (is_named_as_slice(name))
-            throw trip_slice_error(file,
-                                   "holds no TIFF, PNG, EXR or DICOM picture: is it damaged?");
+            shapes.insert(trip_name_shape(name));
+        } else {
+            others.push_back(file);
+        }
+    }
+    std::sort(others.begin(), others.end(), natural_less);
+    for (const std::string &file : others) {
+        const std::string shape = trip_name_shape(file);
+        if (is_named_as_slice(file) ||
+            (shape.find('1') != std::string::npos && shapes.count(shape)))
+            throw trip_slice_error(file, describe(file));
     }
     if (names.empty())
         throw trip_slice_error(path, "holds no TIFF, PNG, EXR or DICOM files");
@@ -224,13 +249,14 @@ std::vector<std::string> find_names(const std::string &path)
 
 } // namespace
 
-trip_slice_files trip_slice_find(const std::string &path)
+trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps)
 {
     trip_slice_files files = { TRIP_IMAGE_OTHER, find_names(path) };
     for (const std::string &name : files.names) {
         trip_image_kind kind = is_regular(name) ? kind_of_file(name) : TRIP_IMAGE_OTHER;
         if (kind == TRIP_IMAGE_OTHER)
-            throw trip_slice_error(name, "is no TIFF, PNG, EXR or DICOM file");
+            throw trip_slice_error(name, is_regular(name) ? "is no TIFF, PNG, EXR or DICOM file"
+                                                          : describe(name) + ", not a slice");
         if (&name == &files.names.front())
             files.kind = kind;
         else if (kind != files.kind)
@@ -239,5 +265,7 @@ trip_slice_files trip_slice_find(const std::string &path)
                                              trip_image_kind_name(kind) +
                                              "; a pattern like \"*.tif\" would choose");
     }
+    if (files.kind != TRIP_IMAGE_DICOM || path.find('%') != std::string::npos)
+        trip_check_numbers(path, files.names, allow_gaps);
     return files;
 }

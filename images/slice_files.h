@@ -27,10 +27,13 @@ struct trip_slice_files {
 /* `path` is one of
  *   a folder: its files of a known kind, in natural order of their names ("s2" before "s10");
  *   a printf-like pattern ("s%03d.tif", one conversion, in the last part): all that exist, in order
- *   of their numbers, of which none may be missing in between;
+ *   of their numbers;
  *   a glob pattern ("s*.png"): what it matches, in natural order;
  *   a file.
- * All are of one kind. */
-trip_slice_files trip_slice_find(const std::string &path);
+ * All are of one kind. Where names count the slices, none may be missing in between, unless
+ * `allow_gaps` (trip_check_numbers() of slice_gaps.h; the places of DICOM slices matter more
+ * than their names, and are checked in dicom_stack.cpp). What is named as a slice but is none, or
+ * cannot be read, is an error. */
+trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps);
 
 #endif

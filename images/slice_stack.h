@@ -48,8 +48,9 @@ class trip_slice_stack
  * are slices, too. */
 std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
                                                      trip_budget *budget);
-/* DICOM, through DCMTK: dicom_stack.cpp. Slices are put in order of their place in space. */
+/* DICOM, through DCMTK: dicom_stack.cpp. Slices are put in order of their place in space, where
+ * none may be missing in between unless `allow_gaps`. */
 std::unique_ptr<trip_slice_stack> trip_dicom_stack(const trip_slice_files &files,
-                                                   trip_budget *budget);
+                                                   trip_budget *budget, bool allow_gaps);
 
 #endif

@@ -24,8 +24,8 @@ static void write_input(FILE *f, const trip_brick_params *p)
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
-    fprintf(f, "%s %d %s %d %" PRIu64 "\n", v->grid ? v->grid : "", (int)v->level_set,
-            v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes);
+    fprintf(f, "%s %d %s %d %" PRIu64 " %d\n", v->grid ? v->grid : "", (int)v->level_set,
+            v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes, v->allow_gaps);
     for (int a = 0; a < 3; a++)
         fprintf(f, "%" PRId64 " %a\n", v->raw_dims[a], v->spacing[a]);
 }

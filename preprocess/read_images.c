@@ -41,9 +41,9 @@ static void close_images(void *opaque)
     free(s);
 }
 
-static int open_stack(state *s, trip_image_stack *stack)
+static int open_stack(state *s, bool allow_gaps, trip_image_stack *stack)
 {
-    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget) };
+    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), allow_gaps };
     int status = trip_image_helper_start(&s->helper, "read");
     if (status == 0)
         status = trip_image_helper_request(s->helper, TRIP_IMAGE_OPEN_STACK, s->path, numbers, -1);
@@ -94,7 +94,10 @@ static int reserve_memory(state *s, const trip_image_stack *stack)
 static int open_images(const char *path, const trip_volume_params *params, trip_budget *budget,
                        trip_volume_info *info, void **out)
 {
-    (void)params;
+    struct stat st;
+    if (params->allow_gaps && stat(path, &st) == 0 && S_ISREG(st.st_mode))
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "is one file: --allow-gaps is for stacks of several");
     size_t path_bytes = strlen(path) + 1;
     state *s = calloc(1, sizeof *s + path_bytes);
     if (!s)
@@ -102,7 +105,7 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
     memcpy(s->path, path, path_bytes);
     s->budget = budget;
     trip_image_stack stack = { 0 };
-    int status = open_stack(s, &stack);
+    int status = open_stack(s, params->allow_gaps, &stack);
     const char *fault = status == 0 ? fault_of(&stack) : NULL;
     if (fault)
         status = trip_image_helper_distrust(s->helper, fault);

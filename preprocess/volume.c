@@ -64,6 +64,9 @@ static int check_options(const char *path, const char *format, const trip_volume
     if (strcmp(format, "openvdb") != 0 && (p->grid || p->level_set))
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s: --grid and --level-set are for OpenVDB", format);
+    if (strcmp(format, "images") != 0 && p->allow_gaps)
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "its format is %s: --allow-gaps is for stacks of slices", format);
     for (int a = 0; a < 3; a++)
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))

@@ -154,6 +154,38 @@ static void dicom_slices_are_ordered_and_placed_in_space(void **state)
     assert_true(info.oriented);
 }
 
+/* Slices at 0, 1.5, 4.5, 6 and so on: drawn 1.5 apart where the gap is allowed. */
+static void a_dicom_slice_missing_between_others_is_refused_unless_allowed(void **state)
+{
+    (void)state;
+    for (int k = 0; k < NZ; k++) {
+        char name[32], position[32];
+        snprintf(name, sizeof name, "gap%d.dcm", k + 1);
+        snprintf(position, sizeof position, "0\\0\\%g", 1.5 * (k > 1 ? k + 1 : k));
+        const dicom d = { .type = TRIP_U8,
+                          .position = position,
+                          .orientation = "1\\0\\0\\0\\1\\0" };
+        write_dicom(name, &d, k, 1);
+    }
+    assert_refused(path_of("gap%d.dcm"), "gap2.dcm: a slice is missing after it");
+    float values[VOXELS];
+    trip_volume_info info;
+    const trip_volume_params params = { .allow_gaps = true };
+    catch_reports();
+    assert_int_equal(read_volume(path_of("gap%d.dcm"), &params, 2, values, VOXELS, &info), 0);
+    trip_report_redirect(NULL, NULL);
+    assert_non_null(strstr(reported, "gap2.dcm"));
+    assert_true(fabs(info.index_to_world.m[2][2] - 1.5) < 1e-12);
+}
+
+static void gaps_are_allowed_in_stacks_of_several_files_only(void **state)
+{
+    (void)state;
+    const trip_volume_params params = { .allow_gaps = true };
+    write_tiff("pages.tif", TRIP_U8, 0, NZ);
+    assert_refused_as(TRIP_USAGE, path_of("pages.tif"), &params, "is one file");
+}
+
 static void dicom_without_positions_is_ordered_by_number(void **state)
 {
     (void)state;
@@ -202,11 +234,15 @@ static void dicom_slices_beside_their_line_are_refused(void **state)
                                       "0\\4\\8", "0\\5\\10", "0\\6\\12" };
     const char *const gap[NZ] = { "0\\0\\0",  "0\\1\\2",  "0\\2\\4", "0\\3\\6",
                                   "0\\5\\10", "0\\6\\12", "0\\7\\14" };
+    const char *const uneven[NZ] = { "0\\0\\0",   "0\\1\\2",    "0\\2\\4",   "0\\3\\6",
+                                     "0\\4.5\\9", "0\\5.5\\11", "0\\6.5\\13" };
     const char *axial = "1\\0\\0\\0\\1\\0";
     assert_string_equal(report_of_places(straight, axial, 0), "");
     assert_non_null(strstr(report_of_places(crooked, axial, TRIP_ERROR),
                            "p0.dcm: slice 4 of its series lies 0.3 beside the line"));
-    assert_non_null(strstr(report_of_places(gap, axial, 0), "perhaps some are missing"));
+    assert_non_null(
+        strstr(report_of_places(gap, axial, TRIP_ERROR), "p3.dcm: a slice is missing after it"));
+    assert_non_null(strstr(report_of_places(uneven, axial, 0), "perhaps some are missing"));
     assert_int_equal(reports, 1);
     assert_non_null(strstr(report_of_places(straight, "1\\0\\0\\0.5\\1\\0", TRIP_ERROR),
                            "not at right angles"));
@@ -397,6 +433,8 @@ int main(void)
         cmocka_unit_test(grey_is_taken_from_channels),
         cmocka_unit_test(a_tiff_with_depth_in_its_tiles_is_refused),
         cmocka_unit_test(dicom_slices_are_ordered_and_placed_in_space),
+        cmocka_unit_test(a_dicom_slice_missing_between_others_is_refused_unless_allowed),
+        cmocka_unit_test(gaps_are_allowed_in_stacks_of_several_files_only),
         cmocka_unit_test(dicom_without_positions_is_ordered_by_number),
         cmocka_unit_test(dicom_slices_beside_their_line_are_refused),
         cmocka_unit_test(dicom_without_positions_says_nothing_of_the_patient),

@@ -1,0 +1,164 @@
+#include "slice_gaps.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "slice_files.h"
+
+namespace
+{
+
+constexpr size_t most_digits = 18;
+
+bool is_digit(char c)
+{
+    return isdigit((unsigned char)c) != 0;
+}
+
+/* The last part of a path, as texts and digits in turn: text, digits, text, ..., text. */
+std::vector<std::string> split_name(const std::string &path)
+{
+    size_t slash = path.rfind('/');
+    std::vector<std::string> parts(1);
+    for (size_t i = slash == std::string::npos ? 0 : slash + 1; i < path.size(); i++) {
+        bool in_digits = parts.size() % 2 == 0;
+        if (is_digit(path[i]) != in_digits)
+            parts.emplace_back();
+        parts.back() += path[i];
+    }
+    if (parts.size() % 2 == 0)
+        parts.emplace_back();
+    return parts;
+}
+
+using Parts = std::vector<std::string>;
+
+/* The place of the only number that differs, or 0. */
+size_t find_counter(const std::vector<Parts> &names)
+{
+    size_t counter = 0;
+    for (size_t at = 1; at < names[0].size(); at += 2) {
+        bool differs = false;
+        for (const Parts &parts : names)
+            differs = differs || parts[at] != names[0][at];
+        if (differs && counter)
+            return 0;
+        counter = differs ? at : counter;
+    }
+    return counter;
+}
+
+struct Numbered {
+    long long number;
+    const Parts *parts;
+};
+
+std::vector<Numbered> numbers_of(const std::vector<Parts> &names, size_t counter)
+{
+    std::vector<Numbered> numbered;
+    for (const Parts &parts : names) {
+        if (parts[counter].size() > most_digits)
+            return {};
+        numbered.push_back({ std::atoll(parts[counter].c_str()), &parts });
+    }
+    std::sort(numbered.begin(), numbered.end(),
+              [](const Numbered &a, const Numbered &b) { return a.number < b.number; });
+    return numbered;
+}
+
+/* What the slice would be called, with zeros in front as its neighbour has. */
+std::string name_with(const Numbered &neighbour, size_t counter, long long number)
+{
+    std::string name;
+    for (size_t at = 0; at < neighbour.parts->size(); at++) {
+        std::string digits = std::to_string(number);
+        size_t width = (*neighbour.parts)[at].size();
+        if (at == counter && digits.size() < width)
+            digits.insert(0, width - digits.size(), '0');
+        name += at == counter ? digits : (*neighbour.parts)[at];
+    }
+    return name;
+}
+
+void report_gap(const std::string &path, const std::string &what, bool allow_gaps)
+{
+    if (!allow_gaps)
+        throw trip_slice_error(path, what + "; --allow-gaps goes on as if its neighbours touched");
+    trip_warn(path.c_str(), "%s; drawn as if its neighbours touched", what.c_str());
+}
+
+void check_one_shape(const std::string &path, const std::vector<Parts> &names, bool allow_gaps)
+{
+    size_t counter = find_counter(names);
+    const std::vector<Numbered> all =
+        counter ? numbers_of(names, counter) : std::vector<Numbered>();
+    if (all.size() < 2)
+        return;
+    long long step = all.size() == 2 ? 1 : all[1].number - all[0].number;
+    for (size_t i = 1; i < all.size(); i++)
+        step = std::min(step, all[i].number - all[i - 1].number);
+    unsigned long long missing = 0;
+    const Numbered *before = nullptr;
+    for (size_t i = 1; i < all.size() && step > 0; i++) {
+        long long apart = all[i].number - all[i - 1].number;
+        missing += (unsigned long long)((apart - 1) / step);
+        if (apart != step && !before)
+            before = &all[i - 1];
+    }
+    if (!before)
+        return;
+    long long number = before->number + step;
+    std::string what = "slice " + std::to_string(number) + " is missing (" +
+                       name_with(*before, counter, number) + ")";
+    if (missing > 1)
+        what += ", and " + std::to_string(missing - 1) + " more";
+    report_gap(path, what, allow_gaps);
+}
+
+} // namespace
+
+std::string trip_name_shape(const std::string &name)
+{
+    std::string shape;
+    const Parts parts = split_name(name);
+    for (size_t at = 0; at < parts.size(); at++)
+        shape += at % 2 ? "1" : parts[at];
+    return shape;
+}
+
+void trip_check_numbers(const std::string &path, const std::vector<std::string> &names,
+                        bool allow_gaps)
+{
+    std::map<std::string, std::vector<Parts>> shapes;
+    for (const std::string &name : names)
+        shapes[trip_name_shape(name)].push_back(split_name(name));
+    for (const auto &shape : shapes)
+        check_one_shape(path, shape.second, allow_gaps);
+}
+
+double trip_check_places(const std::vector<double> &places, const std::vector<std::string> &names,
+                         bool allow_gaps)
+{
+    std::vector<double> steps;
+    for (size_t i = 1; i < places.size(); i++)
+        steps.push_back(places[i] - places[i - 1]);
+    if (steps.size() < 2)
+        return 1;
+    std::vector<double> sorted = steps;
+    std::sort(sorted.begin(), sorted.end());
+    const double usual = sorted[(sorted.size() - 1) / 2];
+    for (size_t i = 0; i < steps.size(); i++) {
+        double times = steps[i] / usual, whole = std::round(times);
+        if (!(whole >= 2 && whole < 1e6 && std::fabs(times - whole) <= 0.1))
+            continue;
+        report_gap(names[i],
+                   "a slice is missing after it: the next one, " + names[i + 1] + ", lies " +
+                       std::to_string((long)whole) + " steps on",
+                   allow_gaps);
+        return usual * (double)steps.size() / (places.back() - places.front());
+    }
+    return 1;
+}

@@ -1,0 +1,225 @@
+#include "slice_files.h"
+
+#include <cerrno>
+#include <fstream>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+extern "C" {
+#include <cmocka.h>
+}
+
+#include "report.h"
+#include "slice_gaps.h"
+
+namespace
+{
+
+int warnings;
+std::string last_warning;
+
+void keep_line(const char *line, void *)
+{
+    warnings++;
+    last_warning = line;
+}
+
+char folder[] = "slice_files-XXXXXX";
+
+int enter_folder(void **)
+{
+    trip_report_redirect(keep_line, nullptr);
+    return mkdtemp(folder) ? chdir(folder) : -1;
+}
+
+int leave_folder(void **)
+{
+    trip_report_redirect(nullptr, nullptr);
+    return chdir("..") == 0 && system((std::string("rm -r ") + folder).c_str()) == 0 ? 0 : -1;
+}
+
+/* A file by whose first bytes it is a TIFF. */
+void make_slice(const std::string &path)
+{
+    std::ofstream(path) << "II*" << '\0' << "........";
+}
+
+void make_folder(const std::string &path, const std::vector<std::string> &slices)
+{
+    assert_int_equal(mkdir(path.c_str(), 0777), 0);
+    for (const std::string &name : slices)
+        make_slice(path + "/" + name);
+}
+
+std::string why_refused(const std::string &path)
+{
+    try {
+        trip_slice_find(path, false);
+    } catch (const trip_slice_error &e) {
+        return e.where + ": " + e.what();
+    }
+    return "";
+}
+
+void assert_refused(const std::string &path, const std::string &part)
+{
+    const std::string why = why_refused(path);
+    if (why.find(part) == std::string::npos)
+        fail_msg("\"%s\" is not in \"%s\"", part.c_str(), why.c_str());
+}
+
+void a_missing_number_is_named_with_its_file(void **)
+{
+    make_folder("gap", { "s_0015.tif", "s_0016.tif", "s_0018.tif", "s_0019.tif" });
+    for (const char *path : { "gap", "gap/", "gap/s_*.tif", "gap/s_%04d.tif" })
+        assert_refused(path, "slice 17 is missing (s_0017.tif); --allow-gaps goes on");
+    unlink("gap/s_0016.tif");
+    assert_refused("gap", "slice 16 is missing (s_0016.tif), and 1 more");
+    warnings = 0;
+    assert_int_equal(trip_slice_find("gap", true).names.size(), 3);
+    assert_int_equal(warnings, 1);
+    assert_true(last_warning.find("slice 16 is missing") != std::string::npos);
+}
+
+void two_slices_that_are_not_neighbours_have_a_gap(void **)
+{
+    make_folder("two", { "a1.tif", "a3.tif" });
+    assert_refused("two", "slice 2 is missing (a2.tif)");
+    make_slice("two/a2.tif");
+    assert_int_equal(trip_slice_find("two", false).names.size(), 3);
+}
+
+void numbers_in_equal_steps_have_no_gap(void **)
+{
+    make_folder("even", { "z00.tif", "z05.tif", "z10.tif", "z15.tif" });
+    assert_true(why_refused("even").empty());
+    make_slice("even/z25.tif");
+    assert_refused("even", "slice 20 is missing (z20.tif)");
+}
+
+void zeros_in_front_are_as_many_as_the_names_have(void **)
+{
+    make_folder("bare", { "8.tif", "9.tif", "11.tif" });
+    assert_refused("bare", "slice 10 is missing (10.tif)");
+}
+
+/* Dates and times, two counters, names without numbers, and too many digits: nothing is counted. */
+void names_that_no_single_number_counts_have_no_gaps(void **)
+{
+    make_folder("dates", { "20240131_0959.tif", "20240201_1107.tif", "20240201_1115.tif" });
+    make_folder("words", { "back.tif", "front.tif", "middle.tif" });
+    make_folder("long", { "1000000000000000000000.tif", "3000000000000000000000.tif" });
+    for (const char *path : { "dates", "words", "long" })
+        assert_true(why_refused(path).empty());
+}
+
+void names_of_another_shape_are_no_part_of_the_count(void **)
+{
+    make_folder("mixed", { "cover.tif", "p1.tif", "p2.tif", "p3.tif", "q7.tif" });
+    assert_true(why_refused("mixed").empty());
+}
+
+void what_is_named_as_a_slice_and_is_none_is_an_error(void **)
+{
+    make_folder("bad", { "im1", "im2", "im4" });
+    assert_int_equal(symlink("nowhere", "bad/im3"), 0);
+    assert_refused("bad", "bad/im3: is a link that leads nowhere");
+    unlink("bad/im3");
+    assert_int_equal(mkfifo("bad/im3", 0666), 0);
+    assert_refused("bad", "bad/im3: is a pipe");
+    assert_refused("bad/im%d", "bad/im3: is a pipe");
+    assert_refused("bad/im*", "bad/im3: is a pipe");
+    unlink("bad/im3");
+    assert_int_equal(mkdir("bad/im3", 0777), 0);
+    assert_refused("bad", "bad/im3: is a folder");
+    assert_int_equal(rmdir("bad/im3"), 0);
+    std::ofstream("bad/im3") << "";
+    assert_refused("bad", "bad/im3: holds no TIFF, PNG, EXR or DICOM picture");
+    unlink("bad/im3");
+    make_slice("bad/im3");
+    assert_true(why_refused("bad").empty());
+    assert_int_equal(symlink("nowhere", "bad/other.tif"), 0);
+    assert_refused("bad", "bad/other.tif: is a link that leads nowhere");
+}
+
+void a_slice_that_may_not_be_read_is_an_error(void **)
+{
+    const uid_t self = geteuid();
+    make_folder("closed", { "c1.tif", "c2.tif" });
+    assert_int_equal(chmod("closed/c2.tif", 0), 0);
+    assert_int_equal(chmod(".", 0755), 0);
+    if (self == 0) /* root may read everything */
+        assert_int_equal(seteuid(65534), 0);
+    const std::string why = why_refused("closed");
+    assert_int_equal(seteuid(self), 0);
+    assert_string_equal(why.c_str(), "closed/c2.tif: cannot open: Permission denied");
+}
+
+void other_files_and_folders_beside_slices_are_passed_over(void **)
+{
+    make_folder("beside", { "t1.tif", "t2.tif", ".t9.tif" });
+    std::ofstream("beside/notes.txt") << "hello";
+    std::ofstream("beside/series 2") << "hello";
+    assert_int_equal(mkdir("beside/more", 0777), 0);
+    assert_int_equal(mkfifo("beside/pipe", 0666), 0);
+    assert_int_equal(trip_slice_find("beside", false).names.size(), 2);
+}
+
+void places_in_equal_steps_have_no_gap(void **)
+{
+    assert_true(trip_check_places({}, {}, false) == 1);
+    assert_true(trip_check_places({ 3 }, { "a" }, false) == 1);
+    assert_true(trip_check_places({ 3, 9 }, { "a", "b" }, false) == 1);
+    assert_true(trip_check_places({ 0, 1.5, 3, 4.5 }, { "a", "b", "c", "d" }, false) == 1);
+}
+
+/* Neither twice the usual step nor thrice: uneven, but nothing is missing. */
+void places_in_uneven_steps_have_no_gap(void **)
+{
+    assert_true(trip_check_places({ 0, 1, 2.3, 3.8 }, { "a", "b", "c", "d" }, false) == 1);
+}
+
+/* Steps of 2, 2, 6 and 2, whose mean is 3. */
+void a_place_that_is_left_out_is_named_by_its_neighbours(void **)
+{
+    const std::vector<double> places = { 0, 2, 4, 10, 12 };
+    const std::vector<std::string> names = { "a", "b", "c", "d", "e" };
+    try {
+        trip_check_places(places, names, false);
+        fail_msg("%s", "no gap is found");
+    } catch (const trip_slice_error &e) {
+        assert_string_equal(e.where.c_str(), "c");
+        assert_string_equal(e.what(), "a slice is missing after it: the next one, d, lies 3 steps "
+                                      "on; --allow-gaps goes on as if its neighbours touched");
+    }
+    warnings = 0;
+    const double squeeze = trip_check_places(places, names, true);
+    assert_true(squeeze > 0.6666 && squeeze < 0.6667);
+    assert_int_equal(warnings, 1);
+}
+
+} // namespace
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_missing_number_is_named_with_its_file),
+        cmocka_unit_test(two_slices_that_are_not_neighbours_have_a_gap),
+        cmocka_unit_test(numbers_in_equal_steps_have_no_gap),
+        cmocka_unit_test(zeros_in_front_are_as_many_as_the_names_have),
+        cmocka_unit_test(names_that_no_single_number_counts_have_no_gaps),
+        cmocka_unit_test(names_of_another_shape_are_no_part_of_the_count),
+        cmocka_unit_test(what_is_named_as_a_slice_and_is_none_is_an_error),
+        cmocka_unit_test(a_slice_that_may_not_be_read_is_an_error),
+        cmocka_unit_test(other_files_and_folders_beside_slices_are_passed_over),
+        cmocka_unit_test(places_in_equal_steps_have_no_gap),
+        cmocka_unit_test(places_in_uneven_steps_have_no_gap),
+        cmocka_unit_test(a_place_that_is_left_out_is_named_by_its_neighbours),
+    };
+    return cmocka_run_group_tests(tests, enter_folder, leave_folder);
+}
