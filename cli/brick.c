@@ -334,6 +334,7 @@ static int print_json(const options *o, const trip_brick_summary *s, const brick
         cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)s->dims[a]));
         cJSON_AddItemToArray(spacing, cJSON_CreateNumber(s->spacing[a]));
     }
+    cJSON_AddStringToObject(root, "function_kind", trip_tf_kind_name(s->kind));
     add_number(root, "value_min", s->value_min);
     add_number(root, "value_max", s->value_max);
     add_number(root, "voxels", (double)s->voxels);
@@ -373,6 +374,7 @@ static void print_text(const options *o, const trip_brick_summary *s)
            s->spacing[2]);
     printf("%-9s %llu read, values %.7g to %.7g\n", "voxels", (unsigned long long)s->voxels,
            s->value_min, s->value_max);
+    printf("%-9s %s\n", "taken for", trip_tf_kind_title(s->kind));
     printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
     printf("%-9s %s, %.3g bytes per kept voxel\n", "written", trip_format_bytes(s->bytes, bytes),
            (double)s->bytes / kept);

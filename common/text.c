@@ -3,6 +3,7 @@
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -105,4 +106,25 @@ void trip_text_write(FILE *f, const char *text)
         fwrite(shown, 1, trip_text_show(text, c, shown), f);
         text += c.bytes;
     }
+}
+
+size_t trip_text_distance(const char *a, const char *b)
+{
+    enum { MOST = 64 };
+    size_t row[MOST], m = strlen(a), n = strlen(b);
+    if (m >= MOST || n >= MOST)
+        return SIZE_MAX;
+    for (size_t j = 0; j <= n; j++)
+        row[j] = j;
+    for (size_t i = 1; i <= m; i++) {
+        size_t diagonal = row[0]; /* of the row above, one to the left */
+        row[0] = i;
+        for (size_t j = 1; j <= n; j++) {
+            size_t above = row[j], changed = diagonal + (a[i - 1] != b[j - 1]);
+            size_t other = 1 + (above < row[j - 1] ? above : row[j - 1]);
+            row[j] = changed < other ? changed : other;
+            diagonal = above;
+        }
+    }
+    return row[n];
 }

@@ -1,8 +1,10 @@
-/* Numbers as text, the same in every locale, and text from outside. Any thread may call these. */
+/* Numbers as text, the same in every locale; text from outside; how alike texts are. Any thread may
+ * call these. */
 #ifndef TRIP_TEXT_H
 #define TRIP_TEXT_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 
@@ -33,5 +35,9 @@ unsigned trip_text_show(const char *text, trip_text_character c, char *shown);
 
 /* All of a text in that way. */
 void trip_text_write(FILE *f, const char *text);
+
+/* How many characters have to be put in, left out or changed to make one text of the other; of
+ * texts longer than 63 characters, SIZE_MAX. */
+size_t trip_text_distance(const char *a, const char *b);
 
 #endif

@@ -9,7 +9,8 @@
 
 enum { BINS = 1024, GROUPS = 64, GROUP_BINS = BINS / GROUPS, LEVELS = 24 };
 
-static const double solid_opacity = 0.3;     /* of a volume of one value */
+static const double solid_opacity = 0.3;     /* where nothing tells background from foreground */
+static const double even_depth = 1.2;        /* optical, of a cube of all voxels of one value */
 static const double strongest_opacity = 0.7; /* at rank 1 */
 static const double invisible = 0.1;         /* up to this standing opacity is 0: mostly noise */
 /* The optical depth that the lower four fifths of the foreground may have along a typical ray. */
@@ -145,10 +146,19 @@ static void reverse(trip_tf_point *points, size_t count)
     }
 }
 
+int trip_tf_even_fog(trip_tf **out, const trip_histogram *h)
+{
+    double edge = cbrt(fmax(1, (double)h->total));
+    const trip_tf_point point = { h->value_min, { 0.85, 0.87, 0.9, 1 - exp(-even_depth / edge) } };
+    return trip_tf_from_points(out, &point, 1, false, 0);
+}
+
 int trip_tf_from_histogram(trip_tf **out, const trip_histogram *h)
 {
     trip_tf_point points[LEVELS + 2];
     analysis a;
+    if (h->value_min == h->value_max)
+        return trip_tf_even_fog(out, h);
     analyse(&a, h, false);
     bool downwards = a.foreground * 1000 < a.under; /* a bright background */
     if (downwards)

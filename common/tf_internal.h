@@ -18,6 +18,9 @@ struct trip_tf {
     size_t count;          /* at least 1 */
     bool normalised;
     double unit_world; /* 0: one voxel */
+    bool hounsfield;   /* a preset in Hounsfield units */
+    bool made;         /* the points are still to be made from a histogram, ... */
+    trip_tf_kind as;   /* ... as this kind's */
 };
 
 /* Why a point cannot stand in a function, or NULL. `before` is the point before it, or NULL. */
@@ -29,9 +32,32 @@ trip_rgba trip_tf_evaluate_below(const trip_tf *tf, double value);
 
 /* A built-in preset; reports an unknown name. */
 int trip_tf_from_preset(trip_tf **out, const char *name);
+bool trip_tf_is_preset(const char *name);
+/* The preset that `name` may be a slip of, or NULL. */
+const char *trip_tf_nearest_preset(const char *name);
+
+/* The function of a kind, whose points trip_tf_adapt() makes. */
+int trip_tf_from_kind(trip_tf **out, trip_tf_kind kind);
 
 /* A ParaView colour map, or an array of them of which `preset` names one (NULL: the first). */
 int trip_tf_parse_colormap(trip_tf **out, const char *name, const char *text, size_t bytes,
                            const char *preset);
+
+/* A volume of one value: fog through which one sees about a third of what is behind. */
+int trip_tf_even_fog(trip_tf **out, const trip_histogram *histogram);
+
+/* What stands above a background of the lowest values. */
+typedef struct trip_tf_tissue {
+    double valley;       /* the rarest value between the background and the tissue */
+    double middle, high; /* half, and 98 % of the tissue lie below */
+    double share;        /* of all voxels that are above the valley */
+    double sharpest;     /* share of the tissue in the most frequent thirtieth of its values */
+} trip_tf_tissue;
+/* False where there is no valley. */
+bool trip_tf_find_tissue(trip_tf_tissue *out, const trip_histogram *histogram);
+
+/* One of these, or a `.tf`, told apart by the content. */
+int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t bytes,
+                      const char *preset);
 
 #endif

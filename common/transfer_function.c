@@ -61,7 +61,9 @@ int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "out of memory");
     }
     memcpy(copy, points, count * sizeof *copy);
-    *tf = (trip_tf){ copy, count, normalised, unit_world };
+    *tf = (trip_tf){
+        .points = copy, .count = count, .normalised = normalised, .unit_world = unit_world
+    };
     *out = tf;
     return TRIP_OK;
 }
@@ -71,87 +73,6 @@ void trip_tf_destroy(trip_tf *tf)
     if (tf)
         free(tf->points);
     free(tf);
-}
-
-/* Reads at most TRIP_TF_MAX_FILE_BYTES; *text is the caller's to free. */
-static int read_file(const char *path, char **text, size_t *bytes)
-{
-    FILE *f = fopen(path, "re");
-    if (!f)
-        return trip_fail_errno(TRIP_TF_STAGE, path, "cannot open");
-    char *buffer = malloc(TRIP_TF_MAX_FILE_BYTES + 1);
-    int status = TRIP_OK;
-    if (!buffer) {
-        status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path, "out of memory");
-    } else {
-        *bytes = fread(buffer, 1, TRIP_TF_MAX_FILE_BYTES + 1, f);
-        if (ferror(f))
-            status = trip_fail_errno(TRIP_TF_STAGE, path, "cannot read");
-        else if (*bytes > TRIP_TF_MAX_FILE_BYTES)
-            status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,
-                               "longer than %d MiB; this is not a transfer function",
-                               TRIP_TF_MAX_FILE_BYTES >> 20);
-    }
-    fclose(f);
-    if (status) {
-        free(buffer);
-        buffer = NULL;
-    }
-    *text = buffer;
-    return status;
-}
-
-/* JSON begins with a bracket, which no .tf can. */
-static bool is_json(const char *text, size_t bytes)
-{
-    size_t i = bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-    while (i < bytes && strchr(" \t\r\n", text[i]) && text[i])
-        i++;
-    return i < bytes && (text[i] == '{' || text[i] == '[');
-}
-
-static int load_file(trip_tf **out, const char *path, const char *preset)
-{
-    char *text = NULL;
-    size_t bytes = 0;
-    int status = read_file(path, &text, &bytes);
-    if (status)
-        return status;
-    if (is_json(text, bytes))
-        status = trip_tf_parse_colormap(out, path, text, bytes, preset);
-    else if (preset)
-        status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,
-                           "#%s picks a preset of a JSON file, and this is not one", preset);
-    else
-        status = trip_tf_parse(out, path, text, bytes);
-    free(text);
-    return status;
-}
-
-/* "FILE#NAME", unless a file of that whole name exists. */
-static int load_path(trip_tf **out, const char *path)
-{
-    const char *hash = strrchr(path, '#');
-    FILE *whole = hash ? fopen(path, "re") : NULL;
-    if (whole)
-        fclose(whole);
-    if (!hash || whole)
-        return load_file(out, path, NULL);
-    char *file = strndup(path, (size_t)(hash - path));
-    if (!file)
-        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path, "out of memory");
-    int status = load_file(out, file, hash + 1);
-    free(file);
-    return status;
-}
-
-int trip_tf_load(trip_tf **out, const char *path_or_preset)
-{
-    static const char prefix[] = "preset:";
-    *out = NULL;
-    if (strncmp(path_or_preset, prefix, sizeof prefix - 1) == 0)
-        return trip_tf_from_preset(out, path_or_preset + sizeof prefix - 1);
-    return load_path(out, path_or_preset);
 }
 
 bool trip_tf_is_normalised(const trip_tf *tf)
@@ -251,6 +172,18 @@ bool trip_tf_visible_in(const trip_tf *tf, double lo, double hi)
     return false;
 }
 
+bool trip_tf_visible_span(const trip_tf *tf, double lo, double hi, double span[2])
+{
+    size_t first = 0, last = tf->count;
+    while (first < tf->count && !(tf->points[first].colour.opacity > 0))
+        first++;
+    while (last > 0 && !(tf->points[last - 1].colour.opacity > 0))
+        last--;
+    span[0] = first > 0 && first < tf->count ? fmax(lo, tf->points[first - 1].value) : lo;
+    span[1] = last > 0 && last < tf->count ? fmin(hi, tf->points[last].value) : hi;
+    return trip_tf_visible_in(tf, lo, hi);
+}
+
 static void write_number(FILE *f, double number, char end)
 {
     char text[32];
@@ -265,6 +198,8 @@ char *trip_tf_to_text(const trip_tf *tf)
     FILE *f = open_memstream(&text, &bytes);
     if (!f)
         return NULL;
+    if (tf->made)
+        fprintf(f, "# made from the histogram: %s\n", trip_tf_kind_name(tf->as));
     fputs("unit ", f);
     if (tf->unit_world > 0)
         write_number(f, tf->unit_world, '\n');

@@ -1,6 +1,6 @@
 /* Transfer functions: scalar value -> colour and opacity, piecewise linear. A function is built
- * once, is read-only afterwards, and may be shared by threads. Forms: our plain `.tf` text,
- * ParaView colour-map JSON, built-in presets, and one made from a histogram; TRANSFER_FUNCTIONS.md
+ * once, is read-only afterwards, and may be shared by threads. Forms: our plain `.tf` text, the
+ * files of other programs, built-in presets, and those made from a histogram; TRANSFER_FUNCTIONS.md
  * describes them all.
  *
  * Opacity is per unit length: a constant region of opacity o and thickness L units has opacity
@@ -28,16 +28,45 @@ typedef struct trip_tf_point {
     trip_rgba colour;
 } trip_tf_point;
 
-/* Counts of a volume's finite values in equal bins over [value_min, value_max]. */
+/* Counts of a volume's finite values in equal bins over [value_min, value_max]; `total` is their
+ * sum. */
 typedef struct trip_histogram {
     double value_min, value_max;
     uint64_t counts[1024];
     uint64_t total;
 } trip_histogram;
 
-/* From a file: `.tf` text or ParaView JSON (told apart by content), "FILE.json#NAME" for one map of
- * several; "preset:NAME"; or the text of a `.tf` itself via trip_tf_parse. All report and return a
- * negative status on failure, TRIP_USAGE for an unknown preset. */
+/* What a volume is: each kind has an automatic function of its own. */
+typedef enum trip_tf_kind {
+    TRIP_TF_AUTOMATIC, /* not known yet */
+    TRIP_TF_CT,        /* in Hounsfield units */
+    TRIP_TF_MR,
+    TRIP_TF_FOG,
+    TRIP_TF_LABELS,
+    TRIP_TF_SIMULATION, /* and all else */
+    TRIP_TF_KINDS
+} trip_tf_kind;
+
+/* "auto", "ct", "mr", "fog", "labels", "simulation"; of a text that is none of them
+ * TRIP_TF_AUTOMATIC. */
+const char *trip_tf_kind_name(trip_tf_kind kind);
+/* The same for people: "CT in Hounsfield units", ... */
+const char *trip_tf_kind_title(trip_tf_kind kind);
+trip_tf_kind trip_tf_kind_from_name(const char *name);
+
+/* What is known of a volume besides its values. */
+typedef struct trip_tf_origin {
+    bool sparse;          /* only some voxels exist, and the histogram holds those */
+    bool integers;        /* values are whole numbers */
+    bool patient;         /* world space is anatomical */
+    const char *modality; /* of DICOM: "CT", "MR", ...; NULL or "": not known */
+} trip_tf_origin;
+trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
+
+/* A preset's name ("bone", "preset:bone"), or a file, told apart by its content: `.tf` text or
+ * ParaView JSON; "FILE#NAME" for one of several. A name without a slash or a dot that is a preset's
+ * is the preset. All report and return a negative status on failure, TRIP_USAGE for an unknown
+ * preset. trip_tf_parse() takes `.tf` text itself. */
 int trip_tf_load(trip_tf **out, const char *path_or_preset);
 int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t bytes);
 int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count, bool normalised,
@@ -46,15 +75,42 @@ int trip_tf_from_histogram(trip_tf **out, const trip_histogram *histogram);
 /* The same for densities, as of smoke and clouds, where the histogram holds only the voxels in
  * which there is any: for values below zero it is trip_tf_from_histogram(). */
 int trip_tf_fog_from_histogram(trip_tf **out, const trip_histogram *histogram);
+int trip_tf_ct_from_histogram(trip_tf **out, const trip_histogram *histogram);
+int trip_tf_mr_from_histogram(trip_tf **out, const trip_histogram *histogram);
+int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *histogram);
+/* The one of these for a kind other than TRIP_TF_AUTOMATIC. */
+int trip_tf_make_automatic(trip_tf **out, trip_tf_kind kind, const trip_histogram *histogram);
 void trip_tf_destroy(trip_tf *tf);
 
-/* Names of the built-in presets, NULL-terminated. */
-const char *const *trip_tf_preset_names(void);
+/* The built-in presets, by number from 0; NULL beyond the last. The basis is what the values are
+ * relative to. */
+const char *trip_tf_preset_name(size_t i);
+const char *trip_tf_preset_summary(size_t i);
+const char *trip_tf_preset_basis(size_t i);
 
 /* True when values are fractions of the data's range rather than in the data's own units. */
 bool trip_tf_is_normalised(const trip_tf *tf);
 /* Turns a normalised function into data units in place; no effect otherwise. */
 void trip_tf_denormalise(trip_tf *tf, double value_min, double value_max);
+
+/* The data that a function is for. */
+typedef struct trip_tf_data {
+    double value_min, value_max;
+    const trip_histogram *histogram; /* NULL: not known */
+    trip_tf_kind kind;               /* what the data was recognised as */
+} trip_tf_data;
+
+/* Whether the function is normalised, or to be made from a histogram ("auto", "mr", ...). */
+bool trip_tf_needs_data(const trip_tf *tf);
+/* Turns such a function into data units in place. Fails where a histogram is needed and not known;
+ * `where` is for the message. */
+int trip_tf_adapt(trip_tf *tf, const trip_tf_data *data, const char *where);
+/* Stretches the function, in data units from then on, so that its domain (0 to 1 where it is
+ * normalised, else its first to its last point) spans level - width / 2 to level + width / 2. */
+int trip_tf_window(trip_tf *tf, double width, double level);
+/* Warns where nothing in [value_min, value_max] shows, and where a function in Hounsfield units is
+ * used on values that are not. */
+void trip_tf_check_range(const trip_tf *tf, double value_min, double value_max, const char *where);
 
 /* Unit of length in world units; 0 means one voxel. */
 double trip_tf_unit_world(const trip_tf *tf);
@@ -68,6 +124,10 @@ trip_rgba trip_tf_evaluate(const trip_tf *tf, double value);
 
 /* Whether any value of [lo, hi] has opacity > 0. */
 bool trip_tf_visible_in(const trip_tf *tf, double lo, double hi);
+
+/* The lowest and highest values of [lo, hi] that have opacity > 0, or are next to such; false where
+ * there is none. */
+bool trip_tf_visible_span(const trip_tf *tf, double lo, double hi, double span[2]);
 
 /* The function as `.tf` text, for keeping in a data set; caller frees. */
 char *trip_tf_to_text(const trip_tf *tf);

@@ -73,7 +73,7 @@ static int scan(brick *b)
     double begin = now_seconds();
     int status = 0;
     if (start)
-        trip_brick_input_set_tally(&b->in, &start->tally);
+        status = trip_brick_input_set_tally(&b->in, &start->tally);
     else
         status =
             trip_brick_input_scan(&b->in, (trip_scan_params){ .slices = b->plan.slices,
@@ -344,6 +344,13 @@ static int check_tally(brick *b)
                          "no voxel is visible: the values are from %g to %g, and the transfer "
                          "functions and ranges show none of them",
                          t->value_min, t->value_max);
+    if (t->value_min == t->value_max)
+        trip_warn(
+            b->params->input,
+            "every voxel there is has the value %g: there is nothing to see but their outline",
+            t->value_min);
+    for (size_t i = 0; i < b->params->function_count; i++)
+        trip_tf_check_range(b->in.functions[i], t->value_min, t->value_max, b->params->input);
     return 0;
 }
 
@@ -438,6 +445,7 @@ static void fill_summary(brick *b)
     s->not_finite = b->in.tally->voxels - b->in.tally->finite;
     s->value_min = b->in.tally->value_min;
     s->value_max = b->in.tally->value_max;
+    s->kind = trip_brick_kind(b->in.info, &b->in.histogram);
     s->input_bytes = input_bytes(b);
     s->temporary_bytes = trip_spill_bytes(b->spill);
     s->stages[TRIP_BRICK_READ].bytes_read = s->input_bytes;

@@ -3,6 +3,7 @@
 #ifndef TRIP_BRICK_H
 #define TRIP_BRICK_H
 
+#include "transfer_function.h"
 #include "volume.h"
 
 typedef struct trip_value_range {
@@ -59,6 +60,7 @@ typedef struct trip_brick_summary {
     double spacing[3];
     uint64_t voxels, kept, not_finite;
     double value_min, value_max;
+    trip_tf_kind kind;        /* what the volume was recognised as */
     uint64_t input_bytes;     /* as stored, decompressed */
     uint64_t bytes;           /* of the data set's splats */
     uint64_t temporary_bytes; /* spilled */

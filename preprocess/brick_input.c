@@ -104,10 +104,10 @@ static bool is_envelope_automatic(const trip_brick_params *p)
 
 bool trip_brick_input_needs_scan(const trip_brick_input *in)
 {
-    bool normalised = false;
+    bool needed = is_envelope_automatic(in->params);
     for (size_t i = 0; i < in->params->function_count; i++)
-        normalised = normalised || trip_tf_is_normalised(in->functions[i]);
-    return normalised || is_envelope_automatic(in->params);
+        needed = needed || trip_tf_needs_data(in->functions[i]);
+    return needed;
 }
 
 void trip_brick_input_progress(const trip_brick_input *in, const char *stage, uint64_t done,
@@ -124,14 +124,18 @@ static int on_scan_progress(void *user, uint64_t voxels)
     return 0;
 }
 
-void trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known)
+int trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known)
 {
+    int status = 0;
     if (known != in->tally)
         *in->tally = *known;
     in->scanned = true;
     trip_tally_histogram(in->tally, &in->histogram);
-    for (size_t i = 0; i < in->params->function_count; i++)
-        trip_tf_denormalise(in->functions[i], in->tally->value_min, in->tally->value_max);
+    const trip_tf_data data = { in->tally->value_min, in->tally->value_max, &in->histogram,
+                                trip_brick_kind(in->info, &in->histogram) };
+    for (size_t i = 0; i < in->params->function_count && status == 0; i++)
+        status = trip_tf_adapt(in->functions[i], &data, in->params->input);
+    return status;
 }
 
 int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan)
@@ -140,15 +144,14 @@ int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan)
     scan.user = in;
     int status =
         trip_scan_volume(in->tally, in->volume, in->params->input, in->workers, &scan, in->budget);
-    if (status == 0)
-        trip_brick_input_set_tally(in, in->tally);
-    return status;
+    return status == 0 ? trip_brick_input_set_tally(in, in->tally) : status;
 }
 
 static int add_automatic(trip_brick_input *in)
 {
     trip_tf *tf;
-    int status = trip_brick_automatic_tf(&tf, in->info, &in->histogram);
+    int status =
+        trip_tf_make_automatic(&tf, trip_brick_kind(in->info, &in->histogram), &in->histogram);
     if (status < 0)
         return status;
     status = trip_envelope_add_tf(&in->envelope, tf);

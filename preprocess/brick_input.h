@@ -34,10 +34,11 @@ void trip_brick_input_close(trip_brick_input *in);
 
 /* 8 and 16 bit integers: codes stand for all values of the type, without a look at the data. */
 bool trip_brick_has_narrow_type(const trip_brick_input *in);
-/* Whether the envelope needs to know the volume's values: it is automatic, or normalised. */
+/* Whether the envelope needs to know the volume's values: it is automatic, or a function depends on
+ * them. */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
-/* Fills the tally with `known`. */
-void trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known);
+/* Fills the tally with `known`, and makes the functions that depend on the data. */
+int trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known);
 /* Fills the tally from the volume, as slices, stride and passing_seconds of `scan` say. */
 int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan);
 int trip_brick_input_make_envelope(trip_brick_input *in);

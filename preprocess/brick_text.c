@@ -1,7 +1,10 @@
 #include "brick_text.h"
 
 #include <cjson/cJSON.h>
+#include <inttypes.h>
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,23 +71,30 @@ static int make_ramp(trip_tf **out, const trip_brick_text *t)
     return trip_tf_from_points(out, points, POINTS, false, 0);
 }
 
-/* Sparse volumes are smoke and clouds: what there is of them is all foreground. */
-int trip_brick_automatic_tf(trip_tf **out, const trip_volume_info *info, const trip_histogram *h)
+trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h)
 {
-    return info->sparse ? trip_tf_fog_from_histogram(out, h) : trip_tf_from_histogram(out, h);
+    const trip_tf_origin origin = {
+        .sparse = info->sparse,
+        .integers = info->type < TRIP_F16 && info->slope == floor(info->slope) &&
+                    info->inter == floor(info->inter),
+        .patient = !strcmp(info->format, "nifti") || !strcmp(info->format, "dicom"),
+    };
+    return trip_tf_recognise(&origin, h);
 }
 
 /* What is drawn when no function is given. */
 static int add_default_function(cJSON *root, const trip_brick_text *t)
 {
     trip_tf *made = NULL;
+    const trip_brick_params *p = t->params;
+    bool given = p->function_count > 0 && !p->automatic;
+    bool ranges = p->range_count > 0 && t->envelope->count > 0 && !p->automatic;
     int status = 0;
-    if (t->params->automatic)
-        status = trip_brick_automatic_tf(&made, t->info, t->histogram);
-    else if (t->params->function_count == 0 && t->params->range_count > 0 && t->envelope->count > 0)
+    if (!given && ranges)
         status = make_ramp(&made, t);
-    else if (t->params->function_count == 0)
-        status = trip_brick_automatic_tf(&made, t->info, t->histogram);
+    else if (!given)
+        status =
+            trip_tf_make_automatic(&made, trip_brick_kind(t->info, t->histogram), t->histogram);
     if (status == 0)
         add_function(root, "transfer_function", made ? made : t->functions[0]);
     trip_tf_destroy(made);
@@ -102,6 +112,45 @@ static void add_functions(cJSON *root, const trip_brick_text *t)
     }
 }
 
+/* One option as the command line takes it, "--name=value". */
+__attribute__((format(printf, 2, 3))) static void add_option(cJSON *options, const char *form, ...)
+{
+    char *text;
+    va_list args;
+    va_start(args, form);
+    int length = vasprintf(&text, form, args);
+    va_end(args);
+    if (length < 0)
+        return;
+    cJSON_AddItemToArray(options, cJSON_CreateString(text));
+    free(text);
+}
+
+/* What `brick` has to be given to read the input in the same way again. */
+static void add_source_options(cJSON *root, const trip_volume_params *v)
+{
+    cJSON *options = cJSON_AddArrayToObject(root, "source_options");
+    char number[3][32];
+    if (v->grid)
+        add_option(options, "--grid=%s", v->grid);
+    if (v->level_set)
+        add_option(options, "--level-set=%s",
+                   v->level_set == TRIP_LEVEL_SET_BAND ? "band" : "filled");
+    if (v->raw_dims[0])
+        add_option(options, "--size=%" PRId64 ",%" PRId64 ",%" PRId64, v->raw_dims[0],
+                   v->raw_dims[1], v->raw_dims[2]);
+    if (v->raw_type)
+        add_option(options, "--type=%s", v->raw_type);
+    if (v->raw_endian)
+        add_option(options, "--endian=%s", v->raw_endian == 2 ? "big" : "little");
+    if (v->raw_offset_bytes)
+        add_option(options, "--offset=%" PRIu64, v->raw_offset_bytes);
+    if (v->spacing[0] > 0)
+        add_option(options, "--spacing=%s,%s,%s", trip_text_from_double(v->spacing[0], number[0]),
+                   trip_text_from_double(v->spacing[1], number[1]),
+                   trip_text_from_double(v->spacing[2], number[2]));
+}
+
 static const char *base_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
@@ -112,6 +161,7 @@ char *trip_brick_text_make(const trip_brick_text *t)
 {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "source", base_name(t->params->input));
+    add_source_options(root, &t->params->volume);
     cJSON_AddStringToObject(root, "format", t->info->format);
     if (t->info->name[0])
         cJSON_AddStringToObject(root, "grid", t->info->name);
@@ -120,6 +170,8 @@ char *trip_brick_text_make(const trip_brick_text *t)
     if (t->info->oriented)
         cJSON_AddTrueToObject(root, "oriented");
     cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
+    cJSON_AddStringToObject(root, "function_kind",
+                            trip_tf_kind_name(trip_brick_kind(t->info, t->histogram)));
     cJSON_AddBoolToObject(root, "keep_all", t->params->keep_all);
     add_envelope(root, t);
     add_functions(root, t);

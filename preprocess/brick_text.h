@@ -14,8 +14,8 @@ typedef struct trip_brick_text {
     const trip_histogram *histogram;
 } trip_brick_text;
 
-/* The function that shows a volume of which no more than this is known. */
-int trip_brick_automatic_tf(trip_tf **out, const trip_volume_info *info, const trip_histogram *h);
+/* What a volume is of which no more than this is known; never TRIP_TF_AUTOMATIC. */
+trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h);
 
 /* The text, for free(); NULL after a reported failure. */
 char *trip_brick_text_make(const trip_brick_text *t);

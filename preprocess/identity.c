@@ -10,7 +10,7 @@
 #include "report.h"
 
 /* Changes whenever other bytes come out of the same input and parameters. */
-enum { BRICKER_VERSION = 1 };
+enum { BRICKER_VERSION = 2 };
 
 /* A file is known by its name, length and time of change; of a pattern only the name is known. */
 static void write_input(FILE *f, const trip_brick_params *p)

@@ -102,6 +102,51 @@ static const char *string_at(const trip_dataset_text *t, const char *key)
     return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(t->root, key));
 }
 
+trip_tf_kind trip_dataset_text_kind(const trip_dataset_text *t)
+{
+    trip_tf_kind kind = trip_tf_kind_from_name(string_at(t, "function_kind"));
+    return kind == TRIP_TF_AUTOMATIC ? TRIP_TF_SIMULATION : kind;
+}
+
+bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out)
+{
+    const cJSON *histogram = cJSON_GetObjectItemCaseSensitive(t->root, "histogram");
+    const cJSON *counts = cJSON_GetObjectItemCaseSensitive(histogram, "counts");
+    const int bins = sizeof out->counts / sizeof *out->counts;
+    *out = (trip_histogram){
+        .value_min = number_of(cJSON_GetObjectItemCaseSensitive(histogram, "value_min")),
+        .value_max = number_of(cJSON_GetObjectItemCaseSensitive(histogram, "value_max")),
+    };
+    if (!cJSON_IsArray(counts) || cJSON_GetArraySize(counts) != bins ||
+        !isfinite(out->value_max - out->value_min) || out->value_min > out->value_max)
+        return false;
+    int i = 0;
+    const cJSON *count;
+    cJSON_ArrayForEach(count, counts)
+    {
+        double n = number_of(count);
+        if (!(n >= 0 && n < 0x1p53))
+            return false;
+        out->counts[i++] = (uint64_t)n;
+        out->total += (uint64_t)n;
+    }
+    return out->total > 0;
+}
+
+const char *trip_dataset_text_source(const trip_dataset_text *t)
+{
+    return string_at(t, "source");
+}
+
+const char *trip_dataset_text_source_option(const trip_dataset_text *t, int i)
+{
+    enum { MOST_OPTIONS = 32 };
+    const cJSON *options = cJSON_GetObjectItemCaseSensitive(t->root, "source_options");
+    if (i >= MOST_OPTIONS)
+        return NULL;
+    return cJSON_GetStringValue(cJSON_GetArrayItem(options, i));
+}
+
 int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out)
 {
     const char *text = string_at(t, "transfer_function");

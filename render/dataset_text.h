@@ -4,6 +4,8 @@
  *   "format"             "openvdb", "nrrd", ... : where the volume came from
  *   "space"              "LPS" or "RAS": how world space lies in the patient (anatomy.h)
  *   "oriented"           true: the file gave the directions of its axes, so none are guessed
+ *   "source", "source_options"  the file it was made of, and the options that say how to read it
+ *   "function_kind"      "ct", "mr", "fog", "labels", "simulation": what the volume is
  *   "up", "front"        "+x" ... "-z": the world direction that is up, whatever else is said, and
  *                        that the object faces
  *   "transfer_function"  a function as `.tf` text, in data units: drawn when none is given
@@ -23,6 +25,17 @@ typedef struct trip_dataset_text trip_dataset_text;
  * The time that this and what follows take is in proportion to the length of the text. */
 int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d);
 void trip_dataset_text_destroy(trip_dataset_text *t);
+
+/* What the volume was recognised as; TRIP_TF_SIMULATION where the text does not tell. */
+trip_tf_kind trip_dataset_text_kind(const trip_dataset_text *t);
+
+/* False when the text holds none that can be one. */
+bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out);
+
+/* Of what it was made: a file's name without its folder, and the options of `brick` that say how to
+ * read it, from 0 on; NULL where the text does not tell, or beyond the last. */
+const char *trip_dataset_text_source(const trip_dataset_text *t);
+const char *trip_dataset_text_source_option(const trip_dataset_text *t, int i);
 
 /* The stored function; without one, a grey ramp over the values, faint as fog. */
 int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out);

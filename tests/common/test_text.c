@@ -122,6 +122,21 @@ static void what_is_not_printable_is_shown_as_bytes(void **state)
     assert_string_equal(text, "a\\n\\t\\x1b\xc3\xbc\\xc2\\x9b\\xff");
 }
 
+static void distance_counts_the_changes_of_single_characters(void **state)
+{
+    (void)state;
+    assert_int_equal(trip_text_distance("bone", "bone"), 0);
+    assert_int_equal(trip_text_distance("", "bone"), 4);
+    assert_int_equal(trip_text_distance("bone", "bones"), 1);
+    assert_int_equal(trip_text_distance("bone", "bnoe"), 2);
+    assert_int_equal(trip_text_distance("kitten", "sitting"), 3);
+    assert_int_equal(trip_text_distance("saturday", "sunday"), 3);
+    char lengthy[65];
+    memset(lengthy, 'a', 64);
+    lengthy[64] = 0;
+    assert_true(trip_text_distance(lengthy, "a") == SIZE_MAX);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -132,6 +147,7 @@ int main(void)
         cmocka_unit_test(utf8_is_told_from_other_bytes),
         cmocka_unit_test(what_is_not_printable_is_shown_as_bytes),
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
+        cmocka_unit_test(distance_counts_the_changes_of_single_characters),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,14 +47,17 @@ static double luminance(trip_rgba c)
     return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
 }
 
-static void one_value_is_a_solid(void **state)
+static void one_value_is_fog_of_moderate_depth(void **state)
 {
     (void)state;
-    start(7, 7);
-    h.counts[0] = 1000;
-    trip_tf *tf = automatic();
-    assert_true(opacity(tf, 7) > 0.1);
-    trip_tf_destroy(tf);
+    for (int edge = 10; edge <= 1000; edge *= 10) {
+        start(7, 7);
+        h.counts[0] = (uint64_t)edge * (uint64_t)edge * (uint64_t)edge;
+        trip_tf *tf = automatic();
+        double through_a_cube = 1 - pow(1 - opacity(tf, 7), edge);
+        assert_true(through_a_cube > 0.6 && through_a_cube < 0.8);
+        trip_tf_destroy(tf);
+    }
 }
 
 static void nothing_at_all_still_makes_a_function(void **state)
@@ -190,7 +193,7 @@ static void range_that_is_not_finite_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_value_is_a_solid),
+        cmocka_unit_test(one_value_is_fog_of_moderate_depth),
         cmocka_unit_test(nothing_at_all_still_makes_a_function),
         cmocka_unit_test(two_values_show_the_upper_one_only),
         cmocka_unit_test(angiogram_shows_all_but_its_zeros),

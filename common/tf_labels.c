@@ -1,0 +1,77 @@
+/* The automatic function for labels, whole numbers that name things: every value has a colour of
+ * its own, and what lies between two of them is neither. */
+#include "tf_internal.h"
+
+#include "report.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { BINS = 1024 };
+
+static const double label_opacity = 0.5;
+
+/* Hues a golden section apart, so that neighbours differ; lighter and darker in turn. */
+static trip_rgba colour_of(double label)
+{
+    double hue = fmod(label * 0.61803398875, 1), x = 6 * hue, rgb[3];
+    double chroma = fmod(label, 3) < 1 ? 0.55 : fmod(label, 3) < 2 ? 0.7 : 0.45;
+    const double distance[3] = { fabs(x - 3) - 1, 2 - fabs(x - 2), 2 - fabs(x - 4) };
+    for (int k = 0; k < 3; k++)
+        rgb[k] = 0.95 - chroma * (1 - fmin(1, fmax(0, distance[k])));
+    return (trip_rgba){ rgb[0], rgb[1], rgb[2], label_opacity };
+}
+
+/* Zero, or the most frequent where there is none. */
+static double background_of(const trip_histogram *h)
+{
+    int most = 0;
+    for (int i = 1; i < BINS; i++)
+        if (h->counts[i] > h->counts[most])
+            most = i;
+    if (h->value_min <= 0)
+        return 0;
+    return ceil(h->value_min + (h->value_max - h->value_min) * most / BINS);
+}
+
+/* A label's colour holds half way to the whole numbers beside it. */
+static size_t add_label(trip_tf_point *points, size_t count, double label, double background)
+{
+    trip_rgba colour = colour_of(label);
+    colour.opacity = label == background ? 0 : label_opacity;
+    points[count++] = (trip_tf_point){ label - 0.5, colour };
+    points[count++] = (trip_tf_point){ label + 0.5, colour };
+    return count;
+}
+
+/* The whole numbers of a bin; one that lies on its edge was perhaps the last of the bin before. */
+static size_t add_bin(trip_tf_point *points, size_t count, const trip_histogram *h, int bin,
+                      double background)
+{
+    double width = (h->value_max - h->value_min) / BINS;
+    double from = ceil(h->value_min + width * bin - 1e-6), to = h->value_min + width * (bin + 1);
+    for (double label = from; label < to || (bin == BINS - 1 && label <= h->value_max); label++)
+        if (count == 0 || label > points[count - 1].value)
+            count = add_label(points, count, label, background);
+    return count;
+}
+
+int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *h)
+{
+    double range = h->value_max - h->value_min, background = background_of(h);
+    int occurring = 0;
+    for (int i = 0; i < BINS; i++)
+        occurring += h->counts[i] > 0;
+    if (occurring <= 2 || !(range >= 1 && range < 16384)) /* a solid, or no labels */
+        return trip_tf_from_histogram(out, h);
+    trip_tf_point *points = calloc(2 * (size_t)range + 4, sizeof *points);
+    if (!points)
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "out of memory");
+    size_t count = 0;
+    for (int i = 0; i < BINS; i++)
+        if (h->counts[i] > 0)
+            count = add_bin(points, count, h, i, background);
+    int status = trip_tf_from_points(out, points, count, false, 0);
+    free(points);
+    return status;
+}
