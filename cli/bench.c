@@ -66,7 +66,7 @@ static int measure(bench_options *o, bench_report *r)
         o->input = sample.data;
     }
     if (!status)
-        status = session_open(&s, o->input, o->tf, o->memory_bytes);
+        status = session_open(&s, o->input, &(session_look){ .tf = o->tf }, o->memory_bytes);
     if (!status) {
         describe(&s, o, included, r);
         status = measure_table(&s, o, r);

@@ -26,7 +26,7 @@ enum {
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
-      "Transfer function: .tf, ParaView JSON or preset:NAME (default: kept in the data set)", 0 },
+      "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
       "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024)", 0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,

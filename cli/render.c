@@ -29,7 +29,8 @@ typedef struct drawing {
     bool counting; /* the frames are drawn once more, and everything of them */
 } drawing;
 
-/* What the function shows is kept besides what is shown without one, so that nothing is missing. */
+/* What the function shows is kept besides what is shown without one, so that nothing is missing;
+ * everything where a window moves it, so that the next window finds it in the cache. */
 static int brick_volume(drawing *d)
 {
     enum { MOST_THREADS = 256 };
@@ -37,9 +38,10 @@ static int brick_volume(drawing *d)
     const trip_brick_params wanted = {
         .input = o->input,
         .volume = o->volume,
-        .functions = &o->tf,
-        .function_count = o->tf ? 1 : 0,
+        .functions = &o->function.tf,
+        .function_count = o->function.tf ? 1 : 0,
         .automatic = true,
+        .keep_all = o->function.window > 0,
         .memory_bytes = o->memory_bytes,
         .threads = (unsigned)(o->threads < MOST_THREADS ? o->threads : MOST_THREADS),
     };
@@ -57,8 +59,8 @@ static int open_drawing(drawing *d)
     bool volume = cached_volume_wanted(o->input);
     int status = volume ? brick_volume(d) : 0;
     if (!status)
-        status =
-            session_open(&d->session, volume ? d->volume.path : o->input, o->tf, o->memory_bytes);
+        status = session_open(&d->session, volume ? d->volume.path : o->input, &o->function,
+                              o->memory_bytes);
     if (!status)
         status = session_take_image(&d->session, o->width, o->height, &d->rgba);
     if (!status)

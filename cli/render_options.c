@@ -1,5 +1,6 @@
 #include "render_options.h"
 
+#include <float.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -28,6 +29,9 @@ enum {
     KEY_ZOOM,
     KEY_BACKGROUND,
     KEY_TF,
+    KEY_OPACITY_SCALE,
+    KEY_WINDOW,
+    KEY_LEVEL,
     KEY_LIGHT,
     KEY_NO_SHADING,
     KEY_H,
@@ -77,8 +81,17 @@ static const struct argp_option options[] = {
       "Parallel view, HEIGHT world units high, or so that all is in view", 1 },
     { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...", 1 },
     { NULL, 0, NULL, 0, "Look:", 2 },
-    { "tf", KEY_TF, "FILE", 0,
-      "Transfer function: .tf, ParaView JSON or preset:NAME (default: kept in the data set)", 2 },
+    { "tf", KEY_TF, "NAME|FILE", 0,
+      "Transfer function (default: kept in the data set): auto, ct, mr, fog, labels or simulation, "
+      "made from the histogram; ct-bone, ct-soft, ct-lung, ct-skin in Hounsfield units; grey, "
+      "bone, hot-metal, viridis, vessels, xray over the data's range; or a file that `triptych tf` "
+      "reads",
+      2 },
+    { "opacity-scale", KEY_OPACITY_SCALE, "X", 0,
+      "Multiplies extinction: an opacity o becomes 1-(1-o)^X", 2 },
+    { "window", KEY_WINDOW, "W", 0,
+      "With --level: stretch the function over the values from L-W/2 to L+W/2", 2 },
+    { "level", KEY_LEVEL, "L", 0, "The middle of --window", 2 },
     { "light", KEY_LIGHT, "X,Y,Z|head", 0,
       "Direction to the light, or from the eye (default: head); not with --no-shading", 2 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
@@ -119,7 +132,7 @@ static const struct argp_option options[] = {
 /* While parsing: what was given, for the checks of combinations. */
 typedef struct parse {
     render_options *o;
-    bool h, target, background, lists, forms, side, light;
+    bool h, target, background, lists, forms, side, light, level;
 } parse;
 
 static int parse_size(const char *text, render_options *o)
@@ -165,6 +178,12 @@ static int parse_background(const char *text, trip_settings *s)
         if (s->background[i] < 0 || s->background[i] > 1)
             return trip_option_fail("--background", "components lie between 0 and 1");
     return status;
+}
+
+static int parse_window(const char *text, session_look *look)
+{
+    int status = trip_option_number("--window", text, 0, DBL_MAX, &look->window);
+    return !status && look->window == 0 ? trip_option_fail("--window", "must be above 0") : status;
 }
 
 /* One or two of the four names, joined by a comma. */
@@ -302,8 +321,15 @@ static int parse_look(int key, char *arg, parse *p)
     render_options *o = p->o;
     switch (key) {
     case KEY_TF:
-        o->tf = arg;
+        o->function.tf = arg;
         return 0;
+    case KEY_OPACITY_SCALE:
+        return trip_option_number("--opacity-scale", arg, 1e-6, 1e6, &o->function.opacity_scale);
+    case KEY_WINDOW:
+        return parse_window(arg, &o->function);
+    case KEY_LEVEL:
+        p->level = true;
+        return trip_option_number("--level", arg, -DBL_MAX, DBL_MAX, &o->function.level);
     case KEY_LIGHT:
         p->light = true;
         return parse_light(arg, &o->settings);
@@ -386,6 +412,9 @@ static int check(parse *p)
         return status;
     if (p->light && !o->settings.shading)
         return trip_option_fail("--light", "does not apply with --no-shading");
+    if (p->level != (o->function.window > 0))
+        return trip_option_fail(p->level ? "--level" : "--window",
+                                "--window and --level are given together");
     if (p->h && o->settings.method != TRIP_METHOD_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     if (p->target && o->renderer == TRIP_RENDERER_REFERENCE)

@@ -5,6 +5,7 @@
 #include "framing.h"
 #include "reader.h"
 #include "renderer_choice.h"
+#include "session.h"
 #include "settings.h"
 #include "volume.h"
 
@@ -22,7 +23,7 @@ typedef struct render_options {
     const char *input,
         *output;               /* data set or volume; an image file, its name's model in an orbit */
     trip_volume_params volume; /* how a volume is read */
-    const char *tf;            /* file or preset; NULL: the function kept in the data set */
+    session_look function;     /* colour and opacity */
     const char *stats;         /* file, "-" for stdout, or NULL */
     int width, height;
     bool eye_given, look_given, up_given;

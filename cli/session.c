@@ -1,32 +1,70 @@
 #include "session.h"
 
+#include <math.h>
+#include <stdlib.h>
+
+#include "brick_command.h"
 #include "report.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 
-static void warn_of_culled_values(const session *s, const trip_tf *tf)
+static void warn_of_culled_values(const session *s, const trip_tf *tf, const session_look *look)
 {
     double range[2], voxels = trip_dataset_text_culled(s->text, tf, range);
-    if (voxels >= 1)
-        trip_warn(s->input,
-                  "the transfer function shows about %.0f voxels with values from %g to %g that "
-                  "were left out when the data set was made; brick it again for this function",
-                  voxels, range[0], range[1]);
+    if (voxels < 1)
+        return;
+    double span[2];
+    trip_tf_visible_span(tf, s->data->header.value_min, s->data->header.value_max, span);
+    char *command = brick_command(s->text, s->input, look->tf, look->window > 0 ? span : NULL);
+    trip_warn(s->input,
+              "the transfer function shows about %.0f voxels with values from %g to %g that were "
+              "left out when the data set was made; to have them: %s",
+              voxels, range[0], range[1], command ? command : "brick it again");
+    free(command);
 }
 
-static int load_transfer_function(session *s, const char *name)
+/* An opacity o becomes 1 - (1 - o)^scale. */
+static void scale_extinction(trip_tf_entry *table, double scale)
+{
+    if (scale > 0 && scale != 1)
+        for (int code = 0; code < 65536; code++)
+            table[code].extinction = (float)(table[code].extinction * scale);
+}
+
+/* The function in data units, with its window. */
+static int load_function(const session *s, const session_look *look, trip_tf **tf)
+{
+    const trip_file_header *h = &s->data->header;
+    trip_histogram histogram;
+    bool known = trip_dataset_text_histogram(s->text, &histogram);
+    const trip_tf_data data = { h->value_min, h->value_max, known ? &histogram : NULL,
+                                trip_dataset_text_kind(s->text) };
+    int status = look->tf ? trip_tf_load(tf, look->tf) : trip_dataset_text_tf(s->text, s->data, tf);
+    bool window = look->window > 0;
+    if (!status && window && trip_tf_is_normalised(*tf))
+        status = trip_tf_window(*tf, look->window, look->level);
+    else if (!status) {
+        status = trip_tf_adapt(*tf, &data, s->input);
+        if (!status && window)
+            status = trip_tf_window(*tf, look->window, look->level);
+    }
+    return status;
+}
+
+static int load_transfer_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
-    int status = name ? trip_tf_load(&tf, name) : trip_dataset_text_tf(s->text, s->data, &tf);
-    if (status)
-        return status;
-    trip_tf_denormalise(tf, h->value_min, h->value_max);
-    warn_of_culled_values(s, tf);
-    double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
-    trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
+    int status = load_function(s, look, &tf);
+    if (!status) {
+        trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
+        warn_of_culled_values(s, tf, look);
+        double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+        trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
+        scale_extinction(s->table, look->opacity_scale);
+    }
     trip_tf_destroy(tf);
-    return 0;
+    return status;
 }
 
 static int take_table(session *s)
@@ -38,7 +76,7 @@ static int take_table(session *s)
                      "the transfer function's table does not fit the memory given; raise --memory");
 }
 
-int session_open(session *s, const char *input, const char *tf, uint64_t memory_bytes)
+int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
 {
     *s = (session){ .input = input };
     int status = trip_budget_create(&s->budget, memory_bytes);
@@ -49,7 +87,7 @@ int session_open(session *s, const char *input, const char *tf, uint64_t memory_
     if (!status)
         status = take_table(s);
     if (!status)
-        status = load_transfer_function(s, tf);
+        status = load_transfer_function(s, look);
     return status;
 }
 

@@ -17,9 +17,16 @@ typedef struct session {
     trip_tf_entry *table; /* 65536 entries */
 } session;
 
-/* `tf` is a file or preset, NULL: the function kept in the data set. Warns when the function shows
- * values that were left out when the data set was made. Close it also after a failure. */
-int session_open(session *s, const char *input, const char *tf, uint64_t memory_bytes);
+/* The transfer function; zero means the one kept in the data set, as it is. */
+typedef struct session_look {
+    const char *tf;       /* file or preset */
+    double opacity_scale; /* of extinction; 0: 1 */
+    double window, level; /* what the function's domain spans; window 0: not moved */
+} session_look;
+
+/* Warns when the function shows values that were left out when the data set was made, with the
+ * command that makes it anew. Close it also after a failure. */
+int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);
 void session_close(session *s);
 
 /* What a reader is wanted for; zero means the default. */

@@ -67,6 +67,9 @@ RENDER = {
     "--zoom": NUMBERS + ["0", "-1", "1e9"],
     "--background": POINTS[:2] + ["1,2", "white", "2,0,0", "-1,0,0", "0,0,0,2", "nan,0,0"],
     "--tf": ["preset:nonsense", "preset:"],
+    "--opacity-scale": NUMBERS + ["0", "-1", "1e9"],
+    "--window": NUMBERS + ["0", "-5", "100"],
+    "--level": NUMBERS + ["100"],
     "--light": POINTS + ["0,0,0", "heads"],
     "--h": NUMBERS + ["1", "-0.1", "1.5"],
     "--kernel-radius": NUMBERS + ["0", "-1", "1e9"],
@@ -184,6 +187,8 @@ class Options(program.ProgramTest):
             "--light": ["head", "1,2,3", "-1e9,0,0"],
             "--background": ["none", "1,0,0", "0,0.5,1,0.25"],
             "--hidden": ["skip", "draw"],
+            "--opacity-scale": ["0.01", "1", "1e6"],
+            "--window=50 --level": ["-10", "0", "100"],
             "--target": ["rgba32f", "rgba16f", "rgba8"],
             "--engine": ["auto", "pread"],
             "--threads": ["1", "3"],
@@ -199,10 +204,10 @@ class Options(program.ProgramTest):
             "--orbit": ["1", "2"],
             "--tf": [
                 "preset:" + name
-                for name in ("grey", "bone", "hot-metal", "viridis", "fog", "vessels", "xray")
+                for name in ("grey", "bone", "viridis", "fog", "auto", "mr", "labels", "ct-soft")
             ],
         }
-        runs = [[f"{option}={value}"] for option, all_of in values.items() for value in all_of]
+        runs = [f"{option}={value}".split() for option, all_of in values.items() for value in all_of]
         runs += [
             ["--no-shading"],
             ["--explain"],

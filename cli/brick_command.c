@@ -1,0 +1,70 @@
+#include "brick_command.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "text.h"
+
+/* A blank before it; in single quotes where a shell would read it as more than one word. */
+static void write_word(FILE *f, const char *word)
+{
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                                "_-+=./,:@%";
+    fputc(' ', f);
+    if (*word && strspn(word, plain) == strlen(word)) {
+        fputs(word, f);
+        return;
+    }
+    fputc('\'', f);
+    for (const char *c = word; *c; c++)
+        fputs(*c == '\'' ? "'\\''" : (char[]){ *c, 0 }, f);
+    fputc('\'', f);
+}
+
+/* The source beside the data set, where it is there; else the name alone. */
+static void write_source(FILE *f, const char *path, const char *source)
+{
+    char *beside = NULL;
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/')
+        length--;
+    while (length > 0 && path[length - 1] != '/')
+        length--;
+    bool near = access(source, F_OK) != 0 && length > 0 &&
+                asprintf(&beside, "%.*s%s", (int)length, path, source) >= 0 &&
+                access(beside, F_OK) == 0;
+    if (*source == '-' && !near)
+        fputs(" --", f);
+    write_word(f, near ? beside : source);
+    free(beside);
+}
+
+char *brick_command(const trip_dataset_text *text, const char *path, const char *tf,
+                    const double *range)
+{
+    char *command = NULL, *option = NULL, lo[32], hi[32];
+    size_t bytes;
+    const char *source = trip_dataset_text_source(text), *how;
+    FILE *f = source ? open_memstream(&command, &bytes) : NULL;
+    if (!f)
+        return NULL;
+    fputs("triptych brick", f);
+    for (int i = 0; (how = trip_dataset_text_source_option(text, i)); i++)
+        write_word(f, how);
+    write_word(f, "--tf");
+    write_word(f, tf ? tf : "auto");
+    if (range && asprintf(&option, "--range=%s:%s", trip_text_from_double(range[0], lo),
+                          trip_text_from_double(range[1], hi)) >= 0) {
+        write_word(f, option);
+        free(option);
+    }
+    fputs(" --force -o", f);
+    write_word(f, path);
+    write_source(f, path, source);
+    if (fclose(f) == 0)
+        return command;
+    free(command);
+    return NULL;
+}

@@ -1,0 +1,13 @@
+/* The command line that bricks a data set again, as one would type it into a shell. */
+#ifndef TRIP_BRICK_COMMAND_H
+#define TRIP_BRICK_COMMAND_H
+
+#include "dataset_text.h"
+
+/* For the data set at `path`; `tf` is the function then kept in it, NULL for the automatic one, and
+ * `range` is kept too (NULL: none). For free(); NULL where the data set's text does not tell what
+ * it was made of. */
+char *brick_command(const trip_dataset_text *text, const char *path, const char *tf,
+                    const double *range);
+
+#endif

@@ -1,0 +1,195 @@
+"""The look without a file: presets by name, windows, the scale of opacity, what is made of a volume
+without being told, and volumes in which there is nothing to see."""
+import json
+import os
+import re
+import subprocess
+import unittest
+
+import numpy
+
+import program
+
+try:
+    import pyopenvdb
+except ImportError:
+    pyopenvdb = None
+
+FRONT = ["--size", "64x64", "--no-shading", "--renderer", "cpu", "--method", "axis"]
+
+
+def chest(shape=(24, 40, 40)):
+    """Air, a body of muscle with lungs and a bone, in Hounsfield units."""
+    z, y, x = numpy.indices(shape)
+    volume = numpy.full(shape, -1000, "i2")
+    body = ((x - 20) / 17) ** 2 + ((y - 20) / 13) ** 2 < 1
+    volume[body] = 50
+    volume[body & (abs(abs(x - 20) - 8) < 4) & (abs(y - 20) < 6)] = -820
+    volume[(abs(x - 20) < 2) & (abs(y - 28) < 2)] = 700
+    random = numpy.random.default_rng(1)
+    return (volume + random.integers(-12, 13, shape)).astype("i2")
+
+
+class Look(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nrrd("chest.nrrd", chest())
+        cls.works(cls(), "brick", "chest.nrrd", "--keep-all", "-q")
+        values = program.ball((20, 20, 20), dtype="u1")
+        program.write_nrrd("ball.nrrd", values)
+        cls.works(cls(), "brick", "ball.nrrd", "--keep-all", "-q")
+
+    def kind(self, path, *options):
+        return json.loads(
+            self.works("brick", path, "--json", "--force", "-o", "k.trip", *options).stdout
+        )["function_kind"]
+
+    def test_opacity_scale_multiplies_extinction(self):
+        view = ["--eye=9.5,-60,9.5", "--look=9.5,9.5,9.5", "--ortho=24", "--size=32x32"]
+        view += ["--renderer", "reference", "--method", "axis", "--tf", "viridis"]
+        once = self.picture("ball.trip", *view)[..., 3].astype(float)
+        self.assertGreater(once.max(), 0.5)
+        for scale in (0.25, 1, 3):
+            scaled = self.picture("ball.trip", *view, "--opacity-scale", scale)
+            expected = 1 - (1 - once) ** scale
+            self.assertLess(abs(scaled[..., 3] - expected).max(), 2e-4, scale)
+
+    def test_a_window_is_the_function_moved(self):
+        shape = [(0, 0.1, 0.2, 0.9, 0), (0.5, 0.2, 0.9, 0.3, 0.1), (1, 1, 0.5, 0.1, 0.6)]
+
+        def write(path, scale, offset, head=""):
+            lines = [f"{v * scale + offset} {r} {g} {b} {o}\n" for v, r, g, b, o in shape]
+            program.write(path, (head + "".join(lines)).encode())
+
+        write("plain.tf", 50, 30)
+        write("normalised.tf", 1, 0, "values normalised\n")
+        write("moved.tf", 80, 60)
+        moved = self.picture("ball.trip", *FRONT, "--tf", "moved.tf")
+        for name in ("plain.tf", "normalised.tf"):
+            windowed = self.picture(
+                "ball.trip", *FRONT, "--tf", name, "--window=80", "--level=100"
+            )
+            self.assertLess(abs(windowed - moved).max(), 1e-5)
+        self.assertGreater(abs(moved - self.picture("ball.trip", *FRONT)).max(), 0.1)
+
+    def test_window_and_level_are_given_together(self):
+        for option in ("--window=5", "--level=5"):
+            self.fails(2, "render", "ball.trip", "-o", "a.png", option, says="together")
+
+    def test_a_presets_bare_name_is_the_preset_and_a_path_is_a_file(self):
+        program.write("bone", b"0 0 1 0 1\n")
+        by_name = self.picture("ball.trip", *FRONT, "--tf", "bone")
+        self.assertTrue((by_name == self.picture("ball.trip", *FRONT, "--tf", "preset:bone")).all())
+        green = self.picture("ball.trip", *FRONT, "--tf", "./bone")
+        self.assertGreater(green[32, 32, 1], 0.9)
+        self.assertEqual(green[..., 0].max(), 0)
+        self.assertGreater(by_name[32, 32, 0], 0.3)
+        os.unlink("bone")
+
+    def test_a_slip_is_answered_with_the_preset(self):
+        for slip, preset in (("bnoe", "bone"), ("bone.tf", "bone"), ("ct-bones", "ct-bone")):
+            self.fails(
+                1, "render", "ball.trip", "-o", "a.png", "--tf", slip, says=f"preset:{preset}?"
+            )
+            self.fails(1, "brick", "ball.nrrd", "-o", "b.trip", "--tf", slip, says=f"{preset}?")
+
+    def test_every_name_in_the_help_draws(self):
+        page = self.works("render", "--help").stdout.decode()
+        names = [
+            *("auto", "ct", "mr", "fog", "labels", "simulation", "ct-bone", "ct-soft", "ct-lung"),
+            *("ct-skin", "grey", "bone", "hot-metal", "viridis", "vessels", "xray"),
+        ]
+        for name in names:
+            self.assertRegex(page, rf"\b{name}\b")
+            self.works("render", "chest.trip", "-o", "a.png", "--size=20x20", "--tf", name)
+
+    def test_presets_for_ct_warn_of_other_values(self):
+        run = self.works("render", "ball.trip", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
+        self.assertRegex(run.stderr, r"warning: ball.trip: values from 0 to 200 are hardly Houns")
+        run = self.works("render", "chest.trip", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
+        self.assertEqual(run.stderr, "")
+
+    def test_a_function_that_shows_nothing_says_so(self):
+        program.write("nothing.tf", b"300 1 1 1 0\n400 1 1 1 1\n")
+        run = self.works("render", "ball.trip", "-o", "a.png", "--size=20x20", "--tf=nothing.tf")
+        self.assertIn("shows nothing of the values from 0 to 200", run.stderr)
+
+    def test_volumes_are_told_apart(self):
+        self.assertEqual(self.kind("chest.nrrd"), "ct")
+        self.assertEqual(self.kind("ball.nrrd"), "simulation")
+        parts = numpy.zeros((16, 16, 16), "u2")
+        parts[4:12, 4:12, 4:12] = numpy.indices((8, 8, 8)).sum(0) // 4 * 3 + 5
+        program.write_nrrd("parts.nrrd", parts)
+        self.assertEqual(self.kind("parts.nrrd"), "labels")
+        random = numpy.random.default_rng(2)
+        head = abs(random.normal(0, 12, (32, 32, 32)))
+        head[8:24, 6:26, 6:26] = random.normal(500, 120, (16, 20, 20))
+        program.write_nifti("head.nii", numpy.clip(head, 0, 1500).astype("u2"))
+        self.assertEqual(self.kind("head.nii"), "mr")
+        self.assertEqual(
+            self.kind(os.path.join(program.DATASETS, "wdas_cloud_sixteenth.vdb")), "fog"
+        )
+        self.assertEqual(self.kind(os.path.join(program.DATASETS, "tooth.nhdr")), "simulation")
+
+    def test_auto_when_drawing_is_the_automatic_function_when_bricking(self):
+        for name in ("chest.nrrd", "ball.nrrd"):
+            self.works("brick", name, "-q", "--force", "-o", "auto.trip")
+            kept = self.picture("auto.trip", *FRONT)
+            self.assertGreater(kept[..., 3].max(), 0.3)
+            self.assertTrue((kept == self.picture("auto.trip", *FRONT, "--tf", "auto")).all())
+            self.works("brick", name, "-q", "--force", "-o", "given.trip", "--tf", "auto")
+            self.assertTrue((kept == self.picture("given.trip", *FRONT)).all())
+
+    def test_one_value_is_fog_of_moderate_depth(self):
+        for value in (0, 7):
+            program.write_nrrd("even.nrrd", numpy.full((32, 32, 32), value, "u1"))
+            run = self.works("brick", "even.nrrd", "-q", "--force")
+            self.assertIn(f"every voxel there is has the value {value}", run.stderr)
+            alpha = self.picture("even.trip", *FRONT)[..., 3]
+            # Optical depth 1.2 through the cube, seen a little askew: up to sqrt(3) times as long.
+            self.assertGreater(alpha[32, 32], 1 - numpy.exp(-1.1))
+            self.assertLess(alpha.max(), 1 - numpy.exp(-1.2 * 3**0.5))
+
+    @unittest.skipUnless(pyopenvdb, "no pyopenvdb")
+    def test_a_sparse_grid_of_one_value_is_fog_of_moderate_depth(self):
+        grid = pyopenvdb.FloatGrid()
+        z, y, x = numpy.indices((33, 33, 33)) - 16
+        inside = x * x + y * y + z * z < 15**2
+        grid.copyFromArray(numpy.where(inside, 3, 0).astype("f4"))
+        grid.name, grid.gridClass = "density", pyopenvdb.GridClass.FOG_VOLUME
+        pyopenvdb.write("even.vdb", grids=[grid])
+        self.works("brick", "even.vdb", "-q", "--force", "-o", "even_vdb.trip")
+        alpha = self.picture("even_vdb.trip", *FRONT)[..., 3]
+        # The ball's diameter is 1.24 times the edge of a cube of as many voxels.
+        self.assertGreater(alpha[32, 32], 0.5)
+        self.assertLess(alpha.max(), 1 - numpy.exp(-1.2 * 1.24 * 1.1))
+
+    def test_a_binary_solid_stays_solid(self):
+        solid = numpy.zeros((32, 32, 32), "u1")
+        solid[8:24, 8:24, 8:24] = 128
+        program.write_nrrd("solid.nrrd", solid)
+        self.works("brick", "solid.nrrd", "-q", "--force")
+        self.assertGreater(self.picture("solid.trip", *FRONT)[32, 32, 3], 0.99)
+
+    def test_the_command_to_brick_again_works_as_it_stands(self):
+        name = "it's a ball; $x.raw"
+        program.write_raw(name, program.ball((20, 20, 20)))
+        brick = ["--size=20,20,20", "--spacing=1,1,2", "-q", "-o", "again.trip", "--force"]
+        program.write("low.tf", b"10 1 1 1 0\n20 1 1 1 0.5\n200 1 1 1 0.5\n")
+        views = [["--tf", "low.tf"], ["--window=100", "--level=60"]]
+        for view in views:
+            self.works("brick", name, "--range=150:255", *brick)
+            run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", *view)
+            command = re.search(r"to have them: triptych (brick .*)\n", run.stderr)
+            self.assertTrue(command, run.stderr)
+            subprocess.run(
+                f"'{program.PROGRAM}' {command[1]} -q", shell=True, check=True, stderr=subprocess.PIPE
+            )
+            run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", *view)
+            self.assertEqual(run.stderr, "")
+            self.assertEqual(self.info("again.trip")["spacing"], [1, 1, 2])
+
+
+if __name__ == "__main__":
+    program.main()
