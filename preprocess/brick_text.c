@@ -77,7 +77,7 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
         .sparse = info->sparse,
         .integers = info->type < TRIP_F16 && info->slope == floor(info->slope) &&
                     info->inter == floor(info->inter),
-        .patient = !strcmp(info->format, "nifti") || !strcmp(info->format, "dicom"),
+        .patient = info->space[0] || !strcmp(info->format, "nifti"),
     };
     return trip_tf_recognise(&origin, h);
 }
