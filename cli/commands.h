@@ -8,6 +8,7 @@ int trip_command_brick(int argc, char **argv);  /* brick.c */
 int trip_command_cache(int argc, char **argv);  /* cache.c */
 int trip_command_info(int argc, char **argv);   /* info.c */
 int trip_command_render(int argc, char **argv); /* render.c */
+int trip_command_tf(int argc, char **argv);     /* tf.c */
 
 /* Exit status of a trip_status. */
 int trip_exit_status(int status);

@@ -16,6 +16,7 @@ static const struct command {
     { "render", "draw a volume or data set into image files", trip_command_render },
     { "cache", "list or clear the data sets that render made of volumes", trip_command_cache },
     { "bench", "measure drawing and reading, as tables", trip_command_bench },
+    { "tf", "list, show and convert transfer functions", trip_command_tf },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 

@@ -34,21 +34,11 @@ static void scale_extinction(trip_tf_entry *table, double scale)
 /* The function in data units, with its window. */
 static int load_function(const session *s, const session_look *look, trip_tf **tf)
 {
-    const trip_file_header *h = &s->data->header;
-    trip_histogram histogram;
-    bool known = trip_dataset_text_histogram(s->text, &histogram);
-    const trip_tf_data data = { h->value_min, h->value_max, known ? &histogram : NULL,
-                                trip_dataset_text_kind(s->text) };
     int status = look->tf ? trip_tf_load(tf, look->tf) : trip_dataset_text_tf(s->text, s->data, tf);
     bool window = look->window > 0;
-    if (!status && window && trip_tf_is_normalised(*tf))
-        status = trip_tf_window(*tf, look->window, look->level);
-    else if (!status) {
-        status = trip_tf_adapt(*tf, &data, s->input);
-        if (!status && window)
-            status = trip_tf_window(*tf, look->window, look->level);
-    }
-    return status;
+    if (!status && !(window && trip_tf_is_normalised(*tf))) /* a window replaces the range */
+        status = trip_dataset_text_adapt(s->text, s->data, *tf);
+    return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 
 static int load_transfer_function(session *s, const session_look *look)

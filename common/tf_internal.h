@@ -32,14 +32,14 @@ trip_rgba trip_tf_evaluate_below(const trip_tf *tf, double value);
 
 /* A built-in preset; reports an unknown name. */
 int trip_tf_from_preset(trip_tf **out, const char *name);
-bool trip_tf_is_preset(const char *name);
 /* The preset that `name` may be a slip of, or NULL. */
 const char *trip_tf_nearest_preset(const char *name);
 
 /* The function of a kind, whose points trip_tf_adapt() makes. */
 int trip_tf_from_kind(trip_tf **out, trip_tf_kind kind);
 
-/* A ParaView colour map, or an array of them of which `preset` names one (NULL: the first). */
+/* A ParaView colour map, or an array of them of which `preset` names one (NULL: the first), or the
+ * JSON that Slicer keeps volume properties in. */
 int trip_tf_parse_colormap(trip_tf **out, const char *name, const char *text, size_t bytes,
                            const char *preset);
 
@@ -56,6 +56,11 @@ typedef struct trip_tf_tissue {
 /* False where there is no valley. */
 bool trip_tf_find_tissue(trip_tf_tissue *out, const trip_histogram *histogram);
 
+/* A preset of Slicer's, a volume property of VTK's, or a colour map of an older ParaView. */
+int trip_tf_parse_xml(trip_tf **out, const char *name, const char *text, size_t bytes,
+                      const char *preset);
+/* A volume property of Slicer's, as text. */
+int trip_tf_parse_vp(trip_tf **out, const char *name, const char *text, size_t bytes);
 /* One of these, or a `.tf`, told apart by the content. */
 int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t bytes,
                       const char *preset);

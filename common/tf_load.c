@@ -59,6 +59,18 @@ static int read_file(const char *path, char **text, size_t *bytes)
     return status;
 }
 
+/* A .vp begins with a line of a single number, which no `.tf` has. */
+static bool is_vp(const char *text, size_t bytes)
+{
+    size_t i = 0;
+    while (i < bytes && text[i] >= '0' && text[i] <= '9')
+        i++;
+    size_t digits = i;
+    while (i < bytes && (text[i] == ' ' || text[i] == '\t' || text[i] == '\r'))
+        i++;
+    return digits > 0 && i < bytes && text[i] == '\n';
+}
+
 int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t bytes,
                       const char *preset)
 {
@@ -69,10 +81,13 @@ int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t 
     *out = NULL;
     if (first == '{' || first == '[')
         return trip_tf_parse_colormap(out, name, text, bytes, preset);
+    if (first == '<')
+        return trip_tf_parse_xml(out, name, text, bytes, preset);
     if (preset)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, name,
                          "#%s picks one of several functions, and this file holds one", preset);
-    return trip_tf_parse(out, name, text, bytes);
+    return is_vp(text + i, bytes - i) ? trip_tf_parse_vp(out, name, text, bytes)
+                                      : trip_tf_parse(out, name, text, bytes);
 }
 
 static int load_file(trip_tf **out, const char *path, const char *preset)

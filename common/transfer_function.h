@@ -63,8 +63,9 @@ typedef struct trip_tf_origin {
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
 
-/* A preset's name ("bone", "preset:bone"), or a file, told apart by its content: `.tf` text or
- * ParaView JSON; "FILE#NAME" for one of several. A name without a slash or a dot that is a preset's
+/* A preset's name ("bone", "preset:bone"), or a file, told apart by its content: `.tf` text, JSON of
+ * ParaView or 3D Slicer, a .vp, XML of Slicer, VTK or ParaView; "FILE#NAME" for one of several. A
+ * name without a slash or a dot that is a preset's
  * is the preset. All report and return a negative status on failure, TRIP_USAGE for an unknown
  * preset. trip_tf_parse() takes `.tf` text itself. */
 int trip_tf_load(trip_tf **out, const char *path_or_preset);
@@ -84,6 +85,7 @@ void trip_tf_destroy(trip_tf *tf);
 
 /* The built-in presets, by number from 0; NULL beyond the last. The basis is what the values are
  * relative to. */
+bool trip_tf_is_preset(const char *name);
 const char *trip_tf_preset_name(size_t i);
 const char *trip_tf_preset_summary(size_t i);
 const char *trip_tf_preset_basis(size_t i);
@@ -131,6 +133,20 @@ bool trip_tf_visible_span(const trip_tf *tf, double lo, double hi, double span[2
 
 /* The function as `.tf` text, for keeping in a data set; caller frees. */
 char *trip_tf_to_text(const trip_tf *tf);
+
+/* The forms that functions are written in. */
+typedef enum trip_tf_format {
+    TRIP_TF_TEXT, /* `.tf` */
+    TRIP_TF_PARAVIEW,
+    TRIP_TF_VP,
+    TRIP_TF_VP_JSON,
+    TRIP_TF_SLICER,
+    TRIP_TF_VTK,
+} trip_tf_format;
+
+/* *text, for free(), is the function called `name`. Refuses a normalised function in a form that
+ * knows data units only; warns where the unit of opacity is lost. */
+int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, char **text);
 
 /* Extinction per unit length of an opacity: -ln(1 - min(opacity, TRIP_OPACITY_MAX)). */
 double trip_extinction(double opacity);

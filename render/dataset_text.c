@@ -102,13 +102,15 @@ static const char *string_at(const trip_dataset_text *t, const char *key)
     return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(t->root, key));
 }
 
-trip_tf_kind trip_dataset_text_kind(const trip_dataset_text *t)
+/* TRIP_TF_SIMULATION where the text does not tell. */
+static trip_tf_kind kind_of(const trip_dataset_text *t)
 {
     trip_tf_kind kind = trip_tf_kind_from_name(string_at(t, "function_kind"));
     return kind == TRIP_TF_AUTOMATIC ? TRIP_TF_SIMULATION : kind;
 }
 
-bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out)
+/* False when the text holds nothing that can be one. */
+static bool read_histogram(const trip_dataset_text *t, trip_histogram *out)
 {
     const cJSON *histogram = cJSON_GetObjectItemCaseSensitive(t->root, "histogram");
     const cJSON *counts = cJSON_GetObjectItemCaseSensitive(histogram, "counts");
@@ -131,6 +133,15 @@ bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out
         out->total += (uint64_t)n;
     }
     return out->total > 0;
+}
+
+int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, trip_tf *tf)
+{
+    trip_histogram histogram;
+    bool known = trip_tf_needs_data(tf) && read_histogram(t, &histogram);
+    const trip_tf_data data = { d->header.value_min, d->header.value_max, known ? &histogram : NULL,
+                                kind_of(t) };
+    return trip_tf_adapt(tf, &data, t->path);
 }
 
 const char *trip_dataset_text_source(const trip_dataset_text *t)

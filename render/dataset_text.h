@@ -26,16 +26,13 @@ typedef struct trip_dataset_text trip_dataset_text;
 int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d);
 void trip_dataset_text_destroy(trip_dataset_text *t);
 
-/* What the volume was recognised as; TRIP_TF_SIMULATION where the text does not tell. */
-trip_tf_kind trip_dataset_text_kind(const trip_dataset_text *t);
-
-/* False when the text holds none that can be one. */
-bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out);
-
 /* Of what it was made: a file's name without its folder, and the options of `brick` that say how to
  * read it, from 0 on; NULL where the text does not tell, or beyond the last. */
 const char *trip_dataset_text_source(const trip_dataset_text *t);
 const char *trip_dataset_text_source_option(const trip_dataset_text *t, int i);
+
+/* Turns a function that is relative to the data, or made from its histogram, into data units. */
+int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, trip_tf *tf);
 
 /* The stored function; without one, a grey ramp over the values, faint as fog. */
 int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out);

@@ -1,0 +1,316 @@
+/* triptych tf: lists the built-in transfer functions, shows any function as `.tf` text, and
+ * converts between the forms of other programs. */
+#include "commands.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "dataset_text.h"
+#include "options.h"
+#include "progress.h"
+#include "report.h"
+#include "text.h"
+#include "volume_function.h"
+
+enum { KEY_TF = 256, KEY_RANGE, KEY_FORMAT, KEY_FORCE };
+
+typedef enum action { LIST, SHOW, CONVERT } action;
+
+typedef struct options {
+    const char *words[3]; /* the action, IN, OUT */
+    int count;
+    action action;
+    const char *tf;
+    double lo, hi;
+    bool range, force;
+    int format; /* -1: by the output's name */
+} options;
+
+static const struct argp_option option_table[] = {
+    { "tf", KEY_TF, "NAME|FILE", 0,
+      "For a data set or a volume: this function, made for it (default: the data set's own, the "
+      "volume's automatic one)",
+      0 },
+    { "range", KEY_RANGE, "LO:HI", 0, "The data's range, for a function that runs over it", 0 },
+    { "format", KEY_FORMAT, "NAME", 0,
+      "tf, paraview, vp, vp.json (3D Slicer), slicer (presets in XML) or vtk (XML); default: by "
+      "OUT's name: .tf, .json, .vp, .vp.json, .xml (slicer)",
+      0 },
+    { "force", KEY_FORCE, NULL, 0, "Replace OUT", 0 },
+    { 0 },
+};
+
+static const char *const formats[] = { "tf", "paraview", "vp", "vp.json", "slicer", "vtk", NULL };
+
+static int parse_range(options *o, const char *text)
+{
+    char lo[64] = "";
+    const char *colon = strchr(text, ':');
+    if (!colon || colon - text >= (int)sizeof lo)
+        return trip_option_fail("--range", "takes two values with a colon between them, LO:HI");
+    memcpy(lo, text, (size_t)(colon - text));
+    o->range = true;
+    if (!trip_text_to_double(lo, &o->lo) || !trip_text_to_double(colon + 1, &o->hi) ||
+        o->lo >= o->hi)
+        return trip_option_fail("--range", "takes two numbers, the smaller first, as LO:HI");
+    return 0;
+}
+
+static int check(options *o)
+{
+    static const char *const actions[] = { "list", "show", "convert", NULL };
+    static const int words[] = { 1, 2, 3 };
+    int which = 0;
+    if (o->count == 0)
+        return trip_option_fail("tf", "list, show or convert? `triptych tf --help`");
+    int status = trip_option_choice("tf", o->words[0], actions, &which);
+    o->action = (action)which;
+    if (status)
+        return status;
+    if (o->count < words[which])
+        return trip_option_fail(o->words[0], which == CONVERT ? "takes IN and OUT"
+                                                              : "takes a function, a data set or "
+                                                                "a volume");
+    if (o->count > words[which])
+        return trip_option_fail(o->words[words[which]], "one thing at a time");
+    if (o->action == LIST && (o->tf || o->range || o->format >= 0 || o->force))
+        return trip_option_fail("list", "takes no options");
+    if (o->action == SHOW && (o->format > 0 || o->force))
+        return trip_option_fail("show", "prints `.tf`; `convert` writes other forms");
+    return 0;
+}
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case KEY_TF:
+        o->tf = arg;
+        return 0;
+    case KEY_RANGE:
+        return parse_range(o, arg);
+    case KEY_FORMAT:
+        return trip_option_choice("--format", arg, formats, &o->format);
+    case KEY_FORCE:
+        o->force = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (o->count == 3)
+            return trip_option_fail(arg, "one thing at a time");
+        o->words[o->count++] = arg;
+        return 0;
+    case ARGP_KEY_END:
+        return check(o);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void list(void)
+{
+    printf("%-11s %-13s %s\n", "name", "values", "for");
+    for (size_t i = 0; trip_tf_preset_name(i); i++)
+        printf("%-11s %-13s %s\n", trip_tf_preset_name(i), trip_tf_preset_basis(i),
+               trip_tf_preset_summary(i));
+}
+
+static bool ends_with(const char *name, const char *end)
+{
+    size_t length = strlen(name), other = strlen(end);
+    return length > other && !strcasecmp(name + length - other, end);
+}
+
+static bool is_dataset(const char *path)
+{
+    char index[4096];
+    struct stat st;
+    int length = snprintf(index, sizeof index, "%s/index.trip", path);
+    return length < (int)sizeof index && stat(index, &st) == 0;
+}
+
+/* What no volume is called, nor a pattern of slices. */
+static bool is_function(const char *name)
+{
+    static const char *const ends[] = { ".tf", ".json", ".vp", ".xml" };
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
+        if (ends_with(name, ends[i]))
+            return true;
+    struct stat st;
+    return strncmp(name, "preset:", 7) == 0 || strchr(name, '#') ||
+           (stat(name, &st) != 0 && !strpbrk(name, "%*?["));
+}
+
+static int load_from_dataset(trip_tf **tf, const options *o)
+{
+    trip_budget *budget = NULL;
+    trip_dataset *data = NULL;
+    trip_dataset_text *text = NULL;
+    int status = trip_budget_create(&budget, 0);
+    if (!status)
+        status = trip_dataset_open(&data, o->words[1], budget);
+    if (!status)
+        status = trip_dataset_text_parse(&text, data);
+    if (!status)
+        status = o->tf ? trip_tf_load(tf, o->tf) : trip_dataset_text_tf(text, data, tf);
+    if (!status)
+        status = trip_dataset_text_adapt(text, data, *tf);
+    trip_dataset_text_destroy(text);
+    if (data)
+        trip_dataset_close(data);
+    if (budget)
+        trip_budget_destroy(budget);
+    return status;
+}
+
+static void on_progress(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    trip_progress_show(user, stage, done, total, "voxels");
+}
+
+static int load_from_volume(trip_tf **tf, const options *o)
+{
+    trip_progress progress = trip_progress_start(false);
+    const trip_brick_params params = {
+        .input = o->words[1],
+        .functions = &o->tf,
+        .function_count = o->tf != NULL,
+        .progress = on_progress,
+        .progress_user = &progress,
+    };
+    int status = trip_volume_function(&params, tf);
+    trip_progress_end(&progress);
+    return status;
+}
+
+/* IN is a preset or a function's file, a data set, or a volume. */
+static int load(trip_tf **tf, const options *o)
+{
+    const char *in = o->words[1];
+    *tf = NULL;
+    if (is_dataset(in))
+        return load_from_dataset(tf, o);
+    if (!trip_tf_is_preset(in) && !is_function(in))
+        return load_from_volume(tf, o);
+    if (o->tf)
+        return trip_option_fail("--tf", "is for a data set or a volume");
+    int status = trip_tf_load(tf, in);
+    if (!status && trip_tf_needs_data(*tf) && !trip_tf_is_normalised(*tf))
+        return trip_fail(TRIP_USAGE, "tf", in,
+                         "is made from a histogram: `triptych tf show --tf %s DATA`, DATA being a "
+                         "data set or a volume",
+                         in);
+    if (!status && o->range)
+        trip_tf_denormalise(*tf, o->lo, o->hi);
+    return status;
+}
+
+static int choose_format(const options *o, trip_tf_format *format)
+{
+    static const struct {
+        const char *end;
+        trip_tf_format format;
+    } ends[] = { { ".tf", TRIP_TF_TEXT },
+                 { ".vp.json", TRIP_TF_VP_JSON },
+                 { ".json", TRIP_TF_PARAVIEW },
+                 { ".vp", TRIP_TF_VP },
+                 { ".xml", TRIP_TF_SLICER } };
+    if (o->format >= 0) {
+        *format = (trip_tf_format)o->format;
+        return 0;
+    }
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
+        if (ends_with(o->words[2], ends[i].end)) {
+            *format = ends[i].format;
+            return 0;
+        }
+    return trip_option_fail(o->words[2],
+                            "is called neither .tf, .json, .vp.json, .vp nor .xml; say "
+                            "which by --format");
+}
+
+static int write_all(const char *path, int fd, const char *text)
+{
+    for (size_t length = strlen(text); length > 0;) {
+        ssize_t written = write(fd, text, length);
+        if (written < 0 && errno != EINTR)
+            return trip_fail_errno("write", path, NULL);
+        text += written > 0 ? written : 0;
+        length -= written > 0 ? (size_t)written : 0;
+    }
+    return fsync(fd) == 0 ? 0 : trip_fail_errno("write", path, NULL);
+}
+
+/* Under another name until it is complete. */
+static int write_file(const options *o, const char *text)
+{
+    const char *path = o->words[2];
+    char *temporary;
+    struct stat st;
+    bool there = lstat(path, &st) == 0;
+    if (there && !o->force)
+        return trip_fail(TRIP_ERROR, "tf", path, "is there already; --force replaces it");
+    if (asprintf(&temporary, "%s.XXXXXX", path) < 0)
+        return trip_fail(TRIP_ERROR, "tf", path, "out of memory");
+    mode_t mask = umask(0);
+    umask(mask);
+    int fd = mkstemp(temporary);
+    int status = fd < 0 ? trip_fail_errno("write", path, "cannot make a file beside it")
+                        : write_all(path, fd, text);
+    if (!status && fchmod(fd, there ? st.st_mode & 0777 : 0666 & ~mask) != 0)
+        status = trip_fail_errno("write", path, NULL);
+    if (!status && rename(temporary, path) != 0)
+        status = trip_fail_errno("write", path, "cannot rename to it");
+    if (fd >= 0)
+        close(fd);
+    if (fd >= 0 && status)
+        unlink(temporary);
+    free(temporary);
+    return status;
+}
+
+static int convert(const options *o)
+{
+    trip_tf *tf = NULL;
+    trip_tf_format format = TRIP_TF_TEXT;
+    const char *out = o->action == SHOW ? "-" : o->words[2];
+    int status =
+        o->action == SHOW || (!strcmp(out, "-") && o->format < 0) ? 0 : choose_format(o, &format);
+    if (!status)
+        status = load(&tf, o);
+    char *text = NULL;
+    if (!status)
+        status = trip_tf_write(tf, format, o->words[1], &text);
+    if (!status && !strcmp(out, "-"))
+        fputs(text, stdout);
+    else if (!status)
+        status = write_file(o, text);
+    free(text);
+    trip_tf_destroy(tf);
+    return status;
+}
+
+int trip_command_tf(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse_key,
+        .args_doc = "list\nshow NAME|FILE|DATA.trip|VOLUME\nconvert IN OUT",
+        .doc =
+            "Lists the built-in transfer functions; shows one, or that of a data set or volume, as "
+            "`.tf` text; converts between the forms of other programs. IN is anything that can be "
+            "shown, OUT a file, or - for standard output.",
+    };
+    options o = { .format = -1 };
+    int status = trip_options_parse(&argp, argc, argv, &o);
+    if (!status && o.action == LIST)
+        list();
+    else if (!status)
+        status = convert(&o);
+    return trip_exit_status(status);
+}

@@ -1,0 +1,125 @@
+"""`triptych tf`: what it lists, shows and converts, and what it refuses."""
+import json
+import os
+import stat
+import xml.etree.ElementTree
+
+import program
+
+STEP = b"-400 0.6 0.3 0.2 0\n150 0.9 0.6 0.5 0.01\n150 1 0.9 0.8 0.3\n3000 1 1 0.9 0.9\n"
+
+
+class Tf(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write("step.tf", STEP)
+        program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
+        cls.works(cls(), "brick", "ball.nrrd", "-q")
+
+    def shown(self, *arguments):
+        """The points that `tf show` prints."""
+        lines = self.works("tf", "show", *arguments).stdout.decode().splitlines()
+        self.assertRegex(lines[0], "^unit ")
+        return [tuple(map(float, line.split())) for line in lines[2:]]
+
+    def test_every_listed_preset_can_be_shown(self):
+        lines = self.works("tf", "list").stdout.decode().splitlines()[1:]
+        made = 0
+        for line in lines:
+            name = line.split()[0]
+            if "histogram" in line:
+                made += 1
+                self.fails(2, "tf", "show", name, says="made from a histogram")
+                self.shown("--tf", name, "ball.trip")
+            else:
+                self.assertGreater(len(self.shown(name)), 2)
+        self.assertEqual(made, 6)
+        self.assertGreater(len(lines), 14)
+
+    def test_the_function_of_a_data_set_is_that_of_its_volume_and_can_be_edited(self):
+        points = self.shown("ball.trip")
+        self.assertEqual(points, self.shown("ball.nrrd"))
+        self.assertEqual(points, self.shown("--tf", "auto", "ball.trip"))
+        text = self.works("tf", "show", "ball.trip").stdout
+        program.write("edited.tf", text)
+        view = ["ball.trip", "--size", "32x32"]
+        as_kept = self.picture(*view)
+        self.assertTrue((as_kept == self.picture(*view, "--tf", "edited.tf")).all())
+
+    def test_a_preset_over_the_range_is_shown_for_the_data(self):
+        self.assertEqual([p[0] for p in self.shown("ball.trip", "--tf", "grey")], [0, 20, 80, 200])
+        self.assertEqual([p[0] for p in self.shown("grey", "--range=-100:100")],
+                         [-100, -80, -20, 100])
+        self.assertEqual([p[0] for p in self.shown("grey")], [0, 0.1, 0.4, 1])
+
+    def test_converts_there_and_back(self):
+        for name in ("a.json", "a.vp", "a.vp.json", "a.xml", "a.tf"):
+            self.works("tf", "convert", "step.tf", name)
+            points = self.shown(name)
+            self.assertEqual([p[1:] for p in points], [
+                (0.6, 0.3, 0.2, 0), (0.9, 0.6, 0.5, 0.01), (1, 0.9, 0.8, 0.3), (1, 1, 0.9, 0.9)])
+            for got, expected in zip(points, (-400, 150, 150, 3000)):
+                self.assertAlmostEqual(got[0], expected, places=9)
+        self.works("tf", "convert", "step.tf", "vtk.xml", "--format", "vtk")
+        self.assertEqual(len(self.shown("vtk.xml")), 4)
+
+    def test_others_read_what_is_written(self):
+        """By the parsers of Python's own library."""
+        out = lambda form: self.works("tf", "convert", "step.tf", "-", "--format", form).stdout
+        colour_map = json.loads(out("paraview"))[0]
+        self.assertEqual(colour_map["RGBPoints"][:4], [-400, 0.6, 0.3, 0.2])
+        self.assertEqual(colour_map["Points"][-4:], [3000, 0.9, 0.5, 0])
+        self.assertEqual(colour_map["ColorSpace"], "RGB")
+        component = json.loads(out("vp.json"))["volumeProperties"][0]["components"][0]
+        self.assertEqual(component["scalarOpacity"]["points"][-1], {"x": 3000, "y": 0.9})
+        self.assertEqual(component["rgbTransferFunction"]["points"][0]["color"], [0.6, 0.3, 0.2])
+        preset = xml.etree.ElementTree.fromstring(out("slicer")).find("VolumeProperty").attrib
+        numbers = list(map(float, preset["scalarOpacity"].split()))
+        self.assertEqual(numbers[0], len(numbers) - 1)
+        self.assertEqual(numbers[1:3] + numbers[-2:], [-400, 0, 3000, 0.9])
+        numbers = list(map(float, preset["colorTransfer"].split()))
+        self.assertEqual(numbers[0], len(numbers) - 1)
+        values = numbers[1::4]
+        self.assertEqual(sorted(set(values)), values)  # no value twice
+        root = xml.etree.ElementTree.fromstring(out("vtk"))
+        points = root.findall("Component/ScalarOpacity/PiecewiseFunction/Point")
+        self.assertEqual([float(p.get("Value")) for p in points], [0, 0.01, 0.3, 0.9])
+        lines = out("vp").decode().splitlines()
+        self.assertEqual(len(lines), 9)
+        self.assertEqual(len(lines[8].split()), 1 + int(lines[8].split()[0]))
+
+    def test_what_is_there_is_replaced_by_force_only(self):
+        program.write("there.tf", b"0 0 0 0 0\n")
+        os.chmod("there.tf", 0o600)
+        self.leaves_nothing(1, "tf", "convert", "ct-bone", "there.tf", says="--force")
+        self.assertEqual(len(self.shown("there.tf")), 1)
+        self.works("tf", "convert", "ct-bone", "there.tf", "--force")
+        self.assertEqual(len(self.shown("there.tf")), 5)
+        self.assertEqual(stat.S_IMODE(os.stat("there.tf").st_mode), 0o600)
+
+    def test_wrong_usage_is_one_line(self):
+        for arguments in (
+            [], ["lst"], ["show"], ["convert", "grey"], ["show", "grey", "bone"],
+            ["list", "grey"], ["list", "--force"], ["show", "grey", "--force"],
+            ["convert", "grey", "a.txt"], ["convert", "grey", "a.b.xml"],
+            ["show", "grey", "--tf", "bone"], ["show", "grey", "--range=1"],
+            ["show", "grey", "--range=2:1"], ["convert", "grey", "-", "--format=x"],
+        ):
+            self.leaves_nothing(2, "tf", *arguments)
+
+    def test_bad_input_is_one_line_and_no_file(self):
+        program.write("bad.xml", b"<MRML><VolumeProperty scalarOpacity='2 0 1'")
+        program.write("bad.vp", b"1\n2\n")
+        program.write("bad.json", b"{")
+        program.write("laughs.xml", b'<!DOCTYPE a [<!ENTITY b "cc">]><a>&b;</a>')
+        program.write("empty.tf", b"")
+        for name in ("bad.xml", "bad.vp", "bad.json", "laughs.xml", "empty.tf", "none.tf", "none",
+                     "/dev/null", "."):
+            self.leaves_nothing(1, "tf", "convert", name, "out.tf")
+            self.fails(1, "tf", "show", name)
+        self.leaves_nothing(1, "tf", "convert", "grey", "no/such/folder/a.tf")
+
+
+if __name__ == "__main__":
+    program.main()
