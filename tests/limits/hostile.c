@@ -1,0 +1,109 @@
+#include "hostile.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include <xxhash.h>
+
+#include "dataset.h"
+
+static void give_up(const char *path)
+{
+    perror(path);
+    abort();
+}
+
+static void load(hostile_file *f, const char *path, const char *name)
+{
+    char file[512];
+    struct stat st;
+    snprintf(file, sizeof file, "%s/%s", path, name);
+    snprintf(f->name, sizeof f->name, "%s", name);
+    FILE *in = fopen(file, "rb");
+    if (!in || fstat(fileno(in), &st) != 0)
+        give_up(file);
+    f->bytes = (size_t)st.st_size;
+    f->data = malloc(f->bytes);
+    if (fread(f->data, 1, f->bytes, in) != f->bytes)
+        give_up(file);
+    fclose(in);
+}
+
+void hostile_load(hostile *h, const char *path)
+{
+    char name[32];
+    load(&h->index, path, TRIP_INDEX_NAME);
+    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
+        load(&h->planes[i], path, trip_dataset_plane_name(i / TRIP_PLANES, i % TRIP_PLANES, name));
+}
+
+static void copy(hostile_file *to, const hostile_file *from)
+{
+    *to = *from;
+    to->data = malloc(from->bytes);
+    memcpy(to->data, from->data, from->bytes);
+}
+
+void hostile_copy(hostile *to, const hostile *from)
+{
+    copy(&to->index, &from->index);
+    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
+        copy(&to->planes[i], &from->planes[i]);
+}
+
+void hostile_free(hostile *h)
+{
+    free(h->index.data);
+    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
+        free(h->planes[i].data);
+}
+
+/* The checksums of consecutive pages of data[0, bytes), to a table. */
+static void sum_pages(const unsigned char *data, size_t bytes, unsigned page_log2,
+                      unsigned char *table)
+{
+    size_t page = (size_t)1 << page_log2;
+    for (size_t at = 0; at < bytes; at += page, table += sizeof(uint64_t)) {
+        uint64_t sum = XXH64(data + at, bytes - at < page ? bytes - at : page, 0);
+        memcpy(table, &sum, sizeof sum);
+    }
+}
+
+void hostile_seal(hostile *h, const hostile *sound)
+{
+    const trip_file_header *was = hostile_header(sound);
+    unsigned char *index = h->index.data;
+    for (int i = 0; i < HOSTILE_PLANE_FILES; i++) {
+        const trip_file_list *list = hostile_list(sound, sound, i / TRIP_PLANES);
+        sum_pages(h->planes[i].data, h->planes[i].bytes, was->page_log2,
+                  index + list->page_checksums_offset[i % TRIP_PLANES]);
+    }
+    sum_pages(index + TRIP_HEADER_BYTES, was->checksums_offset - TRIP_HEADER_BYTES, was->page_log2,
+              index + was->checksums_offset);
+    trip_file_header *header = hostile_header(h);
+    header->checksums_checksum =
+        XXH64(index + was->checksums_offset, was->index_bytes - was->checksums_offset, 0);
+    header->header_checksum = 0;
+    header->header_checksum = XXH64(header, sizeof *header, 0);
+}
+
+static void write_file(const hostile_file *f, const char *path)
+{
+    char file[512];
+    snprintf(file, sizeof file, "%s/%s", path, f->name);
+    FILE *out = fopen(file, "wb");
+    if (!out || fwrite(f->data, 1, f->bytes, out) != f->bytes || fclose(out) != 0)
+        give_up(file);
+}
+
+void hostile_write(const hostile *h, const char *path)
+{
+    if (mkdir(path, 0700) != 0 && errno != EEXIST)
+        give_up(path);
+    write_file(&h->index, path);
+    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
+        write_file(&h->planes[i], path);
+}

@@ -1,0 +1,382 @@
+/* Data sets changed on purpose, with right checksums: every field of every table and records, to
+ * every value that has ever made trouble. Opening, checking and drawing each of them by all
+ * renderers ends well or with one line; a picture that comes out holds finite numbers. */
+#include "dataset_text.h"
+#include "hostile.h"
+#include "rounds.h"
+#include "scenes.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { SIZE = 24, RECORDS = 120, SPANS = 40, TEXTS = 24 };
+
+static struct {
+    scene scene;
+    hostile sound;
+    char path[128]; /* of the changed data set */
+    const scene_renderer *renderers;
+} shared;
+
+static struct {
+    unsigned tried, opened, verified, drawn;
+} counts;
+
+static bool cloudy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    uint32_t hash = scene_hash(i, j, k);
+    (void)user;
+    gradient[0] = i - 15;
+    gradient[1] = j - 12;
+    gradient[2] = k - 10;
+    *code = hash % 60000;
+    return hash % 3 != 0;
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    scene_create(&shared.scene, &(scene_params){ .dims = { 30, 24, 20 },
+                                                 .tile_voxels = 16,
+                                                 .slab_sheets = 5,
+                                                 .normals = true,
+                                                 .voxel = cloudy });
+    scene_colour(&shared.scene, 0, 49999, 1, 0.4, 0.1, 0.1);
+    scene_colour(&shared.scene, 50000, 65535, 0.2, 0.6, 1, 0.9);
+    hostile_load(&shared.sound, shared.scene.path);
+    snprintf(shared.path, sizeof shared.path, "%s/hostile.trip", shared.scene.folder);
+    shared.renderers = scene_renderers();
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    hostile_free(&shared.sound);
+    scene_destroy(&shared.scene);
+    print_message("%u data sets: %u opened, %u held by their own index, %u pictures\n",
+                  counts.tried, counts.opened, counts.verified, counts.drawn);
+    return 0;
+}
+
+/* A failure is said once, and success is silent. */
+static void check_reports(const char *what, const char *step, int status)
+{
+    int reports = test_caught_reports();
+    if (reports != (status < 0))
+        fail_msg("%s: %s gave %d and %d lines, the last: %s", what, step, status, reports,
+                 test_last_report);
+}
+
+static int draw_planned(trip_renderer *renderer, const trip_frame *frame, trip_budget *budget,
+                        float *rgba)
+{
+    trip_reader *reader;
+    trip_frame_stats stats;
+    int status = trip_reader_create(&reader, frame->data,
+                                    &(trip_reader_params){ .planes = frame->plan->planes }, budget);
+    if (status)
+        return status;
+    status = trip_frame_draw(renderer, reader, frame, rgba, &stats);
+    trip_reader_destroy(reader);
+    return status;
+}
+
+static int draw(const trip_dataset *data, const scene_renderer *by, trip_budget *budget,
+                float *rgba)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_renderer *renderer;
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = scene_view(&shared.scene, trip_v3(1, 0.8, -0.3), 45, 45, SIZE);
+    settings.h = 0.8;
+    int status = trip_camera_make(&camera, &view, &data->index_to_world);
+    if (!status)
+        status = trip_plan_make(&plan, data, &camera, &settings, shared.scene.table, budget);
+    if (status)
+        return status;
+    status = by->create(&renderer, budget);
+    if (!status) {
+        const trip_frame frame = { .data = data,
+                                   .camera = &camera,
+                                   .settings = &settings,
+                                   .plan = &plan,
+                                   .table = shared.scene.table };
+        status = draw_planned(renderer, &frame, budget, rgba);
+        renderer->ops->destroy(renderer);
+    }
+    trip_plan_release(&plan, budget);
+    return status;
+}
+
+static void check_picture(const char *what, const trip_dataset *data, const scene_renderer *by,
+                          trip_budget *budget)
+{
+    static float rgba[SIZE * SIZE * 4];
+    test_catch_reports();
+    int status = draw(data, by, budget, rgba);
+    check_reports(what, by->name, status);
+    if (status)
+        return;
+    counts.drawn++;
+    for (int i = 0; i < SIZE * SIZE * 4; i++)
+        if (!(rgba[i] >= -0.001 && rgba[i] <= 1.001))
+            fail_msg("%s: %s draws %g", what, by->name, (double)rgba[i]);
+}
+
+static void check_text(const char *what, const trip_dataset *data)
+{
+    trip_dataset_text *text = NULL;
+    trip_tf *tf = NULL;
+    test_catch_reports();
+    int status = trip_dataset_text_parse(&text, data);
+    if (!status)
+        status = trip_dataset_text_tf(text, data, &tf);
+    check_reports(what, "its text", status);
+    trip_tf_destroy(tf);
+    trip_dataset_text_destroy(text);
+}
+
+/* Opens, checks and draws what lies there; `slow` renderers where there is reason to. */
+static void judge(const char *what, bool slow)
+{
+    trip_budget *budget;
+    trip_dataset *data = NULL;
+    assert_int_equal(trip_budget_create(&budget, UINT64_C(1) << 28), 0);
+    counts.tried++;
+    test_catch_reports();
+    int status = trip_dataset_open(&data, shared.path, budget);
+    check_reports(what, "open", status);
+    if (!status) {
+        counts.opened++;
+        check_text(what, data);
+        test_catch_reports();
+        int verified = trip_dataset_verify(data, budget);
+        check_reports(what, "verify", verified);
+        counts.verified += verified == 0;
+        for (const scene_renderer *r = shared.renderers; r->name; r++)
+            if (slow || !strcmp(r->name, "cpu"))
+                check_picture(what, data, r, budget);
+        trip_dataset_close(data);
+    }
+    trip_budget_destroy(budget);
+}
+
+/* The sound data set but for `bytes` bytes of one file. */
+static void judge_changed(const char *what, hostile *h, bool slow)
+{
+    hostile_seal(h, &shared.sound);
+    hostile_write(h, shared.path);
+    hostile_free(h);
+    judge(what, slow);
+}
+
+static const uint64_t whole_numbers[] = {
+    0,
+    1,
+    2,
+    3,
+    7,
+    63,
+    64,
+    65,
+    127,
+    128,
+    255,
+    256,
+    4096,
+    32767,
+    65535,
+    65536,
+    0x7fffffff,
+    0x80000000,
+    0xffffffff,
+    UINT64_C(1) << 32,
+    UINT64_C(1) << 62,
+    INT64_MAX,
+    UINT64_C(1) << 63,
+    UINT64_MAX - 7,
+    UINT64_MAX,
+};
+enum { WHOLE_NUMBERS = sizeof whole_numbers / sizeof whole_numbers[0] };
+
+static const double real_numbers[] = {
+    0.0,   -0.0, -1,   1e-320, 1e-300, 1e-30,    -1e-30,    1e-12, 1e12, -1e12,   1e30,
+    -1e30, 1e38, 1e39, 1e300,  -1e300, INFINITY, -INFINITY, NAN,   0.5,  1 << 20,
+};
+enum { REAL_NUMBERS = sizeof real_numbers / sizeof real_numbers[0] };
+
+/* Sets one whole number of the index to each of the values, and a little more and less than it is.
+ */
+static void try_whole(const char *what, size_t at, size_t bytes)
+{
+    uint64_t was = 0;
+    memcpy(&was, shared.sound.index.data + at, bytes);
+    for (int i = 0; i < WHOLE_NUMBERS + 2; i++) {
+        char name[96];
+        hostile h;
+        uint64_t value =
+            i < WHOLE_NUMBERS ? whole_numbers[i] : was + (i == WHOLE_NUMBERS ? 1u : -1u);
+        if (bytes < 8 && value >> 8 * bytes)
+            continue;
+        snprintf(name, sizeof name, "%s at byte %zu = %llu", what, at, (unsigned long long)value);
+        hostile_copy(&h, &shared.sound);
+        memcpy(h.index.data + at, &value, bytes);
+        judge_changed(name, &h, i % 9 == 0);
+    }
+}
+
+static void try_real(const char *what, size_t at)
+{
+    for (int i = 0; i < REAL_NUMBERS; i++) {
+        char name[96];
+        hostile h;
+        snprintf(name, sizeof name, "%s at byte %zu = %g", what, at, real_numbers[i]);
+        hostile_copy(&h, &shared.sound);
+        memcpy(h.index.data + at, &real_numbers[i], sizeof real_numbers[i]);
+        judge_changed(name, &h, true);
+    }
+}
+
+static void the_headers_whole_numbers(void **state)
+{
+    (void)state;
+    for (size_t at = offsetof(trip_file_header, dims);
+         at < offsetof(trip_file_header, index_to_world); at += 8)
+        try_whole("header", at, 8);
+    try_whole("header", offsetof(trip_file_header, version), 4);
+    try_whole("header", offsetof(trip_file_header, header_bytes), 4);
+    try_whole("header", offsetof(trip_file_header, index_bytes), 8);
+    try_whole("header", offsetof(trip_file_header, checksums_offset), 8);
+    for (size_t at = offsetof(trip_file_header, voxels); at < offsetof(trip_file_header, tile_log2);
+         at += 8)
+        try_whole("header", at, 8);
+    for (size_t at = offsetof(trip_file_header, tile_log2);
+         at < offsetof(trip_file_header, lists_offset); at += 4)
+        try_whole("header", at, 4);
+    for (size_t at = offsetof(trip_file_header, lists_offset);
+         at < offsetof(trip_file_header, reserved) + 8; at += 8)
+        try_whole("header", at, 8);
+}
+
+static void the_headers_real_numbers(void **state)
+{
+    (void)state;
+    for (size_t at = offsetof(trip_file_header, index_to_world);
+         at < offsetof(trip_file_header, voxels); at += 8)
+        try_real("header", at);
+}
+
+/* Whole maps and ranges at once, which one number alone cannot be without being refused. */
+static void the_scale_of_the_map_and_of_the_values(void **state)
+{
+    static const double scales[] = {
+        1e-150, 1e-40, 1e-20, 1e-12, 1e-6, 1e6, 1e12, 1e20, 1e40, 1e99
+    };
+    (void)state;
+    for (size_t i = 0; i < 2 * sizeof scales / sizeof scales[0]; i++) {
+        char name[96];
+        hostile h;
+        double s = scales[i / 2];
+        hostile_copy(&h, &shared.sound);
+        trip_file_header *header = hostile_header(&h);
+        for (int k = 0; k < 12 && i % 2 == 0; k++)
+            header->index_to_world[k] *= s;
+        if (i % 2 == 1) {
+            header->code_lo = header->value_min = -s;
+            header->code_hi = header->value_max = s;
+            header->gradient_scale = s;
+        }
+        snprintf(name, sizeof name, "%s times %g", i % 2 ? "values" : "space", s);
+        judge_changed(name, &h, true);
+    }
+}
+
+static void the_lists(void **state)
+{
+    size_t lists = hostile_header(&shared.sound)->lists_offset;
+    (void)state;
+    for (size_t at = 0; at < 8; at += 4)
+        try_whole("list X", lists + at, 4);
+    for (size_t at = 8; at < sizeof(trip_file_list); at += 8)
+        try_whole("list Z", lists + 2 * sizeof(trip_file_list) + at, 8);
+}
+
+static void slabs_bricks_and_counts(void **state)
+{
+    const trip_file_list *list = hostile_list(&shared.sound, &shared.sound, 1);
+    size_t slab = list->slabs_offset + sizeof(trip_file_slab); /* the second */
+    size_t brick = list->bricks_offset + sizeof(trip_file_brick);
+    size_t counted = list->counts_offset + 2 * 5;
+    (void)state;
+    try_whole("slab", slab, 8);
+    try_whole("slab", slab + 8, 8);
+    try_whole("slab", slab + 16, 4);
+    try_whole("slab", slab + 20, 4);
+    for (size_t at = 0; at < 12; at += 4)
+        try_whole("brick", brick + at, 4);
+    for (size_t at = 12; at < 16; at += 2)
+        try_whole("brick", brick + at, 2);
+    for (size_t at = 16; at < sizeof(trip_file_brick); at++)
+        try_whole("brick", brick + at, 1);
+    for (size_t at = 0; at < 10; at += 2)
+        try_whole("count", counted + at, 2);
+}
+
+static unsigned random_below(unsigned count)
+{
+    return (unsigned)(test_random() * count);
+}
+
+static void records(void **state)
+{
+    int rounds = limits_rounds(RECORDS);
+    (void)state;
+    for (int i = 0; i < rounds; i++) {
+        char name[96];
+        hostile h;
+        hostile_copy(&h, &shared.sound);
+        hostile_file *f = &h.planes[random_below(HOSTILE_PLANE_FILES)];
+        unsigned changes = 1u << random_below(12);
+        for (unsigned k = 0; k < changes; k++)
+            f->data[random_below((unsigned)f->bytes)] = (unsigned char)random_below(256);
+        snprintf(name, sizeof name, "%u bytes of %s, round %d", changes, f->name, i);
+        judge_changed(name, &h, i % 10 == 0);
+    }
+}
+
+/* Parts of the index moved onto other parts, as no single number does. */
+static void spans_of_the_index(void **state)
+{
+    int rounds = limits_rounds(SPANS);
+    unsigned content = (unsigned)hostile_header(&shared.sound)->checksums_offset;
+    (void)state;
+    for (int i = 0; i < rounds; i++) {
+        char name[96];
+        hostile h;
+        unsigned bytes = 8 * (1 + random_below(32));
+        unsigned from =
+            TRIP_HEADER_BYTES + 8 * random_below((content - TRIP_HEADER_BYTES - bytes) / 8);
+        unsigned to =
+            TRIP_HEADER_BYTES + 8 * random_below((content - TRIP_HEADER_BYTES - bytes) / 8);
+        hostile_copy(&h, &shared.sound);
+        memmove(h.index.data + to, h.index.data + from, bytes);
+        snprintf(name, sizeof name, "%u bytes from %u to %u", bytes, from, to);
+        judge_changed(name, &h, i % 10 == 0);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_headers_whole_numbers),
+        cmocka_unit_test(the_headers_real_numbers),
+        cmocka_unit_test(the_scale_of_the_map_and_of_the_values),
+        cmocka_unit_test(the_lists),
+        cmocka_unit_test(slabs_bricks_and_counts),
+        cmocka_unit_test(records),
+        cmocka_unit_test(spans_of_the_index),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
