@@ -1,0 +1,45 @@
+#include "input_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdbool.h>
+#include <unistd.h>
+
+#include "report.h"
+
+enum { WAIT_MS = 100 }; /* between looks at the interrupt flag */
+
+int trip_input_open(const char *path)
+{
+    return open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+}
+
+/* Until there is something to read, or the end; false when the user wants to stop. A pipe that
+ * nobody has opened for writing yet is not at its end: it is waited for. */
+static bool wait_for_data(int fd)
+{
+    while (!trip_interrupted()) {
+        struct pollfd p = { .fd = fd, .events = POLLIN };
+        if (poll(&p, 1, WAIT_MS) > 0)
+            return true;
+    }
+    errno = EINTR;
+    return false;
+}
+
+ssize_t trip_input_read(int fd, void *to, size_t bytes)
+{
+    size_t done = 0;
+    while (done < bytes) {
+        if (!wait_for_data(fd))
+            return -1;
+        ssize_t n = read(fd, (char *)to + done, bytes - done);
+        if (n == 0)
+            break;
+        if (n < 0 && errno != EAGAIN && errno != EINTR)
+            return -1;
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return (ssize_t)done;
+}
