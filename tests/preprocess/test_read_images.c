@@ -401,6 +401,24 @@ static void slices_too_large_for_the_memory_are_refused(void **state)
     trip_budget_destroy(budget);
 }
 
+/* A window of 1048576 x 1024 pixels in 1.3 kB: its lines are never to be held, 4 GB of them. */
+static void a_picture_that_promises_more_than_the_memory_is_refused(void **state)
+{
+    (void)state;
+    trip_budget *budget;
+    trip_volume *v;
+    assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
+    catch_reports();
+    assert_int_equal(
+        trip_volume_open(&v, TRIP_SOURCE_DIR "/tests/regress/huge_window.exr", NULL, budget),
+        TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(reports, 1);
+    assert_non_null(strstr(reported, "huge_window.exr"));
+    assert_non_null(strstr(reported, "--memory"));
+    trip_budget_destroy(budget);
+}
+
 static void a_stack_can_be_read_again(void **state)
 {
     (void)state;
@@ -446,6 +464,7 @@ int main(void)
         cmocka_unit_test(truncated_slices_are_refused),
         cmocka_unit_test(corrupted_slices_do_no_harm),
         cmocka_unit_test(slices_too_large_for_the_memory_are_refused),
+        cmocka_unit_test(a_picture_that_promises_more_than_the_memory_is_refused),
         cmocka_unit_test(a_stack_can_be_read_again),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
