@@ -1,6 +1,7 @@
 /* Where transfer functions come from: names and files. */
 #include "tf_internal.h"
 
+#include "input_file.h"
 #include "report.h"
 
 #include <errno.h>
@@ -34,23 +35,24 @@ static int fail_to_open(const char *path)
 /* Reads at most TRIP_TF_MAX_FILE_BYTES; *text is the caller's to free. */
 static int read_file(const char *path, char **text, size_t *bytes)
 {
-    FILE *f = fopen(path, "re");
-    if (!f)
+    int fd = trip_input_open(path);
+    if (fd < 0)
         return fail_to_open(path);
     char *buffer = malloc(TRIP_TF_MAX_FILE_BYTES + 1);
+    ssize_t n = buffer ? trip_input_read(fd, buffer, TRIP_TF_MAX_FILE_BYTES + 1) : 0;
     int status = TRIP_OK;
-    if (!buffer) {
+    if (!buffer)
         status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path, "out of memory");
-    } else {
-        *bytes = fread(buffer, 1, TRIP_TF_MAX_FILE_BYTES + 1, f);
-        if (ferror(f))
-            status = trip_fail_errno(TRIP_TF_STAGE, path, "cannot read");
-        else if (*bytes > TRIP_TF_MAX_FILE_BYTES)
-            status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,
-                               "longer than %d MiB; this is not a transfer function",
-                               TRIP_TF_MAX_FILE_BYTES >> 20);
-    }
-    fclose(f);
+    else if (n < 0 && trip_interrupted())
+        status = trip_fail(TRIP_INTERRUPTED, TRIP_TF_STAGE, path, "interrupted");
+    else if (n < 0)
+        status = trip_fail_errno(TRIP_TF_STAGE, path, "cannot read");
+    else if (n > TRIP_TF_MAX_FILE_BYTES)
+        status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,
+                           "longer than %d MiB; this is not a transfer function",
+                           TRIP_TF_MAX_FILE_BYTES >> 20);
+    *bytes = n > 0 ? (size_t)n : 0;
+    close(fd);
     if (status) {
         free(buffer);
         buffer = NULL;
