@@ -143,6 +143,8 @@ def blobs(alpha):
 
 
 class Orientation(program.ProgramTest):
+    default = None
+
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -170,6 +172,14 @@ class Orientation(program.ProgramTest):
         self.assertLess(head[0] + 10, left[0], about)
         self.assertLess(head[1] + 15, nose[1], about)
         self.assertLess(nose[1] + 4, left[1], about)
+
+    def check_same_default(self, about):
+        """As of the first acquisition; what is fitted into the picture are other voxels each time."""
+        picture = self.picture("a.trip", "--size=96x96")
+        if self.default is None:
+            type(self).default = picture
+            self.assertGreater(abs(picture - picture[:, ::-1]).mean(), 0.05)  # has no symmetry
+        self.alike(picture, self.default, about, most=0.6, mean=0.02)
 
     def check_markers(self, camera, to_patient, about):
         """Each is where it is projected, and nothing shows elsewhere."""
@@ -219,6 +229,7 @@ class Orientation(program.ProgramTest):
             if own is None:
                 own = picture
                 self.check_markers(camera, to_patient, about)
+                self.check_same_default(about)
             self.check_default_view(about)
             # The same grid: nothing but gradients along other axes, which are rounded.
             self.alike(picture, own, about, most=0.005, mean=1e-4)
