@@ -98,7 +98,8 @@ static void set_quantiser(brick *b, double lo, double hi)
     double most = b->in.scanned ? b->in.tally->value_max : hi;
     b->quantiser =
         (trip_quantiser){ lo, hi > lo ? hi : lo + 1,
-                          trip_gradient_bound(b->in.info, least, most > least ? most : least + 1) };
+                          trip_gradient_bound(b->in.info, least, most > least ? most : least + 1),
+                          trip_gradient_unit(&b->in.info->index_to_world) };
 }
 
 /* Codes stand for the type's values, or for the range if it is known; else that is for the end. */

@@ -266,8 +266,9 @@ static uint32_t normal_of(const trip_tile *t, const trip_quantiser *q, unsigned 
 {
     if (t->format.quantised)
         return t->normals[position];
+    double scale = q->gradient_scale * (q->gradient_unit > 0 ? q->gradient_unit : 1);
     uint32_t magnitude =
-        trip_normal_pack((const double[3]){ t->magnitudes[position] }, q->gradient_scale) >> 24;
+        trip_normal_pack((const double[3]){ t->magnitudes[position] }, scale) >> 24;
     return magnitude ? t->normals[position] | magnitude << 24 : 0;
 }
 

@@ -8,7 +8,7 @@
  *                words 0, one uint16 a splat; whichever is shorter
  *   values       codes (uint16), or float32 while the range of the values is not known yet
  *   normals      packed (uint32); then without their magnitude while that range is not known
- *   magnitudes   float32, of gradients, while the range is not known */
+ *   magnitudes   float32, of gradients per gradient_unit, while the range is not known */
 #ifndef TRIP_PIECE_H
 #define TRIP_PIECE_H
 
@@ -28,6 +28,7 @@ enum {
 typedef struct trip_quantiser {
     double lo, hi;
     double gradient_scale;
+    double gradient_unit; /* trip_gradient_unit() of magnitudes that wait; 0: 1 */
 } trip_quantiser;
 
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)

@@ -1,5 +1,6 @@
 #include "splats.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -24,6 +25,7 @@ struct trip_splatter {
     trip_splat_params params;
     trip_budget *budget;
     double to_world[3][3]; /* of gradients: the inverse transpose of index_to_world */
+    double gradient_unit;
     int64_t edge;
     unsigned words;       /* of the bitmap of an edge x edge square */
     uint16_t spread[128]; /* bits of a coordinate at the even places */
@@ -99,6 +101,7 @@ static void fill_map(trip_splatter *s)
 {
     trip_affine to_index;
     trip_affine_invert(&s->params.info->index_to_world, &to_index);
+    s->gradient_unit = trip_gradient_unit(&s->params.info->index_to_world);
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++)
             s->to_world[row][column] = to_index.m[column][row];
@@ -234,7 +237,7 @@ static void put_normals(const view *v, const kept_row *r)
         }
         double magnitude = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
         to[x] = trip_normal_pack(g, magnitude) & 0xffffff;
-        v->w->magnitudes[r->index + x] = (float)magnitude;
+        v->w->magnitudes[r->index + x] = (float)fmin(magnitude * v->s->gradient_unit, FLT_MAX);
     }
 }
 
@@ -435,6 +438,12 @@ uint64_t trip_splatter_kept(const trip_splatter *s)
     for (unsigned i = 0; i < s->params.threads; i++)
         kept += workspace_of(s, i)->kept;
     return kept;
+}
+
+double trip_gradient_unit(const trip_affine *index_to_world)
+{
+    double voxel = cbrt(fabs(trip_affine_determinant(index_to_world)));
+    return voxel > 0 && isfinite(voxel) ? ldexp(1, ilogb(voxel)) : 1;
 }
 
 double trip_gradient_bound(const trip_volume_info *info, double lo, double hi)

@@ -40,6 +40,10 @@ int trip_splatter_box(trip_splatter *s, unsigned thread, const trip_box *box);
 void trip_splatter_tally(const trip_splatter *s, trip_tally *out);
 uint64_t trip_splatter_kept(const trip_splatter *s);
 
+/* A power of two about a voxel's length: gradients that wait for their range, in floats, do so as
+ * values per this, which no unit of the world takes out of a float's range. */
+double trip_gradient_unit(const trip_affine *index_to_world);
+
 /* A bound of the magnitude of world-space gradients, by central differences, of values that are in
  * [lo, hi], background included: known before anything is read. */
 double trip_gradient_bound(const trip_volume_info *info, double lo, double hi);

@@ -151,7 +151,7 @@ static int run(const char *name, const run_params *p, uint64_t *spilled)
 {
     building b;
     trip_workers *producers;
-    trip_quantiser q = { 0, 1, 1 };
+    trip_quantiser q = { .hi = 1, .gradient_scale = 1 };
     open_building(&b, name, p);
     assert_int_equal(trip_workers_create(&producers, p->producers), 0);
     int status = 0;

@@ -96,6 +96,8 @@ static void close_bench(bench *b)
 static void gather(bench *b, int axis, uint32_t *voxels, uint32_t *normals)
 {
     trip_tile *tile;
+    trip_quantiser q = b->quantiser;
+    q.gradient_unit = trip_gradient_unit(&b->info.index_to_world);
     size_t count = (size_t)(b->dims[0] * b->dims[1] * b->dims[2]);
     memset(voxels, 0xff, count * sizeof *voxels);
     memset(normals, 0xff, count * sizeof *normals);
@@ -107,7 +109,7 @@ static void gather(bench *b, int axis, uint32_t *voxels, uint32_t *normals)
         assert_true(trip_piece_check(piece, &b->format, bytes));
         at += bytes;
         trip_tile_add(tile, piece);
-        uint32_t splats = trip_tile_take(tile, &b->quantiser, &v, &n);
+        uint32_t splats = trip_tile_take(tile, &q, &v, &n);
         uint64_t morton = piece->key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
         int64_t tile_u = 0, tile_v = 0, p[3];
         while (trip_morton((uint32_t)tile_u, 0) != (morton & UINT64_C(0x5555555555555555)))
