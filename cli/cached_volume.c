@@ -205,7 +205,8 @@ static int make(search *s)
     return status;
 }
 
-static int find_or_make(search *s)
+/* 1: it is there. */
+static int find(search *s)
 {
     cached_volume *v = s->v;
     int status = find_key(s);
@@ -213,12 +214,10 @@ static int find_or_make(search *s)
         status = TRIP_ERROR;
     s->params.output = v->path;
     s->params.most_bytes = v->folder.limit_bytes;
-    if (status == 0 && !take(s))
-        status = make(s);
-    return status;
+    return status == 0 ? take(s) : status;
 }
 
-int cached_volume_open(cached_volume *v, const trip_brick_params *wanted)
+static int open_volume(cached_volume *v, const trip_brick_params *wanted, bool making)
 {
     search s = { .v = v, .params = *wanted, .progress = trip_progress_start(false) };
     s.params.progress = on_brick_progress;
@@ -226,11 +225,27 @@ int cached_volume_open(cached_volume *v, const trip_brick_params *wanted)
     *v = (cached_volume){ .hold = -1 };
     int status = cache_folder_open(&v->folder, true);
     if (status == 0)
-        status = find_or_make(&s);
+        status = find(&s);
+    if (status == 0 && making)
+        status = make(&s);
     trip_progress_end(&s.progress);
     trip_source_free(&s.source);
     free(s.options);
     return status;
+}
+
+int cached_volume_find(cached_volume *v, const trip_brick_params *wanted)
+{
+    int status = open_volume(v, wanted, false);
+    if (status == 0)
+        cached_volume_close(v);
+    return status;
+}
+
+int cached_volume_open(cached_volume *v, const trip_brick_params *wanted)
+{
+    int status = open_volume(v, wanted, true);
+    return status > 0 ? 0 : status;
 }
 
 void cached_volume_close(cached_volume *v)

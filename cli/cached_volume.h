@@ -25,6 +25,8 @@ bool cached_volume_wanted(const char *input);
 /* `wanted` says all but the output. Progress is shown on a terminal. Close it also after a failure.
  */
 int cached_volume_open(cached_volume *v, const trip_brick_params *wanted);
+/* The same where it is there already: 1; else 0. */
+int cached_volume_find(cached_volume *v, const trip_brick_params *wanted);
 void cached_volume_close(cached_volume *v);
 
 /* After drawing failed: looks whether the data set is damaged, and removes it then. */

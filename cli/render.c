@@ -29,22 +29,29 @@ typedef struct drawing {
     bool counting; /* the frames are drawn once more, and everything of them */
 } drawing;
 
-/* What the function shows is kept besides what is shown without one, so that nothing is missing;
- * everything where a window moves it, so that the next window finds it in the cache. */
-static int brick_volume(drawing *d)
+/* What is kept of a volume: what is shown by default, and what the function shows besides, so that
+ * nothing is missing; everything where a window moves it, so that the next window finds it in the
+ * cache. */
+static trip_brick_params brick_params(const render_options *o, const session_look *look)
 {
     enum { MOST_THREADS = 256 };
-    const render_options *o = &d->o;
-    const trip_brick_params wanted = {
+    bool all = look->window > 0;
+    return (trip_brick_params){
         .input = o->input,
         .volume = o->volume,
-        .functions = &o->function.tf,
-        .function_count = o->function.tf ? 1 : 0,
+        .functions = &look->tf,
+        .function_count = look->tf && !all ? 1 : 0,
         .automatic = true,
-        .keep_all = o->function.window > 0,
+        .keep_all = all,
         .memory_bytes = o->memory_bytes,
         .threads = (unsigned)(o->threads < MOST_THREADS ? o->threads : MOST_THREADS),
     };
+}
+
+static int brick_volume(drawing *d)
+{
+    const render_options *o = &d->o;
+    const trip_brick_params wanted = brick_params(o, &o->function);
     int status = cached_volume_open(&d->volume, &wanted);
     if (status == 0 && d->volume.note[0])
         trip_note(o->input, "%s", d->volume.note);
@@ -53,14 +60,42 @@ static int brick_volume(drawing *d)
     return status;
 }
 
+/* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
+ * function shows; 0: it does not. */
+static int open_usual(drawing *d, session_look look)
+{
+    const trip_brick_params usual = brick_params(&d->o, &(session_look){ 0 });
+    bool missing = false;
+    int status = look.tf || look.window > 0 ? cached_volume_find(&d->volume, &usual) : 0;
+    if (status != 1)
+        return status;
+    look.missing = &missing;
+    status = session_open(&d->session, d->volume.path, &look, d->o.memory_bytes);
+    if (!missing || status < 0)
+        return status < 0 ? status : 1;
+    session_close(&d->session);
+    cached_volume_close(&d->volume);
+    return 0;
+}
+
+static int open_volume(drawing *d)
+{
+    session_look look = d->o.function;
+    look.name = d->o.input;
+    int status = open_usual(d, look);
+    if (status != 0)
+        return status < 0 ? status : 0;
+    status = brick_volume(d);
+    return status == 0 ? session_open(&d->session, d->volume.path, &look, d->o.memory_bytes)
+                       : status;
+}
+
 static int open_drawing(drawing *d)
 {
     const render_options *o = &d->o;
-    bool volume = cached_volume_wanted(o->input);
-    int status = volume ? brick_volume(d) : 0;
-    if (!status)
-        status = session_open(&d->session, volume ? d->volume.path : o->input, &o->function,
-                              o->memory_bytes);
+    int status = cached_volume_wanted(o->input)
+                     ? open_volume(d)
+                     : session_open(&d->session, o->input, &o->function, o->memory_bytes);
     if (!status)
         status = session_take_image(&d->session, o->width, o->height, &d->rgba);
     if (!status)

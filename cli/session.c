@@ -8,6 +8,15 @@
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 
+/* Whether the caller is told that values which show were left out. */
+static bool tell_missing(const session *s, const trip_tf *tf, const session_look *look)
+{
+    double range[2];
+    if (look->missing)
+        *look->missing = trip_dataset_text_culled(s->text, tf, range) >= 1;
+    return look->missing && *look->missing;
+}
+
 static void warn_of_culled_values(const session *s, const trip_tf *tf, const session_look *look)
 {
     double range[2], voxels = trip_dataset_text_culled(s->text, tf, range);
@@ -46,7 +55,7 @@ static int load_transfer_function(session *s, const session_look *look)
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
     int status = load_function(s, look, &tf);
-    if (!status) {
+    if (!status && !tell_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
         warn_of_culled_values(s, tf, look);
         double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
@@ -68,7 +77,7 @@ static int take_table(session *s)
 
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
 {
-    *s = (session){ .input = input };
+    *s = (session){ .input = look->name ? look->name : input };
     int status = trip_budget_create(&s->budget, memory_bytes);
     if (!status)
         status = trip_dataset_open(&s->data, input, s->budget);

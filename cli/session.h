@@ -22,6 +22,8 @@ typedef struct session_look {
     const char *tf;       /* file or preset */
     double opacity_scale; /* of extinction; 0: 1 */
     double window, level; /* what the function's domain spans; window 0: not moved */
+    const char *name;     /* the input's in messages; NULL: the data set's path */
+    bool *missing;        /* set, in the place of a warning, where values that show were left out */
 } session_look;
 
 /* Warns when the function shows values that were left out when the data set was made, with the

@@ -136,6 +136,26 @@ class Cache(program.ProgramTest):
         program.write("all.tf", b"0 0 1 0 0.1\n255 0 0 1 0.1\n")
         self.differ(self.draw("noise.nrrd", "--tf", "all.tf", bricked=True), drawn)
 
+    def test_the_usual_data_set_serves_every_function_that_shows_no_more(self):
+        values = program.ball((20, 20, 20))
+        program.write_nrrd("ball.nrrd", values)
+        self.draw("ball.nrrd", bricked=True)
+        program.write("few.tf", b"150 1 0 0 0\n199 0 0 1 0.1\n200 0 0 1 0.1\n")
+        drawn = self.draw("ball.nrrd", "--tf", "few.tf", bricked=False)
+        self.same(drawn, self.two_steps("ball.nrrd", "--tf", "few.tf"))
+        self.assertEqual(len(self.entries()), 1)
+
+    def test_a_window_shows_what_the_automatic_function_leaves_out(self):
+        values = program.noise((16, 16, 16))
+        program.write_nrrd("noise.nrrd", values)
+        window = ["--tf", "grey", "--window", "60", "--level", "40"]
+        drawn = self.draw("noise.nrrd", *window, bricked=True)
+        wanted = self.two_steps("noise.nrrd", *window, brick=["--keep-all"])
+        self.assertLess(abs(drawn - wanted).max(), 1 / 255)
+        self.same(self.draw("noise.nrrd", *window, bricked=False), drawn)
+        run = self.works("render", "noise.nrrd", "-o", "x.png", *SIZE, *window)
+        self.assertEqual(run.stderr, "")
+
     # Never stale
 
     def test_a_changed_file_is_drawn_anew(self):
