@@ -15,6 +15,7 @@ enum {
     KEY_GRID = 256,
     KEY_LEVEL_SET,
     KEY_SPACING,
+    KEY_ALLOW_GAPS,
     KEY_SIZE,
     KEY_EYE,
     KEY_LOOK,
@@ -52,13 +53,6 @@ enum {
 
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
-    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it settled):", 0 },
-    { "grid", KEY_GRID, "NAME", 0,
-      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 0 },
-    { "level-set", KEY_LEVEL_SET, "HOW", 0,
-      "What to make of an OpenVDB level set: filled or band (default: filled)", 0 },
-    { "spacing", KEY_SPACING, "X,Y,Z", 0,
-      "Distance of voxels along each axis (default: the file's, else 1)", 0 },
     { NULL, 0, NULL, 0, "View:", 1 },
     { "size", KEY_SIZE, "WxH", 0, "Pixels (default: 1024x1024)", 1 },
     { "view", KEY_VIEW, "SIDE", 0,
@@ -126,6 +120,14 @@ static const struct argp_option options[] = {
       "With --stats or --explain: draw everything once more, untimed, hidden bricks too, and count "
       "the splats",
       5 },
+    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it settled):", 6 },
+    { "grid", KEY_GRID, "NAME", 0,
+      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 6 },
+    { "level-set", KEY_LEVEL_SET, "HOW", 0,
+      "What to make of an OpenVDB level set: filled or band (default: filled)", 6 },
+    { "spacing", KEY_SPACING, "X,Y,Z", 0,
+      "Distance of voxels along each axis (default: the file's, else 1)", 6 },
+    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", 6 },
     { 0 },
 };
 
@@ -217,6 +219,9 @@ static int parse_volume(int key, char *arg, trip_volume_params *v)
         return trip_option_level_set(arg, &v->level_set);
     case KEY_SPACING:
         return trip_option_spacing(arg, v->spacing);
+    case KEY_ALLOW_GAPS:
+        v->allow_gaps = true;
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -404,9 +409,11 @@ static int check(parse *p)
     if (!o->output)
         return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
     const trip_volume_params *v = &o->volume;
-    if ((v->grid || v->level_set || v->spacing[0] > 0) && !cached_volume_wanted(o->input))
-        return trip_option_fail(o->input,
-                                "is a data set: --grid, --level-set and --spacing are for volumes");
+    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->allow_gaps) &&
+        !cached_volume_wanted(o->input))
+        return trip_option_fail(
+            o->input,
+            "is a data set: --grid, --level-set, --spacing and --allow-gaps are for volumes");
     int status = check_view(p);
     if (status)
         return status;

@@ -14,6 +14,7 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 
 # Option: wrong values; None where it takes none.
 BRICK = {
+    "--allow-gaps": None,
     "--endian": NAMES,
     "--level-set": NAMES + ["refuse"],
     "--offset": ["", "-1", "x", "1.5", "9" * 30],
@@ -38,6 +39,7 @@ BRICK = {
     "--output": [],
 }
 RENDER = {
+    "--allow-gaps": None,
     "--grid": [],
     "--level-set": NAMES + ["refuse"],
     "--spacing": POINTS + ["0,1,1", "-1,1,1"],
