@@ -73,21 +73,20 @@ static void end_line(line *l, bool terminal)
     l->text[l->length++] = '\n';
 }
 
+static _Thread_local trip_held_report *held;
+
 /* One write(2) a line, so that lines of several threads do not mix. */
-static void emit(line *l)
+static void emit(const char *text)
 {
-    if (l->cut) {
-        memcpy(l->text + l->length, "...", 3);
-        l->length += 3;
-    }
-    l->text[l->length] = 0;
+    line l = { .length = strlen(text) };
     if (report_sink) {
-        report_sink(l->text, report_user);
+        report_sink(text, report_user);
         return;
     }
-    end_line(l, isatty(STDERR_FILENO) == 1);
-    for (size_t done = 0; done < l->length;) {
-        ssize_t n = write(STDERR_FILENO, l->text + done, l->length - done);
+    memcpy(l.text, text, l.length);
+    end_line(&l, isatty(STDERR_FILENO) == 1);
+    for (size_t done = 0; done < l.length;) {
+        ssize_t n = write(STDERR_FILENO, l.text + done, l.length - done);
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
@@ -96,8 +95,17 @@ static void emit(line *l)
     }
 }
 
-__attribute__((format(printf, 3, 0))) static void report(const char *what, const char *where,
-                                                         const char *why, va_list args)
+static void finish_line(line *l)
+{
+    if (l->cut) {
+        memcpy(l->text + l->length, "...", 3);
+        l->length += 3;
+    }
+    l->text[l->length] = 0;
+}
+
+__attribute__((format(printf, 4, 0))) static void
+report(bool failure, const char *what, const char *where, const char *why, va_list args)
 {
     int saved_errno = errno;
     char text[LINE_BYTES];
@@ -109,7 +117,11 @@ __attribute__((format(printf, 3, 0))) static void report(const char *what, const
     if (where && *where)
         put_where(&l, where);
     put_visible(&l, text);
-    emit(&l);
+    finish_line(&l);
+    if (!failure || !held)
+        emit(l.text);
+    else if (!*held->line)
+        memcpy(held->line, l.text, l.length + 1);
     errno = saved_errno;
 }
 
@@ -120,7 +132,7 @@ int trip_fail(int status, const char *what, const char *where, const char *why, 
 {
     va_list args;
     va_start(args, why);
-    report(what, where, why, args);
+    report(true, what, where, why, args);
     va_end(args);
     return status;
 }
@@ -128,7 +140,10 @@ int trip_fail(int status, const char *what, const char *where, const char *why, 
 int trip_fail_errno(const char *what, const char *where, const char *action)
 {
     char buffer[256];
-    const char *reason = strerror_r(errno, buffer, sizeof buffer);
+    const char *reason = errno == EFBIG
+                             ? "larger than files may be here: see the limit on file sizes "
+                               "(ulimit -f) and the file system's own"
+                             : strerror_r(errno, buffer, sizeof buffer);
     if (action && *action)
         return trip_fail(TRIP_ERROR, what, where, "%s: %s", action, reason);
     return trip_fail(TRIP_ERROR, what, where, "%s", reason);
@@ -138,7 +153,7 @@ void trip_warn(const char *where, const char *why, ...)
 {
     va_list args;
     va_start(args, why);
-    report("warning", where, why, args);
+    report(false, "warning", where, why, args);
     va_end(args);
 }
 
@@ -146,8 +161,26 @@ void trip_note(const char *where, const char *what, ...)
 {
     va_list args;
     va_start(args, what);
-    report("note", where, what, args);
+    report(false, "note", where, what, args);
     va_end(args);
+}
+
+void trip_report_hold(trip_held_report *h)
+{
+    *h->line = 0;
+    h->before = held;
+    held = h;
+}
+
+void trip_report_release(trip_held_report *h)
+{
+    held = h->before;
+}
+
+void trip_report_print(const trip_held_report *h)
+{
+    if (*h->line)
+        emit(h->line);
 }
 
 static void on_signal(int number)
@@ -165,6 +198,7 @@ void trip_interrupt_install(void)
     interrupted = 0;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    signal(SIGXFSZ, SIG_IGN);
 }
 
 int trip_interrupted(void)

@@ -36,11 +36,25 @@ __attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const ch
 /* Prints "triptych: note: WHERE: what": a choice made for the user, and how to make another. */
 __attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *what, ...);
 
+/* Failures of this thread, of which the first is kept instead of printed: of work that is shared
+ * out only the first failure of all is told. */
+typedef struct trip_held_report {
+    char line[4096];
+    struct trip_held_report *before; /* what held this thread's failures when this began */
+} trip_held_report;
+
+/* From here on `h` keeps this thread's failures, until release, on the same thread. */
+void trip_report_hold(trip_held_report *h);
+void trip_report_release(trip_held_report *h);
+/* Prints what was kept, if anything. */
+void trip_report_print(const trip_held_report *h);
+
 /* Where lines go instead of stderr, for tests; NULL restores stderr. Not thread-safe to change. */
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
 
 /* Installs handlers for SIGINT and SIGTERM that only set a flag; long loops poll the flag and
- * return trip_fail(TRIP_INTERRUPTED, ...). A second signal ends the process at once. */
+ * return trip_fail(TRIP_INTERRUPTED, ...). A second signal ends the process at once. Writing beyond
+ * a limit on file sizes becomes an error (EFBIG) instead of the end of the process. */
 void trip_interrupt_install(void);
 int trip_interrupted(void);
 

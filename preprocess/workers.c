@@ -40,11 +40,11 @@ unsigned trip_workers_processors(void)
     return count < 1 ? 1 : (unsigned)count;
 }
 
-static bool take_item(trip_workers *w, uint64_t *item, int status)
+static bool take_item(trip_workers *w, uint64_t *item)
 {
     pthread_mutex_lock(&w->lock);
-    if (status < 0 && w->status == 0)
-        w->status = status;
+    if (w->status == 0 && w->next_item < w->items && trip_interrupted())
+        w->status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
     bool some = w->status == 0 && w->next_item < w->items;
     if (some)
         *item = w->next_item++;
@@ -52,12 +52,28 @@ static bool take_item(trip_workers *w, uint64_t *item, int status)
     return some;
 }
 
+/* True for the first one of a loop. */
+static bool note_failure(trip_workers *w, int status)
+{
+    pthread_mutex_lock(&w->lock);
+    bool first = w->status == 0;
+    if (first)
+        w->status = status;
+    pthread_mutex_unlock(&w->lock);
+    return first;
+}
+
 static void run_loop(trip_workers *w, unsigned thread)
 {
+    trip_held_report report;
     uint64_t item;
-    int status = 0;
-    while (take_item(w, &item, status))
-        status = w->work(w->user, thread, item);
+    while (take_item(w, &item)) {
+        trip_report_hold(&report);
+        int status = w->work(w->user, thread, item);
+        trip_report_release(&report);
+        if (status < 0 && note_failure(w, status))
+            trip_report_print(&report);
+    }
 }
 
 /* Waits for a loop later than `seen`; false when the pool is being destroyed. */

@@ -10,7 +10,7 @@
 typedef struct trip_workers trip_workers;
 
 /* One item; `thread` is 0 .. count - 1. A negative status stops the loop: items not begun are left
- * out. */
+ * out. The first failure only is reported. A signal to stop ends the loop as a failure does. */
 typedef int (*trip_work)(void *user, unsigned thread, uint64_t item);
 
 /* Processors that the process may run on. */

@@ -1,9 +1,7 @@
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "test.h"
 
-#include <cmocka.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
 
 #include "workers.h"
@@ -101,6 +99,55 @@ static void waiting_may_be_cut_short(void **state)
     trip_workers_destroy(pool);
 }
 
+/* Each item waits for the others, so that all fail. */
+static int fail_together(void *user, unsigned thread, uint64_t item)
+{
+    (void)thread;
+    pthread_barrier_wait(user);
+    trip_fail(TRIP_ERROR, "read", "a.vdb", "item %d is corrupt", (int)item);
+    return trip_fail(TRIP_ERROR, "read", "a.vdb", "once more, of item %d", (int)item);
+}
+
+static void a_failure_of_several_threads_at_once_is_reported_once(void **state)
+{
+    (void)state;
+    enum { THREADS = 4 };
+    trip_workers *w;
+    pthread_barrier_t all;
+    assert_int_equal(pthread_barrier_init(&all, NULL, THREADS), 0);
+    assert_int_equal(trip_workers_create(&w, THREADS), 0);
+    test_catch_reports();
+    assert_int_equal(trip_workers_run(w, fail_together, &all, THREADS), TRIP_ERROR);
+    assert_one_report("is corrupt");
+    trip_workers_destroy(w);
+    pthread_barrier_destroy(&all);
+}
+
+static int count_up(void *user, unsigned thread, uint64_t item)
+{
+    _Atomic unsigned *done = user;
+    (void)thread;
+    (void)item;
+    ++*done;
+    return 0;
+}
+
+static void a_signal_to_stop_ends_a_loop_with_one_report(void **state)
+{
+    (void)state;
+    trip_workers *w;
+    _Atomic unsigned done = 0;
+    assert_int_equal(trip_workers_create(&w, 3), 0);
+    trip_interrupt_install();
+    raise(SIGINT);
+    test_catch_reports();
+    assert_int_equal(trip_workers_run(w, count_up, &done, 1000), TRIP_INTERRUPTED);
+    assert_one_report("interrupted");
+    assert_int_equal(done, 0);
+    trip_interrupt_install();
+    trip_workers_destroy(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -108,6 +155,8 @@ int main(void)
         cmocka_unit_test(a_failure_stops_the_loop_and_is_told),
         cmocka_unit_test(a_loop_of_nothing_is_over_at_once),
         cmocka_unit_test(waiting_may_be_cut_short),
+        cmocka_unit_test(a_failure_of_several_threads_at_once_is_reported_once),
+        cmocka_unit_test(a_signal_to_stop_ends_a_loop_with_one_report),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
