@@ -103,12 +103,18 @@ int trip_dense_rewind(void *state)
     return trip_byte_stream_rewind(d->stream);
 }
 
+/* Between reads of this length a signal is seen. */
+#define READ_BYTES_MAX ((uint64_t)32 << 20)
+
 /* The next bytes, over the borders of files; to nowhere when `to` is NULL. */
 static int take_bytes(dense_file *d, uint64_t bytes, char *to)
 {
     while (bytes > 0) {
         int status = d->left_bytes == 0 ? open_source(d, d->current + 1) : 0;
         uint64_t n = bytes < d->left_bytes ? bytes : d->left_bytes;
+        n = to && n > READ_BYTES_MAX ? READ_BYTES_MAX : n;
+        if (status == 0 && trip_interrupted())
+            status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
         if (status == 0)
             status = to ? trip_byte_stream_read(d->stream, to, (size_t)n)
                         : trip_byte_stream_skip(d->stream, n);

@@ -4,7 +4,7 @@
 
 #include "report.h"
 
-enum { LOOK_PIECES = 4096 };
+enum { LOOK_PIECES = 512 };
 
 int trip_list_output_create(trip_list_output *o, int axis, const trip_piece_format *f,
                             trip_writer *writer, trip_budget *budget)

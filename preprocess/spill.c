@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "flusher.h"
 #include "folder.h"
 #include "report.h"
 
@@ -172,19 +173,15 @@ int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count
 
 static int write_buffer(trip_spill *s, size_t bytes)
 {
-    for (size_t done = 0; done < bytes;) {
-        ssize_t n = pwrite(s->file, s->buffer + done, bytes - done, (off_t)(s->offset + done));
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n == 0 || (n < 0 && (errno == ENOSPC || errno == EDQUOT)))
-            return trip_fail(TRIP_ERROR, "brick", s->path,
-                             "no space left on the disk after %llu bytes of temporary data: free "
-                             "some, write elsewhere, or allow more --memory",
-                             (unsigned long long)(s->offset + done));
-        if (n < 0)
-            return trip_fail_errno("brick", s->path, "cannot write");
-        done += (size_t)n;
-    }
+    int error = trip_flusher_write(s->file, s->buffer, bytes, s->offset);
+    if (error == ENOSPC || error == EDQUOT)
+        return trip_fail(TRIP_ERROR, "brick", s->path,
+                         "no space left on the disk after %llu bytes of temporary data: free "
+                         "some, write elsewhere, or allow more --memory",
+                         (unsigned long long)s->offset);
+    errno = error;
+    if (error)
+        return trip_fail_errno("brick", s->path, "cannot write");
     s->offset += bytes;
     s->used = 0;
     return 0;
