@@ -10,6 +10,7 @@
 #include <cjson/cJSON.h>
 
 #include "json.h"
+#include "new_file.h"
 #include "render_view.h"
 #include "report.h"
 #include "text.h"
@@ -117,9 +118,8 @@ int render_stats_add_camera(render_stats *s, const trip_camera_params *view)
     return added ? 0 : out_of_memory();
 }
 
-static bool write_text(const char *path, const char *text)
+static bool write_text(FILE *f, const char *text)
 {
-    FILE *f = fopen(path, "w");
     if (!f)
         return false;
     bool good = fputs(text, f) >= 0 && fputs("\n", f) >= 0;
@@ -135,15 +135,17 @@ static bool is_special(const char *path)
 
 static int write_file(const char *path, const char *text)
 {
-    char partial[4096];
-    bool special = is_special(path);
-    if (snprintf(partial, sizeof partial, "%s.partial", path) >= (int)sizeof partial)
-        return trip_fail(TRIP_ERROR, "write", path, "the name is too long");
-    if (write_text(special ? path : partial, text) && (special || rename(partial, path) == 0))
-        return 0;
-    int status = trip_fail_errno("write", path, "cannot write");
-    if (!special)
-        unlink(partial);
+    trip_new_file file;
+    if (is_special(path))
+        return write_text(fopen(path, "we"), text) ? 0
+                                                   : trip_fail_errno("write", path, "cannot write");
+    int status = trip_new_file_begin(&file, "write", path);
+    if (status < 0)
+        return status;
+    if (write_text(fdopen(dup(file.fd), "w"), text))
+        return trip_new_file_finish(&file);
+    status = trip_fail_errno("write", path, "cannot write");
+    trip_new_file_abandon(&file);
     return status;
 }
 

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "fields.h"
+#include "new_file.h"
 #include "report.h"
 #include "write_vdb.h"
 
@@ -168,23 +169,23 @@ static bool ends_with(const char *text, const char *end)
 
 static int generate(job *j)
 {
-    char partial[4096];
-    if (snprintf(partial, sizeof partial, "%s.partial", j->output) >= (int)sizeof partial)
-        return trip_fail(TRIP_USAGE, "generate", j->output, "the name is too long");
-    int status;
-    if (ends_with(j->output, ".vdb")) {
-        j->type = SAMPLE_F32;
-        status = write_sparse(j, partial);
-    } else if (ends_with(j->output, ".nrrd") || ends_with(j->output, ".raw")) {
-        status = write_dense(j, partial, ends_with(j->output, ".nrrd"));
-    } else {
+    trip_new_file file;
+    bool sparse = ends_with(j->output, ".vdb"), header = ends_with(j->output, ".nrrd");
+    if (!sparse && !header && !ends_with(j->output, ".raw"))
         return trip_fail(TRIP_USAGE, "generate", j->output,
                          "the name must end in .nrrd, .raw or .vdb");
-    }
-    if (status == TRIP_OK && rename(partial, j->output) != 0)
-        status = trip_fail_errno("generate", j->output, "cannot rename to");
+    int status = trip_new_file_begin(&file, "generate", j->output);
     if (status != TRIP_OK)
-        unlink(partial);
+        return status;
+    if (sparse) {
+        j->type = SAMPLE_F32;
+        status = write_sparse(j, file.temporary);
+    } else {
+        status = write_dense(j, file.temporary, header);
+    }
+    if (status == TRIP_OK)
+        return trip_new_file_finish(&file);
+    trip_new_file_abandon(&file);
     return status;
 }
 

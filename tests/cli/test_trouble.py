@@ -1,6 +1,8 @@
 """A machine in the way: no rights, a full disk, too little memory, Ctrl-C, a closed standard output.
 One line, exit status 1, and nothing under the final name."""
+import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -127,6 +129,73 @@ class Trouble(program.ProgramTest):
             self.assertEqual(os.listdir("disk"), ["filler"])
         finally:
             subprocess.run(["umount", "disk"], check=True)
+
+    def test_limit_on_file_sizes(self):
+        def limited():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (200000, 200000))
+
+        for arguments in (
+            ("brick", "cloud.nrrd", "-o", "out.trip", "-q", "--keep-all"),
+            ("brick", "cloud.nrrd", "-o", "out.trip", "-q", "--keep-all", "--memory", "28M"),
+        ):
+            self.fails(1, *arguments, preexec_fn=limited, says="ulimit -f")
+        picture = ("render", "small.trip", "-o", "out.exr", "--size", "600x600")
+        self.fails(1, *picture, "--background", "0.3,0.5,0.7", preexec_fn=limited)
+        self.assertEqual(leftovers(), [])
+
+    def test_links_and_modes_where_stats_go(self):
+        draw = ("render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", "s.json")
+        with open("victim", "w") as f:
+            f.write("not to be touched")
+        os.symlink("victim", "s.json.partial")
+        with open("s.json", "w") as f:
+            os.chmod("s.json", 0o600)
+        self.works(*draw)
+        with open("victim") as f:
+            self.assertEqual(f.read(), "not to be touched")
+        with open("s.json") as f:
+            self.assertEqual(json.load(f)["size"], [20, 20])
+        self.assertEqual(os.stat("s.json").st_mode & 0o777, 0o600)
+        self.assertTrue(os.path.islink("s.json.partial"))
+
+    def test_foreign_file_in_a_data_set_that_is_to_be_replaced(self):
+        shutil.copytree("small.trip", "out.trip")
+        with open("out.trip/notes.txt", "w") as f:
+            f.write("mine")
+        self.fails(1, "brick", "small.nrrd", "-o", "out.trip", "-q", "--force", says="notes.txt")
+        self.assertEqual(leftovers(), ["out.trip"])
+        self.works("info", "--verify", "out.trip")
+        os.remove("out.trip/notes.txt")
+        self.works("brick", "small.nrrd", "-o", "out.trip", "-q", "--force")
+        self.assertEqual(leftovers(), ["out.trip"])
+        shutil.rmtree("out.trip")
+
+    # Ctrl-C
+
+    def test_a_pipe_that_nobody_writes_to_can_be_interrupted(self):
+        os.mkfifo("f.tf")
+        for arguments in ("brick", "small.nrrd"), ("render", "small.trip"):
+            output = "out.trip" if arguments[0] == "brick" else "out.png"
+            process = program.start(*arguments, "-o", output, "--tf", "f.tf")
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+            self.assertEqual(process.returncode, 1, err)
+            self.assertRegex(err.decode(), r"\Atriptych: [^\n]*interrupted\n\Z")
+            self.assertEqual(leftovers(), [])
+
+    def test_a_pipe_is_read_when_it_is_written_to(self):
+        os.mkfifo("g.tf")
+        process = program.start(
+            "render", "small.trip", "-o", "s.png", "--size", "20x20", "--tf", "g.tf"
+        )
+        with open("g.tf", "w") as f:
+            f.write("values data\n0 1 1 1 0\n")
+            f.flush()
+            time.sleep(0.3)
+            f.write("255 1 1 1 1\n")
+        out, err = process.communicate(timeout=60)
+        self.assertEqual((process.returncode, err), (0, b""))
 
     def test_standard_output_full_or_closed(self):
         for arguments in (
