@@ -1,0 +1,151 @@
+/* What an interrupted run of `brick` left: the journal from the input, with right checksums. What
+ * is accepted must be safe to go on with, and be in bounds. The first byte says what kind of run
+ * reads it; then records: a byte of kind, two of length, the bytes. */
+#include "fuzz.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "journal.h"
+
+enum {
+    SLICE_VOXELS = 64 * 64,
+    SLICES = 64,
+    VOXELS = SLICE_VOXELS * SLICES,
+    PIECES_BYTES = 1 << 20
+};
+
+static char folder[64];
+
+static void make_folder(void)
+{
+    strcpy(folder, access("/dev/shm", W_OK) == 0 ? "/dev/shm/fuzz-XXXXXX" : "/tmp/fuzz-XXXXXX");
+    FUZZ_PROMISE(mkdtemp(folder));
+}
+
+static FILE *create(const char *name)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "wb");
+    FUZZ_PROMISE(f);
+    return f;
+}
+
+enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEGMENTS, KINDS };
+
+/* Records are long and mostly zero: the input gives how they begin, and after a byte of how many,
+ * the segments of a checkpoint before that. */
+static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t size)
+{
+    size_t segments = kind == CHECKPOINT_WITH_SEGMENTS && size ? data[0] % 8 : 0;
+    size_t body = kind == RAW     ? size
+                  : kind == START ? sizeof(trip_journal_start)
+                                  : sizeof(trip_checkpoint);
+    size_t bytes = body + segments * sizeof(trip_segment);
+    unsigned char *record = calloc(1, bytes + 1);
+    if (segments && size > 1 + segments * sizeof(trip_segment)) {
+        memcpy(record + body, data + 1, segments * sizeof(trip_segment));
+        data += 1 + segments * sizeof(trip_segment);
+        size -= 1 + segments * sizeof(trip_segment);
+    }
+    memcpy(record, data, size < body ? size : body);
+    const uint64_t number = kind == CHECKPOINT_WITH_SEGMENTS ? CHECKPOINT : kind;
+    const uint64_t head[3] = { number, bytes, XXH64(record, bytes, number) };
+    fwrite(head, sizeof head, 1, f);
+    fwrite(record, bytes, 1, f);
+    free(record);
+}
+
+static void write_files(const uint8_t *data, size_t size)
+{
+    FILE *journal = create("journal"), *runs = create("runs"), *pieces = create("pieces");
+    while (size >= 3) {
+        size_t bytes = data[1] | (size_t)data[2] << 8;
+        bytes = bytes < size - 3 ? bytes : size - 3;
+        write_record(journal, data[0] % KINDS, data + 3, bytes);
+        data += 3 + bytes;
+        size -= 3 + bytes;
+    }
+    fclose(journal);
+    FUZZ_PROMISE(ftruncate(fileno(runs), 1000 * sizeof(trip_run_record)) == 0);
+    fclose(runs);
+    FUZZ_PROMISE(ftruncate(fileno(pieces), PIECES_BYTES) == 0);
+    fclose(pieces);
+}
+
+/* A tally that was accepted can be added to another, and made a histogram of. */
+static void use_tally(const trip_tally *t)
+{
+    static trip_tally sum;
+    static trip_histogram histogram;
+    const float values[4] = { -1e30f, 3e-40f, 1, 1e30f };
+    trip_tally_histogram(t, &histogram);
+    for (size_t count = 0; count <= 4; count++) {
+        trip_tally_clear(&sum);
+        trip_tally_range(&sum, values, NULL, count);
+        trip_tally_count(&sum, values, NULL, count);
+        trip_tally_add(&sum, t);
+        FUZZ_PROMISE(sum.voxels == t->voxels + count);
+        trip_tally_histogram(&sum, &histogram);
+    }
+}
+
+static void check_segments(const trip_spill *spill)
+{
+    uint64_t end = 0;
+    for (size_t i = 0; i < trip_spill_count(spill); i++) {
+        const trip_segment *s = trip_spill_segment(spill, i);
+        FUZZ_PROMISE(s->axis < 3 && s->offset >= end && s->bytes <= PIECES_BYTES);
+        end = s->offset + s->bytes;
+        FUZZ_PROMISE(end <= PIECES_BYTES);
+    }
+    FUZZ_PROMISE(trip_spill_bytes(spill) <= PIECES_BYTES);
+}
+
+static void check_journal(const trip_journal *j, const trip_journal_params *p,
+                          const trip_spill *spill)
+{
+    const trip_journal_start *start = trip_journal_get_start(j);
+    const trip_checkpoint *c = trip_journal_get_checkpoint(j);
+    check_segments(spill);
+    if (start && p->scanned)
+        use_tally(&start->tally);
+    if (!c)
+        return;
+    FUZZ_PROMISE(start && c->kept <= VOXELS && c->ordered_splats <= p->ordered_splats);
+    FUZZ_PROMISE(!p->slice_voxels || c->done <= SLICES);
+    FUZZ_PROMISE(c->runs <= 1000 && c->segments == trip_spill_count(spill));
+    if (!p->scanned)
+        use_tally(&c->tally);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    trip_budget *budget;
+    trip_spill *spill;
+    trip_journal *journal = NULL;
+    if (size < 1)
+        return 0;
+    const trip_journal_params p = { .resume = true,
+                                    .identity = 0,
+                                    .scanned = data[0] & 1,
+                                    .voxels = VOXELS,
+                                    .slice_voxels = data[0] & 2 ? SLICE_VOXELS : 0,
+                                    .ordered_splats = 5000 };
+    make_folder();
+    write_files(data + 1, size - 1);
+    FUZZ_PROMISE(trip_budget_create(&budget, 1 << 24) == 0);
+    FUZZ_PROMISE(trip_spill_open(&spill, folder, true, budget) == 0);
+    if (trip_journal_open(&journal, spill, &p, budget) == 0)
+        check_journal(journal, &p, spill);
+    trip_journal_close(journal);
+    trip_spill_keep(spill, false);
+    trip_spill_close(spill);
+    trip_budget_destroy(budget);
+    return 0;
+}
