@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -22,6 +23,7 @@ typedef struct line {
 static void (*report_sink)(const char *line, void *user);
 static void *report_user;
 static volatile sig_atomic_t interrupted;
+static atomic_bool told_interruption; /* since the signal */
 
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user)
 {
@@ -95,6 +97,13 @@ static void emit(const char *text)
     }
 }
 
+/* A signal ends the work of all threads, and is one fault. */
+static void tell(int status, const char *text)
+{
+    if (status != TRIP_INTERRUPTED || !interrupted || !atomic_exchange(&told_interruption, true))
+        emit(text);
+}
+
 static void finish_line(line *l)
 {
     if (l->cut) {
@@ -105,7 +114,7 @@ static void finish_line(line *l)
 }
 
 __attribute__((format(printf, 4, 0))) static void
-report(bool failure, const char *what, const char *where, const char *why, va_list args)
+report(int status, const char *what, const char *where, const char *why, va_list args)
 {
     int saved_errno = errno;
     char text[LINE_BYTES];
@@ -118,10 +127,12 @@ report(bool failure, const char *what, const char *where, const char *why, va_li
         put_where(&l, where);
     put_visible(&l, text);
     finish_line(&l);
-    if (!failure || !held)
-        emit(l.text);
-    else if (!*held->line)
+    if (status == TRIP_OK || !held) {
+        tell(status, l.text);
+    } else if (!*held->line) {
         memcpy(held->line, l.text, l.length + 1);
+        held->status = status;
+    }
     errno = saved_errno;
 }
 
@@ -132,7 +143,7 @@ int trip_fail(int status, const char *what, const char *where, const char *why, 
 {
     va_list args;
     va_start(args, why);
-    report(true, what, where, why, args);
+    report(status, what, where, why, args);
     va_end(args);
     return status;
 }
@@ -153,7 +164,7 @@ void trip_warn(const char *where, const char *why, ...)
 {
     va_list args;
     va_start(args, why);
-    report(false, "warning", where, why, args);
+    report(TRIP_OK, "warning", where, why, args);
     va_end(args);
 }
 
@@ -161,7 +172,7 @@ void trip_note(const char *where, const char *what, ...)
 {
     va_list args;
     va_start(args, what);
-    report(false, "note", where, what, args);
+    report(TRIP_OK, "note", where, what, args);
     va_end(args);
 }
 
@@ -180,7 +191,7 @@ void trip_report_release(trip_held_report *h)
 void trip_report_print(const trip_held_report *h)
 {
     if (*h->line)
-        emit(h->line);
+        tell(h->status, h->line);
 }
 
 static void on_signal(int number)
@@ -196,6 +207,7 @@ void trip_interrupt_install(void)
     struct sigaction action = { .sa_handler = on_signal, .sa_flags = SA_RESTART };
     sigemptyset(&action.sa_mask);
     interrupted = 0;
+    told_interruption = false;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGXFSZ, SIG_IGN);

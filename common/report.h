@@ -40,6 +40,7 @@ __attribute__((format(printf, 2, 3))) void trip_note(const char *where, const ch
  * out only the first failure of all is told. */
 typedef struct trip_held_report {
     char line[4096];
+    int status;
     struct trip_held_report *before; /* what held this thread's failures when this began */
 } trip_held_report;
 
@@ -53,8 +54,9 @@ void trip_report_print(const trip_held_report *h);
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
 
 /* Installs handlers for SIGINT and SIGTERM that only set a flag; long loops poll the flag and
- * return trip_fail(TRIP_INTERRUPTED, ...). A second signal ends the process at once. Writing beyond
- * a limit on file sizes becomes an error (EFBIG) instead of the end of the process. */
+ * return trip_fail(TRIP_INTERRUPTED, ...), of which one is told. A second signal ends the process
+ * at once. Writing beyond a limit on file sizes becomes an error (EFBIG) instead of the end of the
+ * process. */
 void trip_interrupt_install(void);
 int trip_interrupted(void);
 

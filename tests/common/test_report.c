@@ -136,6 +136,18 @@ static void first_signal_sets_a_flag(void **state)
     assert_true(trip_interrupted());
 }
 
+static void an_interruption_is_told_once(void **state)
+{
+    (void)state;
+    trip_interrupt_install();
+    raise(SIGINT);
+    test_catch_reports();
+    assert_int_equal(trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted"), TRIP_INTERRUPTED);
+    assert_int_equal(trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted"), TRIP_INTERRUPTED);
+    assert_one_report("triptych: brick: interrupted");
+    trip_interrupt_install();
+}
+
 static void second_signal_ends_the_process(void **state)
 {
     (void)state;
@@ -166,6 +178,7 @@ int main(void)
         cmocka_unit_test(reporting_leaves_errno_alone),
         cmocka_unit_test(without_a_sink_lines_go_to_stderr),
         cmocka_unit_test(first_signal_sets_a_flag),
+        cmocka_unit_test(an_interruption_is_told_once),
         cmocka_unit_test(second_signal_ends_the_process),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
