@@ -217,9 +217,11 @@ void trip_tally_add(trip_tally *t, const trip_tally *other)
     t->counted += other->counted;
 }
 
+/* Values are floats. */
 static bool check_range(double lo, double hi)
 {
-    return fabs(lo) <= FLT_MAX && fabs(hi) <= FLT_MAX && lo <= hi;
+    return fabs(lo) <= FLT_MAX && fabs(hi) <= FLT_MAX && lo <= hi && (double)(float)lo == lo &&
+           (double)(float)hi == hi;
 }
 
 /* Bins of values in [lo, hi] only, none wider than such a range needs: adding to a tally of a wider

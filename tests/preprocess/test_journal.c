@@ -216,6 +216,7 @@ ATTACK(bin_behind_the_range, checkpoint()->tally.counts[TRIP_TALLY_BINS - 1] = 1
 ATTACK(bins_overflowing, checkpoint()->tally.counts[0] = UINT64_MAX)
 ATTACK(value_not_a_number, checkpoint()->tally.value_min = NAN)
 ATTACK(value_beyond_floats, checkpoint()->tally.value_max = 1e300)
+ATTACK(value_between_floats, checkpoint()->tally.value_min = 1e-310)
 ATTACK(range_upside_down, checkpoint()->tally.value_max = checkpoint()->tally.value_min - 1)
 ATTACK(none_finite_but_counted, checkpoint()->tally.finite = 0)
 ATTACK(a_voxel_more, checkpoint()->tally.voxels++)
@@ -261,6 +262,7 @@ static void numbers_that_no_run_writes_are_refused(void **state)
         { "bins overflowing", bins_overflowing },
         { "value not a number", value_not_a_number },
         { "value beyond floats", value_beyond_floats },
+        { "value between floats", value_between_floats },
         { "range upside down", range_upside_down },
         { "none finite but counted", none_finite_but_counted },
         { "a voxel more", a_voxel_more },
