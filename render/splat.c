@@ -106,8 +106,9 @@ bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *
     return set_bounds(f, ray, out);
 }
 
-/* In front of the eye by so little nothing is an ellipse, whatever overflows. */
-static const double nearest = 1e-30;
+/* Voxels in front of the eye. So near the plane of the eye every support crosses it and is no
+ * ellipse, whatever divides by what rounding left of 0. */
+static const double nearest = 1e-6;
 
 bool trip_splat_is_broken(const trip_splat *s)
 {

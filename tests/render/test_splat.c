@@ -173,6 +173,27 @@ static void splats_behind_or_across_the_plane_of_the_eye_are_not_drawn(void **st
     assert_false(trip_splat_project(&f, trip_v3(0.5, -9, 0), &s));
 }
 
+static void what_rounding_leaves_of_a_voxel_in_the_plane_of_the_eye_is_not_drawn(void **state)
+{
+    (void)state;
+    trip_camera_params p = { .eye = { 60, 50, 55 },
+                             .look = { 30, 40, 50 },
+                             .up = { 0, 0, 1 },
+                             .fov_degrees = 75,
+                             .width = 96,
+                             .height = 80 };
+    trip_affine identity = trip_affine_identity();
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &p, &identity), 0);
+    trip_settings settings = trip_settings_default();
+    trip_splat_frame f = trip_splat_frame_make(&c, &settings);
+    trip_splat s;
+    /* (30, 10, 5) . (5, -4, -22) = 0 */
+    assert_false(trip_splat_project(&f, trip_v3(65, 46, 33), &s));
+    assert_true(fabs(s.z) < 1e-12);
+    assert_false(trip_splat_is_broken(&s));
+}
+
 static void the_stretch_is_the_world_length_of_an_index_step_along_the_ray(void **state)
 {
     (void)state;
@@ -199,6 +220,7 @@ int main(void)
         cmocka_unit_test(minified_splats_are_as_wide_as_the_low_pass),
         cmocka_unit_test(a_round_splat_before_an_upright_grid_is_a_circle_of_known_size),
         cmocka_unit_test(splats_behind_or_across_the_plane_of_the_eye_are_not_drawn),
+        cmocka_unit_test(what_rounding_leaves_of_a_voxel_in_the_plane_of_the_eye_is_not_drawn),
         cmocka_unit_test(the_stretch_is_the_world_length_of_an_index_step_along_the_ray),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
