@@ -60,7 +60,7 @@ class Records(program.ProgramTest):
         for name in self.renderers:
             self.fails(
                 1, "render", path, "-o", "b.exr", f"--renderer={name}", "--size=40x40",
-                says="x.voxels: byte 12: the splat is outside its brick's bounds",
+                says="voxels: byte 12: the splat is outside its brick's bounds",
             )
 
     def test_a_code_outside_the_bricks_range(self):

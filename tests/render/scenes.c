@@ -211,6 +211,18 @@ double scene_difference(const scene_picture *a, const scene_picture *b)
     return test_most_apart(a->rgba, b->rgba, 4 * (size_t)a->width * (size_t)a->height);
 }
 
+void scene_compare_counts(const trip_list_stats *expected, const trip_list_stats *counts,
+                          const char *name)
+{
+    double drawn = (double)expected->splats_drawn;
+    double apart = fabs(drawn - (double)counts->splats_drawn);
+    assert_int_equal(expected->splats_read, counts->splats_read);
+    assert_int_equal(expected->bytes_read, counts->bytes_read);
+    assert_int_equal(expected->splats_projected, counts->splats_projected);
+    if (!(apart <= 1 + 2e-4 * drawn))
+        fail_msg("%s: %.0f splats drawn, %.0f apart", name, drawn, apart);
+}
+
 trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distance,
                               double fov_degrees, int size)
 {

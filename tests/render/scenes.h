@@ -77,6 +77,12 @@ static inline const float *scene_pixel(const scene_picture *p, int x, int y)
 /* Largest difference of any component. */
 double scene_difference(const scene_picture *a, const scene_picture *b);
 
+/* Counts of a list by the reference and by a renderer, whose kernels may work in single precision:
+ * of the splats drawn, those whose edge all but meets a pixel centre may count for one and not for
+ * the other. */
+void scene_compare_counts(const trip_list_stats *expected, const trip_list_stats *counts,
+                          const char *name);
+
 /* A view of the volume's middle from a direction (world space, from the middle to the eye). */
 trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distance,
                               double fov_degrees, int size);

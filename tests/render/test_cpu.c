@@ -19,19 +19,6 @@ static double mean_difference(const scene_picture *a, const scene_picture *b)
 /* What instruction sets may differ by: they round alike but for fused products. */
 #define SETS_DIFFER (0.05 / 255)
 
-/* The kernels' own counts: they work in single precision, so that a pixel centre that a support's
- * edge all but meets may count for one and not for the other. */
-static void compare_counts(const trip_list_stats *expected, const trip_list_stats *p,
-                           const char *isa)
-{
-    double apart = fabs((double)expected->splats_drawn - (double)p->splats_drawn);
-    assert_int_equal(expected->splats_read, p->splats_read);
-    assert_int_equal(expected->bytes_read, p->bytes_read);
-    assert_int_equal(expected->splats_projected, p->splats_projected);
-    if (!(apart <= 1 + 2e-4 * (double)expected->splats_drawn))
-        fail_msg("%s: %.0f splats drawn, %.0f apart", isa, (double)expected->splats_drawn, apart);
-}
-
 /* Within 1/255 everywhere, 0.05/255 on average, and the same counts, with every instruction set;
  * and these like one another. */
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
@@ -44,7 +31,7 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
         if (!(most <= 1.0 / 255 && mean <= 0.05 / 255))
             fail_msg("%s: most %.4f, mean %.5f of 1/255", (*isa)->isa, 255 * most, 255 * mean);
         for (int axis = 0; axis < 3; axis++)
-            compare_counts(&expected.stats.lists[axis], &p.stats.lists[axis], (*isa)->isa);
+            scene_compare_counts(&expected.stats.lists[axis], &p.stats.lists[axis], (*isa)->isa);
         if (first.rgba) {
             double apart = scene_difference(&first, &p);
             if (!(apart <= SETS_DIFFER))
