@@ -19,14 +19,18 @@ SIZE = ["--size", "40x40", "--renderer", "cpu"]
 
 
 def tree(folder):
-    """Every path below it, with what files hold."""
+    """Every path below it, with what files hold and where links lead."""
     found = {}
     for base, folders, files in os.walk(folder):
         for name in folders:
             found[os.path.join(base, name)] = None
         for name in files:
-            with open(os.path.join(base, name), "rb") as f:
-                found[os.path.join(base, name)] = f.read()
+            path = os.path.join(base, name)
+            if os.path.islink(path):
+                found[path] = os.readlink(path)
+                continue
+            with open(path, "rb") as f:
+                found[path] = f.read()
     return found
 
 
