@@ -1,61 +1,13 @@
 /* Volume files of every format, whole: no crash and no leak, memory within the budget, and blocks
  * within the volume. The first byte says which name the file gets. */
-#include "fuzz.h"
-
-#include "volume.h"
-
-#include <stdio.h>
-#include <unistd.h>
-
-enum { MEMORY_BYTES = 64 << 20, MOST_BLOCKS = 64 };
+#include "volume_file.h"
 
 static const char *const extensions[] = { "nii", "vol", "vdb", "nrrd", "nii.gz" };
 
-/* A corner of the block with its neighbours. */
-static void decode(const trip_volume *v, const trip_block *b)
-{
-    float values[6 * 6 * 6];
-    uint8_t active[6 * 6 * 6];
-    int64_t lo[3], size[3];
-    for (int a = 0; a < 3; a++) {
-        lo[a] = b->origin[a] - 1;
-        size[a] = (b->size[a] < 4 ? b->size[a] : 4) + 2;
-    }
-    (void)trip_block_decode(v, b, lo, size, values, active);
-}
-
-static void read_through(trip_volume *v)
-{
-    const trip_volume_info *info = trip_volume_get_info(v);
-    trip_block b;
-    for (int i = 0; i < MOST_BLOCKS && trip_volume_next(v, 1, &b) == 1; i++) {
-        for (int a = 0; a < 3; a++) {
-            FUZZ_PROMISE(info->dims[a] >= 1 && b.size[a] >= 1);
-            FUZZ_PROMISE(b.origin[a] >= 0 && b.origin[a] <= info->dims[a] - b.size[a]);
-        }
-        decode(v, &b);
-        trip_block_release(v, &b);
-    }
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    char path[64];
-    trip_volume *v;
-    trip_budget *budget;
-    if (size < 1)
-        return 0;
-    const size_t kinds = sizeof extensions / sizeof *extensions;
-    snprintf(path, sizeof path, "/dev/shm/fuzz-%d.%s", (int)getpid(), extensions[data[0] % kinds]);
-    FILE *f = fopen(path, "wb");
-    FUZZ_PROMISE(f && fwrite(data + 1, 1, size - 1, f) == size - 1 && fclose(f) == 0);
-    FUZZ_PROMISE(trip_budget_create(&budget, MEMORY_BYTES) == 0);
-    if (trip_volume_open(&v, path, NULL, budget) == 0) {
-        read_through(v);
-        trip_volume_close(v);
-    }
-    FUZZ_PROMISE(trip_budget_left_bytes(budget) == MEMORY_BYTES);
-    trip_budget_destroy(budget);
-    unlink(path);
+    if (size >= 1)
+        fuzz_volume_file(data + 1, size - 1,
+                         extensions[data[0] % (sizeof extensions / sizeof *extensions)]);
     return 0;
 }

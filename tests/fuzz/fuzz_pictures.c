@@ -1,0 +1,10 @@
+/* Pictures and DICOM slices, read by the helper program in its own process: whatever they hold, the
+ * helper's end included, this side reports it and goes on. A start of the helper each makes it
+ * slow. */
+#include "volume_file.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    fuzz_volume_file(data, size, "picture");
+    return 0;
+}
