@@ -627,6 +627,13 @@ static int end_frame(trip_renderer *base, float *rgba)
     return trip_frame_poll();
 }
 
+/* Tiles of the last flush may still be blended. */
+static void abort_frame(trip_renderer *base)
+{
+    cpu *r = (cpu *)base;
+    trip_cpu_pool_wait(r->pool, &r->blend_job);
+}
+
 static void stats(const trip_renderer *base, trip_list_stats lists[3])
 {
     memcpy(lists, ((const cpu *)base)->stats, 3 * sizeof *lists);
@@ -641,8 +648,6 @@ static void destroy(trip_renderer *base)
 {
     cpu *r = (cpu *)base;
     trip_budget *budget = r->budget;
-    if (r->pool)
-        trip_cpu_pool_wait(r->pool, &r->blend_job);
     trip_cpu_pool_destroy(r->pool);
     release_tiles(r);
     for (int i = 0; i < 2; i++)
@@ -660,6 +665,7 @@ static const trip_renderer_ops cpu_ops = {
     .begin_list = begin_list,
     .draw = draw,
     .end_frame = end_frame,
+    .abort_frame = abort_frame,
     .stats = stats,
 };
 

@@ -165,6 +165,8 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
     double merge_start = now_ms();
     if (!status)
         status = renderer->ops->end_frame(renderer, rgba);
+    if (status && renderer->ops->abort_frame)
+        renderer->ops->abort_frame(renderer);
     while (d.held_count > 0) /* the image is there, or is given up */
         release_oldest(&d);
     if (status)

@@ -65,6 +65,9 @@ typedef struct trip_renderer_ops {
     /* Merges the layers, puts the background behind, and gives width * height * 4 floats,
      * premultiplied, row 0 at the top. */
     int (*end_frame)(trip_renderer *r, float *rgba);
+    /* The frame is given up: returns when nothing that it is drawn from is in use. NULL: nothing is
+     * between the other calls. */
+    void (*abort_frame)(trip_renderer *r);
     /* Counts of the frame just ended, by axis (bytes_read is the caller's). */
     void (*stats)(const trip_renderer *r, trip_list_stats lists[3]);
 } trip_renderer_ops;

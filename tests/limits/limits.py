@@ -104,9 +104,12 @@ class Test(unittest.TestCase):
     def tell(self, text):
         print(f"    {text}", flush=True)
 
-    def works(self, name, *arguments, **popen):
+    def works(self, name, *arguments, warns="", **popen):
+        """Ends well and silently, or with one line of warning that holds `warns`."""
         r = run(name, *arguments, **popen)
-        self.assertEqual((r.status, r.err), (0, ""), f"{name} {arguments}")
+        self.assertEqual((r.status, r.err.count("\n")), (0, 1 if warns else 0),
+                         f"{name} {arguments}: {r.err}")
+        self.assertIn(warns, r.err)
         return r
 
     def fails(self, name, *arguments, says="", **popen):

@@ -93,7 +93,8 @@ class Hidden(limits.Test):
         read = {memory: [sum(axis["bytes_read"] for axis in frame["lists"].values())
                          for frame in drawn] for memory, drawn in frames.items()}
         self.tell(f"bytes read by each frame: {read}")
-        self.assertEqual(read["1G"][0], read["24M"][0])
+        # The same but for pages that two reads share, of which smaller slots make more.
+        self.assertAlmostEqual(read["1G"][0], read["24M"][0], delta=0.01 * read["24M"][0])
         self.assertLess(sum(read["1G"]), 0.7 * sum(read["24M"]))
         self.assertEqual(read["1G"][2:], [0, 0])  # from behind: the lists of the first two
         for frame in frames["1G"][2:]:
