@@ -312,6 +312,8 @@ static void plan_is_interrupted(const scene *s, const trip_camera_params *view)
     trip_plan plan;
     trip_settings settings = trip_settings_default();
     assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    trip_interrupt_install();
+    raise(SIGINT);
     test_catch_reports();
     assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget),
                      TRIP_INTERRUPTED);
