@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "dataset_text.h"
+#include "new_file.h"
 #include "options.h"
 #include "progress.h"
 #include "report.h"
@@ -246,31 +247,19 @@ static int write_all(const char *path, int fd, const char *text)
     return fsync(fd) == 0 ? 0 : trip_fail_errno("write", path, NULL);
 }
 
-/* Under another name until it is complete. */
 static int write_file(const options *o, const char *text)
 {
     const char *path = o->words[2];
-    char *temporary;
     struct stat st;
-    bool there = lstat(path, &st) == 0;
-    if (there && !o->force)
+    trip_new_file file;
+    if (lstat(path, &st) == 0 && !o->force)
         return trip_fail(TRIP_ERROR, "tf", path, "is there already; --force replaces it");
-    if (asprintf(&temporary, "%s.XXXXXX", path) < 0)
-        return trip_fail(TRIP_ERROR, "tf", path, "out of memory");
-    mode_t mask = umask(0);
-    umask(mask);
-    int fd = mkstemp(temporary);
-    int status = fd < 0 ? trip_fail_errno("write", path, "cannot make a file beside it")
-                        : write_all(path, fd, text);
-    if (!status && fchmod(fd, there ? st.st_mode & 0777 : 0666 & ~mask) != 0)
-        status = trip_fail_errno("write", path, NULL);
-    if (!status && rename(temporary, path) != 0)
-        status = trip_fail_errno("write", path, "cannot rename to it");
-    if (fd >= 0)
-        close(fd);
-    if (fd >= 0 && status)
-        unlink(temporary);
-    free(temporary);
+    int status = trip_new_file_begin(&file, "write", path);
+    if (!status)
+        status = write_all(path, file.fd, text);
+    if (!status)
+        return trip_new_file_finish(&file);
+    trip_new_file_abandon(&file);
     return status;
 }
 
