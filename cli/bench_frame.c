@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "cpu_renderer.h"
+#include "cpu/cpu_renderer.h"
 #include "report.h"
 
 double bench_now_ms(void)

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "cached_volume.h"
-#include "cpu_renderer.h"
+#include "cpu/cpu_renderer.h"
 #include "frame.h"
 #include "image_file.h"
 #include "progress.h"

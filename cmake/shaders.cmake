@@ -1,8 +1,8 @@
 # Embeds the shaders, and the header that C and GLSL share, into the binary: generates
-# gl_shader_text.c, an array of names and texts (render/gl_shader_text.h). Included by
+# shader_text.c, an array of names and texts (render/gl/shader_text.h). Included by
 # render/CMakeLists.txt; runs itself as a script at build time when a shader has changed.
 if(CMAKE_SCRIPT_MODE_FILE)
-    set(code "#include \"gl_shader_text.h\"\n\n")
+    set(code "#include \"gl/shader_text.h\"\n\n")
     set(table "")
     foreach(file IN LISTS TRIP_SHADER_FILES)
         get_filename_component(name ${file} NAME)
@@ -23,8 +23,8 @@ function(trip_embed_shaders target)
     file(GLOB files CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/shaders/*.vert
          ${CMAKE_SOURCE_DIR}/shaders/*.frag ${CMAKE_SOURCE_DIR}/shaders/*.comp
          ${CMAKE_SOURCE_DIR}/shaders/*.glsl)
-    list(APPEND files ${CMAKE_SOURCE_DIR}/render/gl_shared.h)
-    set(output ${CMAKE_CURRENT_BINARY_DIR}/gl_shader_text.c)
+    list(APPEND files ${CMAKE_SOURCE_DIR}/render/gl/shared.h)
+    set(output ${CMAKE_CURRENT_BINARY_DIR}/shader_text.c)
     add_custom_command(
         OUTPUT ${output}
         COMMAND ${CMAKE_COMMAND} "-DTRIP_SHADER_FILES=${files}" -DTRIP_SHADER_OUTPUT=${output}

@@ -1,6 +1,6 @@
 // The number type of a pass: float, or double where TRIP_DOUBLE is defined (counts and weights,
 // which must agree with the reference in every decision), and the frame's constants in it.
-#include "gl_shared.h"
+#include "shared.h"
 
 #ifdef TRIP_DOUBLE
 #define real double

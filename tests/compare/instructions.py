@@ -13,7 +13,7 @@ import tempfile
 ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain"]
 
 # The functions whose cost, with all they call, is a stage's: those of the kernels' table
-# (render/cpu_kernels.h), of render/cpu_show.h and of render/cpu_bin.h, which no compiler can hide.
+# (render/cpu/kernels/kernels.h), of render/cpu/show.h and of render/cpu/bin.h, which no compiler can hide.
 STAGES = {
     "hiding": ["trip_cpu_show"],
     "projection": ["stage", "project"],

@@ -1,6 +1,6 @@
 /* The pictures of the reference and the CPU renderer have the same bits whatever tiles, slabs,
  * rings, engines, caches and threads brought the bytes, in whatever order reads end. */
-#include "cpu_renderer.h"
+#include "cpu/cpu_renderer.h"
 #include "renderer_choice.h"
 #include "rounds.h"
 #include "scenes.h"

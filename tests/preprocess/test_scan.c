@@ -125,8 +125,8 @@ static int scan_raw(trip_tally *t, const char *type, int64_t nx, int64_t ny, int
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
     assert_int_equal(trip_workers_create(&workers, threads), 0);
     assert_int_equal(trip_volume_open(&volume, test_path("v.raw"), &p, budget), 0);
-    int status = trip_scan_volume(t, volume, "v.raw", workers,
-                                  &(trip_scan_params){ .slices = 3 }, budget);
+    int status =
+        trip_scan_volume(t, volume, "v.raw", workers, &(trip_scan_params){ .slices = 3 }, budget);
     trip_volume_close(volume);
     trip_workers_destroy(workers);
     trip_budget_destroy(budget);

@@ -1,6 +1,6 @@
 /* The CPU renderer with each instruction set against the reference: grids, views and settings that
  * take different ways through its kernels. Real data: test_gl_views.c. */
-#include "cpu_isa.h"
+#include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "test.h"
 

@@ -1,7 +1,7 @@
 /* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
  * first, and in which order tiles get their splats back. */
-#include "cpu_bin.h"
-#include "cpu_near.h"
+#include "cpu/bin.h"
+#include "cpu/near.h"
 #include "test.h"
 
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Which splats every instruction set leaves out over closed blocks: those without an open block
  * among the pixels of their support, block by block. */
-#include "cpu_isa.h"
-#include "cpu_near.h"
+#include "cpu/kernels/isa.h"
+#include "cpu/near.h"
 #include "scenes.h"
 #include "test.h"
 

@@ -1,8 +1,8 @@
 /* What counts as hidden: never a voxel with a pixel of its support in an open block, by the
  * definition of splats in double precision. */
-#include "cpu_isa.h"
-#include "cpu_near.h"
-#include "cpu_show.h"
+#include "cpu/kernels/isa.h"
+#include "cpu/near.h"
+#include "cpu/show.h"
 #include "scenes.h"
 #include "test.h"
 

@@ -1,6 +1,6 @@
 /* The instruction sets of this build that this processor runs; those it lacks are skipped by name.
  * The other tests of the processor's renderer take those that run. */
-#include "cpu_isa.h"
+#include "cpu/kernels/isa.h"
 #include "test.h"
 
 static void expect_runs(const char *name)

@@ -1,5 +1,5 @@
 /* The short form of a thin splat's opacity against its definition, in double precision. */
-#include "cpu_near.h"
+#include "cpu/near.h"
 #include "test.h"
 
 #include <math.h>

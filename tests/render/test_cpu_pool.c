@@ -1,5 +1,5 @@
 /* The renderer's threads: every task of every job runs once, and is over when the wait is. */
-#include "cpu_pool.h"
+#include "cpu/pool.h"
 #include "test.h"
 
 #include <stdatomic.h>

@@ -1,7 +1,7 @@
 /* What must not change a bit of the CPU renderer's picture: threads, memory, the data's tile and
  * batch sizes, and whether what is hidden is left out. */
-#include "cpu_isa.h"
-#include "cpu_renderer.h"
+#include "cpu/kernels/isa.h"
+#include "cpu/cpu_renderer.h"
 #include "cpu_scenes.h"
 #include "test.h"
 

@@ -1,6 +1,6 @@
 /* Layers of smaller targets, with every instruction set: what a pixel holds there, and how far that
  * takes the picture from the reference. */
-#include "cpu_isa.h"
+#include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "splat.h"
 #include "test.h"

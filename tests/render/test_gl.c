@@ -6,7 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "gl_context.h"
+#include "gl/context.h"
 #include "scenes.h"
 #include "test.h"
 

@@ -1,7 +1,7 @@
 /* Projection knows no scale: volumes of any unit, far from the world's origin, in narrow and in
  * wide views, by every renderer and with every instruction set, against the reference; and bit for
  * bit where the scale is a power of two. */
-#include "cpu_isa.h"
+#include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "splat.h"
 #include "test.h"

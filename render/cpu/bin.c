@@ -1,0 +1,351 @@
+#include "cpu/bin.h"
+
+#include <string.h>
+
+#include "report.h"
+
+/* Room for a splat's places in the tiles' orders, on average; splats that need more are wide, and
+ * their chunks are spread. */
+enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_SEGMENT = 4, SMALLEST_CHUNK = 64 };
+
+/* Places that are written together. */
+enum { AT_A_TIME = 16 };
+
+static void *part(char *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? memory + *at : NULL;
+    *at += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+/* Lays the arrays out in `memory`, or only counts when it is NULL. */
+static size_t lay_out(trip_cpu_flush *f, char *memory)
+{
+    size_t at = 0;
+    f->splats = part(memory, &at, (size_t)f->capacity * sizeof *f->splats);
+    f->order = part(memory, &at, (size_t)f->order_capacity * sizeof *f->order);
+    f->segments = part(memory, &at, (size_t)f->segment_capacity * sizeof *f->segments);
+    f->chunks = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->chunks);
+    f->spread = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->spread);
+    return at;
+}
+
+int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget)
+{
+    f->capacity = capacity;
+    f->order_capacity = capacity * ORDERS_PER_SPLAT;
+    f->segment_capacity = capacity / SPLATS_PER_SEGMENT;
+    f->chunk_capacity = capacity / SMALLEST_CHUNK;
+    f->bytes = lay_out(f, NULL);
+    char *memory = trip_budget_take(budget, f->bytes);
+    if (!memory) {
+        f->bytes = 0;
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "its buffers do not fit the memory given; raise --memory");
+    }
+    lay_out(f, memory);
+    return 0;
+}
+
+void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget)
+{
+    trip_budget_release(budget, f->splats, f->bytes);
+    trip_budget_release(budget, f->shares, f->share_bytes);
+}
+
+int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
+{
+    if (tiles <= f->tile_capacity)
+        return 0;
+    trip_budget_release(budget, f->shares, f->share_bytes);
+    f->tile_capacity = 0;
+    f->share_bytes = tiles * sizeof *f->shares;
+    f->shares = trip_budget_take(budget, f->share_bytes);
+    if (!f->shares) {
+        f->share_bytes = 0;
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "the image's tiles do not fit the memory given; raise --memory or draw a "
+                         "smaller image");
+    }
+    f->tile_capacity = tiles;
+    return 0;
+}
+
+void trip_cpu_flush_empty(trip_cpu_flush *f)
+{
+    f->chunk_count = f->spread_count = 0;
+    atomic_store_explicit(&f->splats_used, 0, memory_order_relaxed);
+    atomic_store_explicit(&f->orders_used, 0, memory_order_relaxed);
+    atomic_store_explicit(&f->segments_used, 0, memory_order_relaxed);
+}
+
+trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f)
+{
+    if (f->chunk_count == f->chunk_capacity || (f->one_by_one && f->chunk_count == 1))
+        return NULL;
+    trip_cpu_chunk *chunk = &f->chunks[f->chunk_count++];
+    *chunk = (trip_cpu_chunk){ 0 };
+    return chunk;
+}
+
+bool trip_cpu_flush_claim(trip_cpu_flush *f, trip_cpu_chunk *chunk, uint32_t splats)
+{
+    uint64_t first = atomic_fetch_add_explicit(&f->splats_used, splats + 1, memory_order_relaxed);
+    chunk->splat = (uint32_t)first;
+    chunk->full = first + splats + 1 > f->capacity;
+    return !chunk->full;
+}
+
+uint32_t trip_cpu_flush_cut(trip_cpu_flush *f)
+{
+    uint32_t first = 0;
+    while (first < f->chunk_count && !f->chunks[first].full)
+        first++;
+    f->one_by_one = first == 0 && f->chunk_count > 0;
+    f->chunk_count = first;
+    if (first == 0)
+        trip_cpu_flush_empty(f);
+    return first;
+}
+
+/* Where the tiles' places begin is not known before all are counted, and a chunk's splats are many:
+ * so they are looked at once, and what follows is done for series of them. Splats come in the order
+ * of squares of voxels, five to ten to a series. */
+static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_series *series)
+{
+    uint32_t found = 0, before = splats[0].tiles;
+    series[0] = (trip_cpu_series){ before, 1 };
+    for (uint32_t i = 1; i < n; i++) {
+        uint32_t tiles = splats[i].tiles;
+        found += (tiles != before) | (tiles & TRIP_CPU_TILES_MORE) / TRIP_CPU_TILES_MORE;
+        before = tiles;
+        series[found] = (trip_cpu_series){ tiles, (uint16_t)(i + 1) };
+    }
+    return found + 1;
+}
+
+typedef struct span {
+    uint32_t first, last; /* tiles counted, inclusive */
+    uint64_t places;
+} span;
+
+/* Tiles of a splat that lies in many. */
+typedef struct reach {
+    uint32_t first, across, down;
+} reach;
+
+static reach reach_of(const trip_cpu_splat *s)
+{
+    return (reach){ s->tiles & TRIP_CPU_TILES_FIRST,
+                    s->x1 / TRIP_CPU_TILE - s->x0 / TRIP_CPU_TILE + 1,
+                    s->y1 / TRIP_CPU_TILE - s->y0 / TRIP_CPU_TILE + 1 };
+}
+
+static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *counts, span *s)
+{
+    reach r = reach_of(splat);
+    for (uint32_t y = 0; y < r.down; y++)
+        for (uint32_t x = 0; x < r.across; x++)
+            counts[r.first + y * across + x]++;
+    uint32_t last = r.first + (r.down - 1) * across + r.across - 1;
+    s->last = last > s->last ? last : s->last;
+    s->places += (uint64_t)r.across * r.down;
+}
+
+/* Whether it also lies in the tile to the right, and in the one below: 0 or 1. */
+static uint32_t right_of(uint32_t tiles)
+{
+    return tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+}
+
+static uint32_t below_of(uint32_t tiles)
+{
+    return tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+}
+
+/* Few lie in more than 2 x 2, so four counts without a branch are cheaper than a loop whose length
+ * the processor cannot guess. */
+static span count(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
+                  uint32_t across, uint32_t *counts)
+{
+    span s = { UINT32_MAX, 0, 0 };
+    uint32_t places = 0, last = 0, from = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t tiles = series[i].tiles, first = tiles & TRIP_CPU_TILES_FIRST;
+        uint32_t right = right_of(tiles), below = below_of(tiles), here = series[i].end - from;
+        s.first = first < s.first ? first : s.first;
+        last = first > last ? first : last;
+        if (tiles & TRIP_CPU_TILES_MORE) {
+            count_wide(&splats[from], across, counts, &s);
+        } else {
+            uint32_t *c = counts + first;
+            c[0] += here;
+            c[1] += here * right;
+            c[across] += here * below;
+            c[across + 1] += here * (right & below);
+            places += here * (right + 1) * (below + 1);
+        }
+        from = series[i].end;
+    }
+    last += across + 1;
+    s.last = last > s.last ? last : s.last;
+    s.places += places;
+    return s;
+}
+
+static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *next,
+                       uint16_t *order, uint16_t index)
+{
+    reach r = reach_of(splat);
+    for (uint32_t y = 0; y < r.down; y++)
+        for (uint32_t x = 0; x < r.across; x++)
+            order[next[r.first + y * across + x]++] = index;
+}
+
+typedef uint16_t places __attribute__((vector_size(2 * AT_A_TIME)));
+
+/* `count` splats from `first` on to the next places of a tile; more may be written behind them. */
+static inline void put(uint16_t *order, uint32_t *next, places first, uint32_t count)
+{
+    memcpy(order + *next, &first, sizeof first);
+    *next += count;
+}
+
+/* The next `count` places, of all tiles that the splats lie in. */
+static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uint32_t tiles,
+                           places first, uint32_t count)
+{
+    uint32_t *c = next + (tiles & TRIP_CPU_TILES_FIRST);
+    uint32_t right = right_of(tiles), below = below_of(tiles);
+    put(order, c, first, count);
+    if (right)
+        put(order, c + 1, first, count);
+    if (below)
+        put(order, c + across, first, count);
+    if (right & below)
+        put(order, c + across + 1, first, count);
+}
+
+/* `next` holds where each tile's next place is. */
+static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
+                  uint32_t across, uint32_t *next, uint16_t *order)
+{
+    places ahead;
+    uint32_t from = 0;
+    for (uint16_t i = 0; i < AT_A_TIME; i++)
+        ahead[i] = i;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t tiles = series[i].tiles, end = series[i].end;
+        if (tiles & TRIP_CPU_TILES_MORE) {
+            place_wide(&splats[from], across, next, order, (uint16_t)from);
+            from = end;
+            continue;
+        }
+        for (; end - from > AT_A_TIME; from += AT_A_TIME)
+            put_all(order, next, across, tiles, ahead + (uint16_t)from, AT_A_TIME);
+        put_all(order, next, across, tiles, ahead + (uint16_t)from, end - from);
+        from = end;
+    }
+}
+
+/* Turns counts into places and makes a segment of every tile that has some. Behind each is room for
+ * what put() writes too much. */
+static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, const span *s,
+                              uint32_t place_at, uint32_t *counts)
+{
+    uint32_t made = chunk->first_segment;
+    for (uint32_t t = s->first; t <= s->last; t++) {
+        uint32_t n = counts[t];
+        if (n == 0)
+            continue;
+        f->segments[made++] = (trip_cpu_segment){
+            .tile = t,
+            .chunk = (uint32_t)(chunk - f->chunks),
+            .first = place_at,
+            .count = n,
+        };
+        counts[t] = place_at;
+        place_at += n + AT_A_TIME;
+    }
+    return made - chunk->first_segment;
+}
+
+static uint32_t occupied(const uint32_t *counts, const span *s)
+{
+    uint32_t n = 0;
+    for (uint32_t t = s->first; t <= s->last; t++)
+        n += counts[t] != 0;
+    return n;
+}
+
+void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
+                  trip_cpu_sorting *sorting)
+{
+    const trip_cpu_splat *splats = f->splats + chunk->splat;
+    uint32_t *counts = sorting->counts;
+    if (chunk->splats == 0)
+        return;
+    uint32_t n = find_series(splats, chunk->splats, sorting->series);
+    span s = count(splats, sorting->series, n, grid.across, counts);
+    uint32_t segments = occupied(counts, &s);
+    uint64_t room = s.places + segments * AT_A_TIME;
+    uint64_t segment = atomic_fetch_add_explicit(&f->segments_used, segments, memory_order_relaxed);
+    uint64_t at = atomic_fetch_add_explicit(&f->orders_used, room, memory_order_relaxed);
+    chunk->spread = segment + segments > f->segment_capacity || at + room > f->order_capacity;
+    if (!chunk->spread) {
+        chunk->first_segment = (uint32_t)segment;
+        chunk->segments = make_segments(f, chunk, &s, (uint32_t)at, counts);
+        place(splats, sorting->series, n, grid.across, counts, f->order);
+    }
+    memset(counts + s.first, 0, (s.last - s.first + 1) * sizeof *counts);
+}
+
+static void append(trip_cpu_flush *f, uint32_t segment)
+{
+    trip_cpu_share *share = &f->shares[f->segments[segment].tile];
+    f->segments[segment].next = TRIP_CPU_NONE;
+    if (share->head == TRIP_CPU_NONE)
+        share->head = segment;
+    else
+        f->segments[share->tail].next = segment;
+    share->tail = segment;
+    share->splats += f->segments[segment].count;
+}
+
+void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask)
+{
+    uint32_t tiles = mask->grid.across * mask->grid.down;
+    for (uint32_t t = 0; t < tiles; t++)
+        f->shares[t] = (trip_cpu_share){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
+    for (uint32_t c = 0; c < f->chunk_count; c++) {
+        const trip_cpu_chunk *chunk = &f->chunks[c];
+        if (chunk->spread)
+            f->spread[f->spread_count++] = c;
+        for (uint32_t i = 0; i < chunk->segments; i++) {
+            uint32_t segment = chunk->first_segment + i;
+            if (!trip_cpu_tile_is_closed(mask, f->segments[segment].tile))
+                append(f, segment);
+        }
+    }
+    for (uint32_t i = 0; i < f->spread_count; i++)
+        for (uint32_t t = 0; t < tiles; t++)
+            f->shares[t].splats += f->chunks[f->spread[i]].splats;
+}
+
+void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
+                         void (*take)(void *user, const trip_cpu_splat *splats,
+                                      const uint16_t *order, uint32_t count),
+                         void *user)
+{
+    uint32_t segment = f->shares[tile].head, spread = 0;
+    while (segment != TRIP_CPU_NONE || spread < f->spread_count) {
+        const trip_cpu_segment *s = segment == TRIP_CPU_NONE ? NULL : &f->segments[segment];
+        if (spread < f->spread_count && (!s || f->spread[spread] < s->chunk)) {
+            const trip_cpu_chunk *chunk = &f->chunks[f->spread[spread++]];
+            take(user, f->splats + chunk->splat, NULL, chunk->splats);
+        } else {
+            take(user, f->splats + f->chunks[s->chunk].splat, f->order + s->first, s->count);
+            segment = s->next;
+        }
+    }
+}

@@ -1,0 +1,17 @@
+#include "cpu/count.h"
+
+#include "weight.h"
+
+bool trip_cpu_is_projected(const trip_cpu_view *view, const trip_run *run, uint32_t voxel)
+{
+    const trip_camera *camera = &view->splat.camera;
+    double p[3];
+    p[view->axis] = run->sheet;
+    p[view->u_axis] = run->u + (int)trip_voxel_u(voxel);
+    p[view->v_axis] = run->v + (int)trip_voxel_v(voxel);
+    trip_vec3 position = trip_v3(p[0], p[1], p[2]);
+    trip_splat s;
+    return trip_splat_project(&view->splat, position, &s) &&
+           trip_weight_may_reach(view->of->settings, camera, view->of->plan->axis_of_view,
+                                 view->axis, trip_sub(position, camera->eye), s.radius);
+}

@@ -1,0 +1,247 @@
+#include "cpu/cover.h"
+
+/* With b the half-size of a support at its centre's G, and |r(p)| within |p - c| |rx| of |r_c|, the
+ * support reaches b / (1 - b |rx| / |r_c|): that is worked out where it is less than 1.3 b, and
+ * where kernels are at least eight radii of depth away. The splats are computed in floats, which is
+ * what the slack is for. */
+#define SLACK_PX 0.05
+#define NEAREST_RADII 8.0
+#define MOST_GROWTH 0.23
+
+enum { BLOCK = 4, BLOCKS = TRIP_CPU_TILE / BLOCK };
+
+static double dot(const double along[3], const double at[3])
+{
+    return along[0] * at[0] + along[1] * at[1] + along[2] * at[2];
+}
+
+static double reach(const double along[3], const double half[3])
+{
+    return fabs(along[0]) * half[0] + fabs(along[1]) * half[1] + fabs(along[2]) * half[2];
+}
+
+/* Pixels, inclusive; none when first > last. */
+typedef struct range {
+    int first, last;
+} range;
+
+static range pixels(double middle, double reach, int size)
+{
+    double lo = middle - reach - SLACK_PX - 0.5, hi = middle + reach + SLACK_PX - 0.5;
+    if (hi < 0 || lo > size - 1)
+        return (range){ 0, -1 };
+    return (range){ lo > 0 ? (int)lo + 1 : 0, hi < size - 1 ? (int)hi : size - 1 };
+}
+
+/* Of the splats of a box: where the centre of the middle one lies, how far from there the others'
+ * centres, and how far their supports reach from their centres at the centres' G. */
+typedef struct spread {
+    double middle, centres, support;
+} spread;
+
+/* Of x = X / z over a box, given 1 / z at its middle and at its nearest point: with x0 that of the
+ * middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. S is sigma^2 times the
+ * square of x's gradient (X - x z)' / z. */
+static spread spread_of(const trip_cpu_view *view, const double along_x[4], const double along_z[4],
+                        const trip_cpu_box *box, double inverse, double inverse_nearest)
+{
+    const double radius = view->of->settings->kernel_radius;
+    const double low_pass2 = view->splat.low_pass2 * view->splat.cutoff2;
+    double x = (dot(along_x, box->middle) + along_x[3]) * inverse, slope[3];
+    for (int i = 0; i < 3; i++)
+        slope[i] = along_x[i] - x * along_z[i];
+    double centres = reach(slope, box->half) * inverse_nearest;
+    double steepest = sqrt(dot(slope, slope)) + centres * sqrt(dot(along_z, along_z));
+    double kernel = radius * steepest * inverse_nearest;
+    return (spread){ x, centres, sqrt(kernel * kernel + low_pass2) };
+}
+
+static uint64_t bits_of(int left, int right, int top, int bottom)
+{
+    uint64_t columns = (0xffu << left & 0xffu >> (7 - right)) * UINT64_C(0x0101010101010101);
+    return columns & UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
+}
+
+/* What of the blocks [first, last] lies in a tile, counted from its first. */
+static range in_tile(range blocks, int tile)
+{
+    int first = blocks.first - tile * BLOCKS, last = blocks.last - tile * BLOCKS;
+    return (range){ first > 0 ? first : 0, last < BLOCKS - 1 ? last : BLOCKS - 1 };
+}
+
+static trip_cpu_cover cover_of(const trip_cpu_mask *mask, range px, range py)
+{
+    static_assert(BLOCKS == 8, "a byte for a row");
+    range x = { px.first / BLOCK, px.last / BLOCK }, y = { py.first / BLOCK, py.last / BLOCK };
+    bool open = false, closed = false;
+    if (px.first > px.last || py.first > py.last)
+        return TRIP_CPU_HIDDEN;
+    for (int ty = y.first / BLOCKS; ty <= y.last / BLOCKS; ty++)
+        for (int tx = x.first / BLOCKS; tx <= x.last / BLOCKS; tx++) {
+            range h = in_tile(x, tx), v = in_tile(y, ty);
+            uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
+            uint64_t rest =
+                bits &
+                atomic_load_explicit(&mask->tiles[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
+                                     memory_order_relaxed);
+            open |= rest != 0;
+            closed |= rest != bits;
+            if (open && closed)
+                return TRIP_CPU_PARTLY;
+        }
+    return open ? TRIP_CPU_SHOWN : TRIP_CPU_HIDDEN;
+}
+
+/* |rx| / |r_c|, or |ry| where that is more, is at most this. */
+static double most_turn(const trip_cpu_view *view)
+{
+    return sqrt(fmax(view->splat.rxrx, view->splat.ryry)) * view->forward_length;
+}
+
+/* A box on the screen. */
+typedef struct outline {
+    spread x, y;
+    double grown; /* supports, at most */
+    double z, inverse_nearest;
+} outline;
+
+static const double *depth_along(const trip_cpu_view *view)
+{
+    static const double none[4] = { 0, 0, 0, 0 };
+    return view->splat.camera.ortho ? none : view->along_z;
+}
+
+/* TRIP_CPU_SHOWN, or what is to be said of the box where nothing can be worked out. */
+static trip_cpu_cover find_outline(const trip_cpu_view *view, const trip_cpu_box *box, outline *out)
+{
+    const double *along_z = depth_along(view);
+    double inverse = 1, growth = 0;
+    out->z = out->inverse_nearest = 1;
+    if (!view->splat.camera.ortho) {
+        double radius = view->of->settings->kernel_radius * view->forward_length;
+        double z = dot(along_z, box->middle) + along_z[3], deep = reach(along_z, box->half);
+        if (z - deep < (NEAREST_RADII + 1) * radius)
+            return z + deep + radius <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
+        inverse = 1 / z;
+        out->z = z;
+        out->inverse_nearest = 1 / (z - deep);
+    }
+    out->x = spread_of(view, view->along_x, along_z, box, inverse, out->inverse_nearest);
+    out->y = spread_of(view, view->along_y, along_z, box, inverse, out->inverse_nearest);
+    if (!view->splat.camera.ortho) {
+        double most = out->x.support > out->y.support ? out->x.support : out->y.support;
+        growth = sqrt(2) * most * most_turn(view);
+    }
+    out->grown = 1 / (1 - growth);
+    return growth > MOST_GROWTH ? TRIP_CPU_PARTLY : TRIP_CPU_SHOWN;
+}
+
+trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
+                                  const trip_cpu_box *box)
+{
+    const trip_camera *camera = &view->splat.camera;
+    outline o;
+    trip_cpu_cover cover = find_outline(view, box, &o);
+    if (cover != TRIP_CPU_SHOWN)
+        return cover;
+    return cover_of(mask, pixels(o.x.middle, o.x.centres + o.x.support * o.grown, camera->width),
+                    pixels(o.y.middle, o.y.centres + o.y.support * o.grown, camera->height));
+}
+
+/* With x that of a square's own middle, x - x0 is at most `centres` of the region, by which a slope
+ * (X - x z)' may differ. */
+static trip_cpu_line line_of(const double along[4], const double along_z[4], const spread *s,
+                             const outline *o)
+{
+    trip_cpu_line line = { .middle = s->middle };
+    double slopes = 0;
+    for (int i = 0; i < 2; i++) {
+        line.by[i] = along[i] - s->middle * along_z[i];
+        slopes += fabs(line.by[i]) + s->centres * fabs(along_z[i]);
+    }
+    double centres = 0.5 * (TRIP_CPU_SQUARE - 1) * slopes * o->inverse_nearest;
+    line.reach = centres + s->support * o->grown + SLACK_PX;
+    return line;
+}
+
+trip_cpu_cover trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int64_t sheet,
+                                    trip_cpu_region *region)
+{
+    const double half = 0.5 * (TRIP_CPU_REGION - 1), *along_z = depth_along(view);
+    trip_cpu_box box = { { u + half, v + half, (double)sheet }, { half, half, 0 } };
+    outline o;
+    trip_cpu_cover cover = find_outline(view, &box, &o);
+    if (cover != TRIP_CPU_SHOWN)
+        return cover;
+    *region = (trip_cpu_region){ .x = line_of(view->along_x, along_z, &o.x, &o),
+                                 .y = line_of(view->along_y, along_z, &o.y, &o),
+                                 .z = o.z,
+                                 .z_by = { along_z[0], along_z[1] } };
+    return TRIP_CPU_SHOWN;
+}
+
+static const trip_file_slab *slab_of(const trip_list *list, uint64_t brick)
+{
+    uint64_t lo = 0, hi = list->slab_count;
+    while (hi - lo > 1) {
+        uint64_t middle = (lo + hi) / 2;
+        if (list->slabs[middle].first_brick <= brick)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    return &list->slabs[lo];
+}
+
+trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
+                                int64_t last_sheet)
+{
+    const trip_file_header *header = &view->of->data->header;
+    const trip_list *list = &view->of->data->lists[view->axis];
+    const trip_file_brick *b = &list->bricks[brick];
+    double u = (double)((uint64_t)b->tile_u << header->tile_log2);
+    double v = (double)((uint64_t)b->tile_v << header->tile_log2);
+    double sheet = (double)((uint64_t)slab_of(list, brick)->slab * header->slab_sheets);
+    double lo[3] = { u + b->u_min, v + b->v_min, fmax(sheet + b->sheet_min, (double)first_sheet) };
+    double hi[3] = { u + b->u_max, v + b->v_max, fmin(sheet + b->sheet_max, (double)last_sheet) };
+    trip_cpu_box box;
+    for (int i = 0; i < 3; i++) {
+        box.middle[i] = 0.5 * (lo[i] + hi[i]);
+        box.half[i] = 0.5 * (hi[i] - lo[i]);
+    }
+    return box;
+}
+
+/* Components of r are linear over the tile: their extremes are at its corners. */
+static void magnitudes(const trip_camera *c, int x, int y, double least[3], double most[3])
+{
+    double lo[3] = { INFINITY, INFINITY, INFINITY }, hi[3] = { -INFINITY, -INFINITY, -INFINITY };
+    for (int corner = 0; corner < 4; corner++) {
+        trip_vec3 ray = trip_camera_ray(c, x + (corner & 1 ? TRIP_CPU_TILE : 0),
+                                        y + (corner & 2 ? TRIP_CPU_TILE : 0));
+        for (int axis = 0; axis < 3; axis++) {
+            double r = trip_component(ray, axis);
+            lo[axis] = r < lo[axis] ? r : lo[axis];
+            hi[axis] = r > hi[axis] ? r : hi[axis];
+        }
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        most[axis] = fmax(fabs(lo[axis]), fabs(hi[axis]));
+        least[axis] = lo[axis] <= 0 && hi[axis] >= 0 ? 0 : fmin(fabs(lo[axis]), fabs(hi[axis]));
+    }
+}
+
+unsigned trip_cpu_tile_axes(const trip_cpu_view *view, int x, int y)
+{
+    const trip_settings *s = view->of->settings;
+    double least[3], most[3], h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    unsigned axes = 0;
+    if (s->method == TRIP_METHOD_AXIS)
+        return 1u << view->of->plan->axis_of_view;
+    magnitudes(&view->splat.camera, x, y, least, most);
+    double largest = fmax(least[0], fmax(least[1], least[2]));
+    for (int axis = 0; axis < 3; axis++)
+        if (!(most[axis] < h * largest * (1 - 1e-12)))
+            axes |= 1u << axis;
+    return axes;
+}

@@ -1,0 +1,733 @@
+/* The CPU renderer: its threads project the voxels of a batch into splats, sort them by screen tile
+ * and blend each tile's splats in list order, while the next batch is projected. What a pixel gets
+ * depends on the order of the splats alone, never on where a batch, chunk or flush ends, so the
+ * picture is the same bit for bit for any number of threads, memory, tile and batch size. Once the
+ * program is interrupted no task does anything, and what waits for them returns at once. */
+#include "cpu/cpu_renderer.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "cpu/bin.h"
+#include "cpu/count.h"
+#include "cpu/cover.h"
+#include "cpu/kernels/isa.h"
+#include "cpu/near.h"
+#include "cpu/pool.h"
+#include "cpu/show.h"
+#include "report.h"
+
+#define VISIBLE_BYTES (65536 * sizeof(trip_tf_entry))
+
+enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
+
+/* Fewer voxels are not worth a chunk. */
+enum { LEAST_CHUNK = 512 };
+
+/* Much is hidden where fewer voxels than this share show. */
+#define MUCH_HIDDEN 0.75
+
+/* What has become of a tile's pixels. */
+enum tile_state {
+    TILE_BEGUN = 1,  /* in the list being drawn */
+    TILE_MERGED = 2, /* the sum holds earlier lists */
+};
+
+/* One thread's own memory. */
+typedef struct worker {
+    trip_cpu_scratch scratch;
+    trip_cpu_span shown[TRIP_CPU_CHUNK];
+    trip_cpu_sorting sorting;
+    _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
+} worker;
+
+/* A tile to blend, or a quarter of one. */
+typedef struct portion {
+    uint32_t tile;
+    unsigned quarters;
+    uint32_t splats;
+} portion;
+
+typedef struct cpu {
+    trip_renderer base;
+    trip_budget *budget;
+    const trip_cpu_kernels *kernels;
+    trip_cpu_pool *pool;
+    char device[64];
+    worker *workers;
+    size_t workers_bytes;
+
+    trip_cpu_mask mask; /* bits are cleared by whoever blends the tile */
+    size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
+    float *pixels, *sums;
+    uint8_t *states;
+    uint8_t *axes; /* whose lists may have weight in a tile, a bit each */
+    portion *portions;
+
+    const trip_frame *frame;
+    trip_cpu_view view;
+    bool in_list;
+    trip_list_stats stats[3];
+    /* Where the frame counts: the same with every voxel visible, whatever its code. */
+    trip_frame counted_frame;
+    trip_cpu_view counted_view;
+    trip_tf_entry *visible; /* 65536 entries; NULL until wanted */
+
+    trip_cpu_flush flushes[2];
+    trip_cpu_flush *filling, *blending;
+    const trip_batch *batch;
+    uint32_t first_chunk;   /* of the job */
+    double shown_per_voxel; /* of late */
+    uint32_t portion_count;
+    float *rgba;
+    trip_cpu_job project_job, blend_job, tile_job;
+} cpu;
+
+/* ---- tiles ---- */
+
+static uint32_t tile_count(const cpu *r)
+{
+    return r->mask.grid.across * r->mask.grid.down;
+}
+
+static int tile_x(const cpu *r, uint32_t tile)
+{
+    return (int)(tile % r->mask.grid.across) * TRIP_CPU_TILE;
+}
+
+static int tile_y(const cpu *r, uint32_t tile)
+{
+    return (int)(tile / r->mask.grid.across) * TRIP_CPU_TILE;
+}
+
+static float *tile_pixels(const cpu *r, uint32_t tile)
+{
+    return r->pixels + (size_t)tile * FLOATS_PER_TILE;
+}
+
+/* Whether one list alone has weight in a tile, and so it is 1 all over. */
+static bool is_alone(const cpu *r, uint32_t tile)
+{
+    return (r->axes[tile] & (r->axes[tile] - 1)) == 0;
+}
+
+/* ---- projecting a batch ---- */
+
+/* Counts by projecting for the count alone: what is hidden or transparent counts too. */
+static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s)
+{
+    const trip_cpu_view *view = &r->counted_view;
+    const uint32_t *voxels = r->batch->voxels + s->first;
+    for (uint32_t i = 0; i < s->count; i++)
+        chunk->counts.splats_projected += trip_cpu_is_projected(view, s->run, voxels[i]);
+    for (uint32_t done = 0; done < s->count; done += TRIP_CPU_STAGED) {
+        uint32_t left = s->count - done, n = left < TRIP_CPU_STAGED ? left : TRIP_CPU_STAGED;
+        n = r->kernels->stage(view, s->run, voxels + done, NULL, n, false, &w->scratch.staged, 0);
+        n = r->kernels->project(view, NULL, &w->scratch.staged, n, &w->scratch.lanes, w->counted);
+        chunk->counts.splats_drawn += r->kernels->drawn(view, &w->scratch, w->counted, n);
+    }
+}
+
+/* What of a chunk may show: at most a span a voxel. */
+static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
+{
+    const trip_cpu_asking asking = { r->kernels, &r->view, &r->mask, r->batch, &w->scratch.lanes };
+    bool reversed = r->batch->selection->descending;
+    uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
+    for (size_t i = chunk->run; left > 0; i++) {
+        const trip_run *run = &r->batch->runs[i];
+        trip_cpu_span all = { run, run->first, run->count };
+        uint32_t count = run->count - skip < left ? run->count - skip : left;
+        trip_cpu_span part = trip_cpu_span_part(&all, reversed, skip, count);
+        if (r->frame->count)
+            count_span(r, w, chunk, &part);
+        n += trip_cpu_show(&asking, &part, w->shown + n);
+        left -= count;
+        skip = 0;
+    }
+    return n;
+}
+
+static bool much_is_hidden(const cpu *r)
+{
+    return r->shown_per_voxel < MUCH_HIDDEN;
+}
+
+/* Projects what is staged to the end of the chunk. */
+static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_t *staged)
+{
+    const _Atomic uint64_t *open = much_is_hidden(r) ? r->mask.tiles : NULL;
+    trip_cpu_splat *out = r->filling->splats + chunk->splat + chunk->splats;
+    chunk->splats +=
+        r->kernels->project(&r->view, open, &w->scratch.staged, *staged, &w->scratch.lanes, out);
+    *staged = 0;
+}
+
+static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s,
+                         uint32_t *staged)
+{
+    const trip_batch *batch = r->batch;
+    bool reversed = batch->selection->descending;
+    for (uint32_t done = 0; done < s->count;) {
+        uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
+        n = n < room ? n : room;
+        uint64_t from = trip_cpu_span_part(s, reversed, done, n).first;
+        *staged = r->kernels->stage(&r->view, s->run, batch->voxels + from,
+                                    r->view.shading ? batch->normals + from : NULL, n, reversed,
+                                    &w->scratch.staged, *staged);
+        if (*staged == TRIP_CPU_STAGED)
+            empty_staged(r, w, chunk, staged);
+        done += n;
+    }
+}
+
+static void project_chunk(void *context, unsigned task, unsigned thread)
+{
+    cpu *r = context;
+    if (trip_interrupted())
+        return;
+    worker *w = &r->workers[thread];
+    trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
+    uint32_t staged = 0, shown = show_chunk(r, w, chunk), voxels = 0;
+    for (uint32_t i = 0; i < shown; i++)
+        voxels += w->shown[i].count;
+    if (voxels == 0 || !trip_cpu_flush_claim(r->filling, chunk, voxels))
+        return;
+    for (uint32_t i = 0; i < shown; i++)
+        project_span(r, w, chunk, &w->shown[i], &staged);
+    empty_staged(r, w, chunk, &staged);
+    trip_cpu_bin(r->filling, chunk, r->mask.grid, &w->sorting);
+}
+
+/* ---- blending a flush ---- */
+
+typedef struct blend_context {
+    const trip_cpu_kernels *kernels;
+    trip_cpu_scratch *scratch;
+} blend_context;
+
+static void blend_some(void *user, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count)
+{
+    blend_context *c = user;
+    c->kernels->tile_blend(c->scratch, splats, order, count);
+}
+
+/* The mask's bits of some quarters of a tile. */
+static uint64_t bits_of_quarters(unsigned quarters)
+{
+    static const uint64_t quarter = 0x0f0f0f0f;
+    return (quarters & 1 ? quarter : 0) | (quarters & 2 ? quarter << 4 : 0) |
+           (quarters & 4 ? quarter << 32 : 0) | (quarters & 8 ? quarter << 36 : 0);
+}
+
+static void blend_portion(void *context, unsigned task, unsigned thread)
+{
+    cpu *r = context;
+    if (trip_interrupted())
+        return;
+    const portion *p = &r->portions[task];
+    trip_cpu_scratch *s = &r->workers[thread].scratch;
+    int x = tile_x(r, p->tile), y = tile_y(r, p->tile);
+    if (!(r->states[p->tile] & TILE_BEGUN)) {
+        r->kernels->tile_clear(&r->view, x, y, is_alone(r, p->tile), tile_pixels(r, p->tile));
+        r->states[p->tile] |= TILE_BEGUN;
+    }
+    r->kernels->tile_begin(&r->view, s, x, y, p->quarters, tile_pixels(r, p->tile));
+    trip_cpu_share_each(r->blending, p->tile, blend_some, &(blend_context){ r->kernels, s });
+    uint64_t open = r->kernels->tile_end(s) | ~bits_of_quarters(p->quarters);
+    atomic_fetch_and_explicit(&r->mask.tiles[p->tile], open, memory_order_relaxed);
+}
+
+static int most_first(const void *a, const void *b)
+{
+    const portion *p = a, *q = b;
+    return p->splats < q->splats ? 1 : p->splats > q->splats ? -1 : 0;
+}
+
+/* Tiles with work, those with most of it first. One that holds so much that a thread would still be
+ * at it when the others are done, with the next splats to project too, is given out in quarters,
+ * though each looks through all of its splats; not when it is new, since then one thread has to
+ * clear it. */
+static void make_portions(cpu *r, const trip_cpu_flush *f)
+{
+    uint64_t all = 0;
+    r->portion_count = 0;
+    for (uint32_t t = 0; t < tile_count(r); t++)
+        all += f->shares[t].splats;
+    uint64_t large = all / trip_cpu_pool_threads(r->pool) * 2;
+    for (uint32_t t = 0; t < tile_count(r); t++) {
+        uint32_t n = f->shares[t].splats;
+        if (n == 0 || trip_cpu_tile_is_closed(&r->mask, t))
+            continue;
+        if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TILE_BEGUN) {
+            for (unsigned q = 0; q < 4; q++)
+                r->portions[r->portion_count++] = (portion){ t, 1u << q, n / 3 };
+        } else {
+            r->portions[r->portion_count++] = (portion){ t, 15, n };
+        }
+    }
+    qsort(r->portions, r->portion_count, sizeof *r->portions, most_first);
+}
+
+/* Hands what is projected to the blending threads, once they are done with what came before. */
+static void flush(cpu *r)
+{
+    trip_cpu_flush *full = r->filling;
+    if (full->chunk_count == 0)
+        return;
+    trip_cpu_link(full, &r->mask);
+    trip_cpu_pool_wait(r->pool, &r->blend_job);
+    make_portions(r, full);
+    r->filling = full == &r->flushes[0] ? &r->flushes[1] : &r->flushes[0];
+    r->blending = full;
+    trip_cpu_flush_empty(r->filling);
+    r->blend_job = (trip_cpu_job){ .run = blend_portion, .context = r, .tasks = r->portion_count };
+    trip_cpu_pool_start(r->pool, &r->blend_job);
+}
+
+/* Ends with everything drawn so far in the pixels. */
+static void settle(cpu *r)
+{
+    flush(r);
+    trip_cpu_pool_wait(r->pool, &r->blend_job);
+}
+
+/* ---- drawing ---- */
+
+/* A place in a batch's runs. */
+typedef struct cursor {
+    size_t run;
+    uint32_t skip;
+} cursor;
+
+/* Voxels that the buffer will still take, by how many of them showed of late; some when it is
+ * empty. Where much is hidden it counts as full sooner: the sooner splats are blended, the sooner
+ * they hide what lies behind them. */
+static uint64_t room(const cpu *r)
+{
+    const trip_cpu_flush *f = r->filling;
+    uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed);
+    uint32_t capacity = much_is_hidden(r) ? f->capacity / 4 : f->capacity;
+    double left = ((double)capacity - (double)used) / (1.1 * r->shown_per_voxel);
+    if (f->chunk_count == 0)
+        left = fmax(left, TRIP_CPU_CHUNK);
+    return left < LEAST_CHUNK ? 0 : (uint64_t)left;
+}
+
+static uint64_t voxels_from(const trip_batch *batch, const cursor *at)
+{
+    uint64_t voxels = 0;
+    for (size_t i = at->run; i < batch->run_count; i++)
+        voxels += batch->runs[i].count;
+    return voxels - at->skip;
+}
+
+/* Of a chunk, when so many are left: fewer towards the end, so that the threads end together. */
+static uint32_t chunk_voxels(const cpu *r, uint64_t left)
+{
+    uint64_t each = left / trip_cpu_pool_threads(r->pool) / 2;
+    return each < LEAST_CHUNK      ? LEAST_CHUNK
+           : each > TRIP_CPU_CHUNK ? TRIP_CPU_CHUNK
+                                   : (uint32_t)each;
+}
+
+/* Reserves the next chunk, of `most` voxels; false when the batch is through or there are no more
+ * chunks. */
+static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor *at)
+{
+    trip_cpu_chunk *chunk = at->run < batch->run_count ? trip_cpu_flush_reserve(r->filling) : NULL;
+    if (!chunk)
+        return false;
+    chunk->run = at->run;
+    chunk->skip = at->skip;
+    while (at->run < batch->run_count && chunk->voxels < most) {
+        uint32_t left = batch->runs[at->run].count - at->skip, wanted = most - chunk->voxels;
+        if (left > wanted) {
+            at->skip += wanted;
+            chunk->voxels = most;
+        } else {
+            chunk->voxels += left;
+            *at = (cursor){ at->run + 1, 0 };
+        }
+    }
+    return true;
+}
+
+/* Fails when some splat's numbers were not finite. */
+static int check_splats(const cpu *r)
+{
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        if (r->workers[i].scratch.lanes.broken)
+            return trip_splat_fail();
+    return 0;
+}
+
+/* Goes back to the first of the chunks that the buffer had no room for. */
+static void keep_chunks(cpu *r, cursor *at)
+{
+    trip_cpu_flush *f = r->filling;
+    trip_list_stats *stats = &r->stats[r->view.axis];
+    uint32_t reserved = f->chunk_count, kept = trip_cpu_flush_cut(f);
+    if (kept < reserved)
+        *at = (cursor){ f->chunks[kept].run, f->chunks[kept].skip };
+    for (uint32_t i = r->first_chunk; i < kept; i++) {
+        stats->splats_read += f->chunks[i].voxels;
+        stats->splats_projected += f->chunks[i].counts.splats_projected;
+        stats->splats_drawn += f->chunks[i].counts.splats_drawn;
+    }
+}
+
+/* How many voxels show, from which room() knows how many more will fit. Few voxels tell little. */
+static void learn(cpu *r, uint64_t shown, uint64_t voxels)
+{
+    double known = TRIP_CPU_CHUNK;
+    double now = ((double)shown + known * r->shown_per_voxel) / ((double)voxels + known);
+    r->shown_per_voxel = fmax(0.02, now);
+}
+
+/* As much of the batch as the buffer takes. */
+static int project_batch(cpu *r, const trip_batch *batch, cursor *at)
+{
+    trip_cpu_flush *f = r->filling;
+    uint64_t used = atomic_load_explicit(&f->splats_used, memory_order_relaxed), reserved = 0;
+    r->batch = batch;
+    r->first_chunk = f->chunk_count;
+    uint64_t wanted = voxels_from(batch, at), most = room(r);
+    wanted = wanted < most ? wanted : most;
+    while (reserved < wanted && reserve_chunk(r, batch, chunk_voxels(r, wanted - reserved), at))
+        reserved += f->chunks[f->chunk_count - 1].voxels;
+    if (reserved == 0)
+        return 0;
+    r->project_job = (trip_cpu_job){ .run = project_chunk,
+                                     .context = r,
+                                     .tasks = f->chunk_count - r->first_chunk };
+    trip_cpu_pool_start(r->pool, &r->project_job);
+    trip_cpu_pool_wait(r->pool, &r->project_job);
+    learn(r, atomic_load_explicit(&f->splats_used, memory_order_relaxed) - used, reserved);
+    keep_chunks(r, at);
+    return check_splats(r);
+}
+
+static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
+{
+    cpu *r = (cpu *)base;
+    bool shading = r->frame->settings->shading && batch->normals;
+    cursor at = { 0, 0 };
+    int status = 0;
+    if (r->frame->count)
+        trip_cpu_view_make(&r->counted_view, &r->counted_frame, r->view.axis, front_to_back);
+    if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
+        settle(r);
+        trip_cpu_view_make(&r->view, r->frame, r->view.axis, front_to_back);
+        r->view.shading = shading;
+    }
+    while (at.run < batch->run_count && !status) {
+        status = project_batch(r, batch, &at);
+        if (at.run < batch->run_count)
+            flush(r);
+        if (!status)
+            status = trip_frame_poll();
+    }
+    return status;
+}
+
+/* ---- lists and frames ---- */
+
+static float *tile_sum(const cpu *r, uint32_t tile)
+{
+    return r->sums + (size_t)tile * FLOATS_PER_TILE;
+}
+
+/* What is alone in its tile stays as it is. */
+static bool is_to_merge(const cpu *r, uint32_t tile)
+{
+    return r->states[tile] & TILE_BEGUN && !is_alone(r, tile);
+}
+
+static void merge_tile(cpu *r, uint32_t tile)
+{
+    bool first = !(r->states[tile] & TILE_MERGED);
+    r->kernels->tile_merge(&r->view, tile_x(r, tile), tile_y(r, tile), tile_pixels(r, tile), first,
+                           tile_sum(r, tile));
+    r->states[tile] = TILE_MERGED;
+}
+
+static void finish_tile(cpu *r, uint32_t tile)
+{
+    trip_cpu_content content = TRIP_CPU_NOTHING;
+    if (r->states[tile] & TILE_MERGED)
+        content = TRIP_CPU_SUM;
+    else if (r->states[tile] & TILE_BEGUN)
+        content = TRIP_CPU_LAYER;
+    r->kernels->tile_finish(&r->view, tile_x(r, tile), tile_y(r, tile), content,
+                            content == TRIP_CPU_SUM ? tile_sum(r, tile) : tile_pixels(r, tile),
+                            r->rgba);
+}
+
+/* Tasks of whole rows of tiles. */
+static void merge_row(void *context, unsigned task, unsigned thread)
+{
+    cpu *r = context;
+    (void)thread;
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
+        if (!trip_interrupted() && is_to_merge(r, t))
+            merge_tile(r, t);
+}
+
+static void finish_row(void *context, unsigned task, unsigned thread)
+{
+    cpu *r = context;
+    (void)thread;
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
+        if (!trip_interrupted())
+            finish_tile(r, t);
+}
+
+static void for_each_row(cpu *r, void (*run)(void *, unsigned, unsigned))
+{
+    r->tile_job = (trip_cpu_job){ .run = run, .context = r, .tasks = r->mask.grid.down };
+    trip_cpu_pool_start(r->pool, &r->tile_job);
+    trip_cpu_pool_wait(r->pool, &r->tile_job);
+}
+
+static int end_list(cpu *r)
+{
+    if (!r->in_list)
+        return 0;
+    bool merge = false;
+    settle(r);
+    for (uint32_t t = 0; t < tile_count(r) && !merge; t++)
+        merge = is_to_merge(r, t);
+    if (merge)
+        for_each_row(r, merge_row);
+    r->in_list = false;
+    return trip_frame_poll();
+}
+
+static int begin_list(trip_renderer *base, int axis)
+{
+    cpu *r = (cpu *)base;
+    int status = end_list(r);
+    if (status)
+        return status;
+    trip_cpu_view_make(&r->view, r->frame, axis, true);
+    for (uint32_t t = 0; t < tile_count(r); t++)
+        atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> axis & 1 ? UINT64_MAX : 0,
+                              memory_order_relaxed);
+    r->in_list = true;
+    r->shown_per_voxel = 1;
+    return 0;
+}
+
+static void *part(char *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? memory + *at : NULL;
+    *at += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+static size_t lay_out(cpu *r, char *memory)
+{
+    size_t at = 0, tiles = tile_count(r);
+    r->pixels = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->pixels);
+    r->sums = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->sums);
+    r->states = part(memory, &at, tiles);
+    r->axes = part(memory, &at, tiles);
+    r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
+    r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
+    /* Bins look one tile beyond the last, diagonally. */
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        r->workers[i].sorting.counts = part(
+            memory, &at, (tiles + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
+    return at;
+}
+
+static void release_tiles(cpu *r)
+{
+    trip_budget_release(r->budget, r->pixels, r->tiles_bytes);
+    r->pixels = NULL;
+    r->tiles_bytes = 0;
+    r->mask.grid = (trip_cpu_grid){ 0, 0 };
+}
+
+static int fit_tiles(cpu *r, int width, int height)
+{
+    trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE,
+                           ((uint32_t)height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE };
+    if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down)
+        return 0;
+    release_tiles(r);
+    r->mask.grid = grid;
+    size_t bytes = lay_out(r, NULL);
+    char *memory = trip_budget_take(r->budget, bytes);
+    if (!memory) {
+        r->mask.grid = (trip_cpu_grid){ 0, 0 };
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "%zu bytes of pixels do not fit the memory given; raise --memory or draw "
+                         "a smaller image",
+                         bytes);
+    }
+    lay_out(r, memory);
+    r->tiles_bytes = bytes;
+    for (int i = 0; i < 2; i++) {
+        int status = trip_cpu_flush_fit(&r->flushes[i], tile_count(r), r->budget);
+        if (status)
+            return status;
+    }
+    return 0;
+}
+
+/* Any extinction will do that the kernels do not take for nothing. */
+static int begin_counting(cpu *r)
+{
+    const trip_camera *camera = r->frame->camera;
+    if (!r->visible)
+        r->visible = trip_budget_take(r->budget, VISIBLE_BYTES);
+    if (!r->visible)
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "the memory given does not suffice for counting; raise --memory");
+    for (int i = 0; i < 65536; i++)
+        r->visible[i] = (trip_tf_entry){ .extinction = (float)(0x1p20 / camera->voxel_world) };
+    r->counted_frame = *r->frame;
+    r->counted_frame.table = r->visible;
+    return 0;
+}
+
+static int begin_frame(trip_renderer *base, const trip_frame *frame)
+{
+    cpu *r = (cpu *)base;
+    trip_cpu_pool_wait(r->pool, &r->blend_job); /* of a frame that was given up */
+    trip_cpu_flush_empty(r->filling);
+    r->in_list = false;
+    r->frame = frame;
+    memset(r->stats, 0, sizeof r->stats);
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        r->workers[i].scratch.lanes.broken = false;
+    int status = fit_tiles(r, frame->camera->width, frame->camera->height);
+    if (!status && frame->count)
+        status = begin_counting(r);
+    if (status)
+        return status;
+    trip_cpu_view_make(&r->view, frame, frame->plan->axis_of_view, true);
+    memset(r->states, 0, tile_count(r));
+    for (uint32_t t = 0; t < tile_count(r); t++)
+        r->axes[t] = (uint8_t)trip_cpu_tile_axes(&r->view, tile_x(r, t), tile_y(r, t));
+    return 0;
+}
+
+static int end_frame(trip_renderer *base, float *rgba)
+{
+    cpu *r = (cpu *)base;
+    int status = end_list(r);
+    if (status)
+        return status;
+    r->rgba = rgba;
+    for_each_row(r, finish_row);
+    return trip_frame_poll();
+}
+
+/* Tiles of the last flush may still be blended. */
+static void abort_frame(trip_renderer *base)
+{
+    cpu *r = (cpu *)base;
+    trip_cpu_pool_wait(r->pool, &r->blend_job);
+}
+
+static void stats(const trip_renderer *base, trip_list_stats lists[3])
+{
+    memcpy(lists, ((const cpu *)base)->stats, 3 * sizeof *lists);
+}
+
+static const char *device(const trip_renderer *base)
+{
+    return ((const cpu *)base)->device;
+}
+
+static void destroy(trip_renderer *base)
+{
+    cpu *r = (cpu *)base;
+    trip_budget *budget = r->budget;
+    trip_cpu_pool_destroy(r->pool);
+    release_tiles(r);
+    for (int i = 0; i < 2; i++)
+        trip_cpu_flush_destroy(&r->flushes[i], budget);
+    trip_budget_release(budget, r->workers, r->workers_bytes);
+    trip_budget_release(budget, r->visible, VISIBLE_BYTES);
+    trip_budget_release(budget, r, sizeof *r);
+}
+
+static const trip_renderer_ops cpu_ops = {
+    .name = "cpu",
+    .destroy = destroy,
+    .device = device,
+    .begin_frame = begin_frame,
+    .begin_list = begin_list,
+    .draw = draw,
+    .end_frame = end_frame,
+    .abort_frame = abort_frame,
+    .stats = stats,
+};
+
+bool trip_cpu_covered(void *renderer, const trip_selection *selection, uint32_t brick)
+{
+    cpu *r = renderer;
+    if (r->base.ops != &cpu_ops || !r->in_list || selection->axis != r->view.axis ||
+        !r->view.front_to_back)
+        return false;
+    trip_cpu_box box =
+        trip_cpu_brick_box(&r->view, brick, selection->sheet_first, selection->sheet_last);
+    return trip_cpu_box_cover(&r->view, &r->mask, &box) == TRIP_CPU_HIDDEN;
+}
+
+/* ---- creation ---- */
+
+/* An eighth of the memory given goes to the two buffers of splats. */
+static uint32_t flush_capacity(const trip_budget *budget)
+{
+    uint64_t each = trip_budget_limit_bytes(budget) / 16 / 100; /* bytes a splat, roughly */
+    return each < MIN_SPLATS ? MIN_SPLATS : each > MAX_SPLATS ? MAX_SPLATS : (uint32_t)each;
+}
+
+static int create_parts(cpu *r, unsigned threads)
+{
+    int status = trip_cpu_pool_create(&r->pool, threads);
+    if (status)
+        return status;
+    threads = trip_cpu_pool_threads(r->pool);
+    r->workers_bytes = threads * sizeof *r->workers;
+    r->workers = trip_budget_take(r->budget, r->workers_bytes);
+    if (!r->workers) {
+        r->workers_bytes = 0;
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "the memory given does not suffice for %u threads; raise --memory",
+                         threads);
+    }
+    for (int i = 0; i < 2 && !status; i++)
+        status = trip_cpu_flush_create(&r->flushes[i], flush_capacity(r->budget), r->budget);
+    r->filling = &r->flushes[0];
+    snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->kernels->isa, threads,
+             threads == 1 ? "" : "s");
+    return status;
+}
+
+int trip_cpu_create(trip_renderer **out, trip_budget *budget, unsigned threads)
+{
+    *out = NULL;
+    const trip_cpu_kernels *kernels = trip_cpu_isa_choose(getenv("TRIPTYCH_ISA"));
+    if (!kernels)
+        return TRIP_USAGE;
+    cpu *r = trip_budget_take(budget, sizeof *r);
+    if (!r)
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer", "out of memory");
+    r->base.ops = &cpu_ops;
+    r->budget = budget;
+    r->kernels = kernels;
+    int status = create_parts(r, threads);
+    if (status) {
+        destroy(&r->base);
+        return status;
+    }
+    *out = &r->base;
+    return 0;
+}

@@ -1,0 +1,603 @@
+/* Kernels that blend projected splats into the pixels of a tile: included by table_tmpl.h after
+ * simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the blocks of
+ * pixels that they may touch, in their order; then block after block takes its splats, its pixels
+ * all the while in registers. */
+#ifndef TRIP_CPU_BLEND_H
+#define TRIP_CPU_BLEND_H
+
+#include <stddef.h>
+
+#include "cpu/kernels/exp_tmpl.h"
+#include "cpu/kernels/kernels.h"
+#include "cpu/kernels/simd_tmpl.h"
+
+#define BLOCK_ROWS (V / 4)
+#define BLOCKS_ACROSS (TRIP_CPU_TILE / 4)
+#define BLOCKS_DOWN (TRIP_CPU_TILE / BLOCK_ROWS)
+#define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
+#define BLOCK_FLOATS (4 * V)
+/* Eight rows of blocks, a bit each. */
+#define BANDS (BLOCKS / 64)
+
+static_assert(BLOCKS_ACROSS == 8 && BANDS >= 1 && BANDS <= TRIP_CPU_BANDS, "64 blocks to a band");
+
+/* ---- what a target keeps ---- */
+
+/* The nearest half float to a, 0 <= a < 65504, ties to even: eleven bits, or below 2^-14 multiples
+ * of 2^-24, which is the step of floats between 1/2 and 1. */
+INLINE vf to_half(vf a)
+{
+    vi bits = v_bits(a);
+    vf normal = v_from_bits((bits + 0xfff + (v_shift_right(bits, 13) & 1)) & ~0x1fff);
+    return v_select(v_gt(v_set(0x1p-14f), a), (a + v_set(0.5f)) - v_set(0.5f), normal);
+}
+
+/* The nearest multiple of 1/255. */
+INLINE vf to_unorm8(vf a)
+{
+    vf steps = v_fma(v_min(v_set(1), v_max(v_set(0), a)), v_set(255), v_set(0.5f));
+    return v_from_int(v_truncate(steps)) * v_set(1.0f / 255);
+}
+
+INLINE vf kept(vf a, trip_target target)
+{
+    if (target == TRIP_TARGET_RGBA16F)
+        return to_half(a);
+    if (target == TRIP_TARGET_RGBA8)
+        return to_unorm8(a);
+    return a;
+}
+
+/* ---- where pixels lie ---- */
+
+/* Pixel centres of a block from the tile's corner. */
+INLINE vf block_x(unsigned number)
+{
+    vf x;
+    for (int i = 0; i < V; i++)
+        x[i] = (float)(i % 4) + 0.5f;
+    return x + v_set((float)(4 * (number % BLOCKS_ACROSS)));
+}
+
+INLINE vf block_y(unsigned number)
+{
+    vf y;
+    for (int i = 0; i < V; i++)
+        y[i] = (float)(i / 4) + 0.5f;
+    return y + v_set((float)(BLOCK_ROWS * (number / BLOCKS_ACROSS)));
+}
+
+/* ---- blending ---- */
+
+/* Where transpose() leaves a word. */
+INLINE unsigned place_of(unsigned word)
+{
+    return word % 8 * 8 + word / 8;
+}
+
+/* A block's pixels and where they lie. */
+typedef struct patch {
+    vf r, g, b, t;
+    vf x, y; /* pixel centres from the tile's corner */
+    vf ray;  /* G */
+    vf stretch;
+    vf cutoff; /* as in trip_cpu_view */
+} patch;
+
+/* u of trip_cpu_splat. */
+INLINE vf nearness(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
+{
+    vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
+    vf b = v_fma(p->y, v_set(splat->l22), v_set(splat->l2));
+    vf u;
+    if (rays == TRIP_CPU_PARALLEL)
+        u = v_fnma(b, b, v_fnma(a, a, v_set(1)));
+    else
+        u = v_fnma(p->ray, v_fma(b, b, a * a), v_set(1));
+    return v_max(u, v_set(0));
+}
+
+/* Opacity of a thin splat: 0 outside its support.
+ *
+ * Footprints are always evaluated. A table of them with the centre moved to the nearest of n x n
+ * places in a pixel, which parallel views alone would allow, is off by up to exp(-1/2) / (sqrt(2) n
+ * s) of the peak, s the footprint's standard deviation in pixels: no pixel off by more than 1/255
+ * takes n s > 109 and so a table of 2 MB, n^2 footprints of (2 TRIP_CUTOFF s)^2 pixels. */
+INLINE vf thin_opacity(const trip_cpu_splat *splat, vf u)
+{
+    static_assert(TRIP_CPU_TERMS == 5, "the terms below");
+    vf sum = v_fma(u, v_set(splat->c[4]), v_set(splat->c[3]));
+    sum = v_fma(u, sum, v_set(splat->c[2]));
+    sum = v_fma(u, sum, v_set(splat->c[1]));
+    sum = v_fma(u, sum, v_set(splat->c[0]));
+    return u * sum * sum;
+}
+
+/* Optical depth of other splats, likewise. */
+INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, vf u, trip_cpu_rays rays)
+{
+    vf y = v_fma(u, p->cutoff, v_set(splat->c[TRIP_CPU_LEAST]));
+    vf depth = exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
+    return rays == TRIP_CPU_STRETCHED ? depth * p->stretch : depth;
+}
+
+INLINE vf opacity(const patch *p, const trip_cpu_splat *splat, bool thick, trip_cpu_rays rays)
+{
+    vf u = nearness(p, splat, rays);
+    if (rays != TRIP_CPU_STRETCHED && !thick)
+        return thin_opacity(splat, u);
+    vf depth = optical_depth(p, splat, u, rays);
+    return thick ? v_set(1) - exp_minus(depth) : depth * thin_ratio(depth);
+}
+
+/* put_behind() for splats where every pixel is open and stays so. */
+INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, vf opacity)
+{
+    vf left = v_fnma(p->t, opacity, p->t), taken = p->t - left;
+    p->r = v_fma(taken, v_set(splat->r), p->r);
+    p->g = v_fma(taken, v_set(splat->g), p->g);
+    p->b = v_fma(taken, v_set(splat->b), p->b);
+    p->t = left;
+}
+
+/* Front to back: `splat` goes behind what the pixels hold. */
+INLINE void put_behind(patch *p, const trip_cpu_splat *splat, vf opacity, trip_target target)
+{
+    vm open = v_ge(p->t, v_set((float)TRIP_SATURATION));
+    vf left = v_fnma_where(open, p->t, opacity, p->t), taken = p->t - left;
+    p->r = kept(v_fma(taken, v_set(splat->r), p->r), target);
+    p->g = kept(v_fma(taken, v_set(splat->g), p->g), target);
+    p->b = kept(v_fma(taken, v_set(splat->b), p->b), target);
+    p->t = target == TRIP_TARGET_RGBA32F ? left : v_set(1) - kept(v_set(1) - left, target);
+}
+
+INLINE vf over(vf behind, float colour, vf keep, trip_target target)
+{
+    vf front = v_set(colour);
+    return kept(v_fma(behind - front, keep, front), target);
+}
+
+/* Back to front: `splat` goes over what the pixels hold. */
+INLINE void put_over(patch *p, const trip_cpu_splat *splat, vf depth, trip_target target)
+{
+    vm inside = v_gt(depth, v_set(0));
+    vf keep = exp_minus(depth), left = p->t * keep;
+    p->r = v_select(inside, over(p->r, splat->r, keep, target), p->r);
+    p->g = v_select(inside, over(p->g, splat->g, keep, target), p->g);
+    p->b = v_select(inside, over(p->b, splat->b, keep, target), p->b);
+    if (target != TRIP_TARGET_RGBA32F)
+        left = v_set(1) - kept(v_set(1) - left, target);
+    p->t = v_select(inside, left, p->t);
+}
+
+INLINE bool any_open(vf t)
+{
+    return vm_any(v_ge(t, v_set((float)TRIP_SATURATION)));
+}
+
+INLINE bool all_open(vf t)
+{
+    return vm_all(v_ge(t, v_set((float)TRIP_SATURATION)));
+}
+
+static void set_rays(trip_cpu_scratch *s, unsigned number);
+
+INLINE patch load_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays)
+{
+    const float *pixels = s->pixels + BLOCK_FLOATS * number;
+    patch p = {
+        .r = v_load(pixels),
+        .g = v_load(pixels + V),
+        .b = v_load(pixels + 2 * V),
+        .t = v_load(pixels + 3 * V),
+        .x = block_x(number),
+        .y = block_y(number),
+        .cutoff = v_set(s->view->cutoff),
+    };
+    if (rays != TRIP_CPU_PARALLEL) {
+        const float *of = s->rays + 2 * V * number;
+        if (!(s->rays_known[number / 64] >> number % 64 & 1))
+            set_rays(s, number);
+        p.ray = v_load(of);
+        p.stretch = v_load(of + V);
+    }
+    return p;
+}
+
+INLINE void store_block(trip_cpu_scratch *s, unsigned number, const patch *p)
+{
+    float *pixels = s->pixels + BLOCK_FLOATS * number;
+    v_store(pixels, p->r);
+    v_store(pixels + V, p->g);
+    v_store(pixels + 2 * V, p->b);
+    v_store(pixels + 3 * V, p->t);
+}
+
+/* Which splats of the group may touch a block, a bit each. */
+typedef struct touching {
+    const trip_cpu_splat *local;
+    uint64_t splats[TRIP_CPU_LOCAL / 64];
+} touching;
+
+typedef void blend_one(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
+                       bool front_to_back, trip_target target);
+
+/* Its address is kept in one register: sums of two in every operand would cost the processor an
+ * operation each. */
+INLINE const trip_cpu_splat *splat_at(const trip_cpu_splat *local, unsigned number)
+{
+    local += number;
+    __asm__("" : "+r"(local));
+    return local;
+}
+
+/* In order. Where bits can be packed to a list at once, the processor has to guess but one end of a
+ * loop, not one for each word. */
+INLINE void blend_each(patch *p, const touching *t, blend_one *one, trip_cpu_rays rays,
+                       bool front_to_back, trip_target target)
+{
+#ifdef V_PACKS_BITS
+    uint8_t numbers[TRIP_CPU_LOCAL + 64];
+    uint32_t count = 0;
+    static_assert(TRIP_CPU_LOCAL <= 256, "numbers of a byte");
+    for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
+        count += v_pack_bits(numbers + count, t->splats[word], 64 * word);
+    for (uint32_t i = 0; i < count; i++)
+        one(p, splat_at(t->local, numbers[i]), rays, front_to_back, target);
+#else
+    for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
+        for (uint64_t rest = t->splats[word]; rest; rest &= rest - 1)
+            one(p, splat_at(t->local, 64 * word + (unsigned)__builtin_ctzll(rest)), rays,
+                front_to_back, target);
+#endif
+}
+
+INLINE void blend_thin_open(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
+                            bool front_to_back, trip_target target)
+{
+    (void)front_to_back;
+    (void)target;
+    put_behind_open(p, splat, opacity(p, splat, false, rays));
+}
+
+INLINE void blend_any(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays, bool front_to_back,
+                      trip_target target)
+{
+    bool thick = splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT;
+    if (front_to_back)
+        put_behind(p, splat, opacity(p, splat, thick, rays), target);
+    else
+        put_over(p, splat, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
+}
+
+/* The splats where none is thick; false, with nothing done, when a pixel is closed or would be. */
+INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
+{
+    patch q = *p;
+    if (!all_open(q.t))
+        return false;
+    blend_each(&q, t, blend_thin_open, rays, true, TRIP_TARGET_RGBA32F);
+    if (!all_open(q.t))
+        return false;
+    *p = q;
+    return true;
+}
+
+/* All splats of the group that may touch a block, in order; false when its pixels take no more
+ * light. Closed pixels never change, so asking late is no error. */
+INLINE bool blend_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
+                        bool front_to_back, trip_target target)
+{
+    patch p = load_block(s, number, rays);
+    touching t = { .local = s->local };
+    uint64_t thick = 0;
+    for (unsigned word = 0; word < (s->splats + 63) / 64; word++) {
+        t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
+        thick |= t.splats[word] & s->thick[word];
+    }
+    bool simple = front_to_back && target == TRIP_TARGET_RGBA32F && !thick;
+    if (!simple || !blend_open(&p, &t, rays))
+        blend_each(&p, &t, blend_any, rays, front_to_back, target);
+    store_block(s, number, &p);
+    return !front_to_back || any_open(p.t);
+}
+
+INLINE void blend_group(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
+                        trip_target target)
+{
+    for (unsigned band = 0; band < BANDS; band++)
+        for (uint64_t rest = s->any[band] & s->open[band]; rest; rest &= rest - 1) {
+            unsigned bit = (unsigned)__builtin_ctzll(rest);
+            if (!blend_block(s, 64 * band + bit, rays, front_to_back, target))
+                s->open[band] &= ~(UINT64_C(1) << bit);
+        }
+}
+
+#define BLEND(name, rays, front_to_back, target)                                                   \
+    static void name(trip_cpu_scratch *s)                                                          \
+    {                                                                                              \
+        blend_group(s, rays, front_to_back, target);                                               \
+    }
+BLEND(behind_parallel, TRIP_CPU_PARALLEL, true, TRIP_TARGET_RGBA32F)
+BLEND(behind_perspective, TRIP_CPU_PERSPECTIVE, true, TRIP_TARGET_RGBA32F)
+BLEND(behind_stretched, TRIP_CPU_STRETCHED, true, TRIP_TARGET_RGBA32F)
+BLEND(behind_half, TRIP_CPU_STRETCHED, true, TRIP_TARGET_RGBA16F)
+BLEND(behind_unorm8, TRIP_CPU_STRETCHED, true, TRIP_TARGET_RGBA8)
+BLEND(over_float, TRIP_CPU_STRETCHED, false, TRIP_TARGET_RGBA32F)
+BLEND(over_half, TRIP_CPU_STRETCHED, false, TRIP_TARGET_RGBA16F)
+BLEND(over_unorm8, TRIP_CPU_STRETCHED, false, TRIP_TARGET_RGBA8)
+#undef BLEND
+
+static void (*choose_blend(const trip_cpu_view *view))(trip_cpu_scratch *)
+{
+    static void (*const behind[])(trip_cpu_scratch *) = { behind_stretched, behind_half,
+                                                          behind_unorm8 };
+    static void (*const over[])(trip_cpu_scratch *) = { over_float, over_half, over_unorm8 };
+    if (view->rays == TRIP_CPU_PARALLEL)
+        return behind_parallel;
+    if (view->rays == TRIP_CPU_PERSPECTIVE)
+        return behind_perspective;
+    return (view->front_to_back ? behind : over)[view->of->settings->target];
+}
+
+/* ---- sorting a group by blocks ---- */
+
+typedef uint64_t words8 __attribute__((vector_size(64)));
+
+/* Swaps the bits that `low` names in b with those `step` higher in a, so that of each pair of words
+ * (a, b) the blocks of step x step bits off the diagonal change places. */
+INLINE void exchange(words8 *a, words8 *b, unsigned step, uint64_t low)
+{
+    words8 swap = (*a >> step ^ *b) & low;
+    *a ^= swap << step;
+    *b ^= swap;
+}
+
+INLINE void exchange_all(words8 rows[8], unsigned step, uint64_t low4, uint64_t low2, uint64_t low1)
+{
+    for (int i = 0; i < 4; i++)
+        exchange(&rows[i], &rows[i + 4], 4 * step, low4);
+    for (int i = 0; i < 8; i += i % 2 ? 3 : 1)
+        exchange(&rows[i], &rows[i + 2], 2 * step, low2);
+    for (int i = 0; i < 8; i += 2)
+        exchange(&rows[i], &rows[i + 1], step, low1);
+}
+
+/* Bit i of word k becomes bit k of word i, which then lies at place_of(i): steps of 32, 16 and 8
+ * words are between vectors of eight, and so are the smaller ones once the vectors are transposed
+ * themselves. */
+static void transpose(uint64_t words[64])
+{
+    words8 rows[8], columns[8];
+    memcpy(rows, words, sizeof rows);
+    exchange_all(rows, 8, UINT64_C(0x00000000ffffffff), UINT64_C(0x0000ffff0000ffff),
+                 UINT64_C(0x00ff00ff00ff00ff));
+    for (int i = 0; i < 8; i++)
+        for (int k = 0; k < 8; k++)
+            columns[i][k] = rows[k][i];
+    exchange_all(columns, 1, UINT64_C(0x0f0f0f0f0f0f0f0f), UINT64_C(0x3333333333333333),
+                 UINT64_C(0x5555555555555555));
+    memcpy(words, columns, sizeof columns);
+}
+
+static uint64_t union_of(const uint64_t words[64])
+{
+    uint64_t all = 0;
+    for (int i = 0; i < 64; i++)
+        all |= words[i];
+    return all;
+}
+
+static void empty_group(trip_cpu_scratch *s)
+{
+    for (unsigned band = 0; band < BANDS; band++) {
+        s->any[band] = 0;
+        for (uint32_t first = 0; first < s->splats; first += 64) {
+            uint64_t *words = s->touched[band][first / 64];
+            if (s->splats - first < 64)
+                memset(words + (s->splats - first), 0, (64 - (s->splats - first)) * sizeof *words);
+            s->any[band] |= union_of(words);
+            transpose(words);
+        }
+    }
+    s->blend(s);
+    s->splats = 0;
+}
+
+static bool takes_light(const trip_cpu_scratch *s)
+{
+    uint64_t any = 0;
+    for (unsigned band = 0; band < BANDS; band++)
+        any |= s->open[band];
+    return any != 0;
+}
+
+/* The splat as seen from this tile's corner, which is so far from its first tile's. */
+INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int4 from)
+{
+    float4 f = __builtin_convertvector(from, float4);
+    *local = *splat;
+    local->l1 = splat->l1 + (splat->l11 * f[0] + splat->l21 * f[1]);
+    local->l2 = splat->l2 + splat->l22 * f[1];
+}
+
+/* Bits of the blocks of a band that lie in a column or further right, in every row; none from the
+ * eighth on. */
+INLINE uint64_t from_column(uint32_t column)
+{
+#define FROM(i) UINT64_C(0x0101010101010101) * (0xff << (i)&0xff)
+    static const uint64_t bits[9] = { FROM(0), FROM(1), FROM(2), FROM(3), FROM(4),
+                                      FROM(5), FROM(6), FROM(7), 0 };
+#undef FROM
+    return bits[column];
+}
+
+/* Bits of the blocks of a band that lie in a row of the tile's or further down, a byte a row. */
+INLINE uint64_t from_row(unsigned band, uint32_t row)
+{
+    static const uint8_t bits[64] = { [32 ... 63] = 0xff };
+    static_assert(BLOCKS_DOWN <= 32 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+                  "the bytes above");
+    uint64_t word;
+    memcpy(&word, bits + 32 + 8 * band - row, sizeof word);
+    return word;
+}
+
+static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
+{
+    return splat->x0 < s->x + TRIP_CPU_TILE && splat->x1 >= s->x &&
+           splat->y0 < s->y + TRIP_CPU_TILE && splat->y1 >= s->y;
+}
+
+/* What tile_blend() keeps in registers. */
+typedef struct gathering {
+    uint32_t splats;
+    uint64_t thick; /* which of the last 64 are, the last one highest */
+    int4 corner;    /* of the tile: x, y, x, y */
+} gathering;
+
+/* Splats whose blocks are all closed are left out. */
+INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
+{
+    uint32_t at = g->splats;
+    const int4 to_block = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
+    uint64_t four, blocks[BANDS], any = 0;
+    memcpy(&four, (const char *)splat + offsetof(trip_cpu_splat, x0), sizeof four);
+    int4 bounds = int4_widened(four);
+    int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_TILE - 1) >> to_block;
+    uint32_t left = (uint32_t)in[0], right = (uint32_t)in[2];
+    uint32_t top = (uint32_t)in[1], bottom = (uint32_t)in[3];
+    uint64_t columns = from_column(left) & ~from_column(right + 1);
+    for (unsigned band = 0; band < BANDS; band++) {
+        blocks[band] = from_row(band, top) & ~from_row(band, bottom + 1);
+        blocks[band] &= columns & s->open[band];
+        any |= blocks[band];
+    }
+    if (any == 0)
+        return;
+    make_local(&s->local[at], splat, g->corner - (bounds & ~(TRIP_CPU_TILE - 1)));
+    g->thick = g->thick >> 1 | (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << 63;
+    for (unsigned band = 0; band < BANDS; band++)
+        s->touched[band][at / 64][at % 64] = blocks[band];
+    g->splats = ++at;
+    if (at % 64 != 0)
+        return;
+    s->thick[at / 64 - 1] = g->thick;
+    if (at == TRIP_CPU_LOCAL) {
+        s->splats = at;
+        empty_group(s);
+        g->splats = 0;
+    }
+}
+
+/* Splats to fetch ahead: they lie scattered among those of other tiles. */
+#define AHEAD 32
+
+INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
+                         const uint16_t *order, uint32_t count)
+{
+    uint32_t i = 0;
+    for (; i < AHEAD && i < count; i++)
+        __builtin_prefetch(&splats[order[i]]);
+    for (; i < count; i++) {
+        __builtin_prefetch(&splats[order[i]]);
+        add(s, g, &splats[order[i - AHEAD]]);
+    }
+    for (i = count < AHEAD ? 0 : count - AHEAD; i < count; i++)
+        add(s, g, &splats[order[i]]);
+}
+
+static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count)
+{
+    gathering g = { s->splats, s->thick[s->splats / 64], { s->x, s->y, s->x, s->y } };
+    if (!takes_light(s))
+        return;
+    if (order)
+        add_in_order(s, &g, splats, order, count);
+    else
+        for (uint32_t i = 0; i < count; i++)
+            if (meets(s, &splats[i]))
+                add(s, &g, &splats[i]);
+    s->splats = g.splats;
+    s->thick[g.splats / 64] = g.thick;
+}
+
+static uint64_t tile_end(trip_cpu_scratch *s)
+{
+    uint64_t open = 0;
+    if (s->splats % 64 != 0)
+        s->thick[s->splats / 64] >>= 64 - s->splats % 64;
+    empty_group(s);
+    for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
+        uint64_t bits = s->open[row / 8] >> 8 * (row % 8) & 255;
+        open |= bits << 8 * (row * BLOCK_ROWS / 4);
+    }
+    return open;
+}
+
+/* ---- taking up a tile ---- */
+
+INLINE vf form_at(const float form[6], vf x, vf y)
+{
+    vf fx = v_fma(x, v_set(form[3]), v_fma(y, v_set(form[4]), v_set(form[1])));
+    vf fy = v_fma(y, v_set(form[5]), v_set(form[2]));
+    return v_fma(x, fx, v_fma(y, fy, v_set(form[0])));
+}
+
+/* G and the stretch at a block's pixels. */
+static void set_rays(trip_cpu_scratch *s, unsigned number)
+{
+    const trip_cpu_view *view = s->view;
+    float *of = s->rays + 2 * V * number;
+    vf x = v_set((float)(s->x - 0.5 * view->splat.camera.width)) + block_x(number);
+    vf y = v_set((float)(s->y - 0.5 * view->splat.camera.height)) + block_y(number);
+    vf inverse = v_set(1) / form_at(view->ray2, x, y), stretch = v_set(1);
+    if (view->stretch_varies)
+        stretch = v_sqrt(form_at(view->world2, x, y) * inverse);
+    v_store(of, view->splat.camera.ortho ? v_set(1) : inverse);
+    v_store(of + V, stretch);
+    s->rays_known[number / 64] |= UINT64_C(1) << number % 64;
+}
+
+/* The blocks of the quarters that are ours: the others' pixels may be another thread's. */
+static uint64_t blocks_of_quarters(unsigned quarters, unsigned band)
+{
+    uint64_t blocks = 0;
+    for (unsigned row = 0; row < 8; row++) {
+        unsigned below = 8 * band + row >= BLOCKS_DOWN / 2, pair = quarters >> 2 * below & 3;
+        uint64_t bits = (pair & 1 ? 0x0fu : 0) | (pair & 2 ? 0xf0u : 0);
+        blocks |= bits << 8 * row;
+    }
+    return blocks;
+}
+
+/* Which blocks are ours and hold a pixel that may still take light. */
+static void find_open(trip_cpu_scratch *s, unsigned quarters)
+{
+    for (unsigned band = 0; band < BANDS; band++) {
+        s->open[band] = blocks_of_quarters(quarters, band);
+        if (!s->view->front_to_back)
+            continue;
+        for (uint64_t rest = s->open[band]; rest; rest &= rest - 1) {
+            unsigned bit = (unsigned)__builtin_ctzll(rest);
+            if (!any_open(v_load(s->pixels + BLOCK_FLOATS * (64 * band + bit) + 3 * V)))
+                s->open[band] &= ~(UINT64_C(1) << bit);
+        }
+    }
+}
+
+static void tile_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
+                       unsigned quarters, float *pixels)
+{
+    s->view = view;
+    s->x = x;
+    s->y = y;
+    s->pixels = pixels;
+    s->splats = 0;
+    s->blend = choose_blend(view);
+    memset(s->rays_known, 0, sizeof s->rays_known);
+    find_open(s, quarters);
+}
+
+#endif

@@ -1,0 +1,51 @@
+#include "cpu/kernels/isa.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "report.h"
+
+/* Once, so that the list below is complete when any thread sees it. */
+static const trip_cpu_kernels *runnable[5];
+
+__attribute__((constructor)) static void find_runnable(void)
+{
+    int n = 0;
+#if defined(__x86_64__)
+    __builtin_cpu_init();
+    bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
+    bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                  __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+    if (avx512 && __builtin_cpu_supports("avx512vbmi2"))
+        runnable[n++] = &trip_cpu_avx512_vbmi2;
+    if (avx512)
+        runnable[n++] = &trip_cpu_avx512;
+    if (avx2)
+        runnable[n++] = &trip_cpu_avx2;
+#elif defined(__aarch64__)
+    runnable[n++] = &trip_cpu_neon;
+#endif
+    runnable[n] = &trip_cpu_plain;
+}
+
+const trip_cpu_kernels *const *trip_cpu_isas(void)
+{
+    return runnable;
+}
+
+const trip_cpu_kernels *trip_cpu_isa_choose(const char *name)
+{
+    if (!name || !*name)
+        return runnable[0];
+    char names[64] = "";
+    for (int i = 0; runnable[i]; i++) {
+        if (strcmp(runnable[i]->isa, name) == 0)
+            return runnable[i];
+        size_t used = strlen(names);
+        snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "", runnable[i]->isa);
+    }
+    trip_fail(TRIP_USAGE, "render", "TRIPTYCH_ISA", "'%s' does not run here; choose one of %s",
+              name, names);
+    return NULL;
+}

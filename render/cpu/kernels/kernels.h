@@ -1,0 +1,188 @@
+/* What the CPU renderer's inner loops share: a projected splat, the constants of a list, the pixels
+ * of a screen tile, and the table of loops that each instruction set provides. The kernels are pure
+ * functions of their arguments; threads give each its own scratch. isa.h chooses a table. */
+#ifndef TRIP_CPU_KERNELS_H
+#define TRIP_CPU_KERNELS_H
+
+#include <assert.h>
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "renderer.h"
+#include "splat.h"
+
+/* Edge of a screen tile in pixels. Its pixels are kept as V-lane vectors of four columns times V /
+ * 4 rows (a block), so that a small footprint meets few vectors and all of them aligned: block
+ * after block, row by row of blocks, each as R[V] G[V] B[V] T[V]; T is 1 - alpha. */
+#define TRIP_CPU_TILE 32
+#define TRIP_CPU_TILE_PIXELS (TRIP_CPU_TILE * TRIP_CPU_TILE)
+
+/* Exponents are kept ready for the conversion to a float's bits: y stands for
+ * 2^(y / TRIP_CPU_EXP_UNIT - 127). */
+#define TRIP_CPU_EXP_UNIT 8388608.0
+
+/* Splats whose largest optical depth is at most this are thin: short forms give their opacity. */
+#define TRIP_CPU_THIN 0.3f
+
+/* Opacities of thin splats in views with one stretch are u (c[0] + c[1] u + ... + c[4] u^4)^2. */
+#define TRIP_CPU_TERMS 5
+
+/* What is kept instead of c[] by a splat that is thick or in a view whose stretch varies. */
+enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE };
+
+/* One splat, ready to blend; 64 bytes, a cache line. With (x, y) a pixel's position from the corner
+ * of the tile at hand (of the first that the splat lies in, until tile_blend() takes it up),
+ *     a = l11 x + l21 y + l1,  b = l22 y + l2,  u = max(0, 1 - G (a^2 + b^2)),
+ * G as in trip_cpu_rays: u = 1 - m / k^2 of splat.h, 1 at the centre and 0 outside the support. Its
+ * opacity there is that of c[]; or its optical depth, times the stretch where it
+ * varies, is what 2^(least + u cutoff) exceeds `edge` by, `cutoff` as in trip_cpu_view. */
+typedef struct trip_cpu_splat {
+    float l11, l21, l22, l1, l2;
+    float r, g, b;
+    float c[TRIP_CPU_TERMS];
+    uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
+    uint32_t tiles;          /* those that it lies in, see below */
+} trip_cpu_splat;
+
+static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
+
+/* trip_cpu_splat.tiles: the number of the first tile (top left); whether the splat also lies in the
+ * one to the right of it and in the one below it, or in more than these two by two; and whether it
+ * is not thin. */
+#define TRIP_CPU_TILES_RIGHT_SHIFT 28
+#define TRIP_CPU_TILES_BELOW_SHIFT 29
+#define TRIP_CPU_TILES_MORE (1u << 30)
+#define TRIP_CPU_TILES_THICK_SHIFT 31
+#define TRIP_CPU_TILES_FIRST ((1u << 28) - 1)
+
+/* Where the rays of a view are alike, their tables are not needed. */
+typedef enum trip_cpu_rays {
+    TRIP_CPU_PARALLEL,    /* G = 1, stretch constant */
+    TRIP_CPU_PERSPECTIVE, /* G(p) = 1 / |r(p)|^2, stretch constant: cubic voxels */
+    TRIP_CPU_STRETCHED,   /* G(p) and stretch(p) */
+} trip_cpu_rays;
+
+/* Constants of one list of one frame. */
+typedef struct trip_cpu_view {
+    const trip_frame *of;
+    trip_splat_frame splat;
+    trip_cpu_rays rays;
+    bool front_to_back, shading;
+    bool stretch_varies;
+    int axis, u_axis, v_axis;
+    float gradient_most; /* the largest magnitude of a normal, over gradient_full of shade.h */
+    double stretch;      /* world units per index length; the cube root of |J| where it varies */
+    /* |r|^2 and |J r|^2 / stretch^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2
+     * times these. */
+    float ray2[6], world2[6];
+    float cutoff; /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
+    float thin;   /* the largest optical depth, stretch aside, of thin splats */
+    int tiles_across;
+    double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
+    double forward_length;                     /* most that z changes by over an index length */
+    double eye[3];                             /* [u, v, sheet] */
+    double world[3][3];  /* index_to_world's columns for u, v, sheet, over voxel_world */
+    trip_splat parallel; /* the footprint of all, in parallel views */
+} trip_cpu_view;
+
+/* Voxels waiting to be projected: one entry a lane, from any runs. */
+#define TRIP_CPU_STAGED 256
+typedef struct trip_cpu_staged {
+    int32_t u[TRIP_CPU_STAGED + 16], v[TRIP_CPU_STAGED + 16], sheet[TRIP_CPU_STAGED + 16];
+    int32_t code[TRIP_CPU_STAGED + 16], normal[TRIP_CPU_STAGED + 16];
+} trip_cpu_staged;
+
+/* The same voxels on their way to splats: what one loop of the projection leaves to the next. */
+typedef struct trip_cpu_lanes {
+    /* The centre is (x + whole_x, y + whole_y). */
+    float x[TRIP_CPU_STAGED], y[TRIP_CPU_STAGED];
+    float whole_x[TRIP_CPU_STAGED], whole_y[TRIP_CPU_STAGED];
+    float z[TRIP_CPU_STAGED];
+    float l11[TRIP_CPU_STAGED], l21[TRIP_CPU_STAGED], l22[TRIP_CPU_STAGED];
+    float l1[TRIP_CPU_STAGED], l2[TRIP_CPU_STAGED];
+    float depth[TRIP_CPU_STAGED]; /* the largest optical depth, edge and all, stretch aside */
+    float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED];           /* two uint16 each */
+    float tiles[TRIP_CPU_STAGED];                                  /* uint32 */
+    uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
+    bool broken; /* set for good when the numbers of some splat are not finite */
+} trip_cpu_lanes;
+
+/* Splats that are sorted by blocks of a tile together, and bands of 64 blocks at most. */
+#define TRIP_CPU_LOCAL 256
+#define TRIP_CPU_BANDS 4
+
+/* What one thread needs while it blends a tile. */
+typedef struct trip_cpu_scratch {
+    _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by block: G[V], stretch[V] */
+    _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
+    /* By band and 64 splats: first each splat's blocks, then each block's splats. */
+    uint64_t touched[TRIP_CPU_BANDS][TRIP_CPU_LOCAL / 64][64];
+    uint64_t any[TRIP_CPU_BANDS];        /* blocks that some splat may touch */
+    uint64_t open[TRIP_CPU_BANDS];       /* ours that may still take light */
+    uint64_t rays_known[TRIP_CPU_BANDS]; /* those whose `rays` are filled in */
+    uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats are not thin */
+    uint32_t splats;
+    int x, y; /* of the tile's first pixel */
+    float *pixels;
+    void (*blend)(struct trip_cpu_scratch *s); /* the group, in order */
+    const trip_cpu_view *view;
+    trip_cpu_staged staged;
+    trip_cpu_lanes lanes;
+} trip_cpu_scratch;
+
+/* What a tile holds when all lists are drawn. */
+typedef enum trip_cpu_content {
+    TRIP_CPU_NOTHING,
+    TRIP_CPU_LAYER, /* of the only list with weight there, as blended */
+    TRIP_CPU_SUM,   /* of several lists, as merged */
+} trip_cpu_content;
+
+struct trip_cpu_region;
+
+typedef struct trip_cpu_kernels {
+    const char *isa;
+    unsigned lanes;
+
+    /* Which squares of a region may show, by trip_cpu_mask's words: in Morton order, a bit each,
+     * the first lowest. */
+    uint64_t (*squares)(const trip_cpu_view *view, const struct trip_cpu_region *region,
+                        const _Atomic uint64_t *open, trip_cpu_lanes *lanes);
+
+    /* Adds voxels of one run to `staged` in draw order, leaving out transparent ones; at most
+     * TRIP_CPU_STAGED - `filled` voxels. Returns the new fill. */
+    uint32_t (*stage)(const trip_cpu_view *view, const trip_run *run, const uint32_t *voxels,
+                      const uint32_t *normals, uint32_t count, bool reversed,
+                      trip_cpu_staged *staged, uint32_t filled);
+    /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
+     * order. With `open`, a word a tile as in trip_cpu_mask, those over closed blocks alone may be
+     * left out; NULL: none are. `out` has room for count + 16. Returns how many. */
+    uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
+                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
+                        trip_cpu_splat *out);
+
+    /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere; `alone`
+     * says that its weight is 1 all over the tile. */
+    void (*tile_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
+    /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. */
+    void (*tile_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
+                       unsigned quarters, float *pixels);
+    /* Blends splats[order[i]] in order, or splats[i] where order is NULL. */
+    void (*tile_blend)(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
+                       uint32_t count);
+    /* Ends with every splat in the pixels. Returns which blocks of 4 x 4 pixels of the quarters
+     * hold a pixel that may still take light: eight rows of eight bits, the first lowest. */
+    uint64_t (*tile_end)(trip_cpu_scratch *s);
+    /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
+    void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
+                       float *sum);
+    /* The finished picture of a tile into an image, from what the lists came to there. */
+    void (*tile_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
+                        const float *pixels, float *rgba);
+
+    /* How many of so many splats that project() made have a pixel centre of the image in their
+     * support where the list has weight. Uses `s` for itself. */
+    uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
+                      uint32_t count);
+} trip_cpu_kernels;
+
+#endif

@@ -1,0 +1,220 @@
+/* Kernels that begin and finish the pixels of a tile: weights of the lists, the merge (equation 3
+ * of Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
+ * The weights are computed in double precision by the operations of weight.c in their order, so
+ * that where a list begins does not depend on who asks, and what is near there is exact for any h.
+ */
+#ifndef TRIP_CPU_MERGE_H
+#define TRIP_CPU_MERGE_H
+
+#include "cpu/kernels/blend_tmpl.h"
+#include "cpu/kernels/kernels.h"
+#include "weight.h"
+
+typedef int64_t vl __attribute__((vector_size(4 * V)));
+
+INLINE vd vd_select(vl m, vd a, vd b)
+{
+    return (vd)((m & (vl)a) | (~m & (vl)b));
+}
+
+INLINE vd vd_abs(vd a)
+{
+    return (vd)((vl)a & INT64_MAX);
+}
+
+INLINE vd vd_max(vd a, vd b)
+{
+    return vd_select((vl)(a > b), a, b);
+}
+
+typedef struct rays {
+    vd r[3]; /* magnitudes */
+} rays;
+
+INLINE rays rays_at(const trip_camera *c, vd x, vd y)
+{
+    const double r0[3] = { c->r0.x, c->r0.y, c->r0.z };
+    const double rx[3] = { c->rx.x, c->rx.y, c->rx.z }, ry[3] = { c->ry.x, c->ry.y, c->ry.z };
+    rays out;
+    for (int i = 0; i < 3; i++) {
+        vd r = vd_set(r0[i]);
+        if (!c->ortho)
+            r = r + (vd_set(rx[i]) * x + vd_set(ry[i]) * y);
+        out.r[i] = vd_abs(r);
+    }
+    return out;
+}
+
+/* As largest_axis() of weight.c: the first of equals. */
+INLINE vl is_largest(const rays *r, int axis)
+{
+    vl x = (vl)(r->r[0] >= r->r[1]) & (vl)(r->r[0] >= r->r[2]);
+    if (axis == 0)
+        return x;
+    vl y = ~x & (vl)(r->r[1] >= r->r[2]);
+    return axis == 1 ? y : ~x & ~y;
+}
+
+INLINE vd weight_half(const trip_cpu_view *view, const trip_settings *s, int axis, vd x, vd y)
+{
+    if (s->method == TRIP_METHOD_AXIS)
+        return vd_set(axis == view->of->plan->axis_of_view);
+    rays r = rays_at(&view->splat.camera, x, y);
+    if (s->method == TRIP_METHOD_CLIP)
+        return vd_select(is_largest(&r, axis), vd_set(1), vd_set(0));
+    vd most = vd_max(r.r[0], vd_max(r.r[1], r.r[2]));
+    return vd_max(vd_set(0), (r.r[axis] / most - vd_set(s->h)) / vd_set(1 - s->h));
+}
+
+INLINE vd_pair centres(int first, const float offsets[V])
+{
+    vf f = v_load(offsets);
+    return (vd_pair){ vd_low(f) + vd_set(first), vd_high(f) + vd_set(first) };
+}
+
+/* The list's weight at the pixels of block (column, row) of the tile at (x, y). */
+INLINE vf weight(const trip_cpu_view *view, int axis, int x, int y, int column, int row)
+{
+    float across[V], down[V];
+    for (int i = 0; i < V; i++) {
+        across[i] = (float)(4 * column + i % 4) + 0.5f;
+        down[i] = (float)(BLOCK_ROWS * row + i / 4) + 0.5f;
+    }
+    vd_pair px = centres(x, across), py = centres(y, down);
+    const trip_settings *s = view->of->settings;
+    return v_narrow(weight_half(view, s, axis, px.lo, py.lo),
+                    weight_half(view, s, axis, px.hi, py.hi));
+}
+
+/* Lanes of a block that lie in the image. */
+INLINE vm in_image(const trip_camera *camera, int x, int y, int column, int row)
+{
+    vf px, py;
+    for (int i = 0; i < V; i++) {
+        px[i] = (float)(x + 4 * column + i % 4);
+        py[i] = (float)(y + BLOCK_ROWS * row + i / 4);
+    }
+    return vm_and(v_gt(v_set((float)camera->width), px), v_gt(v_set((float)camera->height), py));
+}
+
+static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, float *pixels)
+{
+    for (int b = 0; b < BLOCKS; b++) {
+        float *block = pixels + BLOCK_FLOATS * b;
+        int column = b % BLOCKS_ACROSS, row = b / BLOCKS_ACROSS;
+        vf t = v_set(1);
+        if (view->front_to_back) {
+            vm open = in_image(&view->splat.camera, x, y, column, row);
+            if (!alone)
+                open = vm_and(open, v_gt(weight(view, view->axis, x, y, column, row), v_set(0)));
+            t = v_select(open, t, v_set(0));
+        }
+        for (int c = 0; c < 3; c++)
+            v_store(block + c * V, v_set(0));
+        v_store(block + 3 * V, t);
+    }
+}
+
+static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
+                       float *sum)
+{
+    for (int b = 0; b < BLOCKS; b++) {
+        const float *block = pixels + BLOCK_FLOATS * b;
+        float *to = sum + BLOCK_FLOATS * b;
+        vf w = weight(view, view->axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
+        w = w * w;
+        for (int c = 0; c < 4; c++) {
+            vf layer = v_load(block + c * V);
+            if (c == 3)
+                layer = v_set(1) - layer;
+            v_store(to + c * V, first ? w * layer : v_fma(w, layer, v_load(to + c * V)));
+        }
+    }
+}
+
+/* 1 / the sum of the squares of the lists' weights at a block: 1 unless lists are merged. */
+INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
+{
+    vf sum = v_set(0);
+    if (view->of->settings->method != TRIP_METHOD_MERGE)
+        return v_set(1);
+    for (int axis = 0; axis < 3; axis++) {
+        vf w = weight(view, axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
+        sum = v_fma(w, w, sum);
+    }
+    return v_set(1) / sum;
+}
+
+/* Block b of the picture before the background. */
+INLINE void merged_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
+                         const float *pixels, vf out[4])
+{
+    for (int c = 0; c < 4; c++)
+        out[c] = v_load(pixels + BLOCK_FLOATS * b + c * V);
+    if (content == TRIP_CPU_LAYER) {
+        out[3] = v_set(1) - out[3];
+        return;
+    }
+    vf inverse = inverse_weight(view, x, y, b);
+    for (int c = 0; c < 4; c++)
+        out[c] = out[c] * inverse;
+}
+
+/* The background, premultiplied. */
+INLINE float behind(const trip_cpu_view *view, int channel)
+{
+    const double *background = view->of->settings->background;
+    return (float)(channel == 3 ? background[3] : background[channel] * background[3]);
+}
+
+/* A block's pixels, `line_floats` from line to line; the first `count` columns of the first `lines`
+ * lines lie in the image. */
+INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, const vf out[4])
+{
+    uint32_t row[V];
+    bool whole = count >= 4 && lines >= BLOCK_ROWS;
+    float block[BLOCK_FLOATS];
+    for (uint32_t i = 0; i < V; i++)
+        row[i] = 4 * (i % 4) + i / 4 * (whole ? (uint32_t)line_floats : 16);
+    v_store_rows(whole ? rgba : block, row, out[0], out[1], out[2], out[3]);
+    if (whole)
+        return;
+    for (int r = 0; r < BLOCK_ROWS && r < lines && count > 0; r++)
+        memcpy(rgba + (size_t)r * line_floats, block + 16 * r,
+               16 * (size_t)(count < 4 ? count : 4));
+}
+
+/* A tile where no list has drawn. */
+static void tile_background(const trip_cpu_view *view, float *rgba, size_t line_floats, int count,
+                            int lines)
+{
+    const float pixel[4] = { behind(view, 0), behind(view, 1), behind(view, 2), behind(view, 3) };
+    count = count < TRIP_CPU_TILE ? count : TRIP_CPU_TILE;
+    for (int r = 0; r < lines && r < TRIP_CPU_TILE; r++)
+        for (int i = 0; i < count; i++)
+            memcpy(rgba + (size_t)r * line_floats + 4 * i, pixel, sizeof pixel);
+}
+
+static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
+                        const float *pixels, float *rgba)
+{
+    const trip_camera *camera = &view->splat.camera;
+    size_t line_floats = 4 * (size_t)camera->width;
+    rgba += (size_t)y * line_floats + 4 * (size_t)x;
+    if (content == TRIP_CPU_NOTHING) {
+        tile_background(view, rgba, line_floats, camera->width - x, camera->height - y);
+        return;
+    }
+    for (int b = 0; b < BLOCKS; b++) {
+        int column = 4 * (b % BLOCKS_ACROSS), line = BLOCK_ROWS * (b / BLOCKS_ACROSS);
+        vf out[4];
+        merged_block(view, x, y, b, content, pixels, out);
+        vf through = v_set(1) - out[3];
+        for (int c = 0; c < 4; c++)
+            out[c] = v_fma(through, v_set(behind(view, c)), out[c]);
+        store_pixels(rgba + (size_t)line * line_floats + 4 * column, line_floats,
+                     camera->width - x - column, camera->height - y - line, out);
+    }
+}
+
+#endif

@@ -1,0 +1,554 @@
+/* Kernels that turn the voxels of runs into projected splats, V at a time: included by
+ * table_tmpl.h after simd.h. Positions are computed in double precision from the voxel's
+ * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
+ * footprint in single. The few splats for whose numbers single does not do, near the plane of the
+ * eye above all, go through trip_cpu_project_near(), which tells when they cannot be drawn. */
+#ifndef TRIP_CPU_PROJECT_H
+#define TRIP_CPU_PROJECT_H
+
+#include "cpu/kernels/closed_tmpl.h"
+#include "cpu/kernels/exp_tmpl.h"
+#include "cpu/kernels/kernels.h"
+#include "cpu/near.h"
+#include "cpu/kernels/simd_tmpl.h"
+#include "shade.h"
+
+/* Splats whose largest optical depth is below 2^-60 are left out: 10^18 of them would not show. */
+#define FAINTEST 0x1p-60f
+
+#define LOG2_E 1.44269504088896340736
+
+/* ---- staging: runs of voxels to lanes ---- */
+
+INLINE vi load_lanes(const uint32_t *from, uint32_t at, uint32_t lanes, uint32_t count,
+                     bool reversed)
+{
+    if (lanes == V)
+        return reversed ? vi_reverse(vi_load(from + count - at - V)) : vi_load(from + at);
+    int32_t part[V] = { 0 };
+    for (uint32_t i = 0; i < lanes; i++)
+        part[i] = (int32_t)(reversed ? from[lanes - 1 - i] : from[at + i]);
+    return vi_load(part);
+}
+
+static uint32_t stage(const trip_cpu_view *view, const trip_run *run, const uint32_t *voxels,
+                      const uint32_t *normals, uint32_t count, bool reversed,
+                      trip_cpu_staged *staged, uint32_t filled)
+{
+    const float *extinction = &view->of->table[0].extinction;
+    const vi run_u = vi_set(run->u), run_v = vi_set(run->v), sheet = vi_set(run->sheet);
+    for (uint32_t i = 0; i < count; i += V) {
+        uint32_t lanes = count - i < V ? count - i : V;
+        vi voxel = load_lanes(voxels, i, lanes, count, reversed);
+        vi code = v_shift_right(voxel, 16);
+        vm seen = vm_and(v_gt(v_gather(extinction, code * 4), v_set(0)), vm_first(lanes));
+        vi_store_packed(staged->u + filled, seen, run_u + (voxel & 255));
+        vi_store_packed(staged->v + filled, seen, run_v + (v_shift_right(voxel, 8) & 255));
+        vi_store_packed(staged->sheet + filled, seen, sheet);
+        vi_store_packed(staged->code + filled, seen, code);
+        if (normals)
+            vi_store_packed(staged->normal + filled, seen,
+                            load_lanes(normals, i, lanes, count, reversed));
+        filled += (uint32_t)__builtin_popcount(vm_bits(seen));
+    }
+    return filled;
+}
+
+/* ---- the centre ---- */
+
+INLINE vd_pair along(const double c[4], vd_pair u, vd_pair v, vd_pair s)
+{
+    return (vd_pair){
+        vd_fma(u.lo, vd_set(c[0]),
+               vd_fma(v.lo, vd_set(c[1]), vd_fma(s.lo, vd_set(c[2]), vd_set(c[3])))),
+        vd_fma(u.hi, vd_set(c[0]),
+               vd_fma(v.hi, vd_set(c[1]), vd_fma(s.hi, vd_set(c[2]), vd_set(c[3])))),
+    };
+}
+
+INLINE vd_pair widen_int(vi a)
+{
+    return (vd_pair){ vd_low_int(a), vd_high_int(a) };
+}
+
+/* 1 / z to double precision: a Newton step from the single-precision quotient. */
+INLINE vd refine(vd z, vd inverse)
+{
+    return vd_fma(inverse, vd_fma(-z, inverse, vd_set(1)), inverse);
+}
+
+INLINE void split(vd_pair p, vf *whole, vf *part)
+{
+    *whole = v_from_int(v_truncate(v_narrow(p.lo, p.hi)));
+    *part = v_narrow(p.lo - vd_low(*whole), p.hi - vd_high(*whole));
+}
+
+INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                  trip_cpu_lanes *lanes)
+{
+    vd_pair u = widen_int(vi_load(staged->u + at)), v = widen_int(vi_load(staged->v + at));
+    vd_pair s = widen_int(vi_load(staged->sheet + at));
+    vd_pair x = along(view->along_x, u, v, s), y = along(view->along_y, u, v, s);
+    vd_pair zs = along(view->along_z, u, v, s);
+    vf z = v_narrow(zs.lo, zs.hi), whole, part;
+    v_store(lanes->z + at, z);
+    if (!view->splat.camera.ortho) {
+        vf inverse = v_set(1) / z;
+        vd lo = refine(zs.lo, vd_low(inverse)), hi = refine(zs.hi, vd_high(inverse));
+        x = (vd_pair){ x.lo * lo, x.hi * hi };
+        y = (vd_pair){ y.lo * lo, y.hi * hi };
+    }
+    split(x, &whole, &part);
+    v_store(lanes->whole_x + at, whole);
+    v_store(lanes->x + at, part);
+    split(y, &whole, &part);
+    v_store(lanes->whole_y + at, whole);
+    v_store(lanes->y + at, part);
+}
+
+/* ---- the footprint ---- */
+
+typedef struct footprint {
+    vf l11, l21, l22;                    /* as in trip_cpu_splat */
+    vf spread;                           /* |S| / |S'| */
+    vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
+    vm usual;                            /* the numbers are good */
+} footprint;
+
+/* Constants of a perspective view as floats; rays relative to the image's middle, pixel steps X =
+ * rx / step and Y = ry / step of a length about 1, so that no square of theirs leaves a float's
+ * range however narrow the view. */
+typedef struct perspective {
+    vf middle_x, middle_y, step;
+    vf rr, rX, rY, XX, XY, YY; /* of r at the middle, X and Y */
+    vf det;                    /* (r . X x Y)^2 */
+    vf inverse_sigma;          /* of a splat at depth 1, in pixels: step (r . X x Y) / sigma */
+    vf reach, inverse_step;    /* cutoff^2 step; 1 / step */
+    vf near;                   /* 2 cutoff^2 step^2 */
+} perspective;
+
+/* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
+ */
+#define FARTHEST 1e12f
+
+INLINE perspective perspective_of(const trip_splat_frame *f)
+{
+    const trip_camera *c = &f->camera;
+    trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    double step = sqrt(fmax(f->rxrx, f->ryry));
+    trip_vec3 x = trip_scale(c->rx, 1 / step), y = trip_scale(c->ry, 1 / step);
+    double volume = trip_dot(r, trip_cross(x, y));
+    return (perspective){
+        .middle_x = v_set((float)(0.5 * c->width)),
+        .middle_y = v_set((float)(0.5 * c->height)),
+        .step = v_set((float)step),
+        .rr = v_set((float)trip_dot(r, r)),
+        .rX = v_set((float)trip_dot(r, x)),
+        .rY = v_set((float)trip_dot(r, y)),
+        .XX = v_set((float)trip_dot(x, x)),
+        .XY = v_set((float)trip_dot(x, y)),
+        .YY = v_set((float)trip_dot(y, y)),
+        .det = v_set((float)(volume * volume)),
+        .inverse_sigma = v_set((float)(step * volume / f->sigma)),
+        .reach = v_set((float)(f->cutoff2 * step)),
+        .inverse_step = v_set((float)(1 / step)),
+        .near = v_set((float)(2 * f->cutoff2 * step * step)),
+    };
+}
+
+/* Bounds of the support, the ellipse of E and l in splat.h over u of footprint_of(), to be widened
+ * by the caller; k2 is cutoff^2 / u. */
+INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
+{
+    vf inverse = v_set(1) / v_fnma(exy, exy, exx * eyy);
+    f->shift_x = v_fnma(exy, ly, eyy * lx) * inverse;
+    f->shift_y = v_fnma(exy, lx, exx * ly) * inverse;
+    vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
+    f->half_x = v_sqrt(size * eyy);
+    f->half_y = v_sqrt(size * exx);
+}
+
+/* With D = r_c . X x Y, constant over the image, and u = (step D z / sigma)^2,
+ * u S = adj [X x r_c, Y x r_c] and |u S| = D^2 |r_c|^2: u alone carries the size of a splat in
+ * pixels, and all else is about 1. */
+INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
+                              const trip_cpu_lanes *lanes, uint32_t at)
+{
+    footprint out;
+    vf x = ((v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at)) * p->step;
+    vf y = ((v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at)) * p->step;
+    vf rx = v_fma(x, p->XX, v_fma(y, p->XY, p->rX)); /* r_c . X */
+    vf ry = v_fma(x, p->XY, v_fma(y, p->YY, p->rY));
+    vf rr = v_fma(x, p->rX + rx, v_fma(y, p->rY + ry, p->rr)); /* |r_c|^2 */
+    vf u = p->inverse_sigma * v_load(lanes->z + at);
+    u = u * u;
+    /* From here on S, S' and the low-pass times u. */
+    vf low_pass = v_set((float)f->low_pass2) * u;
+    vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
+    vf sxy = v_fnma(rr, p->XY, rx * ry);
+    vf det_s = p->det * rr;
+    vf det = v_fma(low_pass, sxx + syy + low_pass, det_s);
+    sxx = sxx + low_pass;
+    syy = syy + low_pass;
+
+    /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
+    vf inverse = v_set(1) / (det * syy);
+    vf inverse_det = syy * inverse, inverse_syy = det * inverse;
+    vf rr_u = rr * u, unit = rr_u * v_set((float)(1 / f->cutoff2));
+    out.l11 = v_sqrt(unit * (syy * inverse_det));
+    out.l21 = -(sxy * inverse_syy) * out.l11;
+    out.l22 = v_sqrt(unit * inverse_syy);
+    out.spread = det_s * inverse_det;
+
+    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. What is
+     * not a number is not usual. */
+    vf trace = v_fma(p->XX, sxx, v_fma(p->YY, syy, (p->XY + p->XY) * sxy));
+    out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
+    vf t = p->reach / rr_u, t_step = t * p->step;
+    bound(&out, v_fnma(t_step, p->XX, syy * inverse_det), v_fnma(t_step, p->XY, -sxy * inverse_det),
+          v_fnma(t_step, p->YY, sxx * inverse_det), t * rx, t * ry, t * rr * p->inverse_step);
+    return out;
+}
+
+INLINE footprint footprint_parallel(const trip_cpu_view *view)
+{
+    const trip_splat *s = &view->parallel;
+    trip_cpu_splat one;
+    trip_cpu_set_conic(s, &one);
+    return (footprint){
+        .l11 = v_set(one.l11),
+        .l21 = v_set(one.l21),
+        .l22 = v_set(one.l22),
+        .spread = v_set((float)pow(s->amplitude / view->splat.amplitude, 2)),
+        .shift_x = v_set((float)(0.5 * (s->x0 + s->x1) - s->x)),
+        .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
+        .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
+        .half_y = v_set((float)(0.5 * (s->y1 - s->y0))),
+        .usual = vm_first(V),
+    };
+}
+
+/* ---- colour and light ---- */
+
+typedef struct colour {
+    vf r, g, b;
+} colour;
+
+typedef struct v3 {
+    vf x, y, z;
+} v3;
+
+INLINE vf dot(v3 a, v3 b)
+{
+    return v_fma(a.x, b.x, v_fma(a.y, b.y, a.z * b.z));
+}
+
+INLINE v3 unit(v3 a)
+{
+    vf inverse = v_set(1) / v_sqrt(v_max(dot(a, a), v_set(1e-30f)));
+    return (v3){ a.x * inverse, a.y * inverse, a.z * inverse };
+}
+
+INLINE v3 v3_of(trip_vec3 a)
+{
+    return (v3){ v_set((float)a.x), v_set((float)a.y), v_set((float)a.z) };
+}
+
+INLINE vf offset(vi index, double eye)
+{
+    vd_pair a = widen_int(index);
+    return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
+}
+
+/* From the voxel to the eye, world space, not normalised. */
+INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
+{
+    const trip_camera *camera = &view->splat.camera;
+    if (camera->ortho)
+        return v3_of(trip_scale(camera->world_forward, -1));
+    vf c[3] = { offset(u, view->eye[0]), offset(v, view->eye[1]), offset(sheet, view->eye[2]) };
+    vf w[3];
+    for (int i = 0; i < 3; i++)
+        w[i] = -v_fma(
+            v_set((float)view->world[i][0]), c[0],
+            v_fma(v_set((float)view->world[i][1]), c[1], v_set((float)view->world[i][2]) * c[2]));
+    return (v3){ w[0], w[1], w[2] };
+}
+
+/* As trip_normal_unpack(): the direction, and the magnitude over gradient_scale. */
+INLINE v3 unpack_normal(vi normal, vf *magnitude)
+{
+    const vf step = v_set(2.0f / 4095);
+    vf a = v_fma(v_from_int(normal & 4095), step, v_set(-1));
+    vf b = v_fma(v_from_int(v_shift_right(normal, 12) & 4095), step, v_set(-1));
+    vf m = v_from_int(v_shift_right(normal, 24)) * v_set(1.0f / 255);
+    *magnitude = m * m;
+    v3 n = { .z = v_set(1) - v_abs(a) - v_abs(b) };
+    vm below = v_gt(v_set(0), n.z);
+    n.x = v_select(below, v_copysign(v_set(1) - v_abs(b), a), a);
+    n.y = v_select(below, v_copysign(v_set(1) - v_abs(a), b), b);
+    return unit(n);
+}
+
+/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
+ */
+INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
+{
+    const trip_settings *s = view->of->settings;
+    vf magnitude;
+    v3 normal = unpack_normal(packed, &magnitude);
+    eye = unit(eye);
+    v3 light = eye, half = eye;
+    if (!s->headlight) {
+        light = v3_of(s->light_direction);
+        half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
+    }
+    vf strength = v_min(v_set(1), magnitude * v_set(view->gradient_most));
+    vf diffuse = v_abs(dot(normal, light));
+    /* Processors are slow with numbers below 2^-126, as a 24th power soon is. */
+    vf h2 = v_max(dot(normal, half) * dot(normal, half), v_set(0x1p-8f));
+    vf h8 = (h2 * h2) * (h2 * h2);
+    static_assert((int)TRIP_SHININESS == 24, "the power below");
+    vf gloss = strength * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
+    vf matt = v_fma(diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
+    matt = v_fma(strength, matt, v_set(1));
+    return (colour){ v_min(v_set(1), v_fma(c.r, matt, gloss)),
+                     v_min(v_set(1), v_fma(c.g, matt, gloss)),
+                     v_min(v_set(1), v_fma(c.b, matt, gloss)) };
+}
+
+/* ---- putting it together ---- */
+
+/* log2 of a positive number; error below 3e-7. The polynomial is Cephes' logf(). */
+INLINE vf log2_of(vf a)
+{
+    vi t = (vi)((vu)v_bits(a) - 0x3f3504f3u); /* sqrt(1/2); wraps in lanes without a splat */
+    vf e = v_from_int(t >> 23);
+    vf f = v_from_bits((t & 0x7fffff) + 0x3f3504f3) - v_set(1);
+    vf p = v_set(7.0376836292e-2f);
+    p = v_fma(p, f, v_set(-1.1514610310e-1f));
+    p = v_fma(p, f, v_set(1.1676998740e-1f));
+    p = v_fma(p, f, v_set(-1.2420140846e-1f));
+    p = v_fma(p, f, v_set(1.4249322787e-1f));
+    p = v_fma(p, f, v_set(-1.6668057665e-1f));
+    p = v_fma(p, f, v_set(2.0000714765e-1f));
+    p = v_fma(p, f, v_set(-2.4999993993e-1f));
+    p = v_fma(p, f, v_set(3.3333331174e-1f));
+    vf f2 = f * f;
+    vf ln = v_fma(f2, v_fma(f, p, v_set(-0.5f)), f);
+    return v_fma(ln, v_set((float)LOG2_E), e);
+}
+
+/* First and last pixel whose centre lies in shift +- half about whole + part, a little more than
+ * less; nothing when first > last. */
+INLINE void pixels(vf whole, vf part, vf shift, vf half, int size, vi *first, vi *last)
+{
+    const vf zero = v_set(0), edge = v_set((float)size);
+    vf middle = whole + (part + shift);
+    vf slack = v_fma(half + v_abs(shift), v_set(1e-3f), v_set(1e-3f));
+    slack = v_fma(v_abs(middle), v_set(1e-6f), slack);
+    vf reach = half + slack - v_set(0.5f);
+    /* v_max gives its second argument where the first is not a number. */
+    *first = v_truncate(v_min(v_max(middle - reach, zero), edge));
+    *last = v_truncate(v_min(v_max(middle + reach + v_set(1), zero), edge)) - 1;
+}
+
+INLINE vm less_or_equal(vi a, vi b)
+{
+    return v_ge(v_from_int(b), v_from_int(a));
+}
+
+/* As trip_cpu_tiles(). */
+INLINE vi tiles_of(vi x0, vi y0, vi x1, vi y1, int across)
+{
+    const vi one = vi_set(1);
+    static_assert(TRIP_CPU_TILE == 32, "the shifts below");
+    vi x = x0 >> 5, y = y0 >> 5, right = (x1 >> 5) - x, below = (y1 >> 5) - y;
+    vi more = v_shift_right((one - right) | (one - below), 31); /* the sign: either is above 1 */
+    vi any_right = v_shift_right(-right, 31), any_below = v_shift_right(-below, 31);
+    return y * across + x + (any_right << TRIP_CPU_TILES_RIGHT_SHIFT) +
+           (any_below << TRIP_CPU_TILES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_TILES_MORE;
+}
+
+/* Where the tile of a pixel begins. */
+INLINE vf first_of_tile(vi pixel)
+{
+    return v_from_int(pixel & ~(TRIP_CPU_TILE - 1));
+}
+
+/* Everything but colour and opacity; the bits of the lanes that have pixels. */
+INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extinction,
+                         trip_cpu_lanes *lanes, uint32_t at)
+{
+    const trip_camera *camera = &view->splat.camera;
+    vf depth = extinction * v_set((float)(view->splat.amplitude * view->stretch));
+    depth = depth * v_sqrt(f->spread);
+    vi x0, x1, y0, y1;
+    pixels(v_load(lanes->whole_x + at), v_load(lanes->x + at), f->shift_x, f->half_x, camera->width,
+           &x0, &x1);
+    pixels(v_load(lanes->whole_y + at), v_load(lanes->y + at), f->shift_y, f->half_y,
+           camera->height, &y0, &y1);
+    vf x = v_load(lanes->x + at) + (v_load(lanes->whole_x + at) - first_of_tile(x0));
+    vf y = v_load(lanes->y + at) + (v_load(lanes->whole_y + at) - first_of_tile(y0));
+    v_store(lanes->l11 + at, f->l11);
+    v_store(lanes->l21 + at, f->l21);
+    v_store(lanes->l22 + at, f->l22);
+    v_store(lanes->l1 + at, -v_fma(f->l11, x, f->l21 * y));
+    v_store(lanes->l2 + at, -(f->l22 * y));
+    v_store(lanes->depth + at, depth);
+    vi_store(lanes->first + at, x0 | y0 << 16);
+    vi_store(lanes->last + at, x1 | y1 << 16);
+    vi_store(lanes->tiles + at, tiles_of(x0, y0, x1, y1, view->tiles_across));
+    vm seen = vm_and(v_gt(v_load(lanes->z + at), v_set(0)), v_gt(depth, v_set(FAINTEST)));
+    return vm_bits(vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1))));
+}
+
+/* Offsets in floats of the lanes' records in the output: a lane that is not kept is overwritten by
+ * the next. */
+INLINE uint32_t rank(unsigned bits, uint32_t row[V])
+{
+    uint32_t n = 0;
+    for (unsigned i = 0; i < V; i++) {
+        row[i] = n * 16;
+        n += bits >> i & 1;
+    }
+    return n;
+}
+
+/* The lanes near the plane of the eye, one by one; returns those that are drawn. */
+static unsigned project_near(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                             unsigned lanes, trip_cpu_splat near[V], bool *broken)
+{
+    unsigned drawn = 0;
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned i = (unsigned)__builtin_ctz(lanes);
+        uint32_t k = at + i;
+        double extinction = (double)view->of->table[staged->code[k]].extinction;
+        if (trip_cpu_project_near(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
+                                  &near[i], broken))
+            drawn |= 1u << i;
+    }
+    return drawn;
+}
+
+/* Puts the geometry of near splats over what the lanes computed; their colours stay. */
+static void replace_near(trip_cpu_splat *out, const uint32_t row[V], unsigned lanes,
+                         const trip_cpu_splat near[V])
+{
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned i = (unsigned)__builtin_ctz(lanes);
+        trip_cpu_splat *s = out + row[i] / 16;
+        trip_cpu_splat n = near[i];
+        n.r = s->r;
+        n.g = s->g;
+        n.b = s->b;
+        *s = n;
+    }
+}
+
+INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
+{
+    const float *table = &view->of->table[0].r;
+    vi code = vi_load(staged->code + at);
+    colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
+                 v_gather(table + 2, code * 4) };
+    if (!view->shading)
+        return c;
+    v3 eye = towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),
+                         vi_load(staged->sheet + at));
+    return shaded(view, c, eye, vi_load(staged->normal + at));
+}
+
+/* trip_cpu_splat.c[] of thin splats. */
+INLINE void thin_terms(vf depth, vf c[TRIP_CPU_TERMS])
+{
+    vf root = v_sqrt(depth);
+    for (int i = 0; i < TRIP_CPU_TERMS; i++) {
+        const float *by = trip_cpu_thin[i];
+        vf sum = v_fma(v_set(by[3]), depth, v_set(by[2]));
+        c[i] = v_fma(v_fma(sum, depth, v_set(by[1])), depth, v_set(by[0])) * root;
+    }
+}
+
+/* The same of the others. */
+INLINE void long_terms(const trip_cpu_view *view, vf depth, vm which, vf c[TRIP_CPU_TERMS])
+{
+    vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
+    vf least = v_fma(log2_of(depth), one, bias) - v_set(view->cutoff);
+    c[TRIP_CPU_LEAST] = v_select(which, least, c[TRIP_CPU_LEAST]);
+    c[TRIP_CPU_EDGE] = v_select(which, exp2_biased(least), c[TRIP_CPU_EDGE]);
+}
+
+/* The lanes that are kept, as splats. */
+INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
+                  const uint32_t row[V], colour light, trip_cpu_splat *out)
+{
+    float *base = &out->l11;
+    vf depth = v_load(lanes->depth + at), c[TRIP_CPU_TERMS];
+    vf tiles = v_load(lanes->tiles + at), limit = v_set(view->thin);
+    thin_terms(depth, c);
+    if (view->rays == TRIP_CPU_STRETCHED)
+        long_terms(view, depth, v_ge(depth, v_set(0)), c);
+    else if (vm_any(v_gt(depth, limit)))
+        long_terms(view, depth, v_gt(depth, limit), c);
+    const vi thick = vi_set(INT32_MIN);
+    static_assert(TRIP_CPU_TILES_THICK_SHIFT == 31, "the bit above");
+    tiles = v_select(v_gt(depth, limit), v_from_bits(v_bits(tiles) | thick), tiles);
+    v_store_rows(base, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
+                 v_load(lanes->l22 + at), v_load(lanes->l1 + at));
+    v_store_rows(base + 4, row, v_load(lanes->l2 + at), light.r, light.g, light.b);
+    v_store_rows(base + 8, row, c[0], c[1], c[2], c[3]);
+    v_store_rows(base + 12, row, c[4], v_load(lanes->first + at), v_load(lanes->last + at), tiles);
+}
+
+static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                             trip_cpu_lanes *lanes, trip_cpu_splat *out)
+{
+    uint32_t row[V];
+    unsigned kept = lanes->kept[at / V], near = lanes->near[at / V];
+    trip_cpu_splat replaced[V];
+    if (near)
+        near = project_near(view, staged, at, near, replaced, &lanes->broken);
+    kept |= near;
+    if (kept == 0)
+        return 0;
+    uint32_t n = rank(kept, row);
+    store(view, lanes, at, row, colour_of(view, staged, at), out);
+    if (near)
+        replace_near(out, row, near, replaced);
+    return n;
+}
+
+/* In three loops, each short enough that the processor works on several vectors at a time: one
+ * loop's chain of divisions and roots would leave it waiting. What lies over closed blocks is left
+ * out before it is coloured, stored, sorted and gathered. */
+static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
+                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
+                        trip_cpu_splat *out)
+{
+    uint32_t n = 0;
+    const float *extinction = &view->of->table[0].extinction;
+    footprint parallel = footprint_parallel(view);
+    perspective persp = perspective_of(&view->splat);
+    for (uint32_t i = 0; i < count; i += V)
+        place(view, staged, i, lanes);
+    for (uint32_t i = 0; i < count; i += V) {
+        footprint f = parallel;
+        if (!view->splat.camera.ortho)
+            f = footprint_of(&persp, &view->splat, lanes, i);
+        unsigned valid = vm_bits(vm_first(count - i));
+        unsigned behind = vm_bits(v_ge(v_set(0), v_load(lanes->z + i)));
+        unsigned near = valid & ~behind & ~vm_bits(f.usual);
+        vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
+        unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~near;
+        if (open && kept)
+            kept &= over_open_blocks(lanes, i, open, view->tiles_across);
+        lanes->kept[i / V] = kept;
+        lanes->near[i / V] = near;
+    }
+    for (uint32_t i = 0; i < count; i += V)
+        n += store_splats(view, staged, i, lanes, out + n);
+    return n;
+}
+
+#endif

@@ -1,0 +1,223 @@
+#include "cpu/near.h"
+
+#include <string.h>
+
+#include "shade.h"
+
+#define LOG2_E 1.44269504088896340736
+
+/* Squared length of the longest column of a matrix bounds what it can stretch from below, their sum
+ * from above. */
+static double most_stretch(const trip_affine *a)
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            sum += a->m[i][j] * a->m[i][j];
+    return sqrt(sum);
+}
+
+uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across)
+{
+    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
+    uint32_t right = s->x1 / TRIP_CPU_TILE - x, below = s->y1 / TRIP_CPU_TILE - y;
+    uint32_t more = right > 1 || below > 1 ? TRIP_CPU_TILES_MORE : 0;
+    return (y * (uint32_t)tiles_across + x) | more |
+           (uint32_t)(right > 0) << TRIP_CPU_TILES_RIGHT_SHIFT |
+           (uint32_t)(below > 0) << TRIP_CPU_TILES_BELOW_SHIFT;
+}
+
+void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
+{
+    double unit = s->ray2 / (TRIP_CUTOFF * TRIP_CUTOFF);
+    double xx = s->conic_xx * unit, xy = s->conic_xy * unit, yy = s->conic_yy * unit;
+    double l11 = sqrt(xx), l21 = xy / l11;
+    out->l11 = (float)l11;
+    out->l21 = (float)l21;
+    out->l22 = (float)sqrt(fmax(0, yy - l21 * l21));
+}
+
+/* Pixels whose centres lie in [lo, hi], cut to the image; false when there are none. */
+static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *last)
+{
+    double a = fmax(0, ceil(lo - 0.5 - 1e-3)), b = fmin(size - 1, floor(hi - 0.5 + 1e-3));
+    if (!(a <= b))
+        return false;
+    *first = (uint16_t)a;
+    *last = (uint16_t)b;
+    return true;
+}
+
+/* The opacity is within 4e-4 A of 1 - exp(-A (exp(-m / 2) - edge)), within 1.5e-4 A for A up to
+ * 0.1, and so within 1.2e-4. Its integral over the plane, where area is in proportion to m, is
+ * within 1e-6 of itself, so that many faint splats add up to nothing wrong. Found by least squares
+ * over u and A together, reweighted to even out the error at each A, with that integral as a
+ * condition. */
+const float trip_cpu_thin[TRIP_CPU_TERMS][4] = {
+    { 0.159756631f, -0.168852314f, -0.0508883893f, 0.346433312f },
+    { 0.0594277196f, 1.73690438f, 0.0941105708f, -2.60230803f },
+    { 0.759691179f, -5.79509068f, 0.645263553f, 6.28719616f },
+    { -0.622695327f, 7.89423943f, -1.71902728f, -6.14846611f },
+    { 0.641818106f, -3.9144907f, 1.08012068f, 2.11197734f },
+};
+
+static void set_opacity(const trip_cpu_view *view, double depth, trip_cpu_splat *out)
+{
+    if (depth > (double)view->thin)
+        out->tiles |= 1u << TRIP_CPU_TILES_THICK_SHIFT;
+    if (depth > (double)view->thin || view->rays == TRIP_CPU_STRETCHED) {
+        double least = log2(depth) + 127 - (double)view->cutoff / TRIP_CPU_EXP_UNIT;
+        out->c[TRIP_CPU_LEAST] = (float)(least * TRIP_CPU_EXP_UNIT);
+        out->c[TRIP_CPU_EDGE] = (float)(depth * view->splat.edge);
+        return;
+    }
+    for (int i = 0; i < TRIP_CPU_TERMS; i++) {
+        double c = 0;
+        for (int j = 3; j >= 0; j--)
+            c = c * depth + (double)trip_cpu_thin[i][j];
+        out->c[i] = (float)(c * sqrt(depth));
+    }
+}
+
+bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
+                           trip_cpu_splat *out, bool *broken)
+{
+    const trip_camera *camera = &view->splat.camera;
+    double position[3];
+    position[view->u_axis] = u;
+    position[view->v_axis] = v;
+    position[view->axis] = sheet;
+    trip_splat s;
+    memset(out, 0, sizeof *out);
+    bool drawn =
+        trip_splat_project(&view->splat, trip_v3(position[0], position[1], position[2]), &s);
+    if (trip_splat_is_broken(&s))
+        *broken = true;
+    if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
+        !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
+        return false;
+    trip_cpu_set_conic(&s, out);
+    double x = s.x - out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    double y = s.y - out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    out->l1 = (float)-((double)out->l11 * x + (double)out->l21 * y);
+    out->l2 = (float)-((double)out->l22 * y);
+    double depth = extinction * s.amplitude * view->stretch;
+    out->tiles = trip_cpu_tiles(out, view->tiles_across);
+    set_opacity(view, depth, out);
+    return depth > 0x1p-60;
+}
+
+/* X = to_x . (voxel - eye) and so on as a function of the list's own coordinates. */
+static void set_along(double out[4], const trip_cpu_view *view, trip_vec3 to)
+{
+    const trip_camera *camera = &view->splat.camera;
+    out[0] = trip_component(to, view->u_axis);
+    out[1] = trip_component(to, view->v_axis);
+    out[2] = trip_component(to, view->axis);
+    out[3] = -trip_dot(to, camera->eye);
+}
+
+static bool is_similarity(const trip_affine *a)
+{
+    double size = cbrt(fabs(trip_affine_determinant(a)));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            double dot = 0;
+            for (int k = 0; k < 3; k++)
+                dot += a->m[k][i] * a->m[k][j];
+            if (fabs(dot - (i == j) * size * size) > 1e-9 * size * size)
+                return false;
+        }
+    }
+    return true;
+}
+
+/* |a + x b + y c|^2, as ray2 in trip_cpu_view. */
+static void set_form(float out[6], trip_vec3 a, trip_vec3 b, trip_vec3 c)
+{
+    out[0] = (float)trip_dot(a, a);
+    out[1] = (float)(2 * trip_dot(a, b));
+    out[2] = (float)(2 * trip_dot(a, c));
+    out[3] = (float)trip_dot(b, b);
+    out[4] = (float)(2 * trip_dot(b, c));
+    out[5] = (float)trip_dot(c, c);
+}
+
+static void set_forms(trip_cpu_view *view)
+{
+    const trip_camera *c = &view->splat.camera;
+    const trip_affine *world = &c->index_to_world;
+    trip_vec3 zero = trip_v3(0, 0, 0), r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    trip_vec3 rx = c->ortho ? zero : c->rx, ry = c->ortho ? zero : c->ry;
+    double unit = 1 / view->stretch;
+    set_form(view->ray2, r, rx, ry);
+    set_form(view->world2, trip_scale(trip_affine_vector(world, r), unit),
+             trip_scale(trip_affine_vector(world, rx), unit),
+             trip_scale(trip_affine_vector(world, ry), unit));
+}
+
+/* Tables of G and stretch where they vary, and always in the rarer ways of blending. */
+static void set_rays(trip_cpu_view *view)
+{
+    const trip_camera *camera = &view->splat.camera;
+    bool alike = is_similarity(&camera->index_to_world);
+    bool usual = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
+    view->stretch_varies = !(camera->ortho || alike);
+    view->stretch =
+        view->stretch_varies ? camera->voxel_world : trip_splat_stretch(&view->splat, 0, 0);
+    view->rays = TRIP_CPU_STRETCHED;
+    if (usual && camera->ortho)
+        view->rays = TRIP_CPU_PARALLEL;
+    else if (usual && alike)
+        view->rays = TRIP_CPU_PERSPECTIVE;
+}
+
+static void set_limits(trip_cpu_view *view)
+{
+    const trip_camera *camera = &view->splat.camera;
+    double most = 1;
+    if (view->stretch_varies)
+        most = most_stretch(&camera->index_to_world) / view->stretch;
+    view->thin = (float)((double)TRIP_CPU_THIN / most);
+    view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
+    view->tiles_across = (camera->width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
+}
+
+/* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */
+static void set_parallel(trip_cpu_view *view)
+{
+    const trip_camera *camera = &view->splat.camera;
+    if (camera->ortho)
+        trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
+}
+
+void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back)
+{
+    const trip_file_header *header = &frame->data->header;
+    const trip_camera *camera = frame->camera;
+    const double full = trip_shade_gradient_full(header, camera->voxel_world);
+    const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
+    *view = (trip_cpu_view){
+        .of = frame,
+        .splat = trip_splat_frame_make(camera, frame->settings),
+        .front_to_back = front_to_back,
+        .axis = axis,
+        .u_axis = (axis + 1) % 3,
+        .v_axis = (axis + 2) % 3,
+        .gradient_most = (float)fmin(header->gradient_scale / full, 1e30),
+    };
+    const int axes[3] = { view->u_axis, view->v_axis, axis };
+    for (int i = 0; i < 3; i++) {
+        view->eye[i] = eye[axes[i]];
+        for (int k = 0; k < 3; k++)
+            view->world[k][i] = camera->index_to_world.m[k][axes[i]] / camera->voxel_world;
+    }
+    set_along(view->along_x, view, camera->to_x);
+    set_along(view->along_y, view, camera->to_y);
+    set_along(view->along_z, view, camera->forward);
+    view->forward_length = trip_length(camera->forward);
+    set_rays(view);
+    set_forms(view);
+    set_limits(view);
+    set_parallel(view);
+}

@@ -1,9 +1,0 @@
-/* The kernels for NEON. */
-#if defined(__aarch64__)
-
-#define TRIP_SIMD TRIP_SIMD_NEON
-#include "cpu_table.h"
-
-const trip_cpu_kernels trip_cpu_neon = TRIP_CPU_TABLE("neon");
-
-#endif

@@ -1,5 +1,0 @@
-/* The kernels for plain C, for any processor. */
-#define TRIP_SIMD TRIP_SIMD_PLAIN
-#include "cpu_table.h"
-
-const trip_cpu_kernels trip_cpu_plain = TRIP_CPU_TABLE("plain");

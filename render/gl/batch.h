@@ -1,0 +1,51 @@
+/* A batch of splats in GL memory: its records, a record for each run, the run of every draw
+ * position, and the pieces to draw in one form. Owned by one renderer, refilled for every batch;
+ * its memory is a slot of the ring, but for records that lie in GL memory already. */
+#ifndef TRIP_GL_BATCH_H
+#define TRIP_GL_BATCH_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "gl/ring.h"
+#include "gl/shared.h"
+#include "renderer.h"
+
+/* What places the runs of a list. */
+typedef struct trip_gl_placing {
+    const trip_camera *camera;
+    const trip_gl_frame_double *constants; /* of the list */
+    int axis;
+    double tile_voxels;
+    bool quads; /* always */
+    double
+        sprite_depth; /* and where voxels may be nearer than this, trip_gl_frame_sprite_depth() */
+} trip_gl_placing;
+
+/* Draw positions [first, first + count). */
+typedef struct trip_gl_piece {
+    uint32_t first, count;
+    bool quads;
+} trip_gl_piece;
+
+typedef struct trip_gl_part {
+    size_t offset, bytes; /* in its slot; bytes 0: not there */
+} trip_gl_part;
+
+typedef struct trip_gl_batch {
+    trip_gl_slot *slot;    /* of runs and run_of */
+    trip_gl_slot *records; /* of voxels and normals */
+    trip_gl_part voxels, normals, runs, run_of;
+    uint32_t positions;
+    trip_gl_piece *pieces;
+    size_t piece_count, piece_room;
+} trip_gl_batch;
+
+/* Fills `b` from a batch of the reader in draw order. `records` is the slot that the batch lies in;
+ * NULL: it is copied. `list_firsts`, when not NULL, gives for every run its first place in the
+ * list: the whole list's records are in GL memory already, and the batch has runs only. */
+int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placing,
+                       const trip_batch *batch, trip_gl_slot *records, const uint64_t *list_firsts);
+void trip_gl_batch_release(trip_gl_batch *b);
+
+#endif

@@ -1,0 +1,207 @@
+#include "gl/frame_block.h"
+
+#include <math.h>
+
+#include "shade.h"
+#include "splat.h"
+#include "weight.h"
+
+/* Components of a vector of the data's axes in list axes; an even permutation, so that cross
+ * products keep their sign. */
+static trip_gl_double4 in_list_axes(trip_vec3 v, int axis, double w)
+{
+    return (trip_gl_double4){ { trip_component(v, axis), trip_component(v, (axis + 1) % 3),
+                                trip_component(v, (axis + 2) % 3), w } };
+}
+
+static trip_gl_double4 as_it_is(trip_vec3 v, double w)
+{
+    return (trip_gl_double4){ { v.x, v.y, v.z, w } };
+}
+
+/* Coefficients of |r0 + x rx + y ry|^2 by (1, x, y, x x) and (x y, y y), times `scale`. */
+static void square(trip_gl_double4 *a, trip_gl_double4 *b, trip_vec3 r0, trip_vec3 rx, trip_vec3 ry,
+                   double scale)
+{
+    *a = (trip_gl_double4){ { scale * trip_dot(r0, r0), scale * 2 * trip_dot(r0, rx),
+                              scale * 2 * trip_dot(r0, ry), scale * trip_dot(rx, rx) } };
+    *b = (trip_gl_double4){ { scale * 2 * trip_dot(rx, ry), scale * trip_dot(ry, ry), 0, 0 } };
+}
+
+/* Pixel steps of a length about 1, so that no square of theirs leaves a float's range however
+ * narrow the view. */
+static void set_steps(trip_gl_frame_double *f, int axis, trip_vec3 forward, trip_vec3 r0,
+                      trip_vec3 rx, trip_vec3 ry, double sigma)
+{
+    double step = fmax(trip_length(rx), trip_length(ry));
+    trip_vec3 x = trip_scale(rx, 1 / step), y = trip_scale(ry, 1 / step);
+    double volume = trip_dot(r0, trip_cross(x, y));
+    f->forward = in_list_axes(forward, axis, step * volume / sigma);
+    f->ray_x = in_list_axes(x, axis, step);
+    f->ray_y = in_list_axes(y, axis, volume * volume);
+}
+
+/* Rays from the image's centre, scaled so that the one there has length 1: projected numbers do not
+ * depend on the scale, and floats keep far from their limits whatever the world's unit. */
+static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis, double sigma)
+{
+    double px = 0.5 * c->width, py = 0.5 * c->height;
+    f->screen = (trip_gl_double4){ { px, py, c->width, c->height } };
+    trip_vec3 r0 = trip_camera_ray(c, px, py);
+    double length = c->ortho ? 1 : trip_length(r0);
+    trip_vec3 forward = trip_scale(c->forward, length);
+    trip_vec3 to_x = trip_scale(c->to_x, length), to_y = trip_scale(c->to_y, length);
+    trip_vec3 rx = trip_scale(c->rx, 1 / length), ry = trip_scale(c->ry, 1 / length);
+    r0 = trip_scale(r0, 1 / length);
+    if (!c->ortho) {
+        to_x = trip_sub(to_x, trip_scale(forward, px));
+        to_y = trip_sub(to_y, trip_scale(forward, py));
+    }
+    set_steps(f, axis, forward, r0, rx, ry, sigma);
+    f->to_x = in_list_axes(to_x, axis, 0);
+    f->to_y = in_list_axes(to_y, axis, 0);
+    square(&f->ray2_a, &f->ray2_b, r0, rx, ry, 1);
+
+    const trip_affine *j = &c->index_to_world;
+    square(&f->world2_a, &f->world2_b, trip_affine_vector(j, r0), trip_affine_vector(j, rx),
+           trip_affine_vector(j, ry), 1 / (c->voxel_world * c->voxel_world));
+}
+
+/* All splats of a parallel view have the same footprint and the same world length along the ray. */
+static void set_parallel(trip_gl_frame_double *f, const trip_splat_frame *constants)
+{
+    trip_splat s;
+    const trip_camera *c = &constants->camera;
+    if (!c->ortho || !trip_splat_project(constants, trip_add(c->eye, c->r0), &s))
+        return;
+    double world = trip_splat_stretch(constants, 0, 0);
+    f->parallel = (trip_gl_double4){ { s.conic_xx, s.conic_xy, s.conic_yy, s.amplitude * world } };
+    f->parallel_size =
+        (trip_gl_double4){ { 0.5 * (s.x1 - s.x0), 0.5 * (s.y1 - s.y0), s.radius, 0 } };
+}
+
+static void set_world(trip_gl_frame_double *f, const trip_frame *frame, int axis)
+{
+    const trip_camera *c = frame->camera;
+    const trip_file_header *header = &frame->data->header;
+    trip_gl_double4 *columns[3] = { &f->world_0, &f->world_1, &f->world_2 };
+    for (int i = 0; i < 3; i++) {
+        int a = (axis + i) % 3;
+        const double(*m)[4] = c->index_to_world.m;
+        *columns[i] =
+            as_it_is(trip_scale(trip_v3(m[0][a], m[1][a], m[2][a]), 1 / c->voxel_world), 0);
+    }
+    double full = trip_shade_gradient_full(header, c->voxel_world);
+    f->light = as_it_is(frame->settings->light_direction, 0);
+    f->to_eye =
+        as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_scale / full, 1e30));
+}
+
+void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int axis)
+{
+    const trip_camera *c = frame->camera;
+    const trip_settings *s = frame->settings;
+    trip_splat_frame constants = trip_splat_frame_make(c, s);
+    trip_vec3 none = { 0, 0, 0 };
+    *out = (trip_gl_frame_double){ 0 };
+    set_projection(out, c, axis, constants.sigma);
+    set_parallel(out, &constants);
+    set_world(out, frame, axis);
+    out->camera_r0 = as_it_is(c->r0, 0);
+    out->camera_rx = as_it_is(c->ortho ? none : c->rx, 0);
+    out->camera_ry = as_it_is(c->ortho ? none : c->ry, 0);
+    out->kernel =
+        (trip_gl_double4){ { constants.sigma * constants.sigma, constants.cutoff2,
+                             constants.low_pass2, constants.amplitude * c->voxel_world } };
+    out->edge.v[0] = constants.edge;
+    double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };
+    const double *b = s->background;
+    out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
+}
+
+void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in)
+{
+    const double *from = (const double *)in;
+    float *to = (float *)out;
+    for (size_t i = 0; i < sizeof *in / sizeof *from; i++)
+        to[i] = (float)from[i];
+}
+
+/* Whether index-to-world is a rotation and one scale, so that a voxel is as long every way. */
+static bool is_isotropic(const trip_camera *c)
+{
+    const double(*m)[4] = c->index_to_world.m;
+    double unit = c->voxel_world * c->voxel_world;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j <= i; j++) {
+            double dot = m[0][i] * m[0][j] + m[1][i] * m[1][j] + m[2][i] * m[2][j];
+            if (fabs(dot - (i == j ? unit : 0)) > 1e-9 * unit)
+                return false;
+        }
+    }
+    return true;
+}
+
+unsigned trip_gl_frame_effects(const trip_frame *frame, int axis)
+{
+    const trip_settings *s = frame->settings;
+    unsigned effects = 0;
+    if (frame->camera->ortho)
+        effects |= TRIP_GL_PARALLEL;
+    else if (!is_isotropic(frame->camera))
+        effects |= TRIP_GL_ANISOTROPIC;
+    if (s->shading && frame->plan->planes & 1u << TRIP_PLANE_NORMALS)
+        effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0);
+    if (s->indexed)
+        effects |= TRIP_GL_INDEXED;
+    if (trip_gl_frame_is_whole(frame, axis))
+        effects |= TRIP_GL_UNCULLED;
+    return effects;
+}
+
+/* The rays with weight and a given sign of r_a form a convex cone, so that the corner pixels speak
+ * for all. */
+bool trip_gl_frame_is_whole(const trip_frame *frame, int axis)
+{
+    const trip_camera *c = frame->camera;
+    if (c->ortho || frame->settings->method == TRIP_METHOD_AXIS)
+        return true;
+    double sign = trip_component(trip_camera_ray(c, 0.5, 0.5), axis);
+    for (int i = 0; i < 4; i++) {
+        trip_vec3 ray =
+            trip_camera_ray(c, i & 1 ? c->width - 0.5 : 0.5, i & 2 ? c->height - 0.5 : 0.5);
+        if (!(trip_weight(frame->settings, frame->plan->axis_of_view, ray, axis) > 0) ||
+            !(sign * trip_component(ray, axis) > 0))
+            return false;
+    }
+    return true;
+}
+
+/* With r_max and r_min the largest and smallest |ray| of the image and of its plane, any support
+ * reaches at most  k sigma |ry| r_max / (K depth) + k low-pass r_max / r_min  pixels from its
+ * centre along x within the image (from S'_xx and g >= (r_min / r_max)^2 in splat.h), and alike
+ * along y. */
+double trip_gl_frame_sprite_depth(const trip_frame *frame, double point_size_px)
+{
+    const trip_camera *c = frame->camera;
+    double half = 0.5 * (point_size_px - 2);
+    if (fmax(c->width, c->height) <= point_size_px)
+        return 0;
+    if (c->ortho) {
+        trip_splat s;
+        trip_splat_frame constants = trip_splat_frame_make(c, frame->settings);
+        bool fits = trip_splat_project(&constants, trip_add(c->eye, c->r0), &s) &&
+                    fmax(s.x1 - s.x0, s.y1 - s.y0) <= 2 * half;
+        return fits ? 0 : HUGE_VAL;
+    }
+    double r_max = 0;
+    for (int i = 0; i < 4; i++)
+        r_max = fmax(r_max,
+                     trip_length(trip_camera_ray(c, i & 1 ? c->width : 0, i & 2 ? c->height : 0)));
+    trip_vec3 normal = trip_cross(c->rx, c->ry);
+    double k = fabs(trip_dot(c->r0, normal)), r_min = k / trip_length(normal);
+    double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
+    double wide = fmax(trip_length(c->rx), trip_length(c->ry));
+    return room > 0 ? frame->settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
+}

@@ -1,0 +1,36 @@
+/* The constants of one list of a frame as the shaders want them (shared.h), and which of the
+ * shaders' effects the frame calls for. Pure functions. */
+#ifndef TRIP_GL_FRAME_BLOCK_H
+#define TRIP_GL_FRAME_BLOCK_H
+
+#include <stdbool.h>
+
+#include "gl/shared.h"
+#include "renderer.h"
+
+/* Effects compiled into a shader only when the scene or view needs them. */
+enum trip_gl_effect {
+    TRIP_GL_PARALLEL = 1,    /* parallel view */
+    TRIP_GL_ANISOTROPIC = 2, /* not cubes: a voxel is not as long every way */
+    TRIP_GL_SHADED = 4,
+    TRIP_GL_HEADLIGHT = 8,
+    TRIP_GL_INDEXED = 16,
+    TRIP_GL_QUADS = 32,    /* two triangles a splat instead of a sprite */
+    TRIP_GL_UNCULLED = 64, /* every pixel has weight in the list */
+    TRIP_GL_EFFECT_SETS = 128,
+};
+
+void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int axis);
+void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in);
+
+/* The effects of the frame, TRIP_GL_QUADS aside. */
+unsigned trip_gl_frame_effects(const trip_frame *frame, int axis);
+
+/* Whether every pixel of the image has weight in the list, so that nothing need be masked. */
+bool trip_gl_frame_is_whole(const trip_frame *frame, int axis);
+
+/* The depth (world units) from which on the part of a support that lies in the image fits a sprite
+ * of the given size; 0 where every support does, infinity where none need. */
+double trip_gl_frame_sprite_depth(const trip_frame *frame, double point_size_px);
+
+#endif

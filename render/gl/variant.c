@@ -1,0 +1,102 @@
+#include "gl/variant.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "gl/frame_block.h"
+#include "gl/program.h"
+#include "report.h"
+#include "shade.h"
+
+static const struct {
+    const char *vertex, *fragment, *compute;
+    unsigned effects; /* that mean something in the pass */
+    bool in_double;
+} passes[] = {
+    [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
+    [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp", TRIP_GL_PARALLEL | TRIP_GL_INDEXED, true },
+    [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
+    [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, 0, true },
+};
+
+static void write_effects(FILE *out, unsigned effects)
+{
+    static const struct {
+        unsigned effect;
+        const char *name;
+    } names[] = {
+        { TRIP_GL_PARALLEL, "PARALLEL" }, { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
+        { TRIP_GL_SHADED, "SHADED" },     { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
+        { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
+        { TRIP_GL_UNCULLED, "UNCULLED" },
+    };
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (effects & names[i].effect)
+            fprintf(out, "#define %s\n", names[i].name);
+}
+
+static int write_defines(const trip_gl_variant *variant, char *text, size_t bytes)
+{
+    FILE *out = fmemopen(text, bytes, "w");
+    if (!out)
+        return trip_fail(TRIP_ERROR, "gl", "shaders", "out of memory");
+    if (passes[variant->pass].in_double)
+        fprintf(out, "#define TRIP_DOUBLE\n");
+    fprintf(out, "#define METHOD %d\n#define LAYERS %u\n", (int)variant->method, variant->layers);
+    write_effects(out, variant->effects);
+    if (variant->effects & TRIP_GL_SHADED)
+        fprintf(out,
+                "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"
+                "#define SHININESS %f\n",
+                TRIP_AMBIENT, TRIP_DIFFUSE, TRIP_SPECULAR, TRIP_SHININESS);
+    fclose(out);
+    return TRIP_OK;
+}
+
+static int build(const trip_gl_variant *variant, GLuint *program)
+{
+    char defines[1024] = "";
+    int status = write_defines(variant, defines, sizeof defines);
+    if (status)
+        return status;
+    return trip_gl_program_build(program, &(trip_gl_program_source){
+                                              .vertex = passes[variant->pass].vertex,
+                                              .fragment = passes[variant->pass].fragment,
+                                              .compute = passes[variant->pass].compute,
+                                              .defines = defines,
+                                          });
+}
+
+static uint32_t key_of(const trip_gl_variant *v)
+{
+    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 24;
+}
+
+int trip_gl_variants_get(trip_gl_variants *v, trip_gl_variant variant, GLuint *program)
+{
+    variant.effects &= passes[variant.pass].effects;
+    uint32_t key = key_of(&variant);
+    for (size_t i = 0; i < v->count; i++) {
+        if (v->built[i].key == key) {
+            *program = v->built[i].program;
+            return TRIP_OK;
+        }
+    }
+    trip_gl_built *built = realloc(v->built, (v->count + 1) * sizeof *built);
+    if (!built)
+        return trip_fail(TRIP_ERROR, "gl", "shaders", "out of memory");
+    v->built = built;
+    int status = build(&variant, program);
+    if (!status)
+        v->built[v->count++] = (trip_gl_built){ key, *program };
+    return status;
+}
+
+void trip_gl_variants_release(trip_gl_variants *v)
+{
+    for (size_t i = 0; i < v->count; i++)
+        glDeleteProgram(v->built[i].program);
+    free(v->built);
+    *v = (trip_gl_variants){ 0 };
+}

@@ -1,0 +1,147 @@
+/* What the gl renderer works out for a frame before it draws; needs no OpenGL. */
+#include "gl/frame_block.h"
+#include "splat.h"
+#include "test.h"
+#include "weight.h"
+
+static double between(double lo, double hi)
+{
+    return lo + (hi - lo) * test_random();
+}
+
+static trip_vec3 random_vector(double size)
+{
+    return trip_v3(between(-size, size), between(-size, size), between(-size, size));
+}
+
+/* Any view of a grid of any shape. */
+static trip_camera random_camera(void)
+{
+    trip_camera c;
+    trip_affine grid = trip_affine_identity();
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            grid.m[i][j] += between(-0.4, 0.4);
+    trip_camera_params p = { .eye = random_vector(100),
+                             .look = random_vector(20),
+                             .up = trip_normalize(random_vector(1)),
+                             .fov_degrees = between(2, 170),
+                             .width = (int)between(20, 900),
+                             .height = (int)between(20, 900) };
+    assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
+    return c;
+}
+
+static double clipped(double lo, double hi, double size)
+{
+    return fmin(hi, size) - fmax(lo, 0);
+}
+
+static void from_the_sprite_depth_on_every_support_fits_a_sprite(void **state)
+{
+    (void)state;
+    int checked = 0;
+    trip_settings settings = trip_settings_default();
+    for (int i = 0; i < 300; i++) {
+        trip_camera c = random_camera();
+        trip_frame frame = { .camera = &c, .settings = &settings };
+        trip_splat_frame constants = trip_splat_frame_make(&c, &settings);
+        double size = between(16, 300), depth = trip_gl_frame_sprite_depth(&frame, size);
+        for (int k = 0; k < 1000 && isfinite(depth); k++) {
+            /* Mostly just beyond the bound, near the image and beside it. */
+            double z = fmax(depth, 1e-3) * (1 + test_random() * test_random());
+            trip_vec3 ray =
+                trip_camera_ray(&c, between(-1, 2) * c.width, between(-1, 2) * c.height);
+            trip_splat s;
+            if (!trip_splat_project(&constants, trip_add(c.eye, trip_scale(ray, z)), &s))
+                continue;
+            /* Pixel centres within: at most the extent plus one. */
+            double extent = fmax(clipped(s.x0, s.x1, c.width), clipped(s.y0, s.y1, c.height));
+            assert_true(fmax(c.width, c.height) <= size || extent + 1 <= size);
+            checked++;
+        }
+    }
+    assert_true(checked > 10000);
+}
+
+static void a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use(void **state)
+{
+    (void)state;
+    trip_settings settings = trip_settings_default();
+    trip_camera c = random_camera();
+    trip_frame frame = { .camera = &c, .settings = &settings };
+    assert_true(trip_gl_frame_sprite_depth(&frame, 900) == 0);
+    assert_true(trip_gl_frame_sprite_depth(&frame, 1) == HUGE_VAL);
+}
+
+static bool every_pixel_weighs(const trip_frame *frame, int axis)
+{
+    const trip_camera *c = frame->camera;
+    for (int y = 0; y < c->height; y += 7)
+        for (int x = 0; x < c->width; x += 7)
+            if (!(trip_weight(frame->settings, frame->plan->axis_of_view,
+                              trip_camera_ray(c, x + 0.5, y + 0.5), axis) > 0))
+                return false;
+    return true;
+}
+
+static void a_list_is_whole_only_if_every_pixel_has_weight_in_it(void **state)
+{
+    (void)state;
+    int whole = 0;
+    for (int i = 0; i < 600; i++) {
+        trip_settings settings = trip_settings_default();
+        trip_plan plan = { 0 };
+        trip_camera c = random_camera();
+        settings.method = (trip_method)(i % 3);
+        settings.h = between(0, 0.99);
+        plan.axis_of_view = trip_weight_axis_of_view(&c);
+        trip_frame frame = { .camera = &c, .settings = &settings, .plan = &plan };
+        int axis = settings.method == TRIP_METHOD_AXIS ? plan.axis_of_view : i / 3 % 3;
+        if (!trip_gl_frame_is_whole(&frame, axis))
+            continue;
+        assert_true(every_pixel_weighs(&frame, axis));
+        whole++;
+    }
+    assert_true(whole > 20);
+}
+
+static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
+{
+    (void)state;
+    trip_settings settings = trip_settings_default();
+    trip_plan plan = { .planes = 1u << TRIP_PLANE_VOXELS };
+    trip_affine grid = trip_affine_identity();
+    trip_camera_params p = {
+        .eye = { 50, 40, 30 }, .up = { 0, 0, 1 }, .fov_degrees = 60, .width = 100, .height = 80
+    };
+    trip_camera c;
+    trip_frame frame = { .camera = &c, .settings = &settings, .plan = &plan };
+    assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
+    assert_int_equal(trip_gl_frame_effects(&frame, 0), 0);
+
+    plan.planes |= 1u << TRIP_PLANE_NORMALS;
+    assert_int_equal(trip_gl_frame_effects(&frame, 0), TRIP_GL_SHADED | TRIP_GL_HEADLIGHT);
+    settings.shading = false;
+    settings.indexed = true;
+    assert_int_equal(trip_gl_frame_effects(&frame, 0), TRIP_GL_INDEXED);
+
+    grid.m[1][1] = 1.01;
+    assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
+    assert_int_equal(trip_gl_frame_effects(&frame, 0), TRIP_GL_INDEXED | TRIP_GL_ANISOTROPIC);
+    p.ortho_height = 50;
+    assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
+    assert_int_equal(trip_gl_frame_effects(&frame, 0),
+                     TRIP_GL_INDEXED | TRIP_GL_PARALLEL | TRIP_GL_UNCULLED);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(from_the_sprite_depth_on_every_support_fits_a_sprite),
+        cmocka_unit_test(a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use),
+        cmocka_unit_test(a_list_is_whole_only_if_every_pixel_has_weight_in_it),
+        cmocka_unit_test(effects_are_asked_for_only_where_the_frame_needs_them),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
