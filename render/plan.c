@@ -8,69 +8,6 @@
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
 
-/* Smallest and largest of a linear function over the rectangle of pixel positions. */
-static void range_over(double at0, double per_x, double per_y, const double lo[2],
-                       const double hi[2], double range[2])
-{
-    range[0] = at0 + fmin(per_x * lo[0], per_x * hi[0]) + fmin(per_y * lo[1], per_y * hi[1]);
-    range[1] = at0 + fmax(per_x * lo[0], per_x * hi[0]) + fmax(per_y * lo[1], per_y * hi[1]);
-}
-
-static double least_magnitude(const double range[2])
-{
-    if (range[0] <= 0 && range[1] >= 0)
-        return 0;
-    return fmin(fabs(range[0]), fabs(range[1]));
-}
-
-/* False only when |r_a| <= h max |r_b| for every ray of the rectangle: the components' ranges are
- * taken apart, which becomes exact as rectangles shrink. */
-static bool rectangle_may_weigh(const trip_camera *c, double h, int axis, const int lo[2],
-                                const int hi[2])
-{
-    const double from[2] = { lo[0] + 0.5, lo[1] + 0.5 }, to[2] = { hi[0] + 0.5, hi[1] + 0.5 };
-    double most = 0, least = 0;
-    for (int b = 0; b < 3; b++) {
-        double range[2];
-        range_over(trip_component(c->r0, b), trip_component(c->rx, b), trip_component(c->ry, b),
-                   from, to, range);
-        if (b == axis)
-            most = fmax(fabs(range[0]), fabs(range[1]));
-        else
-            least = fmax(least, least_magnitude(range));
-    }
-    return most * (1 + 1e-9) >= h * least; /* room for rounding */
-}
-
-/* Whether the list has weight at a pixel of the rectangle [lo, hi] (inclusive): exact, by halving.
- */
-static bool some_pixel_weighs(const trip_camera *c, const trip_settings *s, int axis_of_view,
-                              int axis, const int lo[2], const int hi[2])
-{
-    int middle[2] = { lo[0] + (hi[0] - lo[0]) / 2, lo[1] + (hi[1] - lo[1]) / 2 };
-    trip_vec3 ray = trip_camera_ray(c, middle[0] + 0.5, middle[1] + 0.5);
-    if (trip_weight(s, axis_of_view, ray, axis) > 0)
-        return true;
-    if (lo[0] == hi[0] && lo[1] == hi[1])
-        return false;
-    if (!rectangle_may_weigh(c, s->method == TRIP_METHOD_CLIP ? 1 : s->h, axis, lo, hi))
-        return false;
-    int d = hi[0] - lo[0] >= hi[1] - lo[1] ? 0 : 1;
-    int first_hi[2] = { hi[0], hi[1] }, second_lo[2] = { lo[0], lo[1] };
-    first_hi[d] = middle[d];
-    second_lo[d] = middle[d] + 1;
-    return some_pixel_weighs(c, s, axis_of_view, axis, lo, first_hi) ||
-           some_pixel_weighs(c, s, axis_of_view, axis, second_lo, hi);
-}
-
-static bool list_is_used(const trip_camera *c, const trip_settings *s, int axis_of_view, int axis)
-{
-    if (c->ortho || s->method == TRIP_METHOD_AXIS)
-        return trip_weight(s, axis_of_view, c->r0, axis) > 0;
-    const int lo[2] = { 0, 0 }, hi[2] = { c->width - 1, c->height - 1 };
-    return some_pixel_weighs(c, s, axis_of_view, axis, lo, hi);
-}
-
 static int add_pass(trip_plan_list *list, const trip_dataset *data, int axis, bool descending,
                     bool front_to_back, int64_t first, int64_t last, trip_budget *budget)
 {
@@ -135,7 +72,7 @@ static int select_bricks(trip_plan_list *list, const trip_list *source, trip_cul
         int64_t slab_sheet = (int64_t)slab->slab * slab_sheets;
         for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {
             const trip_file_brick *brick = &source->bricks[j];
-            switch (trip_cull_brick(cull, source->axis, brick, slab_sheet)) {
+            switch (trip_cull_brick(cull, source->axis, brick, slab)) {
             case TRIP_CULL_KEEP:
                 select_brick(list, j, brick, slab_sheet);
                 break;
@@ -182,7 +119,7 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
     trip_cull cull = trip_cull_make(data, camera, settings, plan->axis_of_view, table);
     for (int axis = 0; axis < 3 && !status; axis++) {
         trip_plan_list *list = &plan->lists[axis];
-        list->used = list_is_used(camera, settings, plan->axis_of_view, axis);
+        list->used = trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
         if (!list->used)
             continue;
         status = add_passes(list, data, camera, settings, axis, budget);

@@ -1,5 +1,8 @@
 #include "plan_cull.h"
 
+#include "brick_box.h"
+#include "weight.h"
+
 enum { BLOCK_CODES = 256 };
 
 /* What is known of a block of codes. */
@@ -32,7 +35,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
     return (trip_cull){
         .camera = camera,
         .settings = settings,
-        .tile_log2 = data->header.tile_log2,
+        .header = &data->header,
         .axis_of_view = axis_of_view,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
                    side(camera, camera->to_x, camera->width - 0.5, -1),
@@ -69,21 +72,15 @@ static bool some_visible(trip_cull *cull, unsigned first, unsigned last)
     return false;
 }
 
-static box brick_box(const trip_cull *cull, int axis, const trip_file_brick *b, int64_t slab_sheet)
+/* By index axes, from the eye. */
+static box place_box(const trip_cull *cull, int axis, const trip_brick_box *b)
 {
-    int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    double tile_u = (double)((int64_t)b->tile_u << cull->tile_log2);
-    double tile_v = (double)((int64_t)b->tile_v << cull->tile_log2);
     box r;
-    r.lo[axis] = (double)(slab_sheet + b->sheet_min);
-    r.hi[axis] = (double)(slab_sheet + b->sheet_max);
-    r.lo[u] = tile_u + b->u_min;
-    r.hi[u] = tile_u + b->u_max;
-    r.lo[v] = tile_v + b->v_min;
-    r.hi[v] = tile_v + b->v_max;
-    for (int a = 0; a < 3; a++) {
-        r.lo[a] -= trip_component(cull->camera->eye, a);
-        r.hi[a] -= trip_component(cull->camera->eye, a);
+    for (int i = 0; i < 3; i++) {
+        int a = (axis + 1 + i) % 3;
+        double eye = trip_component(cull->camera->eye, a);
+        r.lo[a] = b->lo[i] - eye;
+        r.hi[a] = b->hi[i] - eye;
     }
     return r;
 }
@@ -117,29 +114,27 @@ static bool outside(const trip_cull *cull, const box *b, double radius)
     return false;
 }
 
-/* A point of the box, grown by the radius, with |c_a| > h |c_b|: its coordinates are independent,
- * so the largest |c_a| meets the smallest |c_b|. Such points carry rays with weight. */
+/* The points of the box, grown by the radius, are those that carry rays near its splats. */
 static bool may_weigh(const trip_cull *cull, const box *b, double radius, int axis)
 {
-    const trip_settings *s = cull->settings;
-    if (s->method == TRIP_METHOD_AXIS || cull->camera->ortho)
+    double lo[3], hi[3];
+    if (cull->settings->method == TRIP_METHOD_AXIS || cull->camera->ortho)
         return true; /* decided for the list as a whole */
-    double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
-    double most = larger(fabs(b->lo[axis] - radius), fabs(b->hi[axis] + radius));
     for (int a = 0; a < 3; a++) {
-        double least = larger(0, larger(b->lo[a], -b->hi[a]) - radius);
-        if (a != axis && most < h * least)
-            return false;
+        lo[a] = b->lo[a] - radius;
+        hi[a] = b->hi[a] + radius;
     }
-    return true;
+    trip_ray_bounds bounds = trip_ray_bounds_of(lo, hi);
+    return trip_weight_may_lie(cull->settings, cull->axis_of_view, &bounds, axis);
 }
 
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
-                                 int64_t slab_sheet)
+                                 const trip_file_slab *slab)
 {
     if (!some_visible(cull, brick->code_min, brick->code_max))
         return TRIP_CULL_TRANSPARENT;
-    box b = brick_box(cull, axis, brick, slab_sheet);
+    trip_brick_box place = trip_brick_box_of(cull->header, slab, brick);
+    box b = place_box(cull, axis, &place);
     double depth = farthest_along(&b, cull->camera->forward);
     if (!(depth > 0))
         return TRIP_CULL_OUTSIDE;

@@ -24,7 +24,7 @@ typedef struct trip_cull_plane {
 typedef struct trip_cull {
     const trip_camera *camera;
     const trip_settings *settings;
-    unsigned tile_log2;
+    const trip_file_header *header;
     int axis_of_view;
     trip_cull_plane sides[4]; /* through the outermost pixel centres */
     double radius2, spread2;  /* radius of a splat at depth z: sqrt(radius2 + spread2 z^2) */
@@ -37,8 +37,8 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_settings *settings, int axis_of_view,
                          const trip_tf_entry *table);
 
-/* `slab_sheet` is the first sheet of the brick's slab. */
+/* `slab` is the one that the brick is in. */
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
-                                 int64_t slab_sheet);
+                                 const trip_file_slab *slab);
 
 #endif

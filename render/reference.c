@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "pixels.h"
 #include "report.h"
 #include "shade.h"
 #include "splat.h"
@@ -136,24 +137,16 @@ static void composite(double layer[4], const double rgb[3], double alpha, bool f
     layer[3] = layer[3] * keep + add;
 }
 
-/* The pixels whose centres lie in [lo, hi], cut to the image. */
-static void pixel_range(double lo, double hi, int size, int *first, int *last)
-{
-    *first = (int)fmin(size, fmax(0, ceil(lo - 0.5)));
-    *last = (int)fmax(-1, fmin(size - 1, floor(hi - 0.5)));
-}
-
 /* True when some pixel centre is in the support where the list has weight. */
 static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3],
                            double extinction, bool front_to_back)
 {
     const trip_camera *camera = r->frame->camera;
-    int x0, x1, y0, y1;
+    trip_pixels columns = trip_pixels_within(s->x0, s->x1, camera->width);
+    trip_pixels rows = trip_pixels_within(s->y0, s->y1, camera->height);
     bool touched = false;
-    pixel_range(s->x0, s->x1, camera->width, &x0, &x1);
-    pixel_range(s->y0, s->y1, camera->height, &y0, &y1);
-    for (int y = y0; y <= y1 && !trip_interrupted(); y++) {
-        for (int x = x0; x <= x1; x++) {
+    for (int y = rows.first; y <= rows.last && !trip_interrupted(); y++) {
+        for (int x = columns.first; x <= columns.last; x++) {
             pixel *p = &row_of(r, y)[x];
             double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
             if (!(p->weight > 0 && m <= r->constants.cutoff2))

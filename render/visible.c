@@ -1,5 +1,6 @@
 #include "visible.h"
 
+#include "brick_box.h"
 #include "report.h"
 
 enum { AXIS = 2 }; /* the list that is read; all hold the same voxels */
@@ -27,10 +28,6 @@ typedef struct search {
     int count;
     form forms[TRIP_REACHES_MAX];
 } search;
-
-typedef struct box {
-    double lo[3], hi[3];
-} box;
 
 void trip_visible_start(trip_visible *v, const trip_tf_entry *table)
 {
@@ -81,7 +78,7 @@ static double value_at(const search *s, const form *f, double x, double y, doubl
 }
 
 /* A convex function is greatest at a corner. */
-static double bound(const search *s, const form *f, const box *b)
+static double bound(const search *s, const form *f, const trip_brick_box *b)
 {
     double most = -INFINITY;
     if (f->around == 0)
@@ -129,21 +126,13 @@ static form make_form(const search *s, trip_vec3 normal, double offset, double a
     };
 }
 
-static box brick_box(const trip_file_header *h, const trip_file_brick *b, uint32_t slab)
-{
-    double u = (double)((uint64_t)b->tile_u << h->tile_log2);
-    double v = (double)((uint64_t)b->tile_v << h->tile_log2);
-    double sheet = (double)slab * h->slab_sheets;
-    return (box){ { u + b->u_min, v + b->v_min, sheet + b->sheet_min },
-                  { u + b->u_max, v + b->v_max, sheet + b->sheet_max } };
-}
-
 /* The bounds of a brick that may matter: false when it holds nothing visible or was read. */
-static bool bound_brick(const search *s, const trip_file_brick *b, uint32_t slab, double *bounds)
+static bool bound_brick(const search *s, const trip_file_brick *b, const trip_file_slab *slab,
+                        double *bounds)
 {
     if (!some_shown(s->visible, b->code_min, b->code_max))
         return false;
-    box place = brick_box(&s->visible->data->header, b, slab);
+    trip_brick_box place = trip_brick_box_of(&s->visible->data->header, slab, b);
     for (int i = 0; i < s->count; i++) {
         bounds[i] = bound(s, &s->forms[i], &place);
         if (bounds[i] >= s->forms[i].read)
@@ -161,7 +150,7 @@ static void look_ahead(search *s)
         s->forms[i].left = -INFINITY;
     for (const trip_file_slab *slab = list->slabs; slab < list->slabs + list->slab_count; slab++)
         for (uint32_t b = 0; b < slab->brick_count; b++)
-            if (bound_brick(s, &list->bricks[slab->first_brick + b], slab->slab, bounds))
+            if (bound_brick(s, &list->bricks[slab->first_brick + b], slab, bounds))
                 for (int i = 0; i < s->count; i++)
                     s->forms[i].left = fmax(s->forms[i].left, bounds[i]);
 }
@@ -184,7 +173,7 @@ static bool select_bricks(search *s, trip_selection *selection)
         for (uint32_t b = 0; b < slab->brick_count; b++) {
             uint64_t index = slab->first_brick + b;
             bool wanted = false;
-            if (bound_brick(s, &list->bricks[index], slab->slab, bounds))
+            if (bound_brick(s, &list->bricks[index], slab, bounds))
                 for (int i = 0; i < s->count; i++)
                     wanted |= bounds[i] >= from[i];
             if (wanted)
@@ -199,8 +188,8 @@ static bool select_bricks(search *s, trip_selection *selection)
 static bool may_matter(const search *s, const trip_run *run)
 {
     double last = (double)((1u << s->visible->data->header.tile_log2) - 1);
-    const box place = { { run->u, run->v, run->sheet },
-                        { run->u + last, run->v + last, run->sheet } };
+    const trip_brick_box place = { { run->u, run->v, run->sheet },
+                                   { run->u + last, run->v + last, run->sheet } };
     for (int i = 0; i < s->count; i++)
         if (bound(s, &s->forms[i], &place) > s->forms[i].best)
             return true;
@@ -262,7 +251,8 @@ static int find(search *s)
 static double result(const search *s, const form *f)
 {
     const trip_visible *v = s->visible;
-    const box all = { { v->lo[0], v->lo[1], v->lo[2] }, { v->hi[0], v->hi[1], v->hi[2] } };
+    const trip_brick_box all = { { v->lo[0], v->lo[1], v->lo[2] },
+                                 { v->hi[0], v->hi[1], v->hi[2] } };
     return f->best > -INFINITY ? f->best : bound(s, f, &all);
 }
 

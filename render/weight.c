@@ -1,5 +1,11 @@
 #include "weight.h"
 
+/* fmax() without the call: nothing here is not a number. */
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
 static double largest(trip_vec3 r)
 {
     return fmax(fabs(r.x), fmax(fabs(r.y), fabs(r.z)));
@@ -38,8 +44,96 @@ bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axi
         return axis == axis_of_view;
     if (c->ortho)
         return trip_weight(s, axis_of_view, c->r0, axis) > 0;
-    double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    double h = trip_weight_h(s);
     double bound = fabs(trip_component(centre_from_eye, axis)) - h * largest(centre_from_eye) +
                    sqrt(1 + h * h) * radius;
     return s->method == TRIP_METHOD_CLIP ? bound >= 0 : bound > 0;
+}
+
+trip_ray_bounds trip_ray_bounds_of(const double lo[3], const double hi[3])
+{
+    trip_ray_bounds b;
+    for (int a = 0; a < 3; a++) {
+        b.least[a] = larger(0, larger(lo[a], -hi[a]));
+        b.most[a] = larger(fabs(lo[a]), fabs(hi[a]));
+    }
+    return b;
+}
+
+trip_ray_bounds trip_ray_bounds_over(const trip_camera *c, const double from[2], const double to[2])
+{
+    double lo[3], hi[3];
+    for (int a = 0; a < 3; a++) {
+        lo[a] = hi[a] = trip_component(c->r0, a);
+        if (c->ortho)
+            continue;
+        double x = trip_component(c->rx, a), y = trip_component(c->ry, a);
+        lo[a] += fmin(x * from[0], x * to[0]) + fmin(y * from[1], y * to[1]);
+        hi[a] += fmax(x * from[0], x * to[0]) + fmax(y * from[1], y * to[1]);
+    }
+    return trip_ray_bounds_of(lo, hi);
+}
+
+bool trip_weight_may_lie(const trip_settings *s, int axis_of_view, const trip_ray_bounds *bounds,
+                         int axis)
+{
+    if (s->method == TRIP_METHOD_AXIS)
+        return axis == axis_of_view;
+    double least = larger(bounds->least[0], larger(bounds->least[1], bounds->least[2]));
+    return !(bounds->most[axis] * (1 + 1e-9) < trip_weight_h(s) * least); /* room for rounding */
+}
+
+/* Pixels, inclusive. */
+typedef struct rectangle {
+    int lo[2], hi[2];
+} rectangle;
+
+/* By halving. */
+static bool some_pixel_weighs(const trip_settings *s, const trip_camera *c, int axis_of_view,
+                              int axis, const rectangle *r)
+{
+    int middle[2] = { r->lo[0] + (r->hi[0] - r->lo[0]) / 2, r->lo[1] + (r->hi[1] - r->lo[1]) / 2 };
+    trip_vec3 ray = trip_camera_ray(c, middle[0] + 0.5, middle[1] + 0.5);
+    if (trip_weight(s, axis_of_view, ray, axis) > 0)
+        return true;
+    if (r->lo[0] == r->hi[0] && r->lo[1] == r->hi[1])
+        return false;
+    const double from[2] = { r->lo[0] + 0.5, r->lo[1] + 0.5 };
+    const double to[2] = { r->hi[0] + 0.5, r->hi[1] + 0.5 };
+    trip_ray_bounds bounds = trip_ray_bounds_over(c, from, to);
+    if (!trip_weight_may_lie(s, axis_of_view, &bounds, axis))
+        return false;
+    int d = r->hi[0] - r->lo[0] >= r->hi[1] - r->lo[1] ? 0 : 1;
+    rectangle first = *r, second = *r;
+    first.hi[d] = middle[d];
+    second.lo[d] = middle[d] + 1;
+    return some_pixel_weighs(s, c, axis_of_view, axis, &first) ||
+           some_pixel_weighs(s, c, axis_of_view, axis, &second);
+}
+
+bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
+                              int axis)
+{
+    if (c->ortho || s->method == TRIP_METHOD_AXIS)
+        return trip_weight(s, axis_of_view, c->r0, axis) > 0;
+    const rectangle image = { { 0, 0 }, { c->width - 1, c->height - 1 } };
+    return some_pixel_weighs(s, c, axis_of_view, axis, &image);
+}
+
+/* The rays with weight and a given sign of r_a form a convex cone, so that the corner pixels speak
+ * for all. */
+bool trip_weight_is_everywhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
+                               int axis)
+{
+    if (c->ortho || s->method == TRIP_METHOD_AXIS)
+        return true;
+    double sign = trip_component(trip_camera_ray(c, 0.5, 0.5), axis);
+    for (int i = 0; i < 4; i++) {
+        trip_vec3 ray =
+            trip_camera_ray(c, i & 1 ? c->width - 0.5 : 0.5, i & 2 ? c->height - 0.5 : 0.5);
+        if (!(trip_weight(s, axis_of_view, ray, axis) > 0) ||
+            !(sign * trip_component(ray, axis) > 0))
+            return false;
+    }
+    return true;
 }

@@ -15,11 +15,44 @@ double trip_weight(const trip_settings *s, int axis_of_view, trip_vec3 ray, int 
 /* argmax |r_a| of the ray at the image centre: the one list of Westover's method. */
 int trip_weight_axis_of_view(const trip_camera *c);
 
+/* The h of a method: clip weighs as merge does with h = 1. */
+static inline double trip_weight_h(const trip_settings *s)
+{
+    return s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+}
+
 /* A bound for culling by w +- dw (2008 section 5.4), exact in the safe direction: false only when
  * no ray that passes within `radius` (index space) of `centre` has weight in list `axis`. For a ray
  * through c + e, |e| <= radius: |r_a| - h max |r_b| <= |c_a| - h max |c_b| + sqrt(1 + h^2) radius,
  * c taken from the eye. (clip: h = 1. Parallel views: the weight of the one direction decides.) */
 bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axis_of_view, int axis,
                            trip_vec3 centre_from_eye, double radius);
+
+/* Bounds of |r_a| over a set of rays, by axis. */
+typedef struct trip_ray_bounds {
+    double least[3], most[3];
+} trip_ray_bounds;
+
+/* Of the rays whose components lie in [lo, hi]. */
+trip_ray_bounds trip_ray_bounds_of(const double lo[3], const double hi[3]);
+
+/* Of the rays of the pixel positions in [from, to], x and y. */
+trip_ray_bounds trip_ray_bounds_over(const trip_camera *c, const double from[2],
+                                     const double to[2]);
+
+/* False only when no ray within the bounds has weight in list `axis`. The components are taken
+ * apart, which becomes exact as the bounds narrow. */
+bool trip_weight_may_lie(const trip_settings *s, int axis_of_view, const trip_ray_bounds *bounds,
+                         int axis);
+
+/* Whether list `axis` has weight at the centre of some pixel of the image, exactly. */
+bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
+                              int axis);
+
+/* Whether every pixel centre has weight in list `axis`, and its rays go the same way along it: then
+ * nothing need be masked, and one direction draws all. In views whose weights are constant it is
+ * true: lists without weight are not drawn. */
+bool trip_weight_is_everywhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
+                               int axis);
 
 #endif

@@ -1,5 +1,8 @@
 #include "cpu/cover.h"
 
+#include "brick_box.h"
+#include "pixels.h"
+
 /* With b the half-size of a support at its centre's G, and |r(p)| within |p - c| |rx| of |r_c|, the
  * support reaches b / (1 - b |rx| / |r_c|): that is worked out where it is less than 1.3 b, and
  * where kernels are at least eight radii of depth away. The splats are computed in floats, which is
@@ -20,17 +23,9 @@ static double reach(const double along[3], const double half[3])
     return fabs(along[0]) * half[0] + fabs(along[1]) * half[1] + fabs(along[2]) * half[2];
 }
 
-/* Pixels, inclusive; none when first > last. */
-typedef struct range {
-    int first, last;
-} range;
-
-static range pixels(double middle, double reach, int size)
+static trip_pixels pixels(double middle, double reach, int size)
 {
-    double lo = middle - reach - SLACK_PX - 0.5, hi = middle + reach + SLACK_PX - 0.5;
-    if (hi < 0 || lo > size - 1)
-        return (range){ 0, -1 };
-    return (range){ lo > 0 ? (int)lo + 1 : 0, hi < size - 1 ? (int)hi : size - 1 };
+    return trip_pixels_within(middle - reach - SLACK_PX, middle + reach + SLACK_PX, size);
 }
 
 /* Of the splats of a box: where the centre of the middle one lies, how far from there the others'
@@ -63,22 +58,23 @@ static uint64_t bits_of(int left, int right, int top, int bottom)
 }
 
 /* What of the blocks [first, last] lies in a tile, counted from its first. */
-static range in_tile(range blocks, int tile)
+static trip_pixels in_tile(trip_pixels blocks, int tile)
 {
     int first = blocks.first - tile * BLOCKS, last = blocks.last - tile * BLOCKS;
-    return (range){ first > 0 ? first : 0, last < BLOCKS - 1 ? last : BLOCKS - 1 };
+    return (trip_pixels){ first > 0 ? first : 0, last < BLOCKS - 1 ? last : BLOCKS - 1 };
 }
 
-static trip_cpu_cover cover_of(const trip_cpu_mask *mask, range px, range py)
+static trip_cpu_cover cover_of(const trip_cpu_mask *mask, trip_pixels px, trip_pixels py)
 {
     static_assert(BLOCKS == 8, "a byte for a row");
-    range x = { px.first / BLOCK, px.last / BLOCK }, y = { py.first / BLOCK, py.last / BLOCK };
+    trip_pixels x = { px.first / BLOCK, px.last / BLOCK },
+                y = { py.first / BLOCK, py.last / BLOCK };
     bool open = false, closed = false;
     if (px.first > px.last || py.first > py.last)
         return TRIP_CPU_HIDDEN;
     for (int ty = y.first / BLOCKS; ty <= y.last / BLOCKS; ty++)
         for (int tx = x.first / BLOCKS; tx <= x.last / BLOCKS; tx++) {
-            range h = in_tile(x, tx), v = in_tile(y, ty);
+            trip_pixels h = in_tile(x, tx), v = in_tile(y, ty);
             uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
             uint64_t rest =
                 bits &
@@ -180,68 +176,19 @@ trip_cpu_cover trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int
     return TRIP_CPU_SHOWN;
 }
 
-static const trip_file_slab *slab_of(const trip_list *list, uint64_t brick)
-{
-    uint64_t lo = 0, hi = list->slab_count;
-    while (hi - lo > 1) {
-        uint64_t middle = (lo + hi) / 2;
-        if (list->slabs[middle].first_brick <= brick)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    return &list->slabs[lo];
-}
-
 trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
                                 int64_t last_sheet)
 {
-    const trip_file_header *header = &view->of->data->header;
-    const trip_list *list = &view->of->data->lists[view->axis];
-    const trip_file_brick *b = &list->bricks[brick];
-    double u = (double)((uint64_t)b->tile_u << header->tile_log2);
-    double v = (double)((uint64_t)b->tile_v << header->tile_log2);
-    double sheet = (double)((uint64_t)slab_of(list, brick)->slab * header->slab_sheets);
-    double lo[3] = { u + b->u_min, v + b->v_min, fmax(sheet + b->sheet_min, (double)first_sheet) };
-    double hi[3] = { u + b->u_max, v + b->v_max, fmin(sheet + b->sheet_max, (double)last_sheet) };
+    const trip_dataset *data = view->of->data;
+    const trip_list *list = &data->lists[view->axis];
+    trip_brick_box b =
+        trip_brick_box_of(&data->header, trip_brick_slab(list, brick), &list->bricks[brick]);
+    b.lo[2] = fmax(b.lo[2], (double)first_sheet);
+    b.hi[2] = fmin(b.hi[2], (double)last_sheet);
     trip_cpu_box box;
     for (int i = 0; i < 3; i++) {
-        box.middle[i] = 0.5 * (lo[i] + hi[i]);
-        box.half[i] = 0.5 * (hi[i] - lo[i]);
+        box.middle[i] = 0.5 * (b.lo[i] + b.hi[i]);
+        box.half[i] = 0.5 * (b.hi[i] - b.lo[i]);
     }
     return box;
-}
-
-/* Components of r are linear over the tile: their extremes are at its corners. */
-static void magnitudes(const trip_camera *c, int x, int y, double least[3], double most[3])
-{
-    double lo[3] = { INFINITY, INFINITY, INFINITY }, hi[3] = { -INFINITY, -INFINITY, -INFINITY };
-    for (int corner = 0; corner < 4; corner++) {
-        trip_vec3 ray = trip_camera_ray(c, x + (corner & 1 ? TRIP_CPU_TILE : 0),
-                                        y + (corner & 2 ? TRIP_CPU_TILE : 0));
-        for (int axis = 0; axis < 3; axis++) {
-            double r = trip_component(ray, axis);
-            lo[axis] = r < lo[axis] ? r : lo[axis];
-            hi[axis] = r > hi[axis] ? r : hi[axis];
-        }
-    }
-    for (int axis = 0; axis < 3; axis++) {
-        most[axis] = fmax(fabs(lo[axis]), fabs(hi[axis]));
-        least[axis] = lo[axis] <= 0 && hi[axis] >= 0 ? 0 : fmin(fabs(lo[axis]), fabs(hi[axis]));
-    }
-}
-
-unsigned trip_cpu_tile_axes(const trip_cpu_view *view, int x, int y)
-{
-    const trip_settings *s = view->of->settings;
-    double least[3], most[3], h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
-    unsigned axes = 0;
-    if (s->method == TRIP_METHOD_AXIS)
-        return 1u << view->of->plan->axis_of_view;
-    magnitudes(&view->splat.camera, x, y, least, most);
-    double largest = fmax(least[0], fmax(least[1], least[2]));
-    for (int axis = 0; axis < 3; axis++)
-        if (!(most[axis] < h * largest * (1 - 1e-12)))
-            axes |= 1u << axis;
-    return axes;
 }

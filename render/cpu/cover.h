@@ -65,8 +65,4 @@ trip_cpu_cover trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int
 trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
                                 int64_t last_sheet);
 
-/* The axes, a bit each, whose lists may have weight in the tile at (x, y). Where there is but one,
- * its weight is 1 all over the tile. */
-unsigned trip_cpu_tile_axes(const trip_cpu_view *view, int x, int y);
-
 #endif

@@ -16,6 +16,7 @@
 #include "cpu/pool.h"
 #include "cpu/show.h"
 #include "report.h"
+#include "weight.h"
 
 #define VISIBLE_BYTES (65536 * sizeof(trip_tf_entry))
 
@@ -594,6 +595,19 @@ static int begin_counting(cpu *r)
     return 0;
 }
 
+/* The axes, a bit each, whose lists may have weight in the tile at (x, y). Where there is but one,
+ * its weight is 1 all over the tile. */
+static uint8_t axes_of_tile(const trip_frame *frame, int x, int y)
+{
+    const double from[2] = { x, y }, to[2] = { x + TRIP_CPU_TILE, y + TRIP_CPU_TILE };
+    trip_ray_bounds bounds = trip_ray_bounds_over(frame->camera, from, to);
+    unsigned axes = 0;
+    for (int axis = 0; axis < 3; axis++)
+        if (trip_weight_may_lie(frame->settings, frame->plan->axis_of_view, &bounds, axis))
+            axes |= 1u << axis;
+    return (uint8_t)axes;
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     cpu *r = (cpu *)base;
@@ -612,7 +626,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_cpu_view_make(&r->view, frame, frame->plan->axis_of_view, true);
     memset(r->states, 0, tile_count(r));
     for (uint32_t t = 0; t < tile_count(r); t++)
-        r->axes[t] = (uint8_t)trip_cpu_tile_axes(&r->view, tile_x(r, t), tile_y(r, t));
+        r->axes[t] = axes_of_tile(frame, tile_x(r, t), tile_y(r, t));
     return 0;
 }
 

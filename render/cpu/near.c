@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pixels.h"
 #include "shade.h"
 
 #define LOG2_E 1.44269504088896340736
@@ -37,15 +38,16 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
     out->l22 = (float)sqrt(fmax(0, yy - l21 * l21));
 }
 
-/* Pixels whose centres lie in [lo, hi], cut to the image; false when there are none. */
+/* Room for the rounding of a support's bounds. */
+#define SLACK_PX 1e-3
+
+/* False when there are no pixels. */
 static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *last)
 {
-    double a = fmax(0, ceil(lo - 0.5 - 1e-3)), b = fmin(size - 1, floor(hi - 0.5 + 1e-3));
-    if (!(a <= b))
-        return false;
-    *first = (uint16_t)a;
-    *last = (uint16_t)b;
-    return true;
+    trip_pixels p = trip_pixels_within(lo - SLACK_PX, hi + SLACK_PX, size);
+    *first = (uint16_t)p.first;
+    *last = (uint16_t)p.last;
+    return p.first <= p.last;
 }
 
 /* The opacity is within 4e-4 A of 1 - exp(-A (exp(-m / 2) - edge)), within 1.5e-4 A for A up to

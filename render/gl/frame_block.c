@@ -114,7 +114,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int 
         (trip_gl_double4){ { constants.sigma * constants.sigma, constants.cutoff2,
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
     out->edge.v[0] = constants.edge;
-    double h = s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    double h = trip_weight_h(s);
     out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };
     const double *b = s->background;
     out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
@@ -155,27 +155,9 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, int axis)
         effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0);
     if (s->indexed)
         effects |= TRIP_GL_INDEXED;
-    if (trip_gl_frame_is_whole(frame, axis))
+    if (trip_weight_is_everywhere(s, frame->camera, frame->plan->axis_of_view, axis))
         effects |= TRIP_GL_UNCULLED;
     return effects;
-}
-
-/* The rays with weight and a given sign of r_a form a convex cone, so that the corner pixels speak
- * for all. */
-bool trip_gl_frame_is_whole(const trip_frame *frame, int axis)
-{
-    const trip_camera *c = frame->camera;
-    if (c->ortho || frame->settings->method == TRIP_METHOD_AXIS)
-        return true;
-    double sign = trip_component(trip_camera_ray(c, 0.5, 0.5), axis);
-    for (int i = 0; i < 4; i++) {
-        trip_vec3 ray =
-            trip_camera_ray(c, i & 1 ? c->width - 0.5 : 0.5, i & 2 ? c->height - 0.5 : 0.5);
-        if (!(trip_weight(frame->settings, frame->plan->axis_of_view, ray, axis) > 0) ||
-            !(sign * trip_component(ray, axis) > 0))
-            return false;
-    }
-    return true;
 }
 
 /* With r_max and r_min the largest and smallest |ray| of the image and of its plane, any support

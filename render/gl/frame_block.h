@@ -26,9 +26,6 @@ void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *i
 /* The effects of the frame, TRIP_GL_QUADS aside. */
 unsigned trip_gl_frame_effects(const trip_frame *frame, int axis);
 
-/* Whether every pixel of the image has weight in the list, so that nothing need be masked. */
-bool trip_gl_frame_is_whole(const trip_frame *frame, int axis);
-
 /* The depth (world units) from which on the part of a support that lies in the image fits a sprite
  * of the given size; 0 where every support does, infinity where none need. */
 double trip_gl_frame_sprite_depth(const trip_frame *frame, double point_size_px);

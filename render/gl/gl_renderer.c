@@ -19,6 +19,7 @@
 #include "gl/target.h"
 #include "gl/variant.h"
 #include "report.h"
+#include "weight.h"
 
 enum {
     TABLE_BYTES = 65536 * sizeof(trip_tf_entry),
@@ -206,7 +207,8 @@ static int begin_list(trip_renderer *base, int axis)
 {
     gl_renderer *r = (gl_renderer *)base;
     const trip_frame *frame = r->frame;
-    bool whole = trip_gl_frame_is_whole(frame, axis);
+    bool whole =
+        trip_weight_is_everywhere(frame->settings, frame->camera, frame->plan->axis_of_view, axis);
     int status = trip_gl_context_use(r->context);
     if (!status)
         status = trip_gl_target_begin_layer(&r->target, axis, !whole);

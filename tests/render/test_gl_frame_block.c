@@ -74,38 +74,6 @@ static void a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use(void **
     assert_true(trip_gl_frame_sprite_depth(&frame, 1) == HUGE_VAL);
 }
 
-static bool every_pixel_weighs(const trip_frame *frame, int axis)
-{
-    const trip_camera *c = frame->camera;
-    for (int y = 0; y < c->height; y += 7)
-        for (int x = 0; x < c->width; x += 7)
-            if (!(trip_weight(frame->settings, frame->plan->axis_of_view,
-                              trip_camera_ray(c, x + 0.5, y + 0.5), axis) > 0))
-                return false;
-    return true;
-}
-
-static void a_list_is_whole_only_if_every_pixel_has_weight_in_it(void **state)
-{
-    (void)state;
-    int whole = 0;
-    for (int i = 0; i < 600; i++) {
-        trip_settings settings = trip_settings_default();
-        trip_plan plan = { 0 };
-        trip_camera c = random_camera();
-        settings.method = (trip_method)(i % 3);
-        settings.h = between(0, 0.99);
-        plan.axis_of_view = trip_weight_axis_of_view(&c);
-        trip_frame frame = { .camera = &c, .settings = &settings, .plan = &plan };
-        int axis = settings.method == TRIP_METHOD_AXIS ? plan.axis_of_view : i / 3 % 3;
-        if (!trip_gl_frame_is_whole(&frame, axis))
-            continue;
-        assert_true(every_pixel_weighs(&frame, axis));
-        whole++;
-    }
-    assert_true(whole > 20);
-}
-
 static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
 {
     (void)state;
@@ -140,7 +108,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(from_the_sprite_depth_on_every_support_fits_a_sprite),
         cmocka_unit_test(a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use),
-        cmocka_unit_test(a_list_is_whole_only_if_every_pixel_has_weight_in_it),
         cmocka_unit_test(effects_are_asked_for_only_where_the_frame_needs_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -270,6 +270,7 @@ static void a_brick_is_transparent_when_no_code_of_its_range_has_extinction(void
     trip_settings settings = unlit(TRIP_METHOD_AXIS, 0);
     trip_cull cull = trip_cull_make(s.data, &c, &settings, 0, s.table);
     trip_file_brick brick = s.data->lists[0].bricks[0];
+    const trip_file_slab *slab = s.data->lists[0].slabs;
     for (unsigned i = 0; i < 20000; i++) {
         unsigned first = i * 40503u % 65536, length = i * 7919u % (i % 3 ? 600 : 30000);
         unsigned last = first + length < 65536 ? first + length : 65535;
@@ -278,7 +279,8 @@ static void a_brick_is_transparent_when_no_code_of_its_range_has_extinction(void
             visible |= (int)first <= shown[k] && shown[k] <= (int)last;
         brick.code_min = (uint16_t)first;
         brick.code_max = (uint16_t)last;
-        assert_int_equal(trip_cull_brick(&cull, 0, &brick, 0) == TRIP_CULL_TRANSPARENT, !visible);
+        assert_int_equal(trip_cull_brick(&cull, 0, &brick, slab) == TRIP_CULL_TRANSPARENT,
+                         !visible);
     }
     scene_destroy(&s);
 }

@@ -1,5 +1,6 @@
 #include "test.h"
 
+#include "pixels.h"
 #include "weight.h"
 
 static trip_settings with(trip_method method, double h)
@@ -136,6 +137,82 @@ static void in_a_parallel_view_the_one_direction_decides(void **state)
     assert_false(trip_weight_may_reach(&s, &c, 0, 1, trip_v3(-10, 20, 0), 1));
 }
 
+typedef struct weighing {
+    bool some, all;
+} weighing;
+
+static weighing weigh_every_pixel(const trip_settings *s, const trip_camera *c, int view, int axis)
+{
+    weighing w = { false, true };
+    for (int y = 0; y < c->height; y++)
+        for (int x = 0; x < c->width; x++) {
+            bool some = trip_weight(s, view, trip_camera_ray(c, x + 0.5, y + 0.5), axis) > 0;
+            w.some |= some;
+            w.all &= some;
+        }
+    return w;
+}
+
+static void a_list_is_used_if_some_pixel_has_weight_in_it_and_whole_only_if_all_have(void **state)
+{
+    (void)state;
+    int whole = 0, unused = 0;
+    for (int i = 0; i < 900; i++) {
+        trip_settings s = with((trip_method)(i % 3), 0.99 * test_random());
+        trip_camera c = random_camera(i % 5 == 0);
+        int view = trip_weight_axis_of_view(&c), axis = i / 3 % 3;
+        weighing w = weigh_every_pixel(&s, &c, view, axis);
+        assert_int_equal(trip_weight_is_somewhere(&s, &c, view, axis), w.some);
+        unused += !w.some;
+        if (!w.some || !trip_weight_is_everywhere(&s, &c, view, axis))
+            continue;
+        assert_true(w.all);
+        whole++;
+    }
+    assert_true(whole > 20 && unused > 20);
+}
+
+static void bounds_over_a_rectangle_hold_for_every_ray_in_it(void **state)
+{
+    (void)state;
+    int ruled_out = 0;
+    for (int i = 0; i < 900; i++) {
+        trip_settings s = with((trip_method)(i % 2), 0.99 * test_random());
+        trip_camera c = random_camera(i % 5 == 0);
+        const double from[2] = { 40 * test_random(), 40 * test_random() };
+        const double to[2] = { from[0] + 9 * test_random(), from[1] + 9 * test_random() };
+        trip_ray_bounds b = trip_ray_bounds_over(&c, from, to);
+        for (int k = 0; k < 50; k++) {
+            trip_vec3 ray = trip_camera_ray(&c, from[0] + (to[0] - from[0]) * test_random(),
+                                            from[1] + (to[1] - from[1]) * test_random());
+            for (int a = 0; a < 3; a++) {
+                double r = fabs(trip_component(ray, a)), room = 1e-9 * trip_length(ray);
+                assert_true(r >= b.least[a] - room && r <= b.most[a] + room);
+                if (!trip_weight_may_lie(&s, 0, &b, a)) {
+                    assert_close(trip_weight(&s, 0, ray, a), 0, 0);
+                    ruled_out++;
+                }
+            }
+        }
+    }
+    assert_true(ruled_out > 1000);
+}
+
+static void pixels_are_those_whose_centres_lie_within_the_bounds(void **state)
+{
+    (void)state;
+    enum { SIZE = 9 };
+    for (int i = 0; i < 20000; i++) {
+        double lo = floor(60 * test_random() - 30) / 4, hi = lo + floor(24 * test_random() - 4) / 4;
+        trip_pixels p = trip_pixels_within(lo, hi, SIZE);
+        for (int x = 0; x < SIZE; x++)
+            assert_int_equal(x >= p.first && x <= p.last, x + 0.5 >= lo && x + 0.5 <= hi);
+        assert_true(p.first >= 0 && p.last < SIZE);
+    }
+    assert_true(trip_pixels_within(NAN, 3, SIZE).last < 0);
+    assert_true(trip_pixels_within(-INFINITY, INFINITY, SIZE).last == SIZE - 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -146,6 +223,9 @@ int main(void)
         cmocka_unit_test(a_ball_is_left_out_only_when_no_ray_through_it_has_weight),
         cmocka_unit_test(without_a_band_every_ball_is_kept_and_far_ones_beyond_it_are_not),
         cmocka_unit_test(in_a_parallel_view_the_one_direction_decides),
+        cmocka_unit_test(a_list_is_used_if_some_pixel_has_weight_in_it_and_whole_only_if_all_have),
+        cmocka_unit_test(bounds_over_a_rectangle_hold_for_every_ray_in_it),
+        cmocka_unit_test(pixels_are_those_whose_centres_lie_within_the_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
