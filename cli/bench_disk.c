@@ -26,7 +26,7 @@ uint64_t bench_files_bytes(const session *s, bench_files files)
     uint64_t bytes = 0;
     for (int i = 0; i < FILES; i++)
         if (files >> i & 1)
-            bytes += s->data->lists[i / TRIP_PLANES].splats * TRIP_RECORD_BYTES;
+            bytes += s->data->lists[i / TRIP_PLANES].plane_bytes[i % TRIP_PLANES];
     return bytes;
 }
 
@@ -34,7 +34,7 @@ void bench_files_forget(const session *s, bench_files files)
 {
     for (int i = 0; i < FILES; i++)
         if (files >> i & 1)
-            posix_fadvise(s->data->plane_fd[i / TRIP_PLANES][i % TRIP_PLANES], 0, 0,
+            posix_fadvise(s->data->lists[i / TRIP_PLANES].plane_fd[i % TRIP_PLANES], 0, 0,
                           POSIX_FADV_DONTNEED);
 }
 
@@ -96,16 +96,7 @@ static bool has_list(bench_files files, int axis)
     return files >> axis * TRIP_PLANES & ((1u << TRIP_PLANES) - 1);
 }
 
-static int select_list(const session *s, int axis, trip_selection *all)
-{
-    const trip_list *list = &s->data->lists[axis];
-    int status = trip_selection_create(all, s->data, axis, false, 0, INT64_MAX, s->budget);
-    for (uint64_t i = 0; i < list->brick_count && !status; i++)
-        trip_selection_add(all, i);
-    return status;
-}
-
-static int stream_lists(trip_reader *reader, const trip_selection lists[3], bench_files files)
+static int stream_lists(trip_reader *reader, const trip_pass lists[3], bench_files files)
 {
     trip_batch batch;
     int status = trip_reader_begin(reader, NULL);
@@ -124,13 +115,17 @@ int bench_files_stream(const session *s, bench_files files, trip_reader *reader,
                        bench_disk_read *out)
 {
     trip_selection lists[3] = { 0 };
+    trip_pass passes[3];
     int status = 0;
     for (int axis = 0; axis < 3 && !status; axis++)
         if (has_list(files, axis))
-            status = select_list(s, axis, &lists[axis]);
+            status = trip_selection_create_whole(&lists[axis], s->data, &s->data->lists[axis],
+                                                 false, s->budget);
+    for (int axis = 0; axis < 3; axis++)
+        passes[axis] = trip_pass_of(&lists[axis]);
     double start = bench_now_ms();
     if (!status)
-        status = stream_lists(reader, lists, files);
+        status = stream_lists(reader, passes, files);
     out->ms = bench_now_ms() - start;
     out->bytes = trip_reader_get_stats(reader).bytes_read;
     out->direct = strstr(trip_reader_engine_name(reader), "O_DIRECT");

@@ -117,7 +117,7 @@ static void add_lists(cJSON *root, const trip_dataset *d)
     for (int axis = 0; axis < 3; axis++) {
         const char name[2] = { (char)('x' + axis), 0 };
         cJSON *list = cJSON_AddObjectToObject(lists, name);
-        cJSON_AddItemToObject(list, "splats", number((double)d->lists[axis].splats));
+        cJSON_AddItemToObject(list, "splats", number((double)d->lists[axis].records));
         cJSON_AddItemToObject(list, "slabs", number((double)d->lists[axis].slab_count));
         cJSON_AddItemToObject(list, "bricks", number((double)d->lists[axis].brick_count));
     }

@@ -20,6 +20,9 @@ typedef struct drawing {
     trip_reader *reader;
     const trip_frame *frame;
     trip_frame_stats *stats;
+    trip_pass passes[TRIP_READER_PASSES_MAX];
+    bool front_to_back[TRIP_READER_PASSES_MAX];
+    unsigned pass_count;
     int next_axis;       /* lists before this one were begun */
     uint64_t splats;     /* drawn so far */
     uint64_t bytes_read; /* counted so far */
@@ -48,8 +51,11 @@ static int begin_reading(drawing *d)
     int status = trip_reader_begin(d->reader, NULL);
     for (int axis = 0; axis < 3; axis++) {
         const trip_plan_list *list = &d->frame->plan->lists[axis];
-        for (int i = 0; i < list->pass_count && !status; i++)
-            status = trip_reader_then(d->reader, &list->passes[i].selection);
+        for (int i = 0; i < list->pass_count && !status; i++) {
+            d->passes[d->pass_count] = trip_pass_of(&list->passes[i].selection);
+            d->front_to_back[d->pass_count] = list->passes[i].front_to_back;
+            status = trip_reader_then(d->reader, &d->passes[d->pass_count++]);
+        }
     }
     return status;
 }
@@ -66,16 +72,16 @@ static int begin_lists(drawing *d, int last)
 
 static bool is_front_to_back(const drawing *d, const trip_batch *batch)
 {
-    const trip_plan_pass *passes = d->frame->plan->lists[batch->selection->axis].passes;
-    return passes[batch->selection != &passes[0].selection].front_to_back;
+    return d->front_to_back[batch->pass - d->passes];
 }
 
 static int draw_batch(drawing *d, const trip_batch *batch)
 {
     uint64_t bytes = trip_reader_get_stats(d->reader).bytes_read;
-    d->stats->lists[batch->selection->axis].bytes_read += bytes - d->bytes_read;
+    int axis = batch->pass->selections->list->axis;
+    d->stats->lists[axis].bytes_read += bytes - d->bytes_read;
     d->bytes_read = bytes;
-    int status = begin_lists(d, batch->selection->axis);
+    int status = begin_lists(d, axis);
     if (status)
         return status;
     double start = now_ms();

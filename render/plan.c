@@ -14,8 +14,9 @@ static int add_pass(trip_plan_list *list, const trip_dataset *data, int axis, bo
     if (first > last)
         return 0;
     trip_plan_pass *pass = &list->passes[list->pass_count];
-    int status =
-        trip_selection_create(&pass->selection, data, axis, descending, first, last, budget);
+    int status = trip_selection_create(&pass->selection, data,
+                                       trip_dataset_find(data, axis, 0, TRIP_KIND_VOXELS),
+                                       descending, first, last, budget);
     if (status)
         return status;
     pass->front_to_back = front_to_back;
@@ -124,7 +125,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
             continue;
         status = add_passes(list, data, camera, settings, axis, budget);
         if (!status)
-            status = select_bricks(list, &data->lists[axis], &cull, data->header.slab_sheets);
+            status = select_bricks(list, trip_dataset_find(data, axis, 0, TRIP_KIND_VOXELS), &cull,
+                                   data->header.slab_sheets);
         if (!status)
             drop_empty_passes(list, budget);
     }

@@ -210,7 +210,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
-            uint32_t in_run = batch->selection->descending ? run->count - 1 - k : k;
+            uint32_t in_run = batch->pass->descending ? run->count - 1 - k : k;
             size_t at = run->first + in_run;
             uint32_t record = batch->voxels[at];
             draw_splat(r, voxel_position(r->axis, run, record), record,

@@ -144,7 +144,7 @@ static bool bound_brick(const search *s, const trip_file_brick *b, const trip_fi
 /* How far bricks that were not read may reach. */
 static void look_ahead(search *s)
 {
-    const trip_list *list = &s->visible->data->lists[AXIS];
+    const trip_list *list = trip_dataset_find(s->visible->data, AXIS, 0, TRIP_KIND_VOXELS);
     double bounds[TRIP_REACHES_MAX];
     for (int i = 0; i < s->count; i++)
         s->forms[i].left = -INFINITY;
@@ -158,7 +158,7 @@ static void look_ahead(search *s)
 /* Selects those that reach the farthest; false when none may reach farther than what was found. */
 static bool select_bricks(search *s, trip_selection *selection)
 {
-    const trip_list *list = &s->visible->data->lists[AXIS];
+    const trip_list *list = trip_dataset_find(s->visible->data, AXIS, 0, TRIP_KIND_VOXELS);
     double from[TRIP_REACHES_MAX], bounds[TRIP_REACHES_MAX];
     bool some = false;
     for (int i = 0; i < s->count; i++) {
@@ -215,7 +215,8 @@ static int read_selected(search *s, const trip_selection *selection)
 {
     trip_reader *reader = s->visible->reader;
     trip_batch batch;
-    int status = trip_reader_begin(reader, selection);
+    const trip_pass pass = trip_pass_of(selection);
+    int status = trip_reader_begin(reader, &pass);
     while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
         for (size_t i = 0; i < batch.run_count; i++)
             if (may_matter(s, &batch.runs[i]))
@@ -231,17 +232,18 @@ static int read_selected(search *s, const trip_selection *selection)
 static int find(search *s)
 {
     const trip_visible *v = s->visible;
+    const trip_list *list = trip_dataset_find(v->data, AXIS, 0, TRIP_KIND_VOXELS);
     trip_selection selection;
     int status = 0;
     for (bool more = true; more && !status;) {
-        status = trip_selection_create(&selection, v->data, AXIS, false, 0, INT32_MAX, v->budget);
+        status = trip_selection_create(&selection, v->data, list, false, 0, INT32_MAX, v->budget);
         if (status)
             return status;
         look_ahead(s);
         more = select_bricks(s, &selection);
         if (more)
             status = read_selected(s, &selection);
-        trip_reader_begin(v->reader, NULL); /* the selection does not outlive the pass */
+        trip_reader_begin(v->reader, NULL); /* nothing is read of it any more */
         trip_selection_destroy(&selection, v->budget);
     }
     return status;

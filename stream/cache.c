@@ -18,7 +18,8 @@ typedef struct entry {
 
 struct trip_cache {
     trip_budget *budget;
-    uint32_t first_page[3][TRIP_PLANES];
+    uint32_t (*first_page)[TRIP_PLANES]; /* by list */
+    unsigned list_count;
     unsigned page_log2;
     uint32_t page_count, entry_count, used, hand, pass;
     uint32_t settled; /* nothing of this pass and those before it is under way */
@@ -29,16 +30,20 @@ struct trip_cache {
     unsigned char *memory;
 };
 
-static uint64_t plane_pages(const trip_dataset *d)
+static uint64_t plane_pages(const trip_dataset *d, const trip_list *list, int plane)
 {
-    uint64_t bytes = d->header.kept * TRIP_RECORD_BYTES;
+    uint64_t bytes = list->plane_bytes[plane];
     uint64_t page = UINT64_C(1) << d->header.page_log2;
     return bytes / page + (bytes % page != 0);
 }
 
 uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes)
 {
-    return 3 * (uint64_t)__builtin_popcount(planes) * plane_pages(d) << d->header.page_log2;
+    uint64_t pages = 0;
+    for (unsigned i = 0; i < d->list_count; i++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            pages += planes >> plane & 1 ? plane_pages(d, &d->lists[i], plane) : 0;
+    return pages << d->header.page_log2;
 }
 
 static size_t memory_bytes(const trip_cache *c)
@@ -50,10 +55,10 @@ static size_t memory_bytes(const trip_cache *c)
 static void number_pages(trip_cache *c, const trip_dataset *d, unsigned planes)
 {
     uint64_t first = 0;
-    for (int axis = 0; axis < 3; axis++)
+    for (unsigned i = 0; i < d->list_count; i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++) {
-            c->first_page[axis][plane] = (uint32_t)first;
-            first += planes >> plane & 1 ? plane_pages(d) : 0;
+            c->first_page[i][plane] = (uint32_t)first;
+            first += planes >> plane & 1 ? plane_pages(d, &d->lists[i], plane) : 0;
         }
 }
 
@@ -66,15 +71,18 @@ int trip_cache_create(trip_cache **out, const trip_dataset *d, unsigned planes, 
     trip_cache *c = calloc(1, sizeof *c);
     if (!c)
         return trip_fail(TRIP_ERROR, "read", d->path, "out of memory");
-    number_pages(c, d, planes);
     c->budget = budget;
+    c->list_count = d->list_count;
+    c->first_page = trip_budget_take(budget, c->list_count * sizeof *c->first_page);
+    if (c->first_page)
+        number_pages(c, d, planes);
     c->page_log2 = d->header.page_log2;
     c->page_count = (uint32_t)(pages < UINT32_MAX ? pages : 0);
     c->entry_count = (uint32_t)(entries < pages ? entries : pages);
     c->entry_of = trip_budget_take(budget, c->page_count * sizeof *c->entry_of);
     c->entries = trip_budget_take(budget, c->entry_count * sizeof *c->entries);
     c->memory = trip_budget_take(budget, memory_bytes(c));
-    if (pages < UINT32_MAX && c->entry_of && c->entries && c->memory) {
+    if (pages < UINT32_MAX && c->first_page && c->entry_of && c->entries && c->memory) {
         *out = c;
         return TRIP_OK;
     }
@@ -87,15 +95,16 @@ void trip_cache_destroy(trip_cache *c)
 {
     if (!c)
         return;
+    trip_budget_release(c->budget, c->first_page, c->list_count * sizeof *c->first_page);
     trip_budget_release(c->budget, c->entry_of, c->page_count * sizeof *c->entry_of);
     trip_budget_release(c->budget, c->entries, c->entry_count * sizeof *c->entries);
     trip_budget_release(c->budget, c->memory, memory_bytes(c));
     free(c);
 }
 
-uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offset)
+uint32_t trip_cache_page(const trip_cache *c, unsigned list, int plane, uint64_t offset)
 {
-    return c->first_page[axis][plane] + (uint32_t)(offset >> c->page_log2);
+    return c->first_page[list][plane] + (uint32_t)(offset >> c->page_log2);
 }
 
 static unsigned char *memory_of(const trip_cache *c, uint32_t position)
@@ -109,10 +118,11 @@ static bool holds_all(const trip_cache *c)
     return c->entry_count == c->page_count;
 }
 
-const unsigned char *trip_cache_bytes(const trip_cache *c, int axis, int plane, uint64_t offset)
+const unsigned char *trip_cache_bytes(const trip_cache *c, unsigned list, int plane,
+                                      uint64_t offset)
 {
     assert(holds_all(c));
-    return memory_of(c, c->first_page[axis][plane] + 1) + offset;
+    return memory_of(c, c->first_page[list][plane] + 1) + offset;
 }
 
 void trip_cache_settle(trip_cache *c)

@@ -22,9 +22,10 @@ int trip_cache_create(trip_cache **out, const trip_dataset *d, unsigned planes, 
 void trip_cache_destroy(trip_cache *c);
 /* Bytes that hold everything. */
 uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes);
-uint32_t trip_cache_page(const trip_cache *c, int axis, int plane, uint64_t offset);
+uint32_t trip_cache_page(const trip_cache *c, unsigned list, int plane, uint64_t offset);
 /* Bytes of a plane from `offset` on, where there is room for all: valid where its pages are. */
-const unsigned char *trip_cache_bytes(const trip_cache *c, int axis, int plane, uint64_t offset);
+const unsigned char *trip_cache_bytes(const trip_cache *c, unsigned list, int plane,
+                                      uint64_t offset);
 
 /* Reader's thread: nothing is under way. */
 void trip_cache_settle(trip_cache *c);

@@ -18,6 +18,11 @@ const char *trip_dataset_plane_name(int axis, int plane, char *name)
     return name;
 }
 
+const char *trip_list_plane_name(const trip_list *list, int plane, char *name)
+{
+    return trip_dataset_plane_name(list->axis, plane, name);
+}
+
 static void set_path(char *where, size_t room, const trip_dataset *d, const char *name)
 {
     snprintf(where, room, "%s/%s", d->path, name);
@@ -104,24 +109,50 @@ static const void *table(const trip_dataset *d, uint64_t offset)
     return (const unsigned char *)d->memory + offset;
 }
 
+static void set_list(trip_dataset *d, trip_list *l, const trip_file_list *f)
+{
+    l->axis = (int)f->axis;
+    l->level = f->level;
+    l->kind = TRIP_KIND_VOXELS;
+    l->planes = d->header.planes;
+    for (int a = 0; a < 3; a++)
+        l->dims[a] = (int64_t)d->header.dims[a];
+    l->index_to_world = d->index_to_world;
+    l->sheet_step = 1;
+    l->records = f->splats;
+    l->slab_count = f->slab_count;
+    l->brick_count = f->brick_count;
+    l->slabs = table(d, f->slabs_offset);
+    l->bricks = table(d, f->bricks_offset);
+    l->counts = table(d, f->counts_offset);
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        if (l->planes >> plane & 1) {
+            l->page_checksums[plane] = table(d, f->page_checksums_offset[plane]);
+            l->plane_bytes[plane] = l->records * TRIP_RECORD_BYTES;
+        }
+}
+
 static int set_lists(trip_dataset *d)
 {
     const trip_file_list *files = table(d, d->header.lists_offset);
-    for (int a = 0; a < 3; a++) {
-        const trip_file_list *f = &files[a];
-        trip_list *l = &d->lists[a];
-        *l = (trip_list){ .axis = a,
-                          .splats = f->splats,
-                          .slab_count = f->slab_count,
-                          .brick_count = f->brick_count,
-                          .slabs = table(d, f->slabs_offset),
-                          .bricks = table(d, f->bricks_offset),
-                          .counts = table(d, f->counts_offset) };
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (d->header.planes >> plane & 1)
-                l->page_checksums[plane] = table(d, f->page_checksums_offset[plane]);
-    }
+    unsigned count = d->header.list_count;
+    d->lists = trip_budget_take(d->budget, count * sizeof *d->lists); /* zeroed */
+    if (!d->lists)
+        return trip_fail(TRIP_ERROR, "open", d->path,
+                         "no memory for its %u lists: give more with --memory", count);
     memcpy(d->index_to_world.m, d->header.index_to_world, sizeof d->index_to_world.m);
+    for (; d->list_count < count; d->list_count++) {
+        trip_list *l = &d->lists[d->list_count];
+        l->index = d->list_count;
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            l->plane_fd[plane] = -1;
+        set_list(d, l, &files[d->list_count]);
+    }
+    return TRIP_OK;
+}
+
+static int set_text(trip_dataset *d)
+{
     d->text = trip_budget_take(d->budget, d->header.text_bytes + 1); /* zeroed */
     if (!d->text)
         return trip_fail(TRIP_ERROR, "open", d->path,
@@ -131,12 +162,12 @@ static int set_lists(trip_dataset *d)
     return TRIP_OK;
 }
 
-static int open_plane(trip_dataset *d, int folder, int axis, int plane)
+static int open_plane(trip_dataset *d, int folder, trip_list *list, int plane)
 {
     char name[32], where[4096];
-    uint64_t bytes = 0, wanted = d->lists[axis].splats * TRIP_RECORD_BYTES;
-    trip_dataset_plane_name(axis, plane, name);
-    int status = open_file(d, folder, name, &d->plane_fd[axis][plane], &bytes);
+    uint64_t bytes = 0, wanted = list->plane_bytes[plane];
+    trip_list_plane_name(list, plane, name);
+    int status = open_file(d, folder, name, &list->plane_fd[plane], &bytes);
     if (status != TRIP_OK)
         return status;
     d->bytes += bytes;
@@ -145,7 +176,7 @@ static int open_plane(trip_dataset *d, int folder, int axis, int plane)
     set_path(where, sizeof where, d, name);
     return trip_fail(TRIP_ERROR, "open", where, "%llu bytes instead of the %llu of %llu splats",
                      (unsigned long long)bytes, (unsigned long long)wanted,
-                     (unsigned long long)d->lists[axis].splats);
+                     (unsigned long long)list->records);
 }
 
 static int open_files(trip_dataset *d, int folder)
@@ -158,10 +189,12 @@ static int open_files(trip_dataset *d, int folder)
         close(fd);
     if (status == TRIP_OK)
         status = set_lists(d);
-    for (int axis = 0; axis < 3; axis++)
+    if (status == TRIP_OK)
+        status = set_text(d);
+    for (unsigned i = 0; i < d->list_count; i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (status == TRIP_OK && d->header.planes >> plane & 1)
-                status = open_plane(d, folder, axis, plane);
+            if (status == TRIP_OK && d->lists[i].planes >> plane & 1)
+                status = open_plane(d, folder, &d->lists[i], plane);
     return status;
 }
 
@@ -176,9 +209,6 @@ static trip_dataset *allocate(const char *path, trip_budget *budget)
         return NULL;
     }
     d->budget = budget;
-    for (int axis = 0; axis < 3; axis++)
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            d->plane_fd[axis][plane] = -1;
     return d;
 }
 
@@ -222,10 +252,12 @@ void trip_dataset_close(trip_dataset *d)
 {
     if (!d)
         return;
-    for (int axis = 0; axis < 3; axis++)
+    for (unsigned i = 0; i < d->list_count; i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (d->plane_fd[axis][plane] >= 0)
-                close(d->plane_fd[axis][plane]);
+            if (d->lists[i].plane_fd[plane] >= 0)
+                close(d->lists[i].plane_fd[plane]);
+    if (d->lists)
+        trip_budget_release(d->budget, d->lists, d->header.list_count * sizeof *d->lists);
     trip_budget_release(d->budget, d->memory, d->memory_bytes);
     if (d->text)
         trip_budget_release(d->budget, d->text, d->header.text_bytes + 1);
@@ -233,15 +265,25 @@ void trip_dataset_close(trip_dataset *d)
     free(d);
 }
 
+const trip_list *trip_dataset_find(const trip_dataset *d, int axis, unsigned level, trip_kind kind)
+{
+    for (unsigned i = 0; i < d->list_count; i++) {
+        const trip_list *l = &d->lists[i];
+        if (l->axis == axis && l->level == level && l->kind == kind)
+            return l;
+    }
+    return NULL;
+}
+
 /* From the bricks of one list: all three hold every splat. */
 void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3])
 {
-    const trip_list *list = &d->lists[2];
+    const trip_list *list = trip_dataset_find(d, 2, 0, TRIP_KIND_VOXELS);
     for (int a = 0; a < 3; a++) {
-        lo[a] = list->brick_count ? INFINITY : 0;
-        hi[a] = list->brick_count ? -INFINITY : (double)d->header.dims[a] - 1;
+        lo[a] = list && list->brick_count ? INFINITY : 0;
+        hi[a] = list && list->brick_count ? -INFINITY : (double)d->header.dims[a] - 1;
     }
-    for (uint64_t i = 0; i < list->slab_count; i++) {
+    for (uint64_t i = 0; list && i < list->slab_count; i++) {
         const trip_file_slab *slab = &list->slabs[i];
         double sheet = (double)slab->slab * d->header.slab_sheets;
         for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {

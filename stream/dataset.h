@@ -7,28 +7,39 @@
 #include "budget.h"
 #include "format.h"
 #include "geometry.h"
+#include "kind.h"
 
 #define TRIP_INDEX_NAME "index.trip"
 
+/* Records of one kind, in the order along one axis, at one level. */
 typedef struct trip_list {
+    unsigned index; /* in the data set's lists */
     int axis;
-    uint64_t splats;
+    unsigned level; /* 0: full resolution */
+    trip_kind kind;
+    unsigned planes; /* bit per trip_plane present */
+    int64_t dims[3]; /* of the list's own grid, along i, j, k */
+    trip_affine index_to_world;
+    double sheet_first, sheet_step; /* places sheets along the list coordinate: level-0 indices */
+    uint64_t records;
     uint64_t slab_count, brick_count;
     const trip_file_slab *slabs;
     const trip_file_brick *bricks;
     const uint16_t *counts;                      /* [brick][sheet in slab] */
     const uint64_t *page_checksums[TRIP_PLANES]; /* NULL where the plane is absent */
+    uint64_t plane_bytes[TRIP_PLANES];
+    int plane_fd[TRIP_PLANES]; /* -1 where absent; opened for reading */
 } trip_list;
 
 typedef struct trip_dataset {
     char *path;
     trip_file_header header;
-    trip_affine index_to_world;
-    trip_list lists[3];           /* X, Y, Z at level 0 */
-    char *text;                   /* JSON, terminated */
-    uint64_t bytes;               /* of all files */
-    int plane_fd[3][TRIP_PLANES]; /* -1 where absent; opened for reading */
-    void *memory;                 /* the index; from the budget */
+    trip_affine index_to_world; /* of level 0 */
+    trip_list *lists;           /* from the budget */
+    unsigned list_count;
+    char *text;     /* JSON, terminated */
+    uint64_t bytes; /* of all files */
+    void *memory;   /* the index; from the budget */
     size_t memory_bytes;
     trip_budget *budget;
 } trip_dataset;
@@ -44,8 +55,18 @@ int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
 /* The first and last voxel kept along each index axis; without any, those of the grid. */
 void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3]);
 
+/* NULL where the data set has no such list. */
+const trip_list *trip_dataset_find(const trip_dataset *d, int axis, unsigned level, trip_kind kind);
+
+/* Where a sheet lies along the list's axis, in level-0 index units: passes merge lists by it. */
+static inline double trip_list_sheet_coordinate(const trip_list *list, int64_t sheet)
+{
+    return list->sheet_first + list->sheet_step * (double)sheet;
+}
+
 /* Name of a plane file, "x.voxels"; `name` has room for 32 bytes. */
 const char *trip_dataset_plane_name(int axis, int plane, char *name);
+const char *trip_list_plane_name(const trip_list *list, int plane, char *name);
 
 static inline double trip_dataset_value(const trip_dataset *d, unsigned code)
 {

@@ -15,7 +15,7 @@ typedef struct voxel_sums {
 
 typedef struct list_verifier {
     const trip_dataset *data;
-    int axis;
+    const trip_list *list;
     uint64_t splat;                   /* list position of the next record */
     int64_t sheet, brick, last_order; /* of the run being checked: it may go on in the next batch */
     voxel_sums sums;
@@ -39,7 +39,7 @@ static void add_voxel(voxel_sums *s, const uint64_t p[3], uint32_t code, uint32_
 static int fail_record(const list_verifier *v, const char *why)
 {
     char name[32], where[4096];
-    trip_dataset_plane_name(v->axis, TRIP_PLANE_VOXELS, name);
+    trip_list_plane_name(v->list, TRIP_PLANE_VOXELS, name);
     snprintf(where, sizeof where, "%s/%s", v->data->path, name);
     return trip_fail(TRIP_ERROR, "verify", where, "byte %llu: %s",
                      (unsigned long long)v->splat * TRIP_RECORD_BYTES, why);
@@ -59,17 +59,18 @@ static int check_run(list_verifier *v, const trip_batch *batch, const trip_run *
     const uint32_t *voxels = batch->voxels + run->first;
     const uint32_t *normals = batch->normals ? batch->normals + run->first : NULL;
     uint64_t p[3] = { 0 };
+    int axis = v->list->axis;
     if (run->sheet != v->sheet || run->brick != v->brick)
         v->last_order = -1;
     v->sheet = run->sheet;
     v->brick = run->brick;
-    p[v->axis] = (uint64_t)run->sheet;
+    p[axis] = (uint64_t)run->sheet;
     for (uint32_t i = 0; i < run->count; i++) {
         int status = check_record(v, voxels[i]);
         if (status < 0)
             return status;
-        p[(v->axis + 1) % 3] = (uint64_t)run->u + trip_voxel_u(voxels[i]);
-        p[(v->axis + 2) % 3] = (uint64_t)run->v + trip_voxel_v(voxels[i]);
+        p[(axis + 1) % 3] = (uint64_t)run->u + trip_voxel_u(voxels[i]);
+        p[(axis + 2) % 3] = (uint64_t)run->v + trip_voxel_v(voxels[i]);
         add_voxel(&v->sums, p, trip_voxel_code(voxels[i]), normals ? normals[i] : 0);
         v->splat++;
     }
@@ -87,7 +88,8 @@ static int check_batch(list_verifier *v, const trip_batch *batch)
 static int check_pass(list_verifier *v, trip_reader *r, const trip_selection *s)
 {
     trip_batch batch;
-    int status = trip_reader_begin(r, s), more = 0;
+    trip_pass pass = trip_pass_of(s);
+    int status = trip_reader_begin(r, &pass), more = 0;
     while (status == TRIP_OK && (more = trip_reader_next(r, &batch)) > 0) {
         status = check_batch(v, &batch);
         trip_reader_release(r, &batch);
@@ -97,16 +99,14 @@ static int check_pass(list_verifier *v, trip_reader *r, const trip_selection *s)
     return status < 0 ? status : more;
 }
 
-static int check_list(const trip_dataset *d, trip_reader *r, int axis, trip_budget *budget,
-                      voxel_sums *sums)
+static int check_list(const trip_dataset *d, trip_reader *r, const trip_list *list,
+                      trip_budget *budget, voxel_sums *sums)
 {
     trip_selection s;
-    list_verifier v = { .data = d, .axis = axis, .sheet = -1, .brick = -1 };
-    int status = trip_selection_create(&s, d, axis, false, 0, INT32_MAX, budget);
+    list_verifier v = { .data = d, .list = list, .sheet = -1, .brick = -1 };
+    int status = trip_selection_create_whole(&s, d, list, false, budget);
     if (status < 0)
         return status;
-    for (uint64_t b = 0; b < d->lists[axis].brick_count; b++)
-        trip_selection_add(&s, b);
     status = check_pass(&v, r, &s);
     trip_selection_destroy(&s, budget);
     *sums = v.sums;
@@ -120,7 +120,7 @@ int trip_dataset_verify(const trip_dataset *d, trip_budget *budget)
     int status =
         trip_reader_create(&r, d, &(trip_reader_params){ .planes = d->header.planes }, budget);
     for (int axis = 0; axis < 3 && status == TRIP_OK; axis++) {
-        status = check_list(d, r, axis, budget, &sums[axis]);
+        status = check_list(d, r, &d->lists[axis], budget, &sums[axis]);
         if (status == TRIP_OK &&
             (sums[axis].sum != sums[0].sum || sums[axis].twist != sums[0].twist))
             status = trip_fail(TRIP_ERROR, "verify", d->path,

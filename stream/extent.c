@@ -10,9 +10,14 @@ static uint64_t page_ceil(const trip_planner *p, uint64_t offset)
     return page_floor(p, offset + p->page_bytes - 1);
 }
 
-void trip_planner_begin(trip_planner *p, const trip_selection *s)
+static const trip_selection *selection_of(const trip_planner *p)
 {
-    p->it = trip_run_begin(s);
+    return &p->it.pass->selections[p->run.selection];
+}
+
+void trip_planner_begin(trip_planner *p, const trip_pass *pass, trip_pass_cursor *cursors)
+{
+    p->it = trip_pass_begin(pass, cursors);
     p->has_run = false;
     p->open = false;
 }
@@ -26,7 +31,8 @@ static void close_segment(trip_planner *p, trip_extent *e)
     trip_segment *s = &e->segments[e->segment_count++];
     *s = (trip_segment){ .offset = offset,
                          .bytes = (size_t)(page_ceil(p, p->high) - offset),
-                         .slot_offset = e->bytes };
+                         .slot_offset = e->bytes,
+                         .list = p->list };
     for (size_t i = p->first_run; i < e->run_count; i++)
         e->runs[i].first += e->bytes / TRIP_RECORD_BYTES - offset / TRIP_RECORD_BYTES;
     e->bytes += s->bytes;
@@ -35,7 +41,7 @@ static void close_segment(trip_planner *p, trip_extent *e)
 
 static uint64_t gap_to(const trip_planner *p, uint64_t first, uint64_t end)
 {
-    return p->it.selection->descending ? p->low - end : first - p->high;
+    return p->it.pass->descending ? p->low - end : first - p->high;
 }
 
 static bool open_segment(trip_planner *p, const trip_extent *e, uint64_t first, uint64_t end)
@@ -43,9 +49,10 @@ static bool open_segment(trip_planner *p, const trip_extent *e, uint64_t first, 
     if (e->segment_count == TRIP_SEGMENTS_MAX || e->bytes == p->slot_bytes)
         return false;
     p->open = true;
+    p->list = selection_of(p)->list;
     p->first_run = e->run_count;
-    p->anchor = p->it.selection->descending ? page_ceil(p, end) : page_floor(p, first);
-    p->low = p->it.selection->descending ? end : first;
+    p->anchor = p->it.pass->descending ? page_ceil(p, end) : page_floor(p, first);
+    p->low = p->it.pass->descending ? end : first;
     p->high = p->low;
     return true;
 }
@@ -56,7 +63,7 @@ static uint32_t fitting(const trip_planner *p, const trip_extent *e, uint64_t fi
 {
     size_t room = p->slot_bytes - e->bytes;
     uint64_t bytes;
-    if (p->it.selection->descending) {
+    if (p->it.pass->descending) {
         uint64_t limit = p->anchor > room ? p->anchor - room : 0;
         bytes = end <= limit ? 0 : end - (first > limit ? first : limit);
     } else {
@@ -72,7 +79,7 @@ static void take(trip_planner *p, trip_extent *e, uint32_t count)
     trip_run *run = &e->runs[e->run_count++];
     *run = p->run;
     run->count = count;
-    if (p->it.selection->descending)
+    if (p->it.pass->descending)
         run->first += p->run.count - count;
     else
         p->run.first += count;
@@ -90,7 +97,10 @@ static bool place(trip_planner *p, trip_extent *e)
 {
     uint64_t first = p->run.first * TRIP_RECORD_BYTES;
     uint64_t end = first + (uint64_t)p->run.count * TRIP_RECORD_BYTES;
-    if (p->open && gap_to(p, first, end) > p->gap_bytes)
+    bool changes = p->open && p->list != selection_of(p)->list;
+    if (changes && p->one_segment)
+        return false;
+    if (p->open && (changes || gap_to(p, first, end) > p->gap_bytes))
         close_segment(p, e);
     if (!p->open && !open_segment(p, e, first, end))
         return false;
@@ -102,7 +112,7 @@ static bool place(trip_planner *p, trip_extent *e)
 
 static bool skip_run(trip_planner *p)
 {
-    if (!p->skip || !p->skip(p->skip_user, p->it.selection, p->run.brick))
+    if (!p->skip || !p->skip(p->skip_user, selection_of(p), p->run.brick))
         return false;
     p->runs_skipped++;
     p->splats_skipped += p->run.count;
@@ -116,7 +126,7 @@ bool trip_planner_fill(trip_planner *p, trip_extent *e)
     e->run_count = e->bytes = 0;
     e->splats = 0;
     while (e->run_count < e->run_room) {
-        if (!p->has_run && !(p->has_run = trip_run_next(&p->it, &p->run)))
+        if (!p->has_run && !(p->has_run = trip_pass_next(&p->it, &p->run)))
             break;
         if (!skip_run(p) && !place(p, e))
             break;

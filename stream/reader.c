@@ -65,25 +65,17 @@ int trip_reader_open_direct(int fd)
     return open(path, O_RDONLY | O_CLOEXEC | O_DIRECT);
 }
 
-static void open_direct_files(trip_reader *r)
-{
-    for (int axis = 0; axis < 3; axis++)
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            r->direct_fd[axis][plane] =
-                r->read_planes[plane] && !r->params.buffered
-                    ? trip_reader_open_direct(r->data->plane_fd[axis][plane])
-                    : -1;
-}
-
 static int take_memory(trip_reader *r)
 {
     unsigned n = r->params.slots;
     r->slots = trip_budget_take(r->budget, n * sizeof *r->slots);
     r->queue = trip_budget_take(r->budget, n * sizeof *r->queue);
     r->runs = trip_budget_take(r->budget, n * run_room(r) * sizeof *r->runs);
+    r->cursors = trip_budget_take(r->budget, r->data->list_count * sizeof *r->cursors);
     if (!r->params.slot_memory)
         r->slot_memory = trip_budget_take(r->budget, n * slot_total_bytes(r));
-    if (!r->slots || !r->queue || !r->runs || (!r->params.slot_memory && !r->slot_memory))
+    if (!r->slots || !r->queue || !r->runs || !r->cursors ||
+        (!r->params.slot_memory && !r->slot_memory))
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "no memory for %u slots of %zu bytes: give more with --memory", n,
                          slot_total_bytes(r));
@@ -104,6 +96,7 @@ static void release_memory(trip_reader *r)
     trip_budget_release(r->budget, r->slots, n * sizeof *r->slots);
     trip_budget_release(r->budget, r->queue, n * sizeof *r->queue);
     trip_budget_release(r->budget, r->runs, n * run_room(r) * sizeof *r->runs);
+    trip_budget_release(r->budget, r->cursors, r->data->list_count * sizeof *r->cursors);
     trip_budget_release(r->budget, r->slot_memory, n * slot_total_bytes(r));
 }
 
@@ -135,22 +128,43 @@ static int create_engine(trip_reader *r)
                                : "cannot start threads");
 }
 
-static void set_sources(trip_reader *r)
+static trip_source make_source(trip_reader *r, const trip_list *list, int plane)
 {
-    for (int axis = 0; axis < 3; axis++)
+    bool direct = r->read_planes[plane] && list->plane_fd[plane] >= 0 && !r->params.buffered;
+    return (trip_source){
+        .fd = list->plane_fd[plane],
+        .direct_fd = direct ? trip_reader_open_direct(list->plane_fd[plane]) : -1,
+        .direct_refused = &r->direct_refused,
+        .file_bytes = list->plane_bytes[plane],
+        .page_log2 = r->data->header.page_log2,
+        .checksums = list->page_checksums[plane],
+        .cache = r->cache,
+        .first_page = r->cache ? trip_cache_page(r->cache, list->index, plane, 0) : 0,
+        .fault = r->params.fault,
+        .fault_user = r->params.fault_user,
+    };
+}
+
+static int make_sources(trip_reader *r)
+{
+    unsigned lists = r->data->list_count;
+    r->sources = trip_budget_take(r->budget, lists * sizeof *r->sources);
+    if (!r->sources)
+        return trip_fail(TRIP_ERROR, "read", r->data->path,
+                         "no memory for its %u lists: give more with --memory", lists);
+    for (unsigned i = 0; i < lists; i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            r->sources[axis][plane] = (trip_source){
-                .fd = r->data->plane_fd[axis][plane],
-                .direct_fd = r->direct_fd[axis][plane],
-                .direct_refused = &r->direct_refused,
-                .file_bytes = r->data->lists[axis].splats * TRIP_RECORD_BYTES,
-                .page_log2 = r->data->header.page_log2,
-                .checksums = r->data->lists[axis].page_checksums[plane],
-                .cache = r->cache,
-                .first_page = r->cache ? trip_cache_page(r->cache, axis, plane, 0) : 0,
-                .fault = r->params.fault,
-                .fault_user = r->params.fault_user,
-            };
+            r->sources[i][plane] = make_source(r, &r->data->lists[i], plane);
+    return TRIP_OK;
+}
+
+static void release_sources(trip_reader *r)
+{
+    for (unsigned i = 0; r->sources && i < r->data->list_count; i++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            if (r->sources[i][plane].direct_fd >= 0)
+                close(r->sources[i][plane].direct_fd);
+    trip_budget_release(r->budget, r->sources, r->data->list_count * sizeof *r->sources);
 }
 
 static int create_cache(trip_reader *r)
@@ -162,16 +176,15 @@ static int create_cache(trip_reader *r)
                  : TRIP_OK;
 }
 
-static int load_list(trip_reader *r, int axis)
+static int load_list(trip_reader *r, const trip_list *list)
 {
     trip_selection s;
     trip_batch batch;
-    int status = trip_selection_create(&s, r->data, axis, false, 0, INT32_MAX, r->budget);
+    int status = trip_selection_create_whole(&s, r->data, list, false, r->budget);
     if (status < 0)
         return status;
-    for (uint64_t b = 0; b < r->data->lists[axis].brick_count; b++)
-        trip_selection_add(&s, b);
-    status = trip_reader_begin(r, &s);
+    trip_pass pass = trip_pass_of(&s);
+    status = trip_reader_begin(r, &pass);
     while (status == TRIP_OK && (status = trip_reader_next(r, &batch)) == 1) {
         trip_reader_release(r, &batch);
         status = TRIP_OK;
@@ -189,8 +202,8 @@ static int load_lists(trip_reader *r)
     bool (*skip)(void *, const trip_selection *, uint32_t) = r->params.skip;
     int status = TRIP_OK;
     r->params.skip = NULL;
-    for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
-        status = load_list(r, axis);
+    for (unsigned i = 0; i < r->data->list_count && status == TRIP_OK; i++)
+        status = load_list(r, &r->data->lists[i]);
     r->params.skip = skip;
     r->in_memory = status == TRIP_OK && !r->params.slot_memory;
     return status;
@@ -209,13 +222,13 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
     pthread_mutex_init(&r->lock, NULL);
     pthread_cond_init(&r->ready, NULL);
     set_defaults(r);
-    open_direct_files(r);
     int status = check_params(r);
     if (status == TRIP_OK)
         status = take_memory(r);
     if (status == TRIP_OK)
         status = create_cache(r);
-    set_sources(r);
+    if (status == TRIP_OK)
+        status = make_sources(r);
     if (status == TRIP_OK)
         status = create_engine(r);
     if (status == TRIP_OK && r->params.engine == TRIP_ENGINE_NULL)
@@ -251,7 +264,7 @@ const char *trip_reader_engine_name(const trip_reader *r)
     if (r->params.engine == TRIP_ENGINE_NULL)
         return "null";
     bool uring = r->ops == &trip_engine_uring;
-    bool direct = r->direct_fd[0][TRIP_PLANE_VOXELS] >= 0 &&
+    bool direct = r->sources[0][TRIP_PLANE_VOXELS].direct_fd >= 0 &&
                   !atomic_load_explicit(&r->direct_refused, memory_order_relaxed);
     return uring ? direct ? "io_uring+O_DIRECT" : "io_uring" : direct ? "pread+O_DIRECT" : "pread";
 }
@@ -264,10 +277,7 @@ void trip_reader_destroy(trip_reader *r)
         trip_reader_drain(r);
         r->ops->destroy(r->engine);
     }
-    for (int axis = 0; axis < 3; axis++)
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (r->direct_fd[axis][plane] >= 0)
-                close(r->direct_fd[axis][plane]);
+    release_sources(r);
     trip_cache_destroy(r->cache);
     release_memory(r);
     pthread_cond_destroy(&r->ready);

@@ -48,7 +48,7 @@ typedef struct trip_reader_params {
  * now counting from the batch's own start. Runs are in draw order; in a descending pass each is
  * drawn last splat to first. A run may be split between two batches. */
 typedef struct trip_batch {
-    const trip_selection *selection;
+    const trip_pass *pass;
     const uint32_t *voxels;  /* NULL when only runs are asked for */
     const uint32_t *normals; /* NULL also when that plane is not read */
     size_t splats;           /* length of the arrays above, holes included */
@@ -56,6 +56,12 @@ typedef struct trip_batch {
     size_t run_count;
     void *slot;
 } trip_batch;
+
+/* The list that a run of a batch is of. */
+static inline const trip_list *trip_batch_list(const trip_batch *b, const trip_run *run)
+{
+    return b->pass->selections[run->selection].list;
+}
 
 typedef struct trip_reader_stats {
     uint64_t bytes_read, reads;           /* from the disk, of slots handed out */
@@ -79,12 +85,13 @@ void trip_reader_destroy(trip_reader *r);
 /* For a renderer that has the splats already: nothing is read, and batches hold runs only,
  * from the next trip_reader_begin() on, which must follow. */
 void trip_reader_set_runs_only(trip_reader *r, bool runs_only);
-/* Starts reading a pass (NULL: none yet); the selection must outlive it. Passes that are not over
+/* Starts reading a pass (NULL: none yet), which must outlive its reading and has at most as many
+ * selections as the data set has lists. Passes that are not over
  * are given up; all batches must have been released. */
-int trip_reader_begin(trip_reader *r, const trip_selection *s);
+int trip_reader_begin(trip_reader *r, const trip_pass *pass);
 /* Another pass behind those begun, up to TRIP_READER_PASSES_MAX: it is read ahead while the last
  * batches of the one before it are drawn. */
-int trip_reader_then(trip_reader *r, const trip_selection *s);
+int trip_reader_then(trip_reader *r, const trip_pass *pass);
 /* 1: *batch is filled and its slot held until released; 0: all passes are over; negative: failed.
  */
 int trip_reader_next(trip_reader *r, trip_batch *batch);

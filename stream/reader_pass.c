@@ -21,10 +21,9 @@ static void request_done(trip_request *q)
     pthread_mutex_unlock(&r->lock);
 }
 
-static trip_request *add_request(trip_reader *r, trip_slot *s, int plane, uint64_t offset,
-                                 size_t bytes, unsigned char *data)
+static trip_request *add_request(trip_slot *s, const trip_source *source, const trip_list *list,
+                                 int plane, uint64_t offset, size_t bytes, unsigned char *data)
 {
-    const trip_source *source = &r->sources[s->selection->axis][plane];
     trip_request *q = &s->requests[s->request_count++];
     uint64_t left = source->file_bytes - offset;
     q->source = source;
@@ -33,6 +32,7 @@ static trip_request *add_request(trip_reader *r, trip_slot *s, int plane, uint64
     q->bytes = bytes < left ? bytes : (size_t)left;
     q->done = request_done;
     q->owner = s;
+    q->list = list;
     q->plane = plane;
     q->cached = q->keep = false;
     trip_request_start(q);
@@ -62,7 +62,7 @@ static void reserve_pages(trip_reader *r, const trip_request *q)
 static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment, int plane,
                          unsigned char *data)
 {
-    const trip_source *source = &r->sources[s->selection->axis][plane];
+    const trip_source *source = &r->sources[segment->list->index][plane];
     unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX * TRIP_PLANES;
     for (size_t at = 0; at < segment->bytes;) {
         uint64_t offset = segment->offset + at;
@@ -72,7 +72,7 @@ static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segme
         bool cached = split && trip_cache_find(r->cache, page);
         if (split)
             bytes = alike_bytes(r, source, offset, bytes, cached);
-        trip_request *q = add_request(r, s, plane, offset, bytes, data + at);
+        trip_request *q = add_request(s, source, segment->list, plane, offset, bytes, data + at);
         q->cached = cached;
         q->keep = split && !cached;
         if (q->keep)
@@ -110,7 +110,7 @@ static void enter_pass(trip_reader *r)
 {
     if (r->pass == r->pass_count)
         return;
-    trip_planner_begin(&r->planner, r->passes[r->pass]);
+    trip_planner_begin(&r->planner, r->passes[r->pass], r->cursors);
     if (r->cache)
         trip_cache_begin_pass(r->cache);
 }
@@ -120,7 +120,7 @@ static void enter_pass(trip_reader *r)
 static bool plan_slot(trip_reader *r, trip_slot *s)
 {
     for (; r->pass < r->pass_count; r->pass++, enter_pass(r)) {
-        s->selection = r->passes[r->pass];
+        s->pass = r->passes[r->pass];
         if (trip_planner_fill(&r->planner, &s->extent))
             return true;
     }
@@ -191,7 +191,7 @@ void trip_reader_set_runs_only(trip_reader *r, bool runs_only)
     r->runs_only = runs_only;
 }
 
-int trip_reader_begin(trip_reader *r, const trip_selection *s)
+int trip_reader_begin(trip_reader *r, const trip_pass *pass)
 {
     trip_reader_drain(r);
     for (unsigned i = 0; i < r->params.slots; i++)
@@ -202,31 +202,36 @@ int trip_reader_begin(trip_reader *r, const trip_selection *s)
     r->planner = (trip_planner){ .page_bytes = (size_t)1 << r->data->header.page_log2,
                                  .slot_bytes = r->params.slot_bytes,
                                  .gap_bytes = r->in_memory ? SIZE_MAX : r->params.gap_bytes,
+                                 .one_segment = r->in_memory,
                                  .skip = r->params.skip,
                                  .skip_user = r->params.skip_user };
     if (r->cache)
         trip_cache_settle(r->cache);
-    return s ? trip_reader_then(r, s) : TRIP_OK;
+    return pass ? trip_reader_then(r, pass) : TRIP_OK;
 }
 
-int trip_reader_then(trip_reader *r, const trip_selection *s)
+int trip_reader_then(trip_reader *r, const trip_pass *pass)
 {
     if (r->pass_count == TRIP_READER_PASSES_MAX)
         return trip_fail(TRIP_ERROR, "read", r->data->path, "more than %d passes at a time",
                          TRIP_READER_PASSES_MAX);
-    r->passes[r->pass_count++] = s;
+    if (pass->selection_count > r->data->list_count)
+        return trip_fail(TRIP_ERROR, "read", r->data->path,
+                         "%u selections in a pass, more than there are lists",
+                         pass->selection_count);
+    r->passes[r->pass_count++] = pass;
     if (r->pass == r->pass_count - 1)
         enter_pass(r);
     fill_slots(r);
     return TRIP_OK;
 }
 
-static int report_fault(const trip_reader *r, const trip_slot *s, const trip_request *q)
+static int report_fault(const trip_reader *r, const trip_request *q)
 {
     char name[32], where[4096];
     unsigned long long at = q->fault_at;
     snprintf(where, sizeof where, "%s/%s", r->data->path,
-             trip_dataset_plane_name(s->selection->axis, q->plane, name));
+             trip_list_plane_name(q->list, q->plane, name));
     if (q->fault == TRIP_REQUEST_CHECKSUM)
         return trip_fail(TRIP_ERROR, "read", where,
                          "byte %llu: the page that starts here is damaged (checksum): make the "
@@ -242,7 +247,7 @@ static int check_slot(const trip_reader *r, const trip_slot *s)
 {
     for (unsigned i = 0; i < s->request_count; i++)
         if (s->requests[i].fault != TRIP_REQUEST_OK)
-            return report_fault(r, s, &s->requests[i]);
+            return report_fault(r, &s->requests[i]);
     return TRIP_OK;
 }
 
@@ -253,7 +258,8 @@ static const void *records(const trip_reader *r, const trip_slot *s, int plane)
     if (r->runs_only || !r->read_planes[plane])
         return NULL;
     if (r->in_memory)
-        return trip_cache_bytes(r->cache, s->selection->axis, plane, s->extent.segments[0].offset);
+        return trip_cache_bytes(r->cache, s->extent.segments[0].list->index, plane,
+                                s->extent.segments[0].offset);
     return s->memory + (plane == TRIP_PLANE_NORMALS ? r->params.slot_bytes : 0);
 }
 
@@ -267,11 +273,12 @@ static unsigned long long file_offset(const trip_slot *s, size_t record)
     return s->extent.segments[i].offset + (at - s->extent.segments[i].slot_offset);
 }
 
-static int report_record(const trip_reader *r, const trip_batch *b, size_t record, const char *why)
+static int report_record(const trip_reader *r, const trip_batch *b, const trip_list *list,
+                         size_t record, const char *why)
 {
     char name[32], where[4096];
     snprintf(where, sizeof where, "%s/%s", r->data->path,
-             trip_dataset_plane_name(b->selection->axis, TRIP_PLANE_VOXELS, name));
+             trip_list_plane_name(list, TRIP_PLANE_VOXELS, name));
     return trip_fail(TRIP_ERROR, "read", where, "byte %llu: %s: make the data set again",
                      file_offset(b->slot, record), why);
 }
@@ -279,14 +286,14 @@ static int report_record(const trip_reader *r, const trip_batch *b, size_t recor
 /* What draws takes records as they are: those outside their bricks end here. */
 static int check_records(const trip_reader *r, const trip_batch *b)
 {
-    const trip_file_brick *bricks = r->data->lists[b->selection->axis].bricks;
     for (size_t i = 0; i < b->run_count && b->voxels; i++) {
         const trip_run *run = &b->runs[i];
-        const trip_file_brick *brick = &bricks[run->brick];
+        const trip_list *list = trip_batch_list(b, run);
+        const trip_file_brick *brick = &list->bricks[run->brick];
         const uint32_t *records = b->voxels + run->first;
         size_t sound = trip_record_check(brick, records, run->count);
         if (sound < run->count)
-            return report_record(r, b, run->first + sound,
+            return report_record(r, b, list, run->first + sound,
                                  trip_record_fault(brick, records[sound]));
     }
     return TRIP_OK;
@@ -295,7 +302,7 @@ static int check_records(const trip_reader *r, const trip_batch *b)
 static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
     *batch = (trip_batch){
-        .selection = s->selection,
+        .pass = s->pass,
         .voxels = records(r, s, TRIP_PLANE_VOXELS),
         .normals = records(r, s, TRIP_PLANE_NORMALS),
         .splats = s->extent.bytes / TRIP_RECORD_BYTES,

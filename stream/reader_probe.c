@@ -33,9 +33,9 @@ static bool run(trip_engine engine, trip_request *q)
 bool trip_reader_probe(const trip_dataset *d, trip_engine engine, void *memory)
 {
     const trip_list *list = &d->lists[0];
-    uint64_t bytes = list->splats * TRIP_RECORD_BYTES, page = UINT64_C(1) << d->header.page_log2;
+    uint64_t bytes = list->records * TRIP_RECORD_BYTES, page = UINT64_C(1) << d->header.page_log2;
     _Atomic bool refused = false;
-    int fd = d->plane_fd[0][TRIP_PLANE_VOXELS];
+    int fd = list->plane_fd[TRIP_PLANE_VOXELS];
     trip_source source = { .fd = fd,
                            .direct_fd = trip_reader_open_direct(fd),
                            .direct_refused = &refused,

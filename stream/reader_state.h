@@ -22,7 +22,7 @@ typedef struct trip_slot {
     trip_slot_state state;
     unsigned pending; /* under the reader's lock: requests not done */
     unsigned char *memory;
-    const trip_selection *selection; /* of its pass */
+    const trip_pass *pass;
     trip_extent extent;
     trip_request requests[TRIP_SLOT_REQUESTS_MAX];
     unsigned request_count;
@@ -36,14 +36,14 @@ struct trip_reader {
     void *engine;
     bool read_planes[TRIP_PLANES];
     unsigned plane_count;
-    int direct_fd[3][TRIP_PLANES];
     _Atomic bool direct_refused;
-    trip_source sources[3][TRIP_PLANES];
-    trip_cache *cache; /* or NULL */
-    const trip_selection *passes[TRIP_READER_PASSES_MAX];
+    trip_source (*sources)[TRIP_PLANES]; /* by list */
+    trip_cache *cache;                   /* or NULL */
+    const trip_pass *passes[TRIP_READER_PASSES_MAX];
     unsigned pass_count, pass; /* pass: the one being planned; pass_count when all are planned */
     trip_planner planner;
-    int failed; /* status that ended the passes */
+    trip_pass_cursor *cursors; /* of the pass being planned: one for each list */
+    int failed;                /* status that ended the passes */
     bool runs_only;
     bool in_memory; /* batches lie in the cache: nothing is requested, and slots hold only runs */
     trip_reader_stats stats;

@@ -37,6 +37,7 @@ typedef struct trip_request {
     size_t bytes;        /* whole pages, but not beyond the file's end */
     void (*done)(struct trip_request *q);
     void *owner;
+    const trip_list *list;
     int plane;
     bool cached;               /* all its pages are in the cache and are copied from there */
     bool keep;                 /* pages that the cache has made room for are stored there */

@@ -2,19 +2,17 @@
 
 #include "report.h"
 
-#include <assert.h>
-
 static size_t bitmap_bytes(const trip_selection *s)
 {
-    return (s->data->lists[s->axis].brick_count / 64 + 1) * sizeof(uint64_t);
+    return (s->list->brick_count / 64 + 1) * sizeof(uint64_t);
 }
 
-int trip_selection_create(trip_selection *s, const trip_dataset *d, int axis, bool descending,
-                          int64_t sheet_first, int64_t sheet_last, trip_budget *budget)
+int trip_selection_create(trip_selection *s, const trip_dataset *d, const trip_list *list,
+                          bool descending, int64_t sheet_first, int64_t sheet_last,
+                          trip_budget *budget)
 {
-    assert(axis >= 0 && axis < 3);
     *s = (trip_selection){ .data = d,
-                           .axis = axis,
+                           .list = list,
                            .descending = descending,
                            .sheet_first = sheet_first,
                            .sheet_last = sheet_last };
@@ -22,8 +20,17 @@ int trip_selection_create(trip_selection *s, const trip_dataset *d, int axis, bo
     if (!s->bricks)
         return trip_fail(TRIP_ERROR, "plan", d->path,
                          "no memory for the choice of %llu bricks: give more with --memory",
-                         (unsigned long long)d->lists[axis].brick_count);
+                         (unsigned long long)list->brick_count);
     return TRIP_OK;
+}
+
+int trip_selection_create_whole(trip_selection *s, const trip_dataset *d, const trip_list *list,
+                                bool descending, trip_budget *budget)
+{
+    int status = trip_selection_create(s, d, list, descending, 0, INT32_MAX, budget);
+    for (uint64_t b = 0; b < list->brick_count && status == TRIP_OK; b++)
+        trip_selection_add(s, b);
+    return status;
 }
 
 void trip_selection_destroy(trip_selection *s, trip_budget *budget)
@@ -35,7 +42,7 @@ void trip_selection_destroy(trip_selection *s, trip_budget *budget)
 
 static const trip_list *list_of(const trip_run_iterator *it)
 {
-    return &it->selection->data->lists[it->selection->axis];
+    return it->selection->list;
 }
 
 static const trip_file_slab *slab_of(const trip_run_iterator *it)
@@ -86,13 +93,13 @@ static bool enter_slab(trip_run_iterator *it)
     bool last = it->slab + 1 == (int64_t)l->slab_count;
     it->sheet = down ? slab_sheets(it) - 1 : 0;
     it->brick = down ? (int64_t)slab->brick_count - 1 : 0;
-    it->splat = !down ? slab->first_splat : last ? l->splats : slab[1].first_splat;
+    it->splat = !down ? slab->first_splat : last ? l->records : slab[1].first_splat;
     return true;
 }
 
 trip_run_iterator trip_run_begin(const trip_selection *s)
 {
-    const trip_list *l = &s->data->lists[s->axis];
+    const trip_list *l = s->list;
     trip_run_iterator it = { .selection = s };
     it.slab = s->descending ? (int64_t)l->slab_count - 1 : 0;
     enter_slab(&it);
@@ -147,4 +154,49 @@ bool trip_run_next(trip_run_iterator *it, trip_run *run)
         }
     }
     return false;
+}
+
+static void advance(trip_pass_cursor *c)
+{
+    c->has_run = trip_run_next(&c->it, &c->run);
+    if (c->has_run)
+        c->coordinate = trip_list_sheet_coordinate(c->it.selection->list, c->run.sheet);
+}
+
+trip_pass_iterator trip_pass_begin(const trip_pass *pass, trip_pass_cursor *cursors)
+{
+    for (unsigned i = 0; i < pass->selection_count; i++) {
+        cursors[i] = (trip_pass_cursor){ .it = trip_run_begin(&pass->selections[i]) };
+        advance(&cursors[i]);
+    }
+    return (trip_pass_iterator){ .pass = pass, .cursors = cursors };
+}
+
+/* The selection whose sheet comes next; NULL at the end. */
+static trip_pass_cursor *find_next(const trip_pass_iterator *it)
+{
+    trip_pass_cursor *best = NULL;
+    for (unsigned i = 0; i < it->pass->selection_count; i++) {
+        trip_pass_cursor *c = &it->cursors[i];
+        if (c->has_run && (!best || (it->pass->descending ? c->coordinate >= best->coordinate
+                                                          : c->coordinate < best->coordinate)))
+            best = c;
+    }
+    return best;
+}
+
+bool trip_pass_next(trip_pass_iterator *it, trip_run *run)
+{
+    if (!it->at)
+        it->at = find_next(it);
+    trip_pass_cursor *c = it->at;
+    if (!c)
+        return false;
+    int32_t sheet = c->run.sheet;
+    *run = c->run;
+    run->selection = (uint16_t)(c - it->cursors);
+    advance(c);
+    if (!c->has_run || c->run.sheet != sheet)
+        it->at = NULL;
+    return true;
 }

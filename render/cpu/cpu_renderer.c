@@ -133,7 +133,7 @@ static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const tri
 static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
 {
     const trip_cpu_asking asking = { r->kernels, &r->view, &r->mask, r->batch, &w->scratch.lanes };
-    bool reversed = r->batch->selection->descending;
+    bool reversed = r->batch->pass->descending;
     uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
         const trip_run *run = &r->batch->runs[i];
@@ -168,7 +168,7 @@ static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const t
                          uint32_t *staged)
 {
     const trip_batch *batch = r->batch;
-    bool reversed = batch->selection->descending;
+    bool reversed = batch->pass->descending;
     for (uint32_t done = 0; done < s->count;) {
         uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
         n = n < room ? n : room;
@@ -686,7 +686,7 @@ static const trip_renderer_ops cpu_ops = {
 bool trip_cpu_covered(void *renderer, const trip_selection *selection, uint32_t brick)
 {
     cpu *r = renderer;
-    if (r->base.ops != &cpu_ops || !r->in_list || selection->axis != r->view.axis ||
+    if (r->base.ops != &cpu_ops || !r->in_list || selection->list->axis != r->view.axis ||
         !r->view.front_to_back)
         return false;
     trip_cpu_box box =

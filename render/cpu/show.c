@@ -116,7 +116,7 @@ uint32_t trip_cpu_show(const trip_cpu_asking *asking, const trip_cpu_span *span,
         return 0;
     showing s = { .asking = asking,
                   .voxels = asking->batch->voxels + span->first,
-                  .reversed = asking->batch->selection->descending,
+                  .reversed = asking->batch->pass->descending,
                   .all = span,
                   .shown = shown };
     if (cover == TRIP_CPU_PARTLY && span->count >= FEWEST)

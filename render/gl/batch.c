@@ -143,8 +143,7 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *p, const trip_bat
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         uint64_t first = list_firsts ? list_firsts[i] : run->first;
-        runs[i] =
-            make_run(p, run, first, batch->selection->descending, list_firsts != NULL, position);
+        runs[i] = make_run(p, run, first, batch->pass->descending, list_firsts != NULL, position);
         add_piece(b, position, run->count, needs_quads(p, run));
         for (uint32_t k = 0; k < run->count; k++)
             run_of[position++] = (uint32_t)i;

@@ -161,14 +161,13 @@ static int read_batches(arrays *a, trip_reader *reader, int axis, fill_run *fill
 static int read_list(arrays *a, trip_reader *reader, int axis, fill_run *fill)
 {
     trip_selection all;
-    int64_t sheets = (int64_t)a->data->header.dims[axis];
-    int status = trip_selection_create(&all, a->data, axis, false, 0, sheets - 1, a->budget);
+    const trip_list *list = trip_dataset_find(a->data, axis, 0, TRIP_KIND_VOXELS);
+    int status = trip_selection_create_whole(&all, a->data, list, false, a->budget);
     if (status)
         return status;
-    for (uint64_t i = 0; i < a->data->lists[axis].brick_count; i++)
-        trip_selection_add(&all, i);
+    trip_pass pass = trip_pass_of(&all);
     a->filled = 0;
-    status = trip_reader_begin(reader, &all);
+    status = trip_reader_begin(reader, &pass);
     if (!status)
         status = read_batches(a, reader, axis, fill);
     trip_selection_destroy(&all, a->budget);
@@ -260,7 +259,7 @@ int trip_gl_resident_load(trip_gl_resident *r, const trip_dataset *data, unsigne
 
 void trip_gl_resident_bind(trip_gl_resident *r, int axis)
 {
-    r->selection = NULL;
+    r->pass = NULL;
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_VERTICES, r->vertices);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_ORDER, r->order[axis]);
     if (r->normals)
@@ -288,9 +287,9 @@ int trip_gl_resident_find(trip_gl_resident *r, const trip_batch *batch, const ui
         r->firsts = more;
         r->room = batch->run_count;
     }
-    if (r->selection != batch->selection) {
-        r->selection = batch->selection;
-        r->iterator = trip_run_begin(batch->selection);
+    if (r->pass != batch->pass) {
+        r->pass = batch->pass;
+        r->iterator = trip_run_begin(batch->pass->selections);
         r->run = (trip_run){ 0 };
         r->taken = 0;
     }
@@ -300,7 +299,7 @@ int trip_gl_resident_find(trip_gl_resident *r, const trip_batch *batch, const ui
             return trip_fail(TRIP_ERROR, "gl", "batch", "runs are out of order");
         /* Descending, the first part is the run's end. */
         uint32_t before =
-            batch->selection->descending ? r->run.count - r->taken - part->count : r->taken;
+            batch->pass->descending ? r->run.count - r->taken - part->count : r->taken;
         r->firsts[i] = r->run.first + before;
         r->taken += part->count;
     }

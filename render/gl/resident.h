@@ -20,7 +20,7 @@ typedef struct trip_gl_resident {
     uint64_t bytes;
     GLuint vertices, normals, order[3];
     /* Where the pass being drawn has got to in its list. */
-    const trip_selection *selection;
+    const trip_pass *pass;
     trip_run_iterator iterator;
     trip_run run;
     uint32_t taken; /* splats of `run` already handed out */

@@ -39,7 +39,7 @@ static void set_list(trip_dataset *d, int axis, const unsigned char *index)
     const trip_file_list *f = (const void *)(index + d->header.lists_offset);
     f += axis;
     d->lists[axis] = (trip_list){ .axis = axis,
-                                  .splats = f->splats,
+                                  .records = f->splats,
                                   .slab_count = f->slab_count,
                                   .brick_count = f->brick_count,
                                   .slabs = (const void *)(index + f->slabs_offset),
@@ -62,7 +62,8 @@ static void walk_list(const trip_dataset *d, int axis, bool descending, trip_bud
     trip_selection s;
     trip_run run;
     uint64_t next = descending ? d->header.kept : 0;
-    FUZZ_PROMISE(trip_selection_create(&s, d, axis, descending, 0, INT32_MAX, budget) == TRIP_OK);
+    FUZZ_PROMISE(trip_selection_create(&s, d, &d->lists[axis], descending, 0, INT32_MAX, budget) ==
+                 TRIP_OK);
     for (uint64_t b = 0; b < d->lists[axis].brick_count; b++)
         trip_selection_add(&s, b);
     for (trip_run_iterator it = trip_run_begin(&s); trip_run_next(&it, &run);) {
@@ -76,7 +77,8 @@ static void walk_list(const trip_dataset *d, int axis, bool descending, trip_bud
 
 static void walk(const trip_file_header *h, const unsigned char *index)
 {
-    trip_dataset d = { .header = *h };
+    trip_list lists[3];
+    trip_dataset d = { .header = *h, .lists = lists, .list_count = 3 };
     trip_budget *budget;
     char path[] = "fuzz";
     d.path = path;

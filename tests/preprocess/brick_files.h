@@ -96,9 +96,9 @@ static inline void test_read_run(const trip_dataset *d, int axis, const trip_run
     uint32_t voxels[16384], normals[16384] = { 0 };
     size_t bytes = run->count * sizeof *voxels;
     const int64_t offset = (int64_t)run->first * 4;
-    assert_int_equal(pread(d->plane_fd[axis][0], voxels, bytes, offset), bytes);
-    if (d->plane_fd[axis][1] >= 0)
-        assert_int_equal(pread(d->plane_fd[axis][1], normals, bytes, offset), bytes);
+    assert_int_equal(pread(d->lists[axis].plane_fd[0], voxels, bytes, offset), bytes);
+    if (d->lists[axis].plane_fd[1] >= 0)
+        assert_int_equal(pread(d->lists[axis].plane_fd[1], normals, bytes, offset), bytes);
     for (uint32_t n = 0; n < run->count; n++) {
         int64_t p[3];
         p[axis] = run->sheet;
@@ -134,9 +134,9 @@ static inline void test_read_lists(const char *name, test_lists *l)
         l->codes[axis] = malloc(l->voxels * sizeof(int32_t));
         l->normals[axis] = calloc(l->voxels, sizeof(uint32_t));
         memset(l->codes[axis], 0xff, l->voxels * sizeof(int32_t));
-        assert_int_equal(
-            trip_selection_create(&s, d, axis, false, 0, (int64_t)d->header.dims[axis] - 1, budget),
-            0);
+        assert_int_equal(trip_selection_create(&s, d, &d->lists[axis], false, 0,
+                                               (int64_t)d->header.dims[axis] - 1, budget),
+                         0);
         for (uint64_t brick = 0; brick < d->lists[axis].brick_count; brick++)
             trip_selection_add(&s, brick);
         trip_run_iterator it = trip_run_begin(&s);

@@ -154,14 +154,14 @@ static void draw_pieces(frame_by_hand *f, const trip_batch *batch, uint32_t piec
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         f->splats += run->count;
-        if (skip && trip_cpu_covered(f->renderer, batch->selection, run->brick)) {
+        if (skip && trip_cpu_covered(f->renderer, batch->pass->selections, run->brick)) {
             f->hidden += run->count;
             continue;
         }
         for (uint32_t done = 0; done < run->count; done += piece) {
             trip_run part = *run;
             part.count = run->count - done < piece ? run->count - done : piece;
-            part.first += batch->selection->descending ? run->count - done - part.count : done;
+            part.first += batch->pass->descending ? run->count - done - part.count : done;
             trip_batch one = *batch;
             one.runs = &part;
             one.run_count = 1;
@@ -183,8 +183,8 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, uint32_t piece, bool 
             continue;
         assert_int_equal(f->renderer->ops->begin_list(f->renderer, axis), 0);
         for (int i = 0; i < f->plan.lists[axis].pass_count; i++) {
-            assert_int_equal(trip_reader_begin(reader, &f->plan.lists[axis].passes[i].selection),
-                             0);
+            const trip_pass pass = trip_pass_of(&f->plan.lists[axis].passes[i].selection);
+            assert_int_equal(trip_reader_begin(reader, &pass), 0);
             while (trip_reader_next(reader, &batch) > 0) {
                 draw_pieces(f, &batch, piece, skip);
                 trip_reader_release(reader, &batch);

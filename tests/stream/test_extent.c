@@ -10,6 +10,8 @@ typedef struct plan_test {
     fixture f;
     trip_dataset *d;
     trip_selection s;
+    trip_pass pass;
+    trip_pass_cursor cursor;
     trip_planner planner;
     trip_run runs[RUNS_MAX];
     trip_extent extent;
@@ -25,9 +27,11 @@ static void start(plan_test *t, bool descending, size_t slot_bytes, size_t gap_b
                                            .page_bytes = 4096,
                                            .in_memory = true });
     assert_int_equal(trip_dataset_open(&t->d, t->f.path, t->f.budget), TRIP_OK);
-    assert_int_equal(trip_selection_create(&t->s, t->d, 0, descending, 0, SHEETS, t->f.budget), 0);
+    assert_int_equal(
+        trip_selection_create(&t->s, t->d, &t->d->lists[0], descending, 0, SHEETS, t->f.budget), 0);
     t->planner =
         (trip_planner){ .page_bytes = 4096, .slot_bytes = slot_bytes, .gap_bytes = gap_bytes };
+    t->pass = trip_pass_of(&t->s);
     t->extent.runs = t->runs;
     t->extent.run_room = RUNS_MAX;
 }
@@ -56,7 +60,7 @@ static void the_whole_list_is_cut_at_slot_ends(void **state)
     start(&t, false, 3 * 4096, 4096);
     for (uint64_t b = 0; b < 16; b++)
         trip_selection_add(&t.s, b);
-    trip_planner_begin(&t.planner, &t.s);
+    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
     while (trip_planner_fill(&t.planner, &t.extent)) {
         assert_int_equal(t.extent.segment_count, 1);
         size_t left = SHEETS * SHEET_BYTES - next;
@@ -76,7 +80,7 @@ static void large_gaps_part_segments_and_small_ones_do_not(void **state)
     trip_selection_add(&t.s, 1); /* bytes 1024 to 2048 of each sheet */
     trip_selection_add(&t.s, 6); /* 6144 to 7168, after a gap of 4096 */
     t.s.sheet_last = 1;
-    trip_planner_begin(&t.planner, &t.s);
+    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.segment_count, 2);
     expect_segment(&t, 0, 0, 8192, 0);
@@ -97,7 +101,7 @@ static void a_descending_pass_places_segments_from_the_files_end(void **state)
     trip_selection_add(&t.s, 1);
     trip_selection_add(&t.s, 7);
     t.s.sheet_last = 1;
-    trip_planner_begin(&t.planner, &t.s);
+    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.segment_count, 4);
     expect_segment(&t, 0, SHEET_BYTES + 4096, 4096, 0);
@@ -117,7 +121,7 @@ static void a_descending_pass_takes_the_whole_list_backwards(void **state)
     start(&t, true, 4096, 4096);
     for (uint64_t b = 0; b < 16; b++)
         trip_selection_add(&t.s, b);
-    trip_planner_begin(&t.planner, &t.s);
+    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
     uint64_t splats = 0;
     while (trip_planner_fill(&t.planner, &t.extent)) {
         for (size_t i = 0; i + 1 < t.extent.run_count; i++)
@@ -138,7 +142,7 @@ static void a_full_table_of_runs_ends_the_extent(void **state)
     for (uint64_t b = 0; b < 16; b++)
         trip_selection_add(&t.s, b);
     t.extent.run_room = 5;
-    trip_planner_begin(&t.planner, &t.s);
+    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
     while (trip_planner_fill(&t.planner, &t.extent)) {
         assert_true(t.extent.run_count <= 5);
         runs += t.extent.run_count;

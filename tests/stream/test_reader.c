@@ -32,11 +32,12 @@ static uint64_t brick_of(const trip_dataset *d, int axis, const fixture_voxel *x
 static size_t expect(const fixture *f, const trip_selection *s, fixture_voxel *out)
 {
     size_t n = 0;
+    int axis = s->list->axis;
     for (size_t i = 0; i < f->count; i++) {
         size_t at = s->descending ? f->count - 1 - i : i;
-        const fixture_voxel *x = &f->lists[s->axis][at];
-        if (x->p[s->axis] >= s->sheet_first && x->p[s->axis] <= s->sheet_last &&
-            trip_selection_has(s, brick_of(s->data, s->axis, x)))
+        const fixture_voxel *x = &f->lists[axis][at];
+        if (x->p[axis] >= s->sheet_first && x->p[axis] <= s->sheet_last &&
+            trip_selection_has(s, brick_of(s->data, axis, x)))
             out[n++] = *x;
     }
     return n;
@@ -44,12 +45,12 @@ static size_t expect(const fixture *f, const trip_selection *s, fixture_voxel *o
 
 static size_t decode(const trip_batch *batch, fixture_voxel *out)
 {
-    int axis = batch->selection->axis;
+    int axis = batch->pass->selections->list->axis;
     size_t n = 0;
     for (size_t r = 0; r < batch->run_count; r++) {
         const trip_run *run = &batch->runs[r];
         for (uint32_t i = 0; i < run->count; i++) {
-            uint64_t at = run->first + (batch->selection->descending ? run->count - 1 - i : i);
+            uint64_t at = run->first + (batch->pass->descending ? run->count - 1 - i : i);
             fixture_voxel *x = &out[n++];
             assert_true(at < batch->splats);
             *x = (fixture_voxel){ .code = trip_voxel_code(batch->voxels[at]),
@@ -68,12 +69,15 @@ static int read_passes(trip_reader *r, const trip_selection *s, int passes, unsi
                        fixture_voxel *out, size_t *count)
 {
     trip_batch held[64] = { 0 };
+    trip_pass all[TRIP_READER_PASSES_MAX];
     unsigned first = 0, n = 0;
     int status;
     *count = 0;
     assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
-    for (int i = 0; i < passes; i++)
-        assert_int_equal(trip_reader_then(r, &s[i]), TRIP_OK);
+    for (int i = 0; i < passes; i++) {
+        all[i] = trip_pass_of(&s[i]);
+        assert_int_equal(trip_reader_then(r, &all[i]), TRIP_OK);
+    }
     do {
         if (n > hold) {
             trip_reader_release(r, &held[first++ % 64]);
@@ -101,7 +105,8 @@ static void select_some(trip_selection *s, const trip_dataset *d, uint64_t *stat
     int64_t dim = (int64_t)d->header.dims[axis];
     int64_t first = r & 8 ? (int64_t)(r >> 8 & 63) % dim : 0;
     int64_t last = r & 16 ? (int64_t)(r >> 16 & 63) % dim : dim - 1;
-    assert_int_equal(trip_selection_create(s, d, axis, r & 32, first, last, d->budget), TRIP_OK);
+    assert_int_equal(trip_selection_create(s, d, &d->lists[axis], r & 32, first, last, d->budget),
+                     TRIP_OK);
     for (uint64_t b = 0; b < d->lists[axis].brick_count; b++)
         if (r & 64 || fixture_random(state) % 3 == 0)
             trip_selection_add(s, b);
@@ -215,7 +220,8 @@ static void every_engine_and_ring_hands_out_the_same_runs(void **state)
 
 static void select_all(trip_selection *s, const trip_dataset *d, int axis, bool descending)
 {
-    assert_int_equal(trip_selection_create(s, d, axis, descending, 0, INT32_MAX, d->budget), 0);
+    assert_int_equal(
+        trip_selection_create(s, d, &d->lists[axis], descending, 0, INT32_MAX, d->budget), 0);
     for (uint64_t b = 0; b < d->lists[axis].brick_count; b++)
         trip_selection_add(s, b);
 }
@@ -239,7 +245,7 @@ static void the_callers_own_memory_is_read_into(void **state)
     check_random_passes(&f, d, &params, 2, 4);
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 1, true);
-    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     while (trip_reader_next(r, &batch) == 1) {
         bool own = false;
         for (int i = 0; i < 3; i++)
@@ -309,7 +315,7 @@ static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     assert_int_equal(asked, 0);
     select_all(&s, d, 1, false);
-    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
     unsigned first = asked;
     assert_int_equal(trip_reader_next(r, &next), 1);
@@ -320,7 +326,7 @@ static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
     const uint32_t *voxels = batch.voxels;
     trip_reader_release(r, &next);
     trip_reader_release(r, &batch);
-    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
     assert_ptr_equal(batch.voxels, voxels);
     assert_int_equal(trip_reader_get_stats(r).bytes_read, 0);
@@ -355,17 +361,18 @@ static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     for (int i = 0; i < 3; i++)
         select_all(&s[i], d, i, i == 1);
-    assert_int_equal(trip_reader_begin(r, &s[0]), TRIP_OK);
-    assert_int_equal(trip_reader_then(r, &s[1]), TRIP_OK);
-    assert_int_equal(trip_reader_then(r, &s[2]), TRIP_OK);
+    const trip_pass passes[3] = { trip_pass_of(&s[0]), trip_pass_of(&s[1]), trip_pass_of(&s[2]) };
+    assert_int_equal(trip_reader_begin(r, &passes[0]), TRIP_OK);
+    assert_int_equal(trip_reader_then(r, &passes[1]), TRIP_OK);
+    assert_int_equal(trip_reader_then(r, &passes[2]), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
-    assert_ptr_equal(batch.selection, &s[0]);
+    assert_ptr_equal(batch.pass, &passes[0]);
     for (int i = 0; i < 3; i++) /* every list is one slot; the first one is still held */
         sem_wait(&reads);
     trip_reader_release(r, &batch);
     for (int i = 1; i < 3; i++) {
         assert_int_equal(trip_reader_next(r, &batch), 1);
-        assert_ptr_equal(batch.selection, &s[i]);
+        assert_ptr_equal(batch.pass, &passes[i]);
         assert_int_equal(trip_reader_get_stats(r).bytes_read, (i + 1) * f.count * 4);
         trip_reader_release(r, &batch);
     }
@@ -397,7 +404,7 @@ static void with_runs_alone_nothing_is_read(void **state)
     select_all(&s, d, 1, true);
     trip_run_iterator it = trip_run_begin(&s);
     trip_reader_set_runs_only(r, true);
-    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     while (trip_reader_next(r, &batch) == 1) {
         assert_null(batch.voxels);
         assert_null(batch.normals);
@@ -434,11 +441,12 @@ static void more_passes_than_there_is_room_for_are_refused(void **state)
     open_fixture(&f, &d);
     assert_int_equal(trip_reader_create(&r, d, &(trip_reader_params){ 0 }, f.budget), TRIP_OK);
     select_all(&s, d, 0, false);
+    const trip_pass pass = trip_pass_of(&s);
     assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
     for (int i = 0; i < TRIP_READER_PASSES_MAX; i++)
-        assert_int_equal(trip_reader_then(r, &s), TRIP_OK);
+        assert_int_equal(trip_reader_then(r, &pass), TRIP_OK);
     fixture_catch_reports();
-    assert_int_equal(trip_reader_then(r, &s), TRIP_ERROR);
+    assert_int_equal(trip_reader_then(r, &pass), TRIP_ERROR);
     assert_non_null(strstr(fixture_reports(), "passes"));
     trip_reader_destroy(r);
     trip_selection_destroy(&s, f.budget);
@@ -662,7 +670,8 @@ static void gaps_are_read_through_only_when_they_are_small(void **state)
         trip_selection s;
         trip_reader_params params = { .gap_bytes = i ? 1 << 20 : 4096 };
         assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
-        assert_int_equal(trip_selection_create(&s, d, 0, false, 0, INT32_MAX, f.budget), TRIP_OK);
+        assert_int_equal(trip_selection_create(&s, d, &d->lists[0], false, 0, INT32_MAX, f.budget),
+                         TRIP_OK);
         trip_selection_add(&s, 0);
         trip_selection_add(&s, d->lists[0].brick_count - 1);
         bytes[i] = read_bytes(r, &s, out);
@@ -692,7 +701,7 @@ static void a_pass_given_up_leaves_the_reader_ready_for_the_next(void **state)
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 0, false);
     for (int i = 0; i < 5; i++) {
-        assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+        assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
         for (int k = 0; k < i; k++) {
             assert_int_equal(trip_reader_next(r, &batch), 1);
             trip_reader_release(r, &batch);
@@ -700,7 +709,7 @@ static void a_pass_given_up_leaves_the_reader_ready_for_the_next(void **state)
     }
     assert_int_equal(read_pass(r, &s, 0, out, &n), 0);
     assert_int_equal(n, f.count);
-    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     trip_selection_destroy(&s, f.budget);
     trip_reader_destroy(r); /* with reads under way */
     free(out);
@@ -719,7 +728,7 @@ static void holding_every_slot_is_an_error_and_not_a_hang(void **state)
     trip_reader_params params = { .slot_bytes = 4096, .slots = 2 };
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 0, false);
-    assert_int_equal(trip_reader_begin(r, &s), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batches[0]), 1);
     assert_int_equal(trip_reader_next(r, &batches[1]), 1);
     fixture_catch_reports();

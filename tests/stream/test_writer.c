@@ -15,17 +15,19 @@ static void read_list(const trip_dataset *d, int axis, bool descending, fixture_
     size_t n = 0;
     uint32_t voxels[128 * 128], normals[128 * 128];
     const trip_list *l = &d->lists[axis];
-    assert_int_equal(trip_selection_create(&s, d, axis, descending, 0, INT32_MAX, d->budget),
-                     TRIP_OK);
+    assert_int_equal(
+        trip_selection_create(&s, d, &d->lists[axis], descending, 0, INT32_MAX, d->budget),
+        TRIP_OK);
     for (uint64_t b = 0; b < l->brick_count; b++)
         trip_selection_add(&s, b);
     for (trip_run_iterator it = trip_run_begin(&s); trip_run_next(&it, &run);) {
         ssize_t bytes = (ssize_t)run.count * 4;
-        assert_int_equal(pread(d->plane_fd[axis][0], voxels, (size_t)bytes, (off_t)run.first * 4),
-                         bytes);
+        assert_int_equal(
+            pread(d->lists[axis].plane_fd[0], voxels, (size_t)bytes, (off_t)run.first * 4), bytes);
         if (d->header.planes & 2)
             assert_int_equal(
-                pread(d->plane_fd[axis][1], normals, (size_t)bytes, (off_t)run.first * 4), bytes);
+                pread(d->lists[axis].plane_fd[1], normals, (size_t)bytes, (off_t)run.first * 4),
+                bytes);
         for (uint32_t i = 0; i < run.count; i++) {
             uint32_t at = descending ? run.count - 1 - i : i;
             assert_true(n < room);

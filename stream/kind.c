@@ -1,0 +1,19 @@
+#include "kind.h"
+
+#include "format.h"
+
+#include <stddef.h>
+
+static const trip_kind_info kinds[TRIP_KINDS] = {
+    [TRIP_KIND_VOXELS] = { .name = "voxels",
+                           .planes = 1u << TRIP_PLANE_VOXELS | 1u << TRIP_PLANE_NORMALS,
+                           .splatted = true,
+                           .lattice = true,
+                           .reach = 1 },
+    [TRIP_KIND_HALO] = { .name = "halo", .planes = 1u << TRIP_PLANE_VOXELS, .lattice = true },
+};
+
+const trip_kind_info *trip_kind_of(trip_kind kind)
+{
+    return (unsigned)kind < TRIP_KINDS ? &kinds[kind] : NULL;
+}

@@ -1,0 +1,25 @@
+/* What kinds of records a list can hold. A kind is a row of a table of constants, which
+ * says all that the code needs of a list's records: it does not branch on the kind itself. */
+#ifndef TRIP_KIND_H
+#define TRIP_KIND_H
+
+#include <stdbool.h>
+
+typedef enum trip_kind {
+    TRIP_KIND_VOXELS, /* voxels that show under some transfer function */
+    TRIP_KIND_HALO,   /* transparent neighbours of those: values alone, for interpolation */
+    TRIP_KINDS,
+} trip_kind;
+
+typedef struct trip_kind_info {
+    const char *name; /* "voxels", "halo" */
+    unsigned planes;  /* bit per trip_plane that such a list may have */
+    bool splatted;    /* drawn by splatting */
+    bool lattice;     /* records are points of the list's grid, and are culled as such */
+    double reach;     /* how far a splat reaches from its voxel, as multiple of the kernel radius */
+} trip_kind_info;
+
+/* NULL for a number that is no kind. */
+const trip_kind_info *trip_kind_of(trip_kind kind);
+
+#endif
