@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "format.h"
+#include "normal.h"
 #include "report.h"
 
 static unsigned tile_words(const trip_piece_format *f)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "format.h"
+#include "normal.h"
 #include "report.h"
 
 /* What one thread works on: a box in local coordinates, which count from the corner of its cell of

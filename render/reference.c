@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "normal.h"
 #include "pixels.h"
 #include "report.h"
 #include "shade.h"

@@ -9,15 +9,13 @@
 
 #include "camera.h"
 #include "format.h"
+#include "normal.h"
 #include "settings.h"
 
 #define TRIP_AMBIENT 0.3
 #define TRIP_DIFFUSE 0.7
 #define TRIP_SPECULAR 0.2
 #define TRIP_SHININESS 24.0
-/* Gradient at which shading is full, as a fraction of the range of values per voxel length. Not of
- * the codes' range, which is the type's: 12 bits stored in 16 are lit like the same in floats. */
-#define TRIP_GRADIENT_FULL 0.04
 
 /* |gradient| in value per world unit at which shading is full. */
 static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world)

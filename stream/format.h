@@ -118,13 +118,6 @@ static inline unsigned trip_voxel_code(uint32_t voxel)
     return voxel >> 16;
 }
 
-/* Normal record: bits 0-11 and 12-23 octahedral coordinates of the world-space gradient direction
- * (unorm12 over [-1, 1]), bits 24-31 the magnitude m: |gradient| = (m / 255)^2 * gradient_scale.
- * Magnitude 0 has no direction. Pack and unpack: stream/normal.c; worst angle error 0.06 degrees.
- */
-uint32_t trip_normal_pack(const double gradient[3], double gradient_scale);
-void trip_normal_unpack(uint32_t normal, double gradient_scale, double gradient[3]);
-
 /* Interleaves the bits of u (even) and v (odd). */
 uint64_t trip_morton(uint32_t u, uint32_t v);
 

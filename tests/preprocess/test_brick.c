@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include "normal.h"
 enum { NX = 97, NY = 70, NZ = 61, N = NX * NY * NZ };
 
 static uint8_t bytes[N];

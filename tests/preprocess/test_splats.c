@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "normal.h"
 #include "splats.h"
 
 /* A volume of floats as a raw file, opened, with a splatter whose pieces are put together again

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "normal.h"
+
 /* The voxels of one tile of a sheet in Morton order. */
 static uint32_t gather_run(const scene_params *p, int axis, int sheet, int tile_u, int tile_v,
                            int tile, double gradient_scale, uint32_t *voxels, uint32_t *normals)

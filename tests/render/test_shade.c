@@ -1,5 +1,6 @@
 #include "test.h"
 
+#include "normal.h"
 #include "shade.h"
 
 static trip_camera camera(bool ortho)
@@ -93,6 +94,75 @@ static void a_parallel_view_is_lit_alike_everywhere(void **state)
     }
 }
 
+static double random_coordinate(uint64_t *state)
+{
+    *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(*state >> 11) * 0x1p-52 - 1;
+}
+
+static trip_vec3 random_direction(uint64_t *state)
+{
+    trip_vec3 v;
+    do
+        v = trip_v3(random_coordinate(state), random_coordinate(state), random_coordinate(state));
+    while (trip_length(v) > 1 || trip_length(v) == 0);
+    return trip_normalize(v);
+}
+
+/* Of 3 bytes of a gradient in units of `full`, in 1/255: of a white and of a dark splat. */
+static double colour_error(const trip_compact_normals *c, const trip_settings *s, trip_vec3 g)
+{
+    trip_camera view = camera(false);
+    double exact[3] = { g.x, g.y, g.z }, kept[3], worst = 0;
+    trip_compact_normal_unpack(c, trip_compact_normal_pack(c, exact), kept);
+    for (int dark = 0; dark < 2; dark++) {
+        double a[3] = { dark ? 0.1 : 1 }, b[3] = { a[0] };
+        trip_shade(s, &view, c->full, trip_v3(0, 0, 0), exact, a);
+        trip_shade(s, &view, c->full, trip_v3(0, 0, 0), kept, b);
+        worst = fmax(worst, 255 * fabs(a[0] - b[0]));
+    }
+    return worst;
+}
+
+static void three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    trip_affine m = trip_affine_identity();
+    trip_compact_normals c = trip_compact_normals_make(&m, 1, (const double[]){ 1, 1, 1 });
+    uint64_t random = 1;
+    double worst = 0;
+    for (int i = 0; i < 1000000; i++) {
+        s.headlight = i % 2;
+        s.light_direction = random_direction(&random);
+        worst = fmax(worst, colour_error(&c, &s, trip_scale(random_direction(&random), 1.5)));
+    }
+    assert_true(worst < 0.5);
+}
+
+/* Where values have no smallest difference. */
+static void three_bytes_of_any_gradient_change_a_colour_by_less_than_three_steps(void **state)
+{
+    (void)state;
+    trip_settings s = trip_settings_default();
+    trip_affine m = trip_affine_identity();
+    double step[3];
+    trip_compact_normals_choose(&m, 1, 0, step);
+    trip_compact_normals c = trip_compact_normals_make(&m, 1, step);
+    uint64_t random = 2;
+    double worst = 0, sum = 0;
+    const int count = 1000000;
+    for (int i = 0; i < count; i++) {
+        s.headlight = i % 2;
+        s.light_direction = random_direction(&random);
+        double length = 0.5 * (random_coordinate(&random) + 1);
+        double error = colour_error(&c, &s, trip_scale(random_direction(&random), length));
+        worst = fmax(worst, error);
+        sum += error;
+    }
+    assert_true(worst < 3 && sum / count < 0.4);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -103,6 +173,8 @@ int main(void)
         cmocka_unit_test(a_given_light_shines_from_its_direction),
         cmocka_unit_test(the_result_stays_within_the_colours_range),
         cmocka_unit_test(a_parallel_view_is_lit_alike_everywhere),
+        cmocka_unit_test(three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step),
+        cmocka_unit_test(three_bytes_of_any_gradient_change_a_colour_by_less_than_three_steps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "normal.h"
 /* The four voxels of the example, by list. Tiles have 16 x 16 voxels. */
 typedef struct example_voxel {
     uint32_t p[3];

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "normal.h"
+
 static double angle_degrees(const double a[3], const double b[3])
 {
     double c[3] = { a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
@@ -68,6 +70,109 @@ static void magnitudes_beyond_the_scale_are_cut_to_it(void **state)
     assert_true(fabs(b[2] - 3) < 1e-3);
 }
 
+static trip_affine stretched(double x, double y, double z)
+{
+    trip_affine m = trip_affine_identity();
+    m.m[0][0] = x;
+    m.m[1][1] = y;
+    m.m[2][2] = z;
+    return m;
+}
+
+/* The sign of the whole is not kept. */
+static bool is_same_or_opposite(const double a[3], const double b[3])
+{
+    return (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) ||
+           (a[0] == -b[0] && a[1] == -b[1] && a[2] == -b[2]);
+}
+
+/* Voxels of 1 x 2 x 4: all factors are powers of two, so that equality is exact. */
+static void central_differences_of_bytes_are_exact_below_full(void **state)
+{
+    (void)state;
+    const trip_affine m = stretched(1, 2, 4);
+    const double full = 0.04 * 255 / 2;
+    double step[3];
+    unsigned weak = 0;
+    trip_compact_normals_choose(&m, full, 0.5, step);
+    trip_compact_normals c = trip_compact_normals_make(&m, full, step);
+    for (int z = -50; z <= 50; z++)
+        for (int y = -30; y <= 30; y++)
+            for (int x = -15; x <= 15; x++) {
+                double index[3] = { x / 2.0, y / 2.0, z / 2.0 }, back[3];
+                double world[3] = { x / 2.0, y / 4.0, z / 8.0 };
+                if (length(world) >= full)
+                    continue;
+                trip_compact_normal_unpack(&c, trip_compact_normal_pack(&c, index), back);
+                assert_true(is_same_or_opposite(back, world));
+                weak++;
+            }
+    assert_true(weak > 30000);
+}
+
+static void other_weak_gradients_come_back_within_half_a_step(void **state)
+{
+    uint64_t random = 7;
+    (void)state;
+    const trip_affine m = { { { 0.5, 0.1, 0, 0 }, { 0, 3, -0.2, 0 }, { 0.3, 0, 1, 0 } } };
+    trip_affine inverse;
+    double step[3];
+    assert_true(trip_affine_invert(&m, &inverse));
+    trip_compact_normals_choose(&m, 2, 0, step);
+    trip_compact_normals c = trip_compact_normals_make(&m, 2, step);
+    for (int i = 0; i < 100000; i++) {
+        double w[3], back[3];
+        for (int k = 0; k < 3; k++)
+            w[k] = 2 * random_coordinate(&random);
+        if (length(w) >= 2)
+            continue;
+        trip_vec3 g = trip_affine_transpose_vector(&m, trip_v3(w[0], w[1], w[2]));
+        uint32_t normal = trip_compact_normal_pack(&c, (const double[]){ g.x, g.y, g.z });
+        trip_compact_normal_unpack(&c, normal, back);
+        trip_vec3 b = trip_affine_transpose_vector(&m, trip_v3(back[0], back[1], back[2]));
+        double sign = g.z < -step[2] / 2 ? -1 : 1;
+        assert_true(fabs(b.x - sign * g.x) <= step[0] * 0.5000001);
+        assert_true(fabs(b.y - sign * g.y) <= step[1] * 0.5000001);
+        assert_true(fabs(b.z - sign * g.z) <= step[2] * 0.5000001);
+        assert_int_equal(normal >> 23, 0);
+    }
+}
+
+static void strong_gradients_keep_their_direction_within_a_tenth_of_a_degree(void **state)
+{
+    uint64_t random = 1;
+    double worst = 0;
+    (void)state;
+    const trip_affine m = trip_affine_identity();
+    trip_compact_normals c = trip_compact_normals_make(&m, 2, (const double[]){ 1, 1, 1 });
+    for (int i = 0; i < 1000000; i++) {
+        double a[3], b[3];
+        for (int k = 0; k < 3; k++)
+            a[k] = i < 27 ? 2 * ((int[]){ i, i / 3, i / 9 }[k] % 3 - 1)
+                          : 9 * random_coordinate(&random);
+        if (length(a) < 2)
+            continue;
+        trip_compact_normal_unpack(&c, trip_compact_normal_pack(&c, a), b);
+        double angle = angle_degrees(a, b);
+        worst = fmax(worst, fmin(angle, 180 - angle));
+        assert_true(fabs(length(b) - 2) < 1e-12);
+    }
+    assert_true(worst < 0.1);
+}
+
+static void compact_normals_of_what_is_not_finite_are_zero(void **state)
+{
+    const double none[][3] = { { NAN, 1, 0 }, { 0, INFINITY, 0 }, { 0, 0, 0 } };
+    double b[3];
+    (void)state;
+    const trip_affine m = trip_affine_identity();
+    trip_compact_normals c = trip_compact_normals_make(&m, 1, (const double[]){ 1, 1, 1 });
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(trip_compact_normal_pack(&c, none[i]), 0);
+    trip_compact_normal_unpack(&c, 0, b);
+    assert_true(b[0] == 0 && b[1] == 0 && b[2] == 0);
+}
+
 static void morton_codes_interleave_all_bits(void **state)
 {
     uint64_t random = 3;
@@ -90,6 +195,10 @@ int main(void)
         cmocka_unit_test(magnitudes_come_back_within_half_a_step_of_their_root),
         cmocka_unit_test(what_has_no_direction_is_zero),
         cmocka_unit_test(magnitudes_beyond_the_scale_are_cut_to_it),
+        cmocka_unit_test(central_differences_of_bytes_are_exact_below_full),
+        cmocka_unit_test(other_weak_gradients_come_back_within_half_a_step),
+        cmocka_unit_test(strong_gradients_keep_their_direction_within_a_tenth_of_a_degree),
+        cmocka_unit_test(compact_normals_of_what_is_not_finite_are_zero),
         cmocka_unit_test(morton_codes_interleave_all_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

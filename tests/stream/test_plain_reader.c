@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <math.h>
 
+#include "normal.h"
 static FILE *start_reader(const char *path)
 {
     char command[512];
