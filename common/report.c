@@ -1,9 +1,7 @@
 #include "report.h"
 
 #include <errno.h>
-#include <signal.h>
 #include <stdarg.h>
-#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -20,15 +18,11 @@ typedef struct line {
     bool cut;
 } line;
 
-static void (*report_sink)(const char *line, void *user);
-static void *report_user;
-static volatile sig_atomic_t interrupted;
-static atomic_bool told_interruption; /* since the signal */
-
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user)
 {
-    report_sink = sink;
-    report_user = user;
+    trip_scope *s = trip_scope_current();
+    s->sink = sink;
+    s->user = user;
 }
 
 static void put(line *l, const char *bytes, size_t count)
@@ -78,13 +72,9 @@ static void end_line(line *l, bool terminal)
 static _Thread_local trip_held_report *held;
 
 /* One write(2) a line, so that lines of several threads do not mix. */
-static void emit(const char *text)
+static void print(const char *text)
 {
     line l = { .length = strlen(text) };
-    if (report_sink) {
-        report_sink(text, report_user);
-        return;
-    }
     memcpy(l.text, text, l.length);
     end_line(&l, isatty(STDERR_FILENO) == 1);
     for (size_t done = 0; done < l.length;) {
@@ -97,11 +87,35 @@ static void emit(const char *text)
     }
 }
 
-/* A signal ends the work of all threads, and is one fault. */
+/* To the innermost scope that takes it. */
+static void emit(int status, const char *text)
+{
+    const trip_scope *s = trip_scope_current();
+    while (s && !s->sink && !(s->failed && status != TRIP_OK))
+        s = s->around;
+    if (s && s->failed && status != TRIP_OK)
+        s->failed(s->user, status, text);
+    else if (s)
+        s->sink(text, s->user);
+    else
+        print(text);
+}
+
+static void keep(int status, const char *text)
+{
+    if (*held->line)
+        return;
+    memcpy(held->line, text, strlen(text) + 1);
+    held->status = status;
+}
+
+/* Work that ends for all of its threads has one fault. */
 static void tell(int status, const char *text)
 {
-    if (status != TRIP_INTERRUPTED || !interrupted || !atomic_exchange(&told_interruption, true))
-        emit(text);
+    if (status != TRIP_OK && held)
+        keep(status, text);
+    else if (status != TRIP_INTERRUPTED || trip_scope_tell_once())
+        emit(status, text);
 }
 
 static void finish_line(line *l)
@@ -127,12 +141,7 @@ report(int status, const char *what, const char *where, const char *why, va_list
         put_where(&l, where);
     put_visible(&l, text);
     finish_line(&l);
-    if (status == TRIP_OK || !held) {
-        tell(status, l.text);
-    } else if (!*held->line) {
-        memcpy(held->line, l.text, l.length + 1);
-        held->status = status;
-    }
+    tell(status, l.text);
     errno = saved_errno;
 }
 
@@ -192,28 +201,4 @@ void trip_report_print(const trip_held_report *h)
 {
     if (*h->line)
         tell(h->status, h->line);
-}
-
-static void on_signal(int number)
-{
-    (void)number;
-    interrupted = 1;
-    signal(SIGINT, SIG_DFL);
-    signal(SIGTERM, SIG_DFL);
-}
-
-void trip_interrupt_install(void)
-{
-    struct sigaction action = { .sa_handler = on_signal, .sa_flags = SA_RESTART };
-    sigemptyset(&action.sa_mask);
-    interrupted = 0;
-    told_interruption = false;
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    signal(SIGXFSZ, SIG_IGN);
-}
-
-int trip_interrupted(void)
-{
-    return interrupted;
 }

@@ -1,8 +1,11 @@
 /* Errors, warnings and results for people. Functions return 0 or a negative trip_status; whoever
  * detects a fault reports it once with trip_fail(), callers only forward the code. Any thread may
- * call these; each message is one line on stderr: "triptych: what: where: why". */
+ * call these; each message is one line, "triptych: what: where: why", and goes where the thread's
+ * scope sends it: to stderr where that says nothing. */
 #ifndef TRIP_REPORT_H
 #define TRIP_REPORT_H
+
+#include "scope.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -12,7 +15,7 @@ enum trip_status {
     TRIP_OK = 0,
     TRIP_ERROR = -1,       /* failed: exit status 1 */
     TRIP_USAGE = -2,       /* wrong usage: exit status 2 */
-    TRIP_INTERRUPTED = -3, /* Ctrl-C or SIGTERM: exit status 1 */
+    TRIP_INTERRUPTED = -3, /* Ctrl-C, SIGTERM or cancelled: exit status 1 */
 };
 
 /* Prints "triptych: WHAT: WHERE: why" and returns `status`. WHAT is the stage ("read", "brick",
@@ -47,18 +50,12 @@ typedef struct trip_held_report {
 /* From here on `h` keeps this thread's failures, until release, on the same thread. */
 void trip_report_hold(trip_held_report *h);
 void trip_report_release(trip_held_report *h);
-/* Prints what was kept, if anything. */
+/* Reports what was kept, if anything, as a failure of this thread. */
 void trip_report_print(const trip_held_report *h);
 
-/* Where lines go instead of stderr, for tests; NULL restores stderr. Not thread-safe to change. */
+/* Where the lines of the scope that the calling thread is in go, its failures among them; NULL
+ * restores what was. While no other thread is in that scope. */
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
-
-/* Installs handlers for SIGINT and SIGTERM that only set a flag; long loops poll the flag and
- * return trip_fail(TRIP_INTERRUPTED, ...), of which one is told. A second signal ends the process
- * at once. Writing beyond a limit on file sizes becomes an error (EFBIG) instead of the end of the
- * process. */
-void trip_interrupt_install(void);
-int trip_interrupted(void);
 
 #ifdef __cplusplus
 }

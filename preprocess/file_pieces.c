@@ -28,6 +28,7 @@ typedef struct job {
     uint64_t begin, end, first; /* first: where pieces start, aligned */
     uint64_t pieces;
     unsigned char *to;
+    trip_scope *scope;         /* of who wants it */
     atomic_uint_fast64_t next; /* piece */
     atomic_uint seats;         /* threads that have their piece of memory */
     atomic_bool failed;
@@ -116,6 +117,7 @@ static void *read_pieces(void *user)
     job *j = user;
     unsigned char *memory = j->file->memory + (size_t)PIECE_BYTES * atomic_fetch_add(&j->seats, 1);
     uint64_t index;
+    trip_scope_enter(j->scope);
     while ((index = atomic_fetch_add(&j->next, 1)) < j->pieces && !atomic_load(&j->failed))
         if (trip_interrupted() || !read_piece(j, index, memory))
             atomic_store(&j->failed, true);
@@ -129,6 +131,7 @@ bool trip_file_pieces_read(trip_file_pieces *p, uint64_t offset, void *to, size_
     job j = { .file = p,
               .begin = offset,
               .end = offset + bytes,
+              .scope = trip_scope_current(),
               .first = offset & ~((uint64_t)ALIGNMENT_BYTES - 1),
               .to = to };
     if (p->useless || bytes == 0 || j.end > p->file_bytes)

@@ -27,6 +27,7 @@ struct trip_list_builder {
     trip_list_output outputs[3]; /* the ordered one is the background thread's until the merge */
     pthread_t thread;
     bool thread_runs;
+    trip_scope *scope; /* of the creator */
 
     pthread_mutex_t lock; /* guards all below; a chunk goes with the chain that it is in */
     pthread_cond_t work, freed;
@@ -96,6 +97,7 @@ static void do_job(trip_list_builder *b, job *j, int status)
 static void *thread_main(void *arg)
 {
     trip_list_builder *b = arg;
+    trip_scope_enter(b->scope);
     pthread_mutex_lock(&b->lock);
     for (;;) {
         while (!b->first_job && !b->stopping)
@@ -269,6 +271,7 @@ static int create_parts(trip_list_builder *b, trip_budget *budget)
 
 static int start_thread(trip_list_builder *b)
 {
+    b->scope = trip_scope_current();
     errno = pthread_create(&b->thread, NULL, thread_main, b);
     b->thread_runs = errno == 0;
     return b->thread_runs ? 0 : trip_fail_errno("brick", "threads", "cannot start");

@@ -18,7 +18,8 @@ struct trip_workers {
     pthread_mutex_t lock; /* guards all below */
     pthread_cond_t started, finished;
     bool stopping;
-    uint64_t loop; /* number of the loop, so that a thread sees a new one */
+    uint64_t loop;     /* number of the loop, so that a thread sees a new one */
+    trip_scope *scope; /* of the thread that started it */
     trip_work work;
     void *user;
     uint64_t items, next_item;
@@ -84,6 +85,7 @@ static bool await_loop(trip_workers *w, uint64_t *seen)
         pthread_cond_wait(&w->started, &w->lock);
     *seen = w->loop;
     bool go = !w->stopping;
+    trip_scope_enter(w->scope);
     pthread_mutex_unlock(&w->lock);
     return go;
 }
@@ -169,6 +171,7 @@ void trip_workers_start(trip_workers *w, trip_work work, void *user, uint64_t it
 {
     pthread_mutex_lock(&w->lock);
     assert(w->busy == 0);
+    w->scope = trip_scope_current();
     w->work = work;
     w->user = user;
     w->items = items;

@@ -24,9 +24,10 @@ static bool is_software(const trip_renderer *gl)
 /* Whatever draws fastest here; a renderer that this machine lacks is passed over in silence. */
 static int create_best(trip_renderer **out, unsigned threads, trip_budget *budget)
 {
-    trip_report_redirect(drop, NULL);
+    trip_scope quiet = { .around = trip_scope_current(), .sink = drop };
+    trip_scope *before = trip_scope_enter(&quiet);
     int status = trip_gl_create(out, budget);
-    trip_report_redirect(NULL, NULL);
+    trip_scope_enter(before);
     if (!status && !is_software(*out))
         return 0;
     if (!status)

@@ -30,6 +30,7 @@ typedef struct slot {
     /* Written before `tickets` is released, read by who took a ticket. */
     void (*run)(void *context, unsigned task, unsigned thread);
     void *context;
+    trip_scope *scope;         /* of the starter */
     _Atomic uint32_t finished; /* each task's release, the waiter's acquire */
     bool taken;                /* the starter's */
 } slot;
@@ -86,7 +87,9 @@ static bool run_task(trip_cpu_pool *pool, slot *s, unsigned thread)
             return false;
     } while (!atomic_compare_exchange_weak_explicit(&s->tickets, &tickets, tickets + 1,
                                                     memory_order_acquire, memory_order_acquire));
+    trip_scope *before = trip_scope_enter(s->scope);
     s->run(s->context, (unsigned)(tickets & TICKET_MASK), thread);
+    trip_scope_enter(before);
     if (atomic_fetch_add(&s->finished, 1) + 1 == tasks_of(tickets) && atomic_load(&pool->waiting))
         wake_one(&s->finished);
     return true;
@@ -219,6 +222,7 @@ void trip_cpu_pool_start(trip_cpu_pool *pool, trip_cpu_job *job)
     job->active = s->taken = true;
     s->run = job->run;
     s->context = job->context;
+    s->scope = trip_scope_current();
     atomic_store_explicit(&s->finished, 0, memory_order_relaxed);
     atomic_store_explicit(&pool->oldest, pool->slots[1 - at].taken ? 1 - at : at,
                           memory_order_relaxed);

@@ -1,6 +1,7 @@
 #include "test.h"
 
 #include <errno.h>
+#include <pthread.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -148,6 +149,137 @@ static void an_interruption_is_told_once(void **state)
     trip_interrupt_install();
 }
 
+static void take_failure(void *user, int status, const char *line)
+{
+    snprintf(user, 64, "%d %.50s", status, line);
+}
+
+static void take_line(const char *line, void *user)
+{
+    snprintf(user, 64, "%.60s", line);
+}
+
+static void a_scope_takes_the_lines_of_its_threads_alone(void **state)
+{
+    (void)state;
+    char text[64] = "";
+    trip_scope s = { .sink = take_line, .user = text };
+    test_catch_reports();
+    trip_scope *before = trip_scope_enter(&s);
+    trip_warn("a", "inside");
+    assert_string_equal(text, "triptych: warning: a: inside");
+    trip_scope_enter(before);
+    trip_warn("a", "outside");
+    assert_string_equal(text, "triptych: warning: a: inside");
+    assert_one_report("triptych: warning: a: outside");
+}
+
+static void failures_go_where_they_are_wanted_and_other_lines_further_out(void **state)
+{
+    (void)state;
+    char text[64] = "";
+    trip_scope s = { .around = trip_scope_current(), .failed = take_failure, .user = text };
+    test_catch_reports();
+    trip_scope *before = trip_scope_enter(&s);
+    trip_fail(TRIP_USAGE, "a", "b", "wrong");
+    trip_warn("a", "odd");
+    trip_scope_enter(before);
+    assert_string_equal(text, "-2 triptych: a: b: wrong");
+    assert_one_report("triptych: warning: a: odd");
+}
+
+static void a_held_failure_is_reported_where_it_is_given_back(void **state)
+{
+    (void)state;
+    char text[64] = "";
+    trip_held_report h;
+    trip_scope s = { .failed = take_failure, .user = text };
+    trip_scope *before = trip_scope_enter(&s);
+    trip_report_hold(&h);
+    trip_fail(TRIP_ERROR, "a", "b", "first");
+    trip_fail(TRIP_ERROR, "a", "b", "second");
+    trip_report_release(&h);
+    assert_string_equal(text, "");
+    trip_report_print(&h);
+    trip_scope_enter(before);
+    assert_string_equal(text, "-1 triptych: a: b: first");
+}
+
+/* Whether the work of a thread in some scopes is still wanted. */
+static bool is_wanted_in(trip_scope *s)
+{
+    trip_scope *before = trip_scope_enter(s);
+    bool wanted = !trip_interrupted();
+    trip_scope_enter(before);
+    return wanted;
+}
+
+static void cancelling_ends_a_scope_and_those_in_it(void **state)
+{
+    (void)state;
+    trip_scope outer = { 0 }, inner = { .around = &outer }, other = { 0 };
+    trip_scope_cancel(&inner);
+    assert_false(is_wanted_in(&inner));
+    assert_true(is_wanted_in(&outer));
+    assert_true(is_wanted_in(&other));
+    trip_scope_renew(&inner);
+    assert_true(is_wanted_in(&inner));
+    trip_scope_cancel(&outer);
+    assert_false(is_wanted_in(&inner));
+    assert_true(is_wanted_in(&other));
+    assert_false(trip_interrupted());
+}
+
+static void a_cancelled_scope_reports_one_interruption(void **state)
+{
+    (void)state;
+    trip_scope s = { .around = trip_scope_current() };
+    trip_scope_cancel(&s);
+    test_catch_reports();
+    trip_scope *before = trip_scope_enter(&s);
+    trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
+    trip_fail(TRIP_INTERRUPTED, "read", "a.trip", "interrupted");
+    trip_scope_enter(before);
+    assert_one_report("triptych: render: frame: interrupted");
+}
+
+typedef struct counter {
+    trip_scope scope;
+    int count, foreign;
+} counter;
+
+static void *warn_in(void *scope)
+{
+    trip_scope_enter(scope);
+    for (int i = 0; i < 1000; i++)
+        trip_warn("a", "%p", scope);
+    return NULL;
+}
+
+static void count_own(const char *line, void *user)
+{
+    counter *c = user;
+    char own[64];
+    snprintf(own, sizeof own, "triptych: warning: a: %p", user);
+    *(strcmp(line, own) ? &c->foreign : &c->count) += 1;
+}
+
+static void threads_in_different_scopes_do_not_meet(void **state)
+{
+    (void)state;
+    counter counters[2] = { { .count = 0 }, { .count = 0 } };
+    pthread_t threads[2];
+    for (int i = 0; i < 2; i++) {
+        counters[i].scope = (trip_scope){ .sink = count_own, .user = &counters[i] };
+        assert_int_equal(pthread_create(&threads[i], NULL, warn_in, &counters[i].scope), 0);
+    }
+    for (int i = 0; i < 2; i++) {
+        pthread_join(threads[i], NULL);
+        assert_int_equal(counters[i].count, 1000);
+        assert_int_equal(counters[i].foreign, 0);
+    }
+}
+
 static void second_signal_ends_the_process(void **state)
 {
     (void)state;
@@ -179,6 +311,12 @@ int main(void)
         cmocka_unit_test(without_a_sink_lines_go_to_stderr),
         cmocka_unit_test(first_signal_sets_a_flag),
         cmocka_unit_test(an_interruption_is_told_once),
+        cmocka_unit_test(a_scope_takes_the_lines_of_its_threads_alone),
+        cmocka_unit_test(failures_go_where_they_are_wanted_and_other_lines_further_out),
+        cmocka_unit_test(a_held_failure_is_reported_where_it_is_given_back),
+        cmocka_unit_test(cancelling_ends_a_scope_and_those_in_it),
+        cmocka_unit_test(a_cancelled_scope_reports_one_interruption),
+        cmocka_unit_test(threads_in_different_scopes_do_not_meet),
         cmocka_unit_test(second_signal_ends_the_process),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
