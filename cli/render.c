@@ -15,6 +15,9 @@
 #include "report.h"
 #include "session.h"
 
+/* Its helper ends with the program. */
+static trip_image_files pictures;
+
 /* Everything that lives as long as the command. */
 typedef struct drawing {
     render_options o;
@@ -212,7 +215,7 @@ static int draw_image(drawing *d, int index)
         status = render_stats_add_camera(d->stats, &camera.params);
     trip_plan_release(&plan, s->budget);
     if (!status)
-        status = trip_image_write(path, d->o.width, d->o.height, d->rgba, NULL);
+        status = trip_image_write(&pictures, path, d->o.width, d->o.height, d->rgba, NULL);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
         render_stats_summary(path, &d->o, &stats, stdout);
     return status;
@@ -255,7 +258,7 @@ int trip_command_render(int argc, char **argv)
     if (!status)
         status = open_drawing(&d);
     if (!status)
-        status = trip_image_prepare(); /* it gets ready while the first image is drawn */
+        status = trip_image_prepare(&pictures); /* it gets ready while the first image is drawn */
     int images = d.o.orbit ? d.o.orbit : 1;
     for (int i = 0; i < images && !status; i++)
         status = draw_image(&d, i);

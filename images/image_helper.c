@@ -37,8 +37,8 @@ struct trip_image_helper {
 };
 
 /* What stands in for the program in tests. */
-static trip_image_stand_in stand_in;
-static int stand_in_patience_ms;
+static _Thread_local trip_image_stand_in stand_in;
+static _Thread_local int stand_in_patience_ms;
 
 void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms)
 {

@@ -111,8 +111,9 @@ int trip_image_helper_receive(trip_image_helper *h, void *data, size_t bytes);
 /* What it sent cannot be, and `why` says what: ends the helper, reports, returns TRIP_ERROR. */
 int trip_image_helper_distrust(trip_image_helper *h, const char *why);
 
-/* For tests: what takes the program's place from the next start on, NULL for the program again. It
- * gets the helper's end of the connection, which is closed when it returns; 0, or an errno. */
+/* For tests: what takes the program's place from the calling thread's next start on, NULL for the
+ * program again. It gets the helper's end of the connection, which is closed when it returns; 0, or
+ * an errno. */
 typedef int (*trip_image_stand_in)(int fd);
 void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms);
 

@@ -2,7 +2,6 @@
 
 #include <limits.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,10 +11,6 @@
 #include "image_helper.h"
 #include "new_file.h"
 #include "report.h"
-
-/* One helper for all pictures of this process, started when first wanted and kept. */
-static pthread_mutex_t helper_lock = PTHREAD_MUTEX_INITIALIZER;
-static trip_image_helper *helper; /* under helper_lock */
 
 /* What a format can hold, the default depth first. */
 typedef struct format {
@@ -60,24 +55,20 @@ int trip_image_check_path(const char *path, const trip_image_params *params)
                      f->extension);
 }
 
-static int start_helper(const char *what)
+static int start_helper(trip_image_files *files, const char *what)
 {
-    return helper ? 0 : trip_image_helper_start(&helper, what);
+    return files->helper ? 0 : trip_image_helper_start(&files->helper, what);
 }
 
-/* After a failure the connection may be in the middle of something. */
-static void drop_helper(void)
+void trip_image_close(trip_image_files *files)
 {
-    trip_image_helper_stop(helper);
-    helper = NULL;
+    trip_image_helper_stop(files->helper);
+    files->helper = NULL;
 }
 
-int trip_image_prepare(void)
+int trip_image_prepare(trip_image_files *files)
 {
-    pthread_mutex_lock(&helper_lock);
-    int status = start_helper("write");
-    pthread_mutex_unlock(&helper_lock);
-    return status;
+    return start_helper(files, "write");
 }
 
 static int check_finite(const char *path, int width, int height, const float *rgba)
@@ -95,8 +86,9 @@ static int check_finite(const char *path, int width, int height, const float *rg
     return 0;
 }
 
-static int write_locked(const char *path, int width, int height, const float *rgba,
-                        const trip_image_params *params)
+/* After a failure the connection may be in the middle of something. */
+static int write_checked(trip_image_files *files, const char *path, int width, int height,
+                         const float *rgba, const trip_image_params *params)
 {
     trip_new_file file;
     const int64_t numbers[5] = { width, height, params->depth, params->drop_alpha,
@@ -104,23 +96,23 @@ static int write_locked(const char *path, int width, int height, const float *rg
     int status = trip_new_file_begin(&file, "write", path);
     if (status < 0)
         return status;
-    status = start_helper("write");
+    status = start_helper(files, "write");
     if (status == 0)
-        status = trip_image_helper_request(helper, TRIP_IMAGE_WRITE, path, numbers, file.fd);
+        status = trip_image_helper_request(files->helper, TRIP_IMAGE_WRITE, path, numbers, file.fd);
     if (status == 0)
-        status = trip_image_helper_send(helper, rgba,
+        status = trip_image_helper_send(files->helper, rgba,
                                         (size_t)width * (size_t)height * 4 * sizeof(float));
     if (status == 0)
-        status = trip_image_helper_expect(helper, 0);
+        status = trip_image_helper_expect(files->helper, 0);
     if (status == 0)
         return trip_new_file_finish(&file);
-    drop_helper();
+    trip_image_close(files);
     trip_new_file_abandon(&file);
     return status;
 }
 
-int trip_image_write(const char *path, int width, int height, const float *rgba,
-                     const trip_image_params *params)
+int trip_image_write(trip_image_files *files, const char *path, int width, int height,
+                     const float *rgba, const trip_image_params *params)
 {
     static const trip_image_params defaults;
     int status = trip_image_check_path(path, params);
@@ -130,12 +122,9 @@ int trip_image_write(const char *path, int width, int height, const float *rgba,
         return trip_fail(TRIP_USAGE, "write", path, "a picture of %d x %d pixels is empty", width,
                          height);
     status = check_finite(path, width, height, rgba);
-    if (status < 0)
-        return status;
-    pthread_mutex_lock(&helper_lock);
-    status = write_locked(path, width, height, rgba, params ? params : &defaults);
-    pthread_mutex_unlock(&helper_lock);
-    return status;
+    return status < 0
+               ? status
+               : write_checked(files, path, width, height, rgba, params ? params : &defaults);
 }
 
 /* The size that comes first must be that of a picture which fills the data. */
@@ -149,7 +138,8 @@ static bool is_size_of(const trip_image_size *size, uint64_t data_bytes)
            !__builtin_add_overflow(bytes, sizeof *size, &bytes) && bytes == data_bytes;
 }
 
-static int receive_picture(const char *path, trip_image_size *size, float **rgba_out)
+static int receive_picture(trip_image_helper *helper, const char *path, trip_image_size *size,
+                           float **rgba_out)
 {
     uint64_t bytes;
     int status = trip_image_helper_outcome(helper, &bytes);
@@ -172,21 +162,20 @@ static int receive_picture(const char *path, trip_image_size *size, float **rgba
     return status;
 }
 
-int trip_image_read(const char *path, int *width_out, int *height_out, float **rgba_out)
+int trip_image_read(trip_image_files *files, const char *path, int *width_out, int *height_out,
+                    float **rgba_out)
 {
     trip_image_size size = { 0 };
     const int64_t numbers[5] = { (int64_t)(trip_memory_available_bytes() / 4) };
-    pthread_mutex_lock(&helper_lock);
-    int status = start_helper("read");
+    int status = start_helper(files, "read");
     if (status == 0)
-        status = trip_image_helper_request(helper, TRIP_IMAGE_READ, path, numbers, -1);
+        status = trip_image_helper_request(files->helper, TRIP_IMAGE_READ, path, numbers, -1);
     if (status == 0)
-        status = receive_picture(path, &size, rgba_out);
-    if (status < 0)
-        drop_helper();
-    pthread_mutex_unlock(&helper_lock);
-    if (status < 0)
+        status = receive_picture(files->helper, path, &size, rgba_out);
+    if (status < 0) {
+        trip_image_close(files);
         return status;
+    }
     *width_out = (int)size.width;
     *height_out = (int)size.height;
     return 0;

@@ -1,5 +1,5 @@
 /* Pictures in files: PNG, JPEG, TIFF and OpenEXR, written by the helper program of image_helper.h.
- * Any thread may call these; they take turns.
+ * One thread at a time uses a helper; several threads have one each.
  *
  * In memory a picture is float RGBA, premultiplied (associated) alpha, `height` rows of `width`
  * pixels, row 0 at the top. Colours are display values (sRGB): PNG, JPEG and TIFF get what the
@@ -29,25 +29,33 @@ typedef struct trip_image_params {
     int jpeg_quality; /* 1 to 100; default 95 */
 } trip_image_params;
 
+/* The helper, started when first wanted and kept for the pictures that follow. Starts zeroed. */
+typedef struct trip_image_files {
+    struct trip_image_helper *helper;
+} trip_image_files;
+
 /* Checks that `path` names a format that can hold `params` (which may be NULL), before any work is
  * done: 0, or TRIP_USAGE and one line that names the formats. */
 int trip_image_check_path(const char *path, const trip_image_params *params);
 
 /* Starts the helper, which needs a fifth of a second to get ready, so that the first picture need
  * not wait; a helper that is missing is noticed before any work is done. */
-int trip_image_prepare(void);
+int trip_image_prepare(trip_image_files *files);
+/* Ends the helper. */
+void trip_image_close(trip_image_files *files);
 
 /* Writes the picture in the format that the extension names (.png, .jpg, .jpeg, .tif, .tiff, .exr,
  * in any case). Integers are rounded to nearest after clamping to [0, 1]. PNG gets unassociated
  * alpha, computed before rounding, as its standard wants; TIFF and EXR associated alpha. The file
  * is written under another name in the same folder and renamed when complete, so that a failed
  * write leaves what was there. A pixel that is not finite is a reported failure, not written. */
-int trip_image_write(const char *path, int width, int height, const float *rgba,
-                     const trip_image_params *params);
+int trip_image_write(trip_image_files *files, const char *path, int width, int height,
+                     const float *rgba, const trip_image_params *params);
 
 /* Reads a picture of one to four channels (grey, grey and alpha, RGB, RGBA) into *rgba_out, which
  * the caller frees with free(). */
-int trip_image_read(const char *path, int *width_out, int *height_out, float **rgba_out);
+int trip_image_read(trip_image_files *files, const char *path, int *width_out, int *height_out,
+                    float **rgba_out);
 
 #ifdef __cplusplus
 }

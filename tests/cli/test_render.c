@@ -34,8 +34,9 @@ typedef struct picture {
 
 static picture load(const char *path)
 {
+    static trip_image_files files;
     picture p;
-    assert_int_equal(trip_image_read(path, &p.width, &p.height, &p.rgba), 0);
+    assert_int_equal(trip_image_read(&files, path, &p.width, &p.height, &p.rgba), 0);
     return p;
 }
 

@@ -54,12 +54,12 @@ static void read_slices(void)
     trip_budget_destroy(budget);
 }
 
-static void read_picture(void)
+static void read_picture(trip_image_files *files)
 {
     int width, height;
     float *rgba;
     volatile float sum = 0;
-    if (trip_image_read("some.png", &width, &height, &rgba) < 0)
+    if (trip_image_read(files, "some.png", &width, &height, &rgba) < 0)
         return;
     FUZZ_PROMISE(width >= 1 && height >= 1);
     for (size_t i = 0; i < (size_t)width * (size_t)height * 4; i++)
@@ -71,16 +71,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     if (size < 1 || size > MOST_BYTES)
         return -1;
+    trip_image_files files = { 0 };
     answer.data = data + 1;
     answer.size = size - 1;
     answer.fd = -1;
     trip_image_helper_replace(answer_at_once, PATIENCE_MS);
     if (data[0] % 2)
-        read_picture();
+        read_picture(&files);
     else
         read_slices();
     trip_image_helper_replace(refuse, PATIENCE_MS);
-    FUZZ_PROMISE(trip_image_read("", &(int){ 0 }, &(int){ 0 }, &(float *){ NULL }) < 0);
+    FUZZ_PROMISE(trip_image_read(&files, "", &(int){ 0 }, &(int){ 0 }, &(float *){ NULL }) < 0);
+    trip_image_close(&files);
     if (answer.fd >= 0)
         close(answer.fd);
     return 0;

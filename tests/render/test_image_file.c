@@ -11,6 +11,7 @@
 #include "test.h"
 
 static char folder[64];
+static trip_image_files files;
 
 static const char *path_of(const char *name)
 {
@@ -41,6 +42,7 @@ static int count_files(void)
 static int remove_folder(void **state)
 {
     (void)state;
+    trip_image_close(&files);
     DIR *d = opendir(folder);
     for (struct dirent *e; (e = readdir(d));)
         unlink(path_of(e->d_name));
@@ -68,8 +70,8 @@ static double round_trip(const char *name, const trip_image_params *params)
     float rgba[W * H * 4], *back;
     int width, height;
     fill(rgba, W, H);
-    assert_int_equal(trip_image_write(path_of(name), W, H, rgba, params), 0);
-    assert_int_equal(trip_image_read(path_of(name), &width, &height, &back), 0);
+    assert_int_equal(trip_image_write(&files, path_of(name), W, H, rgba, params), 0);
+    assert_int_equal(trip_image_read(&files, path_of(name), &width, &height, &back), 0);
     assert_int_equal(width, W);
     assert_int_equal(height, H);
     double worst = test_most_apart(rgba, back, W * H * 4);
@@ -121,20 +123,20 @@ static void exr_holds_linear_light_of_colours_without_their_alpha(void **state)
     (void)state;
     const float opaque[4] = { 0.5f, 0.02f, 1, 1 }, half[4] = { 0.25f, 0.01f, 0.5f, 0.5f };
     float file[4];
-    assert_int_equal(trip_image_write(path_of("l.exr"), 1, 1, opaque, NULL), 0);
+    assert_int_equal(trip_image_write(&files, path_of("l.exr"), 1, 1, opaque, NULL), 0);
     read_exr_pixel(path_of("l.exr"), 4, file);
     assert_true(file[0] == 1 && file[1] == 1);
     assert_close(file[2], 0.00154799, 1e-7);
     assert_close(file[3], 0.21404114, 1e-7);
     /* Half as opaque: half the light of the same colour. */
-    assert_int_equal(trip_image_write(path_of("l.exr"), 1, 1, half, NULL), 0);
+    assert_int_equal(trip_image_write(&files, path_of("l.exr"), 1, 1, half, NULL), 0);
     read_exr_pixel(path_of("l.exr"), 4, file);
     assert_true(file[0] == 0.5f && file[1] == 0.5f);
     assert_close(file[2], 0.00077399, 1e-7);
     assert_close(file[3], 0.10702057, 1e-7);
     /* Over black, what is seen is the premultiplied colour: 0.25 is 0.05087609 of light. */
     const trip_image_params over_black = { .drop_alpha = true };
-    assert_int_equal(trip_image_write(path_of("l.exr"), 1, 1, half, &over_black), 0);
+    assert_int_equal(trip_image_write(&files, path_of("l.exr"), 1, 1, half, &over_black), 0);
     read_exr_pixel(path_of("l.exr"), 3, file);
     assert_close(file[0], 0.21404114, 1e-7);
     assert_close(file[2], 0.05087609, 1e-7);
@@ -146,8 +148,8 @@ static void the_curve_of_exr_loses_nothing_outside_its_range(void **state)
     const float rgba[2][4] = { { -0.5f, 3, 0.03f, 1 }, { 0.25f, 0, 2, 0 } };
     float *back;
     int width, height;
-    assert_int_equal(trip_image_write(path_of("o.exr"), 2, 1, rgba[0], NULL), 0);
-    assert_int_equal(trip_image_read(path_of("o.exr"), &width, &height, &back), 0);
+    assert_int_equal(trip_image_write(&files, path_of("o.exr"), 2, 1, rgba[0], NULL), 0);
+    assert_int_equal(trip_image_read(&files, path_of("o.exr"), &width, &height, &back), 0);
     assert_true(test_most_apart(rgba[0], back, 8) < 1e-6);
     free(back);
 }
@@ -183,7 +185,7 @@ static void a_png_holds_straight_colour_rounded_to_nearest_and_the_top_row_first
         0.5f,  0.5f, 0, 0,    /* colour without alpha cannot be held */
     };
     uint8_t pixels[12];
-    assert_int_equal(trip_image_write(path_of("p.png"), 1, 3, rgba, NULL), 0);
+    assert_int_equal(trip_image_write(&files, path_of("p.png"), 1, 3, rgba, NULL), 0);
     read_narrow_png(path_of("p.png"), pixels, 3, 4);
     const uint8_t expected[] = { 128, 51, 0, 128, 0, 255, 0, 255, 0, 0, 0, 0 };
     assert_memory_equal(pixels, expected, sizeof pixels);
@@ -200,7 +202,7 @@ static void every_code_is_reached_from_half_a_step_on_either_side(void **state)
                 rgba[n][c] = ((float)n + 0.49f * (float)sign) / 255;
         for (int n = 0; n < 256; n += 64) {
             const trip_image_params rgb = { .drop_alpha = true };
-            assert_int_equal(trip_image_write(path_of("c.png"), 1, 64, rgba[n], &rgb), 0);
+            assert_int_equal(trip_image_write(&files, path_of("c.png"), 1, 64, rgba[n], &rgb), 0);
             read_narrow_png(path_of("c.png"), pixels + n * 3, 64, 3);
         }
         for (int n = 0; n < 256 * 3; n++)
@@ -217,8 +219,8 @@ static void jpeg_is_the_picture_over_black(void **state)
     int width, height;
     for (int i = 0; i < SIDE * SIDE; i++)
         memcpy(rgba + 4 * i, (float[]){ 0.4f, 0.2f, 0.1f, 0.5f }, 16);
-    assert_int_equal(trip_image_write(path_of("a.JPG"), SIDE, SIDE, rgba, NULL), 0);
-    assert_int_equal(trip_image_read(path_of("a.JPG"), &width, &height, &back), 0);
+    assert_int_equal(trip_image_write(&files, path_of("a.JPG"), SIDE, SIDE, rgba, NULL), 0);
+    assert_int_equal(trip_image_read(&files, path_of("a.JPG"), &width, &height, &back), 0);
     for (int i = 0; i < SIDE * SIDE; i++) {
         assert_true(fabsf(back[4 * i] - 0.4f) < 0.012f && fabsf(back[4 * i + 1] - 0.2f) < 0.012f);
         assert_true(back[4 * i + 3] == 1);
@@ -231,12 +233,12 @@ static void a_pixel_that_is_no_number_is_refused_and_the_old_file_stays(void **s
     (void)state;
     float rgba[2 * 4] = { 1, 1, 1, 1, 1, 1, 1, 1 };
     struct stat before, after;
-    assert_int_equal(trip_image_write(path_of("n.exr"), 2, 1, rgba, NULL), 0);
+    assert_int_equal(trip_image_write(&files, path_of("n.exr"), 2, 1, rgba, NULL), 0);
     stat(path_of("n.exr"), &before);
     for (int i = 0; i < 2; i++) {
         rgba[5] = i ? NAN : -INFINITY;
         test_catch_reports();
-        assert_int_equal(trip_image_write(path_of("n.exr"), 2, 1, rgba, NULL), TRIP_ERROR);
+        assert_int_equal(trip_image_write(&files, path_of("n.exr"), 2, 1, rgba, NULL), TRIP_ERROR);
         assert_one_report("n.exr: pixel (1, 0) is not a finite number");
     }
     stat(path_of("n.exr"), &after);
@@ -247,8 +249,8 @@ static void expect_refusal(const char *path, trip_image_depth depth, int status,
 {
     const float rgba[4] = { 0, 0, 0, 1 };
     test_catch_reports();
-    assert_int_equal(trip_image_write(path, 1, 1, rgba, &(trip_image_params){ .depth = depth }),
-                     status);
+    assert_int_equal(
+        trip_image_write(&files, path, 1, 1, rgba, &(trip_image_params){ .depth = depth }), status);
     assert_one_report(why);
 }
 
@@ -289,16 +291,16 @@ static void a_full_disk_is_reported_and_leaves_nothing(void **state)
     getrlimit(RLIMIT_FSIZE, &old);
     tight = (struct rlimit){ 3000, old.rlim_max };
     test_catch_reports();
-    assert_int_equal(
-        trip_image_read(path_of("missing.png"), &(int){ 0 }, &(int){ 0 }, &(float *){ NULL }),
-        TRIP_ERROR);
+    assert_int_equal(trip_image_read(&files, path_of("missing.png"), &(int){ 0 }, &(int){ 0 },
+                                     &(float *){ NULL }),
+                     TRIP_ERROR);
     assert_one_report("missing.png");
     int before = count_files();
     const char *const names[] = { "full.png", "full.jpg", "full.tif", "full.exr" };
     for (int i = 0; i < 4; i++) {
         test_catch_reports();
         setrlimit(RLIMIT_FSIZE, &tight);
-        int status = trip_image_write(path_of(names[i]), SIDE, SIDE, rgba, NULL);
+        int status = trip_image_write(&files, path_of(names[i]), SIDE, SIDE, rgba, NULL);
         setrlimit(RLIMIT_FSIZE, &old);
         assert_one_report("File too large");
         assert_int_equal(status, TRIP_ERROR);
@@ -317,10 +319,11 @@ static void a_broken_picture_is_refused_when_read(void **state)
     for (int i = 0; i < SIDE * SIDE * 4; i++)
         rgba[i] = (float)test_random();
     for (int i = 0; i < 2; i++) {
-        assert_int_equal(trip_image_write(path_of(names[i]), SIDE, SIDE, rgba, NULL), 0);
+        assert_int_equal(trip_image_write(&files, path_of(names[i]), SIDE, SIDE, rgba, NULL), 0);
         assert_int_equal(truncate(path_of(names[i]), 5000), 0);
         test_catch_reports();
-        assert_int_equal(trip_image_read(path_of(names[i]), &width, &height, &back), TRIP_ERROR);
+        assert_int_equal(trip_image_read(&files, path_of(names[i]), &width, &height, &back),
+                         TRIP_ERROR);
         assert_one_report(names[i]);
     }
 }
