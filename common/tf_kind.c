@@ -98,6 +98,14 @@ static bool is_mr(const trip_histogram *h)
     return h->value_min >= 0 && trip_tf_find_tissue(&t, h) && t.share >= 0.18 && t.sharpest < 0.3;
 }
 
+/* What DICOM calls CT is in Hounsfield units, unless its rescaling was lost: then nothing is below
+ * zero, where the air around a patient is. */
+static bool is_stated_ct(const char *modality, const trip_histogram *h)
+{
+    return !strcmp(modality, "CT") && h->value_min >= -32768 && h->value_min <= -100 &&
+           h->value_max <= 65535;
+}
+
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *o, const trip_histogram *h)
 {
     const char *modality = o->modality ? o->modality : "";
@@ -108,11 +116,13 @@ trip_tf_kind trip_tf_recognise(const trip_tf_origin *o, const trip_histogram *h)
         return TRIP_TF_SIMULATION;
     if (!strcmp(modality, "MR") && h->value_min >= 0)
         return TRIP_TF_MR;
+    if (is_stated_ct(modality, h))
+        return TRIP_TF_CT;
     if (!strcmp(modality, "SEG") || (o->integers && are_labels(h)))
         return TRIP_TF_LABELS;
-    if (is_ct(h))
+    if (strcmp(modality, "MR") != 0 && is_ct(h))
         return TRIP_TF_CT;
-    return o->patient && is_mr(h) ? TRIP_TF_MR : TRIP_TF_SIMULATION;
+    return o->patient && !*modality && is_mr(h) ? TRIP_TF_MR : TRIP_TF_SIMULATION;
 }
 
 int trip_tf_make_automatic(trip_tf **out, trip_tf_kind kind, const trip_histogram *h)

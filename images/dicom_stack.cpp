@@ -29,6 +29,7 @@ constexpr Uint32 lazy_bytes = 4096;
 struct Header {
     std::string file;
     std::string series;
+    std::string modality; /* a code string, or empty */
     int64_t width = 0, height = 0, frames = 1;
     unsigned allocated = 0, stored = 0, high = 0; /* bits */
     bool is_signed = false;
@@ -204,6 +205,19 @@ void check_header(const Header &h, unsigned samples)
         throw trip_slice_error(h.file, "has a rescale slope of 0");
 }
 
+/* Of at most 16 letters, digits, blanks and underscores, as the standard has it; of another form it
+ * says nothing. */
+std::string get_modality(DcmItem &item)
+{
+    OFString text;
+    if (item.findAndGetOFString(DCM_Modality, text).bad())
+        return "";
+    auto known = [](unsigned char c) {
+        return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == ' ' || c == '_';
+    };
+    return text.size() <= 16 && std::all_of(text.begin(), text.end(), known) ? text.c_str() : "";
+}
+
 Header read_header(const std::string &file)
 {
     DcmFileFormat format;
@@ -214,6 +228,7 @@ Header read_header(const std::string &file)
     h.file = file;
     if (set.findAndGetOFString(DCM_SeriesInstanceUID, series).good())
         h.series = series.c_str();
+    h.modality = get_modality(set);
     h.width = get_count(set, DCM_Columns, 0);
     h.height = get_count(set, DCM_Rows, 0);
     h.frames = (int64_t)get_integer(set, DCM_NumberOfFrames, 1);
@@ -281,12 +296,14 @@ double sort_slices(std::vector<Header> &headers, bool allow_gaps)
     return 1;
 }
 
-/* The frames of one file in order of their place; none where places are not known. */
-std::vector<Uint32> sort_frames(Header &h)
+/* The frames of one file in order of their place; none where places are not known. Sets `squeeze`
+ * to what trip_check_places() returns of them. */
+std::vector<Uint32> sort_frames(Header &h, bool allow_gaps, double &squeeze)
 {
     std::vector<Uint32> order(h.placed() ? h.places.size() : 0);
     std::vector<trip_vec3> sorted;
-    std::vector<double> depths;
+    std::vector<std::string> names;
+    std::vector<double> depths, sorted_depths;
     for (size_t i = 0; i < order.size(); i++) {
         order[i] = (Uint32)i;
         depths.push_back(trip_dot(h.places[i], h.normal()));
@@ -297,7 +314,10 @@ std::vector<Uint32> sort_frames(Header &h)
         if (i > 0 && !(depths[order[i]] - depths[order[i - 1]] > 1e-6))
             throw trip_slice_error(h.file, "has several frames at one place: of several times?");
         sorted.push_back(h.places[order[i]]);
+        sorted_depths.push_back(depths[order[i]]);
+        names.push_back(h.file + ": frame " + std::to_string(order[i] + 1));
     }
+    squeeze = trip_check_places(sorted_depths, names, allow_gaps);
     if (!sorted.empty()) {
         h.places = sorted;
         h.origin = sorted[0];
@@ -441,12 +461,13 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool 
     }
     double squeeze = sort_slices(headers_, allow_gaps);
     if (headers_[0].frames > 1)
-        frames_ = sort_frames(headers_[0]);
+        frames_ = sort_frames(headers_[0], allow_gaps, squeeze);
     const Header &h = headers_[0];
     index_to_world = make_map(headers_, squeeze);
     oriented = all_have(headers_, [](const Header &o) { return o.rows.size() == 6; });
     if (all_placed(headers_) && h.biped)
         std::strcpy(space, "LPS");
+    std::snprintf(modality, sizeof modality, "%s", h.modality.c_str());
     dims[0] = h.width;
     dims[1] = h.height;
     dims[2] = h.frames > 1 ? h.frames : (int64_t)headers_.size();

@@ -83,6 +83,7 @@ typedef struct trip_image_stack {
     double slope, inter;
     double index_to_world[3][4];
     char space[8];         /* anatomical, as in anatomy.h; terminated */
+    char modality[24];     /* of DICOM, at most 16 characters; terminated */
     uint64_t helper_bytes; /* of the allowed memory that it uses until it ends */
 } trip_image_stack;
 

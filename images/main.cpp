@@ -130,6 +130,10 @@ class Session
         trip_slice_files files = trip_slice_find(path, allow_gaps);
         stack_ = files.kind == TRIP_IMAGE_DICOM ? trip_dicom_stack(files, budget_, allow_gaps)
                                                 : trip_picture_stack(files, budget_);
+        bool frames = files.kind == TRIP_IMAGE_DICOM && stack_->dims[2] > 1;
+        if (allow_gaps && files.names[0] == path && !frames)
+            throw trip_slice_error(path, "is one file: --allow-gaps is for stacks of several",
+                                   TRIP_USAGE);
         trip_image_stack s = {};
         std::memcpy(s.dims, stack_->dims, sizeof s.dims);
         s.type = stack_->type;
@@ -137,6 +141,7 @@ class Session
         s.inter = stack_->inter;
         std::memcpy(s.index_to_world, stack_->index_to_world.m, sizeof s.index_to_world);
         std::memcpy(s.space, stack_->space, sizeof s.space);
+        std::memcpy(s.modality, stack_->modality, sizeof s.modality);
         s.oriented = stack_->oriented;
         s.helper_bytes = trip_budget_peak_bytes(budget_);
         reply_data(sizeof s);

@@ -40,8 +40,9 @@ class trip_slice_stack
     trip_scalar type = TRIP_U8;
     double slope = 1, inter = 0; /* value = slope * stored + inter */
     trip_affine index_to_world = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
-    char space[8] = "";    /* anatomical, as in anatomy.h */
-    bool oriented = false; /* the map's directions are the file's */
+    char space[8] = "";     /* anatomical, as in anatomy.h */
+    char modality[24] = ""; /* of DICOM: "CT", "MR", ... */
+    bool oriented = false;  /* the map's directions are the file's */
 };
 
 /* TIFF, PNG or EXR, through OpenImageIO: picture_stack.cpp. The pages of one TIFF

@@ -77,6 +77,7 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
         .sparse = info->sparse,
         .integers = info->type < TRIP_F16 && info->slope == floor(info->slope) &&
                     info->inter == floor(info->inter),
+        .modality = info->modality,
         .patient = info->space[0] || !strcmp(info->format, "nifti"),
     };
     return trip_tf_recognise(&origin, h);
@@ -126,10 +127,9 @@ __attribute__((format(printf, 2, 3))) static void add_option(cJSON *options, con
     free(text);
 }
 
-/* What `brick` has to be given to read the input in the same way again. */
-static void add_source_options(cJSON *root, const trip_volume_params *v)
+/* How the input is read. */
+static void add_volume_options(cJSON *options, const trip_volume_params *v)
 {
-    cJSON *options = cJSON_AddArrayToObject(root, "source_options");
     char number[3][32];
     if (v->grid)
         add_option(options, "--grid=%s", v->grid);
@@ -149,6 +149,21 @@ static void add_source_options(cJSON *root, const trip_volume_params *v)
         add_option(options, "--spacing=%s,%s,%s", trip_text_from_double(v->spacing[0], number[0]),
                    trip_text_from_double(v->spacing[1], number[1]),
                    trip_text_from_double(v->spacing[2], number[2]));
+    if (v->allow_gaps)
+        add_option(options, "--allow-gaps");
+}
+
+/* What `brick` has to be given to make the data set again, but for what is kept. */
+static void add_source_options(cJSON *root, const trip_brick_params *p)
+{
+    cJSON *options = cJSON_AddArrayToObject(root, "source_options");
+    add_volume_options(options, &p->volume);
+    if (p->no_normals)
+        add_option(options, "--no-normals");
+    if (p->tile_voxels)
+        add_option(options, "--tile=%u", p->tile_voxels);
+    if (p->slab_sheets)
+        add_option(options, "--slab-sheets=%u", p->slab_sheets);
 }
 
 static const char *base_name(const char *path)
@@ -161,10 +176,12 @@ char *trip_brick_text_make(const trip_brick_text *t)
 {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "source", base_name(t->params->input));
-    add_source_options(root, &t->params->volume);
+    add_source_options(root, t->params);
     cJSON_AddStringToObject(root, "format", t->info->format);
     if (t->info->name[0])
         cJSON_AddStringToObject(root, "grid", t->info->name);
+    if (t->info->note[0])
+        cJSON_AddStringToObject(root, "note", t->info->note);
     if (t->info->space[0])
         cJSON_AddStringToObject(root, "space", t->info->space);
     if (t->info->oriented)

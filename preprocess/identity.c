@@ -9,8 +9,9 @@
 #include "format.h"
 #include "report.h"
 
-/* Changes whenever other bytes come out of the same input and parameters. */
-enum { BRICKER_VERSION = 2 };
+/* Raised with every change by which other bytes come out of the same input and parameters, be it in
+ * a reader, in triptych-images or in the bricker. */
+enum { BRICKER_VERSION = 3 };
 
 /* A file is known by its name, length and time of change; of a pattern only the name is known. */
 static void write_input(FILE *f, const trip_brick_params *p)

@@ -9,8 +9,8 @@
 /* `functions` as they were loaded. Fails when memory runs out. */
 int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, uint64_t *out);
 
-/* All parameters but the input, memory and threads as text, for free(); the functions are loaded.
- */
+/* All parameters but the input, memory and threads as text, with the versions of the bricker and of
+ * the format, for free(); the functions are loaded. */
 int trip_brick_options_text(const trip_brick_params *p, char **out);
 
 #endif

@@ -54,6 +54,14 @@ static int open_stack(state *s, bool allow_gaps, trip_image_stack *stack)
     return status;
 }
 
+/* A code string of DICOM, as the standard has it. */
+static bool is_modality(const char *text, size_t room)
+{
+    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _";
+    size_t length = strnlen(text, room);
+    return length <= 16 && strspn(text, letters) == length;
+}
+
 /* What of it cannot be, or NULL; sizes that no memory holds are refused later. */
 static const char *fault_of(const trip_image_stack *stack)
 {
@@ -67,6 +75,8 @@ static const char *fault_of(const trip_image_stack *stack)
     if (!memchr(stack->space, '\0', sizeof stack->space) || (stack->oriented & ~1) ||
         (stack->space[0] && !trip_anatomy_known(stack->space)))
         return "a space of no known kind";
+    if (!is_modality(stack->modality, sizeof stack->modality))
+        return "a modality of no known form";
     return finite ? NULL : "a map that is not finite";
 }
 
@@ -94,10 +104,6 @@ static int reserve_memory(state *s, const trip_image_stack *stack)
 static int open_images(const char *path, const trip_volume_params *params, trip_budget *budget,
                        trip_volume_info *info, void **out)
 {
-    struct stat st;
-    if (params->allow_gaps && stat(path, &st) == 0 && S_ISREG(st.st_mode))
-        return trip_fail(TRIP_USAGE, "read", path,
-                         "is one file: --allow-gaps is for stacks of several");
     size_t path_bytes = strlen(path) + 1;
     state *s = calloc(1, sizeof *s + path_bytes);
     if (!s)
@@ -118,6 +124,7 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
     memcpy(info->dims, stack.dims, sizeof info->dims);
     memcpy(info->index_to_world.m, stack.index_to_world, sizeof info->index_to_world.m);
     memcpy(info->space, stack.space, sizeof info->space);
+    memcpy(info->modality, stack.modality, sizeof info->modality);
     info->oriented = stack.oriented != 0;
     info->type = (trip_scalar)stack.type;
     info->slope = stack.slope;

@@ -50,6 +50,7 @@ typedef struct trip_volume_info {
     const char *format; /* "nrrd", "openvdb", ... */
     char space[8];      /* how world space lies in the patient, as in anatomy.h; "" : not said */
     bool oriented;      /* the file says how its axes lie in world space: nothing to be guessed */
+    char modality[17];  /* of DICOM: "CT", "MR", ...; "": not known */
     char name[128];     /* grid name where the format has one */
     char note[512];     /* for people: what was chosen where the file leaves a choice, or "" */
 } trip_volume_info;

@@ -158,6 +158,11 @@ const char *trip_dataset_text_source_option(const trip_dataset_text *t, int i)
     return cJSON_GetStringValue(cJSON_GetArrayItem(options, i));
 }
 
+const char *trip_dataset_text_note(const trip_dataset_text *t)
+{
+    return string_at(t, "note");
+}
+
 int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out)
 {
     const char *text = string_at(t, "transfer_function");

@@ -4,7 +4,9 @@
  *   "format"             "openvdb", "nrrd", ... : where the volume came from
  *   "space"              "LPS" or "RAS": how world space lies in the patient (anatomy.h)
  *   "oriented"           true: the file gave the directions of its axes, so none are guessed
- *   "source", "source_options"  the file it was made of, and the options that say how to read it
+ *   "source", "source_options"  the file it was made of, and the options of `brick` that make it
+ *                        again, but for those of what is kept
+ *   "note"               what was chosen where the file leaves a choice, for people
  *   "function_kind"      "ct", "mr", "fog", "labels", "simulation": what the volume is
  *   "up", "front"        "+x" ... "-z": the world direction that is up, whatever else is said, and
  *                        that the object faces
@@ -26,10 +28,13 @@ typedef struct trip_dataset_text trip_dataset_text;
 int trip_dataset_text_parse(trip_dataset_text **out, const trip_dataset *d);
 void trip_dataset_text_destroy(trip_dataset_text *t);
 
-/* Of what it was made: a file's name without its folder, and the options of `brick` that say how to
- * read it, from 0 on; NULL where the text does not tell, or beyond the last. */
+/* Of what it was made: a file's name without its folder, and the options of `brick` that make it
+ * again, from 0 on; NULL where the text does not say, or beyond the last. */
 const char *trip_dataset_text_source(const trip_dataset_text *t);
 const char *trip_dataset_text_source_option(const trip_dataset_text *t, int i);
+
+/* What was chosen for the user where the file left a choice; NULL: nothing. */
+const char *trip_dataset_text_note(const trip_dataset_text *t);
 
 /* Turns a function that is relative to the data, or made from its histogram, into data units. */
 int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, trip_tf *tf);

@@ -312,9 +312,19 @@ def dicom_geometry(group, place, rows, spacing):
     return dicom_numbers(0x28, 0x0030, spacing[1::-1])
 
 
-def write_dicom(path, image, z, spacing=(1, 1, 1), place=None, rows=(1, 0, 0, 0, 1, 0), frames=()):
+def write_dicom(
+    path,
+    image,
+    z,
+    spacing=(1, 1, 1),
+    place=None,
+    rows=(1, 0, 0, 0, 1, 0),
+    frames=(),
+    modality="",
+    inter=0,
+):
     """Explicit VR little endian, 16 bits. `place` is that of the first pixel, `rows` the directions
-    of rows and columns. `frames` holds the places of the slices of `image`, of three axes then: a
+    of rows and columns; `inter` is added to the values. `frames` holds the places of the slices of `image`, of three axes then: a
     file of several frames that keeps its geometry in sequences."""
     e, columns = dicom_element, image.shape[-1]
     us = lambda value: struct.pack("<H", value)
@@ -339,6 +349,7 @@ def write_dicom(path, image, z, spacing=(1, 1, 1), place=None, rows=(1, 0, 0, 0,
     data = (
         e(8, 0x0016, b"UI", b"1.2.840.10008.5.1.4.1.1.2")
         + e(8, 0x0018, b"UI", f"1.2.3.{z + 1}".encode())
+        + (e(8, 0x0060, b"CS", modality.encode()) if modality else b"")
         + e(0x20, 0x000E, b"UI", b"1.2.3.4")
         + e(0x20, 0x0013, b"IS", str(z + 1).encode())
         + (b"" if sequences else dicom_geometry(0x20, place, rows, spacing))
@@ -352,6 +363,7 @@ def write_dicom(path, image, z, spacing=(1, 1, 1), place=None, rows=(1, 0, 0, 0,
         + e(0x28, 0x0101, b"US", us(16))
         + e(0x28, 0x0102, b"US", us(15))
         + e(0x28, 0x0103, b"US", us(0))
+        + (dicom_numbers(0x28, 0x1052, [inter]) + dicom_numbers(0x28, 0x1053, [1]) if inter else b"")
         + sequences
         + e(0x7FE0, 0x0010, b"OW", image.astype("<u2").tobytes())
     )

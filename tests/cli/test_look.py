@@ -3,6 +3,7 @@ without being told, and volumes in which there is nothing to see."""
 import json
 import os
 import re
+import shutil
 import subprocess
 import unittest
 
@@ -189,6 +190,30 @@ class Look(program.ProgramTest):
             run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", *view)
             self.assertEqual(run.stderr, "")
             self.assertEqual(self.info("again.trip")["spacing"], [1, 1, 2])
+
+    def again(self, source, *options):
+        """What `info` says of a data set, and of the one by the command that is printed."""
+        before = self.brick(source, "again.trip", "--range=150:255", *options)
+        run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", "--tf", "low.tf")
+        command = re.search(r"to have them: triptych (brick .*)\n", run.stderr)
+        self.assertTrue(command, run.stderr)
+        shutil.rmtree("again.trip")
+        subprocess.run(
+            f"'{program.PROGRAM}' {command[1]} -q", shell=True, check=True, stderr=subprocess.PIPE
+        )
+        return before, self.info("again.trip")
+
+    def test_the_command_to_brick_again_has_all_that_the_data_set_depends_on(self):
+        program.write("low.tf", b"10 1 1 1 0\n20 1 1 1 0.5\n200 1 1 1 0.5\n")
+        program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
+        options = "--no-normals", "--tile=16", "--slab-sheets=3"
+        before, after = self.again("ball.nrrd", *options)
+        for key, value in ("tile_voxels", 16), ("slab_sheets", 3), ("normals", False):
+            self.assertEqual((before[key], after[key]), (value, value), key)
+        for z, image in enumerate(program.ball((20, 20, 20))):
+            program.write_tiff(f"s{z + (z > 9)}.tif", image)
+        before, after = self.again("s%d.tif", "--allow-gaps")
+        self.assertEqual(before["dims"], after["dims"])
 
 
 if __name__ == "__main__":

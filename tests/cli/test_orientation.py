@@ -5,6 +5,7 @@ The phantom is a function of the place in the patient, in millimetres to the lef
 head: a body, a nose in front, and markers at its left and at its head. It has no symmetry.
 """
 import os
+import shutil
 
 import numpy
 
@@ -285,6 +286,39 @@ class Orientation(program.ProgramTest):
         self.assertLess(down, -15)
         across, down = self.bright_from_middle("space_ras.nrrd")  # bright in front, at the left
         self.assertGreater(across, 8)
+
+    def test_a_frame_missing_among_others_is_refused_unless_allowed(self):
+        """Frames at 0, 2, 4, 8, 10, 12 in a file: 2 apart, and not 2.4, where the gap is allowed."""
+        values = program.noise((6, 8, 8)).astype("u2")
+        places = [(0, 0, z) for z in (0, 2, 4, 8, 10, 12)]
+        program.write_dicom("gap.dcm", values, 0, (1, 1, 2), places[0], frames=places)
+        self.fails(1, "brick", "gap.dcm", "-o", "g.trip", "-q", says="frame 3: a slice is missing")
+        run = self.works("brick", "gap.dcm", "-o", "g.trip", "-q", "--force", "--allow-gaps")
+        self.assertIn("frame 3: a slice is missing", run.stderr)
+        self.assertAlmostEqual(self.info("g.trip")["spacing"][2], 2)
+        even = [(0, 0, 2 * z) for z in range(6)]
+        program.write_dicom("even.dcm", values, 0, (1, 1, 2), even[0], frames=even)
+        self.assertEqual(
+            self.works("brick", "even.dcm", "-o", "e.trip", "-q", "--allow-gaps").stderr, ""
+        )
+
+    def test_dicom_says_what_kind_of_images_they_are(self):
+        values = program.noise((8, 16, 16), "u2") % 2000
+        for modality, inter, kind in (
+            ("MR", 0, "mr"),
+            ("CT", -1024, "ct"),
+            ("CT", 0, "simulation"),
+            ("", -1024, "simulation"),
+            ("PT", 0, "simulation"),
+            ("ct\x1b[2J", -1024, "simulation"),
+        ):
+            shutil.rmtree("scan", ignore_errors=True)
+            os.makedirs("scan")
+            for z, image in enumerate(values):
+                program.write_dicom(f"scan/{z}.dcm", image, z, modality=modality, inter=inter)
+            self.works("brick", "scan", "-o", "s.trip", "-q", "--force")
+            source = self.info("s.trip")["source"]
+            self.assertEqual(source["function_kind"], kind, (modality, inter))
 
     def test_info_says_in_words_where_the_axes_point(self):
         affine, values = acquisition(*ACQUISITIONS["gantry tilt"][:3])

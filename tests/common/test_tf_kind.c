@@ -114,6 +114,35 @@ static void dicom_says_what_it_is(void **state)
     put_head();
     trip_tf_origin mr = { .integers = true, .modality = "MR" };
     assert_int_equal(trip_tf_recognise(&mr, &h), TRIP_TF_MR);
+    trip_tf_origin other = { .integers = true, .patient = true, .modality = "PT" };
+    assert_int_equal(trip_tf_recognise(&other, &h), TRIP_TF_SIMULATION);
+}
+
+/* Values between which nothing is told apart by their histogram. */
+static void dicom_says_that_values_are_hounsfield_units(void **state)
+{
+    (void)state;
+    trip_tf_origin origin = { .integers = true, .patient = true };
+    start(-1000, 1000);
+    for (int v = -1000; v < 1000; v += 10)
+        put(v, 1000);
+    assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_SIMULATION);
+    origin.modality = "CT";
+    assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_CT);
+    start(0, 2000); /* not rescaled */
+    for (int v = 0; v < 2000; v += 10)
+        put(v, 1000);
+    assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_SIMULATION);
+}
+
+static void magnetic_resonance_below_zero_is_no_tomogram(void **state)
+{
+    (void)state;
+    put_chest(-1024, 3071);
+    trip_tf_origin origin = { .patient = true };
+    assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_CT);
+    origin.modality = "MR";
+    assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_SIMULATION);
 }
 
 int main(void)
@@ -129,6 +158,8 @@ int main(void)
         cmocka_unit_test(an_image_of_few_grey_levels_is_not_labels),
         cmocka_unit_test(a_binary_solid_is_a_label),
         cmocka_unit_test(dicom_says_what_it_is),
+        cmocka_unit_test(dicom_says_that_values_are_hounsfield_units),
+        cmocka_unit_test(magnetic_resonance_below_zero_is_no_tomogram),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

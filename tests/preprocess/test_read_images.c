@@ -178,12 +178,16 @@ static void a_dicom_slice_missing_between_others_is_refused_unless_allowed(void 
     assert_true(fabs(info.index_to_world.m[2][2] - 1.5) < 1e-12);
 }
 
+/* A single frame has none either. */
 static void gaps_are_allowed_in_stacks_of_several_files_only(void **state)
 {
     (void)state;
     const trip_volume_params params = { .allow_gaps = true };
     write_tiff("pages.tif", TRIP_U8, 0, NZ);
     assert_refused_as(TRIP_USAGE, path_of("pages.tif"), &params, "is one file");
+    const dicom d = { .type = TRIP_U8 };
+    write_dicom("one.dcm", &d, 0, 1);
+    assert_refused_as(TRIP_USAGE, path_of("one.dcm"), &params, "is one file");
 }
 
 static void dicom_without_positions_is_ordered_by_number(void **state)
