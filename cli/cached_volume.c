@@ -85,19 +85,15 @@ static int wait_until_settled(const trip_source *source)
     return 0;
 }
 
-/* The options, and which program this is: another version may make another data set of the same
- * volume. */
+/* The options and the program's version: another one may make another data set of the same volume.
+ */
 static int describe(search *s)
 {
-    struct stat program = { 0 };
     char *options;
     int status = trip_brick_options_text(&s->params, &options);
     if (status < 0)
         return status;
-    if (stat("/proc/self/exe", &program) < 0)
-        program = (struct stat){ 0 };
-    int length = asprintf(&s->options, "%s%jd %jd %ld\n", options, (intmax_t)program.st_size,
-                          (intmax_t)program.st_mtim.tv_sec, program.st_mtim.tv_nsec);
+    int length = asprintf(&s->options, "%s" TRIP_VERSION "\n", options);
     free(options);
     if (length >= 0)
         return 0;
@@ -188,7 +184,6 @@ static int brick(search *s)
     if (status < 0)
         return status;
     v->seconds = now_seconds() - begin;
-    memcpy(v->note, summary.note, sizeof v->note);
     v->hold = cache_folder_hold(&v->folder, &v->key);
     return cache_folder_shrink(&v->folder, v->folder.limit_bytes);
 }

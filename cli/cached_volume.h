@@ -15,7 +15,6 @@ typedef struct cached_volume {
     cache_folder folder;
     int hold;       /* keeps the data set from being removed */
     double seconds; /* that bricking took; 0 where it was there */
-    char note[512]; /* as trip_brick_summary has it */
 } cached_volume;
 
 /* Whether the input of a command that draws is to be bricked: it is no folder with a data set in

@@ -8,6 +8,7 @@
 #include "cpu/cpu_renderer.h"
 #include "frame.h"
 #include "image_file.h"
+#include "piped_function.h"
 #include "progress.h"
 #include "render_options.h"
 #include "render_stats.h"
@@ -21,6 +22,7 @@ static trip_image_files pictures;
 /* Everything that lives as long as the command. */
 typedef struct drawing {
     render_options o;
+    piped_function function;
     cached_volume volume; /* where the input is one */
     session session;
     render_views views;
@@ -56,8 +58,6 @@ static int brick_volume(drawing *d)
     const render_options *o = &d->o;
     const trip_brick_params wanted = brick_params(o, &o->function);
     int status = cached_volume_open(&d->volume, &wanted);
-    if (status == 0 && d->volume.note[0])
-        trip_note(o->input, "%s", d->volume.note);
     if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
         printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
     return status;
@@ -81,7 +81,7 @@ static int open_usual(drawing *d, session_look look)
     return 0;
 }
 
-static int open_volume(drawing *d)
+static int open_from_cache(drawing *d)
 {
     session_look look = d->o.function;
     look.name = d->o.input;
@@ -91,6 +91,16 @@ static int open_volume(drawing *d)
     status = brick_volume(d);
     return status == 0 ? session_open(&d->session, d->volume.path, &look, d->o.memory_bytes)
                        : status;
+}
+
+/* What was chosen of the volume is said whether it was bricked now or before. */
+static int open_volume(drawing *d)
+{
+    int status = open_from_cache(d);
+    const char *note = status == 0 ? trip_dataset_text_note(d->session.text) : NULL;
+    if (note)
+        trip_note(d->o.input, "%s", note);
+    return status;
 }
 
 static int open_drawing(drawing *d)
@@ -256,6 +266,10 @@ int trip_command_render(int argc, char **argv)
     drawing d = { 0 };
     int status = render_options_parse(&d.o, argc, argv);
     if (!status)
+        status = render_options_check_outputs(&d.o);
+    if (!status)
+        status = piped_function_keep(&d.function, &d.o.function.tf);
+    if (!status)
         status = open_drawing(&d);
     if (!status)
         status = trip_image_prepare(&pictures); /* it gets ready while the first image is drawn */
@@ -271,5 +285,6 @@ int trip_command_render(int argc, char **argv)
     if (status == TRIP_ERROR && d.volume.hold >= 0 && d.volume.path)
         cached_volume_check(&d.volume, d.o.input);
     close_drawing(&d);
+    piped_function_release(&d.function);
     return trip_exit_status(status);
 }

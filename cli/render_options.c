@@ -4,11 +4,14 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 #include "cached_volume.h"
 #include "image_file.h"
+#include "new_file.h"
 #include "options.h"
 #include "report.h"
+#include "text.h"
 #include "volume_options.h"
 
 enum {
@@ -237,9 +240,15 @@ static int parse_up(const char *text, render_options *o)
 
 static int parse_ortho(const char *text, render_options *o)
 {
+    double height;
     o->ortho_height = 0;
     o->ortho_fit = !strcmp(text, "fit");
-    return o->ortho_fit ? 0 : trip_option_number("--ortho", text, 1e-100, 1e100, &o->ortho_height);
+    if (o->ortho_fit)
+        return 0;
+    if (!trip_text_to_double(text, &height))
+        return trip_fail(TRIP_USAGE, "usage", "--ortho", "\"%s\" is neither a height nor fit",
+                         text);
+    return trip_option_number("--ortho", text, 1e-100, 1e100, &o->ortho_height);
 }
 
 /* Which side is seen. */
@@ -493,4 +502,19 @@ int render_options_parse(render_options *o, int argc, char **argv)
     *o = (render_options){ .width = 1024, .height = 1024, .settings = trip_settings_default() };
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);
+}
+
+/* What is written to as it is: devices, pipes and links. */
+static bool is_special(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
+}
+
+int render_options_check_outputs(const render_options *o)
+{
+    int status = trip_new_file_check("write", o->output);
+    if (!status && o->stats && strcmp(o->stats, "-") && !is_special(o->stats))
+        status = trip_new_file_check("write", o->stats);
+    return status;
 }

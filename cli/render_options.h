@@ -44,5 +44,7 @@ typedef struct render_options {
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int render_options_parse(render_options *o, int argc, char **argv);
+/* What cannot be written at the end, before any work: 0, or TRIP_ERROR once reported. */
+int render_options_check_outputs(const render_options *o);
 
 #endif

@@ -51,6 +51,22 @@ int trip_new_file_begin(trip_new_file *f, const char *what, const char *path)
     return 0;
 }
 
+int trip_new_file_check(const char *what, const char *path)
+{
+    char folder[PATH_MAX];
+    struct stat st;
+    const char *slash = strrchr(path, '/');
+    int length = slash ? snprintf(folder, sizeof folder, "%.*s", (int)(slash + 1 - path), path)
+                       : snprintf(folder, sizeof folder, ".");
+    if (length >= (int)sizeof folder)
+        return trip_fail(TRIP_ERROR, what, path, "the name is too long");
+    if (stat(folder, &st) != 0 || access(folder, W_OK | X_OK) != 0)
+        return trip_fail_errno(what, path, "cannot create a file in its folder");
+    if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
+        return trip_fail(TRIP_ERROR, what, path, "is a folder");
+    return 0;
+}
+
 int trip_new_file_finish(trip_new_file *f)
 {
     int closed = close(f->fd);

@@ -15,6 +15,9 @@ typedef struct trip_new_file {
 /* `what` begins the lines about it ("write"); it and `path` must outlive the file. 0, or a reported
  * failure, after which there is nothing to end. */
 int trip_new_file_begin(trip_new_file *f, const char *what, const char *path);
+/* Whether a file could be made there, for work that is long: a reported failure where its folder is
+ * missing or not to be written in, or where the path is a folder's. Makes nothing. */
+int trip_new_file_check(const char *what, const char *path);
 /* Gives the file its name; a reported failure leaves nothing. */
 int trip_new_file_finish(trip_new_file *f);
 /* Removes it, unless it is finished. */

@@ -390,8 +390,10 @@ class Cache(program.ProgramTest):
             self.skipTest("another user cannot run the program where it lies")
         os.chmod(self.folder, 0o755)
         os.chmod(self.home, 0o555)
+        os.mkdir("open")
+        os.chmod("open", 0o777)
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
-        self.fails(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME", **identity)
+        self.fails(1, "render", "v.nrrd", "-o", "open/x.png", says="XDG_CACHE_HOME", **identity)
 
     def test_a_folder_of_another_or_open_to_others_is_refused(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
@@ -495,7 +497,69 @@ class Cache(program.ProgramTest):
         for wrong in [], ["nonsense"], ["list", "clear"], ["clear", "--json"], ["list", "--x"]:
             self.fails(2, "cache", *wrong)
 
+    def test_another_build_of_the_same_version_finds_it(self):
+        program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
+        self.draw("ball.nrrd", bricked=True)
+        shutil.copy(program.PROGRAM, "rebuilt")
+        os.utime("rebuilt", (1, 1))
+        with open("rebuilt", "ab") as f:
+            f.write(b"more")
+        run = subprocess.run(
+            ["./rebuilt", "render", "ball.nrrd", "-o", "one.exr", *SIZE],
+            capture_output=True,
+            check=True,
+        )
+        self.assertNotIn(b"bricked", run.stdout)
+        self.assertEqual(len(self.entries()), 1)
+
+    def test_a_function_through_a_pipe(self):
+        program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
+        text = b"values data\n20 1 0 0 0\n90 1 0.2 0 0.3\n200 0 0 1 0.6\n"
+        pictures = []
+        for bricked in True, False:
+            out, into = os.pipe()
+            os.write(into, text)
+            os.close(into)
+            run = self.works(
+                *("render", "ball.nrrd", "-o", "one.exr", *SIZE, "--tf", f"/dev/fd/{out}"),
+                pass_fds=[out],
+            )
+            os.close(out)
+            self.assertEqual(b"bricked" in run.stdout, bricked)
+            pictures.append(program.read_exr("one.exr"))
+        program.write("f.tf", text)
+        wanted = self.draw("ball.nrrd", "--tf", "f.tf", bricked=False)
+        self.differ(self.draw("ball.nrrd", bricked=True), wanted)
+        for picture in pictures:
+            self.same(picture, wanted)
+        out, into = os.pipe()
+        os.write(into, b"nonsense\n")
+        os.close(into)
+        pipe = f"/dev/fd/{out}"
+        self.fails(1, "render", "ball.nrrd", "-o", "x.png", "--tf", pipe, says=pipe, pass_fds=[out])
+        os.close(out)
+
     # Messages
+
+    def test_what_was_chosen_is_said_of_what_is_in_the_cache_too(self):
+        vdb = os.path.join(program.DATASETS, "densityAndHeat.vdb")
+        for bricked in True, False:
+            run = self.works("render", vdb, "-o", "one.png", *SIZE)
+            self.assertEqual(b"bricked" in run.stdout, bricked)
+            self.assertRegex(run.stderr, r'\Atriptych: note: [^\n]*"density" is taken[^\n]*\n\Z')
+        self.assertEqual(self.works("render", vdb, "-o", "a.png", *SIZE, "--grid=heat").stderr, "")
+
+    def test_what_cannot_be_written_is_said_before_the_volume_is_read(self):
+        program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
+        os.makedirs("folder.png", exist_ok=True)
+        for wrong in (
+            ["-o", "missing/x.png"],
+            ["-o", "ball.nrrd/x.png"],
+            ["-o", "folder.png"],
+            ["-o", "x.png", "--stats", "missing/s.json"],
+        ):
+            self.leaves_nothing(1, "render", "ball.nrrd", *wrong, says=wrong[-1])
+        self.assertEqual(self.entries(), [])
 
     def test_what_is_no_volume_leaves_nothing(self):
         program.write("text.txt", b"hello\n" * 100)

@@ -60,7 +60,7 @@ RENDER = {
     "--look": POINTS,
     "--up": POINTS + ["0,0,0"],
     "--fov": NUMBERS + ["0", "-5", "180"],
-    "--ortho": NUMBERS + ["0", "-5"],
+    "--ortho": NUMBERS + ["0", "-5", "Fit"],
     "--orbit": COUNTS + ["1000000"],
     "--view": NAMES + ["above", "FRONT"],
     "--azimuth": NUMBERS + ["1e9"],
