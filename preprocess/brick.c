@@ -130,7 +130,7 @@ static int plan_memory(brick *b)
 static bool has_spilled_order(const brick *b)
 {
     for (size_t i = 0; i < trip_spill_count(b->spill); i++)
-        if (trip_spill_segment(b->spill, i)->axis == TRIP_ORDERED_AXIS)
+        if (trip_list_axis(trip_spill_segment(b->spill, i)->list) == TRIP_ORDERED_AXIS)
             return true;
     return false;
 }
@@ -234,10 +234,10 @@ static int open_builder(brick *b)
     return trip_list_builder_create(&b->builder, &p, b->in.budget);
 }
 
-static void *reserve(void *user, unsigned thread, int axis, size_t bytes)
+static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
 {
     const brick *b = user;
-    return trip_list_builder_reserve(b->builder, thread, axis, bytes);
+    return trip_list_builder_reserve(b->builder, thread, list, bytes);
 }
 
 static int open_splatter(brick *b)
@@ -292,7 +292,7 @@ static int open_output(brick *b)
         status = open_builder(b);
     if (status == 0 && b->summary->resumed)
         status =
-            trip_leftover_replay(&b->leftover, b->journal, trip_list_builder_ordered(b->builder),
+            trip_leftover_replay(&b->leftover, b->journal, trip_list_builder_ordered(b->builder, TRIP_ORDERED_AXIS),
                                  b->format.tile_log2, b->in.budget);
     return status;
 }

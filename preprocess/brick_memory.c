@@ -16,7 +16,7 @@ enum { MOST_SLICES = 32 };
 #define LATE_BYTES ((uint64_t)2 << 20)
 /* Of the writer's index, for a tile of a sheet. */
 #define TILE_BYTES 400
-/* Of a splat that is alone in its pieces, in all lists. */
+/* Of a splat that is alone in its pieces, in all lists of its kind. */
 #define LONE_SPLAT_BYTES (3 * 48)
 
 typedef struct needs {
@@ -42,8 +42,9 @@ static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, 
 {
     uint64_t slice = (uint64_t)(info->dims[0] * info->dims[1]);
     uint64_t tile = UINT64_C(1) << 2 * f->tile_log2;
+    const uint64_t kinds = f->halo ? 2 : 1;
     needs n = { .opened_bytes = OPENED_BYTES + threads * trip_splat_thread_bytes(f, info->sparse),
-                .late_bytes = LATE_BYTES + TILE_BYTES * tiles_of_largest_sheet(info, f),
+                .late_bytes = kinds * (LATE_BYTES + TILE_BYTES * tiles_of_largest_sheet(info, f)),
                 .list_min_bytes = trip_list_builder_min_bytes(f, threads) };
     if (__builtin_mul_overflow(slice * LONE_SPLAT_BYTES, (uint64_t)info->dims[2],
                                &n.list_max_bytes) ||

@@ -26,10 +26,10 @@ typedef struct trip_checkpoint {
     trip_tally tally;              /* of the part, unless scanned */
 } trip_checkpoint;
 
-/* One run of the ordered list. */
+/* One run of a list in order. */
 typedef struct trip_run_record {
     uint64_t key;
-    uint32_t splats;
+    uint16_t list, splats;
     uint32_t checksum; /* of its records, trip_run_checksum() */
 } trip_run_record;
 

@@ -12,19 +12,21 @@
 
 enum { ORDERED_AXIS = TRIP_ORDERED_AXIS };
 
-/* What the background thread is to do with chunks: append the list in order, or spill the others.
- */
+/* What the background thread is to do with chunks: append lists in order, or spill the others. */
 typedef struct job {
     struct job *next;
     bool ordered;
-    trip_chain chains[3];
+    trip_chain chains[TRIP_MOST_LISTS];
     trip_checkpoint *checkpoint; /* to be noted once it is done; or NULL */
 } job;
 
 struct trip_list_builder {
     trip_list_builder_params params;
-    uint32_t (*open)[3];         /* [producer][axis], the chunk being filled; the producer's own */
-    trip_list_output outputs[3]; /* the ordered one is the background thread's until the merge */
+    unsigned lists;
+    uint32_t (
+        *open)[TRIP_MOST_LISTS]; /* [producer][list], the chunk being filled; the producer's */
+    trip_list_output outputs[TRIP_MOST_LISTS]; /* those in order are the background thread's until
+                                                  the merge */
     pthread_t thread;
     bool thread_runs;
     trip_scope *scope; /* of the creator */
@@ -34,7 +36,7 @@ struct trip_list_builder {
     trip_piece_pool pool;
     bool stopping, has_spilled;
     int status;
-    trip_chain filled[3];
+    trip_chain filled[TRIP_MOST_LISTS];
     job *first_job, *last_job;
     unsigned jobs; /* waiting or being done */
 };
@@ -42,19 +44,19 @@ struct trip_list_builder {
 uint64_t trip_list_builder_min_bytes(const trip_piece_format *f, unsigned producers)
 {
     /* Every producer fills a chunk of each list; as many again wait to be spilled. */
-    return (uint64_t)trip_chunk_bytes(f) * (6 * (uint64_t)producers + 6);
+    return (uint64_t)trip_chunk_bytes(f) * 2 * trip_piece_list_count(f) * ((uint64_t)producers + 1);
 }
 
-static bool is_spilled(const trip_list_builder *b, int axis)
+static bool is_spilled(const trip_list_builder *b, unsigned list)
 {
-    return !(b->params.in_order && axis == ORDERED_AXIS);
+    return !(b->params.in_order && trip_list_axis(list) == ORDERED_AXIS);
 }
 
-static int append_ordered(trip_list_builder *b, const job *j)
+static int append_chain(trip_list_builder *b, unsigned list, const trip_chain *chain)
 {
-    trip_pool_source memory = trip_pool_source_make(&b->pool, &j->chains[ORDERED_AXIS]);
+    trip_pool_source memory = trip_pool_source_make(&b->pool, list, chain);
     trip_piece_source *source = &memory.source;
-    return trip_list_output_merge(&b->outputs[ORDERED_AXIS], &b->params.quantiser, &source, 1);
+    return trip_list_output_merge(&b->outputs[list], &b->params.quantiser, &source, 1);
 }
 
 static void free_chain(trip_list_builder *b, trip_chain *c)
@@ -65,12 +67,15 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
     pthread_mutex_unlock(&b->lock);
 }
 
-static int do_spill(trip_list_builder *b, job *j, int status)
+/* Lists one after the other; their chunks are free at once, also when it fails. */
+static int do_chains(trip_list_builder *b, job *j, int status)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        if (status == 0)
-            status = trip_spill_chain(b->params.spill, axis, &b->pool, &j->chains[axis]);
-        free_chain(b, &j->chains[axis]);
+    for (unsigned list = 0; list < b->lists; list++) {
+        if (status == 0 && j->ordered)
+            status = append_chain(b, list, &j->chains[list]);
+        else if (status == 0)
+            status = trip_spill_chain(b->params.spill, list, &b->pool, &j->chains[list]);
+        free_chain(b, &j->chains[list]);
     }
     if (status == 0 && j->checkpoint)
         status = trip_journal_write_checkpoint(b->params.journal, j->checkpoint, b->params.spill);
@@ -79,11 +84,7 @@ static int do_spill(trip_list_builder *b, job *j, int status)
 
 static void do_job(trip_list_builder *b, job *j, int status)
 {
-    if (!j->ordered)
-        status = do_spill(b, j, status);
-    else if (status == 0)
-        status = append_ordered(b, j);
-    free_chain(b, &j->chains[ORDERED_AXIS]);
+    status = do_chains(b, j, status);
     pthread_mutex_lock(&b->lock);
     if (status < 0 && b->status == 0)
         b->status = status;
@@ -115,7 +116,7 @@ static void *thread_main(void *arg)
     return NULL;
 }
 
-/* Under the lock: hands filled chunks over, of the ordered list or of all others. Takes over the
+/* Under the lock: hands filled chunks over, of lists in order or of all others. Takes over the
  * checkpoint, also when it fails. */
 static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkpoint)
 {
@@ -126,11 +127,11 @@ static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkp
     }
     *j = (job){ .ordered = ordered, .checkpoint = checkpoint };
     b->has_spilled |= !ordered;
-    for (int axis = 0; axis < 3; axis++) {
-        bool goes = is_spilled(b, axis) != ordered;
-        j->chains[axis] = goes ? b->filled[axis] : trip_chain_empty();
+    for (unsigned list = 0; list < b->lists; list++) {
+        bool goes = is_spilled(b, list) != ordered;
+        j->chains[list] = goes ? b->filled[list] : trip_chain_empty();
         if (goes)
-            b->filled[axis] = trip_chain_empty();
+            b->filled[list] = trip_chain_empty();
     }
     if (b->first_job)
         b->last_job->next = j;
@@ -146,8 +147,8 @@ static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkp
 static uint32_t spillable(const trip_list_builder *b)
 {
     uint32_t chunks = 0;
-    for (int axis = 0; axis < 3; axis++)
-        chunks += is_spilled(b, axis) ? b->filled[axis].chunks : 0;
+    for (unsigned list = 0; list < b->lists; list++)
+        chunks += is_spilled(b, list) ? b->filled[list].chunks : 0;
     return chunks;
 }
 
@@ -167,37 +168,38 @@ static uint32_t take_chunk(trip_list_builder *b)
 }
 
 /* Under the lock. */
-static void close_chunk(trip_list_builder *b, unsigned producer, int axis)
+static void close_chunk(trip_list_builder *b, unsigned producer, unsigned list)
 {
-    uint32_t chunk = b->open[producer][axis];
+    uint32_t chunk = b->open[producer][list];
     if (chunk != TRIP_NO_CHUNK)
-        trip_chain_push(&b->pool, &b->filled[axis], chunk);
-    b->open[producer][axis] = TRIP_NO_CHUNK;
+        trip_chain_push(&b->pool, &b->filled[list], chunk);
+    b->open[producer][list] = TRIP_NO_CHUNK;
 }
 
-static void close_list(trip_list_builder *b, int axis)
+static void close_list(trip_list_builder *b, unsigned list)
 {
     for (unsigned i = 0; i < b->params.producers; i++)
-        close_chunk(b, i, axis);
+        close_chunk(b, i, list);
 }
 
-static uint32_t open_chunk(trip_list_builder *b, unsigned producer, int axis)
+static uint32_t open_chunk(trip_list_builder *b, unsigned producer, unsigned list)
 {
     pthread_mutex_lock(&b->lock);
-    close_chunk(b, producer, axis);
+    close_chunk(b, producer, list);
     uint32_t chunk = take_chunk(b);
     pthread_mutex_unlock(&b->lock);
     if (chunk != TRIP_NO_CHUNK)
         b->pool.chunks[chunk].used_bytes = 0;
-    return b->open[producer][axis] = chunk;
+    return b->open[producer][list] = chunk;
 }
 
-void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, int axis, size_t bytes)
+void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned list,
+                                size_t bytes)
 {
-    uint32_t chunk = b->open[producer][axis];
+    uint32_t chunk = b->open[producer][list];
     assert(bytes <= b->pool.chunk_bytes);
     if (chunk == TRIP_NO_CHUNK || b->pool.chunks[chunk].used_bytes + bytes > b->pool.chunk_bytes)
-        chunk = open_chunk(b, producer, axis);
+        chunk = open_chunk(b, producer, list);
     if (chunk == TRIP_NO_CHUNK)
         return NULL;
     void *at = trip_chunk_memory(&b->pool, chunk) + b->pool.chunks[chunk].used_bytes;
@@ -217,11 +219,14 @@ static bool is_time_to_spill(const trip_list_builder *b, double done)
 int trip_list_builder_end_batch(trip_list_builder *b, double done)
 {
     pthread_mutex_lock(&b->lock);
-    if (b->params.in_order) {
-        close_list(b, ORDERED_AXIS);
-        if (b->filled[ORDERED_AXIS].first != TRIP_NO_CHUNK)
-            queue_job(b, true, NULL);
-    }
+    bool some = false;
+    for (unsigned list = 0; list < b->lists; list++)
+        if (!is_spilled(b, list)) {
+            close_list(b, list);
+            some = some || b->filled[list].first != TRIP_NO_CHUNK;
+        }
+    if (some)
+        queue_job(b, true, NULL);
     int status = b->status;
     bool full = is_time_to_spill(b, done);
     pthread_mutex_unlock(&b->lock);
@@ -231,22 +236,23 @@ int trip_list_builder_end_batch(trip_list_builder *b, double done)
 int trip_list_builder_spill(trip_list_builder *b, trip_checkpoint *checkpoint)
 {
     pthread_mutex_lock(&b->lock);
-    for (int axis = 0; axis < 3; axis++)
-        close_list(b, axis);
+    for (unsigned list = 0; list < b->lists; list++)
+        close_list(b, list);
     int status = queue_job(b, false, checkpoint);
     pthread_mutex_unlock(&b->lock);
     return status;
 }
 
-trip_list_output *trip_list_builder_ordered(trip_list_builder *b)
+trip_list_output *trip_list_builder_ordered(trip_list_builder *b, unsigned list)
 {
-    return &b->outputs[ORDERED_AXIS];
+    return &b->outputs[list];
 }
 
-static int note_run(void *user, uint64_t key, const uint32_t *voxels, const uint32_t *normals,
-                    uint32_t splats)
+static int note_run(void *user, unsigned list, uint64_t key, const uint32_t *voxels,
+                    const uint32_t *normals, uint32_t splats)
 {
-    trip_run_record run = { key, splats, trip_run_checksum(voxels, normals, splats) };
+    trip_run_record run = { key, (uint16_t)list, (uint16_t)splats,
+                            trip_run_checksum(voxels, normals, splats) };
     return trip_journal_add_run(user, &run);
 }
 
@@ -254,18 +260,20 @@ static int create_parts(trip_list_builder *b, trip_budget *budget)
 {
     const trip_list_builder_params *p = &b->params;
     int status = trip_piece_pool_create(&b->pool, &p->format, p->dims, p->memory_bytes, budget);
-    for (int axis = 0; axis < 3 && status == 0; axis++)
-        status = trip_list_output_create(&b->outputs[axis], axis, &p->format, p->writer, budget);
-    b->outputs[ORDERED_AXIS].run = p->in_order ? note_run : NULL;
-    b->outputs[ORDERED_AXIS].run_user = p->journal;
+    for (unsigned list = 0; list < b->lists && status == 0; list++) {
+        status = trip_list_output_create(&b->outputs[list], list, &b->pool.formats[list], p->writer,
+                                         budget);
+        b->outputs[list].run = is_spilled(b, list) ? NULL : note_run;
+        b->outputs[list].run_user = p->journal;
+    }
     if (status < 0)
         return status;
     b->open = calloc(p->producers, sizeof *b->open);
     if (!b->open)
         return trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
     for (unsigned i = 0; i < p->producers; i++)
-        for (int axis = 0; axis < 3; axis++)
-            b->open[i][axis] = TRIP_NO_CHUNK;
+        for (unsigned list = 0; list < b->lists; list++)
+            b->open[i][list] = TRIP_NO_CHUNK;
     return 0;
 }
 
@@ -285,12 +293,13 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
     if (!b)
         return trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
     b->params = *params;
+    b->lists = trip_piece_list_count(&params->format);
     b->has_spilled = trip_spill_count(params->spill) > 0;
     pthread_mutex_init(&b->lock, NULL);
     pthread_cond_init(&b->work, NULL);
     pthread_cond_init(&b->freed, NULL);
-    for (int axis = 0; axis < 3; axis++)
-        b->filled[axis] = trip_chain_empty();
+    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+        b->filled[list] = trip_chain_empty();
     int status = create_parts(b, budget);
     if (status == 0)
         status = start_thread(b);
@@ -321,8 +330,8 @@ void trip_list_builder_destroy(trip_list_builder *b)
     if (!b)
         return;
     stop_thread(b, true);
-    for (int axis = 0; axis < 3; axis++)
-        trip_list_output_destroy(&b->outputs[axis]);
+    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+        trip_list_output_destroy(&b->outputs[list]);
     trip_piece_pool_destroy(&b->pool);
     free(b->open);
     pthread_mutex_destroy(&b->lock);
@@ -343,9 +352,9 @@ int trip_list_builder_finish(trip_list_builder *b, const trip_quantiser *quantis
                               .spill = b->params.spill,
                               .outputs = b->outputs,
                               .quantiser = quantiser };
-    for (int axis = 0; axis < 3; axis++) {
-        close_list(b, axis);
-        merge.lists[axis] = is_spilled(b, axis);
+    for (unsigned list = 0; list < b->lists; list++) {
+        close_list(b, list);
+        merge.lists[list] = is_spilled(b, list);
     }
     return trip_list_merge_run(&merge, workers, progress, user);
 }

@@ -22,38 +22,38 @@ static int spill_piece(void *user, const trip_piece *piece)
     return trip_spill_append(s->spill, piece, trip_piece_get_parts(s->format, piece).bytes);
 }
 
-static int spill_sources(trip_spill *spill, int axis, const trip_piece_format *format,
+static int spill_sources(trip_spill *spill, unsigned list, const trip_piece_format *format,
                          trip_piece_source **sources, size_t count)
 {
-    int status = trip_spill_begin(spill, axis);
+    int status = trip_spill_begin(spill, list);
     if (status == 0)
         status = trip_merge(sources, count, spill_piece, &(spilling){ spill, format });
     return status == 0 ? trip_spill_end(spill) : status;
 }
 
-int trip_spill_chain(trip_spill *spill, int axis, const trip_piece_pool *pool,
+int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *pool,
                      const trip_chain *chain)
 {
     if (chain->first == TRIP_NO_CHUNK)
         return 0;
-    trip_pool_source memory = trip_pool_source_make(pool, chain);
+    trip_pool_source memory = trip_pool_source_make(pool, list, chain);
     trip_piece_source *source = &memory.source;
-    return spill_sources(spill, axis, &pool->format, &source, 1);
+    return spill_sources(spill, list, &pool->formats[list], &source, 1);
 }
 
 /* What the workers share. */
 typedef struct merge_job {
     const trip_list_merge *merge;
-    int axes[3];
+    unsigned lists[TRIP_MOST_LISTS];
     pthread_mutex_t lock; /* guards the pool's free chain */
 } merge_job;
 
-static size_t segments_of(const trip_list_merge *m, int axis)
+static size_t segments_of(const trip_list_merge *m, unsigned list)
 {
     size_t count = 0;
     for (size_t i = 0; i < trip_spill_count(m->spill); i++) {
         const trip_segment *s = trip_spill_segment(m->spill, i);
-        count += s->axis == (uint32_t)axis && !s->retired;
+        count += s->list == list && !s->retired;
     }
     return count;
 }
@@ -80,7 +80,7 @@ static void close_sources(source_set *s)
     free(s->sources);
 }
 
-static int open_segment(source_set *s, size_t index)
+static int open_segment(source_set *s, size_t index, unsigned list)
 {
     const trip_list_merge *m = s->job->merge;
     trip_piece_pool *pool = m->pool;
@@ -89,7 +89,7 @@ static int open_segment(source_set *s, size_t index)
     trip_chain_push(pool, &s->buffers, buffer);
     pthread_mutex_unlock(&s->job->lock);
     trip_segment_reader *r = &s->readers[s->count];
-    int status = trip_segment_reader_open(r, m->spill, index, &pool->format,
+    int status = trip_segment_reader_open(r, m->spill, index, &pool->formats[list],
                                           trip_chunk_memory(pool, buffer), pool->chunk_bytes);
     s->segments[s->count] = index;
     s->sources[s->count++] = &r->source;
@@ -97,10 +97,10 @@ static int open_segment(source_set *s, size_t index)
 }
 
 /* The first `limit` segments of a list; there is room for one source more. */
-static int open_sources(source_set *s, merge_job *job, int axis, size_t limit)
+static int open_sources(source_set *s, merge_job *job, unsigned list, size_t limit)
 {
     const trip_list_merge *m = job->merge;
-    size_t wanted = segments_of(m, axis);
+    size_t wanted = segments_of(m, list);
     wanted = wanted < limit ? wanted : limit;
     *s = (source_set){ .job = job, .buffers = trip_chain_empty() };
     s->readers = calloc(wanted + 1, sizeof *s->readers);
@@ -111,8 +111,8 @@ static int open_sources(source_set *s, merge_job *job, int axis, size_t limit)
     int status = 0;
     for (size_t i = 0; s->count < wanted && status == 0; i++) {
         const trip_segment *segment = trip_spill_segment(m->spill, i);
-        if (segment->axis == (uint32_t)axis && !segment->retired)
-            status = open_segment(s, i);
+        if (segment->list == list && !segment->retired)
+            status = open_segment(s, i, list);
     }
     return status;
 }
@@ -121,27 +121,27 @@ static int merge_list(void *user, unsigned thread, uint64_t item)
 {
     merge_job *job = user;
     const trip_list_merge *m = job->merge;
-    int axis = job->axes[item];
+    unsigned list = job->lists[item];
     source_set s;
     (void)thread;
-    int status = open_sources(&s, job, axis, SIZE_MAX);
+    int status = open_sources(&s, job, list, SIZE_MAX);
     if (status == 0) {
-        trip_pool_source memory = trip_pool_source_make(m->pool, &m->in_memory[axis]);
+        trip_pool_source memory = trip_pool_source_make(m->pool, list, &m->in_memory[list]);
         s.sources[s.count] = &memory.source;
-        status = trip_list_output_merge(&m->outputs[axis], m->quantiser, s.sources, s.count + 1);
+        status = trip_list_output_merge(&m->outputs[list], m->quantiser, s.sources, s.count + 1);
     }
     close_sources(&s);
     return status;
 }
 
 /* Merges as many segments of a list as there are buffers for into one. */
-static int consolidate(merge_job *job, int axis)
+static int consolidate(merge_job *job, unsigned list)
 {
     const trip_list_merge *m = job->merge;
     source_set s;
-    int status = open_sources(&s, job, axis, m->pool->free.chunks);
+    int status = open_sources(&s, job, list, m->pool->free.chunks);
     if (status == 0)
-        status = spill_sources(m->spill, axis, &m->pool->format, s.sources, s.count);
+        status = spill_sources(m->spill, list, &m->pool->formats[list], s.sources, s.count);
     for (size_t i = 0; i < s.count && status == 0; i++)
         trip_spill_retire(m->spill, s.segments[i]);
     close_sources(&s);
@@ -153,28 +153,29 @@ static int make_room(merge_job *job)
 {
     const trip_list_merge *m = job->merge;
     size_t segments = 0;
-    int status = 0, lists = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        segments += m->lists[axis] ? segments_of(m, axis) : 0;
-        lists += m->lists[axis];
+    int status = 0;
+    unsigned lists = 0;
+    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++) {
+        segments += m->lists[list] ? segments_of(m, list) : 0;
+        lists += m->lists[list];
     }
     if (segments <= m->pool->free.chunks)
         return 0;
-    for (int axis = 0; axis < 3 && status == 0; axis++) {
-        status = trip_spill_chain(m->spill, axis, m->pool, &m->in_memory[axis]);
-        trip_chain_free(m->pool, &m->in_memory[axis]);
+    for (unsigned list = 0; list < TRIP_MOST_LISTS && status == 0; list++) {
+        status = trip_spill_chain(m->spill, list, m->pool, &m->in_memory[list]);
+        trip_chain_free(m->pool, &m->in_memory[list]);
     }
-    for (int axis = 0; axis < 3 && status == 0; axis++)
-        while (status == 0 && segments_of(m, axis) > m->pool->free.chunks / (size_t)lists)
-            status = consolidate(job, axis);
+    for (unsigned list = 0; list < TRIP_MOST_LISTS && status == 0; list++)
+        while (status == 0 && segments_of(m, list) > m->pool->free.chunks / (size_t)lists)
+            status = consolidate(job, list);
     return status;
 }
 
 static uint64_t splats_so_far(const trip_list_merge *m)
 {
     uint64_t splats = 0;
-    for (int axis = 0; axis < 3; axis++)
-        splats += atomic_load_explicit(&m->outputs[axis].splats, memory_order_relaxed);
+    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+        splats += atomic_load_explicit(&m->outputs[list].splats, memory_order_relaxed);
     return splats;
 }
 
@@ -183,9 +184,9 @@ int trip_list_merge_run(const trip_list_merge *m, trip_workers *workers,
 {
     merge_job job = { .merge = m };
     unsigned lists = 0;
-    for (int axis = 0; axis < 3; axis++)
-        if (m->lists[axis])
-            job.axes[lists++] = axis;
+    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+        if (m->lists[list])
+            job.lists[lists++] = list;
     pthread_mutex_init(&job.lock, NULL);
     int status = make_room(&job);
     if (status == 0) {

@@ -10,10 +10,10 @@
 
 typedef struct trip_list_merge {
     trip_piece_pool *pool; /* its free chunks are what segments are read through */
-    trip_chain *in_memory; /* of each axis */
+    trip_chain *in_memory; /* of each list */
     trip_spill *spill;
-    trip_list_output *outputs; /* of each axis */
-    bool lists[3];             /* axes to merge */
+    trip_list_output *outputs;   /* of each list */
+    bool lists[TRIP_MOST_LISTS]; /* to merge */
     const trip_quantiser *quantiser;
 } trip_list_merge;
 
@@ -22,7 +22,7 @@ int trip_list_merge_run(const trip_list_merge *m, trip_workers *workers,
                         void (*progress)(void *user, uint64_t splats), void *user);
 
 /* Sorts the pieces of a chain into a segment of the spill. */
-int trip_spill_chain(trip_spill *spill, int axis, const trip_piece_pool *pool,
+int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *pool,
                      const trip_chain *chain);
 
 #endif

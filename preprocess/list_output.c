@@ -6,10 +6,10 @@
 
 enum { LOOK_PIECES = 512 };
 
-int trip_list_output_create(trip_list_output *o, int axis, const trip_piece_format *f,
+int trip_list_output_create(trip_list_output *o, unsigned list, const trip_piece_format *f,
                             trip_writer *writer, trip_budget *budget)
 {
-    *o = (trip_list_output){ .axis = axis, .writer = writer };
+    *o = (trip_list_output){ .list = list, .writer = writer };
     return trip_tile_create(&o->tile, f, budget);
 }
 
@@ -34,8 +34,9 @@ int trip_list_output_append(trip_list_output *o, uint64_t key, const uint32_t *v
                             const uint32_t *normals, uint32_t splats)
 {
     uint64_t tile = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
-    int status = trip_writer_append(o->writer, o->axis, (uint32_t)(key >> TRIP_TILE_MORTON_BITS),
-                                    even_bits(tile), even_bits(tile >> 1), voxels, normals, splats);
+    int status =
+        trip_writer_append(o->writer, (int)o->list, (uint32_t)(key >> TRIP_TILE_MORTON_BITS),
+                           even_bits(tile), even_bits(tile >> 1), voxels, normals, splats);
     atomic_fetch_add_explicit(&o->splats, splats, memory_order_relaxed);
     return status;
 }
@@ -57,7 +58,8 @@ static int flush(assembly *a)
     a->pending = false;
     uint32_t splats = trip_tile_take(o->tile, a->quantiser, &voxels, &normals);
     int status = trip_list_output_append(o, a->key, voxels, normals, splats);
-    return status == 0 && o->run ? o->run(o->run_user, a->key, voxels, normals, splats) : status;
+    return status == 0 && o->run ? o->run(o->run_user, o->list, a->key, voxels, normals, splats)
+                                 : status;
 }
 
 static int take_piece(void *user, const trip_piece *piece)

@@ -7,18 +7,19 @@
 #include "writer.h"
 
 typedef struct trip_list_output {
-    int axis;
+    unsigned list;
     trip_writer *writer;
     trip_tile *tile;
     _Atomic uint64_t splats; /* appended; other threads may look (relaxed) */
     unsigned looked;         /* pieces since the last look for a signal */
     /* Hears of every run appended; NULL: nobody. */
-    int (*run)(void *user, uint64_t key, const uint32_t *voxels, const uint32_t *normals,
-               uint32_t splats);
+    int (*run)(void *user, unsigned list, uint64_t key, const uint32_t *voxels,
+               const uint32_t *normals, uint32_t splats);
     void *run_user;
 } trip_list_output;
 
-int trip_list_output_create(trip_list_output *o, int axis, const trip_piece_format *f,
+/* `f` is the list's own. */
+int trip_list_output_create(trip_list_output *o, unsigned list, const trip_piece_format *f,
                             trip_writer *writer, trip_budget *budget);
 void trip_list_output_destroy(trip_list_output *o);
 

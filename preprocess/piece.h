@@ -18,6 +18,14 @@
 
 #include "budget.h"
 
+/* Lists by number: of kept voxels along X, Y and Z, then of their halo. */
+enum { TRIP_HALO_LISTS = 3, TRIP_MOST_LISTS = 6 };
+
+static inline int trip_list_axis(unsigned list)
+{
+    return (int)(list % 3);
+}
+
 enum {
     TRIP_TILE_MAX_SPLATS = 128 * 128,
     TRIP_TILE_MAX_WORDS = TRIP_TILE_MAX_SPLATS / 64,
@@ -37,12 +45,26 @@ static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
     return !(code > 0) ? 0 : code >= 65535 ? 65535 : (uint32_t)code; /* NaN: 0 */
 }
 
-/* The same for all pieces of a run of the program. */
+/* The same for all pieces of a run of the program, but that those of a halo have no normals. */
 typedef struct trip_piece_format {
     unsigned tile_log2;
     bool quantised; /* codes and whole normals; otherwise floats */
     bool normals;
+    bool halo; /* there are lists of a halo */
 } trip_piece_format;
+
+static inline unsigned trip_piece_list_count(const trip_piece_format *f)
+{
+    return f->halo ? TRIP_MOST_LISTS : TRIP_HALO_LISTS;
+}
+
+/* The format of the pieces of one list. */
+static inline trip_piece_format trip_piece_format_of(const trip_piece_format *f, unsigned list)
+{
+    trip_piece_format own = *f;
+    own.normals = f->normals && list < TRIP_HALO_LISTS;
+    return own;
+}
 
 typedef struct trip_piece {
     uint64_t key;  /* sheet << TRIP_TILE_MORTON_BITS | Morton code of the tile */

@@ -31,7 +31,7 @@ static void count_key_bits(trip_piece_pool *pool, const int64_t dims[3])
 {
     for (int a = 0; a < 3; a++) {
         unsigned sheets = bits_for((uint64_t)dims[a]);
-        unsigned tiles = 2 * bits_for((uint64_t)(dims[a] >> pool->format.tile_log2) + 1);
+        unsigned tiles = 2 * bits_for((uint64_t)(dims[a] >> pool->formats[0].tile_log2) + 1);
         pool->sheet_bits = sheets > pool->sheet_bits ? sheets : pool->sheet_bits;
         pool->tile_bits = tiles > pool->tile_bits ? tiles : pool->tile_bits;
     }
@@ -40,10 +40,11 @@ static void count_key_bits(trip_piece_pool *pool, const int64_t dims[3])
 int trip_piece_pool_create(trip_piece_pool *pool, const trip_piece_format *f, const int64_t dims[3],
                            uint64_t bytes, trip_budget *budget)
 {
-    *pool = (trip_piece_pool){ .format = *f,
-                               .budget = budget,
+    *pool = (trip_piece_pool){ .budget = budget,
                                .chunk_bytes = trip_chunk_bytes(f),
                                .free = trip_chain_empty() };
+    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+        pool->formats[list] = trip_piece_format_of(f, list);
     count_key_bits(pool, dims);
     pool->chunk_count = (bytes < MAX_POOL_BYTES ? bytes : MAX_POOL_BYTES) / pool->chunk_bytes;
     pool->memory = trip_budget_take(budget, pool->chunk_count * pool->chunk_bytes);
@@ -134,7 +135,7 @@ static uint32_t join(const trip_piece_pool *pool, const buckets *from)
 
 /* Links the pieces of a chain by ascending key (radix sort, lowest digit first); returns the first.
  */
-static uint32_t sort_chain(const trip_piece_pool *pool, const trip_chain *c)
+static uint32_t sort_chain(const trip_piece_pool *pool, unsigned list, const trip_chain *c)
 {
     buckets now = { 0 };
     for (uint32_t i = c->first; i != TRIP_NO_CHUNK; i = pool->chunks[i].next) {
@@ -142,7 +143,7 @@ static uint32_t sort_chain(const trip_piece_pool *pool, const trip_chain *c)
         const unsigned char *end = at + pool->chunks[i].used_bytes;
         while (at < end) {
             put(pool, &now, link_of(pool, at), 0);
-            at += trip_piece_get_parts(&pool->format, (const void *)at).bytes;
+            at += trip_piece_get_parts(&pool->formats[list], (const void *)at).bytes;
         }
     }
     uint32_t first = join(pool, &now);
@@ -165,8 +166,9 @@ static int advance(trip_piece_source *source)
     return 0;
 }
 
-trip_pool_source trip_pool_source_make(const trip_piece_pool *pool, const trip_chain *c)
+trip_pool_source trip_pool_source_make(const trip_piece_pool *pool, unsigned list,
+                                       const trip_chain *c)
 {
-    uint32_t first = sort_chain(pool, c);
+    uint32_t first = sort_chain(pool, list, c);
     return (trip_pool_source){ { first ? piece_at(pool, first) : NULL, advance }, pool };
 }

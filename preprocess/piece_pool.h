@@ -23,7 +23,7 @@ static inline trip_chain trip_chain_empty(void)
 }
 
 typedef struct trip_piece_pool {
-    trip_piece_format format;
+    trip_piece_format formats[TRIP_MOST_LISTS]; /* of the pieces of each list */
     trip_budget *budget;
     unsigned tile_bits, sheet_bits; /* that keys make use of */
     size_t chunk_bytes, chunk_count;
@@ -51,13 +51,14 @@ static inline unsigned char *trip_chunk_memory(const trip_piece_pool *pool, uint
     return pool->memory + chunk * pool->chunk_bytes;
 }
 
-/* The pieces of a chain by ascending key; they stay where they are. */
+/* The pieces of a list's chain by ascending key; they stay where they are. */
 typedef struct trip_pool_source {
     trip_piece_source source; /* first */
     const trip_piece_pool *pool;
 } trip_pool_source;
 
 /* The chain must not change while the source is used. */
-trip_pool_source trip_pool_source_make(const trip_piece_pool *pool, const trip_chain *c);
+trip_pool_source trip_pool_source_make(const trip_piece_pool *pool, unsigned list,
+                                       const trip_chain *c);
 
 #endif

@@ -135,7 +135,7 @@ static int make_room(trip_spill *s, size_t count)
 static uint64_t end_of_segment(const trip_segment *t, uint64_t offset)
 {
     uint64_t end;
-    bool sound = t->offset == offset && t->axis < 3 && t->retired == 0 &&
+    bool sound = t->offset == offset && t->list < TRIP_MOST_LISTS && t->retired == 0 &&
                  t->bytes >= sizeof(trip_piece) && t->bytes % 8 == 0 &&
                  !__builtin_add_overflow(t->offset, t->bytes, &end) &&
                  !__builtin_add_overflow(end, BLOCK_BYTES - 1, &end) && end <= INT64_MAX;
@@ -187,7 +187,7 @@ static int write_buffer(trip_spill *s, size_t bytes)
     return 0;
 }
 
-int trip_spill_begin(trip_spill *s, int axis)
+int trip_spill_begin(trip_spill *s, unsigned list)
 {
     if (s->file < 0 && open_file(s) < 0)
         return TRIP_ERROR;
@@ -196,7 +196,7 @@ int trip_spill_begin(trip_spill *s, int axis)
     s->cut = true;
     if (make_room(s, s->count + 1) < 0)
         return TRIP_ERROR;
-    s->segments[s->count] = (trip_segment){ .offset = s->offset, .axis = (uint32_t)axis };
+    s->segments[s->count] = (trip_segment){ .offset = s->offset, .list = list };
     XXH64_reset(s->hash, 0);
     return 0;
 }

@@ -11,7 +11,7 @@ typedef struct trip_segment {
     uint64_t offset;   /* in the file, a multiple of 4096 */
     uint64_t bytes;    /* of pieces */
     uint64_t checksum; /* XXH64 of those bytes */
-    uint32_t axis;
+    uint32_t list;
     uint32_t retired; /* 1: merged into a later segment */
 } trip_segment;
 
@@ -36,7 +36,7 @@ const char *trip_spill_path(const trip_spill *s);
 int trip_spill_folder(const trip_spill *s);
 
 /* Pieces of a segment are appended by ascending key. */
-int trip_spill_begin(trip_spill *s, int axis);
+int trip_spill_begin(trip_spill *s, unsigned list);
 int trip_spill_append(trip_spill *s, const void *piece, size_t bytes);
 int trip_spill_end(trip_spill *s);
 

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "dilate.h"
 #include "format.h"
 #include "normal.h"
 #include "report.h"
@@ -12,13 +13,16 @@
  * the grid along x and y and from the box's own first slice along z. Arrays of voxels are dense,
  * x fastest, `edge` a row; only entries of kept voxels are written and read. */
 typedef struct workspace {
-    float *decoded;   /* the box with one voxel around it where gradients are wanted */
-    uint8_t *active;  /* of the same voxels, in sparse volumes */
+    float *decoded;  /* the box with one voxel around it where gradients or a halo are wanted */
+    uint8_t *active; /* of the same voxels, in sparse volumes */
+    uint8_t *keep;   /* likewise; around the box only where a halo is wanted */
+    uint8_t *near;   /* kept, or a neighbour is */
+    uint8_t *scratch;
     uint32_t *values; /* codes, or the bits of floats */
     uint32_t *normals;
     float *magnitudes;
-    uint64_t *bits[3]; /* [sheet][word]: which places of the cell's part of a sheet are taken */
-    uint64_t kept;     /* in all boxes so far */
+    uint64_t *bits[3];   /* [sheet][word]: which places of the cell's part of a sheet are taken */
+    uint64_t kept, halo; /* in all boxes so far; a voxel of a halo as often as boxes give it */
     trip_tally tally;
 } workspace;
 
@@ -35,15 +39,21 @@ struct trip_splatter {
     unsigned char *memory; /* of all threads; each begins with its workspace */
 };
 
-/* The box at hand, and how to step through the decoded values. */
+/* Decoded voxels: the box and what is around it. */
+typedef struct window {
+    int64_t lo[3], size[3];
+    int64_t pitch, slice; /* entries to the next row and slice */
+} window;
+
+/* A part of the window that lies in one cell of the grid, whose splats are made together. */
 typedef struct view {
     const trip_splatter *s;
-    const trip_box *box;
+    const window *window;
     workspace *w;
-    int64_t cell[3];      /* grid coordinates of the local origin */
-    int64_t from[3];      /* local coordinates of the box's first voxel */
-    int64_t pitch, slice; /* decoded values to the next row and slice */
-    const float *first;   /* decoded value of the box's first voxel */
+    int64_t lo[3], size[3];
+    int64_t cell[3]; /* grid coordinates of the local origin */
+    int64_t from[3]; /* local coordinates of the part's first voxel */
+    size_t first;    /* in the window, of that voxel */
 } view;
 
 int64_t trip_splat_edge(const trip_piece_format *f)
@@ -63,16 +73,19 @@ static void *carve(unsigned char *base, size_t *used, size_t bytes)
 static size_t lay_out(const trip_piece_format *f, bool sparse, unsigned char *base, workspace *w)
 {
     size_t edge = (size_t)trip_splat_edge(f), plane = edge * edge, used = 0;
-    size_t halo = (edge + 2) * (edge + 2) * (TRIP_SPLAT_HEIGHT + 2);
-    size_t voxels = plane * TRIP_SPLAT_HEIGHT;
+    size_t around = (edge + 2) * (edge + 2) * (TRIP_SPLAT_HEIGHT + 2);
+    size_t voxels = plane * TRIP_SPLAT_HEIGHT, height = TRIP_SPLAT_HEIGHT + (f->halo ? 2 : 0);
     carve(base, &used, sizeof *w);
-    w->decoded = carve(base, &used, halo * sizeof(float));
-    w->active = carve(base, &used, sparse ? halo : 0);
-    w->values = carve(base, &used, voxels * sizeof(uint32_t));
+    w->decoded = carve(base, &used, around * sizeof(float));
+    w->active = carve(base, &used, sparse ? around : 0);
+    w->keep = carve(base, &used, around + 8); /* looked at eight at a time */
+    w->near = carve(base, &used, f->halo ? around + 8 : 0);
+    w->scratch = carve(base, &used, f->halo ? around : 0);
+    w->values = carve(base, &used, plane * height * sizeof(uint32_t));
     w->normals = carve(base, &used, f->normals ? voxels * sizeof(uint32_t) : 0);
     w->magnitudes = carve(base, &used, f->normals && !f->quantised ? voxels * sizeof(float) : 0);
     for (int axis = 0; axis < 3; axis++)
-        w->bits[axis] = carve(base, &used, (axis == 2 ? TRIP_SPLAT_HEIGHT : edge) * plane / 8);
+        w->bits[axis] = carve(base, &used, (axis == 2 ? height : edge) * plane / 8);
     return (used + 4095) & ~(size_t)4095;
 }
 
@@ -149,30 +162,32 @@ void trip_splatter_destroy(trip_splatter *s)
         trip_budget_release(s->budget, s, s->bytes);
 }
 
-static view view_of(const trip_splatter *s, unsigned thread, const trip_box *box)
+static window window_of(const trip_splatter *s, const trip_box *box)
 {
-    view v = { .s = s, .box = box, .w = workspace_of(s, thread) };
-    int64_t halo = s->params.format.normals ? 1 : 0;
-    for (int a = 0; a < 2; a++) {
-        v.cell[a] = box->lo[a] & ~(s->edge - 1);
-        v.from[a] = box->lo[a] - v.cell[a];
+    window n;
+    int64_t around = s->params.format.normals || s->params.format.halo;
+    for (int a = 0; a < 3; a++) {
+        n.lo[a] = box->lo[a] - around;
+        n.size[a] = box->size[a] + 2 * around;
     }
-    v.cell[2] = box->lo[2];
-    v.pitch = box->size[0] + 2 * halo;
-    v.slice = v.pitch * (box->size[1] + 2 * halo);
-    v.first = v.w->decoded + halo * (v.slice + v.pitch + 1);
-    return v;
+    n.pitch = n.size[0];
+    n.slice = n.size[0] * n.size[1];
+    return n;
 }
 
-static int decode(const view *v)
+static view view_of(const trip_splatter *s, unsigned thread, const window *n, const int64_t lo[3],
+                    const int64_t size[3])
 {
-    int64_t halo = v->s->params.format.normals ? 1 : 0, lo[3], size[3];
+    view v = { .s = s, .window = n, .w = workspace_of(s, thread) };
     for (int a = 0; a < 3; a++) {
-        lo[a] = v->box->lo[a] - halo;
-        size[a] = v->box->size[a] + 2 * halo;
+        v.lo[a] = lo[a];
+        v.size[a] = size[a];
+        v.cell[a] = a == 2 ? lo[a] : lo[a] & ~(s->edge - 1);
+        v.from[a] = lo[a] - v.cell[a];
     }
-    return trip_block_decode(v->box->volume, v->box->block, lo, size, v->w->decoded,
-                             v->s->params.info->sparse ? v->w->active : NULL);
+    v.first =
+        (size_t)((lo[2] - n->lo[2]) * n->slice + (lo[1] - n->lo[1]) * n->pitch + lo[0] - n->lo[0]);
+    return v;
 }
 
 static inline double difference(const float *at, int64_t step)
@@ -188,31 +203,36 @@ static double careful_difference(const float *at, int64_t step)
     return 0.5 * (after - before);
 }
 
-/* World-space gradient: J^-T times the central differences of index space. */
+/* Central differences of index space; J^-T takes them to world space. */
 static inline void gradient(const view *v, const float *at, double g[3])
 {
-    double x = difference(at, 1), y = difference(at, v->pitch), z = difference(at, v->slice);
-    if (!isfinite(x + y + z)) { /* as soon as one neighbour is not */
-        x = careful_difference(at, 1);
-        y = careful_difference(at, v->pitch);
-        z = careful_difference(at, v->slice);
-    }
-    const double(*m)[3] = v->s->to_world;
-    for (int row = 0; row < 3; row++)
-        g[row] = m[row][0] * x + m[row][1] * y + m[row][2] * z;
+    const int64_t step[3] = { 1, v->window->pitch, v->window->slice };
+    for (int a = 0; a < 3; a++)
+        g[a] = difference(at, step[a]);
+    if (isfinite(g[0] + g[1] + g[2]))
+        return;
+    for (int a = 0; a < 3; a++) /* as soon as one neighbour is not */
+        g[a] = careful_difference(at, step[a]);
 }
 
-/* The kept voxels of a row of the box. Local coordinates in `x`, ascending. */
-typedef struct kept_row {
+static inline void to_world(const trip_splatter *s, const double index[3], double g[3])
+{
+    const double(*m)[3] = s->to_world;
+    for (int row = 0; row < 3; row++)
+        g[row] = m[row][0] * index[0] + m[row][1] * index[1] + m[row][2] * index[2];
+}
+
+/* The voxels of a row that become splats. Local coordinates in `x`, ascending. */
+typedef struct splat_row {
     const float *values; /* decoded, of local x `first` */
     unsigned first;
     int64_t y, z; /* local */
     size_t index; /* in the arrays of voxels, of local x 0 */
     unsigned count;
     uint8_t x[128];
-} kept_row;
+} splat_row;
 
-static void put_values(const view *v, const kept_row *r)
+static void put_values(const view *v, const splat_row *r)
 {
     uint32_t *to = v->w->values + r->index;
     const trip_quantiser q = v->s->params.quantiser;
@@ -224,14 +244,19 @@ static void put_values(const view *v, const kept_row *r)
             memcpy(&to[r->x[i]], &r->values[r->x[i] - r->first], sizeof *to);
 }
 
-static void put_normals(const view *v, const kept_row *r)
+static void put_normals(const view *v, const splat_row *r)
 {
     uint32_t *to = v->w->normals + r->index;
     const trip_splat_params *p = &v->s->params;
     for (unsigned i = 0; i < r->count; i++) {
         unsigned x = r->x[i];
-        double g[3];
-        gradient(v, r->values + (x - r->first), g);
+        double index[3], g[3];
+        gradient(v, r->values + (x - r->first), index);
+        if (p->compact) {
+            to[x] = trip_compact_normal_pack(p->compact, index);
+            continue;
+        }
+        to_world(v->s, index, g);
         if (p->format.quantised) {
             to[x] = trip_normal_pack(g, p->quantiser.gradient_scale);
             continue;
@@ -244,11 +269,11 @@ static void put_normals(const view *v, const kept_row *r)
 
 /* Marks the voxels in the sheets of the three lists. The place in a sheet counts the third
  * coordinate from a multiple of the edge. */
-static void mark(const view *v, const kept_row *r)
+static void mark(const view *v, const splat_row *r)
 {
     const uint16_t *spread = v->s->spread;
     const size_t words = v->s->words;
-    const unsigned y = spread[r->y], z = spread[(v->box->lo[2] + r->z) & (v->s->edge - 1)];
+    const unsigned y = spread[r->y], z = spread[(v->lo[2] + r->z) & (v->s->edge - 1)];
     const unsigned place = y | z << 1; /* in all sheets along X */
     uint64_t *x_words = v->w->bits[0] + place / 64;
     uint64_t *y_sheet = v->w->bits[1] + (size_t)r->y * words;
@@ -262,50 +287,63 @@ static void mark(const view *v, const kept_row *r)
     }
 }
 
-/* Places of the ones in `keep`, each counted from `first`; returns how many. */
-static unsigned find_kept(const uint8_t *keep, int64_t count, int64_t first, uint8_t *places)
+/* Places of the ones in `flags`, each counted from `first`; returns how many. */
+static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, uint8_t *places)
 {
     unsigned n = 0;
     for (int64_t i = 0; i < count; i += 8) {
         uint64_t eight;
-        memcpy(&eight, keep + i, sizeof eight);
+        memcpy(&eight, flags + i, sizeof eight);
         if (eight == 0)
             continue;
         for (int64_t k = i; k < i + 8 && k < count; k++) {
             places[n] = (uint8_t)(first + k);
-            n += keep[k];
+            n += flags[k];
         }
     }
     return n;
 }
 
-static unsigned do_row(const view *v, int64_t y, int64_t z)
+/* The row (y, z) of a part, with those of its voxels that have a flag. */
+static splat_row row_of(const view *v, const uint8_t *flags, int64_t y, int64_t z)
 {
-    uint8_t keep[128 + 8] = { 0 }; /* looked at eight at a time */
-    const float *row = v->first + z * v->slice + y * v->pitch;
-    const trip_splat_params *p = &v->s->params;
-    const uint8_t *active = p->info->sparse ? v->w->active + (row - v->w->decoded) : NULL;
-    size_t count = (size_t)v->box->size[0];
-    if (p->tally)
-        trip_tally_range(&v->w->tally, row, active, count);
-    if (p->tally)
-        trip_tally_count(&v->w->tally, row, active, count);
-    trip_envelope_keep_row(p->envelope, row, count, keep);
-    for (size_t i = 0; active && i < count; i++)
-        keep[i] &= active[i];
-    kept_row r = { .values = row,
-                   .first = (unsigned)v->from[0],
-                   .y = v->from[1] + y,
-                   .z = z,
-                   .index = (size_t)((z * v->s->edge + v->from[1] + y) * v->s->edge) };
-    r.count = find_kept(keep, v->box->size[0], v->from[0], r.x);
-    if (r.count == 0)
-        return 0;
-    mark(v, &r);
-    put_values(v, &r);
-    if (p->format.normals)
-        put_normals(v, &r);
-    return r.count;
+    size_t at = v->first + (size_t)(z * v->window->slice + y * v->window->pitch);
+    splat_row r = { .values = v->w->decoded + at,
+                    .first = (unsigned)v->from[0],
+                    .y = v->from[1] + y,
+                    .z = z,
+                    .index = (size_t)((z * v->s->edge + v->from[1] + y) * v->s->edge) };
+    r.count = find_flags(flags + at, v->size[0], v->from[0], r.x);
+    return r;
+}
+
+static void put_row(const view *v, const splat_row *r, bool normals)
+{
+    if (r->count == 0)
+        return;
+    mark(v, r);
+    put_values(v, r);
+    if (normals)
+        put_normals(v, r);
+}
+
+static void tally_row(const view *v, int64_t y, int64_t z)
+{
+    size_t at = v->first + (size_t)(z * v->window->slice + y * v->window->pitch);
+    const uint8_t *active = v->s->params.info->sparse ? v->w->active + at : NULL;
+    trip_tally_range(&v->w->tally, v->w->decoded + at, active, (size_t)v->size[0]);
+    trip_tally_count(&v->w->tally, v->w->decoded + at, active, (size_t)v->size[0]);
+}
+
+/* Which voxels of the window are kept. */
+static void find_kept(const trip_splatter *s, const workspace *w, const window *n)
+{
+    const int64_t rows = n->size[1] * n->size[2];
+    for (int64_t r = 0; r < rows; r++)
+        trip_envelope_keep_row(s->params.envelope, w->decoded + r * n->pitch, (size_t)n->pitch,
+                               w->keep + r * n->pitch);
+    for (int64_t i = 0; s->params.info->sparse && i < rows * n->pitch; i++)
+        w->keep[i] &= w->active[i];
 }
 
 static void clear_bits(const view *v)
@@ -313,12 +351,13 @@ static void clear_bits(const view *v)
     size_t words = v->s->words;
     for (int axis = 0; axis < 3; axis++)
         memset(v->w->bits[axis] + (size_t)v->from[axis] * words, 0,
-               (size_t)v->box->size[axis] * words * sizeof(uint64_t));
+               (size_t)v->size[axis] * words * sizeof(uint64_t));
 }
 
 /* Where the splats of one tile of one sheet are, to be gathered in list order. */
 typedef struct part {
-    int axis;
+    unsigned list;
+    int axis;               /* the list's */
     int64_t sheet;          /* local */
     unsigned first_place;   /* of the tile in the cell's square */
     const uint64_t *bitmap; /* of the tile */
@@ -344,7 +383,7 @@ static uint32_t gather_indices(const view *v, const part *p, uint32_t *indices)
     /* Places count the third coordinate from a multiple of the edge, the arrays from the box. */
     int64_t base = p->sheet * stride[p->axis];
     if (p->axis != 2)
-        base -= (v->box->lo[2] & (edge - 1)) * stride[2];
+        base -= (v->lo[2] & (edge - 1)) * stride[2];
     uint32_t n = 0;
     for (unsigned w = 0; w < p->words; w++)
         for (uint64_t bits = p->bitmap[w]; bits; bits &= bits - 1) {
@@ -354,11 +393,12 @@ static uint32_t gather_indices(const view *v, const part *p, uint32_t *indices)
     return n;
 }
 
-static void fill_piece(const view *v, trip_piece *piece, const uint32_t *indices, uint32_t splats)
+static void fill_piece(const view *v, const trip_piece_format *f, trip_piece *piece,
+                       const uint32_t *indices, uint32_t splats)
 {
     const workspace *w = v->w;
     unsigned char *base = (unsigned char *)piece;
-    trip_piece_parts parts = trip_piece_get_parts(&v->s->params.format, piece);
+    trip_piece_parts parts = trip_piece_get_parts(f, piece);
     uint16_t *codes = (void *)(base + parts.values);
     uint32_t *floats = (void *)(base + parts.values), *normals = (void *)(base + parts.normals);
     float *magnitudes = (void *)(base + parts.magnitudes);
@@ -386,44 +426,122 @@ static int emit_part(const view *v, unsigned thread, const part *p)
     if (used == 0)
         return 0;
     uint32_t splats = gather_indices(v, p, indices);
-    unsigned words = trip_piece_choose_words(&params->format, splats, used);
-    size_t bytes = trip_piece_layout(&params->format, splats, words).bytes;
-    trip_piece *piece = params->reserve(params->user, thread, p->axis, bytes);
+    const trip_piece_format f = trip_piece_format_of(&params->format, p->list);
+    unsigned words = trip_piece_choose_words(&f, splats, used);
+    size_t bytes = trip_piece_layout(&f, splats, words).bytes;
+    trip_piece *piece = params->reserve(params->user, thread, p->list, bytes);
     if (!piece)
         return TRIP_ERROR;
-    trip_piece_begin(piece, &params->format, key_of(v, p), splats, words, p->bitmap);
-    fill_piece(v, piece, indices, splats);
+    trip_piece_begin(piece, &f, key_of(v, p), splats, words, p->bitmap);
+    fill_piece(v, &f, piece, indices, splats);
     return 0;
 }
 
-static int emit_list(const view *v, unsigned thread, int axis)
+static int emit_list(const view *v, unsigned thread, unsigned list)
 {
     unsigned tile_words = 1u << (2 * v->s->params.format.tile_log2 - 6);
-    int status = 0;
-    for (int64_t i = 0; i < v->box->size[axis] && status == 0; i++) {
+    int status = 0, axis = trip_list_axis(list);
+    for (int64_t i = 0; i < v->size[axis] && status == 0; i++) {
         int64_t sheet = v->from[axis] + i;
         const uint64_t *bits = v->w->bits[axis] + (size_t)sheet * v->s->words;
         for (unsigned w = 0; w < v->s->words && status == 0; w += tile_words)
-            status = emit_part(v, thread, &(part){ axis, sheet, w * 64, bits + w, tile_words });
+            status =
+                emit_part(v, thread, &(part){ list, axis, sheet, w * 64, bits + w, tile_words });
     }
+    return status;
+}
+
+/* Makes the pieces of all voxels of a part that have a flag, in three lists from `list` on; adds
+ * their number to *splats. */
+static int make_part(const view *v, unsigned thread, const uint8_t *flags, unsigned list,
+                     uint64_t *splats)
+{
+    uint64_t made = 0;
+    int status = 0;
+    clear_bits(v);
+    for (int64_t z = 0; z < v->size[2]; z++)
+        for (int64_t y = 0; y < v->size[1]; y++) {
+            splat_row r = row_of(v, flags, y, z);
+            put_row(v, &r, v->s->params.format.normals && list < TRIP_HALO_LISTS);
+            made += r.count;
+        }
+    for (unsigned l = list; l < list + 3 && made > 0 && status == 0; l++)
+        status = emit_list(v, thread, l);
+    *splats += made;
+    return status;
+}
+
+/* Marks the voxels of the window that are not kept, have a value, and a neighbour that is kept.
+ * False when there are none. */
+static bool find_halo(const workspace *w, const window *n)
+{
+    size_t count = (size_t)(n->slice * n->size[2]);
+    if (!memchr(w->keep, 1, count) || !memchr(w->keep, 0, count))
+        return false;
+    trip_dilate(w->keep, w->near, w->scratch, n->size);
+    for (size_t i = 0; i < count; i++)
+        w->near[i] &= (uint8_t)(!w->keep[i] & (fabsf(w->decoded[i]) <= FLT_MAX));
+    return true;
+}
+
+/* The voxels whose halo this box makes: its own, and where no block of a sparse volume may be, one
+ * around it. What several boxes make is put together as one. */
+static void halo_range(const trip_splatter *s, const trip_box *box, int axis, int64_t *begin,
+                       int64_t *end)
+{
+    const int64_t first = box->block->origin[axis], past = first + box->block->size[axis];
+    *begin = box->lo[axis];
+    *end = *begin + box->size[axis];
+    if (s->params.info->sparse && *begin == first && *begin > 0)
+        --*begin;
+    if (s->params.info->sparse && *end == past && *end < s->params.info->dims[axis])
+        ++*end;
+}
+
+/* The part of [begin, end) along an axis that is in the cell of `at`. */
+static int64_t cell_end(const trip_splatter *s, int64_t at, int64_t end)
+{
+    int64_t past = (at & ~(s->edge - 1)) + s->edge;
+    return past < end ? past : end;
+}
+
+/* Cell by cell: what is around a box may lie in others. */
+static int make_halo(const trip_splatter *s, unsigned thread, const trip_box *box, const window *n)
+{
+    workspace *w = workspace_of(s, thread);
+    int64_t begin[3], end[3], at[3];
+    int status = 0;
+    if (!find_halo(w, n))
+        return 0;
+    for (int a = 0; a < 3; a++)
+        halo_range(s, box, a, &begin[a], &end[a]);
+    for (at[2] = begin[2]; at[2] < end[2]; at[2] = cell_end(s, at[2], end[2]))
+        for (at[1] = begin[1]; at[1] < end[1]; at[1] = cell_end(s, at[1], end[1]))
+            for (at[0] = begin[0]; at[0] < end[0] && status == 0;
+                 at[0] = cell_end(s, at[0], end[0])) {
+                int64_t size[3];
+                for (int a = 0; a < 3; a++)
+                    size[a] = cell_end(s, at[a], end[a]) - at[a];
+                view v = view_of(s, thread, n, at, size);
+                status = make_part(&v, thread, w->near, TRIP_HALO_LISTS, &w->halo);
+            }
     return status;
 }
 
 int trip_splatter_box(trip_splatter *s, unsigned thread, const trip_box *box)
 {
-    view v = view_of(s, thread, box);
-    uint64_t kept = 0;
-    int status = decode(&v);
+    workspace *w = workspace_of(s, thread);
+    const window n = window_of(s, box);
+    view v = view_of(s, thread, &n, box->lo, box->size);
+    int status = trip_block_decode(box->volume, box->block, n.lo, n.size, w->decoded,
+                                   s->params.info->sparse ? w->active : NULL);
     if (status < 0)
         return status;
-    clear_bits(&v);
-    for (int64_t z = 0; z < box->size[2]; z++)
-        for (int64_t y = 0; y < box->size[1]; y++)
-            kept += do_row(&v, y, z);
-    v.w->kept += kept;
-    for (int axis = 0; axis < 3 && kept > 0 && status == 0; axis++)
-        status = emit_list(&v, thread, axis);
-    return status;
+    for (int64_t row = 0; s->params.tally && row < box->size[1] * box->size[2]; row++)
+        tally_row(&v, row % box->size[1], row / box->size[1]);
+    find_kept(s, w, &n);
+    status = make_part(&v, thread, w->keep, 0, &w->kept);
+    return status == 0 && s->params.format.halo ? make_halo(s, thread, box, &n) : status;
 }
 
 void trip_splatter_tally(const trip_splatter *s, trip_tally *out)
@@ -439,6 +557,14 @@ uint64_t trip_splatter_kept(const trip_splatter *s)
     for (unsigned i = 0; i < s->params.threads; i++)
         kept += workspace_of(s, i)->kept;
     return kept;
+}
+
+uint64_t trip_splatter_halo(const trip_splatter *s)
+{
+    uint64_t halo = 0;
+    for (unsigned i = 0; i < s->params.threads; i++)
+        halo += workspace_of(s, i)->halo;
+    return halo;
 }
 
 double trip_gradient_unit(const trip_affine *index_to_world)

@@ -236,7 +236,7 @@ ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
 ATTACK(most_segments, checkpoint()->segments = UINT64_MAX)
 ATTACK(segments_that_wrap, checkpoint()->segments += UINT64_C(1) << 59)
 ATTACK(fewer_segments, checkpoint()->segments--)
-ATTACK(segment_of_no_axis, segments()->axis = 3)
+ATTACK(segment_of_no_list, segments()->list = 6)
 ATTACK(segment_elsewhere, segments()->offset = 4096)
 ATTACK(segment_that_wraps, segments()->bytes = UINT64_MAX - 4095)
 ATTACK(segment_of_nothing, segments()->bytes = 0)
@@ -290,7 +290,7 @@ static void segments_that_no_run_writes_are_refused(void **state)
 {
     (void)state;
     static const attack attacks[] = {
-        { "segment of no axis", segment_of_no_axis },
+        { "segment of no axis", segment_of_no_list },
         { "segment elsewhere", segment_elsewhere },
         { "segment that wraps", segment_that_wraps },
         { "segment of nothing", segment_of_nothing },

@@ -24,7 +24,7 @@ typedef struct building {
     trip_list_builder *builder;
 } building;
 
-static const trip_piece_format format = { 5, true, true };
+static const trip_piece_format format = { 5, true, true, false };
 static const int64_t dims[3] = { NX, NY, NZ };
 
 static void open_building(building *b, const char *name, const run_params *p)
@@ -78,14 +78,14 @@ static bool is_splat(unsigned x, unsigned y, unsigned z)
 }
 
 /* The piece of one row of voxels: x from x0 to x0 + 31, in the list along `axis`. */
-static void put_row(trip_list_builder *b, unsigned producer, int axis, const unsigned from[3],
+static void put_row(trip_list_builder *b, unsigned producer, unsigned axis, const unsigned from[3],
                     unsigned step_axis)
 {
     uint64_t bitmap[16] = { 0 };
     uint16_t codes[32];
     uint32_t normals[32];
     unsigned splats = 0, used = 0, p[3] = { from[0], from[1], from[2] };
-    const unsigned u = ((unsigned)axis + 1) % 3, v = ((unsigned)axis + 2) % 3;
+    const unsigned u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (unsigned i = 0; i < 32 && from[step_axis] + i < (unsigned)dims[step_axis]; i++) {
         p[step_axis] = from[step_axis] + i;
         if (!is_splat(p[0], p[1], p[2]))

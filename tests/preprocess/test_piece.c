@@ -107,7 +107,7 @@ static void pieces_of_a_tile_come_out_as_one_run(void **state)
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 26), 0);
     for (unsigned log2 = 4; log2 <= 7; log2++)
         for (int kind = 0; kind < 4; kind++)
-            check_format(&(trip_piece_format){ log2, kind & 1, kind & 2 }, budget);
+            check_format(&(trip_piece_format){ log2, kind & 1, kind & 2, false }, budget);
     trip_budget_destroy(budget);
 }
 
@@ -121,7 +121,7 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
     uint64_t random = 5;
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 26), 0);
     for (unsigned log2 = 4; log2 <= 7; log2++) {
-        const trip_piece_format f = { log2, true, true };
+        const trip_piece_format f = { log2, true, true, false };
         uint64_t bitmap[TRIP_TILE_MAX_WORDS] = { 0 };
         trip_tile *tile;
         assert_int_equal(trip_tile_create(&tile, &f, budget), 0);

@@ -16,19 +16,19 @@ typedef struct bench {
     trip_splatter *splatter;
     trip_piece_format format;
     trip_quantiser quantiser;
-    unsigned char *memory[3]; /* pieces, one after the other */
-    size_t used[3];
+    unsigned char *memory[TRIP_MOST_LISTS]; /* pieces, one after the other */
+    size_t used[TRIP_MOST_LISTS];
 } bench;
 
 enum { PIECE_MEMORY = 16 << 20 };
 
-static void *keep_piece(void *user, unsigned thread, int axis, size_t bytes)
+static void *keep_piece(void *user, unsigned thread, unsigned list, size_t bytes)
 {
     bench *b = user;
     (void)thread;
-    void *at = b->memory[axis] + b->used[axis];
-    assert_true(b->used[axis] + bytes <= PIECE_MEMORY);
-    b->used[axis] += bytes;
+    void *at = b->memory[list] + b->used[list];
+    assert_true(b->used[list] + bytes <= PIECE_MEMORY);
+    b->used[list] += bytes;
     return at;
 }
 
@@ -37,7 +37,7 @@ static void open_bench(bench *b, const int64_t dims[3], const float *values, uns
 {
     size_t count = (size_t)(dims[0] * dims[1] * dims[2]);
     trip_volume_params p = { .raw_dims = { dims[0], dims[1], dims[2] }, .raw_type = "float" };
-    *b = (bench){ .format = { tile_log2, quantised, true },
+    *b = (bench){ .format = { tile_log2, quantised, true, false },
                   .quantiser = { .lo = -1000, .hi = 1000, .gradient_scale = 4096 } };
     memcpy(b->dims, dims, sizeof b->dims);
     test_write("v.raw", values, count * sizeof *values);
@@ -45,8 +45,8 @@ static void open_bench(bench *b, const int64_t dims[3], const float *values, uns
     assert_int_equal(trip_workers_create(&b->workers, 1), 0);
     assert_int_equal(trip_volume_open(&b->volume, test_path("v.raw"), &p, b->budget), 0);
     b->info = *trip_volume_get_info(b->volume);
-    for (int axis = 0; axis < 3; axis++)
-        b->memory[axis] = aligned_alloc(8, PIECE_MEMORY);
+    for (int list = 0; list < TRIP_MOST_LISTS; list++)
+        b->memory[list] = aligned_alloc(8, PIECE_MEMORY);
 }
 
 static int splat_box(void *user, unsigned thread, const trip_box *box)
@@ -89,25 +89,28 @@ static void close_bench(bench *b)
     trip_volume_close(b->volume);
     trip_workers_destroy(b->workers);
     trip_budget_destroy(b->budget);
-    for (int axis = 0; axis < 3; axis++)
-        free(b->memory[axis]);
+    for (int list = 0; list < TRIP_MOST_LISTS; list++)
+        free(b->memory[list]);
 }
 
-/* The splats of a list by voxel: records, 0xff... where there is none. */
-static void gather(bench *b, int axis, uint32_t *voxels, uint32_t *normals)
+/* The splats of a list by voxel: records, 0xff... where there is none. Those of a halo have no
+ * normals. */
+static void gather(bench *b, unsigned list, uint32_t *voxels, uint32_t *normals)
 {
     trip_tile *tile;
+    const int axis = trip_list_axis(list);
+    const trip_piece_format format = trip_piece_format_of(&b->format, list);
     trip_quantiser q = b->quantiser;
     q.gradient_unit = trip_gradient_unit(&b->info.index_to_world);
     size_t count = (size_t)(b->dims[0] * b->dims[1] * b->dims[2]);
     memset(voxels, 0xff, count * sizeof *voxels);
     memset(normals, 0xff, count * sizeof *normals);
-    assert_int_equal(trip_tile_create(&tile, &b->format, b->budget), 0);
-    for (size_t at = 0; at < b->used[axis];) {
-        const trip_piece *piece = (const void *)(b->memory[axis] + at);
+    assert_int_equal(trip_tile_create(&tile, &format, b->budget), 0);
+    for (size_t at = 0; at < b->used[list];) {
+        const trip_piece *piece = (const void *)(b->memory[list] + at);
         const uint32_t *v, *n;
-        size_t bytes = trip_piece_get_parts(&b->format, piece).bytes;
-        assert_true(trip_piece_check(piece, &b->format, bytes));
+        size_t bytes = trip_piece_get_parts(&format, piece).bytes;
+        assert_true(trip_piece_check(piece, &format, bytes));
         at += bytes;
         trip_tile_add(tile, piece);
         uint32_t splats = trip_tile_take(tile, &q, &v, &n);
@@ -122,9 +125,9 @@ static void gather(bench *b, int axis, uint32_t *voxels, uint32_t *normals)
             p[(axis + 1) % 3] = (tile_u << b->format.tile_log2) + trip_voxel_u(v[i]);
             p[(axis + 2) % 3] = (tile_v << b->format.tile_log2) + trip_voxel_v(v[i]);
             size_t to = (size_t)((p[2] * b->dims[1] + p[1]) * b->dims[0] + p[0]);
-            assert_true(to < count && normals[to] == UINT32_MAX);
+            assert_true(to < count && voxels[to] == UINT32_MAX);
             voxels[to] = trip_voxel_code(v[i]);
-            normals[to] = n[i];
+            normals[to] = n ? n[i] : UINT32_MAX;
         }
     }
     trip_tile_destroy(tile);
@@ -162,6 +165,94 @@ static void every_kept_voxel_is_once_in_every_list(void **state)
         close_bench(&b);
     }
     trip_envelope_destroy(&e);
+}
+
+/* Whether voxel i of the grid has a neighbour, or is itself, in [lo, hi]. */
+static bool is_near(const float *values, const int64_t dims[3], int64_t i, float lo, float hi)
+{
+    int64_t at[3] = { i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1] };
+    for (int n = 0; n < 27; n++) {
+        int64_t x = at[0] + n % 3 - 1, y = at[1] + n / 3 % 3 - 1, z = at[2] + n / 9 - 1;
+        if (x < 0 || y < 0 || z < 0 || x >= dims[0] || y >= dims[1] || z >= dims[2])
+            continue;
+        float value = values[(z * dims[1] + y) * dims[0] + x];
+        if (value >= lo && value <= hi)
+            return true;
+    }
+    return false;
+}
+
+static void check_halo(bench *b, const float *values, float lo, float hi)
+{
+    size_t count = (size_t)(b->dims[0] * b->dims[1] * b->dims[2]);
+    uint32_t *voxels = malloc(count * sizeof *voxels), *normals = malloc(count * sizeof *normals);
+    uint64_t halo = 0;
+    assert_true(voxels && normals);
+    for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS; list++) {
+        gather(b, list, voxels, normals);
+        for (size_t i = 0; i < count; i++) {
+            bool kept = values[i] >= lo && values[i] <= hi;
+            bool wanted =
+                !kept && isfinite(values[i]) && is_near(values, b->dims, (int64_t)i, lo, hi);
+            assert_int_equal(voxels[i], wanted ? (uint32_t)values[i] : UINT32_MAX);
+            halo += wanted;
+        }
+    }
+    assert_int_equal(3 * trip_splatter_halo(b->splatter), halo);
+    free(voxels);
+    free(normals);
+}
+
+/* Few voxels are kept, at random, some at the borders of boxes; some values are not finite. */
+static void the_halo_is_what_is_around_kept_voxels(void **state)
+{
+    (void)state;
+    enum { NX = 131, NY = 70, NZ = 37, N = NX * NY * NZ };
+    const int64_t dims[3] = { NX, NY, NZ };
+    static float values[N];
+    for (unsigned log2 = 4; log2 <= 7; log2++)
+        for (int normals = 0; normals < 2; normals++) {
+            trip_envelope e = { 0 };
+            uint64_t random = 9 + log2;
+            bench b;
+            unsigned rare = log2 % 2 ? 1000 : 20;
+            for (int i = 0; i < N; i++)
+                values[i] = test_random(&random) % rare == 0 ? 1000 : (float)(i % 900);
+            for (int i = 5; i < N; i += 997)
+                values[i] = i % 2 ? NAN : INFINITY;
+            assert_int_equal(trip_envelope_add_range(&e, 950, 1001), 0);
+            open_bench(&b, dims, values, log2, true);
+            b.format.halo = true;
+            b.format.normals = normals;
+            b.quantiser.lo = 0;
+            b.quantiser.hi = 65535;
+            splat_all(&b, &e, 1 + 3 * log2);
+            check_halo(&b, values, 950, 1001);
+            close_bench(&b);
+            trip_envelope_destroy(&e);
+        }
+}
+
+static void without_a_border_of_what_is_kept_there_is_no_halo(void **state)
+{
+    (void)state;
+    enum { N = 20 };
+    const int64_t dims[3] = { N, N, N };
+    static float values[N * N * N];
+    for (int all = 0; all < 2; all++) {
+        trip_envelope e = { 0 };
+        bench b;
+        assert_int_equal(trip_envelope_add_range(&e, all ? 0 : 1, 2), 0);
+        open_bench(&b, dims, values, 6, true);
+        b.format.halo = true;
+        splat_all(&b, &e, 7);
+        assert_int_equal(trip_splatter_halo(b.splatter), 0);
+        for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS; list++)
+            assert_int_equal(b.used[list], 0);
+        assert_int_equal(trip_splatter_kept(b.splatter), all ? N * N * N : 0);
+        close_bench(&b);
+        trip_envelope_destroy(&e);
+    }
 }
 
 /* A rotation, a shear and unequal spacings. */
@@ -299,6 +390,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(every_kept_voxel_is_once_in_every_list, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(the_halo_is_what_is_around_kept_voxels, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(without_a_border_of_what_is_kept_there_is_no_halo,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(gradients_of_a_linear_field_are_right_in_a_sheared_space,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(gradients_of_a_quadratic_field_are_right_in_a_sheared_space,
