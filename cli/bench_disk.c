@@ -16,7 +16,7 @@ bench_files bench_files_of_plan(const trip_plan *plan)
     bench_files files = 0;
     for (int axis = 0; axis < 3; axis++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (plan->lists[axis].pass_count && plan->planes >> plane & 1)
+            if (plan->layers[axis].pass_count && plan->planes >> plane & 1)
                 files |= 1u << (axis * TRIP_PLANES + plane);
     return files;
 }

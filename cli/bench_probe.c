@@ -29,7 +29,7 @@ static int begin_frame(trip_renderer *r, const trip_frame *frame)
     return 0;
 }
 
-static int begin_list(trip_renderer *r, int axis)
+static int begin_layer(trip_renderer *r, int axis)
 {
     probe_of(r)->axis = axis;
     return 0;
@@ -73,9 +73,11 @@ static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
     (void)front_to_back;
     if (!p->every)
         return 0;
-    trip_splat_frame f = trip_splat_frame_make(p->frame->camera, p->frame->settings);
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
+        const trip_list *list = trip_batch_list(batch, run);
+        trip_splat_frame f =
+            trip_splat_frame_make(&p->frame->plan->lists[list->index].camera, p->frame->settings);
         uint64_t next = (p->every - p->seen % p->every) % p->every;
         for (uint64_t k = next; k < run->count; k += p->every)
             look_at(p, &f, run, batch->voxels[run->first + k]);
@@ -104,7 +106,7 @@ bench_probe bench_probe_make(unsigned every)
         .destroy = destroy,
         .device = device,
         .begin_frame = begin_frame,
-        .begin_list = begin_list,
+        .begin_layer = begin_layer,
         .draw = draw,
         .end_frame = end_frame,
         .stats = stats,

@@ -55,9 +55,13 @@ static void add_ms(cJSON *object, const char *name, double ms)
     cJSON_AddRawToObject(object, name, text);
 }
 
-/* Bricks that are not selected are not read. */
-static void add_plan(cJSON *list, const trip_plan_list *p)
+/* Level 0 goes with what was read of its layer. */
+static void add_plan(cJSON *lists, const trip_list *of, const trip_plan_list *p)
 {
+    char name[24];
+    cJSON *list = cJSON_GetObjectItem(lists, trip_plan_list_name(of, name));
+    if (!list)
+        list = cJSON_AddObjectToObject(lists, name);
     cJSON_AddNumberToObject(list, "bricks", (double)p->bricks);
     cJSON_AddNumberToObject(list, "bricks_selected", (double)p->bricks_selected);
     cJSON_AddNumberToObject(list, "bricks_transparent", (double)p->bricks_transparent);
@@ -95,9 +99,11 @@ int render_stats_add_frame(render_stats *s, const trip_dataset *data, const trip
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     for (int axis = 0; axis < 3; axis++) {
         cJSON *list = add_list(lists, axis, frame);
-        add_plan(list, &plan->lists[axis]);
         cJSON_AddNumberToObject(list, "bytes_read", (double)frame->lists[axis].bytes_read);
     }
+    for (unsigned i = 0; i < data->list_count; i++)
+        if (trip_kind_of(data->lists[i].kind)->splatted)
+            add_plan(lists, &data->lists[i], &plan->lists[i]);
     return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
 }
 

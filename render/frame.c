@@ -20,10 +20,7 @@ typedef struct drawing {
     trip_reader *reader;
     const trip_frame *frame;
     trip_frame_stats *stats;
-    trip_pass passes[TRIP_READER_PASSES_MAX];
-    bool front_to_back[TRIP_READER_PASSES_MAX];
-    unsigned pass_count;
-    int next_axis;       /* lists before this one were begun */
+    int next_axis;       /* layers before this one were begun */
     uint64_t splats;     /* drawn so far */
     uint64_t bytes_read; /* counted so far */
     /* Drawn, but perhaps not done with: held[held_first % HELD_MAX] is the oldest. */
@@ -33,14 +30,11 @@ typedef struct drawing {
 
 static void tell_progress(drawing *d, const trip_batch *batch)
 {
-    uint64_t total = 0;
     if (!d->frame->progress)
         return;
     for (size_t i = 0; i < batch->run_count; i++)
         d->splats += batch->runs[i].count;
-    for (int axis = 0; axis < 3; axis++)
-        total += d->frame->plan->lists[axis].splats_selected;
-    d->frame->progress(d->frame->progress_user, d->splats, total);
+    d->frame->progress(d->frame->progress_user, d->splats, trip_plan_splats(d->frame->plan));
 }
 
 /* Passes are read one behind the other, so that the next is on its way while the last batches of
@@ -50,29 +44,28 @@ static int begin_reading(drawing *d)
     trip_reader_set_runs_only(d->reader, d->renderer->resident);
     int status = trip_reader_begin(d->reader, NULL);
     for (int axis = 0; axis < 3; axis++) {
-        const trip_plan_list *list = &d->frame->plan->lists[axis];
-        for (int i = 0; i < list->pass_count && !status; i++) {
-            d->passes[d->pass_count] = trip_pass_of(&list->passes[i].selection);
-            d->front_to_back[d->pass_count] = list->passes[i].front_to_back;
-            status = trip_reader_then(d->reader, &d->passes[d->pass_count++]);
-        }
+        const trip_plan_layer *layer = &d->frame->plan->layers[axis];
+        for (int i = 0; i < layer->pass_count && !status; i++)
+            status = trip_reader_then(d->reader, &layer->passes[i].pass);
     }
     return status;
 }
 
-/* The lists up to `last` that have passes, in order. */
-static int begin_lists(drawing *d, int last)
+/* The layers up to `last` that have passes, in order. */
+static int begin_layers(drawing *d, int last)
 {
     int status = 0;
     for (; d->next_axis <= last && !status; d->next_axis++)
-        if (d->frame->plan->lists[d->next_axis].pass_count)
-            status = d->renderer->ops->begin_list(d->renderer, d->next_axis);
+        if (d->frame->plan->layers[d->next_axis].pass_count)
+            status = d->renderer->ops->begin_layer(d->renderer, d->next_axis);
     return status;
 }
 
 static bool is_front_to_back(const drawing *d, const trip_batch *batch)
 {
-    return d->front_to_back[batch->pass - d->passes];
+    int axis = batch->pass->selections->list->axis;
+    const trip_plan_pass *passes = d->frame->plan->layers[axis].passes;
+    return passes[batch->pass != &passes[0].pass].front_to_back;
 }
 
 static int draw_batch(drawing *d, const trip_batch *batch)
@@ -81,7 +74,7 @@ static int draw_batch(drawing *d, const trip_batch *batch)
     int axis = batch->pass->selections->list->axis;
     d->stats->lists[axis].bytes_read += bytes - d->bytes_read;
     d->bytes_read = bytes;
-    int status = begin_lists(d, axis);
+    int status = begin_layers(d, axis);
     if (status)
         return status;
     double start = now_ms();
@@ -132,7 +125,7 @@ static int draw_lists(drawing *d)
         if (!status)
             status = trip_frame_poll();
     }
-    return status ? status : begin_lists(d, 2);
+    return status ? status : begin_layers(d, 2);
 }
 
 /* The renderer's counts; bytes were counted here. */

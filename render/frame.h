@@ -1,4 +1,4 @@
-/* One image from a data set: plan, then for each list reader -> renderer, then merge. */
+/* One image from a data set: plan, then for each layer reader -> renderer, then merge. */
 #ifndef TRIP_FRAME_H
 #define TRIP_FRAME_H
 
@@ -6,8 +6,8 @@
 
 typedef struct trip_frame_stats {
     double ms, read_ms, draw_ms, merge_ms;
-    bool counted; /* splats projected and drawn; else those counts say nothing */
-    trip_list_stats lists[3];
+    bool counted;             /* splats projected and drawn; else those counts say nothing */
+    trip_list_stats lists[3]; /* by layer: all lists of an axis */
     trip_reader_stats reader; /* summed over the passes */
 } trip_frame_stats;
 

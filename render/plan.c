@@ -1,6 +1,7 @@
 #include "plan.h"
 
 #include <inttypes.h>
+#include <string.h>
 
 #include "plan_cull.h"
 #include "report.h"
@@ -8,20 +9,22 @@
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
 
-static int add_pass(trip_plan_list *list, const trip_dataset *data, int axis, bool descending,
-                    bool front_to_back, int64_t first, int64_t last, trip_budget *budget)
+/* What a plan is made from. */
+typedef struct planning {
+    trip_plan *plan;
+    const trip_dataset *data;
+    const trip_camera *camera;
+    const trip_settings *settings;
+    const trip_tf_entry *table;
+    trip_budget *budget;
+} planning;
+
+/* The sheets on one side of the eye, or all. */
+typedef enum sides { ALL, BEYOND, BELOW } sides;
+
+static bool is_in_layer(const trip_list *list, int axis)
 {
-    if (first > last)
-        return 0;
-    trip_plan_pass *pass = &list->passes[list->pass_count];
-    int status = trip_selection_create(&pass->selection, data,
-                                       trip_dataset_find(data, axis, 0, TRIP_KIND_VOXELS),
-                                       descending, first, last, budget);
-    if (status)
-        return status;
-    pass->front_to_back = front_to_back;
-    list->pass_count++;
-    return 0;
+    return list->axis == axis && trip_kind_of(list->kind)->splatted;
 }
 
 /* First sheet that is not below the eye, cut to [0, sheets]. */
@@ -30,105 +33,216 @@ static int64_t first_sheet_beyond(double eye, int64_t sheets)
     return (int64_t)fmin((double)sheets, fmax(0, ceil(eye)));
 }
 
-/* The sides of the eye, each from the eye outwards. Sides do not cover one another: a ray meets
- * only the side it points to. In a parallel view the eye is infinitely far off. */
-static int add_passes(trip_plan_list *list, const trip_dataset *data, const trip_camera *camera,
-                      const trip_settings *settings, int axis, trip_budget *budget)
+static int add_selection(const planning *p, trip_plan_pass *pass, const trip_list *list, sides side)
 {
-    int64_t sheets = (int64_t)data->header.dims[axis];
-    trip_vec3 gaze = trip_camera_ray(camera, 0.5 * camera->width, 0.5 * camera->height);
-    bool upwards = trip_component(gaze, axis) > 0;
-    if (settings->traversal == TRIP_TRAVERSAL_ASCENDING)
-        return add_pass(list, data, axis, false, upwards, 0, sheets - 1, budget);
-    if (camera->ortho)
-        return add_pass(list, data, axis, !upwards, true, 0, sheets - 1, budget);
-    int64_t beyond = first_sheet_beyond(trip_component(camera->eye, axis), sheets);
-    int status = add_pass(list, data, axis, false, true, beyond, sheets - 1, budget);
+    trip_plan *plan = p->plan;
+    int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
+    double eye = trip_component(plan->lists[list->index].camera.eye, list->axis);
+    if (side == BEYOND)
+        first = first_sheet_beyond(eye, sheets);
+    else if (side == BELOW)
+        last = first_sheet_beyond(eye, sheets) - 1;
+    if (first > last)
+        return 0;
+    trip_selection *s = &plan->selections[plan->selection_count];
+    int status =
+        trip_selection_create(s, p->data, list, pass->pass.descending, first, last, p->budget);
     if (status)
         return status;
-    return add_pass(list, data, axis, true, true, 0, beyond - 1, budget);
+    plan->selection_count++;
+    pass->pass.selection_count++;
+    return 0;
 }
 
-static void select_brick(trip_plan_list *list, uint64_t index, const trip_file_brick *brick,
-                         int64_t slab_sheet)
+static int add_pass(const planning *p, int axis, sides side, bool descending, bool front_to_back)
 {
-    for (int i = 0; i < list->pass_count; i++) {
-        trip_selection *s = &list->passes[i].selection;
-        if (slab_sheet + brick->sheet_max >= s->sheet_first &&
+    trip_plan_layer *layer = &p->plan->layers[axis];
+    trip_plan_pass *pass = &layer->passes[layer->pass_count];
+    int status = 0;
+    *pass = (trip_plan_pass){
+        .pass = { .selections = &p->plan->selections[p->plan->selection_count],
+                  .descending = descending },
+        .front_to_back = front_to_back,
+    };
+    for (unsigned i = 0; i < p->data->list_count && !status; i++)
+        if (is_in_layer(&p->data->lists[i], axis))
+            status = add_selection(p, pass, &p->data->lists[i], side);
+    layer->pass_count += pass->pass.selection_count > 0;
+    return status;
+}
+
+/* The sides of the eye, each from the eye outwards. Sides do not cover one another: a ray meets
+ * only the side it points to. In a parallel view the eye is infinitely far off. */
+static int add_passes(const planning *p, int axis)
+{
+    const trip_camera *c = p->camera;
+    trip_vec3 gaze = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    bool upwards = trip_component(gaze, axis) > 0;
+    if (p->settings->traversal == TRIP_TRAVERSAL_ASCENDING)
+        return add_pass(p, axis, ALL, false, upwards);
+    if (c->ortho)
+        return add_pass(p, axis, ALL, !upwards, true);
+    int status = add_pass(p, axis, BEYOND, false, true);
+    return status ? status : add_pass(p, axis, BELOW, true, true);
+}
+
+/* Those of a pass: they lie in the plan's array. */
+static trip_selection *selections_of(const trip_plan *plan, const trip_plan_pass *pass)
+{
+    return plan->selections + (pass->pass.selections - plan->selections);
+}
+
+/* Of a list in pass `i` of its layer; NULL where it has none. */
+static trip_selection *selection_in(const trip_plan *plan, int axis, int i, const trip_list *list)
+{
+    const trip_plan_pass *pass = &plan->layers[axis].passes[i];
+    trip_selection *selections = selections_of(plan, pass);
+    for (unsigned k = 0; k < pass->pass.selection_count; k++)
+        if (selections[k].list == list)
+            return &selections[k];
+    return NULL;
+}
+
+/* A list whose bricks are being selected. */
+typedef struct selecting {
+    const planning *p;
+    const trip_list *list;
+    trip_plan_list *planned;
+    trip_cull cull;
+    trip_selection *selections[2]; /* of the layer's passes; NULL: in none of its sheets */
+} selecting;
+
+static void select_brick(const selecting *of, uint64_t index, int64_t slab_sheet)
+{
+    const trip_file_brick *brick = &of->list->bricks[index];
+    for (int i = 0; i < 2; i++) {
+        trip_selection *s = of->selections[i];
+        if (s && slab_sheet + brick->sheet_max >= s->sheet_first &&
             slab_sheet + brick->sheet_min <= s->sheet_last)
             trip_selection_add(s, index);
     }
-    list->bricks_selected++;
-    list->splats_selected += brick->splats;
+    of->planned->bricks_selected++;
+    of->planned->splats_selected += brick->splats;
 }
 
-static int select_bricks(trip_plan_list *list, const trip_list *source, trip_cull *cull,
-                         uint32_t slab_sheets)
+static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t index)
 {
-    list->bricks = source->brick_count;
-    for (uint64_t i = 0; i < source->slab_count; i++) {
+    switch (trip_cull_brick(&of->cull, of->list->axis, &of->list->bricks[index], slab)) {
+    case TRIP_CULL_KEEP:
+        select_brick(of, index, (int64_t)slab->slab * of->p->data->header.slab_sheets);
+        break;
+    case TRIP_CULL_TRANSPARENT:
+        of->planned->bricks_transparent++;
+        break;
+    case TRIP_CULL_OUTSIDE:
+        of->planned->bricks_outside++;
+        break;
+    case TRIP_CULL_NO_WEIGHT:
+        of->planned->bricks_without_weight++;
+        break;
+    }
+}
+
+static int select_bricks(const planning *p, const trip_list *list)
+{
+    trip_plan *plan = p->plan;
+    trip_plan_list *planned = &plan->lists[list->index];
+    selecting of = { .p = p, .list = list, .planned = planned };
+    of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
+                             plan->axis_of_view, p->table);
+    for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
+        of.selections[i] = selection_in(plan, list->axis, i, list);
+    planned->bricks = list->brick_count;
+    for (uint64_t i = 0; i < list->slab_count; i++) {
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "render", "plan", "interrupted");
-        const trip_file_slab *slab = &source->slabs[i];
-        int64_t slab_sheet = (int64_t)slab->slab * slab_sheets;
-        for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {
-            const trip_file_brick *brick = &source->bricks[j];
-            switch (trip_cull_brick(cull, source->axis, brick, slab)) {
-            case TRIP_CULL_KEEP:
-                select_brick(list, j, brick, slab_sheet);
-                break;
-            case TRIP_CULL_TRANSPARENT:
-                list->bricks_transparent++;
-                break;
-            case TRIP_CULL_OUTSIDE:
-                list->bricks_outside++;
-                break;
-            case TRIP_CULL_NO_WEIGHT:
-                list->bricks_without_weight++;
-                break;
-            }
-        }
+        const trip_file_slab *slab = &list->slabs[i];
+        for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++)
+            consider_brick(&of, slab, j);
     }
     return 0;
 }
 
-/* Passes that read nothing are left out. */
-static void drop_empty_passes(trip_plan_list *list, trip_budget *budget)
+/* Selections that read nothing are left out, and passes without any. */
+static void drop_empty(trip_plan *plan, trip_plan_layer *layer, trip_budget *budget)
 {
     int kept = 0;
-    for (int i = 0; i < list->pass_count; i++) {
-        trip_plan_pass pass = list->passes[i];
-        trip_run_iterator it = trip_run_begin(&pass.selection);
-        trip_run run;
-        if (trip_run_next(&it, &run))
-            list->passes[kept++] = pass;
-        else
-            trip_selection_destroy(&pass.selection, budget);
+    for (int i = 0; i < layer->pass_count; i++) {
+        trip_plan_pass pass = layer->passes[i];
+        trip_selection *selections = selections_of(plan, &pass);
+        unsigned left = 0;
+        for (unsigned k = 0; k < pass.pass.selection_count; k++) {
+            trip_selection s = selections[k];
+            trip_run_iterator it = trip_run_begin(&s);
+            trip_run run;
+            selections[k] = (trip_selection){ 0 };
+            if (trip_run_next(&it, &run))
+                selections[left++] = s;
+            else
+                trip_selection_destroy(&s, budget);
+        }
+        pass.pass.selection_count = left;
+        if (left > 0)
+            layer->passes[kept++] = pass;
     }
-    list->pass_count = kept;
+    layer->pass_count = kept;
+}
+
+/* The view in a list's own index space. */
+static int place_list(const planning *p, const trip_list *list)
+{
+    trip_plan_list *planned = &p->plan->lists[list->index];
+    planned->drawn = true;
+    int status = trip_list_grid_make(&planned->grid, p->data, list);
+    if (status)
+        return status;
+    planned->camera = *p->camera;
+    if (memcmp(&list->index_to_world, &p->data->index_to_world, sizeof list->index_to_world) == 0)
+        return 0;
+    return trip_camera_make(&planned->camera, &p->camera->params, &list->index_to_world);
+}
+
+static int plan_layer(const planning *p, int axis)
+{
+    int status = 0;
+    for (unsigned i = 0; i < p->data->list_count && !status; i++)
+        if (is_in_layer(&p->data->lists[i], axis))
+            status = place_list(p, &p->data->lists[i]);
+    if (!status)
+        status = add_passes(p, axis);
+    for (unsigned i = 0; i < p->data->list_count && !status; i++)
+        if (is_in_layer(&p->data->lists[i], axis))
+            status = select_bricks(p, &p->data->lists[i]);
+    if (!status)
+        drop_empty(p->plan, &p->plan->layers[axis], p->budget);
+    return status;
+}
+
+static int take_lists(trip_plan *plan, unsigned count, trip_budget *budget)
+{
+    plan->list_count = count;
+    plan->lists = trip_budget_take(budget, count * sizeof *plan->lists);
+    plan->selections = trip_budget_take(budget, 2 * (size_t)count * sizeof *plan->selections);
+    if (plan->lists && plan->selections)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", "plan",
+                     "%u lists do not fit the memory given; raise --memory", count);
 }
 
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
-    int status = 0;
+    const planning p = { plan, data, camera, settings, table, budget };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .planes = 1u << TRIP_PLANE_VOXELS };
     if (settings->shading)
         plan->planes |= data->header.planes & 1u << TRIP_PLANE_NORMALS;
-
-    trip_cull cull = trip_cull_make(data, camera, settings, plan->axis_of_view, table);
+    int status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {
-        trip_plan_list *list = &plan->lists[axis];
-        list->used = trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
-        if (!list->used)
-            continue;
-        status = add_passes(list, data, camera, settings, axis, budget);
-        if (!status)
-            status = select_bricks(list, trip_dataset_find(data, axis, 0, TRIP_KIND_VOXELS), &cull,
-                                   data->header.slab_sheets);
-        if (!status)
-            drop_empty_passes(list, budget);
+        trip_plan_layer *layer = &plan->layers[axis];
+        layer->used = trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
+        if (layer->used)
+            status = plan_layer(&p, axis);
     }
     if (status)
         trip_plan_release(plan, budget);
@@ -137,9 +251,11 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
 
 void trip_plan_release(trip_plan *plan, trip_budget *budget)
 {
-    for (int axis = 0; axis < 3; axis++)
-        for (int i = 0; i < plan->lists[axis].pass_count; i++)
-            trip_selection_destroy(&plan->lists[axis].passes[i].selection, budget);
+    size_t count = plan->list_count;
+    for (unsigned i = 0; i < plan->selection_count; i++)
+        trip_selection_destroy(&plan->selections[i], budget);
+    trip_budget_release(budget, plan->selections, 2 * count * sizeof *plan->selections);
+    trip_budget_release(budget, plan->lists, count * sizeof *plan->lists);
     *plan = (trip_plan){ 0 };
 }
 
@@ -160,46 +276,79 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     }
 }
 
-static void explain_passes(const trip_plan_list *list, FILE *out)
+static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *out)
 {
-    for (int i = 0; i < list->pass_count; i++) {
-        const trip_plan_pass *pass = &list->passes[i];
-        fprintf(out, "%ssheets %" PRId64 " to %" PRId64 " %s, %s", i ? "; then " : "            ",
-                pass->selection.sheet_first, pass->selection.sheet_last,
-                pass->selection.descending ? "descending" : "ascending",
-                pass->front_to_back ? "front to back" : "back to front");
+    const trip_plan_layer *layer = &plan->layers[list->axis];
+    const char *before = "            ";
+    for (int i = 0; i < layer->pass_count; i++) {
+        const trip_selection *s = selection_in(plan, list->axis, i, list);
+        if (!s)
+            continue;
+        fprintf(out, "%ssheets %" PRId64 " to %" PRId64 " %s, %s", before, s->sheet_first,
+                s->sheet_last, s->descending ? "descending" : "ascending",
+                layer->passes[i].front_to_back ? "front to back" : "back to front");
+        before = "; then ";
     }
     fprintf(out, "\n");
 }
 
-static void explain_list(const trip_plan *plan, int axis, FILE *out)
+static bool is_read(const trip_plan *plan, const trip_list *list)
 {
-    const trip_plan_list *list = &plan->lists[axis];
-    fprintf(out, "list %c      ", axis_names[axis]);
-    if (!list->used) {
+    const trip_plan_layer *layer = &plan->layers[list->axis];
+    for (int i = 0; i < layer->pass_count; i++)
+        if (selection_in(plan, list->axis, i, list))
+            return true;
+    return false;
+}
+
+static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out)
+{
+    const trip_plan_list *planned = &plan->lists[list->index];
+    char name[24], bytes[32];
+    fprintf(out, "list %-6s ", trip_plan_list_name(list, name));
+    if (!trip_kind_of(list->kind)->splatted) {
+        fprintf(out, "not read: its records are not splatted\n");
+        return;
+    }
+    if (!planned->drawn) {
         fprintf(out, "not read: no ray of the view has weight in it\n");
         return;
     }
     unsigned planes = plan->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
-    char bytes[32];
+    bool read = is_read(plan, list);
     fprintf(out,
             "%s: %" PRIu64 " of %" PRIu64 " bricks, %" PRIu64 " splats, %s (left out: %" PRIu64
             " transparent, %" PRIu64 " out of view, %" PRIu64 " without weight)\n",
-            list->pass_count ? "read" : "empty", list->bricks_selected, list->bricks,
-            list->splats_selected,
-            trip_format_bytes(list->splats_selected * TRIP_RECORD_BYTES * planes, bytes),
-            list->bricks_transparent, list->bricks_outside, list->bricks_without_weight);
-    if (list->pass_count)
-        explain_passes(list, out);
+            read ? "read" : "empty", planned->bricks_selected, planned->bricks,
+            planned->splats_selected,
+            trip_format_bytes(planned->splats_selected * TRIP_RECORD_BYTES * planes, bytes),
+            planned->bricks_transparent, planned->bricks_outside, planned->bricks_without_weight);
+    if (read)
+        explain_passes(plan, list, out);
+}
+
+const char *trip_plan_list_name(const trip_list *list, char name[24])
+{
+    const char *kind = list->kind == TRIP_KIND_VOXELS ? "" : trip_kind_of(list->kind)->name;
+    if (list->level == 0)
+        snprintf(name, 24, "%c%s%s", "xyz"[list->axis], *kind ? " " : "", kind);
+    else
+        snprintf(name, 24, "%c%u%s%s", "xyz"[list->axis], list -> level, *kind ? " " : "", kind);
+    return name;
+}
+
+uint64_t trip_plan_splats(const trip_plan *plan)
+{
+    uint64_t splats = 0;
+    for (unsigned i = 0; i < plan->list_count; i++)
+        splats += plan->lists[i].splats_selected;
+    return splats;
 }
 
 uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *data)
 {
-    uint64_t splats = 0;
-    for (int axis = 0; axis < 3; axis++)
-        splats += plan->lists[axis].splats_selected;
     unsigned left_out = data->header.planes & ~plan->planes & 1u << TRIP_PLANE_NORMALS;
-    return left_out ? splats * TRIP_RECORD_BYTES : 0;
+    return left_out ? trip_plan_splats(plan) * TRIP_RECORD_BYTES : 0;
 }
 
 static void explain_shading(const trip_plan *plan, const trip_dataset *data, const trip_settings *s,
@@ -221,14 +370,14 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
 {
     int used = 0;
     explain_method(plan, settings, out);
-    for (int axis = 0; axis < 3; axis++) {
-        explain_list(plan, axis, out);
-        used += plan->lists[axis].pass_count > 0;
-    }
+    for (unsigned i = 0; i < data->list_count; i++)
+        explain_list(plan, &data->lists[i], out);
+    for (int axis = 0; axis < 3; axis++)
+        used += plan->layers[axis].pass_count > 0;
     explain_shading(plan, data, settings, out);
     if (used > 1)
         fprintf(out, "merge       runs: %d layers are blended\n", used);
     else
         fprintf(out, "merge       copies: %s\n",
-                used ? "one list has all the weight or all the splats" : "nothing is drawn");
+                used ? "one layer has all the weight or all the splats" : "nothing is drawn");
 }

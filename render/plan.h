@@ -6,35 +6,56 @@
 #include <stdio.h>
 
 #include "camera.h"
+#include "list_grid.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
 
-/* One pass over a list: a side of the eye, or the whole list in `ascending` traversal. */
-typedef struct trip_plan_pass {
-    trip_selection selection;
-    bool front_to_back; /* false only in `ascending` traversal against the gaze */
-} trip_plan_pass;
-
+/* A list of the data set as the frame sees it. */
 typedef struct trip_plan_list {
-    bool used;      /* some ray of the view has weight in this list */
-    int pass_count; /* at most 2: beyond the eye (ascending), then below (descending) */
-    trip_plan_pass passes[2];
+    bool drawn;          /* splatted, and some ray of the view has weight in its layer; where it is
+                            not, what follows is not set */
+    trip_list_grid grid; /* in that of level 0 */
+    trip_camera camera;  /* the view in the list's own index space */
     uint64_t bricks, bricks_selected;
     uint64_t bricks_outside, bricks_without_weight, bricks_transparent; /* why left out */
     uint64_t splats_selected;
 } trip_plan_list;
 
+/* One pass over the lists of an axis: a side of the eye, or all in `ascending` traversal. */
+typedef struct trip_plan_pass {
+    trip_pass pass;
+    bool front_to_back; /* false only in `ascending` traversal against the gaze */
+} trip_plan_pass;
+
+/* What is drawn from the lists of one axis. */
+typedef struct trip_plan_layer {
+    bool used;      /* some ray of the view has weight in it */
+    int pass_count; /* at most 2: beyond the eye (ascending), then below (descending) */
+    trip_plan_pass passes[2];
+} trip_plan_layer;
+
 typedef struct trip_plan {
     int axis_of_view;
     unsigned planes; /* bit per trip_plane to read */
-    trip_plan_list lists[3];
+    unsigned list_count;
+    trip_plan_list *lists; /* by the data set's lists */
+    trip_plan_layer layers[3];
+    trip_selection *selections; /* of all passes: room for two a list */
+    unsigned selection_count;
 } trip_plan;
 
-/* `table` as filled for `data`: bricks whose codes are all transparent are left out. */
+/* `camera` is made with level 0's map. `table` as filled for `data`: bricks whose codes are all
+ * transparent are left out. */
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget);
 void trip_plan_release(trip_plan *plan, trip_budget *budget);
+
+/* Selected in all lists. */
+uint64_t trip_plan_splats(const trip_plan *plan);
+
+/* "x" at level 0, "x1" at level 1, and the kind where it is not voxels; `name` has room for 24. */
+const char *trip_plan_list_name(const trip_list *list, char name[24]);
 
 /* Of the selected splats, in the data set's planes that the plan does not call for. */
 uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *data);

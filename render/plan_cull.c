@@ -28,13 +28,14 @@ static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, do
 }
 
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, int axis_of_view,
-                         const trip_tf_entry *table)
+                         const trip_list_grid *grid, const trip_settings *settings,
+                         int axis_of_view, const trip_tf_entry *table)
 {
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
     return (trip_cull){
         .camera = camera,
         .settings = settings,
+        .grid = grid,
         .header = &data->header,
         .axis_of_view = axis_of_view,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
@@ -121,8 +122,8 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
     if (cull->settings->method == TRIP_METHOD_AXIS || cull->camera->ortho)
         return true; /* decided for the list as a whole */
     for (int a = 0; a < 3; a++) {
-        lo[a] = b->lo[a] - radius;
-        hi[a] = b->hi[a] + radius;
+        lo[a] = (b->lo[a] - radius) * cull->grid->scale[a];
+        hi[a] = (b->hi[a] + radius) * cull->grid->scale[a];
     }
     trip_ray_bounds bounds = trip_ray_bounds_of(lo, hi);
     return trip_weight_may_lie(cull->settings, cull->axis_of_view, &bounds, axis);

@@ -5,6 +5,7 @@
 
 #include "camera.h"
 #include "dataset.h"
+#include "list_grid.h"
 #include "settings.h"
 #include "transfer_function.h"
 
@@ -24,6 +25,7 @@ typedef struct trip_cull_plane {
 typedef struct trip_cull {
     const trip_camera *camera;
     const trip_settings *settings;
+    const trip_list_grid *grid;
     const trip_file_header *header;
     int axis_of_view;
     trip_cull_plane sides[4]; /* through the outermost pixel centres */
@@ -32,10 +34,11 @@ typedef struct trip_cull {
     uint8_t blocks[256]; /* of 256 codes each, as far as looked at: whether some have extinction */
 } trip_cull;
 
-/* What it is made from outlives it. */
+/* For a list of the data set: `camera` views its index space, `grid` is its place in that of level
+ * 0. What it is made from outlives it. */
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, int axis_of_view,
-                         const trip_tf_entry *table);
+                         const trip_list_grid *grid, const trip_settings *settings,
+                         int axis_of_view, const trip_tf_entry *table);
 
 /* `slab` is the one that the brick is in. */
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,

@@ -11,23 +11,24 @@
 #include "splat.h"
 #include "weight.h"
 
-/* One pixel: the list being drawn, and the sum over the lists before it. */
+/* One pixel: the layer being drawn, and the sum over the layers before it. */
 typedef struct pixel {
-    double layer[4];  /* premultiplied over-composite of the list */
-    double weight;    /* w of the list at this pixel */
-    double stretch;   /* world units per index length along the ray */
-    double merged[4]; /* sum of w^2 layer over the lists that are done */
+    double layer[4];  /* premultiplied over-composite */
+    double weight;    /* of the layer at this pixel */
+    double stretch;   /* world units per index length of the list at hand, along the ray */
+    double merged[4]; /* sum of w^2 layer over the layers that are done */
 } pixel;
 
 typedef struct reference {
     trip_renderer base;
     trip_budget *budget;
     const trip_frame *frame;
-    trip_splat_frame constants;
+    const trip_plan_list *list; /* at hand; NULL: none since the layer began */
+    trip_splat_frame constants; /* of it */
     double gradient_full;
     pixel *pixels;
     size_t pixels_bytes;
-    int axis;    /* of the list being drawn; -1 before the first */
+    int axis;    /* of the layer being drawn; -1 before the first */
     bool broken; /* some splat's numbers are not finite */
     trip_list_stats stats[3];
 } reference;
@@ -74,7 +75,6 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     reference *r = (reference *)base;
     const trip_file_header *header = &frame->data->header;
     r->frame = frame;
-    r->constants = trip_splat_frame_make(frame->camera, frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     r->axis = -1;
     r->broken = false;
@@ -104,20 +104,37 @@ static int fold_layer(reference *r)
     return status;
 }
 
-static int begin_list(trip_renderer *base, int axis)
+static int begin_layer(trip_renderer *base, int axis)
 {
     reference *r = (reference *)base;
     const trip_camera *camera = r->frame->camera;
     int status = fold_layer(r);
     r->axis = axis;
+    r->list = NULL;
     for (int y = 0; y < camera->height && !status; y++) {
         for (int x = 0; x < camera->width; x++) {
             pixel *p = &row_of(r, y)[x];
             trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
             memset(p->layer, 0, sizeof p->layer);
             p->weight = trip_weight(r->frame->settings, r->frame->plan->axis_of_view, ray, axis);
-            p->stretch = trip_splat_stretch(&r->constants, x + 0.5, y + 0.5);
         }
+        status = trip_frame_poll();
+    }
+    return status;
+}
+
+/* Takes up the list that the next splats are of. */
+static int use_list(reference *r, const trip_list *of)
+{
+    const trip_plan_list *list = &r->frame->plan->lists[of->index];
+    int status = 0;
+    if (list == r->list)
+        return 0;
+    r->list = list;
+    r->constants = trip_splat_frame_make(&list->camera, r->frame->settings);
+    for (int y = 0; y < list->camera.height && !status; y++) {
+        for (int x = 0; x < list->camera.width; x++)
+            row_of(r, y)[x].stretch = trip_splat_stretch(&r->constants, x + 0.5, y + 0.5);
         status = trip_frame_poll();
     }
     return status;
@@ -138,7 +155,7 @@ static void composite(double layer[4], const double rgb[3], double alpha, bool f
     layer[3] = layer[3] * keep + add;
 }
 
-/* True when some pixel centre is in the support where the list has weight. */
+/* True when some pixel centre is in the support where the layer has weight. */
 static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3],
                            double extinction, bool front_to_back)
 {
@@ -172,7 +189,17 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
         return;
     double gradient[3];
     trip_normal_unpack(*normal, frame->data->header.gradient_scale, gradient);
-    trip_shade(frame->settings, frame->camera, r->gradient_full, voxel, gradient, rgb);
+    trip_shade(frame->settings, &r->list->camera, r->gradient_full, voxel, gradient, rgb);
+}
+
+/* By the rays in the grid of level 0. */
+static bool may_reach(const reference *r, trip_vec3 voxel, double radius)
+{
+    const trip_frame *frame = r->frame;
+    const trip_list_grid *grid = &r->list->grid;
+    trip_vec3 from_eye = trip_list_grid_vector(grid, trip_sub(voxel, r->list->camera.eye));
+    return trip_weight_may_reach(frame->settings, frame->camera, frame->plan->axis_of_view, r->axis,
+                                 from_eye, radius * trip_list_grid_growth(grid));
 }
 
 static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal,
@@ -184,8 +211,7 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     stats->splats_read++;
     bool seen = trip_splat_project(&r->constants, voxel, &s);
     r->broken |= trip_splat_is_broken(&s);
-    if (!seen || !trip_weight_may_reach(frame->settings, frame->camera, frame->plan->axis_of_view,
-                                        r->axis, trip_sub(voxel, frame->camera->eye), s.radius))
+    if (!seen || !may_reach(r, voxel, s.radius))
         return;
     stats->splats_projected++;
 
@@ -205,23 +231,31 @@ static trip_vec3 voxel_position(int axis, const trip_run *run, uint32_t record)
     return trip_v3(p[0], p[1], p[2]);
 }
 
+static void draw_run(reference *r, const trip_batch *batch, const trip_run *run, bool front_to_back)
+{
+    for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
+        uint32_t in_run = batch->pass->descending ? run->count - 1 - k : k;
+        size_t at = run->first + in_run;
+        uint32_t record = batch->voxels[at];
+        draw_splat(r, voxel_position(r->axis, run, record), record,
+                   batch->normals ? &batch->normals[at] : NULL, front_to_back);
+    }
+}
+
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     reference *r = (reference *)base;
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
-        for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
-            uint32_t in_run = batch->pass->descending ? run->count - 1 - k : k;
-            size_t at = run->first + in_run;
-            uint32_t record = batch->voxels[at];
-            draw_splat(r, voxel_position(r->axis, run, record), record,
-                       batch->normals ? &batch->normals[at] : NULL, front_to_back);
-        }
+        int status = use_list(r, trip_batch_list(batch, run));
+        if (status)
+            return status;
+        draw_run(r, batch, run, front_to_back);
     }
     return r->broken ? trip_splat_fail() : trip_frame_poll();
 }
 
-/* The merge's divisor: lists that were not drawn count too, as empty layers. */
+/* The merge's divisor: layers that were not drawn count too, as empty ones. */
 static double weight_sum(const reference *r, int x, int y)
 {
     const trip_frame *frame = r->frame;
@@ -264,7 +298,7 @@ static const trip_renderer_ops reference_ops = {
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
-    .begin_list = begin_list,
+    .begin_layer = begin_layer,
     .draw = draw,
     .end_frame = end_frame,
     .stats = stats,

@@ -1,6 +1,6 @@
-/* The interface behind which renderers stand: begin frame, for each list of the plan begin list and
- * draw its batches in order, end frame. All calls come from one thread. Created once, used for many
- * frames; the frame path does not allocate once sizes have settled. */
+/* The interface behind which renderers stand: begin frame, for each layer of the plan begin layer
+ * and draw its batches in order, end frame. All calls come from one thread. Created once, used for
+ * many frames; the frame path does not allocate once sizes have settled. */
 #ifndef TRIP_RENDERER_H
 #define TRIP_RENDERER_H
 
@@ -33,6 +33,7 @@ static inline int trip_frame_poll(void)
     return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
 }
 
+/* Of all lists of a layer. */
 typedef struct trip_list_stats {
     uint64_t splats_read;      /* handed to the renderer */
     uint64_t splats_projected; /* of those, not culled by w +- dw or the plane of the eye */
@@ -49,7 +50,7 @@ typedef struct trip_renderer_ops {
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);
     /* The layer of `axis` starts empty. */
-    int (*begin_list)(trip_renderer *r, int axis);
+    int (*begin_layer)(trip_renderer *r, int axis);
     /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
     int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
     /* Memory of the renderer's own for a reader's ring: `count` slots of `bytes`, aligned to 4096;
@@ -68,7 +69,7 @@ typedef struct trip_renderer_ops {
     /* The frame is given up: returns when nothing that it is drawn from is in use. NULL: nothing is
      * between the other calls. */
     void (*abort_frame)(trip_renderer *r);
-    /* Counts of the frame just ended, by axis (bytes_read is the caller's). */
+    /* Counts of the frame just ended, by layer (bytes_read is the caller's). */
     void (*stats)(const trip_renderer *r, trip_list_stats lists[3]);
 } trip_renderer_ops;
 

@@ -1,12 +1,12 @@
 // Counts the splats of a batch that are projected and drawn, as trip_list_stats defines them, in
 // double precision like the reference; one invocation a splat. In: the batch's storage blocks and
-// the number of splats. Out: added to the list's counters. Runs only when counts are asked for.
+// the positions. Out: added to the layer's counters. Runs only when counts are asked for.
 #include "fetch.glsl"
 #include "project.glsl"
 #include "weight.glsl"
 
 layout(local_size_x = TRIP_GL_COUNT_GROUP) in;
-layout(location = 0) uniform uint splats;
+layout(location = 0) uniform uvec2 piece; // draw positions: first, count
 
 // Low and high half of "projected", then of "drawn", per axis.
 layout(std430, binding = TRIP_GL_COUNTS) buffer trip_gl_counts { uint counts[]; };
@@ -48,9 +48,9 @@ void main()
 {
     uint position = gl_GlobalInvocationID.y * gl_NumWorkGroups.x * TRIP_GL_COUNT_GROUP +
                     gl_GlobalInvocationID.x;
-    if (position >= splats)
+    if (position >= piece.y)
         return;
-    record r = fetch_record(position);
+    record r = fetch_record(piece.x + position);
     splat s;
     if (!project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius))
         return;

@@ -41,7 +41,8 @@ bool may_reach(real3 from_eye, real radius)
 #ifdef WEIGHT_IS_CONSTANT
     return true;
 #else
-    real bound = abs(from_eye.x) - weight.x * largest_of(from_eye) + weight.y * radius;
+    real3 c = from_eye * to_grid.xyz;
+    real bound = abs(c.x) - weight.x * largest_of(c) + weight.y * (radius * to_grid.w);
 #if METHOD == 1
     return bound >= 0.0;
 #else

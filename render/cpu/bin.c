@@ -333,8 +333,9 @@ void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask)
 }
 
 void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
-                         void (*take)(void *user, const trip_cpu_splat *splats,
-                                      const uint16_t *order, uint32_t count),
+                         void (*take)(void *user, const trip_cpu_chunk *chunk,
+                                      const trip_cpu_splat *splats, const uint16_t *order,
+                                      uint32_t count),
                          void *user)
 {
     uint32_t segment = f->shares[tile].head, spread = 0;
@@ -342,9 +343,10 @@ void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
         const trip_cpu_segment *s = segment == TRIP_CPU_NONE ? NULL : &f->segments[segment];
         if (spread < f->spread_count && (!s || f->spread[spread] < s->chunk)) {
             const trip_cpu_chunk *chunk = &f->chunks[f->spread[spread++]];
-            take(user, f->splats + chunk->splat, NULL, chunk->splats);
+            take(user, chunk, f->splats + chunk->splat, NULL, chunk->splats);
         } else {
-            take(user, f->splats + f->chunks[s->chunk].splat, f->order + s->first, s->count);
+            const trip_cpu_chunk *chunk = &f->chunks[s->chunk];
+            take(user, chunk, f->splats + chunk->splat, f->order + s->first, s->count);
             segment = s->next;
         }
     }

@@ -28,6 +28,7 @@ typedef struct trip_cpu_chunk {
     size_t run;      /* the first, in the batch */
     uint32_t skip;   /* of its voxels, in draw order */
     uint32_t voxels; /* in all */
+    unsigned list;   /* that all of them are of */
     uint32_t splat;  /* first one in the buffer */
     uint32_t splats;
     uint32_t first_segment, segments;
@@ -100,8 +101,9 @@ void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask);
 /* Calls `take` with a tile's splats, piece by piece in their order; order NULL: all of them are to
  * be looked through. */
 void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
-                         void (*take)(void *user, const trip_cpu_splat *splats,
-                                      const uint16_t *order, uint32_t count),
+                         void (*take)(void *user, const trip_cpu_chunk *chunk,
+                                      const trip_cpu_splat *splats, const uint16_t *order,
+                                      uint32_t count),
                          void *user);
 
 #endif

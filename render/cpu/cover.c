@@ -180,7 +180,7 @@ trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64
                                 int64_t last_sheet)
 {
     const trip_dataset *data = view->of->data;
-    const trip_list *list = trip_dataset_find(data, view->axis, 0, TRIP_KIND_VOXELS);
+    const trip_list *list = view->list;
     trip_brick_box b =
         trip_brick_box_of(&data->header, trip_brick_slab(list, brick), &list->bricks[brick]);
     b.lo[2] = fmax(b.lo[2], (double)first_sheet);

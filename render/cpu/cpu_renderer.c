@@ -30,8 +30,8 @@ enum { LEAST_CHUNK = 512 };
 
 /* What has become of a tile's pixels. */
 enum tile_state {
-    TILE_BEGUN = 1,  /* in the list being drawn */
-    TILE_MERGED = 2, /* the sum holds earlier lists */
+    TILE_BEGUN = 1,  /* in the layer being drawn */
+    TILE_MERGED = 2, /* the sum holds earlier layers */
 };
 
 /* One thread's own memory. */
@@ -62,16 +62,18 @@ typedef struct cpu {
     size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
     float *pixels, *sums;
     uint8_t *states;
-    uint8_t *axes; /* whose lists may have weight in a tile, a bit each */
+    uint8_t *axes; /* whose layers may have weight in a tile, a bit each */
     portion *portions;
 
     const trip_frame *frame;
-    trip_cpu_view view;
-    bool in_list;
+    trip_cpu_view view;   /* of the layer being drawn */
+    trip_cpu_view *views; /* of its lists, by number in the data set */
+    unsigned view_room;   /* of `views`, and of `counted_views` where that is there */
+    bool in_layer;
     trip_list_stats stats[3];
     /* Where the frame counts: the same with every voxel visible, whatever its code. */
     trip_frame counted_frame;
-    trip_cpu_view counted_view;
+    trip_cpu_view *counted_views;
     trip_tf_entry *visible; /* 65536 entries; NULL until wanted */
 
     trip_cpu_flush flushes[2];
@@ -106,7 +108,7 @@ static float *tile_pixels(const cpu *r, uint32_t tile)
     return r->pixels + (size_t)tile * FLOATS_PER_TILE;
 }
 
-/* Whether one list alone has weight in a tile, and so it is 1 all over. */
+/* Whether one layer alone has weight in a tile, and so it is 1 all over. */
 static bool is_alone(const cpu *r, uint32_t tile)
 {
     return (r->axes[tile] & (r->axes[tile] - 1)) == 0;
@@ -117,7 +119,7 @@ static bool is_alone(const cpu *r, uint32_t tile)
 /* Counts by projecting for the count alone: what is hidden or transparent counts too. */
 static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s)
 {
-    const trip_cpu_view *view = &r->counted_view;
+    const trip_cpu_view *view = &r->counted_views[chunk->list];
     const uint32_t *voxels = r->batch->voxels + s->first;
     for (uint32_t i = 0; i < s->count; i++)
         chunk->counts.splats_projected += trip_cpu_is_projected(view, s->run, voxels[i]);
@@ -132,7 +134,8 @@ static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const tri
 /* What of a chunk may show: at most a span a voxel. */
 static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
 {
-    const trip_cpu_asking asking = { r->kernels, &r->view, &r->mask, r->batch, &w->scratch.lanes };
+    const trip_cpu_asking asking = { r->kernels, &r->views[chunk->list], &r->mask, r->batch,
+                                     &w->scratch.lanes };
     bool reversed = r->batch->pass->descending;
     uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
@@ -159,8 +162,8 @@ static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_
 {
     const _Atomic uint64_t *open = much_is_hidden(r) ? r->mask.tiles : NULL;
     trip_cpu_splat *out = r->filling->splats + chunk->splat + chunk->splats;
-    chunk->splats +=
-        r->kernels->project(&r->view, open, &w->scratch.staged, *staged, &w->scratch.lanes, out);
+    chunk->splats += r->kernels->project(&r->views[chunk->list], open, &w->scratch.staged, *staged,
+                                         &w->scratch.lanes, out);
     *staged = 0;
 }
 
@@ -173,7 +176,7 @@ static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const t
         uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
         n = n < room ? n : room;
         uint64_t from = trip_cpu_span_part(s, reversed, done, n).first;
-        *staged = r->kernels->stage(&r->view, s->run, batch->voxels + from,
+        *staged = r->kernels->stage(&r->views[chunk->list], s->run, batch->voxels + from,
                                     r->view.shading ? batch->normals + from : NULL, n, reversed,
                                     &w->scratch.staged, *staged);
         if (*staged == TRIP_CPU_STAGED)
@@ -203,15 +206,15 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
 /* ---- blending a flush ---- */
 
 typedef struct blend_context {
-    const trip_cpu_kernels *kernels;
+    const cpu *of;
     trip_cpu_scratch *scratch;
 } blend_context;
 
-static void blend_some(void *user, const trip_cpu_splat *splats, const uint16_t *order,
-                       uint32_t count)
+static void blend_some(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *splats,
+                       const uint16_t *order, uint32_t count)
 {
     blend_context *c = user;
-    c->kernels->tile_blend(c->scratch, splats, order, count);
+    c->of->kernels->tile_blend(&c->of->views[chunk->list], c->scratch, splats, order, count);
 }
 
 /* The mask's bits of some quarters of a tile. */
@@ -235,7 +238,7 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
         r->states[p->tile] |= TILE_BEGUN;
     }
     r->kernels->tile_begin(&r->view, s, x, y, p->quarters, tile_pixels(r, p->tile));
-    trip_cpu_share_each(r->blending, p->tile, blend_some, &(blend_context){ r->kernels, s });
+    trip_cpu_share_each(r->blending, p->tile, blend_some, &(blend_context){ r, s });
     uint64_t open = r->kernels->tile_end(s) | ~bits_of_quarters(p->quarters);
     atomic_fetch_and_explicit(&r->mask.tiles[p->tile], open, memory_order_relaxed);
 }
@@ -333,16 +336,19 @@ static uint32_t chunk_voxels(const cpu *r, uint64_t left)
                                    : (uint32_t)each;
 }
 
-/* Reserves the next chunk, of `most` voxels; false when the batch is through or there are no more
- * chunks. */
+/* Reserves the next chunk, of `most` voxels of one list; false when the batch is through or there
+ * are no more chunks. */
 static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor *at)
 {
     trip_cpu_chunk *chunk = at->run < batch->run_count ? trip_cpu_flush_reserve(r->filling) : NULL;
     if (!chunk)
         return false;
+    unsigned selection = batch->runs[at->run].selection;
     chunk->run = at->run;
     chunk->skip = at->skip;
-    while (at->run < batch->run_count && chunk->voxels < most) {
+    chunk->list = batch->pass->selections[selection].list->index;
+    while (at->run < batch->run_count && chunk->voxels < most &&
+           batch->runs[at->run].selection == selection) {
         uint32_t left = batch->runs[at->run].count - at->skip, wanted = most - chunk->voxels;
         if (left > wanted) {
             at->skip += wanted;
@@ -410,18 +416,33 @@ static int project_batch(cpu *r, const trip_batch *batch, cursor *at)
     return check_splats(r);
 }
 
+/* The views of the layer's lists. */
+static void make_views(cpu *r, bool front_to_back, bool shading)
+{
+    const trip_dataset *data = r->frame->data;
+    int axis = r->view.axis;
+    trip_cpu_layer_view_make(&r->view, r->frame, axis, front_to_back);
+    r->view.shading = shading;
+    for (unsigned i = 0; i < data->list_count; i++) {
+        const trip_list *list = &data->lists[i];
+        if (list->axis != axis || !r->frame->plan->lists[i].drawn)
+            continue;
+        trip_cpu_view_make(&r->views[i], r->frame, list, front_to_back);
+        r->views[i].shading = shading;
+        if (r->frame->count)
+            trip_cpu_view_make(&r->counted_views[i], &r->counted_frame, list, front_to_back);
+    }
+}
+
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     cpu *r = (cpu *)base;
     bool shading = r->frame->settings->shading && batch->normals;
     cursor at = { 0, 0 };
     int status = 0;
-    if (r->frame->count)
-        trip_cpu_view_make(&r->counted_view, &r->counted_frame, r->view.axis, front_to_back);
     if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
         settle(r);
-        trip_cpu_view_make(&r->view, r->frame, r->view.axis, front_to_back);
-        r->view.shading = shading;
+        make_views(r, front_to_back, shading);
     }
     while (at.run < batch->run_count && !status) {
         status = project_batch(r, batch, &at);
@@ -433,7 +454,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     return status;
 }
 
-/* ---- lists and frames ---- */
+/* ---- layers and frames ---- */
 
 static float *tile_sum(const cpu *r, uint32_t tile)
 {
@@ -492,9 +513,9 @@ static void for_each_row(cpu *r, void (*run)(void *, unsigned, unsigned))
     trip_cpu_pool_wait(r->pool, &r->tile_job);
 }
 
-static int end_list(cpu *r)
+static int end_layer(cpu *r)
 {
-    if (!r->in_list)
+    if (!r->in_layer)
         return 0;
     bool merge = false;
     settle(r);
@@ -502,21 +523,22 @@ static int end_list(cpu *r)
         merge = is_to_merge(r, t);
     if (merge)
         for_each_row(r, merge_row);
-    r->in_list = false;
+    r->in_layer = false;
     return trip_frame_poll();
 }
 
-static int begin_list(trip_renderer *base, int axis)
+static int begin_layer(trip_renderer *base, int axis)
 {
     cpu *r = (cpu *)base;
-    int status = end_list(r);
+    int status = end_layer(r);
     if (status)
         return status;
-    trip_cpu_view_make(&r->view, r->frame, axis, true);
+    r->view.axis = axis;
+    make_views(r, true, false);
     for (uint32_t t = 0; t < tile_count(r); t++)
         atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> axis & 1 ? UINT64_MAX : 0,
                               memory_order_relaxed);
-    r->in_list = true;
+    r->in_layer = true;
     r->shown_per_voxel = 1;
     return 0;
 }
@@ -595,7 +617,33 @@ static int begin_counting(cpu *r)
     return 0;
 }
 
-/* The axes, a bit each, whose lists may have weight in the tile at (x, y). Where there is but one,
+static void release_views(cpu *r)
+{
+    size_t bytes = r->view_room * sizeof *r->views;
+    trip_budget_release(r->budget, r->views, bytes);
+    trip_budget_release(r->budget, r->counted_views, bytes);
+    r->views = r->counted_views = NULL;
+    r->view_room = 0;
+}
+
+static int fit_views(cpu *r)
+{
+    unsigned wanted = r->frame->data->list_count;
+    if (wanted > r->view_room)
+        release_views(r);
+    r->view_room = wanted > r->view_room ? wanted : r->view_room;
+    size_t bytes = r->view_room * sizeof *r->views;
+    if (!r->views)
+        r->views = trip_budget_take(r->budget, bytes);
+    if (!r->counted_views && r->frame->count)
+        r->counted_views = trip_budget_take(r->budget, bytes);
+    if (r->views && (r->counted_views || !r->frame->count))
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                     "%u lists do not fit the memory given; raise --memory", wanted);
+}
+
+/* The axes, a bit each, whose layers may have weight in the tile at (x, y). Where there is but one,
  * its weight is 1 all over the tile. */
 static uint8_t axes_of_tile(const trip_frame *frame, int x, int y)
 {
@@ -613,17 +661,19 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     cpu *r = (cpu *)base;
     trip_cpu_pool_wait(r->pool, &r->blend_job); /* of a frame that was given up */
     trip_cpu_flush_empty(r->filling);
-    r->in_list = false;
+    r->in_layer = false;
     r->frame = frame;
     memset(r->stats, 0, sizeof r->stats);
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
     int status = fit_tiles(r, frame->camera->width, frame->camera->height);
+    if (!status)
+        status = fit_views(r);
     if (!status && frame->count)
         status = begin_counting(r);
     if (status)
         return status;
-    trip_cpu_view_make(&r->view, frame, frame->plan->axis_of_view, true);
+    trip_cpu_layer_view_make(&r->view, frame, frame->plan->axis_of_view, true);
     memset(r->states, 0, tile_count(r));
     for (uint32_t t = 0; t < tile_count(r); t++)
         r->axes[t] = axes_of_tile(frame, tile_x(r, t), tile_y(r, t));
@@ -633,7 +683,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
 static int end_frame(trip_renderer *base, float *rgba)
 {
     cpu *r = (cpu *)base;
-    int status = end_list(r);
+    int status = end_layer(r);
     if (status)
         return status;
     r->rgba = rgba;
@@ -664,6 +714,7 @@ static void destroy(trip_renderer *base)
     trip_budget *budget = r->budget;
     trip_cpu_pool_destroy(r->pool);
     release_tiles(r);
+    release_views(r);
     for (int i = 0; i < 2; i++)
         trip_cpu_flush_destroy(&r->flushes[i], budget);
     trip_budget_release(budget, r->workers, r->workers_bytes);
@@ -676,7 +727,7 @@ static const trip_renderer_ops cpu_ops = {
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
-    .begin_list = begin_list,
+    .begin_layer = begin_layer,
     .draw = draw,
     .end_frame = end_frame,
     .abort_frame = abort_frame,
@@ -686,12 +737,13 @@ static const trip_renderer_ops cpu_ops = {
 bool trip_cpu_covered(void *renderer, const trip_selection *selection, uint32_t brick)
 {
     cpu *r = renderer;
-    if (r->base.ops != &cpu_ops || !r->in_list || selection->list->axis != r->view.axis ||
+    if (r->base.ops != &cpu_ops || !r->in_layer || selection->list->axis != r->view.axis ||
         !r->view.front_to_back)
         return false;
+    const trip_cpu_view *view = &r->views[selection->list->index];
     trip_cpu_box box =
-        trip_cpu_brick_box(&r->view, brick, selection->sheet_first, selection->sheet_last);
-    return trip_cpu_box_cover(&r->view, &r->mask, &box) == TRIP_CPU_HIDDEN;
+        trip_cpu_brick_box(view, brick, selection->sheet_first, selection->sheet_last);
+    return trip_cpu_box_cover(view, &r->mask, &box) == TRIP_CPU_HIDDEN;
 }
 
 /* ---- creation ---- */

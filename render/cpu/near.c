@@ -193,11 +193,11 @@ static void set_parallel(trip_cpu_view *view)
         trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
 }
 
-void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back)
+static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_camera *camera,
+                      int axis, bool front_to_back)
 {
     const trip_file_header *header = &frame->data->header;
-    const trip_camera *camera = frame->camera;
-    const double full = trip_shade_gradient_full(header, camera->voxel_world);
+    const double full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
     *view = (trip_cpu_view){
         .of = frame,
@@ -222,4 +222,17 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, 
     set_forms(view);
     set_limits(view);
     set_parallel(view);
+}
+
+void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip_list *list,
+                        bool front_to_back)
+{
+    make_view(view, frame, &frame->plan->lists[list->index].camera, list->axis, front_to_back);
+    view->list = list;
+}
+
+void trip_cpu_layer_view_make(trip_cpu_view *view, const trip_frame *frame, int axis,
+                              bool front_to_back)
+{
+    make_view(view, frame, frame->camera, axis, front_to_back);
 }

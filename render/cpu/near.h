@@ -17,8 +17,13 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);
  * [i][j] A^j. */
 extern const float trip_cpu_thin[TRIP_CPU_TERMS][4];
 
-/* The constants of the list along `axis`; `shading` is set by whoever knows of normals. */
-void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, int axis, bool front_to_back);
+/* The constants of a list of the frame's plan, which draws it; `shading` is the caller's to set. */
+void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip_list *list,
+                        bool front_to_back);
+
+/* The constants of the layer of an axis. */
+void trip_cpu_layer_view_make(trip_cpu_view *view, const trip_frame *frame, int axis,
+                              bool front_to_back);
 
 /* The tiles of a splat whose pixels are set, for an image so many tiles across. */
 uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across);

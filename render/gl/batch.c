@@ -87,7 +87,7 @@ static double dot(const trip_gl_double4 *a, const double c[3])
 static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run, uint64_t first,
                                    bool descending, bool whole, uint32_t position)
 {
-    const trip_gl_frame_double *f = p->constants;
+    const trip_gl_frame_double *f = &p->constants;
     const double origin[3] = { whole ? 0 : run->sheet, whole ? 0 : run->u, whole ? 0 : run->v };
     double c[3];
     for (int i = 0; i < 3; i++)
@@ -124,16 +124,16 @@ static bool needs_quads(const trip_gl_placing *p, const trip_run *run)
     return depth < p->sprite_depth;
 }
 
-static void add_piece(trip_gl_batch *b, uint32_t first, uint32_t count, bool quads)
+static void add_piece(trip_gl_batch *b, uint32_t first, uint32_t count, unsigned list, bool quads)
 {
     trip_gl_piece *last = b->piece_count ? &b->pieces[b->piece_count - 1] : NULL;
-    if (last && last->quads == quads)
+    if (last && last->quads == quads && last->list == list)
         last->count += count;
     else
-        b->pieces[b->piece_count++] = (trip_gl_piece){ first, count, quads };
+        b->pieces[b->piece_count++] = (trip_gl_piece){ first, count, list, quads };
 }
 
-static void fill_runs(trip_gl_batch *b, const trip_gl_placing *p, const trip_batch *batch,
+static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const trip_batch *batch,
                       const uint64_t *list_firsts)
 {
     void *memory = b->slot->memory + b->runs.offset;
@@ -142,15 +142,17 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *p, const trip_bat
     uint32_t *run_of = memory, position = 0;
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
+        unsigned list = trip_batch_list(batch, run)->index;
+        const trip_gl_placing *p = &placings[list];
         uint64_t first = list_firsts ? list_firsts[i] : run->first;
         runs[i] = make_run(p, run, first, batch->pass->descending, list_firsts != NULL, position);
-        add_piece(b, position, run->count, needs_quads(p, run));
+        add_piece(b, position, run->count, list, needs_quads(p, run));
         for (uint32_t k = 0; k < run->count; k++)
             run_of[position++] = (uint32_t)i;
     }
 }
 
-int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placing,
+int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
                        const trip_batch *batch, trip_gl_slot *records, const uint64_t *list_firsts)
 {
     int status = count_positions(b, batch);
@@ -162,7 +164,7 @@ int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placi
         return status;
     if (!records)
         copy_records(b, batch);
-    fill_runs(b, placing, batch, list_firsts);
+    fill_runs(b, placings, batch, list_firsts);
     return TRIP_OK;
 }
 

@@ -11,10 +11,11 @@
 #include "gl/shared.h"
 #include "renderer.h"
 
-/* What places the runs of a list. */
+/* A list of a frame: its constants, and what places its runs. */
 typedef struct trip_gl_placing {
-    const trip_camera *camera;
-    const trip_gl_frame_double *constants; /* of the list */
+    const trip_camera *camera; /* of the list */
+    trip_gl_frame_double constants;
+    unsigned effects;
     int axis;
     double tile_voxels;
     bool quads; /* always */
@@ -22,9 +23,10 @@ typedef struct trip_gl_placing {
         sprite_depth; /* and where voxels may be nearer than this, trip_gl_frame_sprite_depth() */
 } trip_gl_placing;
 
-/* Draw positions [first, first + count). */
+/* Draw positions [first, first + count), all of one list. */
 typedef struct trip_gl_piece {
     uint32_t first, count;
+    unsigned list; /* its number in the data set */
     bool quads;
 } trip_gl_piece;
 
@@ -41,10 +43,11 @@ typedef struct trip_gl_batch {
     size_t piece_count, piece_room;
 } trip_gl_batch;
 
-/* Fills `b` from a batch of the reader in draw order. `records` is the slot that the batch lies in;
+/* Fills `b` from a batch of the reader in draw order; `placings` are those of the data set's lists.
+ * `records` is the slot that the batch lies in;
  * NULL: it is copied. `list_firsts`, when not NULL, gives for every run its first place in the
  * list: the whole list's records are in GL memory already, and the batch has runs only. */
-int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placing,
+int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
                        const trip_batch *batch, trip_gl_slot *records, const uint64_t *list_firsts);
 void trip_gl_batch_release(trip_gl_batch *b);
 

@@ -80,9 +80,9 @@ static void set_parallel(trip_gl_frame_double *f, const trip_splat_frame *consta
         (trip_gl_double4){ { 0.5 * (s.x1 - s.x0), 0.5 * (s.y1 - s.y0), s.radius, 0 } };
 }
 
-static void set_world(trip_gl_frame_double *f, const trip_frame *frame, int axis)
+static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const trip_camera *c,
+                      int axis)
 {
-    const trip_camera *c = frame->camera;
     const trip_file_header *header = &frame->data->header;
     trip_gl_double4 *columns[3] = { &f->world_0, &f->world_1, &f->world_2 };
     for (int i = 0; i < 3; i++) {
@@ -91,33 +91,48 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, int axis
         *columns[i] =
             as_it_is(trip_scale(trip_v3(m[0][a], m[1][a], m[2][a]), 1 / c->voxel_world), 0);
     }
-    double full = trip_shade_gradient_full(header, c->voxel_world);
+    double full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     f->light = as_it_is(frame->settings->light_direction, 0);
     f->to_eye =
         as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_scale / full, 1e30));
 }
 
-void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int axis)
+static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_camera *c, int axis)
 {
-    const trip_camera *c = frame->camera;
     const trip_settings *s = frame->settings;
+    const trip_camera *whole = frame->camera;
     trip_splat_frame constants = trip_splat_frame_make(c, s);
     trip_vec3 none = { 0, 0, 0 };
     *out = (trip_gl_frame_double){ 0 };
     set_projection(out, c, axis, constants.sigma);
     set_parallel(out, &constants);
-    set_world(out, frame, axis);
-    out->camera_r0 = as_it_is(c->r0, 0);
-    out->camera_rx = as_it_is(c->ortho ? none : c->rx, 0);
-    out->camera_ry = as_it_is(c->ortho ? none : c->ry, 0);
+    set_world(out, frame, c, axis);
+    out->camera_r0 = as_it_is(whole->r0, 0);
+    out->camera_rx = as_it_is(whole->ortho ? none : whole->rx, 0);
+    out->camera_ry = as_it_is(whole->ortho ? none : whole->ry, 0);
     out->kernel =
         (trip_gl_double4){ { constants.sigma * constants.sigma, constants.cutoff2,
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
     out->edge.v[0] = constants.edge;
     double h = trip_weight_h(s);
+    out->to_grid = (trip_gl_double4){ { 1, 1, 1, 1 } };
     out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };
     const double *b = s->background;
     out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
+}
+
+void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, const trip_list *list)
+{
+    const trip_plan_list *planned = &frame->plan->lists[list->index];
+    const double *scale = planned->grid.scale;
+    make(out, frame, &planned->camera, list->axis);
+    out->to_grid = in_list_axes(trip_v3(scale[0], scale[1], scale[2]), list->axis,
+                                trip_list_grid_growth(&planned->grid));
+}
+
+void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis)
+{
+    make(out, frame, frame->camera, axis);
 }
 
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in)
@@ -143,13 +158,13 @@ static bool is_isotropic(const trip_camera *c)
     return true;
 }
 
-unsigned trip_gl_frame_effects(const trip_frame *frame, int axis)
+unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis)
 {
     const trip_settings *s = frame->settings;
     unsigned effects = 0;
-    if (frame->camera->ortho)
+    if (camera->ortho)
         effects |= TRIP_GL_PARALLEL;
-    else if (!is_isotropic(frame->camera))
+    else if (!is_isotropic(camera))
         effects |= TRIP_GL_ANISOTROPIC;
     if (s->shading && frame->plan->planes & 1u << TRIP_PLANE_NORMALS)
         effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0);
@@ -164,15 +179,15 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, int axis)
  * reaches at most  k sigma |ry| r_max / (K depth) + k low-pass r_max / r_min  pixels from its
  * centre along x within the image (from S'_xx and g >= (r_min / r_max)^2 in splat.h), and alike
  * along y. */
-double trip_gl_frame_sprite_depth(const trip_frame *frame, double point_size_px)
+double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *c,
+                                  double point_size_px)
 {
-    const trip_camera *c = frame->camera;
     double half = 0.5 * (point_size_px - 2);
     if (fmax(c->width, c->height) <= point_size_px)
         return 0;
     if (c->ortho) {
         trip_splat s;
-        trip_splat_frame constants = trip_splat_frame_make(c, frame->settings);
+        trip_splat_frame constants = trip_splat_frame_make(c, settings);
         bool fits = trip_splat_project(&constants, trip_add(c->eye, c->r0), &s) &&
                     fmax(s.x1 - s.x0, s.y1 - s.y0) <= 2 * half;
         return fits ? 0 : HUGE_VAL;
@@ -185,5 +200,5 @@ double trip_gl_frame_sprite_depth(const trip_frame *frame, double point_size_px)
     double k = fabs(trip_dot(c->r0, normal)), r_min = k / trip_length(normal);
     double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
     double wide = fmax(trip_length(c->rx), trip_length(c->ry));
-    return room > 0 ? frame->settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
+    return room > 0 ? settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
 }

@@ -20,14 +20,18 @@ enum trip_gl_effect {
     TRIP_GL_EFFECT_SETS = 128,
 };
 
-void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, int axis);
+/* Of a list that the plan draws. */
+void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, const trip_list *list);
+/* Of the layer of an axis. */
+void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis);
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in);
 
-/* The effects of the frame, TRIP_GL_QUADS aside. */
-unsigned trip_gl_frame_effects(const trip_frame *frame, int axis);
+/* The effects of a list viewed by `camera`, TRIP_GL_QUADS aside. */
+unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis);
 
 /* The depth (world units) from which on the part of a support that lies in the image fits a sprite
  * of the given size; 0 where every support does, infinity where none need. */
-double trip_gl_frame_sprite_depth(const trip_frame *frame, double point_size_px);
+double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *camera,
+                                  double point_size_px);
 
 #endif

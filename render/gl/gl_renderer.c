@@ -44,12 +44,12 @@ typedef struct gl_renderer {
     GLuint vertex_array, quad_indices;
     GLuint constants, table, counts;
     const trip_frame *frame;
-    trip_gl_frame_double lists[3];
-    trip_gl_placing placing;
-    unsigned effects; /* of the list being drawn */
-    unsigned layers;  /* bit a: list a was begun */
-    uint32_t step;    /* splats to draw before the program is asked whether it is interrupted */
-    uint64_t quads;   /* splats of the frame drawn as quads though sprites were asked for */
+    trip_gl_placing *lists;  /* of the frame, by number in the data set */
+    unsigned constants_room; /* blocks of constants: 3 of layers, and one for each list */
+    int axis;                /* of the layer being drawn */
+    unsigned layers;         /* bit a: the layer of axis a was begun */
+    uint32_t step;  /* splats to draw before the program is asked whether it is interrupted */
+    uint64_t quads; /* splats of the frame drawn as quads though sprites were asked for */
     trip_list_stats stats[3];
     char device[320];
 } gl_renderer;
@@ -70,36 +70,85 @@ static void destroy(trip_renderer *base)
         trip_gl_resident_release(&r->resident);
     }
     trip_gl_batch_release(&r->batch);
+    free(r->lists);
     trip_gl_context_destroy(r->context); /* and with it what is left */
     free(r);
 }
 
-/* Offsets in the buffer of constants: the lists' blocks in float, then in double. */
-static GLintptr constants_offset(int axis, bool in_double)
+/* Blocks of constants: those of the layers, then those of the lists. */
+enum { LIST_BLOCKS = 3 };
+
+/* Offsets in the buffer of constants: the blocks in float, then in double. */
+static GLintptr constants_offset(const gl_renderer *r, unsigned block, bool in_double)
 {
     size_t small = trip_gl_ring_after(0, sizeof(trip_gl_frame_float));
     size_t large = trip_gl_ring_after(0, sizeof(trip_gl_frame_double));
-    return (GLintptr)(in_double ? 3 * small + (size_t)axis * large : (size_t)axis * small);
+    return (GLintptr)(in_double ? r->constants_room * small + block * large : block * small);
 }
 
-static void bind_constants(const gl_renderer *r, int axis, bool in_double)
+static void bind_constants(const gl_renderer *r, unsigned block, bool in_double)
 {
     glBindBufferRange(GL_UNIFORM_BUFFER, TRIP_GL_FRAME, r->constants,
-                      constants_offset(axis, in_double),
+                      constants_offset(r, block, in_double),
                       in_double ? sizeof(trip_gl_frame_double) : sizeof(trip_gl_frame_float));
+}
+
+static void upload_block(gl_renderer *r, unsigned block, const trip_gl_frame_double *constants)
+{
+    trip_gl_frame_float rounded;
+    trip_gl_frame_round(&rounded, constants);
+    glNamedBufferSubData(r->constants, constants_offset(r, block, false), sizeof rounded, &rounded);
+    glNamedBufferSubData(r->constants, constants_offset(r, block, true), sizeof *constants,
+                         constants);
+}
+
+static void place_list(gl_renderer *r, const trip_list *list)
+{
+    const trip_frame *frame = r->frame;
+    trip_gl_placing *p = &r->lists[list->index];
+    const trip_camera *camera = &frame->plan->lists[list->index].camera;
+    *p = (trip_gl_placing){
+        .camera = camera,
+        .effects = trip_gl_frame_effects(frame, camera, list->axis),
+        .axis = list->axis,
+        .tile_voxels = (double)(1u << frame->data->header.tile_log2),
+        .quads = frame->settings->triangles,
+        .sprite_depth = trip_gl_frame_sprite_depth(
+            frame->settings, camera, trip_gl_context_limits(r->context)->point_size_px),
+    };
+    trip_gl_frame_make(&p->constants, frame, list);
+    upload_block(r, LIST_BLOCKS + list->index, &p->constants);
 }
 
 static void upload_constants(gl_renderer *r)
 {
+    const trip_dataset *data = r->frame->data;
     for (int axis = 0; axis < 3; axis++) {
-        trip_gl_frame_float rounded;
-        trip_gl_frame_make(&r->lists[axis], r->frame, axis);
-        trip_gl_frame_round(&rounded, &r->lists[axis]);
-        glNamedBufferSubData(r->constants, constants_offset(axis, false), sizeof rounded, &rounded);
-        glNamedBufferSubData(r->constants, constants_offset(axis, true), sizeof r->lists[axis],
-                             &r->lists[axis]);
+        trip_gl_frame_double layer;
+        trip_gl_frame_make_layer(&layer, r->frame, axis);
+        upload_block(r, (unsigned)axis, &layer);
     }
+    for (unsigned i = 0; i < data->list_count; i++)
+        if (r->frame->plan->lists[i].drawn)
+            place_list(r, &data->lists[i]);
     glNamedBufferSubData(r->table, 0, TABLE_BYTES, r->frame->table);
+}
+
+/* Room for the constants of so many lists. */
+static int fit_constants(gl_renderer *r, unsigned lists)
+{
+    if (r->constants && LIST_BLOCKS + lists <= r->constants_room)
+        return TRIP_OK;
+    trip_gl_placing *more = realloc(r->lists, lists * sizeof *more);
+    if (!more)
+        return trip_fail(TRIP_ERROR, "gl", "lists", "out of memory");
+    r->lists = more;
+    r->constants_room = LIST_BLOCKS + lists;
+    glDeleteBuffers(1, &r->constants);
+    glCreateBuffers(1, &r->constants);
+    glNamedBufferStorage(r->constants, constants_offset(r, r->constants_room, true), NULL,
+                         GL_DYNAMIC_STORAGE_BIT);
+    return trip_gl_check(r->context, "constants");
 }
 
 /* What is drawn at once takes a tenth of a second or so where processors draw: a whole pass over
@@ -156,6 +205,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     if (!status)
         status = trip_gl_target_resize(&r->target, camera->width, camera->height,
                                        frame->settings->target);
+    if (!status)
+        status = fit_constants(r, frame->data->list_count);
     if (!status && frame->settings->indexed)
         status = trip_gl_resident_load(&r->resident, frame->data, frame->plan->planes,
                                        trip_gl_context_limits(r->context)->storage_block_bytes);
@@ -185,13 +236,13 @@ static int use_program(gl_renderer *r, trip_gl_pass pass, unsigned effects)
     return status;
 }
 
-/* Sets the stencil to 1 where the list has weight, and has only those pixels drawn from now on. */
+/* Sets the stencil to 1 where the layer has weight, and has only those pixels drawn from now on. */
 static int mask_region(gl_renderer *r, int axis)
 {
     int status = use_program(r, TRIP_GL_PASS_REGION, 0);
     if (status)
         return status;
-    bind_constants(r, axis, true);
+    bind_constants(r, (unsigned)axis, true);
     glEnable(GL_STENCIL_TEST);
     glStencilFunc(GL_ALWAYS, 1, 1);
     glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
@@ -203,7 +254,7 @@ static int mask_region(gl_renderer *r, int axis)
     return status;
 }
 
-static int begin_list(trip_renderer *base, int axis)
+static int begin_layer(trip_renderer *base, int axis)
 {
     gl_renderer *r = (gl_renderer *)base;
     const trip_frame *frame = r->frame;
@@ -220,21 +271,12 @@ static int begin_list(trip_renderer *base, int axis)
     if (status)
         return status;
     r->layers |= 1u << axis;
-    r->effects = trip_gl_frame_effects(frame, axis);
+    r->axis = axis;
     r->step = splats_at_once(frame);
-    r->placing = (trip_gl_placing){
-        .camera = frame->camera,
-        .constants = &r->lists[axis],
-        .axis = axis,
-        .tile_voxels = (double)(1u << frame->data->header.tile_log2),
-        .quads = frame->settings->triangles,
-        .sprite_depth =
-            trip_gl_frame_sprite_depth(frame, trip_gl_context_limits(r->context)->point_size_px),
-    };
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TABLE, r->table);
     if (frame->settings->indexed)
         trip_gl_resident_bind(&r->resident, axis);
-    return trip_gl_check(r->context, "list");
+    return trip_gl_check(r->context, "layer");
 }
 
 static void bind_part(const trip_gl_slot *slot, GLuint binding, trip_gl_part part)
@@ -275,7 +317,7 @@ static int draw_quads(gl_renderer *r, const trip_gl_piece *piece)
 {
     int status = make_quad_indices(r);
     if (!status)
-        status = use_program(r, TRIP_GL_PASS_SPLAT, r->effects | TRIP_GL_QUADS);
+        status = use_program(r, TRIP_GL_PASS_SPLAT, r->lists[piece->list].effects | TRIP_GL_QUADS);
     if (status)
         return status;
     for (uint32_t done = 0; done < piece->count; done += QUADS_PER_DRAW) {
@@ -284,14 +326,14 @@ static int draw_quads(gl_renderer *r, const trip_gl_piece *piece)
         glDrawElementsBaseVertex(GL_TRIANGLES, quads * QUAD_INDICES, GL_UNSIGNED_INT, NULL,
                                  (GLint)((piece->first + done) * QUAD_VERTICES));
     }
-    if (!r->placing.quads)
+    if (!r->frame->settings->triangles)
         r->quads += piece->count;
     return TRIP_OK;
 }
 
 static int draw_sprites(gl_renderer *r, const trip_gl_piece *piece)
 {
-    int status = use_program(r, TRIP_GL_PASS_SPLAT, r->effects);
+    int status = use_program(r, TRIP_GL_PASS_SPLAT, r->lists[piece->list].effects);
     if (!status)
         glDrawArrays(GL_POINTS, (GLint)piece->first, (GLsizei)piece->count);
     return status;
@@ -303,7 +345,7 @@ static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
     int status = TRIP_OK;
     for (uint32_t done = 0; done < piece->count && !status;) {
         uint32_t left = piece->count - done, count = left < r->step ? left : r->step;
-        const trip_gl_piece part = { piece->first + done, count, piece->quads };
+        const trip_gl_piece part = { piece->first + done, count, piece->list, piece->quads };
         status = part.quads ? draw_quads(r, &part) : draw_sprites(r, &part);
         if (!status && count < piece->count)
             status = trip_gl_await();
@@ -315,30 +357,39 @@ static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
 static int draw_pieces(gl_renderer *r, bool front_to_back)
 {
     int status = TRIP_OK;
-    bind_constants(r, r->placing.axis, false);
     glEnable(GL_BLEND);
     if (front_to_back)
         glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
     else
         glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-    for (size_t i = 0; i < r->batch.piece_count && !status; i++)
+    for (size_t i = 0; i < r->batch.piece_count && !status; i++) {
+        bind_constants(r, LIST_BLOCKS + r->batch.pieces[i].list, false);
         status = draw_piece(r, &r->batch.pieces[i]);
+    }
     return status;
 }
 
-static int count_batch(gl_renderer *r)
+static int count_piece(gl_renderer *r, const trip_gl_piece *piece)
 {
-    int status = use_program(r, TRIP_GL_PASS_COUNT, r->effects);
+    int status = use_program(r, TRIP_GL_PASS_COUNT, r->lists[piece->list].effects);
     if (status)
         return status;
-    GLuint groups = (r->batch.positions + TRIP_GL_COUNT_GROUP - 1) / TRIP_GL_COUNT_GROUP;
+    GLuint groups = (piece->count + TRIP_GL_COUNT_GROUP - 1) / TRIP_GL_COUNT_GROUP;
     GLuint rows = (groups + GROUPS_PER_ROW - 1) / GROUPS_PER_ROW;
-    bind_constants(r, r->placing.axis, true);
+    bind_constants(r, LIST_BLOCKS + piece->list, true);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_COUNTS, r->counts);
-    glUniform1ui(0, r->batch.positions);
+    glUniform2ui(0, piece->first, piece->count);
     glDispatchCompute(rows > 1 ? GROUPS_PER_ROW : groups, rows, 1);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
     return TRIP_OK;
+}
+
+static int count_pieces(gl_renderer *r)
+{
+    int status = TRIP_OK;
+    for (size_t i = 0; i < r->batch.piece_count && !status; i++)
+        status = count_piece(r, &r->batch.pieces[i]);
+    return status;
 }
 
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
@@ -349,15 +400,15 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     if (!status && r->frame->settings->indexed)
         status = trip_gl_resident_find(&r->resident, batch, &list_firsts);
     if (!status)
-        status = trip_gl_batch_fill(&r->batch, &r->ring, &r->placing, batch,
+        status = trip_gl_batch_fill(&r->batch, &r->ring, r->lists, batch,
                                     trip_gl_slots_find(&r->slots, batch->voxels), list_firsts);
     if (status)
         return status;
-    r->stats[r->placing.axis].splats_read += r->batch.positions;
+    r->stats[r->axis].splats_read += r->batch.positions;
     bind_batch(&r->batch);
     status = draw_pieces(r, front_to_back);
     if (!status && r->frame->count)
-        status = count_batch(r);
+        status = count_pieces(r);
     trip_gl_slot_fence(r->batch.slot);
     if (r->batch.records != r->batch.slot)
         trip_gl_slot_fence(r->batch.records);
@@ -466,7 +517,7 @@ static const trip_renderer_ops gl_ops = {
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
-    .begin_list = begin_list,
+    .begin_layer = begin_layer,
     .draw = draw,
     .take_slots = take_slots,
     .drop_slots = drop_slots,
@@ -478,8 +529,6 @@ static const trip_renderer_ops gl_ops = {
 static int make_buffers(gl_renderer *r)
 {
     glCreateVertexArrays(1, &r->vertex_array);
-    glCreateBuffers(1, &r->constants);
-    glNamedBufferStorage(r->constants, constants_offset(3, true), NULL, GL_DYNAMIC_STORAGE_BIT);
     glCreateBuffers(1, &r->table);
     glNamedBufferStorage(r->table, TABLE_BYTES, NULL, GL_DYNAMIC_STORAGE_BIT);
     glCreateBuffers(1, &r->counts);

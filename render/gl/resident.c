@@ -215,6 +215,11 @@ static int load_lists(trip_gl_resident *r, arrays *a, trip_reader *reader)
 static int check_size(const trip_dataset *data, size_t block_bytes)
 {
     const trip_file_header *header = &data->header;
+    for (unsigned i = 0; i < data->list_count; i++)
+        if (data->lists[i].level > 0 && trip_kind_of(data->lists[i].kind)->splatted)
+            return trip_fail(TRIP_ERROR, "gl", data->path,
+                             "indexed lists are of one level, and the data set has several; use "
+                             "replicated lists");
     for (int i = 0; i < 3; i++)
         if (header->dims[i] > MAX_COORDINATE)
             return trip_fail(TRIP_ERROR, "gl", data->path,

@@ -21,7 +21,8 @@
 /* Invocations of a counting work group. */
 #define TRIP_GL_COUNT_GROUP 64
 
-/* Constants of one list of a frame; R is float for drawing, double for counting and weights. */
+/* Constants of one list of a frame, or of a layer by level 0's map; R is float for drawing, double
+ * for counting and weights. */
 #define TRIP_GL_FRAME_FIELDS(R4)                                                                   \
     R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */   \
     R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective) */                          \
@@ -39,6 +40,8 @@
     R4 edge;          /* x: what every footprint is lowered by, exp(-cutoff^2 / 2) */              \
     R4 parallel;      /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */      \
     R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \
+    R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;    \
+                         w: the largest of them */                                                 \
     R4 weight;        /* h, sqrt(1 + h^2), list axis, axis of view */                              \
     R4 background;    /* r, g, b, a; not premultiplied */
 

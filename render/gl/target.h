@@ -1,4 +1,4 @@
-/* What a frame is drawn into: one layer per list, made when the list is first drawn, the stencil
+/* What a frame is drawn into: one layer per axis, made when it is first drawn, the stencil
  * that masks pixels without weight, and the merged image. Owned by one renderer; kept from frame to
  * frame while size and type stay. Its bytes count against the budget. */
 #ifndef TRIP_GL_TARGET_H
@@ -22,7 +22,7 @@ typedef struct trip_gl_target {
 
 /* Readies an image of this size for layers of this type. */
 int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type);
-/* Binds the layer of a list for drawing, empty; with `stencil` its stencil too, all zero. */
+/* Binds the layer of an axis for drawing, empty; with `stencil` its stencil too, all zero. */
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
 /* Binds the image for drawing; it holds rgba32f whatever the layers hold. */
 int trip_gl_target_begin_image(trip_gl_target *t);

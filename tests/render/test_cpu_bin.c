@@ -102,8 +102,10 @@ typedef struct taken {
     float mark, number;
 } taken;
 
-static void take(void *user, const trip_cpu_splat *splats, const uint16_t *order, uint32_t count)
+static void take(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *splats,
+                 const uint16_t *order, uint32_t count)
 {
+    (void)chunk;
     taken *t = user;
     for (uint32_t i = 0; i < count; i++, t->count++) {
         const trip_cpu_splat *s = &splats[order ? order[i] : i];
@@ -158,9 +160,10 @@ static bool lies_in(const trip_cpu_splat *s, uint32_t tile)
            y <= s->y1 / TRIP_CPU_TILE;
 }
 
-static void take_mixed(void *user, const trip_cpu_splat *splats, const uint16_t *order,
-                       uint32_t count)
+static void take_mixed(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *splats,
+                       const uint16_t *order, uint32_t count)
 {
+    (void)chunk;
     taken *t = user;
     assert_non_null(order);
     for (uint32_t i = 0; i < count; i++, t->count++) {

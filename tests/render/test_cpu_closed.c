@@ -56,7 +56,7 @@ static void look(fixture *f, double distance, double ortho_height, int axis)
                              .settings = &f->settings,
                              .plan = &f->plan,
                              .table = f->scene.table };
-    trip_cpu_view_make(&f->view, &f->frame, axis, true);
+    trip_cpu_layer_view_make(&f->view, &f->frame, axis, true);
     f->hidden = f->shown = f->kept_hidden = 0;
 }
 

@@ -31,7 +31,8 @@ static void look(looks *l, const scene *s, const trip_camera_params *params, int
                              .settings = &l->settings,
                              .plan = &l->plan,
                              .table = s->table };
-    trip_cpu_view_make(&l->view, &l->frame, axis, true);
+    trip_cpu_layer_view_make(&l->view, &l->frame, axis, true);
+    l->view.list = trip_dataset_find(s->data, axis, 0, TRIP_KIND_VOXELS);
     l->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, l->open };
 }
 

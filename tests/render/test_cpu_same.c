@@ -179,11 +179,11 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, uint32_t piece, bool 
                                         s->budget),
                      0);
     for (int axis = 0; axis < 3; axis++) {
-        if (f->plan.lists[axis].pass_count == 0)
+        if (f->plan.layers[axis].pass_count == 0)
             continue;
-        assert_int_equal(f->renderer->ops->begin_list(f->renderer, axis), 0);
-        for (int i = 0; i < f->plan.lists[axis].pass_count; i++) {
-            const trip_pass pass = trip_pass_of(&f->plan.lists[axis].passes[i].selection);
+        assert_int_equal(f->renderer->ops->begin_layer(f->renderer, axis), 0);
+        for (int i = 0; i < f->plan.layers[axis].pass_count; i++) {
+            const trip_pass pass = f->plan.layers[axis].passes[i].pass;
             assert_int_equal(trip_reader_begin(reader, &pass), 0);
             while (trip_reader_next(reader, &batch) > 0) {
                 draw_pieces(f, &batch, piece, skip);
@@ -272,7 +272,7 @@ static void frames_follow_one_another_on_one_renderer(void **state)
     draw_by_hand(&f, &s, 5000, false);
     /* A frame given up half-way, with splats still on their way, leaves nothing behind. */
     assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);
-    assert_int_equal(f.renderer->ops->begin_list(f.renderer, 1), 0);
+    assert_int_equal(f.renderer->ops->begin_layer(f.renderer, 1), 0);
     for (int i = 0; i < 2; i++) {
         assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);
         memset(f.rgba, 0, 16 * (size_t)view.width * (size_t)view.height);

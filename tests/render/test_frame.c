@@ -228,7 +228,7 @@ static int lazy_begin_frame(trip_renderer *r, const trip_frame *frame)
     return 0;
 }
 
-static int lazy_begin_list(trip_renderer *r, int axis)
+static int lazy_begin_layer(trip_renderer *r, int axis)
 {
     (void)r;
     (void)axis;
@@ -269,7 +269,7 @@ static void lazy_stats(const trip_renderer *r, trip_list_stats lists[3])
 static const trip_renderer_ops lazy_ops = {
     .name = "lazy",
     .begin_frame = lazy_begin_frame,
-    .begin_list = lazy_begin_list,
+    .begin_layer = lazy_begin_layer,
     .draw = lazy_draw,
     .is_done = lazy_is_done,
     .end_frame = lazy_end_frame,

@@ -44,9 +44,8 @@ static void from_the_sprite_depth_on_every_support_fits_a_sprite(void **state)
     trip_settings settings = trip_settings_default();
     for (int i = 0; i < 300; i++) {
         trip_camera c = random_camera();
-        trip_frame frame = { .camera = &c, .settings = &settings };
         trip_splat_frame constants = trip_splat_frame_make(&c, &settings);
-        double size = between(16, 300), depth = trip_gl_frame_sprite_depth(&frame, size);
+        double size = between(16, 300), depth = trip_gl_frame_sprite_depth(&settings, &c, size);
         for (int k = 0; k < 1000 && isfinite(depth); k++) {
             /* Mostly just beyond the bound, near the image and beside it. */
             double z = fmax(depth, 1e-3) * (1 + test_random() * test_random());
@@ -69,9 +68,8 @@ static void a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use(void **
     (void)state;
     trip_settings settings = trip_settings_default();
     trip_camera c = random_camera();
-    trip_frame frame = { .camera = &c, .settings = &settings };
-    assert_true(trip_gl_frame_sprite_depth(&frame, 900) == 0);
-    assert_true(trip_gl_frame_sprite_depth(&frame, 1) == HUGE_VAL);
+    assert_true(trip_gl_frame_sprite_depth(&settings, &c, 900) == 0);
+    assert_true(trip_gl_frame_sprite_depth(&settings, &c, 1) == HUGE_VAL);
 }
 
 static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
@@ -86,20 +84,20 @@ static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
     trip_camera c;
     trip_frame frame = { .camera = &c, .settings = &settings, .plan = &plan };
     assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
-    assert_int_equal(trip_gl_frame_effects(&frame, 0), 0);
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), 0);
 
     plan.planes |= 1u << TRIP_PLANE_NORMALS;
-    assert_int_equal(trip_gl_frame_effects(&frame, 0), TRIP_GL_SHADED | TRIP_GL_HEADLIGHT);
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_SHADED | TRIP_GL_HEADLIGHT);
     settings.shading = false;
     settings.indexed = true;
-    assert_int_equal(trip_gl_frame_effects(&frame, 0), TRIP_GL_INDEXED);
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_INDEXED);
 
     grid.m[1][1] = 1.01;
     assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
-    assert_int_equal(trip_gl_frame_effects(&frame, 0), TRIP_GL_INDEXED | TRIP_GL_ANISOTROPIC);
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_INDEXED | TRIP_GL_ANISOTROPIC);
     p.ortho_height = 50;
     assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
-    assert_int_equal(trip_gl_frame_effects(&frame, 0),
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0),
                      TRIP_GL_INDEXED | TRIP_GL_PARALLEL | TRIP_GL_UNCULLED);
 }
 

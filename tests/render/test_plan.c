@@ -85,7 +85,7 @@ static void a_list_is_used_exactly_when_some_pixel_has_weight_in_it(void **state
                 trip_vec3 ray = trip_camera_ray(&c, at % c.width + 0.5, at / c.width + 0.5);
                 weighs = trip_weight(&settings, plan.axis_of_view, ray, axis) > 0;
             }
-            assert_int_equal(plan.lists[axis].used, weighs);
+            assert_int_equal(plan.layers[axis].used, weighs);
             used += weighs;
             unused += !weighs;
         }
@@ -108,12 +108,13 @@ static void a_parallel_view_along_an_axis_uses_that_list_alone(void **state)
         trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
         trip_plan plan = make_plan(&s, &c, &settings);
         for (int a = 0; a < 3; a++) {
-            assert_int_equal(plan.lists[a].used, a == axis);
-            assert_int_equal(plan.lists[a].pass_count, a == axis);
+            assert_int_equal(plan.layers[a].used, a == axis);
+            assert_int_equal(plan.layers[a].pass_count, a == axis);
         }
         assert_int_equal(plan.lists[axis].splats_selected, s.data->header.kept);
-        assert_true(plan.lists[axis].passes[0].selection.descending); /* seen from above */
-        assert_true(plan.lists[axis].passes[0].front_to_back);
+        assert_true(
+            plan.layers[axis].passes[0].pass.selections[0].descending); /* seen from above */
+        assert_true(plan.layers[axis].passes[0].front_to_back);
         trip_plan_release(&plan, s.budget);
     }
     scene_destroy(&s);
@@ -130,19 +131,19 @@ static void inside_the_volume_each_list_is_read_from_the_eye_outwards(void **sta
     trip_camera c = make_camera(&s, &p);
     trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
     trip_plan plan = make_plan(&s, &c, &settings);
-    const trip_plan_pass *x = plan.lists[0].passes, *y = plan.lists[1].passes;
-    assert_int_equal(plan.lists[0].pass_count, 2);
-    assert_int_equal(x[0].selection.sheet_first, 21);
-    assert_int_equal(x[0].selection.sheet_last, 49);
-    assert_false(x[0].selection.descending);
-    assert_int_equal(x[1].selection.sheet_first, 0);
-    assert_int_equal(x[1].selection.sheet_last, 20);
-    assert_true(x[1].selection.descending);
-    assert_int_equal(plan.lists[1].pass_count, 2);
-    assert_int_equal(y[0].selection.sheet_first, 30);
-    assert_int_equal(y[1].selection.sheet_last, 29);
-    assert_int_equal(plan.lists[2].pass_count, 1); /* the eye is below all sheets */
-    assert_int_equal(plan.lists[2].passes[0].selection.sheet_first, 0);
+    const trip_plan_pass *x = plan.layers[0].passes, *y = plan.layers[1].passes;
+    assert_int_equal(plan.layers[0].pass_count, 2);
+    assert_int_equal(x[0].pass.selections->sheet_first, 21);
+    assert_int_equal(x[0].pass.selections->sheet_last, 49);
+    assert_false(x[0].pass.selections->descending);
+    assert_int_equal(x[1].pass.selections->sheet_first, 0);
+    assert_int_equal(x[1].pass.selections->sheet_last, 20);
+    assert_true(x[1].pass.selections->descending);
+    assert_int_equal(plan.layers[1].pass_count, 2);
+    assert_int_equal(y[0].pass.selections->sheet_first, 30);
+    assert_int_equal(y[1].pass.selections->sheet_last, 29);
+    assert_int_equal(plan.layers[2].pass_count, 1); /* the eye is below all sheets */
+    assert_int_equal(plan.layers[2].passes[0].pass.selections[0].sheet_first, 0);
     trip_plan_release(&plan, s.budget);
     scene_destroy(&s);
 }
@@ -158,9 +159,9 @@ static void ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze
     settings.traversal = TRIP_TRAVERSAL_ASCENDING;
     trip_plan plan = make_plan(&s, &c, &settings);
     for (int axis = 0; axis < 3; axis++) {
-        assert_int_equal(plan.lists[axis].pass_count, 1);
-        assert_false(plan.lists[axis].passes[0].selection.descending);
-        assert_int_equal(plan.lists[axis].passes[0].front_to_back, axis == 0);
+        assert_int_equal(plan.layers[axis].pass_count, 1);
+        assert_false(plan.layers[axis].passes[0].pass.selections[0].descending);
+        assert_int_equal(plan.layers[axis].passes[0].front_to_back, axis == 0);
     }
     trip_plan_release(&plan, s.budget);
     scene_destroy(&s);
@@ -268,7 +269,8 @@ static void a_brick_is_transparent_when_no_code_of_its_range_has_extinction(void
     trip_camera_params p = scene_view(&s, trip_v3(1, 0.4, 0.3), 150, 40, 32);
     trip_camera c = make_camera(&s, &p);
     trip_settings settings = unlit(TRIP_METHOD_AXIS, 0);
-    trip_cull cull = trip_cull_make(s.data, &c, &settings, 0, s.table);
+    const trip_list_grid grid = { { 1, 1, 1 }, { 0, 0, 0 } };
+    trip_cull cull = trip_cull_make(s.data, &c, &grid, &settings, 0, s.table);
     trip_file_brick brick = s.data->lists[0].bricks[0];
     const trip_file_slab *slab = s.data->lists[0].slabs;
     for (unsigned i = 0; i < 20000; i++) {

@@ -234,6 +234,8 @@ static void expect_refused(const scene *s, const scene_renderer *renderer, trip_
                                         &(trip_reader_params){ .planes = plan.planes }, s->budget),
                      0);
     assert_int_equal(renderer->create(&r, s->budget), 0);
+    for (unsigned i = 0; i < plan.list_count; i++)
+        plan.lists[i].camera = *camera;
     trip_frame frame = {
         .data = s->data, .camera = camera, .settings = &settings, .plan = &plan, .table = s->table
     };

@@ -507,9 +507,39 @@ INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat
         add(s, g, &splats[order[i]]);
 }
 
-static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
-                       uint32_t count)
+/* Blends what is gathered. */
+static void end_group(trip_cpu_scratch *s)
 {
+    if (s->splats % 64 != 0)
+        s->thick[s->splats / 64] >>= 64 - s->splats % 64;
+    empty_group(s);
+}
+
+/* Whether pixels have the same G and stretch in both views. */
+static bool has_same_rays(const trip_cpu_view *a, const trip_cpu_view *b)
+{
+    return a->rays == b->rays && a->stretch_varies == b->stretch_varies &&
+           memcmp(a->ray2, b->ray2, sizeof a->ray2) == 0 &&
+           memcmp(a->world2, b->world2, sizeof a->world2) == 0;
+}
+
+/* Takes up the view that the next splats were projected with. */
+static void use_view(trip_cpu_scratch *s, const trip_cpu_view *view)
+{
+    if (s->view == view)
+        return;
+    if (!has_same_rays(s->view, view)) {
+        end_group(s);
+        memset(s->rays_known, 0, sizeof s->rays_known);
+        s->blend = choose_blend(view);
+    }
+    s->view = view;
+}
+
+static void tile_blend(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
+                       const uint16_t *order, uint32_t count)
+{
+    use_view(s, view);
     gathering g = { s->splats, s->thick[s->splats / 64], { s->x, s->y, s->x, s->y } };
     if (!takes_light(s))
         return;
@@ -526,9 +556,7 @@ static void tile_blend(trip_cpu_scratch *s, const trip_cpu_splat *splats, const 
 static uint64_t tile_end(trip_cpu_scratch *s)
 {
     uint64_t open = 0;
-    if (s->splats % 64 != 0)
-        s->thick[s->splats / 64] >>= 64 - s->splats % 64;
-    empty_group(s);
+    end_group(s);
     for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
         uint64_t bits = s->open[row / 8] >> 8 * (row % 8) & 255;
         open |= bits << 8 * (row * BLOCK_ROWS / 4);

@@ -62,10 +62,11 @@ typedef enum trip_cpu_rays {
     TRIP_CPU_STRETCHED,   /* G(p) and stretch(p) */
 } trip_cpu_rays;
 
-/* Constants of one list of one frame. */
+/* Constants of one list of one frame, or of a layer: what tiles begin and end with. */
 typedef struct trip_cpu_view {
     const trip_frame *of;
-    trip_splat_frame splat;
+    const trip_list *list;  /* NULL: of a layer, by level 0's map */
+    trip_splat_frame splat; /* by the camera of the list */
     trip_cpu_rays rays;
     bool front_to_back, shading;
     bool stretch_varies;
@@ -125,7 +126,7 @@ typedef struct trip_cpu_scratch {
     int x, y; /* of the tile's first pixel */
     float *pixels;
     void (*blend)(struct trip_cpu_scratch *s); /* the group, in order */
-    const trip_cpu_view *view;
+    const trip_cpu_view *view;                 /* of the splats gathered, or of the layer */
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;
 } trip_cpu_scratch;
@@ -166,9 +167,10 @@ typedef struct trip_cpu_kernels {
     /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. */
     void (*tile_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
                        unsigned quarters, float *pixels);
-    /* Blends splats[order[i]] in order, or splats[i] where order is NULL. */
-    void (*tile_blend)(trip_cpu_scratch *s, const trip_cpu_splat *splats, const uint16_t *order,
-                       uint32_t count);
+    /* Blends splats[order[i]] in order, or splats[i] where order is NULL, that were projected with
+     * this view. */
+    void (*tile_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
+                       const uint16_t *order, uint32_t count);
     /* Ends with every splat in the pixels. Returns which blocks of 4 x 4 pixels of the quarters
      * hold a pixel that may still take light: eight rows of eight bits, the first lowest. */
     uint64_t (*tile_end)(trip_cpu_scratch *s);

@@ -59,7 +59,7 @@ INLINE vd weight_half(const trip_cpu_view *view, const trip_settings *s, int axi
 {
     if (s->method == TRIP_METHOD_AXIS)
         return vd_set(axis == view->of->plan->axis_of_view);
-    rays r = rays_at(&view->splat.camera, x, y);
+    rays r = rays_at(view->of->camera, x, y);
     if (s->method == TRIP_METHOD_CLIP)
         return vd_select(is_largest(&r, axis), vd_set(1), vd_set(0));
     vd most = vd_max(r.r[0], vd_max(r.r[1], r.r[2]));

@@ -1,0 +1,378 @@
+#include "scenes.h"
+
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "splat.h"
+#include "weight.h"
+
+/* An object of two levels: cells of 4 x 4 x 4 voxels of level 0, every other one drawn by its
+ * voxels, the rest by those of level 1, so that the levels alternate along every ray and each
+ * hides much of the other. */
+
+enum { N = 24, CELL = 4, SIZE_PX = 44 };
+
+/* Codes of the levels. */
+enum { FINE = 20000, COARSE = 50000 };
+
+/* Voxels of level 0 in one of level 1. */
+typedef struct coarseness {
+    int by[3];
+} coarseness;
+
+static bool is_coarse(const double at[3])
+{
+    int sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (int)at[a] / CELL;
+    return sum % 2;
+}
+
+static bool fine_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = FINE;
+    return !is_coarse((double[3]){ i, j, k });
+}
+
+static bool coarse_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const coarseness *c = user;
+    (void)gradient;
+    *code = COARSE;
+    return is_coarse((double[3]){ i * c->by[0], j * c->by[1], k * c->by[2] });
+}
+
+typedef struct levels {
+    coarseness coarse;
+    scene scenes[2];
+    trip_dataset both;
+    trip_list lists[6];
+    scene drawn;
+} levels;
+
+static double offset_of(const levels *l, int axis)
+{
+    return 0.5 * (l->coarse.by[axis] - 1);
+}
+
+static trip_affine coarse_map(const levels *l, const trip_affine *fine)
+{
+    trip_affine step = trip_affine_identity();
+    for (int a = 0; a < 3; a++) {
+        step.m[a][a] = l->coarse.by[a];
+        step.m[a][3] = offset_of(l, a);
+    }
+    return trip_affine_multiply(fine, &step);
+}
+
+/* One data set of the lists of two. */
+static void create(levels *l, coarseness coarse, double thickness)
+{
+    trip_affine fine = { { { 0, -1, 0, 3 }, { 1, 0, 0, -2 }, { 0, 0, thickness, 5 } } };
+    memset(l, 0, sizeof *l);
+    l->coarse = coarse;
+    scene_params params = { .dims = { N, N, N },
+                            .index_to_world = fine,
+                            .tile_voxels = 16,
+                            .slab_sheets = 4,
+                            .voxel = fine_voxel };
+    scene_create(&l->scenes[0], &params);
+    params.index_to_world = coarse_map(l, &fine);
+    params.voxel = coarse_voxel;
+    params.user = &l->coarse;
+    for (int a = 0; a < 3; a++)
+        params.dims[a] = N / coarse.by[a];
+    scene_create(&l->scenes[1], &params);
+    l->both = *l->scenes[0].data;
+    l->both.lists = l->lists;
+    l->both.list_count = 6;
+    for (unsigned i = 0; i < 6; i++) {
+        trip_list *list = &l->lists[i];
+        *list = l->scenes[i / 3].data->lists[i % 3];
+        list->index = i;
+        list->level = i / 3;
+        list->sheet_first = i < 3 ? 0 : offset_of(l, list->axis);
+        list->sheet_step = i < 3 ? 1 : coarse.by[list->axis];
+    }
+    l->drawn = l->scenes[0];
+    l->drawn.data = &l->both;
+    scene_colour(&l->drawn, FINE, FINE, 1, 0.2, 0.1, 0.25);
+    scene_colour(&l->drawn, COARSE, COARSE, 0.1, 0.7, 1, 0.1);
+}
+
+static void destroy(levels *l)
+{
+    scene_destroy(&l->scenes[0]);
+    scene_destroy(&l->scenes[1]);
+}
+
+/* ---- by brute force ---- */
+
+typedef struct item {
+    double coordinate;
+    int level;
+    uint64_t morton;
+    bool beyond;
+    const trip_tf_entry *entry;
+    trip_splat splat;
+} item;
+
+static int by_place(const void *a, const void *b)
+{
+    const item *p = a, *q = b;
+    if (p->coordinate != q->coordinate)
+        return p->coordinate < q->coordinate ? -1 : 1;
+    if (p->level != q->level)
+        return p->level - q->level;
+    return p->morton < q->morton ? -1 : p->morton > q->morton;
+}
+
+typedef struct brute {
+    const levels *levels;
+    trip_settings settings;
+    trip_splat_frame frames[2];
+    item *items;
+    size_t count;
+} brute;
+
+static bool is_there(const levels *l, int level, const int at[3])
+{
+    unsigned code;
+    double gradient[3];
+    return level ? coarse_voxel((void *)(uintptr_t)&l->coarse, at[0], at[1], at[2], &code, gradient)
+                 : fine_voxel(NULL, at[0], at[1], at[2], &code, gradient);
+}
+
+static void add(brute *b, int level, int axis, const int at[3])
+{
+    const levels *l = b->levels;
+    double eye = trip_component(b->frames[0].camera.eye, axis);
+    item *i = &b->items[b->count];
+    int scale = level ? l->coarse.by[axis] : 1;
+    if (!is_there(l, level, at) ||
+        !trip_splat_project(&b->frames[level], trip_v3(at[0], at[1], at[2]), &i->splat))
+        return;
+    i->coordinate = scale * at[axis] + 0.5 * (scale - 1);
+    i->level = level;
+    i->morton = trip_morton((unsigned)at[(axis + 1) % 3], (unsigned)at[(axis + 2) % 3]);
+    i->entry = &l->drawn.table[level ? COARSE : FINE];
+    i->beyond = b->frames[0].camera.ortho ? trip_component(b->frames[0].camera.r0, axis) > 0
+                                          : i->coordinate >= eye;
+    b->count++;
+}
+
+static void collect(brute *b, int axis)
+{
+    b->count = 0;
+    for (int level = 0; level < 2; level++) {
+        const int *by = b->levels->coarse.by;
+        const int dims[3] = { level ? N / by[0] : N, level ? N / by[1] : N, level ? N / by[2] : N };
+        for (int i = 0; i < dims[0] * dims[1] * dims[2]; i++)
+            add(b, level, axis,
+                (int[3]){ i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1] });
+    }
+    qsort(b->items, b->count, sizeof *b->items, by_place);
+}
+
+static void put_behind(const brute *b, const item *i, double x, double y, double layer[4])
+{
+    const trip_splat_frame *f = &b->frames[i->level];
+    const trip_splat *s = &i->splat;
+    double m = trip_splat_radius2(f, s, x, y);
+    if (x < s->x0 || x > s->x1 || y < s->y0 || y > s->y1 || m > f->cutoff2 ||
+        1 - layer[3] < TRIP_SATURATION)
+        return;
+    double depth = (double)i->entry->extinction * trip_splat_stretch(f, x, y) * s->amplitude *
+                   (exp(-m / 2) - f->edge);
+    double add = (1 - layer[3]) * -expm1(-depth);
+    const float rgb[3] = { i->entry->r, i->entry->g, i->entry->b };
+    for (int c = 0; c < 3; c++)
+        layer[c] += (double)rgb[c] * add;
+    layer[3] += add;
+}
+
+/* What lies beyond the eye upwards, then what lies below it downwards. */
+static void composite(const brute *b, double x, double y, double layer[4])
+{
+    for (size_t i = 0; i < b->count; i++)
+        if (b->items[i].beyond)
+            put_behind(b, &b->items[i], x, y, layer);
+    for (size_t i = b->count; i-- > 0;)
+        if (!b->items[i].beyond)
+            put_behind(b, &b->items[i], x, y, layer);
+}
+
+static float *draw_by_hand(brute *b)
+{
+    const trip_camera *c = &b->frames[0].camera;
+    int axis_of_view = trip_weight_axis_of_view(c);
+    float *rgba = calloc((size_t)4 * SIZE_PX * SIZE_PX, sizeof *rgba);
+    double *weights = calloc((size_t)SIZE_PX * SIZE_PX, sizeof *weights);
+    for (int axis = 0; axis < 3; axis++) {
+        collect(b, axis);
+        for (int p = 0; p < SIZE_PX * SIZE_PX; p++) {
+            double x = p % SIZE_PX + 0.5, y = p / SIZE_PX + 0.5, layer[4] = { 0 };
+            double w = trip_weight(&b->settings, axis_of_view, trip_camera_ray(c, x, y), axis);
+            if (!(w > 0))
+                continue;
+            composite(b, x, y, layer);
+            for (int i = 0; i < 4; i++)
+                rgba[4 * p + i] += (float)(w * w * layer[i]);
+            weights[p] += w * w;
+        }
+    }
+    for (int p = 0; p < SIZE_PX * SIZE_PX; p++)
+        for (int i = 0; i < 4; i++)
+            rgba[4 * p + i] = (float)((double)rgba[4 * p + i] / weights[p]);
+    free(weights);
+    return rgba;
+}
+
+/* ---- views ---- */
+
+static double largest_difference(const float *a, const float *b)
+{
+    double most = 0;
+    for (int i = 0; i < 4 * SIZE_PX * SIZE_PX; i++)
+        most = fmax(most, fabs((double)a[i] - (double)b[i]));
+    return most;
+}
+
+static void expect_right(levels *l, const trip_camera_params *view)
+{
+    brute b = { .levels = l, .settings = trip_settings_default() };
+    const trip_affine *fine = &l->both.index_to_world;
+    trip_affine maps[2] = { *fine, coarse_map(l, fine) };
+    b.settings.shading = false;
+    b.settings.h = 0.6;
+    b.settings.background[3] = 0;
+    for (int level = 0; level < 2; level++) {
+        trip_camera c;
+        assert_int_equal(trip_camera_make(&c, view, &maps[level]), 0);
+        b.frames[level] = trip_splat_frame_make(&c, &b.settings);
+    }
+    b.items = calloc((size_t)2 * N * N * N, sizeof *b.items);
+    assert_non_null(b.items);
+    float *expected = draw_by_hand(&b);
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        scene_picture p = scene_draw(&l->drawn, r, view, &b.settings);
+        double off = largest_difference(p.rgba, expected);
+        if (!(off <= (strcmp(r->name, "reference") ? r->tolerance : 1e-6)))
+            fail_msg("%s: off by %g", r->name, off);
+        scene_picture_free(&p);
+    }
+    free(expected);
+    free(b.items);
+}
+
+static void expect_right_from_everywhere(levels *l)
+{
+    static const double from[][3] = {
+        { 1, 0.6, 0.4 }, { -1, -0.6, -0.4 }, { 0.1, -0.2, 1 }, { 0.3, 1, -0.2 }, { -0.05, 0.1, -1 }
+    };
+    for (size_t i = 0; i < sizeof from / sizeof *from; i++) {
+        trip_camera_params view =
+            scene_view(&l->drawn, trip_v3(from[i][0], from[i][1], from[i][2]), 60, 40, SIZE_PX);
+        expect_right(l, &view);
+    }
+    trip_camera_params inside = scene_view(&l->drawn, trip_v3(0.3, 0.2, 0.5), 2.3, 100, SIZE_PX);
+    expect_right(l, &inside);
+    trip_camera_params parallel = scene_view(&l->drawn, trip_v3(1, 0.6, -0.7), 60, 40, SIZE_PX);
+    parallel.ortho_height = 30;
+    expect_right(l, &parallel);
+}
+
+static void two_levels_are_drawn_in_one_order(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    expect_right_from_everywhere(&l);
+    destroy(&l);
+}
+
+/* Their rays differ from pixel to pixel, and sheets along the last axis coincide. */
+static void levels_of_voxels_of_other_shapes_are_drawn_in_one_order(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 4, 1 } }, 1.25);
+    expect_right_from_everywhere(&l);
+    destroy(&l);
+}
+
+static trip_plan make_plan(const levels *l, const trip_camera_params *view)
+{
+    trip_camera c;
+    trip_plan plan;
+    trip_settings settings = trip_settings_default();
+    assert_int_equal(trip_camera_make(&c, view, &l->both.index_to_world), 0);
+    assert_int_equal(
+        trip_plan_make(&plan, &l->both, &c, &settings, l->drawn.table, l->drawn.budget), 0);
+    return plan;
+}
+
+static void a_plan_names_lists_by_axis_and_level(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    char *text;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = scene_view(&l.drawn, trip_v3(0, 0, 1), 60, 20, SIZE_PX);
+    trip_plan plan = make_plan(&l, &view);
+    assert_int_equal(plan.layers[2].pass_count, 1);
+    assert_int_equal(plan.layers[2].passes[0].pass.selection_count, 2);
+    assert_int_equal(trip_plan_splats(&plan), l.lists[2].records + l.lists[5].records);
+    trip_plan_explain(&plan, &l.both, &settings, f);
+    fclose(f);
+    assert_non_null(strstr(text, "list x1     not read: no ray of the view has weight in it\n"));
+    assert_non_null(strstr(text, "list z      read: "));
+    assert_non_null(strstr(text, "list z1     read: "));
+    assert_non_null(strstr(text, "sheets 0 to 11 descending, front to back\n"));
+    free(text);
+    trip_plan_release(&plan, l.drawn.budget);
+    destroy(&l);
+}
+
+static void lists_that_do_not_lie_along_level_0_are_refused(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    trip_camera_params view = scene_view(&l.drawn, trip_v3(0.1, 0, 1), 60, 20, SIZE_PX);
+    trip_camera c;
+    trip_plan plan;
+    trip_settings settings = trip_settings_default();
+    assert_int_equal(trip_camera_make(&c, &view, &l.both.index_to_world), 0);
+    trip_affine straight = l.lists[5].index_to_world;
+    test_catch_reports();
+    l.lists[5].index_to_world.m[0][0] += 0.01;
+    assert_int_equal(trip_plan_make(&plan, &l.both, &c, &settings, l.drawn.table, l.drawn.budget),
+                     TRIP_ERROR);
+    assert_one_report("does not lie along that of level 0");
+    l.lists[5].index_to_world = straight;
+    l.lists[5].sheet_first += 1;
+    test_catch_reports();
+    assert_int_equal(trip_plan_make(&plan, &l.both, &c, &settings, l.drawn.table, l.drawn.budget),
+                     TRIP_ERROR);
+    assert_one_report("its sheets lie elsewhere");
+    destroy(&l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(two_levels_are_drawn_in_one_order),
+        cmocka_unit_test(levels_of_voxels_of_other_shapes_are_drawn_in_one_order),
+        cmocka_unit_test(a_plan_names_lists_by_axis_and_level),
+        cmocka_unit_test(lists_that_do_not_lie_along_level_0_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
