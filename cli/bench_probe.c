@@ -86,7 +86,7 @@ static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
     return 0;
 }
 
-static int end_frame(trip_renderer *r, float *rgba)
+static int picture(trip_renderer *r, float *rgba)
 {
     (void)r;
     (void)rgba;
@@ -108,7 +108,7 @@ bench_probe bench_probe_make(unsigned every)
         .begin_frame = begin_frame,
         .begin_layer = begin_layer,
         .draw = draw,
-        .end_frame = end_frame,
+        .picture = picture,
         .stats = stats,
     };
     return (bench_probe){ .base = { &ops }, .every = every };

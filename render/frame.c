@@ -1,34 +1,29 @@
 #include "frame.h"
 
+#include <assert.h>
 #include <time.h>
 
 #include "report.h"
 #include "splat.h"
 
-static double now_ms(void)
+enum { HELD_MAX = TRIP_FRAME_HELD_MAX };
+
+/* How long a frame that waits for the disk does not notice that it is given up. */
+enum { LOOK_NS = 20000000 };
+
+uint64_t trip_frame_now_ns(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+    return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
 }
 
-enum { HELD_MAX = 16 };
+static double now_ms(void)
+{
+    return (double)trip_frame_now_ns() * 1e-6;
+}
 
-/* A frame being drawn. */
-typedef struct drawing {
-    trip_renderer *renderer;
-    trip_reader *reader;
-    const trip_frame *frame;
-    trip_frame_stats *stats;
-    int next_axis;       /* layers before this one were begun */
-    uint64_t splats;     /* drawn so far */
-    uint64_t bytes_read; /* counted so far */
-    /* Drawn, but perhaps not done with: held[held_first % HELD_MAX] is the oldest. */
-    trip_batch held[HELD_MAX];
-    unsigned held_first, held_count;
-} drawing;
-
-static void tell_progress(drawing *d, const trip_batch *batch)
+static void tell_progress(trip_drawing *d, const trip_batch *batch)
 {
     if (!d->frame->progress)
         return;
@@ -39,7 +34,7 @@ static void tell_progress(drawing *d, const trip_batch *batch)
 
 /* Passes are read one behind the other, so that the next is on its way while the last batches of
  * one are drawn. */
-static int begin_reading(drawing *d)
+static int begin_reading(trip_drawing *d)
 {
     trip_reader_set_runs_only(d->reader, d->renderer->resident);
     int status = trip_reader_begin(d->reader, NULL);
@@ -52,7 +47,7 @@ static int begin_reading(drawing *d)
 }
 
 /* The layers up to `last` that have passes, in order. */
-static int begin_layers(drawing *d, int last)
+static int begin_layers(trip_drawing *d, int last)
 {
     int status = 0;
     for (; d->next_axis <= last && !status; d->next_axis++)
@@ -61,35 +56,62 @@ static int begin_layers(drawing *d, int last)
     return status;
 }
 
-static bool is_front_to_back(const drawing *d, const trip_batch *batch)
+static bool is_front_to_back(const trip_drawing *d, const trip_batch *batch)
 {
     int axis = batch->pass->selections->list->axis;
     const trip_plan_pass *passes = d->frame->plan->layers[axis].passes;
     return passes[batch->pass != &passes[0].pass].front_to_back;
 }
 
-static int draw_batch(drawing *d, const trip_batch *batch)
+static int begin_batch(trip_drawing *d, const trip_batch *batch)
 {
     uint64_t bytes = trip_reader_get_stats(d->reader).bytes_read;
     int axis = batch->pass->selections->list->axis;
-    d->stats->lists[axis].bytes_read += bytes - d->bytes_read;
+    d->stats.lists[axis].bytes_read += bytes - d->bytes_read;
     d->bytes_read = bytes;
-    int status = begin_layers(d, axis);
-    if (status)
-        return status;
+    assert(batch->run_count > 0);
+    d->held[(d->held_first + d->held_count++) % HELD_MAX] = *batch;
+    d->in_batch = true;
+    d->next_run = 0;
+    return begin_layers(d, axis);
+}
+
+/* Runs of the batch from the next one on: whole ones of `most` splats in all, or one. */
+static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t most)
+{
+    trip_batch piece = *batch;
+    size_t end = d->next_run;
+    uint64_t splats = 0;
+    do
+        splats += batch->runs[end++].count;
+    while (end < batch->run_count && splats + batch->runs[end].count <= most);
+    piece.runs = batch->runs + d->next_run;
+    piece.run_count = end - d->next_run;
+    d->next_run = end;
+    return piece;
+}
+
+/* What a renderer copies is copied once, as a whole. */
+static int draw_piece(trip_drawing *d, bool whole)
+{
+    const trip_batch *batch = &d->held[(d->held_first + d->held_count - 1) % HELD_MAX];
     double start = now_ms();
-    status = d->renderer->ops->draw(d->renderer, batch, is_front_to_back(d, batch));
-    d->stats->draw_ms += now_ms() - start;
-    tell_progress(d, batch);
+    if (d->renderer->ops->take_slots)
+        whole = true;
+    trip_batch piece = next_piece(d, batch, whole ? UINT64_MAX : TRIP_FRAME_PIECE);
+    d->in_batch = d->next_run < batch->run_count;
+    int status = d->renderer->ops->draw(d->renderer, &piece, is_front_to_back(d, batch));
+    d->stats.draw_ms += now_ms() - start;
+    tell_progress(d, &piece);
     return status;
 }
 
-static int is_done(const drawing *d, const trip_batch *batch, bool wait)
+static int is_done(const trip_drawing *d, const trip_batch *batch, bool wait)
 {
     return d->renderer->ops->is_done ? d->renderer->ops->is_done(d->renderer, batch, wait) : 1;
 }
 
-static void release_oldest(drawing *d)
+static void release_oldest(trip_drawing *d)
 {
     trip_reader_release(d->reader, &d->held[d->held_first++ % HELD_MAX]);
     d->held_count--;
@@ -97,7 +119,7 @@ static void release_oldest(drawing *d)
 
 /* Gives back the slots of batches that the renderer is done with, oldest first; where more than
  * `most` are held it is waited for. */
-static int release_drawn(drawing *d, unsigned most)
+static int release_drawn(trip_drawing *d, unsigned most)
 {
     int done = 1;
     while (d->held_count > 0 &&
@@ -107,35 +129,50 @@ static int release_drawn(drawing *d, unsigned most)
 }
 
 /* A renderer may hold up to half of the ring, so that the disk is busy with the other half. */
-static unsigned may_hold(const drawing *d)
+static unsigned may_hold(const trip_drawing *d)
 {
     unsigned half = trip_reader_slots(d->reader) / 2;
     return half < HELD_MAX ? half : HELD_MAX - 1;
 }
 
-static int draw_lists(drawing *d)
+/* The next batch, once the last one is drawn; TRIP_FRAME_DONE when there is none. */
+static int next_batch(trip_drawing *d)
 {
     trip_batch batch;
-    int status = begin_reading(d);
-    while (!status && (status = trip_reader_next(d->reader, &batch)) > 0) {
-        status = draw_batch(d, &batch);
-        d->held[(d->held_first + d->held_count++) % HELD_MAX] = batch;
-        if (!status)
-            status = release_drawn(d, may_hold(d));
-        if (!status)
-            status = trip_frame_poll();
-    }
-    return status ? status : begin_layers(d, 2);
+    if (!trip_reader_await(d->reader, 0))
+        return TRIP_FRAME_WAITS;
+    int status = trip_reader_next(d->reader, &batch);
+    if (status < 0)
+        return status;
+    if (status > 0)
+        status = begin_batch(d, &batch);
+    else
+        status = begin_layers(d, 2);
+    return status < 0 ? status : d->in_batch ? TRIP_FRAME_MORE : TRIP_FRAME_DONE;
+}
+
+/* One piece of what is ready. */
+static int draw_next(trip_drawing *d, bool whole)
+{
+    int status = d->in_batch ? TRIP_FRAME_MORE : next_batch(d);
+    if (status != TRIP_FRAME_MORE)
+        return status;
+    status = draw_piece(d, whole);
+    if (!status && !d->in_batch)
+        status = release_drawn(d, may_hold(d));
+    if (!status)
+        status = trip_frame_poll();
+    return status < 0 ? status : TRIP_FRAME_MORE;
 }
 
 /* The renderer's counts; bytes were counted here. */
-static void take_counts(const trip_renderer *renderer, trip_frame_stats *stats)
+static void take_counts(trip_drawing *d)
 {
     trip_list_stats counts[3];
-    renderer->ops->stats(renderer, counts);
+    d->renderer->ops->stats(d->renderer, counts);
     for (int axis = 0; axis < 3; axis++) {
-        counts[axis].bytes_read = stats->lists[axis].bytes_read;
-        stats->lists[axis] = counts[axis];
+        counts[axis].bytes_read = d->stats.lists[axis].bytes_read;
+        d->stats.lists[axis] = counts[axis];
     }
 }
 
@@ -149,30 +186,96 @@ static int check_camera(const trip_camera *c)
     return isfinite(sum) ? 0 : trip_splat_fail();
 }
 
+int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *reader,
+                     const trip_frame *frame)
+{
+    *d = (trip_drawing){ .renderer = renderer,
+                         .reader = reader,
+                         .frame = frame,
+                         .stats = { .counted = frame->count },
+                         .scope = { .around = trip_scope_current() },
+                         .begun_ms = now_ms() };
+    trip_scope *before = trip_scope_enter(&d->scope);
+    int status = check_camera(frame->camera);
+    if (!status) {
+        d->begun = true;
+        status = renderer->ops->begin_frame(renderer, frame);
+    }
+    if (!status)
+        status = begin_reading(d);
+    trip_scope_enter(before);
+    return status;
+}
+
+int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
+{
+    bool whole = deadline_ns == UINT64_MAX;
+    trip_scope *before = trip_scope_enter(&d->scope);
+    int status = trip_frame_poll();
+    if (!status)
+        do
+            status = d->done ? TRIP_FRAME_DONE : draw_next(d, whole);
+        while (status == TRIP_FRAME_MORE && (whole || trip_frame_now_ns() < deadline_ns));
+    d->done = status == TRIP_FRAME_DONE;
+    trip_scope_enter(before);
+    return status;
+}
+
+void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
+{
+    if (!d->done && !d->in_batch)
+        trip_reader_await(d->reader, timeout_ns);
+}
+
+int trip_frame_picture(trip_drawing *d, float *rgba)
+{
+    double start = now_ms();
+    trip_scope *before = trip_scope_enter(&d->scope);
+    int status = trip_frame_poll();
+    if (!status)
+        status = d->renderer->ops->picture(d->renderer, rgba);
+    trip_scope_enter(before);
+    if (status || !d->done)
+        return status;
+    d->stats.merge_ms = now_ms() - start;
+    d->stats.ms = now_ms() - d->begun_ms;
+    d->stats.reader = trip_reader_get_stats(d->reader);
+    d->stats.read_ms = (double)d->stats.reader.wait_ns * 1e-6;
+    take_counts(d);
+    return 0;
+}
+
+void trip_frame_cancel(trip_drawing *d)
+{
+    trip_scope_cancel(&d->scope);
+}
+
+void trip_frame_end(trip_drawing *d)
+{
+    trip_frame_cancel(d); /* where it is done, nothing is under way */
+    if (d->begun && d->renderer->ops->end_frame)
+        d->renderer->ops->end_frame(d->renderer);
+    while (d->held_count > 0)
+        release_oldest(d);
+    if (!d->done) {
+        d->stats.reader = trip_reader_get_stats(d->reader);
+        trip_reader_begin(d->reader, NULL);
+    }
+    d->begun = false;
+}
+
 int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_frame *frame,
                     float *rgba, trip_frame_stats *stats)
 {
-    double start = now_ms();
-    *stats = (trip_frame_stats){ .counted = frame->count };
-    drawing d = { .renderer = renderer, .reader = reader, .frame = frame, .stats = stats };
-    int status = check_camera(frame->camera);
+    trip_drawing d;
+    int status = trip_frame_begin(&d, renderer, reader, frame);
+    while (!status && (status = trip_frame_step(&d, UINT64_MAX)) == TRIP_FRAME_WAITS) {
+        trip_frame_await(&d, LOOK_NS);
+        status = 0;
+    }
     if (!status)
-        status = renderer->ops->begin_frame(renderer, frame);
-    if (!status)
-        status = draw_lists(&d);
-    stats->reader = trip_reader_get_stats(reader);
-    double merge_start = now_ms();
-    if (!status)
-        status = renderer->ops->end_frame(renderer, rgba);
-    if (status && renderer->ops->abort_frame)
-        renderer->ops->abort_frame(renderer);
-    while (d.held_count > 0) /* the image is there, or is given up */
-        release_oldest(&d);
-    if (status)
-        return status;
-    stats->merge_ms = now_ms() - merge_start;
-    stats->ms = now_ms() - start;
-    stats->read_ms = (double)stats->reader.wait_ns * 1e-6;
-    take_counts(renderer, stats);
-    return 0;
+        status = trip_frame_picture(&d, rgba);
+    trip_frame_end(&d);
+    *stats = d.stats;
+    return status;
 }

@@ -1,4 +1,17 @@
-/* One image from a data set: plan, then for each layer reader -> renderer, then merge. */
+/* One image from a data set: plan, then for each layer reader -> renderer, then merge. A frame is
+ * drawn at once by trip_frame_draw(), or in steps that never wait for the disk:
+ *
+ *     trip_frame_begin(&d, renderer, reader, &frame);
+ *     while ((status = trip_frame_step(&d, deadline_ns)) > 0) {
+ *         trip_frame_picture(&d, rgba);            // so far, whenever it is wanted
+ *         if (status == TRIP_FRAME_WAITS)
+ *             trip_frame_await(&d, timeout_ns);
+ *     }
+ *     trip_frame_picture(&d, rgba);
+ *     trip_frame_end(&d);
+ *
+ * The picture has the same bits whatever the steps were and whether or not it was looked at before.
+ * All calls come from one thread, but for trip_frame_cancel(). */
 #ifndef TRIP_FRAME_H
 #define TRIP_FRAME_H
 
@@ -11,8 +24,63 @@ typedef struct trip_frame_stats {
     trip_reader_stats reader; /* summed over the passes */
 } trip_frame_stats;
 
-/* rgba: width * height * 4 floats. The reader must read at least the plan's planes. */
+#define TRIP_FRAME_HELD_MAX 16
+
+/* A frame being drawn, in memory of the caller's that stays where it is. */
+typedef struct trip_drawing {
+    trip_renderer *renderer;
+    trip_reader *reader;
+    const trip_frame *frame;
+    trip_frame_stats stats; /* complete once the picture of the finished frame was taken */
+
+    /* The rest is frame.c's. */
+    trip_scope scope; /* cancelled: the frame is given up */
+    double begun_ms;
+    bool begun, done;    /* the renderer has begun the frame; every batch is drawn */
+    int next_axis;       /* layers before this one were begun */
+    uint64_t splats;     /* drawn so far */
+    uint64_t bytes_read; /* counted so far */
+    /* Being drawn: held[(held_first + held_count - 1) % TRIP_FRAME_HELD_MAX] from this run on. */
+    bool in_batch;
+    size_t next_run;
+    /* Drawn, but perhaps not done with: held[held_first % TRIP_FRAME_HELD_MAX] is the oldest. */
+    trip_batch held[TRIP_FRAME_HELD_MAX];
+    unsigned held_first, held_count;
+} trip_drawing;
+
+/* What trip_frame_step() has come to; below 0: failed or cancelled. */
+enum {
+    TRIP_FRAME_DONE = 0,
+    TRIP_FRAME_MORE = 1,  /* the deadline has passed, and more is ready to be drawn */
+    TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk is at work */
+};
+
+/* Starts the reads. The reader must read at least the plan's planes. After a failure too,
+ * trip_frame_end() follows. */
+int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *reader,
+                     const trip_frame *frame);
+/* Draws what is ready, until the deadline by CLOCK_MONOTONIC, which it passes by the time of one
+ * piece of at most TRIP_FRAME_PIECE splats or one run; something of what is ready in any case.
+ * UINT64_MAX: no deadline. */
+int trip_frame_step(trip_drawing *d, uint64_t deadline_ns);
+#define TRIP_FRAME_PIECE 16384
+/* Waits until there is something to draw, at most so long; UINT64_MAX: without end. */
+void trip_frame_await(trip_drawing *d, uint64_t timeout_ns);
+/* The picture of what is drawn so far: width * height * 4 floats, premultiplied, row 0 at the top.
+ * After TRIP_FRAME_DONE it is the picture. */
+int trip_frame_picture(trip_drawing *d, float *rgba);
+/* Any thread, while the drawing is there: the frame is given up. A step or picture under way ends
+ * within milliseconds, and like those that follow with TRIP_INTERRUPTED. */
+void trip_frame_cancel(trip_drawing *d);
+/* The renderer and the reader are free for another frame. One that is not done is given up: what
+ * the renderer has under way is dropped. */
+void trip_frame_end(trip_drawing *d);
+
+/* Begins, steps to the end, takes the picture. rgba: width * height * 4 floats. */
 int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_frame *frame,
                     float *rgba, trip_frame_stats *stats);
+
+/* CLOCK_MONOTONIC. */
+uint64_t trip_frame_now_ns(void);
 
 #endif

@@ -87,7 +87,14 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     return status;
 }
 
-/* Adds the finished layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. */
+/* Adds a pixel's layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. Without a layer its
+ * weight is 0. */
+static void merge_pixel(const pixel *p, double merged[4])
+{
+    for (int c = 0; c < 4; c++)
+        merged[c] = p->merged[c] + p->weight * p->weight * p->layer[c];
+}
+
 static int fold_layer(reference *r)
 {
     const trip_camera *camera = r->frame->camera;
@@ -97,8 +104,7 @@ static int fold_layer(reference *r)
     for (int y = 0; y < camera->height && !status; y++) {
         pixel *row = row_of(r, y);
         for (int x = 0; x < camera->width; x++)
-            for (int c = 0; c < 4; c++)
-                row[x].merged[c] += row[x].weight * row[x].weight * row[x].layer[c];
+            merge_pixel(&row[x], row[x].merged);
         status = trip_frame_poll();
     }
     return status;
@@ -268,18 +274,19 @@ static double weight_sum(const reference *r, int x, int y)
     return sum;
 }
 
-static int end_frame(trip_renderer *base, float *rgba)
+static int picture(trip_renderer *base, float *rgba)
 {
     reference *r = (reference *)base;
     const trip_camera *camera = r->frame->camera;
     const double *background = r->frame->settings->background;
     const double behind[4] = { background[0] * background[3], background[1] * background[3],
                                background[2] * background[3], background[3] };
-    int status = fold_layer(r);
+    int status = 0;
     for (int y = 0; y < camera->height && !status; y++) {
         for (int x = 0; x < camera->width; x++) {
-            const double *merged = row_of(r, y)[x].merged;
-            double sum = weight_sum(r, x, y), transmittance = 1 - merged[3] / sum;
+            double merged[4], sum = weight_sum(r, x, y);
+            merge_pixel(&row_of(r, y)[x], merged);
+            double transmittance = 1 - merged[3] / sum;
             for (int c = 0; c < 4; c++)
                 *rgba++ = (float)(merged[c] / sum + transmittance * behind[c]);
         }
@@ -300,7 +307,7 @@ static const trip_renderer_ops reference_ops = {
     .begin_frame = begin_frame,
     .begin_layer = begin_layer,
     .draw = draw,
-    .end_frame = end_frame,
+    .picture = picture,
     .stats = stats,
 };
 

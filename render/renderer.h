@@ -1,6 +1,6 @@
 /* The interface behind which renderers stand: begin frame, for each layer of the plan begin layer
- * and draw its batches in order, end frame. All calls come from one thread. Created once, used for
- * many frames; the frame path does not allocate once sizes have settled. */
+ * and draw its batches in order, picture, end frame. All calls come from one thread at a time.
+ * Created once, used for many frames; the frame path does not allocate once sizes have settled. */
 #ifndef TRIP_RENDERER_H
 #define TRIP_RENDERER_H
 
@@ -24,8 +24,8 @@ typedef struct trip_frame {
     void *progress_user;
 } trip_frame;
 
-/* Asked between pieces of work that take less than about a tenth of a second: fails (reported) once
- * the program is interrupted. */
+/* Between pieces of work that take a few milliseconds: fails (reported) once the frame is no longer
+ * wanted. */
 static inline int trip_frame_poll(void)
 {
     if (!trip_interrupted())
@@ -63,13 +63,14 @@ typedef struct trip_renderer_ops {
     /* 1: the batch is done with, and its slot may be read into; 0: not yet, only when not told to
      * wait; negative: failed. NULL where take_slots is. */
     int (*is_done)(trip_renderer *r, const trip_batch *batch, bool wait);
-    /* Merges the layers, puts the background behind, and gives width * height * 4 floats,
-     * premultiplied, row 0 at the top. */
-    int (*end_frame)(trip_renderer *r, float *rgba);
-    /* The frame is given up: returns when nothing that it is drawn from is in use. NULL: nothing is
-     * between the other calls. */
-    void (*abort_frame)(trip_renderer *r);
-    /* Counts of the frame just ended, by layer (bytes_read is the caller's). */
+    /* Merges what the layers hold so far, puts the background behind, and gives width * height * 4
+     * floats, premultiplied, row 0 at the top. The frame goes on as if it had not been called;
+     * after its last batch it gives the picture. */
+    int (*picture)(trip_renderer *r, float *rgba);
+    /* The frame is over or given up: returns when nothing that it is drawn from is in use. NULL:
+     * nothing is between the other calls. */
+    void (*end_frame)(trip_renderer *r);
+    /* Counts of the frame, once its picture was taken, by layer (bytes_read is the caller's). */
     void (*stats)(const trip_renderer *r, trip_list_stats lists[3]);
 } trip_renderer_ops;
 

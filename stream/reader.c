@@ -220,7 +220,11 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
     r->params = *params;
     r->budget = budget;
     pthread_mutex_init(&r->lock, NULL);
-    pthread_cond_init(&r->ready, NULL);
+    pthread_condattr_t clock;
+    pthread_condattr_init(&clock);
+    pthread_condattr_setclock(&clock, CLOCK_MONOTONIC);
+    pthread_cond_init(&r->ready, &clock);
+    pthread_condattr_destroy(&clock);
     set_defaults(r);
     int status = check_params(r);
     if (status == TRIP_OK)

@@ -68,7 +68,7 @@ typedef struct trip_reader_stats {
     uint64_t bytes_cached;                /* instead from the cache */
     uint64_t splats;                      /* handed out */
     uint64_t runs_skipped, bytes_skipped; /* by the skip callback; gaps read through count too */
-    uint64_t wait_ns;                     /* time next() waited for the disk */
+    uint64_t wait_ns;                     /* time spent waiting for the disk */
 } trip_reader_stats;
 
 /* Whether reads by the engine land in memory that is not the process's own, as a driver's mapping,
@@ -95,6 +95,9 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass);
 /* 1: *batch is filled and its slot held until released; 0: all passes are over; negative: failed.
  */
 int trip_reader_next(trip_reader *r, trip_batch *batch);
+/* Keeps reads under way, and waits until trip_reader_next() has an answer at once, at most so long;
+ * UINT64_MAX: without end. False when the time is over. */
+bool trip_reader_await(trip_reader *r, uint64_t timeout_ns);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
 /* Ring length. */
 unsigned trip_reader_slots(const trip_reader *r);

@@ -161,18 +161,30 @@ static void count_requests(trip_reader *r, const trip_slot *s)
     }
 }
 
+/* Until the first slot of the queue has been read; false when the time is over before. */
+static bool await_first(trip_reader *r, uint64_t timeout_ns)
+{
+    const trip_slot *s = r->queue[r->queue_first];
+    uint64_t start = now_ns(), end;
+    int late = 0;
+    if (__builtin_add_overflow(start, timeout_ns, &end) || end > INT64_MAX)
+        end = INT64_MAX;
+    const struct timespec until = { .tv_sec = (time_t)(end / 1000000000u),
+                                    .tv_nsec = (long)(end % 1000000000u) };
+    pthread_mutex_lock(&r->lock);
+    while (s->pending > 0 && timeout_ns > 0 && !late)
+        late = pthread_cond_timedwait(&r->ready, &r->lock, &until);
+    bool read = s->pending == 0;
+    pthread_mutex_unlock(&r->lock);
+    r->stats.wait_ns += now_ns() - start;
+    return read;
+}
+
 /* Takes the first slot of the queue when it has been read. */
 static trip_slot *wait_first(trip_reader *r)
 {
     trip_slot *s = r->queue[r->queue_first];
-    pthread_mutex_lock(&r->lock);
-    if (s->pending > 0) {
-        uint64_t start = now_ns();
-        while (s->pending > 0)
-            pthread_cond_wait(&r->ready, &r->lock);
-        r->stats.wait_ns += now_ns() - start;
-    }
-    pthread_mutex_unlock(&r->lock);
+    await_first(r, UINT64_MAX);
     r->queue_first = (r->queue_first + 1) % r->params.slots;
     r->queue_count--;
     count_requests(r, s);
@@ -331,6 +343,13 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     }
     s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
     return r->failed ? r->failed : 1;
+}
+
+bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
+{
+    if (!r->failed)
+        fill_slots(r);
+    return r->failed || r->queue_count == 0 || await_first(r, timeout_ns);
 }
 
 void trip_reader_release(trip_reader *r, trip_batch *batch)

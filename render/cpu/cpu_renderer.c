@@ -39,6 +39,8 @@ typedef struct worker {
     trip_cpu_scratch scratch;
     trip_cpu_span shown[TRIP_CPU_CHUNK];
     trip_cpu_sorting sorting;
+    _Alignas(
+        64) float sum[FLOATS_PER_TILE]; /* of a picture, where the frame goes on with its own */
     _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
 } worker;
 
@@ -214,6 +216,8 @@ static void blend_some(void *user, const trip_cpu_chunk *chunk, const trip_cpu_s
                        const uint16_t *order, uint32_t count)
 {
     blend_context *c = user;
+    if (trip_interrupted())
+        return;
     c->of->kernels->tile_blend(&c->of->views[chunk->list], c->scratch, splats, order, count);
 }
 
@@ -475,16 +479,32 @@ static void merge_tile(cpu *r, uint32_t tile)
     r->states[tile] = TILE_MERGED;
 }
 
-static void finish_tile(cpu *r, uint32_t tile)
+/* The sum with the layer being drawn in it. */
+static const float *sum_so_far(const cpu *r, worker *w, uint32_t tile)
+{
+    if (!is_to_merge(r, tile))
+        return tile_sum(r, tile);
+    bool first = !(r->states[tile] & TILE_MERGED);
+    if (!first)
+        memcpy(w->sum, tile_sum(r, tile), sizeof w->sum);
+    r->kernels->tile_merge(&r->view, tile_x(r, tile), tile_y(r, tile), tile_pixels(r, tile), first,
+                           w->sum);
+    return w->sum;
+}
+
+/* The frame's tile stays as it is. */
+static void finish_tile(cpu *r, worker *w, uint32_t tile)
 {
     trip_cpu_content content = TRIP_CPU_NOTHING;
-    if (r->states[tile] & TILE_MERGED)
-        content = TRIP_CPU_SUM;
-    else if (r->states[tile] & TILE_BEGUN)
+    const float *pixels = NULL;
+    if (r->states[tile] & TILE_BEGUN && is_alone(r, tile)) {
         content = TRIP_CPU_LAYER;
-    r->kernels->tile_finish(&r->view, tile_x(r, tile), tile_y(r, tile), content,
-                            content == TRIP_CPU_SUM ? tile_sum(r, tile) : tile_pixels(r, tile),
-                            r->rgba);
+        pixels = tile_pixels(r, tile);
+    } else if (r->states[tile]) {
+        content = TRIP_CPU_SUM;
+        pixels = sum_so_far(r, w, tile);
+    }
+    r->kernels->tile_finish(&r->view, tile_x(r, tile), tile_y(r, tile), content, pixels, r->rgba);
 }
 
 /* Tasks of whole rows of tiles. */
@@ -500,10 +520,9 @@ static void merge_row(void *context, unsigned task, unsigned thread)
 static void finish_row(void *context, unsigned task, unsigned thread)
 {
     cpu *r = context;
-    (void)thread;
     for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
         if (!trip_interrupted())
-            finish_tile(r, t);
+            finish_tile(r, &r->workers[thread], t);
 }
 
 static void for_each_row(cpu *r, void (*run)(void *, unsigned, unsigned))
@@ -659,7 +678,6 @@ static uint8_t axes_of_tile(const trip_frame *frame, int x, int y)
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     cpu *r = (cpu *)base;
-    trip_cpu_pool_wait(r->pool, &r->blend_job); /* of a frame that was given up */
     trip_cpu_flush_empty(r->filling);
     r->in_layer = false;
     r->frame = frame;
@@ -680,19 +698,17 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     return 0;
 }
 
-static int end_frame(trip_renderer *base, float *rgba)
+static int picture(trip_renderer *base, float *rgba)
 {
     cpu *r = (cpu *)base;
-    int status = end_layer(r);
-    if (status)
-        return status;
+    settle(r);
     r->rgba = rgba;
     for_each_row(r, finish_row);
     return trip_frame_poll();
 }
 
 /* Tiles of the last flush may still be blended. */
-static void abort_frame(trip_renderer *base)
+static void end_frame(trip_renderer *base)
 {
     cpu *r = (cpu *)base;
     trip_cpu_pool_wait(r->pool, &r->blend_job);
@@ -729,8 +745,8 @@ static const trip_renderer_ops cpu_ops = {
     .begin_frame = begin_frame,
     .begin_layer = begin_layer,
     .draw = draw,
+    .picture = picture,
     .end_frame = end_frame,
-    .abort_frame = abort_frame,
     .stats = stats,
 };
 

@@ -48,6 +48,7 @@ typedef struct gl_renderer {
     unsigned constants_room; /* blocks of constants: 3 of layers, and one for each list */
     int axis;                /* of the layer being drawn */
     unsigned layers;         /* bit a: the layer of axis a was begun */
+    bool masked;             /* the layer being drawn, by the stencil */
     uint32_t step;  /* splats to draw before the program is asked whether it is interrupted */
     uint64_t quads; /* splats of the frame drawn as quads though sprites were asked for */
     trip_list_stats stats[3];
@@ -272,6 +273,7 @@ static int begin_layer(trip_renderer *base, int axis)
         return status;
     r->layers |= 1u << axis;
     r->axis = axis;
+    r->masked = !whole;
     r->step = splats_at_once(frame);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TABLE, r->table);
     if (frame->settings->indexed)
@@ -469,6 +471,14 @@ static int read_image(const gl_renderer *r, float *rgba)
     return status;
 }
 
+/* Back to the layer that was being drawn. */
+static int go_on(gl_renderer *r)
+{
+    if (r->masked)
+        glEnable(GL_STENCIL_TEST);
+    return trip_gl_target_bind_layer(&r->target, r->axis);
+}
+
 static void read_counts(gl_renderer *r)
 {
     GLuint counts[COUNTS];
@@ -491,7 +501,7 @@ static void describe(gl_renderer *r)
         snprintf(r->device, sizeof r->device, "%s", name);
 }
 
-static int end_frame(trip_renderer *base, float *rgba)
+static int picture(trip_renderer *base, float *rgba)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
@@ -499,6 +509,8 @@ static int end_frame(trip_renderer *base, float *rgba)
         status = merge(r);
     if (!status)
         status = read_image(r, rgba);
+    if (!status && r->layers)
+        status = go_on(r);
     if (status)
         return status;
     if (r->frame->count)
@@ -522,7 +534,7 @@ static const trip_renderer_ops gl_ops = {
     .take_slots = take_slots,
     .drop_slots = drop_slots,
     .is_done = is_done,
-    .end_frame = end_frame,
+    .picture = picture,
     .stats = stats,
 };
 

@@ -82,6 +82,12 @@ int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target 
     return make_texture(t, TRIP_TARGET_RGBA32F, &t->image, &t->framebuffer);
 }
 
+int trip_gl_target_bind_layer(const trip_gl_target *t, int axis)
+{
+    glViewport(0, 0, t->width, t->height);
+    return bind_complete(t->framebuffers[axis], "layer");
+}
+
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil)
 {
     static const GLfloat nothing[4] = { 0, 0, 0, 0 };
@@ -96,10 +102,9 @@ int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil)
     GLuint framebuffer = t->framebuffers[axis];
     glNamedFramebufferRenderbuffer(framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER,
                                    stencil ? t->stencil : 0);
-    status = bind_complete(framebuffer, "layer");
+    status = trip_gl_target_bind_layer(t, axis);
     if (status)
         return status;
-    glViewport(0, 0, t->width, t->height);
     glClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, nothing);
     if (stencil)
         glClearNamedFramebufferiv(framebuffer, GL_STENCIL, 0, &zero);

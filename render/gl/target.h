@@ -24,6 +24,8 @@ typedef struct trip_gl_target {
 int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type);
 /* Binds the layer of an axis for drawing, empty; with `stencil` its stencil too, all zero. */
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
+/* Binds a layer again, as it is. */
+int trip_gl_target_bind_layer(const trip_gl_target *t, int axis);
 /* Binds the image for drawing; it holds rgba32f whatever the layers hold. */
 int trip_gl_target_begin_image(trip_gl_target *t);
 /* Rows [first, first + count) of the image, width * 4 floats each. */

@@ -191,7 +191,8 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, uint32_t piece, bool 
             }
         }
     }
-    assert_int_equal(f->renderer->ops->end_frame(f->renderer, f->rgba), 0);
+    assert_int_equal(f->renderer->ops->picture(f->renderer, f->rgba), 0);
+    f->renderer->ops->end_frame(f->renderer);
     trip_reader_destroy(reader);
 }
 

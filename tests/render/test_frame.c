@@ -253,7 +253,7 @@ static int lazy_is_done(trip_renderer *r, const trip_batch *batch, bool wait)
     return 1;
 }
 
-static int lazy_end_frame(trip_renderer *r, float *rgba)
+static int lazy_picture(trip_renderer *r, float *rgba)
 {
     (void)r;
     (void)rgba;
@@ -272,7 +272,7 @@ static const trip_renderer_ops lazy_ops = {
     .begin_layer = lazy_begin_layer,
     .draw = lazy_draw,
     .is_done = lazy_is_done,
-    .end_frame = lazy_end_frame,
+    .picture = lazy_picture,
     .stats = lazy_stats,
 };
 

@@ -1,0 +1,510 @@
+/* Frames in steps: that may be looked at, given up, and drawn side by side. */
+#include "scenes.h"
+#include "test.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { SIZE = 40, PIXELS = SIZE * SIZE };
+
+/* Everything that a frame is drawn from. */
+typedef struct desk {
+    const scene *scene;
+    trip_settings settings;
+    trip_camera camera;
+    trip_plan plan;
+    trip_renderer *renderer;
+    trip_reader *reader;
+    trip_frame frame;
+} desk;
+
+static void make_scene(scene *s)
+{
+    scene_create(s, &(scene_params){ .dims = { 40, 30, 20 }, .tile_voxels = 16, .normals = true });
+    scene_colour(s, 0, 65535, 1, 0.8, 0.6, 0.02);
+}
+
+/* All three layers have weight in this view. */
+static trip_camera_params view_of(const scene *s)
+{
+    return scene_view(s, trip_v3(1, 1.2, 0.9), 60, 40, SIZE);
+}
+
+static void set_up(desk *d, const scene *s, const scene_renderer *kind, trip_reader_params params)
+{
+    trip_camera_params view = view_of(s);
+    *d = (desk){ .scene = s, .settings = trip_settings_default() };
+    d->settings.h = 0.2;
+    assert_int_equal(trip_camera_make(&d->camera, &view, &s->data->index_to_world), 0);
+    assert_int_equal(
+        trip_plan_make(&d->plan, s->data, &d->camera, &d->settings, s->table, s->budget), 0);
+    params.planes = d->plan.planes;
+    assert_int_equal(trip_reader_create(&d->reader, s->data, &params, s->budget), 0);
+    assert_int_equal(kind->create(&d->renderer, s->budget), 0);
+    d->frame = (trip_frame){ .data = s->data,
+                             .camera = &d->camera,
+                             .settings = &d->settings,
+                             .plan = &d->plan,
+                             .table = s->table };
+}
+
+static void put_away(desk *d)
+{
+    trip_reader_destroy(d->reader);
+    d->renderer->ops->destroy(d->renderer);
+    trip_plan_release(&d->plan, d->scene->budget);
+}
+
+static const trip_reader_params small_slots = { .slots = 2, .slot_bytes = 4096 };
+
+static void draw_whole(desk *d, float *rgba)
+{
+    trip_frame_stats stats;
+    assert_int_equal(trip_frame_draw(d->renderer, d->reader, &d->frame, rgba, &stats), 0);
+}
+
+/* Every component is there, and no pixel more opaque than light can be held back. */
+static void check_range(const float *rgba)
+{
+    for (int i = 0; i < 4 * PIXELS; i++)
+        assert_true(rgba[i] >= 0 && rgba[i] <= 1.00001f);
+}
+
+/* What is drawn only ever adds. */
+static void check_growth(const float *before, const float *after)
+{
+    for (int i = 0; i < PIXELS; i++)
+        assert_true(after[4 * i + 3] >= before[4 * i + 3] - 1e-5f);
+}
+
+static void step_by_step(desk *d, bool look, float *rgba, int *steps)
+{
+    trip_drawing drawing;
+    static float before[4 * PIXELS];
+    memset(before, 0, sizeof before);
+    int status = trip_frame_begin(&drawing, d->renderer, d->reader, &d->frame);
+    assert_int_equal(status, 0);
+    while ((status = trip_frame_step(&drawing, 0)) > 0) {
+        ++*steps;
+        if (status == TRIP_FRAME_WAITS)
+            trip_frame_await(&drawing, UINT64_MAX);
+        if (!look)
+            continue;
+        assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+        check_range(rgba);
+        check_growth(before, rgba);
+        memcpy(before, rgba, sizeof before);
+    }
+    assert_int_equal(status, TRIP_FRAME_DONE);
+    assert_int_equal(trip_frame_step(&drawing, 0), TRIP_FRAME_DONE);
+    assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+    trip_frame_end(&drawing);
+}
+
+static void steps_and_looks_leave_the_picture_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        static float whole[4 * PIXELS], stepped[4 * PIXELS];
+        desk d;
+        int steps = 0;
+        set_up(&d, &s, kind, small_slots);
+        for (int axis = 0; axis < 3; axis++)
+            assert_true(d.plan.layers[axis].pass_count > 0);
+        draw_whole(&d, whole);
+        check_range(whole);
+        step_by_step(&d, false, stepped, &steps);
+        assert_true(steps > 20);
+        assert_memory_equal(whole, stepped, sizeof whole);
+        step_by_step(&d, true, stepped, &steps);
+        assert_memory_equal(whole, stepped, sizeof whole);
+        put_away(&d);
+    }
+    scene_destroy(&s);
+}
+
+static void a_batch_is_drawn_in_pieces_when_there_is_a_deadline(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        trip_drawing drawing;
+        desk d;
+        int steps = 0, status;
+        set_up(&d, &s, kind, (trip_reader_params){ .engine = TRIP_ENGINE_NULL });
+        assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
+        while ((status = trip_frame_step(&drawing, 0)) > 0) {
+            assert_int_equal(status, TRIP_FRAME_MORE);
+            steps++;
+        }
+        /* 24000 splats a layer, which one batch holds. */
+        assert_int_equal(steps, d.renderer->ops->take_slots ? 3 : 6);
+        trip_frame_end(&drawing);
+        put_away(&d);
+    }
+    scene_destroy(&s);
+}
+
+/* Reads wait here until they may go on. */
+typedef struct gate {
+    pthread_mutex_t lock;
+    pthread_cond_t opened;
+    bool open;
+} gate;
+
+static gate closed_gate(void)
+{
+    return (gate){ PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false };
+}
+
+static long pass_gate(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    gate *g = user;
+    (void)data;
+    (void)offset;
+    (void)bytes;
+    pthread_mutex_lock(&g->lock);
+    while (!g->open)
+        pthread_cond_wait(&g->opened, &g->lock);
+    pthread_mutex_unlock(&g->lock);
+    return result;
+}
+
+static void open_gate(gate *g)
+{
+    pthread_mutex_lock(&g->lock);
+    g->open = true;
+    pthread_cond_broadcast(&g->opened);
+    pthread_mutex_unlock(&g->lock);
+}
+
+static void a_step_does_not_wait_for_the_disk(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        static float rgba[4 * PIXELS], whole[4 * PIXELS];
+        gate g = closed_gate();
+        trip_drawing drawing;
+        desk d;
+        int status;
+        set_up(&d, &s, kind, (trip_reader_params){ .fault = pass_gate, .fault_user = &g });
+        d.settings.background[3] = 0;
+        assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
+        for (int i = 0; i < 3; i++) {
+            assert_int_equal(trip_frame_step(&drawing, UINT64_MAX), TRIP_FRAME_WAITS);
+            trip_frame_await(&drawing, 1000);
+            assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+        }
+        for (int i = 0; i < 4 * PIXELS; i++)
+            assert_true(rgba[i] == 0);
+        open_gate(&g);
+        while ((status = trip_frame_step(&drawing, UINT64_MAX)) == TRIP_FRAME_WAITS)
+            trip_frame_await(&drawing, UINT64_MAX);
+        assert_int_equal(status, TRIP_FRAME_DONE);
+        assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+        trip_frame_end(&drawing);
+        draw_whole(&d, whole);
+        assert_memory_equal(rgba, whole, sizeof whole);
+        put_away(&d);
+    }
+    scene_destroy(&s);
+}
+
+/* So slow that no frame is done within 10 ms. */
+static long read_slowly(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    (void)user;
+    (void)data;
+    (void)offset;
+    (void)bytes;
+    nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    return result;
+}
+
+static void a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        static float whole[4 * PIXELS], after[4 * PIXELS];
+        trip_reader_params slow = small_slots;
+        desk d;
+        set_up(&d, &s, kind, small_slots);
+        draw_whole(&d, whole);
+        put_away(&d);
+        slow.fault = read_slowly;
+        slow.engine = TRIP_ENGINE_PREAD;
+        slow.threads = 1;
+        set_up(&d, &s, kind, slow);
+        for (int round = 0; round < 3; round++) {
+            trip_drawing drawing;
+            assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
+            for (uint64_t end = trip_frame_now_ns() + 10000000; trip_frame_now_ns() < end;)
+                if (trip_frame_step(&drawing, end) == TRIP_FRAME_WAITS)
+                    trip_frame_await(&drawing, 1000000);
+            assert_false(drawing.done);
+            if (round == 1)
+                assert_int_equal(trip_frame_picture(&drawing, after), 0);
+            trip_frame_end(&drawing);
+        }
+        draw_whole(&d, after);
+        assert_memory_equal(whole, after, sizeof whole);
+        put_away(&d);
+    }
+    scene_destroy(&s);
+}
+
+static void a_cancelled_frame_fails_and_says_so_once(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
+        static float whole[4 * PIXELS], rgba[4 * PIXELS];
+        trip_drawing drawing;
+        desk d;
+        set_up(&d, &s, kind, small_slots);
+        draw_whole(&d, whole);
+        assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
+        trip_frame_await(&drawing, UINT64_MAX);
+        assert_true(trip_frame_step(&drawing, 0) > 0);
+        trip_frame_cancel(&drawing);
+        test_catch_reports();
+        assert_int_equal(trip_frame_step(&drawing, UINT64_MAX), TRIP_INTERRUPTED);
+        assert_int_equal(trip_frame_picture(&drawing, rgba), TRIP_INTERRUPTED);
+        assert_int_equal(trip_frame_step(&drawing, UINT64_MAX), TRIP_INTERRUPTED);
+        assert_one_report("triptych: render: frame: interrupted");
+        trip_frame_end(&drawing);
+        assert_false(trip_interrupted());
+        draw_whole(&d, rgba);
+        assert_memory_equal(whole, rgba, sizeof whole);
+        put_away(&d);
+    }
+    scene_destroy(&s);
+}
+
+/* A batch handed to a renderer is drawn to its end but for what cancelling leaves out. */
+typedef struct counting {
+    trip_renderer base;
+    trip_drawing *drawing;
+    unsigned cancel_at, draws, ends;
+} counting;
+
+static int counting_begin(trip_renderer *r, const trip_frame *frame)
+{
+    (void)r;
+    (void)frame;
+    return 0;
+}
+
+static int counting_begin_layer(trip_renderer *r, int axis)
+{
+    (void)r;
+    (void)axis;
+    return 0;
+}
+
+static int counting_draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
+{
+    counting *c = (counting *)r;
+    (void)batch;
+    (void)front_to_back;
+    if (++c->draws == c->cancel_at)
+        trip_frame_cancel(c->drawing);
+    return 0;
+}
+
+static void counting_end(trip_renderer *r)
+{
+    ((counting *)r)->ends++;
+}
+
+static void no_batch_is_drawn_after_cancelling(void **state)
+{
+    (void)state;
+    static const trip_renderer_ops ops = {
+        .name = "counting",
+        .begin_frame = counting_begin,
+        .begin_layer = counting_begin_layer,
+        .draw = counting_draw,
+        .end_frame = counting_end,
+    };
+    scene s;
+    make_scene(&s);
+    trip_drawing drawing;
+    desk d;
+    set_up(&d, &s, scene_renderers(), small_slots);
+    counting c = { .base = { .ops = &ops }, .drawing = &drawing, .cancel_at = 3 };
+    int status;
+    assert_int_equal(trip_frame_begin(&drawing, &c.base, d.reader, &d.frame), 0);
+    test_catch_reports();
+    while ((status = trip_frame_step(&drawing, UINT64_MAX)) == TRIP_FRAME_WAITS)
+        trip_frame_await(&drawing, UINT64_MAX);
+    assert_one_report("interrupted");
+    assert_int_equal(status, TRIP_INTERRUPTED);
+    assert_int_equal(c.draws, 3);
+    assert_int_equal(c.ends, 0);
+    trip_frame_end(&drawing);
+    assert_int_equal(c.ends, 1);
+    put_away(&d);
+    scene_destroy(&s);
+}
+
+static double cpu_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static int create_cpu(trip_renderer **out, trip_budget *budget)
+{
+    return trip_cpu_create(out, budget, 2);
+}
+
+/* Large splats, so that blending what is under way takes long: not so once it is given up. */
+static void cancelling_costs_little_of_what_drawing_costs(void **state)
+{
+    (void)state;
+    static const scene_renderer cpu = { "cpu", create_cpu, 0 };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 64, 64, 64 } });
+    scene_colour(&s, 0, 65535, 1, 0.8, 0.6, 0.0001);
+    desk d;
+    set_up(&d, &s, &cpu, (trip_reader_params){ .engine = TRIP_ENGINE_NULL });
+    trip_camera_params view = scene_view(&s, trip_v3(1, 1.2, 0.9), 90, 60, 1024);
+    float *rgba = calloc(4, 1024 * 1024 * sizeof *rgba);
+    assert_non_null(rgba);
+    trip_plan_release(&d.plan, s.budget);
+    assert_int_equal(trip_camera_make(&d.camera, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&d.plan, s.data, &d.camera, &d.settings, s.table, s.budget), 0);
+    double start = cpu_seconds();
+    draw_whole(&d, rgba);
+    double whole = cpu_seconds() - start;
+    for (int steps = 5; steps <= 35; steps += 3) {
+        trip_drawing drawing;
+        assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
+        for (int i = 0; i < steps; i++)
+            assert_int_equal(trip_frame_step(&drawing, 0), TRIP_FRAME_MORE);
+        start = cpu_seconds();
+        trip_frame_end(&drawing);
+        double end = cpu_seconds() - start;
+        if (!(end < whole / 20))
+            fail_msg("giving up takes %g s of processor time, the frame %g s", end, whole);
+    }
+    free(rgba);
+    put_away(&d);
+    scene_destroy(&s);
+}
+
+/* A thread that draws frames of its own scene. */
+typedef struct artist {
+    pthread_t thread;
+    const scene_renderer *kind;
+    scene scene;
+    trip_drawing drawing; /* of the last frame */
+    gate begun;           /* open when that is under way */
+    int status, frames;
+    bool same;
+} artist;
+
+/* Until a frame is cancelled. */
+static void *draw_until_cancelled(void *user)
+{
+    artist *a = user;
+    desk d;
+    float *rgba = calloc(4 * PIXELS, sizeof *rgba);
+    trip_scope quiet = { .failed = NULL };
+    trip_held_report held;
+    trip_scope_enter(&quiet);
+    trip_report_hold(&held);
+    set_up(&d, &a->scene, a->kind, small_slots);
+    d.frame.count = false;
+    assert_int_equal(trip_frame_begin(&a->drawing, d.renderer, d.reader, &d.frame), 0);
+    open_gate(&a->begun);
+    do {
+        a->status = trip_frame_step(&a->drawing, 0);
+        if (a->status == TRIP_FRAME_WAITS)
+            trip_frame_await(&a->drawing, 1000000);
+        if (a->status > 0)
+            a->status = trip_frame_picture(&a->drawing, rgba);
+    } while (a->status == 0 && !a->drawing.done);
+    while (a->status == 0) /* it was quick: the picture is taken again and again */
+        a->status = trip_frame_picture(&a->drawing, rgba);
+    trip_frame_end(&a->drawing);
+    trip_report_release(&held);
+    a->same = strstr(held.line, "interrupted") != NULL;
+    put_away(&d);
+    free(rgba);
+    return NULL;
+}
+
+static void *draw_often(void *user)
+{
+    artist *a = user;
+    desk d;
+    float *first = calloc(4 * PIXELS, sizeof *first), *rgba = calloc(4 * PIXELS, sizeof *rgba);
+    set_up(&d, &a->scene, a->kind, small_slots);
+    a->same = true;
+    for (a->frames = 0; a->frames < 4 && a->status == 0; a->frames++) {
+        trip_frame_stats stats;
+        float *to = a->frames ? rgba : first;
+        a->status = trip_frame_draw(d.renderer, d.reader, &d.frame, to, &stats);
+        a->same &= a->frames == 0 || !memcmp(first, rgba, 4 * PIXELS * sizeof *rgba);
+    }
+    put_away(&d);
+    free(first);
+    free(rgba);
+    return NULL;
+}
+
+static void frames_of_two_data_sets_are_drawn_in_two_threads(void **state)
+{
+    (void)state;
+    static const scene_renderer kinds[] = { { "cpu", create_cpu, 0 },
+                                            { "reference", trip_reference_create, 0 } };
+    for (int i = 0; i < 2; i++) {
+        static artist cancelled, calm;
+        cancelled = (artist){ .kind = &kinds[i], .begun = closed_gate() };
+        calm = (artist){ .kind = &kinds[i] };
+        make_scene(&cancelled.scene);
+        make_scene(&calm.scene);
+        assert_int_equal(pthread_create(&cancelled.thread, NULL, draw_until_cancelled, &cancelled),
+                         0);
+        assert_int_equal(pthread_create(&calm.thread, NULL, draw_often, &calm), 0);
+        pass_gate(&cancelled.begun, NULL, 0, 0, 0);
+        trip_frame_cancel(&cancelled.drawing);
+        pthread_join(cancelled.thread, NULL);
+        pthread_join(calm.thread, NULL);
+        assert_int_equal(cancelled.status, TRIP_INTERRUPTED);
+        assert_true(cancelled.same);
+        assert_int_equal(calm.status, 0);
+        assert_int_equal(calm.frames, 4);
+        assert_true(calm.same);
+        scene_destroy(&cancelled.scene);
+        scene_destroy(&calm.scene);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(steps_and_looks_leave_the_picture_the_same),
+        cmocka_unit_test(a_batch_is_drawn_in_pieces_when_there_is_a_deadline),
+        cmocka_unit_test(a_step_does_not_wait_for_the_disk),
+        cmocka_unit_test(a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is),
+        cmocka_unit_test(a_cancelled_frame_fails_and_says_so_once),
+        cmocka_unit_test(no_batch_is_drawn_after_cancelling),
+        cmocka_unit_test(cancelling_costs_little_of_what_drawing_costs),
+        cmocka_unit_test(frames_of_two_data_sets_are_drawn_in_two_threads),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
