@@ -48,6 +48,7 @@ FIELDS = {"marschner-lobb": marschner_lobb, "shells": shells, "filaments": filam
 
 
 def generate(field, dims, path, *arguments):
+    program.skip_what_is_switched_off([path])
     size = "x".join(map(str, dims))
     return subprocess.run(
         [program.GENERATE, field, "--size", size, "-o", path, *map(str, arguments)],
@@ -127,6 +128,7 @@ class Generate(program.ProgramTest):
             self.assertIn(name, r.stderr)
         before = set(os.listdir("."))
         for name in "i.raw", "i.nrrd", "i.vdb":
+            program.skip_what_is_switched_off([name])
             process = subprocess.Popen(
                 [program.GENERATE, "cloud", "--size", "1500", "-o", name],
                 stderr=subprocess.PIPE,
@@ -142,6 +144,7 @@ class Generate(program.ProgramTest):
 
     def test_a_full_disk(self):
         for name in "v.raw", "v.vdb":
+            program.skip_what_is_switched_off([name])
             script = (
                 'mkdir -p disk && mount -t tmpfs -o size=1m none disk && "$0" shells '
                 f"--size 128 --type float -o disk/{name}; echo status $? && ls -A disk"

@@ -1,0 +1,36 @@
+"""What was left out of the build is refused with one line that says so, and the rest works."""
+import os
+import subprocess
+
+import program
+
+
+class SwitchedOff(program.ProgramTest):
+    def refused(self, *command, says):
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertTrue(program.LINE.fullmatch(run.stderr), run.stderr)
+        self.assertIn(says, run.stderr)
+
+    def test_opengl(self):
+        if "GL" not in program.SWITCHED_OFF:
+            self.skipTest("built with OpenGL")
+        program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
+        self.brick("ball.nrrd", "ball.trip")
+        draw = [program.PROGRAM, "render", "ball.trip", "-o", "x.png", "--size=20x20"]
+        self.refused(*draw, "--renderer=gl", says="built without OpenGL")
+        self.works(*draw[1:])
+
+    def test_openvdb(self):
+        if "OPENVDB" not in program.SWITCHED_OFF:
+            self.skipTest("built with OpenVDB")
+        before = sorted(os.listdir("."))
+        volume = os.path.join(program.DATASETS, "densityAndHeat.vdb")
+        for output in ["brick", volume, "-o", "x.trip"], ["render", volume, "-o", "x.png"]:
+            self.refused(program.PROGRAM, *output, says="built without OpenVDB")
+        self.refused(program.GENERATE, "marschner-lobb", "--size=8", "-o", "v.vdb", says="built without OpenVDB")
+        self.assertEqual(sorted(os.listdir(".")), before)
+
+
+if __name__ == "__main__":
+    program.main()
