@@ -49,8 +49,11 @@ typedef struct gl_renderer {
     int axis;                /* of the layer being drawn */
     unsigned layers;         /* bit a: the layer of axis a was begun */
     bool masked;             /* the layer being drawn, by the stencil */
-    uint32_t step;  /* splats to draw before the program is asked whether it is interrupted */
-    uint64_t quads; /* splats of the frame drawn as quads though sprites were asked for */
+    /* At most two steps of so many splats wait for the GPU, so that an interruption soon ends. */
+    uint32_t step;
+    uint32_t in_step;  /* splats drawn since the last step ended */
+    trip_gl_slot pace; /* the fence behind the last step; no memory */
+    uint64_t quads;    /* splats of the frame drawn as quads though sprites were asked for */
     trip_list_stats stats[3];
     char device[320];
 } gl_renderer;
@@ -69,6 +72,8 @@ static void destroy(trip_renderer *base)
         trip_gl_ring_release(&r->ring);
         trip_gl_slots_release(&r->slots);
         trip_gl_resident_release(&r->resident);
+        if (r->pace.fence)
+            glDeleteSync(r->pace.fence);
     }
     trip_gl_batch_release(&r->batch);
     free(r->lists);
@@ -154,7 +159,7 @@ static int fit_constants(gl_renderer *r, unsigned lists)
 
 /* What is drawn at once takes a tenth of a second or so where processors draw: a whole pass over
  * the image is done in strips of so many pixels, and splats so many of whose pixels. */
-enum { PIXELS_AT_ONCE = 1 << 25, STRIP_PIXELS = 1 << 20 };
+enum { PIXELS_AT_ONCE = 1 << 23, STRIP_PIXELS = 1 << 20 };
 
 /* As many splats as cover PIXELS_AT_ONCE by the size of one in the volume's middle. */
 static uint32_t splats_at_once(const trip_frame *frame)
@@ -275,6 +280,7 @@ static int begin_layer(trip_renderer *base, int axis)
     r->axis = axis;
     r->masked = !whole;
     r->step = splats_at_once(frame);
+    r->in_step = 0;
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_TABLE, r->table);
     if (frame->settings->indexed)
         trip_gl_resident_bind(&r->resident, axis);
@@ -341,16 +347,29 @@ static int draw_sprites(gl_renderer *r, const trip_gl_piece *piece)
     return status;
 }
 
-/* In parts where its splats are large. */
+/* Waits for the step before the last one. */
+static int end_step(gl_renderer *r)
+{
+    int status = trip_gl_slot_is_done(&r->pace, true);
+    if (status < 0)
+        return status;
+    trip_gl_slot_fence(&r->pace);
+    r->in_step = 0;
+    return TRIP_OK;
+}
+
+/* In parts where a step ends within it. */
 static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
 {
     int status = TRIP_OK;
     for (uint32_t done = 0; done < piece->count && !status;) {
-        uint32_t left = piece->count - done, count = left < r->step ? left : r->step;
+        uint32_t left = piece->count - done, room = r->step - r->in_step;
+        uint32_t count = left < room ? left : room;
         const trip_gl_piece part = { piece->first + done, count, piece->list, piece->quads };
         status = part.quads ? draw_quads(r, &part) : draw_sprites(r, &part);
-        if (!status && count < piece->count)
-            status = trip_gl_await();
+        r->in_step += count;
+        if (!status && r->in_step == r->step)
+            status = end_step(r);
         done += count;
     }
     return status;
