@@ -128,18 +128,19 @@ static void set_hard_contrast(scene *s)
     }
 }
 
-static void check_volume(const char *name, bool hard)
+/* All views; where things are taken by turns, every fourth from `first` on. */
+static void check_volume(const char *name, bool hard, int first)
 {
     scene s;
     tally tallies[4] = { { 0, 0, 0 } };
     open_volume(&s, name);
     if (hard)
         set_hard_contrast(&s);
-    for (int i = 0; i < VIEWS; i++)
+    for (int i = TEST_BY_TURNS ? first : 0; i < VIEWS; i += TEST_BY_TURNS ? 4 : 1)
         check_view(&s, i, tallies);
     for (int r = 1; scene_renderers()[r].name; r++)
-        print_message("%s, %llu splats, %d views: %s most %.4f mean %.5f of 1/255\n", name,
-                      (unsigned long long)s.data->header.kept, VIEWS, scene_renderers()[r].name,
+        print_message("%s, %llu splats: %s most %.4f mean %.5f of 1/255\n", name,
+                      (unsigned long long)s.data->header.kept, scene_renderers()[r].name,
                       255 * tallies[r].most, 255 * tallies[r].sum / tallies[r].components);
     scene_destroy(&s);
 }
@@ -147,13 +148,13 @@ static void check_volume(const char *name, bool hard)
 static void twelve_views_of_a_tooth_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("tooth.nhdr", false);
+    check_volume("tooth.nhdr", false, 0);
 }
 
 static void twelve_views_of_a_stent_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("stent.nrrd", false);
+    check_volume("stent.nrrd", false, 1);
 }
 
 static void twelve_views_of_a_cloud_agree_with_the_reference(void **state)
@@ -162,13 +163,13 @@ static void twelve_views_of_a_cloud_agree_with_the_reference(void **state)
 #ifdef TRIP_WITHOUT_OPENVDB
     skip();
 #endif
-    check_volume("wdas_cloud_sixteenth.vdb", false);
+    check_volume("wdas_cloud_sixteenth.vdb", false, 2);
 }
 
 static void nearly_opaque_black_and_white_agrees_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("tooth.nhdr", true);
+    check_volume("tooth.nhdr", true, 3);
 }
 
 int main(void)
