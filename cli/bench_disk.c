@@ -42,7 +42,7 @@ static int read_plane(const session *s, int axis, int plane, plain_disk *d, void
 {
     char path[4096], name[32];
     if (snprintf(path, sizeof path, "%s/%s", s->data->path,
-                 trip_dataset_plane_name(axis, plane, name)) >= (int)sizeof path)
+                 trip_list_plane_name(&s->data->lists[axis], plane, name)) >= (int)sizeof path)
         return trip_fail(TRIP_ERROR, "read", s->data->path, "the name is too long");
     return plain_disk_read(d, path, memory);
 }

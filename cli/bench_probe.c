@@ -70,6 +70,7 @@ static void look_at(bench_probe *p, const trip_splat_frame *f, const trip_run *r
 static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
 {
     bench_probe *p = probe_of(r);
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX];
     (void)front_to_back;
     if (!p->every)
         return 0;
@@ -78,9 +79,11 @@ static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
         const trip_list *list = trip_batch_list(batch, run);
         trip_splat_frame f =
             trip_splat_frame_make(&p->frame->plan->lists[list->index].camera, p->frame->settings);
+        const trip_block block = trip_block_of(batch, run);
+        trip_block_voxels(&block, 0, run->count, voxels);
         uint64_t next = (p->every - p->seen % p->every) % p->every;
         for (uint64_t k = next; k < run->count; k += p->every)
-            look_at(p, &f, run, batch->voxels[run->first + k]);
+            look_at(p, &f, run, voxels[k]);
         p->seen += run->count;
     }
     return 0;

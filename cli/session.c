@@ -130,19 +130,20 @@ int session_make_reader(const session *s, trip_reader **out, const session_reade
     size_t page = (size_t)1 << s->data->header.page_log2;
     size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
     unsigned slots = choose_slots(wanted, left / 4, plane_count);
-    size_t slot = (size_t)(left / 4) / (slots * plane_count) / page * page;
+    size_t slot = (size_t)(left / 4) / slots / page * page, most = MAX_SLOT_BYTES * plane_count;
     slot = slot < page ? page : slot;
     trip_reader_params params = {
         .engine = wanted->engine,
         .planes = wanted->planes,
         .slots = slots,
-        .slot_bytes = slot < MAX_SLOT_BYTES || page > MAX_SLOT_BYTES ? slot : MAX_SLOT_BYTES,
+        .slot_bytes = trip_reader_slot_bytes(s->data, wanted->planes,
+                                             slot < most || page > most ? slot : most),
         .threads = (unsigned)wanted->threads,
         .skip = wanted->skip,
         .skip_user = wanted->skip_user,
         .cache_bytes = wanted->cache ? (size_t)(left / 2) : 0,
     };
-    params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes * plane_count);
+    params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
     return trip_reader_create(out, s->data, &params, s->budget);
 }
 

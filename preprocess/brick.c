@@ -159,6 +159,14 @@ static char *name_beside(const brick *b, const char *suffix)
     return NULL;
 }
 
+static int take_leftover(const brick *b, trip_leftover *out)
+{
+    return trip_leftover_take(out, b->spill, b->partial_path,
+                              &(trip_block_form){ .tile_log2 = b->format.tile_log2,
+                                                  .code_bytes = 2,
+                                                  .normal_bytes = b->format.normals ? 4 : 0 });
+}
+
 /* Locks the place for temporary files and looks what a killed run left. */
 static int open_spill(brick *b)
 {
@@ -171,7 +179,9 @@ static int open_spill(brick *b)
     if (status == 0)
         status = trip_brick_identity(b->params, b->in.functions, &b->identity);
     if (status == 0 && resume)
-        status = trip_leftover_take(&b->leftover, b->spill, b->partial_path, b->format.normals);
+        status = take_leftover(b, &b->leftover);
+    if (status == 0 && resume)
+        trip_leftover_count(&b->leftover);
     if (status == 0)
         status = trip_journal_open(
             &b->journal, b->spill,
@@ -204,16 +214,21 @@ static int start_journal(brick *b)
     return status;
 }
 
+static trip_writer_codes codes_of(const brick *b)
+{
+    return (trip_writer_codes){ .code_lo = b->quantiser.lo,
+                                .code_hi = b->quantiser.hi,
+                                .gradient_scale = b->quantiser.gradient_scale };
+}
+
 static int open_writer(brick *b)
 {
     trip_writer_params p = { .replace = b->params->replace,
-                             .normals = b->format.normals,
+                             .normal_bytes = b->format.normals ? 4 : 0,
                              .tile_voxels = b->params->tile_voxels,
                              .slab_sheets = b->params->slab_sheets,
                              .index_to_world = b->in.info->index_to_world,
-                             .code_lo = b->quantiser.lo,
-                             .code_hi = b->quantiser.hi,
-                             .gradient_scale = b->quantiser.gradient_scale };
+                             .codes = codes_of(b) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     return trip_writer_open(&b->writer, b->params->output, &p, b->in.budget);
 }
@@ -291,9 +306,9 @@ static int open_output(brick *b)
     if (status == 0)
         status = open_builder(b);
     if (status == 0 && b->summary->resumed)
-        status =
-            trip_leftover_replay(&b->leftover, b->journal, trip_list_builder_ordered(b->builder, TRIP_ORDERED_AXIS),
-                                 b->format.tile_log2, b->in.budget);
+        status = trip_leftover_replay(&b->leftover, b->journal,
+                                      trip_list_builder_ordered(b->builder, TRIP_ORDERED_AXIS),
+                                      b->in.budget);
     return status;
 }
 
@@ -388,8 +403,8 @@ static int merge_lists(brick *b)
     int status = 0;
     if (!b->format.quantised) {
         set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
-        status = trip_writer_set_codes(b->writer, b->quantiser.lo, b->quantiser.hi,
-                                       b->quantiser.gradient_scale);
+        const trip_writer_codes codes = codes_of(b);
+        status = trip_writer_set_codes(b->writer, &codes);
     }
     if (status == 0)
         status = trip_list_builder_finish(b->builder, &b->quantiser, b->in.workers,
@@ -402,14 +417,14 @@ static int merge_lists(brick *b)
 static int check_kept(brick *b)
 {
     b->summary->bytes = trip_writer_bytes(b->writer);
-    uint64_t record_bytes = (uint64_t)TRIP_RECORD_BYTES * (b->format.normals ? 6 : 3);
-    if (b->summary->bytes / record_bytes == b->summary->kept)
+    uint64_t written = trip_writer_records(b->writer, 0);
+    if (written == b->summary->kept)
         return 0;
     return trip_fail(TRIP_ERROR, "brick", b->params->output,
                      "%" PRIu64 " voxels were kept and %" PRIu64
                      " written: what the interrupted run left is damaged, without --resume it "
                      "starts again",
-                     b->summary->kept, b->summary->bytes / record_bytes);
+                     b->summary->kept, written);
 }
 
 static int finish_output(brick *b)
@@ -503,12 +518,12 @@ static int run(brick *b)
  * end; a run that was refused before it began leaves all that it found. */
 static void settle_leftovers(brick *b, int status)
 {
-    trip_leftover now = { .fd = { -1, -1 } };
+    trip_leftover now = { 0 };
     bool keep = b->params->resume && status == TRIP_INTERRUPTED;
     if (b->spill && (b->begun || status == 0))
         trip_spill_keep(b->spill, keep);
     if (b->spill && b->begun && keep)
-        trip_leftover_take(&now, b->spill, b->partial_path, b->format.normals);
+        take_leftover(b, &now);
     trip_leftover_close(&now);
 }
 
@@ -527,7 +542,7 @@ static void close_all(brick *b, int status)
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
 {
-    brick b = { .params = params, .summary = summary, .leftover = { .fd = { -1, -1 } } };
+    brick b = { .params = params, .summary = summary };
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);
     close_all(&b, status);

@@ -15,7 +15,8 @@ typedef struct trip_file_pieces trip_file_pieces;
 trip_file_pieces *trip_file_pieces_create(const char *path, int fd, uint64_t file_bytes);
 void trip_file_pieces_destroy(trip_file_pieces *p);
 
-/* False when anything went wrong, or the user wants to stop: to be read in some other way, which will say what. */
+/* False when anything went wrong, or the user wants to stop: to be read in some other way, which
+ * will say what. */
 bool trip_file_pieces_read(trip_file_pieces *p, uint64_t offset, void *to, size_t bytes);
 
 #endif

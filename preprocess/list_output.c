@@ -34,9 +34,8 @@ int trip_list_output_append(trip_list_output *o, uint64_t key, const uint32_t *v
                             const uint32_t *normals, uint32_t splats)
 {
     uint64_t tile = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
-    int status =
-        trip_writer_append(o->writer, (int)o->list, (uint32_t)(key >> TRIP_TILE_MORTON_BITS),
-                           even_bits(tile), even_bits(tile >> 1), voxels, normals, splats);
+    int status = trip_writer_append(o->writer, o->list, (uint32_t)(key >> TRIP_TILE_MORTON_BITS),
+                                    even_bits(tile), even_bits(tile >> 1), voxels, normals, splats);
     atomic_fetch_add_explicit(&o->splats, splats, memory_order_relaxed);
     return status;
 }

@@ -241,7 +241,7 @@ int rewind_vdb(void *state)
     return 0;
 }
 
-int next_box(void *opaque, trip_block *block)
+int next_box(void *opaque, trip_volume_block *block)
 {
     State &state = *(State *)opaque;
     const trip_vdb_grid &grid = *state.grid;
@@ -256,7 +256,7 @@ int next_box(void *opaque, trip_block *block)
     return 1;
 }
 
-int decode_box(const void *opaque, const trip_block *block, const int64_t lo[3],
+int decode_box(const void *opaque, const trip_volume_block *block, const int64_t lo[3],
                const int64_t size[3], float *values, uint8_t *active)
 {
     const State &state = *(const State *)opaque;
@@ -274,7 +274,7 @@ int decode_box(const void *opaque, const trip_block *block, const int64_t lo[3],
     });
 }
 
-void release_box(void *, trip_block *)
+void release_box(void *, trip_volume_block *)
 {
 }
 

@@ -3,24 +3,30 @@
 #ifndef TRIP_RESUME_H
 #define TRIP_RESUME_H
 
+#include <stdio.h>
+
+#include "block.h"
 #include "journal.h"
 #include "list_output.h"
 
 typedef struct trip_leftover {
-    int fd[TRIP_PLANES]; /* -1 where there is none */
-    uint64_t splats;     /* that all planes hold */
+    FILE *files[TRIP_PLANES]; /* NULL where there is none */
+    trip_block_form form;
+    uint64_t splats; /* that all planes hold, once counted */
 } trip_leftover;
 
 /* Moves the Z list's planes of the partial data set into the spill's folder, unless as much of them
  * is there already, and opens them. The caller holds the spill's lock. Links and files of other
  * users are a reported failure. */
 int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *partial_path,
-                       bool normals);
+                       const trip_block_form *form);
+/* Reads through the blocks and counts what they hold. */
+void trip_leftover_count(trip_leftover *l);
 void trip_leftover_close(trip_leftover *l);
 
 /* Appends the runs of the journal's checkpoint. Records that lie outside their tile or are out of
  * order are a reported failure, as are runs that are not as many as the checkpoint says. */
 int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_output *output,
-                         unsigned tile_log2, trip_budget *budget);
+                         trip_budget *budget);
 
 #endif

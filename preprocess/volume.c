@@ -306,7 +306,7 @@ static int fill_slab(trip_volume *v, slab *s, int64_t next_slice)
     return 0;
 }
 
-static int next_slab(trip_volume *v, int64_t slices, trip_block *block)
+static int next_slab(trip_volume *v, int64_t slices, trip_volume_block *block)
 {
     int64_t begin = v->next_slice, depth = v->info.dims[2];
     int64_t end = slices < depth - begin ? begin + slices : depth;
@@ -321,13 +321,13 @@ static int next_slab(trip_volume *v, int64_t slices, trip_block *block)
         slab_free(v, s);
         return status;
     }
-    *block = (trip_block){ .origin = { 0, 0, begin },
-                           .size = { v->info.dims[0], v->info.dims[1], end - begin },
-                           .data = s };
+    *block = (trip_volume_block){ .origin = { 0, 0, begin },
+                                  .size = { v->info.dims[0], v->info.dims[1], end - begin },
+                                  .data = s };
     return 1;
 }
 
-int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block)
+int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_block *block)
 {
     if (!v->reader->read_slices)
         return v->reader->next(v->state, block);
@@ -408,7 +408,7 @@ static void decode_slab(const trip_volume *v, const slab *s, const int64_t lo[3]
         }
 }
 
-int trip_block_decode(const trip_volume *v, const trip_block *block, const int64_t lo[3],
+int trip_block_decode(const trip_volume *v, const trip_volume_block *block, const int64_t lo[3],
                       const int64_t size[3], float *values, uint8_t *active)
 {
     if (!v->reader->read_slices)
@@ -421,7 +421,7 @@ int trip_block_decode(const trip_volume *v, const trip_block *block, const int64
     return 0;
 }
 
-void trip_block_release(trip_volume *v, trip_block *block)
+void trip_block_release(trip_volume *v, trip_volume_block *block)
 {
     if (!block->data)
         return;

@@ -79,11 +79,11 @@ typedef struct trip_volume trip_volume;
 /* A box of voxels ready to decode. origin and size are in voxels; for dense volumes a block is a
  * slab of whole slices, for sparse ones a box around active voxels. Blocks do not overlap and
  * together hold every existing voxel once. */
-typedef struct trip_block {
+typedef struct trip_volume_block {
     int64_t origin[3];
     int64_t size[3];
     void *data; /* the reader's */
-} trip_block;
+} trip_volume_block;
 
 /* `path` may be a file, a folder or a printf-like or glob pattern of slices. */
 int trip_volume_open(trip_volume **out, const char *path, const trip_volume_params *params,
@@ -95,7 +95,7 @@ void trip_volume_close(trip_volume *v);
 int trip_volume_rewind(trip_volume *v);
 /* 1: *block is filled; 0: no more; negative: reported failure. A dense block holds about
  * `slices_hint` slices (at least 1; 0 lets the reader choose) plus what neighbours need. */
-int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_block *block);
+int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_block *block);
 /* Passes over slices before the next block, without reading them where the file allows that.
  * Returns how many it passed over: `slices`, fewer at the end, or 0 where slices have to be read or
  * there are none. */
@@ -103,11 +103,11 @@ int64_t trip_volume_skip(trip_volume *v, int64_t slices);
 /* Values of the box [lo, lo + size) as float32, i fastest, into values; `active`, when not NULL,
  * gets 1 where the voxel exists. The box may exceed the block by one voxel on every side: values
  * outside the volume repeat the edge voxel (dense) or are the background (sparse), active 0. */
-int trip_block_decode(const trip_volume *v, const trip_block *block, const int64_t lo[3],
+int trip_block_decode(const trip_volume *v, const trip_volume_block *block, const int64_t lo[3],
                       const int64_t size[3], float *values, uint8_t *active);
 /* The memory of one released slab stays with the volume, for the next block, until it is rewound or
  * closed. */
-void trip_block_release(trip_volume *v, trip_block *block);
+void trip_block_release(trip_volume *v, trip_volume_block *block);
 
 #ifdef __cplusplus
 }

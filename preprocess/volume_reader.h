@@ -35,10 +35,10 @@ typedef struct trip_volume_reader {
 
     /* Block readers (read_slices NULL): as trip_volume_next, trip_block_decode, _release. decode
      * is called by many threads at once. */
-    int (*next)(void *state, trip_block *block);
-    int (*decode)(const void *state, const trip_block *block, const int64_t lo[3],
+    int (*next)(void *state, trip_volume_block *block);
+    int (*decode)(const void *state, const trip_volume_block *block, const int64_t lo[3],
                   const int64_t size[3], float *values, uint8_t *active);
-    void (*release)(void *state, trip_block *block);
+    void (*release)(void *state, trip_volume_block *block);
 } trip_volume_reader;
 
 /* By content, then name; refuses options that are not for the format. */

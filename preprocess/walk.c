@@ -11,7 +11,7 @@ enum { BATCH_BLOCKS = 512 };
 #define BATCH_VOXELS (UINT64_C(1) << 21)
 
 typedef struct batch {
-    trip_block blocks[BATCH_BLOCKS];
+    trip_volume_block blocks[BATCH_BLOCKS];
     uint64_t first_box[BATCH_BLOCKS + 1]; /* boxes before each block, and in all */
     size_t count;
     uint64_t voxels;
@@ -35,7 +35,7 @@ static int64_t step_along(const trip_walk_params *p, int axis)
     return axis == 2 ? p->height : p->edge;
 }
 
-static uint64_t boxes_of(const trip_walk_params *p, const trip_block *b)
+static uint64_t boxes_of(const trip_walk_params *p, const trip_volume_block *b)
 {
     uint64_t count = 1;
     for (int a = 0; a < 3; a++)
@@ -44,7 +44,7 @@ static uint64_t boxes_of(const trip_walk_params *p, const trip_block *b)
 }
 
 /* Piece `index` of the block's extent along an axis. */
-static void cut(const trip_walk_params *p, const trip_block *b, int axis, int64_t index,
+static void cut(const trip_walk_params *p, const trip_volume_block *b, int axis, int64_t index,
                 trip_box *box)
 {
     int64_t step = step_along(p, axis);
@@ -98,7 +98,7 @@ static int read_batch(walk *w, batch *b, int64_t slices)
     b->count = 0;
     b->first_box[0] = 0;
     while (b->count < (slabs ? 1 : BATCH_BLOCKS) && b->voxels < BATCH_VOXELS) {
-        trip_block *block = &b->blocks[b->count];
+        trip_volume_block *block = &b->blocks[b->count];
         more = trip_volume_next(w->volume, slices, block);
         if (more <= 0)
             break;

@@ -10,7 +10,7 @@
 /* The voxels [lo, lo + size) of a block; they exist where the block says so. */
 typedef struct trip_box {
     const trip_volume *volume;
-    const trip_block *block;
+    const trip_volume_block *block;
     int64_t lo[3];
     int64_t size[3];
 } trip_box;

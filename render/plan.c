@@ -112,6 +112,18 @@ typedef struct selecting {
     trip_selection *selections[2]; /* of the layer's passes; NULL: in none of its sheets */
 } selecting;
 
+static void count_bytes(const selecting *of, uint64_t index)
+{
+    const trip_file_header *h = &of->p->data->header;
+    const trip_file_run *runs = of->list->runs + index * h->slab_sheets;
+    uint64_t *bytes = of->planned->bytes_selected;
+    for (uint32_t s = 0; s < h->slab_sheets; s++) {
+        bytes[TRIP_PLANE_VOXELS] += 8 * (uint64_t)runs[s].words;
+        if (of->list->planes >> TRIP_PLANE_NORMALS & 1)
+            bytes[TRIP_PLANE_NORMALS] += runs[s].records * (uint64_t)h->normal_bytes;
+    }
+}
+
 static void select_brick(const selecting *of, uint64_t index, int64_t slab_sheet)
 {
     const trip_file_brick *brick = &of->list->bricks[index];
@@ -122,7 +134,8 @@ static void select_brick(const selecting *of, uint64_t index, int64_t slab_sheet
             trip_selection_add(s, index);
     }
     of->planned->bricks_selected++;
-    of->planned->splats_selected += brick->splats;
+    of->planned->splats_selected += brick->records;
+    count_bytes(of, index);
 }
 
 static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t index)
@@ -314,14 +327,15 @@ static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out
         fprintf(out, "not read: no ray of the view has weight in it\n");
         return;
     }
-    unsigned planes = plan->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
+    uint64_t bytes_read = 0;
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        bytes_read += plan->planes >> plane & 1 ? planned->bytes_selected[plane] : 0;
     bool read = is_read(plan, list);
     fprintf(out,
             "%s: %" PRIu64 " of %" PRIu64 " bricks, %" PRIu64 " splats, %s (left out: %" PRIu64
             " transparent, %" PRIu64 " out of view, %" PRIu64 " without weight)\n",
             read ? "read" : "empty", planned->bricks_selected, planned->bricks,
-            planned->splats_selected,
-            trip_format_bytes(planned->splats_selected * TRIP_RECORD_BYTES * planes, bytes),
+            planned->splats_selected, trip_format_bytes(bytes_read, bytes),
             planned->bricks_transparent, planned->bricks_outside, planned->bricks_without_weight);
     if (read)
         explain_passes(plan, list, out);
@@ -347,8 +361,12 @@ uint64_t trip_plan_splats(const trip_plan *plan)
 
 uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *data)
 {
-    unsigned left_out = data->header.planes & ~plan->planes & 1u << TRIP_PLANE_NORMALS;
-    return left_out ? trip_plan_splats(plan) * TRIP_RECORD_BYTES : 0;
+    unsigned left_out = data->header.planes & ~plan->planes;
+    uint64_t bytes = 0;
+    for (unsigned i = 0; i < plan->list_count; i++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            bytes += left_out >> plane & 1 ? plan->lists[i].bytes_selected[plane] : 0;
+    return bytes;
 }
 
 static void explain_shading(const trip_plan *plan, const trip_dataset *data, const trip_settings *s,

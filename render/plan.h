@@ -20,6 +20,7 @@ typedef struct trip_plan_list {
     uint64_t bricks, bricks_selected;
     uint64_t bricks_outside, bricks_without_weight, bricks_transparent; /* why left out */
     uint64_t splats_selected;
+    uint64_t bytes_selected[TRIP_PLANES]; /* of those, in the data set's planes */
 } trip_plan_list;
 
 /* One pass over the lists of an axis: a side of the eye, or all in `ascending` traversal. */

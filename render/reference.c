@@ -31,6 +31,7 @@ typedef struct reference {
     int axis;    /* of the layer being drawn; -1 before the first */
     bool broken; /* some splat's numbers are not finite */
     trip_list_stats stats[3];
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } reference;
 
 static void destroy(trip_renderer *base)
@@ -239,12 +240,14 @@ static trip_vec3 voxel_position(int axis, const trip_run *run, uint32_t record)
 
 static void draw_run(reference *r, const trip_batch *batch, const trip_run *run, bool front_to_back)
 {
+    const trip_block block = trip_block_of(batch, run);
+    trip_block_voxels(&block, 0, run->count, r->voxels);
+    if (block.normals)
+        trip_block_normals(&block, 0, run->count, r->normals);
     for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
-        uint32_t in_run = batch->pass->descending ? run->count - 1 - k : k;
-        size_t at = run->first + in_run;
-        uint32_t record = batch->voxels[at];
-        draw_splat(r, voxel_position(r->axis, run, record), record,
-                   batch->normals ? &batch->normals[at] : NULL, front_to_back);
+        uint32_t at = batch->pass->descending ? run->count - 1 - k : k;
+        draw_splat(r, voxel_position(r->axis, run, r->voxels[at]), r->voxels[at],
+                   block.normals ? &r->normals[at] : NULL, front_to_back);
     }
 }
 

@@ -27,6 +27,7 @@ typedef struct search {
     double from[2];
     int count;
     form forms[TRIP_REACHES_MAX];
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } search;
 
 void trip_visible_start(trip_visible *v, const trip_tf_entry *table)
@@ -196,8 +197,11 @@ static bool may_matter(const search *s, const trip_run *run)
     return false;
 }
 
-static void look_at_run(search *s, const trip_run *run, const uint32_t *voxels)
+static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
 {
+    const trip_block block = trip_block_of(batch, run);
+    uint32_t *voxels = s->voxels;
+    trip_block_voxels(&block, 0, run->count, voxels);
     s->visible->splats += run->count;
     for (uint32_t n = 0; n < run->count; n++) {
         if (!is_shown(s->visible, trip_voxel_code(voxels[n])))
@@ -220,7 +224,7 @@ static int read_selected(search *s, const trip_selection *selection)
     while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
         for (size_t i = 0; i < batch.run_count; i++)
             if (may_matter(s, &batch.runs[i]))
-                look_at_run(s, &batch.runs[i], batch.voxels + batch.runs[i].first);
+                look_at_run(s, &batch, &batch.runs[i]);
         trip_reader_release(reader, &batch);
         status =
             trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "render", "view", "interrupted") : 0;

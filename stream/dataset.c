@@ -12,15 +12,32 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-const char *trip_dataset_plane_name(int axis, int plane, char *name)
+const char *trip_plane_file_name(int axis, unsigned level, trip_kind kind, int plane, char *name)
 {
-    snprintf(name, 32, "%c.%s", 'x' + axis, plane == TRIP_PLANE_VOXELS ? "voxels" : "normals");
+    snprintf(name, 32, "%c%u.%s", 'x' + axis, level, trip_kind_of(kind)->plane_names[plane]);
     return name;
+}
+
+bool trip_plane_file_is_named(const char *name)
+{
+    char own[32], *end;
+    errno = 0;
+    unsigned long level = strtoul(name + (*name != 0), &end, 10);
+    if (level > UINT32_MAX)
+        return false;
+    for (int axis = 0; axis < 3; axis++)
+        for (int kind = 0; kind < TRIP_KINDS; kind++)
+            for (int plane = 0; plane < TRIP_PLANES; plane++)
+                if (trip_kind_of((trip_kind)kind)->planes >> plane & 1 &&
+                    !strcmp(name, trip_plane_file_name(axis, (unsigned)level, (trip_kind)kind,
+                                                       plane, own)))
+                    return true;
+    return false;
 }
 
 const char *trip_list_plane_name(const trip_list *list, int plane, char *name)
 {
-    return trip_dataset_plane_name(list->axis, plane, name);
+    return trip_plane_file_name(list->axis, list->level, list->kind, plane, name);
 }
 
 static void set_path(char *where, size_t room, const trip_dataset *d, const char *name)
@@ -113,22 +130,23 @@ static void set_list(trip_dataset *d, trip_list *l, const trip_file_list *f)
 {
     l->axis = (int)f->axis;
     l->level = f->level;
-    l->kind = TRIP_KIND_VOXELS;
-    l->planes = d->header.planes;
+    l->kind = (trip_kind)f->kind;
+    l->planes = f->planes;
     for (int a = 0; a < 3; a++)
-        l->dims[a] = (int64_t)d->header.dims[a];
-    l->index_to_world = d->index_to_world;
-    l->sheet_step = 1;
-    l->records = f->splats;
+        l->dims[a] = (int64_t)f->dims[a];
+    memcpy(l->index_to_world.m, f->index_to_world, sizeof l->index_to_world.m);
+    l->sheet_first = f->sheet_first;
+    l->sheet_step = f->sheet_step;
+    l->records = f->records;
     l->slab_count = f->slab_count;
     l->brick_count = f->brick_count;
     l->slabs = table(d, f->slabs_offset);
     l->bricks = table(d, f->bricks_offset);
-    l->counts = table(d, f->counts_offset);
+    l->runs = table(d, f->runs_offset);
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (l->planes >> plane & 1) {
             l->page_checksums[plane] = table(d, f->page_checksums_offset[plane]);
-            l->plane_bytes[plane] = l->records * TRIP_RECORD_BYTES;
+            l->plane_bytes[plane] = f->plane_bytes[plane];
         }
 }
 
@@ -174,9 +192,8 @@ static int open_plane(trip_dataset *d, int folder, trip_list *list, int plane)
     if (bytes == wanted)
         return TRIP_OK;
     set_path(where, sizeof where, d, name);
-    return trip_fail(TRIP_ERROR, "open", where, "%llu bytes instead of the %llu of %llu splats",
-                     (unsigned long long)bytes, (unsigned long long)wanted,
-                     (unsigned long long)list->records);
+    return trip_fail(TRIP_ERROR, "open", where, "%llu bytes instead of %llu",
+                     (unsigned long long)bytes, (unsigned long long)wanted);
 }
 
 static int open_files(trip_dataset *d, int folder)

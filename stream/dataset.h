@@ -4,6 +4,8 @@
 #ifndef TRIP_DATASET_H
 #define TRIP_DATASET_H
 
+#include <stdbool.h>
+
 #include "budget.h"
 #include "format.h"
 #include "geometry.h"
@@ -25,7 +27,7 @@ typedef struct trip_list {
     uint64_t slab_count, brick_count;
     const trip_file_slab *slabs;
     const trip_file_brick *bricks;
-    const uint16_t *counts;                      /* [brick][sheet in slab] */
+    const trip_file_run *runs;                   /* [brick][sheet in slab] */
     const uint64_t *page_checksums[TRIP_PLANES]; /* NULL where the plane is absent */
     uint64_t plane_bytes[TRIP_PLANES];
     int plane_fd[TRIP_PLANES]; /* -1 where absent; opened for reading */
@@ -48,8 +50,8 @@ int trip_dataset_open(trip_dataset **out, const char *path, trip_budget *budget)
 void trip_dataset_close(trip_dataset *d);
 
 /* Reads every page of every plane and checks it, and that records agree with the index (positions
- * inside the brick's bounds, in Morton order, codes inside its range, spare bits zero, the three
- * lists hold the same voxels). Reports the first fault. */
+ * inside the brick's bounds, codes inside its range, padding zero; the lists of a kind and level
+ * hold the same records, and no two kinds of a level the same voxel). Reports the first fault. */
 int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
 
 /* The first and last voxel kept along each index axis; without any, those of the grid. */
@@ -64,9 +66,11 @@ static inline double trip_list_sheet_coordinate(const trip_list *list, int64_t s
     return list->sheet_first + list->sheet_step * (double)sheet;
 }
 
-/* Name of a plane file, "x.voxels"; `name` has room for 32 bytes. */
-const char *trip_dataset_plane_name(int axis, int plane, char *name);
+/* Name of a plane file, "x0.voxels"; `name` has room for 32 bytes. */
+const char *trip_plane_file_name(int axis, unsigned level, trip_kind kind, int plane, char *name);
 const char *trip_list_plane_name(const trip_list *list, int plane, char *name);
+/* Whether some list's plane file is so named. */
+bool trip_plane_file_is_named(const char *name);
 
 static inline double trip_dataset_value(const trip_dataset *d, unsigned code)
 {

@@ -1,6 +1,8 @@
 #include "dataset_check.h"
 
+#include "block.h"
 #include "geometry.h"
+#include "kind.h"
 #include "report.h"
 
 #include <math.h>
@@ -11,7 +13,7 @@
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are read as they lie in memory");
 
-enum { TEXT_BYTES_MAX = 1 << 24, SECTIONS_MAX = 32 };
+enum { TEXT_BYTES_MAX = 1 << 24, TABLES_PER_LIST = 3 + TRIP_FILE_PLANES };
 
 static int fail_at(const char *where, uint64_t at, const char *why)
 {
@@ -35,6 +37,11 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
     copy.header_checksum = 0;
     if (memcmp(h->magic, TRIP_MAGIC, sizeof h->magic) != 0)
         return FAIL_FIELD(magic, "not the index of a data set (no " TRIP_MAGIC ")");
+    if (h->version == 1)
+        return trip_fail(TRIP_ERROR, "open", where,
+                         "byte %zu: format version 1, which is not read any more: make the data "
+                         "set again with `triptych brick`",
+                         offsetof(trip_file_header, version));
     if (h->version != TRIP_FORMAT_VERSION)
         return trip_fail(TRIP_ERROR, "open", where,
                          "byte %zu: format version %u, this program reads version %d",
@@ -49,6 +56,11 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
     if (h->reserved0 || !all_zero(h->reserved, sizeof h->reserved))
         return FAIL_FIELD(reserved0, "reserved bytes are not zero");
     return TRIP_OK;
+}
+
+static bool is_length(double x)
+{
+    return isfinite(x) && x >= 0;
 }
 
 static int check_grid(const trip_file_header *h, const char *where)
@@ -67,12 +79,15 @@ static int check_grid(const trip_file_header *h, const char *where)
         return FAIL_FIELD(code_lo, "no range of codes");
     if (!isfinite(h->value_min) || !isfinite(h->value_max) || h->value_min > h->value_max)
         return FAIL_FIELD(value_min, "no range of values");
-    if (!isfinite(h->gradient_scale) || h->gradient_scale < 0)
+    if (!is_length(h->gradient_scale) || !is_length(h->gradient_full))
         return FAIL_FIELD(gradient_scale, "no gradient scale");
+    for (int a = 0; a < 3; a++)
+        if (!is_length(h->gradient_step[a]))
+            return FAIL_FIELD(gradient_step, "no gradient step");
     if ((double)h->voxels > voxels)
         return FAIL_FIELD(voxels, "more voxels than the grid has");
-    if (h->kept > h->voxels || h->kept > INT64_MAX / TRIP_RECORD_BYTES)
-        return FAIL_FIELD(kept, "more splats than voxels");
+    if (h->kept > h->voxels || h->halo > h->voxels - h->kept)
+        return FAIL_FIELD(kept, "more was kept than there are voxels");
     return TRIP_OK;
 }
 
@@ -91,8 +106,13 @@ static int check_layout(const trip_file_header *h, const char *where)
         return FAIL_FIELD(page_log2, "page size outside 4096 to 16777216");
     if (!(h->planes & 1u << TRIP_PLANE_VOXELS) || h->planes >> TRIP_PLANES)
         return FAIL_FIELD(planes, "unknown planes, or no voxels");
-    if (h->list_count != 3)
-        return FAIL_FIELD(list_count, "the number of lists is not 3");
+    if (h->code_bytes < 1 || h->code_bytes > 2)
+        return FAIL_FIELD(code_bytes, "codes have 1 or 2 bytes");
+    if (h->planes >> TRIP_PLANE_NORMALS & 1 ? h->normal_bytes < 3 || h->normal_bytes > 4
+                                            : h->normal_bytes != 0)
+        return FAIL_FIELD(normal_bytes, "normals have 3 or 4 bytes, and 0 where there are none");
+    if (h->list_count < 3 || h->list_count > TRIP_LISTS_MAX)
+        return FAIL_FIELD(list_count, "the number of lists is not between 3 and 4096");
     if (h->checksums_offset % 8 || h->checksums_offset < TRIP_HEADER_BYTES ||
         h->checksums_offset > h->index_bytes ||
         h->index_bytes - h->checksums_offset !=
@@ -135,7 +155,7 @@ typedef struct section {
 } section;
 
 typedef struct sections {
-    section items[SECTIONS_MAX];
+    section *items;
     unsigned count;
 } sections;
 
@@ -171,28 +191,124 @@ static int check_overlap(sections *s, const char *where)
     return TRIP_OK;
 }
 
-static int check_list_head(sections *s, const trip_file_header *h, const trip_file_list *f,
-                           uint32_t axis, const char *where, uint64_t at)
+static int check_list_grid(const trip_file_header *h, const trip_file_list *f, const char *where,
+                           uint64_t at)
 {
-    if (f->axis != axis || f->level != 0)
-        return fail_at(where, at, "the lists are not X, Y and Z at level 0");
-    if (f->splats != h->kept)
-        return fail_at(where, at, "the list does not hold the splats that were kept");
+    trip_affine map, inverse;
+    double voxels = 1;
+    for (int a = 0; a < 3; a++) {
+        if (f->dims[a] < 1 || f->dims[a] > INT32_MAX)
+            return fail_at(where, at, "the list's grid size is outside 1 to 2147483647");
+        voxels *= (double)f->dims[a];
+    }
+    if ((double)f->records > voxels)
+        return fail_at(where, at, "the list has more records than its grid has voxels");
+    memcpy(map.m, f->index_to_world, sizeof map.m);
+    if (!trip_affine_invert(&map, &inverse))
+        return fail_at(where, at, "the list's index-to-world map is singular or not finite");
+    if (!(f->sheet_step > 0) ||
+        !isfinite(f->sheet_first + f->sheet_step * (double)f->dims[f->axis]))
+        return fail_at(where, at, "the list's sheets have no ascending coordinates");
+    if (f->level == 0 && (memcmp(f->dims, h->dims, sizeof f->dims) != 0 ||
+                          memcmp(f->index_to_world, h->index_to_world, sizeof map.m) != 0 ||
+                          f->sheet_first != 0 || f->sheet_step != 1))
+        return fail_at(where, at, "a list of level 0 is not of the header's grid");
+    return TRIP_OK;
+}
+
+/* Bytes of a plane whose records all have the same length. */
+static bool plane_bytes_fit(const trip_file_header *h, const trip_file_list *f)
+{
+    uint64_t bytes;
+    for (int plane = 0; plane < TRIP_FILE_PLANES; plane++)
+        if (!(f->planes >> plane & 1) && f->plane_bytes[plane] != 0)
+            return false;
+    if (f->plane_bytes[TRIP_PLANE_VOXELS] % 8 || f->plane_bytes[TRIP_PLANE_VOXELS] > INT64_MAX)
+        return false;
+    if (!(f->planes >> TRIP_PLANE_NORMALS & 1))
+        return true;
+    return !__builtin_mul_overflow(f->records, h->normal_bytes, &bytes) && bytes <= INT64_MAX &&
+           f->plane_bytes[TRIP_PLANE_NORMALS] == bytes;
+}
+
+static int check_list_kind(const trip_file_header *h, const trip_file_list *f, const char *where,
+                           uint64_t at)
+{
+    const trip_kind_info *kind = f->kind < TRIP_KINDS ? trip_kind_of((trip_kind)f->kind) : NULL;
+    if (f->axis > 2 || !kind)
+        return fail_at(where, at, "no such axis or kind of list");
+    if (f->planes != (kind->planes & h->planes))
+        return fail_at(where, at, "the list has not the planes of its kind");
+    if (f->level == 0 && f->records != (f->kind == TRIP_KIND_VOXELS ? h->kept : h->halo))
+        return fail_at(where, at, "the list does not hold the voxels that were kept");
+    if (!plane_bytes_fit(h, f))
+        return fail_at(where, at, "the list's planes have not the bytes of its records");
     if (!all_zero(f->reserved, sizeof f->reserved))
         return fail_at(where, at, "reserved bytes are not zero");
+    return TRIP_OK;
+}
+
+static int check_list_head(sections *s, const trip_file_header *h, const trip_file_list *f,
+                           const char *where, uint64_t at)
+{
+    int status = check_list_kind(h, f, where, at);
+    if (status == TRIP_OK)
+        status = check_list_grid(h, f, where, at);
+    if (status < 0)
+        return status;
     if (f->brick_count > UINT32_MAX)
         return fail_at(where, at, "more bricks than 4294967295");
     if (!add_section(s, h, f->slabs_offset, f->slab_count, sizeof(trip_file_slab), 8) ||
         !add_section(s, h, f->bricks_offset, f->brick_count, sizeof(trip_file_brick), 8) ||
-        !add_section(s, h, f->counts_offset, f->brick_count, 2 * h->slab_sheets, 8))
+        !add_section(s, h, f->runs_offset, f->brick_count,
+                     sizeof(trip_file_run) * (uint64_t)h->slab_sheets, 8))
         return fail_at(where, at, "a table of the list lies outside the file");
-    for (int plane = 0; plane < 4; plane++) {
-        uint64_t pages = page_count(f->splats * TRIP_RECORD_BYTES, h->page_log2);
-        bool present = h->planes >> plane & 1;
-        if (present ? !add_section(s, h, f->page_checksums_offset[plane], pages, 8, 8)
-                    : f->page_checksums_offset[plane] != 0)
+    for (int plane = 0; plane < TRIP_FILE_PLANES; plane++) {
+        uint64_t pages = page_count(f->plane_bytes[plane], h->page_log2);
+        if (f->planes >> plane & 1
+                ? !add_section(s, h, f->page_checksums_offset[plane], pages, 8, 8)
+                : f->page_checksums_offset[plane] != 0)
             return fail_at(where, at, "the list's page checksums lie outside the file");
     }
+    return TRIP_OK;
+}
+
+static bool same_grid(const trip_file_list *f, const trip_file_list *g)
+{
+    return memcmp(f->dims, g->dims, sizeof f->dims) == 0 &&
+           memcmp(f->index_to_world, g->index_to_world, sizeof f->index_to_world) == 0 &&
+           (f->axis != g->axis ||
+            (f->sheet_first == g->sheet_first && f->sheet_step == g->sheet_step));
+}
+
+/* What lists are to one another. */
+static int check_set(const trip_file_header *h, const trip_file_list *lists, const char *where)
+{
+    unsigned axes = 0;
+    bool halo = false;
+    for (uint32_t i = 0; i < h->list_count; i++) {
+        const trip_file_list *f = &lists[i];
+        uint64_t at = h->lists_offset + i * sizeof *f;
+        for (const trip_file_list *g = lists; g < f; g++) {
+            if (f->level != g->level)
+                continue;
+            if (!same_grid(f, g))
+                return fail_at(where, at, "lists of a level have different grids");
+            if (f->kind != g->kind)
+                continue;
+            if (f->axis == g->axis)
+                return fail_at(where, at, "two lists have the same axis, level and kind");
+            if (f->records != g->records)
+                return fail_at(where, at, "lists of a kind and level hold different numbers");
+        }
+        if (f->level == 0 && f->kind == TRIP_KIND_VOXELS)
+            axes |= 1u << f->axis;
+        halo |= f->level == 0 && f->kind == TRIP_KIND_HALO;
+    }
+    if (h->halo && !halo)
+        return FAIL_FIELD(halo, "a halo was kept, and there is no list of it");
+    if (axes != 7)
+        return fail_at(where, h->lists_offset, "the voxels of level 0 are not there for each axis");
     return TRIP_OK;
 }
 
@@ -201,9 +317,11 @@ typedef struct list_check {
     const char *where;
     const trip_file_header *h;
     const trip_file_list *f;
+    trip_block_form form;
     const trip_file_slab *slabs;
     const trip_file_brick *bricks;
-    const uint16_t *counts;
+    const trip_file_run *runs;
+    uint64_t bricks_before, records_before, bytes_before; /* of what was checked so far */
 } list_check;
 
 static int fail_brick(const list_check *c, uint64_t i, const char *why)
@@ -211,23 +329,27 @@ static int fail_brick(const list_check *c, uint64_t i, const char *why)
     return fail_at(c->where, c->f->bricks_offset + i * sizeof *c->bricks, why);
 }
 
-/* Run counts of a brick: none outside its sheets, some in the first and last, no more than the
- * bounds have room for, the right sum. */
-static bool counts_fit(const list_check *c, uint64_t i)
+/* Runs of a brick: none outside its sheets, some in the first and last, no more records than the
+ * bounds have room for, the right sum, and blocks of a length that their records can have. */
+static bool runs_fit(const list_check *c, uint64_t i, uint64_t *bytes)
 {
     const trip_file_brick *b = &c->bricks[i];
-    const uint16_t *counts = c->counts + i * c->h->slab_sheets;
+    const trip_file_run *runs = c->runs + i * c->h->slab_sheets;
     unsigned room = (b->u_max - b->u_min + 1u) * (b->v_max - b->v_min + 1u);
     uint64_t sum = 0;
     for (unsigned s = 0; s < c->h->slab_sheets; s++) {
-        if (counts[s] > (s < b->sheet_min || s > b->sheet_max ? 0 : room))
+        const trip_file_run *r = &runs[s];
+        if (r->records > (s < b->sheet_min || s > b->sheet_max ? 0 : room))
             return false;
-        sum += counts[s];
+        if (r->records ? !trip_block_words_fit(&c->form, r->records, r->words) : r->words != 0)
+            return false;
+        sum += r->records;
+        *bytes += 8 * (uint64_t)r->words;
     }
-    return counts[b->sheet_min] && counts[b->sheet_max] && sum == b->splats;
+    return runs[b->sheet_min].records && runs[b->sheet_max].records && sum == b->records;
 }
 
-static int check_brick(const list_check *c, uint64_t i, uint64_t first_sheet)
+static int check_brick(list_check *c, uint64_t i, uint64_t first_sheet)
 {
     const trip_file_header *h = c->h;
     const trip_file_brick *b = &c->bricks[i];
@@ -235,20 +357,21 @@ static int check_brick(const list_check *c, uint64_t i, uint64_t first_sheet)
     if (b->reserved)
         return fail_brick(c, i, "reserved bytes of a brick are not zero");
     if (b->u_min > b->u_max || b->v_min > b->v_max || b->u_max >= tile || b->v_max >= tile ||
-        b->tile_u * tile + b->u_max >= h->dims[(c->f->axis + 1) % 3] ||
-        b->tile_v * tile + b->v_max >= h->dims[(c->f->axis + 2) % 3])
+        b->tile_u * tile + b->u_max >= c->f->dims[(c->f->axis + 1) % 3] ||
+        b->tile_v * tile + b->v_max >= c->f->dims[(c->f->axis + 2) % 3])
         return fail_brick(c, i, "a brick's bounds are not inside the grid");
     if (b->sheet_min > b->sheet_max || b->sheet_max >= h->slab_sheets ||
-        first_sheet + b->sheet_max >= h->dims[c->f->axis])
+        first_sheet + b->sheet_max >= c->f->dims[c->f->axis])
         return fail_brick(c, i, "a brick's sheets are not inside the grid");
     if (b->code_min > b->code_max)
         return fail_brick(c, i, "a brick's value range is empty");
-    if (!counts_fit(c, i))
-        return fail_brick(c, i, "a brick's run counts do not agree with it");
+    if (!runs_fit(c, i, &c->bytes_before))
+        return fail_brick(c, i, "a brick's runs do not agree with it");
+    c->records_before += b->records;
     return TRIP_OK;
 }
 
-static int check_slab_bricks(const list_check *c, const trip_file_slab *slab, uint64_t *splats)
+static int check_slab_bricks(list_check *c, const trip_file_slab *slab)
 {
     for (uint64_t i = slab->first_brick; i < slab->first_brick + slab->brick_count; i++) {
         const trip_file_brick *b = &c->bricks[i];
@@ -258,30 +381,29 @@ static int check_slab_bricks(const list_check *c, const trip_file_slab *slab, ui
         int status = check_brick(c, i, (uint64_t)slab->slab * c->h->slab_sheets);
         if (status < 0)
             return status;
-        *splats += b->splats;
     }
     return TRIP_OK;
 }
 
-static int check_slabs(const list_check *c)
+static int check_slabs(list_check *c)
 {
-    uint64_t bricks = 0, splats = 0;
     for (uint64_t i = 0; i < c->f->slab_count; i++) {
         const trip_file_slab *slab = &c->slabs[i];
         uint64_t at = c->f->slabs_offset + i * sizeof *slab;
         if (i > 0 && slab->slab <= slab[-1].slab)
             return fail_at(c->where, at, "the slabs are not ascending");
-        if (slab->first_brick != bricks || slab->brick_count < 1 ||
-            slab->brick_count > c->f->brick_count - bricks)
+        if (slab->first_brick != c->bricks_before || slab->brick_count < 1 ||
+            slab->brick_count > c->f->brick_count - c->bricks_before)
             return fail_at(c->where, at, "the slab's bricks do not follow those before");
-        if (slab->first_splat != splats)
-            return fail_at(c->where, at, "the slab's splats do not follow those before");
-        int status = check_slab_bricks(c, slab, &splats);
+        if (slab->first_record != c->records_before || slab->first_block != c->bytes_before)
+            return fail_at(c->where, at, "the slab's records do not follow those before");
+        int status = check_slab_bricks(c, slab);
         if (status < 0)
             return status;
-        bricks += slab->brick_count;
+        c->bricks_before += slab->brick_count;
     }
-    if (bricks != c->f->brick_count || splats != c->f->splats)
+    if (c->bricks_before != c->f->brick_count || c->records_before != c->f->records ||
+        c->bytes_before != c->f->plane_bytes[TRIP_PLANE_VOXELS])
         return fail_at(c->where, c->f->slabs_offset, "the slabs do not add up to the list");
     return TRIP_OK;
 }
@@ -293,28 +415,40 @@ static int check_text(const unsigned char *index, const trip_file_header *h, con
     return TRIP_OK;
 }
 
-int trip_dataset_check_tables(const unsigned char *index, const trip_file_header *h,
-                              const char *where)
+static int check_places(const unsigned char *index, const trip_file_header *h, const char *where,
+                        sections *s)
 {
-    sections s = { .count = 0 };
-    if (!add_section(&s, h, h->lists_offset, h->list_count, sizeof(trip_file_list), 8))
+    if (!add_section(s, h, h->lists_offset, h->list_count, sizeof(trip_file_list), 8))
         return FAIL_FIELD(lists_offset, "the lists lie outside the file");
-    if (!add_section(&s, h, h->text_offset, h->text_bytes, 1, 1))
+    if (!add_section(s, h, h->text_offset, h->text_bytes, 1, 1))
         return FAIL_FIELD(text_offset, "the text lies outside the file");
     const trip_file_list *lists = (const void *)(index + h->lists_offset);
     int status = check_text(index, h, where);
-    for (uint32_t a = 0; a < 3 && status == TRIP_OK; a++)
-        status = check_list_head(&s, h, &lists[a], a, where, h->lists_offset + a * sizeof *lists);
+    for (uint32_t i = 0; i < h->list_count && status == TRIP_OK; i++)
+        status = check_list_head(s, h, &lists[i], where, h->lists_offset + i * sizeof *lists);
     if (status == TRIP_OK)
-        status = check_overlap(&s, where);
-    for (uint32_t a = 0; a < 3 && status == TRIP_OK; a++)
+        status = check_set(h, lists, where);
+    return status == TRIP_OK ? check_overlap(s, where) : status;
+}
+
+int trip_dataset_check_tables(const unsigned char *index, const trip_file_header *h,
+                              const char *where)
+{
+    sections s = { calloc(TABLES_PER_LIST * (size_t)h->list_count + 2, sizeof *s.items), 0 };
+    if (!s.items)
+        return trip_fail(TRIP_ERROR, "open", where, "out of memory");
+    int status = check_places(index, h, where, &s);
+    free(s.items);
+    const trip_file_list *lists = (const void *)(index + h->lists_offset);
+    for (uint32_t i = 0; i < h->list_count && status == TRIP_OK; i++)
         status = check_slabs(&(list_check){
             .where = where,
             .h = h,
-            .f = &lists[a],
-            .slabs = (const void *)(index + lists[a].slabs_offset),
-            .bricks = (const void *)(index + lists[a].bricks_offset),
-            .counts = (const void *)(index + lists[a].counts_offset),
+            .f = &lists[i],
+            .form = trip_block_form_of(h),
+            .slabs = (const void *)(index + lists[i].slabs_offset),
+            .bricks = (const void *)(index + lists[i].bricks_offset),
+            .runs = (const void *)(index + lists[i].runs_offset),
         });
     return status;
 }

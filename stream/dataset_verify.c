@@ -1,5 +1,5 @@
-/* Checks a whole data set: every page by its checksum and every record against its brick, through
- * the reader, the order of records, and the three lists against one another. */
+/* Checks a whole data set: every page by its checksum and every block against its brick, through
+ * the reader; padding; and the lists against one another. */
 #include "dataset.h"
 
 #include "reader.h"
@@ -16,10 +16,20 @@ typedef struct voxel_sums {
 typedef struct list_verifier {
     const trip_dataset *data;
     const trip_list *list;
-    uint64_t splat;                   /* list position of the next record */
-    int64_t sheet, brick, last_order; /* of the run being checked: it may go on in the next batch */
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
     voxel_sums sums;
 } list_verifier;
+
+/* The runs of a list, one by one. */
+typedef struct run_stream {
+    trip_reader *reader;
+    trip_selection all;
+    trip_pass pass;
+    trip_batch batch;
+    size_t next; /* in the batch */
+    trip_run run;
+    trip_block block;
+} run_stream;
 
 static uint64_t mix(uint64_t x)
 {
@@ -36,96 +46,194 @@ static void add_voxel(voxel_sums *s, const uint64_t p[3], uint32_t code, uint32_
     s->twist += mix(voxel ^ UINT64_C(0xd1b54a32d192ed03));
 }
 
-static int fail_record(const list_verifier *v, const char *why)
+static int fail_run(const trip_dataset *d, const trip_list *list, const trip_run *run,
+                    const char *why)
 {
     char name[32], where[4096];
-    trip_list_plane_name(v->list, TRIP_PLANE_VOXELS, name);
-    snprintf(where, sizeof where, "%s/%s", v->data->path, name);
-    return trip_fail(TRIP_ERROR, "verify", where, "byte %llu: %s",
-                     (unsigned long long)v->splat * TRIP_RECORD_BYTES, why);
+    snprintf(where, sizeof where, "%s/%s", d->path,
+             trip_list_plane_name(list, TRIP_PLANE_VOXELS, name));
+    return trip_fail(TRIP_ERROR, "verify", where, "sheet %d, u %d, v %d: %s", (int)run->sheet,
+                     (int)run->u, (int)run->v, why);
 }
 
-static int check_record(list_verifier *v, uint32_t voxel)
+/* ---- streams of runs ---- */
+
+static int open_stream(run_stream *s, const trip_dataset *d, const trip_list *list,
+                       trip_budget *budget)
 {
-    int64_t order = (int64_t)trip_morton(trip_voxel_u(voxel), trip_voxel_v(voxel));
-    if (order <= v->last_order)
-        return fail_record(v, "the splats of the run are not in Morton order");
-    v->last_order = order;
-    return TRIP_OK;
+    *s = (run_stream){ 0 };
+    int status =
+        trip_reader_create(&s->reader, d, &(trip_reader_params){ .planes = list->planes }, budget);
+    if (status == TRIP_OK)
+        status = trip_selection_create_whole(&s->all, d, list, false, budget);
+    s->pass = trip_pass_of(&s->all);
+    return status == TRIP_OK ? trip_reader_begin(s->reader, &s->pass) : status;
 }
 
-static int check_run(list_verifier *v, const trip_batch *batch, const trip_run *run)
+static void close_stream(run_stream *s, trip_budget *budget)
 {
-    const uint32_t *voxels = batch->voxels + run->first;
-    const uint32_t *normals = batch->normals ? batch->normals + run->first : NULL;
+    trip_reader_destroy(s->reader);
+    trip_selection_destroy(&s->all, budget);
+}
+
+/* 1: the next run is there; 0: the list is over; negative: failed. */
+static int next_run(run_stream *s)
+{
+    while (s->next == s->batch.run_count) {
+        if (s->batch.slot)
+            trip_reader_release(s->reader, &s->batch);
+        s->batch.run_count = s->next = 0;
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "verify", s->all.data->path, "interrupted");
+        int status = trip_reader_next(s->reader, &s->batch);
+        if (status <= 0)
+            return status;
+    }
+    s->run = s->batch.runs[s->next++];
+    s->block = trip_block_of(&s->batch, &s->run);
+    return 1;
+}
+
+/* ---- a list ---- */
+
+static int check_run(list_verifier *v, const run_stream *s)
+{
     uint64_t p[3] = { 0 };
     int axis = v->list->axis;
-    if (run->sheet != v->sheet || run->brick != v->brick)
-        v->last_order = -1;
-    v->sheet = run->sheet;
-    v->brick = run->brick;
+    const trip_run *run = &s->run;
+    if (!trip_block_is_padded(&s->block))
+        return fail_run(v->data, v->list, run, "the padding is not zero");
+    trip_block_voxels(&s->block, 0, run->count, v->voxels);
+    if (s->block.normals)
+        trip_block_normals(&s->block, 0, run->count, v->normals);
     p[axis] = (uint64_t)run->sheet;
     for (uint32_t i = 0; i < run->count; i++) {
-        int status = check_record(v, voxels[i]);
-        if (status < 0)
-            return status;
-        p[(axis + 1) % 3] = (uint64_t)run->u + trip_voxel_u(voxels[i]);
-        p[(axis + 2) % 3] = (uint64_t)run->v + trip_voxel_v(voxels[i]);
-        add_voxel(&v->sums, p, trip_voxel_code(voxels[i]), normals ? normals[i] : 0);
-        v->splat++;
+        p[(axis + 1) % 3] = (uint64_t)run->u + trip_voxel_u(v->voxels[i]);
+        p[(axis + 2) % 3] = (uint64_t)run->v + trip_voxel_v(v->voxels[i]);
+        add_voxel(&v->sums, p, trip_voxel_code(v->voxels[i]), s->block.normals ? v->normals[i] : 0);
     }
     return TRIP_OK;
 }
 
-static int check_batch(list_verifier *v, const trip_batch *batch)
+static int check_list(list_verifier *v, trip_budget *budget)
 {
-    int status = TRIP_OK;
-    for (size_t i = 0; i < batch->run_count && status == TRIP_OK; i++)
-        status = check_run(v, batch, &batch->runs[i]);
+    run_stream s;
+    int status = open_stream(&s, v->data, v->list, budget);
+    while (status == TRIP_OK && (status = next_run(&s)) == 1)
+        status = check_run(v, &s);
+    close_stream(&s, budget);
     return status;
 }
 
-static int check_pass(list_verifier *v, trip_reader *r, const trip_selection *s)
+/* ---- lists against one another ---- */
+
+/* Order of runs in lists of the same grid and axis. */
+static int compare_places(const trip_run *a, const trip_run *b)
 {
-    trip_batch batch;
-    trip_pass pass = trip_pass_of(s);
-    int status = trip_reader_begin(r, &pass), more = 0;
-    while (status == TRIP_OK && (more = trip_reader_next(r, &batch)) > 0) {
-        status = check_batch(v, &batch);
-        trip_reader_release(r, &batch);
-        if (status == TRIP_OK && trip_interrupted())
-            status = trip_fail(TRIP_INTERRUPTED, "verify", v->data->path, "interrupted");
-    }
-    return status < 0 ? status : more;
+    uint64_t m = trip_morton((uint32_t)a->u, (uint32_t)a->v);
+    uint64_t n = trip_morton((uint32_t)b->u, (uint32_t)b->v);
+    if (a->sheet != b->sheet)
+        return a->sheet < b->sheet ? -1 : 1;
+    return (m > n) - (m < n);
 }
 
-static int check_list(const trip_dataset *d, trip_reader *r, const trip_list *list,
-                      trip_budget *budget, voxel_sums *sums)
+/* Whether blocks of the same tile share a voxel. */
+static bool share_voxels(const trip_block *a, const trip_block *b)
 {
-    trip_selection s;
-    list_verifier v = { .data = d, .list = list, .sheet = -1, .brick = -1 };
-    int status = trip_selection_create_whole(&s, d, list, false, budget);
-    if (status < 0)
-        return status;
-    status = check_pass(&v, r, &s);
-    trip_selection_destroy(&s, budget);
-    *sums = v.sums;
+    const uint64_t *mask_a = a->masks, *mask_b = b->masks;
+    uint64_t shared = 0;
+    for (unsigned w = 0; w < a->present_words; w++) {
+        for (uint64_t bits = a->present[w] | b->present[w]; bits; bits &= bits - 1) {
+            uint64_t bit = bits & -bits, in_a = 0, in_b = 0;
+            if (a->present[w] & bit)
+                in_a = *mask_a++;
+            if (b->present[w] & bit)
+                in_b = *mask_b++;
+            shared |= in_a & in_b;
+        }
+    }
+    return shared != 0;
+}
+
+/* Goes on with whichever stream is behind. */
+static int compare_streams(run_stream *a, run_stream *b)
+{
+    int status_a = next_run(a), status_b = next_run(b);
+    while (status_a == 1 && status_b == 1) {
+        int order = compare_places(&a->run, &b->run);
+        if (order == 0 && share_voxels(&a->block, &b->block))
+            return fail_run(a->all.data, b->all.list, &b->run,
+                            "a voxel is in a list of another kind too");
+        if (order <= 0)
+            status_a = next_run(a);
+        if (order >= 0)
+            status_b = next_run(b);
+    }
+    return status_a < 0 ? status_a : status_b < 0 ? status_b : TRIP_OK;
+}
+
+static int check_apart(const trip_dataset *d, const trip_list *a, const trip_list *b,
+                       trip_budget *budget)
+{
+    run_stream s = { 0 }, t = { 0 };
+    int status = open_stream(&s, d, a, budget);
+    if (status == TRIP_OK)
+        status = open_stream(&t, d, b, budget);
+    if (status == TRIP_OK)
+        status = compare_streams(&s, &t);
+    close_stream(&t, budget);
+    close_stream(&s, budget);
+    return status;
+}
+
+/* A list against those before it. */
+static int compare_lists(const trip_dataset *d, unsigned i, const voxel_sums *sums,
+                         trip_budget *budget)
+{
+    const trip_list *l = &d->lists[i];
+    int status = TRIP_OK;
+    for (unsigned j = 0; j < i && status == TRIP_OK; j++) {
+        const trip_list *m = &d->lists[j];
+        if (l->level != m->level)
+            continue;
+        if (l->kind == m->kind && (sums[i].sum != sums[j].sum || sums[i].twist != sums[j].twist))
+            status = trip_fail(TRIP_ERROR, "verify", d->path,
+                               "the lists of %s along %c and %c at level %u do not hold the same",
+                               trip_kind_of(l->kind)->name, 'x' + m->axis, 'x' + l->axis, l->level);
+        else if (l->kind != m->kind && l->axis == m->axis)
+            status = check_apart(d, m, l, budget);
+    }
+    return status;
+}
+
+static int check_lists(const trip_dataset *d, list_verifier *v, voxel_sums *sums,
+                       trip_budget *budget)
+{
+    int status = TRIP_OK;
+    for (unsigned i = 0; i < d->list_count && status == TRIP_OK; i++) {
+        v->list = &d->lists[i];
+        v->sums = (voxel_sums){ 0 };
+        status = check_list(v, budget);
+        sums[i] = v->sums;
+        if (status == TRIP_OK)
+            status = compare_lists(d, i, sums, budget);
+    }
     return status;
 }
 
 int trip_dataset_verify(const trip_dataset *d, trip_budget *budget)
 {
-    trip_reader *r;
-    voxel_sums sums[3];
-    int status =
-        trip_reader_create(&r, d, &(trip_reader_params){ .planes = d->header.planes }, budget);
-    for (int axis = 0; axis < 3 && status == TRIP_OK; axis++) {
-        status = check_list(d, r, &d->lists[axis], budget, &sums[axis]);
-        if (status == TRIP_OK &&
-            (sums[axis].sum != sums[0].sum || sums[axis].twist != sums[0].twist))
-            status = trip_fail(TRIP_ERROR, "verify", d->path,
-                               "the lists along x and %c do not hold the same voxels", 'x' + axis);
+    list_verifier *v = trip_budget_take(budget, sizeof *v);
+    voxel_sums *sums = trip_budget_take(budget, d->list_count * sizeof *sums);
+    int status = TRIP_OK;
+    if (v && sums) {
+        v->data = d;
+        status = check_lists(d, v, sums, budget);
+    } else {
+        status = trip_fail(TRIP_ERROR, "verify", d->path,
+                           "no memory to decode runs in: give more with --memory");
     }
-    trip_reader_destroy(r);
+    trip_budget_release(budget, sums, d->list_count * sizeof *sums);
+    trip_budget_release(budget, v, sizeof *v);
     return status;
 }

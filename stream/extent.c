@@ -1,13 +1,28 @@
 #include "extent.h"
 
+#include "block.h"
+
 static uint64_t page_floor(const trip_planner *p, uint64_t offset)
 {
     return offset & ~(uint64_t)(p->page_bytes - 1);
 }
 
-static uint64_t page_ceil(const trip_planner *p, uint64_t offset)
+/* Bytes of the pages that hold [low, high). */
+static size_t paged_bytes(const trip_planner *p, uint64_t low, uint64_t high)
 {
-    return page_floor(p, offset + p->page_bytes - 1);
+    return (size_t)(page_floor(p, high + p->page_bytes - 1) - page_floor(p, low));
+}
+
+size_t trip_planner_least_slot(const trip_dataset *d, unsigned planes)
+{
+    const trip_block_form form = trip_block_form_of(&d->header);
+    size_t page = (size_t)1 << d->header.page_log2, bytes = 0;
+    size_t most[TRIP_PLANES] = { 8 * (size_t)trip_block_most_words(&form),
+                                 ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes };
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        if (planes >> plane & 1) /* from anywhere in a page */
+            bytes += (most[plane] + page - 1) / page * page + page;
+    return bytes;
 }
 
 static const trip_selection *selection_of(const trip_planner *p)
@@ -15,122 +30,166 @@ static const trip_selection *selection_of(const trip_planner *p)
     return &p->it.pass->selections[p->run.selection];
 }
 
+/* Whether a plane of the list is read. */
+static bool is_read(const trip_planner *p, const trip_list *list, int plane)
+{
+    return p->planes & list->planes & 1u << plane;
+}
+
 void trip_planner_begin(trip_planner *p, const trip_pass *pass, trip_pass_cursor *cursors)
 {
     p->it = trip_pass_begin(pass, cursors);
     p->has_run = false;
-    p->open = false;
 }
 
-/* The segment's place is known only now; its runs so far count from the file's start. */
-static void close_segment(trip_planner *p, trip_extent *e)
+/* The next run as a piece of its own. */
+static trip_piece piece_of(const trip_planner *p)
 {
-    if (!p->open)
-        return;
-    uint64_t offset = page_floor(p, p->low);
-    trip_segment *s = &e->segments[e->segment_count++];
-    *s = (trip_segment){ .offset = offset,
-                         .bytes = (size_t)(page_ceil(p, p->high) - offset),
-                         .slot_offset = e->bytes,
-                         .list = p->list };
-    for (size_t i = p->first_run; i < e->run_count; i++)
-        e->runs[i].first += e->bytes / TRIP_RECORD_BYTES - offset / TRIP_RECORD_BYTES;
-    e->bytes += s->bytes;
-    p->open = false;
+    const trip_run *run = &p->run;
+    trip_piece piece = { .list = selection_of(p)->list };
+    const size_t bytes[TRIP_PLANES] = { 8 * (size_t)run->words, run->count * p->normal_bytes };
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        if (is_read(p, piece.list, plane)) {
+            piece.low[plane] = run->at[plane];
+            piece.high[plane] = run->at[plane] + bytes[plane];
+        }
+    return piece;
 }
 
-static uint64_t gap_to(const trip_planner *p, uint64_t first, uint64_t end)
+static size_t piece_bytes(const trip_planner *p, const trip_piece *piece)
 {
-    return p->it.pass->descending ? p->low - end : first - p->high;
+    size_t bytes = 0;
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        bytes += paged_bytes(p, piece->low[plane], piece->high[plane]);
+    return bytes;
 }
 
-static bool open_segment(trip_planner *p, const trip_extent *e, uint64_t first, uint64_t end)
+/* The last piece of the same list, when the gap to the next one is small enough to read through.
+ */
+static trip_piece *find_piece(const trip_planner *p, trip_extent *e, const trip_piece *next)
 {
-    if (e->segment_count == TRIP_SEGMENTS_MAX || e->bytes == p->slot_bytes)
-        return false;
-    p->open = true;
-    p->list = selection_of(p)->list;
-    p->first_run = e->run_count;
-    p->anchor = p->it.pass->descending ? page_ceil(p, end) : page_floor(p, first);
-    p->low = p->it.pass->descending ? end : first;
-    p->high = p->low;
-    return true;
-}
-
-/* Splats of the next run that fit the open segment: all of it, its first ones, or in a descending
- * pass its last ones. */
-static uint32_t fitting(const trip_planner *p, const trip_extent *e, uint64_t first, uint64_t end)
-{
-    size_t room = p->slot_bytes - e->bytes;
-    uint64_t bytes;
-    if (p->it.pass->descending) {
-        uint64_t limit = p->anchor > room ? p->anchor - room : 0;
-        bytes = end <= limit ? 0 : end - (first > limit ? first : limit);
-    } else {
-        uint64_t limit = p->anchor + room;
-        bytes = first >= limit ? 0 : (end < limit ? end : limit) - first;
+    trip_piece *piece = NULL;
+    for (unsigned i = e->piece_count; i > 0 && !piece; i--)
+        if (e->pieces[i - 1].list == next->list)
+            piece = &e->pieces[i - 1];
+    for (int plane = 0; piece && plane < TRIP_PLANES; plane++) {
+        uint64_t gap = p->it.pass->descending ? piece->low[plane] - next->high[plane]
+                                              : next->low[plane] - piece->high[plane];
+        if (gap > p->gap_bytes)
+            return NULL;
     }
-    return (uint32_t)(bytes / TRIP_RECORD_BYTES);
+    return piece;
 }
 
-/* Moves the first (or last) `count` splats of the next run into the extent. */
-static void take(trip_planner *p, trip_extent *e, uint32_t count)
+static trip_piece joined(const trip_piece *a, const trip_piece *b)
 {
-    trip_run *run = &e->runs[e->run_count++];
-    *run = p->run;
-    run->count = count;
-    if (p->it.pass->descending)
-        run->first += p->run.count - count;
-    else
-        p->run.first += count;
-    p->run.count -= count;
-    p->has_run = p->run.count > 0;
-    e->splats += count;
-    uint64_t first = run->first * TRIP_RECORD_BYTES;
-    uint64_t end = first + (uint64_t)count * TRIP_RECORD_BYTES;
-    p->low = first < p->low ? first : p->low;
-    p->high = end > p->high ? end : p->high;
+    trip_piece both = *a;
+    for (int plane = 0; plane < TRIP_PLANES; plane++) {
+        both.low[plane] = a->low[plane] < b->low[plane] ? a->low[plane] : b->low[plane];
+        both.high[plane] = a->high[plane] > b->high[plane] ? a->high[plane] : b->high[plane];
+    }
+    return both;
 }
 
-/* Puts the next run, or what fits of it, into the extent; false when nothing fits. */
+/* Puts the next run into the extent; false when there is no room for it. */
 static bool place(trip_planner *p, trip_extent *e)
 {
-    uint64_t first = p->run.first * TRIP_RECORD_BYTES;
-    uint64_t end = first + (uint64_t)p->run.count * TRIP_RECORD_BYTES;
-    bool changes = p->open && p->list != selection_of(p)->list;
-    if (changes && p->one_segment)
+    trip_piece next = piece_of(p), *piece = find_piece(p, e, &next);
+    unsigned most = p->one_piece ? 1 : TRIP_PIECES_MAX;
+    if (!piece && e->piece_count == most)
         return false;
-    if (p->open && (changes || gap_to(p, first, end) > p->gap_bytes))
-        close_segment(p, e);
-    if (!p->open && !open_segment(p, e, first, end))
+    size_t old = piece ? piece_bytes(p, piece) : 0;
+    if (piece)
+        next = joined(piece, &next);
+    size_t bytes = e->bytes - old + piece_bytes(p, &next);
+    if (bytes > p->slot_bytes && e->run_count > 0)
         return false;
-    uint32_t count = fitting(p, e, first, end);
-    if (count > 0)
-        take(p, e, count);
-    return count > 0;
+    *(piece ? piece : &e->pieces[e->piece_count++]) = next;
+    e->bytes = bytes;
+    e->runs[e->run_count++] = p->run;
+    e->records += p->run.count;
+    p->has_run = false;
+    return true;
 }
 
 static bool skip_run(trip_planner *p)
 {
     if (!p->skip || !p->skip(p->skip_user, selection_of(p), p->run.brick))
         return false;
+    trip_piece piece = piece_of(p);
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        p->bytes_skipped += piece.high[plane] - piece.low[plane];
     p->runs_skipped++;
-    p->splats_skipped += p->run.count;
     p->has_run = false;
     return true;
 }
 
+/* Places the pieces in the slot, plane after plane. */
+static void place_pieces(const trip_planner *p, trip_extent *e)
+{
+    size_t at = 0;
+    for (int plane = 0; plane < TRIP_PLANES; plane++) {
+        e->plane_at[plane] = at;
+        for (unsigned i = 0; i < e->piece_count; i++) {
+            const trip_piece *piece = &e->pieces[i];
+            if (!is_read(p, piece->list, plane))
+                continue;
+            trip_segment *s = &e->segments[e->segment_count++];
+            *s = (trip_segment){ .offset = page_floor(p, piece->low[plane]),
+                                 .bytes = paged_bytes(p, piece->low[plane], piece->high[plane]),
+                                 .slot_offset = at,
+                                 .list = piece->list,
+                                 .plane = plane };
+            at += s->bytes;
+        }
+        e->plane_bytes[plane] = at - e->plane_at[plane];
+    }
+}
+
+static bool is_in(const trip_segment *s, const trip_list *list, int plane, uint64_t offset)
+{
+    return s->list == list && s->plane == plane && offset >= s->offset &&
+           offset - s->offset < s->bytes;
+}
+
+/* Turns a place in a plane file into one in the slot's part for the plane. `from` is the segment
+ * that the last one was in: neighbours mostly are in the same. */
+static size_t place_in_slot(const trip_extent *e, const trip_list *list, int plane, uint64_t offset,
+                            unsigned *from)
+{
+    unsigned i = *from;
+    while (!is_in(&e->segments[i], list, plane, offset))
+        i = i + 1 < e->segment_count ? i + 1 : 0;
+    *from = i;
+    const trip_segment *s = &e->segments[i];
+    return s->slot_offset - e->plane_at[plane] + (size_t)(offset - s->offset);
+}
+
+static void place_runs(const trip_planner *p, trip_extent *e)
+{
+    unsigned from[TRIP_PLANES] = { 0 };
+    for (size_t i = 0; i < e->run_count; i++) {
+        trip_run *run = &e->runs[i];
+        const trip_list *list = p->it.pass->selections[run->selection].list;
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            run->at[plane] = is_read(p, list, plane)
+                                 ? place_in_slot(e, list, plane, run->at[plane], &from[plane])
+                                 : 0;
+    }
+}
+
 bool trip_planner_fill(trip_planner *p, trip_extent *e)
 {
-    e->segment_count = 0;
+    e->piece_count = e->segment_count = 0;
     e->run_count = e->bytes = 0;
-    e->splats = 0;
+    e->records = 0;
     while (e->run_count < e->run_room) {
         if (!p->has_run && !(p->has_run = trip_pass_next(&p->it, &p->run)))
             break;
         if (!skip_run(p) && !place(p, e))
             break;
     }
-    close_segment(p, e);
+    place_pieces(p, e);
+    place_runs(p, e);
     return e->run_count > 0;
 }

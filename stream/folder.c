@@ -16,10 +16,15 @@
 
 static void remove_files(int fd)
 {
-    char name[32];
-    for (int axis = 0; axis < 3; axis++)
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            unlinkat(fd, trip_dataset_plane_name(axis, plane, name), 0);
+    int copy = openat(fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *dir = copy < 0 ? NULL : fdopendir(copy);
+    for (struct dirent *e; dir && (e = readdir(dir));)
+        if (trip_plane_file_is_named(e->d_name))
+            unlinkat(fd, e->d_name, 0);
+    if (dir)
+        closedir(dir);
+    else if (copy >= 0)
+        close(copy);
     unlinkat(fd, TRIP_INDEX_NAME, 0);
     unlinkat(fd, TRIP_SPOOL_NAME, 0);
 }
@@ -51,13 +56,8 @@ static bool is_empty(int fd)
 
 static bool is_dataset_file(const char *name)
 {
-    char plane_name[32];
-    bool known =
-        strcmp(name, TRIP_INDEX_NAME) == 0 || strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
-    for (int axis = 0; axis < 3; axis++)
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            known = known || strcmp(name, trip_dataset_plane_name(axis, plane, plane_name)) == 0;
-    return known;
+    return strcmp(name, TRIP_INDEX_NAME) == 0 || strcmp(name, ".") == 0 ||
+           strcmp(name, "..") == 0 || trip_plane_file_is_named(name);
 }
 
 /* What stands in a data set's folder and is not a data set's could neither be kept nor removed. */

@@ -6,11 +6,15 @@
 
 static const trip_kind_info kinds[TRIP_KINDS] = {
     [TRIP_KIND_VOXELS] = { .name = "voxels",
+                           .plane_names = { "voxels", "normals" },
                            .planes = 1u << TRIP_PLANE_VOXELS | 1u << TRIP_PLANE_NORMALS,
                            .splatted = true,
                            .lattice = true,
                            .reach = 1 },
-    [TRIP_KIND_HALO] = { .name = "halo", .planes = 1u << TRIP_PLANE_VOXELS, .lattice = true },
+    [TRIP_KIND_HALO] = { .name = "halo",
+                         .plane_names = { "halo" },
+                         .planes = 1u << TRIP_PLANE_VOXELS,
+                         .lattice = true },
 };
 
 const trip_kind_info *trip_kind_of(trip_kind kind)

@@ -12,11 +12,12 @@ typedef enum trip_kind {
 } trip_kind;
 
 typedef struct trip_kind_info {
-    const char *name; /* "voxels", "halo" */
-    unsigned planes;  /* bit per trip_plane that such a list may have */
-    bool splatted;    /* drawn by splatting */
-    bool lattice;     /* records are points of the list's grid, and are culled as such */
-    double reach;     /* how far a splat reaches from its voxel, as multiple of the kernel radius */
+    const char *name;           /* "voxels", "halo" */
+    const char *plane_names[2]; /* of its files, by trip_plane; NULL where it has none */
+    unsigned planes;            /* bit per trip_plane that such a list may have */
+    bool splatted;              /* drawn by splatting */
+    bool lattice;               /* records are points of the list's grid, and are culled as such */
+    double reach; /* how far a splat reaches from its voxel, as multiple of the kernel radius */
 } trip_kind_info;
 
 /* NULL for a number that is no kind. */

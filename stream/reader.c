@@ -11,36 +11,40 @@
 
 enum {
     DEFAULT_SLOTS = 8,
-    DEFAULT_SLOT_BYTES = 512 << 10,
+    DEFAULT_SLOT_BYTES = 512 << 10, /* a plane */
+    SLOT_BYTES_MAX = 1 << 30,
     DEFAULT_GAP_BYTES = 32 << 10,
     DEFAULT_THREADS = 4,
-    SLOT_BYTES_PER_RUN = 64, /* room for runs; where they are shorter, slots are not filled */
+    SLOT_BYTES_PER_RUN = 128, /* room for runs; where they are shorter, slots are not filled */
 };
-
-static size_t slot_total_bytes(const trip_reader *r)
-{
-    return r->params.slot_bytes * r->plane_count;
-}
 
 static size_t run_room(const trip_reader *r)
 {
     return r->params.slot_bytes / SLOT_BYTES_PER_RUN;
 }
 
+size_t trip_reader_slot_bytes(const trip_dataset *d, unsigned planes, size_t wanted)
+{
+    size_t page = (size_t)1 << d->header.page_log2, least = trip_planner_least_slot(d, planes);
+    size_t bytes = wanted
+                       ? wanted
+                       : DEFAULT_SLOT_BYTES * (size_t)__builtin_popcount(planes & d->header.planes);
+    bytes = (bytes + page - 1) / page * page;
+    return bytes > least ? bytes : least;
+}
+
 static void set_defaults(trip_reader *r)
 {
     trip_reader_params *p = &r->params;
     size_t page = (size_t)1 << r->data->header.page_log2;
+    p->planes |= 1u << TRIP_PLANE_VOXELS;
     p->slots = p->slots ? p->slots : DEFAULT_SLOTS;
-    if (!p->slot_bytes)
-        p->slot_bytes = page > DEFAULT_SLOT_BYTES ? page : DEFAULT_SLOT_BYTES;
+    if (!p->slot_memory && p->slot_bytes <= SLOT_BYTES_MAX)
+        p->slot_bytes = trip_reader_slot_bytes(r->data, p->planes, p->slot_bytes);
     p->gap_bytes = p->gap_bytes ? p->gap_bytes : DEFAULT_GAP_BYTES;
     p->gap_bytes = p->gap_bytes > page ? p->gap_bytes : page;
-    p->planes |= 1u << TRIP_PLANE_VOXELS;
-    for (int plane = 0; plane < TRIP_PLANES; plane++) {
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
         r->read_planes[plane] = p->planes >> plane & 1;
-        r->plane_count += r->read_planes[plane];
-    }
 }
 
 static int check_params(const trip_reader *r)
@@ -51,10 +55,12 @@ static int check_params(const trip_reader *r)
         return trip_fail(TRIP_ERROR, "read", r->data->path, "the data set has no normals");
     if (p->slots < 2 || p->slots > 4096)
         return trip_fail(TRIP_USAGE, "read", r->data->path, "%u slots: 2 to 4096", p->slots);
-    if (p->slot_bytes % ((size_t)1 << h->page_log2) || p->slot_bytes > 1 << 30)
+    size_t least = trip_planner_least_slot(r->data, p->planes);
+    if (p->slot_bytes % ((size_t)1 << h->page_log2) || p->slot_bytes < least ||
+        p->slot_bytes > SLOT_BYTES_MAX)
         return trip_fail(TRIP_USAGE, "read", r->data->path,
-                         "slots of %zu bytes: a multiple of the page size %u, up to 1 GiB",
-                         p->slot_bytes, 1u << h->page_log2);
+                         "slots of %zu bytes: a multiple of the page size %u, %zu to %zu",
+                         p->slot_bytes, 1u << h->page_log2, least, (size_t)SLOT_BYTES_MAX);
     return TRIP_OK;
 }
 
@@ -73,17 +79,17 @@ static int take_memory(trip_reader *r)
     r->runs = trip_budget_take(r->budget, n * run_room(r) * sizeof *r->runs);
     r->cursors = trip_budget_take(r->budget, r->data->list_count * sizeof *r->cursors);
     if (!r->params.slot_memory)
-        r->slot_memory = trip_budget_take(r->budget, n * slot_total_bytes(r));
+        r->slot_memory = trip_budget_take(r->budget, n * r->params.slot_bytes);
     if (!r->slots || !r->queue || !r->runs || !r->cursors ||
         (!r->params.slot_memory && !r->slot_memory))
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "no memory for %u slots of %zu bytes: give more with --memory", n,
-                         slot_total_bytes(r));
+                         r->params.slot_bytes);
     for (unsigned i = 0; i < n; i++) {
         trip_slot *s = &r->slots[i];
         s->reader = r;
         s->memory = r->params.slot_memory ? r->params.slot_memory[i]
-                                          : r->slot_memory + i * slot_total_bytes(r);
+                                          : r->slot_memory + i * r->params.slot_bytes;
         s->extent.runs = r->runs + i * run_room(r);
         s->extent.run_room = run_room(r);
     }
@@ -97,7 +103,7 @@ static void release_memory(trip_reader *r)
     trip_budget_release(r->budget, r->queue, n * sizeof *r->queue);
     trip_budget_release(r->budget, r->runs, n * run_room(r) * sizeof *r->runs);
     trip_budget_release(r->budget, r->cursors, r->data->list_count * sizeof *r->cursors);
-    trip_budget_release(r->budget, r->slot_memory, n * slot_total_bytes(r));
+    trip_budget_release(r->budget, r->slot_memory, n * r->params.slot_bytes);
 }
 
 int trip_reader_start_engine(trip_engine engine, unsigned depth, unsigned threads,
@@ -259,7 +265,7 @@ trip_reader_stats trip_reader_get_stats(const trip_reader *r)
 {
     trip_reader_stats stats = r->stats;
     stats.runs_skipped = r->planner.runs_skipped;
-    stats.bytes_skipped = r->planner.splats_skipped * TRIP_RECORD_BYTES * r->plane_count;
+    stats.bytes_skipped = r->planner.bytes_skipped;
     return stats;
 }
 

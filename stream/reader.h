@@ -5,6 +5,7 @@
 #ifndef TRIP_READER_H
 #define TRIP_READER_H
 
+#include "block.h"
 #include "selection.h"
 
 #define TRIP_READER_PASSES_MAX 8
@@ -21,17 +22,18 @@ typedef enum trip_engine {
 /* Zero means the default. */
 typedef struct trip_reader_params {
     trip_engine engine;
-    unsigned planes;   /* bit per trip_plane; voxels always */
-    unsigned slots;    /* ring length, 2 or more, default 8 */
-    size_t slot_bytes; /* per plane, a multiple of the page size; default 512 KiB or one page */
-    size_t gap_bytes;  /* gaps up to this are read through; default 32 KiB, at least a page */
-    unsigned threads;  /* that read (pread) and check; default 4 */
-    bool buffered;     /* through the page cache, not O_DIRECT */
+    unsigned planes; /* bit per trip_plane; voxels always */
+    unsigned slots;  /* ring length, 2 or more, default 8 */
+    /* Of all planes together, as trip_reader_slot_bytes() makes it: slots hold whole runs. */
+    size_t slot_bytes;
+    size_t gap_bytes; /* gaps up to this are read through; default 32 KiB, at least a page */
+    unsigned threads; /* that read (pread) and check; default 4 */
+    bool buffered;    /* through the page cache, not O_DIRECT */
     /* Of verified pages kept in memory between passes, from the budget; 0 = none. */
     size_t cache_bytes;
     /* The caller's own memory for the slots: `slots` pointers aligned to 4096 bytes, each to
-     * slot_bytes for the voxels followed by slot_bytes for each further plane read. NULL: taken
-     * from the budget. */
+     * slot_bytes, which are a multiple of the page size and not too few for a run. NULL: taken from
+     * the budget. */
     void *const *slot_memory;
     /* Asked right before a run's bytes are requested: true = leave it out (it lies behind what is
      * already saturated). Called on the thread that calls begin and next. */
@@ -44,14 +46,13 @@ typedef struct trip_reader_params {
     void *fault_user;
 } trip_reader_params;
 
-/* Runs ready to draw: run i has its splats at voxels[runs[i].first ...] and normals[...], `first`
- * now counting from the batch's own start. Runs are in draw order; in a descending pass each is
- * drawn last splat to first. A run may be split between two batches. */
+/* Runs ready to draw, in draw order: run i has its block at planes[TRIP_PLANE_VOXELS] +
+ * runs[i].at[TRIP_PLANE_VOXELS], which is checked, and its normals likewise. */
 typedef struct trip_batch {
     const trip_pass *pass;
-    const uint32_t *voxels;  /* NULL when only runs are asked for */
-    const uint32_t *normals; /* NULL also when that plane is not read */
-    size_t splats;           /* length of the arrays above, holes included */
+    const unsigned char *planes[TRIP_PLANES]; /* NULL where not read, or runs alone are wanted */
+    size_t plane_bytes[TRIP_PLANES];          /* gaps included */
+    uint64_t splats;                          /* records of all runs */
     const trip_run *runs;
     size_t run_count;
     void *slot;
@@ -61,6 +62,17 @@ typedef struct trip_batch {
 static inline const trip_list *trip_batch_list(const trip_batch *b, const trip_run *run)
 {
     return b->pass->selections[run->selection].list;
+}
+
+/* A run of a batch whose planes are there. */
+static inline trip_block trip_block_of(const trip_batch *b, const trip_run *run)
+{
+    const trip_selection *s = &b->pass->selections[run->selection];
+    const trip_block_form form = trip_block_form_of(&s->data->header);
+    bool normals = b->planes[TRIP_PLANE_NORMALS] && s->list->planes >> TRIP_PLANE_NORMALS & 1;
+    return trip_block_make(
+        &form, run->count, run->words, b->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS],
+        normals ? b->planes[TRIP_PLANE_NORMALS] + run->at[TRIP_PLANE_NORMALS] : NULL);
 }
 
 typedef struct trip_reader_stats {
@@ -76,6 +88,10 @@ typedef struct trip_reader_stats {
  * files can be read so. The memory has room for a page and is aligned to 4096 bytes. Nothing is
  * reported. */
 bool trip_reader_probe(const trip_dataset *d, trip_engine engine, void *memory);
+
+/* The length of slots when so many bytes are wanted (0: 512 KiB a plane): whole pages, and room for
+ * the largest run that the data set can have. */
+size_t trip_reader_slot_bytes(const trip_dataset *d, unsigned planes, size_t wanted);
 
 typedef struct trip_reader trip_reader;
 

@@ -2,7 +2,6 @@
 #include "reader.h"
 
 #include "reader_state.h"
-#include "record_check.h"
 #include "report.h"
 
 #include <assert.h>
@@ -21,8 +20,9 @@ static void request_done(trip_request *q)
     pthread_mutex_unlock(&r->lock);
 }
 
-static trip_request *add_request(trip_slot *s, const trip_source *source, const trip_list *list,
-                                 int plane, uint64_t offset, size_t bytes, unsigned char *data)
+static trip_request *add_request(trip_slot *s, const trip_source *source,
+                                 const trip_segment *segment, uint64_t offset, size_t bytes,
+                                 unsigned char *data)
 {
     trip_request *q = &s->requests[s->request_count++];
     uint64_t left = source->file_bytes - offset;
@@ -32,8 +32,8 @@ static trip_request *add_request(trip_slot *s, const trip_source *source, const 
     q->bytes = bytes < left ? bytes : (size_t)left;
     q->done = request_done;
     q->owner = s;
-    q->list = list;
-    q->plane = plane;
+    q->list = segment->list;
+    q->plane = segment->plane;
     q->cached = q->keep = false;
     trip_request_start(q);
     return q;
@@ -57,13 +57,13 @@ static void reserve_pages(trip_reader *r, const trip_request *q)
         trip_cache_reserve(r->cache, page++, q);
 }
 
-/* Requests for a segment of a plane: one, or by turns what is cached and what is not. A slot
- * always keeps a request for every segment and plane still to come. */
-static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment, int plane,
-                         unsigned char *data)
+/* Requests for a segment: one, or by turns what is cached and what is not. A slot
+ * always keeps a request for every segment still to come. */
+static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment)
 {
-    const trip_source *source = &r->sources[segment->list->index][plane];
-    unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX * TRIP_PLANES;
+    const trip_source *source = &r->sources[segment->list->index][segment->plane];
+    unsigned char *data = s->memory + segment->slot_offset;
+    unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX;
     for (size_t at = 0; at < segment->bytes;) {
         uint64_t offset = segment->offset + at;
         size_t bytes = segment->bytes - at;
@@ -72,7 +72,7 @@ static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segme
         bool cached = split && trip_cache_find(r->cache, page);
         if (split)
             bytes = alike_bytes(r, source, offset, bytes, cached);
-        trip_request *q = add_request(s, source, segment->list, plane, offset, bytes, data + at);
+        trip_request *q = add_request(s, source, segment, offset, bytes, data + at);
         q->cached = cached;
         q->keep = split && !cached;
         if (q->keep)
@@ -88,18 +88,10 @@ static void enqueue(trip_reader *r, trip_slot *s)
     r->queue[(r->queue_first + r->queue_count++) % r->params.slots] = s;
 }
 
-/* The planes of a segment are requested side by side. */
 static void submit(trip_reader *r, trip_slot *s)
 {
-    for (unsigned i = 0; i < s->extent.segment_count; i++) {
-        const trip_segment *segment = &s->extent.segments[i];
-        unsigned char *data = s->memory + segment->slot_offset;
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (r->read_planes[plane]) {
-                add_requests(r, s, segment, plane, data);
-                data += r->params.slot_bytes;
-            }
-    }
+    for (unsigned i = 0; i < s->extent.segment_count; i++)
+        add_requests(r, s, &s->extent.segments[i]);
     for (unsigned i = 0; i < s->request_count; i++)
         s->requests[i].next = i + 1 < s->request_count ? &s->requests[i + 1] : NULL;
     enqueue(r, s);
@@ -211,10 +203,12 @@ int trip_reader_begin(trip_reader *r, const trip_pass *pass)
     r->stats = (trip_reader_stats){ 0 };
     r->pass = r->pass_count = 0;
     r->failed = 0;
-    r->planner = (trip_planner){ .page_bytes = (size_t)1 << r->data->header.page_log2,
+    r->planner = (trip_planner){ .planes = r->params.planes,
+                                 .normal_bytes = r->data->header.normal_bytes,
+                                 .page_bytes = (size_t)1 << r->data->header.page_log2,
                                  .slot_bytes = r->params.slot_bytes,
                                  .gap_bytes = r->in_memory ? SIZE_MAX : r->params.gap_bytes,
-                                 .one_segment = r->in_memory,
+                                 .one_piece = r->in_memory,
                                  .skip = r->params.skip,
                                  .skip_user = r->params.skip_user };
     if (r->cache)
@@ -263,50 +257,50 @@ static int check_slot(const trip_reader *r, const trip_slot *s)
     return TRIP_OK;
 }
 
-/* Where a slot's splats lie in a plane. In memory an extent is one segment, since no gap ends it.
- */
-static const void *records(const trip_reader *r, const trip_slot *s, int plane)
+/* Where a slot's part of a plane lies. In memory an extent is one piece, and lies in the cache. */
+static const unsigned char *plane_memory(const trip_reader *r, const trip_slot *s, int plane)
 {
     if (r->runs_only || !r->read_planes[plane])
         return NULL;
-    if (r->in_memory)
-        return trip_cache_bytes(r->cache, s->extent.segments[0].list->index, plane,
-                                s->extent.segments[0].offset);
-    return s->memory + (plane == TRIP_PLANE_NORMALS ? r->params.slot_bytes : 0);
+    if (!r->in_memory)
+        return s->memory + s->extent.plane_at[plane];
+    for (unsigned i = 0; i < s->extent.segment_count; i++) {
+        const trip_segment *segment = &s->extent.segments[i];
+        if (segment->plane == plane)
+            return trip_cache_bytes(r->cache, segment->list->index, plane, segment->offset);
+    }
+    return NULL;
 }
 
-/* Where a record that lies so far into a batch stands in its file. */
-static unsigned long long file_offset(const trip_slot *s, size_t record)
+/* Where in its file a run's block stands. */
+static unsigned long long block_offset(const trip_slot *s, const trip_run *run)
 {
-    size_t at = record * TRIP_RECORD_BYTES;
-    unsigned i = s->extent.segment_count - 1;
-    while (i > 0 && s->extent.segments[i].slot_offset > at)
-        i--;
-    return s->extent.segments[i].offset + (at - s->extent.segments[i].slot_offset);
+    size_t at = s->extent.plane_at[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
+    const trip_segment *segment = s->extent.segments;
+    while (at < segment->slot_offset || at - segment->slot_offset >= segment->bytes)
+        segment++;
+    return segment->offset + (at - segment->slot_offset);
 }
 
-static int report_record(const trip_reader *r, const trip_batch *b, const trip_list *list,
-                         size_t record, const char *why)
+static int report_block(const trip_reader *r, const trip_batch *b, const trip_run *run,
+                        const char *why)
 {
     char name[32], where[4096];
     snprintf(where, sizeof where, "%s/%s", r->data->path,
-             trip_list_plane_name(list, TRIP_PLANE_VOXELS, name));
+             trip_list_plane_name(trip_batch_list(b, run), TRIP_PLANE_VOXELS, name));
     return trip_fail(TRIP_ERROR, "read", where, "byte %llu: %s: make the data set again",
-                     file_offset(b->slot, record), why);
+                     block_offset(b->slot, run), why);
 }
 
-/* What draws takes records as they are: those outside their bricks end here. */
-static int check_records(const trip_reader *r, const trip_batch *b)
+/* What draws takes blocks as they are: those that do not agree with their bricks end here. */
+static int check_blocks(const trip_reader *r, const trip_batch *b)
 {
-    for (size_t i = 0; i < b->run_count && b->voxels; i++) {
+    for (size_t i = 0; i < b->run_count && b->planes[TRIP_PLANE_VOXELS]; i++) {
         const trip_run *run = &b->runs[i];
-        const trip_list *list = trip_batch_list(b, run);
-        const trip_file_brick *brick = &list->bricks[run->brick];
-        const uint32_t *records = b->voxels + run->first;
-        size_t sound = trip_record_check(brick, records, run->count);
-        if (sound < run->count)
-            return report_record(r, b, list, run->first + sound,
-                                 trip_record_fault(brick, records[sound]));
+        const trip_block block = trip_block_of(b, run);
+        const char *why = trip_block_check(&block, &trip_batch_list(b, run)->bricks[run->brick]);
+        if (why)
+            return report_block(r, b, run, why);
     }
     return TRIP_OK;
 }
@@ -315,14 +309,16 @@ static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
     *batch = (trip_batch){
         .pass = s->pass,
-        .voxels = records(r, s, TRIP_PLANE_VOXELS),
-        .normals = records(r, s, TRIP_PLANE_NORMALS),
-        .splats = s->extent.bytes / TRIP_RECORD_BYTES,
+        .splats = s->extent.records,
         .runs = s->extent.runs,
         .run_count = s->extent.run_count,
         .slot = s,
     };
-    r->stats.splats += s->extent.splats;
+    for (int plane = 0; plane < TRIP_PLANES; plane++) {
+        batch->planes[plane] = plane_memory(r, s, plane);
+        batch->plane_bytes[plane] = batch->planes[plane] ? s->extent.plane_bytes[plane] : 0;
+    }
+    r->stats.splats += s->extent.records;
 }
 
 int trip_reader_next(trip_reader *r, trip_batch *batch)
@@ -339,7 +335,7 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     r->failed = check_slot(r, s);
     if (!r->failed) {
         fill_batch(r, s, batch);
-        r->failed = check_records(r, batch);
+        r->failed = check_blocks(r, batch);
     }
     s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
     return r->failed ? r->failed : 1;

@@ -33,7 +33,8 @@ static bool run(trip_engine engine, trip_request *q)
 bool trip_reader_probe(const trip_dataset *d, trip_engine engine, void *memory)
 {
     const trip_list *list = &d->lists[0];
-    uint64_t bytes = list->records * TRIP_RECORD_BYTES, page = UINT64_C(1) << d->header.page_log2;
+    uint64_t bytes = list->plane_bytes[TRIP_PLANE_VOXELS], page = UINT64_C(1)
+                                                                  << d->header.page_log2;
     _Atomic bool refused = false;
     int fd = list->plane_fd[TRIP_PLANE_VOXELS];
     trip_source source = { .fd = fd,

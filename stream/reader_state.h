@@ -9,7 +9,7 @@
 #include "reader.h"
 
 /* Room to tell apart cached pages from others within a segment. */
-#define TRIP_SLOT_REQUESTS_MAX (4 * TRIP_SEGMENTS_MAX * TRIP_PLANES)
+#define TRIP_SLOT_REQUESTS_MAX (4 * TRIP_SEGMENTS_MAX)
 
 typedef enum trip_slot_state {
     TRIP_SLOT_FREE,
@@ -35,7 +35,6 @@ struct trip_reader {
     const trip_engine_ops *ops;
     void *engine;
     bool read_planes[TRIP_PLANES];
-    unsigned plane_count;
     _Atomic bool direct_refused;
     trip_source (*sources)[TRIP_PLANES]; /* by list */
     trip_cache *cache;                   /* or NULL */

@@ -93,7 +93,10 @@ static bool enter_slab(trip_run_iterator *it)
     bool last = it->slab + 1 == (int64_t)l->slab_count;
     it->sheet = down ? slab_sheets(it) - 1 : 0;
     it->brick = down ? (int64_t)slab->brick_count - 1 : 0;
-    it->splat = !down ? slab->first_splat : last ? l->records : slab[1].first_splat;
+    it->record = !down ? slab->first_record : last ? l->records : slab[1].first_record;
+    it->block = !down  ? slab->first_block
+                : last ? l->plane_bytes[TRIP_PLANE_VOXELS]
+                       : slab[1].first_block;
     return true;
 }
 
@@ -123,35 +126,40 @@ static bool settle(trip_run_iterator *it)
     return enter_slab(it);
 }
 
-static void fill_run(const trip_run_iterator *it, uint64_t brick, int64_t sheet, uint64_t first,
-                     uint32_t count, trip_run *run)
+/* The run that the iterator stands at, which may be empty; goes on to the next. */
+static trip_run take_run(trip_run_iterator *it)
 {
-    const trip_file_brick *b = &list_of(it)->bricks[brick];
-    unsigned log2 = it->selection->data->header.tile_log2;
-    *run = (trip_run){ .first = first,
-                       .count = count,
-                       .brick = (uint32_t)brick,
-                       .sheet = (int32_t)sheet,
-                       .u = (int32_t)(b->tile_u << log2),
-                       .v = (int32_t)(b->tile_v << log2) };
+    const trip_selection *s = it->selection;
+    unsigned log2 = s->data->header.tile_log2;
+    uint64_t brick = slab_of(it)->first_brick + (uint64_t)it->brick;
+    const trip_file_brick *b = &s->list->bricks[brick];
+    const trip_file_run *r =
+        &s->list->runs[brick * (uint64_t)slab_sheets(it) + (uint64_t)it->sheet];
+    uint64_t bytes = 8 * (uint64_t)r->words;
+    uint64_t first = s->descending ? it->record - r->records : it->record;
+    uint64_t block = s->descending ? it->block - bytes : it->block;
+    it->record = s->descending ? first : first + r->records;
+    it->block = s->descending ? block : block + bytes;
+    trip_run run = { .first = first,
+                     .at = { block, first * s->data->header.normal_bytes },
+                     .count = r->records,
+                     .words = r->words,
+                     .brick = (uint32_t)brick,
+                     .sheet = (int32_t)((int64_t)slab_of(it)->slab * slab_sheets(it) + it->sheet),
+                     .u = (int32_t)(b->tile_u << log2),
+                     .v = (int32_t)(b->tile_v << log2) };
+    it->brick += s->descending ? -1 : 1;
+    return run;
 }
 
 bool trip_run_next(trip_run_iterator *it, trip_run *run)
 {
     const trip_selection *s = it->selection;
     while (settle(it)) {
-        uint64_t brick = slab_of(it)->first_brick + (uint64_t)it->brick;
-        int64_t sheet = (int64_t)slab_of(it)->slab * slab_sheets(it) + it->sheet;
-        uint32_t count =
-            list_of(it)->counts[brick * (uint64_t)slab_sheets(it) + (uint64_t)it->sheet];
-        uint64_t first = s->descending ? it->splat - count : it->splat;
-        it->splat = s->descending ? first : first + count;
-        it->brick += s->descending ? -1 : 1;
-        if (count > 0 && sheet >= s->sheet_first && sheet <= s->sheet_last &&
-            trip_selection_has(s, brick)) {
-            fill_run(it, brick, sheet, first, count, run);
+        *run = take_run(it);
+        if (run->count > 0 && run->sheet >= s->sheet_first && run->sheet <= s->sheet_last &&
+            trip_selection_has(s, run->brick))
             return true;
-        }
     }
     return false;
 }

@@ -30,23 +30,26 @@ static inline trip_pass trip_pass_of(const trip_selection *s)
     return (trip_pass){ s, 1, s->descending };
 }
 
-/* A contiguous piece of a list: splats [first, first + count) of tile origin (u, v) in `sheet`. In
- * a descending pass its splats are drawn last to first. */
+/* A brick's records in one sheet: [first, first + count) of the list, of tile origin (u, v). In a
+ * descending pass they are drawn last to first. */
 typedef struct trip_run {
     uint64_t first;
+    size_t at[TRIP_PLANES]; /* where its bytes start: in the plane files, or a batch's planes */
     uint32_t count;
     uint32_t brick;
     uint16_t selection; /* its number in the pass */
+    uint16_t words;     /* of its block, 8 bytes each */
     int32_t sheet;
     int32_t u, v;
 } trip_run;
 
 typedef struct trip_run_iterator {
     const trip_selection *selection;
-    int64_t slab;   /* position in list->slabs */
-    int64_t sheet;  /* within the slab */
-    int64_t brick;  /* within the slab */
-    uint64_t splat; /* list position of the current brick's run */
+    int64_t slab;           /* position in list->slabs */
+    int64_t sheet;          /* within the slab */
+    int64_t brick;          /* within the slab */
+    uint64_t record, block; /* where the current brick's run starts (descending: ends) in the list,
+                               and its block in the voxel plane */
 } trip_run_iterator;
 
 /* Without bricks. */

@@ -13,11 +13,11 @@ void trip_slab_init(trip_slab *s, unsigned sheets, trip_budget *budget)
 static void release(trip_slab *s)
 {
     size_t brick_bytes = s->room * sizeof *s->bricks;
-    size_t count_bytes = s->room * s->sheets * sizeof *s->counts;
+    size_t run_bytes = s->room * s->sheets * sizeof *s->runs;
     trip_budget_release(s->budget, s->bricks, brick_bytes);
     trip_budget_release(s->budget, s->bricks_spare, brick_bytes);
-    trip_budget_release(s->budget, s->counts, count_bytes);
-    trip_budget_release(s->budget, s->counts_spare, count_bytes);
+    trip_budget_release(s->budget, s->runs, run_bytes);
+    trip_budget_release(s->budget, s->runs_spare, run_bytes);
 }
 
 void trip_slab_free(trip_slab *s)
@@ -32,12 +32,12 @@ static int grow(trip_slab *s)
     trip_slab n = *s;
     n.room = s->room ? 2 * s->room : 512;
     size_t brick_bytes = n.room * sizeof *n.bricks;
-    size_t count_bytes = n.room * n.sheets * sizeof *n.counts;
+    size_t run_bytes = n.room * n.sheets * sizeof *n.runs;
     n.bricks = trip_budget_take(n.budget, brick_bytes);
     n.bricks_spare = trip_budget_take(n.budget, brick_bytes);
-    n.counts = trip_budget_take(n.budget, count_bytes);
-    n.counts_spare = trip_budget_take(n.budget, count_bytes);
-    if (!n.bricks || !n.bricks_spare || !n.counts || !n.counts_spare) {
+    n.runs = trip_budget_take(n.budget, run_bytes);
+    n.runs_spare = trip_budget_take(n.budget, run_bytes);
+    if (!n.bricks || !n.bricks_spare || !n.runs || !n.runs_spare) {
         release(&n);
         return trip_fail(TRIP_ERROR, "write", "",
                          "no memory for the %zu bricks of a slab: give more, or use larger tiles",
@@ -45,7 +45,7 @@ static int grow(trip_slab *s)
     }
     if (s->brick_count > 0) {
         memcpy(n.bricks, s->bricks, s->brick_count * sizeof *n.bricks);
-        memcpy(n.counts, s->counts, s->brick_count * s->sheets * sizeof *n.counts);
+        memcpy(n.runs, s->runs, s->brick_count * s->sheets * sizeof *n.runs);
     }
     release(s);
     *s = n;
@@ -70,7 +70,7 @@ static trip_slab_brick *find(trip_slab *s, unsigned sheet, uint32_t tile_u, uint
                                        .u_min = UINT8_MAX,
                                        .v_min = UINT8_MAX,
                                        .sheet_min = (uint8_t)sheet } };
-    memset(s->counts + (size_t)(b - s->bricks) * s->sheets, 0, s->sheets * sizeof *s->counts);
+    memset(s->runs + (size_t)(b - s->bricks) * s->sheets, 0, s->sheets * sizeof *s->runs);
     return b;
 }
 
@@ -101,14 +101,15 @@ static void widen(trip_file_brick *b, const uint32_t *voxels, uint32_t count)
 }
 
 const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
-                                     const uint32_t *voxels, uint32_t count)
+                                     const uint32_t *voxels, uint32_t count, uint32_t words)
 {
     trip_slab_brick *b = find(s, sheet, tile_u, tile_v);
     if (!b)
         return NULL;
-    b->brick.splats += count;
+    b->brick.records += count;
     b->brick.sheet_max = (uint8_t)sheet;
-    s->counts[(size_t)(b - s->bricks) * s->sheets + sheet] = (uint16_t)count;
+    s->runs[(size_t)(b - s->bricks) * s->sheets + sheet] =
+        (trip_file_run){ (uint16_t)count, (uint16_t)words };
     widen(&b->brick, voxels, count);
     return &b->brick;
 }
@@ -116,18 +117,17 @@ const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile
 static void move(trip_slab *s, size_t to, size_t from)
 {
     s->bricks_spare[to] = s->bricks[from];
-    memcpy(s->counts_spare + to * s->sheets, s->counts + from * s->sheets,
-           s->sheets * sizeof *s->counts);
+    memcpy(s->runs_spare + to * s->sheets, s->runs + from * s->sheets, s->sheets * sizeof *s->runs);
 }
 
 static void swap_spare(trip_slab *s)
 {
     trip_slab_brick *bricks = s->bricks;
-    uint16_t *counts = s->counts;
+    trip_file_run *runs = s->runs;
     s->bricks = s->bricks_spare;
-    s->counts = s->counts_spare;
+    s->runs = s->runs_spare;
     s->bricks_spare = bricks;
-    s->counts_spare = counts;
+    s->runs_spare = runs;
 }
 
 /* Merges the bricks new in this sheet, in order among themselves, with those of the sheets before.

@@ -17,16 +17,17 @@ typedef struct trip_slab {
     size_t brick_count, merged, cursor, room; /* merged: those of the sheets before, in order */
     trip_slab_brick *bricks;
     trip_slab_brick *bricks_spare; /* the other half of each merge */
-    uint16_t *counts;              /* [brick][sheet] */
-    uint16_t *counts_spare;
+    trip_file_run *runs;           /* [brick][sheet] */
+    trip_file_run *runs_spare;
 } trip_slab;
 
 void trip_slab_init(trip_slab *s, unsigned sheets, trip_budget *budget);
 void trip_slab_free(trip_slab *s);
-/* Runs of a sheet come by ascending tile; call end_sheet after the last one of each sheet. Returns
- * the run's brick as it is now; NULL after a reported failure. */
+/* Runs of a sheet come by ascending tile; call end_sheet after the last one of each sheet. `words`
+ * is the length of the run's block. Returns the run's brick as it is now; NULL after a reported
+ * failure. */
 const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
-                                     const uint32_t *voxels, uint32_t count);
+                                     const uint32_t *voxels, uint32_t count, uint32_t words);
 void trip_slab_end_sheet(trip_slab *s);
 void trip_slab_clear(trip_slab *s);
 

@@ -1,5 +1,6 @@
 #include "writer.h"
 
+#include "block.h"
 #include "dataset.h"
 #include "folder.h"
 #include "output.h"
@@ -14,17 +15,19 @@
 #include <string.h>
 #include <xxhash.h>
 
-enum { PLANE_BUFFER_BYTES = 1 << 20, SPOOL_BUFFER_BYTES = 1 << 16 };
+enum { PLANE_BUFFER_BYTES = 1 << 20, SPOOL_BUFFER_BYTES = 1 << 16, DEFAULT_LISTS = 6 };
 
 /* One list being written. Its tables go to unnamed files until the index is put together, so that
  * memory does not grow with the data. */
 typedef struct list_writer {
+    trip_writer_list is;
+    unsigned planes_present; /* bit per trip_plane */
     trip_output planes[TRIP_PLANES];
     trip_output checksums[TRIP_PLANES];
-    trip_output slabs, bricks, counts;
+    trip_output slabs, bricks, runs;
     trip_slab slab;
-    uint64_t splats, slab_count, brick_count;
-    uint64_t slab_first_splat;
+    uint64_t records, slab_count, brick_count;
+    uint64_t slab_first_record, slab_first_block;
     uint64_t last_tile;     /* Morton code of the tile of the last run */
     int64_t sheet;          /* of the last run; -1 before the first */
     _Atomic uint64_t bytes; /* progress for other threads: relaxed */
@@ -37,8 +40,10 @@ struct trip_writer {
     trip_flusher *flusher;
     atomic_bool failed; /* of the outputs */
     trip_file_header header;
-    unsigned planes;
-    list_writer lists[3];
+    trip_block_form form;
+    trip_writer_list default_lists[DEFAULT_LISTS];
+    list_writer *lists; /* from the budget */
+    unsigned list_count;
 };
 
 static bool is_power_of_two(unsigned x)
@@ -51,15 +56,105 @@ static void set_defaults(trip_writer_params *p)
     p->tile_voxels = p->tile_voxels ? p->tile_voxels : 64;
     p->slab_sheets = p->slab_sheets ? p->slab_sheets : 8;
     p->page_bytes = p->page_bytes ? p->page_bytes : 16384;
+    p->code_bytes = p->code_bytes ? p->code_bytes : 2;
 }
 
-static int check_codes(const trip_writer_params *p, const char *path)
+static int check_codes(const trip_writer_codes *c, const char *path)
 {
-    if (!isfinite(p->code_lo) || !isfinite(p->code_hi) || p->code_lo > p->code_hi)
-        return trip_fail(TRIP_ERROR, "write", path, "value range %g to %g", p->code_lo, p->code_hi);
-    if (!isfinite(p->gradient_scale) || p->gradient_scale < 0)
-        return trip_fail(TRIP_ERROR, "write", path, "gradient scale %g", p->gradient_scale);
+    if (!isfinite(c->code_lo) || !isfinite(c->code_hi) || c->code_lo > c->code_hi)
+        return trip_fail(TRIP_ERROR, "write", path, "value range %g to %g", c->code_lo, c->code_hi);
+    const double gradients[] = { c->gradient_scale, c->gradient_step[0], c->gradient_step[1],
+                                 c->gradient_step[2], c->gradient_full };
+    for (size_t i = 0; i < sizeof gradients / sizeof *gradients; i++)
+        if (!isfinite(gradients[i]) || gradients[i] < 0)
+            return trip_fail(TRIP_ERROR, "write", path, "gradient scale %g", gradients[i]);
     return TRIP_OK;
+}
+
+/* Of two lists of a level. */
+static bool same_grid(const trip_writer_list *a, const trip_writer_list *b)
+{
+    return memcmp(a->dims, b->dims, sizeof a->dims) == 0 &&
+           memcmp(&a->index_to_world, &b->index_to_world, sizeof a->index_to_world) == 0 &&
+           (a->axis != b->axis ||
+            (a->sheet_first == b->sheet_first && a->sheet_step == b->sheet_step));
+}
+
+/* The grid of level 0, along an axis. */
+static trip_writer_list level_0(const trip_writer_params *p, int axis)
+{
+    return (trip_writer_list){ .axis = axis,
+                               .dims = { p->dims[0], p->dims[1], p->dims[2] },
+                               .index_to_world = p->index_to_world,
+                               .sheet_step = 1 };
+}
+
+static int fail_list(const char *path, unsigned i, const char *why)
+{
+    return trip_fail(TRIP_ERROR, "write", path, "list %u: %s", i, why);
+}
+
+static bool same_list(const trip_writer_list *a, const trip_writer_list *b)
+{
+    return a->axis == b->axis && a->level == b->level && a->kind == b->kind;
+}
+
+static int check_list(const trip_writer_params *p, unsigned i, const char *path)
+{
+    const trip_writer_list *l = &p->lists[i];
+    const trip_writer_list full = level_0(p, l->axis);
+    trip_affine inverse;
+    if (l->axis < 0 || l->axis > 2 || !trip_kind_of(l->kind))
+        return fail_list(path, i, "no such axis or kind");
+    for (unsigned j = 0; j < i; j++) {
+        if (same_list(l, &p->lists[j]))
+            return fail_list(path, i, "there are two of its axis, level and kind");
+        if (l->level == p->lists[j].level && !same_grid(l, &p->lists[j]))
+            return fail_list(path, i, "another of its level has another grid");
+    }
+    for (int a = 0; a < 3; a++)
+        if (l->dims[a] < 1 || l->dims[a] > INT32_MAX)
+            return fail_list(path, i, "its grid has 1 to 2147483647 voxels along an axis");
+    if (!trip_affine_invert(&l->index_to_world, &inverse))
+        return fail_list(path, i, "its index-to-world map is singular or not finite");
+    if (!(l->sheet_step > 0) ||
+        !isfinite(l->sheet_first + l->sheet_step * (double)l->dims[l->axis]))
+        return fail_list(path, i, "its sheets have no ascending coordinates");
+    if (l->level == 0 && !same_grid(l, &full))
+        return fail_list(path, i, "is of level 0 and not of the data set's grid");
+    return TRIP_OK;
+}
+
+static int check_lists(const trip_writer_params *p, const char *path)
+{
+    int status = TRIP_OK;
+    unsigned axes = 0;
+    if (p->list_count < 3 || p->list_count > TRIP_LISTS_MAX)
+        return trip_fail(TRIP_ERROR, "write", path, "%u lists: 3 to %d are possible", p->list_count,
+                         TRIP_LISTS_MAX);
+    for (unsigned i = 0; i < p->list_count && status == TRIP_OK; i++) {
+        status = check_list(p, i, path);
+        if (status == TRIP_OK && p->lists[i].level == 0 && p->lists[i].kind == TRIP_KIND_VOXELS)
+            axes |= 1u << p->lists[i].axis;
+    }
+    if (status == TRIP_OK && axes != 7)
+        return trip_fail(TRIP_ERROR, "write", path,
+                         "the voxels of level 0 are not there along each axis");
+    return status;
+}
+
+/* X, Y and Z of the voxels, and then of the halo. */
+static void set_default_lists(trip_writer *w)
+{
+    trip_writer_params *p = &w->params;
+    if (p->lists)
+        return;
+    for (int i = 0; i < DEFAULT_LISTS; i++) {
+        w->default_lists[i] = level_0(p, i % 3);
+        w->default_lists[i].kind = i < 3 ? TRIP_KIND_VOXELS : TRIP_KIND_HALO;
+    }
+    p->lists = w->default_lists;
+    p->list_count = p->halo ? DEFAULT_LISTS : DEFAULT_LISTS / 2;
 }
 
 static int check_params(const trip_writer_params *p, const char *path)
@@ -78,10 +173,24 @@ static int check_params(const trip_writer_params *p, const char *path)
     if (!is_power_of_two(p->page_bytes) || p->page_bytes < 4096 || p->page_bytes > 1 << 24)
         return trip_fail(TRIP_USAGE, "write", path,
                          "page of %u bytes: a power of two from 4096 to 16777216", p->page_bytes);
+    if (p->code_bytes > 2)
+        return trip_fail(TRIP_ERROR, "write", path, "codes of %u bytes: 1 or 2", p->code_bytes);
+    if (p->normal_bytes && p->normal_bytes != 3 && p->normal_bytes != 4)
+        return trip_fail(TRIP_ERROR, "write", path, "normals of %u bytes: 3 or 4", p->normal_bytes);
     if (!trip_affine_invert(&p->index_to_world, &inverse))
         return trip_fail(TRIP_ERROR, "write", path,
                          "the index-to-world map is singular or not finite");
-    return check_codes(p, path);
+    int status = check_codes(&p->codes, path);
+    return status == TRIP_OK ? check_lists(p, path) : status;
+}
+
+static void set_header_codes(trip_file_header *h, const trip_writer_codes *c)
+{
+    h->code_lo = c->code_lo;
+    h->code_hi = c->code_hi;
+    h->gradient_scale = c->gradient_scale;
+    memcpy(h->gradient_step, c->gradient_step, sizeof h->gradient_step);
+    h->gradient_full = c->gradient_full;
 }
 
 /* The parts of the header known from the start. */
@@ -95,14 +204,15 @@ static void fill_header(trip_writer *w)
     for (int a = 0; a < 3; a++)
         h->dims[a] = (uint64_t)p->dims[a];
     memcpy(h->index_to_world, p->index_to_world.m, sizeof h->index_to_world);
-    h->code_lo = p->code_lo;
-    h->code_hi = p->code_hi;
-    h->gradient_scale = p->gradient_scale;
+    set_header_codes(h, &p->codes);
     h->tile_log2 = (uint32_t)__builtin_ctz(p->tile_voxels);
     h->slab_sheets = p->slab_sheets;
     h->page_log2 = (uint32_t)__builtin_ctz(p->page_bytes);
-    h->planes = w->planes;
-    h->list_count = 3;
+    h->planes = 1u << TRIP_PLANE_VOXELS | (p->normal_bytes ? 1u << TRIP_PLANE_NORMALS : 0);
+    h->code_bytes = p->code_bytes;
+    h->normal_bytes = p->normal_bytes;
+    h->list_count = p->list_count;
+    w->form = trip_block_form_of(h);
 }
 
 static int open_spool(trip_writer *w, trip_output *o)
@@ -121,39 +231,63 @@ static size_t larger(size_t a, size_t b)
     return a > b ? a : b;
 }
 
-static int open_plane(trip_writer *w, int axis, int plane)
+/* What is written of many lists at once takes no more memory than of few. */
+static size_t plane_buffer_bytes(const trip_writer *w)
+{
+    size_t share = PLANE_BUFFER_BYTES;
+    while (share > SPOOL_BUFFER_BYTES && share * w->list_count > 3 * PLANE_BUFFER_BYTES)
+        share /= 2;
+    return larger(w->params.page_bytes, share);
+}
+
+static int open_plane(trip_writer *w, list_writer *l, int plane)
 {
     char name[32];
-    list_writer *l = &w->lists[axis];
     size_t page = w->params.page_bytes;
     int status = open_spool(w, &l->checksums[plane]);
     if (status < 0)
         return status;
     return trip_output_create(
         &l->planes[plane],
-        &(trip_output_params){ .folder = w->folder.partial,
-                               .name = trip_dataset_plane_name(axis, plane, name),
-                               .buffer_bytes = larger(page, PLANE_BUFFER_BYTES),
-                               .flusher = w->flusher,
-                               .failed = &w->failed,
-                               .page_bytes = page,
-                               .checksums = &l->checksums[plane] },
+        &(trip_output_params){
+            .folder = w->folder.partial,
+            .name = trip_plane_file_name(l->is.axis, l->is.level, l->is.kind, plane, name),
+            .buffer_bytes = plane_buffer_bytes(w),
+            .flusher = w->flusher,
+            .failed = &w->failed,
+            .page_bytes = page,
+            .checksums = &l->checksums[plane] },
         w->budget);
 }
 
-static int open_list(trip_writer *w, int axis)
+static int open_list(trip_writer *w, list_writer *l, const trip_writer_list *is)
 {
-    list_writer *l = &w->lists[axis];
+    l->is = *is;
+    l->planes_present = w->header.planes & trip_kind_of(is->kind)->planes;
     int status = open_spool(w, &l->slabs);
     trip_slab_init(&l->slab, w->params.slab_sheets, w->budget);
     l->sheet = -1;
     if (status == TRIP_OK)
         status = open_spool(w, &l->bricks);
     if (status == TRIP_OK)
-        status = open_spool(w, &l->counts);
+        status = open_spool(w, &l->runs);
     for (int plane = 0; plane < TRIP_PLANES; plane++)
-        if (status == TRIP_OK && w->planes >> plane & 1)
-            status = open_plane(w, axis, plane);
+        if (status == TRIP_OK && l->planes_present >> plane & 1)
+            status = open_plane(w, l, plane);
+    return status;
+}
+
+static int open_lists(trip_writer *w)
+{
+    unsigned count = w->params.list_count;
+    int status = TRIP_OK;
+    w->lists = trip_budget_take(w->budget, count * sizeof *w->lists); /* zeroed */
+    if (!w->lists)
+        return trip_fail(TRIP_ERROR, "write", w->folder.path,
+                         "no memory for %u lists: give more with --memory", count);
+    w->list_count = count;
+    for (unsigned i = 0; i < count && status == TRIP_OK; i++)
+        status = open_list(w, &w->lists[i], &w->params.lists[i]);
     return status;
 }
 
@@ -166,17 +300,19 @@ int trip_writer_open(trip_writer **out, const char *path, const trip_writer_para
         return trip_fail(TRIP_ERROR, "write", path, "out of memory");
     w->params = *params;
     w->budget = budget;
-    w->planes = 1u << TRIP_PLANE_VOXELS | (params->normals ? 1u << TRIP_PLANE_NORMALS : 0);
     w->folder.fd = -1;
     set_defaults(&w->params);
-    fill_header(w);
+    set_default_lists(w);
     int status = check_params(&w->params, path);
+    if (status == TRIP_OK)
+        fill_header(w);
     if (status == TRIP_OK)
         status = trip_folder_begin(&w->folder, path, params->replace);
     if (status == TRIP_OK && (errno = trip_flusher_create(&w->flusher)))
         status = trip_fail_errno("write", path, "cannot start threads");
-    for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
-        status = open_list(w, axis);
+    if (status == TRIP_OK)
+        status = open_lists(w);
+    w->params.lists = NULL; /* the caller's: copied by now */
     if (status < 0) {
         trip_writer_abort(w);
         return status;
@@ -192,18 +328,20 @@ static int end_slab(trip_writer *w, list_writer *l)
         return TRIP_OK;
     trip_slab_end_sheet(&l->slab);
     trip_file_slab slab = { .first_brick = l->brick_count,
-                            .first_splat = l->slab_first_splat,
+                            .first_record = l->slab_first_record,
+                            .first_block = l->slab_first_block,
                             .brick_count = (uint32_t)n,
                             .slab = (uint32_t)(l->sheet / w->params.slab_sheets) };
     int status = trip_output_append(&l->slabs, &slab, sizeof slab);
     for (size_t i = 0; i < n && status == TRIP_OK; i++)
         status = trip_output_append(&l->bricks, &l->slab.bricks[i].brick, sizeof(trip_file_brick));
     if (status == TRIP_OK)
-        status = trip_output_append(&l->counts, l->slab.counts,
-                                    n * w->params.slab_sheets * sizeof(uint16_t));
+        status = trip_output_append(&l->runs, l->slab.runs,
+                                    n * w->params.slab_sheets * sizeof(trip_file_run));
     l->slab_count++;
     l->brick_count += n;
-    l->slab_first_splat = l->splats;
+    l->slab_first_record = l->records;
+    l->slab_first_block = l->planes[TRIP_PLANE_VOXELS].bytes;
     trip_slab_clear(&l->slab);
     return status;
 }
@@ -223,11 +361,11 @@ static int enter_sheet(trip_writer *w, list_writer *l, uint32_t sheet, uint64_t 
     return status;
 }
 
-static int check_run(const trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u,
+static int check_run(const trip_writer *w, const list_writer *l, uint32_t sheet, uint32_t tile_u,
                      uint32_t tile_v, uint32_t count)
 {
-    const list_writer *l = &w->lists[axis];
-    const int64_t *dims = w->params.dims;
+    const int64_t *dims = l->is.dims;
+    int axis = l->is.axis;
     unsigned log2 = w->header.tile_log2;
     bool inside = sheet < dims[axis] && (int64_t)tile_u << log2 < dims[(axis + 1) % 3] &&
                   (int64_t)tile_v << log2 < dims[(axis + 2) % 3];
@@ -236,61 +374,83 @@ static int check_run(const trip_writer *w, int axis, uint32_t sheet, uint32_t ti
     if (inside && after && count <= 1u << 2 * log2)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                     "list %c: run of %u splats in tile (%u, %u) of sheet %u is %s", 'x' + axis,
-                     count, tile_u, tile_v, sheet, inside ? "out of order" : "outside the grid");
+                     "list %c%u.%s: run of %u records in tile (%u, %u) of sheet %u is %s",
+                     'x' + axis, l->is.level, trip_kind_of(l->is.kind)->name, count, tile_u, tile_v,
+                     sheet, inside ? "out of order" : "outside the grid");
 }
 
 /* A tile at the border reaches beyond the grid; its splats do not. */
-static int check_bounds(const trip_writer *w, int axis, uint32_t sheet, const trip_file_brick *b)
+static int check_bounds(const trip_writer *w, const list_writer *l, uint32_t sheet,
+                        const trip_file_brick *b)
 {
-    const int64_t *dims = w->params.dims;
+    const int64_t *dims = l->is.dims;
+    int axis = l->is.axis;
     unsigned log2 = w->header.tile_log2;
     if (((int64_t)b->tile_u << log2) + b->u_max < dims[(axis + 1) % 3] &&
         ((int64_t)b->tile_v << log2) + b->v_max < dims[(axis + 2) % 3])
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                     "list %c: splats of tile (%u, %u) of sheet %u are outside the grid",
+                     "list %c: records of tile (%u, %u) of sheet %u are outside the grid",
                      'x' + axis, b->tile_u, b->tile_v, sheet);
 }
 
-static int add_to_slab(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u, uint32_t tile_v,
-                       const uint32_t *voxels, uint32_t count)
+static int append_normals(const trip_writer *w, list_writer *l, const uint32_t *normals,
+                          uint32_t count)
 {
-    const trip_file_brick *b = trip_slab_add(&w->lists[axis].slab, sheet % w->params.slab_sheets,
-                                             tile_u, tile_v, voxels, count);
-    return b ? check_bounds(w, axis, sheet, b) : TRIP_ERROR;
+    unsigned char packed[3 * TRIP_RUN_RECORDS_MAX];
+    trip_output *o = &l->planes[TRIP_PLANE_NORMALS];
+    if (w->form.normal_bytes == sizeof *normals)
+        return trip_output_append(o, normals, count * sizeof *normals);
+    trip_normals_pack(w->form.normal_bytes, normals, count, packed);
+    return trip_output_append(o, packed, (size_t)count * w->form.normal_bytes);
 }
 
-int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u, uint32_t tile_v,
-                       const uint32_t *voxels, const uint32_t *normals, uint32_t count)
+/* A run that belongs where it comes. */
+static int append_run(trip_writer *w, list_writer *l, uint32_t sheet, uint32_t tile_u,
+                      uint32_t tile_v, const uint32_t *voxels, uint32_t count)
 {
-    list_writer *l = &w->lists[axis];
-    size_t bytes = (size_t)count * TRIP_RECORD_BYTES;
-    assert(!normals == !(w->planes >> TRIP_PLANE_NORMALS & 1));
+    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    uint32_t words = trip_block_pack(&w->form, voxels, count, block);
+    if (words == 0)
+        return trip_fail(TRIP_ERROR, "write", w->folder.path,
+                         "list %c: records of tile (%u, %u) of sheet %u are out of order, out of "
+                         "the tile, or their codes have more than %u bytes",
+                         'x' + l->is.axis, tile_u, tile_v, sheet, w->form.code_bytes);
+    const trip_file_brick *b = trip_slab_add(&l->slab, sheet % w->params.slab_sheets, tile_u,
+                                             tile_v, voxels, count, words);
+    int status = b ? check_bounds(w, l, sheet, b) : TRIP_ERROR;
+    if (status == TRIP_OK)
+        status = trip_output_append(&l->planes[TRIP_PLANE_VOXELS], block, words * sizeof *block);
+    return status;
+}
+
+int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t tile_u,
+                       uint32_t tile_v, const uint32_t *voxels, const uint32_t *normals,
+                       uint32_t count)
+{
+    assert(list < w->list_count);
+    list_writer *l = &w->lists[list];
+    assert(!normals == !(l->planes_present >> TRIP_PLANE_NORMALS & 1));
     if (count == 0)
         return TRIP_OK;
-    int status = check_run(w, axis, sheet, tile_u, tile_v, count);
+    int status = check_run(w, l, sheet, tile_u, tile_v, count);
     if (status == TRIP_OK)
         status = enter_sheet(w, l, sheet, trip_morton(tile_u, tile_v));
     if (status == TRIP_OK)
-        status = add_to_slab(w, axis, sheet, tile_u, tile_v, voxels, count);
-    if (status == TRIP_OK)
-        status = trip_output_append(&l->planes[TRIP_PLANE_VOXELS], voxels, bytes);
+        status = append_run(w, l, sheet, tile_u, tile_v, voxels, count);
     if (status == TRIP_OK && normals)
-        status = trip_output_append(&l->planes[TRIP_PLANE_NORMALS], normals, bytes);
-    if (status < 0)
-        return status;
-    l->splats += count;
-    atomic_fetch_add_explicit(&l->bytes, normals ? 2 * bytes : bytes, memory_order_relaxed);
-    return TRIP_OK;
+        status = append_normals(w, l, normals, count);
+    l->records += count;
+    atomic_store_explicit(&l->bytes,
+                          l->planes[TRIP_PLANE_VOXELS].bytes + l->planes[TRIP_PLANE_NORMALS].bytes,
+                          memory_order_relaxed);
+    return status;
 }
 
-int trip_writer_set_codes(trip_writer *w, double code_lo, double code_hi, double gradient_scale)
+int trip_writer_set_codes(trip_writer *w, const trip_writer_codes *codes)
 {
-    w->params.code_lo = w->header.code_lo = code_lo;
-    w->params.code_hi = w->header.code_hi = code_hi;
-    w->params.gradient_scale = w->header.gradient_scale = gradient_scale;
-    return check_codes(&w->params, w->folder.path);
+    set_header_codes(&w->header, codes);
+    return check_codes(codes, w->folder.path);
 }
 
 static double grid_voxels(const trip_writer *w)
@@ -299,33 +459,57 @@ static double grid_voxels(const trip_writer *w)
     return (double)dims[0] * (double)dims[1] * (double)dims[2];
 }
 
+/* Records of the lists of a kind at a level; 0 where there are none. */
+static uint64_t records_of(const trip_writer *w, unsigned level, trip_kind kind)
+{
+    for (unsigned i = 0; i < w->list_count; i++)
+        if (w->lists[i].is.level == level && w->lists[i].is.kind == kind)
+            return w->lists[i].records;
+    return 0;
+}
+
+static int check_records(const trip_writer *w)
+{
+    for (unsigned i = 0; i < w->list_count; i++) {
+        const list_writer *l = &w->lists[i];
+        uint64_t wanted = records_of(w, l->is.level, l->is.kind);
+        if (l->records != wanted)
+            return trip_fail(TRIP_ERROR, "write", w->folder.path,
+                             "lists of the same %s hold %llu and %llu records: they must hold the "
+                             "same",
+                             trip_kind_of(l->is.kind)->name, (unsigned long long)wanted,
+                             (unsigned long long)l->records);
+    }
+    return TRIP_OK;
+}
+
 static int check_summary(const trip_writer *w, const trip_writer_summary *s)
 {
-    uint64_t kept = w->lists[0].splats;
-    if (w->lists[1].splats != kept || w->lists[2].splats != kept)
-        return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "the lists hold %llu, %llu and %llu splats: they must hold the same",
-                         (unsigned long long)kept, (unsigned long long)w->lists[1].splats,
-                         (unsigned long long)w->lists[2].splats);
+    uint64_t kept = records_of(w, 0, TRIP_KIND_VOXELS);
+    uint64_t halo = records_of(w, 0, TRIP_KIND_HALO);
+    int status = check_records(w);
+    if (status < 0)
+        return status;
     if (!isfinite(s->value_min) || !isfinite(s->value_max) || s->value_min > s->value_max)
         return trip_fail(TRIP_ERROR, "write", w->folder.path, "value range %g to %g", s->value_min,
                          s->value_max);
-    if (s->voxels < kept || (double)s->voxels > grid_voxels(w))
+    if (s->voxels < kept || s->voxels - kept < halo || (double)s->voxels > grid_voxels(w))
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "%llu splats kept of %llu voxels read, of %.0f in the grid",
-                         (unsigned long long)kept, (unsigned long long)s->voxels, grid_voxels(w));
+                         "%llu voxels kept and %llu around them of %llu read, of %.0f in the grid",
+                         (unsigned long long)kept, (unsigned long long)halo,
+                         (unsigned long long)s->voxels, grid_voxels(w));
     return TRIP_OK;
 }
 
 static int sync_planes(trip_writer *w)
 {
     int status = TRIP_OK;
-    for (int axis = 0; axis < 3; axis++) {
-        list_writer *l = &w->lists[axis];
+    for (unsigned i = 0; i < w->list_count; i++) {
+        list_writer *l = &w->lists[i];
         if (status == TRIP_OK)
             status = end_slab(w, l);
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (status == TRIP_OK && w->planes >> plane & 1)
+            if (status == TRIP_OK && l->planes_present >> plane & 1)
                 status = trip_output_sync(&l->planes[plane]);
     }
     return status;
@@ -339,36 +523,61 @@ static int append_table(trip_output *index, trip_output *table, uint64_t *offset
     return status == TRIP_OK ? trip_output_append_output(index, table) : status;
 }
 
-static int append_list(trip_writer *w, trip_output *index, int axis, trip_file_list *f)
+static void describe_list(const list_writer *l, trip_file_list *f)
 {
-    list_writer *l = &w->lists[axis];
-    f->axis = (uint32_t)axis;
-    f->splats = l->splats;
+    f->axis = (uint32_t)l->is.axis;
+    f->level = l->is.level;
+    f->kind = (uint32_t)l->is.kind;
+    f->planes = l->planes_present;
+    for (int a = 0; a < 3; a++)
+        f->dims[a] = (uint64_t)l->is.dims[a];
+    memcpy(f->index_to_world, l->is.index_to_world.m, sizeof f->index_to_world);
+    f->sheet_first = l->is.sheet_first;
+    f->sheet_step = l->is.sheet_step;
+    f->records = l->records;
     f->slab_count = l->slab_count;
     f->brick_count = l->brick_count;
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        f->plane_bytes[plane] = l->planes[plane].bytes;
+}
+
+static int append_list(trip_output *index, list_writer *l, trip_file_list *f)
+{
+    describe_list(l, f);
     int status = append_table(index, &l->slabs, &f->slabs_offset);
     if (status == TRIP_OK)
         status = append_table(index, &l->bricks, &f->bricks_offset);
     if (status == TRIP_OK)
-        status = append_table(index, &l->counts, &f->counts_offset);
+        status = append_table(index, &l->runs, &f->runs_offset);
     for (int plane = 0; plane < TRIP_PLANES; plane++)
-        if (status == TRIP_OK && w->planes >> plane & 1)
+        if (status == TRIP_OK && l->planes_present >> plane & 1)
             status = append_table(index, &l->checksums[plane], &f->page_checksums_offset[plane]);
     return status;
 }
 
 /* The descriptors follow the tables, whose places they give. */
-static int append_tables(trip_writer *w, trip_output *index, const char *text)
+static int append_lists(trip_writer *w, trip_output *index)
 {
-    trip_file_list lists[3] = { 0 };
+    size_t bytes = w->list_count * sizeof(trip_file_list);
+    trip_file_list *lists = trip_budget_take(w->budget, bytes); /* zeroed */
     int status = TRIP_OK;
-    for (int axis = 0; axis < 3 && status == TRIP_OK; axis++)
-        status = append_list(w, index, axis, &lists[axis]);
+    if (!lists)
+        return trip_fail(TRIP_ERROR, "write", w->folder.path,
+                         "no memory for %u lists: give more with --memory", w->list_count);
+    for (unsigned i = 0; i < w->list_count && status == TRIP_OK; i++)
+        status = append_list(index, &w->lists[i], &lists[i]);
     if (status == TRIP_OK)
         status = trip_output_align(index, 8);
     w->header.lists_offset = index->bytes;
     if (status == TRIP_OK)
-        status = trip_output_append(index, lists, sizeof lists);
+        status = trip_output_append(index, lists, bytes);
+    trip_budget_release(w->budget, lists, bytes);
+    return status;
+}
+
+static int append_tables(trip_writer *w, trip_output *index, const char *text)
+{
+    int status = append_lists(w, index);
     w->header.text_offset = index->bytes;
     w->header.text_bytes = strlen(text);
     if (status == TRIP_OK)
@@ -446,7 +655,8 @@ int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary)
     w->header.value_min = summary->value_min;
     w->header.value_max = summary->value_max;
     w->header.voxels = summary->voxels;
-    w->header.kept = w->lists[0].splats;
+    w->header.kept = records_of(w, 0, TRIP_KIND_VOXELS);
+    w->header.halo = records_of(w, 0, TRIP_KIND_HALO);
     if (status == TRIP_OK)
         status = sync_planes(w);
     if (status == TRIP_OK)
@@ -466,7 +676,7 @@ static void close_list(list_writer *l)
     }
     trip_output_close(&l->slabs);
     trip_output_close(&l->bricks);
-    trip_output_close(&l->counts);
+    trip_output_close(&l->runs);
     trip_slab_free(&l->slab);
 }
 
@@ -475,8 +685,9 @@ void trip_writer_abort(trip_writer *w)
 {
     if (!w)
         return;
-    for (int axis = 0; axis < 3; axis++)
-        close_list(&w->lists[axis]);
+    for (unsigned i = 0; i < w->list_count; i++)
+        close_list(&w->lists[i]);
+    trip_budget_release(w->budget, w->lists, w->list_count * sizeof *w->lists);
     trip_flusher_destroy(w->flusher);
     trip_folder_close(&w->folder);
     free(w);
@@ -485,7 +696,12 @@ void trip_writer_abort(trip_writer *w)
 uint64_t trip_writer_bytes(const trip_writer *w)
 {
     uint64_t bytes = 0;
-    for (int axis = 0; axis < 3; axis++)
-        bytes += atomic_load_explicit(&w->lists[axis].bytes, memory_order_relaxed);
+    for (unsigned i = 0; i < w->list_count; i++)
+        bytes += atomic_load_explicit(&w->lists[i].bytes, memory_order_relaxed);
     return bytes;
+}
+
+uint64_t trip_writer_records(const trip_writer *w, unsigned list)
+{
+    return w->lists[list].records;
 }

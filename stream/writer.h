@@ -1,4 +1,4 @@
-/* Writes a data set: runs appended in list order to each of the three lists, then the index. All
+/* Writes a data set: runs appended in list order to each of its lists, then the index. All
  * files grow in `NAME.trip.partial/`, which becomes `NAME.trip/` only when trip_writer_finish() has
  * synced everything. Different lists may be appended to by different threads at once. The bytes
  * depend on what is appended only. */
@@ -10,34 +10,57 @@
 #include "budget.h"
 #include "format.h"
 #include "geometry.h"
+#include "kind.h"
 
 typedef struct trip_writer trip_writer;
 
-/* Zero means the default. */
-typedef struct trip_writer_params {
-    bool replace; /* an existing NAME.trip is replaced; otherwise refused */
-    bool normals;
-    unsigned tile_voxels; /* 16, 32, 64 (default) or 128 */
-    unsigned slab_sheets; /* default 8 */
-    unsigned page_bytes;  /* default 16384 */
+typedef struct trip_writer_list {
+    int axis;
+    unsigned level;
+    trip_kind kind;
     int64_t dims[3];
     trip_affine index_to_world;
+    double sheet_first, sheet_step; /* list coordinate of sheet 0, and between sheets */
+} trip_writer_list;
+
+/* What codes and normals stand for; the latter by normal_bytes. */
+typedef struct trip_writer_codes {
     double code_lo, code_hi;
     double gradient_scale;
+    double gradient_step[3], gradient_full;
+} trip_writer_codes;
+
+/* Zero means the default. */
+typedef struct trip_writer_params {
+    bool replace;          /* an existing NAME.trip is replaced; otherwise refused */
+    bool halo;             /* the default lists have halos */
+    unsigned code_bytes;   /* 1, for codes that are multiples of 257, or 2 (default) */
+    unsigned normal_bytes; /* 3 or 4; 0: no normals */
+    unsigned tile_voxels;  /* 16, 32, 64 (default) or 128 */
+    unsigned slab_sheets;  /* default 8 */
+    unsigned page_bytes;   /* default 16384 */
+    int64_t dims[3];
+    trip_affine index_to_world;
+    trip_writer_codes codes;
+    /* Among them the voxels at level 0 along each axis, of the grid above. NULL: those, X, Y and Z,
+     * and then their halos. */
+    const trip_writer_list *lists;
+    unsigned list_count;
 } trip_writer_params;
 
 int trip_writer_open(trip_writer **out, const char *path, const trip_writer_params *params,
                      trip_budget *budget);
 
-/* One run: `count` splats of tile (tile_u, tile_v) in `sheet` of the list along `axis`, records in
- * Morton order of (u, v), normals NULL without that plane. Runs must come in list order (sheet,
- * then Morton code of the tile). */
-int trip_writer_append(trip_writer *w, int axis, uint32_t sheet, uint32_t tile_u, uint32_t tile_v,
-                       const uint32_t *voxels, const uint32_t *normals, uint32_t count);
+/* One run: `count` records of tile (tile_u, tile_v) in `sheet` of a list, by its number, voxels in
+ * Morton order of (u, v). Normals are in the form of normal_bytes, in the low bits; NULL where the
+ * list has none. Runs must come in list order (sheet, then Morton code of the tile). */
+int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t tile_u,
+                       uint32_t tile_v, const uint32_t *voxels, const uint32_t *normals,
+                       uint32_t count);
 
 /* Replaces what the parameters said of codes and gradients: records hold codes, so that their range
  * may be found while the volume is read. Before finish. */
-int trip_writer_set_codes(trip_writer *w, double code_lo, double code_hi, double gradient_scale);
+int trip_writer_set_codes(trip_writer *w, const trip_writer_codes *codes);
 
 /* What is known only at the end. */
 typedef struct trip_writer_summary {
@@ -46,11 +69,14 @@ typedef struct trip_writer_summary {
     const char *text; /* JSON */
 } trip_writer_summary;
 
-/* Fails when the three lists hold different numbers of splats. On any failure call abort. */
+/* Fails when lists of a kind and level hold different numbers of records. On any failure call
+ * abort. */
 int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary);
 /* Removes the partial folder. Also frees `w`; finish frees it itself on success only. */
 void trip_writer_abort(trip_writer *w);
 
 uint64_t trip_writer_bytes(const trip_writer *w);
+/* Of a list, by its number. */
+uint64_t trip_writer_records(const trip_writer *w, unsigned list);
 
 #endif

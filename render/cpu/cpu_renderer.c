@@ -37,6 +37,7 @@ enum tile_state {
 /* One thread's own memory. */
 typedef struct worker {
     trip_cpu_scratch scratch;
+    uint32_t voxels[TRIP_CPU_CHUNK], normals[TRIP_CPU_CHUNK]; /* of a chunk: spans are of these */
     trip_cpu_span shown[TRIP_CPU_CHUNK];
     trip_cpu_sorting sorting;
     _Alignas(
@@ -122,7 +123,7 @@ static bool is_alone(const cpu *r, uint32_t tile)
 static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s)
 {
     const trip_cpu_view *view = &r->counted_views[chunk->list];
-    const uint32_t *voxels = r->batch->voxels + s->first;
+    const uint32_t *voxels = w->voxels + s->first;
     for (uint32_t i = 0; i < s->count; i++)
         chunk->counts.splats_projected += trip_cpu_is_projected(view, s->run, voxels[i]);
     for (uint32_t done = 0; done < s->count; done += TRIP_CPU_STAGED) {
@@ -133,18 +134,30 @@ static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const tri
     }
 }
 
+/* Decodes a part of a run to the thread's arrays, from `at` on. */
+static trip_cpu_span decode(const cpu *r, worker *w, const trip_cpu_span *part, uint32_t at)
+{
+    const trip_block block = trip_block_of(r->batch, part->run);
+    uint32_t first = (uint32_t)part->first;
+    trip_block_voxels(&block, first, part->count, w->voxels + at);
+    if (r->view.shading)
+        trip_block_normals(&block, first, part->count, w->normals + at);
+    return (trip_cpu_span){ part->run, at, part->count };
+}
+
 /* What of a chunk may show: at most a span a voxel. */
 static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
 {
-    const trip_cpu_asking asking = { r->kernels, &r->views[chunk->list], &r->mask, r->batch,
-                                     &w->scratch.lanes };
     bool reversed = r->batch->pass->descending;
+    const trip_cpu_asking asking = { r->kernels, &r->views[chunk->list], &r->mask, w->voxels,
+                                     reversed,   &w->scratch.lanes };
     uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
         const trip_run *run = &r->batch->runs[i];
-        trip_cpu_span all = { run, run->first, run->count };
+        const trip_cpu_span all = { run, 0, run->count };
         uint32_t count = run->count - skip < left ? run->count - skip : left;
         trip_cpu_span part = trip_cpu_span_part(&all, reversed, skip, count);
+        part = decode(r, w, &part, chunk->voxels - left);
         if (r->frame->count)
             count_span(r, w, chunk, &part);
         n += trip_cpu_show(&asking, &part, w->shown + n);
@@ -172,14 +185,13 @@ static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_
 static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s,
                          uint32_t *staged)
 {
-    const trip_batch *batch = r->batch;
-    bool reversed = batch->pass->descending;
+    bool reversed = r->batch->pass->descending;
     for (uint32_t done = 0; done < s->count;) {
         uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
         n = n < room ? n : room;
         uint64_t from = trip_cpu_span_part(s, reversed, done, n).first;
-        *staged = r->kernels->stage(&r->views[chunk->list], s->run, batch->voxels + from,
-                                    r->view.shading ? batch->normals + from : NULL, n, reversed,
+        *staged = r->kernels->stage(&r->views[chunk->list], s->run, w->voxels + from,
+                                    r->view.shading ? w->normals + from : NULL, n, reversed,
                                     &w->scratch.staged, *staged);
         if (*staged == TRIP_CPU_STAGED)
             empty_staged(r, w, chunk, staged);
@@ -441,7 +453,7 @@ static void make_views(cpu *r, bool front_to_back, bool shading)
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     cpu *r = (cpu *)base;
-    bool shading = r->frame->settings->shading && batch->normals;
+    bool shading = r->frame->settings->shading && batch->planes[TRIP_PLANE_NORMALS];
     cursor at = { 0, 0 };
     int status = 0;
     if (front_to_back != r->view.front_to_back || shading != r->view.shading) {

@@ -115,8 +115,8 @@ uint32_t trip_cpu_show(const trip_cpu_asking *asking, const trip_cpu_span *span,
     if (cover == TRIP_CPU_HIDDEN)
         return 0;
     showing s = { .asking = asking,
-                  .voxels = asking->batch->voxels + span->first,
-                  .reversed = asking->batch->pass->descending,
+                  .voxels = asking->voxels + span->first,
+                  .reversed = asking->reversed,
                   .all = span,
                   .shown = shown };
     if (cover == TRIP_CPU_PARTLY && span->count >= FEWEST)

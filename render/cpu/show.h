@@ -25,8 +25,9 @@ typedef struct trip_cpu_asking {
     const trip_cpu_kernels *kernels;
     const trip_cpu_view *view;
     const trip_cpu_mask *mask;
-    const trip_batch *batch;
-    trip_cpu_lanes *lanes; /* to work in */
+    const uint32_t *voxels; /* of spans */
+    bool reversed;          /* the draw order is */
+    trip_cpu_lanes *lanes;  /* to work in */
 } trip_cpu_asking;
 
 /* Writes those of a span's voxels that may show to `shown`, in draw order, and returns how many

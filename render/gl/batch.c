@@ -14,11 +14,10 @@ static int count_positions(trip_gl_batch *b, const trip_batch *batch)
     uint64_t sum = 0;
     for (size_t i = 0; i < batch->run_count; i++)
         sum += batch->runs[i].count;
-    if (sum > MAX_POSITIONS || batch->splats > MAX_POSITIONS ||
-        batch->run_count > MAX_BLOCK_BYTES / sizeof(struct trip_gl_run))
+    if (sum > MAX_POSITIONS || batch->run_count > MAX_BLOCK_BYTES / sizeof(struct trip_gl_run))
         return trip_fail(TRIP_ERROR, "gl", "batch",
-                         "%zu splats at a time are too many; read in smaller pieces",
-                         batch->splats);
+                         "%llu splats at a time are too many; read in smaller pieces",
+                         (unsigned long long)sum);
     b->positions = (uint32_t)sum;
     return TRIP_OK;
 }
@@ -30,37 +29,25 @@ static trip_gl_part next_part(size_t *end, size_t bytes)
     return part;
 }
 
-/* Where records that lie in GL memory are. */
-static trip_gl_part part_in(const trip_gl_slot *slot, const uint32_t *records, size_t bytes)
+static int take_slot(trip_gl_batch *b, trip_gl_ring *ring, const trip_batch *batch)
 {
-    const unsigned char *at = (const unsigned char *)records;
-    return records ? (trip_gl_part){ (size_t)(at - slot->memory), bytes } : (trip_gl_part){ 0 };
-}
-
-static int take_slot(trip_gl_batch *b, trip_gl_ring *ring, const trip_batch *batch,
-                     trip_gl_slot *records)
-{
-    size_t end = 0, bytes = batch->splats * TRIP_RECORD_BYTES;
-    if (records) {
-        b->voxels = part_in(records, batch->voxels, bytes);
-        b->normals = part_in(records, batch->normals, bytes);
-    } else {
-        b->voxels = next_part(&end, batch->voxels ? bytes : 0);
-        b->normals = next_part(&end, batch->normals ? bytes : 0);
-    }
+    size_t end = 0, bytes = b->positions * sizeof(uint32_t);
+    b->voxels = next_part(&end, batch->planes[TRIP_PLANE_VOXELS] ? bytes : 0);
+    b->normals = next_part(&end, batch->planes[TRIP_PLANE_NORMALS] ? bytes : 0);
     b->runs = next_part(&end, batch->run_count * sizeof(struct trip_gl_run));
-    b->run_of = next_part(&end, b->positions * sizeof(uint32_t));
-    int status = trip_gl_ring_take(ring, end, &b->slot);
-    b->records = records ? records : b->slot;
-    return status;
+    b->run_of = next_part(&end, bytes);
+    return trip_gl_ring_take(ring, end, &b->slot);
 }
 
-static void copy_records(trip_gl_batch *b, const trip_batch *batch)
+/* The records of a run, decoded, from place `at` on. */
+static void decode_run(trip_gl_batch *b, const trip_batch *batch, const trip_run *run, uint64_t at)
 {
-    if (b->voxels.bytes)
-        memcpy(b->slot->memory + b->voxels.offset, batch->voxels, b->voxels.bytes);
-    if (b->normals.bytes)
-        memcpy(b->slot->memory + b->normals.offset, batch->normals, b->normals.bytes);
+    const trip_block block = trip_block_of(batch, run);
+    void *voxels = b->slot->memory + b->voxels.offset;
+    void *normals = b->slot->memory + b->normals.offset;
+    trip_block_voxels(&block, 0, run->count, (uint32_t *)voxels + at);
+    if (block.normals)
+        trip_block_normals(&block, 0, run->count, (uint32_t *)normals + at);
 }
 
 /* One piece for each run at most. */
@@ -134,7 +121,7 @@ static void add_piece(trip_gl_batch *b, uint32_t first, uint32_t count, unsigned
 }
 
 static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const trip_batch *batch,
-                      const uint64_t *list_firsts)
+                      bool resident)
 {
     void *memory = b->slot->memory + b->runs.offset;
     struct trip_gl_run *runs = memory;
@@ -144,8 +131,10 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
         const trip_run *run = &batch->runs[i];
         unsigned list = trip_batch_list(batch, run)->index;
         const trip_gl_placing *p = &placings[list];
-        uint64_t first = list_firsts ? list_firsts[i] : run->first;
-        runs[i] = make_run(p, run, first, batch->pass->descending, list_firsts != NULL, position);
+        uint64_t first = resident ? run->first : position;
+        runs[i] = make_run(p, run, first, batch->pass->descending, resident, position);
+        if (!resident)
+            decode_run(b, batch, run, position);
         add_piece(b, position, run->count, list, needs_quads(p, run));
         for (uint32_t k = 0; k < run->count; k++)
             run_of[position++] = (uint32_t)i;
@@ -153,19 +142,16 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
 }
 
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, trip_gl_slot *records, const uint64_t *list_firsts)
+                       const trip_batch *batch, bool resident)
 {
     int status = count_positions(b, batch);
     if (!status)
         status = make_room(b, batch->run_count);
     if (!status)
-        status = take_slot(b, ring, batch, records);
-    if (status)
-        return status;
-    if (!records)
-        copy_records(b, batch);
-    fill_runs(b, placings, batch, list_firsts);
-    return TRIP_OK;
+        status = take_slot(b, ring, batch);
+    if (!status)
+        fill_runs(b, placings, batch, resident);
+    return status;
 }
 
 void trip_gl_batch_release(trip_gl_batch *b)

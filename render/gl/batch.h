@@ -35,20 +35,18 @@ typedef struct trip_gl_part {
 } trip_gl_part;
 
 typedef struct trip_gl_batch {
-    trip_gl_slot *slot;    /* of runs and run_of */
-    trip_gl_slot *records; /* of voxels and normals */
+    trip_gl_slot *slot;
     trip_gl_part voxels, normals, runs, run_of;
     uint32_t positions;
     trip_gl_piece *pieces;
     size_t piece_count, piece_room;
 } trip_gl_batch;
 
-/* Fills `b` from a batch of the reader in draw order; `placings` are those of the data set's lists.
- * `records` is the slot that the batch lies in;
- * NULL: it is copied. `list_firsts`, when not NULL, gives for every run its first place in the
- * list: the whole list's records are in GL memory already, and the batch has runs only. */
+/* Fills `b` from a batch of the reader in draw order; its records are decoded. `placings` are those
+ * of the data set's lists. `resident`: the whole list's records are in GL memory already, and the
+ * batch has runs only. */
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, trip_gl_slot *records, const uint64_t *list_firsts);
+                       const trip_batch *batch, bool resident);
 void trip_gl_batch_release(trip_gl_batch *b);
 
 #endif

@@ -296,8 +296,8 @@ static void bind_part(const trip_gl_slot *slot, GLuint binding, trip_gl_part par
 
 static void bind_batch(const trip_gl_batch *b)
 {
-    bind_part(b->records, TRIP_GL_VOXELS, b->voxels);
-    bind_part(b->records, TRIP_GL_NORMALS, b->normals);
+    bind_part(b->slot, TRIP_GL_VOXELS, b->voxels);
+    bind_part(b->slot, TRIP_GL_NORMALS, b->normals);
     bind_part(b->slot, TRIP_GL_RUNS, b->runs);
     bind_part(b->slot, TRIP_GL_RUN_OF, b->run_of);
 }
@@ -416,13 +416,10 @@ static int count_pieces(gl_renderer *r)
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     gl_renderer *r = (gl_renderer *)base;
-    const uint64_t *list_firsts = NULL;
     int status = trip_gl_context_use(r->context);
-    if (!status && r->frame->settings->indexed)
-        status = trip_gl_resident_find(&r->resident, batch, &list_firsts);
     if (!status)
-        status = trip_gl_batch_fill(&r->batch, &r->ring, r->lists, batch,
-                                    trip_gl_slots_find(&r->slots, batch->voxels), list_firsts);
+        status =
+            trip_gl_batch_fill(&r->batch, &r->ring, r->lists, batch, r->frame->settings->indexed);
     if (status)
         return status;
     r->stats[r->axis].splats_read += r->batch.positions;
@@ -431,8 +428,6 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     if (!status && r->frame->count)
         status = count_pieces(r);
     trip_gl_slot_fence(r->batch.slot);
-    if (r->batch.records != r->batch.slot)
-        trip_gl_slot_fence(r->batch.records);
     return status;
 }
 
@@ -455,7 +450,7 @@ static void drop_slots(trip_renderer *base)
 static int is_done(trip_renderer *base, const trip_batch *batch, bool wait)
 {
     gl_renderer *r = (gl_renderer *)base;
-    trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->voxels);
+    trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
     if (!slot)
         return 1;
     int status = trip_gl_context_use(r->context);
@@ -572,7 +567,7 @@ static int make_buffers(gl_renderer *r)
 static int choose_slots(gl_renderer *r)
 {
     const char *slots = getenv("TRIPTYCH_GL_SLOTS");
-    r->copies = slots && !strcmp(slots, "copy");
+    r->copies = !slots || !strcmp(slots, "copy");
     if (!slots || r->copies || !strcmp(slots, "mapped"))
         return TRIP_OK;
     return trip_fail(TRIP_USAGE, "gl", "TRIPTYCH_GL_SLOTS", "'%s' is neither mapped nor copy",

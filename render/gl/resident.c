@@ -24,6 +24,7 @@ typedef struct arrays {
     uint64_t *sheet_firsts; /* of every sheet along Z, and the end */
     uint32_t *order;        /* of the list being loaded */
     uint64_t filled;
+    uint32_t run_voxels[TRIP_RUN_RECORDS_MAX], run_normals[TRIP_RUN_RECORDS_MAX];
 } arrays;
 
 typedef int fill_run(arrays *a, int axis, const trip_run *run, const uint32_t *voxels,
@@ -145,8 +146,11 @@ static int read_batches(arrays *a, trip_reader *reader, int axis, fill_run *fill
         status = TRIP_OK;
         for (size_t i = 0; i < batch.run_count && !status; i++) {
             const trip_run *run = &batch.runs[i];
-            status = fill(a, axis, run, batch.voxels + run->first,
-                          batch.normals ? batch.normals + run->first : NULL);
+            const trip_block block = trip_block_of(&batch, run);
+            trip_block_voxels(&block, 0, run->count, a->run_voxels);
+            if (block.normals)
+                trip_block_normals(&block, 0, run->count, a->run_normals);
+            status = fill(a, axis, run, a->run_voxels, a->run_normals);
         }
         trip_reader_release(reader, &batch);
         if (!status)
@@ -264,52 +268,10 @@ int trip_gl_resident_load(trip_gl_resident *r, const trip_dataset *data, unsigne
 
 void trip_gl_resident_bind(trip_gl_resident *r, int axis)
 {
-    r->pass = NULL;
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_VERTICES, r->vertices);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_ORDER, r->order[axis]);
     if (r->normals)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_NORMALS, r->normals);
-}
-
-/* Moves on to the selection's run that `part` is of: parts come in draw order, some runs are left
- * out, and a run may come in several. */
-static bool move_to(trip_gl_resident *r, const trip_run *part)
-{
-    while (r->taken == r->run.count || r->run.brick != part->brick || r->run.sheet != part->sheet) {
-        r->taken = 0;
-        if (!trip_run_next(&r->iterator, &r->run))
-            return false;
-    }
-    return part->count <= r->run.count - r->taken;
-}
-
-int trip_gl_resident_find(trip_gl_resident *r, const trip_batch *batch, const uint64_t **firsts)
-{
-    if (r->room < batch->run_count) {
-        uint64_t *more = realloc(r->firsts, batch->run_count * sizeof *more);
-        if (!more)
-            return trip_fail(TRIP_ERROR, "gl", "batch", "out of memory");
-        r->firsts = more;
-        r->room = batch->run_count;
-    }
-    if (r->pass != batch->pass) {
-        r->pass = batch->pass;
-        r->iterator = trip_run_begin(batch->pass->selections);
-        r->run = (trip_run){ 0 };
-        r->taken = 0;
-    }
-    for (size_t i = 0; i < batch->run_count; i++) {
-        const trip_run *part = &batch->runs[i];
-        if (!move_to(r, part))
-            return trip_fail(TRIP_ERROR, "gl", "batch", "runs are out of order");
-        /* Descending, the first part is the run's end. */
-        uint32_t before =
-            batch->pass->descending ? r->run.count - r->taken - part->count : r->taken;
-        r->firsts[i] = r->run.first + before;
-        r->taken += part->count;
-    }
-    *firsts = r->firsts;
-    return TRIP_OK;
 }
 
 void trip_gl_resident_release(trip_gl_resident *r)
@@ -318,6 +280,5 @@ void trip_gl_resident_release(trip_gl_resident *r)
     glDeleteBuffers(1, &r->normals);
     glDeleteBuffers(3, r->order);
     trip_budget_discharge(r->budget, r->bytes);
-    free(r->firsts);
     *r = (trip_gl_resident){ .budget = r->budget };
 }

@@ -19,13 +19,6 @@ typedef struct trip_gl_resident {
     unsigned planes;
     uint64_t bytes;
     GLuint vertices, normals, order[3];
-    /* Where the pass being drawn has got to in its list. */
-    const trip_pass *pass;
-    trip_run_iterator iterator;
-    trip_run run;
-    uint32_t taken; /* splats of `run` already handed out */
-    uint64_t *firsts;
-    size_t room;
 } trip_gl_resident;
 
 /* Loads the data set unless it is there. `block_bytes` bounds each array. */
@@ -33,8 +26,6 @@ int trip_gl_resident_load(trip_gl_resident *r, const trip_dataset *data, unsigne
                           size_t block_bytes);
 /* Before the first batch of a list. */
 void trip_gl_resident_bind(trip_gl_resident *r, int axis);
-/* The place in its list of each run of a batch; batches must come in draw order. */
-int trip_gl_resident_find(trip_gl_resident *r, const trip_batch *batch, const uint64_t **firsts);
 void trip_gl_resident_release(trip_gl_resident *r);
 
 #endif

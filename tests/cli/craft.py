@@ -12,18 +12,19 @@ def xxh64(data):
 
 
 class Dataset:
-    """The files of a data set, to be changed and written: `index` and `planes["x.voxels"]` are
+    """The files of a data set, to be changed and written: `index` and `planes["x0.voxels"]` are
     byte arrays."""
 
     def __init__(self, path):
         with open(f"{path}/index.trip", "rb") as f:
             self.index = bytearray(f.read())
-        self.plane_names = ["voxels", "normals"][: self.number("<I", 236).bit_length()]
+        self.lists = self.number("<I", 288)
+        self.names = [self.plane_names(number) for number in range(self.lists)]
         self.planes = {}
-        for axis in "xyz":
-            for plane in self.plane_names:
-                with open(f"{path}/{axis}.{plane}", "rb") as f:
-                    self.planes[f"{axis}.{plane}"] = bytearray(f.read())
+        for names in self.names:
+            for name in names:
+                with open(f"{path}/{name}", "rb") as f:
+                    self.planes[name] = bytearray(f.read())
 
     def number(self, layout, at):
         return struct.unpack_from(layout, self.index, at)[0]
@@ -31,31 +32,53 @@ class Dataset:
     def put(self, layout, at, *values):
         struct.pack_into(layout, self.index, at, *values)
 
-    def list_at(self, axis):
-        """Where the descriptor of a list, 0 to 2, stands."""
-        return self.number("<Q", 248) + 128 * axis
+    def list_at(self, number):
+        """Where the descriptor of a list stands."""
+        return self.number("<Q", 296) + 320 * number
 
-    def bricks(self, axis):
+    def plane_names(self, number):
+        at = self.list_at(number)
+        axis, level, kind, planes = struct.unpack_from("<4I", self.index, at)
+        names = (("voxels", "normals"), ("halo",))[kind][: planes.bit_length()]
+        return [f"{'xyz'[axis]}{level}.{name}" for name in names]
+
+    def bricks(self, number):
         """Where the bricks of a list stand."""
-        at = self.list_at(axis)
-        first = self.number("<Q", at + 40)
-        return [first + 24 * i for i in range(self.number("<Q", at + 32))]
+        at = self.list_at(number)
+        first = self.number("<Q", at + 184)
+        return [first + 24 * i for i in range(self.number("<Q", at + 176))]
 
-    def slabs(self, axis):
-        at = self.list_at(axis)
-        first = self.number("<Q", at + 24)
-        return [first + 24 * i for i in range(self.number("<Q", at + 16))]
+    def slabs(self, number):
+        at = self.list_at(number)
+        first = self.number("<Q", at + 168)
+        return [first + 32 * i for i in range(self.number("<Q", at + 160))]
+
+    def runs(self, number):
+        """Of every run of a list, in file order: where its entry, brick and block stand, records, words."""
+        at = self.list_at(number)
+        table, sheets = self.number("<Q", at + 192), self.number("<I", 268)
+        bricks, first = self.bricks(number), 0
+        for slab in self.slabs(number):
+            block, count = self.number("<Q", slab + 16), self.number("<I", slab + 24)
+            for sheet in range(sheets):
+                for brick in range(first, first + count):
+                    entry = table + 4 * (sheets * brick + sheet)
+                    records, words = struct.unpack_from("<2H", self.index, entry)
+                    if records:
+                        yield entry, bricks[brick], block, records, words
+                    block += 8 * words
+            first += count
 
     def page_sums(self, data):
-        page = 1 << self.number("<I", 232)
+        page = 1 << self.number("<I", 272)
         return [xxh64(data[at : at + page]) for at in range(0, len(data), page)]
 
     def seal(self):
         """Right checksums for what stands there now."""
-        for axis, letter in enumerate("xyz"):
-            for plane, name in enumerate(self.plane_names):
-                sums = self.page_sums(self.planes[f"{letter}.{name}"])
-                at = self.number("<Q", self.list_at(axis) + 56 + 8 * plane)
+        for number in range(self.lists):
+            for plane, name in enumerate(self.names[number]):
+                sums = self.page_sums(self.planes[name])
+                at = self.number("<Q", self.list_at(number) + 232 + 8 * plane)
                 self.put(f"<{len(sums)}Q", at, *sums)
         table = self.number("<Q", 32)
         sums = self.page_sums(self.index[HEADER_BYTES:table])

@@ -9,7 +9,7 @@ import numpy
 
 import program
 
-FILES = ["index.trip", *(f"{axis}.{plane}" for axis in "xyz" for plane in ("voxels", "normals"))]
+FILES = ["index.trip", *(f"{axis}0.{plane}" for axis in "xyz" for plane in ("voxels", "normals"))]
 VIEW = ("--size", "40x40", "--look", "20,15,10", "--eye", "80,-60,70")
 
 
@@ -105,7 +105,7 @@ class BadDatasets(program.ProgramTest):
                 os.symlink("nowhere", f"{path}/{n}")
 
             changes += [lambda path, n=name: os.remove(f"{path}/{n}"), swap, folder, dangling]
-        changes.append(lambda path: os.replace(f"{path}/x.voxels", f"{path}/y.voxels"))
+        changes.append(lambda path: os.replace(f"{path}/x0.voxels", f"{path}/y0.voxels"))
         self.check_all(changes)
 
     def test_what_is_no_data_set(self):
@@ -123,7 +123,7 @@ class BadDatasets(program.ProgramTest):
             ".",
             "/",
             "/dev/null",
-            "a.trip/x.voxels",
+            "a.trip/x0.voxels",
             "a.nrrd",
             "a.nrrd/x.trip",
             "y" * 4090,

@@ -136,9 +136,9 @@ static void stream_reads_the_files_of_all_lists(void **state)
     cJSON *root = bench("stream block.trip --renderer cpu --size 64x64 --repeat 2 --memory 64M");
     const cJSON *rows = rows_of(root, "stages");
     const cJSON *summary = cJSON_GetArrayItem(rows_of(root, "summary"), 0);
-    double planes = file_bytes("block.trip/x.voxels") + file_bytes("block.trip/y.voxels") +
-                    file_bytes("block.trip/z.voxels") + file_bytes("block.trip/x.normals") +
-                    file_bytes("block.trip/y.normals") + file_bytes("block.trip/z.normals");
+    double planes = file_bytes("block.trip/x0.voxels") + file_bytes("block.trip/y0.voxels") +
+                    file_bytes("block.trip/z0.voxels") + file_bytes("block.trip/x0.normals") +
+                    file_bytes("block.trip/y0.normals") + file_bytes("block.trip/z0.normals");
     assert_true(number(stage(rows, "plain"), "bytes_read") == planes);
     assert_true(number(stage(rows, "plain_blind"), "bytes_read") == planes);
     assert_true(number(stage(rows, "plain_small"), "bytes_read") == planes);

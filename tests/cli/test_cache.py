@@ -290,8 +290,8 @@ class Cache(program.ProgramTest):
         changes = {
             "flipped": lambda: self.damage("index.trip", flip),
             "cut off": lambda: self.damage("index.trip", lambda d: d[:-1]),
-            "empty": lambda: self.damage("x.voxels", lambda d: b""),
-            "missing": lambda: os.remove(os.path.join(self.cache, self.entries()[0], "z.voxels")),
+            "empty": lambda: self.damage("x0.voxels", lambda d: b""),
+            "missing": lambda: os.remove(os.path.join(self.cache, self.entries()[0], "z0.voxels")),
             "no index": lambda: os.remove(
                 os.path.join(self.cache, self.entries()[0], "index.trip")
             ),
@@ -438,7 +438,7 @@ class Cache(program.ProgramTest):
             shutil.rmtree(self.cache)
             shutil.rmtree(outside, ignore_errors=True)
             os.makedirs(os.path.join(outside, "index.trip"))
-            program.write(os.path.join(outside, "x.voxels"), b"precious")
+            program.write(os.path.join(outside, "x0.voxels"), b"precious")
             os.makedirs(self.cache, mode=0o700)
             os.symlink(outside, inside(entry))
             os.symlink(outside, inside(f"{key}.trip.partial"))

@@ -26,12 +26,12 @@ static void write_dataset(const char *path, const char *text)
         trip_writer_open(&w, path,
                          &(trip_writer_params){ .dims = { 4, 4, 4 },
                                                 .index_to_world = trip_affine_identity(),
-                                                .code_hi = 1,
+                                                .codes = { .code_hi = 1 },
                                                 .replace = true },
                          budget),
         0);
     for (int axis = 0; axis < 3; axis++)
-        assert_int_equal(trip_writer_append(w, axis, 0, 0, 0, &voxel, NULL, 1), 0);
+        assert_int_equal(trip_writer_append(w, (unsigned)axis, 0, 0, 0, &voxel, NULL, 1), 0);
     assert_int_equal(trip_writer_finish(w, &(trip_writer_summary){ 0, 1, 64, text }), 0);
     trip_budget_destroy(budget);
 }

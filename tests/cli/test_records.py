@@ -23,17 +23,20 @@ class Records(program.ProgramTest):
         if gl.returncode:
             print("skipped for gl: " + gl.stderr, end="", flush=True)
 
-    def change_record(self, axis, place, bits):
-        """Puts `bits` (a mask and a value) into a record and says where it is in which file."""
+    def change_block(self, axis, number, change):
+        """Changes the words of a list's block, by its number, and says where it is in which file.
+        `change` has the presence, the masks and the code words."""
         shutil.rmtree("b.trip", ignore_errors=True)
         shutil.copytree("a.trip", "b.trip")
         data = craft.Dataset("a.trip")
-        records = data.planes[f"{axis}.voxels"]
-        at = place if place >= 0 else len(records) + place
-        (old,) = struct.unpack_from("<I", records, at)
-        struct.pack_into("<I", records, at, (old & ~bits[0]) | bits[1])
+        _, _, at, records, words = list(data.runs("xyz".index(axis)))[number]
+        plane = data.planes[f"{axis}0.voxels"]
+        block = list(struct.unpack_from(f"<{words}Q", plane, at))
+        codes = (records * data.number("<I", 280) + 7) // 8
+        block = change(block[:1], block[1 : words - codes], block[words - codes :])
+        struct.pack_into(f"<{words}Q", plane, at, *block)
         data.write("b.trip")
-        return f"b.trip/{axis}.voxels: byte {at}: "
+        return f"b.trip/{axis}0.voxels: byte {at}: "
 
     def refused(self, where, says):
         for name in self.renderers:
@@ -46,48 +49,71 @@ class Records(program.ProgramTest):
         self.assertIn(says, self.fails(1, "info", "--verify", "b.trip", says=where).stderr)
 
     def test_a_place_outside_the_bricks_bounds(self):
-        for axis, place, bits in (
-            ("x", 0, (0xFF, 0xFF)),
-            ("y", -4, (0xFF00, 0xFF00)),
-            ("z", 4096, (0xFFFF, 0x4040)),
-        ):
-            self.refused(
-                self.change_record(axis, place, bits), "the splat is outside its brick's bounds"
-            )
+        """The last square of a run moves to the tile's last, which is outside the grid."""
+
+        def move(present, masks, codes):
+            last = 1 << present[0].bit_length() - 1
+            return [present[0] & ~last | 1 << 63, *masks, *codes]
+
+        for axis, number in (("x", 0), ("y", -1), ("z", 10)):
+            where = self.change_block(axis, number, move)
+            self.refused(where, "a voxel is outside its brick's bounds")
+
+    def test_squares_that_are_not_as_many_as_masks(self):
+        change = lambda present, masks, codes: [present[0] | 1 << 63, *masks, *codes]
+        where = self.change_block("y", 7, change)
+        self.refused(where, "squares are not as many as its masks")
+
+    def test_masks_that_do_not_hold_as_many_voxels(self):
+        def drop(present, masks, codes):
+            return [*present, masks[0] & masks[0] - 1, *masks[1:], *codes]
+
+        self.refused(self.change_block("z", -2, drop), "as many voxels as the index says")
+
+    def test_a_mask_without_voxels(self):
+        """What the first square of a block loses the second gains."""
+
+        def empty(present, masks, codes):
+            bits = bin(masks[0]).count("1")
+            free = [n for n in range(64) if not masks[1] >> n & 1][:bits]
+            return [*present, 0, masks[1] | sum(1 << n for n in free), *masks[2:], *codes]
+
+        self.refused(self.change_block("x", 0, empty), "a mask is empty")
 
     def test_the_one_that_was_drawn_once(self):
         path = os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests/regress/record_outside_brick.trip")
         for name in self.renderers:
             self.fails(
                 1, "render", path, "-o", "b.exr", f"--renderer={name}", "--size=40x40",
-                says="voxels: byte 12: the splat is outside its brick's bounds",
+                says="voxels: byte 0: a voxel is outside its brick's bounds",
             )
 
     def test_a_code_outside_the_bricks_range(self):
         for axis in "xz":
             data = craft.Dataset("a.trip")
-            (first,) = struct.unpack_from("<I", data.planes[f"{axis}.voxels"], 0)
             for brick in data.bricks("xyz".index(axis)):
-                data.put("<2H", brick + 12, (first >> 16) + 1, 65535)
+                data.put("<2H", brick + 12, data.number("<H", brick + 12) + 1, 65535)
             shutil.rmtree("b.trip", ignore_errors=True)
             shutil.copytree("a.trip", "b.trip")
             data.write("b.trip")
-            self.refused(f"b.trip/{axis}.voxels: byte ", "the value is outside its brick's range")
+            self.refused(f"b.trip/{axis}0.voxels: byte ", "a value is outside its brick's range")
 
     def test_near_the_end_of_the_largest_grid(self):
         """What lies there is drawn as elsewhere, and a record that would lie beyond is refused."""
         data = craft.Dataset("a.trip")
-        tile_log2, slab_sheets = data.number("<I", 224), data.number("<I", 228)
+        tile_log2, slab_sheets = data.number("<I", 264), data.number("<I", 268)
         offset = FAR >> 7 << 7
         self.assertTrue(max(tile_log2, slab_sheets.bit_length() - 1) <= 7)
         for axis in range(3):
             data.put("<Q", 48 + 8 * axis, 2147483647)
-            for brick in data.bricks(axis):
+        for number in range(data.lists):
+            data.put("<3Q", data.list_at(number) + 16, *3 * [2147483647])
+            for brick in data.bricks(number):
                 u, v = struct.unpack_from("<2I", data.index, brick)
                 tiles = offset >> tile_log2
                 data.put("<2I", brick, u + tiles, v + tiles)
-            for slab in data.slabs(axis):
-                data.put("<I", slab + 20, data.number("<I", slab + 20) + offset // slab_sheets)
+            for slab in data.slabs(number):
+                data.put("<I", slab + 28, data.number("<I", slab + 28) + offset // slab_sheets)
         view = (
             "--size=40x40",
             f"--look={offset + 20},{offset + 15},{offset + 10}",
@@ -101,12 +127,12 @@ class Records(program.ProgramTest):
             far = self.picture("far.trip", renderer, *view)
             self.assertGreater(near[..., 3].max(), 0.5)
             self.assertLessEqual(float(numpy.abs(near - far).max()), 1e-3, name)
-        struct.pack_into("<I", data.planes["z.voxels"], 0, 0xFFFFFFFF)
+        struct.pack_into("<Q", data.planes["z0.voxels"], 0, 2**64 - 1)
         data.write("far.trip")
         for name in self.renderers:
             self.fails(
                 1, "render", "far.trip", "-o", "b.exr", f"--renderer={name}", "--h=0", *view,
-                says="far.trip/z.voxels: byte 0: ",
+                says="far.trip/z0.voxels: byte 0: ",
             )
 
 

@@ -50,7 +50,7 @@ class Trouble(program.ProgramTest):
         shutil.copytree("small.trip", "part.trip")
         os.chmod("secret.nrrd", 0)
         os.chmod("secret.trip", 0)
-        os.chmod("part.trip/y.voxels", 0)
+        os.chmod("part.trip/y0.voxels", 0)
         folder = tempfile.mkdtemp(prefix="trip-cli-")
         os.chmod(folder, 0o777)
         try:

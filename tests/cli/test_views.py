@@ -253,9 +253,9 @@ class Views(program.ProgramTest):
 
     def test_a_damaged_list_is_found_while_the_view_is_fitted(self):
         self.volume(ball(16, 5), name="d.trip")
-        with open("d.trip/z.voxels", "r+b") as f:
+        with open("d.trip/z0.voxels", "r+b") as f:
             f.write(b"\xff\xff\xff\xff")
-        self.leaves_nothing(1, "render", "d.trip", "-o", "no.png", says="z.voxels")
+        self.leaves_nothing(1, "render", "d.trip", "-o", "no.png", says="z0.voxels")
 
 
 if __name__ == "__main__":

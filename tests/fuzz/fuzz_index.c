@@ -34,61 +34,72 @@ static unsigned char *seal(const uint8_t *data, size_t size, size_t *bytes)
     return index;
 }
 
-static void set_list(trip_dataset *d, int axis, const unsigned char *index)
+static void set_list(trip_dataset *d, unsigned i, const unsigned char *index)
 {
     const trip_file_list *f = (const void *)(index + d->header.lists_offset);
-    f += axis;
-    d->lists[axis] = (trip_list){ .axis = axis,
-                                  .records = f->splats,
-                                  .slab_count = f->slab_count,
-                                  .brick_count = f->brick_count,
-                                  .slabs = (const void *)(index + f->slabs_offset),
-                                  .bricks = (const void *)(index + f->bricks_offset),
-                                  .counts = (const void *)(index + f->counts_offset) };
+    f += i;
+    d->lists[i] =
+        (trip_list){ .index = i,
+                     .axis = (int)f->axis,
+                     .planes = f->planes,
+                     .dims = { (int64_t)f->dims[0], (int64_t)f->dims[1], (int64_t)f->dims[2] },
+                     .sheet_first = f->sheet_first,
+                     .sheet_step = f->sheet_step,
+                     .records = f->records,
+                     .plane_bytes = { f->plane_bytes[0], f->plane_bytes[1] },
+                     .slab_count = f->slab_count,
+                     .brick_count = f->brick_count,
+                     .slabs = (const void *)(index + f->slabs_offset),
+                     .bricks = (const void *)(index + f->bricks_offset),
+                     .runs = (const void *)(index + f->runs_offset) };
 }
 
-static void check_run(const trip_dataset *d, int axis, const trip_run *run)
+static void check_run(const trip_list *l, unsigned tile_log2, const trip_run *run)
 {
-    const trip_file_brick *b = &d->lists[axis].bricks[run->brick];
-    const uint64_t *dims = d->header.dims;
-    FUZZ_PROMISE(run->count > 0 && run->first + run->count <= d->header.kept);
-    FUZZ_PROMISE((uint64_t)run->sheet < dims[axis]);
-    FUZZ_PROMISE((uint64_t)run->u + b->u_max < dims[(axis + 1) % 3]);
-    FUZZ_PROMISE((uint64_t)run->v + b->v_max < dims[(axis + 2) % 3]);
+    const trip_file_brick *b = &l->bricks[run->brick];
+    FUZZ_PROMISE(run->count > 0 && run->first + run->count <= l->records);
+    FUZZ_PROMISE(run->at[0] + 8 * (uint64_t)run->words <= l->plane_bytes[0]);
+    FUZZ_PROMISE(run->count <= 1u << 2 * tile_log2);
+    FUZZ_PROMISE(run->sheet < l->dims[l->axis]);
+    FUZZ_PROMISE((int64_t)run->u + b->u_max < l->dims[(l->axis + 1) % 3]);
+    FUZZ_PROMISE((int64_t)run->v + b->v_max < l->dims[(l->axis + 2) % 3]);
 }
 
-static void walk_list(const trip_dataset *d, int axis, bool descending, trip_budget *budget)
+static void walk_list(const trip_dataset *d, const trip_list *l, bool descending,
+                      trip_budget *budget)
 {
     trip_selection s;
     trip_run run;
-    uint64_t next = descending ? d->header.kept : 0;
-    FUZZ_PROMISE(trip_selection_create(&s, d, &d->lists[axis], descending, 0, INT32_MAX, budget) ==
-                 TRIP_OK);
-    for (uint64_t b = 0; b < d->lists[axis].brick_count; b++)
-        trip_selection_add(&s, b);
+    uint64_t next = descending ? l->records : 0, at = descending ? l->plane_bytes[0] : 0;
+    FUZZ_PROMISE(trip_selection_create_whole(&s, d, l, descending, budget) == TRIP_OK);
     for (trip_run_iterator it = trip_run_begin(&s); trip_run_next(&it, &run);) {
-        check_run(d, axis, &run);
+        uint64_t bytes = 8 * (uint64_t)run.words;
+        check_run(l, d->header.tile_log2, &run);
         FUZZ_PROMISE(descending ? run.first + run.count == next : run.first == next);
+        FUZZ_PROMISE(descending ? run.at[0] + bytes == at : run.at[0] == at);
         next = descending ? run.first : run.first + run.count;
+        at = descending ? run.at[0] : run.at[0] + bytes;
     }
-    FUZZ_PROMISE(next == (descending ? 0 : d->header.kept));
+    FUZZ_PROMISE(next == (descending ? 0 : l->records));
+    FUZZ_PROMISE(at == (descending ? 0 : l->plane_bytes[0]));
     trip_selection_destroy(&s, budget);
 }
 
 static void walk(const trip_file_header *h, const unsigned char *index)
 {
-    trip_list lists[3];
-    trip_dataset d = { .header = *h, .lists = lists, .list_count = 3 };
+    trip_list *lists = calloc(h->list_count, sizeof *lists);
+    trip_dataset d = { .header = *h, .lists = lists, .list_count = h->list_count };
     trip_budget *budget;
     char path[] = "fuzz";
     d.path = path;
     FUZZ_PROMISE(trip_budget_create(&budget, 1 << 26) == TRIP_OK);
-    for (int axis = 0; axis < 3; axis++) {
-        set_list(&d, axis, index);
-        walk_list(&d, axis, false, budget);
-        walk_list(&d, axis, true, budget);
+    for (unsigned i = 0; i < h->list_count; i++) {
+        set_list(&d, i, index);
+        walk_list(&d, &lists[i], false, budget);
+        walk_list(&d, &lists[i], true, budget);
     }
     trip_budget_destroy(budget);
+    free(lists);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -40,7 +40,7 @@ static void read_slices(void)
 {
     trip_budget *budget;
     trip_volume *v;
-    trip_block b;
+    trip_volume_block b;
     FUZZ_PROMISE(trip_budget_create(&budget, MEMORY_BYTES) == 0);
     if (trip_volume_open(&v, "/", NULL, budget) == 0) {
         const trip_volume_info *info = trip_volume_get_info(v);

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 /* A corner of the block with its neighbours. */
-static void fuzz_decode(const trip_volume *v, const trip_block *b)
+static void fuzz_decode(const trip_volume *v, const trip_volume_block *b)
 {
     float values[6 * 6 * 6];
     uint8_t active[6 * 6 * 6];
@@ -26,7 +26,7 @@ static void fuzz_read_through(trip_volume *v)
 {
     enum { MOST_BLOCKS = 64 };
     const trip_volume_info *info = trip_volume_get_info(v);
-    trip_block b;
+    trip_volume_block b;
     for (int i = 0; i < MOST_BLOCKS && trip_volume_next(v, 1, &b) == 1; i++) {
         for (int a = 0; a < 3; a++) {
             FUZZ_PROMISE(info->dims[a] >= 1 && b.size[a] >= 1);

@@ -37,7 +37,8 @@ void hostile_load(hostile *h, const char *path)
     char name[32];
     load(&h->index, path, TRIP_INDEX_NAME);
     for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
-        load(&h->planes[i], path, trip_dataset_plane_name(i / TRIP_PLANES, i % TRIP_PLANES, name));
+        load(&h->planes[i], path,
+             trip_plane_file_name(i / TRIP_PLANES, 0, TRIP_KIND_VOXELS, i % TRIP_PLANES, name));
 }
 
 static void copy(hostile_file *to, const hostile_file *from)

@@ -17,7 +17,7 @@ typedef struct hostile_file {
 } hostile_file;
 
 typedef struct hostile {
-    hostile_file index, planes[HOSTILE_PLANE_FILES]; /* x.voxels, x.normals, y.voxels, ... */
+    hostile_file index, planes[HOSTILE_PLANE_FILES]; /* x0.voxels, x0.normals, y0.voxels, ... */
 } hostile;
 
 /* From a data set on disk with voxels and normals; the path is a folder's. */

@@ -281,8 +281,11 @@ static void the_scale_of_the_map_and_of_the_values(void **state)
         double s = scales[i / 2];
         hostile_copy(&h, &shared.sound);
         trip_file_header *header = hostile_header(&h);
-        for (int k = 0; k < 12 && i % 2 == 0; k++)
+        for (int k = 0; k < 12 && i % 2 == 0; k++) {
             header->index_to_world[k] *= s;
+            for (int axis = 0; axis < 3; axis++)
+                hostile_list(&h, &shared.sound, axis)->index_to_world[k] *= s;
+        }
         if (i % 2 == 1) {
             header->code_lo = header->value_min = -s;
             header->code_hi = header->value_max = s;
@@ -297,31 +300,35 @@ static void the_lists(void **state)
 {
     size_t lists = hostile_header(&shared.sound)->lists_offset;
     (void)state;
-    for (size_t at = 0; at < 8; at += 4)
+    for (size_t at = 0; at < offsetof(trip_file_list, dims); at += 4)
         try_whole("list X", lists + at, 4);
-    for (size_t at = 8; at < sizeof(trip_file_list); at += 8)
+    for (size_t at = offsetof(trip_file_list, dims); at < sizeof(trip_file_list); at += 8)
         try_whole("list Z", lists + 2 * sizeof(trip_file_list) + at, 8);
+    for (size_t at = offsetof(trip_file_list, index_to_world);
+         at < offsetof(trip_file_list, records); at += 8)
+        try_real("list Z", lists + 2 * sizeof(trip_file_list) + at);
 }
 
-static void slabs_bricks_and_counts(void **state)
+static void slabs_bricks_and_runs(void **state)
 {
     const trip_file_list *list = hostile_list(&shared.sound, &shared.sound, 1);
     size_t slab = list->slabs_offset + sizeof(trip_file_slab); /* the second */
     size_t brick = list->bricks_offset + sizeof(trip_file_brick);
-    size_t counted = list->counts_offset + 2 * 5;
+    size_t run = list->runs_offset + 5 * sizeof(trip_file_run);
     (void)state;
     try_whole("slab", slab, 8);
     try_whole("slab", slab + 8, 8);
-    try_whole("slab", slab + 16, 4);
-    try_whole("slab", slab + 20, 4);
+    try_whole("slab", slab + 16, 8);
+    try_whole("slab", slab + 24, 4);
+    try_whole("slab", slab + 28, 4);
     for (size_t at = 0; at < 12; at += 4)
         try_whole("brick", brick + at, 4);
     for (size_t at = 12; at < 16; at += 2)
         try_whole("brick", brick + at, 2);
     for (size_t at = 16; at < sizeof(trip_file_brick); at++)
         try_whole("brick", brick + at, 1);
-    for (size_t at = 0; at < 10; at += 2)
-        try_whole("count", counted + at, 2);
+    for (size_t at = 0; at < 5 * sizeof(trip_file_run); at += 2)
+        try_whole("run", run + at, 2);
 }
 
 static unsigned random_below(unsigned count)
@@ -374,7 +381,7 @@ int main(void)
         cmocka_unit_test(the_headers_real_numbers),
         cmocka_unit_test(the_scale_of_the_map_and_of_the_values),
         cmocka_unit_test(the_lists),
-        cmocka_unit_test(slabs_bricks_and_counts),
+        cmocka_unit_test(slabs_bricks_and_runs),
         cmocka_unit_test(records),
         cmocka_unit_test(spans_of_the_index),
     };

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 
 #include "brick.h"
+#include "block.h"
 #include "dataset.h"
 #include "report.h"
 #include "selection.h"
@@ -93,12 +94,22 @@ typedef struct test_lists {
 static inline void test_read_run(const trip_dataset *d, int axis, const trip_run *run,
                                  test_lists *l, uint64_t *last_key)
 {
-    uint32_t voxels[16384], normals[16384] = { 0 };
-    size_t bytes = run->count * sizeof *voxels;
-    const int64_t offset = (int64_t)run->first * 4;
-    assert_int_equal(pread(d->lists[axis].plane_fd[0], voxels, bytes, offset), bytes);
-    if (d->lists[axis].plane_fd[1] >= 0)
-        assert_int_equal(pread(d->lists[axis].plane_fd[1], normals, bytes, offset), bytes);
+    static uint64_t words[TRIP_BLOCK_WORDS_MAX];
+    static unsigned char packed[4 * TRIP_RUN_RECORDS_MAX];
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX] = { 0 };
+    const trip_list *list = &d->lists[axis];
+    const trip_block_form form = trip_block_form_of(&d->header);
+    size_t bytes = 8 * (size_t)run->words, normal_bytes = run->count * form.normal_bytes;
+    bool has_normals = list->plane_fd[1] >= 0;
+    assert_int_equal(pread(list->plane_fd[0], words, bytes, (off_t)run->at[0]), bytes);
+    if (has_normals)
+        assert_int_equal(pread(list->plane_fd[1], packed, normal_bytes, (off_t)run->at[1]),
+                         normal_bytes);
+    const trip_block block =
+        trip_block_make(&form, run->count, run->words, words, has_normals ? packed : NULL);
+    trip_block_voxels(&block, 0, run->count, voxels);
+    if (has_normals)
+        trip_block_normals(&block, 0, run->count, normals);
     for (uint32_t n = 0; n < run->count; n++) {
         int64_t p[3];
         p[axis] = run->sheet;
@@ -185,8 +196,8 @@ static inline bool test_same_file(const char *a, const char *b)
 /* All files of two data sets alike, byte for byte. */
 static inline void test_same_dataset(const char *a, const char *b)
 {
-    static const char *const files[] = { "index.trip", "x.voxels",  "y.voxels", "z.voxels",
-                                         "x.normals",  "y.normals", "z.normals" };
+    static const char *const files[] = { "index.trip", "x0.voxels",  "y0.voxels", "z0.voxels",
+                                         "x0.normals", "y0.normals", "z0.normals" };
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         char first[256], second[256];
         snprintf(first, sizeof first, "%s/%s", test_path(a), files[i]);

@@ -65,7 +65,7 @@ static void kept_voxels_are_those_of_the_envelope(void **state)
     assert_int_equal(l.header.kept, kept);
     assert_int_equal(s.kept, kept);
     assert_int_equal(s.voxels, N);
-    assert_int_equal(s.bytes, 24 * kept);
+    assert_true(s.bytes > 18 * kept && s.bytes < 24 * kept); /* codes and normals, and masks */
     assert_false(test_exists("a.trip.partial"));
     assert_false(test_exists("a.trip.spill"));
     test_free_lists(&l);
@@ -246,9 +246,9 @@ static void splats_come_in_one_order_whatever_the_tile(void **state)
         test_check_lists(&l);
         test_free_lists(&l);
         /* Normals follow the order but not the tile, unlike positions in voxel records. */
-        assert_true(test_same_file(test_path("a.trip/x.normals"), test_path("b.trip/x.normals")));
-        assert_true(test_same_file(test_path("a.trip/y.normals"), test_path("b.trip/y.normals")));
-        assert_true(test_same_file(test_path("a.trip/z.normals"), test_path("b.trip/z.normals")));
+        assert_true(test_same_file(test_path("a.trip/x0.normals"), test_path("b.trip/x0.normals")));
+        assert_true(test_same_file(test_path("a.trip/y0.normals"), test_path("b.trip/y0.normals")));
+        assert_true(test_same_file(test_path("a.trip/z0.normals"), test_path("b.trip/z0.normals")));
     }
 }
 
@@ -265,7 +265,7 @@ static void without_normals_there_is_no_such_plane(void **state)
     test_check_lists(&l);
     assert_int_equal(l.header.planes, 1);
     assert_int_equal(l.header.kept, N);
-    assert_false(test_exists("a.trip/x.normals"));
+    assert_false(test_exists("a.trip/x0.normals"));
     test_free_lists(&l);
 }
 

@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <xxhash.h>
 
+#include "block.h"
 #include "journal.h"
 
 enum { NX = 128, NY = 96, NZ = 128, N = NX * NY * NZ };
@@ -335,52 +336,71 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     assert_false(test_exists("a.trip.partial"));
 }
 
-/* The last record of the first run of the list in order, with a right checksum. */
-static void change_leftover(uint32_t voxel)
+/* The first block of the list in order, with a right checksum. */
+static void change_leftover(void (*change)(uint64_t *present, uint64_t *last_mask))
 {
     char path[192];
     trip_run_record run;
+    uint64_t words[TRIP_BLOCK_WORDS_MAX];
     uint32_t voxels[TRIP_TILE_MAX_SPLATS], normals[TRIP_TILE_MAX_SPLATS];
     FILE *planes[2], *runs;
-    snprintf(path, sizeof path, "%s.partial/z.voxels", output);
+    snprintf(path, sizeof path, "%s.partial/z0.voxels", output);
     planes[0] = fopen(path, "r+b");
-    snprintf(path, sizeof path, "%s.partial/z.normals", output);
+    snprintf(path, sizeof path, "%s.partial/z0.normals", output);
     planes[1] = fopen(path, "rb");
     snprintf(path, sizeof path, "%s.spill/runs", output);
     runs = fopen(path, "r+b");
     assert_true(planes[0] && planes[1] && runs);
     assert_int_equal(fread(&run, sizeof run, 1, runs), 1);
-    assert_int_equal(fread(voxels, 4, run.splats, planes[0]), run.splats);
+    assert_int_equal(fread(words, 8, 1, planes[0]), 1);
+    size_t squares = (size_t)__builtin_popcountll(words[0]);
+    size_t count = 1 + squares + trip_block_code_words(run.splats, 2);
+    assert_int_equal(fread(words + 1, 8, count - 1, planes[0]), count - 1);
     assert_int_equal(fread(normals, 4, run.splats, planes[1]), run.splats);
-    voxels[run.splats - 1] = voxel;
+    change(&words[0], &words[squares]);
+    const trip_block_form form = { .tile_log2 = 5, .code_bytes = 2 };
+    const trip_block block = trip_block_make(&form, run.splats, (uint32_t)count, words, NULL);
+    trip_block_voxels(&block, 0, run.splats, voxels);
     run.checksum = trip_run_checksum(voxels, normals, run.splats);
     rewind(planes[0]);
     rewind(runs);
-    assert_int_equal(fwrite(voxels, 4, run.splats, planes[0]), run.splats);
+    assert_int_equal(fwrite(words, 8, count, planes[0]), count);
     assert_int_equal(fwrite(&run, sizeof run, 1, runs), 1);
     fclose(planes[0]);
     fclose(planes[1]);
     fclose(runs);
 }
 
+static void move_outside(uint64_t *present, uint64_t *last_mask)
+{
+    (void)last_mask;
+    *present ^= UINT64_C(1) << (63 - __builtin_clzll(*present)) | UINT64_C(1) << 63;
+}
+
+static void drop_one(uint64_t *present, uint64_t *last_mask)
+{
+    (void)present;
+    *last_mask &= *last_mask - 1;
+}
+
 static void false_records_of_the_list_in_order_are_refused(void **state)
 {
     (void)state;
-    const uint32_t outside_its_tile = 64 | 63 << 8, out_of_order = 0;
     trip_brick_params p = params();
+    p.tile_voxels = 32;
     make_volume();
     leave_killed_run(p);
-    change_leftover(outside_its_tile);
-    expect_refused(p, "outside its tile", "what the interrupted run left is damaged");
+    change_leftover(move_outside);
+    expect_refused(p, "outside", "what the interrupted run left is damaged");
     leave_killed_run(p);
-    change_leftover(out_of_order);
-    expect_refused(p, "out of order", "what the interrupted run left is damaged");
+    change_leftover(drop_one);
+    expect_refused(p, "one less", "what the interrupted run left is damaged");
 }
 
 static void links_and_what_is_no_file_are_not_followed(void **state)
 {
     (void)state;
-    static const char *const names[] = { "journal", "runs", "pieces", "z.voxels" };
+    static const char *const names[] = { "journal", "runs", "pieces", "z0.voxels" };
     static const char victim_text[] = "not to be touched";
     make_volume();
     for (size_t i = 0; i < 2 * sizeof names / sizeof *names; i++) {
@@ -391,7 +411,7 @@ static void links_and_what_is_no_file_are_not_followed(void **state)
         p.replace = true;
         leave_killed_run(p);
         test_write("victim", victim_text, sizeof victim_text);
-        snprintf(path, sizeof path, "%s.partial/z.voxels", output);
+        snprintf(path, sizeof path, "%s.partial/z0.voxels", output);
         unlink(path);
         snprintf(path, sizeof path, "%s.spill/%s", output, names[i / 2]);
         unlink(path);
@@ -452,7 +472,7 @@ static void partial_folders_of_another_user_are_refused(void **state)
 static void what_is_no_longer_at_hand_is_made_again(void **state)
 {
     (void)state;
-    static const char *const names[] = { "spill/pieces", "spill/runs", "partial/z.voxels" };
+    static const char *const names[] = { "spill/pieces", "spill/runs", "partial/z0.voxels" };
     trip_brick_params p = params();
     trip_brick_summary s;
     make_volume();

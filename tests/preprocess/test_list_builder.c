@@ -29,12 +29,11 @@ static const int64_t dims[3] = { NX, NY, NZ };
 
 static void open_building(building *b, const char *name, const run_params *p)
 {
-    trip_writer_params w = { .normals = true,
+    trip_writer_params w = { .normal_bytes = 4,
                              .tile_voxels = 32,
                              .dims = { NX, NY, NZ },
                              .index_to_world = trip_affine_identity(),
-                             .code_hi = 1,
-                             .gradient_scale = 1 };
+                             .codes = { .code_hi = 1, .gradient_scale = 1 } };
     trip_list_builder_params l = { .format = format,
                                    .dims = { NX, NY, NZ },
                                    .producers = p->producers,

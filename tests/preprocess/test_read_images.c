@@ -428,7 +428,7 @@ static void a_stack_can_be_read_again(void **state)
     (void)state;
     trip_budget *budget;
     trip_volume *v;
-    trip_block block;
+    trip_volume_block block;
     float values[2][VOXELS];
     write_tiff("pages.tif", TRIP_U8, 0, NZ);
     assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);

@@ -99,10 +99,10 @@ struct Volume {
             trip_read_vdb.close(state);
         trip_budget_destroy(budget);
     }
-    std::vector<trip_block> blocks() const
+    std::vector<trip_volume_block> blocks() const
     {
-        std::vector<trip_block> all;
-        trip_block block;
+        std::vector<trip_volume_block> all;
+        trip_volume_block block;
         trip_read_vdb.rewind(state);
         while (trip_read_vdb.next(state, &block) == 1)
             all.push_back(block);
@@ -116,7 +116,7 @@ struct Volume {
 
 /* A block with one voxel around it. */
 struct Decoded {
-    Decoded(const Volume &v, const trip_block &block)
+    Decoded(const Volume &v, const trip_volume_block &block)
     {
         for (int a = 0; a < 3; a++) {
             lo[a] = block.origin[a] - 1;
@@ -141,7 +141,7 @@ size_t check_voxels(const Volume &v, const Coord &first, const Expected &expecte
 {
     size_t existing = 0;
     Coord before = Coord::min();
-    for (const trip_block &block : v.blocks()) {
+    for (const trip_volume_block &block : v.blocks()) {
         Decoded d(v, block);
         assert_int_equal(d.status, 0);
         Coord order((int)block.origin[2], (int)block.origin[1], (int)block.origin[0]);
@@ -296,9 +296,9 @@ void active_tiles_of_any_level_become_boxes(void **)
     Volume v(file);
     assert_int_equal(v.status, 0);
     assert_int_equal(v.info.dims[0], 8 + 8192);
-    std::vector<trip_block> blocks = v.blocks();
+    std::vector<trip_volume_block> blocks = v.blocks();
     uint64_t voxels = 0;
-    for (const trip_block &b : blocks) {
+    for (const trip_volume_block &b : blocks) {
         assert_true(b.size[0] <= 64 && b.size[1] <= 64 && b.size[2] <= 64);
         voxels += (uint64_t)(b.size[0] * b.size[1] * b.size[2]);
     }
@@ -464,7 +464,7 @@ void a_level_set_is_filled_by_default_and_says_so(void **)
     params.level_set = TRIP_LEVEL_SET_FILLED;
     Volume filled(file, params);
     assert_int_equal(by_default.status, 0);
-    std::vector<trip_block> blocks = by_default.blocks(), same = filled.blocks();
+    std::vector<trip_volume_block> blocks = by_default.blocks(), same = filled.blocks();
     assert_int_equal(blocks.size(), same.size());
     for (size_t i = 0; i < blocks.size(); i++)
         assert_true(Decoded(by_default, blocks[i]).values == Decoded(filled, same[i]).values);
@@ -490,7 +490,7 @@ void a_filled_level_set_is_a_ball(void **)
         value = (float)std::min(1.0, std::max(0.0, 0.5 - d));
         active = value > 0;
     });
-    for (const trip_block &block : v.blocks()) {
+    for (const trip_volume_block &block : v.blocks()) {
         std::vector<float> values((size_t)(block.size[0] * block.size[1] * block.size[2]));
         assert_int_equal(
             trip_read_vdb.decode(v.state, &block, block.origin, block.size, values.data(), nullptr),
@@ -566,9 +566,9 @@ void many_threads_decode_at_once(void **)
     File file({ grid });
     Volume v(file);
     assert_int_equal(v.status, 0);
-    std::vector<trip_block> blocks = v.blocks();
+    std::vector<trip_volume_block> blocks = v.blocks();
     std::vector<std::vector<float>> serial, parallel(blocks.size());
-    for (const trip_block &block : blocks)
+    for (const trip_volume_block &block : blocks)
         serial.push_back(Decoded(v, block).values);
     std::vector<std::thread> threads;
     for (size_t t = 0; t < 4; t++)
@@ -588,7 +588,7 @@ void read_whatever_it_is(const File &file)
     Volume v(file);
     int failures = v.status < 0;
     if (v.status == 0) {
-        std::vector<trip_block> blocks = v.blocks();
+        std::vector<trip_volume_block> blocks = v.blocks();
         for (size_t n = 0; n < blocks.size() && n < 100; n++)
             failures += Decoded(v, blocks[n]).status < 0;
     }

@@ -36,7 +36,7 @@ static void blocks_are_slabs_that_cover_the_volume_once(void **state)
     (void)state;
     for (int64_t hint = 0; hint <= NZ + 3; hint++) {
         trip_volume *v = open_sample(TRIP_U16, NULL);
-        trip_block block;
+        trip_volume_block block;
         int64_t next = 0;
         while (trip_volume_next(v, hint, &block) == 1) {
             assert_int_equal(block.origin[0], 0);
@@ -61,7 +61,7 @@ static int clamp(int v, int n)
 }
 
 /* The box [lo, hi) of a block against the sample's formula, edges repeated. */
-static void assert_box(const trip_volume *v, const trip_block *block, const int64_t lo[3],
+static void assert_box(const trip_volume *v, const trip_volume_block *block, const int64_t lo[3],
                        const int64_t size[3])
 {
     float values[(NX + 2) * (NY + 2) * (NZ + 2)], *value = values;
@@ -81,7 +81,7 @@ static void every_box_decodes_with_repeated_edges(void **state)
     (void)state;
     for (int64_t hint = 1; hint <= NZ; hint += 2) {
         trip_volume *v = open_sample(TRIP_I16, NULL);
-        trip_block block;
+        trip_volume_block block;
         while (trip_volume_next(v, hint, &block) == 1) {
             int64_t first = block.origin[2] - 1, depth = block.size[2] + 2;
             for (int64_t i = -1; i <= NX; i++)
@@ -102,7 +102,7 @@ static void a_volume_of_one_voxel_repeats_it_on_all_sides(void **state)
 {
     (void)state;
     trip_volume *v;
-    trip_block block;
+    trip_volume_block block;
     float values[27];
     uint8_t active[27];
     const trip_volume_params p = { .raw_dims = { 1, 1, 1 } };
@@ -122,7 +122,7 @@ static void a_box_outside_the_block_is_refused(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_U8, NULL);
-    trip_block block;
+    trip_volume_block block;
     float values[VOXELS];
     assert_int_equal(trip_volume_next(v, 2, &block), 1);
     catch_reports();
@@ -141,7 +141,7 @@ static void blocks_live_until_they_are_released(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_I16, NULL);
-    trip_block blocks[NZ];
+    trip_volume_block blocks[NZ];
     for (int k = 0; k < NZ; k++)
         assert_int_equal(trip_volume_next(v, 1, &blocks[k]), 1);
     for (int k = 0; k < NZ; k++) {
@@ -159,7 +159,7 @@ static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
 static void *decode_blocks(void *volume)
 {
     trip_volume *v = volume;
-    trip_block block;
+    trip_volume_block block;
     bool *right = malloc(sizeof *right);
     *right = true;
     for (;;) {
@@ -203,7 +203,7 @@ static void rewinding_starts_again_even_in_mid_volume(void **state)
     (void)state;
     trip_volume *v = open_sample(TRIP_I16, NULL);
     for (int stop = 0; stop <= NZ; stop++) {
-        trip_block block;
+        trip_volume_block block;
         for (int k = 0; k < stop; k++) {
             assert_int_equal(trip_volume_next(v, 1, &block), 1);
             assert_int_equal(block.origin[2], k);
@@ -219,7 +219,7 @@ static void slabs_come_out_of_the_budget_and_can_be_refused(void **state)
 {
     (void)state;
     trip_volume *v;
-    trip_block block;
+    trip_volume_block block;
     const trip_volume_params p = { .raw_dims = { 1024, 1024, 4 } };
     const char *path = path_of("sparse.raw");
     FILE *f = fopen(path, "wb");
@@ -239,7 +239,7 @@ static void a_read_that_fails_in_mid_volume_stays_failed(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_U8, NULL);
-    trip_block block;
+    trip_volume_block block;
     assert_int_equal(trip_volume_next(v, 2, &block), 1);
     trip_block_release(v, &block);
     assert_int_equal(truncate(path_of("sample.raw"), 4 * NX * NY), 0);

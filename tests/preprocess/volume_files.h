@@ -211,7 +211,7 @@ static inline int read_volume(const char *path, const trip_volume_params *params
 {
     trip_budget *budget;
     trip_volume *v;
-    trip_block block;
+    trip_volume_block block;
     assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
     int status = trip_volume_open(&v, path, params, budget);
     if (status == 0) {
@@ -281,7 +281,7 @@ static inline bool survives(const char *path, const trip_volume_params *params)
     static float values[VOXELS * 4];
     trip_budget *budget;
     trip_volume *v;
-    trip_block block;
+    trip_volume_block block;
     assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
     catch_reports();
     int status = trip_volume_open(&v, path, params, budget);

@@ -49,8 +49,8 @@ static void append_sheet(trip_writer *w, const scene_params *p, int axis, int sh
             continue;
         uint32_t count = gather_run(p, axis, sheet, tile_u, tile_v, tile, 1, voxels, normals);
         if (count)
-            assert_int_equal(trip_writer_append(w, axis, (uint32_t)sheet, (uint32_t)tile_u,
-                                                (uint32_t)tile_v, voxels,
+            assert_int_equal(trip_writer_append(w, (unsigned)axis, (uint32_t)sheet,
+                                                (uint32_t)tile_u, (uint32_t)tile_v, voxels,
                                                 p->normals ? normals : NULL, count),
                              0);
     }
@@ -59,15 +59,13 @@ static void append_sheet(trip_writer *w, const scene_params *p, int axis, int sh
 static void write_dataset(const scene *s, const scene_params *p)
 {
     trip_writer_params params = {
-        .normals = p->normals,
+        .normal_bytes = p->normals ? 4 : 0,
         .tile_voxels = p->tile_voxels,
         .slab_sheets = p->slab_sheets,
         .page_bytes = 4096,
         .dims = { p->dims[0], p->dims[1], p->dims[2] },
         .index_to_world = p->index_to_world,
-        .code_lo = 0,
-        .code_hi = 1,
-        .gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1,
+        .codes = { .code_hi = 1, .gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1 },
     };
     bool given = false;
     for (int i = 0; i < 12; i++)

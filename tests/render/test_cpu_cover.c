@@ -176,10 +176,9 @@ static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, 
                       unsigned y)
 {
     for (int descending = 0; descending < 2; descending++) {
-        const trip_pass pass = { .descending = descending };
         trip_run run = { .count = r->count, .sheet = sheet };
-        trip_batch batch = { .pass = &pass, .voxels = r->voxels };
-        trip_cpu_asking asking = { kernels, &r->looks.view, &r->looks.mask, &batch, &r->lanes };
+        trip_cpu_asking asking = { kernels,   &r->looks.view, &r->looks.mask,
+                                   r->voxels, descending,     &r->lanes };
         trip_cpu_span all = { &run, 0, r->count };
         mark_shown(r, trip_cpu_show(&asking, &all, r->shown), descending);
         for (uint32_t i = 0; i < r->count; i++) {

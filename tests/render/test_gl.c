@@ -241,7 +241,8 @@ static bool draw_in_place(const scene *s, const trip_camera_params *view, trip_r
     assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
     params.planes = plan.planes;
     assert_int_equal(plan.planes, 3);
-    params.slot_memory = r->ops->take_slots(r, params.slots, 2 * params.slot_bytes);
+    params.slot_bytes = trip_reader_slot_bytes(s->data, params.planes, params.slot_bytes);
+    params.slot_memory = r->ops->take_slots(r, params.slots, params.slot_bytes);
     if (params.slot_memory && !trip_reader_probe(s->data, params.engine, params.slot_memory[0])) {
         r->ops->drop_slots(r);
         params.slot_memory = NULL;
@@ -277,8 +278,7 @@ static void reads_into_gl_memory_give_the_same_picture_as_copies(void **state)
         if (params.engine == TRIP_ENGINE_URING)
             continue; /* what `auto` takes, or refused */
         bool copy = i % 2;
-        if (copy)
-            setenv("TRIPTYCH_GL_SLOTS", "copy", 1);
+        setenv("TRIPTYCH_GL_SLOTS", copy ? "copy" : "mapped", 1);
         bool in_place = draw_in_place(&s, &view, params, rgba);
         unsetenv("TRIPTYCH_GL_SLOTS");
         if (copy)

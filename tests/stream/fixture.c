@@ -76,8 +76,8 @@ static int write_list(fixture *f, trip_writer *w, int axis)
             normals[n] = x->normal;
         }
         int status =
-            trip_writer_append(w, axis, first->p[axis], first->p[u] / tile, first->p[v] / tile,
-                               voxels, f->params.normals ? normals : NULL, n);
+            trip_writer_append(w, (unsigned)axis, first->p[axis], first->p[u] / tile,
+                               first->p[v] / tile, voxels, f->params.normals ? normals : NULL, n);
         if (status < 0)
             return status;
     }
@@ -89,15 +89,16 @@ int fixture_write(fixture *f, const char *path)
     trip_writer *w;
     const fixture_params *p = &f->params;
     trip_writer_params params = { .replace = p->replace,
-                                  .normals = p->normals,
+                                  .code_bytes = p->code_bytes,
+                                  .normal_bytes = !p->normals       ? 0
+                                                  : p->normal_bytes ? p->normal_bytes
+                                                                    : 4,
                                   .tile_voxels = p->tile_voxels,
                                   .slab_sheets = p->slab_sheets,
                                   .page_bytes = p->page_bytes,
                                   .dims = { p->dims[0], p->dims[1], p->dims[2] },
                                   .index_to_world = trip_affine_identity(),
-                                  .code_lo = -1,
-                                  .code_hi = 2,
-                                  .gradient_scale = 3 };
+                                  .codes = { .code_lo = -1, .code_hi = 2, .gradient_scale = 3 } };
     int status = trip_writer_open(&w, path, &params, f->budget);
     if (status < 0)
         return status;
@@ -112,6 +113,39 @@ int fixture_write(fixture *f, const char *path)
     if (status < 0)
         trip_writer_abort(w);
     return status;
+}
+
+void fixture_read_run(const trip_dataset *d, const trip_list *list, const trip_run *run,
+                      uint32_t *voxels, uint32_t *normals)
+{
+    static uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    static unsigned char packed[4 * TRIP_RUN_RECORDS_MAX];
+    const trip_block_form form = trip_block_form_of(&d->header);
+    size_t bytes = 8 * (size_t)run->words, normal_bytes = run->count * form.normal_bytes;
+    bool has_normals = list->planes >> TRIP_PLANE_NORMALS & 1;
+    assert_int_equal(
+        pread(list->plane_fd[TRIP_PLANE_VOXELS], block, bytes, (off_t)run->at[TRIP_PLANE_VOXELS]),
+        bytes);
+    if (has_normals)
+        assert_int_equal(pread(list->plane_fd[TRIP_PLANE_NORMALS], packed, normal_bytes,
+                               (off_t)run->at[TRIP_PLANE_NORMALS]),
+                         normal_bytes);
+    const trip_block b =
+        trip_block_make(&form, run->count, run->words, block, has_normals ? packed : NULL);
+    trip_block_voxels(&b, 0, run->count, voxels);
+    memset(normals, 0, run->count * sizeof *normals);
+    if (has_normals)
+        trip_block_normals(&b, 0, run->count, normals);
+}
+
+void fixture_decode_run(const trip_batch *batch, const trip_run *run, uint32_t *voxels,
+                        uint32_t *normals)
+{
+    const trip_block b = trip_block_of(batch, run);
+    trip_block_voxels(&b, 0, run->count, voxels);
+    memset(normals, 0, run->count * sizeof *normals);
+    if (b.normals)
+        trip_block_normals(&b, 0, run->count, normals);
 }
 
 void fixture_make(fixture *f, const fixture_params *params)

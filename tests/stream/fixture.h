@@ -30,6 +30,7 @@ typedef struct fixture_params {
     double density;
     unsigned seed;
     unsigned tile_voxels, slab_sheets, page_bytes;
+    unsigned code_bytes, normal_bytes; /* of the latter, 4 where there are normals */
     bool normals, empty, replace;
     bool in_memory; /* in /dev/shm where there is one: no waiting for the disk to sync */
 } fixture_params;
@@ -49,6 +50,13 @@ uint64_t fixture_random(uint64_t *state);
 void fixture_make(fixture *f, const fixture_params *params);
 int fixture_write(fixture *f, const char *path);
 void fixture_free(fixture *f);
+
+/* A run of an iterator, by plain reads of the plane files; without normals those are 0. */
+void fixture_read_run(const trip_dataset *d, const trip_list *list, const trip_run *run,
+                      uint32_t *voxels, uint32_t *normals);
+/* The records of a run of a batch, likewise. */
+void fixture_decode_run(const trip_batch *batch, const trip_run *run, uint32_t *voxels,
+                        uint32_t *normals);
 
 /* All lines reported while it is on, joined by newlines. */
 void fixture_catch_reports(void);

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """A second, plain reader of NAME.trip, written from stream/FORMAT.md alone.
 
-Checks every checksum and prints one line for every voxel of every list, in list order:
+Checks every checksum and prints one line for every record of every list, in the order of the lists:
 
     LIST i j k code [normal gx gy gz]
 
-with the normal's record in hexadecimal and its gradient. Everything is read at once: it is for
-tests and for understanding the format, not for large data.
+with the list's axis and, but for voxels of level 0, its level and kind ("x", "z0.halo", "y1.voxels"),
+the code as 16 bits, the normal's record in hexadecimal and its gradient in world space (of those
+whose direction alone is kept, of length gradient_full). Everything is read at once: it is for tests
+and for understanding the format, not for large data.
 """
 import struct
 import sys
@@ -18,7 +20,7 @@ except ImportError as missing:
     print(f"plain_reader: {missing} (packages python3-numpy, python3-xxhash)", file=sys.stderr)
     sys.exit(77)
 
-PLANES = ("voxels", "normals")
+KINDS = (("voxels", "normals"), ("halo",))
 
 
 def fail(name, place, why):
@@ -38,27 +40,34 @@ def check_pages(name, data, page_bytes, checksums, start=0):
             fail(name, start + at, "page checksum")
 
 
+def unpack(layout, data, at):
+    """Named fields, one after the other, and where they end."""
+    fields = {}
+    for item in layout.split():
+        code, _, name = item.partition(":")
+        values = struct.unpack_from("<" + code, data, at)
+        at += struct.calcsize("<" + code)
+        if name:
+            fields[name] = values[0] if len(values) == 1 else values
+    return fields, at
+
+
 def read_header(index):
     if index[:8] != b"TRIPTYCH":
         fail("index.trip", 0, "magic")
-    header = {}
-    layout = (
+    header, at = unpack(
         "8x I:version I:header_bytes Q:header_checksum Q:index_bytes Q:checksums_offset "
         "Q:checksums_checksum 3Q:dims 12d:index_to_world d:code_lo d:code_hi d:value_min "
-        "d:value_max d:gradient_scale Q:voxels Q:kept I:tile_log2 I:slab_sheets I:page_log2 "
-        "I:planes I:list_count I:reserved Q:lists_offset Q:text_offset Q:text_bytes"
+        "d:value_max d:gradient_scale 3d:gradient_step d:gradient_full Q:voxels Q:kept Q:halo "
+        "I:tile_log2 I:slab_sheets I:page_log2 I:planes I:code_bytes I:normal_bytes I:list_count "
+        "I:reserved Q:lists_offset Q:text_offset Q:text_bytes",
+        index,
+        0,
     )
-    at = 0
-    for item in layout.split():
-        code, _, name = item.partition(":")
-        values = struct.unpack_from("<" + code, index, at)
-        at += struct.calcsize("<" + code)
-        if name:
-            header[name] = values[0] if len(values) == 1 else values
-    if at != 272 or header["version"] != 1 or header["header_bytes"] != 1024:
+    if at != 320 or header["version"] != 2 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
-    if header["reserved"] or any(index[272:1024]):
-        fail("index.trip", 272, "reserved bytes")
+    if header["reserved"] or any(index[320:1024]):
+        fail("index.trip", 320, "reserved bytes")
     if header["index_bytes"] != len(index):
         fail("index.trip", 24, "length of the file")
     if xxh64(index[:16] + bytes(8) + index[24:1024]) != header["header_checksum"]:
@@ -75,14 +84,22 @@ def check_index(index, header):
 
 
 def read_list(index, header, number):
-    at = header["lists_offset"] + 128 * number
-    names = "splats slab_count slabs_offset brick_count bricks_offset counts_offset".split()
-    axis, level = struct.unpack_from("<2I", index, at)
-    out = dict(zip(names, struct.unpack_from("<6Q", index, at + 8)))
-    out["page_checksums"] = struct.unpack_from("<4Q", index, at + 56)
-    if axis != number or level != 0 or any(index[at + 88 : at + 128]):
+    at = header["lists_offset"] + 320 * number
+    a_list, end = unpack(
+        "I:axis I:level I:kind I:planes 3Q:dims 12d:index_to_world d:sheet_first d:sheet_step "
+        "Q:records Q:slab_count Q:slabs_offset Q:brick_count Q:bricks_offset Q:runs_offset "
+        "4Q:plane_bytes 4Q:page_checksums",
+        index,
+        at,
+    )
+    if a_list["axis"] > 2 or a_list["kind"] >= len(KINDS) or any(index[end : at + 320]):
         fail("index.trip", at, "list descriptor")
-    return out
+    a_list["files"] = [
+        f"{'xyz'[a_list['axis']]}{a_list['level']}.{plane}" for plane in KINDS[a_list["kind"]]
+    ]
+    plain = a_list["level"] == 0 and a_list["kind"] == 0
+    a_list["name"] = "xyz"[a_list["axis"]] if plain else a_list["files"][0]
+    return a_list
 
 
 def morton(u, v):
@@ -92,53 +109,83 @@ def morton(u, v):
     return code
 
 
+def place(code):
+    """(u, v) of a Morton code."""
+    u = sum((code >> 2 * bit & 1) << bit for bit in range(8))
+    return u, sum((code >> 2 * bit + 1 & 1) << bit for bit in range(8))
+
+
 def runs(index, header, a_list):
-    """Yields (sheet, tile_u, tile_v, first splat, count) in file order."""
+    """Yields (sheet, tile_u, tile_v, first record, count, first byte, bytes) in file order."""
     sheets = header["slab_sheets"]
-    splat = 0
-    bricks_before = 0
+    record = block = bricks_before = 0
     for s in range(a_list["slab_count"]):
-        at = a_list["slabs_offset"] + 24 * s
-        first_brick, first_splat, brick_count, slab = struct.unpack_from("<2Q2I", index, at)
-        if (first_brick, first_splat) != (bricks_before, splat):
+        at = a_list["slabs_offset"] + 32 * s
+        first_brick, first_record, first_block, brick_count, slab = struct.unpack_from(
+            "<3Q2I", index, at
+        )
+        if (first_brick, first_record, first_block) != (bricks_before, record, block):
             fail("index.trip", at, "slab does not follow the one before")
         bricks = []
         for b in range(first_brick, first_brick + brick_count):
             brick_at = a_list["bricks_offset"] + 24 * b
             brick = struct.unpack_from("<3I2H6BH", index, brick_at)
-            counts_at = a_list["counts_offset"] + 2 * sheets * b
-            counts = struct.unpack_from(f"<{sheets}H", index, counts_at)
-            if sum(counts) != brick[2] or brick[11]:
+            runs_at = a_list["runs_offset"] + 4 * sheets * b
+            numbers = struct.unpack_from(f"<{2 * sheets}H", index, runs_at)
+            if sum(numbers[::2]) != brick[2] or brick[11]:
                 fail("index.trip", brick_at, "brick")
-            bricks.append((brick[0], brick[1], counts))
-        codes = [morton(u, v) for u, v, _ in bricks]
+            bricks.append((brick[0], brick[1], numbers[::2], numbers[1::2]))
+        codes = [morton(u, v) for u, v, _, _ in bricks]
         if codes != sorted(set(codes)):
             fail("index.trip", at, "bricks are not in Morton order")
         for sheet in range(sheets):
-            for u, v, counts in bricks:
+            for u, v, counts, words in bricks:
                 if counts[sheet]:
-                    yield slab * sheets + sheet, u, v, splat, counts[sheet]
-                splat += counts[sheet]
+                    yield slab * sheets + sheet, u, v, record, counts[sheet], block, 8 * words[sheet]
+                record += counts[sheet]
+                block += 8 * words[sheet]
         bricks_before += brick_count
-    if splat != a_list["splats"] or splat != header["kept"]:
-        fail("index.trip", 216, "number of splats")
+    if record != a_list["records"] or block != a_list["plane_bytes"][0]:
+        fail("index.trip", a_list["slabs_offset"], "number of records or bytes")
 
 
-def read_plane(folder, index, header, a_list, number, plane):
-    name = "xyz"[number] + "." + PLANES[plane]
+def read_plane(folder, index, header, a_list, plane):
+    name = a_list["files"][plane]
     with open(f"{folder}/{name}", "rb") as file:
         data = file.read()
     page = 1 << header["page_log2"]
     count = -(-len(data) // page)
-    if len(data) != 4 * a_list["splats"]:
+    if len(data) != a_list["plane_bytes"][plane]:
         fail(name, len(data), "length of the file")
     offset = a_list["page_checksums"][plane]
     check_pages(name, data, page, numpy.frombuffer(index, "<u8", count=count, offset=offset))
-    return numpy.frombuffer(data, "<u4")
+    return data
 
 
-def gradients(normals, scale):
-    """Rows (gx, gy, gz) of normal records."""
+def decode_block(header, name, at, block, count):
+    """(u, v, code) of the records of a block."""
+    words = 4 if header["tile_log2"] == 7 else 1
+    present = int.from_bytes(block[: 8 * words], "little")
+    squares = [n for n in range(64 * words) if present >> n & 1]
+    if present >> (1 << 2 * (header["tile_log2"] - 3)):
+        fail(name, at, "squares outside the tile")
+    places = []
+    for n, square in enumerate(squares):
+        (mask,) = struct.unpack_from("<Q", block, 8 * (words + n))
+        if mask == 0:
+            fail(name, at, "empty mask")
+        places += [place(64 * square + bit) for bit in range(64) if mask >> bit & 1]
+    codes_at, size = 8 * (words + len(squares)), header["code_bytes"]
+    end = codes_at + size * count
+    if len(places) != count or len(block) != (end + 7) // 8 * 8 or any(block[end:]):
+        fail(name, at, "block")
+    codes = numpy.frombuffer(block, "u1" if size == 1 else "<u2", count=count, offset=codes_at)
+    factor = 257 if size == 1 else 1
+    return [(u, v, factor * int(code)) for (u, v), code in zip(places, codes)]
+
+
+def wide_gradients(normals, scale):
+    """Rows (gx, gy, gz) of 4-byte normals."""
     x = (normals & 4095) * 2.0 / 4095 - 1
     y = (normals >> 12 & 4095) * 2.0 / 4095 - 1
     z = 1 - abs(x) - abs(y)
@@ -149,22 +196,51 @@ def gradients(normals, scale):
     return direction * (length / numpy.linalg.norm(direction, axis=1))[:, None]
 
 
+def narrow_gradients(normals, header):
+    """Rows (gx, gy, gz) of 3-byte normals."""
+    signed = lambda n: numpy.where(n > 127, n - 256, n)
+    step = numpy.array(header["gradient_step"])
+    index = numpy.stack(
+        [signed(normals & 255), signed(normals >> 8 & 255), normals >> 16 & 127], 1
+    ) * step
+    linear = numpy.array(header["index_to_world"]).reshape(3, 4)[:, :3]
+    small = index @ numpy.linalg.inv(linear)
+    p = (normals & 4095) * 2.0 / 4095 - 1
+    q = (normals >> 12 & 2047) * 2.0 / 2047 - 1
+    up = 1 - numpy.maximum(abs(p), abs(q))
+    direction = numpy.stack([(p + q) / 2, (p - q) / 2, up], 1)
+    large = direction * (header["gradient_full"] / numpy.linalg.norm(direction, axis=1))[:, None]
+    return numpy.where((normals >> 23 & 1)[:, None] == 1, large, small)
+
+
+def read_normals(folder, index, header, a_list):
+    """Records and gradients, or nothing."""
+    if not a_list["planes"] & 2:
+        return None, None
+    size = header["normal_bytes"]
+    data = numpy.frombuffer(read_plane(folder, index, header, a_list, 1), "u1")
+    if len(data) != size * a_list["records"]:
+        fail(a_list["files"][1], len(data), "length of the file")
+    parts = data.reshape(-1, size).astype("i8")
+    normals = sum(parts[:, n] << 8 * n for n in range(size))
+    if size == 4:
+        return normals, wide_gradients(normals, header["gradient_scale"])
+    return normals, narrow_gradients(normals, header)
+
+
 def print_list(folder, index, header, number, out):
     a_list = read_list(index, header, number)
-    voxels = read_plane(folder, index, header, a_list, number, 0)
-    normals = None
-    if header["planes"] & 2:
-        normals = read_plane(folder, index, header, a_list, number, 1)
-        gradient = gradients(normals.astype("i8"), header["gradient_scale"])
-    tile = 1 << header["tile_log2"]
-    for sheet, tile_u, tile_v, first, count in runs(index, header, a_list):
-        for n in range(first, first + count):
-            voxel = int(voxels[n])
-            place = [0, 0, 0]
-            place[number] = sheet
-            place[(number + 1) % 3] = tile_u * tile + (voxel & 255)
-            place[(number + 2) % 3] = tile_v * tile + (voxel >> 8 & 255)
-            line = "%s %d %d %d %d" % ("xyz"[number], *place, voxel >> 16)
+    voxels = read_plane(folder, index, header, a_list, 0)
+    normals, gradient = read_normals(folder, index, header, a_list)
+    tile, axis = 1 << header["tile_log2"], a_list["axis"]
+    for sheet, tile_u, tile_v, first, count, at, size in runs(index, header, a_list):
+        block = decode_block(header, a_list["files"][0], at, voxels[at : at + size], count)
+        for n, (u, v, code) in enumerate(block, first):
+            where = [0, 0, 0]
+            where[axis] = sheet
+            where[(axis + 1) % 3] = tile_u * tile + u
+            where[(axis + 2) % 3] = tile_v * tile + v
+            line = "%s %d %d %d %d" % (a_list["name"], *where, code)
             if normals is not None:
                 line += " %08x %.9g %.9g %.9g" % (normals[n], *gradient[n])
             out.write(line + "\n")
@@ -178,7 +254,7 @@ def main():
         index = file.read()
     header = read_header(index)
     check_index(index, header)
-    for number in range(3):
+    for number in range(header["list_count"]):
         print_list(folder, index, header, number, sys.stdout)
 
 

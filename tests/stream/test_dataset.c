@@ -10,8 +10,8 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-static const char *const file_names[] = { "index.trip", "x.voxels",  "y.voxels", "z.voxels",
-                                          "x.normals",  "y.normals", "z.normals" };
+static const char *const file_names[] = { "index.trip", "x0.voxels",  "y0.voxels", "z0.voxels",
+                                          "x0.normals", "y0.normals", "z0.normals" };
 enum { FILES = 7 };
 
 static fixture shared;
@@ -44,6 +44,7 @@ static char *file_path(int file)
 /* Sums all records of a list, so that any other picture would be noticed. */
 static int sum_list(const trip_dataset *d, trip_reader *r, int axis, uint64_t *sum)
 {
+    static uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
     trip_selection s;
     trip_batch b;
     assert_int_equal(
@@ -52,10 +53,12 @@ static int sum_list(const trip_dataset *d, trip_reader *r, int axis, uint64_t *s
         trip_selection_add(&s, i);
     int status = trip_reader_begin(r, &(trip_pass){ &s, 1, false });
     while (status == 0 && (status = trip_reader_next(r, &b)) == 1) {
-        for (size_t i = 0; i < b.run_count; i++)
-            for (uint64_t k = b.runs[i].first; k < b.runs[i].first + b.runs[i].count; k++)
-                *sum = *sum * 31 + b.voxels[k] + ((uint64_t)b.normals[k] << 32) +
+        for (size_t i = 0; i < b.run_count; i++) {
+            fixture_decode_run(&b, &b.runs[i], voxels, normals);
+            for (uint32_t k = 0; k < b.runs[i].count; k++)
+                *sum = *sum * 31 + voxels[k] + ((uint64_t)normals[k] << 32) +
                        (uint64_t)b.runs[i].u + (uint64_t)b.runs[i].sheet * 77;
+        }
         trip_reader_release(r, &b);
         status = 0;
     }
@@ -205,7 +208,7 @@ static void a_file_without_permission_is_an_error(void **state)
         fixture_catch_reports();
         int status = read_everything(shared.path, &sum);
         const char *reports = fixture_reports();
-        _exit(status == TRIP_ERROR && strstr(reports, "z.voxels") &&
+        _exit(status == TRIP_ERROR && strstr(reports, "z0.voxels") &&
                       strstr(reports, "Permission denied")
                   ? 0
                   : 1);
@@ -277,7 +280,8 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     static crafted c;
     (void)state;
     REFUSE(c.header->magic[0] = 'X', "not the index of a data set");
-    REFUSE(c.header->version = 2, "format version 2");
+    REFUSE(c.header->version = 1, "format version 1, which is not read any more");
+    REFUSE(c.header->version = 3, "format version 3");
     REFUSE(c.header->header_bytes = 512, "header size");
     REFUSE(c.header->reserved[700] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");
@@ -290,13 +294,24 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->value_max = NAN, "range of values");
     REFUSE(c.header->gradient_scale = -1, "gradient scale");
     REFUSE(c.header->voxels = UINT64_MAX, "more voxels");
-    REFUSE(c.header->voxels = 1, "more splats");
+    REFUSE(c.header->voxels = 1, "more was kept");
+    REFUSE(c.header->halo = UINT64_MAX, "more was kept");
+    REFUSE(c.header->halo = 1, "no list of it");
+    REFUSE(c.header->gradient_step[1] = NAN, "gradient step");
+    REFUSE(c.header->gradient_full = -1, "gradient scale");
     REFUSE(c.header->tile_log2 = 8, "tile size");
     REFUSE(c.header->slab_sheets = 0, "sheets per slab");
     REFUSE(c.header->page_log2 = 40, "page size");
     REFUSE(c.header->planes = 7, "planes");
     REFUSE(c.header->planes = 2, "planes");
-    REFUSE(c.header->list_count = 4, "number of lists");
+    REFUSE(c.header->list_count = 2, "number of lists");
+    REFUSE(c.header->list_count = 4097, "number of lists");
+    REFUSE(c.header->list_count = 4096, "lists lie outside");
+    REFUSE(c.header->code_bytes = 0, "1 or 2 bytes");
+    REFUSE(c.header->code_bytes = 3, "1 or 2 bytes");
+    REFUSE(c.header->normal_bytes = 2, "3 or 4 bytes");
+    REFUSE(c.header->normal_bytes = 3, "not the bytes of its records");
+    REFUSE(c.header->planes = 1, "3 or 4 bytes");
     REFUSE(c.header->checksums_offset = UINT64_MAX - 7, "checksums are not where");
     REFUSE(c.header->checksums_offset -= 8, "checksums are not where");
     REFUSE(c.header->text_bytes = UINT64_MAX, "text is too long");
@@ -311,15 +326,31 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     (void)state;
 #define SLAB ((trip_file_slab *)(void *)(c.bytes + c.lists[1].slabs_offset))
 #define BRICK ((trip_file_brick *)(void *)(c.bytes + c.lists[1].bricks_offset))
-#define COUNT ((uint16_t *)(void *)(c.bytes + c.lists[1].counts_offset))
-    REFUSE(c.lists[1].axis = 0, "not X, Y and Z");
-    REFUSE(c.lists[0].level = 1, "not X, Y and Z");
-    REFUSE(c.lists[2].splats++, "that were kept");
+#define RUN ((trip_file_run *)(void *)(c.bytes + c.lists[1].runs_offset))
+    REFUSE(c.lists[1].axis = 0, "same axis, level and kind");
+    REFUSE(c.lists[1].axis = 3, "no such axis or kind");
+    REFUSE(c.lists[1].kind = 2, "no such axis or kind");
+    REFUSE(c.lists[1].kind = 1, "not the planes of its kind");
+    REFUSE(c.lists[1].planes = 1, "not the planes of its kind");
+    REFUSE(c.lists[0].level = 1, "not there for each axis");
+    REFUSE(c.lists[2].records++, "that were kept");
+    REFUSE(c.lists[2].dims[0]--, "not of the header's grid");
+    REFUSE(c.lists[2].dims[1] = 0, "grid size");
+    REFUSE(c.lists[2].index_to_world[3] = 7, "not of the header's grid");
+    REFUSE(c.lists[2].index_to_world[0] = NAN, "singular or not finite");
+    REFUSE(c.lists[2].sheet_first = 1, "not of the header's grid");
+    REFUSE(c.lists[2].sheet_step = 0, "no ascending coordinates");
+    REFUSE(c.lists[2].sheet_step = NAN, "no ascending coordinates");
+    REFUSE(c.lists[2].sheet_first = INFINITY, "no ascending coordinates");
+    REFUSE(c.lists[2].plane_bytes[0] += 4, "not the bytes of its records");
+    REFUSE(c.lists[2].plane_bytes[0] += 8, "do not add up");
+    REFUSE(c.lists[2].plane_bytes[1]++, "not the bytes of its records");
+    REFUSE(c.lists[2].plane_bytes[3] = 4, "not the bytes of its records");
     REFUSE(c.lists[2].reserved[4] = 1, "reserved");
     REFUSE(c.lists[1].brick_count = UINT64_MAX, "more bricks");
     REFUSE(c.lists[1].slab_count = UINT64_MAX / 8, "outside the file");
     REFUSE(c.lists[1].bricks_offset = 0, "outside the file");
-    REFUSE(c.lists[1].counts_offset += 1, "outside the file");
+    REFUSE(c.lists[1].runs_offset += 1, "outside the file");
     REFUSE(c.lists[1].page_checksums_offset[1] = 0, "outside the file");
     REFUSE(c.lists[1].page_checksums_offset[3] = 2048, "outside the file");
     REFUSE(c.lists[1].slabs_offset = c.lists[1].bricks_offset, "overlap");
@@ -328,7 +359,7 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE(SLAB[1].first_brick++, "bricks do not follow");
     REFUSE(SLAB[0].brick_count = 0, "bricks do not follow");
     REFUSE(SLAB[0].brick_count = UINT32_MAX, "bricks do not follow");
-    REFUSE(SLAB[1].first_splat++, "splats do not follow");
+    REFUSE(SLAB[1].first_record++, "records do not follow");
     REFUSE(c.lists[1].slab_count--, "do not add up");
     REFUSE(SLAB[0].slab = 1000000, "not inside the grid");
     REFUSE(BRICK[0].reserved = 1, "reserved");
@@ -337,9 +368,12 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE(BRICK[0].u_min = 16, "not inside the grid");
     REFUSE(BRICK[0].sheet_max = 8, "sheets are not inside");
     REFUSE(BRICK[0].code_min = 65535, "value range");
-    REFUSE(BRICK[0].splats++, "run counts");
-    REFUSE(COUNT[0] = 65535, "run counts");
-    REFUSE((COUNT[0]++, COUNT[1]--, BRICK[0].sheet_min = 1), "run counts");
+    REFUSE(SLAB[1].first_block += 8, "records do not follow");
+    REFUSE(BRICK[0].records++, "runs do not agree");
+    REFUSE(RUN[0].records = 65535, "runs do not agree");
+    REFUSE((RUN[0].records++, RUN[1].records--, BRICK[0].sheet_min = 1), "runs do not agree");
+    REFUSE(RUN[0].words = 0, "runs do not agree");
+    REFUSE(RUN[0].words = 65535, "runs do not agree");
     REFUSE((BRICK[1].tile_u = BRICK[0].tile_u, BRICK[1].tile_v = BRICK[0].tile_v), "Morton");
 }
 
@@ -356,7 +390,7 @@ static void verify_finds_records_that_do_not_agree_with_the_index(void **state)
     b->code_max = (uint16_t)(code_max - 1);
     fixture_catch_reports();
     assert_int_equal(trip_dataset_verify(d, shared.budget), TRIP_ERROR);
-    assert_non_null(strstr(fixture_reports(), "y.voxels: byte "));
+    assert_non_null(strstr(fixture_reports(), "y0.voxels: byte "));
     b->code_max = code_max;
     b->u_min++;
     fixture_catch_reports();

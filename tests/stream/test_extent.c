@@ -1,23 +1,24 @@
-/* The planner's packing, on a data set of one dense list: 8 sheets of 16 tiles, each run 1024
- * bytes, pages of 4096 bytes. So run n of a sheet lies at byte 1024 n of its 16384. */
+/* The planner's packing, on a data set of dense lists: along X 8 sheets of 16 tiles. A run has 256
+ * records, so its block has a word of presence, 4 masks and 64 words of codes: 552 bytes. So run n
+ * of a list lies at byte 552 n, its normals at 1024 n; pages have 4096 bytes. */
 #include "fixture.h"
 
 #include "extent.h"
 
-enum { RUN_BYTES = 1024, SHEET_BYTES = 16 * RUN_BYTES, SHEETS = 8, RUNS_MAX = 64 };
+enum { RUN_BYTES = 552, RUN_RECORDS = 256, SHEETS = 8, RUNS = 16 * SHEETS, RUNS_MAX = 256 };
 
 typedef struct plan_test {
     fixture f;
     trip_dataset *d;
-    trip_selection s;
+    trip_selection s[2];
     trip_pass pass;
-    trip_pass_cursor cursor;
+    trip_pass_cursor cursors[2];
     trip_planner planner;
     trip_run runs[RUNS_MAX];
     trip_extent extent;
 } plan_test;
 
-static void start(plan_test *t, bool descending, size_t slot_bytes, size_t gap_bytes)
+static void start(plan_test *t, bool descending, size_t slot_bytes, unsigned planes)
 {
     *t = (plan_test){ 0 };
     fixture_make(&t->f, &(fixture_params){ .dims = { SHEETS, 64, 64 },
@@ -25,20 +26,38 @@ static void start(plan_test *t, bool descending, size_t slot_bytes, size_t gap_b
                                            .tile_voxels = 16,
                                            .slab_sheets = SHEETS,
                                            .page_bytes = 4096,
+                                           .normals = true,
                                            .in_memory = true });
     assert_int_equal(trip_dataset_open(&t->d, t->f.path, t->f.budget), TRIP_OK);
-    assert_int_equal(
-        trip_selection_create(&t->s, t->d, &t->d->lists[0], descending, 0, SHEETS, t->f.budget), 0);
-    t->planner =
-        (trip_planner){ .page_bytes = 4096, .slot_bytes = slot_bytes, .gap_bytes = gap_bytes };
-    t->pass = trip_pass_of(&t->s);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(trip_selection_create(&t->s[i], t->d, &t->d->lists[i], descending, 0,
+                                               INT32_MAX, t->f.budget),
+                         0);
+    t->planner = (trip_planner){ .planes = planes,
+                                 .normal_bytes = 4,
+                                 .page_bytes = 4096,
+                                 .slot_bytes = slot_bytes,
+                                 .gap_bytes = 4096 };
+    t->pass = trip_pass_of(&t->s[0]);
     t->extent.runs = t->runs;
     t->extent.run_room = RUNS_MAX;
 }
 
+static void begin(plan_test *t)
+{
+    trip_planner_begin(&t->planner, &t->pass, t->cursors);
+}
+
+static void select_all(plan_test *t, int list)
+{
+    for (uint64_t b = 0; b < t->d->lists[list].brick_count; b++)
+        trip_selection_add(&t->s[list], b);
+}
+
 static void finish(plan_test *t)
 {
-    trip_selection_destroy(&t->s, t->f.budget);
+    for (int i = 0; i < 2; i++)
+        trip_selection_destroy(&t->s[i], t->f.budget);
     trip_dataset_close(t->d);
     fixture_free(&t->f);
 }
@@ -52,65 +71,97 @@ static void expect_segment(const plan_test *t, unsigned i, uint64_t offset, size
     assert_int_equal(t->extent.segments[i].slot_offset, slot_offset);
 }
 
-static void the_whole_list_is_cut_at_slot_ends(void **state)
+/* Pages from the one with the first byte to the one with the last. */
+static size_t paged(size_t first, size_t end)
+{
+    return (end + 4095) / 4096 * 4096 - first / 4096 * 4096;
+}
+
+static void the_whole_list_is_cut_between_runs(void **state)
 {
     plan_test t;
-    uint64_t next = 0;
+    size_t next = 0;
     (void)state;
-    start(&t, false, 3 * 4096, 4096);
-    for (uint64_t b = 0; b < 16; b++)
-        trip_selection_add(&t.s, b);
-    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
+    start(&t, false, 3 * 4096, 1);
+    select_all(&t, 0);
+    begin(&t);
     while (trip_planner_fill(&t.planner, &t.extent)) {
+        size_t first = next * RUN_BYTES, n = 0;
+        while (next + n < RUNS && paged(first, first + (n + 1) * RUN_BYTES) <= 3 * 4096)
+            n++;
+        assert_int_equal(t.extent.run_count, n);
+        assert_int_equal(t.extent.records, n * RUN_RECORDS);
         assert_int_equal(t.extent.segment_count, 1);
-        size_t left = SHEETS * SHEET_BYTES - next;
-        expect_segment(&t, 0, next, left < 3 * 4096 ? left : 3 * 4096, 0);
-        next += t.extent.bytes;
-        assert_int_equal(t.extent.splats * TRIP_RECORD_BYTES, t.extent.bytes);
+        expect_segment(&t, 0, first / 4096 * 4096, paged(first, first + n * RUN_BYTES), 0);
+        for (size_t i = 0; i < n; i++)
+            assert_int_equal(t.runs[i].at[0], first % 4096 + i * RUN_BYTES);
+        next += n;
     }
-    assert_int_equal(next, SHEETS * SHEET_BYTES);
+    assert_int_equal(next, RUNS);
     finish(&t);
 }
 
-static void large_gaps_part_segments_and_small_ones_do_not(void **state)
+static void planes_follow_one_another_in_a_slot(void **state)
 {
     plan_test t;
     (void)state;
-    start(&t, false, 1 << 16, 4096);
-    trip_selection_add(&t.s, 1); /* bytes 1024 to 2048 of each sheet */
-    trip_selection_add(&t.s, 6); /* 6144 to 7168, after a gap of 4096 */
-    t.s.sheet_last = 1;
-    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
+    start(&t, false, 1 << 20, 3);
+    select_all(&t, 0);
+    begin(&t);
+    assert_true(trip_planner_fill(&t.planner, &t.extent));
+    assert_int_equal(t.extent.run_count, RUNS);
+    assert_int_equal(t.extent.segment_count, 2);
+    size_t voxels = paged(0, RUNS * RUN_BYTES);
+    expect_segment(&t, 0, 0, voxels, 0);
+    expect_segment(&t, 1, 0, RUNS * 4 * RUN_RECORDS, voxels);
+    assert_int_equal(t.extent.plane_at[1], voxels);
+    assert_int_equal(t.extent.plane_bytes[0], voxels);
+    assert_int_equal(t.extent.plane_bytes[1], RUNS * 4 * RUN_RECORDS);
+    for (size_t i = 0; i < RUNS; i++) {
+        assert_int_equal(t.runs[i].at[0], i * RUN_BYTES);
+        assert_int_equal(t.runs[i].at[1], i * 4 * RUN_RECORDS);
+    }
+    finish(&t);
+}
+
+static void large_gaps_part_pieces_and_small_ones_do_not(void **state)
+{
+    plan_test t;
+    (void)state;
+    start(&t, false, 1 << 16, 1);
+    trip_selection_add(&t.s[0], 1); /* from byte 552 of a sheet, which has 8832 */
+    trip_selection_add(&t.s[0], 6); /* from byte 3312, after a gap of 2208 */
+    t.s[0].sheet_last = 1; /* where they start at 9384, after a gap of 5520, and at 12144 */
+    begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.segment_count, 2);
-    expect_segment(&t, 0, 0, 8192, 0);
-    expect_segment(&t, 1, SHEET_BYTES, 8192, 8192);
+    expect_segment(&t, 0, 0, 4096, 0);
+    expect_segment(&t, 1, 8192, 8192, 4096);
     assert_int_equal(t.extent.run_count, 4);
-    const uint64_t first[] = { 256, 1536, 2048 + 256, 2048 + 1536 };
+    const size_t at[] = { 552, 3312, 4096 + 9384 - 8192, 4096 + 12144 - 8192 };
     for (int i = 0; i < 4; i++)
-        assert_int_equal(t.runs[i].first, first[i]);
+        assert_int_equal(t.runs[i].at[0], at[i]);
     assert_false(trip_planner_fill(&t.planner, &t.extent));
     finish(&t);
 }
 
-static void a_descending_pass_places_segments_from_the_files_end(void **state)
+static void a_descending_pass_places_pieces_from_the_files_end(void **state)
 {
     plan_test t;
     (void)state;
-    start(&t, true, 1 << 16, 4096);
-    trip_selection_add(&t.s, 1);
-    trip_selection_add(&t.s, 7);
-    t.s.sheet_last = 1;
-    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
+    start(&t, true, 1 << 16, 1);
+    trip_selection_add(&t.s[0], 1);
+    trip_selection_add(&t.s[0], 15);
+    t.s[0].sheet_last = 1; /* runs from bytes 17112, 9384, 8280 and 552: the middle ones are near */
+    begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
-    assert_int_equal(t.extent.segment_count, 4);
-    expect_segment(&t, 0, SHEET_BYTES + 4096, 4096, 0);
-    expect_segment(&t, 1, SHEET_BYTES, 4096, 4096);
-    expect_segment(&t, 2, 4096, 4096, 8192);
-    expect_segment(&t, 3, 0, 4096, 12288);
-    const uint64_t first[] = { 768, 1024 + 256, 2048 + 768, 3072 + 256 };
+    assert_int_equal(t.extent.segment_count, 3);
+    expect_segment(&t, 0, 16384, 4096, 0);
+    expect_segment(&t, 1, 8192, 4096, 4096);
+    expect_segment(&t, 2, 0, 4096, 8192);
+    const size_t at[] = { 17112 - 16384, 4096 + 9384 - 8192, 4096 + 8280 - 8192, 8192 + 552 };
     for (int i = 0; i < 4; i++)
-        assert_int_equal(t.runs[i].first, first[i]);
+        assert_int_equal(t.runs[i].at[0], at[i]);
     finish(&t);
 }
 
@@ -118,18 +169,42 @@ static void a_descending_pass_takes_the_whole_list_backwards(void **state)
 {
     plan_test t;
     (void)state;
-    start(&t, true, 4096, 4096);
-    for (uint64_t b = 0; b < 16; b++)
-        trip_selection_add(&t.s, b);
-    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
-    uint64_t splats = 0;
+    start(&t, true, 8192, 1);
+    select_all(&t, 0);
+    begin(&t);
+    uint64_t records = 0;
     while (trip_planner_fill(&t.planner, &t.extent)) {
         for (size_t i = 0; i + 1 < t.extent.run_count; i++)
-            assert_int_equal(t.runs[i + 1].first + t.runs[i + 1].count, t.runs[i].first);
-        splats += t.extent.splats;
-        expect_segment(&t, 0, SHEETS * SHEET_BYTES - splats * TRIP_RECORD_BYTES, 4096, 0);
+            assert_int_equal(t.runs[i + 1].at[0] + RUN_BYTES, t.runs[i].at[0]);
+        assert_int_equal(t.runs[0].first, t.f.count - records - RUN_RECORDS);
+        records += t.extent.records;
     }
-    assert_int_equal(splats, t.f.count);
+    assert_int_equal(records, t.f.count);
+    finish(&t);
+}
+
+/* Sheets of X and of Y come in turn, eight of each; Y goes on alone. */
+static void lists_that_come_in_turn_have_pieces_of_their_own(void **state)
+{
+    plan_test t;
+    (void)state;
+    start(&t, false, 1 << 20, 1);
+    select_all(&t, 0);
+    select_all(&t, 1);
+    t.pass = (trip_pass){ t.s, 2, false };
+    begin(&t);
+    assert_true(trip_planner_fill(&t.planner, &t.extent));
+    assert_int_equal(t.extent.segment_count, 2);
+    assert_ptr_equal(t.extent.segments[0].list, &t.d->lists[0]);
+    assert_ptr_equal(t.extent.segments[1].list, &t.d->lists[1]);
+    expect_segment(&t, 0, 0, paged(0, RUNS * RUN_BYTES), 0);
+    uint64_t seen[2] = { 0 };
+    for (size_t i = 0; i < t.extent.run_count; i++) {
+        unsigned s = t.runs[i].selection;
+        assert_int_equal(t.runs[i].at[0] - t.extent.segments[s].slot_offset, 8 * seen[s]);
+        seen[s] += t.runs[i].words;
+    }
+    assert_int_equal(seen[0], RUNS * RUN_BYTES / 8);
     finish(&t);
 }
 
@@ -138,27 +213,40 @@ static void a_full_table_of_runs_ends_the_extent(void **state)
     plan_test t;
     size_t runs = 0;
     (void)state;
-    start(&t, false, 1 << 20, 4096);
-    for (uint64_t b = 0; b < 16; b++)
-        trip_selection_add(&t.s, b);
+    start(&t, false, 1 << 20, 1);
+    select_all(&t, 0);
     t.extent.run_room = 5;
-    trip_planner_begin(&t.planner, &t.pass, &t.cursor);
+    begin(&t);
     while (trip_planner_fill(&t.planner, &t.extent)) {
         assert_true(t.extent.run_count <= 5);
         runs += t.extent.run_count;
     }
-    assert_int_equal(runs, 16 * SHEETS);
+    assert_int_equal(runs, RUNS);
+    finish(&t);
+}
+
+/* A block of 552 bytes and 1024 bytes of normals may each begin at the end of a page. */
+static void the_least_slot_holds_the_largest_run(void **state)
+{
+    plan_test t;
+    (void)state;
+    start(&t, false, 1 << 20, 1);
+    assert_int_equal(trip_planner_least_slot(t.d, 1), 2 * 4096);
+    assert_int_equal(trip_planner_least_slot(t.d, 3), 4 * 4096);
     finish(&t);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_whole_list_is_cut_at_slot_ends),
-        cmocka_unit_test(large_gaps_part_segments_and_small_ones_do_not),
-        cmocka_unit_test(a_descending_pass_places_segments_from_the_files_end),
+        cmocka_unit_test(the_whole_list_is_cut_between_runs),
+        cmocka_unit_test(planes_follow_one_another_in_a_slot),
+        cmocka_unit_test(large_gaps_part_pieces_and_small_ones_do_not),
+        cmocka_unit_test(a_descending_pass_places_pieces_from_the_files_end),
         cmocka_unit_test(a_descending_pass_takes_the_whole_list_backwards),
+        cmocka_unit_test(lists_that_come_in_turn_have_pieces_of_their_own),
         cmocka_unit_test(a_full_table_of_runs_ends_the_extent),
+        cmocka_unit_test(the_least_slot_holds_the_largest_run),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,6 +19,10 @@ static const example_voxel example[] = {
     { { 3, 2, 1 }, 5, { 0, 0, 0 } },
 };
 
+/* And a transparent neighbour, in a list of the halo along Z alone. */
+static const uint32_t halo_voxel[3] = { 18, 1, 0 };
+enum { HALO_CODE = 33000, HALO_LIST = 3 };
+
 static const int example_order[3][4] = { { 0, 1, 3, 2 }, { 0, 1, 2, 3 }, { 0, 1, 2, 3 } };
 
 static void append_example(trip_writer *w, int axis)
@@ -36,29 +40,43 @@ static void append_example(trip_writer *w, int axis)
             normals[1] = trip_normal_pack(x->gradient, 4);
             count = 2;
         }
-        assert_int_equal(
-            trip_writer_append(w, axis, x->p[axis], u / 16, v / 16, voxels, normals, count),
-            TRIP_OK);
+        assert_int_equal(trip_writer_append(w, (unsigned)axis, x->p[axis], u / 16, v / 16, voxels,
+                                            normals, count),
+                         TRIP_OK);
     }
+}
+
+static void append_halo(trip_writer *w)
+{
+    const uint32_t *p = halo_voxel, voxel = trip_voxel_pack(p[0] % 16, p[1] % 16, HALO_CODE);
+    assert_int_equal(trip_writer_append(w, HALO_LIST, p[2], p[0] / 16, p[1] / 16, &voxel, NULL, 1),
+                     TRIP_OK);
 }
 
 static void write_example(const char *path, trip_budget *budget)
 {
     trip_writer *w;
-    trip_writer_params params = {
-        .normals = true,
-        .tile_voxels = 16,
-        .slab_sheets = 4,
-        .page_bytes = 4096,
-        .dims = { 20, 3, 2 },
-        .index_to_world = { .m = { { 0.5, 0, 0, 1 }, { 0, 0.5, 0, 2 }, { 0, 0, 2, 3 } } },
-        .code_lo = -10,
-        .code_hi = 10,
-        .gradient_scale = 4
-    };
+    const trip_affine map = { .m = { { 0.5, 0, 0, 1 }, { 0, 0.5, 0, 2 }, { 0, 0, 2, 3 } } };
+    trip_writer_list lists[4];
+    for (int i = 0; i < 4; i++)
+        lists[i] = (trip_writer_list){ .axis = i < 3 ? i : 2,
+                                       .kind = i < 3 ? TRIP_KIND_VOXELS : TRIP_KIND_HALO,
+                                       .dims = { 20, 3, 2 },
+                                       .index_to_world = map,
+                                       .sheet_step = 1 };
+    trip_writer_params params = { .lists = lists,
+                                  .list_count = 4,
+                                  .normal_bytes = 4,
+                                  .tile_voxels = 16,
+                                  .slab_sheets = 4,
+                                  .page_bytes = 4096,
+                                  .dims = { 20, 3, 2 },
+                                  .index_to_world = map,
+                                  .codes = { .code_lo = -10, .code_hi = 10, .gradient_scale = 4 } };
     assert_int_equal(trip_writer_open(&w, path, &params, budget), TRIP_OK);
     for (int axis = 0; axis < 3; axis++)
         append_example(w, axis);
+    append_halo(w);
     assert_int_equal(trip_writer_finish(w, &(trip_writer_summary){ .value_min = -10,
                                                                    .value_max = 10,
                                                                    .voxels = 120,
@@ -126,7 +144,7 @@ static void check_file(const char *path, const page_file *f)
 
 static void the_example_of_the_page_is_what_is_written(void **state)
 {
-    static page_file files[8];
+    static page_file files[9];
     char path[] = "/tmp/trip-format-XXXXXX", name[64];
     trip_budget *budget;
     (void)state;
@@ -136,8 +154,8 @@ static void the_example_of_the_page_is_what_is_written(void **state)
     write_example(name, budget);
     if (getenv("TRIP_KEEP_EXAMPLE"))
         fixture_run_command("cp -r %s %s", name, getenv("TRIP_KEEP_EXAMPLE"));
-    int count = parse_page(files, 8);
-    assert_int_equal(count, 7);
+    int count = parse_page(files, 9);
+    assert_int_equal(count, 8);
     for (int i = 0; i < count; i++)
         check_file(name, &files[i]);
     trip_budget_destroy(budget);

@@ -75,7 +75,7 @@ static void the_plain_reader_sees_what_was_written(void **state)
 
 static void the_plain_reader_notices_a_changed_byte(void **state)
 {
-    static const char *const files[] = { "index.trip", "y.voxels", "z.normals" };
+    static const char *const files[] = { "index.trip", "y0.voxels", "z0.normals" };
     fixture f;
     char line[256];
     (void)state;
