@@ -5,33 +5,26 @@
 #include <string.h>
 
 #include "cached_volume.h"
-#include "cpu/cpu_renderer.h"
-#include "frame.h"
-#include "image_file.h"
+#include "context.h"
 #include "piped_function.h"
 #include "progress.h"
 #include "render_options.h"
 #include "render_stats.h"
 #include "render_view.h"
 #include "report.h"
-#include "session.h"
 
-/* Its helper ends with the program. */
-static trip_image_files pictures;
+/* The context, whose helper for pictures ends with the program. */
+static triptych *context;
 
 /* Everything that lives as long as the command. */
 typedef struct drawing {
     render_options o;
     piped_function function;
     cached_volume volume; /* where the input is one */
-    session session;
-    render_views views;
+    triptych *t;
     float *rgba;
-    trip_renderer *renderer;
-    trip_reader *reader;
     render_stats *stats;
     trip_progress progress;
-    bool counting; /* the frames are drawn once more, and everything of them */
 } drawing;
 
 /* What is kept of a volume: what is shown by default, and what the function shows besides, so that
@@ -63,59 +56,115 @@ static int brick_volume(drawing *d)
     return status;
 }
 
+static int open_data(drawing *d, const char *path)
+{
+    const render_options *o = &d->o;
+    return triptych_open(d->t, path,
+                         &(triptych_resources){ .memory_bytes = o->memory_bytes,
+                                                .threads = (unsigned)o->threads,
+                                                .renderer = o->renderer,
+                                                .engine = o->engine,
+                                                .keep_pages = o->orbit > 1,
+                                                .read_hidden = o->hidden == RENDER_HIDDEN_DRAW,
+                                                .name = o->input });
+}
+
+/* `left_out` as in triptych_function. */
+static int set_function(drawing *d, int *left_out)
+{
+    const session_look *look = &d->o.function;
+    return triptych_set_function(d->t, &(triptych_function){ .name = look->tf,
+                                                             .opacity_scale = look->opacity_scale,
+                                                             .window = look->window,
+                                                             .level = look->level,
+                                                             .left_out = left_out });
+}
+
 /* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
  * function shows; 0: it does not. */
-static int open_usual(drawing *d, session_look look)
+static int open_usual(drawing *d)
 {
+    const session_look *look = &d->o.function;
     const trip_brick_params usual = brick_params(&d->o, &(session_look){ 0 });
-    bool missing = false;
-    int status = look.tf || look.window > 0 ? cached_volume_find(&d->volume, &usual) : 0;
+    int missing = 0,
+        status = look->tf || look->window > 0 ? cached_volume_find(&d->volume, &usual) : 0;
     if (status != 1)
         return status;
-    look.missing = &missing;
-    status = session_open(&d->session, d->volume.path, &look, d->o.memory_bytes);
+    status = open_data(d, d->volume.path);
+    if (!status)
+        status = set_function(d, &missing);
     if (!missing || status < 0)
         return status < 0 ? status : 1;
-    session_close(&d->session);
+    triptych_close(d->t);
     cached_volume_close(&d->volume);
     return 0;
 }
 
 static int open_from_cache(drawing *d)
 {
-    session_look look = d->o.function;
-    look.name = d->o.input;
-    int status = open_usual(d, look);
+    int status = open_usual(d);
     if (status != 0)
         return status < 0 ? status : 0;
     status = brick_volume(d);
-    return status == 0 ? session_open(&d->session, d->volume.path, &look, d->o.memory_bytes)
-                       : status;
+    if (!status)
+        status = open_data(d, d->volume.path);
+    return status ? status : set_function(d, NULL);
 }
 
 /* What was chosen of the volume is said whether it was bricked now or before. */
 static int open_volume(drawing *d)
 {
     int status = open_from_cache(d);
-    const char *note = status == 0 ? trip_dataset_text_note(d->session.text) : NULL;
+    const char *note = status == 0 ? trip_dataset_text_note(d->t->session.text) : NULL;
     if (note)
         trip_note(d->o.input, "%s", note);
     return status;
 }
 
+static int open_input(drawing *d)
+{
+    if (cached_volume_wanted(d->o.input))
+        return open_volume(d);
+    int status = open_data(d, d->o.input);
+    return status ? status : set_function(d, NULL);
+}
+
+static void show_progress(void *user, uint64_t splats, uint64_t total)
+{
+    drawing *d = user;
+    trip_progress_show(&d->progress, d->t->counting ? "count" : "draw", splats, total, "splats");
+}
+
+static void pass_message(void *user, const char *line)
+{
+    (void)user;
+    trip_report_line(line);
+}
+
+static int create_context(drawing *d)
+{
+    int status = triptych_create(&context);
+    d->t = context;
+    if (status)
+        return trip_fail(TRIP_ERROR, "render", "", "out of memory");
+    triptych_set_messages(d->t, pass_message, NULL);
+    triptych_set_progress(d->t, show_progress, d);
+    return 0;
+}
+
 static int open_drawing(drawing *d)
 {
     const render_options *o = &d->o;
-    int status = cached_volume_wanted(o->input)
-                     ? open_volume(d)
-                     : session_open(&d->session, o->input, &o->function, o->memory_bytes);
+    const triptych_view view = render_view(o);
+    int status = create_context(d);
     if (!status)
-        status = session_take_image(&d->session, o->width, o->height, &d->rgba);
+        status = open_input(d);
     if (!status)
-        status = render_views_make(&d->views, o, &d->session);
+        status = session_take_image(&d->t->session, o->width, o->height, &d->rgba);
     if (!status)
-        status = trip_renderer_create(&d->renderer, o->renderer, (unsigned)o->threads,
-                                      d->session.budget);
+        status = triptych_set_settings(d->t, &o->settings);
+    if (!status)
+        status = triptych_set_view(d->t, &view);
     if (!status && o->stats)
         status = render_stats_create(&d->stats);
     return status;
@@ -124,30 +173,12 @@ static int open_drawing(drawing *d)
 static void close_drawing(drawing *d)
 {
     render_stats_destroy(d->stats);
-    if (d->reader)
-        trip_reader_destroy(d->reader);
-    if (d->renderer)
-        d->renderer->ops->destroy(d->renderer);
-    session_release_image(&d->session, d->o.width, d->o.height, d->rgba);
-    session_close(&d->session);
+    if (d->t) {
+        triptych_end(d->t);
+        session_release_image(&d->t->session, d->o.width, d->o.height, d->rgba);
+        triptych_close(d->t);
+    }
     cached_volume_close(&d->volume);
-}
-
-/* The reader is made when the first plan says which planes there are to read. */
-static int make_reader(drawing *d, unsigned planes)
-{
-    bool finds_hidden = !strcmp(d->renderer->ops->name, "cpu");
-    bool draws_all = d->o.hidden == RENDER_HIDDEN_DRAW || d->counting;
-    const session_reader wanted = {
-        .engine = d->o.engine,
-        .planes = planes,
-        .threads = d->o.threads,
-        .cache = d->o.orbit > 1 && !d->counting,
-        .renderer = d->renderer,
-        .skip = finds_hidden && !draws_all ? trip_cpu_covered : NULL,
-        .skip_user = d->renderer,
-    };
-    return d->reader ? 0 : session_make_reader(&d->session, &d->reader, &wanted);
 }
 
 /* image.png -> image-007.png */
@@ -162,89 +193,75 @@ static int image_path(const drawing *d, int index, char *path, size_t bytes)
     return 0;
 }
 
-static void show_progress(void *user, uint64_t splats, uint64_t total)
+/* A view of the orbit, and the plan of its frame. */
+static int prepare_image(drawing *d, int index)
 {
-    drawing *d = user;
-    trip_progress_show(&d->progress, d->counting ? "count" : "draw", splats, total, "splats");
+    int status = triptych_turn(d->t, d->o.orbit ? 360.0 * index / d->o.orbit : 0);
+    return status ? status : trip_context_prepare(d->t);
 }
 
-static int draw_planned(drawing *d, const trip_camera *camera, const trip_plan *plan,
-                        trip_frame_stats *stats)
+/* Leaves the frame for a look at its plan and statistics. */
+static int draw_prepared(drawing *d)
 {
-    const session *s = &d->session;
-    trip_frame frame = {
-        .data = s->data,
-        .camera = camera,
-        .settings = &d->o.settings,
-        .plan = plan,
-        .table = s->table,
-        .count = d->counting,
-        .progress = show_progress,
-        .progress_user = d,
-    };
-    int status = make_reader(d, plan->planes);
+    enum { LOOK_NS = 20000000 };
     d->progress = trip_progress_start(false);
+    int status = triptych_begin(d->t);
+    while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_WAITS)
+        status = triptych_await(d->t, LOOK_NS);
     if (!status)
-        status = trip_frame_draw(d->renderer, d->reader, &frame, d->rgba, stats);
+        status = triptych_picture(d->t, d->rgba);
     trip_progress_end(&d->progress);
     return status;
 }
 
-/* The camera and the plan of an image; the plan is released by the caller. */
-static int plan_image(const drawing *d, int index, trip_camera *camera, trip_plan *plan)
+static int tell_of_image(drawing *d)
 {
-    const session *s = &d->session;
-    trip_camera_params view = render_views_get(&d->views, index);
-    int status = trip_camera_make(camera, &view, &s->data->index_to_world);
-    return status ? status
-                  : trip_plan_make(plan, s->data, camera, &d->o.settings, s->table, s->budget);
+    const triptych *t = d->t;
+    const trip_frame_stats *stats = &t->drawing.stats;
+    if (d->o.explain)
+        render_stats_explain(stats, t->renderer, t->reader, stdout);
+    int status = 0;
+    if (d->stats)
+        status = render_stats_add_frame(d->stats, t->session.data, &t->plan, stats);
+    if (!status && d->stats)
+        status = render_stats_add_camera(d->stats, &t->camera.params);
+    return status;
 }
 
 static int draw_image(drawing *d, int index)
 {
-    const session *s = &d->session;
+    const triptych *t = d->t;
     char path[4096];
-    trip_camera camera;
-    trip_plan plan;
-    trip_frame_stats stats;
     int status = image_path(d, index, path, sizeof path);
     if (!status)
-        status = plan_image(d, index, &camera, &plan);
+        status = prepare_image(d, index);
     if (status)
         return status;
     if (d->o.explain) {
-        render_stats_explain_camera(&camera.params, d->views.splats, stdout);
-        trip_plan_explain(&plan, s->data, &d->o.settings, stdout);
+        render_stats_explain_camera(&t->camera.params, t->fit_splats, stdout);
+        trip_plan_explain(&t->plan, t->session.data, &t->settings, stdout);
     }
-    status = draw_planned(d, &camera, &plan, &stats);
-    if (!status && d->o.explain)
-        render_stats_explain(&stats, d->renderer, d->reader, stdout);
-    if (!status && d->stats)
-        status = render_stats_add_frame(d->stats, s->data, &plan, &stats);
-    if (!status && d->stats)
-        status = render_stats_add_camera(d->stats, &camera.params);
-    trip_plan_release(&plan, s->budget);
+    status = draw_prepared(d);
     if (!status)
-        status = trip_image_write(&pictures, path, d->o.width, d->o.height, d->rgba, NULL);
+        status = tell_of_image(d);
+    triptych_end(d->t);
+    if (!status)
+        status = triptych_write(d->t, path, d->o.width, d->o.height, d->rgba);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
-        render_stats_summary(path, &d->o, &stats, stdout);
+        render_stats_summary(path, &d->o, &t->drawing.stats, stdout);
     return status;
 }
 
 static int count_image(drawing *d, int index)
 {
-    trip_camera camera;
-    trip_plan plan;
-    trip_frame_stats counted;
-    int status = plan_image(d, index, &camera, &plan);
-    if (status)
-        return status;
-    status = draw_planned(d, &camera, &plan, &counted);
-    trip_plan_release(&plan, d->session.budget);
+    int status = prepare_image(d, index);
+    if (!status)
+        status = draw_prepared(d);
+    triptych_end(d->t);
     if (!status && d->stats)
-        status = render_stats_add_count(d->stats, index, &counted);
+        status = render_stats_add_count(d->stats, index, &d->t->drawing.stats);
     if (!status && d->o.explain)
-        render_stats_explain_count(&counted, stdout);
+        render_stats_explain_count(&d->t->drawing.stats, stdout);
     return status;
 }
 
@@ -253,9 +270,7 @@ static int count_image(drawing *d, int index)
 static int count_images(drawing *d, int images)
 {
     int status = 0;
-    trip_reader_destroy(d->reader);
-    d->reader = NULL;
-    d->counting = true;
+    trip_context_count(d->t);
     for (int i = 0; i < images && !status; i++)
         status = count_image(d, i);
     return status;
@@ -272,12 +287,14 @@ int trip_command_render(int argc, char **argv)
     if (!status)
         status = open_drawing(&d);
     if (!status)
-        status = trip_image_prepare(&pictures); /* it gets ready while the first image is drawn */
+        status =
+            trip_image_prepare(&d.t->pictures); /* it gets ready while the first image is drawn */
     int images = d.o.orbit ? d.o.orbit : 1;
     for (int i = 0; i < images && !status; i++)
         status = draw_image(&d, i);
     if (!status && d.stats)
-        status = render_stats_describe(d.stats, &d.o, d.renderer, d.reader, d.session.budget);
+        status =
+            render_stats_describe(d.stats, &d.o, d.t->renderer, d.t->reader, d.t->session.budget);
     if (!status && d.o.count)
         status = count_images(&d, images);
     if (!status && d.stats)

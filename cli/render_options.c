@@ -11,6 +11,7 @@
 #include "new_file.h"
 #include "options.h"
 #include "report.h"
+#include "view.h"
 #include "text.h"
 #include "volume_options.h"
 
@@ -149,29 +150,31 @@ static int parse_size(const char *text, render_options *o)
     return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
 }
 
-static int parse_point(const char *option, const char *text, trip_vec3 *out, bool *given)
+static int parse_point(const char *option, const char *text, double point[3], bool *given)
 {
-    double v[3];
-    int count, status = trip_option_numbers(option, text, 3, 3, v, &count);
-    *out = trip_v3(v[0], v[1], v[2]);
+    int count;
     *given = true;
-    return status;
+    return trip_option_numbers(option, text, 3, 3, point, &count);
 }
 
-static int parse_light(const char *text, trip_settings *s)
+static bool is_zero(const double v[3])
+{
+    return !(trip_length(trip_v3(v[0], v[1], v[2])) > 0);
+}
+
+static int parse_light(const char *text, triptych_settings *s)
 {
     bool given;
     s->headlight = !strcmp(text, "head");
     if (s->headlight)
         return 0;
-    int status = parse_point("--light", text, &s->light_direction, &given);
-    if (!status && !(trip_length(s->light_direction) > 0))
+    int status = parse_point("--light", text, s->light, &given);
+    if (!status && is_zero(s->light))
         return trip_option_fail("--light", "the direction is zero");
-    s->light_direction = trip_normalize(s->light_direction);
     return status;
 }
 
-static int parse_background(const char *text, trip_settings *s)
+static int parse_background(const char *text, triptych_settings *s)
 {
     int count;
     memset(s->background, 0, sizeof s->background);
@@ -232,8 +235,8 @@ static int parse_volume(int key, char *arg, trip_volume_params *v)
 
 static int parse_up(const char *text, render_options *o)
 {
-    int status = parse_point("--up", text, &o->up, &o->up_given);
-    if (!status && !(trip_length(o->up) > 0))
+    int status = parse_point("--up", text, o->up, &o->up_given);
+    if (!status && is_zero(o->up))
         return trip_option_fail("--up", "the direction is zero");
     return status;
 }
@@ -261,7 +264,7 @@ static int parse_side(int key, char *arg, parse *p)
     switch (key) {
     case KEY_VIEW:
         status = trip_option_choice("--view", arg, views, &which);
-        o->view = (trip_view)(TRIP_VIEW_FRONT + which);
+        o->side = (triptych_side)(TRIPTYCH_FRONT + which);
         break;
     case KEY_AZIMUTH:
         status = trip_option_number("--azimuth", arg, -3600, 3600, &o->azimuth_degrees);
@@ -283,9 +286,9 @@ static int parse_view(int key, char *arg, parse *p)
     case KEY_SIZE:
         return parse_size(arg, o);
     case KEY_EYE:
-        return parse_point("--eye", arg, &o->eye, &o->eye_given);
+        return parse_point("--eye", arg, o->eye, &o->eye_given);
     case KEY_LOOK:
-        return parse_point("--look", arg, &o->look, &o->look_given);
+        return parse_point("--look", arg, o->look, &o->look_given);
     case KEY_UP:
         return parse_up(arg, o);
     case KEY_ROLL:
@@ -293,7 +296,7 @@ static int parse_view(int key, char *arg, parse *p)
     case KEY_ZOOM:
         return trip_option_number("--zoom", arg, 1e-6, 1e6, &o->zoom);
     case KEY_FOV:
-        return trip_option_number("--fov", arg, RENDER_FOV_MIN_DEGREES, RENDER_FOV_MAX_DEGREES,
+        return trip_option_number("--fov", arg, TRIP_FOV_MIN_DEGREES, TRIP_FOV_MAX_DEGREES,
                                   &o->fov_degrees);
     case KEY_ORTHO:
         return parse_ortho(arg, o);
@@ -308,16 +311,16 @@ static int parse_method(int key, char *arg, parse *p)
 {
     static const char *const methods[] = { "merge", "clip", "axis", NULL };
     static const char *const traversals[] = { "outward", "ascending", NULL };
-    trip_settings *s = &p->o->settings;
+    triptych_settings *s = &p->o->settings;
     int which = 0, status;
     switch (key) {
     case KEY_METHOD:
         status = trip_option_choice("--method", arg, methods, &which);
-        s->method = (trip_method)which;
+        s->method = (triptych_method)which;
         return status;
     case KEY_TRAVERSAL:
         status = trip_option_choice("--traversal", arg, traversals, &which);
-        s->traversal = (trip_traversal)which;
+        s->traversal = (triptych_traversal)which;
         return status;
     case KEY_H:
         p->h = true;
@@ -369,12 +372,12 @@ static int parse_renderer(int key, char *arg, parse *p)
     switch (key) {
     case KEY_RENDERER:
         status = trip_option_choice("--renderer", arg, renderers, &which);
-        o->renderer = (trip_renderer_kind)which;
+        o->renderer = (triptych_renderer)which;
         return status;
     case KEY_TARGET:
         p->target = true;
         status = trip_option_choice("--target", arg, targets, &which);
-        o->settings.target = (trip_target)which;
+        o->settings.target = (triptych_target)which;
         return status;
     case KEY_SUBMIT:
         return parse_submit(arg, p);
@@ -386,7 +389,7 @@ static int parse_renderer(int key, char *arg, parse *p)
         return trip_option_bytes("--memory", arg, &o->memory_bytes);
     case KEY_ENGINE:
         status = trip_option_choice("--engine", arg, engines, &which);
-        o->engine = (trip_engine)which;
+        o->engine = (triptych_engine)which;
         return status;
     case KEY_THREADS:
         return trip_option_integer("--threads", arg, 1, 1024, &o->threads);
@@ -431,19 +434,19 @@ static int check(parse *p)
     if (p->level != (o->function.window > 0))
         return trip_option_fail(p->level ? "--level" : "--window",
                                 "--window and --level are given together");
-    if (p->h && o->settings.method != TRIP_METHOD_MERGE)
+    if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
-    if (p->target && o->renderer == TRIP_RENDERER_REFERENCE)
+    if (p->target && o->renderer == TRIPTYCH_RENDERER_REFERENCE)
         return trip_option_fail("--target", "does not apply to --renderer reference");
     bool gl_only = p->lists || p->forms;
-    if (gl_only && o->renderer != TRIP_RENDERER_AUTO && o->renderer != TRIP_RENDERER_GL)
+    if (gl_only && o->renderer != TRIPTYCH_RENDERER_AUTO && o->renderer != TRIPTYCH_RENDERER_GL)
         return trip_option_fail("--submit", "applies to --renderer gl only");
     if (gl_only)
-        o->renderer = TRIP_RENDERER_GL;
-    if (o->hidden && o->renderer != TRIP_RENDERER_AUTO && o->renderer != TRIP_RENDERER_CPU)
+        o->renderer = TRIPTYCH_RENDERER_GL;
+    if (o->hidden && o->renderer != TRIPTYCH_RENDERER_AUTO && o->renderer != TRIPTYCH_RENDERER_CPU)
         return trip_option_fail("--hidden", "applies to --renderer cpu only");
     if (o->hidden)
-        o->renderer = TRIP_RENDERER_CPU;
+        o->renderer = TRIPTYCH_RENDERER_CPU;
     if (o->count && !o->stats && !o->explain)
         return trip_option_fail("--count", "adds to --stats or --explain; give one of them");
     const char *extension = strrchr(o->output, '.');
@@ -499,7 +502,7 @@ int render_options_parse(render_options *o, int argc, char **argv)
                "the next picture of it is drawn at once.\vPoints and lengths are in the data's "
                "world units.",
     };
-    *o = (render_options){ .width = 1024, .height = 1024, .settings = trip_settings_default() };
+    *o = (render_options){ .width = 1024, .height = 1024, .settings = triptych_default_settings() };
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);
 }

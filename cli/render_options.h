@@ -2,11 +2,8 @@
 #ifndef TRIP_RENDER_OPTIONS_H
 #define TRIP_RENDER_OPTIONS_H
 
-#include "framing.h"
-#include "reader.h"
-#include "renderer_choice.h"
 #include "session.h"
-#include "settings.h"
+#include "triptych.h"
 #include "volume.h"
 
 /* What becomes of bricks behind what is already opaque; skipped where nothing is said. */
@@ -16,9 +13,6 @@ typedef enum render_hidden {
     RENDER_HIDDEN_DRAW,
 } render_hidden;
 
-#define RENDER_FOV_MIN_DEGREES 1e-6
-#define RENDER_FOV_MAX_DEGREES 179.999
-
 typedef struct render_options {
     const char *input,
         *output;               /* data set or volume; an image file, its name's model in an orbit */
@@ -27,16 +21,16 @@ typedef struct render_options {
     const char *stats;         /* file, "-" for stdout, or NULL */
     int width, height;
     bool eye_given, look_given, up_given;
-    trip_vec3 eye, look, up;
-    trip_view view;
+    double eye[3], look[3], up[3];
+    triptych_side side;
     double azimuth_degrees, elevation_degrees, roll_degrees;
     double zoom, fov_degrees, ortho_height; /* 0: not given */
     bool ortho_fit;                         /* parallel, as high as needed */
     int orbit;                              /* images of a turntable; 0: one image */
-    trip_settings settings;
-    trip_renderer_kind renderer;
+    triptych_settings settings;
+    triptych_renderer renderer;
     render_hidden hidden;
-    trip_engine engine;
+    triptych_engine engine;
     uint64_t memory_bytes; /* 0: the default */
     int threads;           /* 0: the default */
     bool explain, count;

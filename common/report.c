@@ -93,12 +93,21 @@ static void emit(int status, const char *text)
     const trip_scope *s = trip_scope_current();
     while (s && !s->sink && !(s->failed && status != TRIP_OK))
         s = s->around;
-    if (s && s->failed && status != TRIP_OK)
-        s->failed(s->user, status, text);
-    else if (s)
-        s->sink(text, s->user);
-    else
+    if (!s) {
         print(text);
+        return;
+    }
+    trip_scope *here = trip_scope_enter(s->around); /* whoever takes it may report, further out */
+    if (s->failed && status != TRIP_OK)
+        s->failed(s->user, status, text);
+    else
+        s->sink(text, s->user);
+    trip_scope_enter(here);
+}
+
+void trip_report_line(const char *text)
+{
+    emit(TRIP_OK, text);
 }
 
 static void keep(int status, const char *text)

@@ -39,6 +39,9 @@ __attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const ch
 /* Prints "triptych: note: WHERE: what": a choice made for the user, and how to make another. */
 __attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *what, ...);
 
+/* Passes on a line that another scope took. */
+void trip_report_line(const char *line);
+
 /* Failures of this thread, of which the first is kept instead of printed: of work that is shared
  * out only the first failure of all is told. */
 typedef struct trip_held_report {

@@ -1,7 +1,7 @@
 /* What a thread works for: where its messages go, and whether the work is still wanted. A thread
- * starts in a scope of its own, whose messages go to stderr and whose work ends with a signal to the
- * program; threads that work for another enter its scope. Nothing here belongs to the process but
- * the flag that trip_interrupt_install()'s handler sets. */
+ * starts in a scope of its own, whose messages go to stderr and whose work ends with a signal to
+ * the program; threads that work for another enter its scope. Nothing here belongs to the process
+ * but the flag that trip_interrupt_install()'s handler sets. */
 #ifndef TRIP_SCOPE_H
 #define TRIP_SCOPE_H
 
@@ -13,11 +13,12 @@ extern "C" {
 
 /* Starts zeroed. Several threads may be in one at a time; it outlives their stay. */
 typedef struct trip_scope {
-    struct trip_scope *around; /* takes the messages that this one does not, and ends its work too */
+    struct trip_scope
+        *around; /* takes the messages that this one does not, and ends its work too */
     /* Takes a failure, instead of the function below. */
     void (*failed)(void *user, int status, const char *line);
     /* Takes a line: a warning, a note, or a failure. NULL: the scope around it, or stderr. Both may
-     * be called by any thread in the scope. */
+     * be called by any thread in the scope, and report in the scope around it. */
     void (*sink)(const char *line, void *user);
     void *user;
     /* Atomic; trip_scope_cancel() sets the one, the report of an interruption the other. */

@@ -1,5 +1,6 @@
 #include "image_helper.h"
 
+#include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -46,20 +47,28 @@ void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms)
     stand_in_patience_ms = patience_ms;
 }
 
-/* Beside this program, where it is installed, or where it was built. */
+/* At a place that is told from the folder of a file. */
+static bool is_at(char path[PATH_MAX], const char *file, const char *place)
+{
+    const char *slash = strrchr(file, '/');
+    int folder = slash ? (int)(slash + 1 - file) : 0;
+    int length = snprintf(path, PATH_MAX, "%.*s%s" PROGRAM, folder, file, place);
+    return slash && length < PATH_MAX && access(path, X_OK) == 0;
+}
+
+/* Beside this program, where it is installed with the program or the library, or where it was
+ * built. */
 static bool find_program(char path[PATH_MAX])
 {
-    static const char *const places[] = { "", "../libexec/triptych/" };
     char self[PATH_MAX];
+    Dl_info library;
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
     self[n > 0 ? n : 0] = 0;
-    char *slash = strrchr(self, '/');
-    for (size_t i = 0; slash && i < sizeof places / sizeof places[0]; i++) {
-        slash[1] = 0;
-        int length = snprintf(path, PATH_MAX, "%s%s" PROGRAM, self, places[i]);
-        if (length < PATH_MAX && access(path, X_OK) == 0)
-            return true;
-    }
+    if (is_at(path, self, "") || is_at(path, self, "../libexec/triptych/"))
+        return true;
+    if (dladdr(TRIP_IMAGE_HELPER_BUILT, &library) && library.dli_fname &&
+        is_at(path, library.dli_fname, TRIP_IMAGE_HELPER_FROM_LIBRARY))
+        return true;
     snprintf(path, PATH_MAX, "%s", TRIP_IMAGE_HELPER_BUILT);
     return access(path, X_OK) == 0;
 }

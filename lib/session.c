@@ -50,7 +50,7 @@ static int load_function(const session *s, const session_look *look, trip_tf **t
     return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 
-static int load_transfer_function(session *s, const session_look *look)
+int session_use_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
@@ -75,19 +75,23 @@ static int take_table(session *s)
                      "the transfer function's table does not fit the memory given; raise --memory");
 }
 
-int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
+int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 {
-    *s = (session){ .input = look->name ? look->name : input };
+    *s = (session){ .input = input };
     int status = trip_budget_create(&s->budget, memory_bytes);
     if (!status)
         status = trip_dataset_open(&s->data, input, s->budget);
     if (!status)
         status = trip_dataset_text_parse(&s->text, s->data);
-    if (!status)
-        status = take_table(s);
-    if (!status)
-        status = load_transfer_function(s, look);
-    return status;
+    return status ? status : take_table(s);
+}
+
+int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
+{
+    int status = session_open_data(s, input, memory_bytes);
+    if (look->name)
+        s->input = look->name;
+    return status ? status : session_use_function(s, look);
 }
 
 void session_close(session *s)

@@ -1,7 +1,7 @@
-/* What the commands that draw have in common: the budget, an opened data set, its transfer function
+/* What frames of a data set have in common: the budget, an opened data set, its transfer function
  * as a table, and readers whose rings fit the memory given. One thread. */
-#ifndef TRIP_CLI_SESSION_H
-#define TRIP_CLI_SESSION_H
+#ifndef TRIP_SESSION_H
+#define TRIP_SESSION_H
 
 #include "dataset_text.h"
 #include "plan.h"
@@ -26,8 +26,12 @@ typedef struct session_look {
     bool *missing;        /* set, in the place of a warning, where values that show were left out */
 } session_look;
 
-/* Warns when the function shows values that were left out when the data set was made, with the
- * command that makes it anew. Close it also after a failure. */
+/* The data set alone. */
+int session_open_data(session *s, const char *input, uint64_t memory_bytes);
+/* Its function, from now on. */
+int session_use_function(session *s, const session_look *look);
+/* Both. Warns when the function shows values that were left out when the data set was made, with
+ * the command that makes it anew. Close it also after a failure. */
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);
 void session_close(session *s);
 

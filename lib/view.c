@@ -1,0 +1,175 @@
+#include "view.h"
+
+#include "report.h"
+#include "visible.h"
+
+#define DEGREE (3.14159265358979323846 / 180)
+
+static trip_vec3 vector(const double v[3])
+{
+    return trip_v3(v[0], v[1], v[2]);
+}
+
+/* Whether something of the view is left to find. */
+static bool is_fitted(const triptych_view *o)
+{
+    return !(o->eye && o->look);
+}
+
+static trip_camera_framing framing_of(const triptych_view *o, const session *s)
+{
+    trip_camera_framing f = {
+        .width = o->width,
+        .height = o->height,
+        .view = (trip_view)o->side,
+        .azimuth_degrees = o->azimuth_degrees,
+        .elevation_degrees = o->elevation_degrees,
+        .roll_degrees = o->roll_degrees,
+        .fov_degrees = o->fov_degrees,
+        .parallel = o->ortho_height > 0 || o->ortho_fit,
+        .ortho_height = o->ortho_height,
+        .turntable = o->turntable,
+    };
+    trip_dataset_text_frame(s->text, s->data, &f);
+    if (o->up)
+        trip_framing_set_up(&f, vector(o->up));
+    return f;
+}
+
+/* Another up where the one that was not asked for lies along the view. */
+static void avoid_up_along_view(trip_camera_params *view)
+{
+    trip_vec3 gaze = trip_normalize(trip_sub(view->look, view->eye));
+    if (trip_length(trip_cross(gaze, view->up)) < 1e-6)
+        view->up = fabs(view->up.z) > 0.5 ? trip_v3(0, 1, 0) : trip_v3(0, 0, 1);
+}
+
+/* The view from a given eye at a given point or the middle. */
+static void view_from_eye(const triptych_view *o, const trip_camera_framing *f, const session *s,
+                          trip_camera_params *view)
+{
+    *view = (trip_camera_params){ .eye = vector(o->eye),
+                                  .up = trip_length(f->up) > 0 ? f->up : trip_v3(0, 0, 1),
+                                  .fov_degrees = o->fov_degrees > 0 ? o->fov_degrees : 30,
+                                  .ortho_height = o->ortho_height,
+                                  .width = o->width,
+                                  .height = o->height };
+    view->look = o->look ? vector(o->look) : trip_framing_middle(f, &s->data->index_to_world);
+    if (o->up)
+        view->up = vector(o->up);
+    else
+        avoid_up_along_view(view);
+    trip_vec3 gaze = trip_sub(view->look, view->eye);
+    if (o->roll_degrees != 0)
+        view->up = trip_camera_turn(view, gaze, -o->roll_degrees).up;
+}
+
+static int view_framed(const triptych_view *o, const trip_camera_framing *f, const session *s,
+                       trip_camera_params *view)
+{
+    int status = trip_camera_frame(f, &s->data->index_to_world, view);
+    if (!status && o->look) {
+        view->eye = trip_add(vector(o->look), trip_sub(view->eye, view->look));
+        view->look = vector(o->look);
+    }
+    return status;
+}
+
+/* As through another lens: the eye stays where it is. */
+static int zoom(trip_camera_params *view, double factor)
+{
+    if (factor == 0)
+        return 0;
+    view->ortho_height /= factor;
+    view->fov_degrees = atan(tan(view->fov_degrees / 2 * DEGREE) / factor) * 2 / DEGREE;
+    if (view->ortho_height > 0 ||
+        (view->fov_degrees >= TRIP_FOV_MIN_DEGREES && view->fov_degrees <= TRIP_FOV_MAX_DEGREES))
+        return 0;
+    return trip_fail(TRIP_USAGE, "usage", "--zoom",
+                     "%g makes an angle of view of %g degrees, which is not between %g and %g",
+                     factor, view->fov_degrees, TRIP_FOV_MIN_DEGREES, TRIP_FOV_MAX_DEGREES);
+}
+
+static int make_view(trip_found_view *v, const triptych_view *o, const session *s,
+                     const trip_camera_framing *f)
+{
+    int status = 0;
+    if (o->eye)
+        view_from_eye(o, f, s, &v->params);
+    else
+        status = view_framed(o, f, s, &v->params);
+    v->axis = trip_length(f->up) > 0 ? f->up : trip_v3(0, 0, 1);
+    return status ? status : zoom(&v->params, o->zoom);
+}
+
+/* Half of a splat's reach counts: beyond it is faint, and the margin holds the rest. Of small
+ * things the margin is too narrow for that, and more counts. */
+static double kernel_that_counts(const trip_camera_framing *f, double radius)
+{
+    const double margin = (1 - TRIP_FRAMING_FILL) / 2;
+    double voxels = INFINITY;
+    for (int a = 0; a < 3; a++)
+        voxels = fmin(voxels, f->hi[a] - f->lo[a]);
+    return fmax(radius / 2, radius - margin * voxels);
+}
+
+/* With a reader that is gone before the one of the frames is made. */
+static int make_fitted(trip_found_view *v, const triptych_view *o, const session *s,
+                       double kernel_radius, const session_reader *wanted, trip_camera_framing *f)
+{
+    trip_visible visible = { .data = s->data, .budget = s->budget };
+    trip_dataset_kept_bounds(s->data, visible.lo, visible.hi);
+    int status = session_make_reader(s, &visible.reader, wanted);
+    if (status)
+        return status;
+    trip_visible_start(&visible, s->table);
+    status = trip_visible_bounds(&visible, f->lo, f->hi);
+    visible.kernel_radius = kernel_that_counts(f, kernel_radius);
+    f->reach = trip_visible_reach;
+    f->reach_user = &visible;
+    if (!status)
+        status = make_view(v, o, s, f);
+    v->splats = visible.splats;
+    trip_reader_destroy(visible.reader);
+    return status;
+}
+
+static bool are_finite(const double *v)
+{
+    return !v || isfinite(v[0] + v[1] + v[2]);
+}
+
+static int check(const triptych_view *o)
+{
+    double sum = o->azimuth_degrees + o->elevation_degrees + o->roll_degrees + o->zoom +
+                 o->fov_degrees + o->ortho_height;
+    const char *why = NULL;
+    if (!isfinite(sum) || !are_finite(o->eye) || !are_finite(o->look) || !are_finite(o->up))
+        why = "a number is not finite";
+    else if (o->width < 1 || o->height < 1 || o->width > 99999 || o->height > 99999)
+        why = "a picture has 1 to 99999 pixels either way";
+    else if (o->up && !(trip_length(vector(o->up)) > 0))
+        why = "the direction that is up is zero";
+    else if (o->zoom < 0 || o->ortho_height < 0)
+        why = "neither zoom nor the height of a parallel view is below 0";
+    else if (o->fov_degrees != 0 &&
+             !(o->fov_degrees >= TRIP_FOV_MIN_DEGREES && o->fov_degrees <= TRIP_FOV_MAX_DEGREES))
+        why = "the angle of view lies between 1e-6 and 179.999 degrees";
+    else if (o->side < TRIPTYCH_SIDE_DEFAULT || o->side > TRIPTYCH_ISO)
+        why = "there is no such side";
+    else if (o->eye && o->ortho_fit)
+        why = "with an eye, a parallel view has a given height";
+    return why ? trip_fail(TRIP_USAGE, "render", "view", "%s", why) : 0;
+}
+
+int trip_view_find(trip_found_view *found, const triptych_view *view, const session *s,
+                   double kernel_radius, const session_reader *wanted)
+{
+    *found = (trip_found_view){ .splats = 0 };
+    int status = check(view);
+    if (status)
+        return status;
+    trip_camera_framing f = framing_of(view, s);
+    return is_fitted(view) ? make_fitted(found, view, s, kernel_radius, wanted, &f)
+                           : make_view(found, view, s, &f);
+}

@@ -1,0 +1,98 @@
+"""The installed library: found by pkg-config alone, it draws the example's picture with the bits of
+the program's, as a shared and as a static library, and shows nothing but its header's functions."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CMAKE, BUILD, SOURCE, CC, CXX = sys.argv[1:]
+DATA = os.path.join(SOURCE, "datasets", "tooth.nhdr")
+VIEW = ["--size", "320x240", "--view", "iso", "--azimuth", "30", "--background", "0,0,0.25"]
+
+
+def run(*command, **options):
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
+    if result.returncode:
+        raise AssertionError(f"{command}: {result.returncode}\n{result.stdout}{result.stderr}")
+    return result.stdout
+
+
+@unittest.skipUnless(shutil.which("pkg-config"), "pkg-config is missing")
+class Installed(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.prefix = os.path.join(cls.folder.name, "prefix")
+        run(CMAKE, "--install", BUILD, "--prefix", cls.prefix)
+        [pc] = [root for root, _, files in os.walk(cls.prefix) if "triptych.pc" in files]
+        cls.libraries = os.path.dirname(pc)
+        cls.environment = dict(os.environ, PKG_CONFIG_PATH=pc, LD_LIBRARY_PATH=cls.libraries)
+        cls.program = os.path.join(cls.prefix, "bin", "triptych")
+        cls.data = os.path.join(cls.folder.name, "tooth.trip")
+        run(cls.program, "brick", DATA, "-o", cls.data)
+        cls.expected = os.path.join(cls.folder.name, "expected.exr")
+        run(cls.program, "render", cls.data, "-o", cls.expected, "--tf", "grey", *VIEW)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def pkg_config(self, *options):
+        return run("pkg-config", *options, "triptych", env=self.environment).split()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def draw(self, program):
+        """By the example: its picture has the bits of the program's."""
+        picture = self.path("picture.exr")
+        run(program, self.data, "grey", picture, env=self.environment, cwd=self.folder.name)
+        with open(picture, "rb") as one, open(self.expected, "rb") as other:
+            self.assertEqual(one.read(), other.read())
+
+    def test_the_example_draws_what_the_program_draws(self):
+        run(CC, "-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Werror", "-o",
+            self.path("example"), os.path.join(SOURCE, "lib", "example.c"),
+            *self.pkg_config("--cflags", "--libs"))
+        self.draw(self.path("example"))
+
+    def test_so_it_does_with_the_static_library(self):
+        flags = self.pkg_config("--static", "--cflags", "--libs")
+        static = [os.path.join(self.libraries, "libtriptych.a") if flag == "-ltriptych" else flag
+                  for flag in flags]
+        self.assertNotEqual(flags, static)
+        run(CC, "-std=c11", "-D_POSIX_C_SOURCE=200809L", "-o", self.path("static"),
+            os.path.join(SOURCE, "lib", "example.c"), *static)
+        needed = run("readelf", "-d", self.path("static"))
+        self.assertNotIn("libtriptych", needed)
+        self.draw(self.path("static"))
+
+    def test_the_header_is_c_plus_plus_too(self):
+        with open(self.path("a.cpp"), "w") as f:
+            f.write("#include <triptych.h>\n#include <cstdio>\nint main() { triptych *t;"
+                    " if (triptych_create(&t)) return 1; triptych_view view{}; view.width = 8;"
+                    " int status = triptych_set_view(t, &view); std::puts(triptych_error(t));"
+                    " triptych_destroy(t); return status == TRIPTYCH_USAGE ? 0 : 1; }\n")
+        run(CXX, "-Wall", "-Wextra", "-Werror", "-o", self.path("cpp"), self.path("a.cpp"),
+            *self.pkg_config("--cflags", "--libs"))
+        self.assertIn("no data set is open", run(self.path("cpp"), env=self.environment))
+
+    def test_nothing_but_the_header_s_functions_is_visible(self):
+        with open(os.path.join(SOURCE, "lib", "triptych.h")) as f:
+            header = set(re.findall(r"^TRIPTYCH_API .*?\**(triptych_\w+)\(", f.read(), re.M))
+        symbols = run("nm", "-D", "--defined-only", os.path.join(self.libraries, "libtriptych.so"))
+        visible = {line.split()[-1] for line in symbols.splitlines()}
+        self.assertEqual(visible, header)
+        self.assertGreater(len(header), 20)
+
+    def test_it_has_a_version_and_a_name_with_one(self):
+        library = os.path.realpath(os.path.join(self.libraries, "libtriptych.so"))
+        version = self.pkg_config("--modversion")[0]
+        self.assertEqual(os.path.basename(library), f"libtriptych.so.{version}")
+        self.assertIn(f"[libtriptych.so.{version.split('.')[0]}]", run("readelf", "-d", library))
+
+
+unittest.main(argv=sys.argv[:1])
