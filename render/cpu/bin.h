@@ -25,11 +25,12 @@ typedef struct trip_cpu_segment {
 
 /* Voxels of consecutive runs of a batch, and the splats that they became. */
 typedef struct trip_cpu_chunk {
-    size_t run;      /* the first, in the batch */
-    uint32_t skip;   /* of its voxels, in draw order */
-    uint32_t voxels; /* in all */
-    unsigned list;   /* that all of them are of */
-    uint32_t splat;  /* first one in the buffer */
+    size_t run;       /* the first, in the batch */
+    uint32_t skip;    /* of its squares, in draw order */
+    uint32_t skipped; /* voxels of those */
+    uint32_t voxels;  /* in all, of whole squares */
+    unsigned list;    /* that all of them are of */
+    uint32_t splat;   /* first one in the buffer */
     uint32_t splats;
     uint32_t first_segment, segments;
     bool spread;            /* not sorted: every tile looks through all its splats */
@@ -60,6 +61,8 @@ typedef struct trip_cpu_flush {
 
 /* Most voxels of a chunk. */
 #define TRIP_CPU_CHUNK 4096
+/* And most runs that they are of. */
+#define TRIP_CPU_CHUNK_RUNS 1024
 
 int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget);
 void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget);

@@ -2,14 +2,14 @@
 
 #include "weight.h"
 
-bool trip_cpu_is_projected(const trip_cpu_view *view, const trip_run *run, uint32_t voxel)
+bool trip_cpu_is_projected(const trip_cpu_view *view, int u, int v, int sheet)
 {
     const trip_camera *camera = &view->splat.camera;
     const trip_list_grid *grid = &view->of->plan->lists[view->list->index].grid;
     double p[3];
-    p[view->axis] = run->sheet;
-    p[view->u_axis] = run->u + (int)trip_voxel_u(voxel);
-    p[view->v_axis] = run->v + (int)trip_voxel_v(voxel);
+    p[view->axis] = sheet;
+    p[view->u_axis] = u;
+    p[view->v_axis] = v;
     trip_vec3 position = trip_v3(p[0], p[1], p[2]);
     trip_splat s;
     return trip_splat_project(&view->splat, position, &s) &&

@@ -5,8 +5,8 @@
 
 #include "cpu/kernels/kernels.h"
 
-/* Whether the splat of a voxel of the view's list is projected: not culled by the list's weight or
+/* Whether the splat of a voxel of the view's list is projected: not culled by the layer's weight or
  * the plane of the eye. */
-bool trip_cpu_is_projected(const trip_cpu_view *view, const trip_run *run, uint32_t voxel);
+bool trip_cpu_is_projected(const trip_cpu_view *view, int u, int v, int sheet);
 
 #endif

@@ -37,8 +37,10 @@ enum tile_state {
 /* One thread's own memory. */
 typedef struct worker {
     trip_cpu_scratch scratch;
-    uint32_t voxels[TRIP_CPU_CHUNK], normals[TRIP_CPU_CHUNK]; /* of a chunk: spans are of these */
-    trip_cpu_span shown[TRIP_CPU_CHUNK];
+    trip_cpu_part parts[TRIP_CPU_CHUNK_RUNS]; /* of the chunk at hand */
+    /* A square's bytes, where those about them may not be read. */
+    unsigned char codes[2 * 64 + 2 * TRIP_CPU_READABLE];
+    unsigned char normals[4 * 64 + 2 * TRIP_CPU_READABLE];
     trip_cpu_sorting sorting;
     _Alignas(
         64) float sum[FLOATS_PER_TILE]; /* of a picture, where the frame goes on with its own */
@@ -119,50 +121,74 @@ static bool is_alone(const cpu *r, uint32_t tile)
 
 /* ---- projecting a batch ---- */
 
+/* Whether TRIP_CPU_READABLE bytes before and behind those of a plane lie in the batch too. */
+static bool may_read_about(const trip_batch *batch, int plane, const unsigned char *at,
+                           size_t bytes)
+{
+    size_t before = (size_t)(at - batch->planes[plane]);
+    return before >= TRIP_CPU_READABLE &&
+           before + bytes + TRIP_CPU_READABLE <= batch->plane_bytes[plane];
+}
+
+/* A square of a run, with room to be read about its bytes. */
+static trip_cpu_square make_square(const cpu *r, worker *w, const trip_block *b,
+                                   const trip_run *run, const trip_cpu_walk *at)
+{
+    size_t code = (size_t)at->first * b->code_bytes, normal = (size_t)at->first * b->normal_bytes;
+    unsigned square = at->number, code_bytes = at->count * b->code_bytes;
+    trip_cpu_square s = {
+        .u = run->u + TRIP_CPU_SQUARE * (int)trip_cpu_square_u(square),
+        .v = run->v + TRIP_CPU_SQUARE * (int)trip_cpu_square_v(square),
+        .sheet = run->sheet,
+        .mask = at->mask,
+        .codes = b->codes + code,
+        .normals = b->normals ? b->normals + normal : NULL,
+    };
+    if (!may_read_about(r->batch, TRIP_PLANE_VOXELS, s.codes, code_bytes))
+        s.codes = memcpy(w->codes + TRIP_CPU_READABLE, s.codes, code_bytes);
+    if (s.normals &&
+        !may_read_about(r->batch, TRIP_PLANE_NORMALS, s.normals, at->count * b->normal_bytes))
+        s.normals = memcpy(w->normals + TRIP_CPU_READABLE, s.normals, at->count * b->normal_bytes);
+    return s;
+}
+
 /* Counts by projecting for the count alone: what is hidden or transparent counts too. */
-static void count_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s)
+static void count_part(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_block *block,
+                       const trip_cpu_part *part)
 {
     const trip_cpu_view *view = &r->counted_views[chunk->list];
-    const uint32_t *voxels = w->voxels + s->first;
-    for (uint32_t i = 0; i < s->count; i++)
-        chunk->counts.splats_projected += trip_cpu_is_projected(view, s->run, voxels[i]);
-    for (uint32_t done = 0; done < s->count; done += TRIP_CPU_STAGED) {
-        uint32_t left = s->count - done, n = left < TRIP_CPU_STAGED ? left : TRIP_CPU_STAGED;
-        n = r->kernels->stage(view, s->run, voxels + done, NULL, n, false, &w->scratch.staged, 0);
+    trip_cpu_walk at = trip_cpu_walk_begin(block, false);
+    while (trip_cpu_walk_next(&at)) {
+        if (!trip_cpu_part_has(part, at.number))
+            continue;
+        trip_cpu_square square = make_square(r, w, block, part->run, &at);
+        const trip_cpu_staged *staged = &w->scratch.staged;
+        uint32_t n = r->kernels->stage(view, &square, false, &w->scratch.staged, 0);
+        for (uint32_t i = 0; i < n; i++)
+            chunk->counts.splats_projected +=
+                trip_cpu_is_projected(view, staged->u[i], staged->v[i], staged->sheet[i]);
         n = r->kernels->project(view, NULL, &w->scratch.staged, n, &w->scratch.lanes, w->counted);
         chunk->counts.splats_drawn += r->kernels->drawn(view, &w->scratch, w->counted, n);
     }
 }
 
-/* Decodes a part of a run to the thread's arrays, from `at` on. */
-static trip_cpu_span decode(const cpu *r, worker *w, const trip_cpu_span *part, uint32_t at)
-{
-    const trip_block block = trip_block_of(r->batch, part->run);
-    uint32_t first = (uint32_t)part->first;
-    trip_block_voxels(&block, first, part->count, w->voxels + at);
-    if (r->view.shading)
-        trip_block_normals(&block, first, part->count, w->normals + at);
-    return (trip_cpu_span){ part->run, at, part->count };
-}
-
-/* What of a chunk may show: at most a span a voxel. */
+/* What of a chunk may show: the number of its parts. */
 static uint32_t show_chunk(const cpu *r, worker *w, trip_cpu_chunk *chunk)
 {
-    bool reversed = r->batch->pass->descending;
-    const trip_cpu_asking asking = { r->kernels, &r->views[chunk->list], &r->mask, w->voxels,
-                                     reversed,   &w->scratch.lanes };
+    const trip_cpu_culling culling = { r->kernels, &r->views[chunk->list], &r->mask,
+                                       &w->scratch.lanes };
     uint32_t n = 0, skip = chunk->skip, left = chunk->voxels;
     for (size_t i = chunk->run; left > 0; i++) {
         const trip_run *run = &r->batch->runs[i];
-        const trip_cpu_span all = { run, 0, run->count };
-        uint32_t count = run->count - skip < left ? run->count - skip : left;
-        trip_cpu_span part = trip_cpu_span_part(&all, reversed, skip, count);
-        part = decode(r, w, &part, chunk->voxels - left);
-        if (r->frame->count)
-            count_span(r, w, chunk, &part);
-        n += trip_cpu_show(&asking, &part, w->shown + n);
-        left -= count;
+        const trip_block block = trip_block_of(r->batch, run);
+        trip_cpu_part *part = &w->parts[n];
+        *part = trip_cpu_part_make(run, &block, r->batch->pass->descending, skip, left);
+        left -= part->voxels;
         skip = 0;
+        if (r->frame->count)
+            count_part(r, w, chunk, &block, part);
+        trip_cpu_show(&culling, &block, part);
+        n += part->voxels > 0;
     }
     return n;
 }
@@ -182,20 +208,20 @@ static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_
     *staged = 0;
 }
 
-static void project_span(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_span *s,
+static void project_part(const cpu *r, worker *w, trip_cpu_chunk *chunk, const trip_cpu_part *part,
                          uint32_t *staged)
 {
+    const trip_block block = trip_block_of(r->batch, part->run);
     bool reversed = r->batch->pass->descending;
-    for (uint32_t done = 0; done < s->count;) {
-        uint32_t n = s->count - done, room = TRIP_CPU_STAGED - *staged;
-        n = n < room ? n : room;
-        uint64_t from = trip_cpu_span_part(s, reversed, done, n).first;
-        *staged = r->kernels->stage(&r->views[chunk->list], s->run, w->voxels + from,
-                                    r->view.shading ? w->normals + from : NULL, n, reversed,
-                                    &w->scratch.staged, *staged);
-        if (*staged == TRIP_CPU_STAGED)
+    trip_cpu_walk at = trip_cpu_walk_begin(&block, reversed);
+    while (trip_cpu_walk_next(&at)) {
+        if (!trip_cpu_part_has(part, at.number))
+            continue;
+        trip_cpu_square square = make_square(r, w, &block, part->run, &at);
+        *staged = r->kernels->stage(&r->views[chunk->list], &square, reversed, &w->scratch.staged,
+                                    *staged);
+        if (*staged > TRIP_CPU_STAGED - 64)
             empty_staged(r, w, chunk, staged);
-        done += n;
     }
 }
 
@@ -208,11 +234,11 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
     trip_cpu_chunk *chunk = &r->filling->chunks[r->first_chunk + task];
     uint32_t staged = 0, shown = show_chunk(r, w, chunk), voxels = 0;
     for (uint32_t i = 0; i < shown; i++)
-        voxels += w->shown[i].count;
+        voxels += w->parts[i].voxels;
     if (voxels == 0 || !trip_cpu_flush_claim(r->filling, chunk, voxels))
         return;
     for (uint32_t i = 0; i < shown; i++)
-        project_span(r, w, chunk, &w->shown[i], &staged);
+        project_part(r, w, chunk, &w->parts[i], &staged);
     empty_staged(r, w, chunk, &staged);
     trip_cpu_bin(r->filling, chunk, r->mask.grid, &w->sorting);
 }
@@ -318,7 +344,7 @@ static void settle(cpu *r)
 /* A place in a batch's runs. */
 typedef struct cursor {
     size_t run;
-    uint32_t skip;
+    uint32_t skip, skipped; /* squares of it, in draw order, and their voxels */
 } cursor;
 
 /* Voxels that the buffer will still take, by how many of them showed of late; some when it is
@@ -340,7 +366,7 @@ static uint64_t voxels_from(const trip_batch *batch, const cursor *at)
     uint64_t voxels = 0;
     for (size_t i = at->run; i < batch->run_count; i++)
         voxels += batch->runs[i].count;
-    return voxels - at->skip;
+    return voxels - at->skipped;
 }
 
 /* Of a chunk, when so many are left: fewer towards the end, so that the threads end together. */
@@ -352,8 +378,25 @@ static uint32_t chunk_voxels(const cpu *r, uint64_t left)
                                    : (uint32_t)each;
 }
 
-/* Reserves the next chunk, of `most` voxels of one list; false when the batch is through or there
- * are no more chunks. */
+/* Moves on within a run by as many squares as hold at most `most` voxels; returns how many those
+ * hold. */
+static uint32_t take_squares(const trip_batch *batch, uint32_t most, cursor *at)
+{
+    const trip_block block = trip_block_of(batch, &batch->runs[at->run]);
+    trip_cpu_walk w = trip_cpu_walk_begin(&block, batch->pass->descending);
+    uint32_t voxels = 0;
+    for (uint32_t i = 0; i < at->skip; i++)
+        trip_cpu_walk_next(&w);
+    while (trip_cpu_walk_next(&w) && voxels + w.count <= most) {
+        voxels += w.count;
+        at->skip++;
+    }
+    at->skipped += voxels;
+    return voxels;
+}
+
+/* Reserves the next chunk, of about `most` voxels of one list; false when the batch is through or
+ * there are no more chunks. */
 static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor *at)
 {
     trip_cpu_chunk *chunk = at->run < batch->run_count ? trip_cpu_flush_reserve(r->filling) : NULL;
@@ -362,17 +405,18 @@ static bool reserve_chunk(cpu *r, const trip_batch *batch, uint32_t most, cursor
     unsigned selection = batch->runs[at->run].selection;
     chunk->run = at->run;
     chunk->skip = at->skip;
+    chunk->skipped = at->skipped;
     chunk->list = batch->pass->selections[selection].list->index;
     while (at->run < batch->run_count && chunk->voxels < most &&
+           at->run - chunk->run < TRIP_CPU_CHUNK_RUNS &&
            batch->runs[at->run].selection == selection) {
-        uint32_t left = batch->runs[at->run].count - at->skip, wanted = most - chunk->voxels;
+        uint32_t left = batch->runs[at->run].count - at->skipped, wanted = most - chunk->voxels;
         if (left > wanted) {
-            at->skip += wanted;
-            chunk->voxels = most;
-        } else {
-            chunk->voxels += left;
-            *at = (cursor){ at->run + 1, 0 };
+            chunk->voxels += take_squares(batch, wanted, at);
+            break;
         }
+        chunk->voxels += left;
+        *at = (cursor){ at->run + 1, 0, 0 };
     }
     return true;
 }
@@ -393,7 +437,7 @@ static void keep_chunks(cpu *r, cursor *at)
     trip_list_stats *stats = &r->stats[r->view.axis];
     uint32_t reserved = f->chunk_count, kept = trip_cpu_flush_cut(f);
     if (kept < reserved)
-        *at = (cursor){ f->chunks[kept].run, f->chunks[kept].skip };
+        *at = (cursor){ f->chunks[kept].run, f->chunks[kept].skip, f->chunks[kept].skipped };
     for (uint32_t i = r->first_chunk; i < kept; i++) {
         stats->splats_read += f->chunks[i].voxels;
         stats->splats_projected += f->chunks[i].counts.splats_projected;
@@ -454,7 +498,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
 {
     cpu *r = (cpu *)base;
     bool shading = r->frame->settings->shading && batch->planes[TRIP_PLANE_NORMALS];
-    cursor at = { 0, 0 };
+    cursor at = { 0, 0, 0 };
     int status = 0;
     if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
         settle(r);

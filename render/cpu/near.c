@@ -206,6 +206,8 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         .axis = axis,
         .u_axis = (axis + 1) % 3,
         .v_axis = (axis + 2) % 3,
+        .code_bytes = header->code_bytes,
+        .normal_bytes = header->normal_bytes,
         .gradient_most = (float)fmin(header->gradient_scale / full, 1e30),
     };
     const int axes[3] = { view->u_axis, view->v_axis, axis };

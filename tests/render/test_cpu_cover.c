@@ -134,8 +134,8 @@ typedef struct run_looks {
     looks looks;
     trip_cpu_lanes lanes;
     uint32_t voxels[TILE * TILE];
-    trip_cpu_span shown[TILE * TILE];
-    bool is_shown[TILE * TILE];
+    uint64_t bytes[TRIP_BLOCK_WORDS_MAX];
+    trip_block block;
     uint32_t count, hidden, left_in; /* left_in: that reach no open block */
 } run_looks;
 
@@ -152,43 +152,35 @@ static void fill_run(run_looks *r)
         if (scene_hash((int)i, 1, 2) % 3 == 0)
             r->voxels[r->count++] = u | v << 8;
     }
+    const trip_block_form form = { .tile_log2 = 7, .code_bytes = 2 };
+    uint32_t words = trip_block_pack(&form, r->voxels, r->count, r->bytes);
+    assert_true(words > 0);
+    r->block = trip_block_make(&form, r->count, words, r->bytes, NULL);
 }
 
-/* Spans are parts of the run in draw order. */
-static void mark_shown(run_looks *r, uint32_t spans, bool descending)
+static bool is_shown(const trip_cpu_part *part, uint32_t voxel)
 {
-    uint64_t next = descending ? r->count : 0;
-    memset(r->is_shown, 0, sizeof r->is_shown);
-    for (uint32_t i = 0; i < spans; i++) {
-        const trip_cpu_span *s = &r->shown[i];
-        assert_true(s->count > 0);
-        if (descending)
-            assert_true(s->first + s->count <= next);
-        else
-            assert_true(s->first >= next && s->first + s->count <= r->count);
-        next = descending ? s->first : s->first + s->count;
-        for (uint32_t k = 0; k < s->count; k++)
-            r->is_shown[s->first + k] = true;
-    }
+    unsigned u = trip_voxel_u(voxel) / TRIP_CPU_SQUARE, v = trip_voxel_v(voxel) / TRIP_CPU_SQUARE;
+    return part->voxels > 0 && trip_cpu_part_has(part, (unsigned)trip_morton(u, v));
 }
 
 static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, unsigned x,
                       unsigned y)
 {
-    for (int descending = 0; descending < 2; descending++) {
-        trip_run run = { .count = r->count, .sheet = sheet };
-        trip_cpu_asking asking = { kernels,   &r->looks.view, &r->looks.mask,
-                                   r->voxels, descending,     &r->lanes };
-        trip_cpu_span all = { &run, 0, r->count };
-        mark_shown(r, trip_cpu_show(&asking, &all, r->shown), descending);
-        for (uint32_t i = 0; i < r->count; i++) {
-            const double at[3] = { trip_voxel_u(r->voxels[i]), trip_voxel_v(r->voxels[i]), sheet };
-            bool reached = reaches(&r->looks, at, x, y);
-            assert_false(reached && !r->is_shown[i]);
-            r->hidden += !r->is_shown[i];
-            r->left_in += r->is_shown[i] && !reached;
-        }
+    trip_run run = { .count = r->count, .sheet = sheet };
+    const trip_cpu_culling culling = { kernels, &r->looks.view, &r->looks.mask, &r->lanes };
+    trip_cpu_part part = trip_cpu_part_make(&run, &r->block, false, 0, r->count);
+    uint32_t shown = 0;
+    trip_cpu_show(&culling, &r->block, &part);
+    for (uint32_t i = 0; i < r->count; i++) {
+        const double at[3] = { trip_voxel_u(r->voxels[i]), trip_voxel_v(r->voxels[i]), sheet };
+        bool reached = reaches(&r->looks, at, x, y), stays = is_shown(&part, r->voxels[i]);
+        assert_false(reached && !stays);
+        r->hidden += !stays;
+        r->left_in += stays && !reached;
+        shown += stays;
     }
+    assert_int_equal(part.voxels, shown);
 }
 
 static void runs_show_all_that_reaches_an_open_block(void **state)

@@ -70,6 +70,7 @@ typedef struct trip_cpu_view {
     trip_cpu_rays rays;
     bool front_to_back, shading;
     bool stretch_varies;
+    unsigned code_bytes, normal_bytes; /* of the data set */
     int axis, u_axis, v_axis;
     float gradient_most; /* the largest magnitude of a normal, over gradient_full of shade.h */
     double stretch;      /* world units per index length; the cube root of |J| where it varies */
@@ -86,8 +87,23 @@ typedef struct trip_cpu_view {
     trip_splat parallel; /* the footprint of all, in parallel views */
 } trip_cpu_view;
 
+/* A square of 8 x 8 voxels of a run, as a block has it. */
+typedef struct trip_cpu_square {
+    int u, v, sheet; /* of its corner */
+    uint64_t mask;   /* which voxels are there, by Morton number */
+    /* Of the first voxel; normals are read only with shading. TRIP_CPU_READABLE bytes before and
+     * behind those of the square may be read too. */
+    const unsigned char *codes, *normals;
+} trip_cpu_square;
+
+#define TRIP_CPU_READABLE 64
+
+/* For each byte of a mask, the places of its bits in a square, u + 8 v, a byte each, the lowest
+ * bit's first. */
+extern const uint64_t trip_cpu_places[256];
+
 /* Voxels waiting to be projected: one entry a lane, from any runs. */
-#define TRIP_CPU_STAGED 256
+#define TRIP_CPU_STAGED 320
 typedef struct trip_cpu_staged {
     int32_t u[TRIP_CPU_STAGED + 16], v[TRIP_CPU_STAGED + 16], sheet[TRIP_CPU_STAGED + 16];
     int32_t code[TRIP_CPU_STAGED + 16], normal[TRIP_CPU_STAGED + 16];
@@ -149,10 +165,9 @@ typedef struct trip_cpu_kernels {
     uint64_t (*squares)(const trip_cpu_view *view, const struct trip_cpu_region *region,
                         const _Atomic uint64_t *open, trip_cpu_lanes *lanes);
 
-    /* Adds voxels of one run to `staged` in draw order, leaving out transparent ones; at most
-     * TRIP_CPU_STAGED - `filled` voxels. Returns the new fill. */
-    uint32_t (*stage)(const trip_cpu_view *view, const trip_run *run, const uint32_t *voxels,
-                      const uint32_t *normals, uint32_t count, bool reversed,
+    /* Adds the voxels of a square to `staged` in draw order, leaving out transparent ones; there is
+     * room for 64. Returns the new fill. */
+    uint32_t (*stage)(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
      * order. With `open`, a word a tile as in trip_cpu_mask, those over closed blocks alone may be

@@ -1,5 +1,5 @@
-/* Kernels that turn the voxels of runs into projected splats, V at a time: included by
- * table_tmpl.h after simd.h. Positions are computed in double precision from the voxel's
+/* Kernels that decode squares of voxels and turn them into projected splats, V at a time: included
+ * by table_tmpl.h after simd.h. Positions are computed in double precision from the voxel's
  * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
  * footprint in single. The few splats for whose numbers single does not do, near the plane of the
  * eye above all, go through trip_cpu_project_near(), which tells when they cannot be drawn. */
@@ -18,40 +18,93 @@
 
 #define LOG2_E 1.44269504088896340736
 
-/* ---- staging: runs of voxels to lanes ---- */
+/* ---- staging: squares of voxels to lanes ---- */
 
-INLINE vi load_lanes(const uint32_t *from, uint32_t at, uint32_t lanes, uint32_t count,
-                     bool reversed)
+/* Room for loads that begin before the first byte or end behind the last. */
+enum { PLACES_ROOM = 64 + 2 * V };
+
+/* The places of a mask's voxels in the square, u + 8 v, from places[V] on; returns their number. */
+INLINE uint32_t places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
 {
-    if (lanes == V)
-        return reversed ? vi_reverse(vi_load(from + count - at - V)) : vi_load(from + at);
-    int32_t part[V] = { 0 };
-    for (uint32_t i = 0; i < lanes; i++)
-        part[i] = (int32_t)(reversed ? from[lanes - 1 - i] : from[at + i]);
-    return vi_load(part);
+    uint8_t *out = places + V;
+    uint32_t n = 0;
+    for (unsigned i = 0; i < 8; i++) {
+        unsigned byte = mask >> 8 * i & 255;
+        uint64_t row = (i & 1) << 4 | (i & 2) << 1 | (i & 4) << 3;
+        uint64_t eight = trip_cpu_places[byte] + row * UINT64_C(0x0101010101010101);
+        memcpy(out + n, &eight, sizeof eight);
+        n += (uint32_t)__builtin_popcount(byte);
+    }
+    return n;
 }
 
-static uint32_t stage(const trip_cpu_view *view, const trip_run *run, const uint32_t *voxels,
-                      const uint32_t *normals, uint32_t count, bool reversed,
-                      trip_cpu_staged *staged, uint32_t filled)
+typedef uint8_t bytes_of_lanes __attribute__((vector_size(V)));
+typedef uint16_t halves_of_lanes __attribute__((vector_size(2 * V)));
+
+INLINE vi load_bytes(const uint8_t *from)
+{
+    bytes_of_lanes b;
+    memcpy(&b, from, sizeof b);
+    return __builtin_convertvector(b, vi);
+}
+
+/* 16-bit codes from entry `at` on. */
+INLINE vi load_codes(const unsigned char *codes, unsigned code_bytes, int32_t at)
+{
+    halves_of_lanes h;
+    if (code_bytes == 1)
+        return load_bytes(codes + at) * 257;
+    memcpy(&h, codes + 2 * at, sizeof h);
+    return __builtin_convertvector(h, vi);
+}
+
+INLINE vi load_normals(const unsigned char *normals, unsigned normal_bytes, int32_t at)
+{
+    return normal_bytes == 4 ? vi_load(normals + 4 * at) : vi_load_3_bytes(normals + 3 * at);
+}
+
+/* Lanes beyond the square's voxels hold what lies there, and are left out by a mask. */
+INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *square,
+                             unsigned code_bytes, bool reversed, trip_cpu_staged *staged,
+                             uint32_t filled)
 {
     const float *extinction = &view->of->table[0].extinction;
-    const vi run_u = vi_set(run->u), run_v = vi_set(run->v), sheet = vi_set(run->sheet);
-    for (uint32_t i = 0; i < count; i += V) {
-        uint32_t lanes = count - i < V ? count - i : V;
-        vi voxel = load_lanes(voxels, i, lanes, count, reversed);
-        vi code = v_shift_right(voxel, 16);
-        vm seen = vm_and(v_gt(v_gather(extinction, code * 4), v_set(0)), vm_first(lanes));
-        vi_store_packed(staged->u + filled, seen, run_u + (voxel & 255));
-        vi_store_packed(staged->v + filled, seen, run_v + (v_shift_right(voxel, 8) & 255));
+    const vi u = vi_set(square->u), v = vi_set(square->v), sheet = vi_set(square->sheet);
+    uint8_t places[PLACES_ROOM];
+    int32_t count = (int32_t)places_of(square->mask, places);
+    for (int32_t i = 0; i < count; i += V) {
+        int32_t at = reversed ? count - V - i : i;
+        vi place = load_bytes(places + V + at), code = load_codes(square->codes, code_bytes, at);
+        vi normal = vi_set(0);
+        if (view->shading)
+            normal = load_normals(square->normals, view->normal_bytes, at);
+        if (reversed) {
+            place = vi_reverse(place);
+            code = vi_reverse(code);
+            normal = vi_reverse(normal);
+        }
+        vm seen = v_gt(v_gather(extinction, code * 4), v_set(0));
+        if (count - i < V)
+            seen = vm_and(seen, vm_first((unsigned)(count - i)));
+        vi_store_packed(staged->u + filled, seen, u + (place & 7));
+        vi_store_packed(staged->v + filled, seen, v + v_shift_right(place, 3));
         vi_store_packed(staged->sheet + filled, seen, sheet);
         vi_store_packed(staged->code + filled, seen, code);
-        if (normals)
-            vi_store_packed(staged->normal + filled, seen,
-                            load_lanes(normals, i, lanes, count, reversed));
+        if (view->shading)
+            vi_store_packed(staged->normal + filled, seen, normal);
         filled += (uint32_t)__builtin_popcount(vm_bits(seen));
     }
     return filled;
+}
+
+static uint32_t stage(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
+                      trip_cpu_staged *staged, uint32_t filled)
+{
+    if (view->code_bytes == 1)
+        return reversed ? stage_square(view, square, 1, true, staged, filled)
+                        : stage_square(view, square, 1, false, staged, filled);
+    return reversed ? stage_square(view, square, 2, true, staged, filled)
+                    : stage_square(view, square, 2, false, staged, filled);
 }
 
 /* ---- the centre ---- */

@@ -724,7 +724,7 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
 {
     unsigned bits = vm_bits(m);
     int32_t *out = p;
-    if (bits == (1u << V) - 1) {
+    if ((bits & (bits + 1)) == 0) { /* the first ones */
         vi_store(out, a);
         return;
     }
@@ -733,5 +733,28 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
 }
 
 #endif
+
+/* Three bytes a lane; as many as a vector has are read. */
+INLINE vi vi_load_3_bytes(const unsigned char *from)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+    const __m512i words = _mm512_setr_epi32(0, 1, 2, 0, 3, 4, 5, 0, 6, 7, 8, 0, 9, 10, 11, 0);
+    const __m512i bytes =
+        _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1));
+    __m512i twelve = _mm512_permutexvar_epi32(words, _mm512_loadu_si512(from));
+    return (vi)_mm512_shuffle_epi8(twelve, bytes);
+#elif TRIP_SIMD == TRIP_SIMD_AVX2
+    const __m256i words = _mm256_setr_epi32(0, 1, 2, 0, 3, 4, 5, 0);
+    const __m256i bytes = _mm256_broadcastsi128_si256(
+        _mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1));
+    __m256i eight = _mm256_loadu_si256((const void *)from);
+    return (vi)_mm256_shuffle_epi8(_mm256_permutevar8x32_epi32(eight, words), bytes);
+#else
+    vi a;
+    for (int i = 0; i < V; i++)
+        a[i] = from[3 * i] | from[3 * i + 1] << 8 | from[3 * i + 2] << 16;
+    return a;
+#endif
+}
 
 #endif

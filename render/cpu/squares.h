@@ -1,0 +1,81 @@
+/* The squares of a run's block one after the other, and a run's part of a chunk. Plain values;
+ * blocks are those of a batch, checked. */
+#ifndef TRIP_CPU_SQUARES_H
+#define TRIP_CPU_SQUARES_H
+
+#include "block.h"
+#include "reader.h"
+
+/* Walks over the squares that are present, in draw order. */
+typedef struct trip_cpu_walk {
+    const trip_block *block;
+    bool reversed;
+    unsigned word;
+    uint64_t rest; /* of the word's bits */
+    uint32_t left; /* squares */
+    /* The square at hand. */
+    unsigned number; /* Morton number in the tile */
+    uint64_t mask;
+    uint32_t first, count; /* records of the run */
+} trip_cpu_walk;
+
+static inline trip_cpu_walk trip_cpu_walk_begin(const trip_block *b, bool reversed)
+{
+    unsigned word = reversed ? b->present_words - 1 : 0;
+    return (trip_cpu_walk){ .block = b,
+                            .reversed = reversed,
+                            .word = word,
+                            .rest = b->present[word],
+                            .left = b->squares,
+                            .first = reversed ? b->count : 0 };
+}
+
+/* False at the end. */
+static inline bool trip_cpu_walk_next(trip_cpu_walk *w)
+{
+    const trip_block *b = w->block;
+    if (w->left == 0)
+        return false;
+    while (w->rest == 0)
+        w->rest = b->present[w->reversed ? --w->word : ++w->word];
+    unsigned bit =
+        (unsigned)(w->reversed ? 63 - __builtin_clzll(w->rest) : __builtin_ctzll(w->rest));
+    w->rest &= ~(UINT64_C(1) << bit);
+    w->number = 64 * w->word + bit;
+    w->left--;
+    w->mask = b->masks[w->reversed ? w->left : b->squares - 1 - w->left];
+    uint32_t before = w->count;
+    w->count = (uint32_t)__builtin_popcountll(w->mask);
+    w->first = w->reversed ? w->first - w->count : w->first + before;
+    return true;
+}
+
+/* Where a square lies in its tile, in squares, by its Morton number. */
+static inline int trip_cpu_square_u(unsigned number)
+{
+    return (int)((number & 1) | (number >> 1 & 2) | (number >> 2 & 4) | (number >> 3 & 8));
+}
+
+static inline int trip_cpu_square_v(unsigned number)
+{
+    return trip_cpu_square_u(number >> 1);
+}
+
+/* What of a run is in a chunk: some of its squares, a bit each by Morton number. */
+typedef struct trip_cpu_part {
+    const trip_run *run;
+    uint64_t squares[TRIP_BLOCK_PRESENT_MAX];
+    uint32_t voxels;
+} trip_cpu_part;
+
+static inline bool trip_cpu_part_has(const trip_cpu_part *p, unsigned square)
+{
+    return p->squares[square / 64] >> square % 64 & 1;
+}
+
+/* All squares of a run after the first `skip` in draw order, as long as their voxels are at most
+ * `most`. */
+trip_cpu_part trip_cpu_part_make(const trip_run *run, const trip_block *block, bool reversed,
+                                 uint32_t skip, uint32_t most);
+
+#endif

@@ -1,0 +1,191 @@
+/* Squares of blocks: walked, cut into parts, and decoded by the kernels as by trip_block_voxels().
+ */
+#include "cpu/squares.h"
+
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "cpu/kernels/isa.h"
+
+enum { MOST = TRIP_RUN_RECORDS_MAX };
+
+/* A run's block and what is in it. */
+typedef struct fixture {
+    trip_block_form form;
+    uint32_t voxels[MOST], normals[MOST], count;
+    uint64_t words[TRIP_BLOCK_WORDS_MAX];
+    unsigned char packed_normals[4 * MOST];
+    trip_block block;
+    trip_cpu_staged staged;
+} fixture;
+
+static fixture *make(void)
+{
+    fixture *f = calloc(1, sizeof *f);
+    assert_non_null(f);
+    return f;
+}
+
+/* Voxels of a tile: in some squares all, in others few, in others none. */
+static void fill(fixture *f, unsigned tile_log2, unsigned code_bytes, unsigned normal_bytes)
+{
+    f->form = (trip_block_form){ tile_log2, code_bytes, normal_bytes };
+    f->count = 0;
+    double share = 0;
+    for (uint32_t i = 0; i < 1u << 2 * tile_log2; i++) {
+        uint32_t u = 0, v = 0;
+        for (unsigned bit = 0; bit < tile_log2; bit++) {
+            u |= (i >> 2 * bit & 1) << bit;
+            v |= (i >> (2 * bit + 1) & 1) << bit;
+        }
+        if (i % 64 == 0)
+            share = test_random() * 2 - 0.5;
+        unsigned code = (unsigned)(test_random() * 256) * (code_bytes == 1 ? 257 : 255);
+        if (test_random() >= share)
+            continue;
+        f->normals[f->count] = (uint32_t)(test_random() * 0x1p24) << (normal_bytes == 4 ? 8 : 0);
+        f->voxels[f->count++] = trip_voxel_pack(u, v, code);
+    }
+    if (f->count == 0)
+        f->voxels[f->count++] = trip_voxel_pack(3, 5, 0);
+    uint32_t words = trip_block_pack(&f->form, f->voxels, f->count, f->words);
+    assert_true(words > 0);
+    trip_normals_pack(normal_bytes, f->normals, f->count, f->packed_normals);
+    f->block = trip_block_make(&f->form, f->count, words, f->words, f->packed_normals);
+}
+
+static unsigned square_of(uint32_t voxel)
+{
+    return (unsigned)trip_morton(trip_voxel_u(voxel) / 8, trip_voxel_v(voxel) / 8);
+}
+
+static void squares_come_in_draw_order_with_their_records(void **state)
+{
+    (void)state;
+    fixture *f = make();
+    for (int i = 0; i < 60; i++) {
+        bool reversed = i % 2;
+        fill(f, 4 + (unsigned)i % 4, 2, 4);
+        trip_cpu_walk w = trip_cpu_walk_begin(&f->block, reversed);
+        uint32_t next = reversed ? f->count : 0;
+        while (trip_cpu_walk_next(&w)) {
+            assert_int_equal(reversed ? w.first + w.count : w.first, next);
+            for (uint32_t k = 0; k < w.count; k++)
+                assert_int_equal(square_of(f->voxels[w.first + k]), w.number);
+            next = reversed ? w.first : w.first + w.count;
+            assert_int_equal(trip_morton((uint32_t)trip_cpu_square_u(w.number),
+                                         (uint32_t)trip_cpu_square_v(w.number)),
+                             w.number);
+        }
+        assert_int_equal(next, reversed ? 0 : f->count);
+    }
+    free(f);
+}
+
+static void parts_of_a_run_hold_every_square_once(void **state)
+{
+    (void)state;
+    fixture *f = make();
+    const trip_run run = { 0 };
+    for (int i = 0; i < 60; i++) {
+        bool reversed = i % 2;
+        uint64_t seen[TRIP_BLOCK_PRESENT_MAX] = { 0 };
+        uint32_t skip = 0, voxels = 0, squares;
+        fill(f, 4 + (unsigned)i % 4, 2, 4);
+        for (; voxels < f->count; skip += squares) {
+            uint32_t most = 64 + (uint32_t)(test_random() * 500);
+            trip_cpu_part p = trip_cpu_part_make(&run, &f->block, reversed, skip, most);
+            squares = 0;
+            for (unsigned w = 0; w < f->block.present_words; w++) {
+                assert_int_equal(p.squares[w] & (seen[w] | ~f->block.present[w]), 0);
+                seen[w] |= p.squares[w];
+                squares += (uint32_t)__builtin_popcountll(p.squares[w]);
+            }
+            assert_true(squares > 0 && p.voxels <= most);
+            voxels += p.voxels;
+        }
+        assert_int_equal(voxels, f->count);
+        assert_memory_equal(seen, f->block.present, f->block.present_words * sizeof *seen);
+    }
+    free(f);
+}
+
+/* Bytes of a square with room about them to be read. */
+static trip_cpu_square square_at(const fixture *f, const trip_cpu_walk *w,
+                                 unsigned char bytes[2][4 * 64 + 2 * TRIP_CPU_READABLE])
+{
+    const trip_block *b = &f->block;
+    memset(bytes, 0xee, 2 * sizeof *bytes);
+    unsigned char *codes = bytes[0] + TRIP_CPU_READABLE, *normals = bytes[1] + TRIP_CPU_READABLE;
+    memcpy(codes, b->codes + (size_t)w->first * b->code_bytes, (size_t)w->count * b->code_bytes);
+    memcpy(normals, b->normals + (size_t)w->first * b->normal_bytes,
+           (size_t)w->count * b->normal_bytes);
+    return (trip_cpu_square){ .u = 1000 + 8 * trip_cpu_square_u(w->number),
+                              .v = 2000 + 8 * trip_cpu_square_v(w->number),
+                              .sheet = 77,
+                              .mask = w->mask,
+                              .codes = codes,
+                              .normals = normals };
+}
+
+/* Codes below a third are transparent. */
+static void check_staged(fixture *f, const trip_cpu_kernels *kernels, const trip_cpu_view *view,
+                         bool reversed)
+{
+    trip_cpu_walk w = trip_cpu_walk_begin(&f->block, reversed);
+    unsigned char bytes[2][4 * 64 + 2 * TRIP_CPU_READABLE];
+    while (trip_cpu_walk_next(&w)) {
+        uint32_t filled = (uint32_t)(test_random() * (TRIP_CPU_STAGED - 64)), before = filled;
+        trip_cpu_square square = square_at(f, &w, bytes);
+        uint32_t end = kernels->stage(view, &square, reversed, &f->staged, filled);
+        for (uint32_t k = 0; k < w.count; k++) {
+            uint32_t at = reversed ? w.first + w.count - 1 - k : w.first + k;
+            uint32_t voxel = f->voxels[at];
+            if (trip_voxel_code(voxel) < 22000)
+                continue;
+            assert_int_equal(f->staged.u[filled], 1000 + (int)trip_voxel_u(voxel));
+            assert_int_equal(f->staged.v[filled], 2000 + (int)trip_voxel_v(voxel));
+            assert_int_equal(f->staged.sheet[filled], 77);
+            assert_int_equal(f->staged.code[filled], trip_voxel_code(voxel));
+            if (view->shading)
+                assert_int_equal((uint32_t)f->staged.normal[filled], f->normals[at]);
+            filled++;
+        }
+        assert_true(end == filled && filled >= before);
+    }
+}
+
+static void kernels_decode_squares_in_draw_order(void **state)
+{
+    (void)state;
+    fixture *f = make();
+    trip_tf_entry *table = calloc(65536, sizeof *table);
+    assert_non_null(table);
+    for (int i = 22000; i < 65536; i++)
+        table[i].extinction = 1;
+    const trip_frame frame = { .table = table };
+    for (int i = 0; i < 64; i++) {
+        unsigned code_bytes = 1 + (unsigned)i % 2, normal_bytes = 3 + (unsigned)i / 2 % 2;
+        fill(f, 4 + (unsigned)i / 16, code_bytes, normal_bytes);
+        const trip_cpu_view view = { .of = &frame,
+                                     .shading = i / 4 % 2,
+                                     .code_bytes = code_bytes,
+                                     .normal_bytes = normal_bytes };
+        for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++)
+            check_staged(f, *isa, &view, i / 8 % 2);
+    }
+    free(table);
+    free(f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(squares_come_in_draw_order_with_their_records),
+        cmocka_unit_test(parts_of_a_run_hold_every_square_once),
+        cmocka_unit_test(kernels_decode_squares_in_draw_order),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
