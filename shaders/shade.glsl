@@ -1,10 +1,24 @@
-// Light on a splat. Mirrors trip_shade() in render/shade.c and trip_normal_unpack() in
-// stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS come from render/shade.h.
+// Light on a splat. Mirrors trip_shade() in render/shade.c and trip_normal_unpack(), or with
+// COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS come from render/shade.h.
 #include "real.glsl"
 
 #ifdef SHADED
 
 // World-space gradient direction and, in w, its magnitude over that at full shading.
+#ifdef COMPACT
+vec4 unpack_normal(uint normal)
+{
+    ivec2 xy = ivec2(int(normal << 24) >> 24, int(normal << 16) >> 24);
+    vec3 g = vec3(compact_0.xyz) * float(xy.x) + vec3(compact_1.xyz) * float(xy.y) +
+             vec3(compact_2.xyz) * float(normal >> 16 & 127u);
+    vec2 p = vec2(normal & 4095u, normal >> 12 & 2047u) / vec2(4095.0, 2047.0) - 0.5;
+    vec2 d = vec2(p.x + p.y, p.x - p.y);
+    if ((normal & 0x800000u) != 0u)
+        return vec4(normalize(vec3(d, 1.0 - abs(d.x) - abs(d.y))), float(compact_0.w));
+    float strength = length(g);
+    return vec4(g / max(strength, 1e-15), strength);
+}
+#else
 vec4 unpack_normal(uint normal)
 {
     vec2 p = vec2(normal & 4095u, normal >> 12 & 4095u) * (2.0 / 4095.0) - 1.0;
@@ -14,6 +28,7 @@ vec4 unpack_normal(uint normal)
     float m = float(normal >> 24) / 255.0;
     return vec4(normalize(n), m * m * float(to_eye.w));
 }
+#endif
 
 vec3 shade(vec3 colour, uint normal, vec3 from_eye)
 {

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "normal.h"
 #include "pixels.h"
 #include "shade.h"
 
@@ -193,6 +194,19 @@ static void set_parallel(trip_cpu_view *view)
         trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
 }
 
+static void set_compact_normals(trip_cpu_view *view, const trip_dataset *data, double full)
+{
+    const trip_file_header *h = &data->header;
+    if (h->normal_bytes != 3)
+        return;
+    trip_compact_normals c =
+        trip_compact_normals_make(&data->index_to_world, h->gradient_full, h->gradient_step);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            view->compact[i][j] = (float)(c.to_world[i][j] * c.step[j] / full);
+    view->compact_full = (float)(c.full / full);
+}
+
 static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_camera *camera,
                       int axis, bool front_to_back)
 {
@@ -216,6 +230,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         for (int k = 0; k < 3; k++)
             view->world[k][i] = camera->index_to_world.m[k][axes[i]] / camera->voxel_world;
     }
+    set_compact_normals(view, frame->data, full);
     set_along(view->along_x, view, camera->to_x);
     set_along(view->along_y, view, camera->to_y);
     set_along(view->along_z, view, camera->forward);

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "normal.h"
 #include "shade.h"
 #include "splat.h"
 #include "weight.h"
@@ -97,6 +98,22 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const tr
         as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_scale / full, 1e30));
 }
 
+static void set_compact_normals(trip_gl_frame_double *f, const trip_frame *frame)
+{
+    const trip_file_header *h = &frame->data->header;
+    double full = trip_shade_gradient_full(h, frame->camera->voxel_world);
+    trip_gl_double4 *columns[3] = { &f->compact_0, &f->compact_1, &f->compact_2 };
+    if (h->normal_bytes != 3)
+        return;
+    trip_compact_normals c =
+        trip_compact_normals_make(&frame->data->index_to_world, h->gradient_full, h->gradient_step);
+    for (int j = 0; j < 3; j++)
+        *columns[j] =
+            as_it_is(trip_scale(trip_v3(c.to_world[0][j], c.to_world[1][j], c.to_world[2][j]),
+                                c.step[j] / full),
+                     c.full / full);
+}
+
 static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_camera *c, int axis)
 {
     const trip_settings *s = frame->settings;
@@ -107,6 +124,7 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
     set_projection(out, c, axis, constants.sigma);
     set_parallel(out, &constants);
     set_world(out, frame, c, axis);
+    set_compact_normals(out, frame);
     out->camera_r0 = as_it_is(whole->r0, 0);
     out->camera_rx = as_it_is(whole->ortho ? none : whole->rx, 0);
     out->camera_ry = as_it_is(whole->ortho ? none : whole->ry, 0);
@@ -167,7 +185,8 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
     else if (!is_isotropic(camera))
         effects |= TRIP_GL_ANISOTROPIC;
     if (s->shading && frame->plan->planes & 1u << TRIP_PLANE_NORMALS)
-        effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0);
+        effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0) |
+                   (frame->data->header.normal_bytes == 3 ? TRIP_GL_COMPACT : 0);
     if (s->indexed)
         effects |= TRIP_GL_INDEXED;
     if (trip_weight_is_everywhere(s, frame->camera, frame->plan->axis_of_view, axis))

@@ -32,7 +32,11 @@
     R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                      \
     R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                \
     R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                      \
-    R4 light;                           /* xyz: towards the light, world space */                  \
+    R4 compact_0, compact_1,                                                                       \
+        compact_2;    /* 3-byte normals: xyz: columns of the map from steps to                     \
+                         world space, over full shading; w of the first: length of                 \
+                         those of which the direction alone is kept, likewise */                   \
+    R4 light;         /* xyz: towards the light, world space */                                    \
     R4 to_eye;        /* xyz: towards the eye in parallel views; w: the largest magnitude of a     \
                          gradient over that at full shading */                                     \
     R4 screen;        /* xy: the image's centre, pixels; zw: width, height */                      \

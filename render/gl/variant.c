@@ -29,7 +29,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_PARALLEL, "PARALLEL" }, { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
         { TRIP_GL_SHADED, "SHADED" },     { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
         { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
-        { TRIP_GL_UNCULLED, "UNCULLED" },
+        { TRIP_GL_UNCULLED, "UNCULLED" }, { TRIP_GL_COMPACT, "COMPACT" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

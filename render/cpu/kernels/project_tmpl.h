@@ -343,20 +343,44 @@ INLINE v3 unpack_normal(vi normal, vf *magnitude)
     return unit(n);
 }
 
+/* As trip_compact_normal_unpack(): the direction, and the length over gradient_full. */
+INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length)
+{
+    const float(*m)[3] = view->compact;
+    vf x = v_from_int(normal << 24 >> 24), y = v_from_int(normal << 16 >> 24);
+    vf z = v_from_int(v_shift_right(normal, 16) & 127);
+    v3 weak = { v_fma(v_set(m[0][0]), x, v_fma(v_set(m[0][1]), y, v_set(m[0][2]) * z)),
+                v_fma(v_set(m[1][0]), x, v_fma(v_set(m[1][1]), y, v_set(m[1][2]) * z)),
+                v_fma(v_set(m[2][0]), x, v_fma(v_set(m[2][1]), y, v_set(m[2][2]) * z)) };
+    vf p = v_fma(v_from_int(normal & 4095), v_set(1.0f / 4095), v_set(-0.5f));
+    vf q = v_fma(v_from_int(v_shift_right(normal, 12) & 2047), v_set(1.0f / 2047), v_set(-0.5f));
+    v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) };
+    vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
+    *length = v_select(is_strong, v_set(view->compact_full), v_sqrt(dot(weak, weak)));
+    return unit((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
+                      v_select(is_strong, strong.z, weak.z) });
+}
+
 /* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
  */
 INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
 {
     const trip_settings *s = view->of->settings;
     vf magnitude;
-    v3 normal = unpack_normal(packed, &magnitude);
+    v3 normal;
+    if (view->normal_bytes == 3) {
+        normal = unpack_compact_normal(view, packed, &magnitude);
+    } else {
+        normal = unpack_normal(packed, &magnitude);
+        magnitude = magnitude * v_set(view->gradient_most);
+    }
     eye = unit(eye);
     v3 light = eye, half = eye;
     if (!s->headlight) {
         light = v3_of(s->light_direction);
         half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
     }
-    vf strength = v_min(v_set(1), magnitude * v_set(view->gradient_most));
+    vf strength = v_min(v_set(1), magnitude);
     vf diffuse = v_abs(dot(normal, light));
     /* Processors are slow with numbers below 2^-126, as a 24th power soon is. */
     vf h2 = v_max(dot(normal, half) * dot(normal, half), v_set(0x1p-8f));
