@@ -26,6 +26,7 @@ typedef struct reference {
     const trip_plan_list *list; /* at hand; NULL: none since the layer began */
     trip_splat_frame constants; /* of it */
     double gradient_full;
+    trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
     size_t pixels_bytes;
     int axis;    /* of the layer being drawn; -1 before the first */
@@ -77,6 +78,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     const trip_file_header *header = &frame->data->header;
     r->frame = frame;
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
+    r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
+                                           header->gradient_step);
     r->axis = -1;
     r->broken = false;
     memset(r->stats, 0, sizeof r->stats);
@@ -194,8 +197,12 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
     rgb[2] = entry->b;
     if (!frame->settings->shading || !normal)
         return;
+    const trip_file_header *header = &frame->data->header;
     double gradient[3];
-    trip_normal_unpack(*normal, frame->data->header.gradient_scale, gradient);
+    if (header->normal_bytes == 3)
+        trip_compact_normal_unpack(&r->compact, *normal, gradient);
+    else
+        trip_normal_unpack(*normal, header->gradient_scale, gradient);
     trip_shade(frame->settings, &r->list->camera, r->gradient_full, voxel, gradient, rgb);
 }
 
