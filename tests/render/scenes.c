@@ -2,14 +2,58 @@
 
 #include "test.h"
 
+#include "normal.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "normal.h"
 
+/* What the writer is given; fills in the map that 3-byte normals need. */
+static trip_writer_params writer_params(const scene_params *p, trip_compact_normals *compact)
+{
+    trip_writer_params params = {
+        .code_bytes = p->code_bytes ? p->code_bytes : 2,
+        .normal_bytes = p->normals ? p->normal_bytes ? p->normal_bytes : 4 : 0,
+        .tile_voxels = p->tile_voxels,
+        .slab_sheets = p->slab_sheets,
+        .page_bytes = 4096,
+        .dims = { p->dims[0], p->dims[1], p->dims[2] },
+        .index_to_world = p->index_to_world,
+        .codes = { .code_hi = 1 },
+    };
+    bool given = false;
+    for (int i = 0; i < 12; i++)
+        given |= p->index_to_world.m[i / 4][i % 4] != 0;
+    if (!given)
+        params.index_to_world = trip_affine_identity();
+    double voxel = cbrt(fabs(trip_affine_determinant(&params.index_to_world)));
+    if (params.normal_bytes != 3) {
+        params.codes.gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1;
+        return params;
+    }
+    params.codes.gradient_full = TRIP_GRADIENT_FULL / voxel; /* values go from 0 to 1 */
+    trip_compact_normals_choose(&params.index_to_world, params.codes.gradient_full, 0,
+                                params.codes.gradient_step);
+    *compact = trip_compact_normals_make(&params.index_to_world, params.codes.gradient_full,
+                                         params.codes.gradient_step);
+    return params;
+}
+
+static uint32_t pack_normal(const trip_writer_params *w, const trip_compact_normals *compact,
+                            const double gradient[3])
+{
+    if (w->normal_bytes != 3)
+        return trip_normal_pack(gradient, 1);
+    trip_vec3 g = trip_affine_transpose_vector(&w->index_to_world,
+                                               trip_v3(gradient[0], gradient[1], gradient[2]));
+    return trip_compact_normal_pack(compact, (double[3]){ g.x, g.y, g.z });
+}
+
 /* The voxels of one tile of a sheet in Morton order. */
-static uint32_t gather_run(const scene_params *p, int axis, int sheet, int tile_u, int tile_v,
-                           int tile, double gradient_scale, uint32_t *voxels, uint32_t *normals)
+static uint32_t gather_run(const scene_params *p, const trip_writer_params *w,
+                           const trip_compact_normals *compact, int axis, int sheet, int tile_u,
+                           int tile_v, int tile, uint32_t *voxels, uint32_t *normals)
 {
     int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
     uint32_t count = 0;
@@ -29,12 +73,13 @@ static uint32_t gather_run(const scene_params *p, int axis, int sheet, int tile_
         if (p->voxel && !p->voxel(p->user, at[0], at[1], at[2], &code, gradient))
             continue;
         voxels[count] = trip_voxel_pack((unsigned)u, (unsigned)v, code);
-        normals[count++] = trip_normal_pack(gradient, gradient_scale);
+        normals[count++] = pack_normal(w, compact, gradient);
     }
     return count;
 }
 
-static void append_sheet(trip_writer *w, const scene_params *p, int axis, int sheet, int tile)
+static void append_sheet(trip_writer *w, const scene_params *p, const trip_writer_params *params,
+                         const trip_compact_normals *compact, int axis, int sheet, int tile)
 {
     static uint32_t voxels[128 * 128], normals[128 * 128];
     int tiles_u = (int)((p->dims[(axis + 1) % 3] + tile - 1) / tile);
@@ -47,7 +92,8 @@ static void append_sheet(trip_writer *w, const scene_params *p, int axis, int sh
         }
         if (tile_u >= tiles_u || tile_v >= tiles_v)
             continue;
-        uint32_t count = gather_run(p, axis, sheet, tile_u, tile_v, tile, 1, voxels, normals);
+        uint32_t count =
+            gather_run(p, params, compact, axis, sheet, tile_u, tile_v, tile, voxels, normals);
         if (count)
             assert_int_equal(trip_writer_append(w, (unsigned)axis, (uint32_t)sheet,
                                                 (uint32_t)tile_u, (uint32_t)tile_v, voxels,
@@ -58,26 +104,14 @@ static void append_sheet(trip_writer *w, const scene_params *p, int axis, int sh
 
 static void write_dataset(const scene *s, const scene_params *p)
 {
-    trip_writer_params params = {
-        .normal_bytes = p->normals ? 4 : 0,
-        .tile_voxels = p->tile_voxels,
-        .slab_sheets = p->slab_sheets,
-        .page_bytes = 4096,
-        .dims = { p->dims[0], p->dims[1], p->dims[2] },
-        .index_to_world = p->index_to_world,
-        .codes = { .code_hi = 1, .gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1 },
-    };
-    bool given = false;
-    for (int i = 0; i < 12; i++)
-        given |= p->index_to_world.m[i / 4][i % 4] != 0;
-    if (!given)
-        params.index_to_world = trip_affine_identity();
+    trip_compact_normals compact = { 0 };
+    const trip_writer_params params = writer_params(p, &compact);
     trip_writer *w;
     assert_int_equal(trip_writer_open(&w, s->path, &params, s->budget), 0);
     int tile = p->tile_voxels ? (int)p->tile_voxels : 64;
     for (int axis = 0; axis < 3; axis++)
         for (int sheet = 0; sheet < p->dims[axis]; sheet++)
-            append_sheet(w, p, axis, sheet, tile);
+            append_sheet(w, p, &params, &compact, axis, sheet, tile);
     trip_writer_summary summary = {
         .value_max = 1,
         .voxels = (uint64_t)(p->dims[0] * p->dims[1] * p->dims[2]),

@@ -24,6 +24,7 @@ typedef struct scene_params {
     trip_affine index_to_world; /* all zero: the identity */
     unsigned tile_voxels, slab_sheets;
     bool normals;
+    unsigned code_bytes, normal_bytes; /* 0: 2, and 4 where there are normals */
     double gradient_scale; /* the header's, by which gradients are multiplied; 0: 1 */
     scene_voxel voxel;     /* NULL: every voxel is there with code 65535 */
     void *user;

@@ -82,12 +82,16 @@ static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
         .eye = { 50, 40, 30 }, .up = { 0, 0, 1 }, .fov_degrees = 60, .width = 100, .height = 80
     };
     trip_camera c;
-    trip_frame frame = { .camera = &c, .settings = &settings, .plan = &plan };
+    trip_dataset data = { .header.normal_bytes = 4 };
+    trip_frame frame = { .data = &data, .camera = &c, .settings = &settings, .plan = &plan };
     assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
     assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), 0);
 
     plan.planes |= 1u << TRIP_PLANE_NORMALS;
     assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_SHADED | TRIP_GL_HEADLIGHT);
+    data.header.normal_bytes = 3;
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0),
+                     TRIP_GL_SHADED | TRIP_GL_HEADLIGHT | TRIP_GL_COMPACT);
     settings.shading = false;
     settings.indexed = true;
     assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_INDEXED);
