@@ -1,5 +1,5 @@
 /* The memory promise: every large buffer is taken from a budget that can refuse and knows its
- * peak. One budget per process run, shared by all threads. */
+ * peak. One budget per run or context, shared by all its threads. */
 #ifndef TRIP_BUDGET_H
 #define TRIP_BUDGET_H
 

@@ -1,5 +1,5 @@
-/* A volume file to a data set: the whole of `triptych brick` but for its command line. One call at
- * a time in a process; it starts and ends its own threads. */
+/* A volume file to a data set: the whole of `triptych brick` but for its command line. Any thread;
+ * it starts and ends its own threads, which work in the caller's scope. */
 #ifndef TRIP_BRICK_H
 #define TRIP_BRICK_H
 
