@@ -47,8 +47,9 @@ static void make_voxels(fixture *f)
             (fixture_voxel){ .p = { (uint32_t)(i % (size_t)dims[0]),
                                     (uint32_t)(i / (size_t)dims[0] % (size_t)dims[1]),
                                     (uint32_t)(i / (size_t)(dims[0] * dims[1])) },
-                             .code = r & 65535,
-                             .normal = (uint32_t)(r * 2654435761u >> 3) };
+                             .code = f->params.code_bytes == 1 ? (r & 255) * 257 : r & 65535,
+                             .normal = (uint32_t)(r * 2654435761u >> 3) &
+                                       (f->params.normal_bytes == 3 ? 0xffffff : UINT32_MAX) };
     }
     f->lists[0] = list;
     for (int a = 1; a < 3; a++) {
@@ -98,7 +99,11 @@ int fixture_write(fixture *f, const char *path)
                                   .page_bytes = p->page_bytes,
                                   .dims = { p->dims[0], p->dims[1], p->dims[2] },
                                   .index_to_world = trip_affine_identity(),
-                                  .codes = { .code_lo = -1, .code_hi = 2, .gradient_scale = 3 } };
+                                  .codes = { .code_lo = -1,
+                                             .code_hi = 2,
+                                             .gradient_scale = 3,
+                                             .gradient_step = { 0.5, 0.25, 1 },
+                                             .gradient_full = 3 } };
     int status = trip_writer_open(&w, path, &params, f->budget);
     if (status < 0)
         return status;

@@ -197,6 +197,148 @@ static void a_data_set_behind_a_link_is_replaced_and_the_link_stays(void **state
     fixture_free(&f);
 }
 
+static void codes_and_normals_of_every_length_are_read_as_written(void **state)
+{
+    (void)state;
+    for (unsigned tile = 16; tile <= 128; tile *= 2)
+        for (unsigned i = 0; i < 4; i++)
+            check_round_trip(&(fixture_params){ .tile_voxels = tile,
+                                                .code_bytes = 1 + i % 2,
+                                                .normal_bytes = 3 + i / 2,
+                                                .normals = true });
+}
+
+/* X, Y and Z of the voxels at level 0, their halo along Z, and level 1 along X and Y. */
+enum { MANY = 6 };
+
+static const trip_writer_list *many_lists(void)
+{
+    static trip_writer_list lists[MANY];
+    for (int i = 0; i < MANY; i++) {
+        bool coarse = i > 3;
+        lists[i] = (trip_writer_list){ .axis = i < 3    ? i
+                                               : i == 3 ? 2
+                                                        : i - 4,
+                                       .level = coarse,
+                                       .kind = i == 3 ? TRIP_KIND_HALO : TRIP_KIND_VOXELS,
+                                       .index_to_world = trip_affine_identity(),
+                                       .sheet_first = coarse ? 0.5 : 0,
+                                       .sheet_step = coarse ? 2 : 1 };
+        for (int a = 0; a < 3; a++) {
+            lists[i].dims[a] = coarse ? 20 : 40;
+            lists[i].index_to_world.m[a][a] = coarse ? 2 : 1;
+            lists[i].index_to_world.m[a][3] = coarse ? 0.5 : 0;
+        }
+    }
+    return lists;
+}
+
+/* One voxel in each list: (1, 2, 3) at level 0, `halo` around it, (7, 8, `k`) at level 1. */
+static void write_many(const char *path, const uint32_t halo[3], uint32_t k, trip_budget *budget)
+{
+    trip_writer *w;
+    const trip_writer_params params = { .dims = { 40, 40, 40 },
+                                        .tile_voxels = 16,
+                                        .replace = true,
+                                        .index_to_world = trip_affine_identity(),
+                                        .lists = many_lists(),
+                                        .list_count = MANY };
+    assert_int_equal(trip_writer_open(&w, path, &params, budget), TRIP_OK);
+    for (unsigned i = 0; i < MANY; i++) {
+        const uint32_t fine[3] = { 1, 2, 3 }, coarse[3] = { 7, 8, i == 5 ? k : 9 };
+        const uint32_t *p = i < 3 ? fine : i == 3 ? halo : coarse;
+        int axis = many_lists()[i].axis;
+        uint32_t u = p[(axis + 1) % 3], v = p[(axis + 2) % 3];
+        const uint32_t voxel = trip_voxel_pack(u % 16, v % 16, 100 + i / 4);
+        assert_int_equal(trip_writer_append(w, i, p[axis], u / 16, v / 16, &voxel, NULL, 1),
+                         TRIP_OK);
+    }
+    const trip_writer_summary summary = { .voxels = 64000 };
+    assert_int_equal(trip_writer_finish(w, &summary), TRIP_OK);
+}
+
+static void check_many(const trip_dataset *d)
+{
+    assert_int_equal(d->list_count, MANY);
+    assert_int_equal(d->header.kept, 1);
+    assert_int_equal(d->header.halo, 1);
+    for (unsigned i = 0; i < MANY; i++) {
+        const trip_writer_list *wanted = &many_lists()[i];
+        const trip_list *l = trip_dataset_find(d, wanted->axis, wanted->level, wanted->kind);
+        assert_ptr_equal(l, &d->lists[i]);
+        assert_int_equal(l->index, i);
+        assert_int_equal(l->records, 1);
+        assert_memory_equal(l->dims, wanted->dims, sizeof l->dims);
+        assert_memory_equal(&l->index_to_world, &wanted->index_to_world, sizeof l->index_to_world);
+        assert_true(trip_list_sheet_coordinate(l, 3) == (wanted->level ? 6.5 : 3));
+    }
+    assert_null(trip_dataset_find(d, 2, 1, TRIP_KIND_VOXELS));
+    assert_null(trip_dataset_find(d, 0, 0, TRIP_KIND_HALO));
+}
+
+static void expect_verified(const char *path, trip_budget *budget, const char *fault)
+{
+    trip_dataset *d;
+    assert_int_equal(trip_dataset_open(&d, path, budget), TRIP_OK);
+    fixture_catch_reports();
+    assert_int_equal(trip_dataset_verify(d, budget), fault ? TRIP_ERROR : TRIP_OK);
+    if (fault)
+        assert_non_null(strstr(fixture_reports(), fault));
+    else
+        assert_string_equal(fixture_reports(), "");
+    trip_dataset_close(d);
+}
+
+static void lists_of_other_levels_and_kinds_are_kept_and_verified(void **state)
+{
+    const uint32_t around[3] = { 2, 2, 3 }, within[3] = { 1, 2, 3 };
+    fixture f;
+    trip_dataset *d;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    write_many(path, around, 9, f.budget);
+    assert_int_equal(trip_dataset_open(&d, path, f.budget), TRIP_OK);
+    check_many(d);
+    trip_dataset_close(d);
+    fixture_run_command("test -e %s/z0.halo && test -e %s/y1.voxels", path, path);
+    expect_verified(path, f.budget, NULL);
+    write_many(path, within, 9, f.budget);
+    expect_verified(path, f.budget, "a voxel is in a list of another kind too");
+    write_many(path, around, 10, f.budget);
+    expect_verified(path, f.budget, "the lists of voxels along x and y at level 1");
+    fixture_free(&f);
+}
+
+static void lists_that_make_no_sense_are_refused(void **state)
+{
+    trip_budget *budget;
+    trip_writer *w;
+    trip_writer_list lists[MANY];
+    (void)state;
+    assert_int_equal(trip_budget_create(&budget, 1 << 24), TRIP_OK);
+    fixture_catch_reports();
+    for (int i = 0; i < 9; i++) {
+        trip_writer_params params = { .dims = { 40, 40, 40 },
+                                      .index_to_world = trip_affine_identity(),
+                                      .lists = lists,
+                                      .list_count = MANY };
+        memcpy(lists, many_lists(), sizeof lists);
+        lists[3].kind = i == 0 ? TRIP_KINDS : TRIP_KIND_HALO;
+        lists[4].axis = i == 1 ? 1 : i == 2 ? 3 : 0;
+        lists[4].dims[1] = i == 3 ? 21 : 20;
+        lists[4].sheet_step = i == 4 ? 0 : i == 5 ? INFINITY : 2;
+        lists[2].dims[0] = i == 6 ? 39 : 40;
+        lists[1].level = i == 7 ? 2 : 0;
+        params.list_count = i == 8 ? 2 : MANY;
+        assert_int_equal(trip_writer_open(&w, "/tmp/trip-never.trip", &params, budget), TRIP_ERROR);
+    }
+    fixture_reports();
+    assert_false(is_there("/tmp/trip-never.trip.partial"));
+    trip_budget_destroy(budget);
+}
+
 static trip_writer *open_writer(const char *path, trip_budget *budget)
 {
     trip_writer *w;
@@ -348,6 +490,9 @@ int main(void)
         cmocka_unit_test(a_data_set_behind_a_link_is_replaced_and_the_link_stays),
         cmocka_unit_test(two_writers_of_one_name_do_not_mix),
         cmocka_unit_test(runs_out_of_order_or_place_are_refused),
+        cmocka_unit_test(codes_and_normals_of_every_length_are_read_as_written),
+        cmocka_unit_test(lists_of_other_levels_and_kinds_are_kept_and_verified),
+        cmocka_unit_test(lists_that_make_no_sense_are_refused),
         cmocka_unit_test(parameters_out_of_range_are_refused),
         cmocka_unit_test(a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set),
         cmocka_unit_test(a_full_disk_is_one_line_and_leaves_nothing),

@@ -1,0 +1,243 @@
+/* Blocks: what is packed is decoded, from any record on; bytes are those that FORMAT.md says; a
+ * block that does not agree with its run or its brick is found out. */
+#include "fixture.h"
+
+#include "block.h"
+
+enum { ROOM = TRIP_RUN_RECORDS_MAX };
+
+/* Bit by bit, unlike the code under test. */
+static uint32_t plain_morton(uint32_t u, uint32_t v)
+{
+    uint32_t m = 0;
+    for (int b = 0; b < 8; b++)
+        m |= (u >> b & 1) << 2 * b | (v >> b & 1) << (2 * b + 1);
+    return m;
+}
+
+typedef struct run {
+    trip_block_form form;
+    uint32_t voxels[ROOM], count, words;
+    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    trip_file_brick brick; /* exact bounds */
+} run;
+
+static run shared; /* large */
+
+/* Each voxel of the tile with that chance, in Morton order, and the block of those. */
+static run *make_run(trip_block_form form, double density, uint64_t seed)
+{
+    static uint32_t by_number[ROOM];
+    run *r = &shared;
+    uint32_t edge = 1u << form.tile_log2;
+    for (uint32_t v = 0; v < edge; v++)
+        for (uint32_t u = 0; u < edge; u++)
+            by_number[plain_morton(u, v)] = u | v << 8;
+    *r = (run){ .form = form,
+                .brick = { .code_min = UINT16_MAX, .u_min = UINT8_MAX, .v_min = UINT8_MAX } };
+    trip_file_brick *b = &r->brick;
+    for (uint32_t n = 0; n < edge * edge; n++) {
+        uint64_t random = fixture_random(&seed);
+        if ((double)(random >> 40) >= density * (1 << 24) && n + 1 < edge * edge)
+            continue;
+        uint32_t place = by_number[n], u = place & 255, v = place >> 8;
+        uint32_t code = form.code_bytes == 1 ? (random & 255) * 257 : random & 65535;
+        r->voxels[r->count++] = place | code << 16;
+        b->u_min = (uint8_t)(u < b->u_min ? u : b->u_min);
+        b->u_max = (uint8_t)(u > b->u_max ? u : b->u_max);
+        b->v_min = (uint8_t)(v < b->v_min ? v : b->v_min);
+        b->v_max = (uint8_t)(v > b->v_max ? v : b->v_max);
+        b->code_min = (uint16_t)(code < b->code_min ? code : b->code_min);
+        b->code_max = (uint16_t)(code > b->code_max ? code : b->code_max);
+    }
+    r->words = trip_block_pack(&r->form, r->voxels, r->count, r->block);
+    return r;
+}
+
+static trip_block block_of(const run *r)
+{
+    return trip_block_make(&r->form, r->count, r->words, r->block, NULL);
+}
+
+static void what_is_packed_is_decoded_from_any_record_on(void **state)
+{
+    static uint32_t out[ROOM];
+    const double densities[] = { 0, 0.001, 0.1, 0.7, 1.1 };
+    uint64_t seed = 1;
+    (void)state;
+    for (unsigned log2 = 4; log2 <= 7; log2++)
+        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++)
+            for (int i = 0; i < 5; i++) {
+                const run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, densities[i], i);
+                const trip_block b = block_of(r);
+                assert_true(trip_block_words_fit(&r->form, r->count, r->words));
+                assert_true(r->words <= trip_block_most_words(&r->form));
+                assert_null(trip_block_check(&b, &r->brick));
+                assert_true(trip_block_is_padded(&b));
+                trip_block_voxels(&b, 0, r->count, out);
+                assert_memory_equal(out, r->voxels, r->count * sizeof *out);
+                for (int k = 0; k < 20; k++) {
+                    uint32_t first = (uint32_t)(fixture_random(&seed) % r->count);
+                    uint32_t n = (uint32_t)(fixture_random(&seed) % (r->count - first + 1));
+                    trip_block_voxels(&b, first, n, out);
+                    assert_memory_equal(out, r->voxels + first, n * sizeof *out);
+                }
+            }
+}
+
+static void a_block_has_the_bytes_that_the_format_says(void **state)
+{
+    (void)state;
+    /* (1, 0) is voxel 1 of square 0; (9, 8) is voxel 1 of square 3, (15, 15) voxel 63. */
+    const uint32_t voxels[] = { trip_voxel_pack(1, 0, 257), trip_voxel_pack(9, 8, 514),
+                                trip_voxel_pack(15, 15, 65535) };
+    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    assert_int_equal(trip_block_pack(&(trip_block_form){ 4, 1, 0 }, voxels, 3, block), 4);
+    assert_true(block[0] == 9 && block[1] == 2 && block[2] == (UINT64_C(1) << 63 | 2));
+    assert_true(block[3] == 0xff0201);
+    assert_int_equal(trip_block_pack(&(trip_block_form){ 7, 2, 0 }, voxels, 3, block), 7);
+    assert_true(block[0] == 9 && !block[1] && !block[2] && !block[3] && block[4] == 2);
+    assert_true(block[6] == UINT64_C(0xffff02020101));
+}
+
+static void what_is_no_run_is_not_packed(void **state)
+{
+    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    const trip_block_form small = { 4, 2, 0 }, bytes = { 4, 1, 0 };
+    const uint32_t backwards[] = { trip_voxel_pack(1, 0, 0), trip_voxel_pack(0, 0, 0) };
+    const uint32_t twice[] = { 5, 5 }, outside = trip_voxel_pack(16, 0, 0);
+    const uint32_t far = trip_voxel_pack(128, 0, 0), odd = trip_voxel_pack(0, 0, 258);
+    (void)state;
+    assert_int_equal(trip_block_pack(&small, backwards, 2, block), 0);
+    assert_int_equal(trip_block_pack(&small, twice, 2, block), 0);
+    assert_int_equal(trip_block_pack(&small, &outside, 1, block), 0);
+    assert_int_equal(trip_block_pack(&small, &far, 1, block), 0);
+    assert_int_equal(trip_block_pack(&bytes, &odd, 1, block), 0);
+    assert_int_equal(trip_block_pack(&small, &odd, 1, block), 3);
+}
+
+static void a_number_of_words_fits_where_squares_can_hold_the_records(void **state)
+{
+    const trip_block_form f = { 4, 2, 0 }; /* a word of presence, four squares, four codes a word */
+    (void)state;
+    assert_false(trip_block_words_fit(&f, 0, 2));
+    assert_false(trip_block_words_fit(&f, 1, 2));
+    assert_true(trip_block_words_fit(&f, 1, 3));
+    assert_false(trip_block_words_fit(&f, 1, 4)); /* two squares for one record */
+    assert_true(trip_block_words_fit(&f, 64, 1 + 1 + 16));
+    assert_false(trip_block_words_fit(&f, 65, 1 + 1 + 17));
+    assert_true(trip_block_words_fit(&f, 65, 1 + 4 + 17));
+    assert_false(trip_block_words_fit(&f, 65, 1 + 5 + 17));
+    assert_true(trip_block_words_fit(&f, 256, 1 + 4 + 64));
+    assert_false(trip_block_words_fit(&f, 257, 1 + 4 + 65));
+    assert_false(trip_block_words_fit(&f, UINT32_MAX, 65535));
+}
+
+static void expect_fault(const run *r, const char *why)
+{
+    const trip_block b = block_of(r);
+    const char *fault = trip_block_check(&b, &r->brick);
+    if (!fault || !strstr(fault, why))
+        fail_msg("wanted \"%s\", not \"%s\"", why, fault ? fault : "nothing");
+}
+
+/* Bounds one less on any side leave out the records there: all bounds are exact. */
+static void records_outside_their_brick_are_found(void **state)
+{
+    (void)state;
+    for (unsigned log2 = 4; log2 <= 7; log2++)
+        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++)
+            for (uint64_t seed = 0; seed < 8; seed++) {
+                run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, 0.02, seed);
+                const trip_file_brick exact = r->brick;
+                r->brick.u_min++;
+                expect_fault(r, "outside its brick's bounds");
+                r->brick = exact;
+                r->brick.u_max--;
+                expect_fault(r, "outside its brick's bounds");
+                r->brick = exact;
+                r->brick.v_min++;
+                expect_fault(r, "outside its brick's bounds");
+                r->brick = exact;
+                r->brick.v_max--;
+                expect_fault(r, "outside its brick's bounds");
+                r->brick = exact;
+                r->brick.code_min++;
+                expect_fault(r, "outside its brick's range");
+                r->brick = exact;
+                r->brick.code_max--;
+                expect_fault(r, "outside its brick's range");
+            }
+}
+
+static void masks_that_do_not_agree_with_the_run_are_found(void **state)
+{
+    const trip_block_form f = { 6, 2, 0 };
+    (void)state;
+    run *r = make_run(f, 0.3, 3);
+    r->block[0] &= r->block[0] - 1;
+    expect_fault(r, "squares");
+    r = make_run(f, 0.3, 3);
+    r->block[1] &= r->block[1] - 1;
+    expect_fault(r, "as many voxels");
+    r = make_run(f, 0.3, 3); /* the first mask's bits go to the second, as far as there is room */
+    uint64_t both[2] = { r->block[1], r->block[2] };
+    int bits = __builtin_popcountll(both[0]);
+    for (int n = 0; n < 64 && bits > 0; n++)
+        if (!(both[1] >> n & 1)) {
+            both[1] |= UINT64_C(1) << n;
+            bits--;
+        }
+    assert_int_equal(bits, 0);
+    r->block[1] = 0;
+    r->block[2] = both[1];
+    expect_fault(r, "a mask is empty");
+    r = make_run((trip_block_form){ 4, 2, 0 }, 0.3, 3); /* squares 0 to 3; bit 63 is none of it */
+    r->block[0] ^= UINT64_C(1) << 3 | UINT64_C(1) << 63;
+    expect_fault(r, "outside its brick's bounds");
+}
+
+static void padding_that_is_not_zero_is_found(void **state)
+{
+    (void)state;
+    run *r = make_run((trip_block_form){ 5, 1, 0 }, 0.1, 5);
+    while (r->count % 8 == 0)
+        r = make_run(r->form, 0.1, r->count);
+    const trip_block b = block_of(r);
+    assert_true(trip_block_is_padded(&b));
+    r->block[r->words - 1] |= UINT64_C(1) << 63;
+    assert_false(trip_block_is_padded(&b));
+}
+
+static void normals_are_packed_and_decoded(void **state)
+{
+    const uint32_t normals[] = { 0x000000, 0x800000, 0xabcdef, 0x7fffff };
+    uint32_t out[4];
+    unsigned char packed[16];
+    (void)state;
+    for (unsigned bytes = 3; bytes <= 4; bytes++) {
+        trip_normals_pack(bytes, normals, 4, packed);
+        assert_int_equal(packed[2 * bytes], 0xef);
+        assert_int_equal(packed[2 * bytes + 2], 0xab);
+        const trip_block b = { .count = 4, .normal_bytes = bytes, .normals = packed };
+        trip_block_normals(&b, 0, 4, out);
+        assert_memory_equal(out, normals, sizeof out);
+        trip_block_normals(&b, 2, 1, out);
+        assert_int_equal(out[0], 0xabcdef);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_packed_is_decoded_from_any_record_on),
+        cmocka_unit_test(a_block_has_the_bytes_that_the_format_says),
+        cmocka_unit_test(what_is_no_run_is_not_packed),
+        cmocka_unit_test(a_number_of_words_fits_where_squares_can_hold_the_records),
+        cmocka_unit_test(records_outside_their_brick_are_found),
+        cmocka_unit_test(masks_that_do_not_agree_with_the_run_are_found),
+        cmocka_unit_test(padding_that_is_not_zero_is_found),
+        cmocka_unit_test(normals_are_packed_and_decoded),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
