@@ -439,6 +439,8 @@ int trip_dataset_check_tables(const unsigned char *index, const trip_file_header
         return trip_fail(TRIP_ERROR, "open", where, "out of memory");
     int status = check_places(index, h, where, &s);
     free(s.items);
+    if (status < 0)
+        return status;
     const trip_file_list *lists = (const void *)(index + h->lists_offset);
     for (uint32_t i = 0; i < h->list_count && status == TRIP_OK; i++)
         status = check_slabs(&(list_check){

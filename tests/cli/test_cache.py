@@ -308,7 +308,7 @@ class Cache(program.ProgramTest):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         wanted = self.draw("v.nrrd", bricked=True)
         for list_name in "xyz":
-            self.damage(f"{list_name}.voxels", lambda d: bytes([d[0] ^ 255]) + d[1:])
+            self.damage(f"{list_name}0.voxels", lambda d: bytes([d[0] ^ 255]) + d[1:])
         run = program.call("render", "v.nrrd", "-o", "one.exr", *SIZE)
         self.assertEqual(run.returncode, 1)
         self.assertIn("the same command makes it anew", run.stderr)

@@ -3,7 +3,7 @@ same records and the same picture, bit for bit, from brick to image."""
 import numpy
 import program
 
-FILES = [f"{axis}.{plane}" for axis in "xyz" for plane in ("voxels", "normals")]
+FILES = [f"{axis}0.{plane}" for axis in "xyz" for plane in ("voxels", "normals")]
 VOLUME = program.ball((14, 16, 18), dtype="f4")
 
 
