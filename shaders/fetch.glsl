@@ -1,5 +1,5 @@
 // One splat of the batch by its draw position: its place from the eye (list axes), code and normal.
-// Mirrors trip_run in stream/selection.h and the records in stream/format.h. With INDEXED the batch
+// Mirrors stream/block.h: the bytes of blocks and normals are as in the files. With INDEXED the batch
 // names places in the list's order of one vertex array (x, y, z, code in 16 bits each) instead.
 #include "real.glsl"
 
@@ -11,6 +11,7 @@ layout(std430, binding = TRIP_GL_VERTICES) readonly buffer trip_gl_vertices { uv
 layout(std430, binding = TRIP_GL_ORDER) readonly buffer trip_gl_order { uint order[]; };
 #else
 layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint voxels[]; };
+layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_square squares[]; };
 #endif
 
 struct record {
@@ -30,23 +31,70 @@ real3 offset_of(uint at, out uint code)
     return real3(p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]);
 }
 #else
-real3 offset_of(uint at, out uint code)
+// The place of set bit number k of a mask.
+uint find_bit(uint low, uint high, uint k)
 {
-    uint voxel = voxels[at];
-    code = voxel >> 16;
-    return real3(0.0, voxel & 255u, voxel >> 8 & 255u);
+    uint below = uint(bitCount(low)), word = low, at = 0u;
+    if (k >= below) {
+        k -= below;
+        word = high;
+        at = 32u;
+    }
+    for (uint width = 16u; width > 0u; width >>= 1) {
+        uint here = uint(bitCount(word & ((1u << width) - 1u)));
+        if (k >= here) {
+            k -= here;
+            word >>= width;
+            at += width;
+        }
+    }
+    return at;
+}
+
+// Every second bit of a Morton number in a square.
+uint even_bits(uint n)
+{
+    return (n & 1u) | (n >> 1 & 2u) | (n >> 2 & 4u);
+}
+
+real3 offset_of(trip_gl_square square, uint k, out uint code)
+{
+    uint place = find_bit(square.mask_low, square.mask_high, k);
+    uint code_bytes = uint(edge.y), at = square.codes + code_bytes * k;
+    uint word = voxels[at >> 2] >> (at & 3u) * 8u;
+    code = code_bytes == 1u ? (word & 255u) * 257u : word & 0xffffu;
+    return real3(0.0, (square.corner & 0xffffu) + even_bits(place),
+                 (square.corner >> 16) + even_bits(place >> 1));
+}
+#endif
+
+#ifdef SHADED
+uint normal_at(uint at)
+{
+#ifdef COMPACT
+    uint shift = (at & 3u) * 8u, word = normals[at >> 2] >> shift;
+    if (shift > 8u)
+        word |= normals[(at >> 2) + 1u] << (32u - shift);
+    return word & 0xffffffu;
+#else
+    return normals[at >> 2];
+#endif
 }
 #endif
 
 record fetch_record(uint position)
 {
     record r;
-    trip_gl_run run = runs[run_of[position]];
-    uint at = uint(run.first + run.step * int(position));
 #ifdef INDEXED
-    at = order[at];
-#endif
+    trip_gl_run run = runs[run_of[position]];
+    uint at = order[uint(run.first + run.step * int(position))];
     real3 offset = offset_of(at, r.code);
+#else
+    uint entry = run_of[position], k = entry & 63u;
+    trip_gl_square square = squares[entry >> 6];
+    trip_gl_run run = runs[square.run];
+    real3 offset = offset_of(square, k, r.code);
+#endif
     // In this order: base + offset cancels almost exactly near the eye.
     r.from_eye = (real3(run.base) + offset) + real3(run.base_low);
 #ifdef TRIP_DOUBLE
@@ -59,8 +107,12 @@ record fetch_record(uint position)
     r.place = run.place + vec3(dot(to_x.xyz, offset), dot(to_y.xyz, offset),
                                dot(forward.xyz, offset));
 #endif
-#ifdef SHADED
+#if defined(SHADED) && defined(INDEXED)
     r.normal = normals[at];
+#elif defined(SHADED) && defined(COMPACT)
+    r.normal = normal_at(square.normals + 3u * k);
+#elif defined(SHADED)
+    r.normal = normal_at(square.normals + 4u * k);
 #else
     r.normal = 0u;
 #endif

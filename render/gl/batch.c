@@ -19,6 +19,9 @@ static int count_positions(trip_gl_batch *b, const trip_batch *batch)
                          "%llu splats at a time are too many; read in smaller pieces",
                          (unsigned long long)sum);
     b->positions = (uint32_t)sum;
+    b->square_count = 0;
+    for (size_t i = 0; i < batch->run_count && batch->planes[TRIP_PLANE_VOXELS]; i++)
+        b->square_count += trip_block_of(batch, &batch->runs[i]).squares;
     return TRIP_OK;
 }
 
@@ -29,25 +32,103 @@ static trip_gl_part next_part(size_t *end, size_t bytes)
     return part;
 }
 
-static int take_slot(trip_gl_batch *b, trip_gl_ring *ring, const trip_batch *batch)
+/* A plane that lies in GL memory: from where a storage block may start. */
+static trip_gl_part part_in(const trip_gl_slot *slot, const trip_batch *batch, int plane,
+                            size_t *start)
 {
-    size_t end = 0, bytes = b->positions * sizeof(uint32_t);
-    b->voxels = next_part(&end, batch->planes[TRIP_PLANE_VOXELS] ? bytes : 0);
-    b->normals = next_part(&end, batch->planes[TRIP_PLANE_NORMALS] ? bytes : 0);
-    b->runs = next_part(&end, batch->run_count * sizeof(struct trip_gl_run));
-    b->run_of = next_part(&end, bytes);
-    return trip_gl_ring_take(ring, end, &b->slot);
+    if (!batch->planes[plane])
+        return (trip_gl_part){ 0 };
+    size_t at = (size_t)(batch->planes[plane] - slot->memory);
+    *start = at % TRIP_GL_ALIGNMENT_BYTES;
+    return (trip_gl_part){ at - *start, (*start + batch->plane_bytes[plane] + 3) / 4 * 4 };
 }
 
-/* The records of a run, decoded, from place `at` on. */
-static void decode_run(trip_gl_batch *b, const trip_batch *batch, const trip_run *run, uint64_t at)
+static int take_slot(trip_gl_batch *b, trip_gl_ring *ring, const trip_batch *batch,
+                     trip_gl_slot *records)
 {
-    const trip_block block = trip_block_of(batch, run);
-    void *voxels = b->slot->memory + b->voxels.offset;
-    void *normals = b->slot->memory + b->normals.offset;
-    trip_block_voxels(&block, 0, run->count, (uint32_t *)voxels + at);
-    if (block.normals)
-        trip_block_normals(&block, 0, run->count, (uint32_t *)normals + at);
+    const int voxels = TRIP_PLANE_VOXELS, normals = TRIP_PLANE_NORMALS;
+    size_t end = 0;
+    b->voxels_start = b->normals_start = 0;
+    if (records) {
+        b->voxels = part_in(records, batch, voxels, &b->voxels_start);
+        b->normals = part_in(records, batch, normals, &b->normals_start);
+    } else {
+        b->voxels =
+            next_part(&end, batch->planes[voxels] ? (batch->plane_bytes[voxels] + 3) / 4 * 4 : 0);
+        b->normals =
+            next_part(&end, batch->planes[normals] ? (batch->plane_bytes[normals] + 3) / 4 * 4 : 0);
+    }
+    b->runs = next_part(&end, batch->run_count * sizeof(struct trip_gl_run));
+    b->squares = next_part(&end, b->square_count * sizeof(struct trip_gl_square));
+    b->run_of = next_part(&end, b->positions * sizeof(uint32_t));
+    int status = trip_gl_ring_take(ring, end, &b->slot);
+    b->records = records ? records : b->slot;
+    return status;
+}
+
+static void copy_planes(trip_gl_batch *b, const trip_batch *batch)
+{
+    const int voxels = TRIP_PLANE_VOXELS, normals = TRIP_PLANE_NORMALS;
+    if (batch->planes[voxels])
+        memcpy(b->slot->memory + b->voxels.offset, batch->planes[voxels],
+               batch->plane_bytes[voxels]);
+    if (batch->planes[normals])
+        memcpy(b->slot->memory + b->normals.offset, batch->planes[normals],
+               batch->plane_bytes[normals]);
+}
+
+/* u and v in the tile of a square's corner, by its Morton number. */
+static uint32_t corner_of(uint32_t number)
+{
+    uint32_t at[2] = { 0, 0 };
+    for (unsigned bit = 0; bit < 8; bit++)
+        at[bit % 2] |= (number >> bit & 1) << (bit / 2 + 3);
+    return at[0] | at[1] << 16;
+}
+
+/* The filling of squares and positions. */
+typedef struct filling {
+    struct trip_gl_square *squares;
+    uint32_t *entries;
+    uint32_t square, position;
+} filling;
+
+static void fill_square(filling *f, struct trip_gl_square square, uint32_t count, bool reversed)
+{
+    f->squares[f->square] = square;
+    for (uint32_t k = 0; k < count; k++)
+        f->entries[f->position++] = f->square << 6 | (reversed ? count - 1 - k : k);
+    f->square++;
+}
+
+/* The squares of a run, in draw order, with their draw positions. */
+static void fill_squares(trip_gl_batch *b, filling *f, const trip_batch *batch, uint32_t run)
+{
+    const trip_run *of = &batch->runs[run];
+    const trip_block block = trip_block_of(batch, of);
+    bool reversed = batch->pass->descending;
+    size_t codes = b->voxels_start + (size_t)(block.codes - batch->planes[TRIP_PLANE_VOXELS]);
+    size_t normals = b->normals_start + of->at[TRIP_PLANE_NORMALS];
+    uint32_t numbers[TRIP_BLOCK_SQUARES_MAX], firsts[TRIP_BLOCK_SQUARES_MAX], n = 0, first = 0;
+    for (unsigned w = 0; w < block.present_words; w++)
+        for (uint64_t bits = block.present[w]; bits; bits &= bits - 1, n++) {
+            numbers[n] = 64 * w + (uint32_t)__builtin_ctzll(bits);
+            firsts[n] = first;
+            first += (uint32_t)__builtin_popcountll(block.masks[n]);
+        }
+    for (uint32_t k = 0; k < n; k++) {
+        uint32_t i = reversed ? n - 1 - k : k;
+        uint64_t mask = block.masks[i];
+        const struct trip_gl_square square = {
+            .mask_low = (uint32_t)mask,
+            .mask_high = (uint32_t)(mask >> 32),
+            .codes = (uint32_t)(codes + (size_t)firsts[i] * block.code_bytes),
+            .normals = (uint32_t)(normals + (size_t)firsts[i] * block.normal_bytes),
+            .run = run,
+            .corner = corner_of(numbers[i]),
+        };
+        fill_square(f, square, (uint32_t)__builtin_popcountll(mask), reversed);
+    }
 }
 
 /* One piece for each run at most. */
@@ -125,30 +206,35 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
 {
     void *memory = b->slot->memory + b->runs.offset;
     struct trip_gl_run *runs = memory;
+    memory = b->slot->memory + b->squares.offset;
+    filling f = { .squares = memory };
     memory = b->slot->memory + b->run_of.offset;
-    uint32_t *run_of = memory, position = 0;
+    f.entries = memory;
+    uint32_t position = 0;
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         unsigned list = trip_batch_list(batch, run)->index;
         const trip_gl_placing *p = &placings[list];
-        uint64_t first = resident ? run->first : position;
-        runs[i] = make_run(p, run, first, batch->pass->descending, resident, position);
-        if (!resident)
-            decode_run(b, batch, run, position);
+        runs[i] = make_run(p, run, run->first, batch->pass->descending, resident, position);
         add_piece(b, position, run->count, list, needs_quads(p, run));
-        for (uint32_t k = 0; k < run->count; k++)
-            run_of[position++] = (uint32_t)i;
+        for (uint32_t k = 0; k < run->count && resident; k++)
+            f.entries[position + k] = (uint32_t)i;
+        if (!resident)
+            fill_squares(b, &f, batch, (uint32_t)i);
+        position += run->count;
     }
 }
 
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, bool resident)
+                       const trip_batch *batch, trip_gl_slot *records, bool resident)
 {
     int status = count_positions(b, batch);
     if (!status)
         status = make_room(b, batch->run_count);
     if (!status)
-        status = take_slot(b, ring, batch);
+        status = take_slot(b, ring, batch, records);
+    if (!status && !records)
+        copy_planes(b, batch);
     if (!status)
         fill_runs(b, placings, batch, resident);
     return status;

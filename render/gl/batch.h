@@ -35,18 +35,22 @@ typedef struct trip_gl_part {
 } trip_gl_part;
 
 typedef struct trip_gl_batch {
-    trip_gl_slot *slot;
-    trip_gl_part voxels, normals, runs, run_of;
+    trip_gl_slot *slot;    /* of what is made of the runs */
+    trip_gl_slot *records; /* of voxels and normals */
+    trip_gl_part voxels, normals, runs, squares, run_of;
+    size_t voxels_start, normals_start; /* of the batch's planes in those parts */
+    uint32_t square_count;
     uint32_t positions;
     trip_gl_piece *pieces;
     size_t piece_count, piece_room;
 } trip_gl_batch;
 
-/* Fills `b` from a batch of the reader in draw order; its records are decoded. `placings` are those
+/* Fills `b` from a batch of the reader in draw order. `records` is the slot that its planes lie in;
+ * NULL: they are copied. `placings` are those
  * of the data set's lists. `resident`: the whole list's records are in GL memory already, and the
  * batch has runs only. */
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, bool resident);
+                       const trip_batch *batch, trip_gl_slot *records, bool resident);
 void trip_gl_batch_release(trip_gl_batch *b);
 
 #endif

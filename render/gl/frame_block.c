@@ -132,6 +132,7 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
         (trip_gl_double4){ { constants.sigma * constants.sigma, constants.cutoff2,
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
     out->edge.v[0] = constants.edge;
+    out->edge.v[1] = frame->data->header.code_bytes;
     double h = trip_weight_h(s);
     out->to_grid = (trip_gl_double4){ { 1, 1, 1, 1 } };
     out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };

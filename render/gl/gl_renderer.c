@@ -296,9 +296,10 @@ static void bind_part(const trip_gl_slot *slot, GLuint binding, trip_gl_part par
 
 static void bind_batch(const trip_gl_batch *b)
 {
-    bind_part(b->slot, TRIP_GL_VOXELS, b->voxels);
-    bind_part(b->slot, TRIP_GL_NORMALS, b->normals);
+    bind_part(b->records, TRIP_GL_VOXELS, b->voxels);
+    bind_part(b->records, TRIP_GL_NORMALS, b->normals);
     bind_part(b->slot, TRIP_GL_RUNS, b->runs);
+    bind_part(b->slot, TRIP_GL_SQUARES, b->squares);
     bind_part(b->slot, TRIP_GL_RUN_OF, b->run_of);
 }
 
@@ -418,8 +419,9 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
     if (!status)
-        status =
-            trip_gl_batch_fill(&r->batch, &r->ring, r->lists, batch, r->frame->settings->indexed);
+        status = trip_gl_batch_fill(&r->batch, &r->ring, r->lists, batch,
+                                    trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]),
+                                    r->frame->settings->indexed);
     if (status)
         return status;
     r->stats[r->axis].splats_read += r->batch.positions;
@@ -428,6 +430,8 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     if (!status && r->frame->count)
         status = count_pieces(r);
     trip_gl_slot_fence(r->batch.slot);
+    if (r->batch.records != r->batch.slot)
+        trip_gl_slot_fence(r->batch.records);
     return status;
 }
 

@@ -14,6 +14,8 @@
 #define TRIP_GL_RUN_OF 3
 #define TRIP_GL_TABLE 4
 #define TRIP_GL_COUNTS 5
+#define TRIP_GL_SQUARES 6
+/* The same number, for indexed lists. */
 #define TRIP_GL_VERTICES 6
 #define TRIP_GL_ORDER 7
 /* Texture units: the layer of axis a is unit a. */
@@ -33,15 +35,15 @@
     R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                \
     R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                      \
     R4 compact_0, compact_1,                                                                       \
-        compact_2;    /* 3-byte normals: xyz: columns of the map from steps to                     \
-                         world space, over full shading; w of the first: length of                 \
-                         those of which the direction alone is kept, likewise */                   \
-    R4 light;         /* xyz: towards the light, world space */                                    \
-    R4 to_eye;        /* xyz: towards the eye in parallel views; w: the largest magnitude of a     \
-                         gradient over that at full shading */                                     \
-    R4 screen;        /* xy: the image's centre, pixels; zw: width, height */                      \
-    R4 kernel;        /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */       \
-    R4 edge;          /* x: what every footprint is lowered by, exp(-cutoff^2 / 2) */              \
+        compact_2; /* 3-byte normals: xyz: columns of the map from steps to                        \
+                      world space, over full shading; w of the first: length of                    \
+                      those of which the direction alone is kept, likewise */                      \
+    R4 light;      /* xyz: towards the light, world space */                                       \
+    R4 to_eye;     /* xyz: towards the eye in parallel views; w: the largest magnitude of a        \
+                      gradient over that at full shading */                                        \
+    R4 screen;     /* xy: the image's centre, pixels; zw: width, height */                         \
+    R4 kernel;     /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */          \
+    R4 edge; /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code */   \
     R4 parallel;      /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */      \
     R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \
     R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;    \
@@ -73,10 +75,25 @@ typedef struct trip_gl_frame_double {
 } trip_gl_frame_double;
 #endif
 
-/* A run of a list to draw: draw position i of it is record first + step * i. Its origin (sheet,
- * tile), formed in double: from the eye as base + base_low, and as the products (to_x . c, to_y .
- * c, forward . c), pixels from the image's centre, whose floats keep their precision however far
- * the eye is. */
+#ifdef TRIP_GLSL
+#define TRIP_GL_UINT uint
+#else
+#define TRIP_GL_UINT uint32_t
+#endif
+
+/* An 8 x 8 square of a run's block (stream/block.h); draw position i is number i % 64 of the voxels
+ * of square i / 64, by the entry of its position. */
+struct trip_gl_square {
+    TRIP_GL_UINT mask_low, mask_high;
+    TRIP_GL_UINT codes, normals; /* bytes up to those of its first voxel */
+    TRIP_GL_UINT run;
+    TRIP_GL_UINT corner; /* u and v in the tile, 16 bits each */
+};
+
+/* A run of a list to draw; of indexed lists draw position i is record first + step * i. Its origin
+ * (sheet, tile), formed in double: from the eye as base + base_low, and as the products (to_x . c,
+ * to_y . c, forward . c), pixels from the image's centre, whose floats keep their precision however
+ * far the eye is. */
 struct trip_gl_run {
     TRIP_GL_VEC3 base;
     TRIP_GL_INT first;
