@@ -111,23 +111,50 @@ static cJSON *numbers(const double *values, int count)
     return array;
 }
 
-static void add_lists(cJSON *root, const trip_dataset *d)
+static uint64_t list_bytes(const trip_list *list)
 {
-    cJSON *lists = cJSON_AddObjectToObject(root, "lists");
-    for (int axis = 0; axis < 3; axis++) {
-        const char name[2] = { (char)('x' + axis), 0 };
-        cJSON *list = cJSON_AddObjectToObject(lists, name);
-        cJSON_AddItemToObject(list, "splats", number((double)d->lists[axis].records));
-        cJSON_AddItemToObject(list, "slabs", number((double)d->lists[axis].slab_count));
-        cJSON_AddItemToObject(list, "bricks", number((double)d->lists[axis].brick_count));
-    }
+    return list->plane_bytes[TRIP_PLANE_VOXELS] + list->plane_bytes[TRIP_PLANE_NORMALS];
 }
 
-static void add_matrix(cJSON *root, const trip_dataset *d)
+static uint64_t halo_bytes(const trip_dataset *d)
+{
+    uint64_t bytes = 0;
+    for (unsigned i = 0; i < d->list_count; i++)
+        bytes += d->lists[i].kind == TRIP_KIND_HALO ? list_bytes(&d->lists[i]) : 0;
+    return bytes;
+}
+
+static void add_matrix(cJSON *root, const trip_affine *index_to_world)
 {
     cJSON *rows = cJSON_AddArrayToObject(root, "index_to_world");
     for (int row = 0; row < 3; row++)
-        cJSON_AddItemToArray(rows, numbers(d->index_to_world.m[row], 4));
+        cJSON_AddItemToArray(rows, numbers(index_to_world->m[row], 4));
+}
+
+static cJSON *list_to_json(const trip_list *list)
+{
+    const char axis[2] = { (char)('x' + list->axis), 0 };
+    double dims[3] = { (double)list->dims[0], (double)list->dims[1], (double)list->dims[2] };
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "axis", axis);
+    cJSON_AddItemToObject(root, "level", number(list->level));
+    cJSON_AddStringToObject(root, "kind", trip_kind_of(list->kind)->name);
+    cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
+    add_matrix(root, &list->index_to_world);
+    cJSON_AddItemToObject(root, "sheet_first", number(list->sheet_first));
+    cJSON_AddItemToObject(root, "sheet_step", number(list->sheet_step));
+    cJSON_AddItemToObject(root, "records", number((double)list->records));
+    cJSON_AddItemToObject(root, "slabs", number((double)list->slab_count));
+    cJSON_AddItemToObject(root, "bricks", number((double)list->brick_count));
+    cJSON_AddItemToObject(root, "bytes", number((double)list_bytes(list)));
+    return root;
+}
+
+static void add_lists(cJSON *root, const trip_dataset *d)
+{
+    cJSON *lists = cJSON_AddArrayToObject(root, "lists");
+    for (unsigned i = 0; i < d->list_count; i++)
+        cJSON_AddItemToArray(lists, list_to_json(&d->lists[i]));
 }
 
 static void add_bounds(cJSON *root, const char *name, double bounds[2][3])
@@ -142,7 +169,7 @@ static void add_world(cJSON *root, const trip_dataset *d, const cJSON *text)
 {
     const char *space = space_of(text);
     double bounds[2][3];
-    add_matrix(root, d);
+    add_matrix(root, &d->index_to_world);
     grid_bounds(d, bounds);
     add_bounds(root, "bounds", bounds);
     kept_bounds(d, bounds);
@@ -175,12 +202,21 @@ static cJSON *to_json(const trip_dataset *d, const trip_json *source, bool verif
     cJSON_AddItemToObject(root, "value_max", number(h->value_max));
     cJSON_AddItemToObject(root, "code_lo", number(h->code_lo));
     cJSON_AddItemToObject(root, "code_hi", number(h->code_hi));
-    cJSON_AddItemToObject(root, "gradient_scale", number(h->gradient_scale));
+    if (h->normal_bytes == 4)
+        cJSON_AddItemToObject(root, "gradient_scale", number(h->gradient_scale));
+    if (h->normal_bytes == 3) {
+        cJSON_AddItemToObject(root, "gradient_step", numbers(h->gradient_step, 3));
+        cJSON_AddItemToObject(root, "gradient_full", number(h->gradient_full));
+    }
     cJSON_AddItemToObject(root, "voxels", number((double)h->voxels));
     cJSON_AddItemToObject(root, "kept", number((double)h->kept));
+    cJSON_AddItemToObject(root, "halo", number((double)h->halo));
     cJSON_AddItemToObject(root, "bytes", number((double)d->bytes));
+    cJSON_AddItemToObject(root, "halo_bytes", number((double)halo_bytes(d)));
     cJSON_AddItemToObject(root, "index_bytes", number((double)h->index_bytes));
     cJSON_AddBoolToObject(root, "normals", h->planes >> TRIP_PLANE_NORMALS & 1);
+    cJSON_AddItemToObject(root, "code_bytes", number(h->code_bytes));
+    cJSON_AddItemToObject(root, "normal_bytes", number(h->normal_bytes));
     cJSON_AddItemToObject(root, "tile_voxels", number(1u << h->tile_log2));
     cJSON_AddItemToObject(root, "slab_sheets", number(h->slab_sheets));
     cJSON_AddItemToObject(root, "page_bytes", number(1u << h->page_log2));
@@ -271,11 +307,52 @@ static void print_notes(const cJSON *root)
         }
 }
 
+static void print_sizes(const trip_dataset *d)
+{
+    const trip_file_header *h = &d->header;
+    char bytes[32], index[32], halo[32];
+    double kept = h->kept ? (double)h->kept : 1, around = (double)halo_bytes(d);
+    printf("%-12s %s, %.4g per kept voxel", "size", trip_format_bytes(d->bytes, bytes),
+           ((double)d->bytes - around) / kept);
+    if (h->halo)
+        printf(" and %s of halo, %.4g with it", trip_format_bytes(halo_bytes(d), halo),
+               (double)d->bytes / kept);
+    printf("; index %s (%.2g %%)\n", trip_format_bytes(h->index_bytes, index),
+           100.0 * (double)h->index_bytes / (double)d->bytes);
+    printf("%-12s %u byte%s a code", "planes", h->code_bytes, h->code_bytes > 1 ? "s" : "");
+    if (h->normal_bytes)
+        printf(", %u a normal", h->normal_bytes);
+    putchar('\n');
+}
+
+/* Length of a step along an index axis of a list's grid, in those of the data set's. */
+static double ratio(const trip_dataset *d, const trip_list *list, int axis)
+{
+    const double(*m)[4] = list->index_to_world.m;
+    return trip_length(trip_v3(m[0][axis], m[1][axis], m[2][axis])) /
+           trip_length(direction(d, axis));
+}
+
+/* A list; its grid where that is not the data set's. */
+static void print_list(const trip_dataset *d, const trip_list *list)
+{
+    char bytes[32], name[32], text[3][32];
+    snprintf(name, sizeof name, "%c%u %s", 'x' + list->axis, list->level,
+             trip_kind_of(list->kind)->name);
+    printf("%-12s %llu records, %llu bricks, %s", name, (unsigned long long)list->records,
+           (unsigned long long)list->brick_count, trip_format_bytes(list_bytes(list), bytes));
+    if (list->level > 0)
+        printf("; %lld x %lld x %lld, %s x %s x %s voxels of level 0 each",
+               (long long)list->dims[0], (long long)list->dims[1], (long long)list->dims[2],
+               shortest(ratio(d, list, 0), text[0]), shortest(ratio(d, list, 1), text[1]),
+               shortest(ratio(d, list, 2), text[2]));
+    putchar('\n');
+}
+
 static void print_text(const trip_dataset *d, const trip_json *source)
 {
     const trip_file_header *h = &d->header;
-    char bytes[32], index[32];
-    double kept = h->kept ? (double)h->kept : 1, voxels = h->voxels ? (double)h->voxels : 1;
+    double voxels = h->voxels ? (double)h->voxels : 1;
     printf("%-12s ", "data set");
     trip_text_write(stdout, d->path);
     printf(" (format version %u)\n", h->version);
@@ -289,15 +366,13 @@ static void print_text(const trip_dataset *d, const trip_json *source)
     printf("%-12s %llu\n", "voxels", (unsigned long long)h->voxels);
     printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)h->kept,
            100.0 * (double)h->kept / voxels);
-    printf("%-12s %s, %.3g per kept voxel; index %s (%.2g %%)\n", "size",
-           trip_format_bytes(d->bytes, bytes), (double)d->bytes / kept,
-           trip_format_bytes(h->index_bytes, index),
-           100.0 * (double)h->index_bytes / (double)d->bytes);
-    printf("%-12s voxels%s\n", "planes", h->planes >> TRIP_PLANE_NORMALS & 1 ? ", normals" : "");
-    printf("%-12s tiles of %u x %u voxels over %u sheets; x %llu, y %llu, z %llu\n", "bricks",
-           1u << h->tile_log2, 1u << h->tile_log2, h->slab_sheets,
-           (unsigned long long)d->lists[0].brick_count, (unsigned long long)d->lists[1].brick_count,
-           (unsigned long long)d->lists[2].brick_count);
+    if (h->halo)
+        printf("%-12s %llu neighbours of those, likewise\n", "halo", (unsigned long long)h->halo);
+    print_sizes(d);
+    printf("%-12s tiles of %u x %u voxels over %u sheets\n", "bricks", 1u << h->tile_log2,
+           1u << h->tile_log2, h->slab_sheets);
+    for (unsigned i = 0; i < d->list_count; i++)
+        print_list(d, &d->lists[i]);
     print_notes(source->root);
 }
 
