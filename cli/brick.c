@@ -31,7 +31,8 @@ enum key {
     KEY_TF,
     KEY_RANGE,
     KEY_KEEP_ALL,
-    KEY_NO_NORMALS,
+    KEY_NORMALS,
+    KEY_HALO,
     KEY_TILE,
     KEY_SLAB_SHEETS,
     KEY_MEMORY,
@@ -74,7 +75,13 @@ static const struct argp_option option_table[] = {
       3 },
     { "force", KEY_FORCE, NULL, 0, "Replace an existing data set", 3 },
     { "resume", KEY_RESUME, NULL, 0, "Go on from where the same command was killed", 3 },
-    { "no-normals", KEY_NO_NORMALS, NULL, 0, "Leave out what only shading needs", 3 },
+    { "normals", KEY_NORMALS, "HOW", 0,
+      "What shading needs: compact (3 bytes), full (4), none or auto (default: auto, compact "
+      "unless "
+      "that takes a pass over the input of its own)",
+      3 },
+    { "halo", KEY_HALO, "0|1", 0,
+      "Keep the transparent neighbours of what is kept, for interpolation (default: 1)", 3 },
     { "tile", KEY_TILE, "N", 0, "Tile edge in voxels: 16, 32, 64 or 128 (default: 64)", 3 },
     { "slab-sheets", KEY_SLAB_SHEETS, "N", 0, "Sheets of a brick, 1 to 64 (default: 8)", 3 },
     { "limits", KEY_LIMITS, NULL, 0,
@@ -154,6 +161,24 @@ static int parse_tile(const char *text, unsigned *tile)
     return status;
 }
 
+static int parse_normals(const char *text, trip_brick_normals *normals)
+{
+    static const char *const names[] = { "auto", "compact", "full", "none", NULL };
+    int choice = 0;
+    int status = trip_option_choice("--normals", text, names, &choice);
+    *normals = (trip_brick_normals)choice; /* in their order */
+    return status;
+}
+
+static int parse_halo(const char *text, bool *no_halo)
+{
+    static const char *const names[] = { "0", "1", NULL };
+    int choice = 1;
+    int status = trip_option_choice("--halo", text, names, &choice);
+    *no_halo = choice == 0;
+    return status;
+}
+
 static int parse_unsigned(const char *option, const char *text, int hi, unsigned *out)
 {
     int number;
@@ -211,9 +236,10 @@ static error_t parse_output_option(int key, char *argument, options *o)
     case KEY_RESUME:
         o->brick.resume = true;
         return 0;
-    case KEY_NO_NORMALS:
-        o->brick.no_normals = true;
-        return 0;
+    case KEY_NORMALS:
+        return parse_normals(argument, &o->brick.normals);
+    case KEY_HALO:
+        return parse_halo(argument, &o->brick.no_halo);
     case KEY_TILE:
         return parse_tile(argument, &o->brick.tile_voxels);
     case KEY_SLAB_SHEETS:
@@ -339,9 +365,13 @@ static int print_json(const options *o, const trip_brick_summary *s, const brick
     add_number(root, "value_max", s->value_max);
     add_number(root, "voxels", (double)s->voxels);
     add_number(root, "kept", (double)s->kept);
+    add_number(root, "halo", (double)s->halo);
     add_number(root, "not_finite", (double)s->not_finite);
     add_number(root, "input_bytes", (double)s->input_bytes);
     add_number(root, "bytes", (double)s->bytes);
+    add_number(root, "halo_bytes", (double)s->halo_bytes);
+    add_number(root, "code_bytes", s->code_bytes);
+    add_number(root, "normal_bytes", s->normal_bytes);
     add_number(root, "temporary_bytes", (double)s->temporary_bytes);
     cJSON_AddBoolToObject(root, "resumed", s->resumed);
     add_number(root, "scan_seconds", s->stages[TRIP_BRICK_SCAN].seconds);
@@ -376,8 +406,12 @@ static void print_text(const options *o, const trip_brick_summary *s)
            s->value_min, s->value_max);
     printf("%-9s %s\n", "taken for", trip_tf_kind_title(s->kind));
     printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
-    printf("%-9s %s, %.3g bytes per kept voxel\n", "written", trip_format_bytes(s->bytes, bytes),
-           (double)s->bytes / kept);
+    if (s->halo)
+        printf("%-9s %llu neighbours of those, %s\n", "halo", (unsigned long long)s->halo,
+               trip_format_bytes(s->halo_bytes, bytes));
+    printf("%-9s %s, %.3g bytes per kept voxel%s\n", "written", trip_format_bytes(s->bytes, bytes),
+           (double)(s->bytes - s->halo_bytes) / kept, s->halo ? " without the halo" : "");
+    printf("%-9s codes %u, normals %u\n", "bytes", s->code_bytes, s->normal_bytes);
     if (s->temporary_bytes)
         printf("%-9s %s\n", "spilled", trip_format_bytes(s->temporary_bytes, temporary));
     printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, finish %.2f), %.0f MB/s of input\n",
@@ -395,6 +429,7 @@ static int print_estimate_json(const options *o, const trip_brick_estimate *e)
     cJSON_AddStringToObject(root, "output", o->brick.output);
     add_number(root, "voxels", (double)e->voxels);
     add_number(root, "kept", (double)e->kept);
+    add_number(root, "halo", (double)e->halo);
     add_number(root, "bytes", (double)e->bytes);
     add_number(root, "temporary_bytes", (double)e->temporary_bytes);
     add_number(root, "free_bytes", (double)e->free_bytes);
@@ -406,7 +441,8 @@ static void print_estimate(const options *o, const trip_brick_estimate *e)
 {
     char bytes[32], temporary[32], there[32];
     print_name("data set", o->brick.output);
-    printf("%-9s about %.3g of %.3g voxels\n", "keeps", (double)e->kept, (double)e->voxels);
+    printf("%-9s about %.3g of %.3g voxels, and %.3g neighbours\n", "keeps", (double)e->kept,
+           (double)e->voxels, (double)e->halo);
     printf("%-9s about %s, %s of temporary data; %s are free\n", "takes",
            trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),
            trip_format_bytes(e->free_bytes, there));

@@ -27,6 +27,8 @@ typedef struct brick {
     trip_brick_input in;
     trip_piece_format format;
     trip_quantiser quantiser;
+    unsigned code_bytes, normal_bytes;
+    trip_compact_normals compact; /* what 3 bytes mean */
     trip_memory_plan plan;
     trip_spill *spill;
     trip_leftover leftover;
@@ -84,13 +86,6 @@ static int scan(brick *b)
     return status;
 }
 
-static void type_limits(trip_scalar type, double *lo, double *hi)
-{
-    double size = trip_scalar_bytes(type) == 1 ? 256 : 65536;
-    *lo = type == TRIP_I8 || type == TRIP_I16 ? -size / 2 : 0;
-    *hi = *lo + size - 1;
-}
-
 /* Gradients are as steep as the range of values allows; it may be unknown. */
 static void set_quantiser(brick *b, double lo, double hi)
 {
@@ -105,17 +100,38 @@ static void set_quantiser(brick *b, double lo, double hi)
 /* Codes stand for the type's values, or for the range if it is known; else that is for the end. */
 static void choose_codes(brick *b)
 {
-    double lo, hi;
-    type_limits(b->in.info->type, &lo, &hi);
-    double a = b->in.info->slope * lo + b->in.info->inter,
-           c = b->in.info->slope * hi + b->in.info->inter;
-    b->format.quantised = trip_brick_has_narrow_type(&b->in) || b->in.scanned;
-    if (trip_brick_has_narrow_type(&b->in))
-        set_quantiser(b, fmin(a, c), fmax(a, c));
-    else if (b->in.scanned)
-        set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
-    else
-        set_quantiser(b, 0, 1);
+    double lo = 0, hi = 1;
+    bool narrow = trip_brick_has_narrow_type(&b->in);
+    b->format.quantised = narrow || b->in.scanned;
+    if (narrow)
+        trip_brick_type_range(b->in.info, &lo, &hi);
+    else if (b->in.scanned) {
+        lo = b->in.tally->value_min;
+        hi = b->in.tally->value_max;
+    }
+    set_quantiser(b, lo, hi);
+    b->code_bytes = trip_brick_code_bytes(&b->in);
+}
+
+/* Of the codes' range where that of the values is not known: shading is full there, too. */
+static double full_gradient(const brick *b)
+{
+    double range = b->in.scanned ? b->in.tally->value_max - b->in.tally->value_min : 0;
+    double voxel = cbrt(fabs(trip_affine_determinant(&b->in.info->index_to_world)));
+    return TRIP_GRADIENT_FULL * (range > 0 ? range : b->quantiser.hi - b->quantiser.lo) / voxel;
+}
+
+/* After the codes. */
+static void choose_normals(brick *b)
+{
+    const trip_volume_info *info = b->in.info;
+    double step[3], full = full_gradient(b);
+    double unit = info->type < TRIP_F16 ? fabs(info->slope) / 2 : 0;
+    b->normal_bytes = trip_brick_normal_bytes(&b->in);
+    if (b->normal_bytes != 3)
+        return;
+    trip_compact_normals_choose(&info->index_to_world, full, unit, step);
+    b->compact = trip_compact_normals_make(&info->index_to_world, full, step);
 }
 
 static int plan_memory(brick *b)
@@ -159,14 +175,6 @@ static char *name_beside(const brick *b, const char *suffix)
     return NULL;
 }
 
-static int take_leftover(const brick *b, trip_leftover *out)
-{
-    return trip_leftover_take(out, b->spill, b->partial_path,
-                              &(trip_block_form){ .tile_log2 = b->format.tile_log2,
-                                                  .code_bytes = 2,
-                                                  .normal_bytes = b->format.normals ? 4 : 0 });
-}
-
 /* Locks the place for temporary files and looks what a killed run left. */
 static int open_spill(brick *b)
 {
@@ -179,9 +187,7 @@ static int open_spill(brick *b)
     if (status == 0)
         status = trip_brick_identity(b->params, b->in.functions, &b->identity);
     if (status == 0 && resume)
-        status = take_leftover(b, &b->leftover);
-    if (status == 0 && resume)
-        trip_leftover_count(&b->leftover);
+        status = trip_leftover_take(&b->leftover, b->spill, b->partial_path, &b->format);
     if (status == 0)
         status = trip_journal_open(
             &b->journal, b->spill,
@@ -191,7 +197,9 @@ static int open_spill(brick *b)
                                     .voxels = b->in.grid_voxels,
                                     .slice_voxels =
                                         b->in.info->sparse ? 0 : (uint64_t)(dims[0] * dims[1]),
-                                    .ordered_splats = b->leftover.splats },
+                                    .halo = b->format.halo,
+                                    .ordered_bytes = { b->leftover.bytes[0], b->leftover.bytes[1],
+                                                       b->leftover.bytes[2] } },
             b->in.budget);
     free(path);
     return status;
@@ -214,17 +222,25 @@ static int start_journal(brick *b)
     return status;
 }
 
+/* What the header says of codes and normals. */
 static trip_writer_codes codes_of(const brick *b)
 {
-    return (trip_writer_codes){ .code_lo = b->quantiser.lo,
-                                .code_hi = b->quantiser.hi,
-                                .gradient_scale = b->quantiser.gradient_scale };
+    trip_writer_codes c = { .code_lo = b->quantiser.lo, .code_hi = b->quantiser.hi };
+    if (b->normal_bytes == 4)
+        c.gradient_scale = b->quantiser.gradient_scale;
+    if (b->normal_bytes == 3) {
+        c.gradient_full = b->compact.full;
+        memcpy(c.gradient_step, b->compact.step, sizeof c.gradient_step);
+    }
+    return c;
 }
 
 static int open_writer(brick *b)
 {
     trip_writer_params p = { .replace = b->params->replace,
-                             .normal_bytes = b->format.normals ? 4 : 0,
+                             .halo = b->format.halo,
+                             .code_bytes = b->code_bytes,
+                             .normal_bytes = b->normal_bytes,
                              .tile_voxels = b->params->tile_voxels,
                              .slab_sheets = b->params->slab_sheets,
                              .index_to_world = b->in.info->index_to_world,
@@ -261,6 +277,7 @@ static int open_splatter(brick *b)
                             .envelope = &b->in.envelope,
                             .format = b->format,
                             .quantiser = b->quantiser,
+                            .compact = b->normal_bytes == 3 ? &b->compact : NULL,
                             .tally = !b->in.scanned,
                             .threads = trip_workers_count(b->in.workers),
                             .reserve = reserve,
@@ -288,7 +305,13 @@ static int summarise_done(brick *b)
     b->in.tally->value_min = d->header.value_min;
     b->in.tally->value_max = d->header.value_max;
     b->summary->kept = d->header.kept;
+    b->summary->halo = d->header.halo;
+    b->summary->code_bytes = d->header.code_bytes;
+    b->summary->normal_bytes = d->header.normal_bytes;
     b->summary->bytes = d->bytes - d->header.index_bytes;
+    for (unsigned i = 0; i < d->list_count; i++)
+        if (d->lists[i].kind == TRIP_KIND_HALO)
+            b->summary->halo_bytes += d->lists[i].plane_bytes[TRIP_PLANE_VOXELS];
     b->summary->resumed = true;
     trip_dataset_close(d);
     return 0;
@@ -296,6 +319,7 @@ static int summarise_done(brick *b)
 
 static int open_output(brick *b)
 {
+    const trip_block_form form = { b->format.tile_log2, b->code_bytes, b->normal_bytes };
     int status = open_writer(b);
     if (status == 0)
         status = open_splatter(b);
@@ -306,9 +330,7 @@ static int open_output(brick *b)
     if (status == 0)
         status = open_builder(b);
     if (status == 0 && b->summary->resumed)
-        status = trip_leftover_replay(&b->leftover, b->journal,
-                                      trip_list_builder_ordered(b->builder, TRIP_ORDERED_AXIS),
-                                      b->in.budget);
+        status = trip_leftover_replay(&b->leftover, b->journal, b->builder, &form, b->in.budget);
     return status;
 }
 
@@ -319,10 +341,11 @@ static int on_box(void *user, unsigned thread, const trip_box *box)
 }
 
 /* Adds what the boxes so far gave to what a killed run had seen before. */
-static void add_up(const brick *b, trip_tally *tally, uint64_t *kept)
+static void add_up(const brick *b, trip_tally *tally, uint64_t *kept, uint64_t *halo)
 {
     const trip_checkpoint *before = trip_journal_get_checkpoint(b->journal);
     *kept = trip_splatter_kept(b->splatter) + (before ? before->kept : 0);
+    *halo = trip_splatter_halo(b->splatter) + (before ? before->halo : 0);
     if (b->in.scanned)
         return;
     trip_splatter_tally(b->splatter, tally);
@@ -341,7 +364,7 @@ static int on_batch(void *user, uint64_t done, uint64_t voxels)
     if (!c)
         return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
     c->done = done;
-    add_up(b, &c->tally, &c->kept);
+    add_up(b, &c->tally, &c->kept, &c->halo);
     return trip_list_builder_spill(b->builder, c);
 }
 
@@ -386,7 +409,7 @@ static int read_volume(brick *b)
     end_stage(b, TRIP_BRICK_READ, begin);
     if (status < 0)
         return status;
-    add_up(b, b->in.tally, &b->summary->kept);
+    add_up(b, b->in.tally, &b->summary->kept, &b->summary->halo);
     trip_tally_histogram(b->in.tally, &b->in.histogram);
     return check_tally(b);
 }
@@ -394,7 +417,7 @@ static int read_volume(brick *b)
 static void on_merge_progress(void *user, uint64_t splats)
 {
     const brick *b = user;
-    trip_brick_input_progress(&b->in, "merge", splats, 3 * b->summary->kept);
+    trip_brick_input_progress(&b->in, "merge", splats, 3 * (b->summary->kept + b->summary->halo));
 }
 
 static int merge_lists(brick *b)
@@ -413,18 +436,33 @@ static int merge_lists(brick *b)
     return status;
 }
 
-/* What was written is what was counted: a journal may have counted otherwise. */
-static int check_kept(brick *b)
+static int fail_count(const brick *b, const char *what, uint64_t counted, uint64_t written)
 {
-    b->summary->bytes = trip_writer_bytes(b->writer);
-    uint64_t written = trip_writer_records(b->writer, 0);
-    if (written == b->summary->kept)
-        return 0;
     return trip_fail(TRIP_ERROR, "brick", b->params->output,
-                     "%" PRIu64 " voxels were kept and %" PRIu64
+                     "%" PRIu64 " %s were counted and %" PRIu64
                      " written: what the interrupted run left is damaged, without --resume it "
                      "starts again",
-                     b->summary->kept, written);
+                     counted, what, written);
+}
+
+/* What was written is what was counted: a journal may have counted otherwise. What is around
+ * several boxes of a sparse volume was counted more often. */
+static int check_records(brick *b)
+{
+    trip_brick_summary *s = b->summary;
+    uint64_t kept = trip_writer_records(b->writer, 0);
+    uint64_t halo = b->format.halo ? trip_writer_records(b->writer, TRIP_HALO_LISTS) : 0;
+    if (kept != s->kept)
+        return fail_count(b, "kept voxels", s->kept, kept);
+    if (b->in.info->sparse ? halo > s->halo : halo != s->halo)
+        return fail_count(b, "voxels around them", s->halo, halo);
+    s->halo = halo;
+    s->code_bytes = b->code_bytes;
+    s->normal_bytes = b->normal_bytes;
+    s->bytes = trip_writer_bytes(b->writer);
+    for (unsigned list = TRIP_HALO_LISTS; list < trip_piece_list_count(&b->format); list++)
+        s->halo_bytes += trip_writer_plane_bytes(b->writer, list, TRIP_PLANE_VOXELS);
+    return 0;
 }
 
 static int finish_output(brick *b)
@@ -439,7 +477,7 @@ static int finish_output(brick *b)
         return TRIP_ERROR;
     trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
                               text };
-    int status = check_kept(b);
+    int status = check_records(b);
     if (status == 0)
         status = trip_writer_finish(b->writer, &s);
     if (status == 0)
@@ -491,6 +529,7 @@ static int make(brick *b)
     if (status < 0)
         return status;
     choose_codes(b);
+    choose_normals(b);
     status = plan_memory(b);
     if (status == 0 && !trip_journal_get_start(b->journal))
         status = trip_estimate_check_disk(&b->in, &b->format, &b->plan);
@@ -518,12 +557,12 @@ static int run(brick *b)
  * end; a run that was refused before it began leaves all that it found. */
 static void settle_leftovers(brick *b, int status)
 {
-    trip_leftover now = { 0 };
+    trip_leftover now = trip_leftover_none();
     bool keep = b->params->resume && status == TRIP_INTERRUPTED;
     if (b->spill && (b->begun || status == 0))
         trip_spill_keep(b->spill, keep);
     if (b->spill && b->begun && keep)
-        take_leftover(b, &now);
+        trip_leftover_take(&now, b->spill, b->partial_path, &b->format);
     trip_leftover_close(&now);
 }
 
@@ -542,7 +581,7 @@ static void close_all(brick *b, int status)
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
 {
-    brick b = { .params = params, .summary = summary };
+    brick b = { .params = params, .summary = summary, .leftover = trip_leftover_none() };
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);
     close_all(&b, status);

@@ -10,6 +10,13 @@ typedef struct trip_value_range {
     double lo, hi; /* inclusive */
 } trip_value_range;
 
+typedef enum trip_brick_normals {
+    TRIP_NORMALS_AUTO,    /* compact, unless that takes a pass over the input of its own */
+    TRIP_NORMALS_COMPACT, /* in 3 bytes, see normal.h */
+    TRIP_NORMALS_FULL,    /* in 4 bytes */
+    TRIP_NORMALS_NONE,
+} trip_brick_normals;
+
 /* Zero means the default everywhere. */
 typedef struct trip_brick_params {
     const char *input, *output;
@@ -25,7 +32,8 @@ typedef struct trip_brick_params {
     /* Besides the others also what trip_tf_from_histogram() shows, which is drawn by default. */
     bool automatic;
 
-    bool no_normals;
+    trip_brick_normals normals;
+    bool no_halo; /* the transparent neighbours of what is kept are left out */
     bool replace; /* an existing data set */
     /* Go on from where a run with the same input and parameters was killed, if there was one. */
     bool resume;
@@ -59,10 +67,13 @@ typedef struct trip_brick_summary {
     int64_t dims[3];
     double spacing[3];
     uint64_t voxels, kept, not_finite;
+    uint64_t halo;                     /* neighbours of kept voxels that are not kept themselves */
+    unsigned code_bytes, normal_bytes; /* of a splat in one list */
     double value_min, value_max;
     trip_tf_kind kind;        /* what the volume was recognised as */
     uint64_t input_bytes;     /* as stored, decompressed */
-    uint64_t bytes;           /* of the data set's splats */
+    uint64_t bytes;           /* of the data set's lists, those of the halo included */
+    uint64_t halo_bytes;      /* of the latter */
     uint64_t temporary_bytes; /* spilled */
     bool resumed;
     char note[512]; /* as trip_volume_info has it */
@@ -74,7 +85,7 @@ int trip_brick(const trip_brick_params *params, trip_brick_summary *summary);
 
 /* What such a run will come to, from a look at parts of the input. */
 typedef struct trip_brick_estimate {
-    uint64_t voxels, kept;
+    uint64_t voxels, kept, halo;
     uint64_t bytes, temporary_bytes; /* on the disk of the output */
     uint64_t free_bytes;             /* there */
     double seconds;

@@ -1,5 +1,6 @@
 #include "brick_input.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "brick_memory.h"
@@ -29,7 +30,8 @@ trip_piece_format trip_brick_format(const trip_brick_params *p)
 {
     return (trip_piece_format){ .tile_log2 =
                                     p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6,
-                                .normals = !p->no_normals };
+                                .normals = p->normals != TRIP_NORMALS_NONE,
+                                .halo = !p->no_halo };
 }
 
 static unsigned choose_threads(const trip_brick_input *in)
@@ -97,6 +99,51 @@ bool trip_brick_has_narrow_type(const trip_brick_input *in)
     return type == TRIP_U8 || type == TRIP_I8 || type == TRIP_U16 || type == TRIP_I16;
 }
 
+static bool has_byte_type(const trip_brick_input *in)
+{
+    return in->info->type == TRIP_U8 || in->info->type == TRIP_I8;
+}
+
+void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
+{
+    double size = trip_scalar_bytes(info->type) == 1 ? 256 : 65536;
+    double least = info->type == TRIP_I8 || info->type == TRIP_I16 ? -size / 2 : 0;
+    double a = info->slope * least + info->inter;
+    double b = info->slope * (least + size - 1) + info->inter;
+    *lo = fmin(a, b);
+    *hi = fmax(a, b);
+}
+
+/* Values are rounded to floats, which a large offset may make too coarse. */
+unsigned trip_brick_code_bytes(const trip_brick_input *in)
+{
+    trip_quantiser q = { 0 };
+    if (!has_byte_type(in))
+        return 2;
+    trip_brick_type_range(in->info, &q.lo, &q.hi);
+    for (int stored = in->info->type == TRIP_I8 ? -128 : 0, i = 0; i < 256; i++) {
+        double value = in->info->slope * (stored + i) + in->info->inter;
+        if (trip_quantise(&q, (float)value) % 257)
+            return 2;
+    }
+    return 1;
+}
+
+unsigned trip_brick_normal_bytes(const trip_brick_input *in)
+{
+    switch (in->params->normals) {
+    case TRIP_NORMALS_NONE:
+        return 0;
+    case TRIP_NORMALS_FULL:
+        return 4;
+    case TRIP_NORMALS_COMPACT:
+        return 3;
+    case TRIP_NORMALS_AUTO:
+        break;
+    }
+    return in->scanned || has_byte_type(in) ? 3 : 4;
+}
+
 static bool is_envelope_automatic(const trip_brick_params *p)
 {
     return p->automatic || (!p->keep_all && p->function_count == 0 && p->range_count == 0);
@@ -104,7 +151,8 @@ static bool is_envelope_automatic(const trip_brick_params *p)
 
 bool trip_brick_input_needs_scan(const trip_brick_input *in)
 {
-    bool needed = is_envelope_automatic(in->params);
+    bool needed = is_envelope_automatic(in->params) ||
+                  (in->params->normals == TRIP_NORMALS_COMPACT && !has_byte_type(in));
     for (size_t i = 0; i < in->params->function_count; i++)
         needed = needed || trip_tf_needs_data(in->functions[i]);
     return needed;

@@ -34,8 +34,14 @@ void trip_brick_input_close(trip_brick_input *in);
 
 /* 8 and 16 bit integers: codes stand for all values of the type, without a look at the data. */
 bool trip_brick_has_narrow_type(const trip_brick_input *in);
-/* Whether the envelope needs to know the volume's values: it is automatic, or a function depends on
- * them. */
+/* Of a code: 1 where all values of the type are 8-bit codes exactly, else 2. */
+unsigned trip_brick_code_bytes(const trip_brick_input *in);
+/* Of a normal, once it is known whether the volume is scanned; 0 without. */
+unsigned trip_brick_normal_bytes(const trip_brick_input *in);
+/* What all codes stand for where the type is narrow. */
+void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi);
+/* Whether a pass over the volume has to go first: the envelope is automatic, a function depends on
+ * the values, or compact normals on their range. */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
 /* Fills the tally with `known`, and makes the functions that depend on the data. */
 int trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known);

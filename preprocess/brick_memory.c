@@ -10,8 +10,9 @@ enum { MOST_SLICES = 32 };
 
 /* What the input took before there is a plan. */
 #define TAKEN_BYTES ((uint64_t)1 << 20)
-/* What the writer and the spill take. */
+/* What the writer and the spill take. A halo has more files, with smaller buffers. */
 #define OPENED_BYTES ((uint64_t)18 << 20)
+#define HALO_OPENED_BYTES ((uint64_t)16 << 20)
 /* What the builder takes beside its pieces, and readers for themselves. */
 #define LATE_BYTES ((uint64_t)2 << 20)
 /* Of the writer's index, for a tile of a sheet. */
@@ -43,7 +44,8 @@ static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, 
     uint64_t slice = (uint64_t)(info->dims[0] * info->dims[1]);
     uint64_t tile = UINT64_C(1) << 2 * f->tile_log2;
     const uint64_t kinds = f->halo ? 2 : 1;
-    needs n = { .opened_bytes = OPENED_BYTES + threads * trip_splat_thread_bytes(f, info->sparse),
+    needs n = { .opened_bytes = (f->halo ? HALO_OPENED_BYTES : OPENED_BYTES) +
+                                threads * trip_splat_thread_bytes(f, info->sparse),
                 .late_bytes = kinds * (LATE_BYTES + TILE_BYTES * tiles_of_largest_sheet(info, f)),
                 .list_min_bytes = trip_list_builder_min_bytes(f, threads) };
     if (__builtin_mul_overflow(slice * LONE_SPLAT_BYTES, (uint64_t)info->dims[2],

@@ -158,8 +158,11 @@ static void add_source_options(cJSON *root, const trip_brick_params *p)
 {
     cJSON *options = cJSON_AddArrayToObject(root, "source_options");
     add_volume_options(options, &p->volume);
-    if (p->no_normals)
-        add_option(options, "--no-normals");
+    static const char *const normals[] = { NULL, "compact", "full", "none" };
+    if (p->normals)
+        add_option(options, "--normals=%s", normals[p->normals]);
+    if (p->no_halo)
+        add_option(options, "--halo=0");
     if (p->tile_voxels)
         add_option(options, "--tile=%u", p->tile_voxels);
     if (p->slab_sheets)
@@ -190,6 +193,8 @@ char *trip_brick_text_make(const trip_brick_text *t)
     cJSON_AddStringToObject(root, "function_kind",
                             trip_tf_kind_name(trip_brick_kind(t->info, t->histogram)));
     cJSON_AddBoolToObject(root, "keep_all", t->params->keep_all);
+    if (t->info->sparse)
+        add_number(root, "background", t->info->background);
     add_envelope(root, t);
     add_functions(root, t);
     int status = add_default_function(root, t);

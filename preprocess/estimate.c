@@ -21,6 +21,8 @@ enum { STOPPED = -100 };
 #define TRIAL_BYTES ((size_t)32 << 20)
 /* How long a run may look at the volume before it begins: longer at one that takes hours. */
 static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
+/* What masks take of a record: those of a halo are thinner. */
+static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
 /* Estimates are from a sample: a run is only refused when even much less would not fit. */
 static const double surely = 0.7;
 
@@ -56,19 +58,22 @@ static int on_progress(void *user, uint64_t voxels)
     return now_seconds() > s->until ? STOPPED : 0;
 }
 
-static void scale_up(const trip_brick_input *in, const trip_tally *t, uint64_t *voxels,
-                     uint64_t *kept)
+/* One voxel around a body are, on the average over directions, three for each that is so along x.
+ */
+static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick_estimate *e)
 {
-    double share = t->voxels ? (double)t->kept / (double)t->voxels : 0;
     double all = in->info->sparse ? (double)t->voxels : (double)in->grid_voxels;
-    *voxels = (uint64_t)all;
-    *kept = (uint64_t)(share * all);
+    double scale = t->voxels ? all / (double)t->voxels : 0;
+    e->voxels = (uint64_t)all;
+    e->kept = (uint64_t)(scale * (double)t->kept);
+    e->halo = in->params->no_halo ? 0 : (uint64_t)(3 * scale * (double)t->borders);
 }
 
 /* Kept voxels, by looking at blocks spread over the volume for `limit_seconds` at most (0: no
- * limit); the input's envelope is made. 1: *kept and *voxels are filled; 0: it took too long. */
+ * limit); the input's envelope is made. 1: the numbers of voxels are filled; 0: it took too long.
+ */
 static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
-                         double *passing_seconds, uint64_t *voxels, uint64_t *kept)
+                         double *passing_seconds, trip_brick_estimate *e)
 {
     sampling s = { in, limit_seconds > 0 ? now_seconds() + limit_seconds : INFINITY };
     const trip_scan_params scan = { .slices = slices_of(plan),
@@ -83,7 +88,7 @@ static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, dou
         return trip_fail(TRIP_ERROR, "brick", in->params->input, "needs more --memory");
     int status = trip_scan_volume(t, in->volume, in->params->input, in->workers, &scan, in->budget);
     if (status == 0)
-        scale_up(in, t, voxels, kept);
+        scale_up(in, t, e);
     trip_budget_release(in->budget, t, sizeof *t);
     if (status == STOPPED)
         return trip_volume_rewind(in->volume);
@@ -108,18 +113,22 @@ static uint64_t free_bytes(const char *output)
 }
 
 /* Bytes of a piece for each of its splats, where splats are many. */
-static double piece_bytes(const trip_piece_format *f)
+static double piece_bytes(const trip_piece_format *f, unsigned list)
 {
-    return (double)trip_piece_max_bytes(f) / (double)(1 << 2 * f->tile_log2);
+    const trip_piece_format own = trip_piece_format_of(f, list);
+    return (double)trip_piece_max_bytes(&own) / (double)(1 << 2 * f->tile_log2);
 }
 
-/* Fills all but the seconds, from voxels and kept. */
+/* Fills all but the seconds, from the numbers of voxels. */
 static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *format,
                            const trip_memory_plan *plan, trip_brick_estimate *e)
 {
     int lists = plan->in_order && format->quantised ? 2 : 3;
-    double pieces = (double)e->kept * lists * piece_bytes(format);
-    e->bytes = e->kept * 3 * (format->normals ? 8 : 4);
+    double pieces = lists * ((double)e->kept * piece_bytes(format, 0) +
+                             (double)e->halo * piece_bytes(format, TRIP_HALO_LISTS));
+    double code = trip_brick_code_bytes(in), normal = trip_brick_normal_bytes(in);
+    e->bytes = (uint64_t)(3 * ((double)e->kept * (mask_bytes + code + normal) +
+                               (double)e->halo * (halo_mask_bytes + code)));
     e->temporary_bytes = pieces > 0.9 * (double)plan->list_bytes ? (uint64_t)pieces : 0;
     e->free_bytes = free_bytes(in->params->output);
 }
@@ -163,7 +172,7 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
     if (status == 0)
         status = trip_brick_input_make_envelope(in);
     if (status == 0)
-        status = estimate_kept(in, &plan, 0, &passing, &e->voxels, &e->kept);
+        status = estimate_kept(in, &plan, 0, &passing, e);
     if (status < 0)
         return status;
     double looking = now_seconds() - begin - passing;
@@ -196,7 +205,7 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
         return 0;
     double seconds = check_seconds + check_seconds_per_voxel * (double)in->grid_voxels;
     bool all = in->params->keep_all && !in->info->sparse;
-    int status = all ? 1 : estimate_kept(in, plan, seconds, NULL, &e.voxels, &e.kept);
+    int status = all ? 1 : estimate_kept(in, plan, seconds, NULL, &e);
     if (status <= 0)
         return status;
     estimate_sizes(in, format, plan, &e);

@@ -33,8 +33,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 
 static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
 {
-    fprintf(f, "%d %d %d %d %d %u %u\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
-            p->automatic, p->no_normals, p->tile_voxels, p->slab_sheets);
+    fprintf(f, "%d %d %d %d %d %d %u %u\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
+            p->automatic, (int)p->normals, p->no_halo, p->tile_voxels, p->slab_sheets);
     for (size_t i = 0; i < p->range_count; i++)
         fprintf(f, "%a %a\n", p->ranges[i].lo, p->ranges[i].hi);
     for (size_t i = 0; i < p->function_count; i++) {

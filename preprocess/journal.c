@@ -134,8 +134,12 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
 /* Against the checkpoint before, which is clear at first. Differences cannot overflow then. */
 static bool goes_on(const trip_checkpoint *before, const trip_checkpoint *c)
 {
-    return c->done >= before->done && c->kept >= before->kept && c->runs >= before->runs &&
-           c->segments >= before->segments && c->ordered_splats >= before->ordered_splats;
+    bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
+                c->runs >= before->runs && c->segments >= before->segments &&
+                c->ordered_splats >= before->ordered_splats;
+    for (int i = 0; i < TRIP_ORDERED_FILES; i++)
+        fits = fits && c->ordered_bytes[i] >= before->ordered_bytes[i];
+    return fits;
 }
 
 /* The voxels that exist in what was done, in *voxels: all of them, or, of sparse volumes, at most
@@ -146,6 +150,14 @@ static bool done_voxels(const trip_journal_params *p, uint64_t done, uint64_t *v
     if (p->slice_voxels && __builtin_mul_overflow(done, p->slice_voxels, voxels))
         return false;
     return *voxels <= p->voxels;
+}
+
+/* Kept voxels have 26 neighbours each; where all voxels exist, no more than the others. */
+static bool can_have_halo(const trip_journal_params *p, const trip_checkpoint *c, uint64_t voxels)
+{
+    uint64_t each = c->kept ? c->halo / c->kept : c->halo;
+    bool few = c->kept ? each < 26 || c->halo == 26 * c->kept : each == 0;
+    return few && (p->halo || c->halo == 0) && (!p->slice_voxels || c->halo <= voxels - c->kept);
 }
 
 static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
@@ -162,9 +174,19 @@ static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
         return fail_false(j, "its count of values");
     if (c->kept > t->finite || c->kept > voxels)
         return fail_false(j, "its count of kept voxels");
-    if (c->ordered_splats > c->kept || c->runs > c->ordered_splats)
+    if (!can_have_halo(p, c, voxels))
+        return fail_false(j, "its count of voxels around them");
+    if (c->ordered_splats > c->kept + c->halo || c->runs > c->ordered_splats)
         return fail_false(j, "its count of runs");
     return 0;
+}
+
+static bool has_ordered(const trip_journal *j, const trip_checkpoint *c)
+{
+    bool has = true;
+    for (int i = 0; i < TRIP_ORDERED_FILES; i++)
+        has = has && c->ordered_bytes[i] <= j->params.ordered_bytes[i];
+    return has;
 }
 
 static bool has_runs(const trip_journal *j, uint64_t runs)
@@ -189,7 +211,7 @@ static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *recor
         taken = fail_false(j, "a record");
     else
         taken = check_checkpoint(j, c);
-    if (taken == 0 && c->ordered_splats <= j->params.ordered_splats && has_runs(j, c->runs))
+    if (taken == 0 && has_ordered(j, c) && has_runs(j, c->runs))
         taken = trip_spill_restore(spill, segments, fresh);
     if (taken == 1) {
         j->checkpoint = *c;

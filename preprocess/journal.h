@@ -1,9 +1,8 @@
 /* What a run of `brick` notes down beside its spilled pieces, so that another one can go on where
  * it was when it was killed. Two files in the spill's folder: "journal", records with checksums of
- * which the last may be cut off, and "runs", what was appended to the list that is written in
- * order. They are read back on the machine that wrote them only, and believed no more than any file
- * from outside: what is read is checked against the volume and the parameters. One thread at a
- * time. */
+ * which the last may be cut off, and "runs", what was appended to lists that are written in order.
+ * They are read back on the machine that wrote them only, and believed no more than any file from
+ * outside: what is read is checked against the volume and the parameters. One thread at a time. */
 #ifndef TRIP_JOURNAL_H
 #define TRIP_JOURNAL_H
 
@@ -17,13 +16,17 @@ typedef struct trip_journal_start {
     trip_tally tally;
 } trip_journal_start;
 
-/* All pieces of the first part of the volume are in segments or in the ordered list. */
+/* Plane files of the lists that are written in order. */
+enum { TRIP_ORDERED_VOXELS, TRIP_ORDERED_NORMALS, TRIP_ORDERED_HALO, TRIP_ORDERED_FILES };
+
+/* All pieces of the first part of the volume are in segments or in lists in order. */
 typedef struct trip_checkpoint {
     uint64_t done;                 /* that part, counted as by trip_walk() */
-    uint64_t kept;                 /* voxels of it */
+    uint64_t kept, halo;           /* splats of it */
     uint64_t segments;             /* that there are */
-    uint64_t runs, ordered_splats; /* of the ordered list */
-    trip_tally tally;              /* of the part, unless scanned */
+    uint64_t runs, ordered_splats; /* of lists in order */
+    uint64_t ordered_bytes[TRIP_ORDERED_FILES];
+    trip_tally tally; /* of the part, unless scanned */
 } trip_checkpoint;
 
 /* One run of a list in order. */
@@ -40,10 +43,11 @@ typedef struct trip_journal trip_journal;
 typedef struct trip_journal_params {
     bool resume;
     uint64_t identity;
-    bool scanned;            /* such a run needs a tally of all values first */
-    uint64_t voxels;         /* of the grid */
-    uint64_t slice_voxels;   /* of a slice, all of which exist; 0: the volume is sparse */
-    uint64_t ordered_splats; /* at hand of the list that is written in order */
+    bool scanned;          /* such a run needs a tally of all values first */
+    uint64_t voxels;       /* of the grid */
+    uint64_t slice_voxels; /* of a slice, all of which exist; 0: the volume is sparse */
+    bool halo;             /* there are lists of a halo */
+    uint64_t ordered_bytes[TRIP_ORDERED_FILES]; /* at hand */
 } trip_journal_params;
 
 /* Opens the journal in the folder of `spill`. With `resume`, what stands there is read: up to the
@@ -63,7 +67,7 @@ int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_recor
 
 int trip_journal_write_start(trip_journal *j, const trip_journal_start *start);
 int trip_journal_add_run(trip_journal *j, const trip_run_record *run);
-/* Fills in segments, runs and ordered_splats. */
+/* Fills in segments, runs and ordered_splats; the caller the rest. */
 int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill);
 
 #endif

@@ -67,6 +67,18 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
     pthread_mutex_unlock(&b->lock);
 }
 
+/* With how far the files of lists in order are, whose appender this thread is. */
+static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
+{
+    const trip_writer *w = b->params.writer;
+    const unsigned voxels = ORDERED_AXIS, halo = TRIP_HALO_LISTS + ORDERED_AXIS;
+    c->ordered_bytes[TRIP_ORDERED_VOXELS] = trip_writer_plane_bytes(w, voxels, TRIP_PLANE_VOXELS);
+    c->ordered_bytes[TRIP_ORDERED_NORMALS] = trip_writer_plane_bytes(w, voxels, TRIP_PLANE_NORMALS);
+    if (b->params.format.halo)
+        c->ordered_bytes[TRIP_ORDERED_HALO] = trip_writer_plane_bytes(w, halo, TRIP_PLANE_VOXELS);
+    return trip_journal_write_checkpoint(b->params.journal, c, b->params.spill);
+}
+
 /* Lists one after the other; their chunks are free at once, also when it fails. */
 static int do_chains(trip_list_builder *b, job *j, int status)
 {
@@ -77,9 +89,7 @@ static int do_chains(trip_list_builder *b, job *j, int status)
             status = trip_spill_chain(b->params.spill, list, &b->pool, &j->chains[list]);
         free_chain(b, &j->chains[list]);
     }
-    if (status == 0 && j->checkpoint)
-        status = trip_journal_write_checkpoint(b->params.journal, j->checkpoint, b->params.spill);
-    return status;
+    return status == 0 && j->checkpoint ? note_checkpoint(b, j->checkpoint) : status;
 }
 
 static void do_job(trip_list_builder *b, job *j, int status)

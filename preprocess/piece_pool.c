@@ -6,14 +6,15 @@
 
 #include "report.h"
 
-enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, MIN_CHUNK_BYTES = 256 << 10 };
+enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, MIN_CHUNK_BYTES = 128 << 10 };
 
 /* Pieces are linked by 32-bit counts of 8 bytes, from 1. */
 #define MAX_POOL_BYTES ((uint64_t)8 * (UINT32_MAX - 1))
 
 size_t trip_chunk_bytes(const trip_piece_format *f)
 {
-    size_t bytes = MIN_CHUNK_BYTES;
+    size_t bytes =
+        f->halo ? MIN_CHUNK_BYTES : 2 * MIN_CHUNK_BYTES; /* of more lists, smaller ones */
     while (bytes < 4 * trip_piece_max_bytes(f))
         bytes *= 2;
     return bytes;

@@ -1,15 +1,31 @@
 #include "resume.h"
 
+#include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "block.h"
 #include "dataset.h"
 #include "folder.h"
 #include "report.h"
 
-enum { ORDERED_AXIS = 2, RUNS_AT_A_TIME = 256 };
+enum { RUNS_AT_A_TIME = 256 };
+
+static const struct {
+    trip_kind kind;
+    int plane;
+} files[TRIP_ORDERED_FILES] = {
+    [TRIP_ORDERED_VOXELS] = { TRIP_KIND_VOXELS, TRIP_PLANE_VOXELS },
+    [TRIP_ORDERED_NORMALS] = { TRIP_KIND_VOXELS, TRIP_PLANE_NORMALS },
+    [TRIP_ORDERED_HALO] = { TRIP_KIND_HALO, TRIP_PLANE_VOXELS },
+};
+
+static bool has_file(const trip_piece_format *f, int file)
+{
+    return (file != TRIP_ORDERED_NORMALS || f->normals) && (file != TRIP_ORDERED_HALO || f->halo);
+}
 
 static off_t size_in(int folder, const char *name)
 {
@@ -20,95 +36,40 @@ static off_t size_in(int folder, const char *name)
 }
 
 /* Opens the longer of the two files of a plane, under its name in the spill. Both begin alike. */
-static int take_plane(const trip_spill *spill, int partial, int plane, int *fd)
+static int take_file(const trip_spill *spill, int partial, int file, int *fd)
 {
     char name[32];
     int folder = trip_spill_folder(spill);
-    trip_plane_file_name(ORDERED_AXIS, 0, TRIP_KIND_VOXELS, plane, name);
+    trip_plane_file_name(TRIP_ORDERED_AXIS, 0, files[file].kind, files[file].plane, name);
     if (size_in(partial, name) > size_in(folder, name))
         renameat(partial, name, folder, name);
     return trip_folder_open_file(fd, folder, trip_spill_path(spill), name, O_RDONLY, "brick");
 }
 
-/* Reads on in a plane; false where it ends before. */
-static bool read_plane(const trip_leftover *l, int plane, void *to, size_t bytes)
-{
-    return fread(to, 1, bytes, l->files[plane]) == bytes;
-}
-
-/* The next block and how many records it holds; false where there is no whole one. */
-static bool read_block(const trip_leftover *l, uint64_t *block, trip_block *out)
-{
-    uint32_t present = trip_block_present_words(l->form.tile_log2), squares = 0, records = 0;
-    if (!read_plane(l, TRIP_PLANE_VOXELS, block, present * sizeof *block))
-        return false;
-    for (uint32_t i = 0; i < present; i++)
-        squares += (uint32_t)__builtin_popcountll(block[i]);
-    uint64_t *masks = block + present;
-    if (!read_plane(l, TRIP_PLANE_VOXELS, masks, squares * sizeof *block))
-        return false;
-    for (uint32_t i = 0; i < squares; i++)
-        records += (uint32_t)__builtin_popcountll(masks[i]);
-    uint32_t codes = trip_block_code_words(records, l->form.code_bytes);
-    uint32_t words = present + squares + codes;
-    if (!trip_block_words_fit(&l->form, records, words) ||
-        !read_plane(l, TRIP_PLANE_VOXELS, masks + squares, codes * sizeof *block))
-        return false;
-    *out = trip_block_make(&l->form, records, words, block, NULL);
-    return true;
-}
-
-static void rewind_planes(const trip_leftover *l)
-{
-    for (int plane = 0; plane < TRIP_PLANES; plane++)
-        if (l->files[plane])
-            rewind(l->files[plane]);
-}
-
 int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *partial_path,
-                       const trip_block_form *form)
+                       const trip_piece_format *format)
 {
     int partial = open(partial_path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC), status = 0;
-    *out = (trip_leftover){ .form = *form };
-    for (int plane = 0; plane < TRIP_PLANES && status == 0; plane++) {
-        int fd = -1;
-        if (plane == TRIP_PLANE_NORMALS && !form->normal_bytes)
+    *out = trip_leftover_none();
+    for (int i = 0; i < TRIP_ORDERED_FILES && status == 0; i++) {
+        struct stat st;
+        out->bytes[i] = UINT64_MAX;
+        if (!has_file(format, i))
             continue;
-        status = take_plane(spill, partial, plane, &fd);
-        if (fd >= 0 && !(out->files[plane] = fdopen(fd, "rb"))) {
-            close(fd);
-            status = trip_fail(TRIP_ERROR, "brick", "--resume", "out of memory");
-        }
+        status = take_file(spill, partial, i, &out->fd[i]);
+        bool known = out->fd[i] >= 0 && fstat(out->fd[i], &st) == 0;
+        out->bytes[i] = known ? (uint64_t)st.st_size : 0;
     }
     if (partial >= 0)
         close(partial);
     return status;
 }
 
-void trip_leftover_count(trip_leftover *l)
-{
-    uint64_t block[TRIP_BLOCK_WORDS_MAX], normals = UINT64_MAX;
-    struct stat st;
-    trip_block b;
-    l->splats = 0;
-    if (!l->files[TRIP_PLANE_VOXELS])
-        return;
-    while (read_block(l, block, &b) && !trip_interrupted())
-        l->splats += b.count;
-    if (l->form.normal_bytes)
-        normals =
-            l->files[TRIP_PLANE_NORMALS] && fstat(fileno(l->files[TRIP_PLANE_NORMALS]), &st) == 0
-                ? (uint64_t)st.st_size / l->form.normal_bytes
-                : 0;
-    l->splats = normals < l->splats ? normals : l->splats;
-}
-
 void trip_leftover_close(trip_leftover *l)
 {
-    for (int plane = 0; plane < TRIP_PLANES; plane++)
-        if (l->files[plane])
-            fclose(l->files[plane]);
-    *l = (trip_leftover){ 0 };
+    for (int i = 0; i < TRIP_ORDERED_FILES; i++)
+        if (l->fd[i] >= 0)
+            close(l->fd[i]);
 }
 
 static int fail_damaged(void)
@@ -117,65 +78,133 @@ static int fail_damaged(void)
                      "what the interrupted run left is damaged: without --resume it starts again");
 }
 
-/* What a run is read to. */
+/* Where appending again stands. */
 typedef struct replay {
+    const trip_leftover *leftover;
+    const trip_block_form *form;
+    trip_list_builder *builder;
+    uint64_t at[TRIP_ORDERED_FILES]; /* bytes */
+    uint64_t splats;
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
-    unsigned char packed[sizeof(uint32_t) * TRIP_RUN_RECORDS_MAX];
 } replay;
 
-/* The next run of the leftover planes; false when it is not the one that the journal has. */
-static bool read_run(const trip_leftover *l, const trip_run_record *run, replay *to)
+/* The next bytes of a file. */
+static int read_next(replay *r, int file, void *data, size_t bytes)
 {
-    trip_block block;
-    bool normals = l->form.normal_bytes;
-    const uint8_t edge = (uint8_t)((1u << l->form.tile_log2) - 1);
-    const trip_file_brick tile = { .code_max = UINT16_MAX, .u_max = edge, .v_max = edge };
-    if (!read_block(l, to->block, &block) || block.count != run->splats ||
-        trip_block_check(&block, &tile))
-        return false;
-    trip_block_voxels(&block, 0, block.count, to->voxels);
-    if (normals) {
-        block.normals = to->packed;
-        if (!read_plane(l, TRIP_PLANE_NORMALS, to->packed,
-                        (size_t)block.count * l->form.normal_bytes))
-            return false;
-        trip_block_normals(&block, 0, block.count, to->normals);
+    for (unsigned char *to = data; bytes > 0;) {
+        ssize_t n = pread(r->leftover->fd[file], to, bytes, (off_t)r->at[file]);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return fail_damaged();
+        to += n;
+        bytes -= (size_t)n;
+        r->at[file] += (uint64_t)n;
     }
-    return trip_run_checksum(to->voxels, normals ? to->normals : NULL, run->splats) ==
-           run->checksum;
+    return 0;
 }
 
-static int replay_run(const trip_leftover *l, const trip_run_record *run, trip_list_output *output,
-                      replay *to)
+/* The words of the next block, which say themselves how many they are. */
+static int read_block(replay *r, int file, uint32_t splats, uint32_t *words)
 {
-    if (!read_run(l, run, to))
-        return fail_damaged();
-    if (trip_interrupted())
-        return trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
-    return trip_list_output_append(output, run->key, to->voxels,
-                                   l->form.normal_bytes ? to->normals : NULL, run->splats);
+    uint32_t begun = trip_block_present_words(r->form->tile_log2);
+    uint32_t squares = 0;
+    int status = read_next(r, file, r->block, begun * sizeof *r->block);
+    for (uint32_t i = 0; i < begun && status == 0; i++)
+        squares += (uint32_t)__builtin_popcountll(r->block[i]);
+    *words = begun + squares + trip_block_code_words(splats, r->form->code_bytes);
+    if (status == 0 && !trip_block_words_fit(r->form, splats, *words))
+        status = fail_damaged();
+    return status == 0 ? read_next(r, file, r->block + begun, (*words - begun) * sizeof *r->block)
+                       : status;
 }
 
-int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_output *output,
-                         trip_budget *budget)
+static int read_normals(replay *r, uint32_t splats)
+{
+    return r->leftover->fd[TRIP_ORDERED_NORMALS] < 0
+               ? 0
+               : read_next(r, TRIP_ORDERED_NORMALS, r->packed, splats * r->form->normal_bytes);
+}
+
+/* Any record inside the tile. */
+static trip_file_brick whole_tile(const trip_block_form *f)
+{
+    const uint8_t last = (uint8_t)((1u << f->tile_log2) - 1);
+    return (trip_file_brick){ .code_max = UINT16_MAX, .u_max = last, .v_max = last };
+}
+
+static int read_run(replay *r, const trip_run_record *run, const uint32_t **normals)
+{
+    const bool halo = run->list >= TRIP_HALO_LISTS;
+    const trip_file_brick tile = whole_tile(r->form);
+    uint32_t words;
+    int status = read_block(r, halo ? TRIP_ORDERED_HALO : TRIP_ORDERED_VOXELS, run->splats, &words);
+    if (status == 0 && !halo)
+        status = read_normals(r, run->splats);
+    if (status < 0)
+        return status;
+    bool has_normals = !halo && r->leftover->fd[TRIP_ORDERED_NORMALS] >= 0;
+    trip_block block =
+        trip_block_make(r->form, run->splats, words, r->block, has_normals ? r->packed : NULL);
+    if (trip_block_check(&block, &tile))
+        return fail_damaged();
+    trip_block_voxels(&block, 0, run->splats, r->voxels);
+    if (has_normals)
+        trip_block_normals(&block, 0, run->splats, r->normals);
+    *normals = has_normals ? r->normals : NULL;
+    return 0;
+}
+
+static bool is_ordered(const replay *r, const trip_run_record *run)
+{
+    bool halo = run->list == TRIP_HALO_LISTS + TRIP_ORDERED_AXIS;
+    return (run->list == TRIP_ORDERED_AXIS || (halo && r->leftover->fd[TRIP_ORDERED_HALO] >= 0)) &&
+           run->splats > 0 && run->splats <= 1u << 2 * r->form->tile_log2;
+}
+
+static int replay_run(replay *r, const trip_run_record *run)
+{
+    const uint32_t *normals = NULL;
+    int status = is_ordered(r, run) ? read_run(r, run, &normals) : fail_damaged();
+    if (status == 0 && trip_run_checksum(r->voxels, normals, run->splats) != run->checksum)
+        status = fail_damaged();
+    if (status == 0 && trip_interrupted())
+        status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
+    r->splats += run->splats;
+    return status == 0 ? trip_list_output_append(trip_list_builder_ordered(r->builder, run->list),
+                                                 run->key, r->voxels, normals, run->splats)
+                       : status;
+}
+
+static int replay_runs(replay *r, trip_journal *j)
 {
     const trip_checkpoint *c = trip_journal_get_checkpoint(j);
     trip_run_record runs[RUNS_AT_A_TIME];
-    replay *to = trip_budget_take(budget, sizeof *to);
-    uint64_t splats = 0;
-    if (!to)
-        return trip_fail(TRIP_ERROR, "brick", "--resume", "needs more --memory");
-    int status = c->runs > 0 && !l->files[TRIP_PLANE_VOXELS] ? fail_damaged() : 0;
-    rewind_planes(l);
+    int status = 0;
     for (uint64_t i = 0; i < c->runs && status == 0; i += RUNS_AT_A_TIME) {
         size_t n = c->runs - i < RUNS_AT_A_TIME ? (size_t)(c->runs - i) : RUNS_AT_A_TIME;
         status = trip_journal_read_runs(j, i, runs, n);
-        for (size_t r = 0; r < n && status == 0; r++) {
-            status = replay_run(l, &runs[r], output, to);
-            splats += runs[r].splats;
-        }
+        for (size_t k = 0; k < n && status == 0; k++)
+            status = replay_run(r, &runs[k]);
     }
-    trip_budget_release(budget, to, sizeof *to);
-    return status == 0 && splats != c->ordered_splats ? fail_damaged() : status;
+    if (status == 0 &&
+        (r->splats != c->ordered_splats || memcmp(r->at, c->ordered_bytes, sizeof r->at) != 0))
+        status = fail_damaged();
+    return status;
+}
+
+int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_builder *builder,
+                         const trip_block_form *form, trip_budget *budget)
+{
+    replay *r = trip_budget_take(budget, sizeof *r);
+    if (!r)
+        return trip_fail(TRIP_ERROR, "brick", "--resume", "needs more --memory");
+    r->leftover = l;
+    r->form = form;
+    r->builder = builder;
+    int status = replay_runs(r, j);
+    trip_budget_release(budget, r, sizeof *r);
+    return status;
 }

@@ -203,6 +203,7 @@ void trip_tally_add(trip_tally *t, const trip_tally *other)
     t->voxels += other->voxels;
     t->finite += other->finite;
     t->kept += other->kept;
+    t->borders += other->borders;
     t->value_min = fmin(t->value_min, other->value_min);
     t->value_max = fmax(t->value_max, other->value_max);
     if (other->counted == 0)
@@ -247,7 +248,8 @@ static bool check_bins(const trip_tally *t)
 
 bool trip_tally_check(const trip_tally *t)
 {
-    if (t->finite > t->voxels || t->counted > t->finite || t->kept > t->voxels)
+    if (t->finite > t->voxels || t->counted > t->finite || t->kept > t->voxels ||
+        t->borders > 2 * t->voxels)
         return false;
     if (t->finite == 0)
         return t->value_min == INFINITY && t->value_max == -INFINITY;
@@ -285,8 +287,14 @@ static void count_kept(trip_tally *t, const trip_envelope *e, const float *value
 {
     uint8_t keep[SCAN_EDGE];
     trip_envelope_keep_row(e, values, count, keep);
+    for (size_t i = 0; active && i < count; i++)
+        keep[i] &= active[i];
     for (size_t i = 0; i < count; i++)
-        t->kept += keep[i] & (active ? active[i] : 1);
+        t->kept += keep[i];
+    for (size_t i = 1; i < count; i++)
+        t->borders += keep[i] != keep[i - 1];
+    if (active) /* the rows of sparse volumes end where voxels do */
+        t->borders += (uint64_t)keep[0] + keep[count - 1];
 }
 
 static int scan_box(void *user, unsigned thread, const trip_box *box)

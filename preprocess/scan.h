@@ -14,9 +14,10 @@ enum { TRIP_TALLY_BINS = 16384 };
 /* Cleared by trip_tally_clear(). Fine bin b counts the values in [first + b, first + b + 1) times
  * 2^exponent; the width follows from the range so far and only grows. */
 typedef struct trip_tally {
-    uint64_t voxels; /* that exist */
-    uint64_t finite; /* of them */
-    uint64_t kept;   /* of them, where an envelope says so */
+    uint64_t voxels;  /* that exist */
+    uint64_t finite;  /* of them */
+    uint64_t kept;    /* of them, where an envelope says so */
+    uint64_t borders; /* of kept voxels with others along x, where there is an envelope */
     double value_min,
         value_max; /* of the finite ones; infinity and -infinity when there are none */
     uint64_t counted;

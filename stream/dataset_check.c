@@ -86,8 +86,10 @@ static int check_grid(const trip_file_header *h, const char *where)
             return FAIL_FIELD(gradient_step, "no gradient step");
     if ((double)h->voxels > voxels)
         return FAIL_FIELD(voxels, "more voxels than the grid has");
-    if (h->kept > h->voxels || h->halo > h->voxels - h->kept)
+    if (h->kept > h->voxels)
         return FAIL_FIELD(kept, "more was kept than there are voxels");
+    if ((double)h->halo > voxels - (double)h->kept)
+        return FAIL_FIELD(halo, "more is around what was kept than the grid has");
     return TRIP_OK;
 }
 

@@ -493,7 +493,9 @@ static int check_summary(const trip_writer *w, const trip_writer_summary *s)
     if (!isfinite(s->value_min) || !isfinite(s->value_max) || s->value_min > s->value_max)
         return trip_fail(TRIP_ERROR, "write", w->folder.path, "value range %g to %g", s->value_min,
                          s->value_max);
-    if (s->voxels < kept || s->voxels - kept < halo || (double)s->voxels > grid_voxels(w))
+    /* What is around kept voxels need not exist in a sparse volume, but the grid has it. */
+    if (s->voxels < kept || (double)s->voxels > grid_voxels(w) ||
+        (double)halo > grid_voxels(w) - (double)kept)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
                          "%llu voxels kept and %llu around them of %llu read, of %.0f in the grid",
                          (unsigned long long)kept, (unsigned long long)halo,
@@ -704,4 +706,9 @@ uint64_t trip_writer_bytes(const trip_writer *w)
 uint64_t trip_writer_records(const trip_writer *w, unsigned list)
 {
     return w->lists[list].records;
+}
+
+uint64_t trip_writer_plane_bytes(const trip_writer *w, unsigned list, int plane)
+{
+    return w->lists[list].planes[plane].bytes;
 }

@@ -78,5 +78,6 @@ void trip_writer_abort(trip_writer *w);
 uint64_t trip_writer_bytes(const trip_writer *w);
 /* Of a list, by its number. */
 uint64_t trip_writer_records(const trip_writer *w, unsigned list);
+uint64_t trip_writer_plane_bytes(const trip_writer *w, unsigned list, int plane);
 
 #endif

@@ -150,7 +150,8 @@ class Counts(program.ProgramTest):
             ("--tile=128", "--slab-sheets=64"),
             ("--threads=1",),
             ("--memory=64M", "--threads=2"),
-            ("--no-normals",),
+            ("--normals=none", "--halo=0"),
+            ("--normals=full",),
         ):
             self.assertEqual(self.brick(source, "a.trip", *options)["kept"], wanted, options)
             self.works("info", "--verify", "a.trip")

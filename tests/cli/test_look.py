@@ -206,7 +206,7 @@ class Look(program.ProgramTest):
     def test_the_command_to_brick_again_has_all_that_the_data_set_depends_on(self):
         program.write("low.tf", b"10 1 1 1 0\n20 1 1 1 0.5\n200 1 1 1 0.5\n")
         program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
-        options = "--no-normals", "--tile=16", "--slab-sheets=3"
+        options = "--normals=none", "--tile=16", "--slab-sheets=3"
         before, after = self.again("ball.nrrd", *options)
         for key, value in ("tile_voxels", 16), ("slab_sheets", 3), ("normals", False):
             self.assertEqual((before[key], after[key]), (value, value), key)

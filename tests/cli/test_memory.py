@@ -38,7 +38,7 @@ class Memory(program.ProgramTest):
 
     def test_bricking_and_drawing_a_volume_of_256_mib_with_64(self):
         self.assertEqual(os.path.getsize("large.raw"), 256 * MIB)
-        for envelope in [], ["--range=250:255", "--no-normals"]:
+        for envelope in [], ["--range=250:255", "--normals=none"]:
             rss = peak_rss(*self.raw, "-o", "a.trip", "--memory", "64M", *envelope)
             self.assertLess(rss, 64 * MIB + PROGRAM_BYTES, envelope)
         for output in "a.png", "a.exr":

@@ -31,16 +31,18 @@ class DiskFull(limits.Test):
 
     def brick(self, mebibytes, *arguments):
         """What brick says and leaves there."""
-        command = " ".join([f"'{limits.program('triptych')}' brick '{self.volume}' -o d.trip",
-                            "--keep-all -q", *arguments])
+        command = " ".join([f"'{limits.program('triptych')}' brick '{self.volume}' -o d.trip -q",
+                            *(arguments or ["--keep-all"])])
         r = self.run_on_disk(mebibytes, f"{command}; echo status $?; ls -A")
         status, *left = r.stdout.split("\n", 1)
         return int(status.split()[1]), r.stderr, left[0].split()
 
     def test_brick_refuses_or_stops_and_leaves_nothing_under_the_name(self):
-        # Codes and normals, at least, in three lists: 10.1 MiB, without normals 2.5.
-        for mebibytes in 1, 2, 3, 5, 6, 8, 9, 10:
-            for arguments in [], ["--no-normals"] if mebibytes <= 2 else []:
+        for mebibytes, *arguments in (
+                [1], [2], [4], [6], [8], [9], [10],  # 96^3 * 3 * 4 bytes and masks are 10.3 MiB
+                [1, "--keep-all", "--normals=none"], [2, "--keep-all", "--normals=none"],
+                [1, "--range=100:160"], [2, "--range=100:160"]):  # with a halo
+            with self.subTest(mebibytes=mebibytes, arguments=arguments):
                 status, said, left = self.brick(mebibytes, *arguments)
                 self.assertIn(status, limits.FAILED, said)
                 self.assertRegex(said, r"\Atriptych: [^\n]+\n\Z")

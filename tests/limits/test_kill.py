@@ -99,7 +99,7 @@ class Kill(limits.Test):
             shutil.rmtree(self.name)
 
     def test_what_was_left_by_another_command_is_not_taken_for_this_ones(self):
-        for change in ["--range", "20000:"], ["--tile", "32"], ["--no-normals"]:
+        for change in ["--range", "20000:"], ["--tile", "32"], ["--normals=none"], ["--halo=0"]:
             self.leave_half_made(0.8, *change)
             r = limits.run("triptych", *self.arguments, "--resume")
             if r.status:  # it says so, and starts over only without --resume

@@ -80,24 +80,29 @@ static inline bool test_exists(const char *name)
     return access(test_path(name), F_OK) == 0;
 }
 
-/* What a data set holds: [k][j][i] of every list, code -1 where there is no splat. */
+enum { TEST_LISTS = 6 };
+
+/* What a data set holds: [k][j][i] of every list (X, Y and Z of kept voxels, then of the halo),
+ * code -1 where there is no splat. */
 typedef struct test_lists {
     trip_file_header header;
     size_t voxels;
-    int32_t *codes[3];
-    uint32_t *normals[3];
-    uint64_t splats[3];
+    unsigned lists;
+    int32_t *codes[TEST_LISTS];
+    uint32_t *normals[TEST_LISTS];
+    uint64_t splats[TEST_LISTS];
     uint64_t out_of_order; /* splats not after the one before, by sheet and Morton code */
     char *text;
 } test_lists;
 
-static inline void test_read_run(const trip_dataset *d, int axis, const trip_run *run,
+static inline void test_read_run(const trip_dataset *d, unsigned number, const trip_run *run,
                                  test_lists *l, uint64_t *last_key)
 {
     static uint64_t words[TRIP_BLOCK_WORDS_MAX];
     static unsigned char packed[4 * TRIP_RUN_RECORDS_MAX];
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX] = { 0 };
-    const trip_list *list = &d->lists[axis];
+    const trip_list *list = &d->lists[number];
+    const int axis = list->axis;
     const trip_block_form form = trip_block_form_of(&d->header);
     size_t bytes = 8 * (size_t)run->words, normal_bytes = run->count * form.normal_bytes;
     bool has_normals = list->plane_fd[1] >= 0;
@@ -120,12 +125,12 @@ static inline void test_read_run(const trip_dataset *d, int axis, const trip_run
                      p[0]);
         uint64_t key = (uint64_t)run->sheet << 40 |
                        trip_morton((uint32_t)p[(axis + 1) % 3], (uint32_t)p[(axis + 2) % 3]);
-        l->out_of_order += l->splats[axis] > 0 && key <= *last_key;
+        l->out_of_order += l->splats[number] > 0 && key <= *last_key;
         *last_key = key;
-        assert_int_equal(l->codes[axis][at], -1);
-        l->codes[axis][at] = (int32_t)trip_voxel_code(voxels[n]);
-        l->normals[axis][at] = normals[n];
-        l->splats[axis]++;
+        assert_int_equal(l->codes[number][at], -1);
+        l->codes[number][at] = (int32_t)trip_voxel_code(voxels[n]);
+        l->normals[number][at] = normals[n];
+        l->splats[number]++;
     }
 }
 
@@ -138,21 +143,23 @@ static inline void test_read_lists(const char *name, test_lists *l)
     assert_int_equal(trip_dataset_verify(d, budget), 0);
     *l = (test_lists){ .header = d->header, .text = strdup(d->text) };
     l->voxels = (size_t)(d->header.dims[0] * d->header.dims[1] * d->header.dims[2]);
-    for (int axis = 0; axis < 3; axis++) {
+    l->lists = d->list_count;
+    assert_true(l->lists == 3 || l->lists == TEST_LISTS);
+    for (unsigned i = 0; i < l->lists; i++) {
+        const trip_list *list = &d->lists[i];
         uint64_t last_key = 0;
         trip_selection s;
         trip_run run;
-        l->codes[axis] = malloc(l->voxels * sizeof(int32_t));
-        l->normals[axis] = calloc(l->voxels, sizeof(uint32_t));
-        memset(l->codes[axis], 0xff, l->voxels * sizeof(int32_t));
-        assert_int_equal(trip_selection_create(&s, d, &d->lists[axis], false, 0,
-                                               (int64_t)d->header.dims[axis] - 1, budget),
-                         0);
-        for (uint64_t brick = 0; brick < d->lists[axis].brick_count; brick++)
+        l->codes[i] = malloc(l->voxels * sizeof(int32_t));
+        l->normals[i] = calloc(l->voxels, sizeof(uint32_t));
+        memset(l->codes[i], 0xff, l->voxels * sizeof(int32_t));
+        assert_int_equal(
+            trip_selection_create(&s, d, list, false, 0, list->dims[list->axis] - 1, budget), 0);
+        for (uint64_t brick = 0; brick < list->brick_count; brick++)
             trip_selection_add(&s, brick);
         trip_run_iterator it = trip_run_begin(&s);
         while (trip_run_next(&it, &run))
-            test_read_run(d, axis, &run, l, &last_key);
+            test_read_run(d, i, &run, l, &last_key);
         trip_selection_destroy(&s, budget);
     }
     trip_dataset_close(d);
@@ -161,21 +168,22 @@ static inline void test_read_lists(const char *name, test_lists *l)
 
 static inline void test_free_lists(test_lists *l)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        free(l->codes[axis]);
-        free(l->normals[axis]);
+    for (unsigned i = 0; i < l->lists; i++) {
+        free(l->codes[i]);
+        free(l->normals[i]);
     }
     free(l->text);
 }
 
-/* Sound, in order, and the same splats in all three lists. */
+/* Sound, in order, and the same splats in all three lists of a kind. */
 static inline void test_check_lists(const test_lists *l)
 {
     assert_int_equal(l->out_of_order, 0);
-    for (int axis = 0; axis < 3; axis++) {
-        assert_int_equal(l->splats[axis], l->header.kept);
-        assert_memory_equal(l->codes[axis], l->codes[0], l->voxels * sizeof(int32_t));
-        assert_memory_equal(l->normals[axis], l->normals[0], l->voxels * sizeof(uint32_t));
+    for (unsigned i = 0; i < l->lists; i++) {
+        const unsigned first = i - i % 3;
+        assert_int_equal(l->splats[i], first ? l->header.halo : l->header.kept);
+        assert_memory_equal(l->codes[i], l->codes[first], l->voxels * sizeof(int32_t));
+        assert_memory_equal(l->normals[i], l->normals[first], l->voxels * sizeof(uint32_t));
     }
 }
 
@@ -196,8 +204,9 @@ static inline bool test_same_file(const char *a, const char *b)
 /* All files of two data sets alike, byte for byte. */
 static inline void test_same_dataset(const char *a, const char *b)
 {
-    static const char *const files[] = { "index.trip", "x0.voxels",  "y0.voxels", "z0.voxels",
-                                         "x0.normals", "y0.normals", "z0.normals" };
+    static const char *const files[] = { "index.trip", "x0.voxels",  "y0.voxels",  "z0.voxels",
+                                         "x0.normals", "y0.normals", "z0.normals", "x0.halo",
+                                         "y0.halo",    "z0.halo" };
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         char first[256], second[256];
         snprintf(first, sizeof first, "%s/%s", test_path(a), files[i]);
