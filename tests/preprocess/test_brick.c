@@ -206,6 +206,95 @@ static void values_that_are_not_finite_are_left_out_with_one_warning(void **stat
     test_free_lists(&l);
 }
 
+/* 8 bits are stored as they are, signed or not; 16 bits in their own. */
+static void codes_have_the_bytes_of_the_source(void **state)
+{
+    (void)state;
+    static const char *const types[] = { "uint8", "int8", "int16" };
+    make_bytes();
+    for (int i = 0; i < 3; i++) {
+        test_lists l;
+        trip_brick_summary s;
+        trip_brick_params p = params_for(types[i], "a.trip");
+        p.keep_all = p.replace = true;
+        p.volume.raw_dims[2] = i == 2 ? NZ / 2 : NZ;
+        assert_int_equal(trip_brick(&p, &s), 0);
+        test_read_lists("a.trip", &l);
+        test_check_lists(&l);
+        assert_int_equal(s.code_bytes, i == 2 ? 2 : 1);
+        assert_int_equal(l.header.code_bytes, s.code_bytes);
+        for (int n = 0; n < N && i < 2; n++)
+            assert_int_equal(l.codes[0][n], 257 * (i ? (int8_t)bytes[n] + 128 : bytes[n]));
+        test_free_lists(&l);
+    }
+}
+
+static void check_compact_normal(const trip_compact_normals *c, uint32_t normal, const uint8_t *b)
+{
+    const double e[3] = { (b[1] - b[-1]) / 2.0, (b[NX] - b[-NX]) / 2.0,
+                          (b[NX * NY] - b[-NX * NY]) / 2.0 };
+    double g[3], length = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+    trip_compact_normal_unpack(c, normal, g);
+    double along = g[0] * e[0] + g[1] * e[1] + g[2] * e[2];
+    if (length < c->full) {
+        double sign = along < 0 ? -1 : 1;
+        assert_true(g[0] == sign * e[0] && g[1] == sign * e[1] && g[2] == sign * e[2]);
+    } else { /* within a tenth of a degree */
+        assert_true(fabs(along) > cos(0.1 * M_PI / 180) * length * c->full * (1 - 1e-9));
+    }
+}
+
+static void normals_of_bytes_are_compact_and_exact_below_full_shading(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    const trip_affine m = trip_affine_identity();
+    p.keep_all = true;
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(s.normal_bytes, 3);
+    test_read_lists("a.trip", &l);
+    assert_true(fabs(l.header.gradient_full - 0.04 * 255) < 1e-12);
+    trip_compact_normals c =
+        trip_compact_normals_make(&m, l.header.gradient_full, l.header.gradient_step);
+    for (int k = 1; k < NZ - 1; k++)
+        for (int j = 1; j < NY - 1; j++)
+            for (int i = 1; i < NX - 1; i++) {
+                size_t at = ((size_t)k * NY + (size_t)j) * NX + (size_t)i;
+                check_compact_normal(&c, l.normals[0][at], bytes + at);
+            }
+    test_free_lists(&l);
+}
+
+/* Compact normals need the range of values: where nothing else does, normals are full. */
+static void normals_have_the_bytes_that_were_chosen(void **state)
+{
+    (void)state;
+    static const struct {
+        trip_brick_normals normals;
+        bool ranges;
+        unsigned bytes;
+    } ways[] = {
+        { TRIP_NORMALS_AUTO, false, 3 },    { TRIP_NORMALS_AUTO, true, 4 },
+        { TRIP_NORMALS_COMPACT, true, 3 },  { TRIP_NORMALS_FULL, false, 4 },
+        { TRIP_NORMALS_COMPACT, false, 3 }, { TRIP_NORMALS_NONE, true, 0 },
+    };
+    const trip_value_range range = { -1, 20 };
+    make_floats();
+    for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
+        trip_brick_summary s;
+        trip_brick_params p = params_for("float", "a.trip");
+        p.replace = true;
+        p.normals = ways[i].normals;
+        p.ranges = &range;
+        p.range_count = ways[i].ranges;
+        assert_int_equal(trip_brick(&p, &s), 0);
+        assert_int_equal(s.normal_bytes, ways[i].bytes);
+    }
+}
+
 static void brick_to(trip_brick_params p, const char *output)
 {
     trip_brick_summary s;
@@ -434,6 +523,11 @@ static void another_input_or_other_parameters_are_not_gone_on_with(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(codes_have_the_bytes_of_the_source, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(normals_of_bytes_are_compact_and_exact_below_full_shading,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(normals_have_the_bytes_that_were_chosen, test_begin,
+                                        test_end),
         cmocka_unit_test_setup_teardown(kept_voxels_are_those_of_the_envelope, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(a_transfer_function_keeps_what_it_shows, test_begin,

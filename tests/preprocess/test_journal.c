@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <xxhash.h>
 
-#include "block.h"
 #include "journal.h"
 
 enum { NX = 128, NY = 96, NZ = 128, N = NX * NY * NZ };
@@ -233,6 +232,10 @@ ATTACK(done_beyond_the_end, checkpoint()->done = NZ + 1)
 ATTACK(most_done, checkpoint()->done = UINT64_MAX)
 ATTACK(done_before, checkpoint()->done = 0)
 ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
+ATTACK(halo_without_room, checkpoint()->halo = 1)
+ATTACK(most_halo, checkpoint()->halo = UINT64_MAX)
+ATTACK(more_in_order_than_there_are, checkpoint()->ordered_splats = N + 1)
+ATTACK(fewer_bytes_in_order, checkpoint()->ordered_bytes[TRIP_ORDERED_VOXELS] -= 8)
 ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
 ATTACK(most_segments, checkpoint()->segments = UINT64_MAX)
 ATTACK(segments_that_wrap, checkpoint()->segments += UINT64_C(1) << 59)
@@ -275,6 +278,9 @@ static void numbers_that_no_run_writes_are_refused(void **state)
         { "most done", most_done },
         { "done before", done_before },
         { "more kept than there are", more_kept_than_there_are },
+        { "halo without room", halo_without_room },
+        { "most halo", most_halo },
+        { "more in order than there are", more_in_order_than_there_are },
         { "most runs", most_runs },
         { "most segments", most_segments },
         { "segments that wrap", segments_that_wrap },
@@ -291,7 +297,7 @@ static void segments_that_no_run_writes_are_refused(void **state)
 {
     (void)state;
     static const attack attacks[] = {
-        { "segment of no axis", segment_of_no_list },
+        { "segment of no list", segment_of_no_list },
         { "segment elsewhere", segment_elsewhere },
         { "segment that wraps", segment_that_wraps },
         { "segment of nothing", segment_of_nothing },
@@ -321,6 +327,19 @@ static void another_identity_is_refused(void **state)
     CHECK_ATTACKS(attacks, "another input or other options", false);
 }
 
+static void false_lengths_of_files_in_order_are_found_when_they_are_read(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    make_volume();
+    leave_killed_run(p);
+    read_journal();
+    fewer_bytes_in_order();
+    write_journal();
+    free_records();
+    expect_refused(p, "fewer bytes in order", "what the interrupted run left is damaged");
+}
+
 static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
 {
     (void)state;
@@ -336,65 +355,44 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     assert_false(test_exists("a.trip.partial"));
 }
 
-/* The first block of the list in order, with a right checksum. */
-static void change_leftover(void (*change)(uint64_t *present, uint64_t *last_mask))
+/* Bytes of a file of the killed run. */
+static void overwrite(const char *name, long offset, const void *data, size_t bytes)
 {
     char path[192];
-    trip_run_record run;
-    uint64_t words[TRIP_BLOCK_WORDS_MAX];
-    uint32_t voxels[TRIP_TILE_MAX_SPLATS], normals[TRIP_TILE_MAX_SPLATS];
-    FILE *planes[2], *runs;
-    snprintf(path, sizeof path, "%s.partial/z0.voxels", output);
-    planes[0] = fopen(path, "r+b");
-    snprintf(path, sizeof path, "%s.partial/z0.normals", output);
-    planes[1] = fopen(path, "rb");
-    snprintf(path, sizeof path, "%s.spill/runs", output);
-    runs = fopen(path, "r+b");
-    assert_true(planes[0] && planes[1] && runs);
-    assert_int_equal(fread(&run, sizeof run, 1, runs), 1);
-    assert_int_equal(fread(words, 8, 1, planes[0]), 1);
-    size_t squares = (size_t)__builtin_popcountll(words[0]);
-    size_t count = 1 + squares + trip_block_code_words(run.splats, 2);
-    assert_int_equal(fread(words + 1, 8, count - 1, planes[0]), count - 1);
-    assert_int_equal(fread(normals, 4, run.splats, planes[1]), run.splats);
-    change(&words[0], &words[squares]);
-    const trip_block_form form = { .tile_log2 = 5, .code_bytes = 2 };
-    const trip_block block = trip_block_make(&form, run.splats, (uint32_t)count, words, NULL);
-    trip_block_voxels(&block, 0, run.splats, voxels);
-    run.checksum = trip_run_checksum(voxels, normals, run.splats);
-    rewind(planes[0]);
-    rewind(runs);
-    assert_int_equal(fwrite(words, 8, count, planes[0]), count);
-    assert_int_equal(fwrite(&run, sizeof run, 1, runs), 1);
-    fclose(planes[0]);
-    fclose(planes[1]);
-    fclose(runs);
+    snprintf(path, sizeof path, "%s.%s", output, name);
+    FILE *f = fopen(path, "r+b");
+    assert_non_null(f);
+    assert_int_equal(fseek(f, offset, SEEK_SET), 0);
+    assert_int_equal(fwrite(data, bytes, 1, f), 1);
+    fclose(f);
 }
 
-static void move_outside(uint64_t *present, uint64_t *last_mask)
-{
-    (void)last_mask;
-    *present ^= UINT64_C(1) << (63 - __builtin_clzll(*present)) | UINT64_C(1) << 63;
-}
-
-static void drop_one(uint64_t *present, uint64_t *last_mask)
-{
-    (void)present;
-    *last_mask &= *last_mask - 1;
-}
-
-static void false_records_of_the_list_in_order_are_refused(void **state)
+/* All voxels are kept, so that the first run is a whole tile: one word of squares, 64 masks, then
+ * codes. */
+static void false_records_of_lists_in_order_are_refused(void **state)
 {
     (void)state;
-    trip_brick_params p = params();
-    p.tile_voxels = 32;
+    static const struct {
+        const char *name, *file;
+        long offset;
+        size_t bytes;
+    } attacks[] = {
+        { "no squares", "partial/z0.voxels", 0, 8 },
+        { "an empty mask", "partial/z0.voxels", 8, 8 },
+        { "other codes", "partial/z0.voxels", 8 * 65, 8 },
+        { "other normals", "partial/z0.normals", 0, 4096 },
+        { "run of another list", "spill/runs", offsetof(trip_run_record, list), 2 },
+        { "run of nothing", "spill/runs", offsetof(trip_run_record, splats), 2 },
+        { "run with another checksum", "spill/runs", offsetof(trip_run_record, checksum), 4 },
+    };
+    static const unsigned char zeros[4096];
     make_volume();
-    leave_killed_run(p);
-    change_leftover(move_outside);
-    expect_refused(p, "outside", "what the interrupted run left is damaged");
-    leave_killed_run(p);
-    change_leftover(drop_one);
-    expect_refused(p, "one less", "what the interrupted run left is damaged");
+    for (size_t i = 0; i < sizeof attacks / sizeof *attacks; i++) {
+        trip_brick_params p = params();
+        leave_killed_run(p);
+        overwrite(attacks[i].file, attacks[i].offset, zeros, attacks[i].bytes);
+        expect_refused(p, attacks[i].name, "what the interrupted run left is damaged");
+    }
 }
 
 static void links_and_what_is_no_file_are_not_followed(void **state)
@@ -573,8 +571,9 @@ int main(void)
         TEST(segments_that_no_run_writes_are_refused),
         TEST(a_false_tally_of_all_values_is_refused),
         TEST(another_identity_is_refused),
+        TEST(false_lengths_of_files_in_order_are_found_when_they_are_read),
         TEST(a_false_count_of_kept_voxels_is_found_at_the_end),
-        TEST(false_records_of_the_list_in_order_are_refused),
+        TEST(false_records_of_lists_in_order_are_refused),
         TEST(links_and_what_is_no_file_are_not_followed),
         TEST(folders_of_another_user_are_refused),
         TEST(partial_folders_of_another_user_are_refused),
