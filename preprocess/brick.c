@@ -146,7 +146,7 @@ static int plan_memory(brick *b)
 static bool has_spilled_order(const brick *b)
 {
     for (size_t i = 0; i < trip_spill_count(b->spill); i++)
-        if (trip_list_axis(trip_spill_segment(b->spill, i)->list) == TRIP_ORDERED_AXIS)
+        if (trip_spill_segment(b->spill, i)->list == TRIP_ORDERED_LIST)
             return true;
     return false;
 }
@@ -191,15 +191,14 @@ static int open_spill(brick *b)
     if (status == 0)
         status = trip_journal_open(
             &b->journal, b->spill,
-            &(trip_journal_params){ .resume = resume,
-                                    .identity = b->identity,
-                                    .scanned = trip_brick_input_needs_scan(&b->in),
-                                    .voxels = b->in.grid_voxels,
-                                    .slice_voxels =
-                                        b->in.info->sparse ? 0 : (uint64_t)(dims[0] * dims[1]),
-                                    .halo = b->format.halo,
-                                    .ordered_bytes = { b->leftover.bytes[0], b->leftover.bytes[1],
-                                                       b->leftover.bytes[2] } },
+            &(trip_journal_params){
+                .resume = resume,
+                .identity = b->identity,
+                .scanned = trip_brick_input_needs_scan(&b->in),
+                .voxels = b->in.grid_voxels,
+                .slice_voxels = b->in.info->sparse ? 0 : (uint64_t)(dims[0] * dims[1]),
+                .halo = b->format.halo,
+                .ordered_bytes = { b->leftover.bytes[0], b->leftover.bytes[1] } },
             b->in.budget);
     free(path);
     return status;

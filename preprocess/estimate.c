@@ -124,8 +124,8 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
                            const trip_memory_plan *plan, trip_brick_estimate *e)
 {
     int lists = plan->in_order && format->quantised ? 2 : 3;
-    double pieces = lists * ((double)e->kept * piece_bytes(format, 0) +
-                             (double)e->halo * piece_bytes(format, TRIP_HALO_LISTS));
+    double pieces = lists * (double)e->kept * piece_bytes(format, 0) +
+                    3 * (double)e->halo * piece_bytes(format, TRIP_HALO_LISTS);
     double code = trip_brick_code_bytes(in), normal = trip_brick_normal_bytes(in);
     e->bytes = (uint64_t)(3 * ((double)e->kept * (mask_bytes + code + normal) +
                                (double)e->halo * (halo_mask_bytes + code)));

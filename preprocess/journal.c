@@ -137,7 +137,7 @@ static bool goes_on(const trip_checkpoint *before, const trip_checkpoint *c)
     bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
                 c->runs >= before->runs && c->segments >= before->segments &&
                 c->ordered_splats >= before->ordered_splats;
-    for (int i = 0; i < TRIP_ORDERED_FILES; i++)
+    for (int i = 0; i < TRIP_PLANES; i++)
         fits = fits && c->ordered_bytes[i] >= before->ordered_bytes[i];
     return fits;
 }
@@ -176,7 +176,7 @@ static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
         return fail_false(j, "its count of kept voxels");
     if (!can_have_halo(p, c, voxels))
         return fail_false(j, "its count of voxels around them");
-    if (c->ordered_splats > c->kept + c->halo || c->runs > c->ordered_splats)
+    if (c->ordered_splats > c->kept || c->runs > c->ordered_splats)
         return fail_false(j, "its count of runs");
     return 0;
 }
@@ -184,7 +184,7 @@ static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
 static bool has_ordered(const trip_journal *j, const trip_checkpoint *c)
 {
     bool has = true;
-    for (int i = 0; i < TRIP_ORDERED_FILES; i++)
+    for (int i = 0; i < TRIP_PLANES; i++)
         has = has && c->ordered_bytes[i] <= j->params.ordered_bytes[i];
     return has;
 }

@@ -1,11 +1,13 @@
 /* What a run of `brick` notes down beside its spilled pieces, so that another one can go on where
  * it was when it was killed. Two files in the spill's folder: "journal", records with checksums of
- * which the last may be cut off, and "runs", what was appended to lists that are written in order.
- * They are read back on the machine that wrote them only, and believed no more than any file from
- * outside: what is read is checked against the volume and the parameters. One thread at a time. */
+ * which the last may be cut off, and "runs", what was appended to the list that is written in
+ * order. They are read back on the machine that wrote them only, and believed no more than any file
+ * from outside: what is read is checked against the volume and the parameters. One thread at a
+ * time. */
 #ifndef TRIP_JOURNAL_H
 #define TRIP_JOURNAL_H
 
+#include "format.h"
 #include "scan.h"
 #include "spill.h"
 
@@ -16,23 +18,20 @@ typedef struct trip_journal_start {
     trip_tally tally;
 } trip_journal_start;
 
-/* Plane files of the lists that are written in order. */
-enum { TRIP_ORDERED_VOXELS, TRIP_ORDERED_NORMALS, TRIP_ORDERED_HALO, TRIP_ORDERED_FILES };
-
-/* All pieces of the first part of the volume are in segments or in lists in order. */
+/* All pieces of the first part of the volume are in segments or in the list in order. */
 typedef struct trip_checkpoint {
     uint64_t done;                 /* that part, counted as by trip_walk() */
     uint64_t kept, halo;           /* splats of it */
     uint64_t segments;             /* that there are */
-    uint64_t runs, ordered_splats; /* of lists in order */
-    uint64_t ordered_bytes[TRIP_ORDERED_FILES];
+    uint64_t runs, ordered_splats; /* of the list in order */
+    uint64_t ordered_bytes[TRIP_PLANES];
     trip_tally tally; /* of the part, unless scanned */
 } trip_checkpoint;
 
-/* One run of a list in order. */
+/* One run of the list in order. */
 typedef struct trip_run_record {
     uint64_t key;
-    uint16_t list, splats;
+    uint32_t splats;
     uint32_t checksum; /* of its records, trip_run_checksum() */
 } trip_run_record;
 
@@ -47,7 +46,7 @@ typedef struct trip_journal_params {
     uint64_t voxels;       /* of the grid */
     uint64_t slice_voxels; /* of a slice, all of which exist; 0: the volume is sparse */
     bool halo;             /* there are lists of a halo */
-    uint64_t ordered_bytes[TRIP_ORDERED_FILES]; /* at hand */
+    uint64_t ordered_bytes[TRIP_PLANES]; /* at hand of the list in order */
 } trip_journal_params;
 
 /* Opens the journal in the folder of `spill`. With `resume`, what stands there is read: up to the

@@ -10,9 +10,10 @@
 #include "piece_pool.h"
 #include "report.h"
 
-enum { ORDERED_AXIS = TRIP_ORDERED_AXIS };
+enum { ORDERED_LIST = TRIP_ORDERED_LIST };
 
-/* What the background thread is to do with chunks: append lists in order, or spill the others. */
+/* What the background thread is to do with chunks: append the list in order, or spill the others.
+ */
 typedef struct job {
     struct job *next;
     bool ordered;
@@ -25,7 +26,7 @@ struct trip_list_builder {
     unsigned lists;
     uint32_t (
         *open)[TRIP_MOST_LISTS]; /* [producer][list], the chunk being filled; the producer's */
-    trip_list_output outputs[TRIP_MOST_LISTS]; /* those in order are the background thread's until
+    trip_list_output outputs[TRIP_MOST_LISTS]; /* the one in order is the background thread's until
                                                   the merge */
     pthread_t thread;
     bool thread_runs;
@@ -49,7 +50,7 @@ uint64_t trip_list_builder_min_bytes(const trip_piece_format *f, unsigned produc
 
 static bool is_spilled(const trip_list_builder *b, unsigned list)
 {
-    return !(b->params.in_order && trip_list_axis(list) == ORDERED_AXIS);
+    return !(b->params.in_order && list == ORDERED_LIST);
 }
 
 static int append_chain(trip_list_builder *b, unsigned list, const trip_chain *chain)
@@ -67,15 +68,11 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
     pthread_mutex_unlock(&b->lock);
 }
 
-/* With how far the files of lists in order are, whose appender this thread is. */
+/* With how far the files of the list in order are, whose appender this thread is. */
 static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
 {
-    const trip_writer *w = b->params.writer;
-    const unsigned voxels = ORDERED_AXIS, halo = TRIP_HALO_LISTS + ORDERED_AXIS;
-    c->ordered_bytes[TRIP_ORDERED_VOXELS] = trip_writer_plane_bytes(w, voxels, TRIP_PLANE_VOXELS);
-    c->ordered_bytes[TRIP_ORDERED_NORMALS] = trip_writer_plane_bytes(w, voxels, TRIP_PLANE_NORMALS);
-    if (b->params.format.halo)
-        c->ordered_bytes[TRIP_ORDERED_HALO] = trip_writer_plane_bytes(w, halo, TRIP_PLANE_VOXELS);
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        c->ordered_bytes[plane] = trip_writer_plane_bytes(b->params.writer, ORDERED_LIST, plane);
     return trip_journal_write_checkpoint(b->params.journal, c, b->params.spill);
 }
 
@@ -126,7 +123,7 @@ static void *thread_main(void *arg)
     return NULL;
 }
 
-/* Under the lock: hands filled chunks over, of lists in order or of all others. Takes over the
+/* Under the lock: hands filled chunks over, of the list in order or of all others. Takes over the
  * checkpoint, also when it fails. */
 static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkpoint)
 {
@@ -229,14 +226,11 @@ static bool is_time_to_spill(const trip_list_builder *b, double done)
 int trip_list_builder_end_batch(trip_list_builder *b, double done)
 {
     pthread_mutex_lock(&b->lock);
-    bool some = false;
-    for (unsigned list = 0; list < b->lists; list++)
-        if (!is_spilled(b, list)) {
-            close_list(b, list);
-            some = some || b->filled[list].first != TRIP_NO_CHUNK;
-        }
-    if (some)
-        queue_job(b, true, NULL);
+    if (b->params.in_order) {
+        close_list(b, ORDERED_LIST);
+        if (b->filled[ORDERED_LIST].first != TRIP_NO_CHUNK)
+            queue_job(b, true, NULL);
+    }
     int status = b->status;
     bool full = is_time_to_spill(b, done);
     pthread_mutex_unlock(&b->lock);
@@ -253,16 +247,15 @@ int trip_list_builder_spill(trip_list_builder *b, trip_checkpoint *checkpoint)
     return status;
 }
 
-trip_list_output *trip_list_builder_ordered(trip_list_builder *b, unsigned list)
+trip_list_output *trip_list_builder_ordered(trip_list_builder *b)
 {
-    return &b->outputs[list];
+    return &b->outputs[ORDERED_LIST];
 }
 
-static int note_run(void *user, unsigned list, uint64_t key, const uint32_t *voxels,
-                    const uint32_t *normals, uint32_t splats)
+static int note_run(void *user, uint64_t key, const uint32_t *voxels, const uint32_t *normals,
+                    uint32_t splats)
 {
-    trip_run_record run = { key, (uint16_t)list, (uint16_t)splats,
-                            trip_run_checksum(voxels, normals, splats) };
+    trip_run_record run = { key, splats, trip_run_checksum(voxels, normals, splats) };
     return trip_journal_add_run(user, &run);
 }
 
@@ -273,9 +266,9 @@ static int create_parts(trip_list_builder *b, trip_budget *budget)
     for (unsigned list = 0; list < b->lists && status == 0; list++) {
         status = trip_list_output_create(&b->outputs[list], list, &b->pool.formats[list], p->writer,
                                          budget);
-        b->outputs[list].run = is_spilled(b, list) ? NULL : note_run;
-        b->outputs[list].run_user = p->journal;
     }
+    b->outputs[ORDERED_LIST].run = p->in_order ? note_run : NULL;
+    b->outputs[ORDERED_LIST].run_user = p->journal;
     if (status < 0)
         return status;
     b->open = calloc(p->producers, sizeof *b->open);

@@ -1,6 +1,6 @@
 /* The lists from pieces in any order, in bounded memory. Producers (one thread each) put
- * pieces into memory that they reserve; a background thread of the builder's own appends lists
- * that arrive in order to the data set, and sorts the others' pieces and spills them to disk when
+ * pieces into memory that they reserve; a background thread of the builder's own appends the list
+ * that arrives in order to the data set, and sorts the others' pieces and spills them to disk when
  * memory fills up. At the end pieces on disk and in memory are merged, all lists at once, and
  * written. What is written depends on the splats only.
  *
@@ -13,16 +13,17 @@
 #include "spill.h"
 #include "workers.h"
 
-/* The lists along this axis arrive in order where a volume is read slice by slice. */
-enum { TRIP_ORDERED_AXIS = 2 };
+/* The list, of kept voxels along Z, whose sheets arrive in order where a volume is read slice by
+ * slice. */
+enum { TRIP_ORDERED_LIST = 2 };
 
 typedef struct trip_list_builder_params {
     trip_piece_format format;
-    trip_quantiser quantiser; /* of lists in order; the others get theirs at the end */
+    trip_quantiser quantiser; /* of a list in order; the others get theirs at the end */
     int64_t dims[3];
     unsigned producers;
-    /* The sheets of lists along Z arrive in order, batch by batch: these lists are written as they
-     * come and never spilled. All their splats of a batch have to fit. */
+    /* That list's sheets arrive in order, batch by batch: it is written as it comes and never
+     * spilled. All its splats of a batch have to fit. */
     bool in_order;
     uint64_t memory_bytes; /* for pieces */
     trip_writer *writer;
@@ -39,9 +40,9 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
                              trip_budget *budget);
 void trip_list_builder_destroy(trip_list_builder *b);
 
-/* The output of a list in order, which an interrupted run had begun to append itself, to be used
+/* The list in order, which an interrupted run had begun to append itself: its output, to be used
  * before the first batch. */
-trip_list_output *trip_list_builder_ordered(trip_list_builder *b, unsigned list);
+trip_list_output *trip_list_builder_ordered(trip_list_builder *b);
 
 /* Memory for a piece of a list, aligned to 8 bytes; the piece has to be complete
  * before the same producer reserves again or the batch ends. Waits for memory. NULL when something

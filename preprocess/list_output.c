@@ -57,8 +57,7 @@ static int flush(assembly *a)
     a->pending = false;
     uint32_t splats = trip_tile_take(o->tile, a->quantiser, &voxels, &normals);
     int status = trip_list_output_append(o, a->key, voxels, normals, splats);
-    return status == 0 && o->run ? o->run(o->run_user, o->list, a->key, voxels, normals, splats)
-                                 : status;
+    return status == 0 && o->run ? o->run(o->run_user, a->key, voxels, normals, splats) : status;
 }
 
 static int take_piece(void *user, const trip_piece *piece)

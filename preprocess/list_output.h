@@ -13,8 +13,8 @@ typedef struct trip_list_output {
     _Atomic uint64_t splats; /* appended; other threads may look (relaxed) */
     unsigned looked;         /* pieces since the last look for a signal */
     /* Hears of every run appended; NULL: nobody. */
-    int (*run)(void *user, unsigned list, uint64_t key, const uint32_t *voxels,
-               const uint32_t *normals, uint32_t splats);
+    int (*run)(void *user, uint64_t key, const uint32_t *voxels, const uint32_t *normals,
+               uint32_t splats);
     void *run_user;
 } trip_list_output;
 

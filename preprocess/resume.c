@@ -13,20 +13,6 @@
 
 enum { RUNS_AT_A_TIME = 256 };
 
-static const struct {
-    trip_kind kind;
-    int plane;
-} files[TRIP_ORDERED_FILES] = {
-    [TRIP_ORDERED_VOXELS] = { TRIP_KIND_VOXELS, TRIP_PLANE_VOXELS },
-    [TRIP_ORDERED_NORMALS] = { TRIP_KIND_VOXELS, TRIP_PLANE_NORMALS },
-    [TRIP_ORDERED_HALO] = { TRIP_KIND_HALO, TRIP_PLANE_VOXELS },
-};
-
-static bool has_file(const trip_piece_format *f, int file)
-{
-    return (file != TRIP_ORDERED_NORMALS || f->normals) && (file != TRIP_ORDERED_HALO || f->halo);
-}
-
 static off_t size_in(int folder, const char *name)
 {
     struct stat st;
@@ -36,11 +22,11 @@ static off_t size_in(int folder, const char *name)
 }
 
 /* Opens the longer of the two files of a plane, under its name in the spill. Both begin alike. */
-static int take_file(const trip_spill *spill, int partial, int file, int *fd)
+static int take_plane(const trip_spill *spill, int partial, int plane, int *fd)
 {
     char name[32];
     int folder = trip_spill_folder(spill);
-    trip_plane_file_name(TRIP_ORDERED_AXIS, 0, files[file].kind, files[file].plane, name);
+    trip_plane_file_name(trip_list_axis(TRIP_ORDERED_LIST), 0, TRIP_KIND_VOXELS, plane, name);
     if (size_in(partial, name) > size_in(folder, name))
         renameat(partial, name, folder, name);
     return trip_folder_open_file(fd, folder, trip_spill_path(spill), name, O_RDONLY, "brick");
@@ -51,12 +37,12 @@ int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *
 {
     int partial = open(partial_path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC), status = 0;
     *out = trip_leftover_none();
-    for (int i = 0; i < TRIP_ORDERED_FILES && status == 0; i++) {
+    for (int i = 0; i < TRIP_PLANES && status == 0; i++) {
         struct stat st;
         out->bytes[i] = UINT64_MAX;
-        if (!has_file(format, i))
+        if (i == TRIP_PLANE_NORMALS && !format->normals)
             continue;
-        status = take_file(spill, partial, i, &out->fd[i]);
+        status = take_plane(spill, partial, i, &out->fd[i]);
         bool known = out->fd[i] >= 0 && fstat(out->fd[i], &st) == 0;
         out->bytes[i] = known ? (uint64_t)st.st_size : 0;
     }
@@ -67,7 +53,7 @@ int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *
 
 void trip_leftover_close(trip_leftover *l)
 {
-    for (int i = 0; i < TRIP_ORDERED_FILES; i++)
+    for (int i = 0; i < TRIP_PLANES; i++)
         if (l->fd[i] >= 0)
             close(l->fd[i]);
 }
@@ -82,50 +68,51 @@ static int fail_damaged(void)
 typedef struct replay {
     const trip_leftover *leftover;
     const trip_block_form *form;
-    trip_list_builder *builder;
-    uint64_t at[TRIP_ORDERED_FILES]; /* bytes */
+    trip_list_output *output;
+    uint64_t at[TRIP_PLANES]; /* bytes */
     uint64_t splats;
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
 } replay;
 
-/* The next bytes of a file. */
-static int read_next(replay *r, int file, void *data, size_t bytes)
+/* The next bytes of a plane. */
+static int read_next(replay *r, int plane, void *data, size_t bytes)
 {
     for (unsigned char *to = data; bytes > 0;) {
-        ssize_t n = pread(r->leftover->fd[file], to, bytes, (off_t)r->at[file]);
+        ssize_t n = pread(r->leftover->fd[plane], to, bytes, (off_t)r->at[plane]);
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
             return fail_damaged();
         to += n;
         bytes -= (size_t)n;
-        r->at[file] += (uint64_t)n;
+        r->at[plane] += (uint64_t)n;
     }
     return 0;
 }
 
 /* The words of the next block, which say themselves how many they are. */
-static int read_block(replay *r, int file, uint32_t splats, uint32_t *words)
+static int read_block(replay *r, uint32_t splats, uint32_t *words)
 {
     uint32_t begun = trip_block_present_words(r->form->tile_log2);
     uint32_t squares = 0;
-    int status = read_next(r, file, r->block, begun * sizeof *r->block);
+    int status = read_next(r, TRIP_PLANE_VOXELS, r->block, begun * sizeof *r->block);
     for (uint32_t i = 0; i < begun && status == 0; i++)
         squares += (uint32_t)__builtin_popcountll(r->block[i]);
     *words = begun + squares + trip_block_code_words(splats, r->form->code_bytes);
     if (status == 0 && !trip_block_words_fit(r->form, splats, *words))
         status = fail_damaged();
-    return status == 0 ? read_next(r, file, r->block + begun, (*words - begun) * sizeof *r->block)
+    return status == 0 ? read_next(r, TRIP_PLANE_VOXELS, r->block + begun,
+                                   (*words - begun) * sizeof *r->block)
                        : status;
 }
 
 static int read_normals(replay *r, uint32_t splats)
 {
-    return r->leftover->fd[TRIP_ORDERED_NORMALS] < 0
-               ? 0
-               : read_next(r, TRIP_ORDERED_NORMALS, r->packed, splats * r->form->normal_bytes);
+    return r->form->normal_bytes
+               ? read_next(r, TRIP_PLANE_NORMALS, r->packed, splats * r->form->normal_bytes)
+               : 0;
 }
 
 /* Any record inside the tile. */
@@ -135,47 +122,38 @@ static trip_file_brick whole_tile(const trip_block_form *f)
     return (trip_file_brick){ .code_max = UINT16_MAX, .u_max = last, .v_max = last };
 }
 
-static int read_run(replay *r, const trip_run_record *run, const uint32_t **normals)
+static int read_run(replay *r, const trip_run_record *run)
 {
-    const bool halo = run->list >= TRIP_HALO_LISTS;
     const trip_file_brick tile = whole_tile(r->form);
     uint32_t words;
-    int status = read_block(r, halo ? TRIP_ORDERED_HALO : TRIP_ORDERED_VOXELS, run->splats, &words);
-    if (status == 0 && !halo)
+    int status = read_block(r, run->splats, &words);
+    if (status == 0)
         status = read_normals(r, run->splats);
     if (status < 0)
         return status;
-    bool has_normals = !halo && r->leftover->fd[TRIP_ORDERED_NORMALS] >= 0;
-    trip_block block =
-        trip_block_make(r->form, run->splats, words, r->block, has_normals ? r->packed : NULL);
+    trip_block block = trip_block_make(r->form, run->splats, words, r->block,
+                                       r->form->normal_bytes ? r->packed : NULL);
     if (trip_block_check(&block, &tile))
         return fail_damaged();
     trip_block_voxels(&block, 0, run->splats, r->voxels);
-    if (has_normals)
+    if (r->form->normal_bytes)
         trip_block_normals(&block, 0, run->splats, r->normals);
-    *normals = has_normals ? r->normals : NULL;
     return 0;
-}
-
-static bool is_ordered(const replay *r, const trip_run_record *run)
-{
-    bool halo = run->list == TRIP_HALO_LISTS + TRIP_ORDERED_AXIS;
-    return (run->list == TRIP_ORDERED_AXIS || (halo && r->leftover->fd[TRIP_ORDERED_HALO] >= 0)) &&
-           run->splats > 0 && run->splats <= 1u << 2 * r->form->tile_log2;
 }
 
 static int replay_run(replay *r, const trip_run_record *run)
 {
-    const uint32_t *normals = NULL;
-    int status = is_ordered(r, run) ? read_run(r, run, &normals) : fail_damaged();
+    const uint32_t *normals = r->form->normal_bytes ? r->normals : NULL;
+    bool possible = run->splats > 0 && run->splats <= 1u << 2 * r->form->tile_log2;
+    int status = possible ? read_run(r, run) : fail_damaged();
     if (status == 0 && trip_run_checksum(r->voxels, normals, run->splats) != run->checksum)
         status = fail_damaged();
     if (status == 0 && trip_interrupted())
         status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
     r->splats += run->splats;
-    return status == 0 ? trip_list_output_append(trip_list_builder_ordered(r->builder, run->list),
-                                                 run->key, r->voxels, normals, run->splats)
-                       : status;
+    return status == 0
+               ? trip_list_output_append(r->output, run->key, r->voxels, normals, run->splats)
+               : status;
 }
 
 static int replay_runs(replay *r, trip_journal *j)
@@ -203,7 +181,7 @@ int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_buil
         return trip_fail(TRIP_ERROR, "brick", "--resume", "needs more --memory");
     r->leftover = l;
     r->form = form;
-    r->builder = builder;
+    r->output = trip_list_builder_ordered(builder);
     int status = replay_runs(r, j);
     trip_budget_release(budget, r, sizeof *r);
     return status;

@@ -1,5 +1,5 @@
-/* What a killed run left of the lists that are written in order. Their plane files are taken out of
- * the partial data set, before a new writer removes them, and appended again up to a checkpoint. */
+/* What a killed run left of the list that is written in order. Its plane files are taken out of the
+ * partial data set, before a new writer removes them, and appended again up to a checkpoint. */
 #ifndef TRIP_RESUME_H
 #define TRIP_RESUME_H
 
@@ -7,13 +7,13 @@
 #include "list_builder.h"
 
 typedef struct trip_leftover {
-    int fd[TRIP_ORDERED_FILES];         /* -1 where there is none */
-    uint64_t bytes[TRIP_ORDERED_FILES]; /* UINT64_MAX where the format has no such file */
+    int fd[TRIP_PLANES];         /* -1 where there is none */
+    uint64_t bytes[TRIP_PLANES]; /* UINT64_MAX where the format has no such plane */
 } trip_leftover;
 
 static inline trip_leftover trip_leftover_none(void)
 {
-    return (trip_leftover){ .fd = { -1, -1, -1 } };
+    return (trip_leftover){ .fd = { -1, -1 } };
 }
 
 /* Moves those plane files of the partial data set into the spill's folder, unless as much of them

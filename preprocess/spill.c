@@ -41,8 +41,7 @@ static int fail_memory(const trip_spill *s)
 /* The names are this program's own: the journal's files and those of resume.c, too. */
 static void remove_files(int folder)
 {
-    static const char *const names[] = { DATA_NAME,   "journal",    "runs",
-                                         "z0.voxels", "z0.normals", "z0.halo" };
+    static const char *const names[] = { DATA_NAME, "journal", "runs", "z0.voxels", "z0.normals" };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         unlinkat(folder, names[i], 0);
 }

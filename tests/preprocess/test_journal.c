@@ -235,7 +235,7 @@ ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
 ATTACK(halo_without_room, checkpoint()->halo = 1)
 ATTACK(most_halo, checkpoint()->halo = UINT64_MAX)
 ATTACK(more_in_order_than_there_are, checkpoint()->ordered_splats = N + 1)
-ATTACK(fewer_bytes_in_order, checkpoint()->ordered_bytes[TRIP_ORDERED_VOXELS] -= 8)
+ATTACK(fewer_bytes_in_order, checkpoint()->ordered_bytes[TRIP_PLANE_VOXELS] -= 8)
 ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
 ATTACK(most_segments, checkpoint()->segments = UINT64_MAX)
 ATTACK(segments_that_wrap, checkpoint()->segments += UINT64_C(1) << 59)
@@ -369,7 +369,7 @@ static void overwrite(const char *name, long offset, const void *data, size_t by
 
 /* All voxels are kept, so that the first run is a whole tile: one word of squares, 64 masks, then
  * codes. */
-static void false_records_of_lists_in_order_are_refused(void **state)
+static void false_records_of_the_list_in_order_are_refused(void **state)
 {
     (void)state;
     static const struct {
@@ -381,8 +381,7 @@ static void false_records_of_lists_in_order_are_refused(void **state)
         { "an empty mask", "partial/z0.voxels", 8, 8 },
         { "other codes", "partial/z0.voxels", 8 * 65, 8 },
         { "other normals", "partial/z0.normals", 0, 4096 },
-        { "run of another list", "spill/runs", offsetof(trip_run_record, list), 2 },
-        { "run of nothing", "spill/runs", offsetof(trip_run_record, splats), 2 },
+        { "run of nothing", "spill/runs", offsetof(trip_run_record, splats), 4 },
         { "run with another checksum", "spill/runs", offsetof(trip_run_record, checksum), 4 },
     };
     static const unsigned char zeros[4096];
@@ -573,7 +572,7 @@ int main(void)
         TEST(another_identity_is_refused),
         TEST(false_lengths_of_files_in_order_are_found_when_they_are_read),
         TEST(a_false_count_of_kept_voxels_is_found_at_the_end),
-        TEST(false_records_of_lists_in_order_are_refused),
+        TEST(false_records_of_the_list_in_order_are_refused),
         TEST(links_and_what_is_no_file_are_not_followed),
         TEST(folders_of_another_user_are_refused),
         TEST(partial_folders_of_another_user_are_refused),
