@@ -87,7 +87,10 @@ static void read_journal(void)
     for (record *r = records; fread(r, 8, 3, f) == 3; r++, record_count++) {
         assert_true(record_count < MOST_RECORDS);
         r->body = malloc(r->bytes);
-        assert_int_equal(fread(r->body, 1, r->bytes, f), r->bytes);
+        if (fread(r->body, 1, r->bytes, f) == r->bytes)
+            continue;
+        free(r->body); /* killed while it was written */
+        break;
     }
     fclose(f);
     assert_true(record_count >= 2);
@@ -235,7 +238,6 @@ ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
 ATTACK(halo_without_room, checkpoint()->halo = 1)
 ATTACK(most_halo, checkpoint()->halo = UINT64_MAX)
 ATTACK(more_in_order_than_there_are, checkpoint()->ordered_splats = N + 1)
-ATTACK(fewer_bytes_in_order, checkpoint()->ordered_bytes[TRIP_PLANE_VOXELS] -= 8)
 ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
 ATTACK(most_segments, checkpoint()->segments = UINT64_MAX)
 ATTACK(segments_that_wrap, checkpoint()->segments += UINT64_C(1) << 59)
@@ -334,7 +336,8 @@ static void false_lengths_of_files_in_order_are_found_when_they_are_read(void **
     make_volume();
     leave_killed_run(p);
     read_journal();
-    fewer_bytes_in_order();
+    for (size_t i = 1; i < record_count; i++) /* of the last, not all may be at hand */
+        ((trip_checkpoint *)(void *)records[i].body)->ordered_bytes[TRIP_PLANE_VOXELS] -= 8;
     write_journal();
     free_records();
     expect_refused(p, "fewer bytes in order", "what the interrupted run left is damaged");
