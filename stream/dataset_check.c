@@ -89,7 +89,7 @@ static int check_grid(const trip_file_header *h, const char *where)
     if (h->kept > h->voxels)
         return FAIL_FIELD(kept, "more was kept than there are voxels");
     if ((double)h->halo > voxels - (double)h->kept)
-        return FAIL_FIELD(halo, "more is around what was kept than the grid has");
+        return FAIL_FIELD(halo, "more was kept, with what is around it, than the grid has");
     return TRIP_OK;
 }
 
