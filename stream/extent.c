@@ -42,16 +42,20 @@ void trip_planner_begin(trip_planner *p, const trip_pass *pass, trip_pass_cursor
     p->has_run = false;
 }
 
+static size_t run_bytes(const trip_planner *p, const trip_run *run, int plane)
+{
+    return plane == TRIP_PLANE_VOXELS ? 8 * (size_t)run->words : run->count * p->normal_bytes;
+}
+
 /* The next run as a piece of its own. */
 static trip_piece piece_of(const trip_planner *p)
 {
     const trip_run *run = &p->run;
     trip_piece piece = { .list = selection_of(p)->list };
-    const size_t bytes[TRIP_PLANES] = { 8 * (size_t)run->words, run->count * p->normal_bytes };
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (is_read(p, piece.list, plane)) {
             piece.low[plane] = run->at[plane];
-            piece.high[plane] = run->at[plane] + bytes[plane];
+            piece.high[plane] = run->at[plane] + run_bytes(p, run, plane);
         }
     return piece;
 }
@@ -146,19 +150,22 @@ static void place_pieces(const trip_planner *p, trip_extent *e)
     }
 }
 
-static bool is_in(const trip_segment *s, const trip_list *list, int plane, uint64_t offset)
+/* Whether the segment has all of those bytes. Segments may share a page: where the gap between two
+ * pieces is large in one plane it may be small in another. */
+static bool is_in(const trip_segment *s, const trip_list *list, int plane, uint64_t offset,
+                  size_t bytes)
 {
     return s->list == list && s->plane == plane && offset >= s->offset &&
-           offset - s->offset < s->bytes;
+           offset - s->offset + bytes <= s->bytes;
 }
 
 /* Turns a place in a plane file into one in the slot's part for the plane. `from` is the segment
  * that the last one was in: neighbours mostly are in the same. */
 static size_t place_in_slot(const trip_extent *e, const trip_list *list, int plane, uint64_t offset,
-                            unsigned *from)
+                            size_t bytes, unsigned *from)
 {
     unsigned i = *from;
-    while (!is_in(&e->segments[i], list, plane, offset))
+    while (!is_in(&e->segments[i], list, plane, offset, bytes))
         i = i + 1 < e->segment_count ? i + 1 : 0;
     *from = i;
     const trip_segment *s = &e->segments[i];
@@ -171,10 +178,12 @@ static void place_runs(const trip_planner *p, trip_extent *e)
     for (size_t i = 0; i < e->run_count; i++) {
         trip_run *run = &e->runs[i];
         const trip_list *list = p->it.pass->selections[run->selection].list;
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            run->at[plane] = is_read(p, list, plane)
-                                 ? place_in_slot(e, list, plane, run->at[plane], &from[plane])
-                                 : 0;
+        for (int plane = 0; plane < TRIP_PLANES; plane++) {
+            size_t bytes = run_bytes(p, run, plane);
+            run->at[plane] = is_read(p, list, plane) ? place_in_slot(e, list, plane, run->at[plane],
+                                                                     bytes, &from[plane])
+                                                     : 0;
+        }
     }
 }
 
