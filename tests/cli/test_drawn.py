@@ -112,6 +112,21 @@ class Drawn(program.ProgramTest):
                         self.assertLessEqual(counts["splats_drawn"], counts["splats_projected"])
                         self.assertLessEqual(counts["splats_projected"], counts["splats_read"])
 
+    def test_the_halo_is_neither_read_nor_drawn(self):
+        seen = []
+        for halo in "0", "1":
+            made = self.brick(os.path.join(program.DATASETS, "tooth.nhdr"), "h.trip", "--force",
+                              "--halo", halo)
+            self.assertEqual(made["halo"] > 0, halo == "1")
+            for renderer in "cpu", "reference", "gl":
+                stats = self.stats("h.trip", "--renderer", renderer, "--size", "90x90")
+                lists = [(l["splats_read"], l["bytes_read"])
+                         for l in stats["frames"][0]["lists"].values()]
+                with open("a.exr", "rb") as picture:
+                    seen.append((halo, renderer, lists, picture.read()))
+        for without, with_halo in zip(seen[:3], seen[3:]):
+            self.assertEqual(without[1:], with_halo[1:])
+
     def test_an_orbit_has_a_frame_of_stats_for_each_image(self):
         stats = self.stats("heat.trip", "--orbit", "5", "--size", "30x30")
         self.assertEqual(len(stats["frames"]), 5)
