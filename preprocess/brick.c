@@ -514,9 +514,10 @@ static int prepare(brick *b)
     if (status == 0)
         status = trip_brick_input_open(&b->in, p);
     b->format = trip_brick_format(p);
-    b->format.quantised = true; /* for a first plan; choose_codes() decides */
-    if (status == 0)
+    if (status == 0) {
+        b->format.quantised = trip_brick_will_be_quantised(&b->in);
         status = plan_memory(b);
+    }
     return status == 0 ? open_spill(b) : status;
 }
 

@@ -158,6 +158,11 @@ bool trip_brick_input_needs_scan(const trip_brick_input *in)
     return needed;
 }
 
+bool trip_brick_will_be_quantised(const trip_brick_input *in)
+{
+    return trip_brick_has_narrow_type(in) || trip_brick_input_needs_scan(in);
+}
+
 void trip_brick_input_progress(const trip_brick_input *in, const char *stage, uint64_t done,
                                uint64_t total)
 {

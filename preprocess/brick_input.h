@@ -43,6 +43,9 @@ void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
 /* Whether a pass over the volume has to go first: the envelope is automatic, a function depends on
  * the values, or compact normals on their range. */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
+/* Whether the range of the codes is known before pieces are made: that of the type, or what the
+ * scan will find. */
+bool trip_brick_will_be_quantised(const trip_brick_input *in);
 /* Fills the tally with `known`, and makes the functions that depend on the data. */
 int trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known);
 /* Fills the tally from the volume, as slices, stride and passing_seconds of `scan` say. */

@@ -160,7 +160,7 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
     trip_memory_plan plan;
     bool scan = trip_brick_input_needs_scan(in);
     double begin = now_seconds(), passing = 0;
-    format.quantised = true; /* until more is known */
+    format.quantised = trip_brick_will_be_quantised(in);
     int status =
         trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
                               in->memory_bytes, p->slices);
@@ -177,7 +177,6 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
         return status;
     double looking = now_seconds() - begin - passing;
     double all = looking * (double)stride_of(in, &plan) + passing;
-    format.quantised = scan || trip_brick_has_narrow_type(in);
     estimate_sizes(in, &format, &plan, e);
     e->seconds = all + (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
     return 0;

@@ -53,12 +53,12 @@ class Hidden(limits.Test):
         data = self.brick(volume, "cloud.trip", "--keep-all", "--tile", 16, "--tf", self.tf)
         faint = self.path("faint.tf")
         with open(faint, "w") as f:
-            f.write("0 0 0 0 0\n100 0 0 0 0\n101 1 1 1 0.5\n255 1 1 1 0.5\n")
+            f.write("0 0 0 0 0\n130 0 0 0 0\n131 1 1 1 0.5\n255 1 1 1 0.5\n")
         everything = bytes_read(self.stats(data, "--tf", self.tf, "--h", "0.99", "--hidden",
                                            "draw")[0])
         for arguments, which in [(["--tf", faint, "--h", "0.99"], 0),
-                                 (["--tf", self.tf, "--h", "0.99", "--fov", "10",
-                                   "--eye", "48,-200,48", "--look", "20,48,20"], 1)]:
+                                 (["--tf", self.tf, "--h", "0.99", "--fov", "60",
+                                   "--eye", "48,60,48", "--look", "48,96,48"], 1)]:
             left_out = self.explained(data, *arguments)[1]
             self.assertGreater(left_out[which], 0)
             stats = self.stats(data, *arguments, "--hidden", "draw")[0]
@@ -72,14 +72,17 @@ class Hidden(limits.Test):
         data = self.brick(volume, "lobes.trip", "--keep-all")
         shaded = self.stats(data, "--hidden", "draw")[0]
         plain = self.stats(data, "--no-shading", "--hidden", "draw")[0]
-        self.assertEqual(bytes_read(shaded), 2 * bytes_read(plain))
-        self.assertEqual(shaded["frames"][0]["bytes_of_planes_left_out"], 0)
         splats = sum(axis["splats_read"] for axis in plain["frames"][0]["lists"].values())
-        self.assertEqual(plain["frames"][0]["bytes_of_planes_left_out"], 4 * splats)
+        normals = json.loads(self.works("triptych", "info", data, "--json").out)["normal_bytes"] * splats
+        # Whole pages are read, some of them twice where slots meet.
+        self.assertGreaterEqual(bytes_read(shaded) - bytes_read(plain), normals)
+        self.assertLess(bytes_read(shaded) - bytes_read(plain), 1.25 * normals)
+        self.assertEqual(shaded["frames"][0]["bytes_of_planes_left_out"], 0)
+        self.assertEqual(plain["frames"][0]["bytes_of_planes_left_out"], normals)
         self.assertIn("normal planes are read", self.explained(data)[0])
         said = re.search(r"normal planes are not read, ([\d.]+) MB",
                          self.explained(data, "--no-shading")[0])
-        self.assertAlmostEqual(float(said[1]), 4e-6 * splats, delta=0.01)
+        self.assertAlmostEqual(float(said[1]), 1e-6 * normals, delta=0.01)
 
     def test_a_sequence_reads_less_where_bricks_find_room_in_memory(self):
         data = self.brick(self.generate("turned.nrrd", "marschner-lobb", 144), "turned.trip",

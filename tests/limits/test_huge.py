@@ -32,11 +32,14 @@ class Huge(limits.Test):
             r = self.works("triptych", *arguments, *envelope, "--dry-run", "--json")
             self.assertPromise(r, memory)
             e = json.loads(r.out)
-            self.assertEqual((e["voxels"], e["kept"], e["bytes"]), (voxels, voxels, 24 * voxels))
+            self.assertEqual((e["voxels"], e["kept"]), (voxels, voxels))
+            # Three lists: a code and a normal of 3 bytes each, and a bit in a full square's mask.
+            self.assertGreaterEqual(e["bytes"], 3 * (1 + 3 + 1 / 8) * voxels)
+            self.assertLess(e["bytes"], 13 * voxels)
             self.assertGreater(e["temporary_bytes"], e["bytes"] / 2)
             self.assertGreater(e["seconds"], 0)
             if shutil.disk_usage(self.folder).free > e["bytes"]:
-                self.skipTest("this disk can hold 24 TiB")
+                self.skipTest("this disk can hold the result")
             self.assertPromise(self.fails("triptych", *arguments, *envelope,
                                           says=["d.trip", "needed", "disk"]), memory)
             self.assertEqual(os.listdir(self.folder), ["v.raw"])

@@ -194,7 +194,7 @@ static void dicom_without_positions_is_ordered_by_number(void **state)
 {
     (void)state;
     for (int k = 0; k < NZ; k++) {
-        char name[32], number[8];
+        char name[32], number[12];
         snprintf(name, sizeof name, "i%d.dcm", (k * 3) % NZ);
         snprintf(number, sizeof number, "%d", k + 5);
         const dicom d = { .type = TRIP_U8, .number = number, .thickness = "3" };
@@ -259,7 +259,7 @@ static void dicom_without_positions_says_nothing_of_the_patient(void **state)
 {
     (void)state;
     for (int k = 0; k < NZ; k++) {
-        char name[32], number[8];
+        char name[32], number[12];
         snprintf(name, sizeof name, "q%d.dcm", k);
         snprintf(number, sizeof number, "%d", k);
         const dicom d = {
@@ -287,7 +287,7 @@ static void dicom_slices_rescaled_differently_become_floats(void **state)
 {
     (void)state;
     for (int k = 0; k < NZ; k++) {
-        char name[32], number[8];
+        char name[32], number[12];
         snprintf(name, sizeof name, "r%d.dcm", k);
         snprintf(number, sizeof number, "%d", k);
         const dicom d = { .type = TRIP_U16,
