@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pixels.h"
 #include "splat.h"
 #include "weight.h"
 
@@ -40,10 +41,10 @@ static uint64_t covered(const bench_probe *p, const trip_splat_frame *f, const t
 {
     const trip_camera *camera = p->frame->camera;
     uint64_t pixels = 0;
-    int x0 = (int)fmax(0, ceil(s->x0 - 0.5)), x1 = (int)fmin(camera->width - 1, s->x1 - 0.5);
-    int y0 = (int)fmax(0, ceil(s->y0 - 0.5)), y1 = (int)fmin(camera->height - 1, s->y1 - 0.5);
-    for (int y = y0; y <= y1; y++)
-        for (int x = x0; x <= x1; x++) {
+    const trip_pixels columns = trip_pixels_within(s->x0, s->x1, camera->width);
+    const trip_pixels rows = trip_pixels_within(s->y0, s->y1, camera->height);
+    for (int y = rows.first; y <= rows.last; y++)
+        for (int x = columns.first; x <= columns.last; x++) {
             trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
             pixels +=
                 trip_splat_radius2(f, s, x + 0.5, y + 0.5) <= f->cutoff2 &&

@@ -1,13 +1,17 @@
 /* A run as it lies in the voxel plane: a block. It says which 8 x 8 squares of the tile hold
  * records, which voxels of those, and their codes:
  *
- *   presence   a bit for each square of the tile, by Morton number, in words of 64 bits
- *   masks      a word for each square that is present, ascending: a bit for each voxel by its
- * Morton number in the square, u in the even bits and v in the odd ones; never 0 codes      of
- * code_bytes each, in the order of the bits padding    zeros up to a multiple of 8 bytes
+ * - presence: a bit for each square of the tile, by Morton number, in words of 64 bits;
  *
- * Voxels so come in Morton order of the tile. This is the one place in C that packs, checks and
- * decodes blocks; pure functions. */
+ * - masks: a word for each square that is present, ascending: a bit for each voxel by its Morton
+ *   number in the square, u in the even bits and v in the odd ones; never 0;
+ *
+ * - codes: of code_bytes each, in the order of the bits;
+ *
+ * - padding: zeros up to a multiple of 8 bytes.
+ *
+ * Voxels so come in Morton order of the tile. Packed and checked here alone; decoded here, and in the
+ * CPU renderer's kernels into registers. Pure functions. */
 #ifndef TRIP_BLOCK_H
 #define TRIP_BLOCK_H
 
