@@ -10,8 +10,8 @@
 enum { SEARCH_MAX = 8 /* entries looked at for one that may go */ };
 
 typedef struct entry {
-    uint32_t page; /* reader's thread */
-    uint32_t last_pass;
+    uint32_t page; /* this and the passes: reader's thread */
+    uint32_t reserved_pass, last_pass;
     const void *filler; /* set before its request is submitted */
     _Atomic bool valid; /* release when stored, acquire when found */
 } entry;
@@ -141,7 +141,7 @@ bool trip_cache_find(trip_cache *c, uint32_t page)
     if (position == 0)
         return false;
     entry *e = &c->entries[position - 1];
-    if (!atomic_load_explicit(&e->valid, memory_order_acquire))
+    if (e->reserved_pass > c->settled || !atomic_load_explicit(&e->valid, memory_order_acquire))
         return false;
     e->last_pass = c->pass;
     return true;
@@ -176,7 +176,7 @@ void trip_cache_reserve(trip_cache *c, uint32_t page, const void *filler)
     if (!e)
         return;
     e->page = page;
-    e->last_pass = c->pass;
+    e->reserved_pass = e->last_pass = c->pass;
     e->filler = filler;
     atomic_store_explicit(&e->valid, false, memory_order_relaxed);
     atomic_store_explicit(&c->entry_of[page], (uint32_t)(e - c->entries) + 1, memory_order_release);

@@ -31,7 +31,8 @@ const unsigned char *trip_cache_bytes(const trip_cache *c, unsigned list, int pl
 void trip_cache_settle(trip_cache *c);
 /* Reader's thread: requests of at most TRIP_CACHE_STALE_PASSES passes before may be under way. */
 void trip_cache_begin_pass(trip_cache *c);
-/* Reader's thread: whether the page is there; if so it stays for this pass. */
+/* Reader's thread: whether the page was there when trip_cache_settle() was last called; if so it
+ * stays for this pass. Pages stored since then do not count: when they come is a matter of time. */
 bool trip_cache_find(trip_cache *c, uint32_t page);
 /* Reader's thread: makes room for a page that is not there, to be stored by `filler`, if some page
  * is not needed any more. */
