@@ -71,7 +71,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         .table = f->session->table,
         .count = count,
     };
-    status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, &cost->stats);
+    status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, NULL, &cost->stats);
     cost->ms = bench_now_ms() - start;
     cost->plan_ms = planned - start;
     cost->wait_ms = cost->stats.read_ms;

@@ -90,10 +90,11 @@ static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
     return 0;
 }
 
-static int picture(trip_renderer *r, float *rgba)
+static int picture(trip_renderer *r, float *rgba, float *depth)
 {
     (void)r;
     (void)rgba;
+    (void)depth;
     return 0;
 }
 

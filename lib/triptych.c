@@ -509,7 +509,7 @@ int triptych_picture(triptych *t, float *rgba)
 {
     trip_scope *before = enter(t);
     int status = check_drawing(t);
-    return leave(before, status ? status : trip_frame_picture(&t->drawing, rgba));
+    return leave(before, status ? status : trip_frame_picture(&t->drawing, rgba, NULL));
 }
 
 void triptych_end(triptych *t)

@@ -61,4 +61,10 @@ static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y
     return trip_add(c->r0, trip_add(trip_scale(c->rx, x), trip_scale(c->ry, y)));
 }
 
+/* Its length in world units: the distance between depths of 0 and 1 along the ray. */
+static inline double trip_camera_ray_length(const trip_camera *c, double x, double y)
+{
+    return trip_length(trip_affine_vector(&c->index_to_world, trip_camera_ray(c, x, y)));
+}
+
 #endif

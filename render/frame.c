@@ -227,13 +227,13 @@ void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
         trip_reader_await(d->reader, timeout_ns);
 }
 
-int trip_frame_picture(trip_drawing *d, float *rgba)
+int trip_frame_picture(trip_drawing *d, float *rgba, float *depth)
 {
     double start = now_ms();
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = trip_frame_poll();
     if (!status)
-        status = d->renderer->ops->picture(d->renderer, rgba);
+        status = d->renderer->ops->picture(d->renderer, rgba, depth);
     trip_scope_enter(before);
     if (status || !d->done)
         return status;
@@ -265,7 +265,7 @@ void trip_frame_end(trip_drawing *d)
 }
 
 int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_frame *frame,
-                    float *rgba, trip_frame_stats *stats)
+                    float *rgba, float *depth, trip_frame_stats *stats)
 {
     trip_drawing d;
     int status = trip_frame_begin(&d, renderer, reader, frame);
@@ -274,7 +274,7 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
         status = 0;
     }
     if (!status)
-        status = trip_frame_picture(&d, rgba);
+        status = trip_frame_picture(&d, rgba, depth);
     trip_frame_end(&d);
     *stats = d.stats;
     return status;

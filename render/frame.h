@@ -3,11 +3,11 @@
  *
  *     trip_frame_begin(&d, renderer, reader, &frame);
  *     while ((status = trip_frame_step(&d, deadline_ns)) > 0) {
- *         trip_frame_picture(&d, rgba);            // so far, whenever it is wanted
+ *         trip_frame_picture(&d, rgba, depth);     // so far, whenever it is wanted
  *         if (status == TRIP_FRAME_WAITS)
  *             trip_frame_await(&d, timeout_ns);
  *     }
- *     trip_frame_picture(&d, rgba);
+ *     trip_frame_picture(&d, rgba, depth);
  *     trip_frame_end(&d);
  *
  * The picture has the same bits whatever the steps were and whether or not it was looked at before.
@@ -66,9 +66,10 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns);
 #define TRIP_FRAME_PIECE 16384
 /* Waits until there is something to draw, at most so long; UINT64_MAX: without end. */
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns);
-/* The picture of what is drawn so far: width * height * 4 floats, premultiplied, row 0 at the top.
- * After TRIP_FRAME_DONE it is the picture. */
-int trip_frame_picture(trip_drawing *d, float *rgba);
+/* The picture of what is drawn so far: width * height * 4 floats, premultiplied, row 0 at the top,
+ * and with settings.depth as many distances (layer.h); otherwise `depth` is NULL. After
+ * TRIP_FRAME_DONE it is the picture. */
+int trip_frame_picture(trip_drawing *d, float *rgba, float *depth);
 /* Any thread, while the drawing is there: the frame is given up. A step or picture under way ends
  * within milliseconds, and like those that follow with TRIP_INTERRUPTED. */
 void trip_frame_cancel(trip_drawing *d);
@@ -76,9 +77,9 @@ void trip_frame_cancel(trip_drawing *d);
  * the renderer has under way is dropped. */
 void trip_frame_end(trip_drawing *d);
 
-/* Begins, steps to the end, takes the picture. rgba: width * height * 4 floats. */
+/* Begins, steps to the end, takes the picture; rgba and depth as in trip_frame_picture(). */
 int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_frame *frame,
-                    float *rgba, trip_frame_stats *stats);
+                    float *rgba, float *depth, trip_frame_stats *stats);
 
 /* CLOCK_MONOTONIC. */
 uint64_t trip_frame_now_ns(void);

@@ -250,7 +250,9 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
                          .planes = 1u << TRIP_PLANE_VOXELS };
     if (settings->shading)
         plan->planes |= data->header.planes & 1u << TRIP_PLANE_NORMALS;
-    int status = take_lists(plan, data->list_count, budget);
+    int status = trip_settings_check(settings);
+    if (!status)
+        status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {
         trip_plan_layer *layer = &plan->layers[axis];
         layer->used = trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);

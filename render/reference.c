@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "layer.h"
 #include "normal.h"
 #include "pixels.h"
 #include "report.h"
@@ -13,10 +14,11 @@
 
 /* One pixel: the layer being drawn, and the sum over the layers before it. */
 typedef struct pixel {
-    double layer[4];  /* premultiplied over-composite */
-    double weight;    /* of the layer at this pixel */
-    double stretch;   /* world units per index length of the list at hand, along the ray */
-    double merged[4]; /* sum of w^2 layer over the layers that are done */
+    double layer[TRIP_CHANNELS_MAX]; /* over-composite; depths are distances here */
+    double weight;                   /* of the layer at this pixel */
+    double stretch;    /* world units per index length of the list at hand, along the ray */
+    double ray_length; /* |J r(p)| of it */
+    double merged[TRIP_CHANNELS_MAX]; /* sum of w^2 layer over the layers that are done */
 } pixel;
 
 typedef struct reference {
@@ -25,6 +27,7 @@ typedef struct reference {
     const trip_frame *frame;
     const trip_plan_list *list; /* at hand; NULL: none since the layer began */
     trip_splat_frame constants; /* of it */
+    unsigned channels;          /* of a layer */
     double gradient_full;
     trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
@@ -77,6 +80,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     reference *r = (reference *)base;
     const trip_file_header *header = &frame->data->header;
     r->frame = frame;
+    r->channels = trip_layer_channels(frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
                                            header->gradient_step);
@@ -93,9 +97,9 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
 
 /* Adds a pixel's layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. Without a layer its
  * weight is 0. */
-static void merge_pixel(const pixel *p, double merged[4])
+static void merge_pixel(const reference *r, const pixel *p, double merged[TRIP_CHANNELS_MAX])
 {
-    for (int c = 0; c < 4; c++)
+    for (unsigned c = 0; c < r->channels; c++)
         merged[c] = p->merged[c] + p->weight * p->weight * p->layer[c];
 }
 
@@ -108,7 +112,7 @@ static int fold_layer(reference *r)
     for (int y = 0; y < camera->height && !status; y++) {
         pixel *row = row_of(r, y);
         for (int x = 0; x < camera->width; x++)
-            merge_pixel(&row[x], row[x].merged);
+            merge_pixel(r, &row[x], row[x].merged);
         status = trip_frame_poll();
     }
     return status;
@@ -143,30 +147,34 @@ static int use_list(reference *r, const trip_list *of)
     r->list = list;
     r->constants = trip_splat_frame_make(&list->camera, r->frame->settings);
     for (int y = 0; y < list->camera.height && !status; y++) {
-        for (int x = 0; x < list->camera.width; x++)
-            row_of(r, y)[x].stretch = trip_splat_stretch(&r->constants, x + 0.5, y + 0.5);
+        for (int x = 0; x < list->camera.width; x++) {
+            pixel *p = &row_of(r, y)[x];
+            p->stretch = trip_splat_stretch(&r->constants, x + 0.5, y + 0.5);
+            p->ray_length = trip_camera_ray_length(&list->camera, x + 0.5, y + 0.5);
+        }
         status = trip_frame_poll();
     }
     return status;
 }
 
 /* Puts a fragment behind what is there (front to back) or over it. */
-static void composite(double layer[4], const double rgb[3], double alpha, bool front_to_back)
+static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
+                      const double fragment[TRIP_CHANNELS_MAX], double alpha, bool front_to_back)
 {
     double keep = 1 - alpha, add = alpha;
     if (front_to_back) {
+        double through = 1 - layer[TRIP_CHANNEL_ALPHA];
         keep = 1;
-        add = alpha * (1 - layer[3]);
-        if (1 - layer[3] < TRIP_SATURATION)
+        add = alpha * through;
+        if (through < TRIP_SATURATION)
             return;
     }
-    for (int c = 0; c < 3; c++)
-        layer[c] = layer[c] * keep + rgb[c] * add;
-    layer[3] = layer[3] * keep + add;
+    for (unsigned c = 0; c < r->channels; c++)
+        layer[c] = layer[c] * keep + fragment[c] * add;
 }
 
 /* True when some pixel centre is in the support where the layer has weight. */
-static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3],
+static bool draw_footprint(reference *r, const trip_splat *s, double fragment[TRIP_CHANNELS_MAX],
                            double extinction, bool front_to_back)
 {
     const trip_camera *camera = r->frame->camera;
@@ -182,7 +190,8 @@ static bool draw_footprint(reference *r, const trip_splat *s, const double rgb[3
             touched = true;
             double footprint = s->amplitude * (exp(-m / 2) - r->constants.edge);
             double alpha = -expm1(-extinction * p->stretch * footprint);
-            composite(p->layer, rgb, alpha, front_to_back);
+            fragment[TRIP_CHANNEL_DEPTH] = s->z * p->ray_length;
+            composite(r, p->layer, fragment, alpha, front_to_back);
         }
     }
     return touched;
@@ -230,9 +239,9 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     stats->splats_projected++;
 
     const trip_tf_entry *entry = &frame->table[trip_voxel_code(record)];
-    double rgb[3];
-    colour(r, voxel, entry, normal, rgb);
-    stats->splats_drawn += draw_footprint(r, &s, rgb, entry->extinction, front_to_back);
+    double fragment[TRIP_CHANNELS_MAX] = { [TRIP_CHANNEL_ALPHA] = 1 };
+    colour(r, voxel, entry, normal, fragment);
+    stats->splats_drawn += draw_footprint(r, &s, fragment, entry->extinction, front_to_back);
 }
 
 /* Index position of a record: sheet along the list's axis, u and v along the next two. */
@@ -284,21 +293,36 @@ static double weight_sum(const reference *r, int x, int y)
     return sum;
 }
 
-static int picture(trip_renderer *base, float *rgba)
+static float mean_depth(const double merged[TRIP_CHANNELS_MAX])
 {
-    reference *r = (reference *)base;
-    const trip_camera *camera = r->frame->camera;
+    double alpha = merged[TRIP_CHANNEL_ALPHA];
+    return alpha > 0 ? (float)(merged[TRIP_CHANNEL_DEPTH] / alpha) : INFINITY;
+}
+
+/* Divided by the sum of the merge's weights, over the background. */
+static void finish_colour(const reference *r, const double merged[4], double sum, float rgba[4])
+{
     const double *background = r->frame->settings->background;
     const double behind[4] = { background[0] * background[3], background[1] * background[3],
                                background[2] * background[3], background[3] };
+    double transmittance = 1 - merged[TRIP_CHANNEL_ALPHA] / sum;
+    for (int c = 0; c < 4; c++)
+        rgba[c] = (float)(merged[c] / sum + transmittance * behind[c]);
+}
+
+static int picture(trip_renderer *base, float *rgba, float *depth)
+{
+    reference *r = (reference *)base;
+    const trip_camera *camera = r->frame->camera;
     int status = 0;
     for (int y = 0; y < camera->height && !status; y++) {
         for (int x = 0; x < camera->width; x++) {
-            double merged[4], sum = weight_sum(r, x, y);
-            merge_pixel(&row_of(r, y)[x], merged);
-            double transmittance = 1 - merged[3] / sum;
-            for (int c = 0; c < 4; c++)
-                *rgba++ = (float)(merged[c] / sum + transmittance * behind[c]);
+            double merged[TRIP_CHANNELS_MAX];
+            merge_pixel(r, &row_of(r, y)[x], merged);
+            finish_colour(r, merged, weight_sum(r, x, y), rgba);
+            rgba += 4;
+            if (depth)
+                *depth++ = mean_depth(merged);
         }
         status = trip_frame_poll();
     }

@@ -64,9 +64,10 @@ typedef struct trip_renderer_ops {
      * wait; negative: failed. NULL where take_slots is. */
     int (*is_done)(trip_renderer *r, const trip_batch *batch, bool wait);
     /* Merges what the layers hold so far, puts the background behind, and gives width * height * 4
-     * floats, premultiplied, row 0 at the top. The frame goes on as if it had not been called;
+     * floats, premultiplied, row 0 at the top; with settings.depth also width * height distances as
+     * layer.h has them, otherwise `depth` is NULL. The frame goes on as if it had not been called;
      * after its last batch it gives the picture. */
-    int (*picture)(trip_renderer *r, float *rgba);
+    int (*picture)(trip_renderer *r, float *rgba, float *depth);
     /* The frame is over or given up: returns when nothing that it is drawn from is in use. NULL:
      * nothing is between the other calls. */
     void (*end_frame)(trip_renderer *r);

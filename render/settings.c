@@ -1,5 +1,7 @@
 #include "settings.h"
 
+#include "report.h"
+
 trip_settings trip_settings_default(void)
 {
     return (trip_settings){
@@ -13,4 +15,12 @@ trip_settings trip_settings_default(void)
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
         .background = { 0, 0, 0, 1 },
     };
+}
+
+int trip_settings_check(const trip_settings *s)
+{
+    if (s->depth && s->target != TRIP_TARGET_RGBA32F)
+        return trip_fail(TRIP_USAGE, "render", "depth",
+                         "rounded layers have no depth; leave the target at rgba32f");
+    return 0;
 }

@@ -41,6 +41,7 @@ typedef struct trip_settings {
     trip_target target;
     bool indexed;              /* one vertex array with three index lists instead of three lists */
     bool triangles;            /* bounding quads of two triangles instead of point sprites */
+    bool depth;                /* a picture of distances too, see layer.h; rgba32f only */
     bool shading;              /* diffuse and specular from the stored gradients */
     bool headlight;            /* light from the eye; otherwise from light_direction */
     trip_vec3 light_direction; /* world space, towards the light, unit length */
@@ -49,7 +50,11 @@ typedef struct trip_settings {
     double background[4];      /* r, g, b, a; not premultiplied */
 } trip_settings;
 
-/* The defaults: merge, outward, h 0.85, kernel radius 2, shading by headlight, rgba32f, black. */
+/* The defaults: merge, outward, h 0.85, kernel radius 2, shading by headlight, rgba32f, no depth,
+ * black. */
 trip_settings trip_settings_default(void);
+
+/* Fails (usage) for settings that exclude one another. */
+int trip_settings_check(const trip_settings *s);
 
 #endif

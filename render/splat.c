@@ -135,6 +135,6 @@ double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double
 
 double trip_splat_stretch(const trip_splat_frame *f, double x, double y)
 {
-    trip_vec3 ray = trip_camera_ray(&f->camera, x, y);
-    return trip_length(trip_affine_vector(&f->camera.index_to_world, ray)) / trip_length(ray);
+    return trip_camera_ray_length(&f->camera, x, y) /
+           trip_length(trip_camera_ray(&f->camera, x, y));
 }

@@ -47,13 +47,19 @@ int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *bud
     return 0;
 }
 
+static size_t depth_bytes(const trip_cpu_flush *f)
+{
+    return (size_t)f->capacity * sizeof *f->depths;
+}
+
 void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget)
 {
     trip_budget_release(budget, f->splats, f->bytes);
     trip_budget_release(budget, f->shares, f->share_bytes);
+    trip_budget_release(budget, f->depths, depth_bytes(f));
 }
 
-int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
+static int fit_shares(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
 {
     if (tiles <= f->tile_capacity)
         return 0;
@@ -69,6 +75,17 @@ int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
     }
     f->tile_capacity = tiles;
     return 0;
+}
+
+int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, bool depths, trip_budget *budget)
+{
+    if (depths && !f->depths)
+        f->depths = trip_budget_take(budget, depth_bytes(f));
+    if (depths && !f->depths)
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "depths of %u splats do not fit the memory given; raise --memory",
+                         f->capacity);
+    return fit_shares(f, tiles, budget);
 }
 
 void trip_cpu_flush_empty(trip_cpu_flush *f)

@@ -48,6 +48,7 @@ typedef struct trip_cpu_flush {
     uint32_t capacity; /* splats */
     uint32_t segment_capacity, order_capacity, chunk_capacity, tile_capacity;
     trip_cpu_splat *splats;
+    float *depths; /* of the splats, once layers with depth were drawn */
     uint16_t *order;
     trip_cpu_segment *segments;
     trip_cpu_chunk *chunks;
@@ -66,8 +67,8 @@ typedef struct trip_cpu_flush {
 
 int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget);
 void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget);
-/* Makes room for a frame's tiles. */
-int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget);
+/* Makes room for a frame's tiles, and for depths where its layers have them. */
+int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, bool depths, trip_budget *budget);
 void trip_cpu_flush_empty(trip_cpu_flush *f);
 
 /* The next chunk, or NULL when there can be no more for now. */

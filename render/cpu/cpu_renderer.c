@@ -20,7 +20,7 @@
 
 #define VISIBLE_BYTES (65536 * sizeof(trip_tf_entry))
 
-enum { FLOATS_PER_TILE = 4 * TRIP_CPU_TILE_PIXELS, MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
+enum { MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
 
 /* Fewer voxels are not worth a chunk. */
 enum { LEAST_CHUNK = 512 };
@@ -42,8 +42,8 @@ typedef struct worker {
     unsigned char codes[2 * 64 + 2 * TRIP_CPU_READABLE];
     unsigned char normals[4 * 64 + 2 * TRIP_CPU_READABLE];
     trip_cpu_sorting sorting;
-    _Alignas(
-        64) float sum[FLOATS_PER_TILE]; /* of a picture, where the frame goes on with its own */
+    /* Of a tile of a picture, where the frame goes on with its own. */
+    _Alignas(64) float sum[TRIP_CHANNELS_MAX * TRIP_CPU_TILE_PIXELS];
     _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
 } worker;
 
@@ -57,7 +57,8 @@ typedef struct portion {
 typedef struct cpu {
     trip_renderer base;
     trip_budget *budget;
-    const trip_cpu_kernels *kernels;
+    const trip_cpu_kernels *isa;     /* for layers of colour alone */
+    const trip_cpu_kernels *kernels; /* for the frame's layers */
     trip_cpu_pool *pool;
     char device[64];
     worker *workers;
@@ -65,6 +66,7 @@ typedef struct cpu {
 
     trip_cpu_mask mask; /* bits are cleared by whoever blends the tile */
     size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
+    unsigned channels;  /* that there is room for */
     float *pixels, *sums;
     uint8_t *states;
     uint8_t *axes; /* whose layers may have weight in a tile, a bit each */
@@ -87,7 +89,7 @@ typedef struct cpu {
     uint32_t first_chunk;   /* of the job */
     double shown_per_voxel; /* of late */
     uint32_t portion_count;
-    float *rgba;
+    float *rgba, *depth;
     trip_cpu_job project_job, blend_job, tile_job;
 } cpu;
 
@@ -108,9 +110,14 @@ static int tile_y(const cpu *r, uint32_t tile)
     return (int)(tile / r->mask.grid.across) * TRIP_CPU_TILE;
 }
 
+static size_t tile_floats(const cpu *r)
+{
+    return r->channels * TRIP_CPU_TILE_PIXELS;
+}
+
 static float *tile_pixels(const cpu *r, uint32_t tile)
 {
-    return r->pixels + (size_t)tile * FLOATS_PER_TILE;
+    return r->pixels + tile * tile_floats(r);
 }
 
 /* Whether one layer alone has weight in a tile, and so it is 1 all over. */
@@ -163,12 +170,12 @@ static void count_part(const cpu *r, worker *w, trip_cpu_chunk *chunk, const tri
             continue;
         trip_cpu_square square = make_square(r, w, block, part->run, &at);
         const trip_cpu_staged *staged = &w->scratch.staged;
-        uint32_t n = r->kernels->stage(view, &square, false, &w->scratch.staged, 0);
+        uint32_t n = r->isa->stage(view, &square, false, &w->scratch.staged, 0);
         for (uint32_t i = 0; i < n; i++)
             chunk->counts.splats_projected +=
                 trip_cpu_is_projected(view, staged->u[i], staged->v[i], staged->sheet[i]);
-        n = r->kernels->project(view, NULL, &w->scratch.staged, n, &w->scratch.lanes, w->counted);
-        chunk->counts.splats_drawn += r->kernels->drawn(view, &w->scratch, w->counted, n);
+        n = r->isa->project(view, NULL, &w->scratch.staged, n, &w->scratch.lanes, w->counted, NULL);
+        chunk->counts.splats_drawn += r->isa->drawn(view, &w->scratch, w->counted, n);
     }
 }
 
@@ -198,13 +205,20 @@ static bool much_is_hidden(const cpu *r)
     return r->shown_per_voxel < MUCH_HIDDEN;
 }
 
+/* Depths of a buffer's splats from one on; NULL where it has none. */
+static float *depths_from(const trip_cpu_flush *f, uint32_t splat)
+{
+    return f->depths ? f->depths + splat : NULL;
+}
+
 /* Projects what is staged to the end of the chunk. */
 static void empty_staged(const cpu *r, worker *w, trip_cpu_chunk *chunk, uint32_t *staged)
 {
     const _Atomic uint64_t *open = much_is_hidden(r) ? r->mask.tiles : NULL;
-    trip_cpu_splat *out = r->filling->splats + chunk->splat + chunk->splats;
+    uint32_t at = chunk->splat + chunk->splats;
     chunk->splats += r->kernels->project(&r->views[chunk->list], open, &w->scratch.staged, *staged,
-                                         &w->scratch.lanes, out);
+                                         &w->scratch.lanes, r->filling->splats + at,
+                                         depths_from(r->filling, at));
     *staged = 0;
 }
 
@@ -256,7 +270,8 @@ static void blend_some(void *user, const trip_cpu_chunk *chunk, const trip_cpu_s
     blend_context *c = user;
     if (trip_interrupted())
         return;
-    c->of->kernels->tile_blend(&c->of->views[chunk->list], c->scratch, splats, order, count);
+    c->of->kernels->tile_blend(&c->of->views[chunk->list], c->scratch, splats,
+                               depths_from(c->of->blending, chunk->splat), order, count);
 }
 
 /* The mask's bits of some quarters of a tile. */
@@ -518,7 +533,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
 
 static float *tile_sum(const cpu *r, uint32_t tile)
 {
-    return r->sums + (size_t)tile * FLOATS_PER_TILE;
+    return r->sums + tile * tile_floats(r);
 }
 
 /* What is alone in its tile stays as it is. */
@@ -542,7 +557,7 @@ static const float *sum_so_far(const cpu *r, worker *w, uint32_t tile)
         return tile_sum(r, tile);
     bool first = !(r->states[tile] & TILE_MERGED);
     if (!first)
-        memcpy(w->sum, tile_sum(r, tile), sizeof w->sum);
+        memcpy(w->sum, tile_sum(r, tile), tile_floats(r) * sizeof *w->sum);
     r->kernels->tile_merge(&r->view, tile_x(r, tile), tile_y(r, tile), tile_pixels(r, tile), first,
                            w->sum);
     return w->sum;
@@ -560,7 +575,8 @@ static void finish_tile(cpu *r, worker *w, uint32_t tile)
         content = TRIP_CPU_SUM;
         pixels = sum_so_far(r, w, tile);
     }
-    r->kernels->tile_finish(&r->view, tile_x(r, tile), tile_y(r, tile), content, pixels, r->rgba);
+    r->kernels->tile_finish(&r->view, tile_x(r, tile), tile_y(r, tile), content, pixels, r->rgba,
+                            r->depth);
 }
 
 /* Tasks of whole rows of tiles. */
@@ -628,8 +644,8 @@ static void *part(char *memory, size_t *at, size_t bytes)
 static size_t lay_out(cpu *r, char *memory)
 {
     size_t at = 0, tiles = tile_count(r);
-    r->pixels = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->pixels);
-    r->sums = part(memory, &at, tiles * FLOATS_PER_TILE * sizeof *r->sums);
+    r->pixels = part(memory, &at, tiles * tile_floats(r) * sizeof *r->pixels);
+    r->sums = part(memory, &at, tiles * tile_floats(r) * sizeof *r->sums);
     r->states = part(memory, &at, tiles);
     r->axes = part(memory, &at, tiles);
     r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
@@ -653,10 +669,12 @@ static int fit_tiles(cpu *r, int width, int height)
 {
     trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE,
                            ((uint32_t)height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE };
-    if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down)
+    if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down &&
+        r->channels == r->kernels->channels)
         return 0;
     release_tiles(r);
     r->mask.grid = grid;
+    r->channels = r->kernels->channels;
     size_t bytes = lay_out(r, NULL);
     char *memory = trip_budget_take(r->budget, bytes);
     if (!memory) {
@@ -668,12 +686,13 @@ static int fit_tiles(cpu *r, int width, int height)
     }
     lay_out(r, memory);
     r->tiles_bytes = bytes;
-    for (int i = 0; i < 2; i++) {
-        int status = trip_cpu_flush_fit(&r->flushes[i], tile_count(r), r->budget);
-        if (status)
-            return status;
-    }
-    return 0;
+    int status = 0;
+    for (int i = 0; i < 2 && !status; i++)
+        status = trip_cpu_flush_fit(&r->flushes[i], tile_count(r), r->channels > TRIP_CHANNEL_DEPTH,
+                                    r->budget);
+    if (status)
+        release_tiles(r);
+    return status;
 }
 
 /* Any extinction will do that the kernels do not take for nothing. */
@@ -737,6 +756,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_cpu_flush_empty(r->filling);
     r->in_layer = false;
     r->frame = frame;
+    r->kernels = frame->settings->depth ? r->isa->with_depth : r->isa;
     memset(r->stats, 0, sizeof r->stats);
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
@@ -754,11 +774,12 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     return 0;
 }
 
-static int picture(trip_renderer *base, float *rgba)
+static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     cpu *r = (cpu *)base;
     settle(r);
     r->rgba = rgba;
+    r->depth = depth;
     for_each_row(r, finish_row);
     return trip_frame_poll();
 }
@@ -844,7 +865,7 @@ static int create_parts(cpu *r, unsigned threads)
     for (int i = 0; i < 2 && !status; i++)
         status = trip_cpu_flush_create(&r->flushes[i], flush_capacity(r->budget), r->budget);
     r->filling = &r->flushes[0];
-    snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->kernels->isa, threads,
+    snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->isa->isa, threads,
              threads == 1 ? "" : "s");
     return status;
 }
@@ -860,7 +881,7 @@ int trip_cpu_create(trip_renderer **out, trip_budget *budget, unsigned threads)
         return trip_fail(TRIP_ERROR, "render", "CPU renderer", "out of memory");
     r->base.ops = &cpu_ops;
     r->budget = budget;
-    r->kernels = kernels;
+    r->isa = kernels;
     int status = create_parts(r, threads);
     if (status) {
         destroy(&r->base);

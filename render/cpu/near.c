@@ -239,6 +239,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
     set_forms(view);
     set_limits(view);
     set_parallel(view);
+    view->depth_unit = trip_layer_depth_unit(camera, frame->camera);
 }
 
 void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip_list *list,

@@ -206,6 +206,9 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     gl_renderer *r = (gl_renderer *)base;
     const trip_camera *camera = frame->camera;
     int status = check_size(r, camera);
+    if (!status && frame->settings->depth)
+        status =
+            trip_fail(TRIP_USAGE, "render", "depth", "OpenGL draws none; use the CPU renderer");
     if (!status)
         status = trip_gl_context_use(r->context);
     if (!status)
@@ -519,9 +522,10 @@ static void describe(gl_renderer *r)
         snprintf(r->device, sizeof r->device, "%s", name);
 }
 
-static int picture(trip_renderer *base, float *rgba)
+static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     gl_renderer *r = (gl_renderer *)base;
+    (void)depth;
     int status = trip_gl_context_use(r->context);
     if (!status)
         status = merge(r);

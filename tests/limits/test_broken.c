@@ -87,7 +87,7 @@ static int draw_frame(drawing *d, float *rgba)
                          .settings = &d->settings,
                          .plan = &d->plan,
                          .table = shared.scene.table };
-    return trip_frame_draw(d->renderer, d->reader, &frame, rgba, &stats);
+    return trip_frame_draw(d->renderer, d->reader, &frame, rgba, NULL, &stats);
 }
 
 static void find_files(void)

@@ -77,7 +77,7 @@ static int draw_planned(trip_renderer *renderer, const trip_frame *frame, trip_b
                                     &(trip_reader_params){ .planes = frame->plan->planes }, budget);
     if (status)
         return status;
-    status = trip_frame_draw(renderer, reader, frame, rgba, &stats);
+    status = trip_frame_draw(renderer, reader, frame, rgba, NULL, &stats);
     trip_reader_destroy(reader);
     return status;
 }

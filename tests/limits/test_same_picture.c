@@ -156,7 +156,7 @@ static void draw(const scene *s, trip_renderer_kind kind, const trial *t, int vi
         .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
     };
     for (int i = 0; i < t->frames; i++)
-        assert_int_equal(trip_frame_draw(renderer, reader, &frame, rgba, stats), 0);
+        assert_int_equal(trip_frame_draw(renderer, reader, &frame, rgba, NULL, stats), 0);
     trip_reader_destroy(reader);
     renderer->ops->destroy(renderer);
     trip_budget_destroy(budget);

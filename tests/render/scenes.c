@@ -199,6 +199,11 @@ const scene_renderer *scene_renderers(void)
     return all;
 }
 
+bool scene_has_depth(const scene_renderer *renderer)
+{
+    return strcmp(renderer->name, "gl") != 0;
+}
+
 scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                               const trip_camera_params *view, const trip_settings *settings,
                               const trip_reader_params *reader_params)
@@ -223,7 +228,11 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                          .count = true };
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
     assert_non_null(p.rgba);
-    assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, &p.stats), 0);
+    if (settings->depth) {
+        p.depth = calloc((size_t)p.width * (size_t)p.height, sizeof *p.depth);
+        assert_non_null(p.depth);
+    }
+    assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, p.depth, &p.stats), 0);
 
     r->ops->destroy(r);
     trip_reader_destroy(reader);
@@ -240,7 +249,8 @@ scene_picture scene_draw(const scene *s, const scene_renderer *renderer,
 void scene_picture_free(scene_picture *p)
 {
     free(p->rgba);
-    p->rgba = NULL;
+    free(p->depth);
+    p->rgba = p->depth = NULL;
 }
 
 double scene_difference(const scene_picture *a, const scene_picture *b)

@@ -25,8 +25,8 @@ typedef struct scene_params {
     unsigned tile_voxels, slab_sheets;
     bool normals;
     unsigned code_bytes, normal_bytes; /* 0: 2, and 4 where there are normals */
-    double gradient_scale; /* the header's, by which gradients are multiplied; 0: 1 */
-    scene_voxel voxel;     /* NULL: every voxel is there with code 65535 */
+    double gradient_scale;             /* the header's, by which gradients are multiplied; 0: 1 */
+    scene_voxel voxel;                 /* NULL: every voxel is there with code 65535 */
     void *user;
 } scene_params;
 
@@ -56,9 +56,13 @@ typedef struct scene_renderer {
 /* Every renderer this machine can run, ended by an entry without name. */
 const scene_renderer *scene_renderers(void);
 
+/* Whether it draws depths. */
+bool scene_has_depth(const scene_renderer *renderer);
+
 typedef struct scene_picture {
     int width, height;
     float *rgba;
+    float *depth; /* NULL unless the settings want it */
     trip_frame_stats stats;
 } scene_picture;
 

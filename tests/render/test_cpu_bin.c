@@ -24,7 +24,7 @@ static int set_up(void **state)
     assert_non_null(f);
     assert_int_equal(trip_budget_create(&f->budget, UINT64_C(1) << 24), 0);
     assert_int_equal(trip_cpu_flush_create(&f->flush, CAPACITY, f->budget), 0);
-    assert_int_equal(trip_cpu_flush_fit(&f->flush, TILES, f->budget), 0);
+    assert_int_equal(trip_cpu_flush_fit(&f->flush, TILES, false, f->budget), 0);
     trip_cpu_flush_empty(&f->flush);
     f->sorting.counts = f->counts;
     f->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, f->open };

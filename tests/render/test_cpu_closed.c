@@ -98,8 +98,8 @@ static bool shows(const fixture *f, const trip_cpu_splat *s)
 static void check(fixture *f, const trip_cpu_kernels *k, int seed)
 {
     uint32_t voxels = stage_some(f, seed), next = 0;
-    uint32_t all = k->project(&f->view, NULL, &f->staged, voxels, &f->lanes, f->all);
-    uint32_t some = k->project(&f->view, f->open, &f->staged, voxels, &f->lanes, f->some);
+    uint32_t all = k->project(&f->view, NULL, &f->staged, voxels, &f->lanes, f->all, NULL);
+    uint32_t some = k->project(&f->view, f->open, &f->staged, voxels, &f->lanes, f->some, NULL);
     for (uint32_t i = 0; i < all; i++) {
         bool kept = next < some && !memcmp(&f->all[i], &f->some[next], sizeof f->all[i]);
         next += kept;

@@ -190,7 +190,7 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, size_t piece, bool sk
             }
         }
     }
-    assert_int_equal(f->renderer->ops->picture(f->renderer, f->rgba), 0);
+    assert_int_equal(f->renderer->ops->picture(f->renderer, f->rgba, NULL), 0);
     f->renderer->ops->end_frame(f->renderer);
     trip_reader_destroy(reader);
 }

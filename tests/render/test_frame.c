@@ -33,7 +33,7 @@ static int draw(const scene *s, trip_renderer *r, trip_reader *reader,
                          .plan = &plan,
                          .table = s->table,
                          .count = true };
-    int status = trip_frame_draw(r, reader, &frame, rgba, stats);
+    int status = trip_frame_draw(r, reader, &frame, rgba, NULL, stats);
     trip_plan_release(&plan, s->budget);
     return status;
 }
@@ -131,7 +131,7 @@ static void progress_rises_to_the_number_of_splats(void **state)
                          .table = s.table,
                          .progress = keep_progress,
                          .progress_user = last };
-    assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, &stats), 0);
+    assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, NULL, &stats), 0);
     assert_true(last[0] > 0);
     assert_int_equal(last[0], last[1]);
     trip_plan_release(&plan, s.budget);
@@ -256,10 +256,11 @@ static int lazy_is_done(trip_renderer *r, const trip_batch *batch, bool wait)
     return 1;
 }
 
-static int lazy_picture(trip_renderer *r, float *rgba)
+static int lazy_picture(trip_renderer *r, float *rgba, float *depth)
 {
     (void)r;
     (void)rgba;
+    (void)depth;
     return 0;
 }
 

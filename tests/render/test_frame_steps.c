@@ -62,7 +62,7 @@ static const trip_reader_params small_slots = { .slots = 2, .slot_bytes = 4096 }
 static void draw_whole(desk *d, float *rgba)
 {
     trip_frame_stats stats;
-    assert_int_equal(trip_frame_draw(d->renderer, d->reader, &d->frame, rgba, &stats), 0);
+    assert_int_equal(trip_frame_draw(d->renderer, d->reader, &d->frame, rgba, NULL, &stats), 0);
 }
 
 /* Every component is there, and no pixel more opaque than light can be held back. */
@@ -92,14 +92,14 @@ static void step_by_step(desk *d, bool look, float *rgba, int *steps)
             trip_frame_await(&drawing, UINT64_MAX);
         if (!look)
             continue;
-        assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+        assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
         check_range(rgba);
         check_growth(before, rgba);
         memcpy(before, rgba, sizeof before);
     }
     assert_int_equal(status, TRIP_FRAME_DONE);
     assert_int_equal(trip_frame_step(&drawing, 0), TRIP_FRAME_DONE);
-    assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+    assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
     trip_frame_end(&drawing);
 }
 
@@ -200,7 +200,7 @@ static void a_step_does_not_wait_for_the_disk(void **state)
         for (int i = 0; i < 3; i++) {
             assert_int_equal(trip_frame_step(&drawing, UINT64_MAX), TRIP_FRAME_WAITS);
             trip_frame_await(&drawing, 1000);
-            assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+            assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
         }
         for (int i = 0; i < 4 * PIXELS; i++)
             assert_true(rgba[i] == 0);
@@ -208,7 +208,7 @@ static void a_step_does_not_wait_for_the_disk(void **state)
         while ((status = trip_frame_step(&drawing, UINT64_MAX)) == TRIP_FRAME_WAITS)
             trip_frame_await(&drawing, UINT64_MAX);
         assert_int_equal(status, TRIP_FRAME_DONE);
-        assert_int_equal(trip_frame_picture(&drawing, rgba), 0);
+        assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
         trip_frame_end(&drawing);
         draw_whole(&d, whole);
         assert_memory_equal(rgba, whole, sizeof whole);
@@ -252,7 +252,7 @@ static void a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is(void *
                     trip_frame_await(&drawing, 1000000);
             assert_false(drawing.done);
             if (round == 1)
-                assert_int_equal(trip_frame_picture(&drawing, after), 0);
+                assert_int_equal(trip_frame_picture(&drawing, after, NULL), 0);
             trip_frame_end(&drawing);
         }
         draw_whole(&d, after);
@@ -279,7 +279,7 @@ static void a_cancelled_frame_fails_and_says_so_once(void **state)
         trip_frame_cancel(&drawing);
         test_catch_reports();
         assert_int_equal(trip_frame_step(&drawing, UINT64_MAX), TRIP_INTERRUPTED);
-        assert_int_equal(trip_frame_picture(&drawing, rgba), TRIP_INTERRUPTED);
+        assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), TRIP_INTERRUPTED);
         assert_int_equal(trip_frame_step(&drawing, UINT64_MAX), TRIP_INTERRUPTED);
         assert_one_report("triptych: render: frame: interrupted");
         trip_frame_end(&drawing);
@@ -435,10 +435,10 @@ static void *draw_until_cancelled(void *user)
         if (a->status == TRIP_FRAME_WAITS)
             trip_frame_await(&a->drawing, 1000000);
         if (a->status > 0)
-            a->status = trip_frame_picture(&a->drawing, rgba);
+            a->status = trip_frame_picture(&a->drawing, rgba, NULL);
     } while (a->status == 0 && !a->drawing.done);
     while (a->status == 0) /* it was quick: the picture is taken again and again */
-        a->status = trip_frame_picture(&a->drawing, rgba);
+        a->status = trip_frame_picture(&a->drawing, rgba, NULL);
     trip_frame_end(&a->drawing);
     trip_report_release(&held);
     a->same = strstr(held.line, "interrupted") != NULL;
@@ -457,7 +457,7 @@ static void *draw_often(void *user)
     for (a->frames = 0; a->frames < 4 && a->status == 0; a->frames++) {
         trip_frame_stats stats;
         float *to = a->frames ? rgba : first;
-        a->status = trip_frame_draw(d.renderer, d.reader, &d.frame, to, &stats);
+        a->status = trip_frame_draw(d.renderer, d.reader, &d.frame, to, NULL, &stats);
         a->same &= a->frames == 0 || !memcmp(first, rgba, 4 * PIXELS * sizeof *rgba);
     }
     put_away(&d);

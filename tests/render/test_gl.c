@@ -252,7 +252,7 @@ static bool draw_in_place(const scene *s, const trip_camera_params *view, trip_r
         .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
     };
     for (int i = 0; i < 3; i++)
-        assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, &stats), 0);
+        assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, NULL, &stats), 0);
     trip_reader_destroy(reader);
     trip_plan_release(&plan, s->budget);
     r->ops->destroy(r);
@@ -348,7 +348,7 @@ static int try_frame(const scene *s, trip_renderer *r, const trip_camera_params 
     };
     line_count = 0;
     trip_report_redirect(keep_line, NULL);
-    int status = trip_frame_draw(r, reader, &frame, rgba, &stats);
+    int status = trip_frame_draw(r, reader, &frame, rgba, NULL, &stats);
     trip_report_redirect(NULL, NULL);
     assert_int_equal(line_count, status ? 1 : 0);
     trip_reader_destroy(reader);

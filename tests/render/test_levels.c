@@ -12,7 +12,7 @@
  * voxels, the rest by those of level 1, so that the levels alternate along every ray and each
  * hides much of the other. */
 
-enum { N = 24, CELL = 4, SIZE_PX = 44 };
+enum { N = 24, CELL = 4, SIZE_PX = 44, CHANNELS = 5 };
 
 /* Codes of the levels. */
 enum { FINE = 20000, COARSE = 50000 };
@@ -114,6 +114,7 @@ static void destroy(levels *l)
 
 typedef struct item {
     double coordinate;
+    trip_vec3 place; /* in the world */
     int level;
     uint64_t morton;
     bool beyond;
@@ -157,6 +158,8 @@ static void add(brute *b, int level, int axis, const int at[3])
         !trip_splat_project(&b->frames[level], trip_v3(at[0], at[1], at[2]), &i->splat))
         return;
     i->coordinate = scale * at[axis] + 0.5 * (scale - 1);
+    i->place =
+        trip_affine_point(&b->frames[level].camera.index_to_world, trip_v3(at[0], at[1], at[2]));
     i->level = level;
     i->morton = trip_morton((unsigned)at[(axis + 1) % 3], (unsigned)at[(axis + 2) % 3]);
     i->entry = &l->drawn.table[level ? COARSE : FINE];
@@ -178,7 +181,17 @@ static void collect(brute *b, int axis)
     qsort(b->items, b->count, sizeof *b->items, by_place);
 }
 
-static void put_behind(const brute *b, const item *i, double x, double y, double layer[4])
+/* Along the ray of a pixel to the plane of the splat's centre that faces the eye's. */
+static double distance_of(const brute *b, const item *i, double x, double y)
+{
+    const trip_camera *c = &b->frames[0].camera;
+    trip_vec3 ray = trip_affine_vector(&c->index_to_world, trip_camera_ray(c, x, y));
+    trip_vec3 from_eye = trip_sub(i->place, c->params.eye);
+    return trip_dot(from_eye, c->world_forward) * trip_length(ray) /
+           trip_dot(ray, c->world_forward);
+}
+
+static void put_behind(const brute *b, const item *i, double x, double y, double layer[CHANNELS])
 {
     const trip_splat_frame *f = &b->frames[i->level];
     const trip_splat *s = &i->splat;
@@ -193,10 +206,11 @@ static void put_behind(const brute *b, const item *i, double x, double y, double
     for (int c = 0; c < 3; c++)
         layer[c] += (double)rgb[c] * add;
     layer[3] += add;
+    layer[4] += distance_of(b, i, x, y) * add;
 }
 
 /* What lies beyond the eye upwards, then what lies below it downwards. */
-static void composite(const brute *b, double x, double y, double layer[4])
+static void composite(const brute *b, double x, double y, double layer[CHANNELS])
 {
     for (size_t i = 0; i < b->count; i++)
         if (b->items[i].beyond)
@@ -206,39 +220,53 @@ static void composite(const brute *b, double x, double y, double layer[4])
             put_behind(b, &b->items[i], x, y, layer);
 }
 
+/* CHANNELS floats a pixel. */
 static float *draw_by_hand(brute *b)
 {
     const trip_camera *c = &b->frames[0].camera;
     int axis_of_view = trip_weight_axis_of_view(c);
-    float *rgba = calloc((size_t)4 * SIZE_PX * SIZE_PX, sizeof *rgba);
+    float *merged = calloc((size_t)CHANNELS * SIZE_PX * SIZE_PX, sizeof *merged);
     double *weights = calloc((size_t)SIZE_PX * SIZE_PX, sizeof *weights);
     for (int axis = 0; axis < 3; axis++) {
         collect(b, axis);
         for (int p = 0; p < SIZE_PX * SIZE_PX; p++) {
-            double x = p % SIZE_PX + 0.5, y = p / SIZE_PX + 0.5, layer[4] = { 0 };
+            double x = p % SIZE_PX + 0.5, y = p / SIZE_PX + 0.5, layer[CHANNELS] = { 0 };
             double w = trip_weight(&b->settings, axis_of_view, trip_camera_ray(c, x, y), axis);
             if (!(w > 0))
                 continue;
             composite(b, x, y, layer);
-            for (int i = 0; i < 4; i++)
-                rgba[4 * p + i] += (float)(w * w * layer[i]);
+            for (int i = 0; i < CHANNELS; i++)
+                merged[CHANNELS * p + i] += (float)(w * w * layer[i]);
             weights[p] += w * w;
         }
     }
     for (int p = 0; p < SIZE_PX * SIZE_PX; p++)
-        for (int i = 0; i < 4; i++)
-            rgba[4 * p + i] = (float)((double)rgba[4 * p + i] / weights[p]);
+        for (int i = 0; i < CHANNELS; i++)
+            merged[CHANNELS * p + i] = (float)((double)merged[CHANNELS * p + i] / weights[p]);
     free(weights);
-    return rgba;
+    return merged;
 }
 
 /* ---- views ---- */
 
-static double largest_difference(const float *a, const float *b)
+static double largest_difference(const scene_picture *p, const float *merged)
 {
     double most = 0;
-    for (int i = 0; i < 4 * SIZE_PX * SIZE_PX; i++)
-        most = fmax(most, fabs((double)a[i] - (double)b[i]));
+    for (int i = 0; i < SIZE_PX * SIZE_PX; i++)
+        for (int c = 0; c < 4; c++)
+            most = fmax(most, fabs((double)p->rgba[4 * i + c] - (double)merged[CHANNELS * i + c]));
+    return most;
+}
+
+/* Of depths times opacity, as parts of the object's size. */
+static double largest_depth_difference(const scene_picture *p, const float *merged)
+{
+    double most = 0;
+    for (int i = 0; i < SIZE_PX * SIZE_PX; i++) {
+        double alpha = (double)merged[CHANNELS * i + 3], sum = (double)merged[CHANNELS * i + 4];
+        if (alpha > 1e-3)
+            most = fmax(most, fabs((double)p->depth[i] * alpha - sum) / N);
+    }
     return most;
 }
 
@@ -259,8 +287,11 @@ static void expect_right(levels *l, const trip_camera_params *view)
     assert_non_null(b.items);
     float *expected = draw_by_hand(&b);
     for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        b.settings.depth = scene_has_depth(r);
         scene_picture p = scene_draw(&l->drawn, r, view, &b.settings);
-        double off = largest_difference(p.rgba, expected);
+        double off = largest_difference(&p, expected);
+        if (p.depth)
+            off = fmax(off, largest_depth_difference(&p, expected));
         if (!(off <= (strcmp(r->name, "reference") ? r->tolerance : 1e-6)))
             fail_msg("%s: off by %g", r->name, off);
         scene_picture_free(&p);

@@ -240,7 +240,7 @@ static void expect_refused(const scene *s, const scene_renderer *renderer, trip_
         .data = s->data, .camera = camera, .settings = &settings, .plan = &plan, .table = s->table
     };
     test_catch_reports();
-    assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, &stats), TRIP_ERROR);
+    assert_int_equal(trip_frame_draw(r, reader, &frame, rgba, NULL, &stats), TRIP_ERROR);
     assert_one_report("not finite");
     r->ops->destroy(r);
     trip_reader_destroy(reader);

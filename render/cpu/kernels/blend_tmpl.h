@@ -15,7 +15,8 @@
 #define BLOCKS_ACROSS (TRIP_CPU_TILE / 4)
 #define BLOCKS_DOWN (TRIP_CPU_TILE / BLOCK_ROWS)
 #define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
-#define BLOCK_FLOATS (4 * V)
+#define CHANNELS (TRIP_CPU_DEPTH ? TRIP_CHANNELS_MAX : TRIP_CHANNEL_DEPTH)
+#define BLOCK_FLOATS (CHANNELS * V)
 /* Eight rows of blocks, a bit each. */
 #define BANDS (BLOCKS / 64)
 
@@ -78,8 +79,9 @@ INLINE unsigned place_of(unsigned word)
 /* A block's pixels and where they lie. */
 typedef struct patch {
     vf r, g, b, t;
-    vf x, y; /* pixel centres from the tile's corner */
-    vf ray;  /* G */
+    vf depth; /* of layers with depth */
+    vf x, y;  /* pixel centres from the tile's corner */
+    vf ray;   /* G */
     vf stretch;
     vf cutoff; /* as in trip_cpu_view */
 } patch;
@@ -131,23 +133,28 @@ INLINE vf opacity(const patch *p, const trip_cpu_splat *splat, bool thick, trip_
 }
 
 /* put_behind() for splats where every pixel is open and stays so. */
-INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, vf opacity)
+INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, float depth, vf opacity)
 {
     vf left = v_fnma(p->t, opacity, p->t), taken = p->t - left;
     p->r = v_fma(taken, v_set(splat->r), p->r);
     p->g = v_fma(taken, v_set(splat->g), p->g);
     p->b = v_fma(taken, v_set(splat->b), p->b);
+    if (TRIP_CPU_DEPTH)
+        p->depth = v_fma(taken, v_set(depth), p->depth);
     p->t = left;
 }
 
 /* Front to back: `splat` goes behind what the pixels hold. */
-INLINE void put_behind(patch *p, const trip_cpu_splat *splat, vf opacity, trip_target target)
+INLINE void put_behind(patch *p, const trip_cpu_splat *splat, float depth, vf opacity,
+                       trip_target target)
 {
     vm open = v_ge(p->t, v_set((float)TRIP_SATURATION));
     vf left = v_fnma_where(open, p->t, opacity, p->t), taken = p->t - left;
     p->r = kept(v_fma(taken, v_set(splat->r), p->r), target);
     p->g = kept(v_fma(taken, v_set(splat->g), p->g), target);
     p->b = kept(v_fma(taken, v_set(splat->b), p->b), target);
+    if (TRIP_CPU_DEPTH)
+        p->depth = v_fma(taken, v_set(depth), p->depth);
     p->t = target == TRIP_TARGET_RGBA32F ? left : v_set(1) - kept(v_set(1) - left, target);
 }
 
@@ -158,13 +165,16 @@ INLINE vf over(vf behind, float colour, vf keep, trip_target target)
 }
 
 /* Back to front: `splat` goes over what the pixels hold. */
-INLINE void put_over(patch *p, const trip_cpu_splat *splat, vf depth, trip_target target)
+INLINE void put_over(patch *p, const trip_cpu_splat *splat, float depth, vf optical_depth,
+                     trip_target target)
 {
-    vm inside = v_gt(depth, v_set(0));
-    vf keep = exp_minus(depth), left = p->t * keep;
+    vm inside = v_gt(optical_depth, v_set(0));
+    vf keep = exp_minus(optical_depth), left = p->t * keep;
     p->r = v_select(inside, over(p->r, splat->r, keep, target), p->r);
     p->g = v_select(inside, over(p->g, splat->g, keep, target), p->g);
     p->b = v_select(inside, over(p->b, splat->b, keep, target), p->b);
+    if (TRIP_CPU_DEPTH)
+        p->depth = v_select(inside, over(p->depth, depth, keep, target), p->depth);
     if (target != TRIP_TARGET_RGBA32F)
         left = v_set(1) - kept(v_set(1) - left, target);
     p->t = v_select(inside, left, p->t);
@@ -194,6 +204,8 @@ INLINE patch load_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
         .y = block_y(number),
         .cutoff = v_set(s->view->cutoff),
     };
+    if (TRIP_CPU_DEPTH)
+        p.depth = v_load(pixels + TRIP_CHANNEL_DEPTH * V);
     if (rays != TRIP_CPU_PARALLEL) {
         const float *of = s->rays + 2 * V * number;
         if (!(s->rays_known[number / 64] >> number % 64 & 1))
@@ -211,15 +223,18 @@ INLINE void store_block(trip_cpu_scratch *s, unsigned number, const patch *p)
     v_store(pixels + V, p->g);
     v_store(pixels + 2 * V, p->b);
     v_store(pixels + 3 * V, p->t);
+    if (TRIP_CPU_DEPTH)
+        v_store(pixels + TRIP_CHANNEL_DEPTH * V, p->depth);
 }
 
 /* Which splats of the group may touch a block, a bit each. */
 typedef struct touching {
     const trip_cpu_splat *local;
+    const float *depths; /* of those, in layers with depth */
     uint64_t splats[TRIP_CPU_LOCAL / 64];
 } touching;
 
-typedef void blend_one(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
+typedef void blend_one(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays rays,
                        bool front_to_back, trip_target target);
 
 /* Its address is kept in one register: sums of two in every operand would cost the processor an
@@ -229,6 +244,11 @@ INLINE const trip_cpu_splat *splat_at(const trip_cpu_splat *local, unsigned numb
     local += number;
     __asm__("" : "+r"(local));
     return local;
+}
+
+INLINE float depth_at(const touching *t, unsigned number)
+{
+    return TRIP_CPU_DEPTH ? t->depths[number] : 0;
 }
 
 /* In order. Where bits can be packed to a list at once, the processor has to guess but one end of a
@@ -243,31 +263,33 @@ INLINE void blend_each(patch *p, const touching *t, blend_one *one, trip_cpu_ray
     for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
         count += v_pack_bits(numbers + count, t->splats[word], 64 * word);
     for (uint32_t i = 0; i < count; i++)
-        one(p, splat_at(t->local, numbers[i]), rays, front_to_back, target);
+        one(p, splat_at(t->local, numbers[i]), depth_at(t, numbers[i]), rays, front_to_back,
+            target);
 #else
     for (unsigned word = 0; word < TRIP_CPU_LOCAL / 64; word++)
-        for (uint64_t rest = t->splats[word]; rest; rest &= rest - 1)
-            one(p, splat_at(t->local, 64 * word + (unsigned)__builtin_ctzll(rest)), rays,
-                front_to_back, target);
+        for (uint64_t rest = t->splats[word]; rest; rest &= rest - 1) {
+            unsigned number = 64 * word + (unsigned)__builtin_ctzll(rest);
+            one(p, splat_at(t->local, number), depth_at(t, number), rays, front_to_back, target);
+        }
 #endif
 }
 
-INLINE void blend_thin_open(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays,
+INLINE void blend_thin_open(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays rays,
                             bool front_to_back, trip_target target)
 {
     (void)front_to_back;
     (void)target;
-    put_behind_open(p, splat, opacity(p, splat, false, rays));
+    put_behind_open(p, splat, depth, opacity(p, splat, false, rays));
 }
 
-INLINE void blend_any(patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays, bool front_to_back,
-                      trip_target target)
+INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays rays,
+                      bool front_to_back, trip_target target)
 {
     bool thick = splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT;
     if (front_to_back)
-        put_behind(p, splat, opacity(p, splat, thick, rays), target);
+        put_behind(p, splat, depth, opacity(p, splat, thick, rays), target);
     else
-        put_over(p, splat, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
+        put_over(p, splat, depth, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
 }
 
 /* The splats where none is thick; false, with nothing done, when a pixel is closed or would be. */
@@ -289,7 +311,7 @@ INLINE bool blend_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
                         bool front_to_back, trip_target target)
 {
     patch p = load_block(s, number, rays);
-    touching t = { .local = s->local };
+    touching t = { .local = s->local, .depths = s->local_depths };
     uint64_t thick = 0;
     for (unsigned word = 0; word < (s->splats + 63) / 64; word++) {
         t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
@@ -456,9 +478,11 @@ typedef struct gathering {
     int4 corner;    /* of the tile: x, y, x, y */
 } gathering;
 
-/* Splats whose blocks are all closed are left out. */
-INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
+/* Splats[i]. Splats whose blocks are all closed are left out. */
+INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
+                const float *depths, uint32_t i)
 {
+    const trip_cpu_splat *splat = &splats[i];
     uint32_t at = g->splats;
     const int4 to_block = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
     uint64_t four, blocks[BANDS], any = 0;
@@ -476,6 +500,8 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
     if (any == 0)
         return;
     make_local(&s->local[at], splat, g->corner - (bounds & ~(TRIP_CPU_TILE - 1)));
+    if (TRIP_CPU_DEPTH)
+        s->local_depths[at] = depths[i];
     g->thick = g->thick >> 1 | (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << 63;
     for (unsigned band = 0; band < BANDS; band++)
         s->touched[band][at / 64][at % 64] = blocks[band];
@@ -494,17 +520,17 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splat)
 #define AHEAD 32
 
 INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
-                         const uint16_t *order, uint32_t count)
+                         const float *depths, const uint16_t *order, uint32_t count)
 {
     uint32_t i = 0;
     for (; i < AHEAD && i < count; i++)
         __builtin_prefetch(&splats[order[i]]);
     for (; i < count; i++) {
         __builtin_prefetch(&splats[order[i]]);
-        add(s, g, &splats[order[i - AHEAD]]);
+        add(s, g, splats, depths, order[i - AHEAD]);
     }
     for (i = count < AHEAD ? 0 : count - AHEAD; i < count; i++)
-        add(s, g, &splats[order[i]]);
+        add(s, g, splats, depths, order[i]);
 }
 
 /* Blends what is gathered. */
@@ -537,18 +563,18 @@ static void use_view(trip_cpu_scratch *s, const trip_cpu_view *view)
 }
 
 static void tile_blend(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
-                       const uint16_t *order, uint32_t count)
+                       const float *depths, const uint16_t *order, uint32_t count)
 {
     use_view(s, view);
     gathering g = { s->splats, s->thick[s->splats / 64], { s->x, s->y, s->x, s->y } };
     if (!takes_light(s))
         return;
     if (order)
-        add_in_order(s, &g, splats, order, count);
+        add_in_order(s, &g, splats, depths, order, count);
     else
         for (uint32_t i = 0; i < count; i++)
             if (meets(s, &splats[i]))
-                add(s, &g, &splats[i]);
+                add(s, &g, splats, depths, i);
     s->splats = g.splats;
     s->thick[g.splats / 64] = g.thick;
 }

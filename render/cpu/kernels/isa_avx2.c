@@ -4,6 +4,6 @@
 #define TRIP_SIMD TRIP_SIMD_AVX2
 #include "cpu/kernels/table_tmpl.h"
 
-const trip_cpu_kernels trip_cpu_avx2 = TRIP_CPU_TABLE("avx2");
+TRIP_CPU_TABLE(trip_cpu_avx2, "avx2");
 
 #endif

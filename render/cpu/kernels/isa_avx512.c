@@ -4,6 +4,6 @@
 #define TRIP_SIMD TRIP_SIMD_AVX512
 #include "cpu/kernels/table_tmpl.h"
 
-const trip_cpu_kernels trip_cpu_avx512 = TRIP_CPU_TABLE("avx512");
+TRIP_CPU_TABLE(trip_cpu_avx512, "avx512");
 
 #endif

@@ -2,4 +2,4 @@
 #define TRIP_SIMD TRIP_SIMD_PLAIN
 #include "cpu/kernels/table_tmpl.h"
 
-const trip_cpu_kernels trip_cpu_plain = TRIP_CPU_TABLE("plain");
+TRIP_CPU_TABLE(trip_cpu_plain, "plain");

@@ -8,12 +8,14 @@
 #include <stdatomic.h>
 #include <stdint.h>
 
+#include "layer.h"
 #include "renderer.h"
 #include "splat.h"
 
 /* Edge of a screen tile in pixels. Its pixels are kept as V-lane vectors of four columns times V /
  * 4 rows (a block), so that a small footprint meets few vectors and all of them aligned: block
- * after block, row by row of blocks, each as R[V] G[V] B[V] T[V]; T is 1 - alpha. */
+ * after block, row by row of blocks, each a vector for every channel of layer.h; of alpha, 1 -
+ * alpha is kept. */
 #define TRIP_CPU_TILE 32
 #define TRIP_CPU_TILE_PIXELS (TRIP_CPU_TILE * TRIP_CPU_TILE)
 
@@ -86,6 +88,7 @@ typedef struct trip_cpu_view {
     double forward_length;                     /* most that z changes by over an index length */
     double eye[3];                             /* [u, v, sheet] */
     double world[3][3];  /* index_to_world's columns for u, v, sheet, over voxel_world */
+    double depth_unit;   /* by which z is to be multiplied to be that of layers */
     trip_splat parallel; /* the footprint of all, in parallel views */
 } trip_cpu_view;
 
@@ -134,6 +137,7 @@ typedef struct trip_cpu_lanes {
 typedef struct trip_cpu_scratch {
     _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by block: G[V], stretch[V] */
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
+    float local_depths[TRIP_CPU_LOCAL]; /* of layers with depth */
     /* By band and 64 splats: first each splat's blocks, then each block's splats. */
     uint64_t touched[TRIP_CPU_BANDS][TRIP_CPU_LOCAL / 64][64];
     uint64_t any[TRIP_CPU_BANDS];        /* blocks that some splat may touch */
@@ -158,9 +162,12 @@ typedef enum trip_cpu_content {
 
 struct trip_cpu_region;
 
+/* Kernels are compiled for layers of colour alone and once more for layers with depth. Arguments
+ * named `depths` are one float a splat, and nothing without depth. */
 typedef struct trip_cpu_kernels {
     const char *isa;
-    unsigned lanes;
+    unsigned lanes, channels;
+    const struct trip_cpu_kernels *with_depth; /* the same for layers with depth */
 
     /* Which squares of a region may show, by trip_cpu_mask's words: in Morton order, a bit each,
      * the first lowest. */
@@ -173,10 +180,10 @@ typedef struct trip_cpu_kernels {
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
      * order. With `open`, a word a tile as in trip_cpu_mask, those over closed blocks alone may be
-     * left out; NULL: none are. `out` has room for count + 16. Returns how many. */
+     * left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many. */
     uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
-                        trip_cpu_splat *out);
+                        trip_cpu_splat *out, float *depths);
 
     /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere; `alone`
      * says that its weight is 1 all over the tile. */
@@ -187,16 +194,17 @@ typedef struct trip_cpu_kernels {
     /* Blends splats[order[i]] in order, or splats[i] where order is NULL, that were projected with
      * this view. */
     void (*tile_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
-                       const uint16_t *order, uint32_t count);
+                       const float *depths, const uint16_t *order, uint32_t count);
     /* Ends with every splat in the pixels. Returns which blocks of 4 x 4 pixels of the quarters
      * hold a pixel that may still take light: eight rows of eight bits, the first lowest. */
     uint64_t (*tile_end)(trip_cpu_scratch *s);
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
     void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum);
-    /* The finished picture of a tile into an image, from what the lists came to there. */
+    /* The finished picture of a tile into an image, from what the lists came to there; `depth` is
+     * one float a pixel of the image, and nothing without depth. */
     void (*tile_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
-                        const float *pixels, float *rgba);
+                        const float *pixels, float *rgba, float *depth);
 
     /* How many of so many splats that project() made have a pixel centre of the image in their
      * support where the list has weight. Uses `s` for itself. */

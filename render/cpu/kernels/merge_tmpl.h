@@ -112,6 +112,8 @@ static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, floa
         for (int c = 0; c < 3; c++)
             v_store(block + c * V, v_set(0));
         v_store(block + 3 * V, t);
+        if (TRIP_CPU_DEPTH)
+            v_store(block + TRIP_CHANNEL_DEPTH * V, v_set(0));
     }
 }
 
@@ -123,7 +125,7 @@ static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pix
         float *to = sum + BLOCK_FLOATS * b;
         vf w = weight(view, view->axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
         w = w * w;
-        for (int c = 0; c < 4; c++) {
+        for (int c = 0; c < CHANNELS; c++) {
             vf layer = v_load(block + c * V);
             if (c == 3)
                 layer = v_set(1) - layer;
@@ -147,16 +149,16 @@ INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
 
 /* Block b of the picture before the background. */
 INLINE void merged_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
-                         const float *pixels, vf out[4])
+                         const float *pixels, vf out[CHANNELS])
 {
-    for (int c = 0; c < 4; c++)
+    for (int c = 0; c < CHANNELS; c++)
         out[c] = v_load(pixels + BLOCK_FLOATS * b + c * V);
     if (content == TRIP_CPU_LAYER) {
         out[3] = v_set(1) - out[3];
         return;
     }
     vf inverse = inverse_weight(view, x, y, b);
-    for (int c = 0; c < 4; c++)
+    for (int c = 0; c < CHANNELS; c++)
         out[c] = out[c] * inverse;
 }
 
@@ -184,36 +186,68 @@ INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, 
                16 * (size_t)(count < 4 ? count : 4));
 }
 
-/* A tile where no list has drawn. */
-static void tile_background(const trip_cpu_view *view, float *rgba, size_t line_floats, int count,
-                            int lines)
+/* A tile where no list has drawn; `width` pixels from line to line, of which the first `count`
+ * columns and `lines` lines lie in the image. */
+static void tile_background(const trip_cpu_view *view, float *rgba, float *depth, size_t width,
+                            int count, int lines)
 {
     const float pixel[4] = { behind(view, 0), behind(view, 1), behind(view, 2), behind(view, 3) };
     count = count < TRIP_CPU_TILE ? count : TRIP_CPU_TILE;
     for (int r = 0; r < lines && r < TRIP_CPU_TILE; r++)
-        for (int i = 0; i < count; i++)
-            memcpy(rgba + (size_t)r * line_floats + 4 * i, pixel, sizeof pixel);
+        for (int i = 0; i < count; i++) {
+            memcpy(rgba + 4 * ((size_t)r * width + (size_t)i), pixel, sizeof pixel);
+            if (TRIP_CPU_DEPTH)
+                depth[(size_t)r * width + (size_t)i] = INFINITY;
+        }
+}
+
+/* The mean distance of what is seen at a block's pixels, as layer.h has it, from the merged
+ * sums. */
+INLINE vf mean_distance(const trip_cpu_view *view, int x, int y, unsigned b, vf depth, vf alpha)
+{
+    const trip_camera *camera = &view->splat.camera;
+    vf px = v_set((float)(x - 0.5 * camera->width)) + block_x(b);
+    vf py = v_set((float)(y - 0.5 * camera->height)) + block_y(b);
+    vf ray_length = v_sqrt(form_at(view->world2, px, py)) * v_set((float)view->stretch);
+    vm seen = v_gt(alpha, v_set(0));
+    return v_select(seen, depth / v_select(seen, alpha, v_set(1)) * ray_length, v_set(INFINITY));
+}
+
+/* Distances of a block's pixels, as store_pixels(). */
+INLINE void store_depths(float *depth, size_t width, int count, int lines, vf distances)
+{
+    float block[V];
+    v_store(block, distances);
+    for (int r = 0; r < BLOCK_ROWS && r < lines; r++)
+        for (int i = 0; i < 4 && i < count; i++)
+            depth[(size_t)r * width + (size_t)i] = block[4 * r + i];
 }
 
 static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
-                        const float *pixels, float *rgba)
+                        const float *pixels, float *rgba, float *depth)
 {
     const trip_camera *camera = &view->splat.camera;
-    size_t line_floats = 4 * (size_t)camera->width;
-    rgba += (size_t)y * line_floats + 4 * (size_t)x;
+    const size_t width = (size_t)camera->width, first = (size_t)y * width + (size_t)x;
+    rgba += 4 * first;
+    if (TRIP_CPU_DEPTH)
+        depth += first;
     if (content == TRIP_CPU_NOTHING) {
-        tile_background(view, rgba, line_floats, camera->width - x, camera->height - y);
+        tile_background(view, rgba, depth, width, camera->width - x, camera->height - y);
         return;
     }
     for (int b = 0; b < BLOCKS; b++) {
         int column = 4 * (b % BLOCKS_ACROSS), line = BLOCK_ROWS * (b / BLOCKS_ACROSS);
-        vf out[4];
+        int columns = camera->width - x - column, lines = camera->height - y - line;
+        size_t at = (size_t)line * width + (size_t)column;
+        vf out[CHANNELS];
         merged_block(view, x, y, b, content, pixels, out);
+        if (TRIP_CPU_DEPTH)
+            store_depths(depth + at, width, columns, lines,
+                         mean_distance(view, x, y, (unsigned)b, out[CHANNELS - 1], out[3]));
         vf through = v_set(1) - out[3];
         for (int c = 0; c < 4; c++)
             out[c] = v_fma(through, v_set(behind(view, c)), out[c]);
-        store_pixels(rgba + (size_t)line * line_floats + 4 * column, line_floats,
-                     camera->width - x - column, camera->height - y - line, out);
+        store_pixels(rgba + 4 * at, 4 * width, columns, lines, out);
     }
 }
 

@@ -578,8 +578,18 @@ INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32
     v_store_rows(base + 12, row, c[4], v_load(lanes->first + at), v_load(lanes->last + at), tiles);
 }
 
+/* Depths of the lanes that are kept. */
+INLINE void store_depths_of(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
+                            const uint32_t row[V], float *depths)
+{
+    float z[V];
+    v_store(z, v_load(lanes->z + at) * v_set((float)view->depth_unit));
+    for (int i = 0; i < V; i++)
+        depths[row[i] / 16] = z[i];
+}
+
 static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                             trip_cpu_lanes *lanes, trip_cpu_splat *out)
+                             trip_cpu_lanes *lanes, trip_cpu_splat *out, float *depths)
 {
     uint32_t row[V];
     unsigned kept = lanes->kept[at / V], near = lanes->near[at / V];
@@ -591,6 +601,8 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
         return 0;
     uint32_t n = rank(kept, row);
     store(view, lanes, at, row, colour_of(view, staged, at), out);
+    if (TRIP_CPU_DEPTH)
+        store_depths_of(view, lanes, at, row, depths);
     if (near)
         replace_near(out, row, near, replaced);
     return n;
@@ -601,7 +613,7 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
  * out before it is coloured, stored, sorted and gathered. */
 static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
-                        trip_cpu_splat *out)
+                        trip_cpu_splat *out, float *depths)
 {
     uint32_t n = 0;
     const float *extinction = &view->of->table[0].extinction;
@@ -624,7 +636,7 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
         lanes->near[i / V] = near;
     }
     for (uint32_t i = 0; i < count; i += V)
-        n += store_splats(view, staged, i, lanes, out + n);
+        n += store_splats(view, staged, i, lanes, out + n, TRIP_CPU_DEPTH ? depths + n : NULL);
     return n;
 }
 

@@ -10,12 +10,22 @@
 #include "cpu/kernels/simd_tmpl.h"
 #include "cpu/kernels/squares_tmpl.h"
 
-#define TRIP_CPU_TABLE(name)                                                                       \
+/* Defines the table `name` of the instruction set called `isa`, or with depth the one that `name`
+ * names for layers with depth. */
+#if TRIP_CPU_DEPTH
+#define TRIP_CPU_TABLE(name, isa_name) const trip_cpu_kernels name##_depth = KERNELS(isa_name, NULL)
+#else
+#define TRIP_CPU_TABLE(name, isa_name)                                                             \
+    extern const trip_cpu_kernels name##_depth;                                                    \
+    const trip_cpu_kernels name = KERNELS(isa_name, &name##_depth)
+#endif
+
+#define KERNELS(isa_name, depth_table)                                                             \
     {                                                                                              \
-        .isa = name, .lanes = V, .squares = squares, .stage = stage, .project = project,           \
-        .tile_clear = tile_clear, .tile_begin = tile_begin, .tile_blend = tile_blend,              \
-        .tile_end = tile_end, .tile_merge = tile_merge, .tile_finish = tile_finish,                \
-        .drawn = drawn,                                                                            \
+        .isa = isa_name, .lanes = V, .channels = CHANNELS, .with_depth = depth_table,              \
+        .squares = squares, .stage = stage, .project = project, .tile_clear = tile_clear,          \
+        .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
+        .tile_merge = tile_merge, .tile_finish = tile_finish, .drawn = drawn,                      \
     }
 
 #endif

@@ -1,0 +1,239 @@
+/* The picture of distances: closed forms for flat objects, and the CPU renderer against the
+ * reference. */
+#include "cpu/kernels/isa.h"
+#include "cpu_scenes.h"
+#include "test.h"
+
+/* Sheets of the slabs, which fill the grid across. */
+enum { N = 24, FRONT = 14, BACK = 5 };
+
+static bool one_slab(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)i;
+    (void)j;
+    (void)gradient;
+    *code = 1;
+    return k <= FRONT;
+}
+
+static bool two_sheets(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)i;
+    (void)j;
+    (void)gradient;
+    *code = 1;
+    return k == FRONT || k == BACK;
+}
+
+static bool one_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 1;
+    return i == N / 2 && j == N / 2 && k == N / 2;
+}
+
+/* Turned about x and stretched along the last axis, in units of 1000. */
+static const trip_affine turned = {
+    { { 1000, 0, 0, 500 }, { 0, 600, -1600, 100 }, { 0, 800, 1200, -300 } }
+};
+static const trip_affine plain = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
+
+static trip_settings with_depth(void)
+{
+    trip_settings s = trip_settings_default();
+    s.shading = false;
+    s.depth = true;
+    return s;
+}
+
+/* From the side of the last sheets, along the last axis, `distance` voxel thicknesses from sheet
+ * FRONT. */
+static trip_camera_params head_on(const scene *s, double distance, bool parallel)
+{
+    const trip_affine *map = &s->data->index_to_world;
+    double middle = 0.5 * (N - 1);
+    trip_camera_params view = { .fov_degrees = 12, .width = 21, .height = 21 };
+    view.look = trip_affine_point(map, trip_v3(middle, middle, FRONT));
+    view.eye = trip_affine_point(map, trip_v3(middle, middle, FRONT + distance));
+    view.up = trip_affine_vector(map, trip_v3(0, 1, 0));
+    if (parallel)
+        view.ortho_height = 0.4 * distance * trip_length(view.up);
+    return view;
+}
+
+/* 1 / the cosine between the ray of a pixel and the middle's. */
+static double slant(const trip_camera_params *view, int x, int y)
+{
+    double per_pixel = 2 * tan(view->fov_degrees / 360 * 3.14159265358979323846) / view->height;
+    double across = (x + 0.5 - 0.5 * view->width) * per_pixel;
+    double down = (y + 0.5 - 0.5 * view->height) * per_pixel;
+    return view->ortho_height > 0 ? 1 : sqrt(1 + across * across + down * down);
+}
+
+/* `sheets` beyond FRONT is the mean of what is seen, to within `tolerance` sheets. */
+static void expect_mean(const scene *s, const trip_camera_params *view, double distance,
+                        double sheets, double tolerance)
+{
+    trip_settings settings = with_depth();
+    double thickness = trip_length(trip_affine_vector(&s->data->index_to_world, trip_v3(0, 0, 1)));
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        if (!scene_has_depth(r))
+            continue;
+        scene_picture p = scene_draw(s, r, view, &settings);
+        for (int i = 0; i < p.width * p.height; i++) {
+            double along = (double)p.depth[i] / slant(view, i % p.width, i / p.width) / thickness;
+            if (!(fabs(along - distance - sheets) <= tolerance))
+                fail_msg("%s: pixel %d lies %g sheets off, expected %g", r->name, i,
+                         along - distance, sheets);
+        }
+        scene_picture_free(&p);
+    }
+}
+
+static void check_flat(scene_voxel voxel, double opacity, double sheets, double tolerance)
+{
+    const trip_affine maps[] = { plain, turned };
+    for (int i = 0; i < 4; i++) {
+        scene s;
+        scene_create(&s, &(scene_params){ .dims = { N, N, N },
+                                          .index_to_world = maps[i / 2],
+                                          .tile_voxels = 16,
+                                          .voxel = voxel });
+        /* Of one voxel thickness, not of the cube root of the volume. */
+        double thickness =
+            trip_length(trip_affine_vector(&s.data->index_to_world, trip_v3(0, 0, 1)));
+        double voxel_world = cbrt(fabs(trip_affine_determinant(&s.data->index_to_world)));
+        scene_colour(&s, 1, 1, 1, 0.5, 0.2, 1 - pow(1 - opacity, voxel_world / thickness));
+        trip_camera_params view = head_on(&s, 30, i % 2);
+        expect_mean(&s, &view, 30, sheets, tolerance);
+        scene_destroy(&s);
+    }
+}
+
+/* Of what one sheet lets through, 1e-4 is seen one sheet further back. */
+static void an_opaque_slab_is_as_far_as_its_front_face(void **state)
+{
+    (void)state;
+    check_flat(one_slab, 0.9999, 0, 2e-3);
+}
+
+/* 0.5 of the front one is seen and 0.25 of the back one; kernels ripple by about a hundredth. */
+static void two_half_transparent_sheets_are_at_their_weighted_mean(void **state)
+{
+    (void)state;
+    check_flat(two_sheets, 0.5, (FRONT - BACK) * 0.25 / 0.75, 0.06);
+}
+
+static void where_nothing_is_seen_is_infinitely_far(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { N, N, N }, .voxel = one_voxel });
+    scene_colour(&s, 1, 1, 1, 1, 1, 0.5);
+    trip_settings settings = with_depth();
+    trip_camera_params view = scene_view(&s, trip_v3(0.8, 0.9, 1), 40, 40, 96);
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        if (!scene_has_depth(r))
+            continue;
+        scene_picture p = scene_draw(&s, r, &view, &settings);
+        int seen = 0;
+        for (int i = 0; i < p.width * p.height; i++) {
+            assert_int_equal(isinf(p.depth[i]) != 0, p.rgba[4 * i] == 0);
+            assert_true(p.depth[i] > 38);
+            seen += !isinf(p.depth[i]);
+        }
+        assert_true(seen > 20 && seen < 1000);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+/* Depths times the opacity that they are divided by, in units of the object's size. */
+static double depth_difference(const scene_picture *a, const scene_picture *b, double size)
+{
+    double most = 0;
+    for (int i = 0; i < a->width * a->height; i++) {
+        double alpha = (double)a->rgba[4 * i + 3];
+        if (alpha > 1e-3)
+            most = fmax(most, alpha * fabs((double)a->depth[i] - (double)b->depth[i]) / size);
+    }
+    return most;
+}
+
+static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
+{
+    scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings);
+    trip_settings colour = *settings;
+    colour.depth = false;
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+        scene_picture p = scene_draw(s, &cpu_scenes_cpu, view, settings);
+        scene_picture q = scene_draw(s, &cpu_scenes_cpu, view, &colour);
+        double off = depth_difference(&expected, &p, 40);
+        if (!(off <= 1.0 / 255))
+            fail_msg("%s: off by %g", (*isa)->isa, off);
+        assert_memory_equal(p.rgba, q.rgba,
+                            (size_t)p.width * (size_t)p.height * 4 * sizeof *p.rgba);
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+    }
+    unsetenv("TRIPTYCH_ISA");
+    scene_picture_free(&expected);
+}
+
+static void check_blobs(const trip_affine *map, const trip_settings *settings)
+{
+    scene s;
+    cpu_scenes_blobs(&s, 16, map);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.9, -0.8), 70, 45, 70);
+    compare(&s, &view, settings);
+    view.ortho_height = 50;
+    compare(&s, &view, settings);
+    view = scene_view(&s, trip_v3(0.3, 1, 0.2), 6, 110, 70);
+    compare(&s, &view, settings);
+    scene_destroy(&s);
+}
+
+static void the_cpu_renderer_has_the_reference_s_depths_and_its_own_colours(void **state)
+{
+    (void)state;
+    trip_settings settings = with_depth();
+    settings.background[3] = 0; /* so that alpha is the object's */
+    trip_affine sheared = cpu_scenes_sheared();
+    settings.h = 0.3;
+    check_blobs(NULL, &settings);
+    check_blobs(&sheared, &settings);
+    settings.method = TRIP_METHOD_CLIP;
+    check_blobs(&sheared, &settings);
+    settings.traversal = TRIP_TRAVERSAL_ASCENDING;
+    settings.method = TRIP_METHOD_AXIS;
+    check_blobs(NULL, &settings);
+}
+
+static void depths_take_no_rounded_target(void **state)
+{
+    (void)state;
+    trip_settings settings = with_depth();
+    assert_int_equal(trip_settings_check(&settings), 0);
+    settings.target = TRIP_TARGET_RGBA8;
+    test_catch_reports();
+    assert_int_equal(trip_settings_check(&settings), TRIP_USAGE);
+    assert_one_report("rounded layers have no depth; leave the target at rgba32f");
+    settings.depth = false;
+    assert_int_equal(trip_settings_check(&settings), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_opaque_slab_is_as_far_as_its_front_face),
+        cmocka_unit_test(two_half_transparent_sheets_are_at_their_weighted_mean),
+        cmocka_unit_test(where_nothing_is_seen_is_infinitely_far),
+        cmocka_unit_test(the_cpu_renderer_has_the_reference_s_depths_and_its_own_colours),
+        cmocka_unit_test(depths_take_no_rounded_target),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
