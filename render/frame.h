@@ -74,7 +74,7 @@ int trip_frame_picture(trip_drawing *d, float *rgba, float *depth);
  * within milliseconds, and like those that follow with TRIP_INTERRUPTED. */
 void trip_frame_cancel(trip_drawing *d);
 /* The renderer and the reader are free for another frame. One that is not done is given up: what
- * the renderer has under way is dropped. */
+ * the renderer has under way is dropped, and reads under way are not waited for. */
 void trip_frame_end(trip_drawing *d);
 
 /* Begins, steps to the end, takes the picture; rgba and depth as in trip_frame_picture(). */

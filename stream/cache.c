@@ -7,13 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SEARCH_MAX = 8 /* entries looked at for one that may go */ };
+enum {
+    SEARCH_MAX = 8,     /* entries looked at for one that may go */
+    UNUSED_PASSES = 12, /* two frames of three lists with two sides: what is unused longer may go */
+};
 
 typedef struct entry {
-    uint32_t page; /* this and the passes: reader's thread */
-    uint32_t reserved_pass, last_pass;
-    const void *filler; /* set before its request is submitted */
-    _Atomic bool valid; /* release when stored, acquire when found */
+    uint32_t page;                     /* this and the passes: reader's thread */
+    uint32_t reserved_pass, last_pass; /* last_pass: no later pass has a request for the page */
+    const void *filler;                /* set before its request is submitted */
+    _Atomic bool valid;                /* release when stored, acquire when found */
 } entry;
 
 struct trip_cache {
@@ -22,7 +25,8 @@ struct trip_cache {
     unsigned list_count;
     unsigned page_log2;
     uint32_t page_count, entry_count, used, hand, pass;
-    uint32_t settled; /* nothing of this pass and those before it is under way */
+    uint32_t frame_pass; /* the last pass of the frames before this one */
+    uint32_t ended_pass; /* no request of this pass and those before it is under way */
     /* Of a page: position + 1, 0 = not here. Written by the reader's thread, release; acquire in
      * engine threads. */
     _Atomic uint32_t *entry_of;
@@ -125,14 +129,19 @@ const unsigned char *trip_cache_bytes(const trip_cache *c, unsigned list, int pl
     return memory_of(c, c->first_page[list][plane] + 1) + offset;
 }
 
-void trip_cache_settle(trip_cache *c)
+void trip_cache_begin_frame(trip_cache *c)
 {
-    c->settled = c->pass;
+    c->frame_pass = c->pass;
 }
 
-void trip_cache_begin_pass(trip_cache *c)
+uint32_t trip_cache_begin_pass(trip_cache *c)
 {
-    c->pass++;
+    return ++c->pass;
+}
+
+void trip_cache_end_passes(trip_cache *c, uint32_t first_pass)
+{
+    c->ended_pass = first_pass <= c->frame_pass ? first_pass - 1 : c->frame_pass;
 }
 
 bool trip_cache_find(trip_cache *c, uint32_t page)
@@ -141,20 +150,31 @@ bool trip_cache_find(trip_cache *c, uint32_t page)
     if (position == 0)
         return false;
     entry *e = &c->entries[position - 1];
-    if (e->reserved_pass > c->settled || !atomic_load_explicit(&e->valid, memory_order_acquire))
+    if (e->reserved_pass > c->frame_pass || !atomic_load_explicit(&e->valid, memory_order_acquire))
         return false;
     e->last_pass = c->pass;
     return true;
+}
+
+/* The page's own entry. Where a request under way may store it, it is left to that. */
+static entry *own_entry(trip_cache *c, entry *e)
+{
+    bool under_way = e->last_pass > c->ended_pass;
+    e->last_pass = c->pass;
+    return under_way ? NULL : e;
+}
+
+static bool may_go(const trip_cache *c, const entry *e)
+{
+    return c->pass - e->last_pass > UNUSED_PASSES && e->last_pass <= c->ended_pass;
 }
 
 /* An entry for the page: its own, an empty one, or one that may go. */
 static entry *find_room(trip_cache *c, uint32_t page)
 {
     uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_relaxed);
-    if (position) {
-        entry *own = &c->entries[position - 1];
-        return own->last_pass > c->settled ? NULL : own; /* else it may be being filled */
-    }
+    if (position)
+        return own_entry(c, &c->entries[position - 1]);
     if (holds_all(c))
         return &c->entries[page];
     if (c->used < c->entry_count)
@@ -162,7 +182,7 @@ static entry *find_room(trip_cache *c, uint32_t page)
     for (int i = 0; i < SEARCH_MAX && c->entry_count > 0; i++) {
         entry *e = &c->entries[c->hand];
         c->hand = (c->hand + 1) % c->entry_count;
-        if (c->pass - e->last_pass > TRIP_CACHE_STALE_PASSES) {
+        if (may_go(c, e)) {
             atomic_store_explicit(&c->entry_of[e->page], 0, memory_order_relaxed);
             return e;
         }
@@ -191,8 +211,9 @@ void trip_cache_store(trip_cache *c, uint32_t page, const void *filler, const vo
                       size_t bytes)
 {
     uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_acquire);
-    if (position == 0 || c->entries[position - 1].filler != filler)
+    entry *e = position ? &c->entries[position - 1] : NULL;
+    if (!e || e->filler != filler || atomic_load_explicit(&e->valid, memory_order_relaxed))
         return;
     memcpy(memory_of(c, position), data, bytes);
-    atomic_store_explicit(&c->entries[position - 1].valid, true, memory_order_release);
+    atomic_store_explicit(&e->valid, true, memory_order_release);
 }

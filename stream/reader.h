@@ -29,11 +29,11 @@ typedef struct trip_reader_params {
     size_t gap_bytes; /* gaps up to this are read through; default 32 KiB, at least a page */
     unsigned threads; /* that read (pread) and check; default 4 */
     bool buffered;    /* through the page cache, not O_DIRECT */
-    /* Of verified pages kept in memory between passes, from the budget; 0 = none. */
+    /* Of verified pages kept in memory between frames, from the budget; 0 = none. */
     size_t cache_bytes;
     /* The caller's own memory for the slots: `slots` pointers aligned to 4096 bytes, each to
-     * slot_bytes, which are a multiple of the page size and not too few for a run. NULL: taken from
-     * the budget. */
+     * slot_bytes, which are a multiple of the page size and not too few for a run. It is read into
+     * until trip_reader_destroy() returns. NULL: taken from the budget. */
     void *const *slot_memory;
     /* Asked right before a run's bytes are requested: true = leave it out (it lies behind what is
      * already saturated). Called on the thread that calls begin and next. */
@@ -97,13 +97,15 @@ typedef struct trip_reader trip_reader;
 
 int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_reader_params *params,
                        trip_budget *budget);
+/* Waits for reads under way. */
 void trip_reader_destroy(trip_reader *r);
 /* For a renderer that has the splats already: nothing is read, and batches hold runs only,
  * from the next trip_reader_begin() on, which must follow. */
 void trip_reader_set_runs_only(trip_reader *r, bool runs_only);
-/* Starts reading a pass (NULL: none yet), which must outlive its reading and has at most as many
- * selections as the data set has lists. Passes that are not over
- * are given up; all batches must have been released. */
+/* Starts a frame by reading a pass (NULL: none yet), which must stay there until it is over or
+ * given up, and has at most as many selections as the data set has lists. Passes that are not over
+ * are given up, without waiting: of reads under way nothing is handed out, counted or reported,
+ * and their slots are used again as they end. All batches must have been released. */
 int trip_reader_begin(trip_reader *r, const trip_pass *pass);
 /* Another pass behind those begun, up to TRIP_READER_PASSES_MAX: it is read ahead while the last
  * batches of the one before it are drawn. */

@@ -104,7 +104,7 @@ static void enter_pass(trip_reader *r)
         return;
     trip_planner_begin(&r->planner, r->passes[r->pass], r->cursors);
     if (r->cache)
-        trip_cache_begin_pass(r->cache);
+        r->cache_pass = trip_cache_begin_pass(r->cache);
 }
 
 /* What the slot will hold, of the pass being planned or else of those behind it; false when no runs
@@ -119,10 +119,33 @@ static bool plan_slot(trip_reader *r, trip_slot *s)
     return false;
 }
 
+/* Frees the slots that were given up and have nothing pending any more. */
+static void reclaim_slots(trip_reader *r)
+{
+    uint32_t first_pass = UINT32_MAX;
+    pthread_mutex_lock(&r->lock);
+    for (unsigned i = 0; i < r->params.slots; i++) {
+        trip_slot *s = &r->slots[i];
+        if (s->state != TRIP_SLOT_GIVEN_UP)
+            continue;
+        if (s->pending == 0) {
+            s->state = TRIP_SLOT_FREE;
+            r->given_up_count--;
+        } else if (s->cache_pass < first_pass) {
+            first_pass = s->cache_pass;
+        }
+    }
+    pthread_mutex_unlock(&r->lock);
+    if (r->cache)
+        trip_cache_end_passes(r->cache, first_pass);
+}
+
 /* Plans and requests as much as there are free slots for; where nothing has to be on its way, the
  * next alone, since later more may be skipped. */
 static void fill_slots(trip_reader *r)
 {
+    if (r->given_up_count > 0)
+        reclaim_slots(r);
     for (unsigned i = 0; i < r->params.slots && !(r->in_memory && r->queue_count); i++) {
         trip_slot *s = &r->slots[i];
         if (s->state != TRIP_SLOT_FREE)
@@ -130,6 +153,7 @@ static void fill_slots(trip_reader *r)
         if (!plan_slot(r, s))
             break;
         s->request_count = 0;
+        s->cache_pass = r->cache_pass;
         if (r->runs_only || r->in_memory)
             enqueue(r, s);
         else
@@ -153,30 +177,82 @@ static void count_requests(trip_reader *r, const trip_slot *s)
     }
 }
 
-/* Until the first slot of the queue has been read; false when the time is over before. */
-static bool await_first(trip_reader *r, uint64_t timeout_ns)
+/* Gives up what is being read, without waiting for it. */
+static void give_up_slots(trip_reader *r)
 {
-    const trip_slot *s = r->queue[r->queue_first];
-    uint64_t start = now_ns(), end;
+    for (; r->queue_count > 0; r->queue_count--) {
+        trip_slot *s = r->queue[r->queue_first];
+        r->queue_first = (r->queue_first + 1) % r->params.slots;
+        for (unsigned i = 0; i < s->request_count; i++)
+            atomic_store_explicit(&s->requests[i].given_up, true, memory_order_relaxed);
+        s->state = TRIP_SLOT_GIVEN_UP;
+        r->given_up_count++;
+    }
+}
+
+/* Whether the first slot of the queue was read, or one that was given up can be used again. Under
+ * the lock. */
+static bool slot_is_ready(const trip_reader *r)
+{
+    if (r->queue_count > 0 && r->queue[r->queue_first]->pending == 0)
+        return true;
+    for (unsigned i = 0; i < r->params.slots; i++)
+        if (r->slots[i].state == TRIP_SLOT_GIVEN_UP && r->slots[i].pending == 0)
+            return true;
+    return false;
+}
+
+/* Waits for that; false when the time is over before. */
+static bool wait_for_slot(trip_reader *r, const struct timespec *until)
+{
     int late = 0;
-    if (__builtin_add_overflow(start, timeout_ns, &end) || end > INT64_MAX)
-        end = INT64_MAX;
-    const struct timespec until = { .tv_sec = (time_t)(end / 1000000000u),
-                                    .tv_nsec = (long)(end % 1000000000u) };
+    uint64_t start = now_ns();
     pthread_mutex_lock(&r->lock);
-    while (s->pending > 0 && timeout_ns > 0 && !late)
-        late = pthread_cond_timedwait(&r->ready, &r->lock, &until);
-    bool read = s->pending == 0;
+    while (!slot_is_ready(r) && !late)
+        late = pthread_cond_timedwait(&r->ready, &r->lock, until);
+    bool ready = slot_is_ready(r);
     pthread_mutex_unlock(&r->lock);
     r->stats.wait_ns += now_ns() - start;
+    return ready;
+}
+
+/* Whether trip_reader_next() need not wait. */
+static bool has_answer(trip_reader *r)
+{
+    if (r->queue_count == 0)
+        return r->given_up_count == 0 || r->pass == r->pass_count;
+    pthread_mutex_lock(&r->lock);
+    bool read = r->queue[r->queue_first]->pending == 0;
+    pthread_mutex_unlock(&r->lock);
     return read;
 }
 
-/* Takes the first slot of the queue when it has been read. */
-static trip_slot *wait_first(trip_reader *r)
+static struct timespec time_after(uint64_t timeout_ns)
+{
+    uint64_t end;
+    if (__builtin_add_overflow(now_ns(), timeout_ns, &end) || end > INT64_MAX)
+        end = INT64_MAX;
+    return (struct timespec){ .tv_sec = (time_t)(end / 1000000000u),
+                              .tv_nsec = (long)(end % 1000000000u) };
+}
+
+bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
+{
+    const struct timespec until = time_after(timeout_ns);
+    while (!r->failed) {
+        fill_slots(r);
+        if (has_answer(r))
+            return true;
+        if (timeout_ns == 0 || !wait_for_slot(r, &until))
+            return false;
+    }
+    return true;
+}
+
+/* Takes the first slot of the queue, which has been read. */
+static trip_slot *take_first(trip_reader *r)
 {
     trip_slot *s = r->queue[r->queue_first];
-    await_first(r, UINT64_MAX);
     r->queue_first = (r->queue_first + 1) % r->params.slots;
     r->queue_count--;
     count_requests(r, s);
@@ -185,21 +261,23 @@ static trip_slot *wait_first(trip_reader *r)
 
 void trip_reader_drain(trip_reader *r)
 {
-    while (r->queue_count > 0)
-        wait_first(r)->state = TRIP_SLOT_FREE;
+    const struct timespec until = time_after(UINT64_MAX);
+    give_up_slots(r);
+    for (reclaim_slots(r); r->given_up_count > 0; reclaim_slots(r))
+        wait_for_slot(r, &until);
 }
 
 void trip_reader_set_runs_only(trip_reader *r, bool runs_only)
 {
-    trip_reader_drain(r);
+    give_up_slots(r);
     r->runs_only = runs_only;
 }
 
 int trip_reader_begin(trip_reader *r, const trip_pass *pass)
 {
-    trip_reader_drain(r);
+    give_up_slots(r);
     for (unsigned i = 0; i < r->params.slots; i++)
-        assert(r->slots[i].state == TRIP_SLOT_FREE);
+        assert(r->slots[i].state != TRIP_SLOT_DRAWING);
     r->stats = (trip_reader_stats){ 0 };
     r->pass = r->pass_count = 0;
     r->failed = 0;
@@ -212,7 +290,8 @@ int trip_reader_begin(trip_reader *r, const trip_pass *pass)
                                  .skip = r->params.skip,
                                  .skip_user = r->params.skip_user };
     if (r->cache)
-        trip_cache_settle(r->cache);
+        trip_cache_begin_frame(r->cache);
+    reclaim_slots(r);
     return pass ? trip_reader_then(r, pass) : TRIP_OK;
 }
 
@@ -323,15 +402,15 @@ static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 
 int trip_reader_next(trip_reader *r, trip_batch *batch)
 {
+    trip_reader_await(r, UINT64_MAX);
     if (r->failed)
         return r->failed;
-    fill_slots(r);
     if (r->queue_count == 0 && r->pass == r->pass_count)
         return 0;
     if (r->queue_count == 0)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "all %u slots of the ring are held: release one first", r->params.slots);
-    trip_slot *s = wait_first(r);
+    trip_slot *s = take_first(r);
     r->failed = check_slot(r, s);
     if (!r->failed) {
         fill_batch(r, s, batch);
@@ -339,13 +418,6 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     }
     s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
     return r->failed ? r->failed : 1;
-}
-
-bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
-{
-    if (!r->failed)
-        fill_slots(r);
-    return r->failed || r->queue_count == 0 || await_first(r, timeout_ns);
 }
 
 void trip_reader_release(trip_reader *r, trip_batch *batch)

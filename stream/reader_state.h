@@ -13,7 +13,9 @@
 
 typedef enum trip_slot_state {
     TRIP_SLOT_FREE,
-    TRIP_SLOT_READING, /* ready when nothing is pending */
+    TRIP_SLOT_READING,  /* ready when nothing is pending */
+    TRIP_SLOT_GIVEN_UP, /* was being read when its frame was given up; free when nothing is pending
+                         */
     TRIP_SLOT_DRAWING,
 } trip_slot_state;
 
@@ -23,6 +25,7 @@ typedef struct trip_slot {
     unsigned pending; /* under the reader's lock: requests not done */
     unsigned char *memory;
     const trip_pass *pass;
+    uint32_t cache_pass; /* number of the pass in the cache */
     trip_extent extent;
     trip_request requests[TRIP_SLOT_REQUESTS_MAX];
     unsigned request_count;
@@ -42,6 +45,7 @@ struct trip_reader {
     unsigned pass_count, pass; /* pass: the one being planned; pass_count when all are planned */
     trip_planner planner;
     trip_pass_cursor *cursors; /* of the pass being planned: one for each list */
+    uint32_t cache_pass;       /* of the pass being planned */
     int failed;                /* status that ended the passes */
     bool runs_only;
     bool in_memory; /* batches lie in the cache: nothing is requested, and slots hold only runs */
@@ -52,6 +56,7 @@ struct trip_reader {
     /* Slots being read, in draw order, from queue[queue_first % slots] on. */
     trip_slot **queue;
     unsigned queue_first, queue_count;
+    unsigned given_up_count; /* slots in that state */
     pthread_mutex_t lock;
     pthread_cond_t ready; /* a slot has nothing pending any more */
 };
@@ -63,7 +68,7 @@ int trip_reader_start_engine(trip_engine engine, unsigned depth, unsigned thread
  * when another has taken its name. -1 where the file system, or a missing /proc, does not allow it:
  * then reads go through the page cache. */
 int trip_reader_open_direct(int fd);
-/* Waits until nothing is being read. */
+/* Gives up the passes and waits until nothing is being read. */
 void trip_reader_drain(trip_reader *r);
 
 #endif

@@ -13,6 +13,7 @@ void trip_request_start(trip_request *q)
     q->direct = q->source->direct_fd >= 0 &&
                 !atomic_load_explicit(q->source->direct_refused, memory_order_relaxed);
     atomic_store_explicit(&q->given, false, memory_order_relaxed);
+    atomic_store_explicit(&q->given_up, false, memory_order_relaxed);
     q->done_bytes = 0;
     q->reads = 0;
     q->fault = TRIP_REQUEST_OK;
@@ -114,11 +115,15 @@ bool trip_request_step(trip_request *q, long result)
 void trip_request_run(trip_request *q)
 {
     long result;
-    if (q->cached) {
-        copy_pages(q);
-        return;
-    }
     do {
+        if (atomic_load_explicit(&q->given_up, memory_order_relaxed)) {
+            q->done(q);
+            return;
+        }
+        if (q->cached) {
+            copy_pages(q);
+            return;
+        }
         trip_read read = trip_request_read(q);
         ssize_t n = pread(read.fd, read.data, read.bytes, (off_t)read.offset);
         result = n < 0 ? -errno : n;

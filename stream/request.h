@@ -43,6 +43,7 @@ typedef struct trip_request {
     bool keep;                 /* pages that the cache has made room for are stored there */
     struct trip_request *next; /* the engine's */
     _Atomic bool given;        /* the engine's: set (release) when it goes to the kernel */
+    _Atomic bool given_up;     /* set by the reader (relaxed): it ends before its next read */
     /* Result; the reader's again after `done`. */
     bool direct;
     size_t done_bytes;
@@ -65,7 +66,8 @@ trip_read trip_request_read(const trip_request *q);
 /* Takes the result of that read, a count or -errno. True when another is needed; false when the
  * request is over: then it has been checked and `done` called, and it belongs to the reader. */
 bool trip_request_step(trip_request *q, long result);
-/* Carries out the rest of the request on this thread: all of it where it is cached. */
+/* Carries out the rest of the request on this thread: all of it where it is cached. One that was
+ * given up is over at once, and nothing may be made of its result. */
 void trip_request_run(trip_request *q);
 
 #endif

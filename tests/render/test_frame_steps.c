@@ -150,16 +150,30 @@ static void a_batch_is_drawn_in_pieces_when_there_is_a_deadline(void **state)
     scene_destroy(&s);
 }
 
-/* Reads wait here until they may go on. */
+/* Reads wait here until they may go on, but for the first few. A gate that nobody opens opens
+ * itself after a time, and then has failed. */
 typedef struct gate {
     pthread_mutex_t lock;
     pthread_cond_t opened;
-    bool open;
+    bool open, failed;
+    unsigned times_opened, free, waiting;
 } gate;
+
+enum { GATE_SECONDS = 20 };
 
 static gate closed_gate(void)
 {
-    return (gate){ PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false };
+    return (gate){ PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, .open = false };
+}
+
+static void wait_at(gate *g)
+{
+    struct timespec until;
+    clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_sec += GATE_SECONDS;
+    g->waiting++;
+    for (unsigned before = g->times_opened; g->times_opened == before && !g->failed;)
+        g->failed = pthread_cond_timedwait(&g->opened, &g->lock, &until) != 0;
 }
 
 static long pass_gate(void *user, void *data, uint64_t offset, size_t bytes, long result)
@@ -169,8 +183,9 @@ static long pass_gate(void *user, void *data, uint64_t offset, size_t bytes, lon
     (void)offset;
     (void)bytes;
     pthread_mutex_lock(&g->lock);
-    while (!g->open)
-        pthread_cond_wait(&g->opened, &g->lock);
+    if (!g->open && g->free == 0)
+        wait_at(g);
+    g->free -= g->free > 0;
     pthread_mutex_unlock(&g->lock);
     return result;
 }
@@ -179,6 +194,7 @@ static void open_gate(gate *g)
 {
     pthread_mutex_lock(&g->lock);
     g->open = true;
+    g->times_opened++;
     pthread_cond_broadcast(&g->opened);
     pthread_mutex_unlock(&g->lock);
 }
@@ -259,6 +275,158 @@ static void a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is(void *
         assert_memory_equal(whole, after, sizeof whole);
         put_away(&d);
     }
+    scene_destroy(&s);
+}
+
+static bool uring_works(const scene *s)
+{
+    trip_reader *r;
+    test_catch_reports();
+    int status = trip_reader_create(
+        &r, s->data, &(trip_reader_params){ .engine = TRIP_ENGINE_URING }, s->budget);
+    test_caught_reports();
+    if (status)
+        test_lacks("io_uring");
+    else
+        trip_reader_destroy(r);
+    return !status;
+}
+
+static double thread_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+/* Whether a read waits at the gate. */
+static bool has_come(gate *g)
+{
+    pthread_mutex_lock(&g->lock);
+    bool has = g->waiting > 0;
+    pthread_mutex_unlock(&g->lock);
+    return has;
+}
+
+/* Gives a frame up after some of its reads, while others wait at the gate; returns the processor
+ * time that it takes. */
+static double stop_at_gate(desk *d, gate *g, unsigned reads)
+{
+    trip_drawing drawing;
+    pthread_mutex_lock(&g->lock);
+    g->open = false;
+    g->free = reads;
+    g->waiting = 0;
+    pthread_mutex_unlock(&g->lock);
+    assert_int_equal(trip_frame_begin(&drawing, d->renderer, d->reader, &d->frame), 0);
+    for (uint64_t end = trip_frame_now_ns() + 10000000; trip_frame_now_ns() < end || !has_come(g);)
+        if (trip_frame_step(&drawing, end) == TRIP_FRAME_WAITS)
+            trip_frame_await(&drawing, 1000000);
+    assert_false(drawing.done);
+    double start = thread_seconds();
+    trip_frame_end(&drawing);
+    double seconds = thread_seconds() - start;
+    pthread_mutex_lock(&g->lock);
+    assert_false(g->open || g->failed);
+    pthread_mutex_unlock(&g->lock);
+    return seconds;
+}
+
+static void check_stopping(const scene *s, const scene_renderer *kind, trip_reader_params params)
+{
+    static float whole[4 * PIXELS], after[4 * PIXELS];
+    gate g = closed_gate();
+    desk d;
+    double least = 1;
+    set_up(&d, s, kind, small_slots);
+    draw_whole(&d, whole);
+    put_away(&d);
+    params.slots = 4;
+    params.slot_bytes = small_slots.slot_bytes;
+    params.fault = pass_gate;
+    params.fault_user = &g;
+    set_up(&d, s, kind, params);
+    for (unsigned reads = 0; reads < 12; reads += 4) {
+        double seconds = stop_at_gate(&d, &g, reads);
+        least = seconds < least ? seconds : least;
+        open_gate(&g);
+    }
+    if (!(least < 0.005))
+        fail_msg("%s: giving up takes %g s of processor time", kind->name, least);
+    draw_whole(&d, after);
+    assert_memory_equal(whole, after, sizeof whole);
+    put_away(&d);
+    assert_false(g.failed);
+}
+
+static void a_frame_that_is_given_up_waits_for_no_read(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    bool uring = uring_works(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++)
+        for (int i = 0; i < 4; i++) {
+            const trip_reader_params params = { .engine =
+                                                    i % 2 ? TRIP_ENGINE_PREAD : TRIP_ENGINE_URING,
+                                                .cache_bytes = i / 2 * 50000 };
+            if (uring || params.engine != TRIP_ENGINE_URING)
+                check_stopping(&s, kind, params);
+        }
+    scene_destroy(&s);
+}
+
+/* Every read takes another time. */
+static long read_unevenly(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    _Atomic uint32_t *count = user;
+    (void)data;
+    (void)bytes;
+    uint32_t ns = scene_hash((int)(offset >> 12), (int)++*count, 0) % 500000;
+    nanosleep(&(struct timespec){ .tv_nsec = ns }, NULL);
+    return result;
+}
+
+static void check_many_stops(const scene *s, const scene_renderer *kind, trip_reader_params params)
+{
+    static float whole[4 * PIXELS], after[4 * PIXELS];
+    _Atomic uint32_t count = 0;
+    desk d;
+    params.slot_bytes = small_slots.slot_bytes;
+    params.fault = read_unevenly;
+    params.fault_user = &count;
+    set_up(&d, s, kind, params);
+    draw_whole(&d, whole);
+    for (int i = 0; i < 30; i++) {
+        trip_drawing drawing;
+        assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
+        for (uint32_t steps = scene_hash(i, 1, 2) % 12; steps > 0; steps--)
+            if (trip_frame_step(&drawing, 0) == TRIP_FRAME_WAITS)
+                trip_frame_await(&drawing, scene_hash(i, (int)steps, 3) % 400000);
+        trip_frame_end(&drawing);
+        if (i % 10 != 9)
+            continue;
+        draw_whole(&d, after);
+        assert_memory_equal(whole, after, sizeof whole);
+    }
+    put_away(&d);
+}
+
+static void frames_given_up_at_random_leave_the_next_one_as_it_is(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    bool uring = uring_works(&s);
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++)
+        for (int i = 0; i < 4; i++) {
+            const trip_reader_params params = { .engine =
+                                                    i % 2 ? TRIP_ENGINE_PREAD : TRIP_ENGINE_URING,
+                                                .slots = i == 1 || i == 2 ? 8 : 2,
+                                                .cache_bytes = i / 2 * 100000 };
+            if (uring || params.engine != TRIP_ENGINE_URING)
+                check_many_stops(&s, kind, params);
+        }
     scene_destroy(&s);
 }
 
@@ -501,6 +669,8 @@ int main(void)
         cmocka_unit_test(a_batch_is_drawn_in_pieces_when_there_is_a_deadline),
         cmocka_unit_test(a_step_does_not_wait_for_the_disk),
         cmocka_unit_test(a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is),
+        cmocka_unit_test(a_frame_that_is_given_up_waits_for_no_read),
+        cmocka_unit_test(frames_given_up_at_random_leave_the_next_one_as_it_is),
         cmocka_unit_test(a_cancelled_frame_fails_and_says_so_once),
         cmocka_unit_test(no_batch_is_drawn_after_cancelling),
         cmocka_unit_test(cancelling_costs_little_of_what_drawing_costs),

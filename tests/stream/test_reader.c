@@ -3,12 +3,14 @@
 #include <errno.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <pthread.h>
 #include <semaphore.h>
 #include <stdio.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 /* Index of the brick that holds a voxel, found by trying all of the list. */
@@ -844,6 +846,215 @@ static void a_pass_given_up_leaves_the_reader_ready_for_the_next(void **state)
     close_fixture(&f, d);
 }
 
+/* Reads wait at a gate. One that nobody opens opens itself after a time, and then has failed. */
+typedef struct gate {
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+    unsigned waiting, times_opened;
+    bool open, failed;
+    int kind; /* what comes of reads that have waited: 0 what was read, else -kind, or a bit flipped
+               */
+} gate;
+
+enum { GATE_SECONDS = 20, FLIP_A_BIT = -1 };
+
+static void wait_at(gate *g)
+{
+    struct timespec until;
+    clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_sec += GATE_SECONDS;
+    g->waiting++;
+    pthread_cond_broadcast(&g->changed);
+    for (unsigned before = g->times_opened; g->times_opened == before && !g->failed;)
+        g->failed = pthread_cond_timedwait(&g->changed, &g->lock, &until) != 0;
+}
+
+static long pass_gate(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    gate *g = user;
+    (void)offset;
+    (void)bytes;
+    pthread_mutex_lock(&g->lock);
+    bool waits = !g->open;
+    int kind = g->kind;
+    if (waits)
+        wait_at(g);
+    pthread_mutex_unlock(&g->lock);
+    if (waits && kind == FLIP_A_BIT && result > 0)
+        ((unsigned char *)data)[result / 2] ^= 4;
+    return waits && kind > 0 ? -kind : result;
+}
+
+static void close_gate(gate *g, int kind)
+{
+    pthread_mutex_lock(&g->lock);
+    g->open = false;
+    g->kind = kind;
+    g->waiting = 0;
+    pthread_mutex_unlock(&g->lock);
+}
+
+/* Until a read waits there. */
+static void meet_at_gate(gate *g)
+{
+    pthread_mutex_lock(&g->lock);
+    while (!g->waiting)
+        pthread_cond_wait(&g->changed, &g->lock);
+    pthread_mutex_unlock(&g->lock);
+}
+
+/* Nothing went through; reads that come from here on are unharmed. */
+static void assert_closed(gate *g)
+{
+    pthread_mutex_lock(&g->lock);
+    assert_false(g->open || g->failed);
+    g->kind = 0;
+    pthread_mutex_unlock(&g->lock);
+}
+
+static void *open_later(void *user)
+{
+    gate *g = user;
+    usleep(20000);
+    pthread_mutex_lock(&g->lock);
+    g->open = true;
+    g->times_opened++;
+    pthread_cond_broadcast(&g->changed);
+    pthread_mutex_unlock(&g->lock);
+    return NULL;
+}
+
+/* Passes are given up in the middle of their reads; one that is read to its end begins while these
+ * go on. */
+static void give_up_and_read(trip_reader *r, gate *g, const trip_selection *s, int kind,
+                             const fixture *f, fixture_voxel *out)
+{
+    const trip_pass pass = trip_pass_of(&s[0]), other = trip_pass_of(&s[1]);
+    pthread_t opener;
+    size_t n;
+    close_gate(g, kind);
+    assert_int_equal(trip_reader_begin(r, &pass), TRIP_OK);
+    meet_at_gate(g);
+    assert_int_equal(trip_reader_begin(r, &other), TRIP_OK);
+    assert_false(trip_reader_await(r, 0));
+    assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
+    assert_true(trip_reader_await(r, 0)); /* there is nothing to wait for */
+    assert_closed(g);
+    assert_int_equal(pthread_create(&opener, NULL, open_later, g), 0);
+    assert_int_equal(read_pass(r, s, 1, out, &n), 0);
+    assert_int_equal(n, f->count);
+    assert_memory_equal(out, f->lists[s->list->axis], n * sizeof *out);
+    assert_int_equal(trip_reader_get_stats(r).splats, n);
+    pthread_join(opener, NULL);
+}
+
+static void check_giving_up(const fixture *f, const trip_dataset *d, trip_reader_params params,
+                            int kind)
+{
+    gate g = { PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, .kind = kind };
+    trip_reader *r;
+    trip_selection s[3];
+    pthread_t opener;
+    fixture_voxel *out = calloc(f->count, sizeof *out);
+    params.planes = 3;
+    params.fault = pass_gate;
+    params.fault_user = &g;
+    for (int axis = 0; axis < 3; axis++)
+        select_all(&s[axis], d, axis, false);
+    fixture_catch_reports();
+    assert_int_equal(trip_reader_create(&r, d, &params, f->budget), TRIP_OK);
+    for (int first = 0; first < 2; first++) /* a list of which nothing is cached */
+        give_up_and_read(r, &g, &s[first], kind, f, out);
+    assert_string_equal(fixture_reports(), "");
+    const trip_pass pass = trip_pass_of(&s[2]);
+    close_gate(&g, 0);
+    assert_int_equal(trip_reader_begin(r, &pass), TRIP_OK);
+    meet_at_gate(&g);
+    assert_int_equal(pthread_create(&opener, NULL, open_later, &g), 0);
+    trip_reader_destroy(r); /* waits for what is read into its memory */
+    pthread_join(opener, NULL);
+    assert_false(g.failed);
+    for (int axis = 0; axis < 3; axis++)
+        trip_selection_destroy(&s[axis], f->budget);
+    free(out);
+}
+
+static void giving_up_waits_for_no_read(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    (void)state;
+    open_fixture(&f, &d);
+    bool uring = uring_works(d);
+    const int kinds[] = { 0, EIO, FLIP_A_BIT };
+    for (int i = 0; i < 18; i++) {
+        trip_reader_params params = { .engine = i % 2 ? TRIP_ENGINE_PREAD : TRIP_ENGINE_URING,
+                                      .slots = i % 3 ? 3 : 8,
+                                      .slot_bytes = 1, /* the least */
+                                      .cache_bytes = i / 2 % 3 == 0   ? 0
+                                                     : i / 2 % 3 == 1 ? 300000
+                                                                      : 8 << 20 };
+        if (uring || params.engine != TRIP_ENGINE_URING)
+            check_giving_up(&f, d, params, kinds[i / 6]);
+    }
+    close_fixture(&f, d);
+}
+
+/* Passes given up at random, some of which are read to the end and compared. */
+static void check_random_giving_up(const fixture *f, const trip_dataset *d,
+                                   const trip_reader_params *params)
+{
+    trip_reader *r;
+    uint64_t state = 77;
+    size_t n;
+    fixture_voxel *wanted = calloc(f->count, sizeof *wanted), *got = calloc(f->count, sizeof *got);
+    assert_int_equal(trip_reader_create(&r, d, params, f->budget), TRIP_OK);
+    for (int i = 0; i < 150; i++) {
+        trip_selection s;
+        trip_batch batch;
+        select_some(&s, d, &state);
+        const trip_pass pass = trip_pass_of(&s);
+        if (i % 7 == 6) {
+            size_t n_wanted = expect(f, &s, wanted);
+            assert_int_equal(read_pass(r, &s, 1, got, &n), 0);
+            assert_int_equal(n, n_wanted);
+            assert_memory_equal(got, wanted, n * sizeof *got);
+        } else {
+            assert_int_equal(trip_reader_begin(r, &pass), TRIP_OK);
+            for (uint64_t k = fixture_random(&state) % 4; k > 0; k--)
+                if (trip_reader_next(r, &batch) == 1)
+                    trip_reader_release(r, &batch);
+            assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
+        }
+        trip_selection_destroy(&s, f->budget);
+    }
+    trip_reader_destroy(r);
+    free(wanted);
+    free(got);
+}
+
+static void passes_given_up_at_random_leave_those_after_them_whole(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    (void)state;
+    open_fixture(&f, &d);
+    bool uring = uring_works(d);
+    for (int i = 0; i < 8; i++) {
+        _Atomic uint64_t counter = (uint64_t)i;
+        trip_reader_params params = { .engine = i % 2 ? TRIP_ENGINE_PREAD : TRIP_ENGINE_URING,
+                                      .planes = 3,
+                                      .slots = i % 3 ? 8 : 2,
+                                      .slot_bytes = 1, /* the least */
+                                      .cache_bytes = i / 2 ? (size_t)100000 << i : 0,
+                                      .fault = disturb,
+                                      .fault_user = &counter };
+        if (uring || params.engine != TRIP_ENGINE_URING)
+            check_random_giving_up(&f, d, &params);
+    }
+    close_fixture(&f, d);
+}
+
 static void holding_every_slot_is_an_error_and_not_a_hang(void **state)
 {
     fixture f;
@@ -966,6 +1177,8 @@ int main(void)
         cmocka_unit_test(skipped_bricks_are_left_out_and_counted),
         cmocka_unit_test(gaps_are_read_through_only_when_they_are_small),
         cmocka_unit_test(a_pass_given_up_leaves_the_reader_ready_for_the_next),
+        cmocka_unit_test(giving_up_waits_for_no_read),
+        cmocka_unit_test(passes_given_up_at_random_leave_those_after_them_whole),
         cmocka_unit_test(holding_every_slot_is_an_error_and_not_a_hang),
         cmocka_unit_test(parameters_out_of_range_are_refused),
         cmocka_unit_test(where_io_uring_is_refused_threads_read),
