@@ -2,122 +2,166 @@
 
 #include "test.h"
 
-#include "normal.h"
-
 #include <stdlib.h>
 #include <string.h>
 
 #include "normal.h"
 
-/* What the writer is given; fills in the map that 3-byte normals need. */
-static trip_writer_params writer_params(const scene_params *p, trip_compact_normals *compact)
+enum { PARTS_MAX = 4 };
+
+/* What is written into a data set, and how. */
+typedef struct writing {
+    trip_writer *writer;
+    trip_writer_params params;
+    trip_compact_normals compact; /* where normals have 3 bytes */
+    scene_part parts[PARTS_MAX];  /* the first are the voxels of level 0 */
+    trip_writer_list lists[3 * PARTS_MAX];
+} writing;
+
+trip_affine scene_coarse_map(const trip_affine *fine, const int by[3])
 {
-    trip_writer_params params = {
+    trip_affine step = trip_affine_identity();
+    for (int a = 0; a < 3; a++) {
+        step.m[a][a] = by[a];
+        step.m[a][3] = 0.5 * (by[a] - 1);
+    }
+    return trip_affine_multiply(fine, &step);
+}
+
+static void set_lists(writing *w, const scene_params *p)
+{
+    assert_true(p->part_count < PARTS_MAX);
+    w->parts[0] = (scene_part){ .by = { 1, 1, 1 }, .voxel = p->voxel, .user = p->user };
+    for (unsigned i = 0; i <= p->part_count; i++) {
+        const scene_part *part = i ? &p->parts[i - 1] : &w->parts[0];
+        w->parts[i] = *part;
+        trip_writer_list list = { .level = part->level, .kind = part->kind };
+        list.index_to_world = part->level ? scene_coarse_map(&w->params.index_to_world, part->by)
+                                          : w->params.index_to_world;
+        for (int a = 0; a < 3; a++) {
+            assert_int_equal(p->dims[a] % part->by[a], 0);
+            list.dims[a] = p->dims[a] / part->by[a];
+        }
+        for (int a = 0; a < 3; a++) {
+            list.axis = a;
+            list.sheet_first = 0.5 * (part->by[a] - 1);
+            list.sheet_step = part->by[a];
+            w->lists[3 * i + (unsigned)a] = list;
+        }
+    }
+    w->params.lists = w->lists;
+    w->params.list_count = 3 * (p->part_count + 1);
+}
+
+static void set_params(writing *w, const scene_params *p)
+{
+    w->params = (trip_writer_params){
         .code_bytes = p->code_bytes ? p->code_bytes : 2,
         .normal_bytes = p->normals ? p->normal_bytes ? p->normal_bytes : 4 : 0,
-        .tile_voxels = p->tile_voxels,
+        .tile_voxels = p->tile_voxels ? p->tile_voxels : 64,
         .slab_sheets = p->slab_sheets,
         .page_bytes = 4096,
         .dims = { p->dims[0], p->dims[1], p->dims[2] },
         .index_to_world = p->index_to_world,
         .codes = { .code_hi = 1 },
     };
+    trip_writer_params *params = &w->params;
     bool given = false;
     for (int i = 0; i < 12; i++)
         given |= p->index_to_world.m[i / 4][i % 4] != 0;
     if (!given)
-        params.index_to_world = trip_affine_identity();
-    double voxel = cbrt(fabs(trip_affine_determinant(&params.index_to_world)));
-    if (params.normal_bytes != 3) {
-        params.codes.gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1;
-        return params;
+        params->index_to_world = trip_affine_identity();
+    if (params->normal_bytes != 3) {
+        params->codes.gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1;
+        return;
     }
-    params.codes.gradient_full = TRIP_GRADIENT_FULL / voxel; /* values go from 0 to 1 */
-    trip_compact_normals_choose(&params.index_to_world, params.codes.gradient_full, 0,
-                                params.codes.gradient_step);
-    *compact = trip_compact_normals_make(&params.index_to_world, params.codes.gradient_full,
-                                         params.codes.gradient_step);
-    return params;
+    double voxel = cbrt(fabs(trip_affine_determinant(&params->index_to_world)));
+    params->codes.gradient_full = TRIP_GRADIENT_FULL / voxel; /* values go from 0 to 1 */
+    trip_compact_normals_choose(&params->index_to_world, params->codes.gradient_full, 0,
+                                params->codes.gradient_step);
+    w->compact = trip_compact_normals_make(&params->index_to_world, params->codes.gradient_full,
+                                           params->codes.gradient_step);
 }
 
-static uint32_t pack_normal(const trip_writer_params *w, const trip_compact_normals *compact,
-                            const double gradient[3])
+static uint32_t pack_normal(const writing *w, const double gradient[3])
 {
-    if (w->normal_bytes != 3)
+    if (w->params.normal_bytes != 3)
         return trip_normal_pack(gradient, 1);
-    trip_vec3 g = trip_affine_transpose_vector(&w->index_to_world,
+    trip_vec3 g = trip_affine_transpose_vector(&w->params.index_to_world,
                                                trip_v3(gradient[0], gradient[1], gradient[2]));
-    return trip_compact_normal_pack(compact, (double[3]){ g.x, g.y, g.z });
+    return trip_compact_normal_pack(&w->compact, (double[3]){ g.x, g.y, g.z });
+}
+
+/* The even bits of a Morton code. */
+static uint32_t even_bits(uint32_t morton)
+{
+    uint32_t u = 0;
+    for (int bit = 0; bit < 16; bit++)
+        u |= (morton >> 2 * bit & 1) << bit;
+    return u;
 }
 
 /* The voxels of one tile of a sheet in Morton order. */
-static uint32_t gather_run(const scene_params *p, const trip_writer_params *w,
-                           const trip_compact_normals *compact, int axis, int sheet, int tile_u,
-                           int tile_v, int tile, uint32_t *voxels, uint32_t *normals)
+static uint32_t gather_run(const writing *w, unsigned number, int sheet, uint32_t tile_u,
+                           uint32_t tile_v, uint32_t *voxels, uint32_t *normals)
 {
-    int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    uint32_t count = 0;
-    for (uint32_t m = 0; m < (uint32_t)(tile * tile); m++) {
-        int u = 0, v = 0, at[3];
-        for (int bit = 0; bit < 8; bit++) {
-            u |= (int)(m >> (2 * bit) & 1) << bit;
-            v |= (int)(m >> (2 * bit + 1) & 1) << bit;
-        }
+    const trip_writer_list *list = &w->lists[number];
+    const scene_part *part = &w->parts[number / 3];
+    uint32_t tile = w->params.tile_voxels, count = 0;
+    int axis = list->axis, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    for (uint32_t m = 0; m < tile * tile; m++) {
+        uint32_t u = even_bits(m), v = even_bits(m >> 1);
+        int at[3];
         at[axis] = sheet;
-        at[u_axis] = tile_u * tile + u;
-        at[v_axis] = tile_v * tile + v;
-        if (at[u_axis] >= p->dims[u_axis] || at[v_axis] >= p->dims[v_axis])
+        at[u_axis] = (int)(tile_u * tile + u);
+        at[v_axis] = (int)(tile_v * tile + v);
+        if (at[u_axis] >= list->dims[u_axis] || at[v_axis] >= list->dims[v_axis])
             continue;
         unsigned code = 65535;
         double gradient[3] = { 0 };
-        if (p->voxel && !p->voxel(p->user, at[0], at[1], at[2], &code, gradient))
+        if (part->voxel && !part->voxel(part->user, at[0], at[1], at[2], &code, gradient))
             continue;
-        voxels[count] = trip_voxel_pack((unsigned)u, (unsigned)v, code);
-        normals[count++] = pack_normal(w, compact, gradient);
+        voxels[count] = trip_voxel_pack(u, v, code);
+        normals[count++] = pack_normal(w, gradient);
     }
     return count;
 }
 
-static void append_sheet(trip_writer *w, const scene_params *p, const trip_writer_params *params,
-                         const trip_compact_normals *compact, int axis, int sheet, int tile)
+static void append_sheet(const writing *w, unsigned number, int sheet)
 {
     static uint32_t voxels[128 * 128], normals[128 * 128];
-    int tiles_u = (int)((p->dims[(axis + 1) % 3] + tile - 1) / tile);
-    int tiles_v = (int)((p->dims[(axis + 2) % 3] + tile - 1) / tile);
+    const trip_writer_list *list = &w->lists[number];
+    int64_t tile = w->params.tile_voxels;
+    uint32_t tiles_u = (uint32_t)((list->dims[(list->axis + 1) % 3] + tile - 1) / tile);
+    uint32_t tiles_v = (uint32_t)((list->dims[(list->axis + 2) % 3] + tile - 1) / tile);
+    bool has_normals = w->params.normal_bytes && list->kind == TRIP_KIND_VOXELS;
     for (uint32_t m = 0; m < 64 * 64; m++) {
-        int tile_u = 0, tile_v = 0;
-        for (int bit = 0; bit < 6; bit++) {
-            tile_u |= (int)(m >> (2 * bit) & 1) << bit;
-            tile_v |= (int)(m >> (2 * bit + 1) & 1) << bit;
-        }
+        uint32_t tile_u = even_bits(m), tile_v = even_bits(m >> 1);
         if (tile_u >= tiles_u || tile_v >= tiles_v)
             continue;
-        uint32_t count =
-            gather_run(p, params, compact, axis, sheet, tile_u, tile_v, tile, voxels, normals);
+        uint32_t count = gather_run(w, number, sheet, tile_u, tile_v, voxels, normals);
         if (count)
-            assert_int_equal(trip_writer_append(w, (unsigned)axis, (uint32_t)sheet,
-                                                (uint32_t)tile_u, (uint32_t)tile_v, voxels,
-                                                p->normals ? normals : NULL, count),
+            assert_int_equal(trip_writer_append(w->writer, number, (uint32_t)sheet, tile_u, tile_v,
+                                                voxels, has_normals ? normals : NULL, count),
                              0);
     }
 }
 
 static void write_dataset(const scene *s, const scene_params *p)
 {
-    trip_compact_normals compact = { 0 };
-    const trip_writer_params params = writer_params(p, &compact);
-    trip_writer *w;
-    assert_int_equal(trip_writer_open(&w, s->path, &params, s->budget), 0);
-    int tile = p->tile_voxels ? (int)p->tile_voxels : 64;
-    for (int axis = 0; axis < 3; axis++)
-        for (int sheet = 0; sheet < p->dims[axis]; sheet++)
-            append_sheet(w, p, &params, &compact, axis, sheet, tile);
+    writing w = { 0 };
+    set_params(&w, p);
+    set_lists(&w, p);
+    assert_int_equal(trip_writer_open(&w.writer, s->path, &w.params, s->budget), 0);
+    for (unsigned i = 0; i < w.params.list_count; i++)
+        for (int sheet = 0; sheet < w.lists[i].dims[w.lists[i].axis]; sheet++)
+            append_sheet(&w, i, sheet);
     trip_writer_summary summary = {
         .value_max = 1,
         .voxels = (uint64_t)(p->dims[0] * p->dims[1] * p->dims[2]),
         .text = "{}",
     };
-    assert_int_equal(trip_writer_finish(w, &summary), 0);
+    assert_int_equal(trip_writer_finish(w.writer, &summary), 0);
 }
 
 void scene_create(scene *s, const scene_params *params)

@@ -19,6 +19,15 @@ static inline uint32_t scene_hash(int i, int j, int k)
     return x ^ x >> 15;
 }
 
+/* Further lists along X, Y and Z: a halo, or another level. */
+typedef struct scene_part {
+    unsigned level;
+    trip_kind kind;
+    int by[3]; /* voxels of level 0 that one of this level is as long as; divisors of dims */
+    scene_voxel voxel;
+    void *user;
+} scene_part;
+
 typedef struct scene_params {
     int64_t dims[3];
     trip_affine index_to_world; /* all zero: the identity */
@@ -28,6 +37,8 @@ typedef struct scene_params {
     double gradient_scale;             /* the header's, by which gradients are multiplied; 0: 1 */
     scene_voxel voxel;                 /* NULL: every voxel is there with code 65535 */
     void *user;
+    const scene_part *parts; /* after the voxels of level 0, three lists each */
+    unsigned part_count;     /* at most 3 */
 } scene_params;
 
 typedef struct scene {
@@ -38,6 +49,8 @@ typedef struct scene {
 } scene;
 
 void scene_create(scene *s, const scene_params *params);
+/* The map of a grid whose voxels are `by` voxels of `fine` long and begin where those do. */
+trip_affine scene_coarse_map(const trip_affine *fine, const int by[3]);
 void scene_destroy(scene *s);
 
 /* Codes [first, last] get a colour and an opacity per voxel. */

@@ -48,66 +48,32 @@ static bool coarse_voxel(void *user, int i, int j, int k, unsigned *code, double
 
 typedef struct levels {
     coarseness coarse;
-    scene scenes[2];
-    trip_dataset both;
-    trip_list lists[6];
-    scene drawn;
+    scene drawn; /* a data set of both */
 } levels;
 
-static double offset_of(const levels *l, int axis)
-{
-    return 0.5 * (l->coarse.by[axis] - 1);
-}
-
-static trip_affine coarse_map(const levels *l, const trip_affine *fine)
-{
-    trip_affine step = trip_affine_identity();
-    for (int a = 0; a < 3; a++) {
-        step.m[a][a] = l->coarse.by[a];
-        step.m[a][3] = offset_of(l, a);
-    }
-    return trip_affine_multiply(fine, &step);
-}
-
-/* One data set of the lists of two. */
 static void create(levels *l, coarseness coarse, double thickness)
 {
-    trip_affine fine = { { { 0, -1, 0, 3 }, { 1, 0, 0, -2 }, { 0, 0, thickness, 5 } } };
-    memset(l, 0, sizeof *l);
     l->coarse = coarse;
-    scene_params params = { .dims = { N, N, N },
-                            .index_to_world = fine,
-                            .tile_voxels = 16,
-                            .slab_sheets = 4,
-                            .voxel = fine_voxel };
-    scene_create(&l->scenes[0], &params);
-    params.index_to_world = coarse_map(l, &fine);
-    params.voxel = coarse_voxel;
-    params.user = &l->coarse;
-    for (int a = 0; a < 3; a++)
-        params.dims[a] = N / coarse.by[a];
-    scene_create(&l->scenes[1], &params);
-    l->both = *l->scenes[0].data;
-    l->both.lists = l->lists;
-    l->both.list_count = 6;
-    for (unsigned i = 0; i < 6; i++) {
-        trip_list *list = &l->lists[i];
-        *list = l->scenes[i / 3].data->lists[i % 3];
-        list->index = i;
-        list->level = i / 3;
-        list->sheet_first = i < 3 ? 0 : offset_of(l, list->axis);
-        list->sheet_step = i < 3 ? 1 : coarse.by[list->axis];
-    }
-    l->drawn = l->scenes[0];
-    l->drawn.data = &l->both;
+    const int *by = coarse.by;
+    const scene_part part = {
+        .level = 1, .by = { by[0], by[1], by[2] }, .voxel = coarse_voxel, .user = &l->coarse
+    };
+    scene_create(&l->drawn, &(scene_params){ .dims = { N, N, N },
+                                             .index_to_world = { { { 0, -1, 0, 3 },
+                                                                   { 1, 0, 0, -2 },
+                                                                   { 0, 0, thickness, 5 } } },
+                                             .tile_voxels = 16,
+                                             .slab_sheets = 4,
+                                             .voxel = fine_voxel,
+                                             .parts = &part,
+                                             .part_count = 1 });
     scene_colour(&l->drawn, FINE, FINE, 1, 0.2, 0.1, 0.25);
     scene_colour(&l->drawn, COARSE, COARSE, 0.1, 0.7, 1, 0.1);
 }
 
 static void destroy(levels *l)
 {
-    scene_destroy(&l->scenes[0]);
-    scene_destroy(&l->scenes[1]);
+    scene_destroy(&l->drawn);
 }
 
 /* ---- by brute force ---- */
@@ -273,8 +239,8 @@ static double largest_depth_difference(const scene_picture *p, const float *merg
 static void expect_right(levels *l, const trip_camera_params *view)
 {
     brute b = { .levels = l, .settings = trip_settings_default() };
-    const trip_affine *fine = &l->both.index_to_world;
-    trip_affine maps[2] = { *fine, coarse_map(l, fine) };
+    const trip_affine *fine = &l->drawn.data->index_to_world;
+    trip_affine maps[2] = { *fine, scene_coarse_map(fine, l->coarse.by) };
     b.settings.shading = false;
     b.settings.h = 0.6;
     b.settings.background[3] = 0;
@@ -341,9 +307,9 @@ static trip_plan make_plan(const levels *l, const trip_camera_params *view)
     trip_camera c;
     trip_plan plan;
     trip_settings settings = trip_settings_default();
-    assert_int_equal(trip_camera_make(&c, view, &l->both.index_to_world), 0);
+    assert_int_equal(trip_camera_make(&c, view, &l->drawn.data->index_to_world), 0);
     assert_int_equal(
-        trip_plan_make(&plan, &l->both, &c, &settings, l->drawn.table, l->drawn.budget), 0);
+        trip_plan_make(&plan, l->drawn.data, &c, &settings, l->drawn.table, l->drawn.budget), 0);
     return plan;
 }
 
@@ -360,8 +326,9 @@ static void a_plan_names_lists_by_axis_and_level(void **state)
     trip_plan plan = make_plan(&l, &view);
     assert_int_equal(plan.layers[2].pass_count, 1);
     assert_int_equal(plan.layers[2].passes[0].pass.selection_count, 2);
-    assert_int_equal(trip_plan_splats(&plan), l.lists[2].records + l.lists[5].records);
-    trip_plan_explain(&plan, &l.both, &settings, f);
+    assert_int_equal(trip_plan_splats(&plan),
+                     l.drawn.data->lists[2].records + l.drawn.data->lists[5].records);
+    trip_plan_explain(&plan, l.drawn.data, &settings, f);
     fclose(f);
     assert_non_null(strstr(text, "list x1     not read: no ray of the view has weight in it\n"));
     assert_non_null(strstr(text, "list z      read: "));
@@ -381,18 +348,21 @@ static void lists_that_do_not_lie_along_level_0_are_refused(void **state)
     trip_camera c;
     trip_plan plan;
     trip_settings settings = trip_settings_default();
-    assert_int_equal(trip_camera_make(&c, &view, &l.both.index_to_world), 0);
-    trip_affine straight = l.lists[5].index_to_world;
+    assert_int_equal(trip_camera_make(&c, &view, &l.drawn.data->index_to_world), 0);
+    trip_list *list = &l.drawn.data->lists[5];
+    trip_affine straight = list->index_to_world;
     test_catch_reports();
-    l.lists[5].index_to_world.m[0][0] += 0.01;
-    assert_int_equal(trip_plan_make(&plan, &l.both, &c, &settings, l.drawn.table, l.drawn.budget),
-                     TRIP_ERROR);
+    list->index_to_world.m[0][0] += 0.01;
+    assert_int_equal(
+        trip_plan_make(&plan, l.drawn.data, &c, &settings, l.drawn.table, l.drawn.budget),
+        TRIP_ERROR);
     assert_one_report("does not lie along that of level 0");
-    l.lists[5].index_to_world = straight;
-    l.lists[5].sheet_first += 1;
+    list->index_to_world = straight;
+    list->sheet_first += 1;
     test_catch_reports();
-    assert_int_equal(trip_plan_make(&plan, &l.both, &c, &settings, l.drawn.table, l.drawn.budget),
-                     TRIP_ERROR);
+    assert_int_equal(
+        trip_plan_make(&plan, l.drawn.data, &c, &settings, l.drawn.table, l.drawn.budget),
+        TRIP_ERROR);
     assert_one_report("its sheets lie elsewhere");
     destroy(&l);
 }
