@@ -1,6 +1,5 @@
 #include "hostile.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,9 +35,22 @@ void hostile_load(hostile *h, const char *path)
 {
     char name[32];
     load(&h->index, path, TRIP_INDEX_NAME);
-    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
-        load(&h->planes[i], path,
-             trip_plane_file_name(i / TRIP_PLANES, 0, TRIP_KIND_VOXELS, i % TRIP_PLANES, name));
+    unsigned lists = hostile_header(h)->list_count;
+    h->plane_count = 0;
+    h->planes = calloc((size_t)TRIP_PLANES * lists, sizeof *h->planes);
+    for (unsigned i = 0; i < lists; i++) {
+        const trip_file_list *list = hostile_list(h, h, i);
+        for (int plane = 0; plane < TRIP_PLANES; plane++) {
+            if (!(list->planes >> plane & 1))
+                continue;
+            hostile_file *f = &h->planes[h->plane_count++];
+            load(f, path,
+                 trip_plane_file_name((int)list->axis, list->level, (trip_kind)list->kind, plane,
+                                      name));
+            f->list = i;
+            f->plane = plane;
+        }
+    }
 }
 
 static void copy(hostile_file *to, const hostile_file *from)
@@ -51,15 +63,18 @@ static void copy(hostile_file *to, const hostile_file *from)
 void hostile_copy(hostile *to, const hostile *from)
 {
     copy(&to->index, &from->index);
-    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
+    to->plane_count = from->plane_count;
+    to->planes = calloc(from->plane_count, sizeof *to->planes);
+    for (unsigned i = 0; i < from->plane_count; i++)
         copy(&to->planes[i], &from->planes[i]);
 }
 
 void hostile_free(hostile *h)
 {
     free(h->index.data);
-    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
+    for (unsigned i = 0; i < h->plane_count; i++)
         free(h->planes[i].data);
+    free(h->planes);
 }
 
 /* The checksums of consecutive pages of data[0, bytes), to a table. */
@@ -77,10 +92,10 @@ void hostile_seal(hostile *h, const hostile *sound)
 {
     const trip_file_header *was = hostile_header(sound);
     unsigned char *index = h->index.data;
-    for (int i = 0; i < HOSTILE_PLANE_FILES; i++) {
-        const trip_file_list *list = hostile_list(sound, sound, i / TRIP_PLANES);
-        sum_pages(h->planes[i].data, h->planes[i].bytes, was->page_log2,
-                  index + list->page_checksums_offset[i % TRIP_PLANES]);
+    for (unsigned i = 0; i < h->plane_count; i++) {
+        const hostile_file *f = &h->planes[i];
+        sum_pages(f->data, f->bytes, was->page_log2,
+                  index + hostile_list(sound, sound, f->list)->page_checksums_offset[f->plane]);
     }
     sum_pages(index + TRIP_HEADER_BYTES, was->checksums_offset - TRIP_HEADER_BYTES, was->page_log2,
               index + was->checksums_offset);
@@ -100,11 +115,24 @@ static void write_file(const hostile_file *f, const char *path)
         give_up(file);
 }
 
-void hostile_write(const hostile *h, const char *path)
+static void update(const hostile_file *f, hostile_file *disk, const char *path)
 {
-    if (mkdir(path, 0700) != 0 && errno != EEXIST)
-        give_up(path);
-    write_file(&h->index, path);
-    for (int i = 0; i < HOSTILE_PLANE_FILES; i++)
-        write_file(&h->planes[i], path);
+    if (disk->data && disk->bytes == f->bytes && memcmp(disk->data, f->data, f->bytes) == 0)
+        return;
+    write_file(f, path);
+    free(disk->data);
+    copy(disk, f);
+}
+
+void hostile_write(const hostile *h, hostile *disk, const char *path)
+{
+    if (!disk->planes) {
+        if (mkdir(path, 0700) != 0)
+            give_up(path);
+        disk->plane_count = h->plane_count;
+        disk->planes = calloc(h->plane_count, sizeof *disk->planes);
+    }
+    update(&h->index, &disk->index, path);
+    for (unsigned i = 0; i < h->plane_count; i++)
+        update(&h->planes[i], &disk->planes[i], path);
 }

@@ -8,19 +8,21 @@
 
 #include "format.h"
 
-enum { HOSTILE_PLANE_FILES = 6 };
-
 typedef struct hostile_file {
     char name[32];
+    unsigned list; /* of a plane file: what of */
+    int plane;
     size_t bytes;
     unsigned char *data;
 } hostile_file;
 
 typedef struct hostile {
-    hostile_file index, planes[HOSTILE_PLANE_FILES]; /* x0.voxels, x0.normals, y0.voxels, ... */
+    hostile_file index;
+    hostile_file *planes; /* of all lists, one after the other */
+    unsigned plane_count;
 } hostile;
 
-/* From a data set on disk with voxels and normals; the path is a folder's. */
+/* From a data set on disk; the path is a folder's. */
 void hostile_load(hostile *h, const char *path);
 void hostile_copy(hostile *to, const hostile *from);
 void hostile_free(hostile *h);
@@ -30,16 +32,17 @@ static inline trip_file_header *hostile_header(const hostile *h)
     return (trip_file_header *)(void *)h->index.data;
 }
 
-/* Descriptor of the list along an axis, by the place that the header of `sound` gives it. */
-static inline trip_file_list *hostile_list(const hostile *h, const hostile *sound, int axis)
+/* Descriptor of a list, by the place that the header of `sound` gives it. */
+static inline trip_file_list *hostile_list(const hostile *h, const hostile *sound, unsigned list)
 {
-    return (trip_file_list *)(void *)(h->index.data + hostile_header(sound)->lists_offset) + axis;
+    return (trip_file_list *)(void *)(h->index.data + hostile_header(sound)->lists_offset) + list;
 }
 
 /* Right checksums for whatever stands there now. Tables are found by the places that `sound`, the
  * data set before it was changed, gives them, so that the places themselves may be changed. */
 void hostile_seal(hostile *h, const hostile *sound);
-/* Writes the files into a folder, which is made when it is not there. */
-void hostile_write(const hostile *h, const char *path);
+/* Makes what lies in a folder, `disk`, the same as `h`: files that differ are written. Nothing lies
+ * there yet where `disk` is all zero. */
+void hostile_write(const hostile *h, hostile *disk, const char *path);
 
 #endif

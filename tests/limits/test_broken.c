@@ -1,5 +1,6 @@
 /* Whatever happens to a data set's bytes, on disk or on their way, a frame is the same picture or
  * ends with one line that names the file; and the next frame is whole. */
+#include "cloud.h"
 #include "renderer_choice.h"
 #include "rounds.h"
 #include "scenes.h"
@@ -12,13 +13,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SIZE = 32, FLIPS = 1000, CUTS = 140, MAX_FILES = 8 };
+enum { SIZE = 32, FLIPS = 1000, CUTS = 190 };
 
 static const size_t picture_bytes = (size_t)SIZE * SIZE * 4 * sizeof(float);
 
 static struct {
     scene scene;
-    char files[MAX_FILES][400];
+    char files[CLOUD_FILES][400];
     unsigned file_count;
     float wanted[SIZE * SIZE * 4];
 } shared;
@@ -26,17 +27,6 @@ static struct {
 static unsigned random_below(unsigned count)
 {
     return (unsigned)(test_random() * count);
-}
-
-static bool cloudy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
-{
-    uint32_t hash = scene_hash(i, j, k);
-    (void)user;
-    gradient[0] = i - 15;
-    gradient[1] = j - 12;
-    gradient[2] = k - 10;
-    *code = hash % 60000;
-    return hash % 3 != 0;
 }
 
 /* Everything that takes part in drawing frames, from the disk on. */
@@ -97,23 +87,19 @@ static void find_files(void)
     for (struct dirent *e = readdir(folder); e; e = readdir(folder)) {
         if (e->d_name[0] == '.')
             continue;
-        assert_true(shared.file_count < MAX_FILES);
+        assert_true(shared.file_count < CLOUD_FILES);
         snprintf(shared.files[shared.file_count++], sizeof shared.files[0], "%s/%s",
                  shared.scene.path, e->d_name);
     }
     closedir(folder);
-    assert_int_equal(shared.file_count, 7);
+    assert_int_equal(shared.file_count, CLOUD_FILES);
 }
 
 static int set_up(void **state)
 {
     drawing d;
     (void)state;
-    scene_create(&shared.scene, &(scene_params){ .dims = { 30, 24, 20 },
-                                                 .tile_voxels = 16,
-                                                 .slab_sheets = 5,
-                                                 .normals = true,
-                                                 .voxel = cloudy });
+    cloud_create(&shared.scene);
     scene_colour(&shared.scene, 10000, 49999, 1, 0.4, 0.1, 0.1);
     scene_colour(&shared.scene, 50000, 65535, 0.2, 0.6, 1, 0.9);
     find_files();
