@@ -9,7 +9,8 @@ import numpy
 
 import program
 
-FILES = ["index.trip", *(f"{axis}0.{plane}" for axis in "xyz" for plane in ("voxels", "normals"))]
+PLANES = "voxels", "normals", "halo"
+FILES = ["index.trip", *(f"{axis}0.{plane}" for axis in "xyz" for plane in PLANES)]
 VIEW = ("--size", "40x40", "--look", "20,15,10", "--eye", "80,-60,70")
 
 
@@ -26,6 +27,7 @@ class BadDatasets(program.ProgramTest):
                 ).returncode
                 == 0
             )
+        assert sorted(os.listdir("a.trip")) == sorted(FILES)
         cls.good = cls.draw(cls, "a.trip")[1]
 
     def draw(self, path):
@@ -49,6 +51,7 @@ class BadDatasets(program.ProgramTest):
             assert not os.path.exists(f"{path}.exr"), about
         else:
             assert numpy.array_equal(picture, self.good), about
+            os.remove(f"{path}.exr")
         run = program.call("info", path)
         assert run.returncode == 0 or program.LINE.fullmatch(run.stderr), run.stderr
         shutil.rmtree(path, ignore_errors=True)
