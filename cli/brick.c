@@ -1,4 +1,4 @@
-/* triptych brick: turns a volume into a data set, once; see preprocess/brick.h for how. */
+/* triptych brick: turns a volume into a data set, once. */
 #include "commands.h"
 
 #include <cjson/cJSON.h>
@@ -9,10 +9,11 @@
 #include <string.h>
 
 #include "brick_limits.h"
+#include "budget.h"
+#include "json.h"
+#include "library.h"
 #include "options.h"
 #include "plain_disk.h"
-#include "progress.h"
-#include "json.h"
 #include "report.h"
 #include "text.h"
 #include "volume_options.h"
@@ -45,9 +46,10 @@ enum key {
 };
 
 typedef struct options {
-    trip_brick_params brick;
+    const char *volume, *output;
+    triptych_brick_options brick;
     const char *functions[MAX_FUNCTIONS];
-    trip_value_range ranges[MAX_RANGES];
+    triptych_range ranges[MAX_RANGES];
     char *default_output; /* freed at the end */
     bool quiet, json, dry_run, limits;
 } options;
@@ -127,7 +129,7 @@ static int parse_offset(const char *text, uint64_t *bytes)
 /* "LO:HI"; an empty side is open. */
 static int parse_range(options *o, const char *text)
 {
-    trip_value_range *r = &o->ranges[o->brick.range_count];
+    triptych_range *r = &o->ranges[o->brick.range_count];
     const char *colon = strchr(text, ':');
     char lo[64] = "";
     if (o->brick.range_count == MAX_RANGES)
@@ -135,7 +137,7 @@ static int parse_range(options *o, const char *text)
     if (!colon || colon - text >= (int)sizeof lo)
         return trip_option_fail("--range", "takes two values with a colon between them, LO:HI");
     memcpy(lo, text, (size_t)(colon - text));
-    *r = (trip_value_range){ -FLT_MAX, FLT_MAX };
+    *r = (triptych_range){ -FLT_MAX, FLT_MAX };
     if ((*lo && !trip_text_to_double(lo, &r->lo)) ||
         (colon[1] && !trip_text_to_double(colon + 1, &r->hi)) || r->lo > r->hi)
         return trip_option_fail("--range", "takes two numbers, the smaller first, as LO:HI");
@@ -161,16 +163,16 @@ static int parse_tile(const char *text, unsigned *tile)
     return status;
 }
 
-static int parse_normals(const char *text, trip_brick_normals *normals)
+static int parse_normals(const char *text, triptych_normals *normals)
 {
     static const char *const names[] = { "auto", "compact", "full", "none", NULL };
     int choice = 0;
     int status = trip_option_choice("--normals", text, names, &choice);
-    *normals = (trip_brick_normals)choice; /* in their order */
+    *normals = (triptych_normals)choice; /* in their order */
     return status;
 }
 
-static int parse_halo(const char *text, bool *no_halo)
+static int parse_halo(const char *text, int *no_halo)
 {
     static const char *const names[] = { "0", "1", NULL };
     int choice = 1;
@@ -188,15 +190,16 @@ static int parse_unsigned(const char *option, const char *text, int hi, unsigned
     return status;
 }
 
-static int parse_endian(const char *text, int *endian)
+static int parse_endian(const char *text, triptych_endian *endian)
 {
     static const char *const names[] = { "little", "big", NULL };
-    int status = trip_option_choice("--endian", text, names, endian);
-    *endian += 1;
+    int choice = 0;
+    int status = trip_option_choice("--endian", text, names, &choice);
+    *endian = choice ? TRIPTYCH_ENDIAN_BIG : TRIPTYCH_ENDIAN_LITTLE;
     return status;
 }
 
-static error_t parse_input_option(int key, char *argument, trip_volume_params *v)
+static error_t parse_input_option(int key, char *argument, triptych_brick_options *v)
 {
     switch (key) {
     case KEY_GRID:
@@ -207,9 +210,9 @@ static error_t parse_input_option(int key, char *argument, trip_volume_params *v
         return parse_size(argument, v->raw_dims);
     case KEY_TYPE:
         v->raw_type = argument;
-        return trip_scalar_from_name(argument) < 0
-                   ? trip_option_fail("--type", "no such type; for example uint8, int16 or float")
-                   : 0;
+        return triptych_is_raw_type(argument)
+                   ? 0
+                   : trip_option_fail("--type", "no such type; for example uint8, int16 or float");
     case KEY_SPACING:
         return trip_option_spacing(argument, v->spacing);
     case KEY_ENDIAN:
@@ -228,7 +231,7 @@ static error_t parse_output_option(int key, char *argument, options *o)
 {
     switch (key) {
     case 'o':
-        o->brick.output = argument;
+        o->output = argument;
         return 0;
     case KEY_FORCE:
         o->brick.replace = true;
@@ -254,14 +257,14 @@ static error_t parse_output_option(int key, char *argument, options *o)
         o->quiet = true;
         return 0;
     default:
-        return parse_input_option(key, argument, &o->brick.volume);
+        return parse_input_option(key, argument, &o->brick);
     }
 }
 
 static error_t check_options(const options *o)
 {
-    const trip_brick_params *p = &o->brick;
-    if (!p->input)
+    const triptych_brick_options *p = &o->brick;
+    if (!o->volume)
         return trip_option_fail("INPUT", "no volume given: `triptych brick VOLUME -o NAME.trip`");
     if (p->keep_all && p->range_count)
         return trip_option_fail("--range", "says nothing beside --keep-all");
@@ -293,10 +296,10 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     case KEY_THREADS:
         return parse_unsigned("--threads", argument, 256, &o->brick.threads);
     case ARGP_KEY_ARG:
-        if (o->brick.input)
+        if (o->volume)
             return trip_option_fail(argument, "one volume at a time; slices are given by their "
                                               "folder, or a pattern in quotes, like \"*.tif\"");
-        o->brick.input = argument;
+        o->volume = argument;
         return 0;
     case ARGP_KEY_END:
         return check_options(o);
@@ -308,9 +311,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
 /* INPUT's own name with .trip for what is after its first dot, in this folder. */
 static int choose_output(options *o)
 {
-    const char *input = o->brick.input;
+    const char *input = o->volume;
     size_t length = strlen(input);
-    if (o->brick.output)
+    if (o->output)
         return 0;
     while (length > 1 && input[length - 1] == '/')
         length--;
@@ -324,13 +327,8 @@ static int choose_output(options *o)
         o->default_output = NULL;
         return trip_option_fail("--output", "is needed: the input's name gives none");
     }
-    o->brick.output = o->default_output;
+    o->output = o->default_output;
     return 0;
-}
-
-static void on_progress(void *user, const char *stage, uint64_t done, uint64_t total)
-{
-    trip_progress_show(user, stage, done, total, strcmp(stage, "merge") ? "voxels" : "splats");
 }
 
 static void add_number(cJSON *object, const char *name, double value)
@@ -344,23 +342,23 @@ static int print_object(cJSON *root, const options *o)
     char *text = trip_json_print(root, true);
     cJSON_Delete(root);
     if (!text)
-        return trip_fail(TRIP_ERROR, "brick", o->brick.output, "out of memory");
+        return trip_fail(TRIP_ERROR, "brick", o->output, "out of memory");
     puts(text);
     free(text);
     return 0;
 }
 
-static int print_json(const options *o, const trip_brick_summary *s, const brick_limits *limits)
+static int print_json(const options *o, const triptych_brick_summary *s, const brick_limits *limits)
 {
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "output", o->brick.output);
+    cJSON_AddStringToObject(root, "output", o->output);
     cJSON *dims = cJSON_AddArrayToObject(root, "dims");
     cJSON *spacing = cJSON_AddArrayToObject(root, "spacing");
     for (int a = 0; a < 3; a++) {
         cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)s->dims[a]));
         cJSON_AddItemToArray(spacing, cJSON_CreateNumber(s->spacing[a]));
     }
-    cJSON_AddStringToObject(root, "function_kind", trip_tf_kind_name(s->kind));
+    cJSON_AddStringToObject(root, "function_kind", s->kind);
     add_number(root, "value_min", s->value_min);
     add_number(root, "value_max", s->value_max);
     add_number(root, "voxels", (double)s->voxels);
@@ -374,10 +372,10 @@ static int print_json(const options *o, const trip_brick_summary *s, const brick
     add_number(root, "normal_bytes", s->normal_bytes);
     add_number(root, "temporary_bytes", (double)s->temporary_bytes);
     cJSON_AddBoolToObject(root, "resumed", s->resumed);
-    add_number(root, "scan_seconds", s->stages[TRIP_BRICK_SCAN].seconds);
-    add_number(root, "read_seconds", s->stages[TRIP_BRICK_READ].seconds);
-    add_number(root, "merge_seconds", s->stages[TRIP_BRICK_MERGE].seconds);
-    add_number(root, "finish_seconds", s->stages[TRIP_BRICK_FINISH].seconds);
+    add_number(root, "scan_seconds", s->stages[TRIPTYCH_STAGE_SCAN].seconds);
+    add_number(root, "read_seconds", s->stages[TRIPTYCH_STAGE_READ].seconds);
+    add_number(root, "merge_seconds", s->stages[TRIPTYCH_STAGE_MERGE].seconds);
+    add_number(root, "finish_seconds", s->stages[TRIPTYCH_STAGE_FINISH].seconds);
     add_number(root, "seconds", brick_seconds(s));
     add_number(root, "memory_bytes", (double)s->memory_bytes);
     add_number(root, "peak_memory_bytes", (double)s->peak_memory_bytes);
@@ -394,17 +392,17 @@ static void print_name(const char *label, const char *name)
     putchar('\n');
 }
 
-static void print_text(const options *o, const trip_brick_summary *s)
+static void print_text(const options *o, const triptych_brick_summary *s)
 {
     char bytes[32], temporary[32], peak[32], promise[32];
     double seconds = brick_seconds(s), kept = (double)s->kept, voxels = (double)s->voxels;
-    print_name("data set", o->brick.output);
+    print_name("data set", o->output);
     printf("%-9s %lld x %lld x %lld, spacing %.6g x %.6g x %.6g\n", "grid", (long long)s->dims[0],
            (long long)s->dims[1], (long long)s->dims[2], s->spacing[0], s->spacing[1],
            s->spacing[2]);
     printf("%-9s %llu read, values %.7g to %.7g\n", "voxels", (unsigned long long)s->voxels,
            s->value_min, s->value_max);
-    printf("%-9s %s\n", "taken for", trip_tf_kind_title(s->kind));
+    printf("%-9s %s\n", "taken for", s->kind_title);
     printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
     if (s->halo)
         printf("%-9s %llu neighbours of those, %s\n", "halo", (unsigned long long)s->halo,
@@ -415,18 +413,19 @@ static void print_text(const options *o, const trip_brick_summary *s)
     if (s->temporary_bytes)
         printf("%-9s %s\n", "spilled", trip_format_bytes(s->temporary_bytes, temporary));
     printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, finish %.2f), %.0f MB/s of input\n",
-           "time", seconds, s->stages[TRIP_BRICK_SCAN].seconds, s->stages[TRIP_BRICK_READ].seconds,
-           s->stages[TRIP_BRICK_MERGE].seconds, s->stages[TRIP_BRICK_FINISH].seconds,
+           "time", seconds, s->stages[TRIPTYCH_STAGE_SCAN].seconds,
+           s->stages[TRIPTYCH_STAGE_READ].seconds, s->stages[TRIPTYCH_STAGE_MERGE].seconds,
+           s->stages[TRIPTYCH_STAGE_FINISH].seconds,
            (double)s->input_bytes / 1e6 / (seconds > 0 ? seconds : 1));
     printf("%-9s %s resident at most, %s promised for data\n", "memory",
            trip_format_bytes(trip_memory_peak_rss_bytes(), peak),
            trip_format_bytes(s->memory_bytes, promise));
 }
 
-static int print_estimate_json(const options *o, const trip_brick_estimate *e)
+static int print_estimate_json(const options *o, const triptych_brick_estimate *e)
 {
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "output", o->brick.output);
+    cJSON_AddStringToObject(root, "output", o->output);
     add_number(root, "voxels", (double)e->voxels);
     add_number(root, "kept", (double)e->kept);
     add_number(root, "halo", (double)e->halo);
@@ -437,10 +436,10 @@ static int print_estimate_json(const options *o, const trip_brick_estimate *e)
     return print_object(root, o);
 }
 
-static void print_estimate(const options *o, const trip_brick_estimate *e)
+static void print_estimate(const options *o, const triptych_brick_estimate *e)
 {
     char bytes[32], temporary[32], there[32];
-    print_name("data set", o->brick.output);
+    print_name("data set", o->output);
     printf("%-9s about %.3g of %.3g voxels, and %.3g neighbours\n", "keeps", (double)e->kept,
            (double)e->voxels, (double)e->halo);
     printf("%-9s about %s, %s of temporary data; %s are free\n", "takes",
@@ -449,10 +448,10 @@ static void print_estimate(const options *o, const trip_brick_estimate *e)
     printf("%-9s about %.3g s\n", "time", e->seconds);
 }
 
-static int dry_run(const options *o)
+static int dry_run(triptych *t, const options *o)
 {
-    trip_brick_estimate e;
-    int status = trip_brick_estimate_make(&o->brick, &e);
+    triptych_brick_estimate e;
+    int status = triptych_estimate(t, o->volume, o->output, &o->brick, &e);
     if (status < 0 || o->quiet)
         return status;
     if (o->json)
@@ -461,19 +460,19 @@ static int dry_run(const options *o)
     return 0;
 }
 
-static int brick(const options *o)
+static int brick(triptych *t, const options *o)
 {
-    trip_brick_summary summary;
+    triptych_brick_summary summary;
     brick_limits limits;
     if (o->limits)
-        plain_disk_forget(o->brick.input);
-    int status = trip_brick(&o->brick, &summary);
+        plain_disk_forget(o->volume);
+    int status = triptych_brick(t, o->volume, o->output, &o->brick, &summary);
     if (status == 0 && o->limits)
-        status = brick_limits_measure(&limits, &o->brick, &summary);
+        status = brick_limits_measure(&limits, o->volume, o->output, &summary);
     if (status < 0 || o->quiet)
         return status;
     if (summary.note[0])
-        trip_note(o->brick.input, "%s", summary.note);
+        trip_note(o->volume, "%s", summary.note);
     if (o->json)
         return print_json(o, &summary, &limits);
     print_text(o, &summary);
@@ -484,13 +483,15 @@ static int brick(const options *o)
 
 static int run(options *o)
 {
+    triptych *t = NULL;
     trip_progress progress = trip_progress_start(o->quiet);
     o->brick.functions = o->functions;
     o->brick.ranges = o->ranges;
-    o->brick.progress = on_progress;
-    o->brick.progress_user = &progress;
-    int status = o->dry_run ? dry_run(o) : brick(o);
+    int status = library_create(&t, &progress);
+    if (!status)
+        status = o->dry_run ? dry_run(t, o) : brick(t, o);
     trip_progress_end(&progress);
+    triptych_destroy(t);
     return status;
 }
 

@@ -11,19 +11,19 @@
 /* Of a larger data set only so much is written for the limit. */
 static const uint64_t most_written_bytes = (uint64_t)4 << 30;
 
-static const char *const stage_names[TRIP_BRICK_STAGES] = { "scan", "read", "merge", "finish" };
+static const char *const stage_names[TRIPTYCH_STAGES] = { "scan", "read", "merge", "finish" };
 
-double brick_seconds(const trip_brick_summary *s)
+double brick_seconds(const triptych_brick_summary *s)
 {
     double seconds = 0;
-    for (int i = 0; i < TRIP_BRICK_STAGES; i++)
+    for (int i = 0; i < TRIPTYCH_STAGES; i++)
         seconds += s->stages[i].seconds;
     return seconds;
 }
 
 /* A folder, a pattern or a header beside its data is not what holds the values; compressed values
  * are smaller than what they become, but hardly by this much. */
-static bool holds_values(const char *path, const trip_brick_summary *s)
+static bool holds_values(const char *path, const triptych_brick_summary *s)
 {
     struct stat st;
     return stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
@@ -43,22 +43,23 @@ static int measure_write(plain_disk *d, const char *output, uint64_t bytes, void
     return status;
 }
 
-int brick_limits_measure(brick_limits *l, const trip_brick_params *p, const trip_brick_summary *s)
+int brick_limits_measure(brick_limits *l, const char *volume, const char *data_set,
+                         const triptych_brick_summary *s)
 {
     *l = (brick_limits){ 0 };
     void *memory = aligned_alloc(4096, PLAIN_DISK_MEMORY_BYTES);
     if (!memory)
-        return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
+        return trip_fail(TRIP_ERROR, "brick", volume, "out of memory");
     memset(memory, 1, PLAIN_DISK_MEMORY_BYTES);
-    int status = holds_values(p->input, s) ? plain_disk_read(&l->read, p->input, memory) : 0;
+    int status = holds_values(volume, s) ? plain_disk_read(&l->read, volume, memory) : 0;
     if (status == 0)
-        status = measure_write(&l->write, p->output, s->bytes, memory);
+        status = measure_write(&l->write, data_set, s->bytes, memory);
     free(memory);
     return status;
 }
 
 /* Time as a multiple of the limits' sum; 0 where one is not known. */
-static double ratio(const brick_limits *l, const trip_brick_summary *s)
+static double ratio(const brick_limits *l, const triptych_brick_summary *s)
 {
     double limit = l->read.seconds + l->write.seconds;
     return l->read.bytes > 0 && limit > 0 ? brick_seconds(s) / limit : 0;
@@ -71,10 +72,10 @@ static void print_row(const char *name, double seconds, uint64_t read, uint64_t 
            (double)written / 1e6, rate);
 }
 
-void brick_limits_print(const brick_limits *l, const trip_brick_summary *s)
+void brick_limits_print(const brick_limits *l, const triptych_brick_summary *s)
 {
     printf("\n%-12s %9s %10s %10s %8s\n", "stage", "seconds", "MB read", "MB written", "MB/s");
-    for (int i = 0; i < TRIP_BRICK_STAGES; i++)
+    for (int i = 0; i < TRIPTYCH_STAGES; i++)
         print_row(stage_names[i], s->stages[i].seconds, s->stages[i].bytes_read,
                   s->stages[i].bytes_written);
     print_row("together", brick_seconds(s), s->input_bytes, s->bytes);
@@ -98,10 +99,10 @@ static cJSON *row(const char *name, double seconds, uint64_t read, uint64_t writ
     return object;
 }
 
-cJSON *brick_limits_to_json(const brick_limits *l, const trip_brick_summary *s)
+cJSON *brick_limits_to_json(const brick_limits *l, const triptych_brick_summary *s)
 {
     cJSON *root = cJSON_CreateObject(), *stages = cJSON_AddArrayToObject(root, "stages");
-    for (int i = 0; i < TRIP_BRICK_STAGES; i++)
+    for (int i = 0; i < TRIPTYCH_STAGES; i++)
         cJSON_AddItemToArray(stages, row(stage_names[i], s->stages[i].seconds,
                                          s->stages[i].bytes_read, s->stages[i].bytes_written));
     if (l->read.bytes > 0) {

@@ -5,18 +5,19 @@
 
 #include <cjson/cJSON.h>
 
-#include "brick.h"
 #include "plain_disk.h"
+#include "triptych_brick.h"
 
 typedef struct brick_limits {
     plain_disk read;  /* no bytes where the input is not one file that holds the values */
     plain_disk write; /* of the data set's bytes, or, of a large one, a part: seconds for all */
 } brick_limits;
 
-double brick_seconds(const trip_brick_summary *s);
+double brick_seconds(const triptych_brick_summary *s);
 
-int brick_limits_measure(brick_limits *l, const trip_brick_params *p, const trip_brick_summary *s);
-void brick_limits_print(const brick_limits *l, const trip_brick_summary *s);
-cJSON *brick_limits_to_json(const brick_limits *l, const trip_brick_summary *s);
+int brick_limits_measure(brick_limits *l, const char *volume, const char *data_set,
+                         const triptych_brick_summary *s);
+void brick_limits_print(const brick_limits *l, const triptych_brick_summary *s);
+cJSON *brick_limits_to_json(const brick_limits *l, const triptych_brick_summary *s);
 
 #endif

@@ -8,7 +8,8 @@
 #include <time.h>
 
 #include "cache_folder.h"
-#include "dataset.h"
+#include "budget.h"
+#include "library.h"
 #include "json.h"
 #include "options.h"
 #include "report.h"
@@ -57,21 +58,13 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
 /* The volume's name, as the data set has it; for free(), NULL where it is damaged. */
 static char *source_name(const char *path)
 {
-    trip_budget *budget = NULL;
-    trip_dataset *data = NULL;
+    triptych *t = NULL;
     char *name = NULL;
-    if (trip_budget_create(&budget, 0) < 0)
-        return NULL;
-    trip_json text = { 0 };
-    if (trip_dataset_open(&data, path, budget) == 0 &&
-        trip_json_parse(&text, data->text, path, budget) == 0) {
-        const char *source =
-            cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text.root, "source"));
-        name = strdup(source ? source : "");
+    if (library_create(&t, NULL) == 0 && triptych_open(t, path, NULL) == 0) {
+        name = library_note(t, "source");
+        name = name ? name : strdup("");
     }
-    trip_json_free(&text);
-    trip_dataset_close(data);
-    trip_budget_destroy(budget);
+    triptych_destroy(t);
     return name;
 }
 

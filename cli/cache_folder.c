@@ -15,7 +15,7 @@
 #include "budget.h"
 #include "report.h"
 
-enum { KEY_LENGTH = sizeof(trip_digest) - 1, NAME_BYTES = 64 };
+enum { KEY_LENGTH = sizeof(cache_key) - 1, NAME_BYTES = 64 };
 static const uint64_t least_limit = UINT64_C(4) << 30;
 
 /* What a process that is no longer there may have left, besides its lock. */
@@ -23,14 +23,14 @@ static const char *const leftovers[] = { ".trip.partial", ".trip.spill", ".trip.
                                          ".gone" };
 enum { LEFTOVERS = sizeof leftovers / sizeof leftovers[0] };
 
-static const char *file_name(const trip_digest *key, const char *suffix, char name[NAME_BYTES])
+static const char *file_name(const cache_key *key, const char *suffix, char name[NAME_BYTES])
 {
     snprintf(name, NAME_BYTES, "%s%s", key->text, suffix);
     return name;
 }
 
 /* KEY and what follows it; NULL for any other name. */
-static const char *parse_name(const char *name, trip_digest *key)
+static const char *parse_name(const char *name, cache_key *key)
 {
     if (strspn(name, "0123456789abcdef") != KEY_LENGTH)
         return NULL;
@@ -139,7 +139,7 @@ void cache_folder_close(cache_folder *c)
     *c = (cache_folder){ .fd = -1 };
 }
 
-char *cache_folder_path(const cache_folder *c, const trip_digest *key)
+char *cache_folder_path(const cache_folder *c, const cache_key *key)
 {
     char *path;
     if (asprintf(&path, "%s/%s.trip", c->path, key->text) >= 0)
@@ -157,7 +157,7 @@ static int open_folder(const cache_folder *c, const char *name)
 
 /* Between opening a data set's folder and locking it nobody may remove it, and the other way round:
  * both happen under a lock on the cache's folder. */
-int cache_folder_hold(const cache_folder *c, const trip_digest *key)
+int cache_folder_hold(const cache_folder *c, const cache_key *key)
 {
     char name[NAME_BYTES];
     flock(c->fd, LOCK_SH);
@@ -187,7 +187,7 @@ static bool remove_folder(const cache_folder *c, const char *name)
     return unlinkat(c->fd, name, AT_REMOVEDIR) == 0;
 }
 
-bool cache_folder_remove(const cache_folder *c, const trip_digest *key)
+bool cache_folder_remove(const cache_folder *c, const cache_key *key)
 {
     char name[NAME_BYTES], gone[NAME_BYTES];
     file_name(key, ".trip", name);
@@ -205,7 +205,7 @@ bool cache_folder_remove(const cache_folder *c, const trip_digest *key)
 
 /* What is remembered */
 
-bool cache_folder_recall(const cache_folder *c, const trip_digest *state, trip_digest *key)
+bool cache_folder_recall(const cache_folder *c, const cache_key *state, cache_key *key)
 {
     char name[NAME_BYTES], target[NAME_BYTES];
     ssize_t n = readlinkat(c->fd, file_name(state, ".link", name), target, sizeof target - 1);
@@ -217,7 +217,7 @@ bool cache_folder_recall(const cache_folder *c, const trip_digest *state, trip_d
 }
 
 /* In one step, so that another process sees the old one or the new one. */
-void cache_folder_remember(const cache_folder *c, const trip_digest *state, const trip_digest *key)
+void cache_folder_remember(const cache_folder *c, const cache_key *state, const cache_key *key)
 {
     char name[NAME_BYTES], made[NAME_BYTES];
     snprintf(made, sizeof made, "%s.%ld.link", state->text, (long)getpid());
@@ -237,7 +237,7 @@ static bool is_named(const cache_folder *c, int fd, const char *name)
 }
 
 /* -1: another process holds it, or it cannot be opened, as errno says. */
-static int try_lock(const cache_folder *c, const trip_digest *key)
+static int try_lock(const cache_folder *c, const cache_key *key)
 {
     char name[NAME_BYTES];
     file_name(key, ".lock", name);
@@ -256,7 +256,7 @@ static int try_lock(const cache_folder *c, const trip_digest *key)
     }
 }
 
-int cache_folder_lock(const cache_folder *c, const trip_digest *key, void (*waiting)(void *user),
+int cache_folder_lock(const cache_folder *c, const cache_key *key, void (*waiting)(void *user),
                       void *user)
 {
     for (;;) {
@@ -272,7 +272,7 @@ int cache_folder_lock(const cache_folder *c, const trip_digest *key, void (*wait
     }
 }
 
-void cache_folder_unlock(const cache_folder *c, const trip_digest *key, int fd)
+void cache_folder_unlock(const cache_folder *c, const cache_key *key, int fd)
 {
     char name[NAME_BYTES];
     unlinkat(c->fd, file_name(key, ".lock", name), 0);
@@ -321,7 +321,7 @@ static int by_use(const void *a, const void *b)
 
 /* Calls visit() with the key and the rest of every name that may be ours. */
 static int visit_names(const cache_folder *c,
-                       int (*visit)(const cache_folder *c, const char *name, const trip_digest *key,
+                       int (*visit)(const cache_folder *c, const char *name, const cache_key *key,
                                     const char *rest, void *user),
                        void *user)
 {
@@ -333,7 +333,7 @@ static int visit_names(const cache_folder *c,
             close(copy);
         return status;
     }
-    trip_digest key;
+    cache_key key;
     for (struct dirent *e; status == 0 && (e = readdir(folder));) {
         const char *rest = parse_name(e->d_name, &key);
         status = rest ? visit(c, e->d_name, &key, rest, user) : 0;
@@ -347,7 +347,7 @@ typedef struct listing {
     size_t count;
 } listing;
 
-static int list_entry(const cache_folder *c, const char *name, const trip_digest *key,
+static int list_entry(const cache_folder *c, const char *name, const cache_key *key,
                       const char *rest, void *user)
 {
     listing *l = user;
@@ -376,11 +376,11 @@ int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count)
 }
 
 /* What nobody is at work on: leftovers of killed processes, links to what is gone. */
-static int clean_name(const cache_folder *c, const char *name, const trip_digest *key,
+static int clean_name(const cache_folder *c, const char *name, const cache_key *key,
                       const char *rest, void *user)
 {
     struct stat st;
-    trip_digest target;
+    cache_key target;
     char entry[NAME_BYTES];
     (void)user;
     if (!strcmp(rest, ".link")) {

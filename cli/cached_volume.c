@@ -8,10 +8,10 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "dataset.h"
-#include "identity.h"
-#include "progress.h"
+#include "budget.h"
 #include "report.h"
+
+#define INDEX_NAME "index.trip"
 
 /* Files are read for their content up to this, which takes about a second. */
 static const uint64_t most_content_bytes = UINT64_C(1) << 30;
@@ -19,12 +19,10 @@ static const uint64_t most_content_bytes = UINT64_C(1) << 30;
 /* While a volume is looked for and bricked. */
 typedef struct search {
     cached_volume *v;
-    trip_brick_params params;
-    trip_source source;
-    bool settled; /* before its content was read: so its times tell every later change */
-    char *options;
-    trip_digest state;
-    trip_progress progress;
+    triptych *t;
+    const char *volume;
+    triptych_brick_options options;
+    triptych_identity identity; /* of the files as they were when the key was found */
 } search;
 
 static double now_seconds(void)
@@ -38,7 +36,7 @@ static bool has_index(const char *folder)
 {
     struct stat st;
     char *path;
-    if (asprintf(&path, "%s/" TRIP_INDEX_NAME, folder) < 0)
+    if (asprintf(&path, "%s/" INDEX_NAME, folder) < 0)
         return false;
     bool found = lstat(path, &st) == 0;
     free(path);
@@ -54,106 +52,94 @@ bool cached_volume_wanted(const char *input)
     return !named && !has_index(input);
 }
 
-static void on_brick_progress(void *user, const char *stage, uint64_t done, uint64_t total)
-{
-    search *s = user;
-    trip_progress_show(&s->progress, stage, done, total,
-                       strcmp(stage, "merge") ? "voxels" : "splats");
-}
-
-static void on_content_progress(void *user, uint64_t done, uint64_t total)
-{
-    search *s = user;
-    trip_progress_show(&s->progress, "look", done, total, "bytes");
-}
-
+/* Shows on a terminal that another process makes it. */
 static void on_wait(void *user)
 {
-    search *s = user;
-    trip_progress_show(&s->progress, "wait", 0, 1, "");
+    trip_progress *p = user;
+    trip_progress_show(p, "wait", 0, 1, "");
 }
 
-/* Of large files only the times tell a change, so they must be able to. A clock that is wrong is
- * not waited for. */
-static int wait_until_settled(const trip_source *source)
+static int identify(search *s, uint64_t most_bytes)
 {
-    for (int i = 0; i < 30 && !trip_source_is_settled(source); i++) {
+    return triptych_identify(s->t, s->volume, &s->options, most_bytes, &s->identity);
+}
+
+/* Large files are told apart by their times alone, which must then differ after every later change.
+ * A clock that is wrong is not waited for. */
+static int wait_until_settled(search *s)
+{
+    int status = 0;
+    for (int i = 0; i < 30 && !status && !s->identity.settled; i++) {
         nanosleep(&(struct timespec){ .tv_nsec = 100000000 }, NULL);
         if (trip_interrupted())
-            return trip_fail(TRIP_INTERRUPTED, "read", "", "interrupted");
+            return trip_fail(TRIP_INTERRUPTED, "read", s->volume, "interrupted");
+        status = identify(s, 0);
     }
-    return 0;
+    return status;
 }
 
-/* The options and the program's version: another one may make another data set of the same volume.
- */
-static int describe(search *s)
+static cache_key key_of(const char text[33])
 {
-    char *options;
-    int status = trip_brick_options_text(&s->params, &options);
-    if (status < 0)
-        return status;
-    int length = asprintf(&s->options, "%s" TRIP_VERSION "\n", options);
-    free(options);
-    if (length >= 0)
-        return 0;
-    s->options = NULL;
-    return trip_fail(TRIP_ERROR, "cache", s->params.input, "out of memory");
+    cache_key key;
+    memcpy(key.text, text, sizeof key.text);
+    return key;
 }
 
-static int find_content_key(search *s, trip_digest *key)
+/* By what the files hold, or, of large ones, by their state. */
+static int find_content_key(search *s, cache_key *key)
 {
-    if (s->source.bytes <= most_content_bytes)
-        return trip_source_digest_content(&s->source, s->options, key, on_content_progress, s);
-    *key = s->state;
-    return wait_until_settled(&s->source);
+    bool read = s->identity.bytes <= most_content_bytes;
+    int status = read ? identify(s, most_content_bytes) : wait_until_settled(s);
+    if (status == 0)
+        *key = key_of(*s->identity.content ? s->identity.content : s->identity.state);
+    return status;
 }
 
 static int find_key(search *s)
 {
-    int status = trip_source_find(&s->source, s->params.input, &s->params.volume);
-    if (status == 0)
-        status = describe(s);
-    if (status == 0)
-        status = trip_source_digest_state(&s->source, s->options, &s->state);
-    s->settled = status == 0 && trip_source_is_settled(&s->source);
-    if (status < 0 || (s->settled && cache_folder_recall(&s->v->folder, &s->state, &s->v->key)))
+    int status = identify(s, 0);
+    const cache_key state = key_of(s->identity.state);
+    if (status < 0 ||
+        (s->identity.settled && cache_folder_recall(&s->v->folder, &state, &s->v->key)))
         return status;
     status = find_content_key(s, &s->v->key);
-    if (status == 0 && s->settled)
-        cache_folder_remember(&s->v->folder, &s->state, &s->v->key);
+    if (status == 0 && s->identity.settled) {
+        const cache_key read = key_of(s->identity.state);
+        cache_folder_remember(&s->v->folder, &read, &s->v->key);
+    }
     return status;
 }
 
 /* Whether the files are still those that the key is of. */
 static int check_unchanged(search *s)
 {
-    trip_source now = { 0 };
-    trip_digest key = s->v->key;
-    int status = trip_source_find(&now, s->params.input, &s->params.volume);
-    bool same = status == 0 && trip_source_equal(&s->source, &now);
-    trip_source_free(&now);
-    if (same && !s->settled)
+    const triptych_identity before = s->identity;
+    cache_key key = s->v->key;
+    int status = identify(s, 0);
+    bool same = status == 0 && !strcmp(before.state, s->identity.state);
+    if (same && !before.settled)
         status = find_content_key(s, &key);
     if (status == 0 && (!same || strcmp(key.text, s->v->key.text)))
-        return trip_fail(TRIP_ERROR, "read", s->params.input,
+        return trip_fail(TRIP_ERROR, "read", s->volume,
                          "changed while it was read: draw it again when it is complete");
     return status;
 }
 
-/* Where the memory given does not suffice, drawing says so. */
-static bool opens(const cached_volume *v, uint64_t memory_bytes)
+/* Where the memory given does not suffice, the failure comes from drawing. */
+static bool opens(const search *s)
 {
     struct stat st;
     trip_budget *budget;
-    trip_dataset *data = NULL;
+    uint64_t memory_bytes = s->options.memory_bytes;
     if (trip_budget_create(&budget, memory_bytes) < 0)
         return true;
-    bool fits = fstatat(v->hold, TRIP_INDEX_NAME, &st, AT_SYMLINK_NOFOLLOW) < 0 ||
+    bool fits = fstatat(s->v->hold, INDEX_NAME, &st, AT_SYMLINK_NOFOLLOW) < 0 ||
                 (uint64_t)st.st_size <= trip_budget_left_bytes(budget);
-    bool opened = !fits || trip_dataset_open(&data, v->path, budget) == 0;
-    trip_dataset_close(data);
     trip_budget_destroy(budget);
+    bool opened =
+        !fits ||
+        triptych_open(s->t, s->v->path, &(triptych_resources){ .memory_bytes = memory_bytes }) == 0;
+    triptych_close(s->t);
     return opened;
 }
 
@@ -164,9 +150,9 @@ static bool take(search *s)
     v->hold = cache_folder_hold(&v->folder, &v->key);
     if (v->hold < 0)
         return false;
-    if (opens(v, s->params.memory_bytes))
+    if (opens(s))
         return true;
-    trip_warn(s->params.input, "its data set in the cache is damaged and is made anew");
+    trip_warn(s->volume, "its data set in the cache is damaged and is made anew");
     close(v->hold);
     v->hold = -1;
     cache_folder_remove(&v->folder, &v->key);
@@ -176,9 +162,8 @@ static bool take(search *s)
 static int brick(search *s)
 {
     cached_volume *v = s->v;
-    trip_brick_summary summary;
     double begin = now_seconds();
-    int status = trip_brick(&s->params, &summary);
+    int status = triptych_brick(s->t, s->volume, v->path, &s->options, NULL);
     if (status == 0 && (status = check_unchanged(s)) < 0)
         cache_folder_remove(&v->folder, &v->key);
     if (status < 0)
@@ -192,7 +177,9 @@ static int brick(search *s)
 static int make(search *s)
 {
     cached_volume *v = s->v;
-    int lock = cache_folder_lock(&v->folder, &v->key, on_wait, s);
+    trip_progress progress = trip_progress_start(false);
+    int lock = cache_folder_lock(&v->folder, &v->key, on_wait, &progress);
+    trip_progress_end(&progress);
     if (lock < 0)
         return lock;
     int status = take(s) ? 0 : brick(s);
@@ -207,39 +194,35 @@ static int find(search *s)
     int status = find_key(s);
     if (status == 0 && !(v->path = cache_folder_path(&v->folder, &v->key)))
         status = TRIP_ERROR;
-    s->params.output = v->path;
-    s->params.most_bytes = v->folder.limit_bytes;
+    s->options.most_bytes = v->folder.limit_bytes;
     return status == 0 ? take(s) : status;
 }
 
-static int open_volume(cached_volume *v, const trip_brick_params *wanted, bool making)
+static int open_volume(search *s, bool making)
 {
-    search s = { .v = v, .params = *wanted, .progress = trip_progress_start(false) };
-    s.params.progress = on_brick_progress;
-    s.params.progress_user = &s;
+    cached_volume *v = s->v;
     *v = (cached_volume){ .hold = -1 };
     int status = cache_folder_open(&v->folder, true);
     if (status == 0)
-        status = find(&s);
-    if (status == 0 && making)
-        status = make(&s);
-    trip_progress_end(&s.progress);
-    trip_source_free(&s.source);
-    free(s.options);
-    return status;
+        status = find(s);
+    return status == 0 && making ? make(s) : status;
 }
 
-int cached_volume_find(cached_volume *v, const trip_brick_params *wanted)
+int cached_volume_find(cached_volume *v, triptych *t, const char *volume,
+                       const triptych_brick_options *options)
 {
-    int status = open_volume(v, wanted, false);
+    search s = { .v = v, .t = t, .volume = volume, .options = *options };
+    int status = open_volume(&s, false);
     if (status == 0)
         cached_volume_close(v);
     return status;
 }
 
-int cached_volume_open(cached_volume *v, const trip_brick_params *wanted)
+int cached_volume_open(cached_volume *v, triptych *t, const char *volume,
+                       const triptych_brick_options *options)
 {
-    int status = open_volume(v, wanted, true);
+    search s = { .v = v, .t = t, .volume = volume, .options = *options };
+    int status = open_volume(&s, true);
     return status > 0 ? 0 : status;
 }
 
@@ -254,23 +237,18 @@ void cached_volume_close(cached_volume *v)
     *v = (cached_volume){ .hold = -1 };
 }
 
-void cached_volume_check(cached_volume *v, const char *input)
+void cached_volume_check(cached_volume *v, triptych *t, const char *volume)
 {
-    trip_dataset *data = NULL;
-    trip_budget *budget = NULL;
-    int status = trip_budget_create(&budget, 0);
+    triptych_end(t);
+    int status = triptych_open(t, v->path, NULL);
     if (status == 0)
-        status = trip_dataset_open(&data, v->path, budget);
-    if (status == 0)
-        status = trip_dataset_verify(data, budget);
-    trip_dataset_close(data);
-    if (budget)
-        trip_budget_destroy(budget);
+        status = triptych_verify(t);
+    triptych_close(t);
     if (status == TRIP_ERROR && !trip_interrupted()) {
         close(v->hold);
         v->hold = -1;
         cache_folder_remove(&v->folder, &v->key);
-        trip_warn(input, "its data set in the cache is damaged and is removed: the same command "
-                         "makes it anew");
+        trip_warn(volume, "its data set in the cache is damaged and is removed: the same command "
+                          "makes it anew");
     }
 }

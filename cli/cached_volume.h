@@ -1,17 +1,17 @@
 /* A volume's data set in the cache: found there, or bricked into it first. What it is kept under is
  * the content of the volume's files and the options; so a changed file is another data set, and a
  * copy the same. The files' content is read once and remembered for as long as their times do not
- * change. Files of more than 1 GiB together are known by place, size and times alone. */
+ * change. Files of more than 1 GiB together are told apart by place, size and times alone. */
 #ifndef TRIP_CLI_CACHED_VOLUME_H
 #define TRIP_CLI_CACHED_VOLUME_H
 
-#include "brick.h"
 #include "cache_folder.h"
+#include "library.h"
 
 /* Zeroed at first. */
 typedef struct cached_volume {
     char *path; /* of the data set */
-    trip_digest key;
+    cache_key key;
     cache_folder folder;
     int hold;       /* keeps the data set from being removed */
     double seconds; /* that bricking took; 0 where it was there */
@@ -21,14 +21,17 @@ typedef struct cached_volume {
  * it, and not named NAME.trip. */
 bool cached_volume_wanted(const char *input);
 
-/* `wanted` says all but the output. Progress is shown on a terminal. Close it also after a failure.
- */
-int cached_volume_open(cached_volume *v, const trip_brick_params *wanted);
+/* The data set that bricking `volume` with the options makes. The context has none open before and
+ * after. Close it also after a failure. */
+int cached_volume_open(cached_volume *v, triptych *t, const char *volume,
+                       const triptych_brick_options *options);
 /* The same where it is there already: 1; else 0. */
-int cached_volume_find(cached_volume *v, const trip_brick_params *wanted);
+int cached_volume_find(cached_volume *v, triptych *t, const char *volume,
+                       const triptych_brick_options *options);
 void cached_volume_close(cached_volume *v);
 
-/* After drawing failed: looks whether the data set is damaged, and removes it then. */
-void cached_volume_check(cached_volume *v, const char *input);
+/* After drawing failed: removes the data set where it is damaged. Closes what the context has open.
+ */
+void cached_volume_check(cached_volume *v, triptych *t, const char *volume);
 
 #endif

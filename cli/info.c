@@ -8,8 +8,10 @@
 #include <string.h>
 
 #include "anatomy.h"
-#include "dataset.h"
+#include "budget.h"
+#include "geometry.h"
 #include "json.h"
+#include "library.h"
 #include "options.h"
 #include "report.h"
 #include "text.h"
@@ -49,10 +51,18 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     }
 }
 
-/* Along index axis `axis`, of world space. */
-static trip_vec3 direction(const trip_dataset *d, int axis)
+/* A data set as it is shown. */
+typedef struct data_set {
+    const char *path;
+    triptych *t;
+    triptych_info info;
+    triptych_list *lists; /* info.lists of them */
+    trip_json source;     /* the notes, where they are JSON */
+} data_set;
+
+/* Along axis `axis` of a grid, in world space. */
+static trip_vec3 direction(const double m[3][4], int axis)
 {
-    const double(*m)[4] = d->index_to_world.m;
     return trip_v3(m[0][axis], m[1][axis], m[2][axis]);
 }
 
@@ -63,37 +73,28 @@ static const char *space_of(const cJSON *text)
     return trip_anatomy_known(space) ? space : NULL;
 }
 
-/* The box of world space about voxels lo to hi, from edge to edge. */
-static void world_bounds(const trip_dataset *d, const double lo[3], const double hi[3],
-                         double bounds[2][3])
+/* The box of world space about the whole grid, from edge to edge. */
+static void grid_bounds(const triptych_info *info, double bounds[2][3])
 {
+    trip_affine map;
+    memcpy(map.m, info->index_to_world, sizeof map.m);
     for (int corner = 0; corner < 8; corner++) {
-        trip_vec3 p =
-            trip_v3(corner & 1 ? hi[0] + 0.5 : lo[0] - 0.5, corner & 2 ? hi[1] + 0.5 : lo[1] - 0.5,
-                    corner & 4 ? hi[2] + 0.5 : lo[2] - 0.5);
-        p = trip_affine_point(&d->index_to_world, p);
+        double p[3];
+        for (int a = 0; a < 3; a++)
+            p[a] = corner >> a & 1 ? (double)info->dims[a] - 0.5 : -0.5;
+        trip_vec3 world = trip_affine_point(&map, trip_v3(p[0], p[1], p[2]));
         for (int a = 0; a < 3; a++) {
-            double v = trip_component(p, a);
+            double v = trip_component(world, a);
             bounds[0][a] = corner ? fmin(bounds[0][a], v) : v;
             bounds[1][a] = corner ? fmax(bounds[1][a], v) : v;
         }
     }
 }
 
-static void grid_bounds(const trip_dataset *d, double bounds[2][3])
+static void kept_bounds(const triptych_info *info, double bounds[2][3])
 {
-    const double lo[3] = { 0, 0, 0 };
-    double hi[3];
-    for (int a = 0; a < 3; a++)
-        hi[a] = (double)d->header.dims[a] - 1;
-    world_bounds(d, lo, hi, bounds);
-}
-
-static void kept_bounds(const trip_dataset *d, double bounds[2][3])
-{
-    double lo[3], hi[3];
-    trip_dataset_kept_bounds(d, lo, hi);
-    world_bounds(d, lo, hi, bounds);
+    memcpy(bounds[0], info->lo, sizeof info->lo);
+    memcpy(bounds[1], info->hi, sizeof info->hi);
 }
 
 /* Every byte count below is exact in a double: files are far smaller than 2^53 bytes. */
@@ -111,49 +112,44 @@ static cJSON *numbers(const double *values, int count)
     return array;
 }
 
-static uint64_t list_bytes(const trip_list *list)
-{
-    return list->plane_bytes[TRIP_PLANE_VOXELS] + list->plane_bytes[TRIP_PLANE_NORMALS];
-}
-
-static uint64_t halo_bytes(const trip_dataset *d)
+static uint64_t halo_bytes(const data_set *d)
 {
     uint64_t bytes = 0;
-    for (unsigned i = 0; i < d->list_count; i++)
-        bytes += d->lists[i].kind == TRIP_KIND_HALO ? list_bytes(&d->lists[i]) : 0;
+    for (unsigned i = 0; i < d->info.lists; i++)
+        bytes += strcmp(d->lists[i].kind, "halo") ? 0 : d->lists[i].bytes;
     return bytes;
 }
 
-static void add_matrix(cJSON *root, const trip_affine *index_to_world)
+static void add_matrix(cJSON *root, const double index_to_world[3][4])
 {
     cJSON *rows = cJSON_AddArrayToObject(root, "index_to_world");
     for (int row = 0; row < 3; row++)
-        cJSON_AddItemToArray(rows, numbers(index_to_world->m[row], 4));
+        cJSON_AddItemToArray(rows, numbers(index_to_world[row], 4));
 }
 
-static cJSON *list_to_json(const trip_list *list)
+static cJSON *list_to_json(const triptych_list *list)
 {
     const char axis[2] = { (char)('x' + list->axis), 0 };
     double dims[3] = { (double)list->dims[0], (double)list->dims[1], (double)list->dims[2] };
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "axis", axis);
     cJSON_AddItemToObject(root, "level", number(list->level));
-    cJSON_AddStringToObject(root, "kind", trip_kind_of(list->kind)->name);
+    cJSON_AddStringToObject(root, "kind", list->kind);
     cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
-    add_matrix(root, &list->index_to_world);
+    add_matrix(root, list->index_to_world);
     cJSON_AddItemToObject(root, "sheet_first", number(list->sheet_first));
     cJSON_AddItemToObject(root, "sheet_step", number(list->sheet_step));
     cJSON_AddItemToObject(root, "records", number((double)list->records));
-    cJSON_AddItemToObject(root, "slabs", number((double)list->slab_count));
-    cJSON_AddItemToObject(root, "bricks", number((double)list->brick_count));
-    cJSON_AddItemToObject(root, "bytes", number((double)list_bytes(list)));
+    cJSON_AddItemToObject(root, "slabs", number((double)list->slabs));
+    cJSON_AddItemToObject(root, "bricks", number((double)list->bricks));
+    cJSON_AddItemToObject(root, "bytes", number((double)list->bytes));
     return root;
 }
 
-static void add_lists(cJSON *root, const trip_dataset *d)
+static void add_lists(cJSON *root, const data_set *d)
 {
     cJSON *lists = cJSON_AddArrayToObject(root, "lists");
-    for (unsigned i = 0; i < d->list_count; i++)
+    for (unsigned i = 0; i < d->info.lists; i++)
         cJSON_AddItemToArray(lists, list_to_json(&d->lists[i]));
 }
 
@@ -165,14 +161,14 @@ static void add_bounds(cJSON *root, const char *name, double bounds[2][3])
 }
 
 /* Where the volume lies: its map, its bounds and, of a patient, the ends that its axes point to. */
-static void add_world(cJSON *root, const trip_dataset *d, const cJSON *text)
+static void add_world(cJSON *root, const triptych_info *info, const cJSON *text)
 {
     const char *space = space_of(text);
     double bounds[2][3];
-    add_matrix(root, &d->index_to_world);
-    grid_bounds(d, bounds);
+    add_matrix(root, info->index_to_world);
+    grid_bounds(info, bounds);
     add_bounds(root, "bounds", bounds);
-    kept_bounds(d, bounds);
+    kept_bounds(info, bounds);
     add_bounds(root, "kept_bounds", bounds);
     if (!space)
         return;
@@ -180,59 +176,64 @@ static void add_world(cJSON *root, const trip_dataset *d, const cJSON *text)
     cJSON *axes = cJSON_AddArrayToObject(root, "axes");
     for (int a = 0; a < 3; a++) {
         char ends[4];
-        trip_anatomy_ends(space, direction(d, a), ends);
+        trip_anatomy_ends(space, direction(info->index_to_world, a), ends);
         cJSON_AddItemToArray(axes, cJSON_CreateString(ends));
     }
 }
 
-static cJSON *to_json(const trip_dataset *d, const trip_json *source, bool verified)
+static void add_normals(cJSON *root, const triptych_info *info)
 {
-    const trip_file_header *h = &d->header;
+    if (info->normal_bytes == 4)
+        cJSON_AddItemToObject(root, "gradient_scale", number(info->gradient_scale));
+    if (info->normal_bytes == 3) {
+        cJSON_AddItemToObject(root, "gradient_step", numbers(info->gradient_step, 3));
+        cJSON_AddItemToObject(root, "gradient_full", number(info->gradient_full));
+    }
+}
+
+static cJSON *to_json(const data_set *d, bool verified)
+{
+    const triptych_info *info = &d->info;
     double dims[3], steps[3];
     cJSON *root = cJSON_CreateObject();
     for (int a = 0; a < 3; a++) {
-        dims[a] = (double)h->dims[a];
-        steps[a] = trip_length(direction(d, a));
+        dims[a] = (double)info->dims[a];
+        steps[a] = trip_length(direction(info->index_to_world, a));
     }
-    cJSON_AddItemToObject(root, "format_version", number(h->version));
+    cJSON_AddItemToObject(root, "format_version", number(info->format_version));
     cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
     cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
-    add_world(root, d, source->root);
-    cJSON_AddItemToObject(root, "value_min", number(h->value_min));
-    cJSON_AddItemToObject(root, "value_max", number(h->value_max));
-    cJSON_AddItemToObject(root, "code_lo", number(h->code_lo));
-    cJSON_AddItemToObject(root, "code_hi", number(h->code_hi));
-    if (h->normal_bytes == 4)
-        cJSON_AddItemToObject(root, "gradient_scale", number(h->gradient_scale));
-    if (h->normal_bytes == 3) {
-        cJSON_AddItemToObject(root, "gradient_step", numbers(h->gradient_step, 3));
-        cJSON_AddItemToObject(root, "gradient_full", number(h->gradient_full));
-    }
-    cJSON_AddItemToObject(root, "voxels", number((double)h->voxels));
-    cJSON_AddItemToObject(root, "kept", number((double)h->kept));
-    cJSON_AddItemToObject(root, "halo", number((double)h->halo));
-    cJSON_AddItemToObject(root, "bytes", number((double)d->bytes));
+    add_world(root, info, d->source.root);
+    cJSON_AddItemToObject(root, "value_min", number(info->value_min));
+    cJSON_AddItemToObject(root, "value_max", number(info->value_max));
+    cJSON_AddItemToObject(root, "code_lo", number(info->code_lo));
+    cJSON_AddItemToObject(root, "code_hi", number(info->code_hi));
+    add_normals(root, info);
+    cJSON_AddItemToObject(root, "voxels", number((double)info->voxels));
+    cJSON_AddItemToObject(root, "kept", number((double)info->kept));
+    cJSON_AddItemToObject(root, "halo", number((double)info->halo));
+    cJSON_AddItemToObject(root, "bytes", number((double)info->bytes));
     cJSON_AddItemToObject(root, "halo_bytes", number((double)halo_bytes(d)));
-    cJSON_AddItemToObject(root, "index_bytes", number((double)h->index_bytes));
-    cJSON_AddBoolToObject(root, "normals", h->planes >> TRIP_PLANE_NORMALS & 1);
-    cJSON_AddItemToObject(root, "code_bytes", number(h->code_bytes));
-    cJSON_AddItemToObject(root, "normal_bytes", number(h->normal_bytes));
-    cJSON_AddItemToObject(root, "tile_voxels", number(1u << h->tile_log2));
-    cJSON_AddItemToObject(root, "slab_sheets", number(h->slab_sheets));
-    cJSON_AddItemToObject(root, "page_bytes", number(1u << h->page_log2));
+    cJSON_AddItemToObject(root, "index_bytes", number((double)info->index_bytes));
+    cJSON_AddBoolToObject(root, "normals", info->normal_bytes > 0);
+    cJSON_AddItemToObject(root, "code_bytes", number(info->code_bytes));
+    cJSON_AddItemToObject(root, "normal_bytes", number(info->normal_bytes));
+    cJSON_AddItemToObject(root, "tile_voxels", number(info->tile_voxels));
+    cJSON_AddItemToObject(root, "slab_sheets", number(info->slab_sheets));
+    cJSON_AddItemToObject(root, "page_bytes", number(info->page_bytes));
     if (verified)
         cJSON_AddTrueToObject(root, "verified");
     add_lists(root, d);
-    if (source->root)
-        cJSON_AddItemReferenceToObject(root, "source", source->root);
+    if (d->source.root)
+        cJSON_AddItemReferenceToObject(root, "source", d->source.root);
     else
-        cJSON_AddStringToObject(root, "source", d->text);
+        cJSON_AddStringToObject(root, "source", info->notes);
     return root;
 }
 
-static int print_json(const trip_dataset *d, const trip_json *source, bool verified)
+static int print_json(const data_set *d, bool verified)
 {
-    cJSON *root = to_json(d, source, verified);
+    cJSON *root = to_json(d, verified);
     char *text = trip_json_print(root, true);
     cJSON_Delete(root);
     if (!text)
@@ -264,32 +265,34 @@ static void print_bounds(const char *label, double bounds[2][3])
     putchar('\n');
 }
 
-static void print_world(const trip_dataset *d)
+static void print_world(const triptych_info *info)
 {
     char a[32], b[32], c[32], t[32];
     double bounds[2][3];
-    printf("%-12s %s x %s x %s\n", "spacing", shortest(trip_length(direction(d, 0)), a),
-           shortest(trip_length(direction(d, 1)), b), shortest(trip_length(direction(d, 2)), c));
+    printf("%-12s %s x %s x %s\n", "spacing",
+           shortest(trip_length(direction(info->index_to_world, 0)), a),
+           shortest(trip_length(direction(info->index_to_world, 1)), b),
+           shortest(trip_length(direction(info->index_to_world, 2)), c));
     for (int row = 0; row < 3; row++) {
-        const double *m = d->index_to_world.m[row];
+        const double *m = info->index_to_world[row];
         printf("%-12s %12s %12s %12s %12s\n", row ? "" : "to world", shortest(m[0], a),
                shortest(m[1], b), shortest(m[2], c), shortest(m[3], t));
     }
-    grid_bounds(d, bounds);
+    grid_bounds(info, bounds);
     print_bounds("bounds", bounds);
-    kept_bounds(d, bounds);
+    kept_bounds(info, bounds);
     print_bounds("kept in", bounds);
 }
 
 /* Where x, y and z of the world, and i, j and k of the grid point in the patient. */
-static void print_anatomy(const trip_dataset *d, const char *space)
+static void print_anatomy(const triptych_info *info, const char *space)
 {
     char words[TRIP_ANATOMY_WORDS];
     printf("%-12s %s: x to %s, y to %s, z to %s\n", "space", space, trip_anatomy_end_name(space[0]),
            trip_anatomy_end_name(space[1]), trip_anatomy_end_name(space[2]));
     for (int a = 0; a < 3; a++)
         printf("%c %-10s %s\n", 'i' + a, "points to",
-               trip_anatomy_words(space, direction(d, a), words));
+               trip_anatomy_words(space, direction(info->index_to_world, a), words));
 }
 
 /* The top-level texts and numbers of the notes that brick left. */
@@ -307,92 +310,102 @@ static void print_notes(const cJSON *root)
         }
 }
 
-static void print_sizes(const trip_dataset *d)
+static void print_sizes(const data_set *d)
 {
-    const trip_file_header *h = &d->header;
+    const triptych_info *info = &d->info;
     char bytes[32], index[32], halo[32];
-    double kept = h->kept ? (double)h->kept : 1, around = (double)halo_bytes(d);
-    printf("%-12s %s, %.4g per kept voxel", "size", trip_format_bytes(d->bytes, bytes),
-           ((double)d->bytes - around) / kept);
-    if (h->halo)
+    double kept = info->kept ? (double)info->kept : 1, around = (double)halo_bytes(d);
+    printf("%-12s %s, %.4g per kept voxel", "size", trip_format_bytes(info->bytes, bytes),
+           ((double)info->bytes - around) / kept);
+    if (info->halo)
         printf(" and %s of halo, %.4g with it", trip_format_bytes(halo_bytes(d), halo),
-               (double)d->bytes / kept);
-    printf("; index %s (%.2g %%)\n", trip_format_bytes(h->index_bytes, index),
-           100.0 * (double)h->index_bytes / (double)d->bytes);
-    printf("%-12s %u byte%s a code", "planes", h->code_bytes, h->code_bytes > 1 ? "s" : "");
-    if (h->normal_bytes)
-        printf(", %u a normal", h->normal_bytes);
+               (double)info->bytes / kept);
+    printf("; index %s (%.2g %%)\n", trip_format_bytes(info->index_bytes, index),
+           100.0 * (double)info->index_bytes / (double)info->bytes);
+    printf("%-12s %u byte%s a code", "planes", info->code_bytes, info->code_bytes > 1 ? "s" : "");
+    if (info->normal_bytes)
+        printf(", %u a normal", info->normal_bytes);
     putchar('\n');
 }
 
-/* Length of a step along an index axis of a list's grid, in those of the data set's. */
-static double ratio(const trip_dataset *d, const trip_list *list, int axis)
+/* Length of a step along an axis of a list's grid, in those of the data set's. */
+static double ratio(const triptych_info *info, const triptych_list *list, int axis)
 {
-    const double(*m)[4] = list->index_to_world.m;
-    return trip_length(trip_v3(m[0][axis], m[1][axis], m[2][axis])) /
-           trip_length(direction(d, axis));
+    return trip_length(direction(list->index_to_world, axis)) /
+           trip_length(direction(info->index_to_world, axis));
 }
 
 /* A list; its grid where that is not the data set's. */
-static void print_list(const trip_dataset *d, const trip_list *list)
+static void print_list(const triptych_info *info, const triptych_list *list)
 {
     char bytes[32], name[32], text[3][32];
-    snprintf(name, sizeof name, "%c%u %s", 'x' + list->axis, list->level,
-             trip_kind_of(list->kind)->name);
+    snprintf(name, sizeof name, "%c%u %s", 'x' + list->axis, list->level, list->kind);
     printf("%-12s %llu records, %llu bricks, %s", name, (unsigned long long)list->records,
-           (unsigned long long)list->brick_count, trip_format_bytes(list_bytes(list), bytes));
+           (unsigned long long)list->bricks, trip_format_bytes(list->bytes, bytes));
     if (list->level > 0)
         printf("; %lld x %lld x %lld, %s x %s x %s voxels of level 0 each",
                (long long)list->dims[0], (long long)list->dims[1], (long long)list->dims[2],
-               shortest(ratio(d, list, 0), text[0]), shortest(ratio(d, list, 1), text[1]),
-               shortest(ratio(d, list, 2), text[2]));
+               shortest(ratio(info, list, 0), text[0]), shortest(ratio(info, list, 1), text[1]),
+               shortest(ratio(info, list, 2), text[2]));
     putchar('\n');
 }
 
-static void print_text(const trip_dataset *d, const trip_json *source)
+static void print_text(const data_set *d)
 {
-    const trip_file_header *h = &d->header;
-    double voxels = h->voxels ? (double)h->voxels : 1;
+    const triptych_info *info = &d->info;
+    double voxels = info->voxels ? (double)info->voxels : 1;
     printf("%-12s ", "data set");
     trip_text_write(stdout, d->path);
-    printf(" (format version %u)\n", h->version);
-    printf("%-12s %llu x %llu x %llu\n", "grid", (unsigned long long)h->dims[0],
-           (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
-    print_world(d);
-    if (space_of(source->root))
-        print_anatomy(d, space_of(source->root));
-    print_range("values", h->value_min, h->value_max);
-    print_range("stored as", h->code_lo, h->code_hi);
-    printf("%-12s %llu\n", "voxels", (unsigned long long)h->voxels);
-    printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)h->kept,
-           100.0 * (double)h->kept / voxels);
-    if (h->halo)
-        printf("%-12s %llu neighbours of those, likewise\n", "halo", (unsigned long long)h->halo);
+    printf(" (format version %u)\n", info->format_version);
+    printf("%-12s %lld x %lld x %lld\n", "grid", (long long)info->dims[0], (long long)info->dims[1],
+           (long long)info->dims[2]);
+    print_world(info);
+    if (space_of(d->source.root))
+        print_anatomy(info, space_of(d->source.root));
+    print_range("values", info->value_min, info->value_max);
+    print_range("stored as", info->code_lo, info->code_hi);
+    printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);
+    printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
+           100.0 * (double)info->kept / voxels);
+    if (info->halo)
+        printf("%-12s %llu neighbours of those, likewise\n", "halo",
+               (unsigned long long)info->halo);
     print_sizes(d);
-    printf("%-12s tiles of %u x %u voxels over %u sheets\n", "bricks", 1u << h->tile_log2,
-           1u << h->tile_log2, h->slab_sheets);
-    for (unsigned i = 0; i < d->list_count; i++)
-        print_list(d, &d->lists[i]);
-    print_notes(source->root);
+    printf("%-12s tiles of %u x %u voxels over %u sheets\n", "bricks", info->tile_voxels,
+           info->tile_voxels, info->slab_sheets);
+    for (unsigned i = 0; i < info->lists; i++)
+        print_list(info, &d->lists[i]);
+    print_notes(d->source.root);
 }
 
-static int show(const options *o, trip_budget *budget)
+static int read_lists(data_set *d)
 {
-    trip_dataset *d;
-    trip_json source = { 0 };
-    int status = trip_dataset_open(&d, o->path, budget);
+    int status = 0;
+    d->lists = calloc(d->info.lists, sizeof *d->lists);
+    if (!d->lists)
+        return trip_fail(TRIP_ERROR, "info", d->path, "out of memory");
+    for (unsigned i = 0; i < d->info.lists && !status; i++)
+        status = triptych_get_list(d->t, i, &d->lists[i]);
+    return status;
+}
+
+static int show(const options *o, data_set *d, trip_budget *budget)
+{
+    int status = triptych_open(d->t, o->path, NULL);
     if (status == TRIP_OK && o->verify)
-        status = trip_dataset_verify(d, budget);
+        status = triptych_verify(d->t);
     if (status == TRIP_OK)
-        status = trip_json_parse(&source, d->text, d->path, budget);
+        status = triptych_get_info(d->t, &d->info);
+    if (status == TRIP_OK)
+        status = read_lists(d);
+    if (status == TRIP_OK)
+        status = trip_json_parse(&d->source, d->info.notes, o->path, budget);
     if (status == TRIP_OK && o->json)
-        status = print_json(d, &source, o->verify);
+        status = print_json(d, o->verify);
     else if (status == TRIP_OK)
-        print_text(d, &source);
+        print_text(d);
     if (status == TRIP_OK && o->verify && !o->json)
         printf("%-12s every page and record is as it was written\n", "verified");
-    trip_json_free(&source);
-    trip_dataset_close(d);
     return status;
 }
 
@@ -405,13 +418,20 @@ int trip_command_info(int argc, char **argv)
         .doc = "Show what is in a data set: grid, values, sizes, where it came from.",
     };
     options o = { 0 };
+    data_set d = { 0 };
     trip_budget *budget = NULL;
     int status = trip_options_parse(&argp, argc, argv, &o);
+    d.path = o.path;
     if (status == 0)
         status = trip_budget_create(&budget, 0);
-    if (status < 0)
-        return trip_exit_status(status);
-    status = show(&o, budget);
-    trip_budget_destroy(budget);
+    if (status == 0)
+        status = library_create(&d.t, NULL);
+    if (status == 0)
+        status = show(&o, &d, budget);
+    trip_json_free(&d.source);
+    free(d.lists);
+    triptych_destroy(d.t);
+    if (budget)
+        trip_budget_destroy(budget);
     return trip_exit_status(status);
 }

@@ -29,19 +29,16 @@ static int write_copy(piped_function *p, const char *name, const char *text)
     return n < 0 ? trip_fail_errno("transfer function", name, "cannot keep a copy") : 0;
 }
 
-int piped_function_keep(piped_function *p, const char **name)
+int piped_function_keep(piped_function *p, triptych *t, const char **name)
 {
-    trip_tf *tf = NULL;
+    char *text = NULL;
     if (!is_pipe(*name))
         return 0;
-    int status = trip_tf_load(&tf, *name);
-    char *text = status == 0 ? trip_tf_to_text(tf) : NULL;
+    int status = triptych_convert(t, &(triptych_conversion){ .function = *name }, &text);
     if (status == 0)
-        status = text ? write_copy(p, *name, text)
-                      : trip_fail(TRIP_ERROR, "transfer function", *name, "out of memory");
+        status = write_copy(p, *name, text);
     if (status == 0)
         *name = p->path;
-    trip_tf_destroy(tf);
     free(text);
     return status;
 }

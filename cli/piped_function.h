@@ -3,6 +3,8 @@
 #ifndef TRIP_CLI_PIPED_FUNCTION_H
 #define TRIP_CLI_PIPED_FUNCTION_H
 
+#include "triptych.h"
+
 /* Zeroed at first. */
 typedef struct piped_function {
     char path[32]; /* of its copy in memory; "": there is none */
@@ -11,7 +13,7 @@ typedef struct piped_function {
 
 /* Where *name is a pipe, reads it and makes *name the path of a copy, which holds until release.
  * Other names, and NULL, stay as they are. 0, or a reported failure. */
-int piped_function_keep(piped_function *p, const char **name);
+int piped_function_keep(piped_function *p, triptych *t, const char **name);
 void piped_function_release(piped_function *p);
 
 #endif

@@ -7,11 +7,10 @@
 #include <sys/stat.h>
 
 #include "cached_volume.h"
-#include "image_file.h"
+#include "geometry.h"
 #include "new_file.h"
 #include "options.h"
 #include "report.h"
-#include "view.h"
 #include "text.h"
 #include "volume_options.h"
 
@@ -188,7 +187,7 @@ static int parse_background(const char *text, triptych_settings *s)
     return status;
 }
 
-static int parse_window(const char *text, session_look *look)
+static int parse_window(const char *text, triptych_function *look)
 {
     int status = trip_option_number("--window", text, 0, DBL_MAX, &look->window);
     return !status && look->window == 0 ? trip_option_fail("--window", "must be above 0") : status;
@@ -216,7 +215,7 @@ static int parse_submit(const char *text, parse *p)
     return 0;
 }
 
-static int parse_volume(int key, char *arg, trip_volume_params *v)
+static int parse_volume(int key, char *arg, triptych_brick_options *v)
 {
     switch (key) {
     case KEY_GRID:
@@ -296,7 +295,7 @@ static int parse_view(int key, char *arg, parse *p)
     case KEY_ZOOM:
         return trip_option_number("--zoom", arg, 1e-6, 1e6, &o->zoom);
     case KEY_FOV:
-        return trip_option_number("--fov", arg, TRIP_FOV_MIN_DEGREES, TRIP_FOV_MAX_DEGREES,
+        return trip_option_number("--fov", arg, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES,
                                   &o->fov_degrees);
     case KEY_ORTHO:
         return parse_ortho(arg, o);
@@ -338,7 +337,7 @@ static int parse_look(int key, char *arg, parse *p)
     render_options *o = p->o;
     switch (key) {
     case KEY_TF:
-        o->function.tf = arg;
+        o->function.name = arg;
         return 0;
     case KEY_OPACITY_SCALE:
         return trip_option_number("--opacity-scale", arg, 1e-6, 1e6, &o->function.opacity_scale);
@@ -420,7 +419,7 @@ static int check(parse *p)
         return trip_option_fail("VOLUME", "none given: `triptych render VOLUME -o PICTURE.png`");
     if (!o->output)
         return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
-    const trip_volume_params *v = &o->volume;
+    const triptych_brick_options *v = &o->volume;
     if ((v->grid || v->level_set || v->spacing[0] > 0 || v->allow_gaps) &&
         !cached_volume_wanted(o->input))
         return trip_option_fail(
@@ -452,7 +451,7 @@ static int check(parse *p)
     const char *extension = strrchr(o->output, '.');
     if (!p->background && extension && !strcasecmp(extension, ".exr"))
         memset(o->settings.background, 0, sizeof o->settings.background);
-    return trip_image_check_path(o->output, NULL);
+    return 0;
 }
 
 static error_t parse_key(int key, char *arg, struct argp_state *state)

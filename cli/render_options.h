@@ -1,10 +1,10 @@
-/* What `triptych render` was asked for: the command line, checked, defaults filled in. */
+/* The command line of `triptych render`, checked, defaults filled in. */
 #ifndef TRIP_RENDER_OPTIONS_H
 #define TRIP_RENDER_OPTIONS_H
 
-#include "session.h"
-#include "triptych.h"
-#include "volume.h"
+#include <stdbool.h>
+
+#include "triptych_brick.h"
 
 /* What becomes of bricks behind what is already opaque; skipped where nothing is said. */
 typedef enum render_hidden {
@@ -15,10 +15,10 @@ typedef enum render_hidden {
 
 typedef struct render_options {
     const char *input,
-        *output;               /* data set or volume; an image file, its name's model in an orbit */
-    trip_volume_params volume; /* how a volume is read */
-    session_look function;     /* colour and opacity */
-    const char *stats;         /* file, "-" for stdout, or NULL */
+        *output; /* data set or volume; an image file, its name's model in an orbit */
+    triptych_brick_options volume; /* how a volume is read; nothing else of it is set */
+    triptych_function function;    /* colour and opacity */
+    const char *stats;             /* file, "-" for stdout, or NULL */
     int width, height;
     bool eye_given, look_given, up_given;
     double eye[3], look[3], up[3];

@@ -9,6 +9,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "budget.h"
 #include "json.h"
 #include "new_file.h"
 #include "render_view.h"
@@ -19,7 +20,6 @@ struct render_stats {
     cJSON *root, *frames;
 };
 
-static const char *const axis_names[3] = { "x", "y", "z" };
 static const char *const method_names[] = { "merge", "clip", "axis" };
 
 static int out_of_memory(void)
@@ -55,73 +55,106 @@ static void add_ms(cJSON *object, const char *name, double ms)
     cJSON_AddRawToObject(object, name, text);
 }
 
-/* Level 0 goes with what was read of its layer. */
-static void add_plan(cJSON *lists, const trip_list *of, const trip_plan_list *p)
+/* "x" at level 0, "x1" at level 1; only what is drawn has statistics. */
+static const char *list_name(const triptych_list *list, char name[24])
 {
-    char name[24];
-    cJSON *list = cJSON_GetObjectItem(lists, trip_plan_list_name(of, name));
-    if (!list)
-        list = cJSON_AddObjectToObject(lists, name);
-    cJSON_AddNumberToObject(list, "bricks", (double)p->bricks);
-    cJSON_AddNumberToObject(list, "bricks_selected", (double)p->bricks_selected);
-    cJSON_AddNumberToObject(list, "bricks_transparent", (double)p->bricks_transparent);
-    cJSON_AddNumberToObject(list, "bricks_outside", (double)p->bricks_outside);
-    cJSON_AddNumberToObject(list, "bricks_without_weight", (double)p->bricks_without_weight);
+    if (list->level == 0)
+        snprintf(name, 24, "%c", 'x' + list->axis);
+    else
+        snprintf(name, 24, "%c%u", 'x' + list->axis, list->level);
+    return name;
 }
 
 /* What was not counted is left out. */
-static cJSON *add_list(cJSON *lists, int axis, const trip_frame_stats *frame)
+static void add_splats(cJSON *list, const triptych_list_stats *s)
 {
-    const trip_list_stats *s = &frame->lists[axis];
-    cJSON *list = cJSON_AddObjectToObject(lists, axis_names[axis]);
     cJSON_AddNumberToObject(list, "splats_read", (double)s->splats_read);
-    if (frame->counted) {
-        cJSON_AddNumberToObject(list, "splats_projected", (double)s->splats_projected);
-        cJSON_AddNumberToObject(list, "splats_drawn", (double)s->splats_drawn);
-    }
-    return list;
+    if (!s->counted)
+        return;
+    cJSON_AddNumberToObject(list, "splats_projected", (double)s->splats_projected);
+    cJSON_AddNumberToObject(list, "splats_drawn", (double)s->splats_drawn);
 }
 
-int render_stats_add_frame(render_stats *s, const trip_dataset *data, const trip_plan *plan,
-                           const trip_frame_stats *frame)
+static void add_list(cJSON *list, const triptych_list_stats *s)
 {
-    cJSON *f = cJSON_CreateObject();
-    add_ms(f, "ms", frame->ms);
-    add_ms(f, "read_ms", frame->read_ms);
-    add_ms(f, "draw_ms", frame->draw_ms);
-    add_ms(f, "merge_ms", frame->merge_ms);
-    cJSON_AddNumberToObject(f, "reads", (double)frame->reader.reads);
-    cJSON_AddNumberToObject(f, "bytes_cached", (double)frame->reader.bytes_cached);
-    cJSON_AddNumberToObject(f, "bytes_of_planes_left_out",
-                            (double)trip_plan_bytes_left_out(plan, data));
-    cJSON_AddNumberToObject(f, "runs_skipped", (double)frame->reader.runs_skipped);
-    cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame->reader.bytes_skipped);
-    cJSON *lists = cJSON_AddObjectToObject(f, "lists");
-    for (int axis = 0; axis < 3; axis++) {
-        cJSON *list = add_list(lists, axis, frame);
-        cJSON_AddNumberToObject(list, "bytes_read", (double)frame->lists[axis].bytes_read);
-    }
-    for (unsigned i = 0; i < data->list_count; i++)
-        if (trip_kind_of(data->lists[i].kind)->splatted)
-            add_plan(lists, &data->lists[i], &plan->lists[i]);
-    return f && lists && cJSON_AddItemToArray(s->frames, f) ? 0 : out_of_memory();
+    add_splats(list, s);
+    cJSON_AddNumberToObject(list, "bytes_read", (double)s->bytes_read);
+    cJSON_AddNumberToObject(list, "bricks", (double)s->bricks);
+    cJSON_AddNumberToObject(list, "bricks_selected", (double)s->bricks_selected);
+    cJSON_AddNumberToObject(list, "bricks_transparent", (double)s->bricks_transparent);
+    cJSON_AddNumberToObject(list, "bricks_outside", (double)s->bricks_outside);
+    cJSON_AddNumberToObject(list, "bricks_without_weight", (double)s->bricks_without_weight);
 }
 
-int render_stats_add_count(render_stats *s, int index, const trip_frame_stats *counted)
+/* Calls `one` with each list that can be drawn and its statistics. */
+static int each_list(triptych *t,
+                     void (*one)(void *user, const char *name, const triptych_list_stats *s),
+                     void *user)
+{
+    triptych_info info;
+    int status = triptych_get_info(t, &info);
+    for (unsigned i = 0; i < info.lists && !status; i++) {
+        char name[24];
+        triptych_list list;
+        triptych_list_stats s;
+        status = triptych_get_list(t, i, &list);
+        if (!status)
+            status = triptych_get_list_stats(t, i, &s);
+        if (!status && list.drawn)
+            one(user, list_name(&list, name), &s);
+    }
+    return status;
+}
+
+static void add_whole(void *user, const char *name, const triptych_list_stats *s)
+{
+    add_list(cJSON_AddObjectToObject(user, name), s);
+}
+
+static void add_counted(void *user, const char *name, const triptych_list_stats *s)
+{
+    add_splats(cJSON_AddObjectToObject(user, name), s);
+}
+
+static int add_camera(cJSON *frame, triptych *t)
+{
+    triptych_camera view;
+    int status = triptych_get_camera(t, &view);
+    char *options = status ? NULL : render_view_options(&view);
+    bool added = options && cJSON_AddStringToObject(frame, "camera", options);
+    free(options);
+    return status || added ? status : out_of_memory();
+}
+
+int render_stats_add_frame(render_stats *s, triptych *t)
+{
+    triptych_frame_stats frame;
+    int status = triptych_get_frame_stats(t, &frame);
+    if (status)
+        return status;
+    cJSON *f = cJSON_CreateObject();
+    add_ms(f, "ms", frame.ms);
+    add_ms(f, "read_ms", frame.wait_ms);
+    add_ms(f, "draw_ms", frame.draw_ms);
+    add_ms(f, "merge_ms", frame.merge_ms);
+    cJSON_AddNumberToObject(f, "reads", (double)frame.reads);
+    cJSON_AddNumberToObject(f, "bytes_cached", (double)frame.bytes_cached);
+    cJSON_AddNumberToObject(f, "bytes_of_planes_left_out", (double)frame.bytes_unused);
+    cJSON_AddNumberToObject(f, "runs_skipped", (double)frame.runs_hidden);
+    cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame.bytes_hidden);
+    cJSON *lists = cJSON_AddObjectToObject(f, "lists");
+    if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
+        cJSON_Delete(f);
+        return out_of_memory();
+    }
+    status = each_list(t, add_whole, lists);
+    return status ? status : add_camera(f, t);
+}
+
+int render_stats_add_count(render_stats *s, int index, triptych *t)
 {
     cJSON *lists = cJSON_AddObjectToObject(cJSON_GetArrayItem(s->frames, index), "counted");
-    for (int axis = 0; axis < 3; axis++)
-        add_list(lists, axis, counted);
-    return lists ? 0 : out_of_memory();
-}
-
-int render_stats_add_camera(render_stats *s, const trip_camera_params *view)
-{
-    char *options = render_view_options(view);
-    cJSON *last = cJSON_GetArrayItem(s->frames, cJSON_GetArraySize(s->frames) - 1);
-    bool added = options && cJSON_AddStringToObject(last, "camera", options);
-    free(options);
-    return added ? 0 : out_of_memory();
+    return lists ? each_list(t, add_counted, lists) : out_of_memory();
 }
 
 static bool write_text(FILE *f, const char *text)
@@ -155,32 +188,23 @@ static int write_file(const char *path, const char *text)
     return status;
 }
 
-/* Where reads land, and how the renderer gets at it. */
-static const char *ring_text(const trip_renderer *renderer, const trip_reader *reader)
-{
-    if (renderer->resident)
-        return "not used: the renderer holds the data";
-    if (trip_reader_in_place(reader))
-        return "mapped: reads land in the renderer's memory";
-    return renderer->ops->take_slots ? "copied: batches go to the renderer's memory"
-                                     : "shared: the renderer draws from the ring";
-}
-
-int render_stats_describe(render_stats *s, const render_options *o, const trip_renderer *renderer,
-                          const trip_reader *reader, const trip_budget *budget)
+int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
 {
     cJSON *root = s->root;
     const int size[2] = { o->width, o->height };
-    cJSON_AddStringToObject(root, "renderer", renderer->ops->name);
-    cJSON_AddStringToObject(root, "device", renderer->ops->device(renderer));
+    triptych_frame_stats frame;
+    int status = triptych_get_frame_stats(t, &frame);
+    if (status)
+        return status;
+    cJSON_AddStringToObject(root, "renderer", frame.renderer);
+    cJSON_AddStringToObject(root, "device", frame.device);
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
-    cJSON_AddStringToObject(root, "engine", trip_reader_engine_name(reader));
-    cJSON_AddStringToObject(root, "ring", ring_text(renderer, reader));
+    cJSON_AddStringToObject(root, "engine", frame.engine);
+    cJSON_AddStringToObject(root, "ring", frame.ring);
     cJSON_AddItemToObject(root, "size", cJSON_CreateIntArray(size, 2));
     cJSON_AddNumberToObject(root, "peak_rss_bytes", (double)trip_memory_peak_rss_bytes());
-    cJSON_AddNumberToObject(root, "memory_limit_bytes", (double)trip_budget_limit_bytes(budget));
-    return cJSON_AddNumberToObject(root, "memory_peak_bytes",
-                                   (double)trip_budget_peak_bytes(budget))
+    cJSON_AddNumberToObject(root, "memory_limit_bytes", (double)frame.memory_bytes);
+    return cJSON_AddNumberToObject(root, "memory_peak_bytes", (double)frame.peak_memory_bytes)
                ? 0
                : out_of_memory();
 }
@@ -201,58 +225,77 @@ int render_stats_write(render_stats *s, const render_options *o)
     return status;
 }
 
-void render_stats_explain_camera(const trip_camera_params *view, uint64_t splats, FILE *out)
+int render_stats_explain_plan(triptych *t, FILE *out)
 {
-    char *options = render_view_options(view);
-    fprintf(out, "camera      %s\n", options ? options : "");
-    if (splats)
-        fprintf(out, "fitted      to what is visible, found among %" PRIu64 " splats\n", splats);
+    triptych_camera view;
+    char *options = NULL, *plan = NULL;
+    int status = triptych_get_camera(t, &view);
+    if (!status)
+        status = triptych_explain(t, &plan);
+    if (!status && !(options = render_view_options(&view)))
+        status = out_of_memory();
+    if (!status) {
+        fprintf(out, "camera      %s\n", options);
+        if (view.splats)
+            fprintf(out, "fitted      to what is visible, found among %" PRIu64 " splats\n",
+                    view.splats);
+        fputs(plan, out);
+    }
     free(options);
+    free(plan);
+    return status;
 }
 
-void render_stats_explain(const trip_frame_stats *frame, const trip_renderer *renderer,
-                          const trip_reader *reader, FILE *out)
+static void explain_list(void *user, const char *name, const triptych_list_stats *s)
 {
     char bytes[32];
-    for (int axis = 0; axis < 3; axis++) {
-        const trip_list_stats *s = &frame->lists[axis];
-        if (s->splats_read == 0)
-            continue;
-        fprintf(out, "cost %s      %s read, %" PRIu64 " splats\n", axis_names[axis],
+    if (s->splats_read)
+        fprintf(user, "cost %-6s %s read, %" PRIu64 " splats\n", name,
                 trip_format_bytes(s->bytes_read, bytes), s->splats_read);
-    }
-    if (frame->reader.bytes_cached)
-        fprintf(out, "cache       %s from memory\n",
-                trip_format_bytes(frame->reader.bytes_cached, bytes));
-    if (frame->reader.bytes_skipped)
+}
+
+int render_stats_explain_cost(triptych *t, FILE *out)
+{
+    char bytes[32];
+    triptych_frame_stats frame;
+    int status = triptych_get_frame_stats(t, &frame);
+    if (!status)
+        status = each_list(t, explain_list, out);
+    if (status)
+        return status;
+    if (frame.bytes_cached)
+        fprintf(out, "cache       %s from memory\n", trip_format_bytes(frame.bytes_cached, bytes));
+    if (frame.bytes_hidden)
         fprintf(out, "hidden      %s in %" PRIu64 " runs not read: behind what is opaque\n",
-                trip_format_bytes(frame->reader.bytes_skipped, bytes), frame->reader.runs_skipped);
-    fprintf(out, "ring        %s\n", ring_text(renderer, reader));
+                trip_format_bytes(frame.bytes_hidden, bytes), frame.runs_hidden);
+    fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
-            frame->ms, frame->read_ms, frame->draw_ms, frame->merge_ms);
+            frame.ms, frame.wait_ms, frame.draw_ms, frame.merge_ms);
+    return 0;
 }
 
-void render_stats_explain_count(const trip_frame_stats *counted, FILE *out)
+static void explain_counted(void *user, const char *name, const triptych_list_stats *s)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        const trip_list_stats *s = &counted->lists[axis];
-        if (s->splats_read)
-            fprintf(out,
-                    "count %s     %" PRIu64 " splats, %" PRIu64 " projected, %" PRIu64 " drawn\n",
-                    axis_names[axis], s->splats_read, s->splats_projected, s->splats_drawn);
-    }
+    if (s->splats_read)
+        fprintf(user, "count %-5s %" PRIu64 " splats, %" PRIu64 " projected, %" PRIu64 " drawn\n",
+                name, s->splats_read, s->splats_projected, s->splats_drawn);
 }
 
-void render_stats_summary(const char *path, const render_options *o, const trip_frame_stats *frame,
-                          FILE *out)
+int render_stats_explain_count(triptych *t, FILE *out)
 {
-    uint64_t splats = 0, bytes = 0;
+    return each_list(t, explain_counted, out);
+}
+
+int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out)
+{
     char text[32];
-    for (int axis = 0; axis < 3; axis++) {
-        splats += frame->lists[axis].splats_read;
-        bytes += frame->lists[axis].bytes_read;
-    }
+    triptych_frame_stats frame;
+    int status = triptych_get_frame_stats(t, &frame);
+    if (status)
+        return status;
     trip_text_write(out, path);
     fprintf(out, ": %d x %d, %.2f million splats, %s read, %.2f s\n", o->width, o->height,
-            (double)splats * 1e-6, trip_format_bytes(bytes, text), frame->ms * 1e-3);
+            (double)frame.splats * 1e-6, trip_format_bytes(frame.bytes_read, text),
+            frame.ms * 1e-3);
+    return 0;
 }

@@ -24,15 +24,15 @@ triptych_view render_view(const render_options *o)
     };
 }
 
-static const char *point(trip_vec3 p, char text[128])
+static const char *point(const double p[3], char text[128])
 {
     char x[32], y[32], z[32];
-    snprintf(text, 128, "%s,%s,%s", trip_text_from_double(p.x, x), trip_text_from_double(p.y, y),
-             trip_text_from_double(p.z, z));
+    snprintf(text, 128, "%s,%s,%s", trip_text_from_double(p[0], x), trip_text_from_double(p[1], y),
+             trip_text_from_double(p[2], z));
     return text;
 }
 
-char *render_view_options(const trip_camera_params *view)
+char *render_view_options(const triptych_camera *view)
 {
     char *options, eye[128], look[128], up[128], angle[32];
     bool ortho = view->ortho_height > 0;

@@ -2,13 +2,12 @@
 #ifndef TRIP_RENDER_VIEW_H
 #define TRIP_RENDER_VIEW_H
 
-#include "camera.h"
 #include "render_options.h"
 
 /* What the options say of the view; points into them. */
 triptych_view render_view(const render_options *o);
 
 /* The options that give this view again, to the last bit; for free(). NULL without memory. */
-char *render_view_options(const trip_camera_params *view);
+char *render_view_options(const triptych_camera *view);
 
 #endif

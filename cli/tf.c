@@ -11,13 +11,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "dataset_text.h"
+#include "library.h"
 #include "new_file.h"
 #include "options.h"
-#include "progress.h"
 #include "report.h"
 #include "text.h"
-#include "volume_function.h"
 
 enum { KEY_TF = 256, KEY_RANGE, KEY_FORMAT, KEY_FORCE };
 
@@ -115,10 +113,10 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
 
 static void list(void)
 {
+    triptych_preset p;
     printf("%-11s %-13s %s\n", "name", "values", "for");
-    for (size_t i = 0; trip_tf_preset_name(i); i++)
-        printf("%-11s %-13s %s\n", trip_tf_preset_name(i), trip_tf_preset_basis(i),
-               trip_tf_preset_summary(i));
+    for (unsigned i = 0; triptych_get_preset(i, &p); i++)
+        printf("%-11s %-13s %s\n", p.name, p.values, p.summary);
 }
 
 static bool ends_with(const char *name, const char *end)
@@ -135,6 +133,15 @@ static bool is_dataset(const char *path)
     return length < (int)sizeof index && stat(index, &st) == 0;
 }
 
+static bool is_preset(const char *name)
+{
+    triptych_preset p;
+    for (unsigned i = 0; triptych_get_preset(i, &p); i++)
+        if (!strcmp(p.name, name))
+            return true;
+    return false;
+}
+
 /* What no volume is called, nor a pattern of slices. */
 static bool is_function(const char *name)
 {
@@ -143,91 +150,59 @@ static bool is_function(const char *name)
         if (ends_with(name, ends[i]))
             return true;
     struct stat st;
-    return strncmp(name, "preset:", 7) == 0 || strchr(name, '#') ||
+    return is_preset(name) || strncmp(name, "preset:", 7) == 0 || strchr(name, '#') ||
            (stat(name, &st) != 0 && !strpbrk(name, "%*?["));
 }
 
-static int load_from_dataset(trip_tf **tf, const options *o)
-{
-    trip_budget *budget = NULL;
-    trip_dataset *data = NULL;
-    trip_dataset_text *text = NULL;
-    int status = trip_budget_create(&budget, 0);
-    if (!status)
-        status = trip_dataset_open(&data, o->words[1], budget);
-    if (!status)
-        status = trip_dataset_text_parse(&text, data);
-    if (!status)
-        status = o->tf ? trip_tf_load(tf, o->tf) : trip_dataset_text_tf(text, data, tf);
-    if (!status)
-        status = trip_dataset_text_adapt(text, data, *tf);
-    trip_dataset_text_destroy(text);
-    if (data)
-        trip_dataset_close(data);
-    if (budget)
-        trip_budget_destroy(budget);
-    return status;
-}
-
-static void on_progress(void *user, const char *stage, uint64_t done, uint64_t total)
-{
-    trip_progress_show(user, stage, done, total, "voxels");
-}
-
-static int load_from_volume(trip_tf **tf, const options *o)
-{
-    trip_progress progress = trip_progress_start(false);
-    const trip_brick_params params = {
-        .input = o->words[1],
-        .functions = &o->tf,
-        .function_count = o->tf != NULL,
-        .progress = on_progress,
-        .progress_user = &progress,
-    };
-    int status = trip_volume_function(&params, tf);
-    trip_progress_end(&progress);
-    return status;
-}
-
 /* IN is a preset or a function's file, a data set, or a volume. */
-static int load(trip_tf **tf, const options *o)
+static int convert_in(triptych *t, const options *o, triptych_form form, char **text)
 {
     const char *in = o->words[1];
-    *tf = NULL;
-    if (is_dataset(in))
-        return load_from_dataset(tf, o);
-    if (!trip_tf_is_preset(in) && !is_function(in))
-        return load_from_volume(tf, o);
-    if (o->tf)
+    triptych_conversion c = { .function = o->tf, .form = form, .name = in };
+    int status = 0;
+    if (is_dataset(in)) {
+        status = triptych_open(t, in, NULL);
+    } else if (!is_function(in)) {
+        c.volume = in;
+    } else if (o->tf) {
         return trip_option_fail("--tf", "is for a data set or a volume");
-    int status = trip_tf_load(tf, in);
-    if (!status && trip_tf_needs_data(*tf) && !trip_tf_is_normalised(*tf))
-        return trip_fail(TRIP_USAGE, "tf", in,
-                         "is made from a histogram: `triptych tf show --tf %s DATA`, DATA being a "
-                         "data set or a volume",
-                         in);
-    if (!status && o->range)
-        trip_tf_denormalise(*tf, o->lo, o->hi);
+    } else {
+        c.function = in;
+        c.lo = o->lo;
+        c.hi = o->hi;
+    }
+    return status ? status : triptych_convert(t, &c, text);
+}
+
+static int make_text(const options *o, triptych_form form, char **text)
+{
+    triptych *t = NULL;
+    trip_progress progress = trip_progress_start(false);
+    int status = library_create(&t, &progress);
+    if (!status)
+        status = convert_in(t, o, form, text);
+    trip_progress_end(&progress);
+    triptych_destroy(t);
     return status;
 }
 
-static int choose_format(const options *o, trip_tf_format *format)
+static int choose_form(const options *o, triptych_form *form)
 {
     static const struct {
         const char *end;
-        trip_tf_format format;
-    } ends[] = { { ".tf", TRIP_TF_TEXT },
-                 { ".vp.json", TRIP_TF_VP_JSON },
-                 { ".json", TRIP_TF_PARAVIEW },
-                 { ".vp", TRIP_TF_VP },
-                 { ".xml", TRIP_TF_SLICER } };
+        triptych_form form;
+    } ends[] = { { ".tf", TRIPTYCH_FORM_TF },
+                 { ".vp.json", TRIPTYCH_FORM_VP_JSON },
+                 { ".json", TRIPTYCH_FORM_PARAVIEW },
+                 { ".vp", TRIPTYCH_FORM_VP },
+                 { ".xml", TRIPTYCH_FORM_SLICER } };
     if (o->format >= 0) {
-        *format = (trip_tf_format)o->format;
+        *form = (triptych_form)o->format;
         return 0;
     }
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
         if (ends_with(o->words[2], ends[i].end)) {
-            *format = ends[i].format;
+            *form = ends[i].form;
             return 0;
         }
     return trip_option_fail(o->words[2],
@@ -265,22 +240,18 @@ static int write_file(const options *o, const char *text)
 
 static int convert(const options *o)
 {
-    trip_tf *tf = NULL;
-    trip_tf_format format = TRIP_TF_TEXT;
+    triptych_form form = TRIPTYCH_FORM_TF;
     const char *out = o->action == SHOW ? "-" : o->words[2];
-    int status =
-        o->action == SHOW || (!strcmp(out, "-") && o->format < 0) ? 0 : choose_format(o, &format);
-    if (!status)
-        status = load(&tf, o);
     char *text = NULL;
+    int status =
+        o->action == SHOW || (!strcmp(out, "-") && o->format < 0) ? 0 : choose_form(o, &form);
     if (!status)
-        status = trip_tf_write(tf, format, o->words[1], &text);
+        status = make_text(o, form, &text);
     if (!status && !strcmp(out, "-"))
         fputs(text, stdout);
     else if (!status)
         status = write_file(o, text);
     free(text);
-    trip_tf_destroy(tf);
     return status;
 }
 

@@ -10,12 +10,12 @@ int trip_option_grid(const char *name, const char **grid)
     return 0;
 }
 
-int trip_option_level_set(const char *text, trip_level_set_mode *mode)
+int trip_option_level_set(const char *text, triptych_level_set *mode)
 {
     static const char *const names[] = { "filled", "band", NULL };
     int choice = 0;
     int status = trip_option_choice("--level-set", text, names, &choice);
-    *mode = choice ? TRIP_LEVEL_SET_BAND : TRIP_LEVEL_SET_FILLED;
+    *mode = choice ? TRIPTYCH_LEVEL_SET_BAND : TRIPTYCH_LEVEL_SET_FILLED;
     return status;
 }
 

@@ -3,12 +3,12 @@
 #ifndef TRIP_CLI_VOLUME_OPTIONS_H
 #define TRIP_CLI_VOLUME_OPTIONS_H
 
-#include "volume.h"
+#include "triptych_brick.h"
 
 /* A grid's name; a second one is refused. */
 int trip_option_grid(const char *name, const char **grid);
 /* "filled" or "band". */
-int trip_option_level_set(const char *text, trip_level_set_mode *mode);
+int trip_option_level_set(const char *text, triptych_level_set *mode);
 /* "X,Y,Z", each above 0. */
 int trip_option_spacing(const char *text, double spacing[3]);
 

@@ -1,5 +1,5 @@
-/* What is behind a triptych handle. The program's own commands look into it for their statistics;
- * nothing else includes this. */
+/* What is behind a triptych handle, for the library's own files. One thread at a time, but for
+ * trip_scope_cancel(). */
 #ifndef TRIP_CONTEXT_H
 #define TRIP_CONTEXT_H
 
@@ -11,43 +11,84 @@
 #include "session.h"
 #include "triptych.h"
 
+enum { TRIP_CONTEXT_MOST_THREADS = 256 };
+
+/* A picture's memory, of the budget. */
+typedef struct trip_context_picture {
+    struct trip_context_picture *next;
+    float *rgba;
+    int width, height;
+} trip_context_picture;
+
 struct triptych {
     trip_scope scope;
     pthread_mutex_t lock;
     char error[4096]; /* under lock */
     void (*take)(void *user, const char *line);
     void *take_user;
+    void (*show)(void *user, const char *stage, uint64_t done, uint64_t total);
+    void *show_user;
 
     triptych_resources resources;
     char *name;
     session session;
     bool open, has_function;
+    trip_context_picture *pictures;
     trip_renderer *renderer; /* NULL until a frame is begun */
     trip_reader *reader;     /* the same; of these planes: */
     unsigned planes;
     trip_settings settings;
+    bool counting; /* frames count exactly, and draw what is hidden too; the reader is for that: */
+    bool reader_counts;
 
     bool has_view;
     trip_camera_params view, turned;
     trip_vec3 axis;      /* that a turn goes about */
     uint64_t fit_splats; /* looked at to fit the view */
 
-    bool counting; /* frames count exactly, and draw what is hidden too */
-    void (*progress)(void *user, uint64_t splats, uint64_t total);
-    void *progress_user;
     bool begun, drawn; /* the camera and the plan are there; the drawing, too */
     trip_camera camera;
     trip_plan plan;
+    double plan_ms;
     trip_frame frame;
     trip_drawing drawing;
 
-    trip_image_files pictures;
+    bool has_stats;
+    triptych_frame_stats stats;
+    triptych_list_stats *list_stats; /* by the data set's lists, of the budget; NULL: not yet */
+
+    trip_image_files files;
 };
 
-/* The first part of triptych_begin(), which goes on from there: the renderer, the camera, the plan.
- */
-int trip_context_prepare(triptych *t);
-/* Frames count from the next one on. */
-void trip_context_count(triptych *t);
+/* Every call works in the context's scope: trip_context_leave() with what enter returned, which
+ * gives back `status`. */
+trip_scope *trip_context_enter(triptych *t);
+/* The same for a call that is not about a frame that is begun: what was cancelled before is
+ * forgotten. */
+trip_scope *trip_context_enter_anew(triptych *t);
+int trip_context_leave(trip_scope *before, int status);
+
+/* Fails while a frame is begun, or without the data set that is needed. */
+int trip_context_check_idle(const triptych *t, bool needs_data);
+int trip_context_check_open(const triptych *t);
+/* Fails where the data set has no such list, or none is open. */
+int trip_context_check_list(const triptych *t, unsigned number);
+
+/* As the public functions, in the context's scope and with checked parameters. */
+int trip_context_use_function(triptych *t, const triptych_function *f);
+int trip_context_find_view(triptych *t, const triptych_view *given);
+void trip_context_drop_reader(triptych *t);
+/* What the frame has come to, once its picture is complete. */
+int trip_context_note_stats(triptych *t);
+void trip_context_drop_stats(triptych *t);
+
+/* Passes on how far bricking's stage is; `user` is the context, which shows progress. */
+void trip_context_show_stage(void *user, const char *stage, uint64_t done, uint64_t total);
+
+/* So many threads as a renderer or reader takes. */
+static inline unsigned trip_context_threads(unsigned wanted)
+{
+    return wanted < TRIP_CONTEXT_MOST_THREADS ? wanted : TRIP_CONTEXT_MOST_THREADS;
+}
 
 #endif

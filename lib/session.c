@@ -8,8 +8,8 @@
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 
-/* Whether the caller is told that values which show were left out. */
-static bool tell_missing(const session *s, const trip_tf *tf, const session_look *look)
+/* Whether values which show were left out, where the caller wants that in place of a warning. */
+static bool find_missing(const session *s, const trip_tf *tf, const session_look *look)
 {
     double range[2];
     if (look->missing)
@@ -50,12 +50,30 @@ static int load_function(const session *s, const session_look *look, trip_tf **t
     return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 
+static int take_table(session *s)
+{
+    s->table = trip_budget_take(s->budget, table_bytes);
+    if (s->table)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", s->input,
+                     "the transfer function's table does not fit the memory given; raise --memory");
+}
+
+int session_read_text(session *s)
+{
+    return s->text ? 0 : trip_dataset_text_parse(&s->text, s->data);
+}
+
 int session_use_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
-    int status = load_function(s, look, &tf);
-    if (!status && !tell_missing(s, tf, look)) {
+    int status = session_read_text(s);
+    if (!status && !s->table)
+        status = take_table(s);
+    if (!status)
+        status = load_function(s, look, &tf);
+    if (!status && !find_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
         warn_of_culled_values(s, tf, look);
         double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
@@ -66,24 +84,11 @@ int session_use_function(session *s, const session_look *look)
     return status;
 }
 
-static int take_table(session *s)
-{
-    s->table = trip_budget_take(s->budget, table_bytes);
-    if (s->table)
-        return 0;
-    return trip_fail(TRIP_ERROR, "render", s->input,
-                     "the transfer function's table does not fit the memory given; raise --memory");
-}
-
 int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 {
     *s = (session){ .input = input };
     int status = trip_budget_create(&s->budget, memory_bytes);
-    if (!status)
-        status = trip_dataset_open(&s->data, input, s->budget);
-    if (!status)
-        status = trip_dataset_text_parse(&s->text, s->data);
-    return status ? status : take_table(s);
+    return status ? status : trip_dataset_open(&s->data, input, s->budget);
 }
 
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)

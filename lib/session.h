@@ -13,8 +13,8 @@ typedef struct session {
     const char *input;
     trip_budget *budget;
     trip_dataset *data;
-    trip_dataset_text *text;
-    trip_tf_entry *table; /* 65536 entries */
+    trip_dataset_text *text; /* NULL until it is wanted */
+    trip_tf_entry *table;    /* 65536 entries; the same */
 } session;
 
 /* The transfer function; zero means the one kept in the data set, as it is. */
@@ -28,7 +28,9 @@ typedef struct session_look {
 
 /* The data set alone. */
 int session_open_data(session *s, const char *input, uint64_t memory_bytes);
-/* Its function, from now on. */
+/* What `brick` wrote about it, where that is not read yet. */
+int session_read_text(session *s);
+/* Its function, from now on: reads the text and takes the table where they are not there yet. */
 int session_use_function(session *s, const session_look *look);
 /* Both. Warns when the function shows values that were left out when the data set was made, with
  * the command that makes it anew. Close it also after a failure. */

@@ -1,5 +1,6 @@
 /* Triptych as a library: draws volumes that do not fit in memory. A context holds one opened data
- * set (NAME.trip, as `triptych brick` or triptych_brick() makes it) and draws frames of it:
+ * set (NAME.trip, as `triptych brick` or triptych_brick() of triptych_brick.h makes it) and draws
+ * frames of it:
  *
  *     triptych *t;
  *     if (triptych_create(&t) == 0 && triptych_open(t, "head.trip", NULL) == 0) {
@@ -50,9 +51,15 @@ TRIPTYCH_API void triptych_destroy(triptych *t);
 /* Why the last call failed: one line without its end, "triptych: read: head.trip: ..."; "" where it
  * did not. Valid until the next call. */
 TRIPTYCH_API const char *triptych_error(const triptych *t);
-/* Takes lines for people as they come: warnings, notes and failures; NULL: nobody does. May be
- * called by other threads, but only during a call with this context. */
+/* Calls `take` with each line for people as it comes: warnings, notes and failures. NULL: they are
+ * dropped. It may be called by other threads, but only during a call with this context. */
 TRIPTYCH_API void triptych_set_messages(triptych *t, void (*take)(void *user, const char *line),
+                                        void *user);
+/* Calls `show` now and then during long work, on the calling thread: how much of a stage is done.
+ * Stages are "draw" and "count" (of splats), and those of triptych_brick.h. NULL: no calls. */
+TRIPTYCH_API void triptych_set_progress(triptych *t,
+                                        void (*show)(void *user, const char *stage, uint64_t done,
+                                                     uint64_t total),
                                         void *user);
 /* "0.1.0". */
 TRIPTYCH_API const char *triptych_version(void);
@@ -90,21 +97,40 @@ TRIPTYCH_API void triptych_close(triptych *t);
 typedef struct triptych_info {
     int64_t dims[3];             /* voxels of the volume along i, j, k */
     double index_to_world[3][4]; /* world = matrix . (i, j, k, 1) */
-    double lo[3], hi[3];         /* box of the voxels kept, in world space */
+    int64_t first[3], last[3];   /* voxels kept along i, j, k */
+    double lo[3], hi[3];         /* box of those in world space, from edge to edge */
     double value_min, value_max; /* of the volume */
-    uint64_t kept;               /* voxels: not those that no function given to `brick` shows */
-    uint64_t bytes;              /* on disk */
-    unsigned lists;              /* of voxels, by axis and level of detail */
-    int normals;                 /* 1: it can be shaded */
+    double code_lo, code_hi;     /* values of the lowest and the highest code stored */
+    uint64_t voxels;             /* of the volume */
+    uint64_t kept;               /* of those: not what no function given to `brick` shows */
+    uint64_t halo;               /* neighbours of those, for interpolation */
+    uint64_t bytes, index_bytes; /* on disk: of everything, of the index */
+    unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
+    double gradient_scale, gradient_step[3], gradient_full;   /* of normals of 4 bytes, 3 bytes */
+    unsigned tile_voxels, slab_sheets, page_bytes;
+    const char *notes; /* JSON by whoever made it, or another text; until it is closed */
+    const char
+        *note; /* of those, what was chosen where the volume's file leaves a choice; or NULL */
 } triptych_info;
 
 TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
-/* Makes a data set of a volume (.nhdr, .nrrd, .nii, .vdb, DICOM, slices, ...): all that the
- * automatic transfer function shows, and what the given ones do (presets or files; a list ended by
- * NULL, or NULL). Replaces what is there under that name. Needs no data set open. */
-TRIPTYCH_API int triptych_brick(triptych *t, const char *volume, const char *data_set,
-                                const char *const *functions, const triptych_resources *resources);
+/* Records of one kind along one axis at one level of detail. */
+typedef struct triptych_list {
+    int axis;         /* 0 to 2 */
+    unsigned level;   /* 0: all details */
+    const char *kind; /* "voxels", "halo" */
+    int drawn;        /* 0: there for interpolation alone */
+    int64_t dims[3];  /* of the list's own grid */
+    double index_to_world[3][4];
+    double sheet_first, sheet_step; /* sheets along the axis, in voxels of level 0 */
+    uint64_t records, slabs, bricks, bytes;
+} triptych_list;
+
+/* Lists are numbered from 0 to below triptych_info.lists. */
+TRIPTYCH_API int triptych_get_list(triptych *t, unsigned number, triptych_list *out);
+/* Reads everything and checks it against its checksums and the index. */
+TRIPTYCH_API int triptych_verify(triptych *t);
 
 /* ---- what is drawn ---- */
 
@@ -118,6 +144,33 @@ typedef struct triptych_function {
 
 /* From the next frame on; NULL: the default. */
 TRIPTYCH_API int triptych_set_function(triptych *t, const triptych_function *function);
+
+typedef struct triptych_preset {
+    const char *name, *values, *summary; /* values: what the function's values are relative to */
+} triptych_preset;
+
+/* Built-in functions, numbered from 0; returns 0 beyond the last, else 1. */
+TRIPTYCH_API int triptych_get_preset(unsigned number, triptych_preset *out);
+
+typedef enum triptych_form {
+    TRIPTYCH_FORM_TF,       /* Triptych's own text */
+    TRIPTYCH_FORM_PARAVIEW, /* JSON */
+    TRIPTYCH_FORM_VP,       /* 3D Slicer, as text and as JSON */
+    TRIPTYCH_FORM_VP_JSON,
+    TRIPTYCH_FORM_SLICER, /* presets in XML */
+    TRIPTYCH_FORM_VTK,    /* XML */
+} triptych_form;
+
+typedef struct triptych_conversion {
+    const char *function; /* preset or file; default: the data's own */
+    const char *volume;   /* the data, a file; default: the data set that is open, or none */
+    double lo, hi;        /* lo < hi: without data, what a function over the data's range spans */
+    triptych_form form;
+    const char *name; /* of what is converted, for the text and messages; default: of the above */
+} triptych_conversion;
+
+/* A function in data units, as text that other programs read; *text is for free(). */
+TRIPTYCH_API int triptych_convert(triptych *t, const triptych_conversion *wanted, char **text);
 
 typedef enum triptych_method {
     TRIPTYCH_MERGE, /* three layers, blended */
@@ -147,6 +200,8 @@ typedef struct triptych_settings {
     double h;               /* where layers begin to blend, 0 to below 1 */
     double kernel_radius;   /* of a splat, voxels, 0.1 to 100 */
     double background[4];   /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
+    int count; /* not 0: triptych_list_stats has exact counts, which takes time, of hidden bricks
+                  too */
 } triptych_settings;
 
 /* Merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black. */
@@ -173,10 +228,12 @@ typedef struct triptych_view {
     double azimuth_degrees;                 /* from there round the object, to the right */
     double elevation_degrees, roll_degrees; /* up; the picture clockwise */
     double zoom;                            /* as another lens would; default 1 */
-    double fov_degrees;                     /* vertical, 1e-6 to 179.999; default 30 */
-    double ortho_height;                    /* > 0: parallel, so many world units high */
-    int ortho_fit;                          /* not 0: parallel, as high as needed */
-    int turntable;                          /* not 0: all stays in view when it is turned */
+    double fov_degrees;                     /* vertical; default 30; not beyond these: */
+#define TRIPTYCH_FOV_MIN_DEGREES 1e-6
+#define TRIPTYCH_FOV_MAX_DEGREES 179.999
+    double ortho_height; /* > 0: parallel, so many world units high */
+    int ortho_fit;       /* not 0: parallel, as high as needed */
+    int turntable;       /* not 0: all stays in view when it is turned */
 } triptych_view;
 
 /* Works out the view; reads some of the data where it is to be fitted to what the function shows,
@@ -185,6 +242,16 @@ TRIPTYCH_API int triptych_set_view(triptych *t, const triptych_view *view);
 /* The view that triptych_set_view() made, turned about its up axis: counterclockwise seen from
  * above. */
 TRIPTYCH_API int triptych_turn(triptych *t, double degrees);
+
+typedef struct triptych_camera {
+    double eye[3], look[3], up[3];
+    double fov_degrees, ortho_height; /* ortho_height > 0: parallel */
+    int width, height;
+    uint64_t splats; /* that were looked at to find the view */
+} triptych_camera;
+
+/* The view that frames are drawn from. */
+TRIPTYCH_API int triptych_get_camera(triptych *t, triptych_camera *out);
 
 /* ---- frames ---- */
 
@@ -215,14 +282,52 @@ TRIPTYCH_API void triptych_end(triptych *t);
  * those that follow for a frame that is begun. */
 TRIPTYCH_API void triptych_cancel(triptych *t);
 
-/* Calls `tell` between pieces of a frame: splats drawn, of how many. */
-TRIPTYCH_API void triptych_set_progress(triptych *t,
-                                        void (*tell)(void *user, uint64_t splats, uint64_t total),
-                                        void *user);
+/* ---- what a frame takes ---- */
+
+/* Of a frame that is begun: what it reads and why, an effect or list a line. *text is for free().
+ */
+TRIPTYCH_API int triptych_explain(triptych *t, char **text);
+
+/* Of the last frame whose picture was complete. Texts last until the data set is closed. */
+typedef struct triptych_frame_stats {
+    double ms;                                /* from its begin to its picture */
+    double plan_ms;                           /* before that */
+    double wait_ms, draw_ms, merge_ms;        /* waiting for the disk, drawing, merging layers */
+    uint64_t splats, bytes_read, reads;       /* of all lists, from the disk */
+    uint64_t bytes_cached;                    /* instead from memory */
+    uint64_t runs_hidden, bytes_hidden;       /* not read: behind what is opaque */
+    uint64_t bytes_unused;                    /* not read: of attributes that have no effect */
+    uint64_t memory_bytes, peak_memory_bytes; /* that may be taken, and were since it was opened */
+    const char *renderer, *device, *engine;   /* "cpu", "8 threads, AVX2", "io_uring+O_DIRECT" */
+    const char *ring;                         /* where reads land, in words */
+} triptych_frame_stats;
+
+TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);
+
+typedef struct triptych_list_stats {
+    uint64_t bricks, bricks_selected;
+    uint64_t bricks_transparent, bricks_outside, bricks_without_weight; /* why left out */
+    uint64_t splats_read, bytes_read;
+    int counted; /* by triptych_settings.count; else what follows is 0 */
+    uint64_t splats_projected, splats_drawn; /* not culled; of those, with a pixel centre in them */
+} triptych_list_stats;
+
+/* The same frame's, by list. */
+TRIPTYCH_API int triptych_get_list_stats(triptych *t, unsigned number, triptych_list_stats *out);
+
+/* ---- pictures ---- */
+
+/* Memory for a picture, zeroed, out of triptych_resources.memory_bytes; triptych_close() releases
+ * what is left of it. */
+TRIPTYCH_API int triptych_new_picture(triptych *t, int width, int height, float **rgba);
+TRIPTYCH_API void triptych_release_picture(triptych *t, float *rgba);
 
 /* Writes a picture: .png, .jpg, .tif or, in linear light, .exr. */
 TRIPTYCH_API int triptych_write(triptych *t, const char *path, int width, int height,
                                 const float *rgba);
+/* May come before: refuses a name that triptych_write() refuses, and starts what it writes by,
+ * which is then ready when the first picture is. */
+TRIPTYCH_API int triptych_prepare_write(triptych *t, const char *path);
 
 #ifdef __cplusplus
 }

@@ -82,12 +82,12 @@ static int zoom(trip_camera_params *view, double factor)
         return 0;
     view->ortho_height /= factor;
     view->fov_degrees = atan(tan(view->fov_degrees / 2 * DEGREE) / factor) * 2 / DEGREE;
-    if (view->ortho_height > 0 ||
-        (view->fov_degrees >= TRIP_FOV_MIN_DEGREES && view->fov_degrees <= TRIP_FOV_MAX_DEGREES))
+    if (view->ortho_height > 0 || (view->fov_degrees >= TRIPTYCH_FOV_MIN_DEGREES &&
+                                   view->fov_degrees <= TRIPTYCH_FOV_MAX_DEGREES))
         return 0;
     return trip_fail(TRIP_USAGE, "usage", "--zoom",
                      "%g makes an angle of view of %g degrees, which is not between %g and %g",
-                     factor, view->fov_degrees, TRIP_FOV_MIN_DEGREES, TRIP_FOV_MAX_DEGREES);
+                     factor, view->fov_degrees, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES);
 }
 
 static int make_view(trip_found_view *v, const triptych_view *o, const session *s,
@@ -152,8 +152,8 @@ static int check(const triptych_view *o)
         why = "the direction that is up is zero";
     else if (o->zoom < 0 || o->ortho_height < 0)
         why = "neither zoom nor the height of a parallel view is below 0";
-    else if (o->fov_degrees != 0 &&
-             !(o->fov_degrees >= TRIP_FOV_MIN_DEGREES && o->fov_degrees <= TRIP_FOV_MAX_DEGREES))
+    else if (o->fov_degrees != 0 && !(o->fov_degrees >= TRIPTYCH_FOV_MIN_DEGREES &&
+                                      o->fov_degrees <= TRIPTYCH_FOV_MAX_DEGREES))
         why = "the angle of view lies between 1e-6 and 179.999 degrees";
     else if (o->side < TRIPTYCH_SIDE_DEFAULT || o->side > TRIPTYCH_ISO)
         why = "there is no such side";

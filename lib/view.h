@@ -7,9 +7,6 @@
 #include "session.h"
 #include "triptych.h"
 
-#define TRIP_FOV_MIN_DEGREES 1e-6
-#define TRIP_FOV_MAX_DEGREES 179.999
-
 typedef struct trip_found_view {
     trip_camera_params params;
     trip_vec3 axis;  /* that an orbit goes about */

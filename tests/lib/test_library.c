@@ -1,5 +1,5 @@
-/* The library as others use it: its header and its shared object alone. */
-#include <triptych.h>
+/* The library as others use it: its headers and its shared object alone. */
+#include <triptych_brick.h>
 
 #include <math.h>
 #include <pthread.h>
@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -16,6 +17,7 @@
 enum { SIZE = 96, FLOATS = 4 * SIZE * SIZE };
 
 #define DATA_SET "library.trip"
+#define VOLUME TRIP_SOURCE_DIR "/datasets/tooth.nhdr"
 
 static triptych *new_context(void)
 {
@@ -29,9 +31,14 @@ static int brick(void **state)
 {
     (void)state;
     triptych *t = new_context();
-    const char *const functions[] = { "grey", NULL };
-    int status = triptych_brick(t, TRIP_SOURCE_DIR "/datasets/tooth.nhdr", DATA_SET, functions,
-                                &(triptych_resources){ .memory_bytes = 64 << 20, .threads = 2 });
+    const char *grey = "grey";
+    const triptych_brick_options options = { .functions = &grey,
+                                             .function_count = 1,
+                                             .automatic = 1,
+                                             .replace = 1,
+                                             .memory_bytes = 64 << 20,
+                                             .threads = 2 };
+    int status = triptych_brick(t, VOLUME, DATA_SET, &options, NULL);
     if (status)
         print_error("%s\n", triptych_error(t));
     triptych_destroy(t);
@@ -77,18 +84,297 @@ static void info_is_that_of_the_volume(void **state)
     assert_int_equal(info.dims[2], 161);
     assert_true(info.kept > 0 && info.kept < 103 * 94 * 161);
     assert_true(info.bytes > 0);
-    assert_int_equal(info.lists, 3);
-    assert_int_equal(info.normals, 1);
+    assert_int_equal(info.voxels, 103 * 94 * 161);
+    assert_int_equal(info.lists, 6); /* three of voxels, three of their neighbours */
+    assert_int_equal(info.normal_bytes, 3);
     assert_true(info.value_min < info.value_max);
     for (int a = 0; a < 3; a++) {
-        double corner = info.index_to_world[a][3];
-        double far = corner + info.index_to_world[a][0] * 102 + info.index_to_world[a][1] * 93 +
-                     info.index_to_world[a][2] * 160;
-        assert_true(info.lo[a] < info.hi[a]);
-        assert_true(info.lo[a] >= fmin(corner, far) - 1e-9);
-        assert_true(info.hi[a] <= fmax(corner, far) + 1e-9);
+        /* The volume's axes are those of the world: the box is the kept voxels' own. */
+        double step = info.index_to_world[a][a], corner = info.index_to_world[a][3];
+        assert_true(info.first[a] >= 0 && info.first[a] < info.last[a]);
+        assert_true(info.last[a] < info.dims[a]);
+        assert_true(step > 0);
+        assert_float_equal(info.lo[a], corner + step * ((double)info.first[a] - 0.5), 1e-6);
+        assert_float_equal(info.hi[a], corner + step * ((double)info.last[a] + 0.5), 1e-6);
     }
+    assert_non_null(strstr(info.notes, "tooth"));
     triptych_destroy(t);
+}
+
+static void lists_hold_the_kept_voxels_along_each_axis(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_info info;
+    uint64_t bytes;
+    unsigned drawn = 0;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
+    bytes = info.index_bytes;
+    for (unsigned i = 0; i < info.lists; i++) {
+        triptych_list list;
+        assert_int_equal(triptych_get_list(t, i, &list), TRIPTYCH_OK);
+        assert_int_equal(list.drawn, !strcmp(list.kind, "voxels"));
+        assert_int_equal(list.records, list.drawn ? info.kept : info.halo);
+        assert_int_equal(list.level, 0);
+        assert_memory_equal(list.dims, info.dims, sizeof info.dims);
+        assert_float_equal(list.sheet_step, 1, 0);
+        assert_true(list.bricks > 0 && list.slabs > 0);
+        drawn |= list.drawn ? 1u << list.axis : 0;
+        bytes += list.bytes;
+    }
+    assert_int_equal(drawn, 7);
+    assert_int_equal(bytes, info.bytes);
+    assert_int_equal(triptych_verify(t), TRIPTYCH_OK);
+    triptych_destroy(t);
+}
+
+/* What the frame reads is what its lists read, and a count changes nothing of the picture. */
+static void a_frame_has_statistics_by_list(void **state)
+{
+    (void)state;
+    static float timed[FLOATS], counted[FLOATS];
+    triptych *t = new_context();
+    triptych_settings settings = triptych_default_settings();
+    triptych_frame_stats frame;
+    triptych_list_stats list;
+    triptych_info info;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, timed), TRIPTYCH_OK);
+    for (settings.count = 0; settings.count < 2; settings.count++) {
+        uint64_t splats = 0, bytes = 0, drawn = 0;
+        assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+        assert_int_equal(triptych_draw(t, counted), TRIPTYCH_OK);
+        assert_memory_equal(timed, counted, sizeof timed);
+        assert_int_equal(triptych_get_frame_stats(t, &frame), TRIPTYCH_OK);
+        for (unsigned i = 0; i < info.lists; i++) {
+            assert_int_equal(triptych_get_list_stats(t, i, &list), TRIPTYCH_OK);
+            assert_int_equal(list.counted, settings.count);
+            assert_true(list.splats_drawn <= list.splats_projected);
+            assert_true(list.splats_projected <= list.splats_read);
+            assert_true(list.bricks_selected + list.bricks_transparent + list.bricks_outside +
+                            list.bricks_without_weight <=
+                        list.bricks);
+            splats += list.splats_read;
+            bytes += list.bytes_read;
+            drawn += list.splats_drawn;
+        }
+        assert_int_equal(splats, frame.splats);
+        assert_int_equal(bytes, frame.bytes_read);
+        assert_int_equal(drawn > 0, settings.count);
+    }
+    assert_true(frame.splats > 0 && frame.splats <= 3 * info.kept);
+    assert_true(frame.ms > 0 && frame.memory_bytes == 64 << 20);
+    assert_true(frame.peak_memory_bytes > 0 && frame.peak_memory_bytes <= frame.memory_bytes);
+    assert_string_equal(frame.renderer, "cpu");
+    assert_true(*frame.device && *frame.engine && *frame.ring);
+    assert_fails(t, triptych_get_list_stats(t, info.lists, &list), TRIPTYCH_USAGE, "6 lists");
+    triptych_destroy(t);
+}
+
+static void the_plan_of_a_frame_can_be_printed(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    char *text;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_fails(t, triptych_explain(t, &text), TRIPTYCH_USAGE, "none is begun");
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
+    assert_non_null(strstr(text, "merge"));
+    assert_non_null(strstr(text, "\nlist x"));
+    free(text);
+    triptych_destroy(t);
+}
+
+/* A camera given in full is found again as it is, and looks at what was given. */
+static void the_view_found_gives_the_same_picture_again(void **state)
+{
+    (void)state;
+    static float found[FLOATS], given[FLOATS];
+    triptych *t = new_context();
+    triptych_camera first, second;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_get_camera(t, &first), TRIPTYCH_OK);
+    assert_true(first.splats > 0 && first.width == SIZE && first.height == SIZE);
+    assert_float_equal(first.fov_degrees, 30, 0);
+    assert_int_equal(triptych_draw(t, found), TRIPTYCH_OK);
+    const triptych_view view = { .width = first.width,
+                                 .height = first.height,
+                                 .eye = first.eye,
+                                 .look = first.look,
+                                 .up = first.up,
+                                 .fov_degrees = first.fov_degrees };
+    assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
+    assert_int_equal(triptych_get_camera(t, &second), TRIPTYCH_OK);
+    assert_int_equal(second.splats, 0);
+    assert_memory_equal(first.eye, second.eye, sizeof first.eye);
+    assert_int_equal(triptych_draw(t, given), TRIPTYCH_OK);
+    assert_memory_equal(found, given, sizeof found);
+    triptych_destroy(t);
+}
+
+static void pictures_take_of_the_memory_given(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    float *rgba, *other;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_fails(t, triptych_new_picture(t, 0, 8, &rgba), TRIPTYCH_USAGE, "pixels");
+    assert_fails(t, triptych_new_picture(t, 4096, 4096, &rgba), TRIPTYCH_ERROR, "memory given");
+    assert_int_equal(triptych_new_picture(t, 1536, 1536, &rgba), TRIPTYCH_OK); /* 36 of 64 MiB */
+    assert_fails(t, triptych_new_picture(t, 1536, 1536, &other), TRIPTYCH_ERROR, "memory given");
+    triptych_release_picture(t, rgba);
+    assert_int_equal(triptych_new_picture(t, 1536, 1536, &rgba), TRIPTYCH_OK);
+    assert_float_equal(rgba[4 * 1536 * 1536 - 1], 0, 0);
+    triptych_destroy(t); /* with the picture */
+}
+
+static void functions_are_listed_and_converted(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_preset preset;
+    char *text;
+    int grey = 0;
+    unsigned count = 0;
+    while (triptych_get_preset(count, &preset)) {
+        assert_true(*preset.name && *preset.values && *preset.summary);
+        grey |= !strcmp(preset.name, "grey");
+        count++;
+    }
+    assert_true(count > 10 && grey);
+    assert_fails(t, triptych_convert(t, &(triptych_conversion){ 0 }, &text), TRIPTYCH_USAGE,
+                 "neither");
+    assert_fails(t, triptych_convert(t, &(triptych_conversion){ .function = "mr" }, &text),
+                 TRIPTYCH_USAGE, "histogram");
+    triptych_conversion grey_over = {
+        .function = "grey", .lo = 10, .hi = 30, .form = TRIPTYCH_FORM_VP
+    };
+    assert_int_equal(triptych_convert(t, &grey_over, &text), TRIPTYCH_OK);
+    assert_non_null(strstr(text, "30"));
+    free(text);
+    /* The data set's own function is the volume's automatic one. */
+    char *own, *volumes;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_convert(t, &(triptych_conversion){ 0 }, &own), TRIPTYCH_OK);
+    assert_int_equal(triptych_convert(t, &(triptych_conversion){ .volume = VOLUME }, &volumes),
+                     TRIPTYCH_OK);
+    assert_string_equal(own, volumes);
+    free(own);
+    free(volumes);
+    triptych_destroy(t);
+}
+
+typedef struct stages {
+    int draws, reads, others;
+} stages;
+
+static void note_stage(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    stages *s = user;
+    assert_true(done <= total);
+    s->draws += !strcmp(stage, "draw");
+    s->reads += !strcmp(stage, "read");
+    s->others++;
+}
+
+static void progress_goes_by_stages(void **state)
+{
+    (void)state;
+    static float rgba[FLOATS];
+    triptych *t = new_context();
+    stages seen = { 0 };
+    triptych_brick_summary summary;
+    triptych_set_progress(t, note_stage, &seen);
+    assert_int_equal(triptych_brick(t, VOLUME, "progress.trip", NULL, &summary), TRIPTYCH_OK);
+    assert_true(seen.reads > 0 && seen.draws == 0);
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+    assert_true(seen.draws > 0);
+    assert_fails(t, triptych_brick(t, VOLUME, "progress.trip", NULL, &summary), TRIPTYCH_ERROR,
+                 "progress.trip");
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r progress.trip"), 0);
+}
+
+static void bricking_says_what_it_made(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_brick_summary s;
+    triptych_brick_estimate e;
+    triptych_info info;
+    const triptych_range ranges[] = { { 100, 200 }, { 900, 1000 } };
+    triptych_brick_options o = { .ranges = ranges,
+                                 .range_count = 2,
+                                 .normals = TRIPTYCH_NORMALS_FULL,
+                                 .no_halo = 1,
+                                 .tile_voxels = 32 };
+    assert_int_equal(triptych_estimate(t, VOLUME, "made.trip", &o, &e), TRIPTYCH_OK);
+    assert_int_equal(triptych_brick(t, VOLUME, "made.trip", &o, &s), TRIPTYCH_OK);
+    assert_int_equal(triptych_open(t, "made.trip", NULL), TRIPTYCH_OK);
+    assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
+    assert_int_equal(info.kept, s.kept);
+    assert_int_equal(s.voxels, 103 * 94 * 161);
+    assert_int_equal(e.voxels, s.voxels);
+    assert_true(e.kept > s.kept / 2 && e.kept < s.kept * 2);
+    assert_int_equal(info.lists, 3);
+    assert_int_equal(info.halo, 0);
+    assert_int_equal(info.normal_bytes, 4);
+    assert_int_equal(info.tile_voxels, 32);
+    assert_true(s.kept > 0 && s.peak_memory_bytes <= s.memory_bytes);
+    assert_true(*s.kind && *s.kind_title && s.stages[TRIPTYCH_STAGE_READ].seconds > 0);
+    triptych_close(t);
+    o.tile_voxels = 33;
+    assert_fails(t, triptych_brick(t, VOLUME, "made.trip", &o, &s), TRIPTYCH_USAGE, "tile");
+    o.tile_voxels = 0;
+    o.raw_type = "uint7";
+    assert_fails(t, triptych_estimate(t, VOLUME, "made.trip", &o, &e), TRIPTYCH_USAGE, "type");
+    assert_true(triptych_is_raw_type("uint8") && !triptych_is_raw_type("uint7"));
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r made.trip"), 0);
+}
+
+static void write_volume(const char *name, int bytes, int value)
+{
+    FILE *f = fopen(name, "wb");
+    assert_non_null(f);
+    for (int i = 0; i < bytes; i++)
+        fputc(value, f);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* The same bytes under another name are the same volume in another state. */
+static void volumes_are_identified_by_content_and_by_state(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_identity a, copy, changed, unread, all;
+    const char *one = "identity_4x4x4_uint8.raw";
+    const triptych_brick_options keep_all = { .keep_all = 1 }, threads = { .threads = 1 };
+    write_volume(one, 64, 1);
+    assert_int_equal(triptych_identify(t, one, NULL, 1000, &a), TRIPTYCH_OK);
+    assert_int_equal(triptych_identify(t, one, &threads, 0, &unread), TRIPTYCH_OK);
+    assert_int_equal(triptych_identify(t, one, &keep_all, 1000, &all), TRIPTYCH_OK);
+    assert_int_equal(mkdir("identity", 0700), 0);
+    write_volume("identity/identity_4x4x4_uint8.raw", 64, 1);
+    assert_int_equal(triptych_identify(t, "identity/identity_4x4x4_uint8.raw", NULL, 1000, &copy),
+                     TRIPTYCH_OK);
+    write_volume(one, 64, 2);
+    assert_int_equal(triptych_identify(t, one, NULL, 1000, &changed), TRIPTYCH_OK);
+    assert_int_equal(a.bytes, 64);
+    assert_int_equal(a.settled, 0); /* it was written just now */
+    assert_int_equal(strlen(a.content), 32);
+    assert_string_equal(a.content, copy.content);
+    assert_string_not_equal(a.state, copy.state);
+    assert_string_equal(a.state, unread.state);
+    assert_string_equal(unread.content, "");
+    assert_string_not_equal(a.content, all.content);
+    assert_string_not_equal(a.content, changed.content);
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r identity identity_4x4x4_uint8.raw"), 0);
 }
 
 static void what_fails_says_why_and_the_context_goes_on(void **state)
@@ -118,6 +404,8 @@ static void what_fails_says_why_and_the_context_goes_on(void **state)
     assert_fails(t, triptych_set_function(t, &(triptych_function){ .name = "preset:no-such" }),
                  TRIPTYCH_USAGE, "no-such");
     assert_fails(t, triptych_write(t, "p.gif", SIZE, SIZE, rgba), TRIPTYCH_USAGE, "p.gif");
+    assert_fails(t, triptych_prepare_write(t, "p.gif"), TRIPTYCH_USAGE, "p.gif");
+    assert_int_equal(triptych_prepare_write(t, "p.png"), TRIPTYCH_OK);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "end it first");
     assert_fails(t, triptych_set_function(t, NULL), TRIPTYCH_USAGE, "end it first");
@@ -293,6 +581,15 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(info_is_that_of_the_volume),
+        cmocka_unit_test(lists_hold_the_kept_voxels_along_each_axis),
+        cmocka_unit_test(a_frame_has_statistics_by_list),
+        cmocka_unit_test(the_plan_of_a_frame_can_be_printed),
+        cmocka_unit_test(the_view_found_gives_the_same_picture_again),
+        cmocka_unit_test(pictures_take_of_the_memory_given),
+        cmocka_unit_test(functions_are_listed_and_converted),
+        cmocka_unit_test(progress_goes_by_stages),
+        cmocka_unit_test(bricking_says_what_it_made),
+        cmocka_unit_test(volumes_are_identified_by_content_and_by_state),
         cmocka_unit_test(what_fails_says_why_and_the_context_goes_on),
         cmocka_unit_test(messages_go_to_whoever_takes_them),
         cmocka_unit_test(steps_draw_what_one_call_draws),

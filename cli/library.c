@@ -1,0 +1,51 @@
+#include "library.h"
+
+#include <cjson/cJSON.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "json.h"
+#include "report.h"
+
+static void pass_message(void *user, const char *line)
+{
+    (void)user;
+    trip_report_line(line);
+}
+
+static const char *things_of(const char *stage)
+{
+    static const char *const splats[] = { "draw", "count", "merge" };
+    for (size_t i = 0; i < sizeof splats / sizeof *splats; i++)
+        if (!strcmp(stage, splats[i]))
+            return "splats";
+    return strcmp(stage, "look") ? "voxels" : "bytes";
+}
+
+static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    trip_progress_show(user, stage, done, total, things_of(stage));
+}
+
+int library_create(triptych **out, trip_progress *progress)
+{
+    if (triptych_create(out))
+        return trip_fail(TRIP_ERROR, "usage", "library", "out of memory");
+    triptych_set_messages(*out, pass_message, NULL);
+    if (progress)
+        triptych_set_progress(*out, show_progress, progress);
+    return 0;
+}
+
+char *library_note(triptych *t, const char *key)
+{
+    triptych_info info;
+    trip_json notes = { 0 };
+    char *text = NULL;
+    if (triptych_get_info(t, &info) == 0 && trip_json_parse(&notes, info.notes, "", NULL) == 0) {
+        const char *found = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(notes.root, key));
+        text = found ? strdup(found) : NULL;
+    }
+    trip_json_free(&notes);
+    return text;
+}

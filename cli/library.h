@@ -1,0 +1,16 @@
+/* How the commands use libtriptych: messages go where the program's own do, progress to a line on
+ * the terminal. Also what the notes of a data set say. Main thread only. */
+#ifndef TRIP_CLI_LIBRARY_H
+#define TRIP_CLI_LIBRARY_H
+
+#include "progress.h"
+#include "triptych.h"
+#include "triptych_brick.h"
+
+/* `progress`, which may be NULL, outlives the context. 0, or a reported failure. */
+int library_create(triptych **out, trip_progress *progress);
+
+/* A text among the notes of the data set that is open, for free(); NULL where there is none. */
+char *library_note(triptych *t, const char *key);
+
+#endif

@@ -1,0 +1,168 @@
+/* The frames of triptych.h: begin, steps, picture, end. */
+#include <string.h>
+#include <time.h>
+
+#include "context.h"
+#include "cpu/cpu_renderer.h"
+#include "report.h"
+
+static void show_splats(void *user, uint64_t splats, uint64_t total)
+{
+    triptych *t = user;
+    t->show(t->show_user, t->counting ? "count" : "draw", splats, total);
+}
+
+void trip_context_drop_reader(triptych *t)
+{
+    trip_reader_destroy(t->reader);
+    t->reader = NULL;
+}
+
+/* One that reads all the planes wanted. Counting is by a reader of its own, so that nothing that
+ * was read then is in the cache of the frames that are timed. */
+static int make_reader(triptych *t, unsigned planes)
+{
+    const triptych_resources *r = &t->resources;
+    bool finds_hidden = !strcmp(t->renderer->ops->name, "cpu");
+    bool draws_all = r->read_hidden || t->counting;
+    const session_reader wanted = {
+        .engine = (trip_engine)r->engine,
+        .planes = planes,
+        .threads = (int)trip_context_threads(r->threads),
+        .cache = r->keep_pages && !t->counting,
+        .renderer = t->renderer,
+        .skip = finds_hidden && !draws_all ? trip_cpu_covered : NULL,
+        .skip_user = t->renderer,
+    };
+    if (t->reader && !(planes & ~t->planes) && t->counting == t->reader_counts)
+        return 0;
+    trip_context_drop_reader(t);
+    t->planes = planes;
+    t->reader_counts = t->counting;
+    return session_make_reader(&t->session, &t->reader, &wanted);
+}
+
+static int prepare(triptych *t)
+{
+    session *s = &t->session;
+    const triptych_resources *r = &t->resources;
+    int status = trip_context_check_idle(t, true);
+    if (status)
+        return status;
+    if (!t->has_function)
+        status = trip_context_use_function(t, &(triptych_function){ 0 });
+    if (!status && !t->has_view)
+        status = trip_context_find_view(t, &(triptych_view){ 0 });
+    if (!status && !t->renderer)
+        status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
+                                      s->budget);
+    if (!status)
+        status = trip_camera_make(&t->camera, &t->turned, &s->data->index_to_world);
+    return status;
+}
+
+static int plan(triptych *t)
+{
+    session *s = &t->session;
+    uint64_t start = trip_frame_now_ns();
+    int status = trip_plan_make(&t->plan, s->data, &t->camera, &t->settings, s->table, s->budget);
+    t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    t->begun = status == 0;
+    return status;
+}
+
+static int start(triptych *t)
+{
+    int status = make_reader(t, t->plan.planes);
+    t->frame = (trip_frame){
+        .data = t->session.data,
+        .camera = &t->camera,
+        .settings = &t->settings,
+        .plan = &t->plan,
+        .table = t->session.table,
+        .count = t->counting,
+        .progress = t->show ? show_splats : NULL,
+        .progress_user = t,
+    };
+    t->drawn = status == 0;
+    if (!status)
+        status = trip_frame_begin(&t->drawing, t->renderer, t->reader, &t->frame);
+    return status;
+}
+
+static void end(triptych *t)
+{
+    if (t->drawn)
+        trip_frame_end(&t->drawing);
+    if (t->begun)
+        trip_plan_release(&t->plan, t->session.budget);
+    t->begun = t->drawn = false;
+}
+
+int triptych_begin(triptych *t)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = prepare(t);
+    if (status)
+        return trip_context_leave(before, status);
+    status = plan(t);
+    if (!status)
+        status = start(t);
+    if (status)
+        end(t);
+    return trip_context_leave(before, status);
+}
+
+static int check_drawing(const triptych *t)
+{
+    return t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "none is begun");
+}
+
+int triptych_step(triptych *t, uint64_t deadline_ns)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = check_drawing(t);
+    return trip_context_leave(before, status ? status : trip_frame_step(&t->drawing, deadline_ns));
+}
+
+int triptych_await(triptych *t, uint64_t timeout_ns)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = check_drawing(t);
+    if (!status)
+        trip_frame_await(&t->drawing, timeout_ns);
+    return trip_context_leave(before, status);
+}
+
+int triptych_picture(triptych *t, float *rgba)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = check_drawing(t);
+    if (!status)
+        status = trip_frame_picture(&t->drawing, rgba, NULL);
+    if (!status && t->drawing.done)
+        status = trip_context_note_stats(t);
+    return trip_context_leave(before, status);
+}
+
+void triptych_end(triptych *t)
+{
+    trip_scope *before = trip_scope_enter(&t->scope); /* the error of the last call stays */
+    end(t);
+    trip_context_leave(before, 0);
+}
+
+/* Waits for the disk for so long at a time, so that a call to cancel is noticed. */
+int triptych_draw(triptych *t, float *rgba)
+{
+    enum { LOOK_NS = 20000000 };
+    int status = triptych_begin(t);
+    if (status)
+        return status;
+    while ((status = triptych_step(t, UINT64_MAX)) == TRIPTYCH_WAITS)
+        triptych_await(t, LOOK_NS);
+    if (!status)
+        status = triptych_picture(t, rgba);
+    triptych_end(t);
+    return status;
+}

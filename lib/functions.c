@@ -1,0 +1,86 @@
+/* Transfer functions as things of their own: the built-in ones, and as text for other programs. */
+#include "context.h"
+#include "report.h"
+#include "volume_function.h"
+
+int triptych_get_preset(unsigned number, triptych_preset *out)
+{
+    *out = (triptych_preset){ trip_tf_preset_name(number), trip_tf_preset_basis(number),
+                              trip_tf_preset_summary(number) };
+    return out->name != NULL;
+}
+
+static int load_for_data_set(triptych *t, const char *function, trip_tf **tf)
+{
+    session *s = &t->session;
+    int status = session_read_text(s);
+    if (!status)
+        status = function ? trip_tf_load(tf, function) : trip_dataset_text_tf(s->text, s->data, tf);
+    return status ? status : trip_dataset_text_adapt(s->text, s->data, *tf);
+}
+
+static int load_for_volume(triptych *t, const triptych_conversion *c, trip_tf **tf)
+{
+    const trip_brick_params params = {
+        .input = c->volume,
+        .functions = &c->function,
+        .function_count = c->function != NULL,
+        .progress = t->show ? trip_context_show_stage : NULL,
+        .progress_user = t,
+    };
+    return trip_volume_function(&params, tf);
+}
+
+static int load_alone(const triptych_conversion *c, const char *name, trip_tf **tf)
+{
+    if (!c->function)
+        return trip_fail(TRIP_USAGE, "tf", name, "there is neither a function nor data");
+    int status = trip_tf_load(tf, c->function);
+    if (!status && trip_tf_needs_data(*tf) && !trip_tf_is_normalised(*tf))
+        return trip_fail(TRIP_USAGE, "tf", name,
+                         "is made from a histogram: `triptych tf show --tf %s DATA`, DATA being a "
+                         "data set or a volume",
+                         name);
+    if (!status && c->lo < c->hi)
+        trip_tf_denormalise(*tf, c->lo, c->hi);
+    return status;
+}
+
+static const char *name_of(const triptych *t, const triptych_conversion *c)
+{
+    if (c->name)
+        return c->name;
+    if (c->function)
+        return c->function;
+    return c->volume ? c->volume : t->name ? t->name : "";
+}
+
+static int check(const triptych *t, const triptych_conversion *c)
+{
+    int status = trip_context_check_idle(t, false);
+    bool known = c->form >= TRIPTYCH_FORM_TF && c->form <= TRIPTYCH_FORM_VTK;
+    if (!status && !known)
+        return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "there is no such form");
+    if (!status && !(isfinite(c->lo) && isfinite(c->hi)))
+        return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "the range is not finite");
+    return status;
+}
+
+int triptych_convert(triptych *t, const triptych_conversion *wanted, char **text)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const char *name = name_of(t, wanted);
+    trip_tf *tf = NULL;
+    *text = NULL;
+    int status = check(t, wanted);
+    if (!status && wanted->volume)
+        status = load_for_volume(t, wanted, &tf);
+    else if (!status && t->open)
+        status = load_for_data_set(t, wanted->function, &tf);
+    else if (!status)
+        status = load_alone(wanted, name, &tf);
+    if (!status)
+        status = trip_tf_write(tf, (trip_tf_format)wanted->form, name, text);
+    trip_tf_destroy(tf);
+    return trip_context_leave(before, status);
+}

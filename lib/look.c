@@ -1,0 +1,177 @@
+/* What is drawn: the transfer function, the settings and the view of triptych.h. */
+#include "context.h"
+#include "report.h"
+#include "view.h"
+
+enum { USUAL_SIZE = 1024 };
+
+int trip_context_use_function(triptych *t, const triptych_function *f)
+{
+    bool missing = false;
+    const session_look look = { .tf = f->name,
+                                .opacity_scale = f->opacity_scale,
+                                .window = f->window,
+                                .level = f->level,
+                                .missing = f->left_out ? &missing : NULL };
+    int status = session_use_function(&t->session, &look);
+    if (f->left_out)
+        *f->left_out = missing;
+    t->has_function |= !status && !missing;
+    return status;
+}
+
+static int check_function(const triptych_function *f)
+{
+    bool finite = isfinite(f->opacity_scale) && isfinite(f->window) && isfinite(f->level);
+    return finite && f->opacity_scale >= 0 && f->window >= 0
+               ? 0
+               : trip_fail(TRIP_USAGE, "render", "function",
+                           "opacity scale and window are finite and not below 0");
+}
+
+int triptych_set_function(triptych *t, const triptych_function *function)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_function usual = { 0 };
+    const triptych_function *f = function ? function : &usual;
+    int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = check_function(f);
+    return trip_context_leave(before, status ? status : trip_context_use_function(t, f));
+}
+
+triptych_settings triptych_default_settings(void)
+{
+    const trip_settings s = trip_settings_default();
+    return (triptych_settings){
+        .method = (triptych_method)s.method,
+        .traversal = (triptych_traversal)s.traversal,
+        .target = (triptych_target)s.target,
+        .shading = s.shading,
+        .headlight = s.headlight,
+        .light = { s.light_direction.x, s.light_direction.y, s.light_direction.z },
+        .h = s.h,
+        .kernel_radius = s.kernel_radius,
+        .background = { s.background[0], s.background[1], s.background[2], s.background[3] },
+    };
+}
+
+static const char *fault_of_settings(const triptych_settings *s)
+{
+    trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
+    double length = trip_length(light);
+    if (s->method < TRIPTYCH_MERGE || s->method > TRIPTYCH_AXIS ||
+        s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
+        s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
+        return "there is no such method, traversal or target";
+    if (!(s->h >= 0 && s->h < 1))
+        return "h lies between 0 and below 1";
+    if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
+        return "the kernel radius lies between 0.1 and 100 voxels";
+    if (s->shading && !s->headlight && !(length > 0 && isfinite(length)))
+        return "the direction to the light is zero or not finite";
+    for (int i = 0; i < 4; i++)
+        if (!(s->background[i] >= 0 && s->background[i] <= 1))
+            return "components of the background lie between 0 and 1";
+    return NULL;
+}
+
+int triptych_set_settings(triptych *t, const triptych_settings *s)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const char *fault = fault_of_settings(s);
+    int status = trip_context_check_idle(t, false);
+    if (!status && fault)
+        status = trip_fail(TRIP_USAGE, "render", "settings", "%s", fault);
+    if (status)
+        return trip_context_leave(before, status);
+    t->settings = (trip_settings){
+        .method = (trip_method)s->method,
+        .traversal = (trip_traversal)s->traversal,
+        .target = (trip_target)s->target,
+        .indexed = s->indexed,
+        .triangles = s->triangles,
+        .shading = s->shading,
+        .headlight = s->headlight,
+        .h = s->h,
+        .kernel_radius = s->kernel_radius,
+        .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
+    };
+    t->counting = s->count;
+    if (!s->headlight)
+        t->settings.light_direction =
+            trip_normalize(trip_v3(s->light[0], s->light[1], s->light[2]));
+    return trip_context_leave(before, 0);
+}
+
+int trip_context_find_view(triptych *t, const triptych_view *given)
+{
+    const triptych_resources *r = &t->resources;
+    trip_engine engine = (trip_engine)r->engine;
+    const session_reader wanted = {
+        .engine = engine == TRIP_ENGINE_NULL ? TRIP_ENGINE_AUTO : engine,
+        .threads = (int)trip_context_threads(r->threads),
+    };
+    triptych_view view = *given;
+    trip_found_view found;
+    view.width = view.width ? view.width : USUAL_SIZE;
+    view.height = view.height ? view.height : USUAL_SIZE;
+    int status = t->has_function ? 0 : trip_context_use_function(t, &(triptych_function){ 0 });
+    if (!status)
+        status = trip_view_find(&found, &view, &t->session, t->settings.kernel_radius, &wanted);
+    if (status)
+        return status;
+    t->view = t->turned = found.params;
+    t->axis = found.axis;
+    t->fit_splats = found.splats;
+    t->has_view = true;
+    return 0;
+}
+
+int triptych_set_view(triptych *t, const triptych_view *view)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = trip_context_check_idle(t, true);
+    return trip_context_leave(before, status ? status : trip_context_find_view(t, view));
+}
+
+int triptych_turn(triptych *t, double degrees)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = trip_context_check_idle(t, true);
+    if (!status && !isfinite(degrees))
+        status = trip_fail(TRIP_USAGE, "render", "view", "the angle is not finite");
+    if (!status && !t->has_view)
+        status = trip_context_find_view(t, &(triptych_view){ 0 });
+    if (!status)
+        t->turned = degrees != 0 ? trip_camera_turn(&t->view, t->axis, degrees) : t->view;
+    return trip_context_leave(before, status);
+}
+
+static void put(double out[3], trip_vec3 v)
+{
+    out[0] = v.x;
+    out[1] = v.y;
+    out[2] = v.z;
+}
+
+int triptych_get_camera(triptych *t, triptych_camera *out)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = trip_context_check_open(t);
+    if (!status && !t->has_view)
+        status = trip_context_check_idle(t, true);
+    if (!status && !t->has_view)
+        status = trip_context_find_view(t, &(triptych_view){ 0 });
+    if (status)
+        return trip_context_leave(before, status);
+    *out = (triptych_camera){ .fov_degrees = t->turned.fov_degrees,
+                              .ortho_height = t->turned.ortho_height,
+                              .width = t->turned.width,
+                              .height = t->turned.height,
+                              .splats = t->fit_splats };
+    put(out->eye, t->turned.eye);
+    put(out->look, t->turned.look);
+    put(out->up, t->turned.up);
+    return trip_context_leave(before, 0);
+}

@@ -1,0 +1,142 @@
+/* What a frame takes: the plan in words, statistics of the frame and by list. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "context.h"
+#include "report.h"
+
+int triptych_explain(triptych *t, char **text)
+{
+    trip_scope *before = trip_context_enter(t);
+    size_t bytes;
+    *text = NULL;
+    int status = t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "none is begun");
+    FILE *f = status ? NULL : open_memstream(text, &bytes);
+    if (f)
+        trip_plan_explain(&t->plan, t->session.data, &t->settings, f);
+    if (!status && (!f || fclose(f) != 0)) {
+        free(*text);
+        *text = NULL;
+        status = trip_fail(TRIP_ERROR, "render", "frame", "out of memory");
+    }
+    return trip_context_leave(before, status);
+}
+
+/* Where reads land, and how the renderer gets at it. */
+static const char *ring_text(const trip_renderer *renderer, const trip_reader *reader)
+{
+    if (renderer->resident)
+        return "not used: the renderer holds the data";
+    if (trip_reader_in_place(reader))
+        return "mapped: reads land in the renderer's memory";
+    return renderer->ops->take_slots ? "copied: batches go to the renderer's memory"
+                                     : "shared: the renderer draws from the ring";
+}
+
+static size_t list_stats_bytes(const triptych *t)
+{
+    return t->session.data->list_count * sizeof(triptych_list_stats);
+}
+
+void trip_context_drop_stats(triptych *t)
+{
+    if (t->list_stats)
+        trip_budget_release(t->session.budget, t->list_stats, list_stats_bytes(t));
+    t->list_stats = NULL;
+    t->has_stats = false;
+}
+
+static triptych_frame_stats frame_stats(const triptych *t)
+{
+    const trip_frame_stats *s = &t->drawing.stats;
+    return (triptych_frame_stats){
+        .ms = s->ms,
+        .plan_ms = t->plan_ms,
+        .wait_ms = s->read_ms,
+        .draw_ms = s->draw_ms,
+        .merge_ms = s->merge_ms,
+        .splats = s->reader.splats,
+        .bytes_read = s->reader.bytes_read,
+        .reads = s->reader.reads,
+        .bytes_cached = s->reader.bytes_cached,
+        .runs_hidden = s->reader.runs_skipped,
+        .bytes_hidden = s->reader.bytes_skipped,
+        .bytes_unused = trip_plan_bytes_left_out(&t->plan, t->session.data),
+        .memory_bytes = trip_budget_limit_bytes(t->session.budget),
+        .peak_memory_bytes = trip_budget_peak_bytes(t->session.budget),
+        .renderer = t->renderer->ops->name,
+        .device = t->renderer->ops->device(t->renderer),
+        .engine = trip_reader_engine_name(t->reader),
+        .ring = ring_text(t->renderer, t->reader),
+    };
+}
+
+/* The renderer's counts are of layers: they are given to the layer's most detailed list. */
+static bool has_counts(const triptych *t, const trip_list *list)
+{
+    return trip_dataset_find(t->session.data, list->axis, 0, TRIP_KIND_VOXELS) == list;
+}
+
+static triptych_list_stats list_stats(const triptych *t, unsigned i)
+{
+    const trip_frame_stats *frame = &t->drawing.stats;
+    const trip_plan_list *planned = &t->plan.lists[i];
+    const trip_list *list = &t->session.data->lists[i];
+    triptych_list_stats out = {
+        .bricks = planned->bricks,
+        .bricks_selected = planned->bricks_selected,
+        .bricks_transparent = planned->bricks_transparent,
+        .bricks_outside = planned->bricks_outside,
+        .bricks_without_weight = planned->bricks_without_weight,
+        .counted = frame->counted,
+    };
+    if (has_counts(t, list)) {
+        const trip_list_stats *counts = &frame->lists[list->axis];
+        out.splats_read = counts->splats_read;
+        out.bytes_read = counts->bytes_read;
+        out.splats_projected = frame->counted ? counts->splats_projected : 0;
+        out.splats_drawn = frame->counted ? counts->splats_drawn : 0;
+    }
+    return out;
+}
+
+int trip_context_note_stats(triptych *t)
+{
+    unsigned count = t->session.data->list_count;
+    if (!t->list_stats)
+        t->list_stats = trip_budget_take(t->session.budget, list_stats_bytes(t));
+    if (!t->list_stats)
+        return trip_fail(TRIP_ERROR, "render", t->name,
+                         "the frame's statistics do not fit the memory given; raise --memory");
+    t->stats = frame_stats(t);
+    for (unsigned i = 0; i < count; i++)
+        t->list_stats[i] = list_stats(t, i);
+    t->has_stats = true;
+    return 0;
+}
+
+static int check_stats(const triptych *t)
+{
+    int status = trip_context_check_open(t);
+    if (!status && !t->has_stats)
+        return trip_fail(TRIP_USAGE, "render", t->name, "no frame has been drawn");
+    return status;
+}
+
+int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = check_stats(t);
+    *out = status ? (triptych_frame_stats){ 0 } : t->stats;
+    return trip_context_leave(before, status);
+}
+
+int triptych_get_list_stats(triptych *t, unsigned number, triptych_list_stats *out)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = check_stats(t);
+    if (!status)
+        status = trip_context_check_list(t, number);
+    *out = status ? (triptych_list_stats){ 0 } : t->list_stats[number];
+    return trip_context_leave(before, status);
+}
