@@ -91,19 +91,21 @@ static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t 
     return piece;
 }
 
-/* What a renderer copies is copied once, as a whole. */
 static int draw_piece(trip_drawing *d, bool whole)
 {
+    const trip_renderer_ops *ops = d->renderer->ops;
     const trip_batch *batch = &d->held[(d->held_first + d->held_count - 1) % HELD_MAX];
     double start = now_ms();
-    if (d->renderer->ops->take_slots)
-        whole = true;
-    trip_batch piece = next_piece(d, batch, whole ? UINT64_MAX : TRIP_FRAME_PIECE);
+    size_t first = d->next_run;
+    trip_batch piece = next_piece(d, batch, whole || ops->in_parts ? UINT64_MAX : TRIP_FRAME_PIECE);
+    int status = ops->draw(d->renderer, &piece, is_front_to_back(d, batch));
+    if (status > 0)
+        d->next_run = first;
+    else
+        tell_progress(d, &piece);
     d->in_batch = d->next_run < batch->run_count;
-    int status = d->renderer->ops->draw(d->renderer, &piece, is_front_to_back(d, batch));
     d->stats.draw_ms += now_ms() - start;
-    tell_progress(d, &piece);
-    return status;
+    return status < 0 ? status : TRIP_OK;
 }
 
 static int is_done(const trip_drawing *d, const trip_batch *batch, bool wait)

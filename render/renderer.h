@@ -44,6 +44,9 @@ typedef struct trip_list_stats {
 
 typedef struct trip_renderer trip_renderer;
 
+/* Most splats of a piece or part, but for a single run. */
+#define TRIP_FRAME_PIECE 16384
+
 typedef struct trip_renderer_ops {
     const char *name; /* "reference", "gl", "cpu" */
     void (*destroy)(trip_renderer *r);
@@ -53,6 +56,9 @@ typedef struct trip_renderer_ops {
     int (*begin_layer)(trip_renderer *r, int axis);
     /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
     int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
+    /* Whether draw() is given whole batches and draws them in parts: it returns 1 until the batch
+     * is drawn, and is called again with the same batch. Else it is given pieces of batches. */
+    bool in_parts;
     /* Memory of the renderer's own for a reader's ring: `count` slots of `bytes`, aligned to 4096;
      * batches that lie there are drawn in place. NULL where it has none to give. It stays the
      * renderer's, who must outlive the reader. NULL: batches may lie anywhere, and are done with

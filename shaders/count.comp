@@ -6,7 +6,7 @@
 #include "weight.glsl"
 
 layout(local_size_x = TRIP_GL_COUNT_GROUP) in;
-layout(location = 0) uniform uvec2 piece; // draw positions: first, count
+layout(location = TRIP_GL_PIECE) uniform uvec2 piece; // draw positions: first, count
 
 // Low and high half of "projected", then of "drawn", per axis.
 layout(std430, binding = TRIP_GL_COUNTS) buffer trip_gl_counts { uint counts[]; };
@@ -46,11 +46,9 @@ bool drawn(splat s)
 
 void main()
 {
-    uint position = gl_GlobalInvocationID.y * gl_NumWorkGroups.x * TRIP_GL_COUNT_GROUP +
-                    gl_GlobalInvocationID.x;
-    if (position >= piece.y)
+    if (gl_GlobalInvocationID.x >= piece.y)
         return;
-    record r = fetch_record(piece.x + position);
+    record r = fetch_record(piece.x + gl_GlobalInvocationID.x);
     splat s;
     if (!project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius))
         return;

@@ -3,6 +3,8 @@
 // cut-off nothing is added.
 #include "real.glsl"
 
+layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
+
 layout(location = 0) flat in vec4 footprint;
 layout(location = 1) flat in vec4 colour;
 layout(location = 2) flat in float shear;
@@ -16,7 +18,7 @@ float opacity(float x)
 
 void main()
 {
-    vec2 p = gl_FragCoord.xy - screen.xy, q = p - footprint.xy;
+    vec2 p = gl_FragCoord.xy + vec2(0.0, row) - screen.xy, q = p - footprint.xy;
     float m = q.x * (footprint.z * q.x + shear * q.y) + footprint.w * q.y * q.y;
     float stretch = 1.0;
 #if defined(ANISOTROPIC)

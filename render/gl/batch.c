@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "report.h"
+#include "settings.h"
 
 /* OpenGL 4.5 promises storage blocks of 128 MiB; vertex numbers, four a splat, stay below 2^31. */
 enum { MAX_BLOCK_BYTES = 1 << 27, MAX_POSITIONS = MAX_BLOCK_BYTES / sizeof(uint32_t) };
@@ -175,30 +176,54 @@ static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run
     return r;
 }
 
-/* Whether some place in the run's tile is nearer than sprites can be drawn. */
-static bool needs_quads(const trip_gl_placing *p, const trip_run *run)
+/* The least depth of the places in the run's tile. */
+static double nearest_depth(const trip_gl_placing *p, const trip_run *run)
 {
-    if (p->quads || p->sprite_depth == HUGE_VAL)
-        return true;
-    if (p->sprite_depth <= 0)
-        return false;
     int u = (p->axis + 1) % 3, v = (p->axis + 2) % 3;
     trip_vec3 forward = p->camera->forward;
     double depth = trip_component(forward, p->axis) * run->sheet +
                    trip_component(forward, u) * run->u + trip_component(forward, v) * run->v -
                    trip_dot(forward, p->camera->eye);
     double far = p->tile_voxels - 1;
-    depth += fmin(0, trip_component(forward, u) * far) + fmin(0, trip_component(forward, v) * far);
-    return depth < p->sprite_depth;
+    return depth + fmin(0, trip_component(forward, u) * far) +
+           fmin(0, trip_component(forward, v) * far);
 }
 
-static void add_piece(trip_gl_batch *b, uint32_t first, uint32_t count, unsigned list, bool quads)
+/* Whether splats of that depth may be larger than sprites can be drawn. */
+static bool needs_quads(const trip_gl_placing *p, double depth)
+{
+    if (p->quads || p->sprite_depth == HUGE_VAL)
+        return true;
+    return p->sprite_depth > 0 && depth < p->sprite_depth;
+}
+
+/* A bound on the length of a splat of that depth along a step of one pixel of the camera. */
+static double length_px(const trip_gl_placing *p, trip_vec3 step, double depth, double image_px)
+{
+    double low_pass = 2 * TRIP_CUTOFF * TRIP_LOW_PASS_PX;
+    double px = low_pass + 2 * p->kernel_radius / (depth * trip_length(step));
+    return depth > 0 ? fmin(px, image_px) : image_px;
+}
+
+static uint32_t cost_at(const trip_gl_placing *p, double depth)
+{
+    const trip_camera *c = p->camera;
+    if (c->ortho)
+        depth = 1;
+    double pixels = length_px(p, c->rx, depth, c->width) * length_px(p, c->ry, depth, c->height);
+    uint32_t cost = 1;
+    while (cost < TRIP_GL_PART_COST && cost * (double)TRIP_GL_COST_PX < pixels)
+        cost *= 2;
+    return cost;
+}
+
+static void add_piece(trip_gl_batch *b, trip_gl_piece piece)
 {
     trip_gl_piece *last = b->piece_count ? &b->pieces[b->piece_count - 1] : NULL;
-    if (last && last->quads == quads && last->list == list)
-        last->count += count;
+    if (last && last->quads == piece.quads && last->cost == piece.cost && last->list == piece.list)
+        last->count += piece.count;
     else
-        b->pieces[b->piece_count++] = (trip_gl_piece){ first, count, list, quads };
+        b->pieces[b->piece_count++] = piece;
 }
 
 static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const trip_batch *batch,
@@ -215,8 +240,13 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
         const trip_run *run = &batch->runs[i];
         unsigned list = trip_batch_list(batch, run)->index;
         const trip_gl_placing *p = &placings[list];
+        double depth = nearest_depth(p, run);
         runs[i] = make_run(p, run, run->first, batch->pass->descending, resident, position);
-        add_piece(b, position, run->count, list, needs_quads(p, run));
+        add_piece(b, (trip_gl_piece){ .first = position,
+                                      .count = run->count,
+                                      .cost = cost_at(p, depth),
+                                      .list = list,
+                                      .quads = needs_quads(p, depth) });
         for (uint32_t k = 0; k < run->count && resident; k++)
             f.entries[position + k] = (uint32_t)i;
         if (!resident)
@@ -238,6 +268,19 @@ int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placi
     if (!status)
         fill_runs(b, placings, batch, resident);
     return status;
+}
+
+trip_gl_piece trip_gl_batch_next(const trip_gl_batch *b, trip_gl_cursor *at, uint32_t *room)
+{
+    trip_gl_piece next = b->pieces[at->piece];
+    uint32_t most = *room < next.cost ? 1 : *room / next.cost, left = next.count - at->done;
+    next.first += at->done;
+    next.count = left < most ? left : most;
+    uint32_t cost = next.count * next.cost;
+    *room -= cost < *room ? cost : *room;
+    at->done = next.count < left ? at->done + next.count : 0;
+    at->piece += next.count == left;
+    return next;
 }
 
 void trip_gl_batch_release(trip_gl_batch *b)

@@ -18,17 +18,23 @@ typedef struct trip_gl_placing {
     unsigned effects;
     int axis;
     double tile_voxels;
-    bool quads; /* always */
-    double
-        sprite_depth; /* and where voxels may be nearer than this, trip_gl_frame_sprite_depth() */
+    double kernel_radius;
+    bool quads;          /* always */
+    double sprite_depth; /* and where voxels may be nearer, trip_gl_frame_sprite_depth() */
 } trip_gl_placing;
 
 /* Draw positions [first, first + count), all of one list. */
 typedef struct trip_gl_piece {
     uint32_t first, count;
+    uint32_t cost; /* of each splat, a power of two: at least its pixels over TRIP_GL_COST_PX */
     unsigned list; /* its number in the data set */
     bool quads;
 } trip_gl_piece;
+
+/* What a part of the GPU's work may cost: a step passes its deadline by the time of one. Splats of
+ * up to so many pixels cost 1; larger parts would keep a frame on a software GL from ending soon.
+ */
+enum { TRIP_GL_COST_PX = 128, TRIP_GL_PART_COST = TRIP_FRAME_PIECE };
 
 typedef struct trip_gl_part {
     size_t offset, bytes; /* in its slot; bytes 0: not there */
@@ -45,12 +51,26 @@ typedef struct trip_gl_batch {
     size_t piece_count, piece_room;
 } trip_gl_batch;
 
+/* How far a batch is drawn. */
+typedef struct trip_gl_cursor {
+    size_t piece;
+    uint32_t done; /* of its positions */
+} trip_gl_cursor;
+
 /* Fills `b` from a batch of the reader in draw order. `records` is the slot that its planes lie in;
- * NULL: they are copied. `placings` are those
- * of the data set's lists. `resident`: the whole list's records are in GL memory already, and the
+ * NULL: they are copied. `placings` are by
+ * the data set's lists. `resident`: the records of whole lists are in GL memory already, and the
  * batch has runs only. */
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
                        const trip_batch *batch, trip_gl_slot *records, bool resident);
+static inline bool trip_gl_batch_is_drawn(const trip_gl_batch *b, const trip_gl_cursor *at)
+{
+    return at->piece == b->piece_count;
+}
+
+/* The splats behind the cursor, all of one piece, that cost no more than *room, but one at least;
+ * the cursor moves on, and their cost is taken from *room. */
+trip_gl_piece trip_gl_batch_next(const trip_gl_batch *b, trip_gl_cursor *at, uint32_t *room);
 void trip_gl_batch_release(trip_gl_batch *b);
 
 #endif

@@ -20,6 +20,10 @@
 #define TRIP_GL_ORDER 7
 /* Texture units: the layer of axis a is unit a. */
 #define TRIP_GL_LAYER 0
+/* Locations of uniforms. */
+#define TRIP_GL_ROW 0
+#define TRIP_GL_ROW_IN_BAND 1
+#define TRIP_GL_PIECE 0
 /* Invocations of a counting work group. */
 #define TRIP_GL_COUNT_GROUP 64
 

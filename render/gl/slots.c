@@ -43,9 +43,6 @@ trip_gl_slot *trip_gl_slots_find(const trip_gl_slots *s, const void *memory)
 
 void trip_gl_slots_release(trip_gl_slots *s)
 {
-    for (unsigned i = 0; i < s->count; i++)
-        if (s->slots[i].fence)
-            glDeleteSync(s->slots[i].fence);
     trip_gl_slot_release(&s->whole, s->budget);
     free(s->slots);
     free(s->memory);

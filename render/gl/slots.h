@@ -1,7 +1,8 @@
 /* The slots of a reader's ring in GL memory: a buffer mapped for good, which reads land in and
- * batches are drawn from without a copy. A slot is in use until the GPU has passed the fence behind
- * its last draw. Owned by one renderer; needs its context current. Their bytes count against the
- * budget. TRIPTYCH_GL_SLOTS=copy does without them: batches are copied, to the same picture. */
+ * batches are drawn from without a copy. A slot is in use until the
+ * last part of the GPU's work that reads it is done. Owned by one renderer; needs its context
+ * current. Their bytes count against the budget. TRIPTYCH_GL_SLOTS=copy does without them: batches
+ * are copied, to the same picture. */
 #ifndef TRIP_GL_SLOTS_H
 #define TRIP_GL_SLOTS_H
 
@@ -12,7 +13,7 @@ typedef struct trip_gl_slots {
     trip_gl_slot whole;
     size_t before_bytes; /* of it, up to the first slot */
     unsigned count;
-    trip_gl_slot *slots; /* the whole, each with a fence of its own */
+    trip_gl_slot *slots; /* the whole, each with a last part of its own */
     void **memory; /* of each: aligned to 4096 bytes and to what a storage block's start must be */
 } trip_gl_slots;
 

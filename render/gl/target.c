@@ -1,5 +1,6 @@
 #include "gl/target.h"
 
+#include "renderer.h"
 #include "report.h"
 
 static GLenum internal_format(trip_target type)
@@ -18,9 +19,9 @@ static uint64_t pixel_bytes(trip_target type)
     return bytes[type];
 }
 
-static int charge(trip_gl_target *t, uint64_t bytes_per_pixel)
+static int charge(trip_gl_target *t, uint64_t bytes_per_pixel, int rows)
 {
-    uint64_t bytes = bytes_per_pixel * (uint64_t)t->width * (uint64_t)t->height;
+    uint64_t bytes = bytes_per_pixel * (uint64_t)t->width * (uint64_t)rows;
     if (!trip_budget_charge(t->budget, bytes))
         return trip_fail(TRIP_ERROR, "gl", "image",
                          "layers of %d x %d px do not fit the memory given; raise --memory or draw "
@@ -30,14 +31,23 @@ static int charge(trip_gl_target *t, uint64_t bytes_per_pixel)
     return TRIP_OK;
 }
 
-/* A texture of the target's size with a framebuffer around it. */
-static int make_texture(trip_gl_target *t, trip_target type, GLuint *texture, GLuint *framebuffer)
+static int check_complete(GLuint framebuffer, const char *name)
 {
-    int status = charge(t, pixel_bytes(type));
+    GLenum state = glCheckNamedFramebufferStatus(framebuffer, GL_DRAW_FRAMEBUFFER);
+    if (state == GL_FRAMEBUFFER_COMPLETE)
+        return TRIP_OK;
+    return trip_fail(TRIP_ERROR, "gl", name, "the driver cannot draw into it: status %#x", state);
+}
+
+/* A texture of the target's width with a framebuffer around it. */
+static int make_texture(trip_gl_target *t, trip_target type, int rows, GLuint *texture,
+                        GLuint *framebuffer)
+{
+    int status = charge(t, pixel_bytes(type), rows);
     if (status)
         return status;
     glCreateTextures(GL_TEXTURE_2D, 1, texture);
-    glTextureStorage2D(*texture, 1, internal_format(type), t->width, t->height);
+    glTextureStorage2D(*texture, 1, internal_format(type), t->width, rows);
     if (glGetError() != GL_NO_ERROR)
         return trip_fail(TRIP_ERROR, "gl", "image",
                          "the driver has no memory for layers of %d x %d px; draw a smaller image",
@@ -46,90 +56,110 @@ static int make_texture(trip_gl_target *t, trip_target type, GLuint *texture, GL
     glTextureParameteri(*texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glCreateFramebuffers(1, framebuffer);
     glNamedFramebufferTexture(*framebuffer, GL_COLOR_ATTACHMENT0, *texture, 0);
-    return TRIP_OK;
+    return check_complete(*framebuffer, "layer");
 }
 
-static int make_stencil(trip_gl_target *t)
+static int make_stencil(trip_gl_target *t, trip_gl_band *band)
 {
-    if (t->stencil)
+    if (band->stencil)
         return TRIP_OK;
-    int status = charge(t, 4);
+    int status = charge(t, 4, band->rows);
     if (status)
         return status;
-    glCreateRenderbuffers(1, &t->stencil);
-    glNamedRenderbufferStorage(t->stencil, GL_DEPTH24_STENCIL8, t->width, t->height);
+    glCreateRenderbuffers(1, &band->stencil);
+    glNamedRenderbufferStorage(band->stencil, GL_DEPTH24_STENCIL8, t->width, band->rows);
     return TRIP_OK;
 }
 
-static int bind_complete(GLuint framebuffer, const char *name)
+static int at_least_one_at_most(int count, int most)
 {
-    GLenum state = glCheckNamedFramebufferStatus(framebuffer, GL_DRAW_FRAMEBUFFER);
-    if (state != GL_FRAMEBUFFER_COMPLETE)
-        return trip_fail(TRIP_ERROR, "gl", name, "the driver cannot draw into it: status %#x",
-                         state);
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
-    return TRIP_OK;
+    return count < 1 ? 1 : count > most ? most : count;
+}
+
+static void lay_out(trip_gl_target *t)
+{
+    int least = (t->height + TRIP_GL_BANDS_MAX - 1) / TRIP_GL_BANDS_MAX;
+    int rows = at_least_one_at_most(TRIP_GL_BAND_PIXELS / t->width, t->height);
+    rows = rows < least ? least : rows;
+    for (int y = 0; y < t->height; y += rows) {
+        int left = t->height - y;
+        t->bands[t->band_count++] =
+            (trip_gl_band){ .first_row = y, .rows = left < rows ? left : rows };
+    }
+    t->strip_rows = at_least_one_at_most(TRIP_GL_STRIP_PIXELS / t->width, t->height);
 }
 
 int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type)
 {
-    if (t->image && t->width == width && t->height == height && t->type == type)
+    if (t->strip && t->width == width && t->height == height && t->type == type)
         return TRIP_OK;
     trip_gl_target_release(t);
     t->width = width;
     t->height = height;
     t->type = type;
-    return make_texture(t, TRIP_TARGET_RGBA32F, &t->image, &t->framebuffer);
+    lay_out(t);
+    return make_texture(t, TRIP_TARGET_RGBA32F, t->strip_rows, &t->strip, &t->strip_framebuffer);
 }
 
-int trip_gl_target_bind_layer(const trip_gl_target *t, int axis)
-{
-    glViewport(0, 0, t->width, t->height);
-    return bind_complete(t->framebuffers[axis], "layer");
-}
-
-int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil)
+static int begin_band(trip_gl_target *t, trip_gl_band *band, int axis, bool stencil)
 {
     static const GLfloat nothing[4] = { 0, 0, 0, 0 };
     static const GLint zero = 0;
     int status = TRIP_OK;
-    if (!t->layers[axis])
-        status = make_texture(t, t->type, &t->layers[axis], &t->framebuffers[axis]);
+    if (!band->layers[axis])
+        status =
+            make_texture(t, t->type, band->rows, &band->layers[axis], &band->framebuffers[axis]);
     if (!status && stencil)
-        status = make_stencil(t);
+        status = make_stencil(t, band);
     if (status)
         return status;
-    GLuint framebuffer = t->framebuffers[axis];
+    GLuint framebuffer = band->framebuffers[axis];
     glNamedFramebufferRenderbuffer(framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER,
-                                   stencil ? t->stencil : 0);
-    status = trip_gl_target_bind_layer(t, axis);
+                                   stencil ? band->stencil : 0);
+    status = check_complete(framebuffer, "layer");
     if (status)
         return status;
     glClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, nothing);
     if (stencil)
         glClearNamedFramebufferiv(framebuffer, GL_STENCIL, 0, &zero);
-    return TRIP_OK;
+    return trip_frame_poll();
 }
 
-int trip_gl_target_begin_image(trip_gl_target *t)
+int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil)
 {
-    glViewport(0, 0, t->width, t->height);
-    return bind_complete(t->framebuffer, "image");
+    int status = TRIP_OK;
+    for (int i = 0; i < t->band_count && !status; i++)
+        status = begin_band(t, &t->bands[i], axis, stencil);
+    return status;
 }
 
-void trip_gl_target_read_rows(const trip_gl_target *t, int first, int count, float *rgba)
+void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band)
 {
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, t->framebuffer);
-    glReadPixels(0, first, t->width, count, GL_RGBA, GL_FLOAT, rgba);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, band->framebuffers[axis]);
+    glViewport(0, -band->first_row, t->width, t->height);
+}
+
+void trip_gl_target_bind_strip(const trip_gl_target *t, int rows)
+{
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, t->strip_framebuffer);
+    glViewport(0, 0, t->width, rows);
+}
+
+void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba)
+{
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, t->strip_framebuffer);
+    glReadPixels(0, 0, t->width, rows, GL_RGBA, GL_FLOAT, rgba);
 }
 
 void trip_gl_target_release(trip_gl_target *t)
 {
-    glDeleteFramebuffers(3, t->framebuffers);
-    glDeleteFramebuffers(1, &t->framebuffer);
-    glDeleteTextures(3, t->layers);
-    glDeleteTextures(1, &t->image);
-    glDeleteRenderbuffers(1, &t->stencil);
+    for (int i = 0; i < t->band_count; i++) {
+        glDeleteFramebuffers(3, t->bands[i].framebuffers);
+        glDeleteTextures(3, t->bands[i].layers);
+        glDeleteRenderbuffers(1, &t->bands[i].stencil);
+    }
+    glDeleteFramebuffers(1, &t->strip_framebuffer);
+    glDeleteTextures(1, &t->strip);
     trip_budget_discharge(t->budget, t->bytes);
     *t = (trip_gl_target){ .budget = t->budget };
 }

@@ -1,6 +1,8 @@
 /* What a frame is drawn into: one layer per axis, made when it is first drawn, the stencil
- * that masks pixels without weight, and the merged image. Owned by one renderer; kept from frame to
- * frame while size and type stay. Its bytes count against the budget. */
+ * that masks pixels without weight, and a strip of rows of the merged image. Large layers are made
+ * of bands of rows: where textures are the processor's memory, one takes a while to make. Owned by
+ * one renderer; kept from frame to frame while size and type stay. Its bytes count against the
+ * budget. */
 #ifndef TRIP_GL_TARGET_H
 #define TRIP_GL_TARGET_H
 
@@ -10,26 +12,40 @@
 #include "budget.h"
 #include "settings.h"
 
+enum {
+    TRIP_GL_BAND_PIXELS = 1 << 24, /* about; more in the largest images */
+    TRIP_GL_BANDS_MAX = 32,
+    TRIP_GL_STRIP_PIXELS = 1 << 20, /* a pass over an image is done in strips of about so many */
+};
+
+typedef struct trip_gl_band {
+    int first_row, rows;
+    GLuint layers[3], framebuffers[3]; /* by axis */
+    GLuint stencil;                    /* shared by the layers */
+} trip_gl_band;
+
 typedef struct trip_gl_target {
     trip_budget *budget;
     int width, height;
     trip_target type;
-    GLuint layers[3], framebuffers[3];
-    GLuint stencil;            /* shared by the layers */
-    GLuint image, framebuffer; /* rgba32f */
+    trip_gl_band bands[TRIP_GL_BANDS_MAX];
+    int band_count;
+    int strip_rows;
+    GLuint strip, strip_framebuffer; /* rgba32f whatever the layers hold */
     uint64_t bytes;
 } trip_gl_target;
 
 /* Readies an image of this size for layers of this type. */
 int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type);
-/* Binds the layer of an axis for drawing, empty; with `stencil` its stencil too, all zero. */
+/* Empties the layer of an axis; with `stencil` it has one, all zero. */
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
-/* Binds a layer again, as it is. */
-int trip_gl_target_bind_layer(const trip_gl_target *t, int axis);
-/* Binds the image for drawing; it holds rgba32f whatever the layers hold. */
-int trip_gl_target_begin_image(trip_gl_target *t);
-/* Rows [first, first + count) of the image, width * 4 floats each. */
-void trip_gl_target_read_rows(const trip_gl_target *t, int first, int count, float *rgba);
+/* Binds a band of a layer for drawing: positions are those of the image, but row first_row of the
+ * image is row 0 of the fragments. */
+void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band);
+/* Binds the first `rows` rows of the strip for drawing. */
+void trip_gl_target_bind_strip(const trip_gl_target *t, int rows);
+/* Reads them, width * 4 floats each, when they are drawn. */
+void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba);
 void trip_gl_target_release(trip_gl_target *t);
 
 #endif

@@ -8,6 +8,7 @@
 
 #include "gl/context.h"
 #include "scenes.h"
+#include "splat.h"
 #include "test.h"
 
 static const scene_renderer reference = { "reference", trip_reference_create, 0 };
@@ -317,6 +318,112 @@ static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
     scene_destroy(&s);
 }
 
+/* ---- parts ---- */
+
+enum { PARTS_PX = 300 };
+
+/* Draws a frame in the shortest steps there are; returns their number. */
+static int draw_in_steps(const scene *s, const trip_camera_params *view, float *rgba,
+                         uint64_t *splats)
+{
+    trip_renderer *r;
+    trip_reader *reader;
+    trip_camera camera;
+    trip_plan plan;
+    trip_drawing drawing;
+    trip_settings settings = trip_settings_default();
+    int status, steps = 0;
+    assert_int_equal(trip_gl_create(&r, s->budget), 0);
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
+    *splats = trip_plan_splats(&plan);
+    trip_reader_params params = { .planes = plan.planes, .engine = TRIP_ENGINE_NULL };
+    assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
+    const trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
+    };
+    assert_int_equal(trip_frame_begin(&drawing, r, reader, &frame), 0);
+    while ((status = trip_frame_step(&drawing, 0)) == TRIP_FRAME_MORE)
+        steps++;
+    assert_int_equal(status, TRIP_FRAME_DONE);
+    assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
+    trip_frame_end(&drawing);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s->budget);
+    r->ops->destroy(r);
+    return steps;
+}
+
+/* Steps are as short for large splats as for small ones. */
+static void a_step_is_of_few_pixels(void **state)
+{
+    (void)state;
+    static float rgba[4 * PARTS_PX * PARTS_PX];
+    scene s;
+    uint64_t splats;
+    make_shells(&s, &cubes);
+    trip_settings settings = trip_settings_default();
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.1, 0.2), 800, 40, PARTS_PX);
+    int steps = draw_in_steps(&s, &view, rgba, &splats);
+    assert_true(splats > 10000);
+    assert_true(steps <= 3 + (int)(splats / TRIP_FRAME_PIECE)); /* at most three layers */
+
+    /* A splat is 400 px wide, so that any that is drawn covers a quarter of the image. */
+    view.ortho_height = 3;
+    steps = draw_in_steps(&s, &view, rgba, &splats);
+    assert_true(splats > 1000);
+    assert_true(steps >= (double)splats * PARTS_PX * PARTS_PX / 4 / (1 << 21));
+    scene_picture whole = scene_draw(&s, &gl, &view, &settings);
+    assert_memory_equal(rgba, whole.rgba, sizeof rgba);
+    scene_picture_free(&whole);
+    scene_destroy(&s);
+}
+
+static bool one_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)code;
+    (void)gradient;
+    return i == 2 && j == 2 && k == 2;
+}
+
+/* Layers of more than 2^24 pixels are made of bands: 2048 rows, and 12. */
+static void a_splat_across_two_bands_of_a_layer_is_whole(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 5, 5, 5 }, .voxel = one_voxel });
+    scene_colour(&s, 0, 65535, 1, 1, 1, 0.7);
+    trip_settings settings = trip_settings_default();
+    settings.shading = false;
+    settings.background[3] = 0;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 40, 40, 64);
+    view.width = 8192;
+    view.height = 2060;
+    view.ortho_height = 20.6; /* 100 px a voxel, and the voxel is at row 2046 */
+    view.eye.z += 10.16;
+    view.look.z += 10.16;
+    trip_camera camera;
+    trip_splat splat;
+    assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
+    const trip_splat_frame f = trip_splat_frame_make(&camera, &settings);
+    assert_true(trip_splat_project(&f, trip_v3(2, 2, 2), &splat));
+    assert_true(fabs(splat.y - 2046) < 1e-6);
+    scene_picture p = scene_draw(&s, &gl, &view, &settings);
+    for (int y = 1840; y < p.height; y++) {
+        for (int x = 3890; x < 4300; x++) {
+            double m = trip_splat_radius2(&f, &splat, x + 0.5, y + 0.5), alpha = 0;
+            if (m <= f.cutoff2)
+                alpha = -expm1(-(double)s.table[0].extinction *
+                               trip_splat_stretch(&f, x + 0.5, y + 0.5) * splat.amplitude *
+                               (exp(-m / 2) - f.edge));
+            assert_true(fabs((double)scene_pixel(&p, x, y)[3] - alpha) < 1e-5);
+        }
+    }
+    scene_picture_free(&p);
+    scene_destroy(&s);
+}
+
 /* ---- failures ---- */
 
 static char last_line[512];
@@ -485,6 +592,8 @@ int main(void)
         cmocka_unit_test(the_size_of_batches_makes_no_difference),
         cmocka_unit_test(reads_into_gl_memory_give_the_same_picture_as_copies),
         cmocka_unit_test(coarser_targets_stay_close_and_their_errors_are_known),
+        cmocka_unit_test(a_step_is_of_few_pixels),
+        cmocka_unit_test(a_splat_across_two_bands_of_a_layer_is_whole),
         cmocka_unit_test(what_does_not_fit_is_refused_and_the_next_frame_draws),
         cmocka_unit_test(a_shader_that_does_not_compile_is_named_with_its_line),
         cmocka_unit_test(a_missing_shader_is_reported),

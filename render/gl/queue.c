@@ -1,0 +1,59 @@
+#include "gl/queue.h"
+
+#include "report.h"
+
+/* How long a wait does not notice that the frame is cancelled. */
+static const GLuint64 look_ns = 10000000;
+
+static int wait_failed(void)
+{
+    return trip_fail(TRIP_ERROR, "gl", "queue", "waiting for the GPU failed: OpenGL error %#x",
+                     glGetError());
+}
+
+/* The oldest part under way: GL_TIMEOUT_EXPIRED when it is not done within `ns`. */
+static GLenum look_at_oldest(trip_gl_queue *q, GLuint64 ns)
+{
+    GLsync *fence = &q->fences[(q->done + 1) % TRIP_GL_QUEUE_PARTS];
+    GLenum result = glClientWaitSync(*fence, 0, ns);
+    if (result == GL_TIMEOUT_EXPIRED)
+        return result;
+    glDeleteSync(*fence);
+    *fence = NULL;
+    q->done++;
+    return result;
+}
+
+int trip_gl_queue_is_done(trip_gl_queue *q, uint64_t part, bool wait)
+{
+    while (q->done < part) {
+        GLenum result = look_at_oldest(q, wait ? look_ns : 0);
+        if (result == GL_WAIT_FAILED)
+            return wait_failed();
+        if (result == GL_TIMEOUT_EXPIRED && !wait)
+            return 0;
+        if (result == GL_TIMEOUT_EXPIRED && trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
+    }
+    return 1;
+}
+
+int trip_gl_queue_end_part(trip_gl_queue *q)
+{
+    q->fences[++q->ended % TRIP_GL_QUEUE_PARTS] = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    glFlush();
+    if (q->ended < TRIP_GL_QUEUE_PARTS)
+        return TRIP_OK;
+    int status = trip_gl_queue_is_done(q, q->ended - (TRIP_GL_QUEUE_PARTS - 1), true);
+    return status < 0 ? status : TRIP_OK;
+}
+
+void trip_gl_queue_drain(trip_gl_queue *q)
+{
+    glFinish();
+    for (int i = 0; i < TRIP_GL_QUEUE_PARTS; i++) {
+        glDeleteSync(q->fences[i]);
+        q->fences[i] = NULL;
+    }
+    q->done = q->ended;
+}
