@@ -23,6 +23,11 @@ static size_t run_room(const trip_reader *r)
     return r->params.slot_bytes / SLOT_BYTES_PER_RUN;
 }
 
+static size_t border_bytes(const trip_reader *r)
+{
+    return (size_t)TRIP_BORDERS_MAX << r->data->header.page_log2;
+}
+
 size_t trip_reader_slot_bytes(const trip_dataset *d, unsigned planes, size_t wanted)
 {
     size_t page = (size_t)1 << d->header.page_log2, least = trip_planner_least_slot(d, planes);
@@ -78,9 +83,10 @@ static int take_memory(trip_reader *r)
     r->queue = trip_budget_take(r->budget, n * sizeof *r->queue);
     r->runs = trip_budget_take(r->budget, n * run_room(r) * sizeof *r->runs);
     r->cursors = trip_budget_take(r->budget, r->data->list_count * sizeof *r->cursors);
+    r->border_memory = trip_budget_take(r->budget, border_bytes(r));
     if (!r->params.slot_memory)
         r->slot_memory = trip_budget_take(r->budget, n * r->params.slot_bytes);
-    if (!r->slots || !r->queue || !r->runs || !r->cursors ||
+    if (!r->slots || !r->queue || !r->runs || !r->cursors || !r->border_memory ||
         (!r->params.slot_memory && !r->slot_memory))
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "no memory for %u slots of %zu bytes: give more with --memory", n,
@@ -103,6 +109,7 @@ static void release_memory(trip_reader *r)
     trip_budget_release(r->budget, r->queue, n * sizeof *r->queue);
     trip_budget_release(r->budget, r->runs, n * run_room(r) * sizeof *r->runs);
     trip_budget_release(r->budget, r->cursors, r->data->list_count * sizeof *r->cursors);
+    trip_budget_release(r->budget, r->border_memory, border_bytes(r));
     trip_budget_release(r->budget, r->slot_memory, n * r->params.slot_bytes);
 }
 

@@ -57,16 +57,17 @@ static void reserve_pages(trip_reader *r, const trip_request *q)
         trip_cache_reserve(r->cache, page++, q);
 }
 
-/* Requests for a segment: one, or by turns what is cached and what is not. A slot
- * always keeps a request for every segment still to come. */
-static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment)
+/* Requests for bytes [at, end) of a segment: one, or by turns what is cached and what is not. A
+ * slot always keeps a request for every segment still to come. */
+static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment, size_t at,
+                         size_t end)
 {
     const trip_source *source = &r->sources[segment->list->index][segment->plane];
     unsigned char *data = s->memory + segment->slot_offset;
     unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX;
-    for (size_t at = 0; at < segment->bytes;) {
+    while (at < end) {
         uint64_t offset = segment->offset + at;
-        size_t bytes = segment->bytes - at;
+        size_t bytes = end - at;
         uint32_t page = source->first_page + (uint32_t)(offset >> source->page_log2);
         bool split = r->cache && s->request_count < last;
         bool cached = split && trip_cache_find(r->cache, page);
@@ -90,12 +91,20 @@ static void enqueue(trip_reader *r, trip_slot *s)
 
 static void submit(trip_reader *r, trip_slot *s)
 {
-    for (unsigned i = 0; i < s->extent.segment_count; i++)
-        add_requests(r, s, &s->extent.segments[i]);
+    size_t page = r->planner.page_bytes;
+    for (unsigned i = 0; i < s->extent.segment_count; i++) {
+        const trip_segment *segment = &s->extent.segments[i];
+        size_t first, end;
+        trip_borders_trim(&r->borders, segment, page, &s->from_borders, &first, &end);
+        add_requests(r, s, segment, first, end);
+    }
+    trip_borders_find(&s->borders, &s->extent, s->pass->descending, page);
+    r->borders = s->borders;
     for (unsigned i = 0; i < s->request_count; i++)
         s->requests[i].next = i + 1 < s->request_count ? &s->requests[i + 1] : NULL;
     enqueue(r, s);
-    r->ops->submit(r->engine, s->requests);
+    if (s->request_count > 0)
+        r->ops->submit(r->engine, s->requests);
 }
 
 static void enter_pass(trip_reader *r)
@@ -152,7 +161,7 @@ static void fill_slots(trip_reader *r)
             continue;
         if (!plan_slot(r, s))
             break;
-        s->request_count = 0;
+        s->request_count = s->borders.count = s->from_borders.count = 0;
         s->cache_pass = r->cache_pass;
         if (r->runs_only || r->in_memory)
             enqueue(r, s);
@@ -280,6 +289,7 @@ int trip_reader_begin(trip_reader *r, const trip_pass *pass)
         assert(r->slots[i].state != TRIP_SLOT_DRAWING);
     r->stats = (trip_reader_stats){ 0 };
     r->pass = r->pass_count = 0;
+    r->borders.count = 0;
     r->failed = 0;
     r->planner = (trip_planner){ .planes = r->params.planes,
                                  .normal_bytes = r->data->header.normal_bytes,
@@ -384,6 +394,13 @@ static int check_blocks(const trip_reader *r, const trip_batch *b)
     return TRIP_OK;
 }
 
+static void copy_borders(trip_reader *r, const trip_slot *s)
+{
+    size_t page = r->planner.page_bytes;
+    trip_borders_fetch(&s->from_borders, r->border_memory, s->memory, page);
+    trip_borders_keep(&s->borders, r->border_memory, s->memory, page);
+}
+
 static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 {
     *batch = (trip_batch){
@@ -413,6 +430,7 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     trip_slot *s = take_first(r);
     r->failed = check_slot(r, s);
     if (!r->failed) {
+        copy_borders(r, s);
         fill_batch(r, s, batch);
         r->failed = check_blocks(r, batch);
     }

@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 
+#include "border.h"
 #include "engine.h"
 #include "extent.h"
 #include "reader.h"
@@ -27,6 +28,8 @@ typedef struct trip_slot {
     const trip_pass *pass;
     uint32_t cache_pass; /* number of the pass in the cache */
     trip_extent extent;
+    trip_borders borders;            /* kept for the next slot when this one is handed out */
+    trip_border_copies from_borders; /* before that, copied from those of the slot before */
     trip_request requests[TRIP_SLOT_REQUESTS_MAX];
     unsigned request_count;
 } trip_slot;
@@ -46,12 +49,14 @@ struct trip_reader {
     trip_planner planner;
     trip_pass_cursor *cursors; /* of the pass being planned: one for each list */
     uint32_t cache_pass;       /* of the pass being planned */
+    trip_borders borders;      /* of the slot planned last */
     int failed;                /* status that ended the passes */
     bool runs_only;
     bool in_memory; /* batches lie in the cache: nothing is requested, and slots hold only runs */
     trip_reader_stats stats;
     trip_slot *slots;
-    unsigned char *slot_memory; /* NULL where it is the caller's */
+    unsigned char *slot_memory;   /* NULL where it is the caller's */
+    unsigned char *border_memory; /* pages at the borders of the slot handed out last */
     trip_run *runs;
     /* Slots being read, in draw order, from queue[queue_first % slots] on. */
     trip_slot **queue;

@@ -743,6 +743,74 @@ static void counts_of_bytes_do_not_depend_on_how_long_reads_take(void **state)
     close_fixture(&f, d);
 }
 
+/* How often each page of a file was read. */
+typedef struct page_counts {
+    _Atomic unsigned times[4096];
+} page_counts;
+
+static long count_pages(void *user, void *data, uint64_t offset, size_t bytes, long result)
+{
+    (void)data;
+    for (size_t at = 0; at < bytes; at += 4096)
+        ((page_counts *)user)->times[(offset + at) / 4096]++;
+    return result;
+}
+
+static void check_pages_once(const fixture *f, const trip_dataset *d, unsigned slots)
+{
+    trip_reader *r;
+    static page_counts counts;
+    uint64_t state = slots;
+    fixture_voxel *out = calloc(f->count, sizeof *out), *wanted = calloc(f->count, sizeof *out);
+    size_t n;
+    trip_reader_params params = { .slots = slots,
+                                  .slot_bytes = 1, /* the least */
+                                  .gap_bytes = 4096,
+                                  .fault = count_pages,
+                                  .fault_user = &counts };
+    assert_int_equal(trip_reader_create(&r, d, &params, f->budget), TRIP_OK);
+    for (int i = 0; i < 12; i++) {
+        trip_selection s;
+        memset(&counts, 0, sizeof counts);
+        select_some(&s, d, &state);
+        assert_int_equal(read_pass(r, &s, slots / 2, out, &n), 0);
+        assert_int_equal(n, expect(f, &s, wanted));
+        for (size_t k = 0; k < n; k++)
+            wanted[k].normal = 0;
+        assert_memory_equal(out, wanted, n * sizeof *out);
+        for (int page = 0; page < 4096; page++)
+            assert_true(counts.times[page] <= 1);
+        trip_selection_destroy(&s, f->budget);
+    }
+    trip_reader_destroy(r);
+    free(out);
+    free(wanted);
+}
+
+static void pages_at_the_borders_of_slots_are_read_once(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    (void)state;
+    open_fixture(&f, &d);
+    fixture_voxel *out = calloc(f.count, sizeof *out);
+    for (unsigned slots = 2; slots <= 8; slots += 3)
+        check_pages_once(&f, d, slots);
+    for (int i = 0; i < 6; i++) { /* both planes, in every direction */
+        trip_reader *r;
+        trip_selection s;
+        trip_reader_params params = { .slots = 3, .slot_bytes = 1, .planes = 3 };
+        assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
+        select_all(&s, d, i / 2, i % 2);
+        assert_int_equal(read_bytes(r, &s, out),
+                         d->lists[i / 2].plane_bytes[0] + d->lists[i / 2].plane_bytes[1]);
+        trip_selection_destroy(&s, f.budget);
+        trip_reader_destroy(r);
+    }
+    free(out);
+    close_fixture(&f, d);
+}
+
 static bool skip_odd(void *user, const trip_selection *s, uint32_t brick)
 {
     (void)s;
@@ -1174,6 +1242,7 @@ int main(void)
         cmocka_unit_test(a_data_set_in_memory_is_handed_out_where_it_lies),
         cmocka_unit_test(a_cache_follows_when_other_lists_are_read),
         cmocka_unit_test(counts_of_bytes_do_not_depend_on_how_long_reads_take),
+        cmocka_unit_test(pages_at_the_borders_of_slots_are_read_once),
         cmocka_unit_test(skipped_bricks_are_left_out_and_counted),
         cmocka_unit_test(gaps_are_read_through_only_when_they_are_small),
         cmocka_unit_test(a_pass_given_up_leaves_the_reader_ready_for_the_next),
