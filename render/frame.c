@@ -8,8 +8,8 @@
 
 enum { HELD_MAX = TRIP_FRAME_HELD_MAX };
 
-/* How long a frame that waits for the disk does not notice that it is given up. */
-enum { LOOK_NS = 20000000 };
+/* How often a frame that waits for the disk checks whether it is cancelled. */
+enum { POLL_NS = 20000000 };
 
 uint64_t trip_frame_now_ns(void)
 {
@@ -23,7 +23,7 @@ static double now_ms(void)
     return (double)trip_frame_now_ns() * 1e-6;
 }
 
-static void tell_progress(trip_drawing *d, const trip_batch *batch)
+static void report_progress(trip_drawing *d, const trip_batch *batch)
 {
     if (!d->frame->progress)
         return;
@@ -102,7 +102,7 @@ static int draw_piece(trip_drawing *d, bool whole)
     if (status > 0)
         d->next_run = first;
     else
-        tell_progress(d, &piece);
+        report_progress(d, &piece);
     d->in_batch = d->next_run < batch->run_count;
     d->stats.draw_ms += now_ms() - start;
     return status < 0 ? status : TRIP_OK;
@@ -178,7 +178,7 @@ static void take_counts(trip_drawing *d)
     }
 }
 
-/* Nothing is seen by a camera whose numbers are none, and no renderer could tell. */
+/* Renderers take a camera's numbers as they are: those that are not finite are refused here. */
 static int check_camera(const trip_camera *c)
 {
     const trip_vec3 all[] = { c->eye, c->r0, c->rx, c->ry, c->forward, c->to_x, c->to_y };
@@ -272,7 +272,7 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
     trip_drawing d;
     int status = trip_frame_begin(&d, renderer, reader, frame);
     while (!status && (status = trip_frame_step(&d, UINT64_MAX)) == TRIP_FRAME_WAITS) {
-        trip_frame_await(&d, LOOK_NS);
+        trip_frame_await(&d, POLL_NS);
         status = 0;
     }
     if (!status)

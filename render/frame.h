@@ -63,7 +63,7 @@ int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *read
  * piece of at most TRIP_FRAME_PIECE splats or one run; something of what is ready in any case.
  * UINT64_MAX: no deadline. */
 int trip_frame_step(trip_drawing *d, uint64_t deadline_ns);
-/* Waits until there is something to draw, at most so long; UINT64_MAX: without end. */
+/* Waits until there is something to draw, at most for the timeout; UINT64_MAX: without end. */
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns);
 /* The picture of what is drawn so far: width * height * 4 floats, premultiplied, row 0 at the top,
  * and with settings.depth as many distances (layer.h); otherwise `depth` is NULL. After

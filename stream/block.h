@@ -65,7 +65,7 @@ static inline uint32_t trip_block_most_words(const trip_block_form *f)
            trip_block_code_words(records, f->code_bytes);
 }
 
-/* Whether a run of so many records, at least 1, can have a block of so many words. */
+/* Whether a run of `records`, at least 1, can have a block of `words`. */
 bool trip_block_words_fit(const trip_block_form *f, uint32_t records, uint32_t words);
 
 /* The parts of a block, whose words fit its records; `words` is aligned to 8 bytes. */

@@ -2,20 +2,20 @@
 
 #include <string.h>
 
-static const trip_border *find_border(const trip_borders *b, const trip_segment *segment,
+static const trip_border *find_border(const trip_borders *b, const trip_byte_range *range,
                                       uint64_t offset)
 {
     for (unsigned i = 0; i < b->count; i++)
-        if (b->pages[i].list == segment->list && b->pages[i].plane == segment->plane &&
+        if (b->pages[i].list == range->list && b->pages[i].plane == range->plane &&
             b->pages[i].offset == offset)
             return &b->pages[i];
     return NULL;
 }
 
-static bool has_border(const trip_borders *b, const trip_segment *segment)
+static bool has_border(const trip_borders *b, const trip_byte_range *range)
 {
     for (unsigned i = 0; i < b->count; i++)
-        if (b->pages[i].list == segment->list && b->pages[i].plane == segment->plane)
+        if (b->pages[i].list == range->list && b->pages[i].plane == range->plane)
             return true;
     return false;
 }
@@ -23,8 +23,8 @@ static bool has_border(const trip_borders *b, const trip_segment *segment)
 void trip_borders_find(trip_borders *b, const trip_extent *e, bool descending, size_t page_bytes)
 {
     b->count = 0;
-    for (unsigned i = e->segment_count; i > 0 && b->count < TRIP_BORDERS_MAX; i--) {
-        const trip_segment *s = &e->segments[i - 1];
+    for (unsigned i = e->range_count; i > 0 && b->count < TRIP_BORDERS_MAX; i--) {
+        const trip_byte_range *s = &e->ranges[i - 1];
         if (has_border(b, s)) /* of a later piece */
             continue;
         size_t at = descending ? 0 : s->bytes - page_bytes;
@@ -33,24 +33,24 @@ void trip_borders_find(trip_borders *b, const trip_extent *e, bool descending, s
     }
 }
 
-static bool copy_page(const trip_borders *b, const trip_segment *segment, size_t at,
+static bool copy_page(const trip_borders *b, const trip_byte_range *range, size_t at,
                       trip_border_copies *copies)
 {
-    const trip_border *border = find_border(b, segment, segment->offset + at);
+    const trip_border *border = find_border(b, range, range->offset + at);
     if (border)
         copies->pages[copies->count++] =
-            (trip_border_copy){ (unsigned)(border - b->pages), segment->slot_offset + at };
+            (trip_border_copy){ (unsigned)(border - b->pages), range->slot_offset + at };
     return border;
 }
 
-void trip_borders_trim(const trip_borders *b, const trip_segment *segment, size_t page_bytes,
+void trip_borders_trim(const trip_borders *b, const trip_byte_range *range, size_t page_bytes,
                        trip_border_copies *copies, size_t *first, size_t *end)
 {
     *first = 0;
-    *end = segment->bytes;
-    if (copy_page(b, segment, 0, copies))
+    *end = range->bytes;
+    if (copy_page(b, range, 0, copies))
         *first = page_bytes;
-    else if (copy_page(b, segment, segment->bytes - page_bytes, copies))
+    else if (copy_page(b, range, range->bytes - page_bytes, copies))
         *end -= page_bytes;
 }
 

@@ -28,15 +28,15 @@ typedef struct trip_border_copy {
 } trip_border_copy;
 
 typedef struct trip_border_copies {
-    trip_border_copy pages[TRIP_SEGMENTS_MAX];
+    trip_border_copy pages[TRIP_RANGES_MAX];
     unsigned count;
 } trip_border_copies;
 
 /* The pages that an extent ends with. */
 void trip_borders_find(trip_borders *b, const trip_extent *e, bool descending, size_t page_bytes);
-/* The bytes of a segment that are left to read, [*first, *end), when a page at either end is among
+/* The bytes of a range that are left to read, [*first, *end), when a page at either end is among
  * the borders, which is added to the copies. */
-void trip_borders_trim(const trip_borders *b, const trip_segment *segment, size_t page_bytes,
+void trip_borders_trim(const trip_borders *b, const trip_byte_range *range, size_t page_bytes,
                        trip_border_copies *copies, size_t *first, size_t *end);
 /* Copies between a slot's memory and the pages kept of the slot before, TRIP_BORDERS_MAX of them.
  */

@@ -46,7 +46,8 @@ static void uring_submit(void *engine, trip_request *chain)
         else
             io_uring_prep_read(sqe, read.fd, read.data, (unsigned)read.bytes, read.offset);
         io_uring_sqe_set_data(sqe, q);
-        /* Release, for the thread that reaps it: the kernel orders them, but does not say so. */
+        /* Release, for the thread that reaps it: that the kernel orders the two is not specified.
+         */
         atomic_store_explicit(&q->given, true, memory_order_release);
     }
     submit_queue(e);

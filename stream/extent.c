@@ -138,37 +138,37 @@ static void place_pieces(const trip_planner *p, trip_extent *e)
             const trip_piece *piece = &e->pieces[i];
             if (!is_read(p, piece->list, plane))
                 continue;
-            trip_segment *s = &e->segments[e->segment_count++];
-            *s = (trip_segment){ .offset = page_floor(p, piece->low[plane]),
-                                 .bytes = paged_bytes(p, piece->low[plane], piece->high[plane]),
-                                 .slot_offset = at,
-                                 .list = piece->list,
-                                 .plane = plane };
+            trip_byte_range *s = &e->ranges[e->range_count++];
+            *s = (trip_byte_range){ .offset = page_floor(p, piece->low[plane]),
+                                    .bytes = paged_bytes(p, piece->low[plane], piece->high[plane]),
+                                    .slot_offset = at,
+                                    .list = piece->list,
+                                    .plane = plane };
             at += s->bytes;
         }
         e->plane_bytes[plane] = at - e->plane_at[plane];
     }
 }
 
-/* Whether the segment has all of those bytes. Segments may share a page: where the gap between two
+/* Whether the range has all of those bytes. Ranges may share a page: where the gap between two
  * pieces is large in one plane it may be small in another. */
-static bool is_in(const trip_segment *s, const trip_list *list, int plane, uint64_t offset,
+static bool is_in(const trip_byte_range *s, const trip_list *list, int plane, uint64_t offset,
                   size_t bytes)
 {
     return s->list == list && s->plane == plane && offset >= s->offset &&
            offset - s->offset + bytes <= s->bytes;
 }
 
-/* Turns a place in a plane file into one in the slot's part for the plane. `from` is the segment
+/* Turns a place in a plane file into one in the slot's part for the plane. `from` is the range
  * that the last one was in: neighbours mostly are in the same. */
 static size_t place_in_slot(const trip_extent *e, const trip_list *list, int plane, uint64_t offset,
                             size_t bytes, unsigned *from)
 {
     unsigned i = *from;
-    while (!is_in(&e->segments[i], list, plane, offset, bytes))
-        i = i + 1 < e->segment_count ? i + 1 : 0;
+    while (!is_in(&e->ranges[i], list, plane, offset, bytes))
+        i = i + 1 < e->range_count ? i + 1 : 0;
     *from = i;
-    const trip_segment *s = &e->segments[i];
+    const trip_byte_range *s = &e->ranges[i];
     return s->slot_offset - e->plane_at[plane] + (size_t)(offset - s->offset);
 }
 
@@ -189,7 +189,7 @@ static void place_runs(const trip_planner *p, trip_extent *e)
 
 bool trip_planner_fill(trip_planner *p, trip_extent *e)
 {
-    e->piece_count = e->segment_count = 0;
+    e->piece_count = e->range_count = 0;
     e->run_count = e->bytes = 0;
     e->records = 0;
     while (e->run_count < e->run_room) {

@@ -7,7 +7,7 @@
 #include "selection.h"
 
 #define TRIP_PIECES_MAX 16
-#define TRIP_SEGMENTS_MAX (TRIP_PIECES_MAX * TRIP_PLANES)
+#define TRIP_RANGES_MAX (TRIP_PIECES_MAX * TRIP_PLANES)
 
 /* Runs of a list with small gaps between them: the bytes from the first to the last, by plane. */
 typedef struct trip_piece {
@@ -17,23 +17,23 @@ typedef struct trip_piece {
 
 /* Bytes [offset, offset + bytes) of a plane file go to slot_offset of the slot's memory. Whole
  * pages, so that the last may reach beyond the file's end. */
-typedef struct trip_segment {
+typedef struct trip_byte_range {
     uint64_t offset;
     size_t bytes, slot_offset;
     const trip_list *list;
     int plane;
-} trip_segment;
+} trip_byte_range;
 
 typedef struct trip_extent {
     trip_piece pieces[TRIP_PIECES_MAX];
     unsigned piece_count;
-    trip_segment segments[TRIP_SEGMENTS_MAX];
-    unsigned segment_count;
+    trip_byte_range ranges[TRIP_RANGES_MAX];
+    unsigned range_count;
     /* A plane's part of the slot. The runs' places count from there. */
     size_t plane_at[TRIP_PLANES], plane_bytes[TRIP_PLANES];
     trip_run *runs;
     size_t run_count, run_room;
-    size_t bytes; /* of all segments */
+    size_t bytes; /* of all ranges */
     uint64_t records;
 } trip_extent;
 
@@ -50,7 +50,7 @@ typedef struct trip_planner {
     uint64_t runs_skipped, bytes_skipped;
 } trip_planner;
 
-/* A slot of so many bytes holds any run of the data set. */
+/* Bytes of the smallest slot that holds any run of the data set. */
 size_t trip_planner_least_slot(const trip_dataset *d, unsigned planes);
 
 /* slot_bytes is a multiple of page_bytes and not less than the least, gap_bytes at least

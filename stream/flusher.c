@@ -17,7 +17,7 @@ struct trip_flusher {
     pthread_t threads[THREADS];
 };
 
-static bool give_up_direct(int fd)
+static bool use_page_cache(int fd)
 {
     int flags = fcntl(fd, F_GETFL);
     return flags >= 0 && (flags & O_DIRECT) && fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
@@ -28,7 +28,7 @@ int trip_flusher_write(int fd, const void *data, size_t bytes, uint64_t offset)
     const unsigned char *p = data;
     while (bytes > 0) {
         ssize_t n = pwrite(fd, p, bytes, (off_t)offset);
-        if (n < 0 && (errno == EINTR || (errno == EINVAL && give_up_direct(fd))))
+        if (n < 0 && (errno == EINTR || (errno == EINVAL && use_page_cache(fd))))
             continue;
         if (n <= 0)
             return n < 0 ? errno : ENOSPC;
@@ -36,7 +36,7 @@ int trip_flusher_write(int fd, const void *data, size_t bytes, uint64_t offset)
         offset += (uint64_t)n;
         bytes -= (size_t)n;
         if (bytes > 0)
-            give_up_direct(fd); /* the rest may not be aligned any more */
+            use_page_cache(fd); /* the rest may not be aligned any more */
     }
     return 0;
 }

@@ -8,7 +8,7 @@
 
 /* Opens a folder for temporary data, which is made if it is not there, and locks it. Reports as
  * `what` and returns a negative status when it is a link, another user's, or when another process
- * has locked it (`busy` says so). */
+ * has locked it (the reason given is `busy`). */
 int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *what,
                          const char *busy);
 /* Opens a file in such a folder, `path` standing for the folder in reports. Links, and what is not

@@ -54,7 +54,7 @@ typedef struct trip_file_header {
     double gradient_scale;       /* of 4-byte normals: world-space gradient of magnitude code 255 */
     double gradient_step[3];     /* of 3-byte normals: index-space gradient of 1, along i, j, k */
     double gradient_full;        /* of 3-byte normals: those of which the direction alone is kept
-                                    are at least so long in world space (normal.h) */
+                                    are at least this long in world space (normal.h) */
     uint64_t voxels;             /* voxels read (existing ones, for sparse grids) */
     uint64_t kept;               /* records of a list of voxels at level 0 */
     uint64_t halo;               /* records of a list of the halo at level 0; 0 without one */

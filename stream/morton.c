@@ -1,7 +1,7 @@
 #include "format.h"
 
-/* Spreads the bits of x to the even positions. */
-static uint64_t spread(uint32_t x)
+/* Bit n of x as bit 2n, zeros between. */
+static uint64_t dilate(uint32_t x)
 {
     uint64_t b = x;
     b = (b | b << 16) & UINT64_C(0x0000ffff0000ffff);
@@ -13,5 +13,5 @@ static uint64_t spread(uint32_t x)
 
 uint64_t trip_morton(uint32_t u, uint32_t v)
 {
-    return spread(u) | spread(v) << 1;
+    return dilate(u) | dilate(v) << 1;
 }

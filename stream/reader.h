@@ -35,8 +35,8 @@ typedef struct trip_reader_params {
      * slot_bytes, which are a multiple of the page size and not too few for a run. It is read into
      * until trip_reader_destroy() returns. NULL: taken from the budget. */
     void *const *slot_memory;
-    /* Asked right before a run's bytes are requested: true = leave it out (it lies behind what is
-     * already saturated). Called on the thread that calls begin and next. */
+    /* Called right before a run's bytes are requested; true: it is occluded by saturated pixels,
+     * and left out. On the thread that calls begin and next. */
     bool (*skip)(void *user, const trip_selection *s, uint32_t brick);
     void *skip_user;
     /* For tests: given the bytes that a read has put at `data` from `offset` on and its result (a
@@ -89,7 +89,7 @@ typedef struct trip_reader_stats {
  * reported. */
 bool trip_reader_probe(const trip_dataset *d, trip_engine engine, void *memory);
 
-/* The length of slots when so many bytes are wanted (0: 512 KiB a plane): whole pages, and room for
+/* The length of slots of at least `wanted` bytes (0: 512 KiB a plane): whole pages, and room for
  * the largest run that the data set can have. */
 size_t trip_reader_slot_bytes(const trip_dataset *d, unsigned planes, size_t wanted);
 
@@ -113,8 +113,8 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass);
 /* 1: *batch is filled and its slot held until released; 0: all passes are over; negative: failed.
  */
 int trip_reader_next(trip_reader *r, trip_batch *batch);
-/* Keeps reads under way, and waits until trip_reader_next() has an answer at once, at most so long;
- * UINT64_MAX: without end. False when the time is over. */
+/* Issues reads for free slots, and waits until trip_reader_next() would not wait, at most for the
+ * timeout; UINT64_MAX: without end. False when the time is over. */
 bool trip_reader_await(trip_reader *r, uint64_t timeout_ns);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
 /* Ring length. */

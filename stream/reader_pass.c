@@ -21,7 +21,7 @@ static void request_done(trip_request *q)
 }
 
 static trip_request *add_request(trip_slot *s, const trip_source *source,
-                                 const trip_segment *segment, uint64_t offset, size_t bytes,
+                                 const trip_byte_range *range, uint64_t offset, size_t bytes,
                                  unsigned char *data)
 {
     trip_request *q = &s->requests[s->request_count++];
@@ -32,8 +32,8 @@ static trip_request *add_request(trip_slot *s, const trip_source *source,
     q->bytes = bytes < left ? bytes : (size_t)left;
     q->done = request_done;
     q->owner = s;
-    q->list = segment->list;
-    q->plane = segment->plane;
+    q->list = range->list;
+    q->plane = range->plane;
     q->cached = q->keep = false;
     trip_request_start(q);
     return q;
@@ -57,23 +57,23 @@ static void reserve_pages(trip_reader *r, const trip_request *q)
         trip_cache_reserve(r->cache, page++, q);
 }
 
-/* Requests for bytes [at, end) of a segment: one, or by turns what is cached and what is not. A
- * slot always keeps a request for every segment still to come. */
-static void add_requests(trip_reader *r, trip_slot *s, const trip_segment *segment, size_t at,
+/* Requests for bytes [at, end) of a range: one, or by turns what is cached and what is not. A
+ * slot always keeps a request for every range still to come. */
+static void add_requests(trip_reader *r, trip_slot *s, const trip_byte_range *range, size_t at,
                          size_t end)
 {
-    const trip_source *source = &r->sources[segment->list->index][segment->plane];
-    unsigned char *data = s->memory + segment->slot_offset;
-    unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_SEGMENTS_MAX;
+    const trip_source *source = &r->sources[range->list->index][range->plane];
+    unsigned char *data = s->memory + range->slot_offset;
+    unsigned last = TRIP_SLOT_REQUESTS_MAX - TRIP_RANGES_MAX;
     while (at < end) {
-        uint64_t offset = segment->offset + at;
+        uint64_t offset = range->offset + at;
         size_t bytes = end - at;
         uint32_t page = source->first_page + (uint32_t)(offset >> source->page_log2);
         bool split = r->cache && s->request_count < last;
         bool cached = split && trip_cache_find(r->cache, page);
         if (split)
             bytes = alike_bytes(r, source, offset, bytes, cached);
-        trip_request *q = add_request(s, source, segment, offset, bytes, data + at);
+        trip_request *q = add_request(s, source, range, offset, bytes, data + at);
         q->cached = cached;
         q->keep = split && !cached;
         if (q->keep)
@@ -92,11 +92,11 @@ static void enqueue(trip_reader *r, trip_slot *s)
 static void submit(trip_reader *r, trip_slot *s)
 {
     size_t page = r->planner.page_bytes;
-    for (unsigned i = 0; i < s->extent.segment_count; i++) {
-        const trip_segment *segment = &s->extent.segments[i];
+    for (unsigned i = 0; i < s->extent.range_count; i++) {
+        const trip_byte_range *range = &s->extent.ranges[i];
         size_t first, end;
-        trip_borders_trim(&r->borders, segment, page, &s->from_borders, &first, &end);
-        add_requests(r, s, segment, first, end);
+        trip_borders_trim(&r->borders, range, page, &s->from_borders, &first, &end);
+        add_requests(r, s, range, first, end);
     }
     trip_borders_find(&s->borders, &s->extent, s->pass->descending, page);
     r->borders = s->borders;
@@ -353,10 +353,10 @@ static const unsigned char *plane_memory(const trip_reader *r, const trip_slot *
         return NULL;
     if (!r->in_memory)
         return s->memory + s->extent.plane_at[plane];
-    for (unsigned i = 0; i < s->extent.segment_count; i++) {
-        const trip_segment *segment = &s->extent.segments[i];
-        if (segment->plane == plane)
-            return trip_cache_bytes(r->cache, segment->list->index, plane, segment->offset);
+    for (unsigned i = 0; i < s->extent.range_count; i++) {
+        const trip_byte_range *range = &s->extent.ranges[i];
+        if (range->plane == plane)
+            return trip_cache_bytes(r->cache, range->list->index, plane, range->offset);
     }
     return NULL;
 }
@@ -365,10 +365,10 @@ static const unsigned char *plane_memory(const trip_reader *r, const trip_slot *
 static unsigned long long block_offset(const trip_slot *s, const trip_run *run)
 {
     size_t at = s->extent.plane_at[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
-    const trip_segment *segment = s->extent.segments;
-    while (at < segment->slot_offset || at - segment->slot_offset >= segment->bytes)
-        segment++;
-    return segment->offset + (at - segment->slot_offset);
+    const trip_byte_range *range = s->extent.ranges;
+    while (at < range->slot_offset || at - range->slot_offset >= range->bytes)
+        range++;
+    return range->offset + (at - range->slot_offset);
 }
 
 static int report_block(const trip_reader *r, const trip_batch *b, const trip_run *run,

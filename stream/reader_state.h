@@ -9,8 +9,8 @@
 #include "extent.h"
 #include "reader.h"
 
-/* Room to tell apart cached pages from others within a segment. */
-#define TRIP_SLOT_REQUESTS_MAX (4 * TRIP_SEGMENTS_MAX)
+/* Room to tell apart cached pages from others within a range. */
+#define TRIP_SLOT_REQUESTS_MAX (4 * TRIP_RANGES_MAX)
 
 typedef enum trip_slot_state {
     TRIP_SLOT_FREE,

@@ -19,7 +19,7 @@ void trip_request_start(trip_request *q)
     q->fault = TRIP_REQUEST_OK;
 }
 
-/* A direct read takes whole blocks: at the file's end it asks for more than there is. */
+/* A direct read takes whole blocks: at the file's end it goes beyond. */
 trip_read trip_request_read(const trip_request *q)
 {
     size_t bytes = q->bytes - q->done_bytes;
@@ -68,8 +68,8 @@ static void copy_pages(trip_request *q)
     q->done(q);
 }
 
-/* Whether the read can be tried again. A file system or memory that takes no direct reads says so
- * at the first one. */
+/* Whether the read can be tried again. The first direct read fails where the file system or the
+ * memory takes none. */
 static bool take_error(trip_request *q, int number)
 {
     if (number == EINTR || number == EAGAIN)

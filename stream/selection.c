@@ -109,8 +109,8 @@ trip_run_iterator trip_run_begin(const trip_selection *s)
     return it;
 }
 
-/* Whether the iterator stands at a run, going on to the next sheet or slab where one is used up. */
-static bool settle(trip_run_iterator *it)
+/* Goes on to the next sheet, or slab, where all runs of one were taken; false at the end. */
+static bool find_run(trip_run_iterator *it)
 {
     const trip_list *l = list_of(it);
     if (it->slab < 0 || it->slab >= (int64_t)l->slab_count)
@@ -155,7 +155,7 @@ static trip_run take_run(trip_run_iterator *it)
 bool trip_run_next(trip_run_iterator *it, trip_run *run)
 {
     const trip_selection *s = it->selection;
-    while (settle(it)) {
+    while (find_run(it)) {
         *run = take_run(it);
         if (run->count > 0 && run->sheet >= s->sheet_first && run->sheet <= s->sheet_last &&
             trip_selection_has(s, run->brick))

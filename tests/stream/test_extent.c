@@ -62,13 +62,13 @@ static void finish(plan_test *t)
     fixture_free(&t->f);
 }
 
-static void expect_segment(const plan_test *t, unsigned i, uint64_t offset, size_t bytes,
-                           size_t slot_offset)
+static void expect_range(const plan_test *t, unsigned i, uint64_t offset, size_t bytes,
+                         size_t slot_offset)
 {
-    assert_true(i < t->extent.segment_count);
-    assert_int_equal(t->extent.segments[i].offset, offset);
-    assert_int_equal(t->extent.segments[i].bytes, bytes);
-    assert_int_equal(t->extent.segments[i].slot_offset, slot_offset);
+    assert_true(i < t->extent.range_count);
+    assert_int_equal(t->extent.ranges[i].offset, offset);
+    assert_int_equal(t->extent.ranges[i].bytes, bytes);
+    assert_int_equal(t->extent.ranges[i].slot_offset, slot_offset);
 }
 
 /* Pages from the one with the first byte to the one with the last. */
@@ -91,8 +91,8 @@ static void the_whole_list_is_cut_between_runs(void **state)
             n++;
         assert_int_equal(t.extent.run_count, n);
         assert_int_equal(t.extent.records, n * RUN_RECORDS);
-        assert_int_equal(t.extent.segment_count, 1);
-        expect_segment(&t, 0, first / 4096 * 4096, paged(first, first + n * RUN_BYTES), 0);
+        assert_int_equal(t.extent.range_count, 1);
+        expect_range(&t, 0, first / 4096 * 4096, paged(first, first + n * RUN_BYTES), 0);
         for (size_t i = 0; i < n; i++)
             assert_int_equal(t.runs[i].at[0], first % 4096 + i * RUN_BYTES);
         next += n;
@@ -110,10 +110,10 @@ static void planes_follow_one_another_in_a_slot(void **state)
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.run_count, RUNS);
-    assert_int_equal(t.extent.segment_count, 2);
+    assert_int_equal(t.extent.range_count, 2);
     size_t voxels = paged(0, RUNS * RUN_BYTES);
-    expect_segment(&t, 0, 0, voxels, 0);
-    expect_segment(&t, 1, 0, RUNS * 4 * RUN_RECORDS, voxels);
+    expect_range(&t, 0, 0, voxels, 0);
+    expect_range(&t, 1, 0, RUNS * 4 * RUN_RECORDS, voxels);
     assert_int_equal(t.extent.plane_at[1], voxels);
     assert_int_equal(t.extent.plane_bytes[0], voxels);
     assert_int_equal(t.extent.plane_bytes[1], RUNS * 4 * RUN_RECORDS);
@@ -134,9 +134,9 @@ static void large_gaps_part_pieces_and_small_ones_do_not(void **state)
     t.s[0].sheet_last = 1; /* where they start at 9384, after a gap of 5520, and at 12144 */
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
-    assert_int_equal(t.extent.segment_count, 2);
-    expect_segment(&t, 0, 0, 4096, 0);
-    expect_segment(&t, 1, 8192, 8192, 4096);
+    assert_int_equal(t.extent.range_count, 2);
+    expect_range(&t, 0, 0, 4096, 0);
+    expect_range(&t, 1, 8192, 8192, 4096);
     assert_int_equal(t.extent.run_count, 4);
     const size_t at[] = { 552, 3312, 4096 + 9384 - 8192, 4096 + 12144 - 8192 };
     for (int i = 0; i < 4; i++)
@@ -155,10 +155,10 @@ static void a_descending_pass_places_pieces_from_the_files_end(void **state)
     t.s[0].sheet_last = 1; /* runs from bytes 17112, 9384, 8280 and 552: the middle ones are near */
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
-    assert_int_equal(t.extent.segment_count, 3);
-    expect_segment(&t, 0, 16384, 4096, 0);
-    expect_segment(&t, 1, 8192, 4096, 4096);
-    expect_segment(&t, 2, 0, 4096, 8192);
+    assert_int_equal(t.extent.range_count, 3);
+    expect_range(&t, 0, 16384, 4096, 0);
+    expect_range(&t, 1, 8192, 4096, 4096);
+    expect_range(&t, 2, 0, 4096, 8192);
     const size_t at[] = { 17112 - 16384, 4096 + 9384 - 8192, 4096 + 8280 - 8192, 8192 + 552 };
     for (int i = 0; i < 4; i++)
         assert_int_equal(t.runs[i].at[0], at[i]);
@@ -194,14 +194,14 @@ static void lists_that_come_in_turn_have_pieces_of_their_own(void **state)
     t.pass = (trip_pass){ t.s, 2, false };
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
-    assert_int_equal(t.extent.segment_count, 2);
-    assert_ptr_equal(t.extent.segments[0].list, &t.d->lists[0]);
-    assert_ptr_equal(t.extent.segments[1].list, &t.d->lists[1]);
-    expect_segment(&t, 0, 0, paged(0, RUNS * RUN_BYTES), 0);
+    assert_int_equal(t.extent.range_count, 2);
+    assert_ptr_equal(t.extent.ranges[0].list, &t.d->lists[0]);
+    assert_ptr_equal(t.extent.ranges[1].list, &t.d->lists[1]);
+    expect_range(&t, 0, 0, paged(0, RUNS * RUN_BYTES), 0);
     uint64_t seen[2] = { 0 };
     for (size_t i = 0; i < t.extent.run_count; i++) {
         unsigned s = t.runs[i].selection;
-        assert_int_equal(t.runs[i].at[0] - t.extent.segments[s].slot_offset, 8 * seen[s]);
+        assert_int_equal(t.runs[i].at[0] - t.extent.ranges[s].slot_offset, 8 * seen[s]);
         seen[s] += t.runs[i].words;
     }
     assert_int_equal(seen[0], RUNS * RUN_BYTES / 8);
