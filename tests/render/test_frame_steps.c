@@ -150,8 +150,8 @@ static void a_batch_is_drawn_in_pieces_when_there_is_a_deadline(void **state)
     scene_destroy(&s);
 }
 
-/* Reads wait here until they may go on, but for the first few. A gate that nobody opens opens
- * itself after a time, and then has failed. */
+/* Reads wait here until they may go on, but for the first few. A gate that is left closed opens
+ * by itself after GATE_SECONDS, and then has failed. */
 typedef struct gate {
     pthread_mutex_t lock;
     pthread_cond_t opened;

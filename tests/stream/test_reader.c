@@ -327,8 +327,8 @@ static void memory_that_reads_do_not_land_in_is_found_out(void **state)
     close_fixture(&f, d);
 }
 
-/* Counts the bricks asked about, and skips none. */
-static bool ask(void *user, const trip_selection *s, uint32_t brick)
+/* Counts its calls, and skips no brick. */
+static bool count_calls(void *user, const trip_selection *s, uint32_t brick)
 {
     (void)s;
     (void)brick;
@@ -343,23 +343,23 @@ static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
     trip_reader *r;
     trip_selection s;
     trip_batch batch, next;
-    unsigned asked = 0;
+    unsigned calls = 0;
     (void)state;
     open_fixture(&f, &d);
     trip_reader_params params = { .engine = TRIP_ENGINE_NULL,
                                   .slots = 3,
                                   .slot_bytes = 4096,
                                   .planes = 1u << TRIP_PLANE_NORMALS,
-                                  .skip = ask,
-                                  .skip_user = &asked };
+                                  .skip = count_calls,
+                                  .skip_user = &calls };
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
-    assert_int_equal(asked, 0);
+    assert_int_equal(calls, 0);
     select_all(&s, d, 1, false);
     assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
-    unsigned first = asked;
+    unsigned first = calls;
     assert_int_equal(trip_reader_next(r, &next), 1);
-    assert_true(asked > first);               /* only now: by then more may be hidden */
+    assert_true(calls > first);               /* only now: by then more may be occluded */
     for (int plane = 0; plane < 2; plane++) { /* they may share a page */
         size_t bytes = (size_t)(next.planes[plane] - batch.planes[plane]);
         assert_true(bytes > 0 && bytes <= batch.plane_bytes[plane]);
@@ -377,8 +377,8 @@ static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
     close_fixture(&f, d);
 }
 
-/* Tells that a read has ended. */
-static long tell(void *user, void *data, uint64_t offset, size_t bytes, long result)
+/* Posts the semaphore when a read has ended. */
+static long post_read(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
     (void)data;
     (void)offset;
@@ -399,7 +399,7 @@ static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
     (void)state;
     open_fixture(&f, &d);
     sem_init(&reads, 0, 0);
-    trip_reader_params params = { .slots = 3, .fault = tell, .fault_user = &reads };
+    trip_reader_params params = { .slots = 3, .fault = post_read, .fault_user = &reads };
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     for (int i = 0; i < 3; i++)
         select_all(&s[i], d, i, i == 1);
@@ -441,7 +441,9 @@ static void with_runs_alone_nothing_is_read(void **state)
     (void)state;
     open_fixture(&f, &d);
     sem_init(&reads, 0, 0);
-    trip_reader_params params = { .planes = 3, .slots = 3, .fault = tell, .fault_user = &reads };
+    trip_reader_params params = {
+        .planes = 3, .slots = 3, .fault = post_read, .fault_user = &reads
+    };
     fixture_voxel *out = calloc(f.count, sizeof *out);
     size_t n;
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
@@ -824,17 +826,17 @@ static void skipped_bricks_are_left_out_and_counted(void **state)
     trip_dataset *d;
     trip_reader *r;
     trip_selection s;
-    int asked = 0;
+    int calls = 0;
     size_t n;
     (void)state;
     open_fixture(&f, &d);
     fixture_voxel *out = calloc(f.count, sizeof *out);
     fixture_voxel *wanted = calloc(f.count, sizeof *out);
-    trip_reader_params params = { .skip = skip_odd, .skip_user = &asked, .planes = 3 };
+    trip_reader_params params = { .skip = skip_odd, .skip_user = &calls, .planes = 3 };
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 2, true);
     assert_int_equal(read_pass(r, &s, 0, out, &n), 0);
-    assert_true(asked > 0);
+    assert_true(calls > 0);
     uint64_t skipped = 0;
     for (uint64_t b = 1; b < d->lists[2].brick_count; b += 2) {
         s.bricks[b / 64] &= ~(UINT64_C(1) << b % 64);
@@ -914,7 +916,8 @@ static void a_pass_given_up_leaves_the_reader_ready_for_the_next(void **state)
     close_fixture(&f, d);
 }
 
-/* Reads wait at a gate. One that nobody opens opens itself after a time, and then has failed. */
+/* Reads wait at a gate. One that is left closed opens by itself after GATE_SECONDS, and then has
+ * failed. */
 typedef struct gate {
     pthread_mutex_t lock;
     pthread_cond_t changed;
