@@ -175,15 +175,27 @@ static void a_flipped_byte_ends_the_frame_or_leaves_the_picture_as_it_is(void **
     assert_true(judge(""));
 }
 
+static void copy_file(const char *from, const char *to)
+{
+    char command[1200];
+    snprintf(command, sizeof command, "cp '%s' '%s'", from, to);
+    assert_int_equal(system(command), 0);
+}
+
+/* Where a file is kept while it is damaged. */
+static const char *spare(void)
+{
+    static char path[512];
+    snprintf(path, sizeof path, "%s/copy", shared.scene.folder);
+    return path;
+}
+
 static void cut_to(const char *file, long length)
 {
-    char copy[512], command[1200];
-    snprintf(copy, sizeof copy, "%s/copy", shared.scene.folder);
-    snprintf(command, sizeof command, "cp '%s' '%s'", file, copy);
-    assert_int_equal(system(command), 0);
+    copy_file(file, spare());
     assert_int_equal(truncate(file, length), 0);
     assert_false(judge(file));
-    assert_int_equal(rename(copy, file), 0);
+    assert_int_equal(rename(spare(), file), 0);
 }
 
 static void a_file_of_any_other_length_ends_the_frame(void **state)
@@ -193,6 +205,31 @@ static void a_file_of_any_other_length_ends_the_frame(void **state)
         const char *file = shared.files[(unsigned)i % shared.file_count];
         long whole = file_bytes(file), length = (long)(test_random() * 1.1 * (double)whole);
         cut_to(file, length == whole ? whole + 1 : length);
+    }
+    for (unsigned i = 0; i < shared.file_count; i++) {
+        long whole = file_bytes(shared.files[i]);
+        const long lengths[] = { 0,         1,         1023,      1024,        4096,
+                                 whole - 4, whole - 1, whole + 1, whole + 4096 };
+        for (size_t k = 0; k < sizeof lengths / sizeof *lengths; k++)
+            cut_to(shared.files[i], lengths[k] == whole ? whole / 2 : lengths[k]);
+    }
+    assert_true(judge(""));
+}
+
+/* Planes of normals have the same length along each axis. */
+static void a_file_in_place_of_another_ends_the_frame(void **state)
+{
+    const unsigned step = TEST_BY_TURNS ? 4 : 1;
+    (void)state;
+    for (unsigned i = 0; i < shared.file_count; i++) {
+        copy_file(shared.files[i], spare());
+        for (unsigned k = i % step; k < shared.file_count; k += step) {
+            if (k == i)
+                continue;
+            copy_file(shared.files[k], shared.files[i]);
+            assert_false(judge(shared.files[i]));
+        }
+        assert_int_equal(rename(spare(), shared.files[i]), 0);
     }
     assert_true(judge(""));
 }
@@ -224,7 +261,8 @@ static long happen(void *user, void *data, uint64_t offset, size_t bytes, long r
     }
 }
 
-/* Every third read of the frame in turn. A frame gets over what is short or interrupted. */
+/* One read of the frame in five, another one for each mishap. A frame gets over what is short or
+ * interrupted. */
 static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
                           const float *wanted)
 {
@@ -236,7 +274,7 @@ static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
         .engine = engine, .slots = 3, .slot_bytes = 8192, .fault = happen, .fault_user = &m
     };
     assert_int_equal(open_drawing(&d, kind, params), 0);
-    for (int at = 0;; at += 3) {
+    for (int at = what;; at += TEST_BY_TURNS ? 15 : 5) {
         m.countdown = at;
         test_catch_reports();
         int status = draw_frame(&d, rgba);
@@ -276,6 +314,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_flipped_byte_ends_the_frame_or_leaves_the_picture_as_it_is),
         cmocka_unit_test(a_file_of_any_other_length_ends_the_frame),
+        cmocka_unit_test(a_file_in_place_of_another_ends_the_frame),
         cmocka_unit_test(a_read_that_fails_comes_short_or_damaged_in_mid_frame),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -9,7 +9,7 @@ import subprocess
 import limits
 
 SIZE = "48x40"
-FLIPS = 60  # many more in test_broken.c, without a process each
+FLIPS = 20  # many more in test_broken.c, without a process each
 
 
 class Faults(limits.Test):
@@ -102,8 +102,8 @@ class Faults(limits.Test):
         for name in sorted(os.listdir(self.data)):
             path = os.path.join(self.data, name)
             size = os.path.getsize(path)
-            lengths = {0, 1, 1023, 1024, 4096, size // 2, size - 4, size - 1, size + 1, size + 4096}
-            lengths |= {self.random.randrange(size) for _ in range(limits.rounds(3))}
+            lengths = {0, size - 1, size + 4096}  # more in test_broken.c
+            lengths |= {self.random.randrange(size) for _ in range(limits.rounds(1))}
             for length in sorted(lengths):
                 os.truncate(path, length)
                 self.judge(name, f"{name} cut to {length} bytes", must_fail=True)
@@ -112,8 +112,9 @@ class Faults(limits.Test):
     def test_files_of_another_data_set(self):
         other = self.path("b.trip")
         for name in sorted(os.listdir(self.data)):
-            for source in [os.path.join(other, name)] + \
-                          [os.path.join(self.good, n) for n in os.listdir(self.good) if n != name]:
+            # All the others of the same data set are tried in test_broken.c.
+            mine = self.random.choice(sorted(n for n in os.listdir(self.good) if n != name))
+            for source in os.path.join(other, name), os.path.join(self.good, mine):
                 shutil.copyfile(source, os.path.join(self.data, name))
                 if name == "index.trip":  # then the planes do not fit it
                     self.fails("triptych", "info", "--verify", self.data, says=self.data)
