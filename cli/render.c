@@ -22,7 +22,7 @@ typedef struct drawing {
     piped_function function;
     cached_volume volume; /* where the input is one */
     triptych *t;
-    float *rgba;
+    float *rgba, *depth; /* depth: NULL without --depth */
     render_stats *stats;
     trip_progress progress;
 } drawing;
@@ -134,7 +134,9 @@ static int open_drawing(drawing *d)
     const triptych_view view = render_view(o);
     int status = open_input(d);
     if (!status)
-        status = triptych_new_picture(d->t, o->width, o->height, &d->rgba);
+        status = triptych_new_picture(d->t, o->width, o->height, 4, &d->rgba);
+    if (!status && o->depth)
+        status = triptych_new_picture(d->t, o->width, o->height, 1, &d->depth);
     if (!status)
         status = triptych_set_settings(d->t, &o->settings);
     if (!status)
@@ -149,20 +151,23 @@ static void close_drawing(drawing *d)
     render_stats_destroy(d->stats);
     if (d->t) {
         triptych_end(d->t);
-        triptych_close(d->t); /* the picture too */
+        triptych_close(d->t); /* the pictures too */
     }
     cached_volume_close(&d->volume);
 }
 
-/* image.png -> image-007.png */
-static int image_path(const drawing *d, int index, char *path, size_t bytes)
+enum { PATH_BYTES = 4096 };
+
+/* Of an orbit, image.png -> image-007.png. */
+static int image_path(const drawing *d, const char *output, int index, char path[PATH_BYTES])
 {
-    const char *output = d->o.output, *extension = strrchr(output, '.');
+    const char *extension = strrchr(output, '.');
+    size_t bytes = PATH_BYTES;
     int length = d->o.orbit ? snprintf(path, bytes, "%.*s-%03d%s", (int)(extension - output),
                                        output, index, extension)
                             : snprintf(path, bytes, "%s", output);
     if (length < 0 || (size_t)length >= bytes)
-        return trip_fail(TRIP_USAGE, "render", "-o", "the name is too long");
+        return trip_fail(TRIP_USAGE, "render", output, "the name is too long");
     return 0;
 }
 
@@ -181,7 +186,8 @@ static int draw_frame(drawing *d)
     while ((status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_WAITS)
         triptych_await(d->t, LOOK_NS);
     if (!status)
-        status = triptych_picture(d->t, d->rgba);
+        status = d->depth ? triptych_picture_and_depth(d->t, d->rgba, d->depth)
+                          : triptych_picture(d->t, d->rgba);
     trip_progress_end(&d->progress);
     return status;
 }
@@ -202,16 +208,27 @@ static int draw_planned(drawing *d, int index)
     return status;
 }
 
+static int write_image(drawing *d, const char *path, int index)
+{
+    char depth_path[PATH_BYTES];
+    int status = triptych_write(d->t, path, d->o.width, d->o.height, d->rgba);
+    if (!status && d->depth)
+        status = image_path(d, d->o.depth, index, depth_path);
+    if (!status && d->depth)
+        status = triptych_write_depth(d->t, depth_path, d->o.width, d->o.height, d->depth);
+    return status;
+}
+
 static int draw_image(drawing *d, int index)
 {
-    char path[4096];
-    int status = image_path(d, index, path, sizeof path);
+    char path[PATH_BYTES];
+    int status = image_path(d, d->o.output, index, path);
     if (!status)
         status = draw_planned(d, index);
     if (!status && d->stats)
         status = render_stats_add_frame(d->stats, d->t);
     if (!status)
-        status = triptych_write(d->t, path, d->o.width, d->o.height, d->rgba);
+        status = write_image(d, path, index);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
         status = render_stats_summary(path, &d->o, d->t, stdout);
     return status;
@@ -251,7 +268,7 @@ int trip_command_render(int argc, char **argv)
     if (!status)
         status = create_context(&d);
     if (!status)
-        status = triptych_prepare_write(d.t, d.o.output); /* ready when the first picture is */
+        status = triptych_prepare_write(d.t, d.o.output, d.o.depth);
     if (!status)
         status = render_options_check_outputs(&d.o);
     if (!status)

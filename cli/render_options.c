@@ -45,6 +45,7 @@ enum {
     KEY_METHOD,
     KEY_SUBMIT,
     KEY_TRAVERSAL,
+    KEY_DEPTH,
     KEY_STATS,
     KEY_EXPLAIN,
     KEY_COUNT,
@@ -117,6 +118,10 @@ static const struct argp_option options[] = {
     { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 4 },
     { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 4 },
     { NULL, 0, NULL, 0, "Results:", 5 },
+    { "depth", KEY_DEPTH, "FILE", 0,
+      "Mean distance from the eye to what is seen at each pixel, in world units, infinite where "
+      "nothing is: .exr (channel Z) or .tif; cpu and reference only",
+      5 },
     { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
     { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
     { "count", KEY_COUNT, NULL, 0,
@@ -411,6 +416,20 @@ static int check_view(const parse *p)
     return 0;
 }
 
+/* What draws distances; it is chosen where nothing is said. */
+static int check_depth(render_options *o)
+{
+    if (!o->depth)
+        return 0;
+    if (o->renderer == TRIPTYCH_RENDERER_GL)
+        return trip_option_fail("--depth", "applies to --renderer cpu and reference only");
+    if (o->settings.target != TRIPTYCH_RGBA32F)
+        return trip_option_fail("--depth", "goes with --target rgba32f");
+    if (o->renderer == TRIPTYCH_RENDERER_AUTO)
+        o->renderer = TRIPTYCH_RENDERER_CPU;
+    return 0;
+}
+
 /* Options that cannot apply together; what one implies for another. */
 static int check(parse *p)
 {
@@ -446,6 +465,9 @@ static int check(parse *p)
         return trip_option_fail("--hidden", "applies to --renderer cpu only");
     if (o->hidden)
         o->renderer = TRIPTYCH_RENDERER_CPU;
+    status = check_depth(o);
+    if (status)
+        return status;
     if (o->count && !o->stats && !o->explain)
         return trip_option_fail("--count", "adds to --stats or --explain; give one of them");
     const char *extension = strrchr(o->output, '.');
@@ -460,6 +482,10 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     switch (key) {
     case 'o':
         p->o->output = arg;
+        return 0;
+    case KEY_DEPTH:
+        p->o->depth = arg;
+        p->o->settings.depth = true;
         return 0;
     case KEY_STATS:
         p->o->stats = arg;
@@ -516,6 +542,8 @@ static bool is_special(const char *path)
 int render_options_check_outputs(const render_options *o)
 {
     int status = trip_new_file_check("write", o->output);
+    if (!status && o->depth)
+        status = trip_new_file_check("write", o->depth);
     if (!status && o->stats && strcmp(o->stats, "-") && !is_special(o->stats))
         status = trip_new_file_check("write", o->stats);
     return status;

@@ -18,6 +18,7 @@ typedef struct render_options {
         *output; /* data set or volume; an image file, its name's model in an orbit */
     triptych_brick_options volume; /* how a volume is read; nothing else of it is set */
     triptych_function function;    /* colour and opacity */
+    const char *depth;             /* a file for distances, or NULL */
     const char *stats;             /* file, "-" for stdout, or NULL */
     int width, height;
     bool eye_given, look_given, up_given;

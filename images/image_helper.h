@@ -35,8 +35,8 @@ const char *trip_image_kind_name(trip_image_kind kind);
 
 enum trip_image_task {
     /* A picture to the descriptor, which is open for writing; the path says its format. numbers:
-     * width, height, depth (trip_image_depth), 1 to drop alpha, JPEG quality. Then float RGBA rows
-     * from the top; then the reply. */
+     * width, height, depth (trip_image_depth), trip_image_form, JPEG quality. Then rows of floats
+     * from the top, RGBA or distances; then the reply. */
     TRIP_IMAGE_WRITE = 1,
     /* A picture from a file. numbers: bytes the helper may use. The reply's data: trip_image_size,
      * then float RGBA rows. */
@@ -47,6 +47,9 @@ enum trip_image_task {
     /* numbers: k. Data: the slice's values as stored, in this machine's byte order. */
     TRIP_IMAGE_READ_SLICE,
 };
+
+/* What a picture's file holds, of rows of RGBA the first two, of rows of distances the last. */
+enum trip_image_form { TRIP_IMAGE_FORM_RGBA, TRIP_IMAGE_FORM_RGB, TRIP_IMAGE_FORM_DISTANCES };
 
 /* After one byte of any value, with which a descriptor may come; before the path, without a zero at
  * its end. */

@@ -84,14 +84,18 @@ class Session
     void write_picture(const trip_image_request &request, const std::string &path, int fd)
     {
         const int64_t *n = request.numbers;
-        const trip_picture picture = {
-            path, fd, (int)n[0], (int)n[1], { (trip_image_depth)n[2], n[3] != 0, (int)n[4] }
-        };
-        std::vector<float> row((size_t)n[0] * 4);
+        const bool distances = n[3] == TRIP_IMAGE_FORM_DISTANCES;
+        const trip_picture picture = { path,
+                                       fd,
+                                       (int)n[0],
+                                       (int)n[1],
+                                       { (trip_image_depth)n[2], n[3] == TRIP_IMAGE_FORM_RGB,
+                                         (int)n[4], distances } };
+        std::vector<float> row((size_t)n[0] * (distances ? 1 : 4));
         int64_t left = n[1];
-        auto next_row = [&](float *rgba) {
+        auto next_row = [&](float *pixels) {
             left--;
-            trip_connection_receive(rgba, row.size() * sizeof(float));
+            trip_connection_receive(pixels, row.size() * sizeof(float));
             return true;
         };
         auto drain = [&] {

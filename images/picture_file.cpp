@@ -86,6 +86,8 @@ Encoding choose_encoding(const trip_picture &p)
         e = { "jpeg", TRIP_IMAGE_U8, 3, false, false };
     if (p.params.depth != TRIP_IMAGE_DEPTH_DEFAULT)
         e.depth = p.params.depth;
+    if (p.params.distances)
+        e = { e.plugin, TRIP_IMAGE_FLOAT, 1, false, false };
     return e;
 }
 
@@ -131,9 +133,13 @@ template <typename T> void quantise(const float *from, int channels, T *to)
     }
 }
 
-/* One row in the file's channels and type. */
+/* One row in the file's channels and type. Distances are left as they are. */
 void convert_row(const Encoding &e, int width, const float *from, void *to)
 {
+    if (e.channels == 1) {
+        std::memcpy(to, from, (size_t)width * sizeof(float));
+        return;
+    }
     for (int x = 0; x < width; x++, from += 4) {
         float rgba[4];
         size_t at = (size_t)x * (size_t)e.channels;
@@ -167,6 +173,10 @@ OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
         spec.alpha_channel = 3;
         /* Says what the values are, so that OpenImageIO leaves them alone. */
         spec.attribute("oiio:UnassociatedAlpha", e.associated ? 0 : 1);
+    }
+    if (e.channels == 1) {
+        spec.channelnames = { "Z" };
+        spec.z_channel = 0;
     }
     if (std::strcmp(e.plugin, "jpeg") == 0) {
         spec.attribute("CompressionQuality", p.params.jpeg_quality ? p.params.jpeg_quality : 95);

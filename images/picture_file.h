@@ -16,8 +16,9 @@ struct trip_picture {
     trip_image_params params;
 };
 
-/* Fills one row of float RGBA; false when no more come, which abandons the picture. */
-using trip_picture_row = std::function<bool(float *rgba)>;
+/* Fills one row of float RGBA, or of distances; false when no more come, which abandons the
+ * picture. */
+using trip_picture_row = std::function<bool(float *pixels)>;
 
 /* As trip_image_write(), for a path and params that are known to be right, to the descriptor; asks
  * for all rows from the top, and only for those that it has use for. */

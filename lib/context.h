@@ -16,8 +16,8 @@ enum { TRIP_CONTEXT_MOST_THREADS = 256 };
 /* A picture's memory, of the budget. */
 typedef struct trip_context_picture {
     struct trip_context_picture *next;
-    float *rgba;
-    int width, height;
+    float *pixels;
+    size_t bytes;
 } trip_context_picture;
 
 struct triptych {

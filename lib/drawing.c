@@ -134,15 +134,31 @@ int triptych_await(triptych *t, uint64_t timeout_ns)
     return trip_context_leave(before, status);
 }
 
+/* Distances go with a frame that has them, and only with that. */
+static int take_picture(triptych *t, float *rgba, float *depth)
+{
+    int status = check_drawing(t);
+    if (!status && t->settings.depth != (depth != NULL))
+        status =
+            trip_fail(TRIP_USAGE, "render", "depth", "%s",
+                      depth ? "the frame was begun without" : "is to be taken with the picture");
+    if (!status)
+        status = trip_frame_picture(&t->drawing, rgba, depth);
+    if (!status && t->drawing.done)
+        status = trip_context_note_stats(t);
+    return status;
+}
+
 int triptych_picture(triptych *t, float *rgba)
 {
     trip_scope *before = trip_context_enter(t);
-    int status = check_drawing(t);
-    if (!status)
-        status = trip_frame_picture(&t->drawing, rgba, NULL);
-    if (!status && t->drawing.done)
-        status = trip_context_note_stats(t);
-    return trip_context_leave(before, status);
+    return trip_context_leave(before, take_picture(t, rgba, NULL));
+}
+
+int triptych_picture_and_depth(triptych *t, float *rgba, float *depth)
+{
+    trip_scope *before = trip_context_enter(t);
+    return trip_context_leave(before, take_picture(t, rgba, depth));
 }
 
 void triptych_end(triptych *t)

@@ -64,6 +64,8 @@ static const char *fault_of_settings(const triptych_settings *s)
         s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
         s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
         return "there is no such method, traversal or target";
+    if (s->depth && s->target != TRIPTYCH_RGBA32F)
+        return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1))
         return "h lies between 0 and below 1";
     if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
@@ -91,6 +93,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .target = (trip_target)s->target,
         .indexed = s->indexed,
         .triangles = s->triangles,
+        .depth = s->depth,
         .shading = s->shading,
         .headlight = s->headlight,
         .h = s->h,

@@ -123,49 +123,60 @@ int trip_context_check_list(const triptych *t, unsigned number)
 static void release_picture(triptych *t, trip_context_picture **place)
 {
     trip_context_picture *p = *place;
-    session_release_image(&t->session, p->width, p->height, p->rgba);
+    trip_budget_release(t->session.budget, p->pixels, p->bytes);
     *place = p->next;
     free(p);
 }
 
-static int take_picture(triptych *t, int width, int height, float **rgba)
+static int take_picture(triptych *t, int width, int height, int channels, float **pixels)
 {
     trip_context_picture *p = calloc(1, sizeof *p);
     if (!p)
         return trip_fail(TRIP_ERROR, "render", "picture", "out of memory");
-    int status = session_take_image(&t->session, width, height, rgba);
-    if (status) {
+    p->bytes = (size_t)width * (size_t)height * (size_t)channels * sizeof(float);
+    p->pixels = trip_budget_take(t->session.budget, p->bytes);
+    if (!p->pixels) {
         free(p);
-        return status;
+        return trip_fail(TRIP_ERROR, "render", t->name,
+                         "an image of %d x %d does not fit the memory given; raise --memory or "
+                         "make it smaller",
+                         width, height);
     }
-    *p = (trip_context_picture){ t->pictures, *rgba, width, height };
+    p->next = t->pictures;
     t->pictures = p;
+    *pixels = p->pixels;
     return 0;
 }
 
-int triptych_new_picture(triptych *t, int width, int height, float **rgba)
+int triptych_new_picture(triptych *t, int width, int height, int channels, float **pixels)
 {
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_open(t);
-    *rgba = NULL;
+    *pixels = NULL;
     if (!status && (width < 1 || height < 1 || width > 99999 || height > 99999))
         status = trip_fail(TRIP_USAGE, "render", "picture", "has 1 to 99999 pixels either way");
-    return trip_context_leave(before, status ? status : take_picture(t, width, height, rgba));
+    if (!status && channels != 1 && channels != 4)
+        status = trip_fail(TRIP_USAGE, "render", "picture", "has 4 channels, or 1 for distances");
+    if (!status)
+        status = take_picture(t, width, height, channels, pixels);
+    return trip_context_leave(before, status);
 }
 
-void triptych_release_picture(triptych *t, float *rgba)
+void triptych_release_picture(triptych *t, float *pixels)
 {
     for (trip_context_picture **p = &t->pictures; *p; p = &(*p)->next)
-        if ((*p)->rgba == rgba) {
+        if ((*p)->pixels == pixels) {
             release_picture(t, p);
             return;
         }
 }
 
-int triptych_prepare_write(triptych *t, const char *path)
+int triptych_prepare_write(triptych *t, const char *path, const char *depth_path)
 {
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_image_check_path(path, NULL);
+    if (!status && depth_path)
+        status = trip_image_check_path(depth_path, &(trip_image_params){ .distances = true });
     return trip_context_leave(before, status ? status : trip_image_prepare(&t->files));
 }
 
@@ -173,6 +184,14 @@ int triptych_write(triptych *t, const char *path, int width, int height, const f
 {
     trip_scope *before = trip_context_enter_anew(t);
     return trip_context_leave(before, trip_image_write(&t->files, path, width, height, rgba, NULL));
+}
+
+int triptych_write_depth(triptych *t, const char *path, int width, int height, const float *depth)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const trip_image_params params = { .distances = true };
+    return trip_context_leave(before,
+                              trip_image_write(&t->files, path, width, height, depth, &params));
 }
 
 /* ---- data ---- */

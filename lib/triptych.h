@@ -200,6 +200,7 @@ typedef struct triptych_settings {
     double h;               /* where layers begin to blend, 0 to below 1 */
     double kernel_radius;   /* of a splat, voxels, 0.1 to 100 */
     double background[4];   /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
+    int depth; /* not 0: frames have distances too; neither with GL nor with rounded targets */
     int count; /* not 0: triptych_list_stats has exact counts, which takes time, of hidden bricks
                   too */
 } triptych_settings;
@@ -275,6 +276,9 @@ TRIPTYCH_API int triptych_step(triptych *t, uint64_t deadline_ns);
 TRIPTYCH_API int triptych_await(triptych *t, uint64_t timeout_ns);
 /* The picture so far; after TRIPTYCH_DONE the picture. rgba as above. */
 TRIPTYCH_API int triptych_picture(triptych *t, float *rgba);
+/* The same of a frame with triptych_settings.depth, and as many distances, in world units: from the
+ * eye (in parallel views its plane) to what is seen of the data, on average; +infinity: nothing. */
+TRIPTYCH_API int triptych_picture_and_depth(triptych *t, float *rgba, float *depth);
 /* Also gives up a frame that is not done. */
 TRIPTYCH_API void triptych_end(triptych *t);
 
@@ -317,17 +321,21 @@ TRIPTYCH_API int triptych_get_list_stats(triptych *t, unsigned number, triptych_
 
 /* ---- pictures ---- */
 
-/* Memory for a picture, zeroed, out of triptych_resources.memory_bytes; triptych_close() releases
- * what is left of it. */
-TRIPTYCH_API int triptych_new_picture(triptych *t, int width, int height, float **rgba);
-TRIPTYCH_API void triptych_release_picture(triptych *t, float *rgba);
+/* Memory for a picture, zeroed, out of triptych_resources.memory_bytes: 4 channels, or 1 for
+ * distances. triptych_close() releases what is left of it. */
+TRIPTYCH_API int triptych_new_picture(triptych *t, int width, int height, int channels,
+                                      float **pixels);
+TRIPTYCH_API void triptych_release_picture(triptych *t, float *pixels);
 
 /* Writes a picture: .png, .jpg, .tif or, in linear light, .exr. */
 TRIPTYCH_API int triptych_write(triptych *t, const char *path, int width, int height,
                                 const float *rgba);
-/* May come before: refuses a name that triptych_write() refuses, and starts what it writes by,
- * which is then ready when the first picture is. */
-TRIPTYCH_API int triptych_prepare_write(triptych *t, const char *path);
+/* Writes distances, width * height of them: .exr, as channel Z, or .tif. */
+TRIPTYCH_API int triptych_write_depth(triptych *t, const char *path, int width, int height,
+                                      const float *depth);
+/* May come before: refuses names that these refuse, and starts what they write by, which is then
+ * ready when the first picture is. depth_path may be NULL. */
+TRIPTYCH_API int triptych_prepare_write(triptych *t, const char *path, const char *depth_path);
 
 #ifdef __cplusplus
 }

@@ -38,6 +38,14 @@ static const format *find_format(const char *path)
     return NULL;
 }
 
+static bool holds(const format *f, trip_image_depth depth)
+{
+    for (int i = 0; i < 3; i++)
+        if (f->depths[i] == depth)
+            return true;
+    return false;
+}
+
 int trip_image_check_path(const char *path, const trip_image_params *params)
 {
     const format *f = find_format(path);
@@ -46,11 +54,10 @@ int trip_image_check_path(const char *path, const trip_image_params *params)
                          "pictures are named .png, .jpg, .tif or .exr, which sets their format");
     if (params && (params->jpeg_quality < 0 || params->jpeg_quality > 100))
         return trip_fail(TRIP_USAGE, "write", path, "a JPEG quality is 1 to 100");
-    if (!params || params->depth == TRIP_IMAGE_DEPTH_DEFAULT)
+    if (params && params->distances && !holds(f, TRIP_IMAGE_FLOAT))
+        return trip_fail(TRIP_USAGE, "write", path, "distances are written as .exr or .tif");
+    if (!params || params->depth == TRIP_IMAGE_DEPTH_DEFAULT || holds(f, params->depth))
         return 0;
-    for (int i = 0; i < 3; i++)
-        if (f->depths[i] == params->depth)
-            return 0;
     return trip_fail(TRIP_USAGE, "write", path, "a .%s file cannot hold that kind of number",
                      f->extension);
 }
@@ -71,14 +78,22 @@ int trip_image_prepare(trip_image_files *files)
     return start_helper(files, "write");
 }
 
-static int check_finite(const char *path, int width, int height, const float *rgba)
+static size_t channels_of(const trip_image_params *params)
 {
+    return params->distances ? 1 : 4;
+}
+
+/* What a file takes: numbers, and of distances +infinity too. */
+static int check_numbers(const char *path, int width, int height, const float *pixels,
+                         const trip_image_params *params)
+{
+    size_t channels = channels_of(params);
     for (int y = 0; y < height; y++) {
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "write", path, "interrupted; nothing is written");
         for (int x = 0; x < width; x++)
-            for (int c = 0; c < 4; c++)
-                if (!isfinite(rgba[((size_t)y * (size_t)width + (size_t)x) * 4 + (size_t)c]))
+            for (size_t c = 0; c < channels; c++, pixels++)
+                if (!isfinite(*pixels) && !(params->distances && *pixels > 0))
                     return trip_fail(TRIP_ERROR, "write", path,
                                      "pixel (%d, %d) is not a finite number; nothing is written", x,
                                      y);
@@ -88,11 +103,13 @@ static int check_finite(const char *path, int width, int height, const float *rg
 
 /* After a failure the connection may be in the middle of something. */
 static int write_checked(trip_image_files *files, const char *path, int width, int height,
-                         const float *rgba, const trip_image_params *params)
+                         const float *pixels, const trip_image_params *params)
 {
     trip_new_file file;
-    const int64_t numbers[5] = { width, height, params->depth, params->drop_alpha,
-                                 params->jpeg_quality };
+    const int64_t form = params->distances    ? TRIP_IMAGE_FORM_DISTANCES
+                         : params->drop_alpha ? TRIP_IMAGE_FORM_RGB
+                                              : TRIP_IMAGE_FORM_RGBA;
+    const int64_t numbers[5] = { width, height, params->depth, form, params->jpeg_quality };
     int status = trip_new_file_begin(&file, "write", path);
     if (status < 0)
         return status;
@@ -100,8 +117,9 @@ static int write_checked(trip_image_files *files, const char *path, int width, i
     if (status == 0)
         status = trip_image_helper_request(files->helper, TRIP_IMAGE_WRITE, path, numbers, file.fd);
     if (status == 0)
-        status = trip_image_helper_send(files->helper, rgba,
-                                        (size_t)width * (size_t)height * 4 * sizeof(float));
+        status = trip_image_helper_send(files->helper, pixels,
+                                        (size_t)width * (size_t)height * channels_of(params) *
+                                            sizeof(float));
     if (status == 0)
         status = trip_image_helper_expect(files->helper, 0);
     if (status == 0)
@@ -112,19 +130,18 @@ static int write_checked(trip_image_files *files, const char *path, int width, i
 }
 
 int trip_image_write(trip_image_files *files, const char *path, int width, int height,
-                     const float *rgba, const trip_image_params *params)
+                     const float *pixels, const trip_image_params *params)
 {
     static const trip_image_params defaults;
+    const trip_image_params *p = params ? params : &defaults;
     int status = trip_image_check_path(path, params);
     if (status < 0)
         return status;
     if (width < 1 || height < 1)
         return trip_fail(TRIP_USAGE, "write", path, "a picture of %d x %d pixels is empty", width,
                          height);
-    status = check_finite(path, width, height, rgba);
-    return status < 0
-               ? status
-               : write_checked(files, path, width, height, rgba, params ? params : &defaults);
+    status = check_numbers(path, width, height, pixels, p);
+    return status < 0 ? status : write_checked(files, path, width, height, pixels, p);
 }
 
 /* The size that comes first must be that of a picture which fills the data. */

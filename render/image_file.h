@@ -27,6 +27,7 @@ typedef struct trip_image_params {
     trip_image_depth depth;
     bool drop_alpha;  /* write RGB only: the picture over black; JPEG always does */
     int jpeg_quality; /* 1 to 100; default 95 */
+    bool distances;   /* a picture of width * height floats, one a pixel; TIFF and EXR only */
 } trip_image_params;
 
 /* The helper, started when first wanted and kept for the pictures that follow. Starts zeroed. */
@@ -48,9 +49,10 @@ void trip_image_close(trip_image_files *files);
  * in any case). Integers are rounded to nearest after clamping to [0, 1]. PNG gets unassociated
  * alpha, computed before rounding, as its standard wants; TIFF and EXR associated alpha. The file
  * is written under another name in the same folder and renamed when complete, so that a failed
- * write leaves what was there. A pixel that is not finite is a reported failure, not written. */
+ * write leaves what was there. A pixel that is not finite is a reported failure, not written.
+ * Distances go as they are into one channel of floats, in EXR called Z, and may be +infinity. */
 int trip_image_write(trip_image_files *files, const char *path, int width, int height,
-                     const float *rgba, const trip_image_params *params);
+                     const float *pixels, const trip_image_params *params);
 
 /* Reads a picture of one to four channels (grey, grey and alpha, RGB, RGBA) into *rgba_out, which
  * the caller frees with free(). */

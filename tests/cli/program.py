@@ -140,26 +140,41 @@ def read_exr(path):
 
 
 def read_linear_exr(path):
-    """An OpenEXR file of scan lines, floats by zip: height x width x RGBA."""
+    """The colours of an OpenEXR file: height x width x RGBA."""
+    names, picture = read_exr_channels(path)
+    assert names == [b"A", b"B", b"G", b"R"], names
+    return picture[..., [3, 2, 1, 0]]
+
+
+def read_exr_channels(path):
+    """An OpenEXR file of scan lines, floats by zip: its channels' names, height x width x channels.
+    """
     with open(path, "rb") as f:
         data = f.read()
-    at, window = 8, None
+    at, window, names = 8, None, []
     while data[at]:
         name_end = data.index(0, at)
         type_end = data.index(0, name_end + 1)
         (size,) = struct.unpack_from("<i", data, type_end + 1)
         if data[at:name_end] == b"dataWindow":
             window = struct.unpack_from("<4i", data, type_end + 5)
+        if data[at:name_end] == b"channels":
+            listed = data[type_end + 5 : type_end + 5 + size]
+            while listed[0]:
+                end = listed.index(0)
+                names.append(listed[:end])
+                listed = listed[end + 17 :]
         at = type_end + 5 + size
     width, height = window[2] + 1, window[3] + 1
     blocks = -(-height // 16)
-    picture = numpy.empty((height, width, 4), numpy.float32)
+    count = len(names)
+    picture = numpy.empty((height, width, count), numpy.float32)
     for offset in struct.unpack_from(f"<{blocks}Q", data, at + 1):
         y, size = struct.unpack_from("<2i", data, offset)
         rows = min(16, height - y)
-        plain = exr_unpack(data[offset + 8 : offset + 8 + size], rows * width * 16)
-        picture[y : y + rows] = plain.reshape(rows, 4, width).transpose(0, 2, 1)[..., [3, 2, 1, 0]]
-    return picture
+        plain = exr_unpack(data[offset + 8 : offset + 8 + size], rows * width * count * 4)
+        picture[y : y + rows] = plain.reshape(rows, count, width).transpose(0, 2, 1)
+    return names, picture
 
 
 def exr_unpack(packed, size):

@@ -1,7 +1,11 @@
 """Measuring a frame does not change it: what `render` says of a frame is of the one that is drawn
-without being measured, and exact counts come from a frame of their own."""
+without being measured, and exact counts come from a frame of their own. Distances that come with a
+picture are those of the geometry, and leave the picture as it is."""
 import json
+import os
 import re
+
+import numpy
 
 import program
 
@@ -17,6 +21,53 @@ def bytes_read(frame):
 
 def splats_read(lists):
     return sum(axis["splats_read"] for axis in lists.values())
+
+
+class Depth(program.ProgramTest):
+    """An opaque plate, one voxel thick, seen from straight ahead and from the side."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        plate = numpy.zeros((16, 16, 16), "u1")
+        plate[6] = 200
+        program.write_nrrd("plate.nrrd", plate)
+        program.write("plate.tf", b"100 1 1 1 0\n150 1 1 1 0.9999\n")
+        cls.works(cls(), "brick", "plate.nrrd", "-q", "--tf", "plate.tf")
+
+    def distances(self, renderer, *view):
+        arguments = ["--renderer", renderer, "--size", "32x32", "--tf", "plate.tf", *view]
+        self.works("render", "plate.trip", "-o", "plain.exr", *arguments)
+        self.works("render", "plate.trip", "-o", "p.exr", "--depth", "z.exr", *arguments)
+        with open("plain.exr", "rb") as one, open("p.exr", "rb") as other:
+            self.assertEqual(one.read(), other.read())
+        names, z = program.read_exr_channels("z.exr")
+        self.assertEqual(names, [b"Z"])
+        return z[..., 0]
+
+    def test_distances_to_a_plate(self):
+        for renderer in "cpu", "reference":
+            straight = ["--look=7.5,7.5,6", "--up=0,1,0"]
+            z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--ortho=8")
+            self.assertLess(abs(z - 40).max(), 0.01)
+            z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--fov=8")
+            step = numpy.tan(numpy.radians(4)) * (2 * numpy.arange(32) + 1 - 32) / 32
+            slope = numpy.sqrt(1 + step[:, None] ** 2 + step[None, :] ** 2)
+            self.assertLess(abs(z - 40 * slope).max(), 0.01)
+            z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--ortho=64")
+            self.assertTrue(numpy.isinf(z[0]).all() and numpy.isfinite(z[16, 16]))
+
+    def test_an_orbit_s_distances_are_numbered_as_its_pictures(self):
+        self.works("render", "plate.trip", "-o", "o.png", "--depth=oz.tif", "--orbit=2",
+                   "--size=16x16", "--tf", "plate.tf")
+        for name in "o-000.png", "o-001.png", "oz-000.tif", "oz-001.tif":
+            self.assertTrue(os.path.getsize(name) > 0, name)
+
+    def test_what_has_no_distances_says_so(self):
+        for options in (["--renderer=gl"], ["--target=rgba8"], ["--submit=triangles"]):
+            self.fails(2, "render", "plate.trip", "-o", "a.png", "--depth=z.exr", *options,
+                       says="--depth")
+        self.fails(2, "render", "plate.trip", "-o", "a.png", "--depth=z.png", says=".exr or .tif")
 
 
 class Measured(program.ProgramTest):

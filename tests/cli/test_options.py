@@ -90,6 +90,7 @@ RENDER = {
     "--count": None,
     "--output": [],
     "--stats": [],
+    "--depth": ["z.png", "z.jpg", "z"],
 }
 INFO = {"--verify": None, "--json": None}
 
@@ -215,6 +216,7 @@ class Options(program.ProgramTest):
             ["--no-shading"],
             ["--explain"],
             ["--explain", "--count"],
+            ["--depth=z.tif"],
             ["--stats=-"],
             ["--stats=s.json"],
             ["--stats", "./s.json"],

@@ -221,14 +221,65 @@ static void pictures_take_of_the_memory_given(void **state)
     triptych *t = new_context();
     float *rgba, *other;
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    assert_fails(t, triptych_new_picture(t, 0, 8, &rgba), TRIPTYCH_USAGE, "pixels");
-    assert_fails(t, triptych_new_picture(t, 4096, 4096, &rgba), TRIPTYCH_ERROR, "memory given");
-    assert_int_equal(triptych_new_picture(t, 1536, 1536, &rgba), TRIPTYCH_OK); /* 36 of 64 MiB */
-    assert_fails(t, triptych_new_picture(t, 1536, 1536, &other), TRIPTYCH_ERROR, "memory given");
+    assert_fails(t, triptych_new_picture(t, 0, 8, 4, &rgba), TRIPTYCH_USAGE, "pixels");
+    assert_fails(t, triptych_new_picture(t, 8, 8, 3, &rgba), TRIPTYCH_USAGE, "channels");
+    assert_fails(t, triptych_new_picture(t, 4096, 4096, 4, &rgba), TRIPTYCH_ERROR, "memory given");
+    assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK); /* 36 of 64 MiB */
+    assert_fails(t, triptych_new_picture(t, 1536, 1536, 4, &other), TRIPTYCH_ERROR, "memory given");
+    assert_int_equal(triptych_new_picture(t, 1536, 1536, 1, &other), TRIPTYCH_OK);
     triptych_release_picture(t, rgba);
-    assert_int_equal(triptych_new_picture(t, 1536, 1536, &rgba), TRIPTYCH_OK);
+    assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK);
     assert_float_equal(rgba[4 * 1536 * 1536 - 1], 0, 0);
     triptych_destroy(t); /* with the picture */
+}
+
+/* The eye looks at the box of what is kept from outside: what is seen lies within it. */
+static void depth_is_the_distance_of_what_is_seen(void **state)
+{
+    (void)state;
+    static float rgba[FLOATS], plain[FLOATS], depth[SIZE * SIZE];
+    triptych *t = new_context();
+    triptych_settings settings = triptych_default_settings();
+    triptych_info info;
+    int seen = 0;
+    settings.depth = 1;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
+    const double middle = (info.lo[1] + info.hi[1]) / 2, far = 1000;
+    const triptych_view view = {
+        .width = SIZE,
+        .height = SIZE,
+        .eye = (double[]){ (info.lo[0] + info.hi[0]) / 2, middle - far,
+                           (info.lo[2] + info.hi[2]) / 2 },
+        .look = (double[]){ (info.lo[0] + info.hi[0]) / 2, middle, (info.lo[2] + info.hi[2]) / 2 },
+        .ortho_height = info.hi[2] - info.lo[2] + 20,
+    };
+    assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, plain), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "with the picture");
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    while (triptych_step(t, UINT64_MAX) > 0)
+        assert_int_equal(triptych_await(t, UINT64_MAX), TRIPTYCH_OK);
+    assert_int_equal(triptych_picture_and_depth(t, rgba, depth), TRIPTYCH_OK);
+    triptych_end(t);
+    assert_memory_equal(rgba, plain, sizeof plain);
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        if (isinf(depth[i]))
+            continue;
+        assert_in_range(depth[i], (int)(far + info.lo[1] - middle - 2),
+                        (int)(far + info.hi[1] - middle + 3));
+        seen++;
+    }
+    assert_in_range(seen, SIZE * SIZE / 20, SIZE * SIZE - 1);
+    assert_int_equal(triptych_write_depth(t, "depth.exr", SIZE, SIZE, depth), TRIPTYCH_OK);
+    depth[5] = NAN;
+    assert_fails(t, triptych_write_depth(t, "depth.exr", SIZE, SIZE, depth), TRIPTYCH_ERROR,
+                 "(5, 0)");
+    assert_int_equal(remove("depth.exr"), 0);
+    settings.target = TRIPTYCH_RGBA8;
+    assert_fails(t, triptych_set_settings(t, &settings), TRIPTYCH_USAGE, "depth");
+    triptych_destroy(t);
 }
 
 static void functions_are_listed_and_converted(void **state)
@@ -404,8 +455,9 @@ static void what_fails_says_why_and_the_context_goes_on(void **state)
     assert_fails(t, triptych_set_function(t, &(triptych_function){ .name = "preset:no-such" }),
                  TRIPTYCH_USAGE, "no-such");
     assert_fails(t, triptych_write(t, "p.gif", SIZE, SIZE, rgba), TRIPTYCH_USAGE, "p.gif");
-    assert_fails(t, triptych_prepare_write(t, "p.gif"), TRIPTYCH_USAGE, "p.gif");
-    assert_int_equal(triptych_prepare_write(t, "p.png"), TRIPTYCH_OK);
+    assert_fails(t, triptych_prepare_write(t, "p.gif", NULL), TRIPTYCH_USAGE, "p.gif");
+    assert_fails(t, triptych_prepare_write(t, "p.png", "z.png"), TRIPTYCH_USAGE, "z.png");
+    assert_int_equal(triptych_prepare_write(t, "p.png", "z.exr"), TRIPTYCH_OK);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "end it first");
     assert_fails(t, triptych_set_function(t, NULL), TRIPTYCH_USAGE, "end it first");
@@ -586,6 +638,7 @@ int main(void)
         cmocka_unit_test(the_plan_of_a_frame_can_be_printed),
         cmocka_unit_test(the_view_found_gives_the_same_picture_again),
         cmocka_unit_test(pictures_take_of_the_memory_given),
+        cmocka_unit_test(depth_is_the_distance_of_what_is_seen),
         cmocka_unit_test(functions_are_listed_and_converted),
         cmocka_unit_test(progress_goes_by_stages),
         cmocka_unit_test(bricking_says_what_it_made),

@@ -210,6 +210,28 @@ static void every_code_is_reached_from_half_a_step_on_either_side(void **state)
     }
 }
 
+static void distances_come_back_as_they_were(void **state)
+{
+    (void)state;
+    const trip_image_params distances = { .distances = true };
+    const float z[4] = { 0.5f, 1e6f, INFINITY, 3 };
+    int width, height;
+    float *back;
+    assert_int_equal(trip_image_write(&files, path_of("z.tif"), 4, 1, z, &distances), 0);
+    assert_int_equal(trip_image_read(&files, path_of("z.tif"), &width, &height, &back), 0);
+    assert_int_equal(width, 4);
+    assert_int_equal(height, 1);
+    for (int i = 0; i < 4; i++)
+        assert_true(back[4 * i] == z[i]);
+    free(back);
+    const float none[2] = { 1, NAN }, less[2] = { 1, -INFINITY };
+    assert_int_equal(trip_image_write(&files, path_of("z.exr"), 2, 1, none, &distances),
+                     TRIP_ERROR);
+    assert_int_equal(trip_image_write(&files, path_of("z.exr"), 2, 1, less, &distances),
+                     TRIP_ERROR);
+    assert_int_equal(trip_image_check_path("z.png", &distances), TRIP_USAGE);
+}
+
 static void jpeg_is_the_picture_over_black(void **state)
 {
     (void)state;
@@ -338,6 +360,7 @@ int main(void)
         cmocka_unit_test(the_curve_of_exr_loses_nothing_outside_its_range),
         cmocka_unit_test(a_png_holds_straight_colour_rounded_to_nearest_and_the_top_row_first),
         cmocka_unit_test(every_code_is_reached_from_half_a_step_on_either_side),
+        cmocka_unit_test(distances_come_back_as_they_were),
         cmocka_unit_test(jpeg_is_the_picture_over_black),
         cmocka_unit_test(a_pixel_that_is_no_number_is_refused_and_the_old_file_stays),
         cmocka_unit_test(wrong_names_and_depths_are_wrong_usage),
