@@ -17,12 +17,12 @@ double bench_now_ms(void)
 
 uint64_t bench_splats_drawn(const trip_frame_stats *s)
 {
-    return s->lists[0].splats_drawn + s->lists[1].splats_drawn + s->lists[2].splats_drawn;
+    return s->all.splats_drawn;
 }
 
 uint64_t bench_splats_read(const trip_frame_stats *s)
 {
-    return s->lists[0].splats_read + s->lists[1].splats_read + s->lists[2].splats_read;
+    return s->all.splats_read;
 }
 
 unsigned bench_planes(const session *s, const trip_settings *settings)

@@ -71,33 +71,23 @@ static triptych_frame_stats frame_stats(const triptych *t)
     };
 }
 
-/* The renderer's counts are of layers: they are given to the layer's most detailed list. */
-static bool has_counts(const triptych *t, const trip_list *list)
-{
-    return trip_dataset_find(t->session.data, list->axis, 0, TRIP_KIND_VOXELS) == list;
-}
-
 static triptych_list_stats list_stats(const triptych *t, unsigned i)
 {
-    const trip_frame_stats *frame = &t->drawing.stats;
+    const trip_list_stats counts = trip_frame_list_stats(t->renderer, t->reader, i);
     const trip_plan_list *planned = &t->plan.lists[i];
-    const trip_list *list = &t->session.data->lists[i];
-    triptych_list_stats out = {
+    bool counted = t->drawing.stats.counted;
+    return (triptych_list_stats){
         .bricks = planned->bricks,
         .bricks_selected = planned->bricks_selected,
         .bricks_transparent = planned->bricks_transparent,
         .bricks_outside = planned->bricks_outside,
         .bricks_without_weight = planned->bricks_without_weight,
-        .counted = frame->counted,
+        .splats_read = counts.splats_read,
+        .bytes_read = counts.bytes_read,
+        .counted = counted,
+        .splats_projected = counted ? counts.splats_projected : 0,
+        .splats_drawn = counted ? counts.splats_drawn : 0,
     };
-    if (has_counts(t, list)) {
-        const trip_list_stats *counts = &frame->lists[list->axis];
-        out.splats_read = counts->splats_read;
-        out.bytes_read = counts->bytes_read;
-        out.splats_projected = frame->counted ? counts->splats_projected : 0;
-        out.splats_drawn = frame->counted ? counts->splats_drawn : 0;
-    }
-    return out;
 }
 
 int trip_context_note_stats(triptych *t)

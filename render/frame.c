@@ -65,10 +65,7 @@ static bool is_front_to_back(const trip_drawing *d, const trip_batch *batch)
 
 static int begin_batch(trip_drawing *d, const trip_batch *batch)
 {
-    uint64_t bytes = trip_reader_get_stats(d->reader).bytes_read;
     int axis = batch->pass->selections->list->axis;
-    d->stats.lists[axis].bytes_read += bytes - d->bytes_read;
-    d->bytes_read = bytes;
     assert(batch->run_count > 0);
     d->held[(d->held_first + d->held_count++) % HELD_MAX] = *batch;
     d->in_batch = true;
@@ -167,14 +164,24 @@ static int draw_next(trip_drawing *d, bool whole)
     return status < 0 ? status : TRIP_FRAME_MORE;
 }
 
-/* The renderer's counts; bytes were counted here. */
+trip_list_stats trip_frame_list_stats(const trip_renderer *renderer, const trip_reader *reader,
+                                      unsigned list)
+{
+    trip_list_stats stats = renderer->ops->stats(renderer, list);
+    stats.bytes_read = trip_reader_list_bytes(reader, list);
+    return stats;
+}
+
 static void take_counts(trip_drawing *d)
 {
-    trip_list_stats counts[3];
-    d->renderer->ops->stats(d->renderer, counts);
-    for (int axis = 0; axis < 3; axis++) {
-        counts[axis].bytes_read = d->stats.lists[axis].bytes_read;
-        d->stats.lists[axis] = counts[axis];
+    trip_list_stats *all = &d->stats.all;
+    *all = (trip_list_stats){ 0 };
+    for (unsigned i = 0; i < d->frame->data->list_count; i++) {
+        trip_list_stats list = trip_frame_list_stats(d->renderer, d->reader, i);
+        all->splats_read += list.splats_read;
+        all->splats_projected += list.splats_projected;
+        all->splats_drawn += list.splats_drawn;
+        all->bytes_read += list.bytes_read;
     }
 }
 

@@ -20,7 +20,7 @@
 typedef struct trip_frame_stats {
     double ms, read_ms, draw_ms, merge_ms;
     bool counted;             /* splats projected and drawn; else those counts say nothing */
-    trip_list_stats lists[3]; /* by layer: all lists of an axis */
+    trip_list_stats all;      /* of all lists together */
     trip_reader_stats reader; /* summed over the passes */
 } trip_frame_stats;
 
@@ -36,10 +36,9 @@ typedef struct trip_drawing {
     /* The rest is frame.c's. */
     trip_scope scope; /* cancelled: the frame is given up */
     double begun_ms;
-    bool begun, done;    /* the renderer has begun the frame; every batch is drawn */
-    int next_axis;       /* layers before this one were begun */
-    uint64_t splats;     /* drawn so far */
-    uint64_t bytes_read; /* counted so far */
+    bool begun, done; /* the renderer has begun the frame; every batch is drawn */
+    int next_axis;    /* layers before this one were begun */
+    uint64_t splats;  /* drawn so far */
     /* Being drawn: held[(held_first + held_count - 1) % TRIP_FRAME_HELD_MAX] from this run on. */
     bool in_batch;
     size_t next_run;
@@ -79,6 +78,11 @@ void trip_frame_end(trip_drawing *d);
 /* Begins, steps to the end, takes the picture; rgba and depth as in trip_frame_picture(). */
 int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_frame *frame,
                     float *rgba, float *depth, trip_frame_stats *stats);
+
+/* What a list of the data set, by its number, took of the frame whose picture was last complete,
+ * until the next one begins. Without trip_frame.count only splats read and bytes. */
+trip_list_stats trip_frame_list_stats(const trip_renderer *renderer, const trip_reader *reader,
+                                      unsigned list);
 
 /* CLOCK_MONOTONIC. */
 uint64_t trip_frame_now_ns(void);

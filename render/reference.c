@@ -26,15 +26,17 @@ typedef struct reference {
     trip_budget *budget;
     const trip_frame *frame;
     const trip_plan_list *list; /* at hand; NULL: none since the layer began */
+    unsigned number;            /* of it, in the data set */
     trip_splat_frame constants; /* of it */
     unsigned channels;          /* of a layer */
     double gradient_full;
     trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
     size_t pixels_bytes;
-    int axis;    /* of the layer being drawn; -1 before the first */
-    bool broken; /* some splat's numbers are not finite */
-    trip_list_stats stats[3];
+    int axis;               /* of the layer being drawn; -1 before the first */
+    bool broken;            /* some splat's numbers are not finite */
+    trip_list_stats *stats; /* by the data set's lists: room for */
+    unsigned stats_room;
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } reference;
 
@@ -43,6 +45,7 @@ static void destroy(trip_renderer *base)
     reference *r = (reference *)base;
     trip_budget *budget = r->budget;
     trip_budget_release(budget, r->pixels, r->pixels_bytes);
+    trip_budget_release(budget, r->stats, r->stats_room * sizeof *r->stats);
     trip_budget_release(budget, r, sizeof *r);
 }
 
@@ -70,6 +73,22 @@ static int take_pixels(reference *r, size_t count)
     return 0;
 }
 
+/* Ends with empty counts for so many lists. */
+static int take_stats(reference *r, unsigned lists)
+{
+    if (lists > r->stats_room) {
+        trip_budget_release(r->budget, r->stats, r->stats_room * sizeof *r->stats);
+        r->stats_room = 0;
+        r->stats = trip_budget_take(r->budget, lists * sizeof *r->stats);
+        if (!r->stats)
+            return trip_fail(TRIP_ERROR, "render", "reference renderer",
+                             "%u lists do not fit the memory given; raise --memory", lists);
+        r->stats_room = lists;
+    }
+    memset(r->stats, 0, lists * sizeof *r->stats);
+    return 0;
+}
+
 static pixel *row_of(const reference *r, int y)
 {
     return &r->pixels[(size_t)y * (size_t)r->frame->camera->width];
@@ -86,8 +105,9 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                            header->gradient_step);
     r->axis = -1;
     r->broken = false;
-    memset(r->stats, 0, sizeof r->stats);
-    int status = take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
+    int status = take_stats(r, frame->data->list_count);
+    if (!status)
+        status = take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
     for (int y = 0; y < frame->camera->height && !status; y++) {
         memset(row_of(r, y), 0, (size_t)frame->camera->width * sizeof(pixel));
         status = trip_frame_poll();
@@ -145,6 +165,7 @@ static int use_list(reference *r, const trip_list *of)
     if (list == r->list)
         return 0;
     r->list = list;
+    r->number = of->index;
     r->constants = trip_splat_frame_make(&list->camera, r->frame->settings);
     for (int y = 0; y < list->camera.height && !status; y++) {
         for (int x = 0; x < list->camera.width; x++) {
@@ -229,7 +250,7 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
                        bool front_to_back)
 {
     const trip_frame *frame = r->frame;
-    trip_list_stats *stats = &r->stats[r->axis];
+    trip_list_stats *stats = &r->stats[r->number];
     trip_splat s;
     stats->splats_read++;
     bool seen = trip_splat_project(&r->constants, voxel, &s);
@@ -329,9 +350,9 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
     return status;
 }
 
-static void stats(const trip_renderer *base, trip_list_stats lists[3])
+static trip_list_stats stats(const trip_renderer *base, unsigned list)
 {
-    memcpy(lists, ((const reference *)base)->stats, 3 * sizeof *lists);
+    return ((const reference *)base)->stats[list];
 }
 
 static const trip_renderer_ops reference_ops = {

@@ -11,6 +11,15 @@
 #include "settings.h"
 #include "transfer_function.h"
 
+/* Of a list in one frame. */
+typedef struct trip_list_stats {
+    uint64_t splats_read;      /* handed to the renderer */
+    uint64_t splats_projected; /* of those, not culled by w +- dw or the plane of the eye */
+    uint64_t splats_drawn;     /* of those, with a pixel centre of the image in their support where
+                                  the layer has weight (whatever their opacity) */
+    uint64_t bytes_read;
+} trip_list_stats;
+
 /* What a frame is drawn from; outlives the frame. */
 typedef struct trip_frame {
     const trip_dataset *data;
@@ -18,7 +27,7 @@ typedef struct trip_frame {
     const trip_settings *settings;
     const trip_plan *plan;
     const trip_tf_entry *table; /* 65536 entries */
-    bool count;                 /* fill the counts below exactly, where counting costs time */
+    bool count;                 /* splats projected and drawn, too: counting costs time */
     /* Hears between batches how many splats were drawn, of how many; NULL: nobody asks. */
     void (*progress)(void *user, uint64_t splats, uint64_t total);
     void *progress_user;
@@ -32,15 +41,6 @@ static inline int trip_frame_poll(void)
         return TRIP_OK;
     return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
 }
-
-/* Of all lists of a layer. */
-typedef struct trip_list_stats {
-    uint64_t splats_read;      /* handed to the renderer */
-    uint64_t splats_projected; /* of those, not culled by w +- dw or the plane of the eye */
-    uint64_t splats_drawn;     /* of those, with a pixel centre of the image in their support where
-                                  the list has weight (whatever their opacity) */
-    uint64_t bytes_read;
-} trip_list_stats;
 
 typedef struct trip_renderer trip_renderer;
 
@@ -77,8 +77,9 @@ typedef struct trip_renderer_ops {
     /* The frame is over or given up: returns when nothing that it is drawn from is in use. NULL:
      * nothing is between the other calls. */
     void (*end_frame)(trip_renderer *r);
-    /* Counts of the frame, once its picture was taken, by layer (bytes_read is the caller's). */
-    void (*stats)(const trip_renderer *r, trip_list_stats lists[3]);
+    /* Of a list in the frame, by its number in the data set, once the picture was taken
+     * (bytes_read is the caller's). */
+    trip_list_stats (*stats)(const trip_renderer *r, unsigned list);
 } trip_renderer_ops;
 
 /* Every renderer's first member. */

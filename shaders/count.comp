@@ -1,19 +1,19 @@
 // Counts the splats of a batch that are projected and drawn, as trip_list_stats defines them, in
 // double precision like the reference; one invocation a splat. In: the batch's storage blocks and
-// the positions. Out: added to the layer's counters. Runs only when counts are asked for.
+// the positions. Out: added to the list's counters. Runs only when counts are asked for.
 #include "fetch.glsl"
 #include "project.glsl"
 #include "weight.glsl"
 
 layout(local_size_x = TRIP_GL_COUNT_GROUP) in;
-layout(location = TRIP_GL_PIECE) uniform uvec2 piece; // draw positions: first, count
+layout(location = TRIP_GL_PIECE) uniform uvec3 piece; // draw positions: first, count; number of the list
 
-// Low and high half of "projected", then of "drawn", per axis.
+// Low and high half of "projected", then of "drawn", by list.
 layout(std430, binding = TRIP_GL_COUNTS) buffer trip_gl_counts { uint counts[]; };
 
 void count(int which)
 {
-    uint at = uint(weight.z) * 4u + uint(which) * 2u;
+    uint at = piece.z * 4u + uint(which) * 2u;
     if (atomicAdd(counts[at], 1u) == 0xffffffffu)
         atomicAdd(counts[at + 1u], 1u);
 }

@@ -84,9 +84,10 @@ static int take_memory(trip_reader *r)
     r->runs = trip_budget_take(r->budget, n * run_room(r) * sizeof *r->runs);
     r->cursors = trip_budget_take(r->budget, r->data->list_count * sizeof *r->cursors);
     r->border_memory = trip_budget_take(r->budget, border_bytes(r));
+    r->list_bytes = trip_budget_take(r->budget, r->data->list_count * sizeof *r->list_bytes);
     if (!r->params.slot_memory)
         r->slot_memory = trip_budget_take(r->budget, n * r->params.slot_bytes);
-    if (!r->slots || !r->queue || !r->runs || !r->cursors || !r->border_memory ||
+    if (!r->slots || !r->queue || !r->runs || !r->cursors || !r->border_memory || !r->list_bytes ||
         (!r->params.slot_memory && !r->slot_memory))
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "no memory for %u slots of %zu bytes: give more with --memory", n,
@@ -110,6 +111,7 @@ static void release_memory(trip_reader *r)
     trip_budget_release(r->budget, r->runs, n * run_room(r) * sizeof *r->runs);
     trip_budget_release(r->budget, r->cursors, r->data->list_count * sizeof *r->cursors);
     trip_budget_release(r->budget, r->border_memory, border_bytes(r));
+    trip_budget_release(r->budget, r->list_bytes, r->data->list_count * sizeof *r->list_bytes);
     trip_budget_release(r->budget, r->slot_memory, n * r->params.slot_bytes);
 }
 
@@ -266,6 +268,11 @@ unsigned trip_reader_slots(const trip_reader *r)
 bool trip_reader_in_place(const trip_reader *r)
 {
     return r->params.slot_memory;
+}
+
+uint64_t trip_reader_list_bytes(const trip_reader *r, unsigned list)
+{
+    return r->list_bytes[list];
 }
 
 trip_reader_stats trip_reader_get_stats(const trip_reader *r)

@@ -123,6 +123,8 @@ unsigned trip_reader_slots(const trip_reader *r);
 bool trip_reader_in_place(const trip_reader *r);
 /* Since trip_reader_begin(). */
 trip_reader_stats trip_reader_get_stats(const trip_reader *r);
+/* Of its bytes_read, those of a list, by its number in the data set. */
+uint64_t trip_reader_list_bytes(const trip_reader *r, unsigned list);
 /* "io_uring", "io_uring+O_DIRECT", "pread", "pread+O_DIRECT" or "null". */
 const char *trip_reader_engine_name(const trip_reader *r);
 

@@ -183,6 +183,7 @@ static void count_requests(trip_reader *r, const trip_slot *s)
         const trip_request *q = &s->requests[i];
         r->stats.reads += q->reads;
         *(q->cached ? &r->stats.bytes_cached : &r->stats.bytes_read) += q->done_bytes;
+        r->list_bytes[q->list->index] += q->cached ? 0 : q->done_bytes;
     }
 }
 
@@ -288,6 +289,7 @@ int trip_reader_begin(trip_reader *r, const trip_pass *pass)
     for (unsigned i = 0; i < r->params.slots; i++)
         assert(r->slots[i].state != TRIP_SLOT_DRAWING);
     r->stats = (trip_reader_stats){ 0 };
+    memset(r->list_bytes, 0, r->data->list_count * sizeof *r->list_bytes);
     r->pass = r->pass_count = 0;
     r->borders.count = 0;
     r->failed = 0;

@@ -54,6 +54,7 @@ struct trip_reader {
     bool runs_only;
     bool in_memory; /* batches lie in the cache: nothing is requested, and slots hold only runs */
     trip_reader_stats stats;
+    uint64_t *list_bytes; /* stats.bytes_read by list */
     trip_slot *slots;
     unsigned char *slot_memory;   /* NULL where it is the caller's */
     unsigned char *border_memory; /* pages at the borders of the slot handed out last */

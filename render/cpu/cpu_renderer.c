@@ -75,9 +75,9 @@ typedef struct cpu {
     const trip_frame *frame;
     trip_cpu_view view;   /* of the layer being drawn */
     trip_cpu_view *views; /* of its lists, by number in the data set */
-    unsigned view_room;   /* of `views`, and of `counted_views` where that is there */
+    unsigned list_room;   /* of `views`, and of `counted_views` where that is there */
     bool in_layer;
-    trip_list_stats stats[3];
+    trip_list_stats *stats; /* by number of the list, as many as `views` */
     /* Where the frame counts: the same with every voxel visible, whatever its code. */
     trip_frame counted_frame;
     trip_cpu_view *counted_views;
@@ -449,14 +449,15 @@ static int check_splats(const cpu *r)
 static void keep_chunks(cpu *r, cursor *at)
 {
     trip_cpu_flush *f = r->filling;
-    trip_list_stats *stats = &r->stats[r->view.axis];
     uint32_t reserved = f->chunk_count, kept = trip_cpu_flush_cut(f);
     if (kept < reserved)
         *at = (cursor){ f->chunks[kept].run, f->chunks[kept].skip, f->chunks[kept].skipped };
     for (uint32_t i = r->first_chunk; i < kept; i++) {
-        stats->splats_read += f->chunks[i].voxels;
-        stats->splats_projected += f->chunks[i].counts.splats_projected;
-        stats->splats_drawn += f->chunks[i].counts.splats_drawn;
+        const trip_cpu_chunk *chunk = &f->chunks[i];
+        trip_list_stats *stats = &r->stats[chunk->list];
+        stats->splats_read += chunk->voxels;
+        stats->splats_projected += chunk->counts.splats_projected;
+        stats->splats_drawn += chunk->counts.splats_drawn;
     }
 }
 
@@ -711,27 +712,34 @@ static int begin_counting(cpu *r)
     return 0;
 }
 
-static void release_views(cpu *r)
+static void release_lists(cpu *r)
 {
-    size_t bytes = r->view_room * sizeof *r->views;
+    size_t bytes = r->list_room * sizeof *r->views;
     trip_budget_release(r->budget, r->views, bytes);
     trip_budget_release(r->budget, r->counted_views, bytes);
+    trip_budget_release(r->budget, r->stats, r->list_room * sizeof *r->stats);
     r->views = r->counted_views = NULL;
-    r->view_room = 0;
+    r->stats = NULL;
+    r->list_room = 0;
 }
 
-static int fit_views(cpu *r)
+/* Ends with room for the data set's lists and their counts at 0. */
+static int fit_lists(cpu *r)
 {
     unsigned wanted = r->frame->data->list_count;
-    if (wanted > r->view_room)
-        release_views(r);
-    r->view_room = wanted > r->view_room ? wanted : r->view_room;
-    size_t bytes = r->view_room * sizeof *r->views;
+    if (wanted > r->list_room)
+        release_lists(r);
+    r->list_room = wanted > r->list_room ? wanted : r->list_room;
+    size_t bytes = r->list_room * sizeof *r->views;
     if (!r->views)
         r->views = trip_budget_take(r->budget, bytes);
     if (!r->counted_views && r->frame->count)
         r->counted_views = trip_budget_take(r->budget, bytes);
-    if (r->views && (r->counted_views || !r->frame->count))
+    if (!r->stats)
+        r->stats = trip_budget_take(r->budget, r->list_room * sizeof *r->stats);
+    if (r->stats)
+        memset(r->stats, 0, r->list_room * sizeof *r->stats);
+    if (r->views && r->stats && (r->counted_views || !r->frame->count))
         return 0;
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                      "%u lists do not fit the memory given; raise --memory", wanted);
@@ -757,12 +765,11 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->in_layer = false;
     r->frame = frame;
     r->kernels = frame->settings->depth ? r->isa->with_depth : r->isa;
-    memset(r->stats, 0, sizeof r->stats);
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
     int status = fit_tiles(r, frame->camera->width, frame->camera->height);
     if (!status)
-        status = fit_views(r);
+        status = fit_lists(r);
     if (!status && frame->count)
         status = begin_counting(r);
     if (status)
@@ -791,9 +798,9 @@ static void end_frame(trip_renderer *base)
     trip_cpu_pool_wait(r->pool, &r->blend_job);
 }
 
-static void stats(const trip_renderer *base, trip_list_stats lists[3])
+static trip_list_stats stats(const trip_renderer *base, unsigned list)
 {
-    memcpy(lists, ((const cpu *)base)->stats, 3 * sizeof *lists);
+    return ((const cpu *)base)->stats[list];
 }
 
 static const char *device(const trip_renderer *base)
@@ -807,7 +814,7 @@ static void destroy(trip_renderer *base)
     trip_budget *budget = r->budget;
     trip_cpu_pool_destroy(r->pool);
     release_tiles(r);
-    release_views(r);
+    release_lists(r);
     for (int i = 0; i < 2; i++)
         trip_cpu_flush_destroy(&r->flushes[i], budget);
     trip_budget_release(budget, r->workers, r->workers_bytes);

@@ -24,7 +24,7 @@
 #include "weight.h"
 
 enum {
-    COUNTS = 12, /* low and high half of projected and drawn, per axis */
+    COUNTS = 4, /* of a list: low and high half of projected and drawn */
     QUAD_VERTICES = 4,
     QUAD_INDICES = 6,
 };
@@ -48,11 +48,12 @@ typedef struct gl_renderer {
     GLuint counts;
     trip_gl_constants constants;
     const trip_frame *frame;
-    int axis;        /* of the layer being drawn */
-    unsigned layers; /* bit a: the layer of axis a was begun */
-    bool masked;     /* the layer being drawn, by the stencil */
-    uint64_t quads;  /* splats of the frame drawn as quads though sprites were asked for */
-    trip_list_stats stats[3];
+    int axis;               /* of the layer being drawn */
+    unsigned layers;        /* bit a: the layer of axis a was begun */
+    bool masked;            /* the layer being drawn, by the stencil */
+    uint64_t quads;         /* splats of the frame drawn as quads though sprites were asked for */
+    trip_list_stats *stats; /* by number of the list; `counts` has room for as many */
+    unsigned stats_room;
     char device[320];
 } gl_renderer;
 
@@ -73,6 +74,7 @@ static void destroy(trip_renderer *base)
         trip_gl_constants_release(&r->constants);
     }
     trip_gl_batch_release(&r->batch);
+    free(r->stats);
     trip_gl_context_destroy(r->context); /* and with it what is left */
     free(r);
 }
@@ -86,6 +88,23 @@ static int check_size(const gl_renderer *r, const trip_camera *camera)
                      "%d x %d px exceed the %d px either way that this driver can draw; "
                      "use another renderer or a smaller size",
                      camera->width, camera->height, most);
+}
+
+/* Room for the counts of so many lists. */
+static int fit_stats(gl_renderer *r, unsigned lists)
+{
+    if (lists <= r->stats_room)
+        return TRIP_OK;
+    trip_list_stats *more = realloc(r->stats, lists * sizeof *more);
+    if (!more)
+        return trip_fail(TRIP_ERROR, "gl", "lists", "out of memory");
+    r->stats = more;
+    glDeleteBuffers(1, &r->counts);
+    glCreateBuffers(1, &r->counts);
+    glNamedBufferStorage(r->counts, (GLsizeiptr)(lists * COUNTS * sizeof(GLuint)), NULL,
+                         GL_DYNAMIC_STORAGE_BIT);
+    r->stats_room = lists;
+    return trip_gl_check(r->context, "counts");
 }
 
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
@@ -103,6 +122,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                        frame->settings->target);
     if (!status)
         status = trip_gl_constants_fill(&r->constants, r->context, frame);
+    if (!status)
+        status = fit_stats(r, frame->data->list_count);
     if (!status && frame->settings->indexed)
         status = trip_gl_resident_load(&r->resident, frame->data, frame->plan->planes,
                                        trip_gl_context_limits(r->context)->storage_block_bytes);
@@ -113,7 +134,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->layers = 0;
     r->quads = 0;
     r->in_batch = false;
-    memset(r->stats, 0, sizeof r->stats);
+    memset(r->stats, 0, frame->data->list_count * sizeof *r->stats);
     if (frame->count) {
         static const GLuint zero = 0;
         glClearNamedBufferData(r->counts, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
@@ -237,7 +258,7 @@ static int count_piece(gl_renderer *r, const trip_gl_piece *piece)
         return status;
     trip_gl_constants_bind_list(&r->constants, piece->list, true);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_COUNTS, r->counts);
-    glUniform2ui(TRIP_GL_PIECE, piece->first, piece->count);
+    glUniform3ui(TRIP_GL_PIECE, piece->first, piece->count, piece->list);
     glDispatchCompute((piece->count + TRIP_GL_COUNT_GROUP - 1) / TRIP_GL_COUNT_GROUP, 1, 1);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
     return TRIP_OK;
@@ -302,7 +323,9 @@ static int begin_batch(gl_renderer *r, const trip_batch *batch)
                                     r->frame->settings->indexed);
     if (status)
         return status;
-    r->stats[r->axis].splats_read += r->batch.positions;
+    for (size_t i = 0; i < batch->run_count; i++)
+        r->stats[trip_batch_list(batch, &batch->runs[i])->index].splats_read +=
+            batch->runs[i].count;
     for (size_t i = 0; i < r->batch.piece_count && !r->frame->settings->triangles; i++)
         r->quads += r->batch.pieces[i].quads ? r->batch.pieces[i].count : 0;
     r->at = (trip_gl_cursor){ 0 };
@@ -388,12 +411,11 @@ static int merge(gl_renderer *r, float *rgba)
 
 static void read_counts(gl_renderer *r)
 {
-    GLuint counts[COUNTS];
-    glGetNamedBufferSubData(r->counts, 0, sizeof counts, counts);
-    for (int axis = 0; axis < 3; axis++) {
-        const GLuint *c = counts + 4 * axis;
-        r->stats[axis].splats_projected = c[0] | (uint64_t)c[1] << 32;
-        r->stats[axis].splats_drawn = c[2] | (uint64_t)c[3] << 32;
+    for (unsigned i = 0; i < r->frame->data->list_count; i++) {
+        GLuint c[COUNTS];
+        glGetNamedBufferSubData(r->counts, (GLintptr)(i * sizeof c), sizeof c, c);
+        r->stats[i].splats_projected = c[0] | (uint64_t)c[1] << 32;
+        r->stats[i].splats_drawn = c[2] | (uint64_t)c[3] << 32;
     }
 }
 
@@ -430,9 +452,9 @@ static void end_frame(trip_renderer *base)
         trip_gl_queue_drain(&r->queue);
 }
 
-static void stats(const trip_renderer *base, trip_list_stats lists[3])
+static trip_list_stats stats(const trip_renderer *base, unsigned list)
 {
-    memcpy(lists, ((const gl_renderer *)base)->stats, 3 * sizeof *lists);
+    return ((const gl_renderer *)base)->stats[list];
 }
 
 static const trip_renderer_ops gl_ops = {
@@ -474,8 +496,6 @@ static int make_buffers(gl_renderer *r)
     int status = make_quad_indices(r);
     if (status)
         return status;
-    glCreateBuffers(1, &r->counts);
-    glNamedBufferStorage(r->counts, COUNTS * sizeof(GLuint), NULL, GL_DYNAMIC_STORAGE_BIT);
     glEnable(GL_PROGRAM_POINT_SIZE);
     glDisable(GL_DITHER);
     return trip_gl_check(r->context, "buffers");

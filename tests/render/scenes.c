@@ -278,6 +278,10 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     }
     assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, p.depth, &p.stats), 0);
 
+    p.lists = calloc(s->data->list_count, sizeof *p.lists);
+    assert_non_null(p.lists);
+    for (unsigned i = 0; i < s->data->list_count; i++)
+        p.lists[i] = trip_frame_list_stats(r, reader, i);
     r->ops->destroy(r);
     trip_reader_destroy(reader);
     trip_plan_release(&plan, s->budget);
@@ -294,6 +298,8 @@ void scene_picture_free(scene_picture *p)
 {
     free(p->rgba);
     free(p->depth);
+    free(p->lists);
+    p->lists = NULL;
     p->rgba = p->depth = NULL;
 }
 

@@ -77,6 +77,7 @@ typedef struct scene_picture {
     float *rgba;
     float *depth; /* NULL unless the settings want it */
     trip_frame_stats stats;
+    trip_list_stats *lists; /* by the data set's */
 } scene_picture;
 
 scene_picture scene_draw(const scene *s, const scene_renderer *renderer,

@@ -31,7 +31,7 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
         if (!(most <= 1.0 / 255 && mean <= 0.05 / 255))
             fail_msg("%s: most %.4f, mean %.5f of 1/255", (*isa)->isa, 255 * most, 255 * mean);
         for (int axis = 0; axis < 3; axis++)
-            scene_compare_counts(&expected.stats.lists[axis], &p.stats.lists[axis], (*isa)->isa);
+            scene_compare_counts(&expected.lists[axis], &p.lists[axis], (*isa)->isa);
         if (first.rgba) {
             double apart = scene_difference(&first, &p);
             if (!(apart <= SETS_DIFFER))

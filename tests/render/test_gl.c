@@ -65,7 +65,7 @@ static double mean_difference(const scene_picture *a, const scene_picture *b)
 static void assert_same_counts(const scene_picture *a, const scene_picture *b)
 {
     for (int axis = 0; axis < 3; axis++) {
-        const trip_list_stats *l = &a->stats.lists[axis], *m = &b->stats.lists[axis];
+        const trip_list_stats *l = &a->lists[axis], *m = &b->lists[axis];
         assert_int_equal(l->splats_read, m->splats_read);
         assert_int_equal(l->splats_projected, m->splats_projected);
         assert_int_equal(l->splats_drawn, m->splats_drawn);

@@ -109,7 +109,7 @@ static void check_view(const scene *s, int i, tally *tallies)
         scene_picture p = scene_draw(s, &all[r], &view, &settings);
         add(&tallies[r], &expected, &p, views[i].name);
         for (int axis = 0; axis < 3; axis++)
-            scene_compare_counts(&expected.stats.lists[axis], &p.stats.lists[axis], all[r].name);
+            scene_compare_counts(&expected.lists[axis], &p.lists[axis], all[r].name);
         scene_picture_free(&p);
     }
     scene_picture_free(&expected);

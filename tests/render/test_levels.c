@@ -339,6 +339,38 @@ static void a_plan_names_lists_by_axis_and_level(void **state)
     destroy(&l);
 }
 
+/* Along an axis all voxels of its two lists are in the picture, and no others are read. */
+static void every_list_has_counts_of_its_own(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    const trip_list *lists = l.drawn.data->lists;
+    trip_settings settings = trip_settings_default();
+    trip_vec3 along = trip_affine_vector(&l.drawn.data->index_to_world, trip_v3(0, 0, 1));
+    trip_camera_params view = scene_view(&l.drawn, along, 60, 40, SIZE_PX);
+    view.ortho_height = 40;
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        scene_picture p = scene_draw(&l.drawn, r, &view, &settings);
+        uint64_t bytes = 0, splats = 0;
+        for (unsigned i = 0; i < l.drawn.data->list_count; i++) {
+            uint64_t expected = i % 3 == 2 ? lists[i].records : 0;
+            assert_int_equal(p.lists[i].splats_read, expected);
+            assert_int_equal(p.lists[i].splats_projected, expected);
+            assert_int_equal(p.lists[i].splats_drawn, expected);
+            assert_int_equal(p.lists[i].bytes_read > 0, expected > 0);
+            assert_true(p.lists[i].bytes_read <= lists[i].plane_bytes[TRIP_PLANE_VOXELS]);
+            bytes += p.lists[i].bytes_read;
+            splats += expected;
+        }
+        assert_int_equal(p.stats.all.splats_drawn, splats);
+        assert_int_equal(p.stats.all.bytes_read, bytes);
+        assert_int_equal(p.stats.reader.bytes_read, bytes);
+        scene_picture_free(&p);
+    }
+    destroy(&l);
+}
+
 static void lists_that_do_not_lie_along_level_0_are_refused(void **state)
 {
     (void)state;
@@ -373,6 +405,7 @@ int main(void)
         cmocka_unit_test(two_levels_are_drawn_in_one_order),
         cmocka_unit_test(levels_of_voxels_of_other_shapes_are_drawn_in_one_order),
         cmocka_unit_test(a_plan_names_lists_by_axis_and_level),
+        cmocka_unit_test(every_list_has_counts_of_its_own),
         cmocka_unit_test(lists_that_do_not_lie_along_level_0_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

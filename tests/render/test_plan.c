@@ -219,9 +219,9 @@ static void no_splat_that_touches_a_pixel_is_left_out(void **state)
         scene_picture p = scene_draw(&s, scene_renderers(), &c.params, &settings);
         int axis_of_view = trip_weight_axis_of_view(&c);
         for (int axis = 0; axis < 3; axis++) {
-            assert_int_equal(p.stats.lists[axis].splats_drawn,
+            assert_int_equal(p.lists[axis].splats_drawn,
                              count_touching(&s, &c, &settings, axis_of_view, axis, any_code));
-            left_out += s.data->header.kept - p.stats.lists[axis].splats_read;
+            left_out += s.data->header.kept - p.lists[axis].splats_read;
         }
         scene_picture_free(&p);
     }

@@ -289,8 +289,7 @@ static void a_larger_kernel_blurs_but_keeps_the_opacity(void **state)
 
 static uint64_t drawn(const scene_picture *p)
 {
-    return p->stats.lists[0].splats_drawn + p->stats.lists[1].splats_drawn +
-           p->stats.lists[2].splats_drawn;
+    return p->stats.all.splats_drawn;
 }
 
 static uint64_t count_drawn(const scene *s, const scene_renderer *r, const trip_camera_params *view,
