@@ -72,17 +72,6 @@ void trip_source_free(trip_source *s)
     *s = (trip_source){ 0 };
 }
 
-bool trip_source_equal(const trip_source *a, const trip_source *b)
-{
-    bool equal = a->count == b->count;
-    for (size_t i = 0; equal && i < a->count; i++) {
-        const trip_source_file *x = &a->files[i], *y = &b->files[i];
-        equal = !strcmp(x->path, y->path) && x->inode == y->inode && x->bytes == y->bytes &&
-                x->modified_ns == y->modified_ns && x->changed_ns == y->changed_ns;
-    }
-    return equal;
-}
-
 bool trip_source_is_settled(const trip_source *s)
 {
     struct timespec now;

@@ -29,9 +29,6 @@ typedef struct trip_source {
 int trip_source_find(trip_source *s, const char *path, const trip_volume_params *params);
 void trip_source_free(trip_source *s);
 
-/* Whether both are the same files, none of them changed in between. */
-bool trip_source_equal(const trip_source *a, const trip_source *b);
-
 /* False where a file changed so shortly before that another change might leave the same times: file
  * systems count them in steps of up to two seconds. */
 bool trip_source_is_settled(const trip_source *s);

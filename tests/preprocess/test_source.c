@@ -143,11 +143,11 @@ static void a_change_shows_in_the_state_even_when_size_and_time_are_set_back(voi
     assert_int_equal(utimensat(AT_FDCWD, "v.nii", times, 0), 0);
     assert_int_equal(trip_source_find(&after, "v.nii", &defaults), 0);
     assert_true(after.files[0].modified_ns == before.files[0].modified_ns);
-    assert_false(trip_source_equal(&before, &after));
-    assert_true(trip_source_equal(&after, &after));
     assert_int_equal(trip_source_digest_state(&before, "", &old), 0);
     assert_int_equal(trip_source_digest_state(&after, "", &new), 0);
     assert_string_not_equal(old.text, new.text);
+    assert_int_equal(trip_source_digest_state(&after, "", &old), 0);
+    assert_string_equal(old.text, new.text);
     after.files[0].changed_ns -= INT64_C(3000000000);
     assert_true(trip_source_is_settled(&after));
     trip_source_free(&before);
