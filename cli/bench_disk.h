@@ -24,7 +24,7 @@ typedef struct bench_disk_read {
 /* What is compared with the ring has the same kind of pages and the same work. */
 typedef enum bench_plain {
     BENCH_PLAIN, /* into large pages, which the ring is in where the system has them, and a byte
-                    of every cache line is loaded, as by whoever checks or draws it */
+                    of every cache line is loaded, as checking and drawing do */
     BENCH_PLAIN_BLIND, /* the same, and nothing is loaded */
     BENCH_PLAIN_SMALL, /* nothing loaded, into memory as the system gives it to any program */
 } bench_plain;

@@ -1,5 +1,4 @@
-/* What `triptych bench` was asked for: the command line, checked, the table's defaults filled in.
- */
+/* The command line of `triptych bench`, checked, the table's defaults filled in. */
 #ifndef TRIP_BENCH_OPTIONS_H
 #define TRIP_BENCH_OPTIONS_H
 

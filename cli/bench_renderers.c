@@ -32,7 +32,7 @@ typedef struct contender {
     bench_cost *costs; /* of the size being drawn: [view * repeat + run] */
 } contender;
 
-/* What a view has to be drawn, whoever draws it. */
+/* What is to be drawn in a view, the same for all renderers. */
 typedef struct load {
     double splats, pixels;
 } load;

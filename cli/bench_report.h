@@ -15,7 +15,7 @@ typedef struct bench_column {
 
 typedef struct bench_report bench_report;
 
-/* `command`: the line that the report was asked for by. */
+/* `command`: the command line, which the report repeats. */
 int bench_report_create(bench_report **out, const char *name, const char *command);
 void bench_report_destroy(bench_report *r);
 

@@ -252,7 +252,7 @@ static int try_lock(const cache_folder *c, const cache_key *key)
         }
         if (is_named(c, fd, name))
             return fd;
-        close(fd); /* who had it removed it with its work done */
+        close(fd); /* its holder removed it when its work was done */
     }
 }
 

@@ -5,8 +5,8 @@
 #include "dataset_text.h"
 
 /* For the data set at `path`; `tf` is the function then kept in it, NULL for the automatic one, and
- * `range` is kept too (NULL: none). For free(); NULL where the data set's text does not tell what
- * it was made of. */
+ * `range` is kept too (NULL: none). For free(); NULL where the data set's text does not say
+ * what it was made of. */
 char *brick_command(const trip_dataset_text *text, const char *path, const char *tf,
                     const double *range);
 

@@ -94,8 +94,6 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
 {
     int status = session_open_data(s, input, memory_bytes);
-    if (look->name)
-        s->input = look->name;
     return status ? status : session_use_function(s, look);
 }
 

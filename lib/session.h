@@ -22,7 +22,6 @@ typedef struct session_look {
     const char *tf;       /* file or preset */
     double opacity_scale; /* of extinction; 0: 1 */
     double window, level; /* what the function's domain spans; window 0: not moved */
-    const char *name;     /* the input's in messages; NULL: the data set's path */
     bool *missing;        /* set, in the place of a warning, where values that show were left out */
 } session_look;
 
@@ -37,7 +36,7 @@ int session_use_function(session *s, const session_look *look);
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);
 void session_close(session *s);
 
-/* What a reader is wanted for; zero means the default. */
+/* What a reader is for; zero means the default. */
 typedef struct session_reader {
     trip_engine engine;
     unsigned planes; /* bit per trip_plane */

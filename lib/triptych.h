@@ -108,7 +108,7 @@ typedef struct triptych_info {
     unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
     double gradient_scale, gradient_step[3], gradient_full;   /* of normals of 4 bytes, 3 bytes */
     unsigned tile_voxels, slab_sheets, page_bytes;
-    const char *notes; /* JSON by whoever made it, or another text; until it is closed */
+    const char *notes; /* JSON by the program that made it, or another text; until it is closed */
     const char
         *note; /* of those, what was chosen where the volume's file leaves a choice; or NULL */
 } triptych_info;
@@ -266,8 +266,8 @@ enum {
     TRIPTYCH_WAITS = 2, /* nothing to draw: the disk is at work */
 };
 
-/* The same in steps, for whoever has other things to do: begin, steps until TRIPTYCH_DONE, picture,
- * end. Until the end nothing can be set. */
+/* The same in steps, for programs with other things to do: begin, steps until TRIPTYCH_DONE,
+ * picture, end. Until the end nothing can be set. */
 TRIPTYCH_API int triptych_begin(triptych *t);
 /* Draws what has been read, until the deadline by CLOCK_MONOTONIC in nanoseconds; something of it
  * in any case. Never waits for the disk. UINT64_MAX: no deadline. */

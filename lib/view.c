@@ -36,7 +36,7 @@ static trip_camera_framing framing_of(const triptych_view *o, const session *s)
     return f;
 }
 
-/* Another up where the one that was not asked for lies along the view. */
+/* Another up where the default one lies along the view. */
 static void avoid_up_along_view(trip_camera_params *view)
 {
     trip_vec3 gaze = trip_normalize(trip_sub(view->look, view->eye));
