@@ -1,4 +1,6 @@
-/* triptych bench: measures drawing and reading a data set, and prints tables with their limits. */
+/* triptych bench: measures drawing and reading a data set, and prints tables with their limits. It
+ * uses the parts beneath the library, which it times one by one (reading alone, drawing alone,
+ * several renderers over one copy of the data in memory) where the library joins them to frames. */
 #include "commands.h"
 
 #include <stdio.h>
