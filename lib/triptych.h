@@ -108,9 +108,7 @@ typedef struct triptych_info {
     unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
     double gradient_scale, gradient_step[3], gradient_full;   /* of normals of 4 bytes, 3 bytes */
     unsigned tile_voxels, slab_sheets, page_bytes;
-    const char *notes; /* JSON by the program that made it, or another text; until it is closed */
-    const char
-        *note; /* of those, what was chosen where the volume's file leaves a choice; or NULL */
+    const char *notes; /* as its maker left them, JSON by `brick`; last until it is closed */
 } triptych_info;
 
 TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
