@@ -1050,6 +1050,21 @@ static void check_giving_up(const fixture *f, const trip_dataset *d, trip_reader
     free(out);
 }
 
+/* The caller's memory is read into until the reader is destroyed, and no longer. */
+static void check_giving_up_in_place(const fixture *f, const trip_dataset *d, trip_engine engine)
+{
+    void *memory[4];
+    size_t bytes = trip_reader_slot_bytes(d, 3, 1);
+    for (int i = 0; i < 4; i++)
+        memory[i] = aligned_alloc(4096, bytes);
+    const trip_reader_params params = {
+        .engine = engine, .slots = 4, .slot_bytes = bytes, .slot_memory = memory
+    };
+    check_giving_up(f, d, params, 0);
+    for (int i = 0; i < 4; i++)
+        free(memory[i]);
+}
+
 static void giving_up_waits_for_no_read(void **state)
 {
     fixture f;
@@ -1068,6 +1083,9 @@ static void giving_up_waits_for_no_read(void **state)
         if (uring || params.engine != TRIP_ENGINE_URING)
             check_giving_up(&f, d, params, kinds[i / 6]);
     }
+    check_giving_up_in_place(&f, d, TRIP_ENGINE_PREAD);
+    if (uring)
+        check_giving_up_in_place(&f, d, TRIP_ENGINE_URING);
     close_fixture(&f, d);
 }
 
