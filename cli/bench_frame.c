@@ -36,7 +36,7 @@ unsigned bench_planes(const session *s, const trip_settings *settings)
 static bool is_covered(void *user, const trip_selection *selection, uint32_t brick)
 {
     trip_renderer *covering = *(trip_renderer **)user;
-    return covering && trip_cpu_covered(covering, selection, brick);
+    return covering && trip_cpu_occluded(covering, selection, brick);
 }
 
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,

@@ -31,7 +31,7 @@ static int make_reader(triptych *t, unsigned planes)
         .threads = (int)trip_context_threads(r->threads),
         .cache = r->keep_pages && !t->counting,
         .renderer = t->renderer,
-        .skip = finds_hidden && !draws_all ? trip_cpu_covered : NULL,
+        .skip = finds_hidden && !draws_all ? trip_cpu_occluded : NULL,
         .skip_user = t->renderer,
     };
     if (t->reader && !(planes & ~t->planes) && t->counting == t->reader_counts)

@@ -1,12 +1,18 @@
-/* What a voxel counts for before any kernel is asked (trip_list_stats): the bounds by which whole
- * bricks are culled, taken for one splat. Called by many threads at once. */
+/* Exact counts of splats (trip_list_stats), for frames that want them: every voxel is projected
+ * once more with a table in which all are visible. */
 #ifndef TRIP_CPU_COUNT_H
 #define TRIP_CPU_COUNT_H
 
-#include "cpu/kernels/kernels.h"
+#include "cpu/state.h"
 
-/* Whether the splat of a voxel of the view's list is projected: not culled by the layer's weight or
- * the plane of the eye. */
-bool trip_cpu_is_projected(const trip_cpu_view *view, int u, int v, int sheet);
+#define TRIP_CPU_COUNT_TABLE_BYTES (65536 * sizeof(trip_tf_entry))
+
+/* The frame that is counted, from the one being drawn. */
+int trip_cpu_begin_counting(trip_cpu *r);
+
+/* Adds those of a run's part to the chunk's counts: also what is occluded or transparent. Called by
+ * the worker that fills the chunk. */
+void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
+                         const trip_block *block, const trip_cpu_part *part);
 
 #endif

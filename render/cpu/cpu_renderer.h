@@ -8,6 +8,6 @@
  * can change the list being drawn, because every pixel it might reach is saturated, without weight
  * or outside the image. So the picture is the same, bit for bit, whether it is asked or not. Called
  * on the thread that draws; false for any other renderer. */
-bool trip_cpu_covered(void *renderer, const trip_selection *selection, uint32_t brick);
+bool trip_cpu_occluded(void *renderer, const trip_selection *selection, uint32_t brick);
 
 #endif

@@ -13,11 +13,11 @@ import tempfile
 ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain"]
 
 # The functions whose cost, with all they call, is a stage's: those of the kernels' table
-# (render/cpu/kernels/kernels.h), of render/cpu/show.h and of render/cpu/bin.h, which no compiler can hide.
+# (render/cpu/kernels/kernels.h), of render/cpu/cull.h and of render/cpu/splat_buffer.h, which no compiler can hide.
 STAGES = {
-    "hiding": ["trip_cpu_show"],
+    "hiding": ["trip_cpu_cull"],
     "projection": ["stage", "project"],
-    "binning": ["trip_cpu_bin", "trip_cpu_link"],
+    "binning": ["trip_cpu_sort_chunk", "trip_cpu_link_tile_lists"],
     "blend": ["tile_clear", "tile_begin", "tile_blend", "tile_end"],
     "merge": ["tile_merge", "tile_finish"],
 }

@@ -148,7 +148,7 @@ static void draw(const scene *s, trip_renderer_kind kind, const trial *t, int vi
     assert_int_equal(trip_budget_create(&budget, t->memory_bytes), 0);
     assert_int_equal(trip_renderer_create(&renderer, kind, t->threads, budget), 0);
     params.planes = plan.planes;
-    params.skip = t->skip ? trip_cpu_covered : NULL;
+    params.skip = t->skip ? trip_cpu_occluded : NULL;
     params.skip_user = renderer;
     params.fault_user = &random;
     assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);

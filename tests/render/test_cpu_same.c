@@ -1,5 +1,5 @@
 /* What must not change a bit of the CPU renderer's picture: threads, memory, the data's tile and
- * batch sizes, and whether what is hidden is left out. */
+ * batch sizes, and whether what is occluded is left out. */
 #include "cpu/kernels/isa.h"
 #include "cpu/cpu_renderer.h"
 #include "cpu_scenes.h"
@@ -123,14 +123,14 @@ typedef struct frame_by_hand {
     trip_frame frame;
     trip_renderer *renderer;
     float *rgba;
-    uint64_t splats, hidden;
+    uint64_t splats, occluded;
 } frame_by_hand;
 
 static void begin_by_hand(frame_by_hand *f, const scene *s, const trip_camera_params *view,
                           unsigned threads)
 {
     f->settings = trip_settings_default();
-    f->splats = f->hidden = 0;
+    f->splats = f->occluded = 0;
     assert_int_equal(trip_camera_make(&f->camera, view, &s->data->index_to_world), 0);
     assert_int_equal(
         trip_plan_make(&f->plan, s->data, &f->camera, &f->settings, s->table, s->budget), 0);
@@ -152,7 +152,7 @@ static void end_by_hand(frame_by_hand *f, const scene *s)
     free(f->rgba);
 }
 
-/* Draws a batch in pieces of at most so many runs, leaving out covered bricks. */
+/* Draws a batch in pieces of at most so many runs, leaving out occluded bricks. */
 static void draw_pieces(frame_by_hand *f, const trip_batch *batch, size_t piece, bool skip)
 {
     for (size_t i = 0, n; i < batch->run_count; i += n) {
@@ -161,8 +161,8 @@ static void draw_pieces(frame_by_hand *f, const trip_batch *batch, size_t piece,
         for (n = 0; n < piece && i + n < batch->run_count; n++)
             f->splats += some.runs[n].count;
         some.run_count = n;
-        if (skip && trip_cpu_covered(f->renderer, batch->pass->selections, some.runs->brick)) {
-            f->hidden += some.runs->count;
+        if (skip && trip_cpu_occluded(f->renderer, batch->pass->selections, some.runs->brick)) {
+            f->occluded += some.runs->count;
             continue;
         }
         assert_int_equal(f->renderer->ops->draw(f->renderer, &some, true), 0);
@@ -226,8 +226,8 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* A block of opaque voxels, filling the view: what lies behind its face is covered. */
-static void leaving_out_what_is_covered_draws_the_same(void **state)
+/* A block of opaque voxels, filling the view: what lies behind its face is occluded. */
+static void leaving_out_what_is_occluded_draws_the_same(void **state)
 {
     (void)state;
     scene s;
@@ -240,7 +240,7 @@ static void leaving_out_what_is_covered_draws_the_same(void **state)
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
     begin_by_hand(&all, &s, &view, 1);
     draw_by_hand(&all, &s, UINT32_MAX / 2, false);
-    /* Small flushes let tiles close early. */
+    /* Small buffers let tiles close early. */
     for (unsigned threads = 1; threads <= 4; threads++) {
         trip_budget *budget = s.budget;
         assert_int_equal(trip_budget_create(&s.budget, UINT64_C(64) << 20), 0);
@@ -248,9 +248,9 @@ static void leaving_out_what_is_covered_draws_the_same(void **state)
         draw_by_hand(&some, &s, 1, true);
         assert_memory_equal(all.rgba, some.rgba, 16 * (size_t)view.width * (size_t)view.height);
         if (threads == 1)
-            print_message("%llu of %llu splats left out\n", (unsigned long long)some.hidden,
+            print_message("%llu of %llu splats left out\n", (unsigned long long)some.occluded,
                           (unsigned long long)some.splats);
-        assert_true(some.hidden > 0);
+        assert_true(some.occluded > 0);
         end_by_hand(&some, &s);
         trip_budget_destroy(s.budget);
         s.budget = budget;
@@ -293,7 +293,7 @@ int main(void)
         cmocka_unit_test(little_memory_draws_the_same),
         cmocka_unit_test(a_scene_in_one_tile_draws_the_same),
         cmocka_unit_test(batches_cut_anywhere_draw_the_same),
-        cmocka_unit_test(leaving_out_what_is_covered_draws_the_same),
+        cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(frames_follow_one_another_on_one_renderer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -100,7 +100,7 @@ static void a_layer_holds_what_its_target_can_back_to_front(void **state)
 }
 
 /* How many splats have a pixel centre in their support. */
-static unsigned cover_of(const trip_splat_frame *f, double x, double y)
+static unsigned occlusion_of(const trip_splat_frame *f, double x, double y)
 {
     unsigned n = 0;
     for (int v = 0; v < DIM * DIM * DIM; v++) {
@@ -133,7 +133,7 @@ static void targets_are_off_by_at_most_a_step_a_splat(void **state)
             settings.target = (trip_target)target;
             scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
             for (int i = 0; i < SIZE * SIZE; i++) {
-                unsigned n = cover_of(&f, i % SIZE + 0.5, i / SIZE + 0.5);
+                unsigned n = occlusion_of(&f, i % SIZE + 0.5, i / SIZE + 0.5);
                 for (int c = 0; c < 4; c++) {
                     double off = fabs((double)p.rgba[4 * i + c] - (double)expected.rgba[4 * i + c]);
                     assert_true(off <= n * steps[target] + 0.5 / 255);

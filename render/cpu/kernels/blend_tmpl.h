@@ -1,6 +1,6 @@
 /* Kernels that blend projected splats into the pixels of a tile: included by table_tmpl.h after
- * simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the blocks of
- * pixels that they may touch, in their order; then block after block takes its splats, its pixels
+ * simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the stamps of
+ * pixels that they may touch, in their order; then stamp after stamp takes its splats, its pixels
  * all the while in registers. */
 #ifndef TRIP_CPU_BLEND_H
 #define TRIP_CPU_BLEND_H
@@ -11,16 +11,16 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 
-#define BLOCK_ROWS (V / 4)
-#define BLOCKS_ACROSS (TRIP_CPU_TILE / 4)
-#define BLOCKS_DOWN (TRIP_CPU_TILE / BLOCK_ROWS)
-#define BLOCKS (BLOCKS_ACROSS * BLOCKS_DOWN)
+#define STAMP_ROWS (V / 4)
+#define STAMPS_ACROSS (TRIP_CPU_TILE / 4)
+#define STAMPS_DOWN (TRIP_CPU_TILE / STAMP_ROWS)
+#define STAMPS (STAMPS_ACROSS * STAMPS_DOWN)
 #define CHANNELS (TRIP_CPU_DEPTH ? TRIP_CHANNELS_MAX : TRIP_CHANNEL_DEPTH)
-#define BLOCK_FLOATS (CHANNELS * V)
-/* Eight rows of blocks, a bit each. */
-#define BANDS (BLOCKS / 64)
+#define STAMP_FLOATS (CHANNELS * V)
+/* Eight rows of stamps, a bit each. */
+#define BANDS (STAMPS / 64)
 
-static_assert(BLOCKS_ACROSS == 8 && BANDS >= 1 && BANDS <= TRIP_CPU_BANDS, "64 blocks to a band");
+static_assert(STAMPS_ACROSS == 8 && BANDS >= 1 && BANDS <= TRIP_CPU_BANDS, "64 stamps to a band");
 
 /* ---- what a target keeps ---- */
 
@@ -51,21 +51,21 @@ INLINE vf kept(vf a, trip_target target)
 
 /* ---- where pixels lie ---- */
 
-/* Pixel centres of a block from the tile's corner. */
-INLINE vf block_x(unsigned number)
+/* Pixel centres of a stamp from the tile's corner. */
+INLINE vf stamp_x(unsigned number)
 {
     vf x;
     for (int i = 0; i < V; i++)
         x[i] = (float)(i % 4) + 0.5f;
-    return x + v_set((float)(4 * (number % BLOCKS_ACROSS)));
+    return x + v_set((float)(4 * (number % STAMPS_ACROSS)));
 }
 
-INLINE vf block_y(unsigned number)
+INLINE vf stamp_y(unsigned number)
 {
     vf y;
     for (int i = 0; i < V; i++)
         y[i] = (float)(i / 4) + 0.5f;
-    return y + v_set((float)(BLOCK_ROWS * (number / BLOCKS_ACROSS)));
+    return y + v_set((float)(STAMP_ROWS * (number / STAMPS_ACROSS)));
 }
 
 /* ---- blending ---- */
@@ -76,7 +76,7 @@ INLINE unsigned place_of(unsigned word)
     return word % 8 * 8 + word / 8;
 }
 
-/* A block's pixels and where they lie. */
+/* A stamp's pixels and where they lie. */
 typedef struct patch {
     vf r, g, b, t;
     vf depth; /* of layers with depth */
@@ -192,16 +192,16 @@ INLINE bool all_open(vf t)
 
 static void set_rays(trip_cpu_scratch *s, unsigned number);
 
-INLINE patch load_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays)
+INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays)
 {
-    const float *pixels = s->pixels + BLOCK_FLOATS * number;
+    const float *pixels = s->pixels + STAMP_FLOATS * number;
     patch p = {
         .r = v_load(pixels),
         .g = v_load(pixels + V),
         .b = v_load(pixels + 2 * V),
         .t = v_load(pixels + 3 * V),
-        .x = block_x(number),
-        .y = block_y(number),
+        .x = stamp_x(number),
+        .y = stamp_y(number),
         .cutoff = v_set(s->view->cutoff),
     };
     if (TRIP_CPU_DEPTH)
@@ -216,9 +216,9 @@ INLINE patch load_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     return p;
 }
 
-INLINE void store_block(trip_cpu_scratch *s, unsigned number, const patch *p)
+INLINE void store_stamp(trip_cpu_scratch *s, unsigned number, const patch *p)
 {
-    float *pixels = s->pixels + BLOCK_FLOATS * number;
+    float *pixels = s->pixels + STAMP_FLOATS * number;
     v_store(pixels, p->r);
     v_store(pixels + V, p->g);
     v_store(pixels + 2 * V, p->b);
@@ -227,7 +227,7 @@ INLINE void store_block(trip_cpu_scratch *s, unsigned number, const patch *p)
         v_store(pixels + TRIP_CHANNEL_DEPTH * V, p->depth);
 }
 
-/* Which splats of the group may touch a block, a bit each. */
+/* Which splats of the group may touch a stamp, a bit each. */
 typedef struct touching {
     const trip_cpu_splat *local;
     const float *depths; /* of those, in layers with depth */
@@ -292,7 +292,8 @@ INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_c
         put_over(p, splat, depth, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
 }
 
-/* The splats where none is thick; false, with nothing done, when a pixel is closed or would be. */
+/* The splats where none is thick; false, with nothing done, when a pixel is saturated or would be.
+ */
 INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 {
     patch q = *p;
@@ -305,12 +306,12 @@ INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
     return true;
 }
 
-/* All splats of the group that may touch a block, in order; false when its pixels take no more
- * light. Closed pixels never change, so asking late is no error. */
-INLINE bool blend_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
+/* All splats of the group that may touch a stamp, in order; false when its pixels are all
+ * saturated. Saturated pixels never change, so that a late test is no error. */
+INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
                         bool front_to_back, trip_target target)
 {
-    patch p = load_block(s, number, rays);
+    patch p = load_stamp(s, number, rays);
     touching t = { .local = s->local, .depths = s->local_depths };
     uint64_t thick = 0;
     for (unsigned word = 0; word < (s->splats + 63) / 64; word++) {
@@ -320,7 +321,7 @@ INLINE bool blend_block(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     bool simple = front_to_back && target == TRIP_TARGET_RGBA32F && !thick;
     if (!simple || !blend_open(&p, &t, rays))
         blend_each(&p, &t, blend_any, rays, front_to_back, target);
-    store_block(s, number, &p);
+    store_stamp(s, number, &p);
     return !front_to_back || any_open(p.t);
 }
 
@@ -330,7 +331,7 @@ INLINE void blend_group(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_b
     for (unsigned band = 0; band < BANDS; band++)
         for (uint64_t rest = s->any[band] & s->open[band]; rest; rest &= rest - 1) {
             unsigned bit = (unsigned)__builtin_ctzll(rest);
-            if (!blend_block(s, 64 * band + bit, rays, front_to_back, target))
+            if (!blend_stamp(s, 64 * band + bit, rays, front_to_back, target))
                 s->open[band] &= ~(UINT64_C(1) << bit);
         }
 }
@@ -362,12 +363,12 @@ static void (*choose_blend(const trip_cpu_view *view))(trip_cpu_scratch *)
     return (view->front_to_back ? behind : over)[view->of->settings->target];
 }
 
-/* ---- sorting a group by blocks ---- */
+/* ---- sorting a group by stamps ---- */
 
 typedef uint64_t words8 __attribute__((vector_size(64)));
 
 /* Swaps the bits that `low` names in b with those `step` higher in a, so that of each pair of words
- * (a, b) the blocks of step x step bits off the diagonal change places. */
+ * (a, b) the submatrices of step x step bits off the diagonal change places. */
 INLINE void exchange(words8 *a, words8 *b, unsigned step, uint64_t low)
 {
     words8 swap = (*a >> step ^ *b) & low;
@@ -426,7 +427,7 @@ static void empty_group(trip_cpu_scratch *s)
     s->splats = 0;
 }
 
-static bool takes_light(const trip_cpu_scratch *s)
+static bool is_open(const trip_cpu_scratch *s)
 {
     uint64_t any = 0;
     for (unsigned band = 0; band < BANDS; band++)
@@ -443,7 +444,7 @@ INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int4 
     local->l2 = splat->l2 + splat->l22 * f[1];
 }
 
-/* Bits of the blocks of a band that lie in a column or further right, in every row; none from the
+/* Bits of the stamps of a band that lie in a column or further right, in every row; none from the
  * eighth on. */
 INLINE uint64_t from_column(uint32_t column)
 {
@@ -454,11 +455,11 @@ INLINE uint64_t from_column(uint32_t column)
     return bits[column];
 }
 
-/* Bits of the blocks of a band that lie in a row of the tile's or further down, a byte a row. */
+/* Bits of the stamps of a band that lie in a row of the tile's or further down, a byte a row. */
 INLINE uint64_t from_row(unsigned band, uint32_t row)
 {
     static const uint8_t bits[64] = { [32 ... 63] = 0xff };
-    static_assert(BLOCKS_DOWN <= 32 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+    static_assert(STAMPS_DOWN <= 32 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
                   "the bytes above");
     uint64_t word;
     memcpy(&word, bits + 32 + 8 * band - row, sizeof word);
@@ -478,24 +479,24 @@ typedef struct gathering {
     int4 corner;    /* of the tile: x, y, x, y */
 } gathering;
 
-/* Splats[i]. Splats whose blocks are all closed are left out. */
+/* Splats[i]. Splats whose stamps are all saturated are left out. */
 INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
                 const float *depths, uint32_t i)
 {
     const trip_cpu_splat *splat = &splats[i];
     uint32_t at = g->splats;
-    const int4 to_block = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
-    uint64_t four, blocks[BANDS], any = 0;
+    const int4 to_stamp = { 2, V == 16 ? 2 : V == 8, 2, V == 16 ? 2 : V == 8 };
+    uint64_t four, stamps[BANDS], any = 0;
     memcpy(&four, (const char *)splat + offsetof(trip_cpu_splat, x0), sizeof four);
     int4 bounds = int4_widened(four);
-    int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_TILE - 1) >> to_block;
+    int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_TILE - 1) >> to_stamp;
     uint32_t left = (uint32_t)in[0], right = (uint32_t)in[2];
     uint32_t top = (uint32_t)in[1], bottom = (uint32_t)in[3];
     uint64_t columns = from_column(left) & ~from_column(right + 1);
     for (unsigned band = 0; band < BANDS; band++) {
-        blocks[band] = from_row(band, top) & ~from_row(band, bottom + 1);
-        blocks[band] &= columns & s->open[band];
-        any |= blocks[band];
+        stamps[band] = from_row(band, top) & ~from_row(band, bottom + 1);
+        stamps[band] &= columns & s->open[band];
+        any |= stamps[band];
     }
     if (any == 0)
         return;
@@ -504,7 +505,7 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
         s->local_depths[at] = depths[i];
     g->thick = g->thick >> 1 | (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << 63;
     for (unsigned band = 0; band < BANDS; band++)
-        s->touched[band][at / 64][at % 64] = blocks[band];
+        s->touched[band][at / 64][at % 64] = stamps[band];
     g->splats = ++at;
     if (at % 64 != 0)
         return;
@@ -567,7 +568,7 @@ static void tile_blend(const trip_cpu_view *view, trip_cpu_scratch *s, const tri
 {
     use_view(s, view);
     gathering g = { s->splats, s->thick[s->splats / 64], { s->x, s->y, s->x, s->y } };
-    if (!takes_light(s))
+    if (!is_open(s))
         return;
     if (order)
         add_in_order(s, &g, splats, depths, order, count);
@@ -583,9 +584,9 @@ static uint64_t tile_end(trip_cpu_scratch *s)
 {
     uint64_t open = 0;
     end_group(s);
-    for (unsigned row = 0; row < BLOCKS_DOWN; row++) {
+    for (unsigned row = 0; row < STAMPS_DOWN; row++) {
         uint64_t bits = s->open[row / 8] >> 8 * (row % 8) & 255;
-        open |= bits << 8 * (row * BLOCK_ROWS / 4);
+        open |= bits << 8 * (row * STAMP_ROWS / 4);
     }
     return open;
 }
@@ -599,13 +600,13 @@ INLINE vf form_at(const float form[6], vf x, vf y)
     return v_fma(x, fx, v_fma(y, fy, v_set(form[0])));
 }
 
-/* G and the stretch at a block's pixels. */
+/* G and the stretch at a stamp's pixels. */
 static void set_rays(trip_cpu_scratch *s, unsigned number)
 {
     const trip_cpu_view *view = s->view;
     float *of = s->rays + 2 * V * number;
-    vf x = v_set((float)(s->x - 0.5 * view->splat.camera.width)) + block_x(number);
-    vf y = v_set((float)(s->y - 0.5 * view->splat.camera.height)) + block_y(number);
+    vf x = v_set((float)(s->x - 0.5 * view->splat.camera.width)) + stamp_x(number);
+    vf y = v_set((float)(s->y - 0.5 * view->splat.camera.height)) + stamp_y(number);
     vf inverse = v_set(1) / form_at(view->ray2, x, y), stretch = v_set(1);
     if (view->stretch_varies)
         stretch = v_sqrt(form_at(view->world2, x, y) * inverse);
@@ -614,28 +615,28 @@ static void set_rays(trip_cpu_scratch *s, unsigned number)
     s->rays_known[number / 64] |= UINT64_C(1) << number % 64;
 }
 
-/* The blocks of the quarters that are ours: the others' pixels may be another thread's. */
-static uint64_t blocks_of_quarters(unsigned quarters, unsigned band)
+/* The stamps of the quarters that are ours: the others' pixels may be another thread's. */
+static uint64_t stamps_of_quarters(unsigned quarters, unsigned band)
 {
-    uint64_t blocks = 0;
+    uint64_t stamps = 0;
     for (unsigned row = 0; row < 8; row++) {
-        unsigned below = 8 * band + row >= BLOCKS_DOWN / 2, pair = quarters >> 2 * below & 3;
+        unsigned below = 8 * band + row >= STAMPS_DOWN / 2, pair = quarters >> 2 * below & 3;
         uint64_t bits = (pair & 1 ? 0x0fu : 0) | (pair & 2 ? 0xf0u : 0);
-        blocks |= bits << 8 * row;
+        stamps |= bits << 8 * row;
     }
-    return blocks;
+    return stamps;
 }
 
-/* Which blocks are ours and hold a pixel that may still take light. */
+/* Which stamps are ours and hold an open pixel. */
 static void find_open(trip_cpu_scratch *s, unsigned quarters)
 {
     for (unsigned band = 0; band < BANDS; band++) {
-        s->open[band] = blocks_of_quarters(quarters, band);
+        s->open[band] = stamps_of_quarters(quarters, band);
         if (!s->view->front_to_back)
             continue;
         for (uint64_t rest = s->open[band]; rest; rest &= rest - 1) {
             unsigned bit = (unsigned)__builtin_ctzll(rest);
-            if (!any_open(v_load(s->pixels + BLOCK_FLOATS * (64 * band + bit) + 3 * V)))
+            if (!any_open(v_load(s->pixels + STAMP_FLOATS * (64 * band + bit) + 3 * V)))
                 s->open[band] &= ~(UINT64_C(1) << bit);
         }
     }

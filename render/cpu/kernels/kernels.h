@@ -12,10 +12,13 @@
 #include "renderer.h"
 #include "splat.h"
 
-/* Edge of a screen tile in pixels. Its pixels are kept as V-lane vectors of four columns times V /
- * 4 rows (a block), so that a small footprint meets few vectors and all of them aligned: block
- * after block, row by row of blocks, each a vector for every channel of layer.h; of alpha, 1 -
- * alpha is kept. */
+/* A pixel is saturated when its transmittance is below TRIP_SATURATION, or where its layer has no
+ * weight: it takes no more splats, front to back. Until then it is open.
+ *
+ * Edge of a screen tile in pixels; `tile` is that in this folder, and a square of a sheet is a tile
+ * of the sheet. Its pixels are kept as V-lane vectors of four columns times V / 4 rows (a stamp),
+ * so that a small footprint meets few vectors and all of them aligned: stamp after stamp, row by
+ * row of stamps, each a vector for every channel of layer.h; of alpha, 1 - alpha is kept. */
 #define TRIP_CPU_TILE 32
 #define TRIP_CPU_TILE_PIXELS (TRIP_CPU_TILE * TRIP_CPU_TILE)
 
@@ -92,7 +95,7 @@ typedef struct trip_cpu_view {
     trip_splat parallel; /* the footprint of all, in parallel views */
 } trip_cpu_view;
 
-/* A square of 8 x 8 voxels of a run, as a block has it. */
+/* A square of 8 x 8 voxels of a run, as its block (block.h) has it. */
 typedef struct trip_cpu_square {
     int u, v, sheet; /* of its corner */
     uint64_t mask;   /* which voxels are there, by Morton number */
@@ -123,25 +126,26 @@ typedef struct trip_cpu_lanes {
     float l11[TRIP_CPU_STAGED], l21[TRIP_CPU_STAGED], l22[TRIP_CPU_STAGED];
     float l1[TRIP_CPU_STAGED], l2[TRIP_CPU_STAGED];
     float depth[TRIP_CPU_STAGED]; /* the largest optical depth, edge and all, stretch aside */
-    float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED];           /* two uint16 each */
-    float tiles[TRIP_CPU_STAGED];                                  /* uint32 */
-    uint32_t kept[TRIP_CPU_STAGED / 4], near[TRIP_CPU_STAGED / 4]; /* bits of a vector's lanes */
+    float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED]; /* two uint16 each */
+    float tiles[TRIP_CPU_STAGED];                        /* uint32 */
+    /* Bits of a vector's lanes: those that are kept, and those to project one by one. */
+    uint32_t kept[TRIP_CPU_STAGED / 4], scalar[TRIP_CPU_STAGED / 4];
     bool broken; /* set for good when the numbers of some splat are not finite */
 } trip_cpu_lanes;
 
-/* Splats that are sorted by blocks of a tile together, and bands of 64 blocks at most. */
+/* Splats that are sorted by stamps of a tile together, and bands of 64 stamps at most. */
 #define TRIP_CPU_LOCAL 256
 #define TRIP_CPU_BANDS 4
 
 /* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
-    _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by block: G[V], stretch[V] */
+    _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by stamp: G[V], stretch[V] */
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
     float local_depths[TRIP_CPU_LOCAL]; /* of layers with depth */
-    /* By band and 64 splats: first each splat's blocks, then each block's splats. */
+    /* By band and 64 splats: first each splat's stamps, then each stamp's splats. */
     uint64_t touched[TRIP_CPU_BANDS][TRIP_CPU_LOCAL / 64][64];
-    uint64_t any[TRIP_CPU_BANDS];        /* blocks that some splat may touch */
-    uint64_t open[TRIP_CPU_BANDS];       /* ours that may still take light */
+    uint64_t any[TRIP_CPU_BANDS];        /* stamps that some splat may touch */
+    uint64_t open[TRIP_CPU_BANDS];       /* ours with a pixel that is not saturated */
     uint64_t rays_known[TRIP_CPU_BANDS]; /* those whose `rays` are filled in */
     uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats are not thin */
     uint32_t splats;
@@ -169,8 +173,8 @@ typedef struct trip_cpu_kernels {
     unsigned lanes, channels;
     const struct trip_cpu_kernels *with_depth; /* the same for layers with depth */
 
-    /* Which squares of a region may show, by trip_cpu_mask's words: in Morton order, a bit each,
-     * the first lowest. */
+    /* Which squares of a region may be visible, by trip_cpu_mask's words: in Morton order, a bit
+     * each, the first lowest. */
     uint64_t (*squares)(const trip_cpu_view *view, const struct trip_cpu_region *region,
                         const _Atomic uint64_t *open, trip_cpu_lanes *lanes);
 
@@ -179,13 +183,14 @@ typedef struct trip_cpu_kernels {
     uint32_t (*stage)(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
-     * order. With `open`, a word a tile as in trip_cpu_mask, those over closed blocks alone may be
-     * left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many. */
+     * order. With `open`, a word a tile as in trip_cpu_mask, those over saturated cells alone may
+     * be left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many.
+     */
     uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
                         trip_cpu_splat *out, float *depths);
 
-    /* Empties a tile's pixels: transparent where the list has weight, closed elsewhere; `alone`
+    /* Empties a tile's pixels: transparent where the list has weight, saturated elsewhere; `alone`
      * says that its weight is 1 all over the tile. */
     void (*tile_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
     /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. */
@@ -195,8 +200,8 @@ typedef struct trip_cpu_kernels {
      * this view. */
     void (*tile_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                        const float *depths, const uint16_t *order, uint32_t count);
-    /* Ends with every splat in the pixels. Returns which blocks of 4 x 4 pixels of the quarters
-     * hold a pixel that may still take light: eight rows of eight bits, the first lowest. */
+    /* Ends with every splat in the pixels. Returns which cells of the quarters are open, as
+     * trip_cpu_mask has them. */
     uint64_t (*tile_end)(trip_cpu_scratch *s);
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
     void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,

@@ -1,8 +1,8 @@
 /* Kernels that begin and finish the pixels of a tile: weights of the lists, the merge (equation 3
  * of Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
  * The weights are computed in double precision by the operations of weight.c in their order, so
- * that where a list begins does not depend on who asks, and what is near there is exact for any h.
- */
+ * that a list begins at the same pixel wherever that is computed, and what is near there is exact
+ * for any h. */
 #ifndef TRIP_CPU_MERGE_H
 #define TRIP_CPU_MERGE_H
 
@@ -72,13 +72,13 @@ INLINE vd_pair centres(int first, const float offsets[V])
     return (vd_pair){ vd_low(f) + vd_set(first), vd_high(f) + vd_set(first) };
 }
 
-/* The list's weight at the pixels of block (column, row) of the tile at (x, y). */
+/* The list's weight at the pixels of stamp (column, row) of the tile at (x, y). */
 INLINE vf weight(const trip_cpu_view *view, int axis, int x, int y, int column, int row)
 {
     float across[V], down[V];
     for (int i = 0; i < V; i++) {
         across[i] = (float)(4 * column + i % 4) + 0.5f;
-        down[i] = (float)(BLOCK_ROWS * row + i / 4) + 0.5f;
+        down[i] = (float)(STAMP_ROWS * row + i / 4) + 0.5f;
     }
     vd_pair px = centres(x, across), py = centres(y, down);
     const trip_settings *s = view->of->settings;
@@ -86,22 +86,22 @@ INLINE vf weight(const trip_cpu_view *view, int axis, int x, int y, int column, 
                     weight_half(view, s, axis, px.hi, py.hi));
 }
 
-/* Lanes of a block that lie in the image. */
+/* Lanes of a stamp that lie in the image. */
 INLINE vm in_image(const trip_camera *camera, int x, int y, int column, int row)
 {
     vf px, py;
     for (int i = 0; i < V; i++) {
         px[i] = (float)(x + 4 * column + i % 4);
-        py[i] = (float)(y + BLOCK_ROWS * row + i / 4);
+        py[i] = (float)(y + STAMP_ROWS * row + i / 4);
     }
     return vm_and(v_gt(v_set((float)camera->width), px), v_gt(v_set((float)camera->height), py));
 }
 
 static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, float *pixels)
 {
-    for (int b = 0; b < BLOCKS; b++) {
-        float *block = pixels + BLOCK_FLOATS * b;
-        int column = b % BLOCKS_ACROSS, row = b / BLOCKS_ACROSS;
+    for (int b = 0; b < STAMPS; b++) {
+        float *stamp = pixels + STAMP_FLOATS * b;
+        int column = b % STAMPS_ACROSS, row = b / STAMPS_ACROSS;
         vf t = v_set(1);
         if (view->front_to_back) {
             vm open = in_image(&view->splat.camera, x, y, column, row);
@@ -110,23 +110,23 @@ static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, floa
             t = v_select(open, t, v_set(0));
         }
         for (int c = 0; c < 3; c++)
-            v_store(block + c * V, v_set(0));
-        v_store(block + 3 * V, t);
+            v_store(stamp + c * V, v_set(0));
+        v_store(stamp + 3 * V, t);
         if (TRIP_CPU_DEPTH)
-            v_store(block + TRIP_CHANNEL_DEPTH * V, v_set(0));
+            v_store(stamp + TRIP_CHANNEL_DEPTH * V, v_set(0));
     }
 }
 
 static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum)
 {
-    for (int b = 0; b < BLOCKS; b++) {
-        const float *block = pixels + BLOCK_FLOATS * b;
-        float *to = sum + BLOCK_FLOATS * b;
-        vf w = weight(view, view->axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
+    for (int b = 0; b < STAMPS; b++) {
+        const float *stamp = pixels + STAMP_FLOATS * b;
+        float *to = sum + STAMP_FLOATS * b;
+        vf w = weight(view, view->axis, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
         w = w * w;
         for (int c = 0; c < CHANNELS; c++) {
-            vf layer = v_load(block + c * V);
+            vf layer = v_load(stamp + c * V);
             if (c == 3)
                 layer = v_set(1) - layer;
             v_store(to + c * V, first ? w * layer : v_fma(w, layer, v_load(to + c * V)));
@@ -134,25 +134,25 @@ static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pix
     }
 }
 
-/* 1 / the sum of the squares of the lists' weights at a block: 1 unless lists are merged. */
+/* 1 / the sum of the squares of the lists' weights at a stamp: 1 unless lists are merged. */
 INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
 {
     vf sum = v_set(0);
     if (view->of->settings->method != TRIP_METHOD_MERGE)
         return v_set(1);
     for (int axis = 0; axis < 3; axis++) {
-        vf w = weight(view, axis, x, y, b % BLOCKS_ACROSS, b / BLOCKS_ACROSS);
+        vf w = weight(view, axis, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
         sum = v_fma(w, w, sum);
     }
     return v_set(1) / sum;
 }
 
 /* Block b of the picture before the background. */
-INLINE void merged_block(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
+INLINE void merged_stamp(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
                          const float *pixels, vf out[CHANNELS])
 {
     for (int c = 0; c < CHANNELS; c++)
-        out[c] = v_load(pixels + BLOCK_FLOATS * b + c * V);
+        out[c] = v_load(pixels + STAMP_FLOATS * b + c * V);
     if (content == TRIP_CPU_LAYER) {
         out[3] = v_set(1) - out[3];
         return;
@@ -169,20 +169,20 @@ INLINE float behind(const trip_cpu_view *view, int channel)
     return (float)(channel == 3 ? background[3] : background[channel] * background[3]);
 }
 
-/* A block's pixels, `line_floats` from line to line; the first `count` columns of the first `lines`
+/* A stamp's pixels, `line_floats` from line to line; the first `count` columns of the first `lines`
  * lines lie in the image. */
 INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, const vf out[4])
 {
     uint32_t row[V];
-    bool whole = count >= 4 && lines >= BLOCK_ROWS;
-    float block[BLOCK_FLOATS];
+    bool whole = count >= 4 && lines >= STAMP_ROWS;
+    float stamp[STAMP_FLOATS];
     for (uint32_t i = 0; i < V; i++)
         row[i] = 4 * (i % 4) + i / 4 * (whole ? (uint32_t)line_floats : 16);
-    v_store_rows(whole ? rgba : block, row, out[0], out[1], out[2], out[3]);
+    v_store_rows(whole ? rgba : stamp, row, out[0], out[1], out[2], out[3]);
     if (whole)
         return;
-    for (int r = 0; r < BLOCK_ROWS && r < lines && count > 0; r++)
-        memcpy(rgba + (size_t)r * line_floats, block + 16 * r,
+    for (int r = 0; r < STAMP_ROWS && r < lines && count > 0; r++)
+        memcpy(rgba + (size_t)r * line_floats, stamp + 16 * r,
                16 * (size_t)(count < 4 ? count : 4));
 }
 
@@ -201,26 +201,26 @@ static void tile_background(const trip_cpu_view *view, float *rgba, float *depth
         }
 }
 
-/* The mean distance of what is seen at a block's pixels, as layer.h has it, from the merged
+/* The mean distance of what is seen at a stamp's pixels, as layer.h has it, from the merged
  * sums. */
 INLINE vf mean_distance(const trip_cpu_view *view, int x, int y, unsigned b, vf depth, vf alpha)
 {
     const trip_camera *camera = &view->splat.camera;
-    vf px = v_set((float)(x - 0.5 * camera->width)) + block_x(b);
-    vf py = v_set((float)(y - 0.5 * camera->height)) + block_y(b);
+    vf px = v_set((float)(x - 0.5 * camera->width)) + stamp_x(b);
+    vf py = v_set((float)(y - 0.5 * camera->height)) + stamp_y(b);
     vf ray_length = v_sqrt(form_at(view->world2, px, py)) * v_set((float)view->stretch);
     vm seen = v_gt(alpha, v_set(0));
     return v_select(seen, depth / v_select(seen, alpha, v_set(1)) * ray_length, v_set(INFINITY));
 }
 
-/* Distances of a block's pixels, as store_pixels(). */
+/* Distances of a stamp's pixels, as store_pixels(). */
 INLINE void store_depths(float *depth, size_t width, int count, int lines, vf distances)
 {
-    float block[V];
-    v_store(block, distances);
-    for (int r = 0; r < BLOCK_ROWS && r < lines; r++)
+    float stamp[V];
+    v_store(stamp, distances);
+    for (int r = 0; r < STAMP_ROWS && r < lines; r++)
         for (int i = 0; i < 4 && i < count; i++)
-            depth[(size_t)r * width + (size_t)i] = block[4 * r + i];
+            depth[(size_t)r * width + (size_t)i] = stamp[4 * r + i];
 }
 
 static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
@@ -235,12 +235,12 @@ static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_conten
         tile_background(view, rgba, depth, width, camera->width - x, camera->height - y);
         return;
     }
-    for (int b = 0; b < BLOCKS; b++) {
-        int column = 4 * (b % BLOCKS_ACROSS), line = BLOCK_ROWS * (b / BLOCKS_ACROSS);
+    for (int b = 0; b < STAMPS; b++) {
+        int column = 4 * (b % STAMPS_ACROSS), line = STAMP_ROWS * (b / STAMPS_ACROSS);
         int columns = camera->width - x - column, lines = camera->height - y - line;
         size_t at = (size_t)line * width + (size_t)column;
         vf out[CHANNELS];
-        merged_block(view, x, y, b, content, pixels, out);
+        merged_stamp(view, x, y, b, content, pixels, out);
         if (TRIP_CPU_DEPTH)
             store_depths(depth + at, width, columns, lines,
                          mean_distance(view, x, y, (unsigned)b, out[CHANNELS - 1], out[3]));

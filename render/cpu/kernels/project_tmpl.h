@@ -2,14 +2,14 @@
  * by table_tmpl.h after simd.h. Positions are computed in double precision from the voxel's
  * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
  * footprint in single. The few splats for whose numbers single does not do, near the plane of the
- * eye above all, go through trip_cpu_project_near(), which tells when they cannot be drawn. */
+ * eye above all, are projected one by one by trip_cpu_project_scalar(). */
 #ifndef TRIP_CPU_PROJECT_H
 #define TRIP_CPU_PROJECT_H
 
-#include "cpu/kernels/closed_tmpl.h"
+#include "cpu/kernels/saturated_tmpl.h"
 #include "cpu/kernels/exp_tmpl.h"
 #include "cpu/kernels/kernels.h"
-#include "cpu/near.h"
+#include "cpu/scalar.h"
 #include "cpu/kernels/simd_tmpl.h"
 #include "shade.h"
 
@@ -163,7 +163,7 @@ INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint
 
 typedef struct footprint {
     vf l11, l21, l22;                    /* as in trip_cpu_splat */
-    vf spread;                           /* |S| / |S'| */
+    vf det_ratio;                        /* |S| / |S'| */
     vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
     vm usual;                            /* the numbers are good */
 } footprint;
@@ -251,7 +251,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     out.l11 = v_sqrt(unit * (syy * inverse_det));
     out.l21 = -(sxy * inverse_syy) * out.l11;
     out.l22 = v_sqrt(unit * inverse_syy);
-    out.spread = det_s * inverse_det;
+    out.det_ratio = det_s * inverse_det;
 
     /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. What is
      * not a number is not usual. */
@@ -272,7 +272,7 @@ INLINE footprint footprint_parallel(const trip_cpu_view *view)
         .l11 = v_set(one.l11),
         .l21 = v_set(one.l21),
         .l22 = v_set(one.l22),
-        .spread = v_set((float)pow(s->amplitude / view->splat.amplitude, 2)),
+        .det_ratio = v_set((float)pow(s->amplitude / view->splat.amplitude, 2)),
         .shift_x = v_set((float)(0.5 * (s->x0 + s->x1) - s->x)),
         .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
         .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
@@ -459,7 +459,7 @@ INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extin
 {
     const trip_camera *camera = &view->splat.camera;
     vf depth = extinction * v_set((float)(view->splat.amplitude * view->stretch));
-    depth = depth * v_sqrt(f->spread);
+    depth = depth * v_sqrt(f->det_ratio);
     vi x0, x1, y0, y1;
     pixels(v_load(lanes->whole_x + at), v_load(lanes->x + at), f->shift_x, f->half_x, camera->width,
            &x0, &x1);
@@ -492,30 +492,30 @@ INLINE uint32_t rank(unsigned bits, uint32_t row[V])
     return n;
 }
 
-/* The lanes near the plane of the eye, one by one; returns those that are drawn. */
-static unsigned project_near(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                             unsigned lanes, trip_cpu_splat near[V], bool *broken)
+/* Lanes that are projected one by one; returns those that are drawn. */
+static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged *staged,
+                               uint32_t at, unsigned lanes, trip_cpu_splat splats[V], bool *broken)
 {
     unsigned drawn = 0;
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
         uint32_t k = at + i;
         double extinction = (double)view->of->table[staged->code[k]].extinction;
-        if (trip_cpu_project_near(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
-                                  &near[i], broken))
+        if (trip_cpu_project_scalar(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
+                                    &splats[i], broken))
             drawn |= 1u << i;
     }
     return drawn;
 }
 
-/* Puts the geometry of near splats over what the lanes computed; their colours stay. */
-static void replace_near(trip_cpu_splat *out, const uint32_t row[V], unsigned lanes,
-                         const trip_cpu_splat near[V])
+/* Puts the geometry of such splats over what the lanes computed; their colours stay. */
+static void replace_scalar(trip_cpu_splat *out, const uint32_t row[V], unsigned lanes,
+                           const trip_cpu_splat splats[V])
 {
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
         trip_cpu_splat *s = out + row[i] / 16;
-        trip_cpu_splat n = near[i];
+        trip_cpu_splat n = splats[i];
         n.r = s->r;
         n.g = s->g;
         n.b = s->b;
@@ -592,25 +592,25 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
                              trip_cpu_lanes *lanes, trip_cpu_splat *out, float *depths)
 {
     uint32_t row[V];
-    unsigned kept = lanes->kept[at / V], near = lanes->near[at / V];
+    unsigned kept = lanes->kept[at / V], scalar = lanes->scalar[at / V];
     trip_cpu_splat replaced[V];
-    if (near)
-        near = project_near(view, staged, at, near, replaced, &lanes->broken);
-    kept |= near;
+    if (scalar)
+        scalar = project_scalar(view, staged, at, scalar, replaced, &lanes->broken);
+    kept |= scalar;
     if (kept == 0)
         return 0;
     uint32_t n = rank(kept, row);
     store(view, lanes, at, row, colour_of(view, staged, at), out);
     if (TRIP_CPU_DEPTH)
         store_depths_of(view, lanes, at, row, depths);
-    if (near)
-        replace_near(out, row, near, replaced);
+    if (scalar)
+        replace_scalar(out, row, scalar, replaced);
     return n;
 }
 
 /* In three loops, each short enough that the processor works on several vectors at a time: one
- * loop's chain of divisions and roots would leave it waiting. What lies over closed blocks is left
- * out before it is coloured, stored, sorted and gathered. */
+ * loop's chain of divisions and roots would leave it waiting. What lies over saturated cells is
+ * left out before it is coloured, stored, sorted and gathered. */
 static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
                         trip_cpu_splat *out, float *depths)
@@ -627,13 +627,13 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
             f = footprint_of(&persp, &view->splat, lanes, i);
         unsigned valid = vm_bits(vm_first(count - i));
         unsigned behind = vm_bits(v_ge(v_set(0), v_load(lanes->z + i)));
-        unsigned near = valid & ~behind & ~vm_bits(f.usual);
+        unsigned scalar = valid & ~behind & ~vm_bits(f.usual);
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
-        unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~near;
+        unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~scalar;
         if (open && kept)
-            kept &= over_open_blocks(lanes, i, open, view->tiles_across);
+            kept &= over_open_cells(lanes, i, open, view->tiles_across);
         lanes->kept[i / V] = kept;
-        lanes->near[i / V] = near;
+        lanes->scalar[i / V] = scalar;
     }
     for (uint32_t i = 0; i < count; i += V)
         n += store_splats(view, staged, i, lanes, out + n, TRIP_CPU_DEPTH ? depths + n : NULL);

@@ -1,10 +1,10 @@
-/* Which squares of a region of voxels may show, V at a time: included by table_tmpl.h after
+/* Which squares of a region of voxels may be visible, V at a time: included by table_tmpl.h after
  * project_tmpl.h. */
 #ifndef TRIP_CPU_SQUARES_H
 #define TRIP_CPU_SQUARES_H
 
-#include "cpu/kernels/closed_tmpl.h"
-#include "cpu/cover.h"
+#include "cpu/kernels/saturated_tmpl.h"
+#include "cpu/occlusion.h"
 #include "cpu/kernels/project_tmpl.h"
 
 /* First and last pixel whose centre lies within `reach` of x; nothing when first > last. */
@@ -34,7 +34,7 @@ static uint64_t squares(const trip_cpu_view *view, const trip_cpu_region *region
                         const _Atomic uint64_t *open, trip_cpu_lanes *lanes)
 {
     const trip_camera *camera = &view->splat.camera;
-    uint64_t shown = 0;
+    uint64_t visible = 0;
     vi lane;
     for (int i = 0; i < V; i++)
         lane[i] = i;
@@ -54,10 +54,10 @@ static uint64_t squares(const trip_cpu_view *view, const trip_cpu_region *region
         vi_store(lanes->tiles + i, tiles_of(x0, y0, x1, y1, view->tiles_across));
         unsigned any = vm_bits(vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1)));
         if (any)
-            any &= over_open_blocks(lanes, i, open, view->tiles_across);
-        shown |= (uint64_t)any << i;
+            any &= over_open_cells(lanes, i, open, view->tiles_across);
+        visible |= (uint64_t)any << i;
     }
-    return shown;
+    return visible;
 }
 
 #endif

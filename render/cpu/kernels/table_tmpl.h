@@ -3,7 +3,7 @@
 #define TRIP_CPU_TABLE_H
 
 #include "cpu/kernels/blend_tmpl.h"
-#include "cpu/kernels/drawn_tmpl.h"
+#include "cpu/kernels/count_tmpl.h"
 #include "cpu/kernels/isa.h"
 #include "cpu/kernels/merge_tmpl.h"
 #include "cpu/kernels/project_tmpl.h"

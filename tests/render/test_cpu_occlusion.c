@@ -1,8 +1,8 @@
-/* What counts as hidden: never a voxel with a pixel of its support in an open block, by the
+/* What counts as occluded: never a voxel with a pixel of its support in an open cell, by the
  * definition of splats in double precision. */
 #include "cpu/kernels/isa.h"
-#include "cpu/near.h"
-#include "cpu/show.h"
+#include "cpu/view.h"
+#include "cpu/cull.h"
 #include "scenes.h"
 #include "test.h"
 
@@ -72,7 +72,7 @@ static bool any_reaches(const looks *l, const trip_cpu_box *box, unsigned x, uns
     return false;
 }
 
-static void check_boxes(looks *l, unsigned seed, unsigned *hidden, unsigned *reaching)
+static void check_boxes(looks *l, unsigned seed, unsigned *occluded, unsigned *reaching)
 {
     for (unsigned i = 0; i < 400; i++) {
         uint32_t h = scene_hash((int)i, (int)seed, l->view.axis);
@@ -80,35 +80,35 @@ static void check_boxes(looks *l, unsigned seed, unsigned *hidden, unsigned *rea
         trip_cpu_box box = { { h / 131072 % 5 * 8 + 3.5, (h >> 24 & 8) + 3.5, h / 4096 % 32 },
                              { 3.5, 3.5, 0 } };
         open_only(l, x, y);
-        bool is_hidden = trip_cpu_box_cover(&l->view, &l->mask, &box) == TRIP_CPU_HIDDEN;
+        bool is_occluded = trip_cpu_box_occlusion(&l->view, &l->mask, &box) == TRIP_CPU_OCCLUDED;
         bool reached = any_reaches(l, &box, x, y);
-        assert_false(is_hidden && reached);
-        *hidden += is_hidden;
+        assert_false(is_occluded && reached);
+        *occluded += is_occluded;
         *reaching += reached;
     }
 }
 
-static void what_is_hidden_reaches_no_open_block(void **state)
+static void what_is_occluded_reaches_no_open_cell(void **state)
 {
     (void)state;
     scene s;
     looks l;
-    unsigned hidden = 0, reaching = 0;
+    unsigned occluded = 0, reaching = 0;
     scene_create(&s, &(scene_params){ .dims = { 32, 32, 32 }, .tile_voxels = 32 });
     for (int i = 0; i < 12; i++) {
         trip_vec3 from = { cos(1.1 * i), sin(1.1 * i), 0.5 * sin(3.3 * i) };
         trip_camera_params view = scene_view(&s, from, 90 - 8 * i, 60, SIZE);
         view.ortho_height = i % 3 == 2 ? 40 : 0;
         look(&l, &s, &view, i % 3);
-        check_boxes(&l, (unsigned)i, &hidden, &reaching);
+        check_boxes(&l, (unsigned)i, &occluded, &reaching);
     }
-    print_message("%u hidden, %u reach\n", hidden, reaching);
-    assert_true(hidden > 1000);
+    print_message("%u occluded, %u reach\n", occluded, reaching);
+    assert_true(occluded > 1000);
     assert_true(reaching > 200);
     scene_destroy(&s);
 }
 
-static void without_closed_blocks_all_is_shown(void **state)
+static void without_saturated_cells_all_is_visible(void **state)
 {
     (void)state;
     scene s;
@@ -119,9 +119,9 @@ static void without_closed_blocks_all_is_shown(void **state)
     for (int i = 0; i < ACROSS * ACROSS; i++)
         l.open[i] = UINT64_MAX;
     trip_cpu_box box = { { 15.5, 15.5, 16 }, { 3.5, 3.5, 0 } };
-    assert_int_equal(trip_cpu_box_cover(&l.view, &l.mask, &box), TRIP_CPU_SHOWN);
+    assert_int_equal(trip_cpu_box_occlusion(&l.view, &l.mask, &box), TRIP_CPU_VISIBLE);
     l.open[4] = ~(UINT64_C(1) << 36); /* in the image's middle */
-    assert_int_equal(trip_cpu_box_cover(&l.view, &l.mask, &box), TRIP_CPU_PARTLY);
+    assert_int_equal(trip_cpu_box_occlusion(&l.view, &l.mask, &box), TRIP_CPU_PARTLY);
     scene_destroy(&s);
 }
 
@@ -136,7 +136,7 @@ typedef struct run_looks {
     uint32_t voxels[TILE * TILE];
     uint64_t bytes[TRIP_BLOCK_WORDS_MAX];
     trip_block block;
-    uint32_t count, hidden, left_in; /* left_in: that reach no open block */
+    uint32_t count, occluded, left_in; /* left_in: that reach no open cell */
 } run_looks;
 
 /* Every third voxel of a tile, in Morton order. */
@@ -158,7 +158,7 @@ static void fill_run(run_looks *r)
     r->block = trip_block_make(&form, r->count, words, r->bytes, NULL);
 }
 
-static bool is_shown(const trip_cpu_part *part, uint32_t voxel)
+static bool stays_in(const trip_cpu_part *part, uint32_t voxel)
 {
     unsigned u = trip_voxel_u(voxel) / TRIP_CPU_SQUARE, v = trip_voxel_v(voxel) / TRIP_CPU_SQUARE;
     return part->voxels > 0 && trip_cpu_part_has(part, (unsigned)trip_morton(u, v));
@@ -170,17 +170,17 @@ static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, 
     trip_run run = { .count = r->count, .sheet = sheet };
     const trip_cpu_culling culling = { kernels, &r->looks.view, &r->looks.mask, &r->lanes };
     trip_cpu_part part = trip_cpu_part_make(&run, &r->block, false, 0, r->count);
-    uint32_t shown = 0;
-    trip_cpu_show(&culling, &r->block, &part);
+    uint32_t staying = 0;
+    trip_cpu_cull(&culling, &r->block, &part);
     for (uint32_t i = 0; i < r->count; i++) {
         const double at[3] = { trip_voxel_u(r->voxels[i]), trip_voxel_v(r->voxels[i]), sheet };
-        bool reached = reaches(&r->looks, at, x, y), stays = is_shown(&part, r->voxels[i]);
+        bool reached = reaches(&r->looks, at, x, y), stays = stays_in(&part, r->voxels[i]);
         assert_false(reached && !stays);
-        r->hidden += !stays;
+        r->occluded += !stays;
         r->left_in += stays && !reached;
-        shown += stays;
+        staying += stays;
     }
-    assert_int_equal(part.voxels, shown);
+    assert_int_equal(part.voxels, staying);
 }
 
 static void runs_show_all_that_reaches_an_open_block(void **state)
@@ -189,7 +189,7 @@ static void runs_show_all_that_reaches_an_open_block(void **state)
     scene s;
     run_looks *r = aligned_alloc(64, (sizeof *r + 63) / 64 * 64);
     assert_non_null(r);
-    r->hidden = r->left_in = 0;
+    r->occluded = r->left_in = 0;
     scene_create(&s, &(scene_params){ .dims = { TILE, TILE, 8 }, .tile_voxels = TILE });
     fill_run(r);
     for (int i = 0; i < 4; i++) {
@@ -204,8 +204,8 @@ static void runs_show_all_that_reaches_an_open_block(void **state)
                 check_run(r, *isa, (int)k % 8, x, y);
         }
     }
-    print_message("%u hidden, %u left in\n", r->hidden, r->left_in);
-    assert_true(r->hidden > 10 * r->left_in);
+    print_message("%u occluded, %u left in\n", r->occluded, r->left_in);
+    assert_true(r->occluded > 10 * r->left_in);
     scene_destroy(&s);
     free(r);
 }
@@ -213,8 +213,8 @@ static void runs_show_all_that_reaches_an_open_block(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_hidden_reaches_no_open_block),
-        cmocka_unit_test(without_closed_blocks_all_is_shown),
+        cmocka_unit_test(what_is_occluded_reaches_no_open_cell),
+        cmocka_unit_test(without_saturated_cells_all_is_visible),
         cmocka_unit_test(runs_show_all_that_reaches_an_open_block),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

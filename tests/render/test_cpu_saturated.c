@@ -1,7 +1,7 @@
-/* Which splats every instruction set leaves out over closed blocks: those without an open block
- * among the pixels of their support, block by block. */
+/* Which splats every instruction set leaves out over saturated cells: those without an open cell
+ * among the pixels of their support, cell by cell. */
 #include "cpu/kernels/isa.h"
-#include "cpu/near.h"
+#include "cpu/view.h"
 #include "scenes.h"
 #include "test.h"
 
@@ -22,7 +22,7 @@ typedef struct fixture {
     trip_cpu_lanes lanes;
     _Atomic uint64_t open[TILES];
     trip_cpu_splat all[TRIP_CPU_STAGED + LEFT_OVER], some[TRIP_CPU_STAGED + LEFT_OVER];
-    uint32_t hidden, shown, kept_hidden;
+    uint32_t occluded, visible, kept_occluded;
 } fixture;
 
 static int set_up(void **state)
@@ -57,10 +57,10 @@ static void look(fixture *f, double distance, double ortho_height, int axis)
                              .plan = &f->plan,
                              .table = f->scene.table };
     trip_cpu_layer_view_make(&f->view, &f->frame, axis, true);
-    f->hidden = f->shown = f->kept_hidden = 0;
+    f->occluded = f->visible = f->kept_occluded = 0;
 }
 
-/* Voxels from anywhere, and blocks open one in sixteen, in half of the tiles. */
+/* Voxels from anywhere, and cells open, one in sixteen, in half of the tiles. */
 static uint32_t stage_some(fixture *f, int seed)
 {
     uint32_t count = TRIP_CPU_STAGED - (uint32_t)seed % 40;
@@ -82,8 +82,8 @@ static uint32_t stage_some(fixture *f, int seed)
 
 static bool is_open(const fixture *f, int x, int y)
 {
-    int block = y % TRIP_CPU_TILE / 4 * 8 + x % TRIP_CPU_TILE / 4;
-    return f->open[y / TRIP_CPU_TILE * ACROSS + x / TRIP_CPU_TILE] >> block & 1;
+    int cell = y % TRIP_CPU_TILE / 4 * 8 + x % TRIP_CPU_TILE / 4;
+    return f->open[y / TRIP_CPU_TILE * ACROSS + x / TRIP_CPU_TILE] >> cell & 1;
 }
 
 static bool shows(const fixture *f, const trip_cpu_splat *s)
@@ -105,10 +105,10 @@ static void check(fixture *f, const trip_cpu_kernels *k, int seed)
         next += kept;
         if (shows(f, &f->all[i])) {
             assert_true(kept);
-            f->shown++;
+            f->visible++;
         } else {
-            f->hidden++;
-            f->kept_hidden += kept;
+            f->occluded++;
+            f->kept_occluded += kept;
             if (kept)
                 assert_true(f->all[i].tiles & TRIP_CPU_TILES_MORE);
         }
@@ -124,9 +124,9 @@ static void what_has_an_open_block_stays_and_nothing_else(void **state)
             look(f, 70 + 40 * view, view == 3 ? 50 : 0, view % 3);
             for (int seed = 0; seed < 50; seed++)
                 check(f, *isa, 50 * view + seed);
-            assert_true(f->shown > 1000);
-            assert_true(f->hidden > 1000);
-            assert_int_equal(f->kept_hidden, 0);
+            assert_true(f->visible > 1000);
+            assert_true(f->occluded > 1000);
+            assert_int_equal(f->kept_occluded, 0);
         }
 }
 
@@ -138,8 +138,8 @@ static void large_splats_stay_where_they_show(void **state)
         look(f, 24, 4, 1);
         for (int seed = 0; seed < 50; seed++)
             check(f, *isa, seed);
-        assert_true(f->shown > 100);
-        assert_true(f->kept_hidden < f->hidden);
+        assert_true(f->visible > 100);
+        assert_true(f->kept_occluded < f->occluded);
     }
 }
 

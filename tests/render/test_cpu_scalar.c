@@ -1,5 +1,5 @@
 /* The short form of a thin splat's opacity against its definition, in double precision. */
-#include "cpu/near.h"
+#include "cpu/scalar.h"
 #include "test.h"
 
 #include <math.h>

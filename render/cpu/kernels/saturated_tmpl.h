@@ -1,30 +1,30 @@
-/* Which projected splats lie over closed blocks of pixels only, V at a time: included by
- * project_tmpl.h. Closed pixels never change, so that those splats can be left out; blocks may
- * close while one looks, and never open. */
-#ifndef TRIP_CPU_CLOSED_H
-#define TRIP_CPU_CLOSED_H
+/* Which projected splats lie over saturated cells alone (trip_cpu_mask), V at a time: included by
+ * project_tmpl.h. Saturated pixels never change, so that those splats can be left out; cells may
+ * become saturated meanwhile, and never open again. */
+#ifndef TRIP_CPU_SATURATED_H
+#define TRIP_CPU_SATURATED_H
 
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 
-/* The blocks of four tiles, two by two, that each lane's support may touch. */
-typedef struct blocks {
+/* The cells of four tiles, two by two, that each lane's support may touch. */
+typedef struct cells {
     vi tile;              /* the first; 0 in lanes without pixels */
     vi columns;           /* bits: eight of the first tile, eight of the one to the right */
     vi top, bottom;       /* rows, counted from the first tile's */
     vi any_right, across; /* 1 and a row of tiles where the support goes there, else 0 */
-} blocks;
+} cells;
 
-INLINE blocks blocks_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int tiles_across)
+INLINE cells cells_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int tiles_across)
 {
     vi first = vi_load(lanes->first + at), last = vi_load(lanes->last + at);
     vi tiles = vi_load(lanes->tiles + at);
     vi x0 = first & 0xffff, y0 = v_shift_right(first, 16);
     vi x1 = last & 0xffff, y1 = v_shift_right(last, 16);
-    static_assert(TRIP_CPU_TILE == 32, "eight blocks of four pixels, in the shifts below");
+    static_assert(TRIP_CPU_TILE == 32, "eight cells of four pixels, in the shifts below");
     vi left = x0 >> 2 & 7, right = ((x1 >> 2) - (x0 >> 5) * 8) & 15;
     tiles &= (vi)(x0 <= x1) & (vi)(y0 <= y1);
-    return (blocks){
+    return (cells){
         .tile = tiles & TRIP_CPU_TILES_FIRST,
         .columns = (vi_set(0xffff) << left) & (vi_set(0xffff) >> (15 - right)),
         .top = y0 >> 2 & 7,
@@ -48,7 +48,7 @@ INLINE vw rows_of_below(vw bottom)
     return ~(vw_set(UINT64_MAX) << half << half);
 }
 
-/* The lanes, a bit each, with an open block among those of one of the four tiles. */
+/* The lanes, a bit each, with an open cell among those of one of the four tiles. */
 INLINE unsigned open_in(const _Atomic uint64_t *open, vi tile, vi columns, vw rows_low,
                         vw rows_high)
 {
@@ -59,12 +59,12 @@ INLINE unsigned open_in(const _Atomic uint64_t *open, vi tile, vi columns, vw ro
     return vw_not_0(low) | vw_not_0(high) << V / 2;
 }
 
-/* The lanes, a bit each, that may touch an open block; `open` is a word a tile, as in
+/* The lanes, a bit each, that may touch an open cell; `open` is a word a tile, as in
  * trip_cpu_mask. Those without pixels give any bit. */
-INLINE unsigned over_open_blocks(const trip_cpu_lanes *lanes, uint32_t at,
-                                 const _Atomic uint64_t *open, int tiles_across)
+INLINE unsigned over_open_cells(const trip_cpu_lanes *lanes, uint32_t at,
+                                const _Atomic uint64_t *open, int tiles_across)
 {
-    blocks b = blocks_of_lanes(lanes, at, tiles_across);
+    cells b = cells_of_lanes(lanes, at, tiles_across);
     vw bottom_low = vw_low(b.bottom), bottom_high = vw_high(b.bottom);
     vw low = rows_of_first(vw_low(b.top), bottom_low);
     vw high = rows_of_first(vw_high(b.top), bottom_high);

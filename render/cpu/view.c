@@ -1,9 +1,6 @@
-#include "cpu/near.h"
-
-#include <string.h>
+#include "cpu/view.h"
 
 #include "normal.h"
-#include "pixels.h"
 #include "shade.h"
 
 #define LOG2_E 1.44269504088896340736
@@ -17,97 +14,6 @@ static double most_stretch(const trip_affine *a)
         for (int j = 0; j < 3; j++)
             sum += a->m[i][j] * a->m[i][j];
     return sqrt(sum);
-}
-
-uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across)
-{
-    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
-    uint32_t right = s->x1 / TRIP_CPU_TILE - x, below = s->y1 / TRIP_CPU_TILE - y;
-    uint32_t more = right > 1 || below > 1 ? TRIP_CPU_TILES_MORE : 0;
-    return (y * (uint32_t)tiles_across + x) | more |
-           (uint32_t)(right > 0) << TRIP_CPU_TILES_RIGHT_SHIFT |
-           (uint32_t)(below > 0) << TRIP_CPU_TILES_BELOW_SHIFT;
-}
-
-void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
-{
-    double unit = s->ray2 / (TRIP_CUTOFF * TRIP_CUTOFF);
-    double xx = s->conic_xx * unit, xy = s->conic_xy * unit, yy = s->conic_yy * unit;
-    double l11 = sqrt(xx), l21 = xy / l11;
-    out->l11 = (float)l11;
-    out->l21 = (float)l21;
-    out->l22 = (float)sqrt(fmax(0, yy - l21 * l21));
-}
-
-/* Room for the rounding of a support's bounds. */
-#define SLACK_PX 1e-3
-
-/* False when there are no pixels. */
-static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *last)
-{
-    trip_pixels p = trip_pixels_within(lo - SLACK_PX, hi + SLACK_PX, size);
-    *first = (uint16_t)p.first;
-    *last = (uint16_t)p.last;
-    return p.first <= p.last;
-}
-
-/* The opacity is within 4e-4 A of 1 - exp(-A (exp(-m / 2) - edge)), within 1.5e-4 A for A up to
- * 0.1, and so within 1.2e-4. Its integral over the plane, where area is in proportion to m, is
- * within 1e-6 of itself, so that many faint splats add up to nothing wrong. Found by least squares
- * over u and A together, reweighted to even out the error at each A, with that integral as a
- * condition. */
-const float trip_cpu_thin[TRIP_CPU_TERMS][4] = {
-    { 0.159756631f, -0.168852314f, -0.0508883893f, 0.346433312f },
-    { 0.0594277196f, 1.73690438f, 0.0941105708f, -2.60230803f },
-    { 0.759691179f, -5.79509068f, 0.645263553f, 6.28719616f },
-    { -0.622695327f, 7.89423943f, -1.71902728f, -6.14846611f },
-    { 0.641818106f, -3.9144907f, 1.08012068f, 2.11197734f },
-};
-
-static void set_opacity(const trip_cpu_view *view, double depth, trip_cpu_splat *out)
-{
-    if (depth > (double)view->thin)
-        out->tiles |= 1u << TRIP_CPU_TILES_THICK_SHIFT;
-    if (depth > (double)view->thin || view->rays == TRIP_CPU_STRETCHED) {
-        double least = log2(depth) + 127 - (double)view->cutoff / TRIP_CPU_EXP_UNIT;
-        out->c[TRIP_CPU_LEAST] = (float)(least * TRIP_CPU_EXP_UNIT);
-        out->c[TRIP_CPU_EDGE] = (float)(depth * view->splat.edge);
-        return;
-    }
-    for (int i = 0; i < TRIP_CPU_TERMS; i++) {
-        double c = 0;
-        for (int j = 3; j >= 0; j--)
-            c = c * depth + (double)trip_cpu_thin[i][j];
-        out->c[i] = (float)(c * sqrt(depth));
-    }
-}
-
-bool trip_cpu_project_near(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
-                           trip_cpu_splat *out, bool *broken)
-{
-    const trip_camera *camera = &view->splat.camera;
-    double position[3];
-    position[view->u_axis] = u;
-    position[view->v_axis] = v;
-    position[view->axis] = sheet;
-    trip_splat s;
-    memset(out, 0, sizeof *out);
-    bool drawn =
-        trip_splat_project(&view->splat, trip_v3(position[0], position[1], position[2]), &s);
-    if (trip_splat_is_broken(&s))
-        *broken = true;
-    if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
-        !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
-        return false;
-    trip_cpu_set_conic(&s, out);
-    double x = s.x - out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    double y = s.y - out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    out->l1 = (float)-((double)out->l11 * x + (double)out->l21 * y);
-    out->l2 = (float)-((double)out->l22 * y);
-    double depth = extinction * s.amplitude * view->stretch;
-    out->tiles = trip_cpu_tiles(out, view->tiles_across);
-    set_opacity(view, depth, out);
-    return depth > 0x1p-60;
 }
 
 /* X = to_x . (voxel - eye) and so on as a function of the list's own coordinates. */

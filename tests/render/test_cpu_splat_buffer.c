@@ -1,7 +1,7 @@
 /* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
  * first, and in which order tiles get their splats back. */
-#include "cpu/bin.h"
-#include "cpu/near.h"
+#include "cpu/splat_buffer.h"
+#include "cpu/scalar.h"
 #include "test.h"
 
 #include <stdlib.h>
@@ -11,7 +11,7 @@ enum { ACROSS = 4, TILES = ACROSS * ACROSS, CAPACITY = 2 * TRIP_CPU_CHUNK };
 
 typedef struct fixture {
     trip_budget *budget;
-    trip_cpu_flush flush;
+    trip_cpu_buffer buffer;
     uint32_t counts[TILES + ACROSS + 2];
     trip_cpu_sorting sorting;
     _Atomic uint64_t open[TILES];
@@ -23,9 +23,9 @@ static int set_up(void **state)
     fixture *f = calloc(1, sizeof *f);
     assert_non_null(f);
     assert_int_equal(trip_budget_create(&f->budget, UINT64_C(1) << 24), 0);
-    assert_int_equal(trip_cpu_flush_create(&f->flush, CAPACITY, f->budget), 0);
-    assert_int_equal(trip_cpu_flush_fit(&f->flush, TILES, false, f->budget), 0);
-    trip_cpu_flush_empty(&f->flush);
+    assert_int_equal(trip_cpu_buffer_create(&f->buffer, CAPACITY, f->budget), 0);
+    assert_int_equal(trip_cpu_buffer_fit(&f->buffer, TILES, false, f->budget), 0);
+    trip_cpu_buffer_empty(&f->buffer);
     f->sorting.counts = f->counts;
     f->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, f->open };
     for (int i = 0; i < TILES; i++)
@@ -37,7 +37,7 @@ static int set_up(void **state)
 static int tear_down(void **state)
 {
     fixture *f = *state;
-    trip_cpu_flush_destroy(&f->flush, f->budget);
+    trip_cpu_buffer_destroy(&f->buffer, f->budget);
     trip_budget_destroy(f->budget);
     free(f);
     return 0;
@@ -47,7 +47,7 @@ static int tear_down(void **state)
 static uint32_t reserve(fixture *f, uint32_t count)
 {
     uint32_t reserved = 0;
-    while (reserved < count && trip_cpu_flush_reserve(&f->flush))
+    while (reserved < count && trip_cpu_buffer_reserve(&f->buffer))
         reserved++;
     return reserved;
 }
@@ -56,14 +56,14 @@ static uint32_t reserve(fixture *f, uint32_t count)
  */
 static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
 {
-    trip_cpu_chunk *chunk = &f->flush.chunks[number];
-    if (!trip_cpu_flush_claim(&f->flush, chunk, count))
+    trip_cpu_chunk *chunk = &f->buffer.chunks[number];
+    if (!trip_cpu_buffer_claim(&f->buffer, chunk, count))
         return;
     chunk->splats = count;
     for (uint32_t i = 0; i < count; i++)
-        f->flush.splats[chunk->splat + i] =
+        f->buffer.splats[chunk->splat + i] =
             (trip_cpu_splat){ .r = mark, .g = (float)i, .tiles = i % TILES };
-    trip_cpu_bin(&f->flush, chunk, f->mask.grid, &f->sorting);
+    trip_cpu_sort_chunk(&f->buffer, chunk, f->mask.grid, &f->sorting);
 }
 
 static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state)
@@ -74,7 +74,7 @@ static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state
     fill(f, 3, CAPACITY / 4, 3);
     fill(f, 0, CAPACITY / 8, 0);
     fill(f, 2, CAPACITY / 2, 2);
-    assert_int_equal(trip_cpu_flush_cut(&f->flush), 2);
+    assert_int_equal(trip_cpu_buffer_cut(&f->buffer), 2);
     assert_int_equal(reserve(f, 1), 1);
 }
 
@@ -89,11 +89,11 @@ static void a_first_chunk_that_always_comes_last_finds_room_in_the_end(void **st
         assert_true(reserved > 0);
         for (uint32_t i = reserved; i-- > 0;)
             fill(f, i, TRIP_CPU_CHUNK, 0);
-        kept = trip_cpu_flush_cut(&f->flush);
+        kept = trip_cpu_buffer_cut(&f->buffer);
     }
     assert_int_equal(kept, 1);
     assert_int_equal(rounds, 2);
-    trip_cpu_flush_empty(&f->flush);
+    trip_cpu_buffer_empty(&f->buffer);
     assert_int_equal(reserve(f, 5), 5);
 }
 
@@ -124,11 +124,11 @@ static void tiles_get_their_splats_in_the_chunks_order_whoever_came_first(void *
     assert_int_equal(reserve(f, 3), 3);
     for (int i = 0; i < 3; i++)
         fill(f, order[i], 100, (float)order[i]);
-    assert_int_equal(trip_cpu_flush_cut(&f->flush), 3);
-    trip_cpu_link(&f->flush, &f->mask);
+    assert_int_equal(trip_cpu_buffer_cut(&f->buffer), 3);
+    trip_cpu_link_tile_lists(&f->buffer, &f->mask);
     for (uint32_t tile = 0; tile < TILES; tile++) {
         taken t = { .tile = tile };
-        trip_cpu_share_each(&f->flush, tile, take, &t);
+        trip_cpu_tile_list_each(&f->buffer, tile, take, &t);
         uint32_t each = 100 / TILES + (tile < 100 % TILES);
         assert_int_equal(t.count, tile == 5 ? 0 : 3 * each);
     }
@@ -178,19 +178,19 @@ static void every_tile_that_a_splat_lies_in_gets_it_once(void **state)
     fixture *f = *state;
     enum { SPLATS = 3000 };
     assert_int_equal(reserve(f, 1), 1);
-    trip_cpu_chunk *chunk = &f->flush.chunks[0];
-    assert_true(trip_cpu_flush_claim(&f->flush, chunk, SPLATS));
+    trip_cpu_chunk *chunk = &f->buffer.chunks[0];
+    assert_true(trip_cpu_buffer_claim(&f->buffer, chunk, SPLATS));
     chunk->splats = SPLATS;
     for (uint32_t i = 0; i < SPLATS; i++)
-        f->flush.splats[chunk->splat + i] = mixed(i);
-    trip_cpu_bin(&f->flush, chunk, f->mask.grid, &f->sorting);
-    trip_cpu_link(&f->flush, &f->mask);
+        f->buffer.splats[chunk->splat + i] = mixed(i);
+    trip_cpu_sort_chunk(&f->buffer, chunk, f->mask.grid, &f->sorting);
+    trip_cpu_link_tile_lists(&f->buffer, &f->mask);
     for (uint32_t tile = 0; tile < TILES; tile++) {
         taken t = { .tile = tile };
         uint32_t expected = 0;
         for (uint32_t i = 0; i < SPLATS; i++)
-            expected += lies_in(&f->flush.splats[chunk->splat + i], tile);
-        trip_cpu_share_each(&f->flush, tile, take_mixed, &t);
+            expected += lies_in(&f->buffer.splats[chunk->splat + i], tile);
+        trip_cpu_tile_list_each(&f->buffer, tile, take_mixed, &t);
         assert_int_equal(t.count, expected);
     }
     for (int i = 0; i < TILES + ACROSS + 2; i++)

@@ -1,20 +1,20 @@
-#include "cpu/show.h"
+#include "cpu/cull.h"
 
-/* The fewest voxels whose region is worth a look, which costs about as much as so many splats. */
+/* The fewest voxels whose region is worth a test, which costs about as much as so many splats. */
 enum { FEWEST = 16 };
 
 /* Squares of a word of a block are those of a region. */
 static_assert(TRIP_CPU_REGION_SQUARES == 64 && TRIP_CPU_SQUARE == 8, "as in a block");
 
-/* Which squares of a region of the run's tile may show. */
-static uint64_t look_at(const trip_cpu_culling *c, const trip_run *run, unsigned word)
+/* Which squares of a region of the run's tile of the sheet may be visible. */
+static uint64_t visible_squares(const trip_cpu_culling *c, const trip_run *run, unsigned word)
 {
     trip_cpu_region where;
     int u = run->u + (int)(word & 1) * TRIP_CPU_REGION;
     int v = run->v + (int)(word >> 1) * TRIP_CPU_REGION;
-    trip_cpu_cover cover = trip_cpu_region_make(c->view, u, v, run->sheet, &where);
-    if (cover != TRIP_CPU_SHOWN)
-        return cover == TRIP_CPU_HIDDEN ? 0 : UINT64_MAX;
+    trip_cpu_occlusion occlusion = trip_cpu_region_make(c->view, u, v, run->sheet, &where);
+    if (occlusion != TRIP_CPU_VISIBLE)
+        return occlusion == TRIP_CPU_OCCLUDED ? 0 : UINT64_MAX;
     return c->kernels->squares(c->view, &where, c->mask->tiles, c->lanes);
 }
 
@@ -28,19 +28,19 @@ static uint32_t count_voxels(const trip_block *block, const trip_cpu_part *part)
     return voxels;
 }
 
-void trip_cpu_show(const trip_cpu_culling *c, const trip_block *block, trip_cpu_part *part)
+void trip_cpu_cull(const trip_cpu_culling *c, const trip_block *block, trip_cpu_part *part)
 {
     const trip_run *run = part->run;
     if (!c->view->front_to_back)
         return;
     trip_cpu_box box = trip_cpu_brick_box(c->view, run->brick, run->sheet, run->sheet);
-    trip_cpu_cover cover = trip_cpu_box_cover(c->view, c->mask, &box);
-    if (cover == TRIP_CPU_HIDDEN) {
+    trip_cpu_occlusion occlusion = trip_cpu_box_occlusion(c->view, c->mask, &box);
+    if (occlusion == TRIP_CPU_OCCLUDED) {
         part->voxels = 0;
-    } else if (cover == TRIP_CPU_PARTLY && part->voxels >= FEWEST) {
+    } else if (occlusion == TRIP_CPU_PARTLY && part->voxels >= FEWEST) {
         for (unsigned word = 0; word < block->present_words; word++)
             if (part->squares[word])
-                part->squares[word] &= look_at(c, run, word);
+                part->squares[word] &= visible_squares(c, run, word);
         part->voxels = count_voxels(block, part);
     }
 }

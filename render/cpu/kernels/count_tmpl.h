@@ -1,23 +1,23 @@
 /* Which splats meet a pixel: by the numbers that project() gave them and the arithmetic that blends
  * and weighs, so that what is counted is what the kernels do. Included by table_tmpl.h after
  * merge_tmpl.h. */
-#ifndef TRIP_CPU_DRAWN_H
-#define TRIP_CPU_DRAWN_H
+#ifndef TRIP_CPU_COUNT_TMPL_H
+#define TRIP_CPU_COUNT_TMPL_H
 
 #include "cpu/kernels/blend_tmpl.h"
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/merge_tmpl.h"
 
-/* Whether some pixel of a block of the tile at hand lies in the image, in the support of `splat`,
+/* Whether some pixel of a stamp of the tile at hand lies in the image, in the support of `splat`,
  * which is local to the tile, and where the list has weight. */
-static bool touches_block(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsigned number)
+static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsigned number)
 {
     const trip_cpu_view *view = s->view;
-    int column = (int)number % BLOCKS_ACROSS, row = (int)number / BLOCKS_ACROSS;
+    int column = (int)number % STAMPS_ACROSS, row = (int)number / STAMPS_ACROSS;
     if (!(s->rays_known[number / 64] >> number % 64 & 1))
         set_rays(s, number);
-    patch p = { .x = block_x(number),
-                .y = block_y(number),
+    patch p = { .x = stamp_x(number),
+                .y = stamp_y(number),
                 .ray = v_load(s->rays + 2 * V * number) };
     vm in = vm_and(v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)),
                    in_image(&view->splat.camera, s->x, s->y, column, row));
@@ -38,9 +38,9 @@ static bool touches_tile(trip_cpu_scratch *s, const trip_cpu_splat *splat, int x
         memset(s->rays_known, 0, sizeof s->rays_known);
     s->x = x;
     s->y = y;
-    for (int row = top / BLOCK_ROWS; row <= bottom / BLOCK_ROWS; row++)
+    for (int row = top / STAMP_ROWS; row <= bottom / STAMP_ROWS; row++)
         for (int column = left / 4; column <= right / 4; column++)
-            if (touches_block(s, &local, (unsigned)(row * BLOCKS_ACROSS + column)))
+            if (touches_stamp(s, &local, (unsigned)(row * STAMPS_ACROSS + column)))
                 return true;
     return false;
 }

@@ -1,12 +1,12 @@
-#include "cpu/bin.h"
+#include "cpu/splat_buffer.h"
 
 #include <string.h>
 
 #include "report.h"
 
-/* Room for a splat's places in the tiles' orders, on average; splats that need more are wide, and
- * their chunks are spread. */
-enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_SEGMENT = 4, SMALLEST_CHUNK = 64 };
+/* Room for a splat's places in the tiles' orders, on average; chunks whose splats are so wide that
+ * they need more are left unsorted. */
+enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_BUCKET = 4, SMALLEST_CHUNK = 64 };
 
 /* Places that are written together. */
 enum { AT_A_TIME = 16 };
@@ -19,22 +19,22 @@ static void *part(char *memory, size_t *at, size_t bytes)
 }
 
 /* Lays the arrays out in `memory`, or only counts when it is NULL. */
-static size_t lay_out(trip_cpu_flush *f, char *memory)
+static size_t lay_out(trip_cpu_buffer *f, char *memory)
 {
     size_t at = 0;
     f->splats = part(memory, &at, (size_t)f->capacity * sizeof *f->splats);
     f->order = part(memory, &at, (size_t)f->order_capacity * sizeof *f->order);
-    f->segments = part(memory, &at, (size_t)f->segment_capacity * sizeof *f->segments);
+    f->buckets = part(memory, &at, (size_t)f->bucket_capacity * sizeof *f->buckets);
     f->chunks = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->chunks);
-    f->spread = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->spread);
+    f->unsorted = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->unsorted);
     return at;
 }
 
-int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *budget)
+int trip_cpu_buffer_create(trip_cpu_buffer *f, uint32_t capacity, trip_budget *budget)
 {
     f->capacity = capacity;
     f->order_capacity = capacity * ORDERS_PER_SPLAT;
-    f->segment_capacity = capacity / SPLATS_PER_SEGMENT;
+    f->bucket_capacity = capacity / SPLATS_PER_BUCKET;
     f->chunk_capacity = capacity / SMALLEST_CHUNK;
     f->bytes = lay_out(f, NULL);
     char *memory = trip_budget_take(budget, f->bytes);
@@ -47,28 +47,28 @@ int trip_cpu_flush_create(trip_cpu_flush *f, uint32_t capacity, trip_budget *bud
     return 0;
 }
 
-static size_t depth_bytes(const trip_cpu_flush *f)
+static size_t depth_bytes(const trip_cpu_buffer *f)
 {
     return (size_t)f->capacity * sizeof *f->depths;
 }
 
-void trip_cpu_flush_destroy(trip_cpu_flush *f, trip_budget *budget)
+void trip_cpu_buffer_destroy(trip_cpu_buffer *f, trip_budget *budget)
 {
     trip_budget_release(budget, f->splats, f->bytes);
-    trip_budget_release(budget, f->shares, f->share_bytes);
+    trip_budget_release(budget, f->tile_lists, f->tile_list_bytes);
     trip_budget_release(budget, f->depths, depth_bytes(f));
 }
 
-static int fit_shares(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
+static int fit_tile_lists(trip_cpu_buffer *f, uint32_t tiles, trip_budget *budget)
 {
     if (tiles <= f->tile_capacity)
         return 0;
-    trip_budget_release(budget, f->shares, f->share_bytes);
+    trip_budget_release(budget, f->tile_lists, f->tile_list_bytes);
     f->tile_capacity = 0;
-    f->share_bytes = tiles * sizeof *f->shares;
-    f->shares = trip_budget_take(budget, f->share_bytes);
-    if (!f->shares) {
-        f->share_bytes = 0;
+    f->tile_list_bytes = tiles * sizeof *f->tile_lists;
+    f->tile_lists = trip_budget_take(budget, f->tile_list_bytes);
+    if (!f->tile_lists) {
+        f->tile_list_bytes = 0;
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                          "the image's tiles do not fit the memory given; raise --memory or draw a "
                          "smaller image");
@@ -77,7 +77,7 @@ static int fit_shares(trip_cpu_flush *f, uint32_t tiles, trip_budget *budget)
     return 0;
 }
 
-int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, bool depths, trip_budget *budget)
+int trip_cpu_buffer_fit(trip_cpu_buffer *f, uint32_t tiles, bool depths, trip_budget *budget)
 {
     if (depths && !f->depths)
         f->depths = trip_budget_take(budget, depth_bytes(f));
@@ -85,18 +85,18 @@ int trip_cpu_flush_fit(trip_cpu_flush *f, uint32_t tiles, bool depths, trip_budg
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                          "depths of %u splats do not fit the memory given; raise --memory",
                          f->capacity);
-    return fit_shares(f, tiles, budget);
+    return fit_tile_lists(f, tiles, budget);
 }
 
-void trip_cpu_flush_empty(trip_cpu_flush *f)
+void trip_cpu_buffer_empty(trip_cpu_buffer *f)
 {
-    f->chunk_count = f->spread_count = 0;
+    f->chunk_count = f->unsorted_count = 0;
     atomic_store_explicit(&f->splats_used, 0, memory_order_relaxed);
     atomic_store_explicit(&f->orders_used, 0, memory_order_relaxed);
-    atomic_store_explicit(&f->segments_used, 0, memory_order_relaxed);
+    atomic_store_explicit(&f->buckets_used, 0, memory_order_relaxed);
 }
 
-trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f)
+trip_cpu_chunk *trip_cpu_buffer_reserve(trip_cpu_buffer *f)
 {
     if (f->chunk_count == f->chunk_capacity || (f->one_by_one && f->chunk_count == 1))
         return NULL;
@@ -105,7 +105,7 @@ trip_cpu_chunk *trip_cpu_flush_reserve(trip_cpu_flush *f)
     return chunk;
 }
 
-bool trip_cpu_flush_claim(trip_cpu_flush *f, trip_cpu_chunk *chunk, uint32_t splats)
+bool trip_cpu_buffer_claim(trip_cpu_buffer *f, trip_cpu_chunk *chunk, uint32_t splats)
 {
     uint64_t first = atomic_fetch_add_explicit(&f->splats_used, splats + 1, memory_order_relaxed);
     chunk->splat = (uint32_t)first;
@@ -113,7 +113,7 @@ bool trip_cpu_flush_claim(trip_cpu_flush *f, trip_cpu_chunk *chunk, uint32_t spl
     return !chunk->full;
 }
 
-uint32_t trip_cpu_flush_cut(trip_cpu_flush *f)
+uint32_t trip_cpu_buffer_cut(trip_cpu_buffer *f)
 {
     uint32_t first = 0;
     while (first < f->chunk_count && !f->chunks[first].full)
@@ -121,12 +121,12 @@ uint32_t trip_cpu_flush_cut(trip_cpu_flush *f)
     f->one_by_one = first == 0 && f->chunk_count > 0;
     f->chunk_count = first;
     if (first == 0)
-        trip_cpu_flush_empty(f);
+        trip_cpu_buffer_empty(f);
     return first;
 }
 
-/* Where the tiles' places begin is not known before all are counted, and a chunk's splats are many:
- * so they are looked at once, and what follows is done for series of them. Splats come in the order
+/* A counting sort goes over what it sorts twice, to count and to place, and a chunk's splats are
+ * many: so they are read once, and both passes go over series of them. Splats come in the order
  * of squares of voxels, five to ten to a series. */
 static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_series *series)
 {
@@ -265,17 +265,17 @@ static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, u
     }
 }
 
-/* Turns counts into places and makes a segment of every tile that has some. Behind each is room for
+/* Turns counts into places and makes a bucket of every tile that has some. Behind each is room for
  * what put() writes too much. */
-static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, const span *s,
-                              uint32_t place_at, uint32_t *counts)
+static uint32_t make_buckets(trip_cpu_buffer *f, const trip_cpu_chunk *chunk, const span *s,
+                             uint32_t place_at, uint32_t *counts)
 {
-    uint32_t made = chunk->first_segment;
+    uint32_t made = chunk->first_bucket;
     for (uint32_t t = s->first; t <= s->last; t++) {
         uint32_t n = counts[t];
         if (n == 0)
             continue;
-        f->segments[made++] = (trip_cpu_segment){
+        f->buckets[made++] = (trip_cpu_bucket){
             .tile = t,
             .chunk = (uint32_t)(chunk - f->chunks),
             .first = place_at,
@@ -284,7 +284,7 @@ static uint32_t make_segments(trip_cpu_flush *f, const trip_cpu_chunk *chunk, co
         counts[t] = place_at;
         place_at += n + AT_A_TIME;
     }
-    return made - chunk->first_segment;
+    return made - chunk->first_bucket;
 }
 
 static uint32_t occupied(const uint32_t *counts, const span *s)
@@ -295,8 +295,8 @@ static uint32_t occupied(const uint32_t *counts, const span *s)
     return n;
 }
 
-void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
-                  trip_cpu_sorting *sorting)
+void trip_cpu_sort_chunk(trip_cpu_buffer *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
+                         trip_cpu_sorting *sorting)
 {
     const trip_cpu_splat *splats = f->splats + chunk->splat;
     uint32_t *counts = sorting->counts;
@@ -304,67 +304,67 @@ void trip_cpu_bin(trip_cpu_flush *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
         return;
     uint32_t n = find_series(splats, chunk->splats, sorting->series);
     span s = count(splats, sorting->series, n, grid.across, counts);
-    uint32_t segments = occupied(counts, &s);
-    uint64_t room = s.places + segments * AT_A_TIME;
-    uint64_t segment = atomic_fetch_add_explicit(&f->segments_used, segments, memory_order_relaxed);
+    uint32_t buckets = occupied(counts, &s);
+    uint64_t room = s.places + buckets * AT_A_TIME;
+    uint64_t bucket = atomic_fetch_add_explicit(&f->buckets_used, buckets, memory_order_relaxed);
     uint64_t at = atomic_fetch_add_explicit(&f->orders_used, room, memory_order_relaxed);
-    chunk->spread = segment + segments > f->segment_capacity || at + room > f->order_capacity;
-    if (!chunk->spread) {
-        chunk->first_segment = (uint32_t)segment;
-        chunk->segments = make_segments(f, chunk, &s, (uint32_t)at, counts);
+    chunk->unsorted = bucket + buckets > f->bucket_capacity || at + room > f->order_capacity;
+    if (!chunk->unsorted) {
+        chunk->first_bucket = (uint32_t)bucket;
+        chunk->buckets = make_buckets(f, chunk, &s, (uint32_t)at, counts);
         place(splats, sorting->series, n, grid.across, counts, f->order);
     }
     memset(counts + s.first, 0, (s.last - s.first + 1) * sizeof *counts);
 }
 
-static void append(trip_cpu_flush *f, uint32_t segment)
+static void append(trip_cpu_buffer *f, uint32_t bucket)
 {
-    trip_cpu_share *share = &f->shares[f->segments[segment].tile];
-    f->segments[segment].next = TRIP_CPU_NONE;
-    if (share->head == TRIP_CPU_NONE)
-        share->head = segment;
+    trip_cpu_tile_list *list = &f->tile_lists[f->buckets[bucket].tile];
+    f->buckets[bucket].next = TRIP_CPU_NONE;
+    if (list->head == TRIP_CPU_NONE)
+        list->head = bucket;
     else
-        f->segments[share->tail].next = segment;
-    share->tail = segment;
-    share->splats += f->segments[segment].count;
+        f->buckets[list->tail].next = bucket;
+    list->tail = bucket;
+    list->splats += f->buckets[bucket].count;
 }
 
-void trip_cpu_link(trip_cpu_flush *f, const trip_cpu_mask *mask)
+void trip_cpu_link_tile_lists(trip_cpu_buffer *f, const trip_cpu_mask *mask)
 {
     uint32_t tiles = mask->grid.across * mask->grid.down;
     for (uint32_t t = 0; t < tiles; t++)
-        f->shares[t] = (trip_cpu_share){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
+        f->tile_lists[t] = (trip_cpu_tile_list){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
     for (uint32_t c = 0; c < f->chunk_count; c++) {
         const trip_cpu_chunk *chunk = &f->chunks[c];
-        if (chunk->spread)
-            f->spread[f->spread_count++] = c;
-        for (uint32_t i = 0; i < chunk->segments; i++) {
-            uint32_t segment = chunk->first_segment + i;
-            if (!trip_cpu_tile_is_closed(mask, f->segments[segment].tile))
-                append(f, segment);
+        if (chunk->unsorted)
+            f->unsorted[f->unsorted_count++] = c;
+        for (uint32_t i = 0; i < chunk->buckets; i++) {
+            uint32_t bucket = chunk->first_bucket + i;
+            if (!trip_cpu_tile_is_saturated(mask, f->buckets[bucket].tile))
+                append(f, bucket);
         }
     }
-    for (uint32_t i = 0; i < f->spread_count; i++)
+    for (uint32_t i = 0; i < f->unsorted_count; i++)
         for (uint32_t t = 0; t < tiles; t++)
-            f->shares[t].splats += f->chunks[f->spread[i]].splats;
+            f->tile_lists[t].splats += f->chunks[f->unsorted[i]].splats;
 }
 
-void trip_cpu_share_each(const trip_cpu_flush *f, uint32_t tile,
-                         void (*take)(void *user, const trip_cpu_chunk *chunk,
-                                      const trip_cpu_splat *splats, const uint16_t *order,
-                                      uint32_t count),
-                         void *user)
+void trip_cpu_tile_list_each(const trip_cpu_buffer *f, uint32_t tile,
+                             void (*take)(void *user, const trip_cpu_chunk *chunk,
+                                          const trip_cpu_splat *splats, const uint16_t *order,
+                                          uint32_t count),
+                             void *user)
 {
-    uint32_t segment = f->shares[tile].head, spread = 0;
-    while (segment != TRIP_CPU_NONE || spread < f->spread_count) {
-        const trip_cpu_segment *s = segment == TRIP_CPU_NONE ? NULL : &f->segments[segment];
-        if (spread < f->spread_count && (!s || f->spread[spread] < s->chunk)) {
-            const trip_cpu_chunk *chunk = &f->chunks[f->spread[spread++]];
+    uint32_t bucket = f->tile_lists[tile].head, unsorted = 0;
+    while (bucket != TRIP_CPU_NONE || unsorted < f->unsorted_count) {
+        const trip_cpu_bucket *s = bucket == TRIP_CPU_NONE ? NULL : &f->buckets[bucket];
+        if (unsorted < f->unsorted_count && (!s || f->unsorted[unsorted] < s->chunk)) {
+            const trip_cpu_chunk *chunk = &f->chunks[f->unsorted[unsorted++]];
             take(user, chunk, f->splats + chunk->splat, NULL, chunk->splats);
         } else {
             const trip_cpu_chunk *chunk = &f->chunks[s->chunk];
             take(user, chunk, f->splats + chunk->splat, f->order + s->first, s->count);
-            segment = s->next;
+            bucket = s->next;
         }
     }
 }

@@ -1,4 +1,4 @@
-#include "cpu/cover.h"
+#include "cpu/occlusion.h"
 
 #include "brick_box.h"
 #include "pixels.h"
@@ -11,7 +11,7 @@
 #define NEAREST_RADII 8.0
 #define MOST_GROWTH 0.23
 
-enum { BLOCK = 4, BLOCKS = TRIP_CPU_TILE / BLOCK };
+enum { CELL = 4, CELLS = TRIP_CPU_TILE / CELL };
 
 static double dot(const double along[3], const double at[3])
 {
@@ -30,15 +30,16 @@ static trip_pixels pixels(double middle, double reach, int size)
 
 /* Of the splats of a box: where the centre of the middle one lies, how far from there the others'
  * centres, and how far their supports reach from their centres at the centres' G. */
-typedef struct spread {
+typedef struct projection {
     double middle, centres, support;
-} spread;
+} projection;
 
 /* Of x = X / z over a box, given 1 / z at its middle and at its nearest point: with x0 that of the
  * middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. S is sigma^2 times the
  * square of x's gradient (X - x z)' / z. */
-static spread spread_of(const trip_cpu_view *view, const double along_x[4], const double along_z[4],
-                        const trip_cpu_box *box, double inverse, double inverse_nearest)
+static projection projection_of(const trip_cpu_view *view, const double along_x[4],
+                                const double along_z[4], const trip_cpu_box *box, double inverse,
+                                double inverse_nearest)
 {
     const double radius = view->of->settings->kernel_radius;
     const double low_pass2 = view->splat.low_pass2 * view->splat.cutoff2;
@@ -48,7 +49,7 @@ static spread spread_of(const trip_cpu_view *view, const double along_x[4], cons
     double centres = reach(slope, box->half) * inverse_nearest;
     double steepest = sqrt(dot(slope, slope)) + centres * sqrt(dot(along_z, along_z));
     double kernel = radius * steepest * inverse_nearest;
-    return (spread){ x, centres, sqrt(kernel * kernel + low_pass2) };
+    return (projection){ x, centres, sqrt(kernel * kernel + low_pass2) };
 }
 
 static uint64_t bits_of(int left, int right, int top, int bottom)
@@ -57,23 +58,22 @@ static uint64_t bits_of(int left, int right, int top, int bottom)
     return columns & UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
 }
 
-/* What of the blocks [first, last] lies in a tile, counted from its first. */
-static trip_pixels in_tile(trip_pixels blocks, int tile)
+/* What of the cells [first, last] lies in a tile, counted from its first. */
+static trip_pixels in_tile(trip_pixels cells, int tile)
 {
-    int first = blocks.first - tile * BLOCKS, last = blocks.last - tile * BLOCKS;
-    return (trip_pixels){ first > 0 ? first : 0, last < BLOCKS - 1 ? last : BLOCKS - 1 };
+    int first = cells.first - tile * CELLS, last = cells.last - tile * CELLS;
+    return (trip_pixels){ first > 0 ? first : 0, last < CELLS - 1 ? last : CELLS - 1 };
 }
 
-static trip_cpu_cover cover_of(const trip_cpu_mask *mask, trip_pixels px, trip_pixels py)
+static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px, trip_pixels py)
 {
-    static_assert(BLOCKS == 8, "a byte for a row");
-    trip_pixels x = { px.first / BLOCK, px.last / BLOCK },
-                y = { py.first / BLOCK, py.last / BLOCK };
-    bool open = false, closed = false;
+    static_assert(CELLS == 8, "a byte for a row");
+    trip_pixels x = { px.first / CELL, px.last / CELL }, y = { py.first / CELL, py.last / CELL };
+    bool open = false, saturated = false;
     if (px.first > px.last || py.first > py.last)
-        return TRIP_CPU_HIDDEN;
-    for (int ty = y.first / BLOCKS; ty <= y.last / BLOCKS; ty++)
-        for (int tx = x.first / BLOCKS; tx <= x.last / BLOCKS; tx++) {
+        return TRIP_CPU_OCCLUDED;
+    for (int ty = y.first / CELLS; ty <= y.last / CELLS; ty++)
+        for (int tx = x.first / CELLS; tx <= x.last / CELLS; tx++) {
             trip_pixels h = in_tile(x, tx), v = in_tile(y, ty);
             uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
             uint64_t rest =
@@ -81,11 +81,11 @@ static trip_cpu_cover cover_of(const trip_cpu_mask *mask, trip_pixels px, trip_p
                 atomic_load_explicit(&mask->tiles[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
                                      memory_order_relaxed);
             open |= rest != 0;
-            closed |= rest != bits;
-            if (open && closed)
+            saturated |= rest != bits;
+            if (open && saturated)
                 return TRIP_CPU_PARTLY;
         }
-    return open ? TRIP_CPU_SHOWN : TRIP_CPU_HIDDEN;
+    return open ? TRIP_CPU_VISIBLE : TRIP_CPU_OCCLUDED;
 }
 
 /* |rx| / |r_c|, or |ry| where that is more, is at most this. */
@@ -96,7 +96,7 @@ static double most_turn(const trip_cpu_view *view)
 
 /* A box on the screen. */
 typedef struct outline {
-    spread x, y;
+    projection x, y;
     double grown; /* supports, at most */
     double z, inverse_nearest;
 } outline;
@@ -107,8 +107,9 @@ static const double *depth_along(const trip_cpu_view *view)
     return view->splat.camera.ortho ? none : view->along_z;
 }
 
-/* TRIP_CPU_SHOWN, or what is to be said of the box where nothing can be worked out. */
-static trip_cpu_cover find_outline(const trip_cpu_view *view, const trip_cpu_box *box, outline *out)
+/* TRIP_CPU_VISIBLE, or what is to be said of the box where nothing can be worked out. */
+static trip_cpu_occlusion find_outline(const trip_cpu_view *view, const trip_cpu_box *box,
+                                       outline *out)
 {
     const double *along_z = depth_along(view);
     double inverse = 1, growth = 0;
@@ -117,36 +118,37 @@ static trip_cpu_cover find_outline(const trip_cpu_view *view, const trip_cpu_box
         double radius = view->of->settings->kernel_radius * view->forward_length;
         double z = dot(along_z, box->middle) + along_z[3], deep = reach(along_z, box->half);
         if (z - deep < (NEAREST_RADII + 1) * radius)
-            return z + deep + radius <= 0 ? TRIP_CPU_HIDDEN : TRIP_CPU_PARTLY;
+            return z + deep + radius <= 0 ? TRIP_CPU_OCCLUDED : TRIP_CPU_PARTLY;
         inverse = 1 / z;
         out->z = z;
         out->inverse_nearest = 1 / (z - deep);
     }
-    out->x = spread_of(view, view->along_x, along_z, box, inverse, out->inverse_nearest);
-    out->y = spread_of(view, view->along_y, along_z, box, inverse, out->inverse_nearest);
+    out->x = projection_of(view, view->along_x, along_z, box, inverse, out->inverse_nearest);
+    out->y = projection_of(view, view->along_y, along_z, box, inverse, out->inverse_nearest);
     if (!view->splat.camera.ortho) {
         double most = out->x.support > out->y.support ? out->x.support : out->y.support;
         growth = sqrt(2) * most * most_turn(view);
     }
     out->grown = 1 / (1 - growth);
-    return growth > MOST_GROWTH ? TRIP_CPU_PARTLY : TRIP_CPU_SHOWN;
+    return growth > MOST_GROWTH ? TRIP_CPU_PARTLY : TRIP_CPU_VISIBLE;
 }
 
-trip_cpu_cover trip_cpu_box_cover(const trip_cpu_view *view, const trip_cpu_mask *mask,
-                                  const trip_cpu_box *box)
+trip_cpu_occlusion trip_cpu_box_occlusion(const trip_cpu_view *view, const trip_cpu_mask *mask,
+                                          const trip_cpu_box *box)
 {
     const trip_camera *camera = &view->splat.camera;
     outline o;
-    trip_cpu_cover cover = find_outline(view, box, &o);
-    if (cover != TRIP_CPU_SHOWN)
-        return cover;
-    return cover_of(mask, pixels(o.x.middle, o.x.centres + o.x.support * o.grown, camera->width),
-                    pixels(o.y.middle, o.y.centres + o.y.support * o.grown, camera->height));
+    trip_cpu_occlusion occlusion = find_outline(view, box, &o);
+    if (occlusion != TRIP_CPU_VISIBLE)
+        return occlusion;
+    return occlusion_of(mask,
+                        pixels(o.x.middle, o.x.centres + o.x.support * o.grown, camera->width),
+                        pixels(o.y.middle, o.y.centres + o.y.support * o.grown, camera->height));
 }
 
 /* With x that of a square's own middle, x - x0 is at most `centres` of the region, by which a slope
  * (X - x z)' may differ. */
-static trip_cpu_line line_of(const double along[4], const double along_z[4], const spread *s,
+static trip_cpu_line line_of(const double along[4], const double along_z[4], const projection *s,
                              const outline *o)
 {
     trip_cpu_line line = { .middle = s->middle };
@@ -160,20 +162,20 @@ static trip_cpu_line line_of(const double along[4], const double along_z[4], con
     return line;
 }
 
-trip_cpu_cover trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int64_t sheet,
-                                    trip_cpu_region *region)
+trip_cpu_occlusion trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int64_t sheet,
+                                        trip_cpu_region *region)
 {
     const double half = 0.5 * (TRIP_CPU_REGION - 1), *along_z = depth_along(view);
     trip_cpu_box box = { { u + half, v + half, (double)sheet }, { half, half, 0 } };
     outline o;
-    trip_cpu_cover cover = find_outline(view, &box, &o);
-    if (cover != TRIP_CPU_SHOWN)
-        return cover;
+    trip_cpu_occlusion occlusion = find_outline(view, &box, &o);
+    if (occlusion != TRIP_CPU_VISIBLE)
+        return occlusion;
     *region = (trip_cpu_region){ .x = line_of(view->along_x, along_z, &o.x, &o),
                                  .y = line_of(view->along_y, along_z, &o.y, &o),
                                  .z = o.z,
                                  .z_by = { along_z[0], along_z[1] } };
-    return TRIP_CPU_SHOWN;
+    return TRIP_CPU_VISIBLE;
 }
 
 trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,

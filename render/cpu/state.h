@@ -1,0 +1,108 @@
+/* What the parts of the CPU renderer share: cpu_renderer.c (frames and layers), batch.c (from a
+ * batch to splats), tiles.c (from splats to pixels) and count.c. Written by the renderer's thread
+ * alone, but for each worker's memory, the chunks that it fills and the tiles that it draws. */
+#ifndef TRIP_CPU_STATE_H
+#define TRIP_CPU_STATE_H
+
+#include "cpu/kernels/isa.h"
+#include "cpu/pool.h"
+#include "cpu/splat_buffer.h"
+#include "cpu/squares.h"
+
+/* What has become of a tile's pixels. */
+enum trip_cpu_tile_state {
+    TRIP_CPU_TILE_BEGUN = 1,  /* in the layer being drawn */
+    TRIP_CPU_TILE_MERGED = 2, /* the sum holds earlier layers */
+};
+
+/* One thread's own memory. */
+typedef struct trip_cpu_worker {
+    trip_cpu_scratch scratch;
+    trip_cpu_part parts[TRIP_CPU_CHUNK_RUNS]; /* of the chunk at hand */
+    /* A square's bytes, where those about them may not be read. */
+    unsigned char codes[2 * 64 + 2 * TRIP_CPU_READABLE];
+    unsigned char normals[4 * 64 + 2 * TRIP_CPU_READABLE];
+    trip_cpu_sorting sorting;
+    /* Of a tile of a picture, where the frame goes on with its own. */
+    _Alignas(64) float sum[TRIP_CHANNELS_MAX * TRIP_CPU_TILE_PIXELS];
+    _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
+} trip_cpu_worker;
+
+/* A tile to blend, or a quarter of one. */
+typedef struct trip_cpu_portion {
+    uint32_t tile;
+    unsigned quarters;
+    uint32_t splats;
+} trip_cpu_portion;
+
+typedef struct trip_cpu {
+    trip_renderer base;
+    trip_budget *budget;
+    const trip_cpu_kernels *isa;     /* for layers of colour alone */
+    const trip_cpu_kernels *kernels; /* for the frame's layers */
+    trip_cpu_pool *pool;
+    char device[64];
+    trip_cpu_worker *workers;
+    size_t workers_bytes;
+
+    trip_cpu_mask mask; /* bits are cleared by the thread that blends the tile */
+    size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
+    unsigned channels;  /* that there is room for */
+    float *pixels, *sums;
+    uint8_t *states;
+    uint8_t *axes; /* whose layers may have weight in a tile, a bit each */
+    trip_cpu_portion *portions;
+
+    const trip_frame *frame;
+    trip_cpu_view view;   /* of the layer being drawn */
+    trip_cpu_view *views; /* of its lists, by number in the data set */
+    unsigned list_room;   /* of `views`, and of `counted_views` where that is there */
+    bool in_layer;
+    trip_list_stats *stats; /* by number of the list, as many as `views` */
+    /* Where the frame counts: the same with every voxel visible, whatever its code. */
+    trip_frame counted_frame;
+    trip_cpu_view *counted_views;
+    trip_tf_entry *visible; /* 65536 entries; NULL until wanted */
+
+    trip_cpu_buffer buffers[2];
+    trip_cpu_buffer *filling, *blending;
+    const trip_batch *batch;
+    uint32_t first_chunk;     /* of the job */
+    double visible_per_voxel; /* of late */
+    uint32_t portion_count;
+    float *rgba, *depth;
+    trip_cpu_job project_job, blend_job, tile_job;
+} trip_cpu;
+
+static inline uint32_t trip_cpu_tile_count(const trip_cpu *r)
+{
+    return r->mask.grid.across * r->mask.grid.down;
+}
+
+static inline int trip_cpu_tile_x(const trip_cpu *r, uint32_t tile)
+{
+    return (int)(tile % r->mask.grid.across) * TRIP_CPU_TILE;
+}
+
+static inline int trip_cpu_tile_y(const trip_cpu *r, uint32_t tile)
+{
+    return (int)(tile / r->mask.grid.across) * TRIP_CPU_TILE;
+}
+
+static inline size_t trip_cpu_tile_floats(const trip_cpu *r)
+{
+    return r->channels * TRIP_CPU_TILE_PIXELS;
+}
+
+static inline float *trip_cpu_tile_pixels(const trip_cpu *r, uint32_t tile)
+{
+    return r->pixels + tile * trip_cpu_tile_floats(r);
+}
+
+/* Whether one layer alone has weight in a tile, and so it is 1 all over. */
+static inline bool trip_cpu_is_alone(const trip_cpu *r, uint32_t tile)
+{
+    return (r->axes[tile] & (r->axes[tile] - 1)) == 0;
+}
+
+#endif

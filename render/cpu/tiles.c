@@ -1,0 +1,288 @@
+#include "cpu/tiles.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "report.h"
+#include "weight.h"
+
+/* ---- memory ---- */
+
+static void *part(char *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? memory + *at : NULL;
+    *at += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+static size_t lay_out(trip_cpu *r, char *memory)
+{
+    size_t at = 0, tiles = trip_cpu_tile_count(r);
+    r->pixels = part(memory, &at, tiles * trip_cpu_tile_floats(r) * sizeof *r->pixels);
+    r->sums = part(memory, &at, tiles * trip_cpu_tile_floats(r) * sizeof *r->sums);
+    r->states = part(memory, &at, tiles);
+    r->axes = part(memory, &at, tiles);
+    r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
+    r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
+    /* Splats are also counted for the tile beyond the last, diagonally. */
+    for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
+        r->workers[i].sorting.counts = part(
+            memory, &at, (tiles + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
+    return at;
+}
+
+void trip_cpu_release_tiles(trip_cpu *r)
+{
+    trip_budget_release(r->budget, r->pixels, r->tiles_bytes);
+    r->pixels = NULL;
+    r->tiles_bytes = 0;
+    r->mask.grid = (trip_cpu_grid){ 0, 0 };
+}
+
+int trip_cpu_fit_tiles(trip_cpu *r, int width, int height)
+{
+    trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE,
+                           ((uint32_t)height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE };
+    if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down &&
+        r->channels == r->kernels->channels)
+        return 0;
+    trip_cpu_release_tiles(r);
+    r->mask.grid = grid;
+    r->channels = r->kernels->channels;
+    size_t bytes = lay_out(r, NULL);
+    char *memory = trip_budget_take(r->budget, bytes);
+    if (!memory) {
+        r->mask.grid = (trip_cpu_grid){ 0, 0 };
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "%zu bytes of pixels do not fit the memory given; raise --memory or draw "
+                         "a smaller image",
+                         bytes);
+    }
+    lay_out(r, memory);
+    r->tiles_bytes = bytes;
+    int status = 0;
+    for (int i = 0; i < 2 && !status; i++)
+        status = trip_cpu_buffer_fit(&r->buffers[i], trip_cpu_tile_count(r),
+                                     r->channels > TRIP_CHANNEL_DEPTH, r->budget);
+    if (status)
+        trip_cpu_release_tiles(r);
+    return status;
+}
+
+/* ---- frames and layers ---- */
+
+/* The axes, a bit each, whose layers may have weight in the tile at (x, y). Where there is but one,
+ * its weight is 1 all over the tile. */
+static uint8_t axes_of_tile(const trip_frame *frame, int x, int y)
+{
+    const double from[2] = { x, y }, to[2] = { x + TRIP_CPU_TILE, y + TRIP_CPU_TILE };
+    trip_ray_bounds bounds = trip_ray_bounds_over(frame->camera, from, to);
+    unsigned axes = 0;
+    for (int axis = 0; axis < 3; axis++)
+        if (trip_weight_may_lie(frame->settings, frame->plan->axis_of_view, &bounds, axis))
+            axes |= 1u << axis;
+    return (uint8_t)axes;
+}
+
+void trip_cpu_begin_tiles(trip_cpu *r)
+{
+    memset(r->states, 0, trip_cpu_tile_count(r));
+    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++)
+        r->axes[t] = axes_of_tile(r->frame, trip_cpu_tile_x(r, t), trip_cpu_tile_y(r, t));
+}
+
+void trip_cpu_begin_tile_layer(trip_cpu *r)
+{
+    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++)
+        atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> r->view.axis & 1 ? UINT64_MAX : 0,
+                              memory_order_relaxed);
+}
+
+/* ---- blending ---- */
+
+typedef struct blend_context {
+    const trip_cpu *of;
+    trip_cpu_scratch *scratch;
+} blend_context;
+
+static void blend_some(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *splats,
+                       const uint16_t *order, uint32_t count)
+{
+    blend_context *c = user;
+    if (trip_interrupted())
+        return;
+    c->of->kernels->tile_blend(&c->of->views[chunk->list], c->scratch, splats,
+                               trip_cpu_depths_from(c->of->blending, chunk->splat), order, count);
+}
+
+/* The mask's bits of some quarters of a tile. */
+static uint64_t bits_of_quarters(unsigned quarters)
+{
+    static const uint64_t quarter = 0x0f0f0f0f;
+    return (quarters & 1 ? quarter : 0) | (quarters & 2 ? quarter << 4 : 0) |
+           (quarters & 4 ? quarter << 32 : 0) | (quarters & 8 ? quarter << 36 : 0);
+}
+
+static void blend_portion(void *context, unsigned task, unsigned thread)
+{
+    trip_cpu *r = context;
+    if (trip_interrupted())
+        return;
+    const trip_cpu_portion *p = &r->portions[task];
+    trip_cpu_scratch *s = &r->workers[thread].scratch;
+    int x = trip_cpu_tile_x(r, p->tile), y = trip_cpu_tile_y(r, p->tile);
+    if (!(r->states[p->tile] & TRIP_CPU_TILE_BEGUN)) {
+        r->kernels->tile_clear(&r->view, x, y, trip_cpu_is_alone(r, p->tile),
+                               trip_cpu_tile_pixels(r, p->tile));
+        r->states[p->tile] |= TRIP_CPU_TILE_BEGUN;
+    }
+    r->kernels->tile_begin(&r->view, s, x, y, p->quarters, trip_cpu_tile_pixels(r, p->tile));
+    trip_cpu_tile_list_each(r->blending, p->tile, blend_some, &(blend_context){ r, s });
+    uint64_t open = r->kernels->tile_end(s) | ~bits_of_quarters(p->quarters);
+    atomic_fetch_and_explicit(&r->mask.tiles[p->tile], open, memory_order_relaxed);
+}
+
+static int most_first(const void *a, const void *b)
+{
+    const trip_cpu_portion *p = a, *q = b;
+    return p->splats < q->splats ? 1 : p->splats > q->splats ? -1 : 0;
+}
+
+/* Tiles with work, those with most of it first. One that holds so much that a thread would still be
+ * at it when the others are done, with the next splats to project too, is given out in quarters,
+ * though each goes through all of its splats; not when it is new, since then one thread has to
+ * clear it. */
+static void make_portions(trip_cpu *r, const trip_cpu_buffer *f)
+{
+    uint64_t all = 0;
+    r->portion_count = 0;
+    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++)
+        all += f->tile_lists[t].splats;
+    uint64_t large = all / trip_cpu_pool_threads(r->pool) * 2;
+    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++) {
+        uint32_t n = f->tile_lists[t].splats;
+        if (n == 0 || trip_cpu_tile_is_saturated(&r->mask, t))
+            continue;
+        if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TRIP_CPU_TILE_BEGUN) {
+            for (unsigned q = 0; q < 4; q++)
+                r->portions[r->portion_count++] = (trip_cpu_portion){ t, 1u << q, n / 3 };
+        } else {
+            r->portions[r->portion_count++] = (trip_cpu_portion){ t, 15, n };
+        }
+    }
+    qsort(r->portions, r->portion_count, sizeof *r->portions, most_first);
+}
+
+void trip_cpu_blend_filled(trip_cpu *r)
+{
+    trip_cpu_buffer *full = r->filling;
+    if (full->chunk_count == 0)
+        return;
+    trip_cpu_link_tile_lists(full, &r->mask);
+    trip_cpu_pool_wait(r->pool, &r->blend_job);
+    make_portions(r, full);
+    r->filling = full == &r->buffers[0] ? &r->buffers[1] : &r->buffers[0];
+    r->blending = full;
+    trip_cpu_buffer_empty(r->filling);
+    r->blend_job = (trip_cpu_job){ .run = blend_portion, .context = r, .tasks = r->portion_count };
+    trip_cpu_pool_start(r->pool, &r->blend_job);
+}
+
+void trip_cpu_finish_blending(trip_cpu *r)
+{
+    trip_cpu_blend_filled(r);
+    trip_cpu_pool_wait(r->pool, &r->blend_job);
+}
+
+/* ---- merging ---- */
+
+static float *tile_sum(const trip_cpu *r, uint32_t tile)
+{
+    return r->sums + tile * trip_cpu_tile_floats(r);
+}
+
+/* What is alone in its tile stays as it is. */
+static bool is_to_merge(const trip_cpu *r, uint32_t tile)
+{
+    return r->states[tile] & TRIP_CPU_TILE_BEGUN && !trip_cpu_is_alone(r, tile);
+}
+
+static void merge_tile(trip_cpu *r, uint32_t tile)
+{
+    bool first = !(r->states[tile] & TRIP_CPU_TILE_MERGED);
+    r->kernels->tile_merge(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile),
+                           trip_cpu_tile_pixels(r, tile), first, tile_sum(r, tile));
+    r->states[tile] = TRIP_CPU_TILE_MERGED;
+}
+
+/* The sum with the layer being drawn in it. */
+static const float *sum_so_far(const trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+{
+    if (!is_to_merge(r, tile))
+        return tile_sum(r, tile);
+    bool first = !(r->states[tile] & TRIP_CPU_TILE_MERGED);
+    if (!first)
+        memcpy(w->sum, tile_sum(r, tile), trip_cpu_tile_floats(r) * sizeof *w->sum);
+    r->kernels->tile_merge(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile),
+                           trip_cpu_tile_pixels(r, tile), first, w->sum);
+    return w->sum;
+}
+
+/* The frame's tile stays as it is. */
+static void finish_tile(trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+{
+    trip_cpu_content content = TRIP_CPU_NOTHING;
+    const float *pixels = NULL;
+    if (r->states[tile] & TRIP_CPU_TILE_BEGUN && trip_cpu_is_alone(r, tile)) {
+        content = TRIP_CPU_LAYER;
+        pixels = trip_cpu_tile_pixels(r, tile);
+    } else if (r->states[tile]) {
+        content = TRIP_CPU_SUM;
+        pixels = sum_so_far(r, w, tile);
+    }
+    r->kernels->tile_finish(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile), content,
+                            pixels, r->rgba, r->depth);
+}
+
+/* Tasks of whole rows of tiles. */
+static void merge_row(void *context, unsigned task, unsigned thread)
+{
+    trip_cpu *r = context;
+    (void)thread;
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
+        if (!trip_interrupted() && is_to_merge(r, t))
+            merge_tile(r, t);
+}
+
+static void finish_row(void *context, unsigned task, unsigned thread)
+{
+    trip_cpu *r = context;
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
+        if (!trip_interrupted())
+            finish_tile(r, &r->workers[thread], t);
+}
+
+static void for_each_row(trip_cpu *r, void (*run)(void *, unsigned, unsigned))
+{
+    r->tile_job = (trip_cpu_job){ .run = run, .context = r, .tasks = r->mask.grid.down };
+    trip_cpu_pool_start(r->pool, &r->tile_job);
+    trip_cpu_pool_wait(r->pool, &r->tile_job);
+}
+
+void trip_cpu_merge_layer(trip_cpu *r)
+{
+    bool merge = false;
+    trip_cpu_finish_blending(r);
+    for (uint32_t t = 0; t < trip_cpu_tile_count(r) && !merge; t++)
+        merge = is_to_merge(r, t);
+    if (merge)
+        for_each_row(r, merge_row);
+}
+
+void trip_cpu_finish_picture(trip_cpu *r, float *rgba, float *depth)
+{
+    trip_cpu_finish_blending(r);
+    r->rgba = rgba;
+    r->depth = depth;
+    for_each_row(r, finish_row);
+}
