@@ -53,6 +53,10 @@ enum {
     KEY_MEMORY,
     KEY_ENGINE,
     KEY_THREADS,
+    KEY_FIELD,
+    KEY_KERNEL,
+    KEY_TOLERANCE,
+    KEY_SAMPLES,
 };
 
 static const struct argp_option options[] = {
@@ -103,9 +107,10 @@ static const struct argp_option options[] = {
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 3 },
     { NULL, 0, NULL, 0, "Renderer:", 4 },
     { "renderer", KEY_RENDERER, "NAME", 0,
-      "gl, cpu, reference or auto (default: auto: gl on graphics hardware, else cpu)", 4 },
+      "gl, cpu, reference, integral or auto (default: auto: gl on graphics hardware, else cpu)",
+      4 },
     { "target", KEY_TARGET, "NAME", 0,
-      "Layers of rgba32f, rgba16f or rgba8 (default: rgba32f); not for reference", 4 },
+      "Layers of rgba32f, rgba16f or rgba8 (default: rgba32f); gl and cpu only", 4 },
     { "submit", KEY_SUBMIT, "FORM", 0,
       "replicated or indexed lists, sprites or triangles (default: replicated,sprites); gl only",
       4 },
@@ -117,6 +122,15 @@ static const struct argp_option options[] = {
       4 },
     { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 4 },
     { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 4 },
+    { "field", KEY_FIELD, "NAME", 0,
+      "What is integrated: stored values, those of the source volume, or splats (default: stored); "
+      "integral only",
+      4 },
+    { "kernel", KEY_KERNEL, "NAME", 0,
+      "Interpolation of values, linear or cubic (default: linear); integral only", 4 },
+    { "tolerance", KEY_TOLERANCE, "E", 0,
+      "Error of a pixel's components, 1e-12 to 0.1 (default: 1e-4); integral only", 4 },
+    { "samples", KEY_SAMPLES, "N", 0, "N x N rays a pixel (default: 1); integral only", 4 },
     { NULL, 0, NULL, 0, "Results:", 5 },
     { "depth", KEY_DEPTH, "FILE", 0,
       "Mean distance from the eye to what is seen at each pixel, in world units, infinite where "
@@ -142,7 +156,9 @@ static const struct argp_option options[] = {
 /* While parsing: what was given, for the checks of combinations. */
 typedef struct parse {
     render_options *o;
-    bool h, target, background, lists, forms, side, light, level;
+    bool h, target, background, lists, forms, side, light, level, kernel_radius;
+    bool order;            /* --method or --traversal */
+    bool kernel, integral; /* options of the integral renderer */
 } parse;
 
 static int parse_size(const char *text, render_options *o)
@@ -321,16 +337,19 @@ static int parse_method(int key, char *arg, parse *p)
     case KEY_METHOD:
         status = trip_option_choice("--method", arg, methods, &which);
         s->method = (triptych_method)which;
+        p->order = true;
         return status;
     case KEY_TRAVERSAL:
         status = trip_option_choice("--traversal", arg, traversals, &which);
         s->traversal = (triptych_traversal)which;
+        p->order = true;
         return status;
     case KEY_H:
         p->h = true;
         status = trip_option_number("--h", arg, 0, 1, &s->h);
         return !status && s->h == 1 ? trip_option_fail("--h", "must be below 1") : status;
     case KEY_KERNEL_RADIUS:
+        p->kernel_radius = true;
         return trip_option_number("--kernel-radius", arg, 0.1, 100, &s->kernel_radius);
     default:
         return ARGP_ERR_UNKNOWN;
@@ -365,9 +384,38 @@ static int parse_look(int key, char *arg, parse *p)
     }
 }
 
+static int parse_integral(int key, char *arg, parse *p)
+{
+    static const char *const fields[] = { "stored", "source", "splats", NULL };
+    static const char *const kernels[] = { "linear", "cubic", NULL };
+    render_options *o = p->o;
+    int which = 0, status;
+    switch (key) {
+    case KEY_FIELD:
+        status = trip_option_choice("--field", arg, fields, &which);
+        o->field = (render_field)(which + 1);
+        break;
+    case KEY_KERNEL:
+        p->kernel = true;
+        status = trip_option_choice("--kernel", arg, kernels, &which);
+        o->settings.kernel = (triptych_kernel)which;
+        break;
+    case KEY_TOLERANCE:
+        status = trip_option_number("--tolerance", arg, 1e-12, 0.1, &o->settings.tolerance);
+        break;
+    case KEY_SAMPLES:
+        status = trip_option_integer("--samples", arg, 1, 64, &o->settings.samples);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    p->integral = true;
+    return status;
+}
+
 static int parse_renderer(int key, char *arg, parse *p)
 {
-    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", NULL };
+    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral", NULL };
     static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
     static const char *const hidden[] = { "skip", "draw", NULL };
     static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
@@ -398,7 +446,7 @@ static int parse_renderer(int key, char *arg, parse *p)
     case KEY_THREADS:
         return trip_option_integer("--threads", arg, 1, 1024, &o->threads);
     default:
-        return ARGP_ERR_UNKNOWN;
+        return parse_integral(key, arg, p);
     }
 }
 
@@ -421,12 +469,33 @@ static int check_depth(render_options *o)
 {
     if (!o->depth)
         return 0;
-    if (o->renderer == TRIPTYCH_RENDERER_GL)
+    if (o->renderer == TRIPTYCH_RENDERER_GL || o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_option_fail("--depth", "applies to --renderer cpu and reference only");
     if (o->settings.target != TRIPTYCH_RGBA32F)
         return trip_option_fail("--depth", "goes with --target rgba32f");
     if (o->renderer == TRIPTYCH_RENDERER_AUTO)
         o->renderer = TRIPTYCH_RENDERER_CPU;
+    return 0;
+}
+
+static int check_integral(parse *p)
+{
+    render_options *o = p->o;
+    bool integral = o->renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    o->settings.field = o->field == RENDER_FIELD_SPLATS ? TRIPTYCH_SPLATS : TRIPTYCH_VALUES;
+    if (p->integral && !integral)
+        return trip_option_fail("--field, --kernel, --tolerance, --samples",
+                                "apply to --renderer integral only");
+    if (p->kernel && o->field == RENDER_FIELD_SPLATS)
+        return trip_option_fail("--kernel", "does not apply to --field splats");
+    if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
+        return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
+                                           "source; give the volume in its place");
+    if (integral && (p->h || p->order))
+        return trip_option_fail("--method, --h, --traversal",
+                                "do not apply to --renderer integral, which has no layers");
+    if (integral && p->kernel_radius && o->field != RENDER_FIELD_SPLATS)
+        return trip_option_fail("--kernel-radius", "applies to splats: give --field splats");
     return 0;
 }
 
@@ -454,8 +523,12 @@ static int check(parse *p)
                                 "--window and --level are given together");
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
-    if (p->target && o->renderer == TRIPTYCH_RENDERER_REFERENCE)
-        return trip_option_fail("--target", "does not apply to --renderer reference");
+    status = check_integral(p);
+    if (status)
+        return status;
+    if (p->target &&
+        (o->renderer == TRIPTYCH_RENDERER_REFERENCE || o->renderer == TRIPTYCH_RENDERER_INTEGRAL))
+        return trip_option_fail("--target", "applies to --renderer gl and cpu only");
     bool gl_only = p->lists || p->forms;
     if (gl_only && o->renderer != TRIPTYCH_RENDERER_AUTO && o->renderer != TRIPTYCH_RENDERER_GL)
         return trip_option_fail("--submit", "applies to --renderer gl only");

@@ -6,6 +6,14 @@
 
 #include "triptych_brick.h"
 
+/* What the integral renderer integrates. */
+typedef enum render_field {
+    RENDER_FIELD_UNSET,
+    RENDER_FIELD_STORED, /* the values that the data set holds */
+    RENDER_FIELD_SOURCE, /* those of the volume it was made of */
+    RENDER_FIELD_SPLATS,
+} render_field;
+
 /* What becomes of bricks behind what is already opaque; skipped where nothing is said. */
 typedef enum render_hidden {
     RENDER_HIDDEN_UNSET,
@@ -31,6 +39,7 @@ typedef struct render_options {
     triptych_settings settings;
     triptych_renderer renderer;
     render_hidden hidden;
+    render_field field;
     triptych_engine engine;
     uint64_t memory_bytes; /* 0: the default */
     int threads;           /* 0: the default */

@@ -10,6 +10,7 @@
 #include "identity.h"
 #include "report.h"
 #include "source.h"
+#include "source_field.h"
 
 static trip_volume_params volume_params(const triptych_brick_options *o)
 {
@@ -228,6 +229,30 @@ int triptych_identify(triptych *t, const char *volume, const triptych_brick_opti
         status = identify(t, &params, most_content_bytes, out);
     free(ranges);
     return trip_context_leave(before, status);
+}
+
+static int use_source(triptych *t, const char *path, const triptych_brick_options *o)
+{
+    const trip_volume_params params = volume_params(o);
+    const char *fault = fault_of_volume(o);
+    int status = trip_context_check_idle(t, true);
+    if (!status && fault)
+        status = trip_fail(TRIP_USAGE, "read", path, "%s", fault);
+    if (!status && t->resources.renderer != TRIPTYCH_RENDERER_INTEGRAL)
+        status = trip_fail(TRIP_USAGE, "render", path,
+                           "only the integral renderer draws from a volume's own values");
+    if (status)
+        return status;
+    trip_context_drop_renderer(t); /* the field of which would take as much again */
+    trip_field_destroy(t->source);
+    return trip_source_field_read(&t->source, t->session.data, path, &params, t->session.budget);
+}
+
+int triptych_set_source(triptych *t, const char *volume, const triptych_brick_options *options)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_brick_options usual = { 0 };
+    return trip_context_leave(before, use_source(t, volume, options ? options : &usual));
 }
 
 int triptych_is_raw_type(const char *name)

@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "frame.h"
+#include "field.h"
 #include "image_file.h"
 #include "renderer_choice.h"
 #include "session.h"
@@ -34,6 +35,7 @@ struct triptych {
     session session;
     bool open, has_function;
     trip_context_picture *pictures;
+    trip_field *source;      /* of a volume's own values; NULL: the data set's */
     trip_renderer *renderer; /* NULL until a frame is begun */
     trip_reader *reader;     /* the same; of these planes: */
     unsigned planes;
@@ -78,6 +80,8 @@ int trip_context_check_list(const triptych *t, unsigned number);
 int trip_context_use_function(triptych *t, const triptych_function *f);
 int trip_context_find_view(triptych *t, const triptych_view *given);
 void trip_context_drop_reader(triptych *t);
+/* And the reader, which may be in its memory. */
+void trip_context_drop_renderer(triptych *t);
 /* What the frame has come to, once its picture is complete. */
 int trip_context_note_stats(triptych *t);
 void trip_context_drop_stats(triptych *t);

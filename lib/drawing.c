@@ -18,6 +18,14 @@ void trip_context_drop_reader(triptych *t)
     t->reader = NULL;
 }
 
+void trip_context_drop_renderer(triptych *t)
+{
+    trip_context_drop_reader(t);
+    if (t->renderer)
+        t->renderer->ops->destroy(t->renderer);
+    t->renderer = NULL;
+}
+
 /* One that reads all the planes wanted. Counting is by a reader of its own, so that nothing that
  * was read then is in the cache of the frames that are timed. */
 static int make_reader(triptych *t, unsigned planes)
@@ -29,7 +37,7 @@ static int make_reader(triptych *t, unsigned planes)
         .engine = (trip_engine)r->engine,
         .planes = planes,
         .threads = (int)trip_context_threads(r->threads),
-        .cache = r->keep_pages && !t->counting,
+        .cache = r->keep_pages && !t->counting && !t->plan.gathers,
         .renderer = t->renderer,
         .skip = finds_hidden && !draws_all ? trip_cpu_occluded : NULL,
         .skip_user = t->renderer,
@@ -61,11 +69,34 @@ static int prepare(triptych *t)
     return status;
 }
 
-static int plan(triptych *t)
+/* The plan of a frame by the integral renderer: what its field is made of. */
+static int plan_field(triptych *t)
 {
     session *s = &t->session;
+    unsigned kinds = 1u << TRIP_KIND_VOXELS;
+    if (t->settings.field == TRIP_FIELD_VALUES)
+        kinds = t->source ? 0 : kinds | 1u << TRIP_KIND_HALO;
+    else if (t->source)
+        return trip_fail(TRIP_USAGE, "render", "field",
+                         "splats are made of what the data set holds, not of the volume itself");
+    return trip_plan_make_field(&t->plan, s->data, &t->camera, &t->settings, kinds, s->budget);
+}
+
+static int plan_frame(triptych *t)
+{
+    session *s = &t->session;
+    if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return plan_field(t);
+    if (t->settings.samples > 1)
+        return trip_fail(TRIP_USAGE, "render", "samples",
+                         "only the integral renderer takes more than one a pixel yet");
+    return trip_plan_make(&t->plan, s->data, &t->camera, &t->settings, s->table, s->budget);
+}
+
+static int plan(triptych *t)
+{
     uint64_t start = trip_frame_now_ns();
-    int status = trip_plan_make(&t->plan, s->data, &t->camera, &t->settings, s->table, s->budget);
+    int status = plan_frame(t);
     t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
     t->begun = status == 0;
     return status;
@@ -80,6 +111,7 @@ static int start(triptych *t)
         .settings = &t->settings,
         .plan = &t->plan,
         .table = t->session.table,
+        .field = t->source,
         .count = t->counting,
         .progress = t->show ? show_splats : NULL,
         .progress_user = t,

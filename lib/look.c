@@ -53,7 +53,23 @@ triptych_settings triptych_default_settings(void)
         .h = s.h,
         .kernel_radius = s.kernel_radius,
         .background = { s.background[0], s.background[1], s.background[2], s.background[3] },
+        .field = (triptych_field)s.field,
+        .kernel = (triptych_kernel)s.kernel,
+        .tolerance = s.tolerance,
+        .samples = s.samples,
     };
+}
+
+static const char *fault_of_integral(const triptych_settings *s)
+{
+    if (s->field < TRIPTYCH_VALUES || s->field > TRIPTYCH_SPLATS || s->kernel < TRIPTYCH_LINEAR ||
+        s->kernel > TRIPTYCH_CUBIC)
+        return "there is no such field or kernel";
+    if (!(s->tolerance >= 1e-12 && s->tolerance <= 0.1))
+        return "the tolerance lies between 1e-12 and 0.1";
+    if (!(s->samples >= 1 && s->samples <= 64))
+        return "a pixel has 1 to 64 samples along each side";
+    return NULL;
 }
 
 static const char *fault_of_settings(const triptych_settings *s)
@@ -75,7 +91,7 @@ static const char *fault_of_settings(const triptych_settings *s)
     for (int i = 0; i < 4; i++)
         if (!(s->background[i] >= 0 && s->background[i] <= 1))
             return "components of the background lie between 0 and 1";
-    return NULL;
+    return fault_of_integral(s);
 }
 
 int triptych_set_settings(triptych *t, const triptych_settings *s)
@@ -99,6 +115,10 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .h = s->h,
         .kernel_radius = s->kernel_radius,
         .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
+        .field = (trip_field_kind)s->field,
+        .kernel = (trip_kernel)s->kernel,
+        .tolerance = s->tolerance,
+        .samples = s->samples,
     };
     t->counting = s->count;
     if (!s->headlight)

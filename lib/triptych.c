@@ -201,10 +201,9 @@ static void close_data(triptych *t)
     while (t->pictures)
         release_picture(t, &t->pictures);
     trip_context_drop_stats(t);
-    trip_context_drop_reader(t);
-    if (t->renderer)
-        t->renderer->ops->destroy(t->renderer);
-    t->renderer = NULL;
+    trip_context_drop_renderer(t);
+    trip_field_destroy(t->source);
+    t->source = NULL;
     session_close(&t->session);
     free(t->name);
     t->name = NULL;
@@ -232,7 +231,7 @@ void triptych_destroy(triptych *t)
 static int check_resources(const triptych_resources *r)
 {
     bool known = r->renderer >= TRIPTYCH_RENDERER_AUTO &&
-                 r->renderer <= TRIPTYCH_RENDERER_REFERENCE && r->engine >= TRIPTYCH_ENGINE_AUTO &&
+                 r->renderer <= TRIPTYCH_RENDERER_INTEGRAL && r->engine >= TRIPTYCH_ENGINE_AUTO &&
                  r->engine <= TRIPTYCH_ENGINE_NULL;
     return known ? 0
                  : trip_fail(TRIP_USAGE, "render", "resources",

@@ -71,6 +71,8 @@ typedef enum triptych_renderer {
     TRIPTYCH_RENDERER_GL,   /* OpenGL 4.5, without a window */
     TRIPTYCH_RENDERER_CPU,
     TRIPTYCH_RENDERER_REFERENCE, /* double precision, slow */
+    TRIPTYCH_RENDERER_INTEGRAL,  /* what the others approximate: ray by ray, slower; all of the
+                                    volume has to fit the memory, 16 bytes a voxel */
 } triptych_renderer;
 
 typedef enum triptych_engine {
@@ -187,6 +189,16 @@ typedef enum triptych_target {
     TRIPTYCH_RGBA8,
 } triptych_target;
 
+typedef enum triptych_field {
+    TRIPTYCH_VALUES, /* interpolated between voxels, then classified */
+    TRIPTYCH_SPLATS, /* the sum of the splats */
+} triptych_field;
+
+typedef enum triptych_kernel {
+    TRIPTYCH_LINEAR, /* between the 8 voxels around */
+    TRIPTYCH_CUBIC,  /* Catmull and Rom's, between 64 */
+} triptych_kernel;
+
 typedef struct triptych_settings {
     triptych_method method;
     triptych_traversal traversal;
@@ -199,11 +211,17 @@ typedef struct triptych_settings {
     double kernel_radius;   /* of a splat, voxels, 0.1 to 100 */
     double background[4];   /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     int depth; /* not 0: frames have distances too; neither with GL nor with rounded targets */
+    /* Of the integral renderer alone. */
+    triptych_field field;   /* what it integrates */
+    triptych_kernel kernel; /* of values */
+    double tolerance;       /* of a component of a pixel, 1e-12 to 0.1 */
+    int samples;            /* rays along each side of a pixel, 1 to 64; other renderers: 1 */
     int count; /* not 0: triptych_list_stats has exact counts, which takes time, of hidden bricks
                   too */
 } triptych_settings;
 
-/* Merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black. */
+/* Merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black; values, linear,
+ * 1e-4, one ray a pixel. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 

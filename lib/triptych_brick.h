@@ -101,6 +101,12 @@ TRIPTYCH_API int triptych_brick(triptych *t, const char *volume, const char *dat
                                 const triptych_brick_options *options,
                                 triptych_brick_summary *summary);
 
+/* For the integral renderer, once the data set is open: values come from the volume that it was
+ * made of, all of them and not rounded, and gradients from those values. Reads the volume; of
+ * `options`, which may be NULL, only how it is read counts. Opening a data set ends this. */
+TRIPTYCH_API int triptych_set_source(triptych *t, const char *volume,
+                                     const triptych_brick_options *options);
+
 typedef struct triptych_brick_estimate {
     uint64_t voxels, kept, halo;
     uint64_t bytes, temporary_bytes, free_bytes; /* where the data set would be */

@@ -242,14 +242,18 @@ static int take_lists(trip_plan *plan, unsigned count, trip_budget *budget)
                      "%u lists do not fit the memory given; raise --memory", count);
 }
 
+static unsigned planes_of(const trip_dataset *data, const trip_settings *settings)
+{
+    unsigned normals = settings->shading ? 1u << TRIP_PLANE_NORMALS : 0;
+    return 1u << TRIP_PLANE_VOXELS | (data->header.planes & normals);
+}
+
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
     const planning p = { plan, data, camera, settings, table, budget };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
-                         .planes = 1u << TRIP_PLANE_VOXELS };
-    if (settings->shading)
-        plan->planes |= data->header.planes & 1u << TRIP_PLANE_NORMALS;
+                         .planes = planes_of(data, settings) };
     int status = trip_settings_check(settings);
     if (!status)
         status = take_lists(plan, data->list_count, budget);
@@ -259,6 +263,61 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
         if (layer->used)
             status = plan_layer(&p, axis);
     }
+    if (status)
+        trip_plan_release(plan, budget);
+    return status;
+}
+
+static bool is_gathered(const trip_list *list, unsigned kinds)
+{
+    return list->axis == 2 && list->level == 0 && kinds >> list->kind & 1;
+}
+
+/* All of the list is selected. */
+static int gather_list(const planning *p, trip_plan_pass *pass, const trip_list *list)
+{
+    trip_plan *plan = p->plan;
+    trip_plan_list *planned = &plan->lists[list->index];
+    int status = place_list(p, list);
+    if (!status)
+        status = trip_selection_create_whole(&plan->selections[plan->selection_count], p->data,
+                                             list, false, p->budget);
+    if (status)
+        return status;
+    plan->selection_count++;
+    pass->pass.selection_count++;
+    planned->bricks = planned->bricks_selected = list->brick_count;
+    planned->splats_selected = list->records;
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        planned->bytes_selected[plane] = list->plane_bytes[plane];
+    return 0;
+}
+
+static int gather_lists(const planning *p, unsigned kinds)
+{
+    trip_plan_layer *layer = &p->plan->layers[2];
+    trip_plan_pass *pass = &layer->passes[0];
+    int status = 0;
+    *pass =
+        (trip_plan_pass){ .pass = { .selections = p->plan->selections }, .front_to_back = true };
+    for (unsigned i = 0; i < p->data->list_count && !status; i++)
+        if (p->data->lists[i].records > 0 && is_gathered(&p->data->lists[i], kinds))
+            status = gather_list(p, pass, &p->data->lists[i]);
+    layer->pass_count = pass->pass.selection_count > 0;
+    layer->used = layer->pass_count > 0;
+    return status;
+}
+
+int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, unsigned kinds, trip_budget *budget)
+{
+    const planning p = { plan, data, camera, settings, NULL, budget };
+    *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
+                         .gathers = true,
+                         .planes = planes_of(data, settings) };
+    int status = take_lists(plan, data->list_count, budget);
+    if (!status)
+        status = gather_lists(&p, kinds);
     if (status)
         trip_plan_release(plan, budget);
     return status;
@@ -276,6 +335,12 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
 
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
+    if (plan->gathers) {
+        fprintf(out, "method      integral: ray by ray, through %s, each component within %g\n",
+                s->field == TRIP_FIELD_SPLATS ? "the sum of the splats" : "the values",
+                s->tolerance);
+        return;
+    }
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out, "method      merge: layers of up to three lists, blended by w^2 with h = %g\n",
@@ -316,17 +381,21 @@ static bool is_read(const trip_plan *plan, const trip_list *list)
     return false;
 }
 
+static const char *why_not_drawn(const trip_plan *plan, const trip_list *list)
+{
+    if (plan->gathers)
+        return "";
+    return trip_kind_of(list->kind)->splatted ? ": no ray of the view has weight in it"
+                                              : ": its records are not splatted";
+}
+
 static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out)
 {
     const trip_plan_list *planned = &plan->lists[list->index];
     char name[24], bytes[32];
     fprintf(out, "list %-6s ", trip_plan_list_name(list, name));
-    if (!trip_kind_of(list->kind)->splatted) {
-        fprintf(out, "not read: its records are not splatted\n");
-        return;
-    }
     if (!planned->drawn) {
-        fprintf(out, "not read: no ray of the view has weight in it\n");
+        fprintf(out, "not read%s\n", why_not_drawn(plan, list));
         return;
     }
     uint64_t bytes_read = 0;
@@ -376,7 +445,10 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
 {
     const char *light = s->headlight ? "from the eye" : "from the direction given";
     char bytes[32];
-    if (plan->planes & 1u << TRIP_PLANE_NORMALS)
+    if (plan->gathers && plan->selection_count == 0)
+        fprintf(out, "shading     %s, by differences of the values\n",
+                s->shading ? "runs" : "does not run");
+    else if (plan->planes & 1u << TRIP_PLANE_NORMALS)
         fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))
         fprintf(out, "shading     does not run: the data set has no normals\n");
@@ -395,6 +467,8 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
     for (int axis = 0; axis < 3; axis++)
         used += plan->layers[axis].pass_count > 0;
     explain_shading(plan, data, settings, out);
+    if (plan->gathers)
+        return;
     if (used > 1)
         fprintf(out, "merge       runs: %d layers are blended\n", used);
     else

@@ -38,6 +38,7 @@ typedef struct trip_plan_layer {
 
 typedef struct trip_plan {
     int axis_of_view;
+    bool gathers;    /* trip_plan_make_field()'s */
     unsigned planes; /* bit per trip_plane to read */
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */
@@ -50,6 +51,10 @@ typedef struct trip_plan {
  * transparent are left out. */
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget);
+/* For the integral renderer: one pass over all of the list of level 0 along z, whatever the view
+ * and the function. `kinds` has a bit for each trip_kind that is read; 0: nothing is. */
+int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, unsigned kinds, trip_budget *budget);
 void trip_plan_release(trip_plan *plan, trip_budget *budget);
 
 /* Selected in all lists. */

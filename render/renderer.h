@@ -11,6 +11,8 @@
 #include "settings.h"
 #include "transfer_function.h"
 
+struct trip_field;
+
 /* Of a list in one frame. */
 typedef struct trip_list_stats {
     uint64_t splats_read;      /* handed to the renderer */
@@ -27,7 +29,9 @@ typedef struct trip_frame {
     const trip_settings *settings;
     const trip_plan *plan;
     const trip_tf_entry *table; /* 65536 entries */
-    bool count;                 /* splats projected and drawn, too: counting costs time */
+    /* For the integral renderer: integrate this instead of what batches hold; NULL: those. */
+    const struct trip_field *field;
+    bool count; /* splats projected and drawn, too: counting costs time */
     /* Hears between batches how many splats were drawn, of how many; NULL: nobody asks. */
     void (*progress)(void *user, uint64_t splats, uint64_t total);
     void *progress_user;
@@ -48,7 +52,7 @@ typedef struct trip_renderer trip_renderer;
 #define TRIP_FRAME_PIECE 16384
 
 typedef struct trip_renderer_ops {
-    const char *name; /* "reference", "gl", "cpu" */
+    const char *name; /* "reference", "gl", "cpu", "integral" */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);
@@ -91,5 +95,7 @@ struct trip_renderer {
 int trip_reference_create(trip_renderer **out, trip_budget *budget);
 int trip_gl_create(trip_renderer **out, trip_budget *budget);
 int trip_cpu_create(trip_renderer **out, trip_budget *budget, unsigned threads);
+/* Of frames whose plan is trip_plan_make_field()'s. */
+int trip_integral_create(trip_renderer **out, trip_budget *budget, unsigned threads);
 
 #endif

@@ -45,6 +45,8 @@ int trip_renderer_create(trip_renderer **out, trip_renderer_kind kind, unsigned 
         return trip_reference_create(out, budget);
     case TRIP_RENDERER_CPU:
         return trip_cpu_create(out, budget, threads);
+    case TRIP_RENDERER_INTEGRAL:
+        return trip_integral_create(out, budget, threads);
     case TRIP_RENDERER_AUTO:
         break;
     }

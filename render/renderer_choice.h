@@ -9,6 +9,7 @@ typedef enum trip_renderer_kind {
     TRIP_RENDERER_GL,
     TRIP_RENDERER_CPU,
     TRIP_RENDERER_REFERENCE,
+    TRIP_RENDERER_INTEGRAL,
 } trip_renderer_kind;
 
 /* `threads` 0: as many as there are processors. AUTO says nothing about what it found missing. */

@@ -14,6 +14,8 @@ trip_settings trip_settings_default(void)
         .h = 0.85,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
         .background = { 0, 0, 0, 1 },
+        .tolerance = 1e-4,
+        .samples = 1,
     };
 }
 

@@ -35,6 +35,17 @@ typedef enum trip_target {
     TRIP_TARGET_RGBA8,
 } trip_target;
 
+/* What the integral renderer integrates. */
+typedef enum trip_field_kind {
+    TRIP_FIELD_VALUES, /* values interpolated between voxels, then classified */
+    TRIP_FIELD_SPLATS, /* the sum of the splats */
+} trip_field_kind;
+
+typedef enum trip_kernel {
+    TRIP_KERNEL_LINEAR, /* between the 8 voxels around */
+    TRIP_KERNEL_CUBIC,  /* Catmull and Rom's, between 64 */
+} trip_kernel;
+
 typedef struct trip_settings {
     trip_method method;
     trip_traversal traversal;
@@ -48,10 +59,15 @@ typedef struct trip_settings {
     double h;                  /* 0 <= h < 1 */
     double kernel_radius;      /* voxels (index space) */
     double background[4];      /* r, g, b, a; not premultiplied */
+    /* Of the integral renderer alone. */
+    trip_field_kind field;
+    trip_kernel kernel; /* of values */
+    double tolerance;   /* of a component of a pixel, 0 to 1 */
+    int samples;        /* rays of a pixel, along x and along y; their mean is its colour */
 } trip_settings;
 
 /* The defaults: merge, outward, h 0.85, kernel radius 2, shading by headlight, rgba32f, no depth,
- * black. */
+ * black; values, linear, to 1e-4, one ray a pixel. */
 trip_settings trip_settings_default(void);
 
 /* Fails (usage) for settings that exclude one another. */

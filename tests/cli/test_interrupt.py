@@ -111,6 +111,9 @@ class Interrupt(program.ProgramTest):
     def test_the_reference(self):
         self.check("reference")
 
+    def test_the_integral(self):
+        self.check("integral")
+
     def test_opengl(self):
         self.check("gl")
         self.check("gl", "8192x8192")

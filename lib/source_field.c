@@ -1,0 +1,139 @@
+#include "source_field.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "report.h"
+
+enum { EDGE = 64, SLICES = 16 };
+
+static const size_t values_bytes = (size_t)EDGE * EDGE * SLICES * sizeof(float);
+
+typedef struct reading {
+    const trip_dataset *data;
+    trip_volume *volume;
+    trip_field *field;
+    float *values; /* of a box */
+    trip_budget *budget;
+} reading;
+
+static double code_of(const trip_dataset *data, double value)
+{
+    const trip_file_header *h = &data->header;
+    double range = h->code_hi - h->code_lo;
+    return range > 0 ? (value - h->code_lo) / range * 65535 : 0;
+}
+
+static int put_box(reading *r, const int64_t lo[3], const int64_t size[3])
+{
+    int status = 0;
+    const float *value = r->values;
+    for (int64_t k = lo[2]; k < lo[2] + size[2]; k++)
+        for (int64_t j = lo[1]; j < lo[1] + size[1]; j++)
+            for (int64_t i = lo[0]; i < lo[0] + size[0] && !status; i++, value++) {
+                const int64_t at[3] = { i, j, k };
+                if (isfinite(*value) && !trip_field_at(r->field, i, j, k))
+                    status = trip_field_put(r->field, at, code_of(r->data, *value), NULL);
+            }
+    return status;
+}
+
+static int64_t smaller(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+static int put_range(reading *r, const trip_volume_block *block, const int64_t lo[3],
+                     const int64_t hi[3])
+{
+    int64_t at[3], size[3];
+    int status = 0;
+    for (at[2] = lo[2]; at[2] < hi[2]; at[2] += SLICES)
+        for (at[1] = lo[1]; at[1] < hi[1]; at[1] += EDGE)
+            for (at[0] = lo[0]; at[0] < hi[0] && !status; at[0] += EDGE) {
+                for (int a = 0; a < 3; a++)
+                    size[a] = smaller(a == 2 ? SLICES : EDGE, hi[a] - at[a]);
+                status = trip_block_decode(r->volume, block, at, size, r->values, NULL);
+                if (!status)
+                    status = put_box(r, at, size);
+                if (!status && trip_interrupted())
+                    status = trip_fail(TRIP_INTERRUPTED, "read", "volume", "interrupted");
+            }
+    return status;
+}
+
+/* Of a sparse volume one voxel around belongs to it. */
+static int put_block(reading *r, const trip_volume_block *block)
+{
+    const trip_volume_info *info = trip_volume_get_info(r->volume);
+    int64_t lo[3], hi[3], around = info->sparse;
+    for (int a = 0; a < 3; a++) {
+        lo[a] = block->origin[a] > around ? block->origin[a] - around : 0;
+        hi[a] = smaller(block->origin[a] + block->size[a] + around, info->dims[a]);
+    }
+    return put_range(r, block, lo, hi);
+}
+
+static int put_volume(reading *r)
+{
+    trip_volume_block block;
+    int status;
+    while ((status = trip_volume_next(r->volume, SLICES, &block)) > 0) {
+        status = put_block(r, &block);
+        trip_block_release(r->volume, &block);
+        if (status)
+            return status;
+    }
+    return status;
+}
+
+static int check_grid(const reading *r, const char *path)
+{
+    const trip_volume_info *info = trip_volume_get_info(r->volume);
+    const trip_affine *map = &r->data->index_to_world;
+    bool same = memcmp(&info->index_to_world, map, sizeof *map) == 0;
+    for (int a = 0; a < 3; a++)
+        same &= info->dims[a] == (int64_t)r->data->header.dims[a];
+    return same ? 0
+                : trip_fail(TRIP_ERROR, "read", path,
+                            "is not the volume that %s was made of: its grid is another",
+                            r->data->path);
+}
+
+static int read_volume(reading *r, const char *path)
+{
+    const int64_t *dims = trip_volume_get_info(r->volume)->dims;
+    const trip_file_header *h = &r->data->header;
+    int status = check_grid(r, path);
+    if (!status)
+        status = trip_field_create(&r->field, dims, r->budget);
+    if (!status)
+        status = put_volume(r);
+    return status ? status
+                  : trip_field_finish(
+                        r->field,
+                        &(trip_field_map){ .index_to_world = r->data->index_to_world,
+                                           .value_per_code = (h->code_hi - h->code_lo) / 65535 });
+}
+
+int trip_source_field_read(trip_field **out, const trip_dataset *data, const char *path,
+                           const trip_volume_params *params, trip_budget *budget)
+{
+    reading r = { .data = data,
+                  .budget = budget,
+                  .values = trip_budget_take(budget, values_bytes) };
+    *out = NULL;
+    if (!r.values)
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory; raise --memory");
+    int status = trip_volume_open(&r.volume, path, params, budget);
+    if (!status) {
+        status = read_volume(&r, path);
+        trip_volume_close(r.volume);
+    }
+    trip_budget_release(budget, r.values, values_bytes);
+    if (status)
+        trip_field_destroy(r.field);
+    else
+        *out = r.field;
+    return status;
+}

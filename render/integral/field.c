@@ -1,0 +1,344 @@
+#include "field.h"
+
+#include <string.h>
+
+#include "report.h"
+
+enum {
+    EDGE = TRIP_FIELD_EDGE,
+    CUBE_VOXELS = EDGE * EDGE * EDGE,
+    CHUNK_CUBES = 256, /* taken from the budget at a time */
+};
+
+struct trip_field {
+    trip_budget *budget;
+    int64_t dims[3], cubes[3];
+    size_t places;       /* of the directory */
+    uint32_t *directory; /* by the cube's place in the grid: 1 + its number; 0: it has no voxels */
+    trip_field_cube **chunks;
+    size_t chunk_room, count;
+};
+
+static size_t chunks_of(size_t cubes)
+{
+    return cubes / CHUNK_CUBES + (cubes % CHUNK_CUBES > 0);
+}
+
+static int fail_memory(const char *what)
+{
+    return trip_fail(TRIP_ERROR, "render", "integral",
+                     "%s does not fit the memory given: the integral holds the whole volume, 16 "
+                     "bytes a voxel; raise --memory",
+                     what);
+}
+
+int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budget)
+{
+    trip_field *f = *out = trip_budget_take(budget, sizeof *f);
+    if (!f)
+        return fail_memory("the volume");
+    f->budget = budget;
+    f->places = 1;
+    bool fits = true;
+    for (int a = 0; a < 3; a++) {
+        f->dims[a] = dims[a];
+        f->cubes[a] = (dims[a] + EDGE - 1) / EDGE;
+        fits &= !__builtin_mul_overflow(f->places, (size_t)f->cubes[a], &f->places);
+    }
+    if (!fits || f->places >= UINT32_MAX) {
+        f->places = 0;
+        trip_field_destroy(f);
+        *out = NULL;
+        return fail_memory("the directory of so large a grid");
+    }
+    f->chunk_room = chunks_of(f->places);
+    f->directory = trip_budget_take(budget, f->places * sizeof *f->directory);
+    f->chunks = trip_budget_take(budget, f->chunk_room * sizeof(trip_field_cube *));
+    if (f->directory && f->chunks)
+        return 0;
+    trip_field_destroy(f);
+    *out = NULL;
+    return fail_memory("the directory of the grid");
+}
+
+void trip_field_destroy(trip_field *f)
+{
+    if (!f)
+        return;
+    trip_budget *budget = f->budget;
+    for (size_t i = 0; i < chunks_of(f->count); i++)
+        trip_budget_release(budget, f->chunks[i], CHUNK_CUBES * sizeof **f->chunks);
+    trip_budget_release(budget, f->chunks, f->chunk_room * sizeof(trip_field_cube *));
+    trip_budget_release(budget, f->directory, f->places * sizeof *f->directory);
+    trip_budget_release(budget, f, sizeof *f);
+}
+
+const int64_t *trip_field_dims(const trip_field *f)
+{
+    return f->dims;
+}
+
+size_t trip_field_cubes(const trip_field *f)
+{
+    return f->count;
+}
+
+static trip_field_cube *cube_by_number(const trip_field *f, size_t number)
+{
+    return &f->chunks[number / CHUNK_CUBES][number % CHUNK_CUBES];
+}
+
+const trip_field_cube *trip_field_cube_by_number(const trip_field *f, size_t number)
+{
+    return cube_by_number(f, number);
+}
+
+static uint32_t *place_of(const trip_field *f, const int64_t at[3])
+{
+    return &f->directory[((size_t)(at[2] / EDGE) * (size_t)f->cubes[1] + (size_t)(at[1] / EDGE)) *
+                             (size_t)f->cubes[0] +
+                         (size_t)(at[0] / EDGE)];
+}
+
+static bool is_in_grid(const trip_field *f, const int64_t at[3])
+{
+    return at[0] >= 0 && at[1] >= 0 && at[2] >= 0 && at[0] < f->dims[0] && at[1] < f->dims[1] &&
+           at[2] < f->dims[2];
+}
+
+const trip_field_cube *trip_field_cube_at(const trip_field *f, const int64_t at[3])
+{
+    uint32_t number = is_in_grid(f, at) ? *place_of(f, at) : 0;
+    return number ? cube_by_number(f, number - 1) : NULL;
+}
+
+static size_t index_in_cube(const int64_t at[3])
+{
+    return (size_t)((at[2] % EDGE * EDGE + at[1] % EDGE) * EDGE + at[0] % EDGE);
+}
+
+const trip_field_voxel *trip_field_at(const trip_field *f, int64_t i, int64_t j, int64_t k)
+{
+    const int64_t at[3] = { i, j, k };
+    const trip_field_cube *cube = trip_field_cube_at(f, at);
+    const trip_field_voxel *voxel = cube ? &cube->voxels[index_in_cube(at)] : NULL;
+    return voxel && !isnan(voxel->code) ? voxel : NULL;
+}
+
+/* A new cube, without voxels; NULL when it does not fit. */
+static trip_field_cube *begin_cube(trip_field *f, const int64_t at[3])
+{
+    size_t chunk = f->count / CHUNK_CUBES;
+    if (f->count % CHUNK_CUBES == 0 &&
+        !(f->chunks[chunk] = trip_budget_take(f->budget, CHUNK_CUBES * sizeof **f->chunks)))
+        return NULL;
+    trip_field_cube *cube = cube_by_number(f, f->count++);
+    *place_of(f, at) = (uint32_t)f->count;
+    for (int a = 0; a < 3; a++)
+        cube->at[a] = at[a] / EDGE * EDGE;
+    cube->own[0] = INFINITY;
+    cube->own[1] = -INFINITY;
+    for (int i = 0; i < CUBE_VOXELS; i++)
+        cube->voxels[i] = (trip_field_voxel){ NAN, { NAN, NAN, NAN } };
+    return cube;
+}
+
+int trip_field_put(trip_field *f, const int64_t at[3], double code, const double gradient[3])
+{
+    uint32_t number = *place_of(f, at);
+    trip_field_cube *cube = number ? cube_by_number(f, number - 1) : begin_cube(f, at);
+    if (!cube)
+        return fail_memory("the volume");
+    trip_field_voxel *voxel = &cube->voxels[index_in_cube(at)];
+    voxel->code = (float)code;
+    for (int a = 0; a < 3 && gradient; a++)
+        voxel->gradient[a] = (float)gradient[a];
+    cube->own[0] = fminf(cube->own[0], voxel->code);
+    cube->own[1] = fmaxf(cube->own[1], voxel->code);
+    return 0;
+}
+
+/* Along an axis, codes per index. */
+static double difference(const trip_field *f, const int64_t at[3], double here, int axis)
+{
+    int64_t after[3] = { at[0], at[1], at[2] }, before[3] = { at[0], at[1], at[2] };
+    after[axis]++;
+    before[axis]--;
+    const trip_field_voxel *a = trip_field_at(f, after[0], after[1], after[2]);
+    const trip_field_voxel *b = trip_field_at(f, before[0], before[1], before[2]);
+    double rise = (a ? (double)a->code : here) - (b ? (double)b->code : here);
+    return a && b ? rise / 2 : rise;
+}
+
+static void set_gradient(const trip_field *f, const trip_field_map *map,
+                         const trip_affine *to_index, const int64_t at[3], trip_field_voxel *voxel)
+{
+    bool given = !isnan(voxel->gradient[0]);
+    if (given && !map->signless)
+        return;
+    trip_vec3 rise = trip_v3(difference(f, at, voxel->code, 0), difference(f, at, voxel->code, 1),
+                             difference(f, at, voxel->code, 2));
+    trip_vec3 g = trip_affine_transpose_vector(to_index, trip_scale(rise, map->value_per_code));
+    float *stored = voxel->gradient;
+    if (!given) {
+        stored[0] = (float)g.x;
+        stored[1] = (float)g.y;
+        stored[2] = (float)g.z;
+    } else if (trip_dot(g, trip_v3(stored[0], stored[1], stored[2])) < 0) {
+        for (int a = 0; a < 3; a++)
+            stored[a] = -stored[a];
+    }
+}
+
+static void finish_cube(const trip_field *f, const trip_field_map *map, const trip_affine *to_index,
+                        trip_field_cube *cube)
+{
+    for (int n = 0; n < CUBE_VOXELS; n++) {
+        const int64_t at[3] = { cube->at[0] + n % EDGE, cube->at[1] + n / EDGE % EDGE,
+                                cube->at[2] + n / (EDGE * EDGE) };
+        if (!isnan(cube->voxels[n].code))
+            set_gradient(f, map, to_index, at, &cube->voxels[n]);
+    }
+    memcpy(cube->range, cube->own, sizeof cube->range);
+    for (int n = 0; n < 27; n++) {
+        const int64_t at[3] = { cube->at[0] + (n % 3 - 1) * EDGE,
+                                cube->at[1] + (n / 3 % 3 - 1) * EDGE,
+                                cube->at[2] + (n / 9 - 1) * EDGE };
+        const trip_field_cube *next = trip_field_cube_at(f, at);
+        cube->range[0] = next ? fminf(cube->range[0], next->own[0]) : cube->range[0];
+        cube->range[1] = next ? fmaxf(cube->range[1], next->own[1]) : cube->range[1];
+    }
+}
+
+int trip_field_finish(trip_field *f, const trip_field_map *map)
+{
+    trip_affine to_index;
+    if (!trip_affine_invert(&map->index_to_world, &to_index))
+        return trip_fail(TRIP_ERROR, "render", "integral", "the map to the world is singular");
+    for (size_t i = 0; i < f->count; i++) {
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "render", "integral", "interrupted");
+        finish_cube(f, map, &to_index, cube_by_number(f, i));
+    }
+    return 0;
+}
+
+/* The weights of linear are a mean, the absolute ones of cubic add up to at most 1.25 along each
+ * axis. */
+void trip_field_code_bounds(trip_kernel kernel, double least, double most, double bounds[2])
+{
+    double sum = kernel == TRIP_KERNEL_CUBIC ? 1.25 * 1.25 * 1.25 : 1;
+    double beyond = (sum - 1) / 2 * (most - least);
+    bounds[0] = least - beyond;
+    bounds[1] = most + beyond;
+}
+
+static void set_bounds(trip_kernel kernel, trip_field_cell *cell)
+{
+    double lo = INFINITY, hi = -INFINITY, bounds[2];
+    for (int n = 0; n < cell->edge * cell->edge * cell->edge; n++) {
+        lo = fmin(lo, cell->voxels[n]->code);
+        hi = fmax(hi, cell->voxels[n]->code);
+    }
+    trip_field_code_bounds(kernel, lo, hi, bounds);
+    cell->least = bounds[0];
+    cell->most = bounds[1];
+}
+
+static bool take_corners(const trip_field *f, const int64_t at[3], const trip_field_voxel **corners)
+{
+    for (int n = 0; n < 8; n++) {
+        corners[n] = trip_field_at(f, at[0] + (n & 1), at[1] + (n >> 1 & 1), at[2] + (n >> 2));
+        if (!corners[n])
+            return false;
+    }
+    return true;
+}
+
+/* Of place 0 to 3 along an axis, the voxel, cut to the grid. */
+static int64_t place_along(const trip_field *f, const int64_t at[3], int axis, int place)
+{
+    int64_t i = at[axis] + place - 1, last = f->dims[axis] - 1;
+    return i < 0 ? 0 : i > last ? last : i;
+}
+
+/* Of place 0 to 3 along an axis: which of the cell's two corners is next to it. */
+static int next_corner(int place)
+{
+    return place > 1;
+}
+
+static void take_surroundings(const trip_field *f, const int64_t at[3],
+                              const trip_field_voxel *const *corners,
+                              const trip_field_voxel **voxels)
+{
+    for (int n = 0; n < 64; n++) {
+        int x = n % 4, y = n / 4 % 4, z = n / 16;
+        const trip_field_voxel *v = trip_field_at(
+            f, place_along(f, at, 0, x), place_along(f, at, 1, y), place_along(f, at, 2, z));
+        voxels[n] = v ? v : corners[next_corner(x) + 2 * next_corner(y) + 4 * next_corner(z)];
+    }
+}
+
+bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t at[3],
+                          trip_field_cell *out)
+{
+    const trip_field_voxel *corners[8];
+    if (!take_corners(f, at, corners))
+        return false;
+    memcpy(out->at, at, sizeof out->at);
+    out->edge = kernel == TRIP_KERNEL_CUBIC ? 4 : 2;
+    if (out->edge == 2)
+        memcpy(out->voxels, corners, sizeof corners);
+    else
+        take_surroundings(f, at, corners, out->voxels);
+    set_bounds(kernel, out);
+    return true;
+}
+
+/* Of a position `t` of the way from one corner to the next. */
+static void set_weights(int edge, double t, double w[4])
+{
+    if (edge == 2) {
+        w[0] = 1 - t;
+        w[1] = t;
+        return;
+    }
+    double t2 = t * t, t3 = t2 * t;
+    w[0] = (-t + 2 * t2 - t3) / 2;
+    w[1] = (2 - 5 * t2 + 3 * t3) / 2;
+    w[2] = (t + 4 * t2 - 3 * t3) / 2;
+    w[3] = (-t2 + t3) / 2;
+}
+
+static void set_all_weights(const trip_field_cell *cell, trip_vec3 p, double w[3][4])
+{
+    set_weights(cell->edge, p.x - (double)cell->at[0], w[0]);
+    set_weights(cell->edge, p.y - (double)cell->at[1], w[1]);
+    set_weights(cell->edge, p.z - (double)cell->at[2], w[2]);
+}
+
+double trip_field_code(const trip_field_cell *cell, trip_vec3 p)
+{
+    double w[3][4], sum = 0;
+    const trip_field_voxel *const *v = cell->voxels;
+    set_all_weights(cell, p, w);
+    for (int z = 0; z < cell->edge; z++)
+        for (int y = 0; y < cell->edge; y++)
+            for (int x = 0; x < cell->edge; x++)
+                sum += w[2][z] * w[1][y] * w[0][x] * (double)(*v++)->code;
+    return sum;
+}
+
+void trip_field_gradient(const trip_field_cell *cell, trip_vec3 p, double gradient[3])
+{
+    double w[3][4];
+    const trip_field_voxel *const *v = cell->voxels;
+    set_all_weights(cell, p, w);
+    gradient[0] = gradient[1] = gradient[2] = 0;
+    for (int z = 0; z < cell->edge; z++)
+        for (int y = 0; y < cell->edge; y++)
+            for (int x = 0; x < cell->edge; x++, v++)
+                for (int a = 0; a < 3; a++)
+                    gradient[a] += w[2][z] * w[1][y] * w[0][x] * (double)(*v)->gradient[a];
+}

@@ -1,0 +1,302 @@
+/* The renderer that computes what the others approximate. A frame's batches, all voxels of one list
+ * with their halo, are put into a field, which stays for the frames to come; the picture is then
+ * integrated ray by ray. */
+#include "renderer.h"
+
+#include <stdatomic.h>
+#include <string.h>
+
+#include "cpu/pool.h"
+#include "integrand.h"
+#include "report.h"
+#include "shade.h"
+
+typedef struct integral {
+    trip_renderer base;
+    trip_budget *budget;
+    trip_cpu_pool *pool;
+    trip_classes *classes;
+    trip_splat_hits *hits; /* by thread */
+
+    /* Gathered from batches: of this data set, with the halo or without. */
+    trip_field *field;
+    const trip_dataset *field_data;
+    unsigned planes; /* that it was gathered from */
+    bool has_halo, complete;
+    uint64_t put;
+
+    const trip_frame *frame;
+    trip_compact_normals compact;
+    trip_integrand in;
+    uint64_t splats[TRIP_KINDS]; /* handed over, by the kind of their list */
+    float *rgba;                 /* of the picture being made */
+    _Atomic bool failed;         /* set by any thread: the picture is given up */
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
+} integral;
+
+static void drop_field(integral *r)
+{
+    trip_field_destroy(r->field);
+    r->field = NULL;
+    r->complete = false;
+    r->put = 0;
+}
+
+static void destroy(trip_renderer *base)
+{
+    integral *r = (integral *)base;
+    trip_budget *budget = r->budget;
+    drop_field(r);
+    for (unsigned i = 0; r->hits && i < trip_cpu_pool_threads(r->pool); i++)
+        trip_splat_hits_free(&r->hits[i]);
+    if (r->hits)
+        trip_budget_release(budget, r->hits, trip_cpu_pool_threads(r->pool) * sizeof *r->hits);
+    if (r->classes)
+        trip_budget_release(budget, r->classes, sizeof *r->classes);
+    trip_cpu_pool_destroy(r->pool);
+    trip_budget_release(budget, r, sizeof *r);
+}
+
+static const char *device(const trip_renderer *base)
+{
+    (void)base;
+    return "CPU, double precision";
+}
+
+static bool is_of_splats(const integral *r)
+{
+    return r->frame->settings->field == TRIP_FIELD_SPLATS;
+}
+
+/* A field of splats has no halo, which would count as splats. */
+static int begin_field(integral *r)
+{
+    const trip_dataset *data = r->frame->data;
+    bool halo = !is_of_splats(r);
+    unsigned planes = r->frame->plan->planes;
+    bool same = r->field_data == data && r->has_halo == halo && r->planes == planes;
+    if (r->frame->field || (r->complete && same))
+        return 0;
+    drop_field(r);
+    const int64_t dims[3] = { (int64_t)data->header.dims[0], (int64_t)data->header.dims[1],
+                              (int64_t)data->header.dims[2] };
+    r->field_data = data;
+    r->has_halo = halo;
+    r->planes = planes;
+    return trip_field_create(&r->field, dims, r->budget);
+}
+
+static int check_frame(const trip_frame *frame)
+{
+    const uint64_t *dims = frame->data->header.dims;
+    if (frame->settings->depth)
+        return trip_fail(TRIP_USAGE, "render", "depth", "the integral gives no distances");
+    for (int a = 0; a < 3 && frame->settings->field == TRIP_FIELD_VALUES; a++)
+        if (dims[a] < 2)
+            return trip_fail(TRIP_ERROR, "render", frame->data->path,
+                             "has one voxel along %c, and no cell to interpolate in; "
+                             "--field splats draws it",
+                             "ijk"[a]);
+    return 0;
+}
+
+static int begin_frame(trip_renderer *base, const trip_frame *frame)
+{
+    integral *r = (integral *)base;
+    const trip_file_header *header = &frame->data->header;
+    r->frame = frame;
+    memset(r->splats, 0, sizeof r->splats);
+    r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
+                                           header->gradient_step);
+    int status = check_frame(frame);
+    if (!status)
+        status = begin_field(r);
+    base->resident = r->complete;
+    trip_classes_make(r->classes, frame->table);
+    r->in = (trip_integrand){
+        .classes = r->classes,
+        .settings = frame->settings,
+        .camera = frame->camera,
+        .shaded = frame->settings->shading && header->planes >> TRIP_PLANE_NORMALS & 1,
+        .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world),
+    };
+    return status;
+}
+
+static int begin_layer(trip_renderer *base, int axis)
+{
+    (void)base;
+    (void)axis;
+    return 0;
+}
+
+static void unpack_gradient(const integral *r, uint32_t normal, double gradient[3])
+{
+    const trip_file_header *header = &r->frame->data->header;
+    if (header->normal_bytes == 3)
+        trip_compact_normal_unpack(&r->compact, normal, gradient);
+    else
+        trip_normal_unpack(normal, header->gradient_scale, gradient);
+}
+
+static int put_run(integral *r, const trip_batch *batch, const trip_run *run)
+{
+    const trip_block block = trip_block_of(batch, run);
+    int axis = trip_batch_list(batch, run)->axis, status = 0;
+    trip_block_voxels(&block, 0, run->count, r->voxels);
+    if (block.normals)
+        trip_block_normals(&block, 0, run->count, r->normals);
+    for (uint32_t n = 0; n < run->count && !status; n++) {
+        int64_t at[3];
+        double gradient[3];
+        at[axis] = run->sheet;
+        at[(axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(r->voxels[n]);
+        at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(r->voxels[n]);
+        if (block.normals)
+            unpack_gradient(r, r->normals[n], gradient);
+        status = trip_field_put(r->field, at, trip_voxel_code(r->voxels[n]),
+                                block.normals ? gradient : NULL);
+    }
+    r->put += run->count;
+    return status;
+}
+
+static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
+{
+    integral *r = (integral *)base;
+    int status = 0;
+    (void)front_to_back;
+    for (size_t i = 0; i < batch->run_count && !status; i++) {
+        const trip_run *run = &batch->runs[i];
+        r->splats[trip_batch_list(batch, run)->kind] += run->count;
+        if (!base->resident)
+            status = put_run(r, batch, run);
+    }
+    return status;
+}
+
+/* Once all voxels are there. */
+static int complete_field(integral *r)
+{
+    const trip_file_header *header = &r->frame->data->header;
+    if (r->complete || r->put < trip_plan_splats(r->frame->plan))
+        return 0;
+    int status = trip_field_finish(
+        r->field, &(trip_field_map){ .index_to_world = r->frame->data->index_to_world,
+                                     .value_per_code = (header->code_hi - header->code_lo) / 65535,
+                                     .signless = header->normal_bytes == 3 });
+    r->complete = status == 0;
+    return status;
+}
+
+static int integrate(integral *r, double x, double y, trip_splat_hits *hits, trip_ray_sum *sum)
+{
+    const trip_ray ray = trip_ray_make(r->in.camera, x, y);
+    if (is_of_splats(r))
+        return trip_integrate_splats(&r->in, &ray, hits, sum);
+    *sum = trip_integrate_values(&r->in, &ray);
+    return 0;
+}
+
+/* The mean over a grid of positions in the pixel. */
+static int integrate_pixel(integral *r, int x, int y, trip_splat_hits *hits, double rgba[4])
+{
+    const int samples = r->in.settings->samples;
+    memset(rgba, 0, 4 * sizeof *rgba);
+    for (int n = 0; n < samples * samples; n++) {
+        trip_ray_sum sum;
+        double share = 1.0 / (samples * samples);
+        int status = integrate(r, x + (n % samples + 0.5) / samples,
+                               y + (n / samples + 0.5) / samples, hits, &sum);
+        if (status)
+            return status;
+        for (int c = 0; c < 3; c++)
+            rgba[c] += share * sum.rgb[c];
+        rgba[3] += share * (1 - sum.transmittance);
+    }
+    return 0;
+}
+
+/* The rows of a picture, shared out among threads. */
+static void make_row(void *context, unsigned row, unsigned thread)
+{
+    integral *r = context;
+    const int width = r->in.camera->width;
+    const double *background = r->in.settings->background;
+    float *out = r->rgba + (size_t)row * (size_t)width * 4;
+    for (int x = 0; x < width && !trip_interrupted() && !r->failed; x++) {
+        double rgba[4] = { 0 };
+        if (r->in.field && integrate_pixel(r, x, (int)row, &r->hits[thread], rgba))
+            r->failed = true;
+        double through = (1 - rgba[3]) * background[3];
+        for (int c = 0; c < 3; c++)
+            *out++ = (float)(rgba[c] + through * background[c]);
+        *out++ = (float)(rgba[3] + through);
+    }
+}
+
+/* Before all voxels are there the picture is its background. */
+static int picture(trip_renderer *base, float *rgba, float *depth)
+{
+    integral *r = (integral *)base;
+    (void)depth;
+    int status = r->frame->field ? 0 : complete_field(r);
+    if (status)
+        return status;
+    r->in.field = r->frame->field ? r->frame->field : r->complete ? r->field : NULL;
+    r->rgba = rgba;
+    r->failed = false;
+    trip_cpu_job job = { .run = make_row, .context = r, .tasks = (unsigned)r->in.camera->height };
+    trip_cpu_pool_start(r->pool, &job);
+    trip_cpu_pool_wait(r->pool, &job);
+    return r->failed ? TRIP_ERROR : trip_frame_poll();
+}
+
+static trip_list_stats stats(const trip_renderer *base, unsigned list)
+{
+    const integral *r = (const integral *)base;
+    bool gathered = r->frame->plan->lists[list].drawn;
+    return (trip_list_stats){ .splats_read =
+                                  gathered ? r->splats[r->frame->data->lists[list].kind] : 0 };
+}
+
+static const trip_renderer_ops integral_ops = {
+    .name = "integral",
+    .destroy = destroy,
+    .device = device,
+    .begin_frame = begin_frame,
+    .begin_layer = begin_layer,
+    .draw = draw,
+    .picture = picture,
+    .stats = stats,
+};
+
+static int take_memory(integral *r)
+{
+    unsigned threads = trip_cpu_pool_threads(r->pool);
+    r->classes = trip_budget_take(r->budget, sizeof *r->classes);
+    r->hits = trip_budget_take(r->budget, threads * sizeof *r->hits);
+    if (!r->classes || !r->hits)
+        return trip_fail(TRIP_ERROR, "render", "integral", "out of memory; raise --memory");
+    for (unsigned i = 0; i < threads; i++)
+        r->hits[i].budget = r->budget;
+    return 0;
+}
+
+int trip_integral_create(trip_renderer **out, trip_budget *budget, unsigned threads)
+{
+    integral *r = trip_budget_take(budget, sizeof *r);
+    *out = NULL;
+    if (!r)
+        return trip_fail(TRIP_ERROR, "render", "integral", "out of memory; raise --memory");
+    r->base.ops = &integral_ops;
+    r->budget = budget;
+    int status = trip_cpu_pool_create(&r->pool, threads);
+    if (!status)
+        status = take_memory(r);
+    if (status)
+        destroy(&r->base);
+    else
+        *out = &r->base;
+    return status;
+}

@@ -1,0 +1,43 @@
+/* The emission-absorption integral along a ray, front to back, piece by piece:
+ *     colour        = integral of c(t) k(t) T(t) dt,   T(t) = exp(-integral of k before t)
+ *     transmittance = T at the end
+ * with extinction k and colour c. A piece is halved until Simpson's rule over its halves and over
+ * all of it differ, in colour and transmittance together, by less than its share of the tolerance:
+ * half of that goes by length, half by the opacity that the piece adds in the picture. What is
+ * behind a transmittance of half the tolerance is left out. So the differences of all pieces add up
+ * to at most half the tolerance, and with what is left out to the tolerance; Simpson's rule
+ * over halves is itself some fifteen times closer than the difference says, where the integrand is
+ * smooth. */
+#ifndef TRIP_QUADRATURE_H
+#define TRIP_QUADRATURE_H
+
+#include <stdbool.h>
+
+typedef struct trip_ray_sample {
+    double extinction; /* per unit of t */
+    double rgb[3];     /* of what is there, not multiplied by it */
+} trip_ray_sample;
+
+typedef void (*trip_ray_sampler)(void *user, double t, trip_ray_sample *out);
+
+typedef struct trip_ray_sum {
+    double tolerance, length; /* of the ray that pieces are of */
+    double rgb[3], transmittance;
+} trip_ray_sum;
+
+static inline trip_ray_sum trip_ray_sum_begin(double tolerance, double length)
+{
+    return (trip_ray_sum){ .tolerance = tolerance, .length = length, .transmittance = 1 };
+}
+
+/* Nothing more needs to be added. */
+static inline bool trip_ray_sum_is_over(const trip_ray_sum *s)
+{
+    return s->transmittance <= s->tolerance / 2;
+}
+
+/* Adds the piece [from, to] of the ray, which lies behind all before. */
+void trip_ray_sum_add(trip_ray_sum *s, double from, double to, trip_ray_sampler sampler,
+                      void *user);
+
+#endif

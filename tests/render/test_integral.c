@@ -1,0 +1,687 @@
+/* The integral against closed forms that are worked out here from the geometry alone, and the
+ * reference's splats against it. */
+#include "scenes.h"
+#include "test.h"
+
+#include "field.h"
+#include "shade.h"
+#include "splat.h"
+
+#include <string.h>
+
+enum { EDGE = 20 }; /* voxels of most volumes here; between their centres EDGE - 1 */
+
+/* How a picture is made; zero: one thread, the data set's field. */
+typedef struct making {
+    unsigned threads;
+    const trip_field *field;
+} making;
+
+static scene_picture integrate_with(const scene *s, const trip_camera_params *view,
+                                    const trip_settings *settings, const making *how)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_renderer *r;
+    trip_reader *reader;
+    scene_picture p = { .width = view->width, .height = view->height };
+    unsigned kinds = settings->field == TRIP_FIELD_SPLATS ? 1 : 3;
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(
+        trip_plan_make_field(&plan, s->data, &camera, settings, how->field ? 0 : kinds, s->budget),
+        0);
+    assert_int_equal(trip_reader_create(&reader, s->data,
+                                        &(trip_reader_params){ .planes = plan.planes }, s->budget),
+                     0);
+    assert_int_equal(trip_integral_create(&r, s->budget, how->threads ? how->threads : 1), 0);
+    trip_frame frame = { .data = s->data,
+                         .camera = &camera,
+                         .settings = settings,
+                         .plan = &plan,
+                         .field = how->field,
+                         .table = s->table };
+    p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
+    assert_non_null(p.rgba);
+    assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, NULL, &p.stats), 0);
+    r->ops->destroy(r);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s->budget);
+    return p;
+}
+
+static scene_picture integrate(const scene *s, const trip_camera_params *view,
+                               const trip_settings *settings)
+{
+    return integrate_with(s, view, settings, &(making){ 0 });
+}
+
+static trip_settings exact(double tolerance)
+{
+    trip_settings s = trip_settings_default();
+    s.shading = false;
+    s.tolerance = tolerance;
+    s.background[3] = 0;
+    return s;
+}
+
+/* Of the ray of a pixel's centre in index space: unit direction and origin. */
+static void get_ray(const scene *s, const trip_camera_params *view, int x, int y, trip_vec3 *origin,
+                    trip_vec3 *direction)
+{
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, view, &s->data->index_to_world), 0);
+    *origin = c.eye;
+    if (c.ortho)
+        *origin = trip_add(c.eye, trip_add(trip_scale(c.rx, x + 0.5), trip_scale(c.ry, y + 0.5)));
+    *direction = trip_normalize(trip_camera_ray(&c, x + 0.5, y + 0.5));
+}
+
+/* Where a ray is in the box of all voxel centres: distances from its origin; false: nowhere. */
+static bool in_box(const scene *s, trip_vec3 o, trip_vec3 d, double *from, double *to)
+{
+    *from = 0;
+    *to = INFINITY;
+    for (int a = 0; a < 3; a++) {
+        double t0 = -trip_component(o, a) / trip_component(d, a);
+        double t1 =
+            ((double)s->data->header.dims[a] - 1 - trip_component(o, a)) / trip_component(d, a);
+        if (trip_component(d, a) != 0) {
+            *from = fmax(*from, fmin(t0, t1));
+            *to = fmin(*to, fmax(t0, t1));
+        } else if (trip_component(o, a) < 0 ||
+                   trip_component(o, a) > (double)s->data->header.dims[a] - 1) {
+            return false;
+        }
+    }
+    return *from < *to;
+}
+
+/* World units per index length. */
+static double stretch(const scene *s, trip_vec3 direction)
+{
+    return trip_length(trip_affine_vector(&s->data->index_to_world, direction)) /
+           trip_length(direction);
+}
+
+static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
+
+static void a_constant_block_has_the_opacity_of_the_path_in_it(void **state)
+{
+    (void)state;
+    const trip_vec3 directions[] = { { 1, 0, 0 }, { 0, 0, -1 }, { 0.3, 0.5, 0.2 }, { -1, 2, 0.7 } };
+    for (int i = 0; i < 16; i++) {
+        scene s;
+        int crossed = 0;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .index_to_world = i % 2 ? sheared : trip_affine_identity() });
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ 1, 0.5F, 0.25F, 0.05F };
+        trip_camera_params view = scene_view(&s, directions[i / 4], 60, 40, 9);
+        view.ortho_height = i / 2 % 2 ? 25 : 0;
+        trip_settings settings = exact(1e-6);
+        settings.kernel = (trip_kernel)(i % 3 == 0);
+        scene_picture p = integrate(&s, &view, &settings);
+        for (int n = 0; n < 81; n++) {
+            trip_vec3 o, d;
+            double from, to, alpha = 0;
+            get_ray(&s, &view, n % 9, n / 9, &o, &d);
+            if (in_box(&s, o, d, &from, &to))
+                alpha = 1 - exp(-0.05F * (to - from) * stretch(&s, d));
+            crossed += alpha > 0;
+            const float *c = scene_pixel(&p, n % 9, n / 9);
+            assert_close(c[3], alpha, 1e-6);
+            assert_close(c[0], alpha, 1e-6);
+            assert_close(c[1], alpha / 2, 1e-6);
+            assert_close(c[2], alpha / 4, 1e-6);
+        }
+        assert_in_range(crossed, 5, 81);
+        scene_picture_free(&p);
+        scene_destroy(&s);
+    }
+}
+
+/* Along i by 3000 codes a voxel. */
+static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = 3000u * (unsigned)i;
+    return true;
+}
+
+static void a_ramp_is_integrated_in_extinction_and_in_colour(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = ramp });
+    for (int i = 0; i < 12; i++) {
+        /* First both linear in the value, then the colour alone. */
+        bool both = i % 2;
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ both ? 1 : (float)code / 65535, 0, 0,
+                                             both ? 0.4F * (float)code / 65535 : 0.11F };
+        trip_camera_params view =
+            scene_view(&s, trip_v3(i / 2 - 2.5, 0.4, 0.3 * (i % 3)), 60, 20, 7);
+        const trip_settings settings = exact(1e-6);
+        scene_picture p = integrate(&s, &view, &settings);
+        for (int n = 0; n < 49; n++) {
+            trip_vec3 o, d;
+            double from, to;
+            const float *c = scene_pixel(&p, n % 7, n / 7);
+            get_ray(&s, &view, n % 7, n / 7, &o, &d);
+            if (!in_box(&s, o, d, &from, &to))
+                continue;
+            double length = to - from, value = 3000 * (o.x + from * d.x) / 65535,
+                   rise = 3000 * d.x / 65535, k = 0.11F, through = exp(-k * length);
+            if (both)
+                through = exp(-0.4 * (value + rise * length / 2) * length);
+            assert_close(c[3], 1 - through, 1e-6);
+            /* The integral of (value + rise t) k exp(-k t). */
+            double red = value * (1 - through) + rise * ((1 - through) / k - length * through);
+            assert_close(c[0], both ? 1 - through : red, 1e-6);
+        }
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+/* 20000 up to i = 6, 40000 from i = 7 on. */
+static bool two_halves(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = i <= 6 ? 20000 : 40000;
+    return true;
+}
+
+static void what_is_nearer_covers_what_is_behind(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = two_halves });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] =
+            code <= 30000 ? (trip_tf_entry){ 1, 0, 0, 0.2F } : (trip_tf_entry){ 0, 0, 1, 0.1F };
+    const trip_settings settings = exact(1e-6);
+    for (int side = -1; side <= 1; side += 2) {
+        trip_camera_params view = scene_view(&s, trip_v3(side, 0, 0), 60, 20, 1);
+        view.ortho_height = 0.1;
+        scene_picture p = integrate(&s, &view, &settings);
+        /* Halfway from i = 6 to 7 the value passes 30000, within a 20000th of a voxel. */
+        double red = 6.5 * 0.2, blue = 12.5 * 0.1;
+        double in_front = side < 0 ? red : blue;
+        assert_close(p.rgba[0], exp(-(in_front == red ? 0 : blue)) * (1 - exp(-red)), 2e-5);
+        assert_close(p.rgba[2], exp(-(in_front == red ? red : 0)) * (1 - exp(-blue)), 2e-5);
+        assert_close(p.rgba[3], 1 - exp(-red - blue), 2e-5);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+/* Steep: from 0 to 65535 between i = 9 and 10. */
+static bool cliff(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = i <= 9 ? 0 : 65535;
+    return true;
+}
+
+static void a_narrow_peak_of_the_function_is_not_missed(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = cliff });
+    const trip_settings settings = exact(1e-4);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 60, 20, 1);
+    view.ortho_height = 0.1;
+    const int peaks[] = { 1, 300, 11111, 32768, 65533 };
+    for (int i = 0; i < 5; i++) {
+        /* A triangle two codes wide, of area 65535 codes: on its way a ray has depth 1. */
+        s.table[peaks[i]] = (trip_tf_entry){ 0.5F, 0, 0, 65535 };
+        scene_picture p = integrate(&s, &view, &settings);
+        assert_close(p.rgba[3], 1 - exp(-1), 1e-4);
+        scene_picture_free(&p);
+        s.table[peaks[i]] = (trip_tf_entry){ 0 };
+    }
+    scene_destroy(&s);
+}
+
+/* All but (9, 9, 9). */
+static bool all_but_one(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 65535;
+    return !(i == 9 && j == 9 && k == 9);
+}
+
+static void a_cell_without_a_corner_is_empty(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = all_but_one });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 1, 1, 0.1F };
+    const trip_settings settings = exact(1e-6);
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 60, 20, 1);
+    view.ortho_height = 0.1;
+    for (int i = 0; i < 3; i++) { /* through the cells around it, then beside them */
+        view.eye.x = view.look.x = 8.2 + i;
+        view.eye.y = view.look.y = 9.4;
+        scene_picture p = integrate(&s, &view, &settings);
+        assert_close(p.rgba[3], 1 - exp(-0.1F * (i < 2 ? EDGE - 3 : EDGE - 1)), 1e-6);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+/* 600 (i - 9.5)^2 codes. */
+static bool parabola(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = (unsigned)lround(600 * (i - 9.5) * (i - 9.5));
+    return true;
+}
+
+static void cubic_goes_through_a_parabola_and_linear_through_its_chords(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = parabola });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 1, 1, 2.0F * (float)code / 65535 };
+    trip_settings settings = exact(1e-6);
+    trip_camera_params view = scene_view(&s, trip_v3(0, 1, 0), 60, 20, 1);
+    view.ortho_height = 0.01;
+    for (int i = 0; i < 8; i++) {
+        double x = 3.3 + 1.6 * i, f = x - floor(x);
+        view.eye.x = view.look.x = x;
+        double code = 600 * (x - 9.5) * (x - 9.5), chord = code + 600 * f * (1 - f);
+        settings.kernel = TRIP_KERNEL_CUBIC;
+        scene_picture cubic = integrate(&s, &view, &settings);
+        settings.kernel = TRIP_KERNEL_LINEAR;
+        scene_picture linear = integrate(&s, &view, &settings);
+        assert_close(cubic.rgba[3], 1 - exp(-2 * code / 65535 * (EDGE - 1)), 1e-5);
+        assert_close(linear.rgba[3], 1 - exp(-2 * chord / 65535 * (EDGE - 1)), 1e-5);
+        scene_picture_free(&cubic);
+        scene_picture_free(&linear);
+    }
+    scene_destroy(&s);
+}
+
+/* A ball of radius *user in the middle of a cube: values fall outwards by 0.05 a voxel, the surface
+ * at one half. */
+static double ball(const double *radius, int i, int j, int k, double gradient[3])
+{
+    double middle = *radius + 4;
+    trip_vec3 from = trip_v3(i - middle, j - middle, k - middle);
+    trip_vec3 normal = trip_scale(trip_normalize(from), -0.05);
+    gradient[0] = normal.x;
+    gradient[1] = normal.y;
+    gradient[2] = normal.z;
+    return fmin(65535, fmax(0, 65535 * (0.5 + 0.05 * (*radius - trip_length(from)))));
+}
+
+static bool ball_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    *code = (unsigned)lround(ball(user, i, j, k, gradient));
+    return true;
+}
+
+/* The greatest error within 0.8 of a ball's radius: its surface is opaque, and lit from the eye. */
+static double error_of_ball(const scene *s, double radius, const making *how)
+{
+    enum { SIZE = 31 };
+    trip_settings settings = exact(1e-4);
+    settings.shading = true;
+    trip_camera_params view = scene_view(s, trip_v3(0.2, -1, 0.4), 200, 20, SIZE);
+    view.ortho_height = 2 * radius;
+    scene_picture p = integrate_with(s, &view, &settings, how);
+    double most = 0;
+    for (int n = 0; n < SIZE * SIZE; n++) {
+        double x = (n % SIZE + 0.5) / SIZE * 2 - 1, y = (n / SIZE + 0.5) / SIZE * 2 - 1;
+        if (x * x + y * y > 0.64)
+            continue;
+        double facing = sqrt(1 - x * x - y * y); /* of normal, light and half vector alike */
+        double red = 0.6 * (TRIP_AMBIENT + TRIP_DIFFUSE * facing) +
+                     TRIP_SPECULAR * pow(facing, TRIP_SHININESS);
+        most = fmax(most, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
+    }
+    scene_picture_free(&p);
+    return most;
+}
+
+static void put_ball(trip_field *f, double radius)
+{
+    const int64_t *dims = trip_field_dims(f);
+    for (int64_t n = 0; n < dims[0] * dims[1] * dims[2]; n++) {
+        const int64_t at[3] = { n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1] };
+        double gradient[3];
+        double code = ball(&radius, (int)at[0], (int)at[1], (int)at[2], gradient);
+        assert_int_equal(trip_field_put(f, at, code, NULL), 0);
+    }
+    assert_int_equal(
+        trip_field_finish(f, &(trip_field_map){ trip_affine_identity(), 1.0 / 65535, false }), 0);
+}
+
+/* Normals stored in 4 bytes and in 3, and by differences of the values. */
+static void a_lit_ball_has_its_colours_the_closer_the_finer_it_is(void **state)
+{
+    (void)state;
+    for (int form = 0; form < 3; form++) {
+        double errors[3];
+        for (int i = 0; i < 3; i++) {
+            scene s;
+            trip_field *field = NULL;
+            double radius = 6 << i;
+            int64_t edge = (int64_t)(2 * radius + 9);
+            scene_create(&s, &(scene_params){ .dims = { edge, edge, edge },
+                                              .normals = true,
+                                              .normal_bytes = form == 1 ? 3 : 4,
+                                              .voxel = ball_voxel,
+                                              .user = &radius });
+            for (int code = 0; code < 65536; code++)
+                s.table[code] = (trip_tf_entry){ 0.6F, 0.6F, 0.6F, code < 32768 ? 0 : 1000 };
+            if (form == 2) {
+                assert_int_equal(
+                    trip_field_create(&field, (int64_t[3]){ edge, edge, edge }, s.budget), 0);
+                put_ball(field, radius);
+            }
+            errors[i] = error_of_ball(&s, radius, &(making){ .threads = 2, .field = field });
+            trip_field_destroy(field);
+            scene_destroy(&s);
+        }
+        /* Of normals in 3 bytes an error is left that no resolution lessens: normal.h. */
+        double left = form == 1 ? 0.5 / 255 : 0;
+        assert_true(errors[0] < 0.005);
+        assert_true(errors[1] < left + 0.4 * errors[0]);
+        assert_true(errors[2] < left + 0.4 * errors[1]);
+    }
+}
+
+static bool one_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 7;
+    return i == 9 && j == 10 && k == 8;
+}
+
+static void a_splat_is_a_gaussian_cut_off_and_lowered(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 8; i++) {
+        scene s;
+        const double k = TRIP_CUTOFF, edge = exp(-k * k / 2);
+        int covered = 0;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .voxel = one_voxel,
+                                      .index_to_world = i % 2 ? sheared : trip_affine_identity() });
+        s.table[7] = (trip_tf_entry){ 0.2F, 0.4F, 1, 3 };
+        trip_settings settings = exact(1e-7);
+        settings.field = TRIP_FIELD_SPLATS;
+        settings.kernel_radius = i / 2 % 2 ? 3 : 2;
+        double sigma = settings.kernel_radius / k, twice = 2 * sigma * sigma;
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 40, 14, 15);
+        view.ortho_height = i / 4 ? 8 : 0;
+        scene_picture p = integrate(&s, &view, &settings);
+        for (int n = 0; n < 225; n++) {
+            trip_vec3 o, d;
+            get_ray(&s, &view, n % 15, n / 15, &o, &d);
+            trip_vec3 across = trip_cross(trip_sub(trip_v3(9, 10, 8), o), d);
+            double d2 = trip_dot(across, across);
+            double footprint = d2 < k * k * sigma * sigma ? exp(-d2 / twice) - edge : 0;
+            /* Of unit integral over the plane. */
+            footprint /= 3.14159265358979323846 * twice * (1 - edge * (1 + k * k / 2));
+            double alpha = 1 - exp(-3 * stretch(&s, d) * footprint);
+            covered += alpha > 0.01;
+            assert_close(scene_pixel(&p, n % 15, n / 15)[3], alpha, 1e-6);
+            assert_close(scene_pixel(&p, n % 15, n / 15)[1], 0.4F * alpha, 1e-6);
+        }
+        assert_in_range(covered, 5, 225);
+        scene_picture_free(&p);
+        scene_destroy(&s);
+    }
+}
+
+static void of_a_splat_at_the_eye_the_half_in_front_counts(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = one_voxel });
+    s.table[7] = (trip_tf_entry){ 1, 1, 1, 3 };
+    trip_settings settings = exact(1e-7);
+    settings.field = TRIP_FIELD_SPLATS;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 1, 20, 1);
+    double k = TRIP_CUTOFF, sigma = settings.kernel_radius / k, edge = exp(-k * k / 2);
+    double whole =
+        (1 - edge) / (2 * 3.14159265358979323846 * sigma * sigma) / (1 - edge * (1 + k * k / 2));
+    view.eye = trip_v3(9, 10, 8);
+    view.look = trip_v3(7, 10.5, 8.2);
+    scene_picture p = integrate(&s, &view, &settings);
+    assert_close(p.rgba[3], 1 - exp(-3 * whole / 2), 1e-6);
+    scene_picture_free(&p);
+    scene_destroy(&s);
+}
+
+/* Noise in every voxel, with gradients. */
+static bool noise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    *code = scene_hash(i, j, k) % 65536;
+    for (int a = 0; a < 3; a++)
+        gradient[a] = 0.2 * (scene_hash(k, i + a, j) % 1000 / 1000.0 - 0.5);
+    return scene_hash(j, k, i) % 7 != 0;
+}
+
+/* Many hues, thin and dense by turns. */
+static void set_stripes(scene *s)
+{
+    for (int code = 0; code < 65536; code++) {
+        int stripe = code / 3000;
+        s->table[code] = (trip_tf_entry){ (float)(stripe % 3) / 2, (float)(stripe % 5) / 4,
+                                          (float)(stripe % 7) / 6, stripe % 4 ? 0 : 0.7F };
+    }
+}
+
+static void the_error_is_within_the_tolerance(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 10, 10, 10 }, .normals = true, .voxel = noise });
+    set_stripes(&s);
+    for (int i = 0; i < 4; i++) {
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 20, 30, 8);
+        trip_settings settings = exact(1e-7);
+        settings.shading = true;
+        settings.kernel = (trip_kernel)(i % 2);
+        settings.field = i < 2 ? TRIP_FIELD_VALUES : TRIP_FIELD_SPLATS;
+        scene_picture best = integrate(&s, &view, &settings);
+        for (double tolerance = 1e-1; tolerance > 1e-5; tolerance /= 10) {
+            settings.tolerance = tolerance;
+            scene_picture p = integrate(&s, &view, &settings);
+            double apart = scene_difference(&p, &best);
+            assert_true(apart <= tolerance);
+            scene_picture_free(&p);
+        }
+        scene_picture_free(&best);
+    }
+    scene_destroy(&s);
+}
+
+static void threads_and_tiles_change_no_bit(void **state)
+{
+    (void)state;
+    for (int field = 0; field < 2; field++) {
+        scene_picture first = { 0 };
+        for (int i = 0; i < 4; i++) {
+            scene s;
+            scene_create(&s, &(scene_params){ .dims = { 30, 20, 10 },
+                                              .normals = true,
+                                              .tile_voxels = i / 2 ? 16 : 64,
+                                              .slab_sheets = i / 2 ? 3 : 8,
+                                              .voxel = noise });
+            set_stripes(&s);
+            trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 60, 25, 13);
+            trip_settings settings = exact(1e-4);
+            settings.shading = true;
+            settings.field = (trip_field_kind)field;
+            scene_picture p = integrate_with(&s, &view, &settings,
+                                             &(making){ .threads = 1 + 2 * (unsigned)(i % 2) });
+            if (i == 0)
+                first = p;
+            else
+                assert_memory_equal(p.rgba, first.rgba, 13 * 13 * 4 * sizeof *p.rgba);
+            if (i > 0)
+                scene_picture_free(&p);
+            scene_destroy(&s);
+        }
+        scene_picture_free(&first);
+    }
+}
+
+static void samples_are_the_mean_of_a_finer_picture(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 10, 10, 10 }, .voxel = noise });
+    set_stripes(&s);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 20, 40, 18);
+    trip_settings settings = exact(1e-5);
+    settings.background[3] = 1;
+    settings.background[1] = 0.5;
+    scene_picture fine = integrate(&s, &view, &settings);
+    view.width = view.height = 6;
+    settings.samples = 3;
+    scene_picture p = integrate(&s, &view, &settings);
+    for (int n = 0; n < 36 * 4; n++) {
+        double sum = 0;
+        for (int i = 0; i < 9; i++)
+            sum += scene_pixel(&fine, n / 4 % 6 * 3 + i % 3, n / 24 * 3 + i / 3)[n % 4];
+        assert_close(p.rgba[n], sum / 9, 1e-6);
+    }
+    scene_picture_free(&fine);
+    scene_picture_free(&p);
+    scene_destroy(&s);
+}
+
+/* Values that a data set rounds to whole codes: with extinction linear in the code the depth of a
+ * path is off by at most half a code along it. */
+static void codes_lose_what_rounding_to_them_can(void **state)
+{
+    (void)state;
+    scene s;
+    trip_field *field;
+    double radius = 6, rise = 30;
+    int64_t edge = (int64_t)(2 * radius + 9);
+    scene_create(
+        &s, &(scene_params){ .dims = { edge, edge, edge }, .voxel = ball_voxel, .user = &radius });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)(rise * fmax(0, code - 32768) / 65535) };
+    assert_int_equal(trip_field_create(&field, (int64_t[3]){ edge, edge, edge }, s.budget), 0);
+    put_ball(field, radius);
+    const trip_settings settings = exact(1e-9);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 60, 20, 16);
+    scene_picture stored = integrate(&s, &view, &settings);
+    scene_picture source = integrate_with(&s, &view, &settings, &(making){ .field = field });
+    double depth = rise * 0.5 / 65535 * 2 * (radius + 1),
+           apart = scene_difference(&stored, &source);
+    assert_true(apart > 1e-7 && apart < depth);
+    scene_picture_free(&stored);
+    scene_picture_free(&source);
+    trip_field_destroy(field);
+    scene_destroy(&s);
+}
+
+/* Of one colour the order of splats does not matter, and their opacity is that of the integral, but
+ * for the low-pass of the screen, which counts less the finer the pixels are. */
+static void the_reference_comes_to_the_integral_of_its_splats(void **state)
+{
+    (void)state;
+    enum { SIZE = 12 };
+    scene s;
+    double errors[3] = { 0 };
+    const scene_renderer reference = { "reference", trip_reference_create, 0 };
+    scene_create(&s, &(scene_params){ .dims = { 8, 8, 8 }, .voxel = noise });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, code > 40000 ? 0.3F : 0 };
+    trip_settings settings = exact(1e-6);
+    settings.h = 0;
+    settings.field = TRIP_FIELD_SPLATS;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 20, 0, SIZE);
+    view.ortho_height = 6;
+    scene_picture truth = integrate(&s, &view, &settings);
+    for (int i = 0; i < 3; i++) { /* 2, 6 and 18 pixels a voxel; the same rays */
+        int finer = i == 0 ? 1 : i == 1 ? 3 : 9;
+        view.width = view.height = SIZE * finer;
+        scene_picture splats = scene_draw(&s, &reference, &view, &settings);
+        for (int n = 0; n < SIZE * SIZE; n++) {
+            const float *drawn =
+                scene_pixel(&splats, n % SIZE * finer + finer / 2, n / SIZE * finer + finer / 2);
+            errors[i] = fmax(errors[i], test_most_apart(drawn, truth.rgba + 4 * n, 4));
+        }
+        scene_picture_free(&splats);
+    }
+    scene_picture_free(&truth);
+    /* The low-pass adds a variance that falls with the square of the pixel. */
+    assert_true(errors[0] > 1e-3);
+    assert_close(errors[1] / errors[0], 1.0 / 9, 0.05);
+    assert_close(errors[2] / errors[1], 1.0 / 9, 0.05);
+    scene_destroy(&s);
+}
+
+static void what_does_not_fit_the_memory_is_refused(void **state)
+{
+    (void)state;
+    trip_budget *budget;
+    trip_field *field;
+    const int64_t at[3] = { 3, 3, 3 };
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    test_catch_reports();
+    assert_int_equal(
+        trip_field_create(&field, (int64_t[3]){ INT32_MAX, INT32_MAX, INT32_MAX }, budget),
+        TRIP_ERROR);
+    assert_null(field);
+    assert_int_equal(test_report_count, 1);
+    assert_int_equal(trip_field_create(&field, (int64_t[3]){ 64, 64, 64 }, budget), 0);
+    assert_int_equal(trip_field_put(field, at, 1, NULL), TRIP_ERROR);
+    assert_int_equal(test_report_count, 2);
+    assert_non_null(strstr(test_last_report, "--memory"));
+    trip_field_destroy(field);
+    trip_report_redirect(NULL, NULL);
+    trip_budget_destroy(budget);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_constant_block_has_the_opacity_of_the_path_in_it),
+        cmocka_unit_test(a_ramp_is_integrated_in_extinction_and_in_colour),
+        cmocka_unit_test(what_is_nearer_covers_what_is_behind),
+        cmocka_unit_test(a_narrow_peak_of_the_function_is_not_missed),
+        cmocka_unit_test(a_cell_without_a_corner_is_empty),
+        cmocka_unit_test(cubic_goes_through_a_parabola_and_linear_through_its_chords),
+        cmocka_unit_test(a_lit_ball_has_its_colours_the_closer_the_finer_it_is),
+        cmocka_unit_test(a_splat_is_a_gaussian_cut_off_and_lowered),
+        cmocka_unit_test(of_a_splat_at_the_eye_the_half_in_front_counts),
+        cmocka_unit_test(the_error_is_within_the_tolerance),
+        cmocka_unit_test(threads_and_tiles_change_no_bit),
+        cmocka_unit_test(samples_are_the_mean_of_a_finer_picture),
+        cmocka_unit_test(codes_lose_what_rounding_to_them_can),
+        cmocka_unit_test(the_reference_comes_to_the_integral_of_its_splats),
+        cmocka_unit_test(what_does_not_fit_the_memory_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
