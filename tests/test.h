@@ -15,15 +15,8 @@
 #include <cmocka.h>
 
 #include "report.h"
+#include "sanitizers.h"
 #include "skips.h"
-
-/* Sanitizers make everything several times slower: there a test may take by turns what it otherwise
- * takes in all combinations. */
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define TEST_BY_TURNS 1
-#else
-#define TEST_BY_TURNS 0
-#endif
 
 /* Within `tolerance` of the larger magnitude, or of 1 where both are smaller. */
 #define assert_close(actual, expected, tolerance)                                                  \

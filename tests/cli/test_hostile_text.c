@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "dataset.h"
+#include "sanitizers.h"
 #include "skips.h"
 #include "writer.h"
 
@@ -47,7 +48,7 @@ static char *repeat(const char *begin, const char *unit, const char *end)
     return text;
 }
 
-#ifndef __SANITIZE_ADDRESS__
+#if !TEST_ADDRESS_SANITIZER
 static long peak_of_children(void)
 {
     struct rusage usage;
@@ -78,7 +79,7 @@ static void text_of_16_mib_stays_within_the_memory_promised(void **state)
             assert_works(r);
     }
     free(r);
-#ifdef __SANITIZE_ADDRESS__
+#if TEST_ADDRESS_SANITIZER
     test_lacks("memory without AddressSanitizer's own");
 #else
     assert_true(peak_of_children() < MEMORY + PROGRAM_BYTES);

@@ -157,7 +157,7 @@ static int try_memory(void)
 static void memory_beyond_the_limit_is_refused(void **state)
 {
     (void)state;
-#ifdef __SANITIZE_ADDRESS__
+#if TEST_ADDRESS_SANITIZER
     print_message("skipped: AddressSanitizer keeps released memory, so that there is no limit\n");
     skip();
 #endif

@@ -213,7 +213,7 @@ static void drop(const char *line, void *user)
  * out. */
 static bool has_gl(void)
 {
-#if defined(__SANITIZE_THREAD__)
+#if TEST_THREAD_SANITIZER
     return false;
 #endif
     trip_budget *budget;
