@@ -1,6 +1,8 @@
 #!/bin/sh
-# The tests under AddressSanitizer with UBSan, the threaded ones under ThreadSanitizer, and every
-# fuzzer over its corpus for a few seconds (TRIP_FUZZ_SECONDS each, default 10).
+# The tests under AddressSanitizer with UBSan, those in which threads meet under ThreadSanitizer, and
+# every fuzzer over its corpus for a few seconds (TRIP_FUZZ_SECONDS each, default 10). What is left
+# out of the first, and why, is in tests/CMakeLists.txt; of the second, OpenVDB and GL, which none of
+# its tests use.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -8,7 +10,7 @@ scripts/install-dependencies.sh --tests
 
 cmake --preset asan -DTRIP_WERROR=ON
 cmake --build --preset asan
-ctest --preset asan -j "$(nproc)"
+ctest --preset asan -j "$(nproc)" -LE unsanitized
 
 cmake --preset tsan
 cmake --build --preset tsan --target threaded_tests
