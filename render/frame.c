@@ -150,10 +150,23 @@ static int next_batch(trip_drawing *d)
     return status < 0 ? status : d->in_batch ? TRIP_FRAME_MORE : TRIP_FRAME_DONE;
 }
 
+/* A piece of what the renderer keeps; TRIP_FRAME_DONE when all of it is there. */
+static int load(trip_drawing *d)
+{
+    int status = d->loaded ? TRIP_FRAME_DONE : d->renderer->ops->load(d->renderer);
+    d->loaded = status == TRIP_FRAME_DONE;
+    if (status == TRIP_FRAME_MORE && trip_frame_poll())
+        status = TRIP_INTERRUPTED;
+    return status;
+}
+
 /* One piece of what is ready. */
 static int draw_next(trip_drawing *d, bool whole)
 {
-    int status = d->in_batch ? TRIP_FRAME_MORE : next_batch(d);
+    int status = load(d);
+    if (status != TRIP_FRAME_DONE)
+        return status;
+    status = d->in_batch ? TRIP_FRAME_MORE : next_batch(d);
     if (status != TRIP_FRAME_MORE)
         return status;
     status = draw_piece(d, whole);
@@ -203,6 +216,7 @@ int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *read
                          .frame = frame,
                          .stats = { .counted = frame->count },
                          .scope = { .around = trip_scope_current() },
+                         .loaded = !renderer->ops->load,
                          .begun_ms = now_ms() };
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = check_camera(frame->camera);
@@ -232,7 +246,9 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
 
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 {
-    if (!d->done && !d->in_batch)
+    if (!d->loaded)
+        d->renderer->ops->await_load(d->renderer, timeout_ns);
+    else if (!d->done && !d->in_batch)
         trip_reader_await(d->reader, timeout_ns);
 }
 

@@ -37,6 +37,7 @@ typedef struct trip_drawing {
     trip_scope scope; /* cancelled: the frame is given up */
     double begun_ms;
     bool begun, done; /* the renderer has begun the frame; every batch is drawn */
+    bool loaded;      /* by the renderer, what it keeps */
     int next_axis;    /* layers before this one were begun */
     uint64_t splats;  /* drawn so far */
     /* Being drawn: held[(held_first + held_count - 1) % TRIP_FRAME_HELD_MAX] from this run on. */
@@ -47,20 +48,13 @@ typedef struct trip_drawing {
     unsigned held_first, held_count;
 } trip_drawing;
 
-/* What trip_frame_step() has come to; below 0: failed or cancelled. */
-enum {
-    TRIP_FRAME_DONE = 0,
-    TRIP_FRAME_MORE = 1,  /* the deadline has passed, and more is ready to be drawn */
-    TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk is at work */
-};
-
 /* Starts the reads. The reader must read at least the plan's planes. After a failure too,
  * trip_frame_end() follows. */
 int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *reader,
                      const trip_frame *frame);
-/* Draws what is ready, until the deadline by CLOCK_MONOTONIC, which it passes by the time of one
- * piece of at most TRIP_FRAME_PIECE splats or one run; something of what is ready in any case.
- * UINT64_MAX: no deadline. */
+/* Loads and draws what is ready, until the deadline by CLOCK_MONOTONIC, which it passes by the time
+ * of one piece of at most TRIP_FRAME_PIECE splats or one run; something of what is ready in any
+ * case. UINT64_MAX: no deadline. */
 int trip_frame_step(trip_drawing *d, uint64_t deadline_ns);
 /* Waits until there is something to draw, at most for the timeout; UINT64_MAX: without end. */
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns);

@@ -51,11 +51,24 @@ typedef struct trip_renderer trip_renderer;
 /* Most splats of a piece or part, but for a single run. */
 #define TRIP_FRAME_PIECE 16384
 
+/* What a step has come to; below 0: failed or cancelled. */
+enum {
+    TRIP_FRAME_DONE = 0,
+    TRIP_FRAME_MORE = 1,  /* more is ready to be done */
+    TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk is at work */
+};
+
 typedef struct trip_renderer_ops {
     const char *name; /* "reference", "gl", "cpu", "integral" */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);
+    /* Loads a piece of what the renderer keeps of the data set from frame to frame; called between
+     * begin_frame and begin_layer until TRIP_FRAME_DONE. NULL: it keeps nothing. */
+    int (*load)(trip_renderer *r);
+    /* Where load() has come to TRIP_FRAME_WAITS: waits until it is to be called again, at most so
+     * long. */
+    void (*await_load)(trip_renderer *r, uint64_t timeout_ns);
     /* The layer of `axis` starts empty. */
     int (*begin_layer)(trip_renderer *r, int axis);
     /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */

@@ -227,7 +227,7 @@ static void add_piece(trip_gl_batch *b, trip_gl_piece piece)
 }
 
 static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const trip_batch *batch,
-                      bool resident)
+                      const trip_gl_resident_list *resident)
 {
     void *memory = b->slot->memory + b->runs.offset;
     struct trip_gl_run *runs = memory;
@@ -241,7 +241,8 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
         unsigned list = trip_batch_list(batch, run)->index;
         const trip_gl_placing *p = &placings[list];
         double depth = nearest_depth(p, run);
-        runs[i] = make_run(p, run, run->first, batch->pass->descending, resident, position);
+        uint64_t first = run->first + (resident ? resident[list].order_first : 0);
+        runs[i] = make_run(p, run, first, batch->pass->descending, resident, position);
         add_piece(b, (trip_gl_piece){ .first = position,
                                       .count = run->count,
                                       .cost = cost_at(p, depth),
@@ -256,7 +257,8 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
 }
 
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, trip_gl_slot *records, bool resident)
+                       const trip_batch *batch, trip_gl_slot *records,
+                       const trip_gl_resident_list *resident)
 {
     int status = count_positions(b, batch);
     if (!status)

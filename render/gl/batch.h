@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "gl/resident.h"
 #include "gl/ring.h"
 #include "gl/shared.h"
 #include "renderer.h"
@@ -59,10 +60,11 @@ typedef struct trip_gl_cursor {
 
 /* Fills `b` from a batch of the reader in draw order. `records` is the slot that its planes lie in;
  * NULL: they are copied. `placings` are by
- * the data set's lists. `resident`: the records of whole lists are in GL memory already, and the
- * batch has runs only. */
+ * the data set's lists. `resident`: by the data set's lists, whose records are in GL memory
+ * already; the batch has runs only. NULL: it has its records. */
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, trip_gl_slot *records, bool resident);
+                       const trip_batch *batch, trip_gl_slot *records,
+                       const trip_gl_resident_list *resident);
 static inline bool trip_gl_batch_is_drawn(const trip_gl_batch *b, const trip_gl_cursor *at)
 {
     return at->piece == b->piece_count;

@@ -125,8 +125,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     if (!status)
         status = fit_stats(r, frame->data->list_count);
     if (!status && frame->settings->indexed)
-        status = trip_gl_resident_load(&r->resident, frame->data, frame->plan->planes,
-                                       trip_gl_context_limits(r->context)->storage_block_bytes);
+        status = trip_gl_resident_begin(&r->resident, frame->data, frame->plan->planes,
+                                        trip_gl_context_limits(r->context)->storage_block_bytes);
     if (status)
         return status;
     r->base.resident = frame->settings->indexed;
@@ -140,6 +140,20 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         glClearNamedBufferData(r->counts, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
     }
     return trip_gl_check(r->context, "frame");
+}
+
+static int load(trip_renderer *base)
+{
+    gl_renderer *r = (gl_renderer *)base;
+    int status = trip_gl_context_use(r->context);
+    if (status || !r->frame->settings->indexed)
+        return status;
+    return trip_gl_resident_load(&r->resident);
+}
+
+static void await_load(trip_renderer *base, uint64_t timeout_ns)
+{
+    trip_gl_resident_await(&((gl_renderer *)base)->resident, timeout_ns);
 }
 
 static int use_program(gl_renderer *r, trip_gl_pass pass, unsigned effects)
@@ -320,7 +334,7 @@ static int begin_batch(gl_renderer *r, const trip_batch *batch)
 {
     trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
     int status = trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, batch, slot,
-                                    r->frame->settings->indexed);
+                                    r->frame->settings->indexed ? r->resident.lists : NULL);
     if (status)
         return status;
     for (size_t i = 0; i < batch->run_count; i++)
@@ -448,6 +462,7 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
 static void end_frame(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
+    trip_gl_resident_pause(&r->resident);
     if (trip_gl_context_use(r->context) == TRIP_OK)
         trip_gl_queue_drain(&r->queue);
 }
@@ -462,6 +477,8 @@ static const trip_renderer_ops gl_ops = {
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
+    .load = load,
+    .await_load = await_load,
     .begin_layer = begin_layer,
     .draw = draw,
     .in_parts = true,

@@ -1,6 +1,7 @@
 /* The gl renderer against the reference: forms of submission, methods, targets, the limits of a
  * driver, and what happens when something is missing. Pictures of real data: test_gl_views.c. The
  * order of layers and the opacity of blocks are tested with all renderers in test_reference.c. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -322,35 +323,57 @@ static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
 
 enum { PARTS_PX = 300 };
 
-/* Draws a frame in the shortest steps there are; returns their number. */
-static int draw_in_steps(const scene *s, const trip_camera_params *view, float *rgba,
-                         uint64_t *splats)
-{
-    trip_renderer *r;
+/* A renderer with what its frames are drawn from. */
+typedef struct bench {
+    trip_budget *budget;
+    trip_renderer *renderer;
     trip_reader *reader;
     trip_camera camera;
     trip_plan plan;
+    trip_frame frame;
+} bench;
+
+static void set_up(bench *b, const scene *s, const trip_camera_params *view,
+                   const trip_settings *settings)
+{
+    *b = (bench){ .budget = s->budget };
+    assert_int_equal(trip_gl_create(&b->renderer, s->budget), 0);
+    assert_int_equal(trip_camera_make(&b->camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&b->plan, s->data, &b->camera, settings, s->table, s->budget),
+                     0);
+    trip_reader_params params = { .planes = b->plan.planes, .engine = TRIP_ENGINE_NULL };
+    assert_int_equal(trip_reader_create(&b->reader, s->data, &params, s->budget), 0);
+    b->frame = (trip_frame){ .data = s->data,
+                             .camera = &b->camera,
+                             .settings = settings,
+                             .plan = &b->plan,
+                             .table = s->table };
+}
+
+static void put_away(bench *b)
+{
+    trip_reader_destroy(b->reader);
+    trip_plan_release(&b->plan, b->budget);
+    b->renderer->ops->destroy(b->renderer);
+}
+
+/* Draws a frame in the shortest steps there are, at most so many; returns their number. One that is
+ * not done is given up. */
+static int draw_in_steps(bench *b, int most, float *rgba)
+{
     trip_drawing drawing;
-    trip_settings settings = trip_settings_default();
-    int status, steps = 0;
-    assert_int_equal(trip_gl_create(&r, s->budget), 0);
-    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
-    assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
-    *splats = trip_plan_splats(&plan);
-    trip_reader_params params = { .planes = plan.planes, .engine = TRIP_ENGINE_NULL };
-    assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
-    const trip_frame frame = {
-        .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
-    };
-    assert_int_equal(trip_frame_begin(&drawing, r, reader, &frame), 0);
-    while ((status = trip_frame_step(&drawing, 0)) == TRIP_FRAME_MORE)
-        steps++;
-    assert_int_equal(status, TRIP_FRAME_DONE);
-    assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
+    int status = TRIP_FRAME_MORE, steps = 0;
+    assert_int_equal(trip_frame_begin(&drawing, b->renderer, b->reader, &b->frame), 0);
+    while (status > 0 && steps < most) {
+        status = trip_frame_step(&drawing, 0);
+        steps += status == TRIP_FRAME_MORE;
+        if (status == TRIP_FRAME_WAITS)
+            trip_frame_await(&drawing, UINT64_MAX);
+    }
+    assert_true(status >= 0);
+    if (status == TRIP_FRAME_DONE)
+        assert_int_equal(trip_frame_picture(&drawing, rgba, NULL), 0);
     trip_frame_end(&drawing);
-    trip_reader_destroy(reader);
-    trip_plan_release(&plan, s->budget);
-    r->ops->destroy(r);
     return steps;
 }
 
@@ -360,21 +383,54 @@ static void a_step_is_of_few_pixels(void **state)
     (void)state;
     static float rgba[4 * PARTS_PX * PARTS_PX];
     scene s;
-    uint64_t splats;
+    bench b;
     make_shells(&s, &cubes);
     trip_settings settings = trip_settings_default();
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.1, 0.2), 800, 40, PARTS_PX);
-    int steps = draw_in_steps(&s, &view, rgba, &splats);
+    set_up(&b, &s, &view, &settings);
+    double splats = (double)trip_plan_splats(&b.plan);
     assert_true(splats > 10000);
-    assert_true(steps <= 3 + (int)(splats / TRIP_FRAME_PIECE)); /* at most three layers */
+    int steps = draw_in_steps(&b, INT_MAX, rgba);
+    assert_true(steps <= 3 + splats / TRIP_FRAME_PIECE); /* at most three layers */
+    put_away(&b);
 
     /* A splat is 400 px wide, so that any that is drawn covers a quarter of the image. */
     view.ortho_height = 3;
-    steps = draw_in_steps(&s, &view, rgba, &splats);
+    set_up(&b, &s, &view, &settings);
+    splats = (double)trip_plan_splats(&b.plan);
     assert_true(splats > 1000);
-    assert_true(steps >= (double)splats * PARTS_PX * PARTS_PX / 4 / (1 << 21));
+    steps = draw_in_steps(&b, INT_MAX, rgba);
+    assert_true(steps >= splats * PARTS_PX * PARTS_PX / 4 / (1 << 21));
+    put_away(&b);
     scene_picture whole = scene_draw(&s, &gl, &view, &settings);
     assert_memory_equal(rgba, whole.rgba, sizeof rgba);
+    scene_picture_free(&whole);
+    scene_destroy(&s);
+}
+
+static void indexed_lists_are_loaded_in_steps_and_once(void **state)
+{
+    (void)state;
+    static float rgba[4 * PARTS_PX * PARTS_PX];
+    scene s;
+    bench b;
+    make_shells(&s, &cubes);
+    trip_settings settings = trip_settings_default();
+    settings.indexed = true;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.7), 80, 40, PARTS_PX);
+    scene_picture whole = scene_draw(&s, &gl, &view, &settings);
+    set_up(&b, &s, &view, &settings);
+    assert_true(s.data->header.kept > TRIP_FRAME_PIECE);
+    uint64_t before = trip_budget_left_bytes(s.budget);
+    for (int most = 1; most < 9; most += 2) /* none is done */
+        assert_int_equal(draw_in_steps(&b, most, rgba), most);
+    int first = draw_in_steps(&b, INT_MAX, rgba);
+    assert_memory_equal(rgba, whole.rgba, sizeof rgba);
+    int second = draw_in_steps(&b, INT_MAX, rgba);
+    assert_memory_equal(rgba, whole.rgba, sizeof rgba);
+    assert_true(second < first);
+    assert_true(trip_budget_left_bytes(s.budget) < before);
+    put_away(&b);
     scene_picture_free(&whole);
     scene_destroy(&s);
 }
@@ -593,6 +649,7 @@ int main(void)
         cmocka_unit_test(reads_into_gl_memory_give_the_same_picture_as_copies),
         cmocka_unit_test(coarser_targets_stay_close_and_their_errors_are_known),
         cmocka_unit_test(a_step_is_of_few_pixels),
+        cmocka_unit_test(indexed_lists_are_loaded_in_steps_and_once),
         cmocka_unit_test(a_splat_across_two_bands_of_a_layer_is_whole),
         cmocka_unit_test(what_does_not_fit_is_refused_and_the_next_frame_draws),
         cmocka_unit_test(a_shader_that_does_not_compile_is_named_with_its_line),

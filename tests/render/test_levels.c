@@ -236,6 +236,18 @@ static double largest_depth_difference(const scene_picture *p, const float *merg
     return most;
 }
 
+static void expect_close(const levels *l, const scene_renderer *r, const trip_camera_params *view,
+                         const trip_settings *settings, const float *expected)
+{
+    scene_picture p = scene_draw(&l->drawn, r, view, settings);
+    double off = largest_difference(&p, expected);
+    if (p.depth)
+        off = fmax(off, largest_depth_difference(&p, expected));
+    if (!(off <= (strcmp(r->name, "reference") ? r->tolerance : 1e-6)))
+        fail_msg("%s%s: off by %g", r->name, settings->indexed ? ", indexed" : "", off);
+    scene_picture_free(&p);
+}
+
 static void expect_right(levels *l, const trip_camera_params *view)
 {
     brute b = { .levels = l, .settings = trip_settings_default() };
@@ -254,13 +266,11 @@ static void expect_right(levels *l, const trip_camera_params *view)
     float *expected = draw_by_hand(&b);
     for (const scene_renderer *r = scene_renderers(); r->name; r++) {
         b.settings.depth = scene_has_depth(r);
-        scene_picture p = scene_draw(&l->drawn, r, view, &b.settings);
-        double off = largest_difference(&p, expected);
-        if (p.depth)
-            off = fmax(off, largest_depth_difference(&p, expected));
-        if (!(off <= (strcmp(r->name, "reference") ? r->tolerance : 1e-6)))
-            fail_msg("%s: off by %g", r->name, off);
-        scene_picture_free(&p);
+        expect_close(l, r, view, &b.settings, expected);
+        b.settings.indexed = true;
+        if (!strcmp(r->name, "gl"))
+            expect_close(l, r, view, &b.settings, expected);
+        b.settings.indexed = false;
     }
     free(expected);
     free(b.items);
