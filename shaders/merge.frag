@@ -1,32 +1,59 @@
 // The picture from the layers: C = sum w^2 C_a / sum w^2 over the lists with weight (2005 section
-// 5.2, 2008 section 4.2), with the background behind. In: a band of the layers. Out:
-// premultiplied colour.
-// Mirrors merging in render/reference.c. LAYERS has bit a set where list a was drawn.
+// 5.2, 2008 section 4.2), with the background behind, and with DEPTH the mean distance of what is
+// seen before it. In: a band of the layers. Out: premultiplied colour; world units. Mirrors merging
+// in render/reference.c and render/layer.h. LAYERS has bit a set where list a was drawn.
 #include "weight.glsl"
 
 layout(binding = TRIP_GL_LAYER) uniform sampler2D layers[3];
-layout(location = TRIP_GL_ROW) uniform int row;           // of the image, in which fragments' row 0 lies
+layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
 layout(location = TRIP_GL_ROW_IN_BAND) uniform int row_in_band; // likewise
-layout(location = 0) out vec4 image;
+layout(location = TRIP_GL_OUT_COLOUR) out vec4 image;
+#ifdef DEPTH
+layout(binding = TRIP_GL_LAYER_DEPTH) uniform sampler2D layer_depths[3];
+layout(location = TRIP_GL_OUT_DEPTH) out float image_depth;
+#endif
 
-void add_layer(int axis, vec4 layer, inout vec4 sum, inout float weights)
+struct sums {
+    vec4 colour;
+    float depth, weight;
+};
+
+void add_layer(int axis, sampler2D layer, sampler2D depths, inout sums sum)
 {
+    ivec2 at = ivec2(gl_FragCoord.xy) + ivec2(0, row_in_band);
     float w = float(weight_of(real2(gl_FragCoord.xy) + real2(0.0, row), axis));
-    weights += w * w;
-    // Where there is no weight the layer is masked: what it holds is nothing.
-    if (w > 0.0)
-        sum += w * w * layer;
+    sum.weight += w * w;
+    // Where there is no weight the layer is masked, and a layer that was not drawn is empty.
+    if (!(w > 0.0) || (LAYERS & 1 << axis) == 0)
+        return;
+    sum.colour += w * w * texelFetch(layer, at, 0);
+    sum.depth += w * w * texelFetch(depths, at, 0).r;
 }
+
+#ifdef DEPTH
+// World units; opacity is that of the sum of depths. Nothing is infinitely far.
+float distance_of(float depth_sum, float opacity)
+{
+    real2 p = real2(gl_FragCoord.xy) + real2(0.0, row) - screen.xy;
+    real ray2 = dot(world2_a, real4(1.0, p, p.x * p.x)) + dot(world2_b.xy, p.y * p);
+    float infinity = uintBitsToFloat(0x7f800000u);
+    return opacity > 0.0 ? float(sqrt(ray2) * depth.y) * (depth_sum / opacity) : infinity;
+}
+#define DEPTHS(axis) layer_depths[axis]
+#else
+#define DEPTHS(axis) layers[axis]
+#endif
 
 void main()
 {
-    ivec2 at = ivec2(gl_FragCoord.xy) + ivec2(0, row_in_band);
-    vec4 sum = vec4(0.0);
-    float weights = 0.0;
-    add_layer(0, (LAYERS & 1) != 0 ? texelFetch(layers[0], at, 0) : vec4(0.0), sum, weights);
-    add_layer(1, (LAYERS & 2) != 0 ? texelFetch(layers[1], at, 0) : vec4(0.0), sum, weights);
-    add_layer(2, (LAYERS & 4) != 0 ? texelFetch(layers[2], at, 0) : vec4(0.0), sum, weights);
-    sum /= weights;
+    sums sum = sums(vec4(0.0), 0.0, 0.0);
+    add_layer(0, layers[0], DEPTHS(0), sum);
+    add_layer(1, layers[1], DEPTHS(1), sum);
+    add_layer(2, layers[2], DEPTHS(2), sum);
+    sum.colour /= sum.weight;
     vec4 behind = vec4(background);
-    image = sum + (1.0 - sum.a) * vec4(behind.rgb * behind.a, behind.a);
+    image = sum.colour + (1.0 - sum.colour.a) * vec4(behind.rgb * behind.a, behind.a);
+#ifdef DEPTH
+    image_depth = distance_of(sum.depth / sum.weight, sum.colour.a);
+#endif
 }

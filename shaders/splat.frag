@@ -1,5 +1,5 @@
 // A splat's colour and opacity at a pixel. In: the footprint, flat. Out: premultiplied colour, for
-// blending in list order. Mirrors trip_splat_radius2() and the opacity in render/splat.h; beyond the
+// blending in list order, and with DEPTH the distance as a colour is (render/layer.h). Mirrors trip_splat_radius2() and the opacity in render/splat.h; beyond the
 // cut-off nothing is added.
 #include "real.glsl"
 
@@ -8,7 +8,11 @@ layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragme
 layout(location = 0) flat in vec4 footprint;
 layout(location = 1) flat in vec4 colour;
 layout(location = 2) flat in float shear;
-layout(location = 0) out vec4 fragment;
+layout(location = TRIP_GL_OUT_COLOUR) out vec4 fragment;
+#ifdef DEPTH
+layout(location = 3) flat in float centre_depth;
+layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // its opacity is what is blended by
+#endif
 
 // 1 - exp(-x) without the cancellation at small x.
 float opacity(float x)
@@ -33,4 +37,7 @@ void main()
     float falloff = max(exp(-0.5 * m) - edge.x, 0.0);
     float alpha = opacity(colour.a * stretch * falloff);
     fragment = vec4(colour.rgb * alpha, alpha);
+#ifdef DEPTH
+    fragment_depth = vec4(centre_depth * alpha, 0.0, 0.0, alpha);
+#endif
 }

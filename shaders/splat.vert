@@ -12,6 +12,9 @@ layout(std430, binding = TRIP_GL_TABLE) readonly buffer trip_gl_table { vec4 tab
 layout(location = 0) flat out vec4 footprint;  // centre, conic xx and yy times ray2
 layout(location = 1) flat out vec4 colour;     // r, g, b, extinction * amplitude
 layout(location = 2) flat out float shear;     // 2 conic xy times ray2
+#ifdef DEPTH
+layout(location = 3) flat out float centre_depth;  // of the centre's plane, as layers hold it
+#endif
 
 out gl_PerVertex
 {
@@ -39,6 +42,9 @@ void drop()
     gl_PointSize = 1.0;
     footprint = colour = vec4(0.0);
     shear = 0.0;
+#ifdef DEPTH
+    centre_depth = 0.0;
+#endif
 }
 
 void main()
@@ -66,4 +72,7 @@ void main()
     entry.rgb = shade(entry.rgb, r.normal, r.from_eye);
 #endif
     colour = vec4(entry.rgb, entry.a * s.amplitude);
+#ifdef DEPTH
+    centre_depth = r.place.z * depth.x;
+#endif
 }

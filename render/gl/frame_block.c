@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "layer.h"
 #include "normal.h"
 #include "shade.h"
 #include "splat.h"
@@ -42,6 +43,12 @@ static void set_steps(trip_gl_frame_double *f, int axis, trip_vec3 forward, trip
     f->ray_y = in_list_axes(y, axis, volume * volume);
 }
 
+/* What rays are divided by. */
+static double centre_length(const trip_camera *c)
+{
+    return c->ortho ? 1 : trip_length(trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height));
+}
+
 /* Rays from the image's centre, scaled so that the one there has length 1: projected numbers do not
  * depend on the scale, and floats keep far from their limits whatever the world's unit. */
 static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis, double sigma)
@@ -49,7 +56,7 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
     double px = 0.5 * c->width, py = 0.5 * c->height;
     f->screen = (trip_gl_double4){ { px, py, c->width, c->height } };
     trip_vec3 r0 = trip_camera_ray(c, px, py);
-    double length = c->ortho ? 1 : trip_length(r0);
+    double length = centre_length(c);
     trip_vec3 forward = trip_scale(c->forward, length);
     trip_vec3 to_x = trip_scale(c->to_x, length), to_y = trip_scale(c->to_y, length);
     trip_vec3 rx = trip_scale(c->rx, 1 / length), ry = trip_scale(c->ry, 1 / length);
@@ -61,6 +68,8 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
     set_steps(f, axis, forward, r0, rx, ry, sigma);
     f->to_x = in_list_axes(to_x, axis, 0);
     f->to_y = in_list_axes(to_y, axis, 0);
+    if (c->ortho)
+        rx = ry = trip_v3(0, 0, 0); /* all rays are alike */
     square(&f->ray2_a, &f->ray2_b, r0, rx, ry, 1);
 
     const trip_affine *j = &c->index_to_world;
@@ -133,6 +142,9 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
     out->edge.v[0] = constants.edge;
     out->edge.v[1] = frame->data->header.code_bytes;
+    out->depth = (trip_gl_double4){ { trip_layer_depth_unit(c, whole) * centre_length(whole) /
+                                          centre_length(c),
+                                      whole->voxel_world } };
     double h = trip_weight_h(s);
     out->to_grid = (trip_gl_double4){ { 1, 1, 1, 1 } };
     out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };
@@ -190,6 +202,8 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
                    (frame->data->header.normal_bytes == 3 ? TRIP_GL_COMPACT : 0);
     if (s->indexed)
         effects |= TRIP_GL_INDEXED;
+    if (s->depth)
+        effects |= TRIP_GL_DEPTH;
     if (trip_weight_is_everywhere(s, frame->camera, frame->plan->axis_of_view, axis))
         effects |= TRIP_GL_UNCULLED;
     return effects;

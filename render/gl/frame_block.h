@@ -18,7 +18,8 @@ enum trip_gl_effect {
     TRIP_GL_QUADS = 32,    /* two triangles a splat instead of a sprite */
     TRIP_GL_UNCULLED = 64, /* every pixel has weight in the list */
     TRIP_GL_COMPACT = 128, /* normals of 3 bytes; only with TRIP_GL_SHADED */
-    TRIP_GL_EFFECT_SETS = 256,
+    TRIP_GL_DEPTH = 256,   /* layers have depths (layer.h) */
+    TRIP_GL_EFFECT_SETS = 512,
 };
 
 /* Of a list that the plan draws. */

@@ -112,14 +112,11 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     gl_renderer *r = (gl_renderer *)base;
     const trip_camera *camera = frame->camera;
     int status = check_size(r, camera);
-    if (!status && frame->settings->depth)
-        status =
-            trip_fail(TRIP_USAGE, "render", "depth", "OpenGL draws none; use the CPU renderer");
     if (!status)
         status = trip_gl_context_use(r->context);
     if (!status)
         status = trip_gl_target_resize(&r->target, camera->width, camera->height,
-                                       frame->settings->target);
+                                       frame->settings->target, frame->settings->depth);
     if (!status)
         status = trip_gl_constants_fill(&r->constants, r->context, frame);
     if (!status)
@@ -388,7 +385,7 @@ static int is_done(trip_renderer *base, const trip_batch *batch, bool wait)
 }
 
 /* A strip of the band's rows from `y` on, merged and read. */
-static int merge_strip(gl_renderer *r, const trip_gl_band *band, int y, float *rgba)
+static int merge_strip(gl_renderer *r, const trip_gl_band *band, int y, float *rgba, float *depth)
 {
     const trip_gl_target *t = &r->target;
     int left = band->rows - y, rows = left < t->strip_rows ? left : t->strip_rows;
@@ -402,23 +399,25 @@ static int merge_strip(gl_renderer *r, const trip_gl_band *band, int y, float *r
         status = trip_gl_queue_is_done(&r->queue, r->queue.ended, true);
     if (status < 0)
         return status;
-    trip_gl_target_read_strip(t, rows, rgba + 4 * at);
+    trip_gl_target_read_strip(t, rows, rgba + 4 * at, depth ? depth + at : NULL);
     return trip_frame_poll();
 }
 
-static int merge(gl_renderer *r, float *rgba)
+static int merge(gl_renderer *r, float *rgba, float *depth)
 {
     const trip_gl_target *t = &r->target;
-    int status = use_program(r, TRIP_GL_PASS_MERGE, 0);
+    int status = use_program(r, TRIP_GL_PASS_MERGE, t->depth ? TRIP_GL_DEPTH : 0);
     trip_gl_constants_bind_layer(&r->constants, 0, true);
     glDisable(GL_BLEND);
     glDisable(GL_STENCIL_TEST);
     glBindVertexArray(r->vertex_array);
     for (const trip_gl_band *b = t->bands; b < t->bands + t->band_count; b++) {
-        for (unsigned axis = 0; axis < 3; axis++)
-            glBindTextureUnit(TRIP_GL_LAYER + axis, b->layers[axis]);
+        for (unsigned axis = 0; axis < 3; axis++) {
+            glBindTextureUnit(TRIP_GL_LAYER + axis, b->layers[axis].colour);
+            glBindTextureUnit(TRIP_GL_LAYER_DEPTH + axis, b->layers[axis].depth);
+        }
         for (int y = 0; y < b->rows && !status; y += t->strip_rows)
-            status = merge_strip(r, b, y, rgba);
+            status = merge_strip(r, b, y, rgba, depth);
     }
     return status;
 }
@@ -447,10 +446,9 @@ static void describe(gl_renderer *r)
 static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     gl_renderer *r = (gl_renderer *)base;
-    (void)depth;
     int status = trip_gl_context_use(r->context);
     if (!status)
-        status = merge(r, rgba);
+        status = merge(r, rgba, depth);
     if (status)
         return status;
     if (r->frame->count)

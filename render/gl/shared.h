@@ -18,8 +18,12 @@
 /* The same number, for indexed lists. */
 #define TRIP_GL_VERTICES 6
 #define TRIP_GL_ORDER 7
-/* Texture units: the layer of axis a is unit a. */
+/* Texture units: the layer of axis a is unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
+#define TRIP_GL_LAYER_DEPTH 3
+/* Of a layer, and of the merged image: colour and opacity, and depths where they are wanted. */
+#define TRIP_GL_OUT_COLOUR 0
+#define TRIP_GL_OUT_DEPTH 1
 /* Locations of uniforms. */
 #define TRIP_GL_ROW 0
 #define TRIP_GL_ROW_IN_BAND 1
@@ -52,8 +56,10 @@
     R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \
     R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;    \
                          w: the largest of them */                                                 \
-    R4 weight;        /* h, sqrt(1 + h^2), list axis, axis of view */                              \
-    R4 background;    /* r, g, b, a; not premultiplied */
+    R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along \
+                      the ray at the image's centre; y: world units a voxel of level 0 */          \
+    R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                 \
+    R4 background; /* r, g, b, a; not premultiplied */
 
 #ifdef TRIP_GLSL
 #define TRIP_GL_VEC3 vec3

@@ -1,5 +1,6 @@
 #include "gl/target.h"
 
+#include "gl/shared.h"
 #include "renderer.h"
 #include "report.h"
 
@@ -11,23 +12,27 @@ static GLenum internal_format(trip_target type)
     return formats[type];
 }
 
-static uint64_t pixel_bytes(trip_target type)
+static uint64_t pixel_bytes(GLenum format)
 {
-    static const uint64_t bytes[] = {
-        [TRIP_TARGET_RGBA32F] = 16, [TRIP_TARGET_RGBA16F] = 8, [TRIP_TARGET_RGBA8] = 4
-    };
-    return bytes[type];
+    switch (format) {
+    case GL_RGBA32F:
+        return 16;
+    case GL_RGBA16F:
+        return 8;
+    default:
+        return 4; /* rgba8, r32f, depth24_stencil8 */
+    }
 }
 
-static int charge(trip_gl_target *t, uint64_t bytes_per_pixel, int rows)
+static int charge(const trip_gl_target *t, GLenum format, int rows, uint64_t *charged)
 {
-    uint64_t bytes = bytes_per_pixel * (uint64_t)t->width * (uint64_t)rows;
+    uint64_t bytes = pixel_bytes(format) * (uint64_t)t->width * (uint64_t)rows;
     if (!trip_budget_charge(t->budget, bytes))
         return trip_fail(TRIP_ERROR, "gl", "image",
                          "layers of %d x %d px do not fit the memory given; raise --memory or draw "
                          "a smaller image",
                          t->width, t->height);
-    t->bytes += bytes;
+    *charged += bytes;
     return TRIP_OK;
 }
 
@@ -39,31 +44,54 @@ static int check_complete(GLuint framebuffer, const char *name)
     return trip_fail(TRIP_ERROR, "gl", name, "the driver cannot draw into it: status %#x", state);
 }
 
-/* A texture of the target's width with a framebuffer around it. */
-static int make_texture(trip_gl_target *t, trip_target type, int rows, GLuint *texture,
-                        GLuint *framebuffer)
+/* A texture of the target's width, as attachment `out` of a surface. */
+static int make_texture(const trip_gl_target *t, trip_gl_surface *s, GLenum format, int rows,
+                        GLuint *texture, unsigned out)
 {
-    int status = charge(t, pixel_bytes(type), rows);
+    int status = charge(t, format, rows, &s->bytes);
     if (status)
         return status;
     glCreateTextures(GL_TEXTURE_2D, 1, texture);
-    glTextureStorage2D(*texture, 1, internal_format(type), t->width, rows);
+    glTextureStorage2D(*texture, 1, format, t->width, rows);
     if (glGetError() != GL_NO_ERROR)
         return trip_fail(TRIP_ERROR, "gl", "image",
                          "the driver has no memory for layers of %d x %d px; draw a smaller image",
                          t->width, t->height);
     glTextureParameteri(*texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTextureParameteri(*texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glCreateFramebuffers(1, framebuffer);
-    glNamedFramebufferTexture(*framebuffer, GL_COLOR_ATTACHMENT0, *texture, 0);
-    return check_complete(*framebuffer, "layer");
+    glNamedFramebufferTexture(s->framebuffer, GL_COLOR_ATTACHMENT0 + out, *texture, 0);
+    return TRIP_OK;
 }
 
-static int make_stencil(trip_gl_target *t, trip_gl_band *band)
+static int make_surface(const trip_gl_target *t, trip_gl_surface *s, int rows, GLenum colour,
+                        GLenum depth)
+{
+    static const GLenum outs[] = { [TRIP_GL_OUT_COLOUR] = GL_COLOR_ATTACHMENT0 + TRIP_GL_OUT_COLOUR,
+                                   [TRIP_GL_OUT_DEPTH] = GL_COLOR_ATTACHMENT0 + TRIP_GL_OUT_DEPTH };
+    glCreateFramebuffers(1, &s->framebuffer);
+    int status = make_texture(t, s, colour, rows, &s->colour, TRIP_GL_OUT_COLOUR);
+    if (!status && t->depth)
+        status = make_texture(t, s, depth, rows, &s->depth, TRIP_GL_OUT_DEPTH);
+    if (status)
+        return status;
+    glNamedFramebufferDrawBuffers(s->framebuffer, t->depth ? 2 : 1, outs);
+    return check_complete(s->framebuffer, "layer");
+}
+
+static void release_surface(const trip_gl_target *t, trip_gl_surface *s)
+{
+    glDeleteFramebuffers(1, &s->framebuffer);
+    glDeleteTextures(1, &s->colour);
+    glDeleteTextures(1, &s->depth);
+    trip_budget_discharge(t->budget, s->bytes);
+    *s = (trip_gl_surface){ 0 };
+}
+
+static int make_stencil(const trip_gl_target *t, trip_gl_band *band)
 {
     if (band->stencil)
         return TRIP_OK;
-    int status = charge(t, 4, band->rows);
+    int status = charge(t, GL_DEPTH24_STENCIL8, band->rows, &band->stencil_bytes);
     if (status)
         return status;
     glCreateRenderbuffers(1, &band->stencil);
@@ -89,37 +117,53 @@ static void lay_out(trip_gl_target *t)
     t->strip_rows = at_least_one_at_most(TRIP_GL_STRIP_PIXELS / t->width, t->height);
 }
 
-int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type)
+int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type, bool depth)
 {
-    if (t->strip && t->width == width && t->height == height && t->type == type)
+    if (t->band_count && t->width == width && t->height == height && t->type == type &&
+        t->depth == depth)
         return TRIP_OK;
     trip_gl_target_release(t);
     t->width = width;
     t->height = height;
     t->type = type;
+    t->depth = depth;
     lay_out(t);
-    return make_texture(t, TRIP_TARGET_RGBA32F, t->strip_rows, &t->strip, &t->strip_framebuffer);
+    int status = make_surface(t, &t->strip, t->strip_rows, GL_RGBA32F, GL_R32F);
+    if (status)
+        trip_gl_target_release(t);
+    return status;
 }
 
-static int begin_band(trip_gl_target *t, trip_gl_band *band, int axis, bool stencil)
+/* The layer's surface, made when first wanted. */
+static int fit_layer(const trip_gl_target *t, trip_gl_band *band, int axis)
+{
+    trip_gl_surface *layer = &band->layers[axis];
+    if (layer->framebuffer)
+        return TRIP_OK;
+    int status = make_surface(t, layer, band->rows, internal_format(t->type), GL_RGBA32F);
+    if (status)
+        release_surface(t, layer);
+    return status;
+}
+
+static int begin_band(const trip_gl_target *t, trip_gl_band *band, int axis, bool stencil)
 {
     static const GLfloat nothing[4] = { 0, 0, 0, 0 };
     static const GLint zero = 0;
-    int status = TRIP_OK;
-    if (!band->layers[axis])
-        status =
-            make_texture(t, t->type, band->rows, &band->layers[axis], &band->framebuffers[axis]);
+    int status = fit_layer(t, band, axis);
     if (!status && stencil)
         status = make_stencil(t, band);
     if (status)
         return status;
-    GLuint framebuffer = band->framebuffers[axis];
+    GLuint framebuffer = band->layers[axis].framebuffer;
     glNamedFramebufferRenderbuffer(framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER,
                                    stencil ? band->stencil : 0);
     status = check_complete(framebuffer, "layer");
     if (status)
         return status;
-    glClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, nothing);
+    glClearNamedFramebufferfv(framebuffer, GL_COLOR, TRIP_GL_OUT_COLOUR, nothing);
+    if (t->depth)
+        glClearNamedFramebufferfv(framebuffer, GL_COLOR, TRIP_GL_OUT_DEPTH, nothing);
     if (stencil)
         glClearNamedFramebufferiv(framebuffer, GL_STENCIL, 0, &zero);
     return trip_frame_poll();
@@ -135,31 +179,35 @@ int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil)
 
 void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band)
 {
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, band->framebuffers[axis]);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, band->layers[axis].framebuffer);
     glViewport(0, -band->first_row, t->width, t->height);
 }
 
 void trip_gl_target_bind_strip(const trip_gl_target *t, int rows)
 {
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, t->strip_framebuffer);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, t->strip.framebuffer);
     glViewport(0, 0, t->width, rows);
 }
 
-void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba)
+void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba, float *depth)
 {
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, t->strip_framebuffer);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, t->strip.framebuffer);
+    glReadBuffer(GL_COLOR_ATTACHMENT0 + TRIP_GL_OUT_COLOUR);
     glReadPixels(0, 0, t->width, rows, GL_RGBA, GL_FLOAT, rgba);
+    if (!t->depth)
+        return;
+    glReadBuffer(GL_COLOR_ATTACHMENT0 + TRIP_GL_OUT_DEPTH);
+    glReadPixels(0, 0, t->width, rows, GL_RED, GL_FLOAT, depth);
 }
 
 void trip_gl_target_release(trip_gl_target *t)
 {
     for (int i = 0; i < t->band_count; i++) {
-        glDeleteFramebuffers(3, t->bands[i].framebuffers);
-        glDeleteTextures(3, t->bands[i].layers);
+        for (int axis = 0; axis < 3; axis++)
+            release_surface(t, &t->bands[i].layers[axis]);
         glDeleteRenderbuffers(1, &t->bands[i].stencil);
+        trip_budget_discharge(t->budget, t->bands[i].stencil_bytes);
     }
-    glDeleteFramebuffers(1, &t->strip_framebuffer);
-    glDeleteTextures(1, &t->strip);
-    trip_budget_discharge(t->budget, t->bytes);
+    release_surface(t, &t->strip);
     *t = (trip_gl_target){ .budget = t->budget };
 }

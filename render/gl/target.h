@@ -18,25 +18,34 @@ enum {
     TRIP_GL_STRIP_PIXELS = 1 << 20, /* a pass over an image is done in strips of about so many */
 };
 
+/* Colour and opacity; with depths these too, as wide, since they are blended by an opacity of their
+ * own (TRIP_GL_OUT_COLOUR, TRIP_GL_OUT_DEPTH). */
+typedef struct trip_gl_surface {
+    GLuint colour, depth; /* textures */
+    GLuint framebuffer;
+    uint64_t bytes; /* of the budget */
+} trip_gl_surface;
+
 typedef struct trip_gl_band {
     int first_row, rows;
-    GLuint layers[3], framebuffers[3]; /* by axis */
-    GLuint stencil;                    /* shared by the layers */
+    trip_gl_surface layers[3]; /* by axis */
+    GLuint stencil;            /* shared by the layers */
+    uint64_t stencil_bytes;
 } trip_gl_band;
 
 typedef struct trip_gl_target {
     trip_budget *budget;
     int width, height;
     trip_target type;
+    bool depth;
     trip_gl_band bands[TRIP_GL_BANDS_MAX];
     int band_count;
     int strip_rows;
-    GLuint strip, strip_framebuffer; /* rgba32f whatever the layers hold */
-    uint64_t bytes;
+    trip_gl_surface strip; /* rgba32f and r32f whatever the layers hold */
 } trip_gl_target;
 
-/* Readies an image of this size for layers of this type. */
-int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type);
+/* Readies an image of this size for layers of this type, with depths or without. */
+int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type, bool depth);
 /* Empties the layer of an axis; with `stencil` it has one, all zero. */
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
 /* Binds a band of a layer for drawing: positions are those of the image, but row first_row of the
@@ -44,8 +53,8 @@ int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
 void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band);
 /* Binds the first `rows` rows of the strip for drawing. */
 void trip_gl_target_bind_strip(const trip_gl_target *t, int rows);
-/* Reads them, width * 4 floats each, when they are drawn. */
-void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba);
+/* Reads them when they are drawn, width * 4 floats each; and width depths where there are any. */
+void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba, float *depth);
 void trip_gl_target_release(trip_gl_target *t);
 
 #endif

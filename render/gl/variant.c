@@ -17,7 +17,7 @@ static const struct {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
     [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp", TRIP_GL_PARALLEL | TRIP_GL_INDEXED, true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
-    [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, 0, true },
+    [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
 };
 
 static void write_effects(FILE *out, unsigned effects)
@@ -30,6 +30,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_SHADED, "SHADED" },     { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
         { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
         { TRIP_GL_UNCULLED, "UNCULLED" }, { TRIP_GL_COMPACT, "COMPACT" },
+        { TRIP_GL_DEPTH, "DEPTH" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

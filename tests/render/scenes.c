@@ -243,11 +243,6 @@ const scene_renderer *scene_renderers(void)
     return all;
 }
 
-bool scene_has_depth(const scene_renderer *renderer)
-{
-    return strcmp(renderer->name, "gl") != 0;
-}
-
 scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                               const trip_camera_params *view, const trip_settings *settings,
                               const trip_reader_params *reader_params)

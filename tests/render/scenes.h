@@ -69,9 +69,6 @@ typedef struct scene_renderer {
 /* Every renderer this machine can run, ended by an entry without name. */
 const scene_renderer *scene_renderers(void);
 
-/* Whether it draws depths. */
-bool scene_has_depth(const scene_renderer *renderer);
-
 typedef struct scene_picture {
     int width, height;
     float *rgba;

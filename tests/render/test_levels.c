@@ -240,9 +240,7 @@ static void expect_close(const levels *l, const scene_renderer *r, const trip_ca
                          const trip_settings *settings, const float *expected)
 {
     scene_picture p = scene_draw(&l->drawn, r, view, settings);
-    double off = largest_difference(&p, expected);
-    if (p.depth)
-        off = fmax(off, largest_depth_difference(&p, expected));
+    double off = fmax(largest_difference(&p, expected), largest_depth_difference(&p, expected));
     if (!(off <= (strcmp(r->name, "reference") ? r->tolerance : 1e-6)))
         fail_msg("%s%s: off by %g", r->name, settings->indexed ? ", indexed" : "", off);
     scene_picture_free(&p);
@@ -264,8 +262,8 @@ static void expect_right(levels *l, const trip_camera_params *view)
     b.items = calloc((size_t)2 * N * N * N, sizeof *b.items);
     assert_non_null(b.items);
     float *expected = draw_by_hand(&b);
+    b.settings.depth = true;
     for (const scene_renderer *r = scene_renderers(); r->name; r++) {
-        b.settings.depth = scene_has_depth(r);
         expect_close(l, r, view, &b.settings, expected);
         b.settings.indexed = true;
         if (!strcmp(r->name, "gl"))
