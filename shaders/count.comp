@@ -1,6 +1,6 @@
 // Counts the splats of a batch that are projected and drawn, as trip_list_stats defines them, in
 // double precision like the reference; one invocation a splat. In: the batch's storage blocks and
-// the positions. Out: added to the list's counters. Runs only when counts are asked for.
+// the positions. Out: added to the list's counters. Runs only for frames that count.
 #include "fetch.glsl"
 #include "project.glsl"
 #include "weight.glsl"

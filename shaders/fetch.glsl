@@ -1,6 +1,7 @@
 // One splat of the batch by its draw position: its place from the eye (list axes), code and normal.
-// Mirrors stream/block.h: the bytes of blocks and normals are as in the files. With INDEXED the batch
-// names places in the list's order of one vertex array (x, y, z, code in 16 bits each) instead.
+// Mirrors stream/block.h: the bytes of blocks and normals are as in the files. With INDEXED runs
+// are places in the order of a list, each of which is an index into one array of vertices (x, y, z
+// and code in 16 bits each).
 #include "real.glsl"
 
 layout(std430, binding = TRIP_GL_RUNS) readonly buffer trip_gl_runs { trip_gl_run runs[]; };

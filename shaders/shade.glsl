@@ -1,5 +1,6 @@
 // Light on a splat. Mirrors trip_shade() in render/shade.c and trip_normal_unpack(), or with
-// COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS come from render/shade.h.
+// COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR and SHININESS
+// come from render/shade.h.
 #include "real.glsl"
 
 #ifdef SHADED

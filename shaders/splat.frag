@@ -1,6 +1,6 @@
 // A splat's colour and opacity at a pixel. In: the footprint, flat. Out: premultiplied colour, for
-// blending in list order, and with DEPTH the distance as a colour is (render/layer.h). Mirrors trip_splat_radius2() and the opacity in render/splat.h; beyond the
-// cut-off nothing is added.
+// blending in list order, and with DEPTH the distance likewise (render/layer.h). Mirrors
+// trip_splat_radius2() and the opacity in render/splat.h; beyond the cut-off nothing is added.
 #include "real.glsl"
 
 layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies

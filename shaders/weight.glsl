@@ -1,4 +1,4 @@
-// Which list a pixel takes its colour from. Mirrors render/weight.c. METHOD: 0 merge, 1 clip, 2
+// The weights of the layers at a pixel. Mirrors render/weight.c. METHOD: 0 merge, 1 clip, 2
 // axis, as trip_method.
 #include "real.glsl"
 

@@ -28,7 +28,7 @@ static void GLAPIENTRY debug_message(GLenum source, GLenum type, GLuint id, GLen
                                      GLsizei length, const GLchar *message, const void *user)
 {
     (void)id, (void)length, (void)user;
-    /* Compilers' complaints are reported with their file and line by program.c. */
+    /* program.c reports what compilers say, with file and line. */
     if (severity == GL_DEBUG_SEVERITY_NOTIFICATION || type == GL_DEBUG_TYPE_PERFORMANCE ||
         source == GL_DEBUG_SOURCE_SHADER_COMPILER)
         return;
@@ -45,7 +45,8 @@ static void report_debug_messages(void)
 #endif
 }
 
-/* A context that needs no surface; where EGL insists on a configuration, any that can do OpenGL. */
+/* A context that needs no surface; where EGL has no context without a configuration, any for
+ * OpenGL. */
 static EGLContext create_context(EGLDisplay display, bool robust)
 {
 #ifndef NDEBUG

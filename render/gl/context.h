@@ -26,8 +26,8 @@ int trip_gl_context_use(trip_gl_context *c);
 const char *trip_gl_context_device(const trip_gl_context *c);
 const trip_gl_limits *trip_gl_context_limits(const trip_gl_context *c);
 
-/* Reports what GL has recorded since the last check: out of memory, a lost context, or an error of
- * ours. `where` says what was being done. */
+/* Reports what GL has recorded since the last check: out of memory, a lost context, or a
+ * wrong call. `where` is what was being done. */
 int trip_gl_check(const trip_gl_context *c, const char *where);
 
 #endif

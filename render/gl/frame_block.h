@@ -1,5 +1,5 @@
-/* The constants of one list of a frame as the shaders want them (shared.h), and which of the
- * shaders' effects the frame calls for. Pure functions. */
+/* The constants of one list of a frame in the shaders' form (shared.h), and which of the shaders'
+ * effects the frame needs. Pure functions. */
 #ifndef TRIP_GL_FRAME_BLOCK_H
 #define TRIP_GL_FRAME_BLOCK_H
 

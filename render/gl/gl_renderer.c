@@ -51,7 +51,7 @@ typedef struct gl_renderer {
     int axis;               /* of the layer being drawn */
     unsigned layers;        /* bit a: the layer of axis a was begun */
     bool masked;            /* the layer being drawn, by the stencil */
-    uint64_t quads;         /* splats of the frame drawn as quads though sprites were asked for */
+    uint64_t quads;         /* splats of the frame drawn as quads, not sprites as set */
     trip_list_stats *stats; /* by number of the list; `counts` has room for as many */
     unsigned stats_room;
     char device[320];

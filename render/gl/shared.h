@@ -21,7 +21,7 @@
 /* Texture units: the layer of axis a is unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
-/* Of a layer, and of the merged image: colour and opacity, and depths where they are wanted. */
+/* Of a layer, and of the merged image: colour and opacity, and depths with settings.depth. */
 #define TRIP_GL_OUT_COLOUR 0
 #define TRIP_GL_OUT_DEPTH 1
 /* Locations of uniforms. */

@@ -5,7 +5,7 @@
 
 enum { DIRECT_ALIGNMENT_BYTES = 4096 };
 
-/* One buffer for all, with room to begin at a page: a mapping starts where the driver likes. */
+/* One buffer for all, with room to begin at a page: a mapping may start anywhere. */
 static bool make_whole(trip_gl_slots *s, unsigned count, size_t bytes)
 {
     GLint alignment = 1;

@@ -134,7 +134,7 @@ int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target 
     return status;
 }
 
-/* The layer's surface, made when first wanted. */
+/* The layer's surface, made when it is first drawn into. */
 static int fit_layer(const trip_gl_target *t, trip_gl_band *band, int axis)
 {
     trip_gl_surface *layer = &band->layers[axis];
