@@ -54,7 +54,9 @@ void trip_dataset_close(trip_dataset *d);
  * hold the same records, and no two kinds of a level the same voxel). Reports the first fault. */
 int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
 
-/* The first and last voxel kept along each index axis; without any, those of the grid. */
+/* The first and last voxel kept along each index axis; without any, those of the grid. Level 0's
+ * alone, as is all that framing goes by (render/visible.h): that is right for levels each of which
+ * shows all of one object. What another level alone shows takes no part in it. */
 void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3]);
 
 /* NULL where the data set has no such list. */

@@ -6,36 +6,52 @@
 #include <string.h>
 
 #include "splat.h"
+#include "visible.h"
 #include "weight.h"
 
-/* An object of two levels: cells of 4 x 4 x 4 voxels of level 0, every other one drawn by its
- * voxels, the rest by those of level 1, so that the levels alternate along every ray and each
- * hides much of the other. */
+/* Data sets of two levels. Most are one object in cells of 4 x 4 x 4 voxels of level 0, every other
+ * one drawn by its voxels, the rest by those of level 1, so that the levels alternate along every
+ * ray and each hides much of the other. */
 
 enum { N = 24, CELL = 4, SIZE_PX = 44, CHANNELS = 5 };
 
 /* Codes of the levels. */
 enum { FINE = 20000, COARSE = 50000 };
 
-/* Voxels of level 0 in one of level 1. */
+typedef enum parting {
+    IN_CELLS,
+    APART,        /* level 0 in a box of its own, level 1 in another */
+    COARSE_ALONE, /* level 0 is empty */
+} parting;
+
+/* Voxels of level 0 in one of level 1, and which of the two draws what. */
 typedef struct coarseness {
     int by[3];
+    parting parting;
 } coarseness;
 
-static bool is_coarse(const double at[3])
+/* Whether a place is drawn by a level. */
+static bool is_drawn_by(const coarseness *c, int level, const double at[3])
 {
     int sum = 0;
     for (int a = 0; a < 3; a++)
         sum += (int)at[a] / CELL;
-    return sum % 2;
+    switch (c->parting) {
+    case IN_CELLS:
+        return sum % 2 == level;
+    case APART:
+        return level ? at[0] >= 16 && at[2] >= 8 : at[0] < 8 && at[1] < 12;
+    case COARSE_ALONE:
+        return level && sum % 2;
+    }
+    return false;
 }
 
 static bool fine_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
-    (void)user;
     (void)gradient;
     *code = FINE;
-    return !is_coarse((double[3]){ i, j, k });
+    return is_drawn_by(user, 0, (double[3]){ i, j, k });
 }
 
 static bool coarse_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -43,7 +59,7 @@ static bool coarse_voxel(void *user, int i, int j, int k, unsigned *code, double
     const coarseness *c = user;
     (void)gradient;
     *code = COARSE;
-    return is_coarse((double[3]){ i * c->by[0], j * c->by[1], k * c->by[2] });
+    return is_drawn_by(c, 1, (double[3]){ i * c->by[0], j * c->by[1], k * c->by[2] });
 }
 
 typedef struct levels {
@@ -65,6 +81,7 @@ static void create(levels *l, coarseness coarse, double thickness)
                                              .tile_voxels = 16,
                                              .slab_sheets = 4,
                                              .voxel = fine_voxel,
+                                             .user = &l->coarse,
                                              .parts = &part,
                                              .part_count = 1 });
     scene_colour(&l->drawn, FINE, FINE, 1, 0.2, 0.1, 0.25);
@@ -110,8 +127,9 @@ static bool is_there(const levels *l, int level, const int at[3])
 {
     unsigned code;
     double gradient[3];
-    return level ? coarse_voxel((void *)(uintptr_t)&l->coarse, at[0], at[1], at[2], &code, gradient)
-                 : fine_voxel(NULL, at[0], at[1], at[2], &code, gradient);
+    void *coarse = (void *)(uintptr_t)&l->coarse;
+    return level ? coarse_voxel(coarse, at[0], at[1], at[2], &code, gradient)
+                 : fine_voxel(coarse, at[0], at[1], at[2], &code, gradient);
 }
 
 static void add(brute *b, int level, int axis, const int at[3])
@@ -295,7 +313,7 @@ static void two_levels_are_drawn_in_one_order(void **state)
 {
     (void)state;
     levels l;
-    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    create(&l, (coarseness){ { 2, 2, 2 }, IN_CELLS }, 1);
     expect_right_from_everywhere(&l);
     destroy(&l);
 }
@@ -305,8 +323,47 @@ static void levels_of_voxels_of_other_shapes_are_drawn_in_one_order(void **state
 {
     (void)state;
     levels l;
-    create(&l, (coarseness){ { 2, 4, 1 } }, 1.25);
+    create(&l, (coarseness){ { 2, 4, 1 }, IN_CELLS }, 1.25);
     expect_right_from_everywhere(&l);
+    destroy(&l);
+}
+
+static void levels_with_other_boxes_are_drawn_in_one_order(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 2, 2 }, APART }, 1);
+    expect_right_from_everywhere(&l);
+    destroy(&l);
+}
+
+/* Framing goes by level 0: where that is empty, by the grid. */
+static void expect_bounds_of_the_grid(const levels *l)
+{
+    double lo[3], hi[3];
+    trip_visible visible = { .data = l->drawn.data, .budget = l->drawn.budget };
+    const trip_reader_params params = { .planes = 1u << TRIP_PLANE_VOXELS };
+    trip_dataset_kept_bounds(l->drawn.data, visible.lo, visible.hi);
+    assert_int_equal(trip_reader_create(&visible.reader, l->drawn.data, &params, l->drawn.budget),
+                     0);
+    trip_visible_start(&visible, l->drawn.table);
+    assert_int_equal(trip_visible_bounds(&visible, lo, hi), 0);
+    for (int a = 0; a < 3; a++) {
+        assert_true(visible.lo[a] == 0 && visible.hi[a] == N - 1);
+        assert_true(lo[a] == 0 && hi[a] == N - 1);
+    }
+    trip_reader_destroy(visible.reader);
+}
+
+static void a_data_set_of_level_1_alone_is_drawn_and_framed(void **state)
+{
+    (void)state;
+    levels l;
+    create(&l, (coarseness){ { 2, 2, 2 }, COARSE_ALONE }, 1);
+    assert_int_equal(l.drawn.data->lists[0].records, 0);
+    assert_true(l.drawn.data->lists[3].records > 0);
+    expect_right_from_everywhere(&l);
+    expect_bounds_of_the_grid(&l);
     destroy(&l);
 }
 
@@ -325,7 +382,7 @@ static void a_plan_names_lists_by_axis_and_level(void **state)
 {
     (void)state;
     levels l;
-    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    create(&l, (coarseness){ { 2, 2, 2 }, IN_CELLS }, 1);
     char *text;
     size_t bytes;
     FILE *f = open_memstream(&text, &bytes);
@@ -352,7 +409,7 @@ static void every_list_has_counts_of_its_own(void **state)
 {
     (void)state;
     levels l;
-    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    create(&l, (coarseness){ { 2, 2, 2 }, IN_CELLS }, 1);
     const trip_list *lists = l.drawn.data->lists;
     trip_settings settings = trip_settings_default();
     trip_vec3 along = trip_affine_vector(&l.drawn.data->index_to_world, trip_v3(0, 0, 1));
@@ -383,7 +440,7 @@ static void lists_that_do_not_lie_along_level_0_are_refused(void **state)
 {
     (void)state;
     levels l;
-    create(&l, (coarseness){ { 2, 2, 2 } }, 1);
+    create(&l, (coarseness){ { 2, 2, 2 }, IN_CELLS }, 1);
     trip_camera_params view = scene_view(&l.drawn, trip_v3(0.1, 0, 1), 60, 20, SIZE_PX);
     trip_camera c;
     trip_plan plan;
@@ -412,6 +469,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_levels_are_drawn_in_one_order),
         cmocka_unit_test(levels_of_voxels_of_other_shapes_are_drawn_in_one_order),
+        cmocka_unit_test(levels_with_other_boxes_are_drawn_in_one_order),
+        cmocka_unit_test(a_data_set_of_level_1_alone_is_drawn_and_framed),
         cmocka_unit_test(a_plan_names_lists_by_axis_and_level),
         cmocka_unit_test(every_list_has_counts_of_its_own),
         cmocka_unit_test(lists_that_do_not_lie_along_level_0_are_refused),
