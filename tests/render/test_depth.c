@@ -193,6 +193,20 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
     scene_picture_free(&expected);
 }
 
+/* Threads, batches and splat buffers change no bit. */
+static void expect_same_bits(const scene *s, const trip_camera_params *view,
+                             const trip_settings *settings)
+{
+    const trip_reader_params small = { .slots = 2, .slot_bytes = 8192 };
+    scene_picture p = scene_draw(s, &cpu_scenes_cpu, view, settings);
+    cpu_scenes_threads = 1;
+    scene_picture q = scene_draw_with(s, &cpu_scenes_cpu, view, settings, &small);
+    cpu_scenes_threads = 3;
+    assert_memory_equal(p.depth, q.depth, (size_t)p.width * (size_t)p.height * sizeof *p.depth);
+    scene_picture_free(&p);
+    scene_picture_free(&q);
+}
+
 static void check_blobs(const trip_affine *map, const trip_settings *settings)
 {
     scene s;
@@ -203,6 +217,7 @@ static void check_blobs(const trip_affine *map, const trip_settings *settings)
     compare(&s, &view, settings);
     view = scene_view(&s, trip_v3(0.3, 1, 0.2), 6, 110, 70);
     compare(&s, &view, settings);
+    expect_same_bits(&s, &view, settings);
     scene_destroy(&s);
 }
 
