@@ -20,7 +20,7 @@ struct trip_dataset_text {
     trip_json json;
     const cJSON *root;
     const char *path;   /* of the data set, for messages */
-    interval *envelope; /* ascending, apart from one another; NULL where the text tells of none */
+    interval *envelope; /* ascending, apart from one another; NULL where the text has none */
     size_t envelope_count;
 };
 
@@ -102,7 +102,7 @@ static const char *string_at(const trip_dataset_text *t, const char *key)
     return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(t->root, key));
 }
 
-/* TRIP_TF_SIMULATION where the text does not tell. */
+/* TRIP_TF_SIMULATION where the text has none. */
 static trip_tf_kind kind_of(const trip_dataset_text *t)
 {
     trip_tf_kind kind = trip_tf_kind_from_name(string_at(t, "function_kind"));
@@ -138,8 +138,8 @@ static bool read_histogram(const trip_dataset_text *t, trip_histogram *out)
 int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, trip_tf *tf)
 {
     trip_histogram histogram;
-    bool known = trip_tf_needs_data(tf) && read_histogram(t, &histogram);
-    const trip_tf_data data = { d->header.value_min, d->header.value_max, known ? &histogram : NULL,
+    bool given = trip_tf_needs_data(tf) && read_histogram(t, &histogram);
+    const trip_tf_data data = { d->header.value_min, d->header.value_max, given ? &histogram : NULL,
                                 kind_of(t) };
     return trip_tf_adapt(tf, &data, t->path);
 }

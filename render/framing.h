@@ -1,5 +1,5 @@
 /* Which view shows an object well when none is given: from a named side, everything in the picture,
- * centred, with a margin. What is to be in the picture is told by how far it reaches in given
+ * centred, with a margin. What is to be in the picture is given by how far it reaches in given
  * directions, so that the fit is exact for any shape. One thread. */
 #ifndef TRIP_FRAMING_H
 #define TRIP_FRAMING_H

@@ -3,9 +3,9 @@
 #include "brick_box.h"
 #include "weight.h"
 
-enum { BLOCK_CODES = 256 };
+enum { RANGE_CODES = 256 };
 
-/* What is known of a block of codes. */
+/* What a range of RANGE_CODES codes is. */
 enum { UNKNOWN, TRANSPARENT, VISIBLE };
 
 /* Bounds of the voxel positions of a brick, from the eye. */
@@ -44,31 +44,31 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .radius2 = settings->kernel_radius * settings->kernel_radius,
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
-        .spread2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
+        .low_pass2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
         .table = table,
     };
 }
 
-static bool block_is_visible(trip_cull *cull, unsigned block)
+static bool range_is_visible(trip_cull *cull, unsigned range)
 {
-    const trip_tf_entry *codes = cull->table + block * BLOCK_CODES;
-    if (cull->blocks[block] == UNKNOWN) {
+    const trip_tf_entry *codes = cull->table + range * RANGE_CODES;
+    if (cull->ranges[range] == UNKNOWN) {
         int i = 0;
-        while (i < BLOCK_CODES && !(codes[i].extinction > 0))
+        while (i < RANGE_CODES && !(codes[i].extinction > 0))
             i++;
-        cull->blocks[block] = i < BLOCK_CODES ? VISIBLE : TRANSPARENT;
+        cull->ranges[range] = i < RANGE_CODES ? VISIBLE : TRANSPARENT;
     }
-    return cull->blocks[block] == VISIBLE;
+    return cull->ranges[range] == VISIBLE;
 }
 
 /* Whether some code of [first, last] has extinction. The first mostly has: it was kept. */
 static bool some_visible(trip_cull *cull, unsigned first, unsigned last)
 {
     for (unsigned code = first; code <= last;) {
-        bool whole = code % BLOCK_CODES == 0 && last - code >= BLOCK_CODES - 1;
-        if (whole ? block_is_visible(cull, code / BLOCK_CODES) : cull->table[code].extinction > 0)
+        bool whole = code % RANGE_CODES == 0 && last - code >= RANGE_CODES - 1;
+        if (whole ? range_is_visible(cull, code / RANGE_CODES) : cull->table[code].extinction > 0)
             return true;
-        code += whole ? BLOCK_CODES : 1;
+        code += whole ? RANGE_CODES : 1;
     }
     return false;
 }
@@ -139,8 +139,8 @@ trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_bric
     double depth = farthest_along(&b, cull->camera->forward);
     if (!(depth > 0))
         return TRIP_CULL_OUTSIDE;
-    double spread2 = cull->camera->ortho ? cull->spread2 : cull->spread2 * depth * depth;
-    double radius = sqrt(cull->radius2 + spread2) * (1 + 1e-9); /* room for rounding */
+    double low_pass2 = cull->camera->ortho ? cull->low_pass2 : cull->low_pass2 * depth * depth;
+    double radius = sqrt(cull->radius2 + low_pass2) * (1 + 1e-9); /* room for rounding */
     if (outside(cull, &b, radius))
         return TRIP_CULL_OUTSIDE;
     return may_weigh(cull, &b, radius, axis) ? TRIP_CULL_KEEP : TRIP_CULL_NO_WEIGHT;

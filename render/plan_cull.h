@@ -28,10 +28,10 @@ typedef struct trip_cull {
     const trip_list_grid *grid;
     const trip_file_header *header;
     int axis_of_view;
-    trip_cull_plane sides[4]; /* through the outermost pixel centres */
-    double radius2, spread2;  /* radius of a splat at depth z: sqrt(radius2 + spread2 z^2) */
+    trip_cull_plane sides[4];  /* through the outermost pixel centres */
+    double radius2, low_pass2; /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */
     const trip_tf_entry *table;
-    uint8_t blocks[256]; /* of 256 codes each, as far as looked at: whether some have extinction */
+    uint8_t ranges[256]; /* of 256 codes each, as far as looked at: whether some have extinction */
 } trip_cull;
 
 /* For a list of the data set: `camera` views its index space, `grid` is its place in that of level

@@ -32,7 +32,7 @@ typedef struct trip_frame {
     /* For the integral renderer: integrate this instead of what batches hold; NULL: those. */
     const struct trip_field *field;
     bool count; /* splats projected and drawn, too: counting costs time */
-    /* Hears between batches how many splats were drawn, of how many; NULL: nobody asks. */
+    /* Called between batches with how many splats were drawn, of how many. May be NULL. */
     void (*progress)(void *user, uint64_t splats, uint64_t total);
     void *progress_user;
 } trip_frame;
@@ -78,12 +78,12 @@ typedef struct trip_renderer_ops {
     bool in_parts;
     /* Memory of the renderer's own for a reader's ring: `count` slots of `bytes`, aligned to 4096;
      * batches that lie there are drawn in place. NULL where it has none to give. It stays the
-     * renderer's, who must outlive the reader. NULL: batches may lie anywhere, and are done with
+     * renderer's, which must outlive the reader. NULL: batches may lie anywhere, and are done with
      * when draw() returns. */
     void *const *(*take_slots)(trip_renderer *r, unsigned count, size_t bytes);
     /* Takes that memory back. */
     void (*drop_slots)(trip_renderer *r);
-    /* 1: the batch is done with, and its slot may be read into; 0: not yet, only when not told to
+    /* 1: the batch is done with, and its slot may be read into; 0: not yet, only where it is not to
      * wait; negative: failed. NULL where take_slots is. */
     int (*is_done)(trip_renderer *r, const trip_batch *batch, bool wait);
     /* Merges what the layers hold so far, puts the background behind, and gives width * height * 4

@@ -1,4 +1,4 @@
-/* What the user asked a picture to be. Plain values that every renderer reads alike; start from
+/* What a picture is to be. Plain values that every renderer reads alike; start from
  * trip_settings_default(). Sections of papers: 2005 is Hofsetz & Max, 2008 with Bastos. */
 #ifndef TRIP_SETTINGS_H
 #define TRIP_SETTINGS_H

@@ -113,8 +113,8 @@ static void set_across(search *s, const trip_reach_origin *origin)
 
 static form make_form(const search *s, trip_vec3 normal, double offset, double around)
 {
-    double spread = around > 0 ? around * longest(s->across[0], s->across[1]) : 0;
-    double per_voxel = trip_length(normal) + spread;
+    double turning = around > 0 ? around * longest(s->across[0], s->across[1]) : 0;
+    double per_voxel = trip_length(normal) + turning;
     return (form){
         .normal = normal,
         .offset = offset,

@@ -15,19 +15,20 @@
 enum { SLOTS = 2, MAX_THREADS = 256 };
 
 /* How often a thread looks for work before it sleeps: 10 to 50 microseconds with the processor to
- * itself, then some 200 in which whoever else wants it goes first. Between frames of a small data
- * set planning takes nearly as long. */
+ * itself, then some 200 in which any other thread that wants it goes first. Between frames of a
+ * small data set planning takes nearly as long. */
 enum { LOOKS = 1000, YIELDS = 1500 };
 
 /* A job's tickets in one word, so that taking a task and knowing that its job is still the same are
- * one step: tasks, tasks given out, and a number that tells one job in the slot from the next. */
+ * one step: tasks, tasks given out, and a number that differs from one job in the slot to the next.
+ */
 #define TICKET_BITS 20
 #define TICKET_MASK ((UINT64_C(1) << TICKET_BITS) - 1)
 #define NUMBER_ONE (UINT64_C(1) << 2 * TICKET_BITS)
 
 typedef struct slot {
     _Atomic uint64_t tickets; /* tasks << TICKET_BITS | given out; release by the starter */
-    /* Written before `tickets` is released, read by who took a ticket. */
+    /* Written before `tickets` is released, read by threads that took a ticket. */
     void (*run)(void *context, unsigned task, unsigned thread);
     void *context;
     trip_scope *scope;         /* of the starter */
@@ -42,7 +43,7 @@ struct trip_cpu_pool {
     slot slots[SLOTS];
     _Atomic unsigned oldest; /* slot to look at first */
     /* Words that threads sleep on. */
-    _Atomic uint32_t version; /* counts starts: who has seen them all may sleep */
+    _Atomic uint32_t version; /* counts starts: a thread that has seen them all may sleep */
     _Atomic uint32_t sleepers;
     _Atomic bool waiting; /* the starter sleeps */
     _Atomic bool stop;
@@ -143,7 +144,7 @@ static void *work(void *argument)
     }
 }
 
-/* Lets everyone know that there is something new. */
+/* Wakes all threads for something new. */
 static void announce(trip_cpu_pool *pool)
 {
     atomic_fetch_add(&pool->version, 1);

@@ -1,7 +1,7 @@
 /* Threads of the CPU renderer, made once: jobs of independent tasks, run by the workers and by
- * whoever waits for them. Jobs are started and waited for by one thread, the renderer's; tasks of
- * the job started first are taken first. Everything the starter wrote before the start is seen by
- * the tasks, and everything they wrote is seen after the wait.
+ * the thread that waits for them. Jobs are started and waited for by one thread, the renderer's;
+ * tasks of the job started first are taken first. Everything the starter wrote before the start is
+ * seen by the tasks, and everything they wrote is seen after the wait.
  *
  * A frame has many short jobs, and waking a thread can take longer than one of them: so threads
  * look for work a little while before they sleep. */
