@@ -377,7 +377,8 @@ class Cache(program.ProgramTest):
         os.environ["HOME"] = self.home
         os.environ["XDG_CACHE_HOME"] = "relative"  # to be ignored
         self.works("render", "v.nrrd", "-o", "one.exr", *SIZE)
-        self.assertEqual(len(os.listdir(os.path.join(self.home, ".cache", "triptych"))), 1)
+        self.cache = os.path.join(self.home, ".cache", "triptych")
+        self.assertEqual(len(self.entries()), 1)
         self.assertFalse(os.path.exists("relative/triptych"))
 
     def test_a_home_that_is_read_only(self):
