@@ -119,11 +119,11 @@ static void keep(int status, const char *text)
 }
 
 /* Work that ends for all of its threads has one fault. */
-static void tell(int status, const char *text)
+static void deliver(int status, const char *text)
 {
     if (status != TRIP_OK && held)
         keep(status, text);
-    else if (status != TRIP_INTERRUPTED || trip_scope_tell_once())
+    else if (status != TRIP_INTERRUPTED || trip_scope_report_once())
         emit(status, text);
 }
 
@@ -150,7 +150,7 @@ report(int status, const char *what, const char *where, const char *why, va_list
         put_where(&l, where);
     put_visible(&l, text);
     finish_line(&l);
-    tell(status, l.text);
+    deliver(status, l.text);
     errno = saved_errno;
 }
 
@@ -209,5 +209,5 @@ void trip_report_release(trip_held_report *h)
 void trip_report_print(const trip_held_report *h)
 {
     if (*h->line)
-        tell(h->status, h->line);
+        deliver(h->status, h->line);
 }

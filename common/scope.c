@@ -30,7 +30,7 @@ void trip_scope_cancel(trip_scope *s)
 void trip_scope_renew(trip_scope *s)
 {
     __atomic_store_n(&s->cancelled, false, __ATOMIC_RELAXED);
-    __atomic_store_n(&s->told, false, __ATOMIC_RELAXED);
+    __atomic_store_n(&s->reported, false, __ATOMIC_RELAXED);
 }
 
 int trip_interrupted(void)
@@ -50,10 +50,10 @@ static trip_scope *ended_scope(void)
     return s;
 }
 
-bool trip_scope_tell_once(void)
+bool trip_scope_report_once(void)
 {
     return !trip_interrupted() ||
-           !__atomic_exchange_n(&ended_scope()->told, true, __ATOMIC_RELAXED);
+           !__atomic_exchange_n(&ended_scope()->reported, true, __ATOMIC_RELAXED);
 }
 
 static void on_signal(int number)

@@ -22,7 +22,7 @@ typedef struct trip_scope {
     void (*sink)(const char *line, void *user);
     void *user;
     /* Atomic; trip_scope_cancel() sets the one, the report of an interruption the other. */
-    bool cancelled, told;
+    bool cancelled, reported;
 } trip_scope;
 
 /* The calling thread is in `s` from here on; returns the scope it leaves, to enter again. */
@@ -46,7 +46,7 @@ void trip_interrupt_install(void);
 
 /* Whether an interruption of this thread's work is to be reported: once for a scope that was
  * cancelled, once for a signal. */
-bool trip_scope_tell_once(void);
+bool trip_scope_report_once(void);
 
 #ifdef __cplusplus
 }

@@ -63,11 +63,11 @@ typedef struct trip_tf_origin {
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
 
-/* A preset's name ("bone", "preset:bone"), or a file, told apart by its content: `.tf` text, JSON of
- * ParaView or 3D Slicer, a .vp, XML of Slicer, VTK or ParaView; "FILE#NAME" for one of several. A
- * name without a slash or a dot that is a preset's
- * is the preset. All report and return a negative status on failure, TRIP_USAGE for an unknown
- * preset. trip_tf_parse() takes `.tf` text itself. */
+/* A preset's name ("bone", "preset:bone"), or a file, told apart by its content: `.tf` text, JSON
+ * of ParaView or 3D Slicer, a .vp, XML of Slicer, VTK or ParaView; "FILE#NAME" for one of several.
+ * A name without a slash or a dot that is a preset's is the preset. All report and return a
+ * negative status on failure, TRIP_USAGE for an unknown preset. trip_tf_parse() takes `.tf` text
+ * itself. */
 int trip_tf_load(trip_tf **out, const char *path_or_preset);
 int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t bytes);
 int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count, bool normalised,

@@ -43,7 +43,7 @@ static int64_t smaller(int64_t a, int64_t b)
     return a < b ? a : b;
 }
 
-static int put_range(reading *r, const trip_volume_block *block, const int64_t lo[3],
+static int put_range(reading *r, const trip_volume_portion *portion, const int64_t lo[3],
                      const int64_t hi[3])
 {
     int64_t at[3], size[3];
@@ -53,7 +53,7 @@ static int put_range(reading *r, const trip_volume_block *block, const int64_t l
             for (at[0] = lo[0]; at[0] < hi[0] && !status; at[0] += EDGE) {
                 for (int a = 0; a < 3; a++)
                     size[a] = smaller(a == 2 ? SLICES : EDGE, hi[a] - at[a]);
-                status = trip_block_decode(r->volume, block, at, size, r->values, NULL);
+                status = trip_portion_decode(r->volume, portion, at, size, r->values, NULL);
                 if (!status)
                     status = put_box(r, at, size);
                 if (!status && trip_interrupted())
@@ -63,24 +63,24 @@ static int put_range(reading *r, const trip_volume_block *block, const int64_t l
 }
 
 /* Of a sparse volume one voxel around belongs to it. */
-static int put_block(reading *r, const trip_volume_block *block)
+static int put_portion(reading *r, const trip_volume_portion *portion)
 {
     const trip_volume_info *info = trip_volume_get_info(r->volume);
     int64_t lo[3], hi[3], around = info->sparse;
     for (int a = 0; a < 3; a++) {
-        lo[a] = block->origin[a] > around ? block->origin[a] - around : 0;
-        hi[a] = smaller(block->origin[a] + block->size[a] + around, info->dims[a]);
+        lo[a] = portion->origin[a] > around ? portion->origin[a] - around : 0;
+        hi[a] = smaller(portion->origin[a] + portion->size[a] + around, info->dims[a]);
     }
-    return put_range(r, block, lo, hi);
+    return put_range(r, portion, lo, hi);
 }
 
 static int put_volume(reading *r)
 {
-    trip_volume_block block;
+    trip_volume_portion portion;
     int status;
-    while ((status = trip_volume_next(r->volume, SLICES, &block)) > 0) {
-        status = put_block(r, &block);
-        trip_block_release(r->volume, &block);
+    while ((status = trip_volume_next(r->volume, SLICES, &portion)) > 0) {
+        status = put_portion(r, &portion);
+        trip_portion_release(r->volume, &portion);
         if (status)
             return status;
     }

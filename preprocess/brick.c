@@ -14,6 +14,7 @@
 #include "dataset.h"
 #include "estimate.h"
 #include "folder.h"
+#include "gradient.h"
 #include "identity.h"
 #include "list_builder.h"
 #include "report.h"
@@ -153,9 +154,9 @@ static bool has_spilled_order(const brick *b)
 
 /* When all but the lists is open. A run that goes on with less memory than the killed one had
  * spills the rest of a list that was written in order: all of it comes after what was written. */
-static int settle_memory(brick *b)
+static int update_memory_plan(brick *b)
 {
-    int status = trip_memory_plan_settle(&b->plan, b->params->input, b->in.info, &b->format,
+    int status = trip_memory_plan_update(&b->plan, b->params->input, b->in.info, &b->format,
                                          trip_workers_count(b->in.workers),
                                          trip_budget_left_bytes(b->in.budget));
     b->plan.in_order = b->plan.in_order && b->format.quantised && !has_spilled_order(b);
@@ -323,7 +324,7 @@ static int open_output(brick *b)
     if (status == 0)
         status = open_splatter(b);
     if (status == 0)
-        status = settle_memory(b);
+        status = update_memory_plan(b);
     if (status == 0)
         status = start_journal(b);
     if (status == 0)
@@ -555,7 +556,7 @@ static int run(brick *b)
 
 /* Who resumes and interrupts will want to resume again. Other failures leave nothing, nor does an
  * end; a run that was refused before it began leaves all that it found. */
-static void settle_leftovers(brick *b, int status)
+static void keep_or_remove_leftovers(brick *b, int status)
 {
     trip_leftover now = trip_leftover_none();
     bool keep = b->params->resume && status == TRIP_INTERRUPTED;
@@ -570,7 +571,7 @@ static void close_all(brick *b, int status)
 {
     trip_list_builder_destroy(b->builder);
     trip_splatter_destroy(b->splatter);
-    settle_leftovers(b, status);
+    keep_or_remove_leftovers(b, status);
     trip_writer_abort(b->writer);
     trip_journal_close(b->journal);
     trip_leftover_close(&b->leftover);

@@ -1,5 +1,5 @@
-/* What `brick` reads: the opened volume with the memory and threads to work on it, and which of its
- * values are kept. One thread. */
+/* The input of `brick`: the opened volume, the budget and the workers to process it with, and the
+ * envelope, which says what is kept of it. One thread. */
 #ifndef TRIP_BRICK_INPUT_H
 #define TRIP_BRICK_INPUT_H
 
@@ -15,40 +15,39 @@ typedef struct trip_brick_input {
     trip_workers *workers;
     trip_volume *volume;
     const trip_volume_info *info;
-    uint64_t grid_voxels;  /* of the dims: what progress counts */
+    uint64_t grid_voxels;  /* product of the dims, in which progress is counted */
     uint64_t memory_bytes; /* left once the input was opened */
     trip_tf **functions;   /* params->function_count of them */
-    bool scanned;          /* the tally is of a pass over the volume before */
+    bool scanned;          /* the tally is complete: the volume was scanned */
     trip_tally *tally;
     trip_histogram histogram;
     trip_envelope envelope;
 } trip_brick_input;
 
-/* The format of pieces that the parameters ask for, not quantised yet. */
+/* The format of pieces for these parameters, with `quantised` not set yet. */
 trip_piece_format trip_brick_format(const trip_brick_params *p);
 
 /* Opens the volume and loads the transfer functions. */
 int trip_brick_input_open(trip_brick_input *in, const trip_brick_params *params);
-/* Also after a failure to open. */
+/* May also be called after a failure to open. */
 void trip_brick_input_close(trip_brick_input *in);
 
-/* 8 and 16 bit integers: codes stand for all values of the type, without a look at the data. */
+/* Whether values are integers of 8 or 16 bits, so that codes cover the whole range of the type. */
 bool trip_brick_has_narrow_type(const trip_brick_input *in);
-/* Of a code: 1 where all values of the type are 8-bit codes exactly, else 2. */
+/* Bytes of a code: 1 where 8-bit codes represent all values of the type exactly, else 2. */
 unsigned trip_brick_code_bytes(const trip_brick_input *in);
-/* Of a normal, once it is known whether the volume is scanned; 0 without. */
+/* Bytes of a normal, 0 without normals; to be called after the scan, if there is one. */
 unsigned trip_brick_normal_bytes(const trip_brick_input *in);
-/* What all codes stand for where the type is narrow. */
+/* The values of the lowest and the highest code, for types of 8 or 16 bits. */
 void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi);
-/* Whether a pass over the volume has to go first: the envelope is automatic, a function depends on
- * the values, or compact normals on their range. */
+/* Whether the volume has to be scanned first: because the envelope is automatic, a function depends
+ * on the values, or compact normals depend on their range. */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
-/* Whether the range of the codes is known before pieces are made: that of the type, or what the
- * scan will find. */
+/* Whether the range of the codes is known before pieces are made, from the type or the scan. */
 bool trip_brick_will_be_quantised(const trip_brick_input *in);
-/* Fills the tally with `known`, and makes the functions that depend on the data. */
+/* Takes `known` as the tally and adapts the functions that depend on the data. */
 int trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known);
-/* Fills the tally from the volume, as slices, stride and passing_seconds of `scan` say. */
+/* Scans the volume; the slices, read_ahead, stride and skip_seconds of `scan` are used. */
 int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan);
 int trip_brick_input_make_envelope(trip_brick_input *in);
 

@@ -60,7 +60,7 @@ static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, 
     return n;
 }
 
-/* A block has a neighbour on each side, and two slices are kept for the next one. */
+/* A portion has a neighbour on each side, and two slices are kept for the next one. */
 static uint64_t reader_bytes(const needs *n, int64_t slices, bool read_ahead)
 {
     return (uint64_t)(slices + 2 + (read_ahead ? slices + 2 : 0) + 2) * n->slice_bytes;
@@ -79,7 +79,7 @@ static bool share(trip_memory_plan *plan, const needs *n, uint64_t left)
     return true;
 }
 
-/* Whether blocks of so many slices fit; fills the plan. */
+/* Whether portions of so many slices fit; fills the plan. */
 static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, int64_t slices,
                        bool read_ahead)
 {
@@ -87,7 +87,7 @@ static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, 
     return n->opened_bytes <= memory && share(plan, n, memory - n->opened_bytes);
 }
 
-/* Large blocks cost less at their borders, but splats want most of the memory. */
+/* Large portions cost less at their borders, but splats want most of the memory. */
 static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_t memory)
 {
     return plan->in_order && reader_bytes(n, plan->slices, plan->read_ahead) <= memory / 4;
@@ -131,7 +131,7 @@ int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_v
     return refuse(path, info, &n, threads, slices);
 }
 
-int trip_memory_plan_settle(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
+int trip_memory_plan_update(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
                             const trip_piece_format *format, unsigned threads, uint64_t left_bytes)
 {
     needs n = needs_of(info, format, threads);

@@ -1,4 +1,5 @@
-/* How the memory promised to `brick` is shared out, decided before anything large is taken. */
+/* Divides the memory of `brick` between reading, splats and lists before anything large is
+ * allocated. Any thread. */
 #ifndef TRIP_BRICK_MEMORY_H
 #define TRIP_BRICK_MEMORY_H
 
@@ -6,25 +7,25 @@
 #include "volume.h"
 
 typedef struct trip_memory_plan {
-    int64_t slices;      /* read at a time, of formats that come in slices */
-    bool read_ahead;     /* the next ones while these are worked on */
-    bool in_order;       /* the list along Z can be written as it comes */
-    uint64_t list_bytes; /* for pieces of splats */
+    int64_t slices;      /* read at a time, of dense volumes */
+    bool read_ahead;     /* read the next slices while these are processed */
+    bool in_order;       /* the ordered list can be written as it arrives */
+    uint64_t list_bytes; /* for pieces */
 } trip_memory_plan;
 
-/* Threads to take where nobody said how many: one a processor, but no more than leave half of the
- * memory for other things. */
+/* The default number of threads: one for each processor, but not so many that they take more than
+ * half of the memory. */
 unsigned trip_memory_plan_threads(const trip_piece_format *format, uint64_t memory_bytes);
 
-/* Refuses, with the least that would do, what cannot be done in `memory_bytes`. `slices` 0 leaves
- * that choice to the plan. */
+/* Makes a plan for `memory_bytes`. A reported failure, with the least that would do, if that is too
+ * little. `slices` 0: the plan chooses. */
 int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
                           const trip_piece_format *format, unsigned threads, uint64_t memory_bytes,
                           int64_t slices);
 
-/* Once all but the lists and the slices has been taken and `left_bytes` are there: what the lists
- * get of them. */
-int trip_memory_plan_settle(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
+/* Divides the memory anew, once all but the lists and the slices is allocated and `left_bytes` are
+ * left: sets list_bytes and in_order. */
+int trip_memory_plan_update(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
                             const trip_piece_format *format, unsigned threads, uint64_t left_bytes);
 
 #endif

@@ -1,5 +1,5 @@
-/* What a data set says of itself, as JSON; render/dataset_text.h lists the keys that drawing uses.
- * Nothing in it depends on memory, threads or time. */
+/* The text of a data set, JSON that describes its source and what was kept; render/dataset_text.h
+ * lists the keys that drawing uses. It does not depend on memory, threads or time. */
 #ifndef TRIP_BRICK_TEXT_H
 #define TRIP_BRICK_TEXT_H
 
@@ -14,7 +14,7 @@ typedef struct trip_brick_text {
     const trip_histogram *histogram;
 } trip_brick_text;
 
-/* What a volume is of which no more than this is known; never TRIP_TF_AUTOMATIC. */
+/* The kind of a volume, recognised from its header and histogram; never TRIP_TF_AUTOMATIC. */
 trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h);
 
 /* The text, for free(); NULL after a reported failure. */

@@ -1,14 +1,14 @@
-/* Slices out of one byte stream, or of several one after the other: all that a dense format needs
- * to do once it has read its header. The functions below fit trip_volume_reader as they are. */
+/* Reads slices from one byte stream or from several in sequence: what a reader of a dense format
+ * does after its header. The functions below fit into trip_volume_reader. One thread at a time. */
 #ifndef TRIP_DENSE_FILE_H
 #define TRIP_DENSE_FILE_H
 
 #include "byte_stream.h"
 #include "volume_reader.h"
 
-/* Opens the `count` sources, whose sizes are filled in here: the volume described by *info (dims
- * and type) divided by `count`. swap: the file's byte order is not the machine's. *state is for
- * the calls below. */
+/* Opens `count` sources, each of which holds an equal part of the volume that *info describes (dims
+ * and type); their size_bytes are filled in here. swap: the files' byte order is not the machine's.
+ * *state is for the calls below. */
 int trip_dense_open(void **state, const trip_byte_source *sources, int64_t count,
                     const trip_volume_info *info, bool swap);
 

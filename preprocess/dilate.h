@@ -1,5 +1,5 @@
-/* Which voxels of a box have a neighbour among those kept, 26 neighbours each: what interpolation
- * needs at the border of what is kept. Pure functions. */
+/* Morphological dilation of a set of voxels by their 26 neighbours, which interpolation needs at
+ * the border of what is kept. Pure functions. */
 #ifndef TRIP_DILATE_H
 #define TRIP_DILATE_H
 

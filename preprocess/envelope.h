@@ -1,6 +1,7 @@
-/* The opacity envelope: which values make a splat. It is the union of transfer functions (values
- * whose opacity is above 0) and of value ranges, held as the exact set of float32 values that
- * belong to it: closed intervals, disjoint and ascending. Built by one thread, then read-only. */
+/* The opacity envelope: the set of values that become splats. It is the union of value ranges and
+ * of the values to which transfer functions give opacity above 0, stored exactly for float32 values
+ * as closed intervals, disjoint and ascending. One thread builds it; then any thread may read it.
+ */
 #ifndef TRIP_ENVELOPE_H
 #define TRIP_ENVELOPE_H
 
@@ -10,7 +11,7 @@
 #include "transfer_function.h"
 
 typedef struct trip_interval {
-    float lo, hi; /* both belong to it; finite */
+    float lo, hi; /* inclusive, finite */
 } trip_interval;
 
 typedef struct trip_envelope {
@@ -18,17 +19,17 @@ typedef struct trip_envelope {
     size_t count;
 } trip_envelope;
 
-/* A zeroed envelope holds nothing. Each of these adds to it. */
+/* A zeroed envelope is empty. Each of these adds to it, or reports a failure. */
 int trip_envelope_add_range(trip_envelope *e, double lo, double hi);
-/* Exactly the values v with trip_tf_evaluate(tf, v).opacity > 0; tf is in data units. */
+/* Adds exactly the values v with trip_tf_evaluate(tf, v).opacity > 0; tf is in data units. */
 int trip_envelope_add_tf(trip_envelope *e, const trip_tf *tf);
-/* Every finite value. */
+/* Adds every finite value. */
 int trip_envelope_add_all(trip_envelope *e);
 void trip_envelope_destroy(trip_envelope *e);
 
 /* False for every value that is not finite. */
 bool trip_envelope_keeps(const trip_envelope *e, float value);
-/* keep[i] = 1 where value i belongs to the envelope, else 0. */
+/* keep[i] becomes 1 where value i is in the envelope, else 0. */
 void trip_envelope_keep_row(const trip_envelope *e, const float *values, size_t count,
                             uint8_t *keep);
 

@@ -13,7 +13,7 @@
 
 #include "report.h"
 
-/* Blocks looked at, and slices of each where memory is not short. */
+/* Portions looked at, and slices of each where memory is not short. */
 enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
 /* A pass is stopped with this status when it has taken long enough. */
 enum { STOPPED = -100 };
@@ -40,10 +40,10 @@ static int64_t slices_of(const trip_memory_plan *plan)
 
 static uint64_t stride_of(const trip_brick_input *in, const trip_memory_plan *plan)
 {
-    uint64_t blocks = (uint64_t)(in->info->dims[2] / slices_of(plan)) + 1;
-    if (in->info->sparse) /* blocks differ too much */
+    uint64_t portions = (uint64_t)(in->info->dims[2] / slices_of(plan)) + 1;
+    if (in->info->sparse) /* portions differ too much */
         return 1;
-    return blocks > SAMPLES ? blocks / SAMPLES : 1;
+    return portions > SAMPLES ? portions / SAMPLES : 1;
 }
 
 typedef struct sampling {
@@ -69,11 +69,11 @@ static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick
     e->halo = in->params->no_halo ? 0 : (uint64_t)(3 * scale * (double)t->borders);
 }
 
-/* Kept voxels, by looking at blocks spread over the volume for `limit_seconds` at most (0: no
+/* Kept voxels, by looking at portions spread over the volume for `limit_seconds` at most (0: no
  * limit); the input's envelope is made. 1: the numbers of voxels are filled; 0: it took too long.
  */
 static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
-                         double *passing_seconds, trip_brick_estimate *e)
+                         double *skip_seconds, trip_brick_estimate *e)
 {
     sampling s = { in, limit_seconds > 0 ? now_seconds() + limit_seconds : INFINITY };
     const trip_scan_params scan = { .slices = slices_of(plan),
@@ -82,7 +82,7 @@ static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, dou
                                     .envelope = &in->envelope,
                                     .progress = on_progress,
                                     .user = &s,
-                                    .passing_seconds = passing_seconds };
+                                    .skip_seconds = skip_seconds };
     trip_tally *t = trip_budget_take(in->budget, sizeof *t);
     if (!t)
         return trip_fail(TRIP_ERROR, "brick", in->params->input, "needs more --memory");
@@ -168,7 +168,7 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
         status = trip_brick_input_scan(in, (trip_scan_params){ .slices = slices_of(&plan),
                                                                .read_ahead = plan.read_ahead,
                                                                .stride = stride_of(in, &plan),
-                                                               .passing_seconds = &passing });
+                                                               .skip_seconds = &passing });
     if (status == 0)
         status = trip_brick_input_make_envelope(in);
     if (status == 0)

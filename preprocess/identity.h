@@ -1,16 +1,17 @@
-/* A number for everything that the bytes of a data set depend on: the input file and the parameters
- * but for memory and threads. Runs of one identity may go on from each other. */
+/* A hash of everything that the bytes of a data set depend on: the input file and all parameters
+ * but memory and threads. A run may resume an interrupted one of the same identity. One thread. */
 #ifndef TRIP_IDENTITY_H
 #define TRIP_IDENTITY_H
 
 #include "brick.h"
 #include "transfer_function.h"
 
-/* `functions` as they were loaded. Fails when memory runs out. */
+/* `functions` are those of the parameters, as loaded. Running out of memory is a reported failure.
+ */
 int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, uint64_t *out);
 
-/* All parameters but the input, memory and threads as text, with the versions of the bricker and of
- * the format, for free(); the functions are loaded. */
+/* All parameters but the input, memory and threads as text for free(), with the versions of the
+ * bricker and of the format. Loads the functions that the parameters name. */
 int trip_brick_options_text(const trip_brick_params *p, char **out);
 
 #endif

@@ -1,9 +1,8 @@
-/* What a run of `brick` notes down beside its spilled pieces, so that another one can go on where
- * it was when it was killed. Two files in the spill's folder: "journal", records with checksums of
- * which the last may be cut off, and "runs", what was appended to the list that is written in
- * order. They are read back on the machine that wrote them only, and believed no more than any file
- * from outside: what is read is checked against the volume and the parameters. One thread at a
- * time. */
+/* The journal of a run of `brick`, with which a later run resumes one that was interrupted. Two
+ * files in the spill's folder: "journal", records with checksums, of which the last may be cut off,
+ * and "runs", what was appended to the ordered list. They are read back only on the machine that
+ * wrote them, but are trusted no more than any file from outside: everything read is checked
+ * against the volume and the parameters. One thread at a time. */
 #ifndef TRIP_JOURNAL_H
 #define TRIP_JOURNAL_H
 
@@ -11,24 +10,24 @@
 #include "scan.h"
 #include "spill.h"
 
-/* Written once, when the way of working is settled. */
+/* Written once, before the volume is read into pieces. */
 typedef struct trip_journal_start {
     uint64_t identity; /* of the input and all parameters that the output depends on */
-    uint64_t scanned;  /* 1: the tally is of all values; 0: it is clear */
+    uint64_t scanned;  /* 1: the volume was scanned, into `tally`; 0: that is clear */
     trip_tally tally;
 } trip_journal_start;
 
-/* All pieces of the first part of the volume are in segments or in the list in order. */
+/* All pieces of the first part of the volume are in segments or in the ordered list. */
 typedef struct trip_checkpoint {
-    uint64_t done;                 /* that part, counted as by trip_walk() */
-    uint64_t kept, halo;           /* splats of it */
-    uint64_t segments;             /* that there are */
-    uint64_t runs, ordered_splats; /* of the list in order */
-    uint64_t ordered_bytes[TRIP_PLANES];
-    trip_tally tally; /* of the part, unless scanned */
+    uint64_t done;                       /* the length of that part, as trip_walk() counts it */
+    uint64_t kept, halo;                 /* its splats */
+    uint64_t segments;                   /* of the spill */
+    uint64_t runs, ordered_splats;       /* appended to the ordered list */
+    uint64_t ordered_bytes[TRIP_PLANES]; /* of the ordered list's planes */
+    trip_tally tally;                    /* of that part's values, unless scanned */
 } trip_checkpoint;
 
-/* One run of the list in order. */
+/* One run of the ordered list. */
 typedef struct trip_run_record {
     uint64_t key;
     uint32_t splats;
@@ -42,31 +41,32 @@ typedef struct trip_journal trip_journal;
 typedef struct trip_journal_params {
     bool resume;
     uint64_t identity;
-    bool scanned;          /* such a run needs a tally of all values first */
-    uint64_t voxels;       /* of the grid */
-    uint64_t slice_voxels; /* of a slice, all of which exist; 0: the volume is sparse */
-    bool halo;             /* there are lists of a halo */
-    uint64_t ordered_bytes[TRIP_PLANES]; /* at hand of the list in order */
+    bool scanned;                        /* a run with these parameters scans the volume first */
+    uint64_t voxels;                     /* of the grid */
+    uint64_t slice_voxels;               /* of a slice of a dense volume; 0: the volume is sparse */
+    bool halo;                           /* there are lists of a halo */
+    uint64_t ordered_bytes[TRIP_PLANES]; /* what is left of the ordered list's planes */
 } trip_journal_params;
 
-/* Opens the journal in the folder of `spill`. With `resume`, what stands there is read: up to the
- * last checkpoint for which all is still at hand, and its segments are handed to the spill; what is
- * after it is cut off. Another identity, and numbers that no such run writes, are reported
- * failures. Without `resume`, or when nothing stands there, the journal is new. */
+/* Opens the journal in the folder of `spill`. With `resume`, an existing one is read up to the last
+ * checkpoint whose data are all there; its segments are added to the spill, and what follows it is
+ * cut off. Another identity, and numbers that no such run writes, are reported failures. Without
+ * `resume`, or if there is none, the journal is new. */
 int trip_journal_open(trip_journal **out, trip_spill *spill, const trip_journal_params *params,
                       trip_budget *budget);
 void trip_journal_close(trip_journal *j);
 
-/* What was read back; NULL when the journal is new, or has no checkpoint. */
+/* The records read back or written; NULL where there is none. The checkpoint is the last one that
+ * was read back. */
 const trip_journal_start *trip_journal_get_start(const trip_journal *j);
 const trip_checkpoint *trip_journal_get_checkpoint(const trip_journal *j);
-/* Reads back run `index` of those up to the checkpoint. */
+/* Reads back `count` runs from number `index` on, of those up to the checkpoint. */
 int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_record *runs,
                            size_t count);
 
 int trip_journal_write_start(trip_journal *j, const trip_journal_start *start);
 int trip_journal_add_run(trip_journal *j, const trip_run_record *run);
-/* Fills in segments, runs and ordered_splats; the caller the rest. */
+/* Fills in segments, runs and ordered_splats; the caller fills the rest. */
 int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill);
 
 #endif

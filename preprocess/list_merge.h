@@ -1,5 +1,5 @@
-/* The end of building lists: sorted segments on disk and pieces in memory become the lists of the
- * data set, one worker a list. */
+/* The last step of building lists: merges the sorted segments on disk and the pieces in memory into
+ * the lists of the data set. Each list is merged by one worker. */
 #ifndef TRIP_LIST_MERGE_H
 #define TRIP_LIST_MERGE_H
 
@@ -9,7 +9,7 @@
 #include "workers.h"
 
 typedef struct trip_list_merge {
-    trip_piece_pool *pool; /* its free chunks are what segments are read through */
+    trip_piece_pool *pool; /* its free chunks become the segments' read buffers */
     trip_chain *in_memory; /* of each list */
     trip_spill *spill;
     trip_list_output *outputs;   /* of each list */

@@ -4,19 +4,20 @@
 
 #include "report.h"
 
-enum { LOOK_PIECES = 512 };
+/* An interruption is noticed after this many pieces. */
+enum { INTERRUPT_PIECES = 512 };
 
 int trip_list_output_create(trip_list_output *o, unsigned list, const trip_piece_format *f,
                             trip_writer *writer, trip_budget *budget)
 {
     *o = (trip_list_output){ .list = list, .writer = writer };
-    return trip_tile_create(&o->tile, f, budget);
+    return trip_run_builder_create(&o->builder, f, budget);
 }
 
 void trip_list_output_destroy(trip_list_output *o)
 {
-    trip_tile_destroy(o->tile);
-    o->tile = NULL;
+    trip_run_builder_destroy(o->builder);
+    o->builder = NULL;
 }
 
 /* Every second bit of a Morton code, from bit 0. */
@@ -40,36 +41,36 @@ int trip_list_output_append(trip_list_output *o, uint64_t key, const uint32_t *v
     return status;
 }
 
-/* The tile that is being put together. */
-typedef struct assembly {
+/* The run that is being built. */
+typedef struct building {
     trip_list_output *output;
     const trip_quantiser *quantiser;
     uint64_t key;
     bool pending;
-} assembly;
+} building;
 
-static int flush(assembly *a)
+static int flush(building *a)
 {
     trip_list_output *o = a->output;
     const uint32_t *voxels, *normals;
     if (!a->pending)
         return 0;
     a->pending = false;
-    uint32_t splats = trip_tile_take(o->tile, a->quantiser, &voxels, &normals);
+    uint32_t splats = trip_run_builder_take(o->builder, a->quantiser, &voxels, &normals);
     int status = trip_list_output_append(o, a->key, voxels, normals, splats);
     return status == 0 && o->run ? o->run(o->run_user, a->key, voxels, normals, splats) : status;
 }
 
 static int take_piece(void *user, const trip_piece *piece)
 {
-    assembly *a = user;
+    building *a = user;
     int status = 0;
     if (a->pending && piece->key != a->key)
         status = flush(a);
-    trip_tile_add(a->output->tile, piece);
+    trip_run_builder_add(a->output->builder, piece);
     a->key = piece->key;
     a->pending = true;
-    if (++a->output->looked % LOOK_PIECES == 0 && status == 0 && trip_interrupted())
+    if (++a->output->pieces % INTERRUPT_PIECES == 0 && status == 0 && trip_interrupted())
         status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
     return status;
 }
@@ -77,7 +78,7 @@ static int take_piece(void *user, const trip_piece *piece)
 int trip_list_output_merge(trip_list_output *o, const trip_quantiser *quantiser,
                            trip_piece_source **sources, size_t count)
 {
-    assembly a = { .output = o, .quantiser = quantiser };
+    building a = { .output = o, .quantiser = quantiser };
     int status = trip_merge(sources, count, take_piece, &a);
     return status == 0 ? flush(&a) : status;
 }

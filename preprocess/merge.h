@@ -1,18 +1,20 @@
-/* Pieces from several sorted sources as one sorted sequence. One thread a merge. */
+/* Merges the pieces of several sorted sources into one sorted sequence. One thread for each merge.
+ */
 #ifndef TRIP_MERGE_H
 #define TRIP_MERGE_H
 
 #include "piece.h"
 
-/* Something that gives pieces by ascending key. Embedded in what knows how. */
+/* A sequence of pieces by ascending key. Implementations have it as their first member. */
 typedef struct trip_piece_source {
     const trip_piece *piece; /* the present one; NULL at the end */
-    /* Goes to the next piece; the present one may be gone then. */
+    /* Moves to the next piece, after which the present one is not valid any more. */
     int (*advance)(struct trip_piece_source *s);
 } trip_piece_source;
 
-/* Gives all pieces of the sources, each standing at its first, to `take` by ascending key; those of
- * one key in any order. Reorders `sources`. */
+/* Calls `take` for all pieces of the sources by ascending key, in any order where keys are equal;
+ * ends with the first negative status. Each source is at its first piece before. Reorders
+ * `sources`. */
 int trip_merge(trip_piece_source **sources, size_t count,
                int (*take)(void *user, const trip_piece *piece), void *user);
 

@@ -1,14 +1,14 @@
-/* Pieces: the splats that one box of voxels gives to one tile of one sheet of a list. Between the
- * threads that make them, the spill file and the merge, splats only ever travel as pieces. A tile
- * puts the pieces of one tile together and gives out the run that the data set holds.
+/* A piece: the splats that one box of voxels contributes to one tile of one sheet of a list. Splats
+ * are passed between the threads that make them, the spill and the merge as pieces only. Pure
+ * functions.
  *
- * A piece in memory and in the spill file is a header, then, each padded to 8 bytes:
- *   positions    Morton code of (u, v) in the tile, ascending: either `words` 64-bit words of the
- *                tile's bitmap, after a mask of one bit for each word that is there, or, with
- *                words 0, one uint16 a splat; whichever is shorter
- *   values       codes (uint16), or float32 while the range of the values is not known yet
- *   normals      packed (uint32); then without their magnitude while that range is not known
- *   magnitudes   float32, of gradients per gradient_unit, while the range is not known */
+ * In memory and in the spill, a piece is a header and then these parts, each padded to 8 bytes:
+ *   positions    Morton codes of (u, v) in the tile, ascending: either `words` 64-bit words of the
+ *                tile's bitmap after a mask with one bit for each word that is present, or, where
+ *                words is 0, one uint16 for each splat; whichever is shorter
+ *   values       codes (uint16), or float32 while the range of the values is unknown
+ *   normals      packed (uint32), without their magnitude while that range is unknown
+ *   magnitudes   float32, of gradients per gradient_unit, while that range is unknown */
 #ifndef TRIP_PIECE_H
 #define TRIP_PIECE_H
 
@@ -32,11 +32,11 @@ enum {
     TRIP_TILE_MORTON_BITS = 40, /* tiles of a sheet: up to 2^20 a side */
 };
 
-/* What codes mean: value(c) = lo + (hi - lo) * c / 65535, and the gradient of magnitude 255. */
+/* The meaning of codes, value(c) = lo + (hi - lo) * c / 65535, and of the magnitudes of normals. */
 typedef struct trip_quantiser {
     double lo, hi;
-    double gradient_scale;
-    double gradient_unit; /* trip_gradient_unit() of magnitudes that wait; 0: 1 */
+    double gradient_scale; /* length of a gradient of magnitude 255 */
+    double gradient_unit;  /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
 } trip_quantiser;
 
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
@@ -45,17 +45,23 @@ static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
     return !(code > 0) ? 0 : code >= 65535 ? 65535 : (uint32_t)code; /* NaN: 0 */
 }
 
-/* The same for all pieces of a run of the program, but that those of a halo have no normals. */
+/* The format of all pieces that one bricking makes; those of the halo have no normals. */
 typedef struct trip_piece_format {
     unsigned tile_log2;
-    bool quantised; /* codes and whole normals; otherwise floats */
+    bool quantised; /* values are codes; otherwise floats, and normals have their magnitude apart */
     bool normals;
-    bool halo; /* there are lists of a halo */
+    bool halo; /* there are lists of the halo */
 } trip_piece_format;
 
 static inline unsigned trip_piece_list_count(const trip_piece_format *f)
 {
     return f->halo ? TRIP_MOST_LISTS : TRIP_HALO_LISTS;
+}
+
+/* 64-bit words of a tile's bitmap. */
+static inline unsigned trip_tile_words(const trip_piece_format *f)
+{
+    return 1u << (2 * f->tile_log2 - 6);
 }
 
 /* The format of the pieces of one list. */
@@ -68,12 +74,13 @@ static inline trip_piece_format trip_piece_format_of(const trip_piece_format *f,
 
 typedef struct trip_piece {
     uint64_t key;  /* sheet << TRIP_TILE_MORTON_BITS | Morton code of the tile */
-    uint32_t next; /* free for the owner of the memory */
+    uint32_t next; /* for the owner of the memory, who may link pieces by it */
     uint16_t last; /* number of splats - 1 */
     uint16_t words;
 } trip_piece;
 
-/* Where the parts of a piece are, in bytes from its start; 0 for parts that are not there. */
+/* Offsets of a piece's parts in bytes from its start, 0 for those that it does not have; its
+ * length. */
 typedef struct trip_piece_parts {
     size_t positions, values, normals, magnitudes, bytes;
 } trip_piece_parts;
@@ -85,28 +92,30 @@ static inline trip_piece_parts trip_piece_get_parts(const trip_piece_format *f, 
     return trip_piece_layout(f, p->last + 1u, p->words);
 }
 
-/* No piece is longer than this. */
+/* The length of the longest possible piece. */
 size_t trip_piece_max_bytes(const trip_piece_format *f);
 
-/* `words` of the shorter form of `splats` positions that are in `used` words of the bitmap. */
+/* The header's `words` for the shorter form of `splats` positions in `used` words of the bitmap. */
 unsigned trip_piece_choose_words(const trip_piece_format *f, uint32_t splats, unsigned used);
-/* Fills header and positions, of a piece with this many splats, from the tile's bitmap. */
+/* Fills the header and the positions of a piece with the `splats` positions in the tile's bitmap.
+ */
 void trip_piece_begin(trip_piece *p, const trip_piece_format *f, uint64_t key, uint32_t splats,
                       unsigned words, const uint64_t *bitmap);
 
-/* False unless the header is possible and, for bytes from disk, `room` holds the piece and its
- * positions are ascending and as many as the header says. */
+/* Whether `room` bytes hold a sound piece: its header is possible, and its positions are ascending
+ * and as many as the header says. */
 bool trip_piece_check(const trip_piece *p, const trip_piece_format *f, size_t room);
 
-/* Puts pieces of one key together, in any order. One thread. */
-typedef struct trip_tile trip_tile;
+/* The positions of the bits set in word `w` of a bitmap; returns their number. */
+static inline unsigned trip_word_positions(uint64_t bits, unsigned w, uint16_t *to)
+{
+    unsigned n = 0;
+    for (; bits; bits &= bits - 1)
+        to[n++] = (uint16_t)(w * 64 + (unsigned)__builtin_ctzll(bits));
+    return n;
+}
 
-int trip_tile_create(trip_tile **out, const trip_piece_format *f, trip_budget *budget);
-void trip_tile_destroy(trip_tile *t);
-void trip_tile_add(trip_tile *t, const trip_piece *p);
-/* The records of all that was added since the last call, in list order; they stand until the next
- * one. *normals is NULL without normals. */
-uint32_t trip_tile_take(trip_tile *t, const trip_quantiser *q, const uint32_t **voxels,
-                        const uint32_t **normals);
+/* All positions of a piece; returns their number, which in a sound piece is that of the header. */
+uint32_t trip_piece_positions(const trip_piece *p, const trip_piece_format *f, uint16_t *to);
 
 #endif

@@ -1,8 +1,8 @@
-/* OpenVDB grids as a block reader. Opening reads the grid's tree and passes over its leaves once,
- * to note where they are and to check them; values are read when a block is decoded and not kept.
+/* OpenVDB grids as a portion reader. Opening reads the grid's tree and passes over its leaves once,
+ * to note where they are and to check them; values are read when a portion is decoded and not kept.
  *
  * Memory: per leaf (up to 512 voxels) about 130 bytes, per 128-voxel cube in use 32 KiB, per
- * 4096-voxel cube 256 KiB, 16 bytes a block, all counted against the budget before they are
+ * 4096-voxel cube 256 KiB, 16 bytes a portion, all counted against the budget before they are
  * allocated; and per decoding thread a leaf and a 16 KiB buffer. */
 #include <cmath>
 #include <cstring>
@@ -241,7 +241,7 @@ int rewind_vdb(void *state)
     return 0;
 }
 
-int next_box(void *opaque, trip_volume_block *block)
+int next_box(void *opaque, trip_volume_portion *portion)
 {
     State &state = *(State *)opaque;
     const trip_vdb_grid &grid = *state.grid;
@@ -249,14 +249,14 @@ int next_box(void *opaque, trip_volume_block *block)
         return 0;
     const trip_vdb_box &box = grid.boxes[state.next++];
     for (int a = 0; a < 3; a++) {
-        block->origin[a] = (int64_t)box.lo[a] - grid.lo[a];
-        block->size[a] = box.size[a];
+        portion->origin[a] = (int64_t)box.lo[a] - grid.lo[a];
+        portion->size[a] = box.size[a];
     }
-    block->data = &state; /* boxes hold nothing of their own */
+    portion->data = &state; /* boxes hold nothing of their own */
     return 1;
 }
 
-int decode_box(const void *opaque, const trip_volume_block *block, const int64_t lo[3],
+int decode_box(const void *opaque, const trip_volume_portion *portion, const int64_t lo[3],
                const int64_t size[3], float *values, uint8_t *active)
 {
     const State &state = *(const State *)opaque;
@@ -264,9 +264,9 @@ int decode_box(const void *opaque, const trip_volume_block *block, const int64_t
     return guard(state.path, [&] {
         int64_t at[3];
         for (int a = 0; a < 3; a++) {
-            if (lo[a] < block->origin[a] - 1 || size[a] < 1 ||
-                lo[a] + size[a] > block->origin[a] + block->size[a] + 1)
-                throw trip_vdb_error("asked for voxels outside the block");
+            if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
+                lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
+                throw trip_vdb_error("asked for voxels outside the portion");
             at[a] = lo[a] + grid.lo[a];
         }
         grid.decode(at, size, values, active);
@@ -274,7 +274,7 @@ int decode_box(const void *opaque, const trip_volume_block *block, const int64_t
     });
 }
 
-void release_box(void *, trip_volume_block *)
+void release_box(void *, trip_volume_portion *)
 {
 }
 

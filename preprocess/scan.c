@@ -302,7 +302,7 @@ static int scan_box(void *user, unsigned thread, const trip_box *box)
     scan *s = user;
     float *values = s->values + (size_t)thread * SCAN_VOXELS;
     uint8_t *active = s->sparse ? s->active + (size_t)thread * SCAN_VOXELS : NULL;
-    int status = trip_block_decode(box->volume, box->block, box->lo, box->size, values, active);
+    int status = trip_portion_decode(box->volume, box->portion, box->lo, box->size, values, active);
     if (status < 0)
         return status;
     size_t row = (size_t)box->size[0], rows = (size_t)(box->size[1] * box->size[2]);
@@ -339,7 +339,7 @@ static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *
     unsigned threads = trip_workers_count(workers);
     trip_walk_params walk = { .slices = s->params->slices,
                               .stride = s->params->stride,
-                              .passing_seconds = s->params->passing_seconds,
+                              .skip_seconds = s->params->skip_seconds,
                               .read_ahead = s->params->read_ahead,
                               .edge = SCAN_EDGE,
                               .height = SCAN_HEIGHT,

@@ -16,7 +16,7 @@
 
 #define PIECE_BYTES ((size_t)1 << 20)
 /* The coarsest times of a file system are those of FAT. */
-static const int64_t settled_ns = INT64_C(2000000000);
+static const int64_t stable_ns = INT64_C(2000000000);
 
 static int fail_memory(const char *path)
 {
@@ -72,12 +72,12 @@ void trip_source_free(trip_source *s)
     *s = (trip_source){ 0 };
 }
 
-bool trip_source_is_settled(const trip_source *s)
+bool trip_source_is_stable(const trip_source *s)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     for (size_t i = 0; i < s->count; i++)
-        if (s->files[i].changed_ns > nanoseconds(now) - settled_ns)
+        if (s->files[i].changed_ns > nanoseconds(now) - stable_ns)
             return false;
     return true;
 }

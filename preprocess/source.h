@@ -1,5 +1,5 @@
-/* The files that a volume is read from: which they are, whether they changed, and what they hold.
- * Nothing here reads values; finding the files reads headers and lists folders only. One thread. */
+/* The files that a volume is read from: which they are, whether they changed, and hashes of their
+ * state and content. Finding them reads headers and lists folders only. One thread. */
 #ifndef TRIP_SOURCE_H
 #define TRIP_SOURCE_H
 
@@ -9,11 +9,11 @@
 extern "C" {
 #endif
 
-/* A file as it was when it was found. */
+/* The state of a file when it was found. */
 typedef struct trip_source_file {
     char *path;
     uint64_t inode, bytes;
-    int64_t modified_ns, changed_ns; /* since 1970; the second cannot be set by programs */
+    int64_t modified_ns, changed_ns; /* since 1970; programs cannot set the second */
 } trip_source_file;
 
 /* Zeroed at first. */
@@ -24,25 +24,25 @@ typedef struct trip_source {
     uint64_t bytes; /* of all files */
 } trip_source;
 
-/* `path` as trip_volume_open() takes it. Finds every file that the volume is read from; of a folder
- * or pattern perhaps more than those. */
+/* Finds every file that the volume is read from; for a folder or a pattern perhaps some more.
+ * `path` is as for trip_volume_open(). Reports failures. */
 int trip_source_find(trip_source *s, const char *path, const trip_volume_params *params);
 void trip_source_free(trip_source *s);
 
-/* False where a file changed so shortly before that another change might leave the same times: file
+/* False if a file changed so recently that a further change might leave its times as they are: file
  * systems count them in steps of up to two seconds. */
-bool trip_source_is_settled(const trip_source *s);
+bool trip_source_is_stable(const trip_source *s);
 
-/* 128 bits as hexadecimal digits. */
+/* A hash of 128 bits as hexadecimal digits. */
 typedef struct trip_digest {
     char text[33];
 } trip_digest;
 
-/* Of `text` and the files' names, places and times. */
+/* Hashes `text` with the files' paths, inodes, lengths and times. */
 int trip_source_digest_state(const trip_source *s, const char *text, trip_digest *out);
 
-/* Of `text` and all bytes of the files; of their names only what readers go by. `progress` may be
- * NULL. */
+/* Hashes `text` with all bytes of the files, and of their names only what readers take into
+ * account. `progress`, which may be NULL, gets bytes. */
 int trip_source_digest_content(const trip_source *s, const char *text, trip_digest *out,
                                void (*progress)(void *user, uint64_t done, uint64_t total),
                                void *user);

@@ -5,24 +5,21 @@
 #include <string.h>
 
 #include "dilate.h"
-#include "format.h"
+#include "gradient.h"
 #include "normal.h"
 #include "report.h"
+#include "splat_cell.h"
 
-/* What one thread works on: a box in local coordinates, which count from the corner of its cell of
- * the grid along x and y and from the box's own first slice along z. Arrays of voxels are dense,
- * x fastest, `edge` a row; only entries of kept voxels are written and read. */
+/* One thread's memory. The window is the box with one voxel around it where gradients or a halo are
+ * wanted; its arrays are dense, x fastest. */
 typedef struct workspace {
-    float *decoded;  /* the box with one voxel around it where gradients or a halo are wanted */
-    uint8_t *active; /* of the same voxels, in sparse volumes */
-    uint8_t *keep;   /* likewise; around the box only where a halo is wanted */
-    uint8_t *near;   /* kept, or a neighbour is */
-    uint8_t *scratch;
-    uint32_t *values; /* codes, or the bits of floats */
-    uint32_t *normals;
-    float *magnitudes;
-    uint64_t *bits[3];   /* [sheet][word]: which places of the cell's part of a sheet are taken */
-    uint64_t kept, halo; /* in all boxes so far; a voxel of a halo as often as boxes give it */
+    float *decoded;   /* of the window, as are the next four */
+    uint8_t *active;  /* which voxels exist, in sparse volumes */
+    uint8_t *kept;    /* flags */
+    uint8_t *halo;    /* flags */
+    uint8_t *scratch; /* for trip_dilate() */
+    trip_splat_cell cell;
+    uint64_t kept_count, halo_count; /* in all boxes so far, see trip_splatter_halo() */
     trip_tally tally;
 } workspace;
 
@@ -31,37 +28,27 @@ struct trip_splatter {
     trip_budget *budget;
     double to_world[3][3]; /* of gradients: the inverse transpose of index_to_world */
     double gradient_unit;
-    int64_t edge;
-    unsigned words;       /* of the bitmap of an edge x edge square */
-    uint16_t spread[128]; /* bits of a coordinate at the even places */
-    uint16_t place_u[TRIP_TILE_MAX_SPLATS], place_v[TRIP_TILE_MAX_SPLATS]; /* of a Morton code */
+    trip_cell_tables tables;
     size_t thread_bytes, bytes;
     unsigned char *memory; /* of all threads; each begins with its workspace */
 };
 
-/* Decoded voxels: the box and what is around it. */
-typedef struct window {
-    int64_t lo[3], size[3];
-    int64_t pitch, slice; /* entries to the next row and slice */
-} window;
-
-/* A part of the window that lies in one cell of the grid, whose splats are made together. */
-typedef struct view {
+/* A box on its way through a thread. */
+typedef struct work {
     const trip_splatter *s;
-    const window *window;
+    const trip_box *box;
+    unsigned thread;
     workspace *w;
-    int64_t lo[3], size[3];
-    int64_t cell[3]; /* grid coordinates of the local origin */
-    int64_t from[3]; /* local coordinates of the part's first voxel */
-    size_t first;    /* in the window, of that voxel */
-} view;
+    int64_t lo[3], size[3]; /* of the window */
+    int64_t step[3];        /* between entries of neighbouring voxels in it */
+} work;
 
 int64_t trip_splat_edge(const trip_piece_format *f)
 {
-    return f->tile_log2 > 6 ? (int64_t)1 << f->tile_log2 : 64;
+    return trip_cell_edge(f);
 }
 
-/* The next `bytes` of a thread's memory; NULL where only the size is asked for. */
+/* The next `bytes` of a thread's memory; NULL while only the size is computed. */
 static void *carve(unsigned char *base, size_t *used, size_t bytes)
 {
     size_t at = *used;
@@ -69,23 +56,24 @@ static void *carve(unsigned char *base, size_t *used, size_t bytes)
     return base ? base + at : NULL;
 }
 
-/* Lays a workspace out from `base`, or, with base NULL, counts its bytes. */
+/* Lays a workspace out from `base` and returns its bytes; NULL as base computes these only. */
 static size_t lay_out(const trip_piece_format *f, bool sparse, unsigned char *base, workspace *w)
 {
-    size_t edge = (size_t)trip_splat_edge(f), plane = edge * edge, used = 0;
-    size_t around = (edge + 2) * (edge + 2) * (TRIP_SPLAT_HEIGHT + 2);
+    size_t edge = (size_t)trip_cell_edge(f), plane = edge * edge, used = 0;
+    size_t window = (edge + 2) * (edge + 2) * (TRIP_SPLAT_HEIGHT + 2);
     size_t voxels = plane * TRIP_SPLAT_HEIGHT, height = TRIP_SPLAT_HEIGHT + (f->halo ? 2 : 0);
+    trip_splat_cell *c = &w->cell;
     carve(base, &used, sizeof *w);
-    w->decoded = carve(base, &used, around * sizeof(float));
-    w->active = carve(base, &used, sparse ? around : 0);
-    w->keep = carve(base, &used, around + 8); /* looked at eight at a time */
-    w->near = carve(base, &used, f->halo ? around + 8 : 0);
-    w->scratch = carve(base, &used, f->halo ? around : 0);
-    w->values = carve(base, &used, plane * height * sizeof(uint32_t));
-    w->normals = carve(base, &used, f->normals ? voxels * sizeof(uint32_t) : 0);
-    w->magnitudes = carve(base, &used, f->normals && !f->quantised ? voxels * sizeof(float) : 0);
+    w->decoded = carve(base, &used, window * sizeof(float));
+    w->active = carve(base, &used, sparse ? window : 0);
+    w->kept = carve(base, &used, window + 8); /* flags are read eight at a time */
+    w->halo = carve(base, &used, f->halo ? window + 8 : 0);
+    w->scratch = carve(base, &used, f->halo ? window : 0);
+    c->values = carve(base, &used, plane * height * sizeof(uint32_t));
+    c->normals = carve(base, &used, f->normals ? voxels * sizeof(uint32_t) : 0);
+    c->magnitudes = carve(base, &used, f->normals && !f->quantised ? voxels * sizeof(float) : 0);
     for (int axis = 0; axis < 3; axis++)
-        w->bits[axis] = carve(base, &used, (axis == 2 ? height : edge) * plane / 8);
+        c->bits[axis] = carve(base, &used, (axis == 2 ? height : edge) * plane / 8);
     return (used + 4095) & ~(size_t)4095;
 }
 
@@ -98,17 +86,6 @@ size_t trip_splat_thread_bytes(const trip_piece_format *f, bool sparse)
 static workspace *workspace_of(const trip_splatter *s, unsigned thread)
 {
     return (workspace *)(void *)(s->memory + thread * s->thread_bytes);
-}
-
-static void fill_tables(trip_splatter *s)
-{
-    for (unsigned x = 0; x < 128; x++)
-        s->spread[x] = (uint16_t)trip_morton(x, 0);
-    for (unsigned v = 0; v < (unsigned)s->edge; v++)
-        for (unsigned u = 0; u < (unsigned)s->edge; u++) {
-            s->place_u[trip_morton(u, v)] = (uint16_t)u;
-            s->place_v[trip_morton(u, v)] = (uint16_t)v;
-        }
 }
 
 static void fill_map(trip_splatter *s)
@@ -128,6 +105,7 @@ static void fill_workspaces(trip_splatter *s)
         unsigned char *base = s->memory + i * s->thread_bytes;
         workspace *w = workspace_of(s, i);
         lay_out(&p->format, p->info->sparse, base, w);
+        w->cell.tables = &s->tables;
         trip_tally_clear(&w->tally);
     }
 }
@@ -148,10 +126,8 @@ int trip_splatter_create(trip_splatter **out, const trip_splat_params *params, t
     s->bytes = bytes;
     s->thread_bytes = each;
     s->memory = (unsigned char *)s + own;
-    s->edge = trip_splat_edge(&params->format);
-    s->words = (unsigned)(s->edge * s->edge / 64);
+    trip_cell_tables_fill(&s->tables, &params->format);
     fill_map(s);
-    fill_tables(s);
     fill_workspaces(s);
     return 0;
 }
@@ -162,81 +138,41 @@ void trip_splatter_destroy(trip_splatter *s)
         trip_budget_release(s->budget, s, s->bytes);
 }
 
-static window window_of(const trip_splatter *s, const trip_box *box)
+static work work_on(const trip_splatter *s, unsigned thread, const trip_box *box)
 {
-    window n;
+    work k = { .s = s, .box = box, .thread = thread, .w = workspace_of(s, thread) };
     int64_t around = s->params.format.normals || s->params.format.halo;
     for (int a = 0; a < 3; a++) {
-        n.lo[a] = box->lo[a] - around;
-        n.size[a] = box->size[a] + 2 * around;
+        k.lo[a] = box->lo[a] - around;
+        k.size[a] = box->size[a] + 2 * around;
+        k.step[a] = a == 0 ? 1 : k.step[a - 1] * k.size[a - 1];
     }
-    n.pitch = n.size[0];
-    n.slice = n.size[0] * n.size[1];
-    return n;
+    return k;
 }
 
-static view view_of(const trip_splatter *s, unsigned thread, const window *n, const int64_t lo[3],
-                    const int64_t size[3])
+/* Entry of a voxel in the window's arrays. */
+static size_t entry_of(const work *k, const int64_t voxel[3])
 {
-    view v = { .s = s, .window = n, .w = workspace_of(s, thread) };
-    for (int a = 0; a < 3; a++) {
-        v.lo[a] = lo[a];
-        v.size[a] = size[a];
-        v.cell[a] = a == 2 ? lo[a] : lo[a] & ~(s->edge - 1);
-        v.from[a] = lo[a] - v.cell[a];
-    }
-    v.first =
-        (size_t)((lo[2] - n->lo[2]) * n->slice + (lo[1] - n->lo[1]) * n->pitch + lo[0] - n->lo[0]);
-    return v;
-}
-
-static inline double difference(const float *at, int64_t step)
-{
-    return 0.5 * ((double)at[step] - (double)at[-step]);
-}
-
-/* A neighbour that is not finite is replaced by the voxel's own value. */
-static double careful_difference(const float *at, int64_t step)
-{
-    double after = isfinite(at[step]) ? at[step] : *at;
-    double before = isfinite(at[-step]) ? at[-step] : *at;
-    return 0.5 * (after - before);
-}
-
-/* Central differences of index space; J^-T takes them to world space. */
-static inline void gradient(const view *v, const float *at, double g[3])
-{
-    const int64_t step[3] = { 1, v->window->pitch, v->window->slice };
+    int64_t at = 0;
     for (int a = 0; a < 3; a++)
-        g[a] = difference(at, step[a]);
-    if (isfinite(g[0] + g[1] + g[2]))
-        return;
-    for (int a = 0; a < 3; a++) /* as soon as one neighbour is not */
-        g[a] = careful_difference(at, step[a]);
+        at += (voxel[a] - k->lo[a]) * k->step[a];
+    return (size_t)at;
 }
 
-static inline void to_world(const trip_splatter *s, const double index[3], double g[3])
-{
-    const double(*m)[3] = s->to_world;
-    for (int row = 0; row < 3; row++)
-        g[row] = m[row][0] * index[0] + m[row][1] * index[1] + m[row][2] * index[2];
-}
-
-/* The voxels of a row that become splats. Local coordinates in `x`, ascending. */
+/* The voxels of a row that become splats. */
 typedef struct splat_row {
-    const float *values; /* decoded, of local x `first` */
+    const float *values; /* decoded, of the voxel at local x `first` */
     unsigned first;
-    int64_t y, z; /* local */
-    size_t index; /* in the arrays of voxels, of local x 0 */
+    size_t index; /* in the cell's arrays, of local x 0 */
     unsigned count;
-    uint8_t x[128];
+    uint8_t x[128]; /* local, ascending */
 } splat_row;
 
-static void put_values(const view *v, const splat_row *r)
+static void put_values(const work *k, const splat_row *r)
 {
-    uint32_t *to = v->w->values + r->index;
-    const trip_quantiser q = v->s->params.quantiser;
-    if (v->s->params.format.quantised)
+    uint32_t *to = k->w->cell.values + r->index;
+    const trip_quantiser q = k->s->params.quantiser;
+    if (k->s->params.format.quantised)
         for (unsigned i = 0; i < r->count; i++)
             to[r->x[i]] = trip_quantise(&q, r->values[r->x[i] - r->first]);
     else
@@ -244,51 +180,36 @@ static void put_values(const view *v, const splat_row *r)
             memcpy(&to[r->x[i]], &r->values[r->x[i] - r->first], sizeof *to);
 }
 
-static void put_normals(const view *v, const splat_row *r)
+/* The world-space normal of an index-space gradient, in 4 bytes; where values are not quantised its
+ * magnitude goes to *magnitude. */
+static uint32_t full_normal(const trip_splatter *s, const double index[3], float *magnitude)
 {
-    uint32_t *to = v->w->normals + r->index;
-    const trip_splat_params *p = &v->s->params;
+    const double(*m)[3] = s->to_world;
+    double g[3];
+    for (int row = 0; row < 3; row++)
+        g[row] = m[row][0] * index[0] + m[row][1] * index[1] + m[row][2] * index[2];
+    if (s->params.format.quantised)
+        return trip_normal_pack(g, s->params.quantiser.gradient_scale);
+    double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    *magnitude = (float)fmin(length * s->gradient_unit, FLT_MAX);
+    return trip_normal_pack(g, length) & 0xffffff;
+}
+
+static void put_normals(const work *k, const splat_row *r)
+{
+    const trip_splat_cell *c = &k->w->cell;
+    const trip_compact_normals *compact = k->s->params.compact;
     for (unsigned i = 0; i < r->count; i++) {
-        unsigned x = r->x[i];
-        double index[3], g[3];
-        gradient(v, r->values + (x - r->first), index);
-        if (p->compact) {
-            to[x] = trip_compact_normal_pack(p->compact, index);
-            continue;
-        }
-        to_world(v->s, index, g);
-        if (p->format.quantised) {
-            to[x] = trip_normal_pack(g, p->quantiser.gradient_scale);
-            continue;
-        }
-        double magnitude = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-        to[x] = trip_normal_pack(g, magnitude) & 0xffffff;
-        v->w->magnitudes[r->index + x] = (float)fmin(magnitude * v->s->gradient_unit, FLT_MAX);
+        size_t at = r->index + r->x[i];
+        double gradient[3];
+        trip_gradient_at(r->values + (r->x[i] - r->first), k->step, gradient);
+        c->normals[at] = compact ? trip_compact_normal_pack(compact, gradient)
+                                 : full_normal(k->s, gradient, c->magnitudes + at);
     }
 }
 
-/* Marks the voxels in the sheets of the three lists. The place in a sheet counts the third
- * coordinate from a multiple of the edge. */
-static void mark(const view *v, const splat_row *r)
-{
-    const uint16_t *spread = v->s->spread;
-    const size_t words = v->s->words;
-    const unsigned y = spread[r->y], z = spread[(v->lo[2] + r->z) & (v->s->edge - 1)];
-    const unsigned place = y | z << 1; /* in all sheets along X */
-    uint64_t *x_words = v->w->bits[0] + place / 64;
-    uint64_t *y_sheet = v->w->bits[1] + (size_t)r->y * words;
-    uint64_t *z_sheet = v->w->bits[2] + (size_t)r->z * words;
-    const uint64_t x_bit = UINT64_C(1) << (place % 64);
-    for (unsigned i = 0; i < r->count; i++) {
-        unsigned x = spread[r->x[i]], in_y = z | x << 1, in_z = x | y << 1;
-        x_words[r->x[i] * words] |= x_bit;
-        y_sheet[in_y / 64] |= UINT64_C(1) << (in_y % 64);
-        z_sheet[in_z / 64] |= UINT64_C(1) << (in_z % 64);
-    }
-}
-
-/* Places of the ones in `flags`, each counted from `first`; returns how many. */
-static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, uint8_t *places)
+/* Positions of the ones in `flags`, each counted from `first`; returns their number. */
+static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, uint8_t *positions)
 {
     unsigned n = 0;
     for (int64_t i = 0; i < count; i += 8) {
@@ -297,224 +218,111 @@ static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, u
         if (eight == 0)
             continue;
         for (int64_t k = i; k < i + 8 && k < count; k++) {
-            places[n] = (uint8_t)(first + k);
+            positions[n] = (uint8_t)(first + k);
             n += flags[k];
         }
     }
     return n;
 }
 
-/* The row (y, z) of a part, with those of its voxels that have a flag. */
-static splat_row row_of(const view *v, const uint8_t *flags, int64_t y, int64_t z)
+/* Makes splats of the voxels of a row of the cell that have a flag; returns their number. `y` and
+ * `z` count from the part's first voxel. */
+static unsigned put_row(const work *k, const uint8_t *flags, int64_t y, int64_t z, bool normals)
 {
-    size_t at = v->first + (size_t)(z * v->window->slice + y * v->window->pitch);
-    splat_row r = { .values = v->w->decoded + at,
-                    .first = (unsigned)v->from[0],
-                    .y = v->from[1] + y,
-                    .z = z,
-                    .index = (size_t)((z * v->s->edge + v->from[1] + y) * v->s->edge) };
-    r.count = find_flags(flags + at, v->size[0], v->from[0], r.x);
-    return r;
-}
-
-static void put_row(const view *v, const splat_row *r, bool normals)
-{
-    if (r->count == 0)
-        return;
-    mark(v, r);
-    put_values(v, r);
-    if (normals)
-        put_normals(v, r);
-}
-
-static void tally_row(const view *v, int64_t y, int64_t z)
-{
-    size_t at = v->first + (size_t)(z * v->window->slice + y * v->window->pitch);
-    const uint8_t *active = v->s->params.info->sparse ? v->w->active + at : NULL;
-    trip_tally_range(&v->w->tally, v->w->decoded + at, active, (size_t)v->size[0]);
-    trip_tally_count(&v->w->tally, v->w->decoded + at, active, (size_t)v->size[0]);
-}
-
-/* Which voxels of the window are kept. */
-static void find_kept(const trip_splatter *s, const workspace *w, const window *n)
-{
-    const int64_t rows = n->size[1] * n->size[2];
-    for (int64_t r = 0; r < rows; r++)
-        trip_envelope_keep_row(s->params.envelope, w->decoded + r * n->pitch, (size_t)n->pitch,
-                               w->keep + r * n->pitch);
-    for (int64_t i = 0; s->params.info->sparse && i < rows * n->pitch; i++)
-        w->keep[i] &= w->active[i];
-}
-
-static void clear_bits(const view *v)
-{
-    size_t words = v->s->words;
-    for (int axis = 0; axis < 3; axis++)
-        memset(v->w->bits[axis] + (size_t)v->from[axis] * words, 0,
-               (size_t)v->size[axis] * words * sizeof(uint64_t));
-}
-
-/* Where the splats of one tile of one sheet are, to be gathered in list order. */
-typedef struct part {
-    unsigned list;
-    int axis;               /* the list's */
-    int64_t sheet;          /* local */
-    unsigned first_place;   /* of the tile in the cell's square */
-    const uint64_t *bitmap; /* of the tile */
-    unsigned words;         /* of that */
-} part;
-
-static uint64_t key_of(const view *v, const part *p)
-{
-    const int u = (p->axis + 1) % 3, w = (p->axis + 2) % 3;
-    unsigned log2 = v->s->params.format.tile_log2;
-    int64_t cell[3] = { v->cell[0], v->cell[1], v->cell[2] & ~(v->s->edge - 1) };
-    uint32_t tile_u = (uint32_t)((cell[u] + v->s->place_u[p->first_place]) >> log2);
-    uint32_t tile_v = (uint32_t)((cell[w] + v->s->place_v[p->first_place]) >> log2);
-    return (uint64_t)(v->cell[p->axis] + p->sheet) << TRIP_TILE_MORTON_BITS |
-           trip_morton(tile_u, tile_v);
-}
-
-/* Index of each of the part's voxels in the dense arrays, in list order. */
-static uint32_t gather_indices(const view *v, const part *p, uint32_t *indices)
-{
-    const int64_t edge = v->s->edge, stride[3] = { 1, edge, edge * edge };
-    const int64_t su = stride[(p->axis + 1) % 3], sv = stride[(p->axis + 2) % 3];
-    /* Places count the third coordinate from a multiple of the edge, the arrays from the box. */
-    int64_t base = p->sheet * stride[p->axis];
-    if (p->axis != 2)
-        base -= (v->lo[2] & (edge - 1)) * stride[2];
-    uint32_t n = 0;
-    for (unsigned w = 0; w < p->words; w++)
-        for (uint64_t bits = p->bitmap[w]; bits; bits &= bits - 1) {
-            unsigned place = p->first_place + w * 64 + (unsigned)__builtin_ctzll(bits);
-            indices[n++] = (uint32_t)(base + v->s->place_u[place] * su + v->s->place_v[place] * sv);
-        }
-    return n;
-}
-
-static void fill_piece(const view *v, const trip_piece_format *f, trip_piece *piece,
-                       const uint32_t *indices, uint32_t splats)
-{
-    const workspace *w = v->w;
-    unsigned char *base = (unsigned char *)piece;
-    trip_piece_parts parts = trip_piece_get_parts(f, piece);
-    uint16_t *codes = (void *)(base + parts.values);
-    uint32_t *floats = (void *)(base + parts.values), *normals = (void *)(base + parts.normals);
-    float *magnitudes = (void *)(base + parts.magnitudes);
-    if (v->s->params.format.quantised)
-        for (uint32_t i = 0; i < splats; i++)
-            codes[i] = (uint16_t)w->values[indices[i]];
-    else
-        for (uint32_t i = 0; i < splats; i++)
-            floats[i] = w->values[indices[i]];
-    if (parts.normals)
-        for (uint32_t i = 0; i < splats; i++)
-            normals[i] = w->normals[indices[i]];
-    if (parts.magnitudes)
-        for (uint32_t i = 0; i < splats; i++)
-            magnitudes[i] = w->magnitudes[indices[i]];
-}
-
-static int emit_part(const view *v, unsigned thread, const part *p)
-{
-    uint32_t indices[TRIP_TILE_MAX_SPLATS];
-    const trip_splat_params *params = &v->s->params;
-    unsigned used = 0;
-    for (unsigned w = 0; w < p->words; w++)
-        used += p->bitmap[w] != 0;
-    if (used == 0)
+    trip_splat_cell *c = &k->w->cell;
+    const int64_t voxel[3] = { c->origin[0] + c->first[0], c->origin[1] + c->first[1] + y,
+                               c->origin[2] + z };
+    size_t at = entry_of(k, voxel);
+    splat_row r = { .values = k->w->decoded + at,
+                    .first = (unsigned)c->first[0],
+                    .index = trip_splat_cell_row(c, c->first[1] + y, z) };
+    r.count = find_flags(flags + at, c->size[0], c->first[0], r.x);
+    if (r.count == 0)
         return 0;
-    uint32_t splats = gather_indices(v, p, indices);
-    const trip_piece_format f = trip_piece_format_of(&params->format, p->list);
-    unsigned words = trip_piece_choose_words(&f, splats, used);
-    size_t bytes = trip_piece_layout(&f, splats, words).bytes;
-    trip_piece *piece = params->reserve(params->user, thread, p->list, bytes);
-    if (!piece)
-        return TRIP_ERROR;
-    trip_piece_begin(piece, &f, key_of(v, p), splats, words, p->bitmap);
-    fill_piece(v, &f, piece, indices, splats);
-    return 0;
+    trip_splat_cell_mark(c, c->first[1] + y, z, r.x, r.count);
+    put_values(k, &r);
+    if (normals)
+        put_normals(k, &r);
+    return r.count;
 }
 
-static int emit_list(const view *v, unsigned thread, unsigned list)
+/* Makes the pieces of all voxels of [lo, lo + size) that have a flag, for three lists from `list`
+ * on; adds their number to *count. */
+static int make_pieces(const work *k, const int64_t lo[3], const int64_t size[3],
+                       const uint8_t *flags, unsigned list, uint64_t *count)
 {
-    unsigned tile_words = 1u << (2 * v->s->params.format.tile_log2 - 6);
-    int status = 0, axis = trip_list_axis(list);
-    for (int64_t i = 0; i < v->size[axis] && status == 0; i++) {
-        int64_t sheet = v->from[axis] + i;
-        const uint64_t *bits = v->w->bits[axis] + (size_t)sheet * v->s->words;
-        for (unsigned w = 0; w < v->s->words && status == 0; w += tile_words)
-            status =
-                emit_part(v, thread, &(part){ list, axis, sheet, w * 64, bits + w, tile_words });
-    }
-    return status;
-}
-
-/* Makes the pieces of all voxels of a part that have a flag, in three lists from `list` on; adds
- * their number to *splats. */
-static int make_part(const view *v, unsigned thread, const uint8_t *flags, unsigned list,
-                     uint64_t *splats)
-{
+    const trip_piece_format f = trip_piece_format_of(&k->s->params.format, list);
+    const trip_piece_sink sink = { k->s->params.reserve, k->s->params.user, k->thread };
     uint64_t made = 0;
     int status = 0;
-    clear_bits(v);
-    for (int64_t z = 0; z < v->size[2]; z++)
-        for (int64_t y = 0; y < v->size[1]; y++) {
-            splat_row r = row_of(v, flags, y, z);
-            put_row(v, &r, v->s->params.format.normals && list < TRIP_HALO_LISTS);
-            made += r.count;
-        }
+    trip_splat_cell_begin(&k->w->cell, lo, size);
+    for (int64_t z = 0; z < size[2]; z++)
+        for (int64_t y = 0; y < size[1]; y++)
+            made += put_row(k, flags, y, z, f.normals);
     for (unsigned l = list; l < list + 3 && made > 0 && status == 0; l++)
-        status = emit_list(v, thread, l);
-    *splats += made;
+        status = trip_splat_cell_emit(&k->w->cell, &f, l, &sink);
+    *count += made;
     return status;
 }
 
-/* Marks the voxels of the window that are not kept, have a value, and a neighbour that is kept.
- * False when there are none. */
-static bool find_halo(const workspace *w, const window *n)
+static void find_kept(const work *k)
 {
-    size_t count = (size_t)(n->slice * n->size[2]);
-    if (!memchr(w->keep, 1, count) || !memchr(w->keep, 0, count))
+    const workspace *w = k->w;
+    const int64_t rows = k->size[1] * k->size[2], row = k->size[0];
+    for (int64_t r = 0; r < rows; r++)
+        trip_envelope_keep_row(k->s->params.envelope, w->decoded + r * row, (size_t)row,
+                               w->kept + r * row);
+    for (int64_t i = 0; k->s->params.info->sparse && i < rows * row; i++)
+        w->kept[i] &= w->active[i];
+}
+
+/* Marks the voxels of the window that are not kept, have a finite value, and a neighbour that is
+ * kept. False when there are none. */
+static bool find_halo(const work *k)
+{
+    const workspace *w = k->w;
+    size_t count = (size_t)(k->step[2] * k->size[2]);
+    if (!memchr(w->kept, 1, count) || !memchr(w->kept, 0, count))
         return false;
-    trip_dilate(w->keep, w->near, w->scratch, n->size);
+    trip_dilate(w->kept, w->halo, w->scratch, k->size);
     for (size_t i = 0; i < count; i++)
-        w->near[i] &= (uint8_t)(!w->keep[i] & (fabsf(w->decoded[i]) <= FLT_MAX));
+        w->halo[i] &= (uint8_t)(!w->kept[i] & (fabsf(w->decoded[i]) <= FLT_MAX));
     return true;
 }
 
-/* The voxels whose halo this box makes: its own, and where no block of a sparse volume may be, one
- * around it. What several boxes make is put together as one. */
-static void halo_range(const trip_splatter *s, const trip_box *box, int axis, int64_t *begin,
-                       int64_t *end)
+/* The voxels along an axis whose halo this box makes: its own and, where a portion of a sparse
+ * volume ends, those next to it, which may be in no portion. A voxel may be made by several boxes;
+ * the merge makes one record of it. */
+static void halo_range(const work *k, int axis, int64_t *begin, int64_t *end)
 {
-    const int64_t first = box->block->origin[axis], past = first + box->block->size[axis];
+    const trip_box *box = k->box;
+    const trip_volume_info *info = k->s->params.info;
+    const int64_t first = box->portion->origin[axis], past = first + box->portion->size[axis];
     *begin = box->lo[axis];
     *end = *begin + box->size[axis];
-    if (s->params.info->sparse && *begin == first && *begin > 0)
+    if (info->sparse && *begin == first && *begin > 0)
         --*begin;
-    if (s->params.info->sparse && *end == past && *end < s->params.info->dims[axis])
+    if (info->sparse && *end == past && *end < info->dims[axis])
         ++*end;
 }
 
-/* The part of [begin, end) along an axis that is in the cell of `at`. */
+/* The end of the part of [at, end) that is in the cell of `at`. */
 static int64_t cell_end(const trip_splatter *s, int64_t at, int64_t end)
 {
-    int64_t past = (at & ~(s->edge - 1)) + s->edge;
+    int64_t past = (at & ~(s->tables.edge - 1)) + s->tables.edge;
     return past < end ? past : end;
 }
 
-/* Cell by cell: what is around a box may lie in others. */
-static int make_halo(const trip_splatter *s, unsigned thread, const trip_box *box, const window *n)
+/* Cell by cell, as voxels around a box may lie in others. */
+static int make_halo(const work *k)
 {
-    workspace *w = workspace_of(s, thread);
+    const trip_splatter *s = k->s;
     int64_t begin[3], end[3], at[3];
     int status = 0;
-    if (!find_halo(w, n))
+    if (!find_halo(k))
         return 0;
     for (int a = 0; a < 3; a++)
-        halo_range(s, box, a, &begin[a], &end[a]);
+        halo_range(k, a, &begin[a], &end[a]);
     for (at[2] = begin[2]; at[2] < end[2]; at[2] = cell_end(s, at[2], end[2]))
         for (at[1] = begin[1]; at[1] < end[1]; at[1] = cell_end(s, at[1], end[1]))
             for (at[0] = begin[0]; at[0] < end[0] && status == 0;
@@ -522,26 +330,36 @@ static int make_halo(const trip_splatter *s, unsigned thread, const trip_box *bo
                 int64_t size[3];
                 for (int a = 0; a < 3; a++)
                     size[a] = cell_end(s, at[a], end[a]) - at[a];
-                view v = view_of(s, thread, n, at, size);
-                status = make_part(&v, thread, w->near, TRIP_HALO_LISTS, &w->halo);
+                status = make_pieces(k, at, size, k->w->halo, TRIP_HALO_LISTS, &k->w->halo_count);
             }
     return status;
 }
 
+static void tally_box(const work *k)
+{
+    const trip_box *box = k->box;
+    for (int64_t z = 0; z < box->size[2]; z++)
+        for (int64_t y = 0; y < box->size[1]; y++) {
+            const int64_t voxel[3] = { box->lo[0], box->lo[1] + y, box->lo[2] + z };
+            size_t at = entry_of(k, voxel), count = (size_t)box->size[0];
+            const uint8_t *active = k->s->params.info->sparse ? k->w->active + at : NULL;
+            trip_tally_range(&k->w->tally, k->w->decoded + at, active, count);
+            trip_tally_count(&k->w->tally, k->w->decoded + at, active, count);
+        }
+}
+
 int trip_splatter_box(trip_splatter *s, unsigned thread, const trip_box *box)
 {
-    workspace *w = workspace_of(s, thread);
-    const window n = window_of(s, box);
-    view v = view_of(s, thread, &n, box->lo, box->size);
-    int status = trip_block_decode(box->volume, box->block, n.lo, n.size, w->decoded,
-                                   s->params.info->sparse ? w->active : NULL);
+    const work k = work_on(s, thread, box);
+    int status = trip_portion_decode(box->volume, box->portion, k.lo, k.size, k.w->decoded,
+                                     s->params.info->sparse ? k.w->active : NULL);
     if (status < 0)
         return status;
-    for (int64_t row = 0; s->params.tally && row < box->size[1] * box->size[2]; row++)
-        tally_row(&v, row % box->size[1], row / box->size[1]);
-    find_kept(s, w, &n);
-    status = make_part(&v, thread, w->keep, 0, &w->kept);
-    return status == 0 && s->params.format.halo ? make_halo(s, thread, box, &n) : status;
+    if (s->params.tally)
+        tally_box(&k);
+    find_kept(&k);
+    status = make_pieces(&k, box->lo, box->size, k.w->kept, 0, &k.w->kept_count);
+    return status == 0 && s->params.format.halo ? make_halo(&k) : status;
 }
 
 void trip_splatter_tally(const trip_splatter *s, trip_tally *out)
@@ -555,7 +373,7 @@ uint64_t trip_splatter_kept(const trip_splatter *s)
 {
     uint64_t kept = 0;
     for (unsigned i = 0; i < s->params.threads; i++)
-        kept += workspace_of(s, i)->kept;
+        kept += workspace_of(s, i)->kept_count;
     return kept;
 }
 
@@ -563,29 +381,6 @@ uint64_t trip_splatter_halo(const trip_splatter *s)
 {
     uint64_t halo = 0;
     for (unsigned i = 0; i < s->params.threads; i++)
-        halo += workspace_of(s, i)->halo;
+        halo += workspace_of(s, i)->halo_count;
     return halo;
-}
-
-double trip_gradient_unit(const trip_affine *index_to_world)
-{
-    double voxel = cbrt(fabs(trip_affine_determinant(index_to_world)));
-    return voxel > 0 && isfinite(voxel) ? ldexp(1, ilogb(voxel)) : 1;
-}
-
-double trip_gradient_bound(const trip_volume_info *info, double lo, double hi)
-{
-    trip_affine to_index;
-    double most = 0;
-    if (info->sparse) {
-        lo = fmin(lo, info->background);
-        hi = fmax(hi, info->background);
-    }
-    trip_affine_invert(&info->index_to_world, &to_index);
-    for (int signs = 0; signs < 4; signs++) {
-        trip_vec3 corner = { 1, signs & 1 ? 1 : -1, signs & 2 ? 1 : -1 };
-        most = fmax(most, trip_length(trip_affine_transpose_vector(&to_index, corner)));
-    }
-    double bound = most * (hi - lo) / 2;
-    return bound > 0 && isfinite(bound) ? bound : 1;
 }

@@ -1,6 +1,6 @@
-/* Voxels to splats: which voxels of a box are kept, their code and the gradient there, which are
- * their halo, and the pieces that they make in the lists along X, Y and Z. A splatter is made once;
- * every thread has its own place in it. */
+/* Turns the voxels of a box into splats: finds which voxels are kept, their codes and normals, and
+ * which other voxels are their halo, and makes pieces of them for the lists along X, Y and Z. One
+ * splatter serves several threads, each of which has its own workspace in it. */
 #ifndef TRIP_SPLATS_H
 #define TRIP_SPLATS_H
 
@@ -15,43 +15,35 @@ typedef struct trip_splat_params {
     const trip_envelope *envelope;
     trip_piece_format format;
     trip_quantiser quantiser; /* where the format is quantised */
-    /* Normals in 3 bytes, of quantised formats; NULL: in 4. */
+    /* How normals of 3 bytes are encoded, for quantised formats only; NULL: they have 4 bytes. */
     const trip_compact_normals *compact;
-    bool tally; /* of the values of all voxels, kept or not */
+    bool tally; /* count the values of all voxels, kept or not */
     unsigned threads;
-    /* Memory for a piece of a list, aligned to 8 bytes, or NULL when the run is to end. */
+    /* Returns memory for a piece of a list, aligned to 8 bytes, or NULL after a failure. */
     void *(*reserve)(void *user, unsigned thread, unsigned list, size_t bytes);
     void *user;
 } trip_splat_params;
 
 typedef struct trip_splatter trip_splatter;
 
-/* Edge and height of the boxes to walk with. */
+/* Edge and height in voxels of the boxes that trip_splatter_box() takes: see trip_walk_params. */
 enum { TRIP_SPLAT_HEIGHT = 16 };
 int64_t trip_splat_edge(const trip_piece_format *f);
 
-/* Memory that one thread takes. */
+/* Bytes of one thread's workspace. */
 size_t trip_splat_thread_bytes(const trip_piece_format *f, bool sparse);
 
 int trip_splatter_create(trip_splatter **out, const trip_splat_params *params, trip_budget *budget);
 void trip_splatter_destroy(trip_splatter *s);
 
-/* Makes the pieces of a box. */
+/* Makes the pieces of a box. May run on several threads at once, with different `thread`. */
 int trip_splatter_box(trip_splatter *s, unsigned thread, const trip_box *box);
 
-/* Sums over all threads, while none is at work. */
+/* Sums over all threads, for when none is inside trip_splatter_box(). */
 void trip_splatter_tally(const trip_splatter *s, trip_tally *out);
 uint64_t trip_splatter_kept(const trip_splatter *s);
-/* At least as many as the halo has: of sparse volumes, what is around several boxes is counted
- * several times. */
+/* At least as many as the halo has: in sparse volumes a voxel that lies next to several portions is
+ * counted once for each. */
 uint64_t trip_splatter_halo(const trip_splatter *s);
-
-/* A power of two about a voxel's length: gradients that wait for their range, in floats, do so as
- * values per this, which no unit of the world takes out of a float's range. */
-double trip_gradient_unit(const trip_affine *index_to_world);
-
-/* A bound of the magnitude of world-space gradients, by central differences, of values that are in
- * [lo, hi], background included: known before anything is read. */
-double trip_gradient_bound(const trip_volume_info *info, double lo, double hi);
 
 #endif

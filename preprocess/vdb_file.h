@@ -1,6 +1,6 @@
-/* The outer layers of an OpenVDB file, read here because the library trusts them: it allocates what
- * a length field says and does not look whether a read came up short. Everything in this header
- * throws; nothing above read_vdb.cpp includes it. */
+/* Reads the outer layers of an OpenVDB file with checks that the library does not make: it
+ * allocates what a length field says and ignores short reads. Everything in this header may throw;
+ * nothing above read_vdb.cpp includes it. */
 #ifndef TRIP_VDB_FILE_H
 #define TRIP_VDB_FILE_H
 
@@ -13,7 +13,7 @@
 
 #include "report.h"
 
-/* What is wrong with the file, or with what is asked of it. */
+/* A fault of the file, or an option that does not apply to it. */
 struct trip_vdb_error : std::runtime_error {
     explicit trip_vdb_error(const std::string &why, int code = TRIP_ERROR)
         : std::runtime_error(why), status(code)
@@ -42,17 +42,17 @@ class trip_vdb_fd
     int64_t size_;
 };
 
-/* Buffered bytes of the file by position. A seek that stays in the buffer costs nothing, one beyond
- * the file's end fails. No mapping: pages read do not count as this process's memory, and a file
- * that shrinks meanwhile is an error, not a signal. */
+/* A buffered view of the file. A seek within the buffer costs nothing; one beyond the file's end
+ * throws. The file is not mapped, so that its pages do not count as this process's memory, and a
+ * file that shrinks meanwhile is an error, not a signal. */
 class trip_vdb_buffer : public std::streambuf
 {
   public:
     explicit trip_vdb_buffer(const trip_vdb_fd &fd) : fd_(fd)
     {
     }
-    /* The last eight bytes that were read at once, and where they ended: where a compressed chunk
-     * was passed over, its size and start. */
+    /* The value and end of the last read of exactly eight bytes: after a compressed chunk was
+     * skipped, these are the chunk's size and start. */
     int64_t last_word = 0, last_word_end = -1;
 
   protected:
@@ -72,8 +72,8 @@ class trip_vdb_buffer : public std::streambuf
     char bytes_[16384];
 };
 
-/* A stream for the library's readers and for ours. One thread at a time; several may share the
- * file. Any short read throws. */
+/* A stream for the library's readers and for those here. One thread at a time; streams of several
+ * threads may read one file. Any short read throws. */
 class trip_vdb_stream : private trip_vdb_buffer, public std::istream
 {
   public:
@@ -100,16 +100,16 @@ class trip_vdb_stream : private trip_vdb_buffer, public std::istream
     }
 };
 
-/* A grid as the file's table of contents has it. */
+/* A grid's entry in the file's table of contents. */
 struct trip_vdb_entry {
-    std::string unique_name; /* with the library's separator and number where names repeat */
-    std::string name;        /* for people: "density", or "density[1]" */
+    std::string unique_name; /* with the library's separator and number where a name repeats */
+    std::string name;        /* as shown to users: "density", or "density[1]" */
     std::string type;        /* "float", "vec3s", ... */
-    std::string parent;      /* unique name of the grid whose tree this one shares, or empty */
+    std::string parent;      /* unique name of the grid whose tree this one uses, or empty */
     bool usual_tree;         /* of the 5-4-3 layout that all writers use */
     bool half;               /* floats are stored as 16 bits */
     int64_t offset;          /* of the grid in the file */
-    int64_t end;             /* past its data, 0 when not known */
+    int64_t end;             /* of its data in the file; 0: unknown */
 };
 
 struct trip_vdb_contents {
@@ -122,11 +122,12 @@ struct trip_vdb_contents {
 
 trip_vdb_contents trip_vdb_read_contents(const trip_vdb_fd &fd);
 
-/* What precedes a grid's transform; the stream is left there. */
+/* What precedes a grid's transform. */
 struct trip_vdb_head {
     uint32_t compression;
-    std::string grid_class; /* "level set", "fog volume", ...; empty when the file does not say */
+    std::string grid_class; /* "level set", "fog volume", ...; empty: unknown */
 };
+/* Reads it, and leaves the stream at the transform. */
 trip_vdb_head trip_vdb_read_head(trip_vdb_stream &is, const trip_vdb_contents &contents,
                                  const trip_vdb_entry &entry);
 

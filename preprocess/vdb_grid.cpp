@@ -262,12 +262,12 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
                     for (auto leaf = middle->beginChildOn(); leaf; ++leaf) {
                         leaf->setTransientData((openvdb::Index32)leaf_offsets_.size());
                         leaf_offsets_.push_back(is.tellg());
-                        pass_leaf(is, *leaf);
+                        skip_leaf(is, *leaf);
                     }
         }
     }
 
-    void pass_leaf(trip_vdb_stream &is, const LeafT &leaf)
+    void skip_leaf(trip_vdb_stream &is, const LeafT &leaf)
     {
         typename LeafT::NodeMaskType mask;
         mask.load(is);
@@ -278,7 +278,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
             if (is.get_value<int8_t>() != 1)
                 throw trip_vdb_error("has several buffers a leaf, which is an obsolete form");
         }
-        trip_vdb_tree_check<TreeT>::pass_values(is, LeafT::SIZE, mask, half_);
+        trip_vdb_tree_check<TreeT>::skip_values(is, LeafT::SIZE, mask, half_);
     }
 
     void set_conversion(const trip_vdb_conversion &conversion)

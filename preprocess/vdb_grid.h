@@ -1,7 +1,7 @@
-/* One scalar grid of an OpenVDB file as boxes of existing voxels. In memory are the grid's tree
- * without its leaves' values, where each leaf lies in the file, and the boxes; the values of a box
- * are read from the file when it is decoded, so that decoding keeps nothing. Everything here
- * throws; only read_vdb.cpp includes it. */
+/* One scalar grid of an OpenVDB file as boxes of existing voxels. Memory holds the grid's tree
+ * without the values of its leaves, the place of each leaf in the file, and the boxes. The values
+ * of a box are read from the file when it is decoded. Everything here may throw; only read_vdb.cpp
+ * includes it. */
 #ifndef TRIP_VDB_GRID_H
 #define TRIP_VDB_GRID_H
 
@@ -18,7 +18,8 @@ struct trip_vdb_box {
     uint8_t size[3];
 };
 
-/* A part of the budget that the library's memory is counted against: taken but never touched. */
+/* Memory taken from the budget but never touched, in place of the memory that the library
+ * allocates. */
 class trip_vdb_reservation
 {
   public:
@@ -26,7 +27,7 @@ class trip_vdb_reservation
     trip_vdb_reservation(const trip_vdb_reservation &) = delete;
     trip_vdb_reservation &operator=(const trip_vdb_reservation &) = delete;
     ~trip_vdb_reservation();
-    /* Throws, naming what for, when it does not fit. Once only. */
+    /* Throws when it does not fit; `what` names the purpose in the message. Called once only. */
     void take(trip_budget *budget, uint64_t bytes, const char *what);
 
   private:
@@ -37,7 +38,7 @@ class trip_vdb_reservation
 
 /* How stored values become densities. */
 struct trip_vdb_conversion {
-    trip_level_set_mode mode; /* TRIP_LEVEL_SET_UNSET: as they are */
+    trip_level_set_mode mode; /* TRIP_LEVEL_SET_UNSET: values remain as they are */
     double voxel_world;       /* a voxel's side; distances are in world units */
 };
 
@@ -45,20 +46,22 @@ class trip_vdb_grid
 {
   public:
     virtual ~trip_vdb_grid() = default;
-    /* Values and existence of a box in the grid's coordinates; any thread. */
+    /* Fills the values and, where not NULL, `active` of a box in the grid's coordinates; any
+     * thread. */
     virtual void decode(const int64_t lo[3], const int64_t size[3], float *values,
                         uint8_t *active) const = 0;
 
     trip_scalar type;                /* as stored */
     double background = 0;           /* after conversion */
     int32_t lo[3], hi[3];            /* of all existing voxels, inclusive */
-    std::vector<trip_vdb_box> boxes; /* by their corner's k, then j, then i */
+    std::vector<trip_vdb_box> boxes; /* sorted by their corner's k, then j, then i */
 };
 
 /* Whether a grid of this type ("float", "vec3s", ...) can be loaded. */
 bool trip_vdb_is_scalar(const trip_vdb_entry &entry);
 
-/* Loads the tree of `entry`, at which `is` stands, from `fd`, which must outlive the grid. */
+/* Loads the tree of `entry` from `is`, a stream of `fd` that is positioned there; `fd` must outlive
+ * the grid. */
 std::unique_ptr<trip_vdb_grid> trip_vdb_load(const trip_vdb_fd &fd, trip_vdb_stream &is,
                                              const trip_vdb_contents &contents,
                                              const trip_vdb_head &head, const trip_vdb_entry &entry,

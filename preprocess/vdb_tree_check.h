@@ -1,7 +1,7 @@
-/* A dry run over a grid's tree in its file, before the library builds it in memory: the library
- * writes beyond its buffers when a chunk claims another size than it should have, and would
- * allocate the nodes of a tree of any size. The same functions of the library do the reading, told
- * to pass over the values. Only vdb_grid.cpp includes this. */
+/* Checks a grid's tree in its file and computes its memory before the library builds it: the
+ * library writes beyond its buffers when a chunk claims another size than it should have, and
+ * allocates the nodes of a tree of any size. The check reads with the library's own functions, in
+ * the mode in which they skip values. Only vdb_grid.cpp includes this. */
 #ifndef TRIP_VDB_TREE_CHECK_H
 #define TRIP_VDB_TREE_CHECK_H
 
@@ -19,8 +19,8 @@ constexpr int32_t trip_vdb_far = 1 << 30;
 template <typename TreeT> class trip_vdb_tree_check
 {
   public:
-    /* `is` stands at the tree and knows the file's version and compression; it is moved past the
-     * tree's nodes, to the leaves' values. */
+    /* `is` is positioned at the tree and has the file's version and compression as metadata; it is
+     * moved past the tree's nodes, to the leaves' values. */
     trip_vdb_tree_check(trip_vdb_stream &is, bool as_half) : is_(is), half_(as_half)
     {
         if (is_.get_value<int32_t>() != 1)
@@ -100,9 +100,9 @@ template <typename TreeT> class trip_vdb_tree_check
     }
 
   public:
-    /* Passes over `count` stored values; a chunk's size must fit them. */
+    /* Skips `count` stored values; throws if the size of their chunk is impossible. */
     template <typename MaskT>
-    static void pass_values(trip_vdb_stream &is, openvdb::Index count, const MaskT &mask,
+    static void skip_values(trip_vdb_stream &is, openvdb::Index count, const MaskT &mask,
                             bool as_half)
     {
         openvdb::io::readCompressedValues<ValueT>(is, nullptr, count, mask, as_half);
@@ -140,7 +140,7 @@ template <typename TreeT> class trip_vdb_tree_check
 
     template <typename MaskT> void check_values(openvdb::Index count, const MaskT &mask)
     {
-        pass_values(is_, count, mask, half_);
+        skip_values(is_, count, mask, half_);
     }
 
     trip_vdb_stream &is_;

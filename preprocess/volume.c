@@ -22,7 +22,7 @@ static const trip_volume_reader *const readers[] = {
     &trip_read_vol, &trip_read_images, &trip_read_raw,
 };
 
-/* Whole slices [first, first + count) as stored: a block's own and one neighbour on each side. */
+/* Whole slices [first, first + count) as stored: a portion's own and one neighbour on each side. */
 typedef struct slab {
     int64_t first, count;
     unsigned char *slices;
@@ -39,12 +39,12 @@ struct trip_volume {
     /* The rest is for slice readers. */
     size_t slice_bytes;
     bool swap;
-    int64_t next_slice;   /* first slice of the next block */
+    int64_t next_slice;   /* first slice of the next portion */
     int64_t read_slices;  /* slices the reader has delivered: up to two more than next_slice - 1 */
     unsigned char *carry; /* [next_slice - 1, read_slices), for the next slab */
-    int broken;           /* the status of a failed read: no further block can be right */
-    /* One released slab kept for the next block, since fresh pages cost about as much as reading
-     * into them. Exchanged atomically: blocks may be released by any thread. */
+    int broken;           /* the status of a failed read: no further portion can be right */
+    /* One released slab kept for the next portion, since fresh pages cost about as much as reading
+     * into them. Exchanged atomically: portions may be released by any thread. */
     _Atomic(slab *) spare;
 };
 
@@ -220,7 +220,7 @@ static void drop_spare(trip_volume *v)
     slab_free(v, atomic_exchange(&v->spare, NULL));
 }
 
-/* What is kept from one block to the next. */
+/* What is kept from one portion to the next. */
 static void drop_memory(trip_volume *v)
 {
     drop_spare(v);
@@ -306,7 +306,7 @@ static int fill_slab(trip_volume *v, slab *s, int64_t next_slice)
     return 0;
 }
 
-static int next_slab(trip_volume *v, int64_t slices, trip_volume_block *block)
+static int next_slab(trip_volume *v, int64_t slices, trip_volume_portion *portion)
 {
     int64_t begin = v->next_slice, depth = v->info.dims[2];
     int64_t end = slices < depth - begin ? begin + slices : depth;
@@ -321,23 +321,23 @@ static int next_slab(trip_volume *v, int64_t slices, trip_volume_block *block)
         slab_free(v, s);
         return status;
     }
-    *block = (trip_volume_block){ .origin = { 0, 0, begin },
-                                  .size = { v->info.dims[0], v->info.dims[1], end - begin },
-                                  .data = s };
+    *portion = (trip_volume_portion){ .origin = { 0, 0, begin },
+                                      .size = { v->info.dims[0], v->info.dims[1], end - begin },
+                                      .data = s };
     return 1;
 }
 
-int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_block *block)
+int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_portion *portion)
 {
     if (!v->reader->read_slices)
-        return v->reader->next(v->state, block);
+        return v->reader->next(v->state, portion);
     if (v->broken < 0)
         return v->broken;
     if (v->next_slice == v->info.dims[2])
         return 0;
     if (slices_hint < 1)
         slices_hint = SLAB_BYTES / (int64_t)v->slice_bytes;
-    return next_slab(v, slices_hint < 1 ? 1 : slices_hint, block);
+    return next_slab(v, slices_hint < 1 ? 1 : slices_hint, portion);
 }
 
 int64_t trip_volume_skip(trip_volume *v, int64_t slices)
@@ -346,7 +346,7 @@ int64_t trip_volume_skip(trip_volume *v, int64_t slices)
     if (!v->reader->read_slices || !v->reader->skip_slices || v->broken < 0)
         return 0;
     int64_t left = depth - v->next_slice, count = slices < left ? slices : left;
-    int64_t first = v->next_slice + count - 1; /* the next block's neighbour */
+    int64_t first = v->next_slice + count - 1; /* the next portion's neighbour */
     if (first < v->read_slices)
         return 0;
     if (v->next_slice + count == depth) {
@@ -408,26 +408,26 @@ static void decode_slab(const trip_volume *v, const slab *s, const int64_t lo[3]
         }
 }
 
-int trip_block_decode(const trip_volume *v, const trip_volume_block *block, const int64_t lo[3],
-                      const int64_t size[3], float *values, uint8_t *active)
+int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion,
+                        const int64_t lo[3], const int64_t size[3], float *values, uint8_t *active)
 {
     if (!v->reader->read_slices)
-        return v->reader->decode(v->state, block, lo, size, values, active);
+        return v->reader->decode(v->state, portion, lo, size, values, active);
     for (int a = 0; a < 3; a++)
-        if (lo[a] < block->origin[a] - 1 || size[a] < 1 ||
-            lo[a] + size[a] > block->origin[a] + block->size[a] + 1)
-            return trip_fail(TRIP_ERROR, "read", v->path, "asked for voxels outside the block");
-    decode_slab(v, block->data, lo, size, values, active);
+        if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
+            lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
+            return trip_fail(TRIP_ERROR, "read", v->path, "asked for voxels outside the portion");
+    decode_slab(v, portion->data, lo, size, values, active);
     return 0;
 }
 
-void trip_block_release(trip_volume *v, trip_volume_block *block)
+void trip_portion_release(trip_volume *v, trip_volume_portion *portion)
 {
-    if (!block->data)
+    if (!portion->data)
         return;
     if (v->reader->read_slices)
-        slab_free(v, atomic_exchange(&v->spare, block->data));
+        slab_free(v, atomic_exchange(&v->spare, portion->data));
     else
-        v->reader->release(v->state, block);
-    block->data = NULL;
+        v->reader->release(v->state, portion);
+    portion->data = NULL;
 }

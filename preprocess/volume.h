@@ -1,12 +1,12 @@
-/* A volume being read, whatever its file format: an affine grid of scalar values that arrives once,
- * front to back, in blocks small enough for memory. trip_volume_next() is called by one thread;
- * blocks it returned may be decoded and released by any thread and live until released. Opening
- * reads headers only. One file per format implements trip_volume_reader; volume.c picks it by
- * content, then name.
+/* Reads volumes of all formats: grids of scalar values with an affine map to world space. The
+ * values arrive once, front to back, in portions small enough for memory. One thread calls
+ * trip_volume_next(); any thread may decode and release the portions that it returned, which live
+ * until they are released. Opening reads headers only. One file per format implements
+ * trip_volume_reader; volume.c picks it by content, then name.
  *
  * Voxel (i, j, k) has its centre at index coordinates (i, j, k), i fastest in memory, the first
- * voxel at (0, 0, 0) whatever the file calls it. index_to_world takes those to world space: the
- * file's own, but right-handed (a file whose space is left-handed has its x negated). */
+ * voxel at (0, 0, 0) whatever number the file gives it. index_to_world maps these coordinates to
+ * the world space of the file, made right-handed: x is negated where the file's is left-handed. */
 #ifndef TRIP_VOLUME_H
 #define TRIP_VOLUME_H
 
@@ -48,11 +48,11 @@ typedef struct trip_volume_info {
     bool sparse;         /* only active voxels exist; the others hold `background` */
     double background;
     const char *format; /* "nrrd", "openvdb", ... */
-    char space[8];      /* how world space lies in the patient, as in anatomy.h; "" : not said */
-    bool oriented;      /* the file says how its axes lie in world space: nothing to be guessed */
-    char modality[17];  /* of DICOM: "CT", "MR", ...; "": not known */
+    char space[8];      /* how world space lies in the patient, as in anatomy.h; "": unknown */
+    bool oriented;      /* the file gives the directions of its axes in world space */
+    char modality[17];  /* of DICOM: "CT", "MR", ...; "": unknown */
     char name[128];     /* grid name where the format has one */
-    char note[512];     /* for people: what was chosen where the file leaves a choice, or "" */
+    char note[512];     /* for the user: what was chosen where the file leaves a choice, or "" */
 } trip_volume_info;
 
 typedef enum trip_level_set_mode {
@@ -76,38 +76,40 @@ typedef struct trip_volume_params {
 
 typedef struct trip_volume trip_volume;
 
-/* A box of voxels ready to decode. origin and size are in voxels; for dense volumes a block is a
- * slab of whole slices, for sparse ones a box around active voxels. Blocks do not overlap and
+/* A box of voxels that is ready to be decoded: whole slices of a dense volume, or a box around
+ * active voxels of a sparse one. Origin and size are in voxels. Portions do not overlap and
  * together hold every existing voxel once. */
-typedef struct trip_volume_block {
+typedef struct trip_volume_portion {
     int64_t origin[3];
     int64_t size[3];
     void *data; /* the reader's */
-} trip_volume_block;
+} trip_volume_portion;
 
-/* `path` may be a file, a folder or a printf-like or glob pattern of slices. */
+/* `path` may be a file, a folder, or a printf-like or glob pattern of slices. Reports failures. */
 int trip_volume_open(trip_volume **out, const char *path, const trip_volume_params *params,
                      trip_budget *budget);
 const trip_volume_info *trip_volume_get_info(const trip_volume *v);
 void trip_volume_close(trip_volume *v);
 
-/* Start again from the first block; all blocks must have been released. */
+/* Starts again from the first portion; all portions must have been released. */
 int trip_volume_rewind(trip_volume *v);
-/* 1: *block is filled; 0: no more; negative: reported failure. A dense block holds about
- * `slices_hint` slices (at least 1; 0 lets the reader choose) plus what neighbours need. */
-int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_block *block);
-/* Passes over slices before the next block, without reading them where the file allows that.
- * Returns how many it passed over: `slices`, fewer at the end, or 0 where slices have to be read or
- * there are none. */
+/* 1: *portion is filled; 0: there are no more; negative: reported failure. A portion of a dense
+ * volume holds `slices_hint` slices (0 lets the reader choose), fewer at the end, and in memory one
+ * more on each side. */
+int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_portion *portion);
+/* Skips slices before the next portion without reading them. Returns how many were skipped:
+ * `slices`, fewer at the end, or 0 where the format has to be read to get past them. Negative:
+ * reported failure. */
 int64_t trip_volume_skip(trip_volume *v, int64_t slices);
-/* Values of the box [lo, lo + size) as float32, i fastest, into values; `active`, when not NULL,
- * gets 1 where the voxel exists. The box may exceed the block by one voxel on every side: values
- * outside the volume repeat the edge voxel (dense) or are the background (sparse), active 0. */
-int trip_block_decode(const trip_volume *v, const trip_volume_block *block, const int64_t lo[3],
-                      const int64_t size[3], float *values, uint8_t *active);
-/* The memory of one released slab stays with the volume, for the next block, until it is rewound or
+/* Decodes the box [lo, lo + size) to float32, i fastest, into size[0] * size[1] * size[2] entries
+ * of `values`; entries of `active`, when not NULL, become 1 where the voxel exists, else 0. The box
+ * may exceed the portion by one voxel on every side. Values outside the volume repeat the voxel at
+ * the edge (dense) or are the background (sparse), and are not active. */
+int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion,
+                        const int64_t lo[3], const int64_t size[3], float *values, uint8_t *active);
+/* The volume keeps the memory of one released portion for the next one, until it is rewound or
  * closed. */
-void trip_block_release(trip_volume *v, trip_volume_block *block);
+void trip_portion_release(trip_volume *v, trip_volume_portion *portion);
 
 #ifdef __cplusplus
 }

@@ -6,13 +6,14 @@
 
 #include "report.h"
 
-/* Blocks that lie side by side are small in sparse formats; a batch gives all threads some work. */
-enum { BATCH_BLOCKS = 512 };
+/* Portions that lie side by side are small in sparse formats; a batch gives all threads some work.
+ */
+enum { BATCH_PORTIONS = 512 };
 #define BATCH_VOXELS (UINT64_C(1) << 21)
 
 typedef struct batch {
-    trip_volume_block blocks[BATCH_BLOCKS];
-    uint64_t first_box[BATCH_BLOCKS + 1]; /* boxes before each block, and in all */
+    trip_volume_portion portions[BATCH_PORTIONS];
+    uint64_t first_box[BATCH_PORTIONS + 1]; /* boxes before each portion, and in all */
     size_t count;
     uint64_t voxels;
 } batch;
@@ -35,7 +36,7 @@ static int64_t step_along(const trip_walk_params *p, int axis)
     return axis == 2 ? p->height : p->edge;
 }
 
-static uint64_t boxes_of(const trip_walk_params *p, const trip_volume_block *b)
+static uint64_t boxes_of(const trip_walk_params *p, const trip_volume_portion *b)
 {
     uint64_t count = 1;
     for (int a = 0; a < 3; a++)
@@ -43,8 +44,8 @@ static uint64_t boxes_of(const trip_walk_params *p, const trip_volume_block *b)
     return count;
 }
 
-/* Piece `index` of the block's extent along an axis. */
-static void cut(const trip_walk_params *p, const trip_volume_block *b, int axis, int64_t index,
+/* Piece `index` of the portion's extent along an axis. */
+static void cut(const trip_walk_params *p, const trip_volume_portion *b, int axis, int64_t index,
                 trip_box *box)
 {
     int64_t step = step_along(p, axis);
@@ -58,7 +59,7 @@ static int do_box(void *user, unsigned thread, uint64_t item)
 {
     const walk *w = user;
     const batch *b = w->at_work;
-    size_t low = 0, high = b->count; /* the block with first_box <= item < next first_box */
+    size_t low = 0, high = b->count; /* the portion with first_box <= item < next first_box */
     while (high - low > 1) {
         size_t middle = (low + high) / 2;
         if (b->first_box[middle] <= item)
@@ -66,12 +67,12 @@ static int do_box(void *user, unsigned thread, uint64_t item)
         else
             high = middle;
     }
-    trip_box box = { .volume = w->volume, .block = &b->blocks[low] };
+    trip_box box = { .volume = w->volume, .portion = &b->portions[low] };
     uint64_t index = item - b->first_box[low];
     for (int a = 0; a < 3; a++) {
         uint64_t n =
-            (uint64_t)cuts(box.block->origin[a], box.block->size[a], step_along(w->params, a));
-        cut(w->params, box.block, a, (int64_t)(index % n), &box);
+            (uint64_t)cuts(box.portion->origin[a], box.portion->size[a], step_along(w->params, a));
+        cut(w->params, box.portion, a, (int64_t)(index % n), &box);
         index /= n;
     }
     return w->params->box(w->params->user, thread, &box);
@@ -80,7 +81,7 @@ static int do_box(void *user, unsigned thread, uint64_t item)
 static void release(walk *w, batch *b)
 {
     for (size_t i = 0; i < b->count; i++)
-        trip_block_release(w->volume, &b->blocks[i]);
+        trip_portion_release(w->volume, &b->portions[i]);
     b->count = 0;
 }
 
@@ -97,19 +98,19 @@ static int read_batch(walk *w, batch *b, int64_t slices)
     b->voxels = 0;
     b->count = 0;
     b->first_box[0] = 0;
-    while (b->count < (slabs ? 1 : BATCH_BLOCKS) && b->voxels < BATCH_VOXELS) {
-        trip_volume_block *block = &b->blocks[b->count];
-        more = trip_volume_next(w->volume, slices, block);
+    while (b->count < (slabs ? 1 : BATCH_PORTIONS) && b->voxels < BATCH_VOXELS) {
+        trip_volume_portion *portion = &b->portions[b->count];
+        more = trip_volume_next(w->volume, slices, portion);
         if (more <= 0)
             break;
         b->count++;
-        b->first_box[b->count] = b->first_box[b->count - 1] + boxes_of(w->params, block);
-        b->voxels += (uint64_t)(block->size[0] * block->size[1] * block->size[2]);
+        b->first_box[b->count] = b->first_box[b->count - 1] + boxes_of(w->params, portion);
+        b->voxels += (uint64_t)(portion->size[0] * portion->size[1] * portion->size[2]);
     }
     if (more < 0)
         release(w, b);
     if (b->count > 0)
-        w->done += slabs ? (uint64_t)b->blocks[0].size[2] : 1;
+        w->done += slabs ? (uint64_t)b->portions[0].size[2] : 1;
     w->voxels += b->voxels;
     return more < 0 ? more : 0;
 }
@@ -140,7 +141,7 @@ static int skip_slices(walk *w, uint64_t *count)
 }
 
 /* Passes over slices, or over batches of sparse formats. */
-static int pass_over(walk *w, batch *b, uint64_t count)
+static int skip_batches(walk *w, batch *b, uint64_t count)
 {
     int64_t slices = w->params->slices < 1 ? 1 : w->params->slices;
     int status = count && has_slices(w) ? skip_slices(w, &count) : 0;
@@ -158,13 +159,13 @@ static int pass_over(walk *w, batch *b, uint64_t count)
 }
 
 /* What to pass over for only every so many batches to be looked at. */
-static int pass_stride(walk *w, batch *b)
+static int skip_stride(walk *w, batch *b)
 {
     uint64_t count = w->params->stride > 1 ? w->params->stride - 1 : 0;
     uint64_t slices = w->params->slices < 1 ? 1 : (uint64_t)w->params->slices;
     if (has_slices(w) && __builtin_mul_overflow(count, slices, &count))
         count = UINT64_MAX;
-    return pass_over(w, b, count);
+    return skip_batches(w, b, count);
 }
 
 static double now_seconds(void)
@@ -177,9 +178,9 @@ static double now_seconds(void)
 static int read_next(walk *w, batch *b)
 {
     double begin = now_seconds();
-    int status = pass_stride(w, b);
-    if (w->params->passing_seconds)
-        *w->params->passing_seconds += now_seconds() - begin;
+    int status = skip_stride(w, b);
+    if (w->params->skip_seconds)
+        *w->params->skip_seconds += now_seconds() - begin;
     return status == 0 ? read_batch(w, b, w->params->slices) : status;
 }
 
@@ -187,7 +188,7 @@ static int read_next(walk *w, batch *b)
 static int walk_batches(walk *w, trip_workers *workers, batch *now, batch *ahead)
 {
     const trip_walk_params *p = w->params;
-    int status = pass_over(w, now, p->skip);
+    int status = skip_batches(w, now, p->skip);
     if (status == 0)
         status = read_batch(w, now, p->slices);
     while (status == 0 && now->count > 0) {
@@ -221,7 +222,7 @@ int trip_walk(trip_volume *volume, trip_workers *workers, const trip_walk_params
     walk w = { .params = params, .volume = volume };
     batch *batches = calloc(2, sizeof *batches);
     if (!batches)
-        return trip_fail(TRIP_ERROR, "brick", "blocks", "out of memory");
+        return trip_fail(TRIP_ERROR, "brick", "portions", "out of memory");
     int status = walk_batches(&w, workers, &batches[0], &batches[1]);
     free(batches);
     return status;

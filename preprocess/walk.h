@@ -1,38 +1,40 @@
-/* One pass over a volume: blocks are read by the calling thread while the workers are at the boxes
- * of those before. A box never crosses the borders of an aligned grid, so that what is made of one
- * lies in one place of each list. */
+/* One traversal of a volume: the calling thread reads portions while the workers process the boxes
+ * that earlier portions were cut into. A box never crosses the borders of an aligned grid of cells
+ * as large as the largest tile, so that few boxes give voxels to one tile of a sheet. */
 #ifndef TRIP_WALK_H
 #define TRIP_WALK_H
 
 #include "volume.h"
 #include "workers.h"
 
-/* The voxels [lo, lo + size) of a block; they exist where the block says so. */
+/* The voxels [lo, lo + size) of a portion; which of them exist is known once it is decoded. */
 typedef struct trip_box {
     const trip_volume *volume;
-    const trip_volume_block *block;
+    const trip_volume_portion *portion;
     int64_t lo[3];
     int64_t size[3];
 } trip_box;
 
 typedef struct trip_walk_params {
-    int64_t slices;  /* slices of a block, of formats that come in slices */
-    bool read_ahead; /* read the next blocks while boxes are at work */
-    int64_t edge;    /* of a box along i and j and of the grid: a power of two */
+    int64_t slices;  /* of a portion of a dense volume */
+    bool read_ahead; /* read the next batch while the boxes of one are processed */
+    int64_t edge;    /* voxels of a box and of a cell along i and j: a power of two */
     int64_t height;  /* of a box along k: a power of two, at most `edge` */
-    uint64_t skip;   /* of the volume, passed over at the start without boxes: see `batch` */
-    uint64_t stride; /* then only every so many batches are looked at; default: all */
-    int (*box)(void *user, unsigned thread, const trip_box *box); /* on any thread */
-    /* A batch of blocks is done: on the calling thread, while no box is at work. `done` (slices, or
-     * batches of sparse formats: the same whatever a run's memory is) and `voxels` count from the
-     * start of the volume, what was passed over included. */
+    uint64_t skip;   /* how much of the volume is skipped at its start, counted as `done` below */
+    uint64_t stride; /* after that, of `stride` batches the first is processed; 0: each is */
+    /* Processes a box, on any of the workers' threads. Negative ends the walk with that status. */
+    int (*box)(void *user, unsigned thread, const trip_box *box);
+    /* A batch of portions is finished: called on the calling thread while no box is processed.
+     * `done` counts slices of dense volumes and batches of sparse ones, `voxels` their voxels, both
+     * from the start of the volume with what was skipped. `done` does not depend on the memory or
+     * the threads. */
     int (*batch)(void *user, uint64_t done, uint64_t voxels);
     void *user;
-    double *passing_seconds; /* gets what passing over took; or NULL */
+    double *skip_seconds; /* grows by the time that the stride's skipping took; or NULL */
 } trip_walk_params;
 
-/* Goes through the volume from where it stands, which is its start. A signal to stop is a reported
- * failure. */
+/* Walks through the volume, which must have been opened or rewound just before. An interruption is
+ * a reported failure. */
 int trip_walk(trip_volume *volume, trip_workers *workers, const trip_walk_params *params);
 
 #endif

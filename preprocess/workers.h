@@ -1,6 +1,7 @@
-/* Threads that share out the items of one loop at a time. The thread that starts a loop is free
- * until it waits; items are handed out in ascending order and may finish in any. One owner; the
- * work functions run on the pool's threads. */
+/* A pool of threads that runs one parallel loop at a time. The thread that starts a loop may do
+ * other work until it waits for the end. Items begin in ascending order and may finish in any
+ * order. One thread owns the pool; the work functions run on the pool's threads, in the owner's
+ * scope. */
 #ifndef TRIP_WORKERS_H
 #define TRIP_WORKERS_H
 
@@ -9,11 +10,12 @@
 
 typedef struct trip_workers trip_workers;
 
-/* One item; `thread` is 0 .. count - 1. A negative status stops the loop: items not begun are left
- * out. The first failure only is reported. A signal to stop ends the loop as a failure does. */
+/* Does one item; `thread` is 0 .. count - 1. A negative status ends the loop: items that have not
+ * begun are left out. Only the first failure is reported. An interruption ends the loop as a
+ * failure does. */
 typedef int (*trip_work)(void *user, unsigned thread, uint64_t item);
 
-/* Processors that the process may run on. */
+/* Number of processors that the process may run on. */
 unsigned trip_workers_processors(void);
 
 /* threads 0: one for every processor. */
@@ -22,10 +24,10 @@ void trip_workers_destroy(trip_workers *w);
 unsigned trip_workers_count(const trip_workers *w);
 
 void trip_workers_start(trip_workers *w, trip_work work, void *user, uint64_t items);
-/* True when the loop that was started is over, false after timeout_ms (0: no limit). *status is
- * then the first failure, or 0. */
+/* Waits for the loop: true when it has ended, *status being the first failure or 0; false when
+ * timeout_ms (0: no limit) have gone by. */
 bool trip_workers_wait(trip_workers *w, unsigned timeout_ms, int *status);
-/* Start and wait. */
+/* Starts a loop and waits for its end; returns its status. */
 int trip_workers_run(trip_workers *w, trip_work work, void *user, uint64_t items);
 
 #endif

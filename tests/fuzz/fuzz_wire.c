@@ -40,14 +40,14 @@ static void read_slices(void)
 {
     trip_budget *budget;
     trip_volume *v;
-    trip_volume_block b;
+    trip_volume_portion b;
     FUZZ_PROMISE(trip_budget_create(&budget, MEMORY_BYTES) == 0);
     if (trip_volume_open(&v, "/", NULL, budget) == 0) {
         const trip_volume_info *info = trip_volume_get_info(v);
         FUZZ_PROMISE(info->dims[0] >= 1 && info->dims[1] >= 1 && info->dims[2] >= 1);
         FUZZ_PROMISE(info->type >= 0 && info->type < TRIP_SCALARS);
         for (int i = 0; i < 4 && trip_volume_next(v, 1, &b) == 1; i++)
-            trip_block_release(v, &b);
+            trip_portion_release(v, &b);
         trip_volume_close(v);
     }
     FUZZ_PROMISE(trip_budget_left_bytes(budget) == MEMORY_BYTES);

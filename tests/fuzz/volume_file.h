@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <unistd.h>
 
-/* A corner of the block with its neighbours. */
-static void fuzz_decode(const trip_volume *v, const trip_volume_block *b)
+/* A corner of the portion with its neighbours. */
+static void fuzz_decode(const trip_volume *v, const trip_volume_portion *b)
 {
     float values[6 * 6 * 6];
     uint8_t active[6 * 6 * 6];
@@ -19,21 +19,21 @@ static void fuzz_decode(const trip_volume *v, const trip_volume_block *b)
         lo[a] = b->origin[a] - 1;
         size[a] = (b->size[a] < 4 ? b->size[a] : 4) + 2;
     }
-    (void)trip_block_decode(v, b, lo, size, values, active);
+    (void)trip_portion_decode(v, b, lo, size, values, active);
 }
 
 static void fuzz_read_through(trip_volume *v)
 {
     enum { MOST_BLOCKS = 64 };
     const trip_volume_info *info = trip_volume_get_info(v);
-    trip_volume_block b;
+    trip_volume_portion b;
     for (int i = 0; i < MOST_BLOCKS && trip_volume_next(v, 1, &b) == 1; i++) {
         for (int a = 0; a < 3; a++) {
             FUZZ_PROMISE(info->dims[a] >= 1 && b.size[a] >= 1);
             FUZZ_PROMISE(b.origin[a] >= 0 && b.origin[a] <= info->dims[a] - b.size[a]);
         }
         fuzz_decode(v, &b);
-        trip_block_release(v, &b);
+        trip_portion_release(v, &b);
     }
 }
 

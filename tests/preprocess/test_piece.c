@@ -2,6 +2,7 @@
 
 #include "format.h"
 #include "piece.h"
+#include "run_builder.h"
 
 /* A piece with its memory. */
 typedef struct sample {
@@ -75,10 +76,10 @@ static void check_records(const trip_piece_format *f, const uint64_t *bitmap, ui
 static void check_format(const trip_piece_format *f, trip_budget *budget)
 {
     static sample pieces[3];
-    trip_tile *tile;
+    trip_run_builder *builder;
     const trip_quantiser q = { .lo = 0, .hi = 65535, .gradient_scale = 1 };
     uint64_t random = f->tile_log2;
-    assert_int_equal(trip_tile_create(&tile, f, budget), 0);
+    assert_int_equal(trip_run_builder_create(&builder, f, budget), 0);
     for (unsigned share = 0; share <= 16; share++) {
         uint64_t all[TRIP_TILE_MAX_WORDS] = { 0 }, bitmaps[3][TRIP_TILE_MAX_WORDS] = { 0 };
         const uint32_t *voxels, *normals;
@@ -93,11 +94,11 @@ static void check_format(const trip_piece_format *f, trip_budget *budget)
                 all[w] |= bitmaps[i][w];
         }
         for (int i = 0; i < 3; i++)
-            trip_tile_add(tile, &pieces[(i + (int)share) % 3].piece);
-        uint32_t splats = trip_tile_take(tile, &q, &voxels, &normals);
+            trip_run_builder_add(builder, &pieces[(i + (int)share) % 3].piece);
+        uint32_t splats = trip_run_builder_take(builder, &q, &voxels, &normals);
         check_records(f, all, splats, voxels, normals);
     }
-    trip_tile_destroy(tile);
+    trip_run_builder_destroy(builder);
 }
 
 static void pieces_of_a_tile_come_out_as_one_run(void **state)
@@ -123,8 +124,8 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
     for (unsigned log2 = 4; log2 <= 7; log2++) {
         const trip_piece_format f = { log2, true, true, false };
         uint64_t bitmap[TRIP_TILE_MAX_WORDS] = { 0 };
-        trip_tile *tile;
-        assert_int_equal(trip_tile_create(&tile, &f, budget), 0);
+        trip_run_builder *builder;
+        assert_int_equal(trip_run_builder_create(&builder, &f, budget), 0);
         for (int round = 0; round < 2000; round++) {
             const uint32_t *voxels, *normals;
             for (int i = 0; i < 4; i++)
@@ -138,10 +139,10 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
                 (unsigned char)(1 + test_random(&random) % 255);
             if (!trip_piece_check(&bad.piece, &f, length))
                 continue;
-            trip_tile_add(tile, &bad.piece);
-            assert_true(trip_tile_take(tile, &q, &voxels, &normals) <= 1u << 2 * log2);
+            trip_run_builder_add(builder, &bad.piece);
+            assert_true(trip_run_builder_take(builder, &q, &voxels, &normals) <= 1u << 2 * log2);
         }
-        trip_tile_destroy(tile);
+        trip_run_builder_destroy(builder);
     }
     trip_budget_destroy(budget);
 }

@@ -428,16 +428,16 @@ static void a_stack_can_be_read_again(void **state)
     (void)state;
     trip_budget *budget;
     trip_volume *v;
-    trip_volume_block block;
+    trip_volume_portion portion;
     float values[2][VOXELS];
     write_tiff("pages.tif", TRIP_U8, 0, NZ);
     assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
     assert_int_equal(trip_volume_open(&v, path_of("pages.tif"), NULL, budget), 0);
     for (int turn = 0; turn < 2; turn++) {
-        assert_int_equal(trip_volume_next(v, NZ, &block), 1);
-        assert_int_equal(trip_block_decode(v, &block, block.origin, block.size, values[turn], NULL),
-                         0);
-        trip_block_release(v, &block);
+        assert_int_equal(trip_volume_next(v, NZ, &portion), 1);
+        assert_int_equal(
+            trip_portion_decode(v, &portion, portion.origin, portion.size, values[turn], NULL), 0);
+        trip_portion_release(v, &portion);
         assert_int_equal(trip_volume_rewind(v), 0);
     }
     assert_memory_equal(values[0], values[1], sizeof values[0]);

@@ -99,13 +99,13 @@ struct Volume {
             trip_read_vdb.close(state);
         trip_budget_destroy(budget);
     }
-    std::vector<trip_volume_block> blocks() const
+    std::vector<trip_volume_portion> portions() const
     {
-        std::vector<trip_volume_block> all;
-        trip_volume_block block;
+        std::vector<trip_volume_portion> all;
+        trip_volume_portion portion;
         trip_read_vdb.rewind(state);
-        while (trip_read_vdb.next(state, &block) == 1)
-            all.push_back(block);
+        while (trip_read_vdb.next(state, &portion) == 1)
+            all.push_back(portion);
         return all;
     }
     trip_budget *budget = nullptr;
@@ -114,17 +114,17 @@ struct Volume {
     int status;
 };
 
-/* A block with one voxel around it. */
+/* A portion with one voxel around it. */
 struct Decoded {
-    Decoded(const Volume &v, const trip_volume_block &block)
+    Decoded(const Volume &v, const trip_volume_portion &portion)
     {
         for (int a = 0; a < 3; a++) {
-            lo[a] = block.origin[a] - 1;
-            size[a] = block.size[a] + 2;
+            lo[a] = portion.origin[a] - 1;
+            size[a] = portion.size[a] + 2;
         }
         values.resize((size_t)(size[0] * size[1] * size[2]));
         active.resize(values.size());
-        status = trip_read_vdb.decode(v.state, &block, lo, size, values.data(), active.data());
+        status = trip_read_vdb.decode(v.state, &portion, lo, size, values.data(), active.data());
     }
     int64_t lo[3], size[3];
     std::vector<float> values;
@@ -134,17 +134,17 @@ struct Decoded {
 
 using Expected = std::function<void(const Coord &at, float &value, bool &active)>;
 
-/* Every voxel of every block and of its border is as expected at its coordinates, which are those
+/* Every voxel of every portion and of its border is as expected at its coordinates, which are those
  * of the volume's first voxel plus `first`. Returns how many voxels exist; none may be in two
- * blocks, and blocks come in order. */
+ * portions, and portions come in order. */
 size_t check_voxels(const Volume &v, const Coord &first, const Expected &expected)
 {
     size_t existing = 0;
     Coord before = Coord::min();
-    for (const trip_volume_block &block : v.blocks()) {
-        Decoded d(v, block);
+    for (const trip_volume_portion &portion : v.portions()) {
+        Decoded d(v, portion);
         assert_int_equal(d.status, 0);
-        Coord order((int)block.origin[2], (int)block.origin[1], (int)block.origin[0]);
+        Coord order((int)portion.origin[2], (int)portion.origin[1], (int)portion.origin[0]);
         assert_true(before < order);
         before = order;
         for (size_t n = 0; n < d.values.size(); n++) {
@@ -283,7 +283,7 @@ void every_compression_is_read(void **)
     }
 }
 
-/* Tiles of 8, 128 and 4096 voxels a side: counted and looked at in a few blocks, not all of the
+/* Tiles of 8, 128 and 4096 voxels a side: counted and looked at in a few portions, not all of the
  * 4096-voxel one. */
 void active_tiles_of_any_level_become_boxes(void **)
 {
@@ -296,16 +296,16 @@ void active_tiles_of_any_level_become_boxes(void **)
     Volume v(file);
     assert_int_equal(v.status, 0);
     assert_int_equal(v.info.dims[0], 8 + 8192);
-    std::vector<trip_volume_block> blocks = v.blocks();
+    std::vector<trip_volume_portion> portions = v.portions();
     uint64_t voxels = 0;
-    for (const trip_volume_block &b : blocks) {
+    for (const trip_volume_portion &b : portions) {
         assert_true(b.size[0] <= 64 && b.size[1] <= 64 && b.size[2] <= 64);
         voxels += (uint64_t)(b.size[0] * b.size[1] * b.size[2]);
     }
     assert_true(voxels == 512 + (uint64_t)128 * 128 * 128 + (uint64_t)4096 * 4096 * 4096);
-    for (size_t n = 0; n < blocks.size(); n += 20000) {
-        Decoded d(v, blocks[n]);
-        float expected = blocks[n].origin[0] < 8 ? 1 : blocks[n].origin[0] < 4104 ? 2 : 3;
+    for (size_t n = 0; n < portions.size(); n += 20000) {
+        Decoded d(v, portions[n]);
+        float expected = portions[n].origin[0] < 8 ? 1 : portions[n].origin[0] < 4104 ? 2 : 3;
         size_t inside = (size_t)((d.size[1] + 1) * d.size[0] + 1);
         assert_true(d.values[inside] == expected && d.active[inside] == 1);
     }
@@ -347,7 +347,7 @@ openvdb::FloatGrid::Ptr one_voxel(const char *name, float value)
 
 float only_value(const Volume &v)
 {
-    Decoded d(v, v.blocks().at(0));
+    Decoded d(v, v.portions().at(0));
     return *std::max_element(d.values.begin(), d.values.end());
 }
 
@@ -464,10 +464,10 @@ void a_level_set_is_filled_by_default_and_says_so(void **)
     params.level_set = TRIP_LEVEL_SET_FILLED;
     Volume filled(file, params);
     assert_int_equal(by_default.status, 0);
-    std::vector<trip_volume_block> blocks = by_default.blocks(), same = filled.blocks();
-    assert_int_equal(blocks.size(), same.size());
-    for (size_t i = 0; i < blocks.size(); i++)
-        assert_true(Decoded(by_default, blocks[i]).values == Decoded(filled, same[i]).values);
+    std::vector<trip_volume_portion> portions = by_default.portions(), same = filled.portions();
+    assert_int_equal(portions.size(), same.size());
+    for (size_t i = 0; i < portions.size(); i++)
+        assert_true(Decoded(by_default, portions[i]).values == Decoded(filled, same[i]).values);
     assert_non_null(std::strstr(by_default.info.note, "--level-set band"));
     assert_string_equal(filled.info.note, "");
 }
@@ -490,11 +490,11 @@ void a_filled_level_set_is_a_ball(void **)
         value = (float)std::min(1.0, std::max(0.0, 0.5 - d));
         active = value > 0;
     });
-    for (const trip_volume_block &block : v.blocks()) {
-        std::vector<float> values((size_t)(block.size[0] * block.size[1] * block.size[2]));
-        assert_int_equal(
-            trip_read_vdb.decode(v.state, &block, block.origin, block.size, values.data(), nullptr),
-            0);
+    for (const trip_volume_portion &portion : v.portions()) {
+        std::vector<float> values((size_t)(portion.size[0] * portion.size[1] * portion.size[2]));
+        assert_int_equal(trip_read_vdb.decode(v.state, &portion, portion.origin, portion.size,
+                                              values.data(), nullptr),
+                         0);
         for (float value : values)
             sum += value;
     }
@@ -566,15 +566,15 @@ void many_threads_decode_at_once(void **)
     File file({ grid });
     Volume v(file);
     assert_int_equal(v.status, 0);
-    std::vector<trip_volume_block> blocks = v.blocks();
-    std::vector<std::vector<float>> serial, parallel(blocks.size());
-    for (const trip_volume_block &block : blocks)
-        serial.push_back(Decoded(v, block).values);
+    std::vector<trip_volume_portion> portions = v.portions();
+    std::vector<std::vector<float>> serial, parallel(portions.size());
+    for (const trip_volume_portion &portion : portions)
+        serial.push_back(Decoded(v, portion).values);
     std::vector<std::thread> threads;
     for (size_t t = 0; t < 4; t++)
         threads.emplace_back([&, t] {
-            for (size_t n = t; n < blocks.size(); n += 4)
-                parallel[n] = Decoded(v, blocks[n]).values;
+            for (size_t n = t; n < portions.size(); n += 4)
+                parallel[n] = Decoded(v, portions[n]).values;
         });
     for (std::thread &thread : threads)
         thread.join();
@@ -588,9 +588,9 @@ void read_whatever_it_is(const File &file)
     Volume v(file);
     int failures = v.status < 0;
     if (v.status == 0) {
-        std::vector<trip_volume_block> blocks = v.blocks();
-        for (size_t n = 0; n < blocks.size() && n < 100; n++)
-            failures += Decoded(v, blocks[n]).status < 0;
+        std::vector<trip_volume_portion> portions = v.portions();
+        for (size_t n = 0; n < portions.size() && n < 100; n++)
+            failures += Decoded(v, portions[n]).status < 0;
     }
     trip_report_redirect(nullptr, nullptr);
     assert_int_equal(lines, failures);

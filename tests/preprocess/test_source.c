@@ -131,7 +131,7 @@ static void a_change_shows_in_the_state_even_when_size_and_time_are_set_back(voi
     trip_digest old, new;
     write_file("v.nii", "old");
     assert_int_equal(trip_source_find(&before, "v.nii", &defaults), 0);
-    assert_false(trip_source_is_settled(&before));
+    assert_false(trip_source_is_stable(&before));
     nanosleep(&(struct timespec){ .tv_nsec = 50000000 }, NULL);
     write_file("v.nii", "new");
     const struct timespec times[2] = {
@@ -149,7 +149,7 @@ static void a_change_shows_in_the_state_even_when_size_and_time_are_set_back(voi
     assert_int_equal(trip_source_digest_state(&after, "", &old), 0);
     assert_string_equal(old.text, new.text);
     after.files[0].changed_ns -= INT64_C(3000000000);
-    assert_true(trip_source_is_settled(&after));
+    assert_true(trip_source_is_stable(&after));
     trip_source_free(&before);
     trip_source_free(&after);
 }

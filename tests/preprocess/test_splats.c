@@ -2,7 +2,9 @@
 
 #include <math.h>
 
+#include "gradient.h"
 #include "normal.h"
+#include "run_builder.h"
 #include "splats.h"
 
 /* A volume of floats as a raw file, opened, with a splatter whose pieces are put together again
@@ -97,7 +99,7 @@ static void close_bench(bench *b)
  * normals. */
 static void gather(bench *b, unsigned list, uint32_t *voxels, uint32_t *normals)
 {
-    trip_tile *tile;
+    trip_run_builder *builder;
     const int axis = trip_list_axis(list);
     const trip_piece_format format = trip_piece_format_of(&b->format, list);
     trip_quantiser q = b->quantiser;
@@ -105,15 +107,15 @@ static void gather(bench *b, unsigned list, uint32_t *voxels, uint32_t *normals)
     size_t count = (size_t)(b->dims[0] * b->dims[1] * b->dims[2]);
     memset(voxels, 0xff, count * sizeof *voxels);
     memset(normals, 0xff, count * sizeof *normals);
-    assert_int_equal(trip_tile_create(&tile, &format, b->budget), 0);
+    assert_int_equal(trip_run_builder_create(&builder, &format, b->budget), 0);
     for (size_t at = 0; at < b->used[list];) {
         const trip_piece *piece = (const void *)(b->memory[list] + at);
         const uint32_t *v, *n;
         size_t bytes = trip_piece_get_parts(&format, piece).bytes;
         assert_true(trip_piece_check(piece, &format, bytes));
         at += bytes;
-        trip_tile_add(tile, piece);
-        uint32_t splats = trip_tile_take(tile, &q, &v, &n);
+        trip_run_builder_add(builder, piece);
+        uint32_t splats = trip_run_builder_take(builder, &q, &v, &n);
         uint64_t morton = piece->key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
         int64_t tile_u = 0, tile_v = 0, p[3];
         while (trip_morton((uint32_t)tile_u, 0) != (morton & UINT64_C(0x5555555555555555)))
@@ -130,7 +132,7 @@ static void gather(bench *b, unsigned list, uint32_t *voxels, uint32_t *normals)
             normals[to] = n ? n[i] : UINT32_MAX;
         }
     }
-    trip_tile_destroy(tile);
+    trip_run_builder_destroy(builder);
 }
 
 static void every_kept_voxel_is_once_in_every_list(void **state)

@@ -31,26 +31,26 @@ static int end_budget(void **state)
     return all_returned ? 0 : -1;
 }
 
-static void blocks_are_slabs_that_cover_the_volume_once(void **state)
+static void portions_are_slabs_that_cover_the_volume_once(void **state)
 {
     (void)state;
     for (int64_t hint = 0; hint <= NZ + 3; hint++) {
         trip_volume *v = open_sample(TRIP_U16, NULL);
-        trip_volume_block block;
+        trip_volume_portion portion;
         int64_t next = 0;
-        while (trip_volume_next(v, hint, &block) == 1) {
-            assert_int_equal(block.origin[0], 0);
-            assert_int_equal(block.origin[1], 0);
-            assert_int_equal(block.origin[2], next);
-            assert_int_equal(block.size[0], NX);
-            assert_int_equal(block.size[1], NY);
+        while (trip_volume_next(v, hint, &portion) == 1) {
+            assert_int_equal(portion.origin[0], 0);
+            assert_int_equal(portion.origin[1], 0);
+            assert_int_equal(portion.origin[2], next);
+            assert_int_equal(portion.size[0], NX);
+            assert_int_equal(portion.size[1], NY);
             int64_t left = NZ - next;
-            assert_int_equal(block.size[2], hint == 0 || hint > left ? left : hint);
-            next += block.size[2];
-            trip_block_release(v, &block);
+            assert_int_equal(portion.size[2], hint == 0 || hint > left ? left : hint);
+            next += portion.size[2];
+            trip_portion_release(v, &portion);
         }
         assert_int_equal(next, NZ);
-        assert_int_equal(trip_volume_next(v, hint, &block), 0);
+        assert_int_equal(trip_volume_next(v, hint, &portion), 0);
         trip_volume_close(v);
     }
 }
@@ -60,13 +60,13 @@ static int clamp(int v, int n)
     return v < 0 ? 0 : v >= n ? n - 1 : v;
 }
 
-/* The box [lo, hi) of a block against the sample's formula, edges repeated. */
-static void assert_box(const trip_volume *v, const trip_volume_block *block, const int64_t lo[3],
-                       const int64_t size[3])
+/* The box [lo, hi) of a portion against the sample's formula, edges repeated. */
+static void assert_box(const trip_volume *v, const trip_volume_portion *portion,
+                       const int64_t lo[3], const int64_t size[3])
 {
     float values[(NX + 2) * (NY + 2) * (NZ + 2)], *value = values;
     uint8_t active[(NX + 2) * (NY + 2) * (NZ + 2)], *mark = active;
-    assert_int_equal(trip_block_decode(v, block, lo, size, values, active), 0);
+    assert_int_equal(trip_portion_decode(v, portion, lo, size, values, active), 0);
     for (int k = (int)lo[2]; k < lo[2] + size[2]; k++)
         for (int j = (int)lo[1]; j < lo[1] + size[1]; j++)
             for (int i = (int)lo[0]; i < lo[0] + size[0]; i++) {
@@ -81,18 +81,18 @@ static void every_box_decodes_with_repeated_edges(void **state)
     (void)state;
     for (int64_t hint = 1; hint <= NZ; hint += 2) {
         trip_volume *v = open_sample(TRIP_I16, NULL);
-        trip_volume_block block;
-        while (trip_volume_next(v, hint, &block) == 1) {
-            int64_t first = block.origin[2] - 1, depth = block.size[2] + 2;
+        trip_volume_portion portion;
+        while (trip_volume_next(v, hint, &portion) == 1) {
+            int64_t first = portion.origin[2] - 1, depth = portion.size[2] + 2;
             for (int64_t i = -1; i <= NX; i++)
                 for (int64_t w = 1; i + w <= NX + 1; w++)
                     for (int64_t j = -1; j <= NY; j += 2) {
-                        assert_box(v, &block, (int64_t[3]){ i, -1, first },
+                        assert_box(v, &portion, (int64_t[3]){ i, -1, first },
                                    (int64_t[3]){ w, NY + 2, depth });
-                        assert_box(v, &block, (int64_t[3]){ i, j, first + depth - 1 },
+                        assert_box(v, &portion, (int64_t[3]){ i, j, first + depth - 1 },
                                    (int64_t[3]){ w, 1, 1 });
                     }
-            trip_block_release(v, &block);
+            trip_portion_release(v, &portion);
         }
         trip_volume_close(v);
     }
@@ -102,83 +102,84 @@ static void a_volume_of_one_voxel_repeats_it_on_all_sides(void **state)
 {
     (void)state;
     trip_volume *v;
-    trip_volume_block block;
+    trip_volume_portion portion;
     float values[27];
     uint8_t active[27];
     const trip_volume_params p = { .raw_dims = { 1, 1, 1 } };
     assert_int_equal(trip_volume_open(&v, write_bytes("one.raw", "*", 1), &p, budget), 0);
-    assert_int_equal(trip_volume_next(v, 4, &block), 1);
+    assert_int_equal(trip_volume_next(v, 4, &portion), 1);
     const int64_t lo[3] = { -1, -1, -1 }, size[3] = { 3, 3, 3 };
-    assert_int_equal(trip_block_decode(v, &block, lo, size, values, active), 0);
+    assert_int_equal(trip_portion_decode(v, &portion, lo, size, values, active), 0);
     for (int i = 0; i < 27; i++) {
         assert_true(values[i] == '*');
         assert_int_equal(active[i], i == 13);
     }
-    trip_block_release(v, &block);
+    trip_portion_release(v, &portion);
     trip_volume_close(v);
 }
 
-static void a_box_outside_the_block_is_refused(void **state)
+static void a_box_outside_the_portion_is_refused(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_U8, NULL);
-    trip_volume_block block;
+    trip_volume_portion portion;
     float values[VOXELS];
-    assert_int_equal(trip_volume_next(v, 2, &block), 1);
+    assert_int_equal(trip_volume_next(v, 2, &portion), 1);
     catch_reports();
-    assert_int_equal(trip_block_decode(v, &block, (int64_t[3]){ 0, 0, 2 }, (int64_t[3]){ 1, 1, 2 },
-                                       values, NULL),
+    assert_int_equal(trip_portion_decode(v, &portion, (int64_t[3]){ 0, 0, 2 },
+                                         (int64_t[3]){ 1, 1, 2 }, values, NULL),
                      TRIP_ERROR);
-    assert_int_equal(trip_block_decode(v, &block, (int64_t[3]){ -2, 0, 0 }, (int64_t[3]){ 1, 1, 1 },
-                                       values, NULL),
+    assert_int_equal(trip_portion_decode(v, &portion, (int64_t[3]){ -2, 0, 0 },
+                                         (int64_t[3]){ 1, 1, 1 }, values, NULL),
                      TRIP_ERROR);
     trip_report_redirect(NULL, NULL);
-    trip_block_release(v, &block);
+    trip_portion_release(v, &portion);
     trip_volume_close(v);
 }
 
-static void blocks_live_until_they_are_released(void **state)
+static void portions_live_until_they_are_released(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_I16, NULL);
-    trip_volume_block blocks[NZ];
+    trip_volume_portion portions[NZ];
     for (int k = 0; k < NZ; k++)
-        assert_int_equal(trip_volume_next(v, 1, &blocks[k]), 1);
+        assert_int_equal(trip_volume_next(v, 1, &portions[k]), 1);
     for (int k = 0; k < NZ; k++) {
-        assert_box(v, &blocks[k], (int64_t[3]){ -1, -1, k - 1 }, (int64_t[3]){ NX + 2, NY + 2, 3 });
-        trip_block_release(v, &blocks[k]);
-        assert_null(blocks[k].data);
-        trip_block_release(v, &blocks[k]);
+        assert_box(v, &portions[k], (int64_t[3]){ -1, -1, k - 1 },
+                   (int64_t[3]){ NX + 2, NY + 2, 3 });
+        trip_portion_release(v, &portions[k]);
+        assert_null(portions[k].data);
+        trip_portion_release(v, &portions[k]);
     }
     trip_volume_close(v);
 }
 
 static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
 
-/* Takes blocks in turn with the other threads, then decodes and releases without a lock. */
-static void *decode_blocks(void *volume)
+/* Takes portions in turn with the other threads, then decodes and releases without a lock. */
+static void *decode_portions(void *volume)
 {
     trip_volume *v = volume;
-    trip_volume_block block;
+    trip_volume_portion portion;
     bool *right = malloc(sizeof *right);
     *right = true;
     for (;;) {
         float values[NX * NY];
         pthread_mutex_lock(&reading);
-        int status = trip_volume_next(v, 1, &block);
+        int status = trip_volume_next(v, 1, &portion);
         pthread_mutex_unlock(&reading);
         if (status <= 0)
             break;
-        status = trip_block_decode(v, &block, block.origin, block.size, values, NULL);
+        status = trip_portion_decode(v, &portion, portion.origin, portion.size, values, NULL);
         for (int i = 0; i < NX * NY; i++)
             *right = *right && status == 0 &&
-                     values[i] == (float)sample(TRIP_I16, i % NX, i / NX, (int)block.origin[2]);
-        trip_block_release(v, &block);
+                     values[i] == (float)sample(TRIP_I16, i % NX, i / NX, (int)portion.origin[2]);
+        trip_portion_release(v, &portion);
     }
     return right;
 }
 
-static void blocks_may_be_decoded_and_released_by_other_threads(void **state)
+static void portions_may_be_decoded_and_released_by_other_threads(void **state)
 {
     (void)state;
     enum { THREADS = 4 };
@@ -186,7 +187,7 @@ static void blocks_may_be_decoded_and_released_by_other_threads(void **state)
     for (int round = 0; round < 50; round++) {
         pthread_t threads[THREADS];
         for (int t = 0; t < THREADS; t++)
-            assert_int_equal(pthread_create(&threads[t], NULL, decode_blocks, v), 0);
+            assert_int_equal(pthread_create(&threads[t], NULL, decode_portions, v), 0);
         for (int t = 0; t < THREADS; t++) {
             void *right;
             assert_int_equal(pthread_join(threads[t], &right), 0);
@@ -203,12 +204,12 @@ static void rewinding_starts_again_even_in_mid_volume(void **state)
     (void)state;
     trip_volume *v = open_sample(TRIP_I16, NULL);
     for (int stop = 0; stop <= NZ; stop++) {
-        trip_volume_block block;
+        trip_volume_portion portion;
         for (int k = 0; k < stop; k++) {
-            assert_int_equal(trip_volume_next(v, 1, &block), 1);
-            assert_int_equal(block.origin[2], k);
-            assert_box(v, &block, (int64_t[3]){ 0, 0, k }, (int64_t[3]){ NX, NY, 1 });
-            trip_block_release(v, &block);
+            assert_int_equal(trip_volume_next(v, 1, &portion), 1);
+            assert_int_equal(portion.origin[2], k);
+            assert_box(v, &portion, (int64_t[3]){ 0, 0, k }, (int64_t[3]){ NX, NY, 1 });
+            trip_portion_release(v, &portion);
         }
         assert_int_equal(trip_volume_rewind(v), 0);
     }
@@ -219,7 +220,7 @@ static void slabs_come_out_of_the_budget_and_can_be_refused(void **state)
 {
     (void)state;
     trip_volume *v;
-    trip_volume_block block;
+    trip_volume_portion portion;
     const trip_volume_params p = { .raw_dims = { 1024, 1024, 4 } };
     const char *path = path_of("sparse.raw");
     FILE *f = fopen(path, "wb");
@@ -228,7 +229,7 @@ static void slabs_come_out_of_the_budget_and_can_be_refused(void **state)
     assert_int_equal(truncate(path, 4 << 20), 0);
     assert_int_equal(trip_volume_open(&v, path, &p, budget), 0);
     catch_reports();
-    assert_int_equal(trip_volume_next(v, 1, &block), TRIP_ERROR);
+    assert_int_equal(trip_volume_next(v, 1, &portion), TRIP_ERROR);
     trip_report_redirect(NULL, NULL);
     assert_int_equal(reports, 1);
     assert_non_null(strstr(reported, "--memory"));
@@ -239,13 +240,13 @@ static void a_read_that_fails_in_mid_volume_stays_failed(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_U8, NULL);
-    trip_volume_block block;
-    assert_int_equal(trip_volume_next(v, 2, &block), 1);
-    trip_block_release(v, &block);
+    trip_volume_portion portion;
+    assert_int_equal(trip_volume_next(v, 2, &portion), 1);
+    trip_portion_release(v, &portion);
     assert_int_equal(truncate(path_of("sample.raw"), 4 * NX * NY), 0);
     catch_reports();
-    assert_int_equal(trip_volume_next(v, 2, &block), TRIP_ERROR);
-    assert_int_equal(trip_volume_next(v, 2, &block), TRIP_ERROR);
+    assert_int_equal(trip_volume_next(v, 2, &portion), TRIP_ERROR);
+    assert_int_equal(trip_volume_next(v, 2, &portion), TRIP_ERROR);
     trip_report_redirect(NULL, NULL);
     assert_int_equal(reports, 1);
     trip_volume_close(v);
@@ -312,17 +313,17 @@ static void a_file_without_permission_is_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(blocks_are_slabs_that_cover_the_volume_once, make_budget,
+        cmocka_unit_test_setup_teardown(portions_are_slabs_that_cover_the_volume_once, make_budget,
                                         end_budget),
         cmocka_unit_test_setup_teardown(every_box_decodes_with_repeated_edges, make_budget,
                                         end_budget),
         cmocka_unit_test_setup_teardown(a_volume_of_one_voxel_repeats_it_on_all_sides, make_budget,
                                         end_budget),
-        cmocka_unit_test_setup_teardown(a_box_outside_the_block_is_refused, make_budget,
+        cmocka_unit_test_setup_teardown(a_box_outside_the_portion_is_refused, make_budget,
                                         end_budget),
-        cmocka_unit_test_setup_teardown(blocks_live_until_they_are_released, make_budget,
+        cmocka_unit_test_setup_teardown(portions_live_until_they_are_released, make_budget,
                                         end_budget),
-        cmocka_unit_test_setup_teardown(blocks_may_be_decoded_and_released_by_other_threads,
+        cmocka_unit_test_setup_teardown(portions_may_be_decoded_and_released_by_other_threads,
                                         make_budget, end_budget),
         cmocka_unit_test_setup_teardown(rewinding_starts_again_even_in_mid_volume, make_budget,
                                         end_budget),

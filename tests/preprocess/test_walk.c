@@ -42,8 +42,8 @@ static int see_box(void *user, unsigned thread, const trip_box *box)
     seen *s = user;
     float values[64 * 64 * 16];
     (void)thread;
-    assert_int_equal(trip_block_decode(box->volume, box->block, box->lo, box->size, values, NULL),
-                     0);
+    assert_int_equal(
+        trip_portion_decode(box->volume, box->portion, box->lo, box->size, values, NULL), 0);
     const int64_t step[3] = { s->edge, s->edge, s->height };
     for (int a = 0; a < 3; a++)
         s->wrong = s->wrong || box->lo[a] / step[a] != (box->lo[a] + box->size[a] - 1) / step[a];
@@ -111,7 +111,7 @@ static void every_voxel_is_met_once(void **state)
         }
 }
 
-/* After `skip` slices, each stride-th block of `slices` is looked at. */
+/* After `skip` slices, each stride-th portion of `slices` is looked at. */
 static void check_passing(const char *name)
 {
     static const struct {
@@ -139,14 +139,14 @@ static void check_passing(const char *name)
     }
 }
 
-static void blocks_can_be_passed_over(void **state)
+static void portions_can_be_passed_over(void **state)
 {
     (void)state;
     make_volume(false);
     check_passing("v.raw");
 }
 
-static void compressed_blocks_can_be_passed_over(void **state)
+static void compressed_portions_can_be_skipped(void **state)
 {
     (void)state;
     make_volume(true);
@@ -168,8 +168,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(every_voxel_is_met_once, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(blocks_can_be_passed_over, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(compressed_blocks_can_be_passed_over, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(portions_can_be_passed_over, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(compressed_portions_can_be_skipped, test_begin, test_end),
         cmocka_unit_test_setup_teardown(a_batch_may_end_the_walk, test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,6 @@
 /* What the tests of the readers share: a small volume with known values, its bytes in every type
  * and byte order, compression, files in a folder of the test's own, reading a volume back through
- * the blocks, and catching what is reported. */
+ * the portions, and catching what is reported. */
 #ifndef VOLUME_FILES_H
 #define VOLUME_FILES_H
 
@@ -204,26 +204,27 @@ static inline void catch_reports(void)
     trip_report_redirect(keep_report, NULL);
 }
 
-/* The volume's values through blocks of `slices` slices into values[0..count); the first failure's
- * status. Everything taken from the budget must be given back. */
+/* The volume's values through portions of `slices` slices into values[0..count); the first
+ * failure's status. Everything taken from the budget must be given back. */
 static inline int read_volume(const char *path, const trip_volume_params *params, int64_t slices,
                               float *values, size_t count, trip_volume_info *info)
 {
     trip_budget *budget;
     trip_volume *v;
-    trip_volume_block block;
+    trip_volume_portion portion;
     assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
     int status = trip_volume_open(&v, path, params, budget);
     if (status == 0) {
         if (info)
             *info = *trip_volume_get_info(v);
         float *to = values;
-        while ((status = trip_volume_next(v, slices, &block)) > 0) {
-            size_t n = (size_t)(block.size[0] * block.size[1] * block.size[2]);
+        while ((status = trip_volume_next(v, slices, &portion)) > 0) {
+            size_t n = (size_t)(portion.size[0] * portion.size[1] * portion.size[2]);
             assert_true((size_t)(to - values) + n <= count);
-            assert_int_equal(trip_block_decode(v, &block, block.origin, block.size, to, NULL), 0);
+            assert_int_equal(
+                trip_portion_decode(v, &portion, portion.origin, portion.size, to, NULL), 0);
             to += n;
-            trip_block_release(v, &block);
+            trip_portion_release(v, &portion);
         }
         assert_true(status < 0 || (size_t)(to - values) == count);
         trip_volume_close(v);
@@ -281,15 +282,16 @@ static inline bool survives(const char *path, const trip_volume_params *params)
     static float values[VOXELS * 4];
     trip_budget *budget;
     trip_volume *v;
-    trip_volume_block block;
+    trip_volume_portion portion;
     assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
     catch_reports();
     int status = trip_volume_open(&v, path, params, budget);
     if (status == 0) {
-        while ((status = trip_volume_next(v, 3, &block)) > 0) {
+        while ((status = trip_volume_next(v, 3, &portion)) > 0) {
             int64_t one[3] = { 1, 1, 1 };
-            assert_int_equal(trip_block_decode(v, &block, block.origin, one, values, NULL), 0);
-            trip_block_release(v, &block);
+            assert_int_equal(trip_portion_decode(v, &portion, portion.origin, one, values, NULL),
+                             0);
+            trip_portion_release(v, &portion);
         }
         trip_volume_close(v);
     }

@@ -1,0 +1,32 @@
+/* Gradients of a volume's values by central differences. Pure functions. */
+#ifndef TRIP_GRADIENT_H
+#define TRIP_GRADIENT_H
+
+#include <math.h>
+
+#include "volume.h"
+
+/* The second half of trip_gradient_at(), where a difference is not finite. */
+void trip_gradient_careful(const float *value, const int64_t step[3], double gradient[3]);
+
+/* The gradient in index space, value units per index, at a voxel whose neighbours along axis a are
+ * at value[step[a]] and value[-step[a]]. A neighbour that is not finite counts as the voxel itself.
+ */
+static inline void trip_gradient_at(const float *value, const int64_t step[3], double gradient[3])
+{
+    for (int a = 0; a < 3; a++)
+        gradient[a] = 0.5 * ((double)value[step[a]] - (double)value[-step[a]]);
+    if (!isfinite(gradient[0] + gradient[1] + gradient[2]))
+        trip_gradient_careful(value, step, gradient);
+}
+
+/* A power of two near the length of a voxel. Gradients that are kept as floats until the range of
+ * the values is known are in value units per this length, so that no world unit takes them out of
+ * the range of a float. */
+double trip_gradient_unit(const trip_affine *index_to_world);
+
+/* An upper bound of the magnitude of world-space gradients, in value units per world unit, when all
+ * values are in [lo, hi]; the background is taken into account. */
+double trip_gradient_bound(const trip_volume_info *info, double lo, double hi);
+
+#endif
