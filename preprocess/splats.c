@@ -208,7 +208,18 @@ static void put_normals(const work *k, const splat_row *r)
     }
 }
 
-/* Positions of the ones in `flags`, each counted from `first`; returns their number. */
+/* Bit i is flag i of eight. The product adds up shifted copies of the flags, which meet in no bit;
+ * in its highest byte the flags stand side by side. */
+static unsigned bits_of(uint64_t eight_flags)
+{
+#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
+    eight_flags = __builtin_bswap64(eight_flags);
+#endif
+    return (unsigned)(eight_flags * UINT64_C(0x0102040810204080) >> 56);
+}
+
+/* Positions of the ones in `flags`, each counted from `first`; returns their number. Reads flags in
+ * eights: up to 7 beyond `count`. */
 static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, uint8_t *positions)
 {
     unsigned n = 0;
@@ -217,10 +228,9 @@ static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, u
         memcpy(&eight, flags + i, sizeof eight);
         if (eight == 0)
             continue;
-        for (int64_t k = i; k < i + 8 && k < count; k++) {
-            positions[n] = (uint8_t)(first + k);
-            n += flags[k];
-        }
+        unsigned bits = bits_of(eight) & (count - i < 8 ? (1u << (count - i)) - 1 : 0xff);
+        for (; bits; bits &= bits - 1)
+            positions[n++] = (uint8_t)(first + i + __builtin_ctz(bits));
     }
     return n;
 }
@@ -276,17 +286,31 @@ static void find_kept(const work *k)
         w->kept[i] &= w->active[i];
 }
 
+/* Clears the flags of voxels without a finite value; few voxels have a flag. */
+static void drop_not_finite(const float *values, uint8_t *flags, size_t count)
+{
+    for (size_t i = 0; i < count; i += 8) {
+        uint64_t eight;
+        memcpy(&eight, flags + i, sizeof eight);
+        for (size_t k = i; eight && k < i + 8 && k < count; k++)
+            flags[k] &= (uint8_t)(fabsf(values[k]) <= FLT_MAX);
+    }
+}
+
 /* Marks the voxels of the window that are not kept, have a finite value, and a neighbour that is
  * kept. False when there are none. */
 static bool find_halo(const work *k)
 {
     const workspace *w = k->w;
+    const uint8_t *restrict kept = w->kept;
+    uint8_t *restrict halo = w->halo;
     size_t count = (size_t)(k->step[2] * k->size[2]);
-    if (!memchr(w->kept, 1, count) || !memchr(w->kept, 0, count))
+    if (!memchr(kept, 1, count) || !memchr(kept, 0, count))
         return false;
-    trip_dilate(w->kept, w->halo, w->scratch, k->size);
+    trip_dilate(kept, halo, w->scratch, k->size);
     for (size_t i = 0; i < count; i++)
-        w->halo[i] &= (uint8_t)(!w->kept[i] & (fabsf(w->decoded[i]) <= FLT_MAX));
+        halo[i] &= kept[i] ^ 1;
+    drop_not_finite(w->decoded, halo, count);
     return true;
 }
 
