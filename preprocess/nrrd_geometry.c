@@ -1,0 +1,183 @@
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "nrrd_parser.h"
+
+/* A space that headers name: how the axes of world space lie. */
+typedef struct space {
+    const char *name;       /* without what separates its words */
+    const char *convention; /* as in anatomy.h, when it is right-handed */
+    bool left_handed;
+    bool has_time; /* vectors have a fourth part */
+} space;
+
+static const space spaces[] = {
+    { "rightanteriorsuperior", "RAS", false, false },
+    { "RAS", "RAS", false, false },
+    { "leftposteriorsuperior", "LPS", false, false },
+    { "LPS", "LPS", false, false },
+    { "leftanteriorsuperior", "RAS", true, false },
+    { "LAS", "RAS", true, false },
+    { "scannerxyz", "", false, false },
+    { "3Drighthanded", "", false, false },
+    { "3Dlefthanded", "", true, false },
+};
+
+/* `text` in one of its spellings: words apart or together, in any case, with "time" or "t" after
+ * them. NULL as name where the header has none that is known. */
+static space find_space(const trip_nrrd_parser *p)
+{
+    char name[64] = "";
+    size_t length = 0;
+    const char *text = p->values[TRIP_NRRD_SPACE] ? p->values[TRIP_NRRD_SPACE] : "";
+    for (; *text && length + 1 < sizeof name; text++)
+        if (!strchr("- _", *text))
+            name[length++] = *text;
+    for (size_t i = 0; i < sizeof spaces / sizeof spaces[0] && !*text; i++) {
+        space s = spaces[i];
+        const char *rest = name + strlen(s.name);
+        if (strncasecmp(name, s.name, strlen(s.name)) != 0)
+            continue;
+        s.has_time = strcasecmp(rest, "time") == 0 || strcasecmp(rest, "t") == 0;
+        if (!*rest || s.has_time)
+            return s;
+    }
+    if (p->values[TRIP_NRRD_SPACE])
+        trip_nrrd_warn_unknown(p, p->lines[TRIP_NRRD_SPACE], "space", p->values[TRIP_NRRD_SPACE]);
+    return (space){ 0 };
+}
+
+/* "(x,y,z)", or "(x,y,z,t)" where the space has time, into v. */
+static bool parse_vector(char **text, const space *s, double v[4])
+{
+    char *at = *text + strspn(*text, " \t");
+    v[3] = 0;
+    for (int i = 0; i < (s->has_time ? 4 : 3); i++) {
+        if (*at != "(,,,"[i])
+            return false;
+        char *end, *number = at + 1;
+        v[i] = strtod(number, &end);
+        if (end == number)
+            return false;
+        at = end + strspn(end, " \t");
+    }
+    if (*at != ')')
+        return false;
+    *text = at + 1;
+    return true;
+}
+
+static int parse_directions(const trip_nrrd_parser *p, const space *s, trip_nrrd_header *h)
+{
+    char *text = p->values[TRIP_NRRD_DIRECTIONS];
+    for (int axis = 0; axis < p->axes; axis++) {
+        double v[4];
+        text += strspn(text, " \t");
+        bool none = strncasecmp(text, "none", 4) == 0;
+        if (none)
+            text += 4;
+        else if (!parse_vector(&text, s, v))
+            return trip_nrrd_fail(
+                p, p->lines[TRIP_NRRD_DIRECTIONS],
+                "\"space directions\" must be \"(x,y,z%s)\" or \"none\" for each of "
+                "%d axes",
+                s->has_time ? ",t" : "", p->axes);
+        for (int a = 0; a < 3; a++) {
+            if (axis == p->kept[a] && none)
+                return trip_nrrd_fail(
+                    p, p->lines[TRIP_NRRD_DIRECTIONS],
+                    "axis %d has no direction in space: only scalar volumes can be "
+                    "read",
+                    axis);
+            if (axis == p->kept[a] && v[3] != 0)
+                return trip_nrrd_fail(
+                    p, p->lines[TRIP_NRRD_DIRECTIONS],
+                    "axis %d goes through time: only volumes of one time can be read", axis);
+            for (int row = 0; axis == p->kept[a] && row < 3; row++)
+                h->index_to_world.m[row][a] = v[row];
+        }
+    }
+    return 0;
+}
+
+/* One number for each axis; NaN, which means unknown, where the field is absent. */
+static int parse_numbers(const trip_nrrd_parser *p, trip_nrrd_field f, const char *name,
+                         double v[TRIP_NRRD_AXES_MAX])
+{
+    char *text = p->values[f];
+    for (int axis = 0; axis < p->axes; axis++) {
+        v[axis] = NAN;
+        if (!text)
+            continue;
+        char *end, *word = trip_nrrd_next_word(&text);
+        v[axis] = strtod(word, &end);
+        if (end == word || *end)
+            return trip_nrrd_fail(p, p->lines[f], "\"%s\" must be %d numbers", name, p->axes);
+    }
+    return 0;
+}
+
+/* Whether samples are at the ends of their axis ("node") rather than in the middle of its cells,
+ * which is the default. */
+static void parse_centers(const trip_nrrd_parser *p, bool node[TRIP_NRRD_AXES_MAX])
+{
+    char *text = p->values[TRIP_NRRD_CENTERS];
+    for (int axis = 0; axis < p->axes; axis++)
+        node[axis] = text && strcasecmp(trip_nrrd_next_word(&text), "node") == 0;
+}
+
+/* Spacings, or the extents that stand for them. */
+static int parse_spacings(const trip_nrrd_parser *p, trip_nrrd_header *h)
+{
+    double spacing[TRIP_NRRD_AXES_MAX], min[TRIP_NRRD_AXES_MAX], max[TRIP_NRRD_AXES_MAX];
+    bool node[TRIP_NRRD_AXES_MAX];
+    int status;
+    if ((status = parse_numbers(p, TRIP_NRRD_SPACINGS, "spacings", spacing)) < 0 ||
+        (status = parse_numbers(p, TRIP_NRRD_MINS, "axis mins", min)) < 0 ||
+        (status = parse_numbers(p, TRIP_NRRD_MAXS, "axis maxs", max)) < 0)
+        return status;
+    parse_centers(p, node);
+    for (int a = 0; a < 3; a++) {
+        int axis = p->kept[a];
+        int64_t steps = h->dims[a] - node[axis];
+        double step = spacing[axis];
+        if (isnan(step))
+            step = steps > 0 ? (max[axis] - min[axis]) / (double)steps : 1;
+        if (isnan(step))
+            step = 1;
+        h->index_to_world.m[a][a] = step;
+        h->index_to_world.m[a][3] = isnan(min[axis]) ? 0 : min[axis] + (node[axis] ? 0 : step / 2);
+    }
+    return 0;
+}
+
+/* World space is right-handed: x of a left-handed one is counted the other way. */
+static void set_space(trip_nrrd_header *h, const space *s)
+{
+    snprintf(h->space, sizeof h->space, "%s", s->name ? s->convention : "");
+    for (int column = 0; column < 4 && s->left_handed; column++)
+        h->index_to_world.m[0][column] = 0 - h->index_to_world.m[0][column];
+}
+
+int trip_nrrd_parse_geometry(const trip_nrrd_parser *p, trip_nrrd_header *h)
+{
+    double origin[4];
+    char *text = p->values[TRIP_NRRD_ORIGIN];
+    const space s = find_space(p);
+    h->index_to_world = trip_affine_identity();
+    h->oriented = s.name || p->values[TRIP_NRRD_DIRECTIONS];
+    int status =
+        p->values[TRIP_NRRD_DIRECTIONS] ? parse_directions(p, &s, h) : parse_spacings(p, h);
+    if (status < 0)
+        return status;
+    if (text && (!parse_vector(&text, &s, origin) || *text))
+        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_ORIGIN],
+                              "\"space origin\" must be \"(x,y,z%s)\"", s.has_time ? ",t" : "");
+    for (int row = 0; row < 3 && p->values[TRIP_NRRD_ORIGIN]; row++)
+        h->index_to_world.m[row][3] = origin[row];
+    set_space(h, &s);
+    return 0;
+}
