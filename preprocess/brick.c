@@ -1,42 +1,32 @@
 #include "brick.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
 
+#include "brick_codes.h"
 #include "brick_input.h"
 #include "brick_memory.h"
+#include "brick_temporary.h"
 #include "brick_text.h"
 #include "dataset.h"
 #include "estimate.h"
 #include "folder.h"
-#include "gradient.h"
-#include "identity.h"
 #include "list_builder.h"
 #include "report.h"
-#include "resume.h"
 #include "splats.h"
 
-/* Everything of one run; zeroed at first, so that close() undoes any part of it. */
+/* One run; zeroed at first, so that close_all() undoes any part of it. */
 typedef struct brick {
     const trip_brick_params *params;
     trip_brick_summary *summary;
     trip_brick_input in;
     trip_piece_format format;
-    trip_quantiser quantiser;
-    unsigned code_bytes, normal_bytes;
-    trip_compact_normals compact; /* what 3 bytes mean */
+    trip_brick_codes codes;
     trip_memory_plan plan;
-    trip_spill *spill;
-    trip_leftover leftover;
-    trip_journal *journal;
-    uint64_t identity;
-    char *partial_path; /* of the data set */
-    bool begun;         /* what an interrupted run left is taken over, or was not wanted */
+    trip_brick_temporary temporary;
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
@@ -58,7 +48,7 @@ static uint64_t input_bytes(const brick *b)
 /* Data set and spill so far. */
 static uint64_t bytes_written(const brick *b)
 {
-    return (b->writer ? trip_writer_bytes(b->writer) : 0) + trip_spill_bytes(b->spill);
+    return (b->writer ? trip_writer_bytes(b->writer) : 0) + trip_spill_bytes(b->temporary.spill);
 }
 
 static void end_stage(brick *b, trip_brick_stage stage, double begin)
@@ -72,7 +62,7 @@ static void end_stage(brick *b, trip_brick_stage stage, double begin)
 /* Once it was done, a run that goes on knows the result. */
 static int scan(brick *b)
 {
-    const trip_journal_start *start = trip_journal_get_start(b->journal);
+    const trip_journal_start *start = trip_journal_get_start(b->temporary.journal);
     double begin = now_seconds();
     int status = 0;
     if (start)
@@ -87,54 +77,6 @@ static int scan(brick *b)
     return status;
 }
 
-/* Gradients are as steep as the range of values allows; it may be unknown. */
-static void set_quantiser(brick *b, double lo, double hi)
-{
-    double least = b->in.scanned ? b->in.tally->value_min : lo;
-    double most = b->in.scanned ? b->in.tally->value_max : hi;
-    b->quantiser =
-        (trip_quantiser){ lo, hi > lo ? hi : lo + 1,
-                          trip_gradient_bound(b->in.info, least, most > least ? most : least + 1),
-                          trip_gradient_unit(&b->in.info->index_to_world) };
-}
-
-/* Codes stand for the type's values, or for the range if it is known; else that is for the end. */
-static void choose_codes(brick *b)
-{
-    double lo = 0, hi = 1;
-    bool narrow = trip_brick_has_narrow_type(&b->in);
-    b->format.quantised = narrow || b->in.scanned;
-    if (narrow)
-        trip_brick_type_range(b->in.info, &lo, &hi);
-    else if (b->in.scanned) {
-        lo = b->in.tally->value_min;
-        hi = b->in.tally->value_max;
-    }
-    set_quantiser(b, lo, hi);
-    b->code_bytes = trip_brick_code_bytes(&b->in);
-}
-
-/* Of the codes' range where that of the values is not known: shading is full there, too. */
-static double full_gradient(const brick *b)
-{
-    double range = b->in.scanned ? b->in.tally->value_max - b->in.tally->value_min : 0;
-    double voxel = cbrt(fabs(trip_affine_determinant(&b->in.info->index_to_world)));
-    return TRIP_GRADIENT_FULL * (range > 0 ? range : b->quantiser.hi - b->quantiser.lo) / voxel;
-}
-
-/* After the codes. */
-static void choose_normals(brick *b)
-{
-    const trip_volume_info *info = b->in.info;
-    double step[3], full = full_gradient(b);
-    double unit = info->type < TRIP_F16 ? fabs(info->slope) / 2 : 0;
-    b->normal_bytes = trip_brick_normal_bytes(&b->in);
-    if (b->normal_bytes != 3)
-        return;
-    trip_compact_normals_choose(&info->index_to_world, full, unit, step);
-    b->compact = trip_compact_normals_make(&info->index_to_world, full, step);
-}
-
 static int plan_memory(brick *b)
 {
     return trip_memory_plan_make(&b->plan, b->params->input, b->in.info, &b->format,
@@ -142,109 +84,30 @@ static int plan_memory(brick *b)
                                  b->params->slices);
 }
 
-/* Whether pieces of the Z list were spilled before the run was killed: then what follows cannot be
- * appended before they are merged. */
-static bool has_spilled_order(const brick *b)
-{
-    for (size_t i = 0; i < trip_spill_count(b->spill); i++)
-        if (trip_spill_segment(b->spill, i)->list == TRIP_ORDERED_LIST)
-            return true;
-    return false;
-}
-
-/* When all but the lists is open. A run that goes on with less memory than the killed one had
- * spills the rest of a list that was written in order: all of it comes after what was written. */
+/* To be called when all but the lists is allocated. A resumed run that has less memory than the
+ * interrupted one spills the rest of a list that was written in order: all of it comes after what
+ * was written. But once pieces of that list were spilled, later ones cannot be appended before the
+ * merge. */
 static int update_memory_plan(brick *b)
 {
     int status = trip_memory_plan_update(&b->plan, b->params->input, b->in.info, &b->format,
                                          trip_workers_count(b->in.workers),
                                          trip_budget_left_bytes(b->in.budget));
-    b->plan.in_order = b->plan.in_order && b->format.quantised && !has_spilled_order(b);
+    b->plan.in_order =
+        b->plan.in_order && b->format.quantised && !trip_brick_temporary_has_ordered(&b->temporary);
     return status;
-}
-
-/* The output's name and a suffix, for free(); NULL after a reported failure. */
-static char *name_beside(const brick *b, const char *suffix)
-{
-    char *path;
-    size_t length = strlen(b->params->output);
-    while (length > 1 && b->params->output[length - 1] == '/')
-        length--;
-    if (asprintf(&path, "%.*s%s", (int)length, b->params->output, suffix) >= 0)
-        return path;
-    trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
-    return NULL;
-}
-
-/* Locks the place for temporary files and looks what a killed run left. */
-static int open_spill(brick *b)
-{
-    bool resume = b->params->resume;
-    const int64_t *dims = b->in.info->dims;
-    char *path = name_beside(b, ".spill");
-    b->partial_path = name_beside(b, ".partial");
-    int status = path && b->partial_path ? trip_spill_open(&b->spill, path, resume, b->in.budget)
-                                         : TRIP_ERROR;
-    if (status == 0)
-        status = trip_brick_identity(b->params, b->in.functions, &b->identity);
-    if (status == 0 && resume)
-        status = trip_leftover_take(&b->leftover, b->spill, b->partial_path, &b->format);
-    if (status == 0)
-        status = trip_journal_open(
-            &b->journal, b->spill,
-            &(trip_journal_params){
-                .resume = resume,
-                .identity = b->identity,
-                .scanned = trip_brick_input_needs_scan(&b->in),
-                .voxels = b->in.grid_voxels,
-                .slice_voxels = b->in.info->sparse ? 0 : (uint64_t)(dims[0] * dims[1]),
-                .halo = b->format.halo,
-                .ordered_bytes = { b->leftover.bytes[0], b->leftover.bytes[1] } },
-            b->in.budget);
-    free(path);
-    return status;
-}
-
-/* Notes how this run works, or takes over how far the killed one was. */
-static int start_journal(brick *b)
-{
-    b->summary->resumed = trip_journal_get_checkpoint(b->journal) != NULL;
-    if (trip_journal_get_start(b->journal))
-        return 0;
-    trip_journal_start *start = calloc(1, sizeof *start);
-    if (!start)
-        return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
-    start->identity = b->identity;
-    start->scanned = b->in.scanned;
-    start->tally = *b->in.tally;
-    int status = trip_journal_write_start(b->journal, start);
-    free(start);
-    return status;
-}
-
-/* What the header says of codes and normals. */
-static trip_writer_codes codes_of(const brick *b)
-{
-    trip_writer_codes c = { .code_lo = b->quantiser.lo, .code_hi = b->quantiser.hi };
-    if (b->normal_bytes == 4)
-        c.gradient_scale = b->quantiser.gradient_scale;
-    if (b->normal_bytes == 3) {
-        c.gradient_full = b->compact.full;
-        memcpy(c.gradient_step, b->compact.step, sizeof c.gradient_step);
-    }
-    return c;
 }
 
 static int open_writer(brick *b)
 {
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
-                             .code_bytes = b->code_bytes,
-                             .normal_bytes = b->normal_bytes,
+                             .code_bytes = b->codes.code_bytes,
+                             .normal_bytes = b->codes.normal_bytes,
                              .tile_voxels = b->params->tile_voxels,
                              .slab_sheets = b->params->slab_sheets,
                              .index_to_world = b->in.info->index_to_world,
-                             .codes = codes_of(b) };
+                             .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     return trip_writer_open(&b->writer, b->params->output, &p, b->in.budget);
 }
@@ -253,13 +116,13 @@ static int open_builder(brick *b)
 {
     trip_list_builder_params p = {
         .format = b->format,
-        .quantiser = b->quantiser,
+        .quantiser = b->codes.quantiser,
         .producers = trip_workers_count(b->in.workers),
         .in_order = b->plan.in_order,
         .memory_bytes = b->plan.list_bytes,
         .writer = b->writer,
-        .spill = b->spill,
-        .journal = b->journal,
+        .spill = b->temporary.spill,
+        .journal = b->temporary.journal,
     };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     return trip_list_builder_create(&b->builder, &p, b->in.budget);
@@ -276,21 +139,13 @@ static int open_splatter(brick *b)
     trip_splat_params p = { .info = b->in.info,
                             .envelope = &b->in.envelope,
                             .format = b->format,
-                            .quantiser = b->quantiser,
-                            .compact = b->normal_bytes == 3 ? &b->compact : NULL,
+                            .quantiser = b->codes.quantiser,
+                            .compact = b->codes.normal_bytes == 3 ? &b->codes.compact : NULL,
                             .tally = !b->in.scanned,
                             .threads = trip_workers_count(b->in.workers),
                             .reserve = reserve,
                             .user = b };
     return trip_splatter_create(&b->splatter, &p, b->in.budget);
-}
-
-/* A run that was killed when all was done but for its temporary files. */
-static bool is_done(const brick *b)
-{
-    struct stat st;
-    return b->params->resume && !b->params->replace && trip_journal_get_start(b->journal) &&
-           stat(b->params->output, &st) == 0;
 }
 
 /* The summary of a data set that is there. */
@@ -319,18 +174,21 @@ static int summarise_done(brick *b)
 
 static int open_output(brick *b)
 {
-    const trip_block_form form = { b->format.tile_log2, b->code_bytes, b->normal_bytes };
+    const trip_block_form form = { b->format.tile_log2, b->codes.code_bytes,
+                                   b->codes.normal_bytes };
     int status = open_writer(b);
     if (status == 0)
         status = open_splatter(b);
     if (status == 0)
         status = update_memory_plan(b);
     if (status == 0)
-        status = start_journal(b);
+        status = trip_brick_temporary_begin(&b->temporary, &b->in);
+    b->summary->resumed = trip_journal_get_checkpoint(b->temporary.journal) != NULL;
     if (status == 0)
         status = open_builder(b);
     if (status == 0 && b->summary->resumed)
-        status = trip_leftover_replay(&b->leftover, b->journal, b->builder, &form, b->in.budget);
+        status = trip_leftover_replay(&b->temporary.leftover, b->temporary.journal, b->builder,
+                                      &form, b->in.budget);
     return status;
 }
 
@@ -343,7 +201,7 @@ static int on_box(void *user, unsigned thread, const trip_box *box)
 /* Adds what the boxes so far gave to what a killed run had seen before. */
 static void add_up(const brick *b, trip_tally *tally, uint64_t *kept, uint64_t *halo)
 {
-    const trip_checkpoint *before = trip_journal_get_checkpoint(b->journal);
+    const trip_checkpoint *before = trip_journal_get_checkpoint(b->temporary.journal);
     *kept = trip_splatter_kept(b->splatter) + (before ? before->kept : 0);
     *halo = trip_splatter_halo(b->splatter) + (before ? before->halo : 0);
     if (b->in.scanned)
@@ -395,7 +253,7 @@ static int check_tally(brick *b)
 
 static int read_volume(brick *b)
 {
-    const trip_checkpoint *before = trip_journal_get_checkpoint(b->journal);
+    const trip_checkpoint *before = trip_journal_get_checkpoint(b->temporary.journal);
     trip_walk_params walk = { .slices = b->plan.slices,
                               .read_ahead = b->plan.read_ahead,
                               .edge = trip_splat_edge(&b->format),
@@ -425,12 +283,13 @@ static int merge_lists(brick *b)
     double begin = now_seconds();
     int status = 0;
     if (!b->format.quantised) {
-        set_quantiser(b, b->in.tally->value_min, b->in.tally->value_max);
-        const trip_writer_codes codes = codes_of(b);
+        trip_brick_codes_set_range(&b->codes, &b->in, b->in.tally->value_min,
+                                   b->in.tally->value_max);
+        const trip_writer_codes codes = trip_brick_codes_header(&b->codes);
         status = trip_writer_set_codes(b->writer, &codes);
     }
     if (status == 0)
-        status = trip_list_builder_finish(b->builder, &b->quantiser, b->in.workers,
+        status = trip_list_builder_finish(b->builder, &b->codes.quantiser, b->in.workers,
                                           on_merge_progress, b);
     end_stage(b, TRIP_BRICK_MERGE, begin);
     return status;
@@ -457,8 +316,8 @@ static int check_records(brick *b)
     if (b->in.info->sparse ? halo > s->halo : halo != s->halo)
         return fail_count(b, "voxels around them", s->halo, halo);
     s->halo = halo;
-    s->code_bytes = b->code_bytes;
-    s->normal_bytes = b->normal_bytes;
+    s->code_bytes = b->codes.code_bytes;
+    s->normal_bytes = b->codes.normal_bytes;
     s->bytes = trip_writer_bytes(b->writer);
     for (unsigned list = TRIP_HALO_LISTS; list < trip_piece_list_count(&b->format); list++)
         s->halo_bytes += trip_writer_plane_bytes(b->writer, list, TRIP_PLANE_VOXELS);
@@ -501,7 +360,7 @@ static void fill_summary(brick *b)
     s->value_max = b->in.tally->value_max;
     s->kind = trip_brick_kind(b->in.info, &b->in.histogram);
     s->input_bytes = input_bytes(b);
-    s->temporary_bytes = trip_spill_bytes(b->spill);
+    s->temporary_bytes = trip_spill_bytes(b->temporary.spill);
     s->stages[TRIP_BRICK_READ].bytes_read = s->input_bytes;
     s->stages[TRIP_BRICK_MERGE].bytes_read = s->temporary_bytes;
     s->memory_bytes = trip_budget_limit_bytes(b->in.budget);
@@ -519,7 +378,7 @@ static int prepare(brick *b)
         b->format.quantised = trip_brick_will_be_quantised(&b->in);
         status = plan_memory(b);
     }
-    return status == 0 ? open_spill(b) : status;
+    return status == 0 ? trip_brick_temporary_open(&b->temporary, &b->in, &b->format) : status;
 }
 
 static int make(brick *b)
@@ -529,14 +388,14 @@ static int make(brick *b)
         status = trip_brick_input_make_envelope(&b->in);
     if (status < 0)
         return status;
-    choose_codes(b);
-    choose_normals(b);
+    b->format.quantised = trip_brick_has_narrow_type(&b->in) || b->in.scanned;
+    trip_brick_codes_choose(&b->codes, &b->in);
     status = plan_memory(b);
-    if (status == 0 && !trip_journal_get_start(b->journal))
+    if (status == 0 && !trip_journal_get_start(b->temporary.journal))
         status = trip_estimate_check_disk(&b->in, &b->format, &b->plan);
     if (status == 0)
         status = open_output(b);
-    b->begun = status == 0;
+    b->temporary.begun = status == 0;
     if (status == 0)
         status = read_volume(b);
     if (status == 0)
@@ -548,41 +407,27 @@ static int run(brick *b)
 {
     int status = prepare(b);
     if (status == 0)
-        status = is_done(b) ? summarise_done(b) : make(b);
+        status =
+            trip_brick_temporary_is_done(&b->temporary, b->params) ? summarise_done(b) : make(b);
     if (status == 0)
         fill_summary(b);
     return status;
-}
-
-/* Who resumes and interrupts will want to resume again. Other failures leave nothing, nor does an
- * end; a run that was refused before it began leaves all that it found. */
-static void keep_or_remove_leftovers(brick *b, int status)
-{
-    trip_leftover now = trip_leftover_none();
-    bool keep = b->params->resume && status == TRIP_INTERRUPTED;
-    if (b->spill && (b->begun || status == 0))
-        trip_spill_keep(b->spill, keep);
-    if (b->spill && b->begun && keep)
-        trip_leftover_take(&now, b->spill, b->partial_path, &b->format);
-    trip_leftover_close(&now);
 }
 
 static void close_all(brick *b, int status)
 {
     trip_list_builder_destroy(b->builder);
     trip_splatter_destroy(b->splatter);
-    keep_or_remove_leftovers(b, status);
+    trip_brick_temporary_end(&b->temporary, &b->format, b->params->resume, status);
     trip_writer_abort(b->writer);
-    trip_journal_close(b->journal);
-    trip_leftover_close(&b->leftover);
-    trip_spill_close(b->spill);
+    trip_brick_temporary_close(&b->temporary);
     trip_brick_input_close(&b->in);
-    free(b->partial_path);
 }
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
 {
-    brick b = { .params = params, .summary = summary, .leftover = trip_leftover_none() };
+    brick b = { .params = params, .summary = summary };
+    b.temporary = trip_brick_temporary_none();
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);
     close_all(&b, status);
