@@ -1,6 +1,5 @@
 #include "file_pieces.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -10,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "read_at.h"
 #include "report.h"
 
 enum { THREADS = 4, PIECE_BYTES = 512 << 10, ALIGNMENT_BYTES = 4096 };
@@ -17,9 +17,9 @@ enum { THREADS = 4, PIECE_BYTES = 512 << 10, ALIGNMENT_BYTES = 4096 };
 struct trip_file_pieces {
     int fd, direct_fd;
     uint64_t file_bytes;
-    unsigned char *map;    /* never looked into: asks what the system holds */
+    unsigned char *map;    /* of the file, for mincore(): its bytes are not accessed */
     unsigned char *memory; /* a piece for every thread */
-    bool useless;          /* direct reads are refused after all */
+    bool failed;           /* a read failed: later ones are refused */
 };
 
 /* One read. */
@@ -28,9 +28,9 @@ typedef struct job {
     uint64_t begin, end, first; /* first: where pieces start, aligned */
     uint64_t pieces;
     unsigned char *to;
-    trip_scope *scope;         /* of who wants it */
+    trip_scope *scope;         /* of the calling thread */
     atomic_uint_fast64_t next; /* piece */
-    atomic_uint seats;         /* threads that have their piece of memory */
+    atomic_uint threads;       /* that have begun, each with its piece of memory */
     atomic_bool failed;
 } job;
 
@@ -68,32 +68,17 @@ void trip_file_pieces_destroy(trip_file_pieces *p)
     free(p);
 }
 
-/* Whether the system holds all of [from, to), which is no longer than a piece. */
-static bool is_held(const trip_file_pieces *p, uint64_t from, uint64_t to)
+/* Whether the page cache holds all of [from, to), which is no longer than a piece. */
+static bool is_cached(const trip_file_pieces *p, uint64_t from, uint64_t to)
 {
-    unsigned char held[PIECE_BYTES / ALIGNMENT_BYTES + 1];
+    unsigned char cached[PIECE_BYTES / ALIGNMENT_BYTES + 1];
     uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE), first = from & ~(page - 1);
     size_t pages = (size_t)((to - first + page - 1) / page);
-    if (page < ALIGNMENT_BYTES || mincore(p->map + first, (size_t)(to - first), held) != 0)
+    if (page < ALIGNMENT_BYTES || mincore(p->map + first, (size_t)(to - first), cached) != 0)
         return false;
     for (size_t i = 0; i < pages; i++)
-        if (!(held[i] & 1))
+        if (!(cached[i] & 1))
             return false;
-    return true;
-}
-
-/* At least `least` bytes, of `bytes` that may reach beyond the end of the file. */
-static bool read_whole(int fd, unsigned char *to, uint64_t offset, size_t bytes, size_t least)
-{
-    size_t done = 0;
-    while (done < least) {
-        ssize_t n = pread(fd, to + done, bytes - done, (off_t)(offset + done));
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return false;
-        done += (size_t)n;
-    }
     return true;
 }
 
@@ -103,10 +88,10 @@ static bool read_piece(const job *j, uint64_t index, unsigned char *memory)
     uint64_t from = at > j->begin ? at : j->begin, to = past < j->end ? past : j->end;
     unsigned char *goal = j->to + (from - j->begin);
     size_t wanted = (size_t)(to - from);
-    if (is_held(j->file, from, to))
-        return read_whole(j->file->fd, goal, from, wanted, wanted);
+    if (is_cached(j->file, from, to))
+        return trip_read_at(j->file->fd, goal, wanted, wanted, from) == (ssize_t)wanted;
     size_t whole = (size_t)(to - at + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
-    if (!read_whole(j->file->direct_fd, memory, at, whole, (size_t)(to - at)))
+    if (trip_read_at(j->file->direct_fd, memory, whole, (size_t)(to - at), at) < (ssize_t)(to - at))
         return false;
     memcpy(goal, memory + (from - at), wanted);
     return true;
@@ -115,7 +100,8 @@ static bool read_piece(const job *j, uint64_t index, unsigned char *memory)
 static void *read_pieces(void *user)
 {
     job *j = user;
-    unsigned char *memory = j->file->memory + (size_t)PIECE_BYTES * atomic_fetch_add(&j->seats, 1);
+    unsigned char *memory =
+        j->file->memory + (size_t)PIECE_BYTES * atomic_fetch_add(&j->threads, 1);
     uint64_t index;
     trip_scope_enter(j->scope);
     while ((index = atomic_fetch_add(&j->next, 1)) < j->pieces && !atomic_load(&j->failed))
@@ -134,7 +120,7 @@ bool trip_file_pieces_read(trip_file_pieces *p, uint64_t offset, void *to, size_
               .scope = trip_scope_current(),
               .first = offset & ~((uint64_t)ALIGNMENT_BYTES - 1),
               .to = to };
-    if (p->useless || bytes == 0 || j.end > p->file_bytes)
+    if (p->failed || bytes == 0 || j.end > p->file_bytes)
         return bytes == 0;
     j.pieces = (j.end - j.first + PIECE_BYTES - 1) / PIECE_BYTES;
     /* The calling thread is one of them. */
@@ -144,6 +130,6 @@ bool trip_file_pieces_read(trip_file_pieces *p, uint64_t offset, void *to, size_
     read_pieces(&j);
     for (unsigned i = 0; i < started; i++)
         pthread_join(threads[i], NULL);
-    p->useless = atomic_load(&j.failed);
-    return !p->useless;
+    p->failed = atomic_load(&j.failed);
+    return !p->failed;
 }

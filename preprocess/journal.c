@@ -10,15 +10,17 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "flusher.h"
 #include "folder.h"
+#include "read_at.h"
 #include "report.h"
 
-/* No checkpoint has so many new segments that its record would be longer. */
+/* A record is never longer: no checkpoint adds that many segments. */
 enum { RUN_BUFFER = 4096, RECORD_MOST_BYTES = 4 << 20 };
 
 enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2 };
 
-/* Before every record; the checkpoint's new segments follow it. */
+/* Precedes every record. That of a checkpoint ends with its new segments. */
 typedef struct record_head {
     uint64_t kind;
     uint64_t bytes;    /* of the record after this */
@@ -30,11 +32,11 @@ struct trip_journal {
     char *path; /* of the journal, for messages */
     trip_budget *budget;
     int file, runs_file;
-    uint64_t offset; /* end of what is valid */
+    uint64_t offset; /* end of the valid records */
     bool has_start, has_checkpoint;
     trip_journal_start start;
     trip_checkpoint checkpoint;
-    uint64_t noted; /* segments in the journal so far */
+    uint64_t recorded; /* segments in the journal so far */
     uint64_t runs, ordered_splats;
     trip_run_record buffer[RUN_BUFFER];
     size_t buffered;
@@ -48,35 +50,14 @@ static int fail_memory(const trip_journal *j)
 static int write_at(const trip_journal *j, int file, uint64_t offset, const void *data,
                     size_t bytes)
 {
-    const unsigned char *p = data;
-    while (bytes > 0) {
-        ssize_t n = pwrite(file, p, bytes, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return trip_fail_errno("brick", j->path, "cannot write");
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
-    return 0;
+    errno = trip_flusher_write(file, data, bytes, offset);
+    return errno ? trip_fail_errno("brick", j->path, "cannot write") : 0;
 }
 
 /* False at the end of the file, too. */
 static bool read_at(int file, uint64_t offset, void *data, size_t bytes)
 {
-    unsigned char *p = data;
-    while (bytes > 0) {
-        ssize_t n = pread(file, p, bytes, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return false;
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
-    return true;
+    return trip_read_at(file, data, bytes, bytes, offset) == (ssize_t)bytes;
 }
 
 static int append_record(trip_journal *j, enum record_kind kind, const void *record, size_t bytes)
@@ -89,7 +70,7 @@ static int append_record(trip_journal *j, enum record_kind kind, const void *rec
     return status;
 }
 
-/* Room for the longest record, from the budget; the caller gives it back. */
+/* Room for the longest record, from the budget; the caller releases it. */
 static void *take_room(const trip_journal *j)
 {
     void *room = trip_budget_take(j->budget, RECORD_MOST_BYTES);
@@ -99,7 +80,7 @@ static void *take_room(const trip_journal *j)
     return room;
 }
 
-/* The record at `offset` into `record`; false where no sound one is. */
+/* Reads the record at `offset`; false where there is no sound one. */
 static bool read_record(const trip_journal *j, uint64_t offset, record_head *head, void *record)
 {
     return read_at(j->file, offset, head, sizeof *head) && head->bytes <= RECORD_MOST_BYTES &&
@@ -107,7 +88,7 @@ static bool read_record(const trip_journal *j, uint64_t offset, record_head *hea
            XXH64(record, head->bytes, head->kind) == head->checksum;
 }
 
-/* Checksums are right where somebody made them so, too. */
+/* For records with a sound checksum that no run writes: they may have been made on purpose. */
 static int fail_false(const trip_journal *j, const char *what)
 {
     return trip_fail(TRIP_ERROR, "brick", j->path,
@@ -131,8 +112,8 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
     return 0;
 }
 
-/* Against the checkpoint before, which is clear at first. Differences cannot overflow then. */
-static bool goes_on(const trip_checkpoint *before, const trip_checkpoint *c)
+/* Whether no count is below that of the checkpoint before, which is clear at first. */
+static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
 {
     bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
                 c->runs >= before->runs && c->segments >= before->segments &&
@@ -142,8 +123,9 @@ static bool goes_on(const trip_checkpoint *before, const trip_checkpoint *c)
     return fits;
 }
 
-/* The voxels that exist in what was done, in *voxels: all of them, or, of sparse volumes, at most
- * so many. */
+/* *voxels becomes the number of voxels in the part that was done; for sparse volumes an upper
+ * bound.
+ */
 static bool done_voxels(const trip_journal_params *p, uint64_t done, uint64_t *voxels)
 {
     *voxels = p->voxels;
@@ -152,7 +134,8 @@ static bool done_voxels(const trip_journal_params *p, uint64_t done, uint64_t *v
     return *voxels <= p->voxels;
 }
 
-/* Kept voxels have 26 neighbours each; where all voxels exist, no more than the others. */
+/* Whether the halo can be as large: kept voxels have 26 neighbours each, and in dense volumes the
+ * halo is among the voxels that are not kept. */
 static bool can_have_halo(const trip_journal_params *p, const trip_checkpoint *c, uint64_t voxels)
 {
     uint64_t each = c->kept ? c->halo / c->kept : c->halo;
@@ -165,7 +148,7 @@ static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
     const trip_journal_params *p = &j->params;
     const trip_tally *t = p->scanned ? &j->start.tally : &c->tally;
     uint64_t voxels;
-    if (!goes_on(&j->checkpoint, c))
+    if (!is_later(&j->checkpoint, c))
         return fail_false(j, "the order of its checkpoints");
     if (!done_voxels(p, c->done, &voxels))
         return fail_false(j, "how far it came");
@@ -195,8 +178,8 @@ static bool has_runs(const trip_journal *j, uint64_t runs)
     return fstat(j->runs_file, &st) == 0 && runs <= (uint64_t)st.st_size / sizeof(trip_run_record);
 }
 
-/* A checkpoint and the segments that are new with it. Returns 1 when it was taken over, 0 when what
- * it counts on is no longer there. */
+/* Reads a checkpoint and its new segments. Returns 1 when it is accepted, 0 when data that it needs
+ * are not there any more. */
 static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *record, uint64_t bytes)
 {
     trip_checkpoint *c = malloc(sizeof *c);
@@ -207,7 +190,7 @@ static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *recor
     if (bytes >= sizeof *c)
         memcpy(c, record, sizeof *c);
     int taken = 0;
-    if (bytes != sizeof *c + fresh * sizeof *segments || c->segments != j->noted + fresh)
+    if (bytes != sizeof *c + fresh * sizeof *segments || c->segments != j->recorded + fresh)
         taken = fail_false(j, "a record");
     else
         taken = check_checkpoint(j, c);
@@ -216,13 +199,13 @@ static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *recor
     if (taken == 1) {
         j->checkpoint = *c;
         j->has_checkpoint = true;
-        j->noted = c->segments;
+        j->recorded = c->segments;
     }
     free(c);
     return taken;
 }
 
-/* Reads checkpoints until one is cut off or needs more than there is. */
+/* Reads checkpoints until one is cut off or needs data that are not there. */
 static int read_checkpoints(trip_journal *j, trip_spill *spill, void *record)
 {
     record_head head;
@@ -362,7 +345,7 @@ int trip_journal_add_run(trip_journal *j, const trip_run_record *run)
 
 int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill)
 {
-    size_t fresh = trip_spill_count(spill) - j->noted;
+    size_t fresh = trip_spill_count(spill) - j->recorded;
     size_t bytes = sizeof *c + fresh * sizeof(trip_segment);
     unsigned char *record = malloc(bytes);
     if (!record)
@@ -372,9 +355,9 @@ int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const tri
     c->ordered_splats = j->ordered_splats;
     memcpy(record, c, sizeof *c);
     if (fresh)
-        memcpy(record + sizeof *c, trip_spill_segment(spill, j->noted),
+        memcpy(record + sizeof *c, trip_spill_segment(spill, j->recorded),
                fresh * sizeof(trip_segment));
-    j->noted += fresh;
+    j->recorded += fresh;
     int status = flush_runs(j);
     if (status == 0)
         status = append_record(j, RECORD_CHECKPOINT, record, bytes);

@@ -1,6 +1,5 @@
 #include "resume.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 
 #include "dataset.h"
 #include "folder.h"
+#include "read_at.h"
 #include "report.h"
 
 enum { RUNS_AT_A_TIME = 256 };
@@ -21,7 +21,8 @@ static off_t size_in(int folder, const char *name)
     return found ? st.st_size : -1;
 }
 
-/* Opens the longer of the two files of a plane, under its name in the spill. Both begin alike. */
+/* Opens the longer of the two files of a plane, which begin with the same bytes, under its name in
+ * the spill. */
 static int take_plane(const trip_spill *spill, int partial, int plane, int *fd)
 {
     char name[32];
@@ -64,7 +65,7 @@ static int fail_damaged(void)
                      "what the interrupted run left is damaged: without --resume it starts again");
 }
 
-/* Where appending again stands. */
+/* The state of appending the runs again. */
 typedef struct replay {
     const trip_leftover *leftover;
     const trip_block_form *form;
@@ -76,35 +77,28 @@ typedef struct replay {
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
 } replay;
 
-/* The next bytes of a plane. */
+/* Reads the next bytes of a plane. */
 static int read_next(replay *r, int plane, void *data, size_t bytes)
 {
-    for (unsigned char *to = data; bytes > 0;) {
-        ssize_t n = pread(r->leftover->fd[plane], to, bytes, (off_t)r->at[plane]);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return fail_damaged();
-        to += n;
-        bytes -= (size_t)n;
-        r->at[plane] += (uint64_t)n;
-    }
+    if (trip_read_at(r->leftover->fd[plane], data, bytes, bytes, r->at[plane]) != (ssize_t)bytes)
+        return fail_damaged();
+    r->at[plane] += bytes;
     return 0;
 }
 
-/* The words of the next block, which say themselves how many they are. */
+/* Reads the next block, whose first words determine its length. */
 static int read_block(replay *r, uint32_t splats, uint32_t *words)
 {
-    uint32_t begun = trip_block_present_words(r->form->tile_log2);
+    uint32_t present = trip_block_present_words(r->form->tile_log2);
     uint32_t squares = 0;
-    int status = read_next(r, TRIP_PLANE_VOXELS, r->block, begun * sizeof *r->block);
-    for (uint32_t i = 0; i < begun && status == 0; i++)
+    int status = read_next(r, TRIP_PLANE_VOXELS, r->block, present * sizeof *r->block);
+    for (uint32_t i = 0; i < present && status == 0; i++)
         squares += (uint32_t)__builtin_popcountll(r->block[i]);
-    *words = begun + squares + trip_block_code_words(splats, r->form->code_bytes);
+    *words = present + squares + trip_block_code_words(splats, r->form->code_bytes);
     if (status == 0 && !trip_block_words_fit(r->form, splats, *words))
         status = fail_damaged();
-    return status == 0 ? read_next(r, TRIP_PLANE_VOXELS, r->block + begun,
-                                   (*words - begun) * sizeof *r->block)
+    return status == 0 ? read_next(r, TRIP_PLANE_VOXELS, r->block + present,
+                                   (*words - present) * sizeof *r->block)
                        : status;
 }
 
@@ -115,7 +109,7 @@ static int read_normals(replay *r, uint32_t splats)
                : 0;
 }
 
-/* Any record inside the tile. */
+/* The bounds of a brick that admit every record inside the tile. */
 static trip_file_brick whole_tile(const trip_block_form *f)
 {
     const uint8_t last = (uint8_t)((1u << f->tile_log2) - 1);

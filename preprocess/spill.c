@@ -11,9 +11,10 @@
 
 #include "flusher.h"
 #include "folder.h"
+#include "read_at.h"
 #include "report.h"
 
-enum { BLOCK_BYTES = 4096, BUFFER_BYTES = 1 << 20 };
+enum { ALIGNMENT_BYTES = 4096, BUFFER_BYTES = 1 << 20 };
 
 #define DATA_NAME "pieces"
 
@@ -23,7 +24,7 @@ struct trip_spill {
     int folder; /* holds the lock */
     int file;
     bool keep;
-    bool cut; /* nothing is left in the file of what an interrupted run wrote behind `offset` */
+    bool cut; /* the file ends at `offset`: what an interrupted run wrote after it is gone */
     unsigned char *buffer;
     size_t used;
     uint64_t offset; /* in the file, of the buffer */
@@ -38,7 +39,7 @@ static int fail_memory(const trip_spill *s)
                      "needs more memory than is allowed: give more with --memory");
 }
 
-/* The names are this program's own: the journal's files and those of resume.c, too. */
+/* Removes what this program makes in the folder, the files of journal.c and resume.c included. */
 static void remove_files(int folder)
 {
     static const char *const names[] = { DATA_NAME, "journal", "runs", "z0.voxels", "z0.normals" };
@@ -131,15 +132,15 @@ static int make_room(trip_spill *s, size_t count)
     return 0;
 }
 
-/* Whether a segment can be the next one, from `offset` on: its end, in whole blocks; 0 if not. */
+/* The aligned end of a segment; 0 if it is not sound or does not begin at `offset`. */
 static uint64_t end_of_segment(const trip_segment *t, uint64_t offset)
 {
     uint64_t end;
     bool sound = t->offset == offset && t->list < TRIP_MOST_LISTS && t->retired == 0 &&
                  t->bytes >= sizeof(trip_piece) && t->bytes % 8 == 0 &&
                  !__builtin_add_overflow(t->offset, t->bytes, &end) &&
-                 !__builtin_add_overflow(end, BLOCK_BYTES - 1, &end) && end <= INT64_MAX;
-    return sound ? end & ~((uint64_t)BLOCK_BYTES - 1) : 0;
+                 !__builtin_add_overflow(end, ALIGNMENT_BYTES - 1, &end) && end <= INT64_MAX;
+    return sound ? end & ~((uint64_t)ALIGNMENT_BYTES - 1) : 0;
 }
 
 int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count)
@@ -151,7 +152,7 @@ int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count
         offset = end_of_segment(&segments[i], offset);
         if (offset == 0)
             status = trip_fail(TRIP_ERROR, "brick", s->path,
-                               "its journal tells of temporary data that no run writes: without "
+                               "its journal describes temporary data that no run writes: without "
                                "--resume it starts again");
     }
     if (status == 0 && count && fstat(s->file, &st) < 0)
@@ -159,7 +160,7 @@ int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count
     if (status == 0 && count && offset > (uint64_t)st.st_size)
         return 0;
     if (status == 0 && count > trip_budget_left_bytes(s->budget) / (4 * sizeof *segments))
-        status = fail_memory(s); /* a file can tell of any number of them */
+        status = fail_memory(s); /* a damaged journal may have any number */
     if (status == 0)
         status = make_room(s, s->count + count);
     if (status < 0)
@@ -221,7 +222,7 @@ int trip_spill_append(trip_spill *s, const void *piece, size_t bytes)
 
 int trip_spill_end(trip_spill *s)
 {
-    size_t whole = (s->used + BLOCK_BYTES - 1) & ~((size_t)BLOCK_BYTES - 1);
+    size_t whole = (s->used + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
     memset(s->buffer + s->used, 0, whole - s->used);
     int status = write_buffer(s, whole);
     s->segments[s->count].checksum = XXH64_digest(s->hash);
@@ -258,7 +259,8 @@ static int fail_damaged(const trip_segment_reader *r)
                      (unsigned long long)r->segment.offset);
 }
 
-/* Moves what is left to the end of the head and reads behind it: reads stay aligned. */
+/* Moves the unused bytes to the end of the head and reads behind them, so that reads are aligned.
+ */
 static int refill(trip_segment_reader *r)
 {
     size_t left = r->end - r->begin;
@@ -271,40 +273,35 @@ static int refill(trip_segment_reader *r)
     memmove(r->buffer + r->head_bytes - left, r->buffer + r->begin, left);
     r->begin = r->head_bytes - left;
     r->end = r->head_bytes;
-    size_t whole = (want + BLOCK_BYTES - 1) & ~((size_t)BLOCK_BYTES - 1);
-    for (size_t done = 0; done < want;) {
-        ssize_t n = pread(r->spill->file, r->buffer + r->head_bytes + done, whole - done,
-                          (off_t)(r->segment.offset + r->next + done));
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n < 0)
-            return trip_fail_errno("brick", r->spill->path, "cannot read");
-        if (n == 0)
-            return fail_damaged(r);
-        done += (size_t)n;
-    }
+    size_t whole = (want + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
+    ssize_t n = trip_read_at(r->spill->file, r->buffer + r->head_bytes, whole, want,
+                             r->segment.offset + r->next);
+    if (n < 0)
+        return trip_fail_errno("brick", r->spill->path, "cannot read");
+    if ((size_t)n < want)
+        return fail_damaged(r);
     XXH64_update(r->hash, r->buffer + r->head_bytes, want);
     r->next += want;
     r->end += want;
     return 0;
 }
 
-static bool piece_at_hand(const trip_segment_reader *r)
+static bool has_piece(const trip_segment_reader *r)
 {
     const trip_piece *p = (const void *)(r->buffer + r->begin);
     size_t left = r->end - r->begin;
     return left >= sizeof *p && trip_piece_check(p, r->format, left);
 }
 
-static int show_piece(trip_segment_reader *r)
+static int set_piece(trip_segment_reader *r)
 {
     int status = 0;
-    if (!piece_at_hand(r) && r->next < r->segment.bytes)
+    if (!has_piece(r) && r->next < r->segment.bytes)
         status = refill(r);
     if (status < 0)
         return status;
     r->source.piece = NULL;
-    if (piece_at_hand(r))
+    if (has_piece(r))
         r->source.piece = (const void *)(r->buffer + r->begin);
     else if (r->begin < r->end || XXH64_digest(r->hash) != r->segment.checksum)
         status = fail_damaged(r);
@@ -316,7 +313,7 @@ static int advance_segment(trip_piece_source *source)
     trip_segment_reader *r = (trip_segment_reader *)source;
     uint64_t key = source->piece->key;
     r->begin += trip_piece_get_parts(r->format, source->piece).bytes;
-    int status = show_piece(r);
+    int status = set_piece(r);
     if (status == 0 && source->piece && source->piece->key < key)
         status = fail_damaged(r);
     return status;
@@ -324,7 +321,7 @@ static int advance_segment(trip_piece_source *source)
 
 static size_t head_bytes(const trip_piece_format *f)
 {
-    return (trip_piece_max_bytes(f) + BLOCK_BYTES - 1) & ~((size_t)BLOCK_BYTES - 1);
+    return (trip_piece_max_bytes(f) + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
 }
 
 size_t trip_segment_buffer_bytes(const trip_piece_format *f)
@@ -349,7 +346,7 @@ int trip_segment_reader_open(trip_segment_reader *r, const trip_spill *s, size_t
     if (!r->hash)
         return fail_memory(s);
     XXH64_reset(r->hash, 0);
-    return show_piece(r);
+    return set_piece(r);
 }
 
 void trip_segment_reader_close(trip_segment_reader *r)
