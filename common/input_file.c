@@ -8,15 +8,15 @@
 
 #include "report.h"
 
-enum { WAIT_MS = 100 }; /* between looks at the interrupt flag */
+enum { WAIT_MS = 100 }; /* between checks for an interruption */
 
 int trip_input_open(const char *path)
 {
     return open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 }
 
-/* Until there is something to read, or the end; false when the user wants to stop. A pipe that
- * nobody has opened for writing yet is not at its end: it is waited for. */
+/* Waits until there is something to read or the file ends; false after an interruption. A pipe that
+ * has no writer yet is not at its end. */
 static bool wait_for_data(int fd)
 {
     while (!trip_interrupted()) {

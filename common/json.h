@@ -1,5 +1,5 @@
-/* JSON from files, whose memory is in the budget before it is taken, and JSON that is safe to
- * print. Any thread may call these. */
+/* Parses JSON from files within the memory budget, and prints JSON that any terminal and parser can
+ * take. Any thread. */
 #ifndef TRIP_JSON_H
 #define TRIP_JSON_H
 
@@ -20,7 +20,7 @@ typedef struct trip_json {
  * memory as is charged to the budget first (NULL: not charged). What does not fit or is nested more
  * than 64 deep is a reported failure; what is not JSON is none. */
 int trip_json_parse(trip_json *out, const char *text, const char *path, trip_budget *budget);
-/* Also what was never parsed (all zero). */
+/* May also be called for a zeroed *j. */
 void trip_json_free(trip_json *j);
 
 /* The tree as text, for free(): valid UTF-8 whatever its strings hold, control characters escaped.

@@ -1,5 +1,5 @@
-/* What the machine and the control groups allow a process, read from a file system root, so that
- * tests can give their own. Used by budget.c. */
+/* The memory limits of control groups, and fields of /proc. The root of the file system is a
+ * parameter, so that tests can provide their own. Any thread. */
 #ifndef TRIP_MEMORY_LIMITS_H
 #define TRIP_MEMORY_LIMITS_H
 

@@ -1,6 +1,7 @@
-/* A file that takes its name only when it is complete: until then it has a random one beside it, so
- * that a failure leaves what was there, and what a killed process left behind is in nobody's way.
- * What is replaced hands on its mode; a symbolic link is replaced, not followed. One thread. */
+/* A file that gets its name only when it is complete; before, it has a random name in the same
+ * folder. So a failure leaves an existing file as it was, and what a killed process leaves does not
+ * disturb later runs. A file that is replaced passes on its mode; a symbolic link is replaced, not
+ * followed. One thread. */
 #ifndef TRIP_NEW_FILE_H
 #define TRIP_NEW_FILE_H
 
@@ -12,11 +13,11 @@ typedef struct trip_new_file {
     int fd; /* open for reading and writing; -1 when there is none */
 } trip_new_file;
 
-/* `what` begins the lines about it ("write"); it and `path` must outlive the file. 0, or a reported
- * failure, after which there is nothing to end. */
+/* Creates the file. `what` begins the messages about it ("write"); it and `path` must outlive *f.
+ * After a reported failure there is nothing to finish or to abandon. */
 int trip_new_file_begin(trip_new_file *f, const char *what, const char *path);
-/* Whether a file could be made there, for work that is long: a reported failure where its folder is
- * missing or not to be written in, or where the path is a folder's. Makes nothing. */
+/* Checks before long work that a file can be made there: reports a failure if the folder is missing
+ * or not writable, or if the path is a folder's. Creates nothing. */
 int trip_new_file_check(const char *what, const char *path);
 /* Gives the file its name; a reported failure leaves nothing. */
 int trip_new_file_finish(trip_new_file *f);

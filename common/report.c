@@ -44,7 +44,7 @@ static void put_visible(line *l, const char *text)
     }
 }
 
-/* The end of it where it is long: a path must not crowd out the cause. */
+/* Only the end of a long place, so that there is room for the cause. */
 static void put_where(line *l, const char *where)
 {
     size_t length = strlen(where);
@@ -58,7 +58,7 @@ static void put_where(line *l, const char *where)
     put(l, ": ", 2);
 }
 
-/* A terminal may show progress where the line goes: its rest is cleared. */
+/* On a terminal the line may replace a longer line of progress, the rest of which is cleared. */
 static void end_line(line *l, bool terminal)
 {
     static const char clear[] = { 27, '[', 'K' };
@@ -87,7 +87,7 @@ static void print(const char *text)
     }
 }
 
-/* To the innermost scope that takes it. */
+/* Passes a line to the innermost scope that takes it. */
 static void emit(int status, const char *text)
 {
     const trip_scope *s = trip_scope_current();
@@ -97,7 +97,8 @@ static void emit(int status, const char *text)
         print(text);
         return;
     }
-    trip_scope *here = trip_scope_enter(s->around); /* whoever takes it may report, further out */
+    trip_scope *here =
+        trip_scope_enter(s->around); /* its functions report to the scope around it */
     if (s->failed && status != TRIP_OK)
         s->failed(s->user, status, text);
     else
@@ -118,7 +119,7 @@ static void keep(int status, const char *text)
     held->status = status;
 }
 
-/* Work that ends for all of its threads has one fault. */
+/* Of an interruption, which ends the work of all threads, one report is enough. */
 static void deliver(int status, const char *text)
 {
     if (status != TRIP_OK && held)

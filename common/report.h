@@ -1,7 +1,7 @@
-/* Errors, warnings and results for people. Functions return 0 or a negative trip_status; whoever
- * detects a fault reports it once with trip_fail(), callers only forward the code. Any thread may
- * call these; each message is one line, "triptych: what: where: why", and goes where the thread's
- * scope sends it: to stderr where that says nothing. */
+/* Reports of errors, warnings and choices to the user. Functions return 0 or a negative
+ * trip_status: the function that detects a fault reports it once with trip_fail(), callers only
+ * forward the code. Any thread may call these. Each message is one line, "triptych: what: where:
+ * why", and goes to the sink of the thread's scope, or to stderr. */
 #ifndef TRIP_REPORT_H
 #define TRIP_REPORT_H
 
@@ -27,7 +27,7 @@ __attribute__((format(printf, 4, 5))) int trip_fail(int status, const char *what
 /* Like trip_fail() with strerror(errno) as the why, after an optional action ("cannot open"). */
 int trip_fail_errno(const char *what, const char *where, const char *action);
 
-/* A static analyser sees callers without report.c: these results are never 0. */
+/* For static analysers, which see callers without report.c: these results are never 0. */
 #ifdef __clang_analyzer__
 #define trip_fail(status, ...) (trip_fail(status, __VA_ARGS__), (status))
 #define trip_fail_errno(...) (trip_fail_errno(__VA_ARGS__), TRIP_ERROR)
@@ -39,15 +39,15 @@ __attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const ch
 /* Prints "triptych: note: WHERE: what": a choice made for the user, and how to make another. */
 __attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *what, ...);
 
-/* Passes on a line that another scope took. */
+/* Reports a line that another scope took. */
 void trip_report_line(const char *line);
 
-/* Failures of this thread, of which the first is kept instead of printed: of work that is shared
- * out only the first failure of all is told. */
+/* Holds back failures of a thread: the first is kept instead of reported, so that of several
+ * threads that do one work only the first failure is reported. */
 typedef struct trip_held_report {
     char line[4096];
     int status;
-    struct trip_held_report *before; /* what held this thread's failures when this began */
+    struct trip_held_report *before; /* the one that was in use before */
 } trip_held_report;
 
 /* From here on `h` keeps this thread's failures, until release, on the same thread. */
@@ -56,8 +56,8 @@ void trip_report_release(trip_held_report *h);
 /* Reports what was kept, if anything, as a failure of this thread. */
 void trip_report_print(const trip_held_report *h);
 
-/* Where the lines of the scope that the calling thread is in go, its failures among them; NULL
- * restores what was. While no other thread is in that scope. */
+/* Redirects the lines of the calling thread's scope, its failures among them; NULL ends that. No
+ * other thread may be in the scope. */
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
 
 #ifdef __cplusplus

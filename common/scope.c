@@ -21,7 +21,7 @@ trip_scope *trip_scope_enter(trip_scope *s)
     return before;
 }
 
-/* Relaxed: nothing is handed over by it. */
+/* Relaxed: no other memory is published by it. */
 void trip_scope_cancel(trip_scope *s)
 {
     __atomic_store_n(&s->cancelled, true, __ATOMIC_RELAXED);
@@ -41,7 +41,7 @@ int trip_interrupted(void)
     return interrupted;
 }
 
-/* The scope whose work ends: the one that was cancelled, or the outermost. */
+/* The scope that was cancelled, or the outermost. */
 static trip_scope *ended_scope(void)
 {
     trip_scope *s = trip_scope_current();

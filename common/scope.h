@@ -1,7 +1,7 @@
-/* What a thread works for: where its messages go, and whether the work is still wanted. A thread
- * starts in a scope of its own, whose messages go to stderr and whose work ends with a signal to
- * the program; threads that work for another enter its scope. Nothing here belongs to the process
- * but the flag that trip_interrupt_install()'s handler sets. */
+/* The scope of a thread's work: where its messages go, and whether the work is cancelled. A thread
+ * begins in a scope of its own, whose messages go to stderr and whose work ends with a signal to
+ * the program; threads that work for another thread enter its scope. The only state of the process
+ * is the flag that the handler of trip_interrupt_install() sets. */
 #ifndef TRIP_SCOPE_H
 #define TRIP_SCOPE_H
 
@@ -11,32 +11,33 @@
 extern "C" {
 #endif
 
-/* Starts zeroed. Several threads may be in one at a time; it outlives their stay. */
+/* Initially zeroed. Several threads may be in a scope; it exists until all have left it. */
 typedef struct trip_scope {
     struct trip_scope
-        *around; /* takes the messages that this one does not, and ends its work too */
-    /* Takes a failure, instead of the function below. */
+        *around; /* gets the messages that this one does not take; cancelling it cancels this one */
+    /* Takes failures, if not NULL, in place of sink(). */
     void (*failed)(void *user, int status, const char *line);
-    /* Takes a line: a warning, a note, or a failure. NULL: the scope around it, or stderr. Both may
-     * be called by any thread in the scope, and report in the scope around it. */
+    /* Takes a line: a warning, a note, or a failure. NULL: lines go to the scope around this one,
+     * or to stderr. Both functions may be called by any thread in the scope; what they report goes
+     * to the scope around it. */
     void (*sink)(const char *line, void *user);
     void *user;
-    /* Atomic; trip_scope_cancel() sets the one, the report of an interruption the other. */
+    /* Atomic. Cancelled by trip_scope_cancel(); its interruption was reported. */
     bool cancelled, reported;
 } trip_scope;
 
-/* The calling thread is in `s` from here on; returns the scope it leaves, to enter again. */
+/* Moves the calling thread to scope `s`; returns the scope it leaves, to be entered again. */
 trip_scope *trip_scope_enter(trip_scope *s);
 trip_scope *trip_scope_current(void);
 
-/* Ends the work in a scope: trip_interrupted() is true for the threads in it, and in those that it
- * is around. Any thread. */
+/* Cancels the work in a scope: trip_interrupted() becomes true for the threads in it and in the
+ * scopes that it is around. Any thread. */
 void trip_scope_cancel(trip_scope *s);
-/* Makes a cancelled scope good again, when no thread works in it. */
+/* Ends the cancelling, so that the scope can be used again; no thread may be working in it. */
 void trip_scope_renew(trip_scope *s);
 
-/* Whether the calling thread's work is no longer wanted: long loops look and return
- * trip_fail(TRIP_INTERRUPTED, ...), of which each scope reports one. */
+/* Whether the calling thread's work is cancelled or the program is to end: long loops check this
+ * and return trip_fail(TRIP_INTERRUPTED, ...), of which each scope reports one. */
 int trip_interrupted(void);
 
 /* For programs: installs handlers for SIGINT and SIGTERM, which interrupt all threads. A second
@@ -44,8 +45,8 @@ int trip_interrupted(void);
  * instead of the end of the process. */
 void trip_interrupt_install(void);
 
-/* Whether an interruption of this thread's work is to be reported: once for a scope that was
- * cancelled, once for a signal. */
+/* Whether this thread is to report the interruption of its work: true once for each cancelled scope
+ * and once for a signal. */
 bool trip_scope_report_once(void);
 
 #ifdef __cplusplus

@@ -9,8 +9,9 @@
 
 enum { BINS = 1024, GROUPS = 64, GROUP_BINS = BINS / GROUPS, LEVELS = 24 };
 
-static const double solid_opacity = 0.3;     /* where nothing tells background from foreground */
-static const double even_depth = 1.2;        /* optical, of a cube of all voxels of one value */
+static const double solid_opacity =
+    0.3;                              /* where background and foreground cannot be distinguished */
+static const double even_depth = 1.2; /* optical, of a cube of all voxels of one value */
 static const double strongest_opacity = 0.7; /* at rank 1 */
 static const double invisible = 0.1;         /* up to this standing opacity is 0: mostly noise */
 /* The optical depth that the lower four fifths of the foreground may have along a typical ray. */
@@ -106,7 +107,8 @@ static double veil_extinction(const analysis *a, double power)
     return sum / a->foreground;
 }
 
-/* The power that keeps the veil on a ray with so many foreground voxels at veil_depth or less. */
+/* The power that keeps the optical depth of the veil on a ray through `foreground_voxels` voxels at
+ * veil_depth or less. */
 static double choose_power(const analysis *a, double foreground_voxels)
 {
     double power = 2;

@@ -157,8 +157,9 @@ static void add_opacity(samples *s, double value, double opacity)
 static int parts_of(const trip_tf_nodes *n, size_t i, int total, int least)
 {
     double span = n->data[n->count - 1].value - n->data[0].value;
-    double share = (n->data[i + 1].value - n->data[i].value) / span;
-    int parts = share >= 0 && share <= 1 ? (int)ceil(share * total) : 1; /* span may overflow */
+    double fraction = (n->data[i + 1].value - n->data[i].value) / span;
+    int parts =
+        fraction >= 0 && fraction <= 1 ? (int)ceil(fraction * total) : 1; /* span may overflow */
     return parts > least ? parts : least;
 }
 

@@ -1,6 +1,7 @@
-/* How other programs describe a function: colours and opacities as separate curves, each bent in
- * its own way (vtkColorTransferFunction, vtkPiecewiseFunction). Readers of their files fill curves,
- * which are then sampled where they bend and merged. Nobody but the tf_*.c files includes this. */
+/* Transfer functions as other programs describe them: colours and opacities as separate curves,
+ * each with its own interpolation (vtkColorTransferFunction, vtkPiecewiseFunction). Readers of
+ * their files fill curves, which are then sampled where they are not linear, and merged. Only the
+ * tf_*.c files include this. */
 #ifndef TRIP_TF_CURVES_H
 #define TRIP_TF_CURVES_H
 
@@ -24,7 +25,8 @@ typedef struct trip_tf_curves {
     double unit_world; /* 0: one voxel */
 } trip_tf_curves;
 
-/* Appends a node; one that cannot stand there is reported, `where` and `key` naming the place. */
+/* Appends a node; an impossible one is a reported failure, in which `where` and `key` name the
+ * place. */
 int trip_tf_nodes_add(trip_tf_nodes *n, trip_tf_node node, const char *where, const char *key);
 /* Appends the nodes of "COUNT number number ...": COUNT numbers, four to a node for colours, two
  * for opacities (straight lines between). */
@@ -37,7 +39,7 @@ void trip_tf_curves_stretch(trip_tf_curves *c);
 int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *where);
 void trip_tf_curves_free(trip_tf_curves *c);
 
-/* Warns of opacities by gradient, which are not taken over, where they are not 1 throughout. */
+/* Warns that opacities by gradient are ignored, unless they are all 1. */
 void trip_tf_warn_of_gradient(const trip_tf_nodes *gradient, const char *where);
 
 #endif

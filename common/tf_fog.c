@@ -1,4 +1,4 @@
-/* A transfer function for a density whose scale nobody knows: smoke, clouds, fog. Extinction is
+/* A transfer function for a density of unknown scale: smoke, clouds, fog. Extinction is
  * proportional to density, as in nature, and scaled by the histogram alone: a ray through a cube of
  * all the voxels there are meets `ray_depth`. Colours hardly differ, cool where it is thin and warm
  * where it is dense, so that the eye sees the shape and not the values. */

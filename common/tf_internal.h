@@ -1,5 +1,5 @@
-/* What the tf_*.c files share with transfer_function.c: the representation and the parts a
- * function is built by. Nobody else includes this, but for tests and fuzzers. */
+/* The representation of a transfer function and the parts of its construction. Only the tf_*.c
+ * files, transfer_function.c, tests and fuzzers include this. */
 #ifndef TRIP_TF_INTERNAL_H
 #define TRIP_TF_INTERNAL_H
 
@@ -10,7 +10,7 @@ enum {
     TRIP_TF_MAX_FILE_BYTES = 8 << 20,
 };
 
-/* The stage that errors name. */
+/* The stage in messages. */
 #define TRIP_TF_STAGE "transfer function"
 
 struct trip_tf {
@@ -19,8 +19,8 @@ struct trip_tf {
     bool normalised;
     double unit_world; /* 0: one voxel */
     bool hounsfield;   /* a preset in Hounsfield units */
-    bool made;         /* the points are still to be made from a histogram, ... */
-    trip_tf_kind as;   /* ... as this kind's */
+    bool made;         /* the points are yet to be made from a histogram, ... */
+    trip_tf_kind as;   /* ... as for this kind */
 };
 
 /* Why a point cannot stand in a function, or NULL. `before` is the point before it, or NULL. */
@@ -32,7 +32,7 @@ trip_rgba trip_tf_evaluate_below(const trip_tf *tf, double value);
 
 /* A built-in preset; reports an unknown name. */
 int trip_tf_from_preset(trip_tf **out, const char *name);
-/* The preset that `name` may be a slip of, or NULL. */
+/* The preset of which `name` may be a misspelling, or NULL. */
 const char *trip_tf_nearest_preset(const char *name);
 
 /* The function of a kind, whose points trip_tf_adapt() makes. */
@@ -43,15 +43,15 @@ int trip_tf_from_kind(trip_tf **out, trip_tf_kind kind);
 int trip_tf_parse_colormap(trip_tf **out, const char *name, const char *text, size_t bytes,
                            const char *preset);
 
-/* A volume of one value: fog through which one sees about a third of what is behind. */
+/* For a volume of one value: fog that transmits about a third of what is behind it. */
 int trip_tf_even_fog(trip_tf **out, const trip_histogram *histogram);
 
-/* What stands above a background of the lowest values. */
+/* The tissue above a background of the lowest values. */
 typedef struct trip_tf_tissue {
     double valley;       /* the rarest value between the background and the tissue */
     double middle, high; /* half, and 98 % of the tissue lie below */
-    double share;        /* of all voxels that are above the valley */
-    double sharpest;     /* share of the tissue in the most frequent thirtieth of its values */
+    double fraction;     /* of all voxels that is above the valley */
+    double sharpest;     /* fraction of the tissue in the most frequent thirtieth of its values */
 } trip_tf_tissue;
 /* False where there is no valley. */
 bool trip_tf_find_tissue(trip_tf_tissue *out, const trip_histogram *histogram);
@@ -61,7 +61,7 @@ int trip_tf_parse_xml(trip_tf **out, const char *name, const char *text, size_t 
                       const char *preset);
 /* A volume property of Slicer's, as text. */
 int trip_tf_parse_vp(trip_tf **out, const char *name, const char *text, size_t bytes);
-/* One of these, or a `.tf`, told apart by the content. */
+/* Any of these or a `.tf`, distinguished by the content. */
 int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t bytes,
                       const char *preset);
 

@@ -1,4 +1,4 @@
-/* Tells what a volume is from its histogram and the little that its file says. The rules are in
+/* Recognises the kind of a volume from its histogram and the header of its file. The rules are in
  * TRANSFER_FUNCTIONS.md. */
 #include "tf_internal.h"
 
@@ -34,7 +34,7 @@ trip_tf_kind trip_tf_kind_from_name(const char *name)
     return TRIP_TF_AUTOMATIC;
 }
 
-/* Voxels per unit of value in [lo, hi], as a share of all. */
+/* Voxels per unit of value in [lo, hi], as a fraction of all. */
 static double density_in(const trip_histogram *h, double lo, double hi)
 {
     double range = h->value_max - h->value_min, sum = 0;
@@ -95,7 +95,8 @@ static bool are_labels(const trip_histogram *h)
 static bool is_mr(const trip_histogram *h)
 {
     trip_tf_tissue t;
-    return h->value_min >= 0 && trip_tf_find_tissue(&t, h) && t.share >= 0.18 && t.sharpest < 0.3;
+    return h->value_min >= 0 && trip_tf_find_tissue(&t, h) && t.fraction >= 0.18 &&
+           t.sharpest < 0.3;
 }
 
 /* What DICOM calls CT is in Hounsfield units, unless its rescaling was lost: then nothing is below

@@ -22,14 +22,14 @@ static int fail_to_open(const char *path)
 {
     int error = errno;
     char *stem = error == ENOENT ? stem_of(path) : NULL;
-    const char *near = stem ? trip_tf_nearest_preset(stem) : NULL;
+    const char *nearest = stem ? trip_tf_nearest_preset(stem) : NULL;
     free(stem);
     errno = error;
-    if (!near)
+    if (!nearest)
         return trip_fail_errno(TRIP_TF_STAGE, path, "cannot open");
     return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,
                      "no such file; did you mean preset:%s? `triptych tf list` lists the presets",
-                     near);
+                     nearest);
 }
 
 /* Reads at most TRIP_TF_MAX_FILE_BYTES; *text is the caller's to free. */

@@ -42,21 +42,21 @@ int trip_tf_ct_from_histogram(trip_tf **out, const trip_histogram *h)
     return trip_tf_from_points(out, points, sizeof points / sizeof *points, false, 0);
 }
 
-/* The bin below which a share of the voxels from bin `first` on lies. */
-static int quantile(const trip_histogram *h, int first, double share)
+/* The bin below which a fraction of the voxels from bin `first` on lies. */
+static int quantile(const trip_histogram *h, int first, double fraction)
 {
     double total = 0, below = 0;
     for (int i = first; i < BINS; i++)
         total += (double)h->counts[i];
     for (int i = first; i < BINS; i++) {
         below += (double)h->counts[i];
-        if (below >= share * total)
+        if (below >= fraction * total)
             return i;
     }
     return BINS - 1;
 }
 
-/* Counts in GROUPS equal groups of the bins [first, past), each bin shared out by overlap. */
+/* Counts in GROUPS equal groups of the bins [first, past), each bin divided by overlap. */
 static void group_bins(const trip_histogram *h, int first, int past, double groups[GROUPS])
 {
     double width = (double)(past - first) / GROUPS;
@@ -107,7 +107,7 @@ bool trip_tf_find_tissue(trip_tf_tissue *out, const trip_histogram *h)
         .valley = value_at(h, (double)past * (valley + 0.5) / GROUPS),
         .middle = value_at(h, quantile(h, first, 0.5) + 0.5),
         .high = value_at(h, quantile(h, first, 0.98) + 1),
-        .share = tissue / total,
+        .fraction = tissue / total,
         .sharpest = sharpest / tissue,
     };
     return out->valley < out->middle && out->middle < out->high;

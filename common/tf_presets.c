@@ -146,14 +146,14 @@ const char *trip_tf_nearest_preset(const char *name)
 static int fail_unknown(const char *name)
 {
     char known[512] = "";
-    const char *near = trip_tf_nearest_preset(name);
+    const char *nearest = trip_tf_nearest_preset(name);
     for (int i = 0; i < PRESETS; i++) {
         size_t used = strlen(known);
         snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "", presets[i].name);
     }
     return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, "preset", "no preset `%s`;%s%s%s there are %s",
-                     name, near ? " did you mean `" : "", near ? near : "", near ? "`?" : "",
-                     known);
+                     name, nearest ? " did you mean `" : "", nearest ? nearest : "",
+                     nearest ? "`?" : "", known);
 }
 
 static bool is_end(const trip_tf_point *p)

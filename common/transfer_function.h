@@ -36,9 +36,9 @@ typedef struct trip_histogram {
     uint64_t total;
 } trip_histogram;
 
-/* What a volume is: each kind has an automatic function of its own. */
+/* The kinds of volumes, each of which has an automatic function of its own. */
 typedef enum trip_tf_kind {
-    TRIP_TF_AUTOMATIC, /* not known yet */
+    TRIP_TF_AUTOMATIC, /* not recognised yet */
     TRIP_TF_CT,        /* in Hounsfield units */
     TRIP_TF_MR,
     TRIP_TF_FOG,
@@ -54,7 +54,7 @@ const char *trip_tf_kind_name(trip_tf_kind kind);
 const char *trip_tf_kind_title(trip_tf_kind kind);
 trip_tf_kind trip_tf_kind_from_name(const char *name);
 
-/* What is known of a volume besides its values. */
+/* Properties of a volume besides its values. */
 typedef struct trip_tf_origin {
     bool sparse;          /* only some voxels exist, and the histogram holds those */
     bool integers;        /* values are whole numbers */
@@ -63,10 +63,10 @@ typedef struct trip_tf_origin {
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
 
-/* A preset's name ("bone", "preset:bone"), or a file, told apart by its content: `.tf` text, JSON
- * of ParaView or 3D Slicer, a .vp, XML of Slicer, VTK or ParaView; "FILE#NAME" for one of several.
- * A name without a slash or a dot that is a preset's is the preset. All report and return a
- * negative status on failure, TRIP_USAGE for an unknown preset. trip_tf_parse() takes `.tf` text
+/* A preset's name ("bone", "preset:bone"), or a file, distinguished by its content: `.tf` text,
+ * JSON of ParaView or 3D Slicer, a .vp, XML of Slicer, VTK or ParaView; "FILE#NAME" for one of
+ * several. A name without a slash or a dot that is a preset's is the preset. All report and return
+ * a negative status on failure, TRIP_USAGE for an unknown preset. trip_tf_parse() takes `.tf` text
  * itself. */
 int trip_tf_load(trip_tf **out, const char *path_or_preset);
 int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t bytes);
@@ -144,8 +144,8 @@ typedef enum trip_tf_format {
     TRIP_TF_VTK,
 } trip_tf_format;
 
-/* *text, for free(), is the function called `name`. Refuses a normalised function in a form that
- * knows data units only; warns where the unit of opacity is lost. */
+/* *text, for free(), becomes the function, with the name `name`. Refuses a normalised function in a
+ * form that has data units only; warns where the unit of opacity is lost. */
 int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, char **text);
 
 /* Extinction per unit length of an opacity: -ln(1 - min(opacity, TRIP_OPACITY_MAX)). */

@@ -45,7 +45,7 @@ static uint64_t input_bytes(const brick *b)
     return b->in.tally->voxels * trip_scalar_bytes(b->in.info->type);
 }
 
-/* Data set and spill so far. */
+/* Bytes of the data set and of the spill so far. */
 static uint64_t bytes_written(const brick *b)
 {
     return (b->writer ? trip_writer_bytes(b->writer) : 0) + trip_spill_bytes(b->temporary.spill);
@@ -59,7 +59,7 @@ static void end_stage(brick *b, trip_brick_stage stage, double begin)
     b->written_before += c->bytes_written;
 }
 
-/* Once it was done, a run that goes on knows the result. */
+/* Scans the volume; a resumed run has the result in its journal. */
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->temporary.journal);
@@ -148,7 +148,7 @@ static int open_splatter(brick *b)
     return trip_splatter_create(&b->splatter, &p, b->in.budget);
 }
 
-/* The summary of a data set that is there. */
+/* Summarises the data set that the interrupted run completed. */
 static int summarise_done(brick *b)
 {
     trip_dataset *d;
@@ -198,7 +198,7 @@ static int on_box(void *user, unsigned thread, const trip_box *box)
     return trip_splatter_box(b->splatter, thread, box);
 }
 
-/* Adds what the boxes so far gave to what a killed run had seen before. */
+/* Sums over the boxes so far and over what the interrupted run did before. */
 static void add_up(const brick *b, trip_tally *tally, uint64_t *kept, uint64_t *halo)
 {
     const trip_checkpoint *before = trip_journal_get_checkpoint(b->temporary.journal);
@@ -304,8 +304,8 @@ static int fail_count(const brick *b, const char *what, uint64_t counted, uint64
                      counted, what, written);
 }
 
-/* What was written is what was counted: a journal may have counted otherwise. What is around
- * several boxes of a sparse volume was counted more often. */
+/* The numbers of records written must be those counted, part of which may be from a journal. The
+ * halo of a sparse volume may be counted more than once. */
 static int check_records(brick *b)
 {
     trip_brick_summary *s = b->summary;

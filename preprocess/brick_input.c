@@ -7,7 +7,7 @@
 #include "brick_text.h"
 #include "report.h"
 
-/* Saturated: the grids of sparse volumes may have more. */
+/* Saturates: the grid of a sparse volume may have more than 2^64 voxels. */
 static uint64_t count_voxels(const int64_t dims[3])
 {
     uint64_t voxels = 1;
@@ -114,7 +114,7 @@ void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
     *hi = fmax(a, b);
 }
 
-/* Values are rounded to floats, which a large offset may make too coarse. */
+/* Values are rounded to floats, in which a large offset may leave too few bits for exact codes. */
 unsigned trip_brick_code_bytes(const trip_brick_input *in)
 {
     trip_quantiser q = { 0 };

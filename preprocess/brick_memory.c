@@ -8,23 +8,23 @@
 
 enum { MOST_SLICES = 32 };
 
-/* What the input took before there is a plan. */
+/* Allocated by the input before there is a plan. */
 #define TAKEN_BYTES ((uint64_t)1 << 20)
-/* What the writer and the spill take. A halo has more files, with smaller buffers. */
+/* Allocated by the writer and the spill. With a halo there are more files, with smaller buffers. */
 #define OPENED_BYTES ((uint64_t)18 << 20)
 #define HALO_OPENED_BYTES ((uint64_t)16 << 20)
-/* What the builder takes beside its pieces, and readers for themselves. */
+/* Allocated by the list builder besides its pieces, and by readers. */
 #define LATE_BYTES ((uint64_t)2 << 20)
-/* Of the writer's index, for a tile of a sheet. */
+/* Of the writer's index, for each tile of a sheet. */
 #define TILE_BYTES 400
-/* Of a splat that is alone in its pieces, in all lists of its kind. */
+/* A splat alone in its pieces, in the three lists of its kind. */
 #define LONE_SPLAT_BYTES (3 * 48)
 
 typedef struct needs {
     uint64_t slice_bytes;  /* as stored */
     uint64_t slice_splats; /* pieces of one slice, in one list, if all of it is kept */
-    uint64_t opened_bytes; /* taken before the lists */
-    uint64_t late_bytes;   /* taken after them */
+    uint64_t opened_bytes; /* allocated before the lists */
+    uint64_t late_bytes;   /* allocated after them */
     uint64_t list_min_bytes, list_max_bytes;
 } needs;
 
@@ -55,7 +55,7 @@ static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, 
     if (info->sparse)
         return n;
     n.slice_bytes = slice * trip_scalar_bytes(info->type);
-    /* A quarter more for what is left empty at the ends of chunks. */
+    /* A quarter more, as the ends of chunks remain empty. */
     n.slice_splats = slice / tile * trip_piece_max_bytes(f) / 4 * 5 + slice * 16;
     return n;
 }
@@ -66,8 +66,8 @@ static uint64_t reader_bytes(const needs *n, int64_t slices, bool read_ahead)
     return (uint64_t)(slices + 2 + (read_ahead ? slices + 2 : 0) + 2) * n->slice_bytes;
 }
 
-/* Shares out what is left once the rest is open; false when it is too little. */
-static bool share(trip_memory_plan *plan, const needs *n, uint64_t left)
+/* Divides what is left between the reader and the lists; false when it is too little. */
+static bool divide(trip_memory_plan *plan, const needs *n, uint64_t left)
 {
     uint64_t used = n->late_bytes + reader_bytes(n, plan->slices, plan->read_ahead);
     if (used + n->list_min_bytes > left)
@@ -79,15 +79,16 @@ static bool share(trip_memory_plan *plan, const needs *n, uint64_t left)
     return true;
 }
 
-/* Whether portions of so many slices fit; fills the plan. */
+/* Fills the plan for portions of `slices` slices; false if they do not fit. */
 static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, int64_t slices,
                        bool read_ahead)
 {
     *plan = (trip_memory_plan){ .slices = slices, .read_ahead = read_ahead };
-    return n->opened_bytes <= memory && share(plan, n, memory - n->opened_bytes);
+    return n->opened_bytes <= memory && divide(plan, n, memory - n->opened_bytes);
 }
 
-/* Large portions cost less at their borders, but splats want most of the memory. */
+/* Large portions need less work at their borders, but most of the memory is better used for splats.
+ */
 static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_t memory)
 {
     return plan->in_order && reader_bytes(n, plan->slices, plan->read_ahead) <= memory / 4;
@@ -135,5 +136,5 @@ int trip_memory_plan_update(trip_memory_plan *plan, const char *path, const trip
                             const trip_piece_format *format, unsigned threads, uint64_t left_bytes)
 {
     needs n = needs_of(info, format, threads);
-    return share(plan, &n, left_bytes) ? 0 : refuse(path, info, &n, threads, plan->slices);
+    return divide(plan, &n, left_bytes) ? 0 : refuse(path, info, &n, threads, plan->slices);
 }

@@ -15,11 +15,12 @@
 #include "file_pieces.h"
 #include "report.h"
 
-/* One read of compressed bytes; plain files are read straight into the caller's memory. */
+/* The buffer of compressed bytes; plain files are read into the caller's memory. */
 #define PIECE_BYTES ((size_t)1 << 20)
-/* Plain data from this size on is read in pieces, several at once. */
+/* Plain data from this size on is read by several threads. */
 #define LARGE_BYTES ((uint64_t)4 << 20)
-/* Between looks at the interrupt flag; the decompressors count in 32 bits. */
+/* The most that is read or decompressed between checks for an interruption; the decompressors count
+ * in 32 bits. */
 #define STEP_BYTES ((size_t)4 << 20)
 
 struct trip_byte_stream {
@@ -29,7 +30,7 @@ struct trip_byte_stream {
     uint64_t file_bytes;
     uint64_t position;        /* in the file, of the next byte to read */
     uint64_t done;            /* bytes of the source delivered */
-    trip_file_pieces *pieces; /* of a plain file, where that is of use */
+    trip_file_pieces *pieces; /* of a large plain file; or NULL */
 
     unsigned char *piece; /* compressed bytes read but not used yet: */
     size_t piece_used, piece_bytes;
@@ -149,7 +150,7 @@ static int corrupt(const trip_byte_stream *s)
                      s->position - (s->piece_bytes - s->piece_used));
 }
 
-/* One step of the decompressor over what the piece holds. */
+/* Decompresses some of the buffered bytes. */
 static int step_zlib(trip_byte_stream *s, unsigned char *to, size_t bytes, size_t *got_out)
 {
     z_stream *z = &s->codec.zlib;
@@ -178,7 +179,7 @@ static int step_bzip2(trip_byte_stream *s, unsigned char *to, size_t bytes, size
     return code == BZ_OK || code == BZ_STREAM_END ? 0 : corrupt(s);
 }
 
-/* Whether the piece goes on with another member of the same kind after a completed one. */
+/* Whether another member of the same kind follows a complete one in the buffer. */
 static bool another_member(const trip_byte_stream *s)
 {
     const unsigned char *next = s->piece + s->piece_used;

@@ -31,8 +31,8 @@ static int open_source(dense_file *d, int64_t index)
     return trip_byte_stream_open(&d->stream, &d->sources[index]);
 }
 
-/* Each is opened once, so that a missing or short one is found before hours of work; the first is
- * left open. */
+/* Opens each source once, so that a missing or short one is found before hours of work; the first
+ * remains open. */
 static int open_all(dense_file *d)
 {
     for (int64_t i = d->count - 1; i >= 0; i--) {
@@ -103,10 +103,10 @@ int trip_dense_rewind(void *state)
     return trip_byte_stream_rewind(d->stream);
 }
 
-/* Between reads of this length a signal is seen. */
+/* An interruption is noticed between reads of this length. */
 #define READ_BYTES_MAX ((uint64_t)32 << 20)
 
-/* The next bytes, over the borders of files; to nowhere when `to` is NULL. */
+/* Reads the next bytes, from several sources if need be; skips them when `to` is NULL. */
 static int take_bytes(dense_file *d, uint64_t bytes, char *to)
 {
     while (bytes > 0) {

@@ -1,6 +1,6 @@
 #include "dilate.h"
 
-/* Every flag with the ones before and after it. */
+/* Dilates a row along itself. */
 static void dilate_row(const uint8_t *restrict from, uint8_t *restrict to, int64_t count)
 {
     if (count == 1) {
@@ -13,10 +13,10 @@ static void dilate_row(const uint8_t *restrict from, uint8_t *restrict to, int64
     to[count - 1] = from[count - 2] | from[count - 1];
 }
 
-/* Runs of `length` flags, `count` of them one after the other, each with the one before and the one
- * after it. */
-static void dilate_runs(const uint8_t *restrict from, uint8_t *restrict to, int64_t length,
-                        int64_t count)
+/* Dilates `count` consecutive groups of `length` flags by the groups before and after each: rows in
+ * a slice, or slices in a box. */
+static void dilate_groups(const uint8_t *restrict from, uint8_t *restrict to, int64_t length,
+                          int64_t count)
 {
     for (int64_t r = 0; r < count; r++) {
         const uint8_t *at = from + r * length;
@@ -33,6 +33,6 @@ void trip_dilate(const uint8_t *flags, uint8_t *out, uint8_t *scratch, const int
     for (int64_t row = 0; row < size[1] * size[2]; row++)
         dilate_row(flags + row * size[0], out + row * size[0], size[0]);
     for (int64_t z = 0; z < size[2]; z++)
-        dilate_runs(out + z * slice, scratch + z * slice, size[0], size[1]);
-    dilate_runs(scratch, out, slice, size[2]);
+        dilate_groups(out + z * slice, scratch + z * slice, size[0], size[1]);
+    dilate_groups(scratch, out, slice, size[2]);
 }

@@ -7,7 +7,7 @@
 
 #include "report.h"
 
-/* Beyond this many intervals a row is searched value by value. */
+/* With more intervals, each value of a row is searched for instead. */
 enum { MAX_SWEPT_INTERVALS = 4 };
 
 /* Finite floats numbered in ascending order: -0 and +0 are 0, their neighbours -1 and 1. */
@@ -47,7 +47,7 @@ static int out_of_memory(void)
     return trip_fail(TRIP_ERROR, "brick", "opacity envelope", "out of memory");
 }
 
-/* Adds the ranks [lo, hi] and unites what they touch. */
+/* Adds the ranks [lo, hi] and merges the intervals that they touch. */
 static int add_ranks(trip_envelope *e, int64_t lo, int64_t hi)
 {
     size_t first = 0, past;
@@ -88,9 +88,9 @@ static bool shows(const trip_tf *tf, int64_t rank)
     return trip_tf_evaluate(tf, float_of(rank)).opacity > 0;
 }
 
-/* Adds those of the ranks [lo, hi] that show, where the opacity rises or falls all along: each of
- * the steps that evaluate it (subtract, divide, multiply, add) keeps order, so that what shows is
- * one piece at one end, and bisection finds the exact place. */
+/* Adds the visible ones of the ranks [lo, hi], on which the opacity is monotone: each rounding step
+ * of its evaluation (subtract, divide, multiply, add) is monotone, too, so that the visible ranks
+ * are one interval at one end, whose border bisection finds exactly. */
 static int add_monotone(trip_envelope *e, const trip_tf *tf, int64_t lo, int64_t hi)
 {
     if (lo > hi)

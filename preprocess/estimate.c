@@ -13,17 +13,17 @@
 
 #include "report.h"
 
-/* Portions looked at, and slices of each where memory is not short. */
+/* Portions in a sample, and slices of each where memory permits. */
 enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
-/* A pass is stopped with this status when it has taken long enough. */
+/* The status with which a scan ends that has taken long enough. */
 enum { STOPPED = -100 };
-/* What is written to see how fast the disk is. */
+/* Written to measure the disk's speed. */
 #define TRIAL_BYTES ((size_t)32 << 20)
-/* How long a run may look at the volume before it begins: longer at one that takes hours. */
+/* How long a sample may take before a run begins: longer for a run that takes hours. */
 static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
-/* What masks take of a record: those of a halo are thinner. */
+/* Bytes of masks for each record: those of a halo have fewer bits set. */
 static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
-/* Estimates are from a sample: a run is only refused when even much less would not fit. */
+/* As estimates are from a sample, a run is refused only if this part of them does not fit. */
 static const double surely = 0.7;
 
 static double now_seconds(void)
@@ -41,7 +41,7 @@ static int64_t slices_of(const trip_memory_plan *plan)
 static uint64_t stride_of(const trip_brick_input *in, const trip_memory_plan *plan)
 {
     uint64_t portions = (uint64_t)(in->info->dims[2] / slices_of(plan)) + 1;
-    if (in->info->sparse) /* portions differ too much */
+    if (in->info->sparse) /* the number of voxels differs too much between portions */
         return 1;
     return portions > SAMPLES ? portions / SAMPLES : 1;
 }
@@ -58,8 +58,8 @@ static int on_progress(void *user, uint64_t voxels)
     return now_seconds() > s->until ? STOPPED : 0;
 }
 
-/* One voxel around a body are, on the average over directions, three for each that is so along x.
- */
+/* Scales the sample up to the volume. A layer of one voxel around a body has three voxels for each
+ * pair of neighbours along x across its border, in the mean over directions. */
 static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick_estimate *e)
 {
     double all = in->info->sparse ? (double)t->voxels : (double)in->grid_voxels;
@@ -69,9 +69,9 @@ static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick
     e->halo = in->params->no_halo ? 0 : (uint64_t)(3 * scale * (double)t->borders);
 }
 
-/* Kept voxels, by looking at portions spread over the volume for `limit_seconds` at most (0: no
- * limit); the input's envelope is made. 1: the numbers of voxels are filled; 0: it took too long.
- */
+/* Estimates the numbers of voxels from portions at regular distances in the volume, for at most
+ * `limit_seconds` (0: no limit); the input's envelope is made. 1: *e has the numbers; 0: it took
+ * too long. */
 static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
                          double *skip_seconds, trip_brick_estimate *e)
 {
@@ -112,14 +112,14 @@ static uint64_t free_bytes(const char *output)
     return known ? (uint64_t)v.f_bavail * v.f_frsize : UINT64_MAX;
 }
 
-/* Bytes of a piece for each of its splats, where splats are many. */
+/* Bytes of a piece for each of its splats, if it has many. */
 static double piece_bytes(const trip_piece_format *f, unsigned list)
 {
     const trip_piece_format own = trip_piece_format_of(f, list);
     return (double)trip_piece_max_bytes(&own) / (double)(1 << 2 * f->tile_log2);
 }
 
-/* Fills all but the seconds, from the numbers of voxels. */
+/* Computes the sizes from the numbers of voxels. */
 static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *format,
                            const trip_memory_plan *plan, trip_brick_estimate *e)
 {
@@ -133,7 +133,7 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     e->free_bytes = free_bytes(in->params->output);
 }
 
-/* Seconds to write a byte beside the output, as the writer does: an unnamed file's worth of it. */
+/* Seconds to write a byte on the disk of the output, measured with an unnamed file. */
 static double seconds_per_byte(const char *output)
 {
     char *folder = folder_of(output);
@@ -159,7 +159,7 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
     trip_piece_format format = trip_brick_format(p);
     trip_memory_plan plan;
     bool scan = trip_brick_input_needs_scan(in);
-    double begin = now_seconds(), passing = 0;
+    double begin = now_seconds(), skipping = 0;
     format.quantised = trip_brick_will_be_quantised(in);
     int status =
         trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
@@ -168,15 +168,15 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
         status = trip_brick_input_scan(in, (trip_scan_params){ .slices = slices_of(&plan),
                                                                .read_ahead = plan.read_ahead,
                                                                .stride = stride_of(in, &plan),
-                                                               .skip_seconds = &passing });
+                                                               .skip_seconds = &skipping });
     if (status == 0)
         status = trip_brick_input_make_envelope(in);
     if (status == 0)
-        status = estimate_kept(in, &plan, 0, &passing, e);
+        status = estimate_kept(in, &plan, 0, &skipping, e);
     if (status < 0)
         return status;
-    double looking = now_seconds() - begin - passing;
-    double all = looking * (double)stride_of(in, &plan) + passing;
+    double sampling_seconds = now_seconds() - begin - skipping;
+    double all = sampling_seconds * (double)stride_of(in, &plan) + skipping;
     estimate_sizes(in, &format, &plan, e);
     e->seconds = all + (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
     return 0;

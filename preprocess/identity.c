@@ -9,11 +9,11 @@
 #include "format.h"
 #include "report.h"
 
-/* Raised with every change by which other bytes come out of the same input and parameters, be it in
- * a reader, in triptych-images or in the bricker. */
+/* To be raised with every change after which the same input and parameters give other bytes,
+ * whether in a reader, in triptych-images or in the bricker. */
 enum { BRICKER_VERSION = 3 };
 
-/* A file is known by its name, length and time of change; of a pattern only the name is known. */
+/* A file is identified by its name, length and time of change, a pattern by its text. */
 static void write_input(FILE *f, const trip_brick_params *p)
 {
     struct stat st = { 0 };

@@ -12,13 +12,13 @@
 
 enum { ORDERED_LIST = TRIP_ORDERED_LIST };
 
-/* What the background thread is to do with chunks: append the list in order, or spill the others.
- */
+/* Work for the background thread: to append chunks of the ordered list, or to spill those of
+ * others. */
 typedef struct job {
     struct job *next;
     bool ordered;
     trip_chain chains[TRIP_MOST_LISTS];
-    trip_checkpoint *checkpoint; /* to be noted once it is done; or NULL */
+    trip_checkpoint *checkpoint; /* to be written once it is done; or NULL */
 } job;
 
 struct trip_list_builder {
@@ -26,13 +26,13 @@ struct trip_list_builder {
     unsigned lists;
     uint32_t (
         *open)[TRIP_MOST_LISTS]; /* [producer][list], the chunk being filled; the producer's */
-    trip_list_output outputs[TRIP_MOST_LISTS]; /* the one in order is the background thread's until
-                                                  the merge */
+    trip_list_output outputs[TRIP_MOST_LISTS]; /* until the merge only the background thread uses
+                                                  that of the ordered list */
     pthread_t thread;
     bool thread_runs;
     trip_scope *scope; /* of the creator */
 
-    pthread_mutex_t lock; /* guards all below; a chunk goes with the chain that it is in */
+    pthread_mutex_t lock; /* guards all below; a chunk is guarded with the chain that it is in */
     pthread_cond_t work, freed;
     trip_piece_pool pool;
     bool stopping, has_spilled;
@@ -44,7 +44,7 @@ struct trip_list_builder {
 
 uint64_t trip_list_builder_min_bytes(const trip_piece_format *f, unsigned producers)
 {
-    /* Every producer fills a chunk of each list; as many again wait to be spilled. */
+    /* Every producer fills one chunk of each list while as many wait to be spilled. */
     return (uint64_t)trip_chunk_bytes(f) * 2 * trip_piece_list_count(f) * ((uint64_t)producers + 1);
 }
 
@@ -68,7 +68,7 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
     pthread_mutex_unlock(&b->lock);
 }
 
-/* With how far the files of the list in order are, whose appender this thread is. */
+/* On the thread that appends to the ordered list, whose lengths the checkpoint has. */
 static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
 {
     for (int plane = 0; plane < TRIP_PLANES; plane++)
@@ -76,7 +76,7 @@ static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
     return trip_journal_write_checkpoint(b->params.journal, c, b->params.spill);
 }
 
-/* Lists one after the other; their chunks are free at once, also when it fails. */
+/* Does a job list by list and frees the chunks of each, also on failure. */
 static int do_chains(trip_list_builder *b, job *j, int status)
 {
     for (unsigned list = 0; list < b->lists; list++) {
@@ -123,8 +123,8 @@ static void *thread_main(void *arg)
     return NULL;
 }
 
-/* Under the lock: hands filled chunks over, of the list in order or of all others. Takes over the
- * checkpoint, also when it fails. */
+/* Under the lock: queues the filled chunks of the ordered list or of all others. The checkpoint is
+ * freed after the job or on failure. */
 static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkpoint)
 {
     job *j = malloc(sizeof *j);
@@ -135,9 +135,9 @@ static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkp
     *j = (job){ .ordered = ordered, .checkpoint = checkpoint };
     b->has_spilled |= !ordered;
     for (unsigned list = 0; list < b->lists; list++) {
-        bool goes = is_spilled(b, list) != ordered;
-        j->chains[list] = goes ? b->filled[list] : trip_chain_empty();
-        if (goes)
+        bool included = is_spilled(b, list) != ordered;
+        j->chains[list] = included ? b->filled[list] : trip_chain_empty();
+        if (included)
             b->filled[list] = trip_chain_empty();
     }
     if (b->first_job)
@@ -150,7 +150,7 @@ static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkp
     return 0;
 }
 
-/* Under the lock: chunks that a spill would free. */
+/* Under the lock: the number of chunks that a spill would free. */
 static uint32_t spillable(const trip_list_builder *b)
 {
     uint32_t chunks = 0;
@@ -159,7 +159,7 @@ static uint32_t spillable(const trip_list_builder *b)
     return chunks;
 }
 
-/* Under the lock: a free chunk; none on failure. */
+/* Under the lock: waits for a free chunk; TRIP_NO_CHUNK on failure. */
 static uint32_t take_chunk(trip_list_builder *b)
 {
     while (b->pool.free.first == TRIP_NO_CHUNK && b->status == 0) {
@@ -214,8 +214,8 @@ void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigne
     return at;
 }
 
-/* Under the lock. Half of the memory is spilled in the background while producers fill the other,
- * unless all there will be seems to fit. */
+/* Under the lock. A spill is due when half of the memory is full, so that producers can fill the
+ * other half meanwhile; if all splats seem to fit, only when memory is nearly full. */
 static bool is_time_to_spill(const trip_list_builder *b, double done)
 {
     const double most = 0.9 * (double)b->pool.chunk_count, now = spillable(b);
@@ -313,7 +313,7 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
     return status;
 }
 
-/* Lets the background thread end; with `now`, without doing what is left. */
+/* Ends the background thread, after the queued jobs or, with `now`, without them. */
 static void stop_thread(trip_list_builder *b, bool now)
 {
     if (!b->thread_runs)

@@ -8,7 +8,7 @@
 
 enum { PROGRESS_MS = 200 };
 
-/* Pieces on their way to the spill. */
+/* The user of spill_piece(). */
 typedef struct spilling {
     trip_spill *spill;
     const trip_piece_format *format;
@@ -41,7 +41,7 @@ int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *po
     return spill_sources(spill, list, &pool->formats[list], &source, 1);
 }
 
-/* What the workers share. */
+/* Used by all workers. */
 typedef struct merge_job {
     const trip_list_merge *merge;
     unsigned lists[TRIP_MOST_LISTS];
@@ -58,7 +58,7 @@ static size_t segments_of(const trip_list_merge *m, unsigned list)
     return count;
 }
 
-/* Readers of segments of one list, each with a chunk to read through. */
+/* Readers of segments of one list, each with a chunk as its buffer. */
 typedef struct source_set {
     merge_job *job;
     trip_segment_reader *readers;
@@ -96,7 +96,7 @@ static int open_segment(source_set *s, size_t index, unsigned list)
     return status;
 }
 
-/* The first `limit` segments of a list; there is room for one source more. */
+/* Opens the first `limit` segments of a list, with room for one more source. */
 static int open_sources(source_set *s, merge_job *job, unsigned list, size_t limit)
 {
     const trip_list_merge *m = job->merge;
@@ -134,7 +134,7 @@ static int merge_list(void *user, unsigned thread, uint64_t item)
     return status;
 }
 
-/* Merges as many segments of a list as there are buffers for into one. */
+/* Merges segments of a list into one, as many as there are free chunks for buffers. */
 static int consolidate(merge_job *job, unsigned list)
 {
     const trip_list_merge *m = job->merge;
@@ -148,7 +148,8 @@ static int consolidate(merge_job *job, unsigned list)
     return status;
 }
 
-/* Every segment needs a chunk to be read through: makes room for that, then merges segments. */
+/* Ensures that there is a free chunk for every segment: spills all pieces in memory, then merges
+ * segments until they are few enough. */
 static int make_room(merge_job *job)
 {
     const trip_list_merge *m = job->merge;

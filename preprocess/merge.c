@@ -1,6 +1,6 @@
 #include "merge.h"
 
-/* A heap: no source stands at a smaller key than its parent, the one at half its number. */
+/* Restores the heap below `at`: no source has a smaller key than its parent. */
 static void sift_down(trip_piece_source **heap, size_t count, size_t at)
 {
     trip_piece_source *s = heap[at];

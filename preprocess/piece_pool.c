@@ -13,8 +13,7 @@ enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, MIN_CHUNK_BYTES = 128 << 10 };
 
 size_t trip_chunk_bytes(const trip_piece_format *f)
 {
-    size_t bytes =
-        f->halo ? MIN_CHUNK_BYTES : 2 * MIN_CHUNK_BYTES; /* of more lists, smaller ones */
+    size_t bytes = f->halo ? MIN_CHUNK_BYTES : 2 * MIN_CHUNK_BYTES; /* more lists, smaller chunks */
     while (bytes < 4 * trip_piece_max_bytes(f))
         bytes *= 2;
     return bytes;
@@ -53,8 +52,7 @@ int trip_piece_pool_create(trip_piece_pool *pool, const trip_piece_format *f, co
     if (!pool->memory || !pool->chunks)
         return trip_fail(TRIP_ERROR, "brick", "lists",
                          "the memory allowed cannot be had: try less --memory");
-    /* Filled once, from the front: large pages are harder to get than small ones and gain nothing.
-     */
+    /* Memory is filled once, from the front: huge pages would gain nothing. */
     madvise(pool->memory, pool->chunk_count * pool->chunk_bytes, MADV_NOHUGEPAGE);
     for (size_t i = pool->chunk_count; i-- > 0;)
         trip_chain_push(pool, &pool->free, (uint32_t)i);

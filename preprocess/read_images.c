@@ -1,8 +1,8 @@
-/* Stacks of pictures as a slice reader: a folder, a pattern or one file with several slices, read
- * by the helper program (image_helper.h), which keeps one slice at a time.
+/* Stacks of pictures, as a slice reader: a folder, a pattern or one file with several slices. The
+ * helper program (image_helper.h) reads them, one slice at a time.
  *
- * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. Without metadata
- * voxels are 1 apart; DICOM says how far, and where. */
+ * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. The
+ * distance of voxels and their place are those of DICOM; without metadata the distance is 1. */
 #include <dirent.h>
 #include <glob.h>
 #include <math.h>
@@ -19,7 +19,7 @@
 typedef struct state {
     trip_image_helper *helper;
     trip_budget *budget;
-    void *reserved; /* the helper's share of the budget, never touched */
+    void *reserved; /* budget for the helper's memory, never touched */
     size_t reserved_bytes;
     int64_t next; /* slice */
     size_t slice_bytes;
@@ -54,7 +54,7 @@ static int open_stack(state *s, bool allow_gaps, trip_image_stack *stack)
     return status;
 }
 
-/* A code string of DICOM, as the standard has it. */
+/* Whether it is a code string as the DICOM standard defines it. */
 static bool is_modality(const char *text, size_t room)
 {
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _";
@@ -62,7 +62,7 @@ static bool is_modality(const char *text, size_t room)
     return length <= 16 && strspn(text, letters) == length;
 }
 
-/* What of it cannot be, or NULL; sizes that no memory holds are refused later. */
+/* What is impossible in the helper's answer, or NULL; sizes beyond the memory are refused later. */
 static const char *fault_of(const trip_image_stack *stack)
 {
     bool finite = isfinite(stack->slope) && isfinite(stack->inter);
@@ -80,7 +80,7 @@ static const char *fault_of(const trip_image_stack *stack)
     return finite ? NULL : "a map that is not finite";
 }
 
-/* The helper holds one slice, besides what it reports. */
+/* Takes the helper's memory from the budget: one slice and what it reports. */
 static int reserve_memory(state *s, const trip_image_stack *stack)
 {
     if (__builtin_mul_overflow((uint64_t)stack->dims[0], (uint64_t)stack->dims[1],
@@ -181,7 +181,8 @@ static int by_name(const void *a, const void *b)
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Files of a folder but hidden ones; which of them are slices only their content says. */
+/* Visits the files of a folder but for hidden ones; only their content would show which are slices.
+ */
 static int list_folder(const char *path, visit_file *visit, void *user)
 {
     struct dirent **names;

@@ -1,6 +1,6 @@
-/* NIfTI-1 and -2, .nii or a pair .hdr/.img, gzipped or not, in either byte order. libnifti gives
- * the header's layout, its byte swapping and the quaternion's meaning; the values are streamed by
- * ourselves, since libnifti reads whole images. */
+/* NIfTI-1 and -2, .nii or a pair .hdr/.img, gzipped or not, in either byte order. libnifti provides
+ * the header's layout, its byte swapping and the conversion of the quaternion; the values are
+ * streamed here, since libnifti reads whole images. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -24,7 +24,7 @@ _Static_assert(sizeof(nifti_2_header) == 540, "as on disk");
 /* A header of either version, widened to that of version 2, in the machine's byte order. */
 typedef struct header {
     nifti_2_header n;
-    bool swapped;  /* the file's byte order is the other one */
+    bool swapped;  /* the file's byte order differs from the machine's */
     bool own_file; /* the values are in an .img beside it */
 } header;
 
@@ -97,7 +97,7 @@ static nifti_2_header widen(const nifti_1_header *h)
         n.srow_z[i] = h->srow_z[i];
     }
     n.datatype = h->datatype;
-    /* A float on disk; whatever no file can have becomes a negative offset, refused later. */
+    /* A float on disk; an impossible one becomes a negative offset, which is refused later. */
     n.vox_offset = h->vox_offset >= 0 && h->vox_offset < 0x1p62f ? (int64_t)h->vox_offset : -1;
     n.scl_slope = h->scl_slope;
     n.scl_inter = h->scl_inter;
@@ -252,7 +252,7 @@ static trip_affine from_qform(const nifti_2_header *n)
     return a;
 }
 
-/* The sform is preferred; without sform and qform nothing is said of left, front and head. */
+/* Prefers the sform; without sform and qform the orientation in the patient is unknown. */
 static void set_map(const char *path, const nifti_2_header *n, trip_volume_info *info)
 {
     trip_affine sform = from_sform(n), inverse;
@@ -306,7 +306,7 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
     char *header_path = partner(path, ".img", ".hdr");
     if (!header_path)
         return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
-    nifti_set_debug_level(0); /* it would print by itself */
+    nifti_set_debug_level(0); /* else it prints messages */
     int status = read_header(header_path, &h);
     if (status == 0 && (status = set_dims(header_path, &h.n, info)) == 0)
         status = set_type(header_path, &h.n, info);
@@ -319,7 +319,7 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
     return status;
 }
 
-/* Of one file there is no partner, and of a pair one of these is `path` itself. */
+/* The files of a pair, one of which is `path`; both are the same for a single file. */
 static int nifti_list(const char *path, int (*visit)(void *user, const char *file), void *user)
 {
     char *head = partner(path, ".img", ".hdr"), *values = partner(path, ".hdr", ".img");

@@ -39,7 +39,7 @@ static int read_header(const char *path, trip_nrrd_header *h)
     return status;
 }
 
-/* Where the text goes on after `lines` more lines from byte `start`. */
+/* *offset becomes the byte after the next `lines` lines from byte `start` on. */
 static int skip_lines(const char *path, uint64_t start, int64_t lines, uint64_t *offset)
 {
     FILE *file = fopen(path, "rbe");
@@ -71,7 +71,7 @@ static char *join(const char *header_path, const char *name)
                                                                                          : path;
 }
 
-/* Lines are skipped in the file, bytes after decompression: as the format defines it. */
+/* Lines are skipped in the file, bytes after decompression, as the format defines it. */
 static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t part_bytes)
 {
     int status = 0;

@@ -1,4 +1,4 @@
-/* Headerless values: what they are comes from the options, or from a file name such as
+/* Values without a header. Options describe them, or a file name such as
  * engine_256x256x128_uint8.raw, the naming of the Open SciVis Datasets. */
 #include <ctype.h>
 #include <inttypes.h>
@@ -77,7 +77,7 @@ static int no_size(const char *path)
                      "holds (also --spacing, --endian and --offset)");
 }
 
-/* Options first; the name fills what they leave open. */
+/* From the options; what they leave open, from the file's name. */
 static int find_layout(const char *path, const trip_volume_params *params, trip_volume_info *info)
 {
     int64_t dims[3] = { 0 };

@@ -1,5 +1,5 @@
-/* OpenVDB grids as a portion reader. Opening reads the grid's tree and passes over its leaves once,
- * to note where they are and to check them; values are read when a portion is decoded and not kept.
+/* OpenVDB grids, as a portion reader. Opening reads the grid's tree and checks its leaves without
+ * reading their values; those are read whenever a portion is decoded.
  *
  * Memory: per leaf (up to 512 voxels) about 130 bytes, per 128-voxel cube in use 32 KiB, per
  * 4096-voxel cube 256 KiB, 16 bytes a portion, all counted against the budget before they are
@@ -31,7 +31,7 @@ struct State {
     size_t next = 0; /* box */
 };
 
-/* Runs body(); no exception gets past, each becomes one line. */
+/* Runs body(); every exception becomes a reported failure. */
 template <typename Body> int guard(const std::string &path, const Body &body)
 try {
     return body();
@@ -74,7 +74,7 @@ const trip_vdb_entry &find_grid(const trip_vdb_contents &contents, const char *w
                          TRIP_USAGE);
 }
 
-/* A grid that is broken is no fog: whether that matters shows when it is opened. */
+/* False for a damaged grid, too, which is reported if it is opened. */
 bool is_fog(trip_vdb_stream &is, const trip_vdb_contents &contents, const trip_vdb_entry &entry)
 try {
     return trip_vdb_read_head(is, contents, entry).grid_class == "fog volume";
@@ -83,8 +83,8 @@ try {
     return false;
 }
 
-/* "density", the name that all writers of smoke and clouds give what is seen; else the first fog
- * volume; else the first grid of scalars. */
+/* Chooses "density", the usual name of what is visible in smoke and clouds; else the first fog
+ * volume; else the first scalar grid. */
 const trip_vdb_entry &choose_grid(trip_vdb_stream &is, const trip_vdb_contents &contents)
 {
     const trip_vdb_entry *first = nullptr, *fog = nullptr;
@@ -106,7 +106,7 @@ const trip_vdb_entry &choose_grid(trip_vdb_stream &is, const trip_vdb_contents &
 openvdb::math::Transform::Ptr read_transform(trip_vdb_stream &is)
 {
     int64_t start = is.tellg();
-    is.get_string(1024); /* its name, whose length the library would trust */
+    is.get_string(1024); /* its name, whose length the library does not check */
     is.seekg(start);
     auto transform = openvdb::math::Transform::createLinearTransform();
     transform->read(is);
@@ -152,7 +152,8 @@ trip_vdb_conversion choose_conversion(const trip_vdb_head &head, const trip_vdb_
     return { wanted, std::cbrt(volume) };
 }
 
-/* A grid that shares another's tree has only its own metadata and transform. */
+/* Moves the stream to the tree of a grid that has only metadata and a transform of its own and uses
+ * the tree of another grid. */
 void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const trip_vdb_entry &entry,
                trip_vdb_head &head)
 {
@@ -169,7 +170,7 @@ void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const tri
                          "\" shares the tree of a grid that is not there");
 }
 
-/* What was chosen where the file leaves a choice and the options do not make it. */
+/* Describes what was chosen where neither the file nor the options decide. */
 void write_note(const trip_vdb_contents &contents, const trip_vdb_entry &entry,
                 const trip_vdb_conversion &conversion, const trip_volume_params &params,
                 trip_volume_info *info)
@@ -252,7 +253,7 @@ int next_box(void *opaque, trip_volume_portion *portion)
         portion->origin[a] = (int64_t)box.lo[a] - grid.lo[a];
         portion->size[a] = box.size[a];
     }
-    portion->data = &state; /* boxes hold nothing of their own */
+    portion->data = &state; /* not NULL; boxes have no memory of their own */
     return 1;
 }
 

@@ -19,8 +19,7 @@ typedef struct vol_header {
     uint64_t bytes; /* with the "." line */
 } vol_header;
 
-/* A text line of the form "Name: value" or "." at the start, and a size before long: nothing else
- * is known to begin so. */
+/* Whether the file begins with one of the lines that headers begin with. */
 static bool vol_probe(const char *path, const unsigned char *head, size_t bytes,
                       const trip_volume_params *params)
 {
@@ -40,7 +39,7 @@ static int fail_line(const char *path, int line, const char *why)
     return trip_fail(TRIP_ERROR, "read", where, "%s", why);
 }
 
-/* One "Name: value" line; names that do not concern the values are passed over. */
+/* Takes one "Name: value" line; other names are ignored. */
 static int take_field(vol_header *h, const char *line)
 {
     static const char *const axes[3] = { "X", "Y", "Z" };

@@ -13,7 +13,7 @@ static const struct {
     [TRIP_F32] = { 4, "float" },  [TRIP_F64] = { 8, "double" },
 };
 
-/* NRRD's spellings, those of the Open SciVis file names, and NumPy's. */
+/* Spellings of NRRD, of the Open SciVis file names, and of NumPy. */
 static const struct {
     const char *name;
     trip_scalar type;

@@ -15,7 +15,7 @@ void trip_tally_clear(trip_tally *t)
     t->value_max = -INFINITY;
 }
 
-/* Four values side by side; compilers do not find these by themselves. */
+/* Vectors of four: compilers do not vectorise these loops. */
 typedef float four_floats __attribute__((vector_size(16)));
 typedef int32_t four_ints __attribute__((vector_size(16)));
 
@@ -267,7 +267,7 @@ void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
     for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
         if (t->counts[b] == 0)
             continue;
-        /* The lower edge stands for a fine bin: exact for integers in up to 14 bits. */
+        /* A fine bin counts as its lower edge, which is exact for integers of up to 14 bits. */
         double value = fmax(ldexp((double)(t->first + b), t->exponent), t->value_min);
         int to = range > 0 ? (int)((value - t->value_min) / range * bins) : 0;
         histogram->counts[to < bins ? to : bins - 1] += t->counts[b];
@@ -293,7 +293,7 @@ static void count_kept(trip_tally *t, const trip_envelope *e, const float *value
         t->kept += keep[i];
     for (size_t i = 1; i < count; i++)
         t->borders += keep[i] != keep[i - 1];
-    if (active) /* the rows of sparse volumes end where voxels do */
+    if (active) /* rows of sparse volumes end where voxels do */
         t->borders += (uint64_t)keep[0] + keep[count - 1];
 }
 

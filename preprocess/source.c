@@ -15,7 +15,7 @@
 #include "volume_reader.h"
 
 #define PIECE_BYTES ((size_t)1 << 20)
-/* The coarsest times of a file system are those of FAT. */
+/* The coarsest file times are those of FAT: steps of two seconds. */
 static const int64_t stable_ns = INT64_C(2000000000);
 
 static int fail_memory(const char *path)
@@ -28,7 +28,7 @@ static int64_t nanoseconds(struct timespec t)
     return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
-/* What is missing or no file is for the reader to report: it counts as empty. */
+/* What is missing or no regular file counts as empty; the reader will report it. */
 static int add_file(void *user, const char *path)
 {
     trip_source *s = user;
@@ -130,8 +130,8 @@ int trip_source_digest_state(const trip_source *s, const char *text, trip_digest
     return status;
 }
 
-/* Raw data has its size and type in the name, stacks their order; elsewhere the name says at most
- * how the bytes are packed. */
+/* The names of raw files have their size and type, those of stacks their order; of other names only
+ * the encoding matters. */
 static void add_name(XXH3_state_t *hash, const trip_source *s, const trip_source_file *f)
 {
     bool matters = !strcmp(s->format, "raw") || !strcmp(s->format, "images");
@@ -150,7 +150,7 @@ typedef struct reading {
     void *user;
 } reading;
 
-/* Exactly the bytes that the file had when it was found. */
+/* Adds as many bytes as the file had when it was found. */
 static int add_bytes(reading *r, const trip_source_file *f, int fd)
 {
     for (uint64_t at = 0; at < f->bytes;) {

@@ -18,7 +18,7 @@ using openvdb::CoordBBox;
 
 constexpr int32_t cell_voxels = 64;
 
-/* A stored value as density, and whether the voxel exists. */
+/* The density of a stored value, and whether the voxel exists. */
 struct Sample {
     float value;
     bool exists;
@@ -52,7 +52,7 @@ class Converter
     double scale_ = 1;
 };
 
-/* The part of a box being decoded that is in one node, and where it goes. */
+/* The part of a decoded box that is in one node, and the arrays of the box. */
 struct Part {
     CoordBBox box;
     const int64_t *lo, *size;
@@ -76,14 +76,14 @@ struct Part {
     }
 };
 
-/* Boxes while they are collected. */
+/* Collects the boxes of a grid. */
 class BoxList
 {
   public:
     BoxList(trip_vdb_grid &grid, trip_budget *budget) : grid_(grid), budget_(budget)
     {
     }
-    /* Boxes of all cells of a node or tile whose sides are whole cells. */
+    /* Adds a box for each cell of a node or tile that consists of whole cells. */
     void add_full(const CoordBBox &box)
     {
         include(box);
@@ -107,7 +107,7 @@ class BoxList
         }
         grid_.boxes.push_back(b);
     }
-    /* Existing voxels are in here. */
+    /* Extends the bounds of the existing voxels. */
     void include(const CoordBBox &box)
     {
         bounds_.expand(box);
@@ -120,7 +120,7 @@ class BoxList
     CoordBBox bounds_;
 };
 
-/* Cuts what the boxes have beyond the bounds, and sorts. */
+/* Clips the boxes to the bounds and sorts them. */
 void BoxList::finish()
 {
     std::vector<trip_vdb_box> &boxes = grid_.boxes;
@@ -230,7 +230,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
     /* Leaves of truth values are bits and stay in memory with the tree. */
     static constexpr bool in_memory = std::is_same<ValueT, bool>::value;
 
-    /* The root by hand: the library's own would leak a node that turns out to be corrupt. */
+    /* Reads the root here: the library's function leaks a node that turns out to be corrupt. */
     void read_tree(trip_vdb_stream &is)
     {
         is.get_value<int32_t>(); /* number of buffers, as checked */
@@ -251,7 +251,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         }
     }
 
-    /* Notes where each leaf lies, and checks that it can be read; or reads it. */
+    /* Stores the place of each leaf and checks that it can be read; or reads it. */
     void read_leaves(trip_vdb_stream &is)
     {
         if constexpr (in_memory) {
@@ -274,7 +274,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         if (mask != leaf.valueMask())
             throw trip_vdb_error("is corrupt: a leaf's two masks differ");
         if (io::getFormatVersion(is) < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) {
-            is.skip(3 * sizeof(int32_t)); /* its origin, once more */
+            is.skip(3 * sizeof(int32_t)); /* its origin, repeated */
             if (is.get_value<int8_t>() != 1)
                 throw trip_vdb_error("has several buffers a leaf, which is an obsolete form");
         }
@@ -312,7 +312,8 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         return convert_((double)value, active).exists;
     }
 
-    /* Leaves and leaf-sized tiles of a node of 128 voxels a side, in its eight cells. */
+    /* Adds the boxes of a node of 128 voxels a side, one for each of its eight cells, around the
+     * leaves and leaf-sized tiles in it. */
     void collect_cells(const MiddleT &node, BoxList &list) const
     {
         CoordBBox cells[8];
@@ -387,10 +388,10 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
     const trip_vdb_fd &fd_;
     bool half_;
     trip_vdb_reservation reserved_tree_, reserved_boxes_;
-    /* Not a Tree, which adds only what would be compiled for nothing. */
+    /* The root is enough: a Tree would add code that is not used. */
     typename TreeT::RootNodeType root_;
     std::vector<int64_t> leaf_offsets_; /* by the leaf's transient data */
-    io::StreamMetadata stream_;         /* what a stream at a leaf's values must know */
+    io::StreamMetadata stream_;         /* for a stream that reads a leaf's values */
     Converter convert_;
 };
 

@@ -109,7 +109,7 @@ template <typename TreeT> class trip_vdb_tree_check
         check_chunk(is, count * sizeof(ValueT));
     }
 
-    /* After a chunk of at most `bytes` uncompressed bytes was passed over. */
+    /* Checks the size of the chunk that was just skipped, of at most `bytes` uncompressed bytes. */
     static void check_chunk(trip_vdb_stream &is, uint64_t bytes)
     {
         namespace io = openvdb::io;
@@ -127,7 +127,8 @@ template <typename TreeT> class trip_vdb_tree_check
     }
 
   private:
-    /* Blosc trusts the sizes in its own header. */
+    /* Whether the size in the Blosc header, which the library does not check, is that of the chunk.
+     */
     static bool is_blosc_chunk(trip_vdb_stream &is, int64_t start, int64_t stored)
     {
         if (stored < 16)

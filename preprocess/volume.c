@@ -13,21 +13,21 @@
 #include "volume_reader.h"
 
 #define HEAD_BYTES 1024
-/* A slab's size where the caller has no opinion. */
-#define SLAB_BYTES ((int64_t)16 << 20)
+/* The default size of a portion. */
+#define PORTION_BYTES ((int64_t)16 << 20)
 
-/* In the order they are asked: those with a magic number first. */
+/* In the order of their probing: formats with a magic number first. */
 static const trip_volume_reader *const readers[] = {
     &trip_read_vdb, &trip_read_nrrd,   &trip_read_nifti,
     &trip_read_vol, &trip_read_images, &trip_read_raw,
 };
 
-/* Whole slices [first, first + count) as stored: a portion's own and one neighbour on each side. */
-typedef struct slab {
+/* The stored slices [first, first + count) of a portion: its own and one neighbour on each side. */
+typedef struct stored_slices {
     int64_t first, count;
     unsigned char *slices;
     size_t bytes;
-} slab;
+} stored_slices;
 
 struct trip_volume {
     const trip_volume_reader *reader;
@@ -40,12 +40,12 @@ struct trip_volume {
     size_t slice_bytes;
     bool swap;
     int64_t next_slice;   /* first slice of the next portion */
-    int64_t read_slices;  /* slices the reader has delivered: up to two more than next_slice - 1 */
-    unsigned char *carry; /* [next_slice - 1, read_slices), for the next slab */
-    int broken;           /* the status of a failed read: no further portion can be right */
-    /* One released slab kept for the next portion, since fresh pages cost about as much as reading
-     * into them. Exchanged atomically: portions may be released by any thread. */
-    _Atomic(slab *) spare;
+    int64_t read_slices;  /* slices read so far: up to two more than next_slice - 1 */
+    unsigned char *carry; /* [next_slice - 1, read_slices), for the next portion */
+    int broken;           /* the status of a failed read, after which every portion fails */
+    /* The memory of one released portion, for the next one: fresh pages cost about as much as
+     * reading into them. Exchanged atomically, as any thread may release portions. */
+    _Atomic(stored_slices *) spare;
 };
 
 static bool is_raw_option_given(const trip_volume_params *p)
@@ -54,7 +54,7 @@ static bool is_raw_option_given(const trip_volume_params *p)
            p->raw_offset_bytes;
 }
 
-/* An option that the format cannot follow is an error, not ignored. */
+/* An option that does not apply to the format is an error. */
 static int check_options(const char *path, const char *format, const trip_volume_params *p)
 {
     if (strcmp(format, "raw") != 0 && is_raw_option_given(p))
@@ -120,7 +120,7 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
                      "says what it is");
 }
 
-/* Gives the index axes the wanted lengths in world space and keeps their directions. */
+/* Sets the lengths of the index axes in world space and keeps their directions. */
 static void override_spacing(trip_affine *m, const double spacing[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -207,7 +207,7 @@ const trip_volume_info *trip_volume_get_info(const trip_volume *v)
     return &v->info;
 }
 
-static void slab_free(trip_volume *v, slab *s)
+static void slices_free(trip_volume *v, stored_slices *s)
 {
     if (!s)
         return;
@@ -217,10 +217,10 @@ static void slab_free(trip_volume *v, slab *s)
 
 static void drop_spare(trip_volume *v)
 {
-    slab_free(v, atomic_exchange(&v->spare, NULL));
+    slices_free(v, atomic_exchange(&v->spare, NULL));
 }
 
-/* What is kept from one portion to the next. */
+/* Releases what is kept from one portion to the next. */
 static void drop_memory(trip_volume *v)
 {
     drop_spare(v);
@@ -229,14 +229,14 @@ static void drop_memory(trip_volume *v)
     v->carry = NULL;
 }
 
-static slab *slab_take(trip_volume *v, int64_t first, int64_t count)
+static stored_slices *slices_take(trip_volume *v, int64_t first, int64_t count)
 {
     size_t bytes;
-    slab *s = atomic_exchange(&v->spare, NULL);
+    stored_slices *s = atomic_exchange(&v->spare, NULL);
     if (__builtin_mul_overflow(v->slice_bytes, (size_t)count, &bytes))
         bytes = SIZE_MAX / 2; /* refused below */
     if (s && s->bytes < bytes) {
-        slab_free(v, s);
+        slices_free(v, s);
         s = NULL;
     }
     if (!s && (s = calloc(1, sizeof *s))) {
@@ -284,8 +284,8 @@ int trip_volume_rewind(trip_volume *v)
     return v->reader->rewind(v->state);
 }
 
-/* Fills a slab: the slices that the last one ended with, then new ones from the reader. */
-static int fill_slab(trip_volume *v, slab *s, int64_t next_slice)
+/* Fills *s with the slices that the last portion ended with and with new ones from the reader. */
+static int fill_slices(trip_volume *v, stored_slices *s, int64_t next_slice)
 {
     int64_t kept = v->read_slices - s->first;
     size_t kept_bytes = (size_t)kept * v->slice_bytes;
@@ -306,19 +306,19 @@ static int fill_slab(trip_volume *v, slab *s, int64_t next_slice)
     return 0;
 }
 
-static int next_slab(trip_volume *v, int64_t slices, trip_volume_portion *portion)
+static int next_slices(trip_volume *v, int64_t slices, trip_volume_portion *portion)
 {
     int64_t begin = v->next_slice, depth = v->info.dims[2];
     int64_t end = slices < depth - begin ? begin + slices : depth;
     int64_t first = begin > 0 ? begin - 1 : 0, past = end < depth ? end + 1 : depth;
     if (end < depth && !v->carry && !(v->carry = trip_budget_take(v->budget, 2 * v->slice_bytes)))
         return refused(v, past - first + 2);
-    slab *s = slab_take(v, first, past - first);
+    stored_slices *s = slices_take(v, first, past - first);
     if (!s)
         return refused(v, past - first);
-    int status = fill_slab(v, s, end);
+    int status = fill_slices(v, s, end);
     if (status < 0) {
-        slab_free(v, s);
+        slices_free(v, s);
         return status;
     }
     *portion = (trip_volume_portion){ .origin = { 0, 0, begin },
@@ -336,8 +336,8 @@ int trip_volume_next(trip_volume *v, int64_t slices_hint, trip_volume_portion *p
     if (v->next_slice == v->info.dims[2])
         return 0;
     if (slices_hint < 1)
-        slices_hint = SLAB_BYTES / (int64_t)v->slice_bytes;
-    return next_slab(v, slices_hint < 1 ? 1 : slices_hint, portion);
+        slices_hint = PORTION_BYTES / (int64_t)v->slice_bytes;
+    return next_slices(v, slices_hint < 1 ? 1 : slices_hint, portion);
 }
 
 int64_t trip_volume_skip(trip_volume *v, int64_t slices)
@@ -392,8 +392,8 @@ static void mark_row(int64_t width, bool exists, int64_t lo, int64_t count, uint
         memset(active + begin, 1, (size_t)(end - begin));
 }
 
-static void decode_slab(const trip_volume *v, const slab *s, const int64_t lo[3],
-                        const int64_t size[3], float *values, uint8_t *active)
+static void decode_slices(const trip_volume *v, const stored_slices *s, const int64_t lo[3],
+                          const int64_t size[3], float *values, uint8_t *active)
 {
     const int64_t *dims = v->info.dims;
     size_t row_bytes = v->slice_bytes / (size_t)dims[1];
@@ -417,7 +417,7 @@ int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion
         if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
             lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
             return trip_fail(TRIP_ERROR, "read", v->path, "asked for voxels outside the portion");
-    decode_slab(v, portion->data, lo, size, values, active);
+    decode_slices(v, portion->data, lo, size, values, active);
     return 0;
 }
 
@@ -426,7 +426,7 @@ void trip_portion_release(trip_volume *v, trip_volume_portion *portion)
     if (!portion->data)
         return;
     if (v->reader->read_slices)
-        slab_free(v, atomic_exchange(&v->spare, portion->data));
+        slices_free(v, atomic_exchange(&v->spare, portion->data));
     else
         v->reader->release(v->state, portion);
     portion->data = NULL;

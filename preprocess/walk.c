@@ -6,14 +6,14 @@
 
 #include "report.h"
 
-/* Portions that lie side by side are small in sparse formats; a batch gives all threads some work.
- */
+/* Portions of sparse formats are small; a batch of them has work for all threads. */
 enum { BATCH_PORTIONS = 512 };
 #define BATCH_VOXELS (UINT64_C(1) << 21)
 
 typedef struct batch {
     trip_volume_portion portions[BATCH_PORTIONS];
-    uint64_t first_box[BATCH_PORTIONS + 1]; /* boxes before each portion, and in all */
+    uint64_t
+        first_box[BATCH_PORTIONS + 1]; /* number of each portion's first box, and of all boxes */
     size_t count;
     uint64_t voxels;
 } batch;
@@ -21,11 +21,11 @@ typedef struct batch {
 typedef struct walk {
     const trip_walk_params *params;
     trip_volume *volume;
-    const batch *at_work;
+    const batch *current;
     uint64_t done, voxels; /* up to where the volume was read */
 } walk;
 
-/* Pieces that the grid of `step` cuts [lo, lo + size) into. */
+/* The number of parts that a grid of distance `step` cuts [lo, lo + size) into. */
 static int64_t cuts(int64_t lo, int64_t size, int64_t step)
 {
     return (lo + size - 1) / step - lo / step + 1;
@@ -44,7 +44,7 @@ static uint64_t boxes_of(const trip_walk_params *p, const trip_volume_portion *b
     return count;
 }
 
-/* Piece `index` of the portion's extent along an axis. */
+/* Sets the box to part `index` of the portion along an axis. */
 static void cut(const trip_walk_params *p, const trip_volume_portion *b, int axis, int64_t index,
                 trip_box *box)
 {
@@ -58,7 +58,7 @@ static void cut(const trip_walk_params *p, const trip_volume_portion *b, int axi
 static int do_box(void *user, unsigned thread, uint64_t item)
 {
     const walk *w = user;
-    const batch *b = w->at_work;
+    const batch *b = w->current;
     size_t low = 0, high = b->count; /* the portion with first_box <= item < next first_box */
     while (high - low > 1) {
         size_t middle = (low + high) / 2;
@@ -90,15 +90,15 @@ static bool has_slices(const walk *w)
     return !trip_volume_get_info(w->volume)->sparse;
 }
 
-/* Fills a batch; an empty one is the end. A slab of at most `slices` is a batch by itself. */
+/* Reads a batch; it is empty at the end. In dense volumes it is one portion of at most `slices`. */
 static int read_batch(walk *w, batch *b, int64_t slices)
 {
-    bool slabs = has_slices(w);
+    bool dense = has_slices(w);
     int more = 1;
     b->voxels = 0;
     b->count = 0;
     b->first_box[0] = 0;
-    while (b->count < (slabs ? 1 : BATCH_PORTIONS) && b->voxels < BATCH_VOXELS) {
+    while (b->count < (dense ? 1 : BATCH_PORTIONS) && b->voxels < BATCH_VOXELS) {
         trip_volume_portion *portion = &b->portions[b->count];
         more = trip_volume_next(w->volume, slices, portion);
         if (more <= 0)
@@ -110,7 +110,7 @@ static int read_batch(walk *w, batch *b, int64_t slices)
     if (more < 0)
         release(w, b);
     if (b->count > 0)
-        w->done += slabs ? (uint64_t)b->portions[0].size[2] : 1;
+        w->done += dense ? (uint64_t)b->portions[0].size[2] : 1;
     w->voxels += b->voxels;
     return more < 0 ? more : 0;
 }
@@ -122,12 +122,11 @@ static int check_interrupted(void)
 
 static void start(walk *w, trip_workers *workers, const batch *b)
 {
-    w->at_work = b;
+    w->current = b;
     trip_workers_start(workers, do_box, w, b->first_box[b->count]);
 }
 
-/* Passes over slices that need not be read, if the format knows how; *count becomes what is left.
- */
+/* Skips slices without reading them, where the format allows it; *count becomes what is left. */
 static int skip_slices(walk *w, uint64_t *count)
 {
     const int64_t *dims = trip_volume_get_info(w->volume)->dims;
@@ -140,7 +139,7 @@ static int skip_slices(walk *w, uint64_t *count)
     return 0;
 }
 
-/* Passes over slices, or over batches of sparse formats. */
+/* Skips `count` slices, or batches of sparse volumes. */
 static int skip_batches(walk *w, batch *b, uint64_t count)
 {
     int64_t slices = w->params->slices < 1 ? 1 : w->params->slices;
@@ -158,7 +157,7 @@ static int skip_batches(walk *w, batch *b, uint64_t count)
     return status;
 }
 
-/* What to pass over for only every so many batches to be looked at. */
+/* Skips the batches between two that are processed. */
 static int skip_stride(walk *w, batch *b)
 {
     uint64_t count = w->params->stride > 1 ? w->params->stride - 1 : 0;
@@ -184,7 +183,7 @@ static int read_next(walk *w, batch *b)
     return status == 0 ? read_batch(w, b, w->params->slices) : status;
 }
 
-/* One batch is at work while the next is being read. */
+/* The workers process one batch while the next is read. */
 static int walk_batches(walk *w, trip_workers *workers, batch *now, batch *ahead)
 {
     const trip_walk_params *p = w->params;

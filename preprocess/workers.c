@@ -18,7 +18,7 @@ struct trip_workers {
     pthread_mutex_t lock; /* guards all below */
     pthread_cond_t started, finished;
     bool stopping;
-    uint64_t loop;     /* number of the loop, so that a thread sees a new one */
+    uint64_t loop;     /* counts loops, by which threads notice a new one */
     trip_scope *scope; /* of the thread that started it */
     trip_work work;
     void *user;

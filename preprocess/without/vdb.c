@@ -1,4 +1,5 @@
-/* In the place of read_vdb.cpp, where OpenVDB is switched off: such files are known, and refused.
+/* Takes the place of read_vdb.cpp where OpenVDB is switched off: recognises such files and refuses
+ * them.
  */
 #include <string.h>
 #include <strings.h>
