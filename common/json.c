@@ -14,8 +14,8 @@ enum {
     NODE_BYTES = sizeof(cJSON) + 16 + 2 * 32,
 };
 
-/* What stands outside strings in a text, which need not be sound: as a parser would find it up to
- * the first fault. */
+/* The size of a text's JSON tree as a parser would find it up to the first fault; the text need not
+ * be sound. */
 typedef struct outline {
     uint64_t nodes, bytes;
     int depth; /* the deepest */

@@ -1,8 +1,8 @@
 /* A transfer function from a histogram alone. Most voxels of most volumes are background: air, the
  * zeros around a simulation, the black of an angiogram. Everything up to the upper edge of that
  * peak gets opacity 0, so that it is culled. Above it, opacity grows with a power of a value's
- * standing, half its rank (the share of the foreground below it) and half its place in the range,
- * so that what is common stays a veil and what is rare and high stands out. */
+ * standing, half its rank (the fraction of the foreground below it) and half its place in the
+ * range, so that what is common stays a veil and what is rare and high stands out. */
 #include "tf_internal.h"
 
 #include <math.h>
@@ -82,7 +82,7 @@ static double upper_edge(const analysis *a, int bin)
     return a->low + a->range * (bin + 1) / BINS;
 }
 
-/* Where a bin stands among the foreground, 0 to 1: mostly by its rank, the rest by its value, so
+/* The standing of a bin among the foreground, 0 to 1: mostly by its rank, the rest by its value, so
  * that the noise within one peak of the histogram is not stretched over all opacities. */
 static double standing(const analysis *a, int bin, double rank)
 {

@@ -23,7 +23,7 @@ struct trip_tf {
     trip_tf_kind as;   /* ... as for this kind */
 };
 
-/* Why a point cannot stand in a function, or NULL. `before` is the point before it, or NULL. */
+/* Why a point is not valid in a function, or NULL. `before` is the point before it, or NULL. */
 const char *trip_tf_point_fault(const trip_tf_point *point, const trip_tf_point *before,
                                 bool normalised);
 

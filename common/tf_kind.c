@@ -45,7 +45,8 @@ static double density_in(const trip_histogram *h, double lo, double hi)
     return sum / (double)h->total / (hi - lo);
 }
 
-/* Air and soft tissue are there, each at its place and far more often than what lies between. */
+/* Whether air and soft tissue occur at their values, far more often than the values between them.
+ */
 static bool is_ct(const trip_histogram *h)
 {
     const double air = density_in(h, -1100, -850), tissue = density_in(h, -150, 150);

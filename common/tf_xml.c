@@ -18,7 +18,7 @@ typedef struct xml_reader {
     const char *name, *wanted;
     char where[512];
     bool found;            /* the element that is wanted */
-    bool inside;           /* it, and it goes on */
+    bool inside;           /* within that element */
     bool vtk, map;         /* it is VTK's, ParaView's */
     bool component;        /* inside the first component of VTK's */
     bool grey;             /* colours are brightness */
@@ -113,7 +113,7 @@ static trip_colour_space space_of(const char **attributes)
     return number >= 0 && number <= 5 ? vtk_spaces[(int)number] : TRIP_COLOUR_RGB;
 }
 
-/* What stands inside the component of a VTK property. */
+/* The elements inside the component of a VTK property. */
 static void begin_in_component(xml_reader *r, const char *element, const char **attributes)
 {
     if (!strcmp(element, "RGBTransferFunction") || !strcmp(element, "GrayTransferFunction")) {

@@ -74,7 +74,7 @@ static inline trip_piece_format trip_piece_format_of(const trip_piece_format *f,
 
 typedef struct trip_piece {
     uint64_t key;  /* sheet << TRIP_TILE_MORTON_BITS | Morton code of the tile */
-    uint32_t next; /* for the owner of the memory, who may link pieces by it */
+    uint32_t next; /* for links between pieces, by the owner of the memory */
     uint16_t last; /* number of splats - 1 */
     uint16_t words;
 } trip_piece;

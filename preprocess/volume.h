@@ -71,7 +71,7 @@ typedef struct trip_volume_params {
     double spacing[3];         /* --spacing: raw and image stacks; elsewhere overrides the file's */
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
-    bool allow_gaps;           /* go on where slices of a stack are missing */
+    bool allow_gaps;           /* accept stacks in which slices are missing */
 } trip_volume_params;
 
 typedef struct trip_volume trip_volume;
