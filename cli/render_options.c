@@ -134,7 +134,7 @@ static const struct argp_option options[] = {
     { NULL, 0, NULL, 0, "Results:", 5 },
     { "depth", KEY_DEPTH, "FILE", 0,
       "Mean distance from the eye to what is seen at each pixel, in world units, infinite where "
-      "nothing is: .exr (channel Z) or .tif; cpu and reference only",
+      "nothing is: .exr (channel Z) or .tif; not by integral",
       5 },
     { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
     { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
@@ -464,17 +464,14 @@ static int check_view(const parse *p)
     return 0;
 }
 
-/* What draws distances; it is chosen where nothing is said. */
-static int check_depth(render_options *o)
+static int check_depth(const render_options *o)
 {
     if (!o->depth)
         return 0;
-    if (o->renderer == TRIPTYCH_RENDERER_GL || o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_option_fail("--depth", "applies to --renderer cpu and reference only");
+    if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_option_fail("--depth", "does not apply to --renderer integral");
     if (o->settings.target != TRIPTYCH_RGBA32F)
         return trip_option_fail("--depth", "goes with --target rgba32f");
-    if (o->renderer == TRIPTYCH_RENDERER_AUTO)
-        o->renderer = TRIPTYCH_RENDERER_CPU;
     return 0;
 }
 

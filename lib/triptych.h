@@ -210,7 +210,7 @@ typedef struct triptych_settings {
     double h;               /* where layers begin to blend, 0 to below 1 */
     double kernel_radius;   /* of a splat, voxels, 0.1 to 100 */
     double background[4];   /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
-    int depth; /* not 0: frames have distances too; neither with GL nor with rounded targets */
+    int depth; /* not 0: frames have distances too; not with rounded targets or the integral */
     /* Of the integral renderer alone. */
     triptych_field field;   /* what it integrates */
     triptych_kernel kernel; /* of values */
