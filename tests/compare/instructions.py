@@ -13,7 +13,8 @@ import tempfile
 ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain"]
 
 # The functions whose cost, with all they call, is a stage's: those of the kernels' table
-# (render/cpu/kernels/kernels.h), of render/cpu/cull.h and of render/cpu/splat_buffer.h, which no compiler can hide.
+# (render/cpu/kernels/kernels.h), of render/cpu/cull.h and of render/cpu/splat_buffer.h, which no
+# compiler can hide.
 STAGES = {
     "hiding": ["trip_cpu_cull"],
     "projection": ["stage", "project"],
