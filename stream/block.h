@@ -10,8 +10,8 @@
  *
  * - padding: zeros up to a multiple of 8 bytes.
  *
- * Voxels so come in Morton order of the tile. Packed and checked here alone; decoded here, and in the
- * CPU renderer's kernels into registers. Pure functions. */
+ * Voxels so come in Morton order of the tile. Packed and checked here alone; decoded here, and in
+ * the CPU renderer's kernels into registers. Pure functions. */
 #ifndef TRIP_BLOCK_H
 #define TRIP_BLOCK_H
 
