@@ -27,7 +27,7 @@ struct trip_spill {
     bool cut; /* the file ends at `offset`: what an interrupted run wrote after it is gone */
     unsigned char *buffer;
     size_t used;
-    uint64_t offset; /* in the file, of the buffer */
+    _Atomic uint64_t offset; /* in the file, of the buffer; any thread may read it */
     trip_segment *segments;
     size_t count, room;
     XXH64_state_t *hash; /* of the segment being written */

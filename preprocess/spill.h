@@ -46,6 +46,7 @@ int trip_spill_end(trip_spill *s);
 size_t trip_spill_count(const trip_spill *s);
 const trip_segment *trip_spill_segment(const trip_spill *s, size_t index);
 void trip_spill_retire(trip_spill *s, size_t index);
+/* Written so far; any thread. */
 uint64_t trip_spill_bytes(const trip_spill *s);
 
 /* Reads one segment through the caller's buffer of at least trip_segment_buffer_bytes(), aligned to
