@@ -1,17 +1,17 @@
 #include "gradient.h"
 
-/* A neighbour that is not finite is replaced by the voxel's own value. */
-static double careful_difference(const float *value, int64_t step)
+static double careful_difference(const float *value, int64_t step, double share)
 {
-    double after = isfinite(value[step]) ? value[step] : *value;
-    double before = isfinite(value[-step]) ? value[-step] : *value;
-    return 0.5 * (after - before);
+    bool after = isfinite(value[step]), before = isfinite(value[-step]);
+    double rise = (double)value[after ? step : 0] - (double)value[before ? -step : 0];
+    return after && before ? share * rise : rise;
 }
 
-void trip_gradient_careful(const float *value, const int64_t step[3], double gradient[3])
+void trip_gradient_careful(const float *value, const int64_t step[3], const double share[3],
+                           double gradient[3])
 {
     for (int a = 0; a < 3; a++)
-        gradient[a] = careful_difference(value, step[a]);
+        gradient[a] = careful_difference(value, step[a], share[a]);
 }
 
 double trip_gradient_unit(const trip_affine *index_to_world)

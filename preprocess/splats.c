@@ -195,14 +195,25 @@ static uint32_t full_normal(const trip_splatter *s, const double index[3], float
     return trip_normal_pack(g, length) & 0xffffff;
 }
 
-static void put_normals(const work *k, const splat_row *r)
+/* trip_gradient_share() of a voxel along an axis: beyond a sparse volume lies its background. */
+static double share_of(const work *k, int axis, int64_t at)
+{
+    const trip_volume_info *info = k->s->params.info;
+    return trip_gradient_share(!info->sparse && (at == 0 || at == info->dims[axis] - 1));
+}
+
+/* `voxel`: the one at local x `first`. */
+static void put_normals(const work *k, const splat_row *r, const int64_t voxel[3])
 {
     const trip_splat_cell *c = &k->w->cell;
     const trip_compact_normals *compact = k->s->params.compact;
+    double share[3] = { 0, share_of(k, 1, voxel[1]), share_of(k, 2, voxel[2]) };
     for (unsigned i = 0; i < r->count; i++) {
         size_t at = r->index + r->x[i];
+        unsigned x = r->x[i] - r->first;
         double gradient[3];
-        trip_gradient_at(r->values + (r->x[i] - r->first), k->step, gradient);
+        share[0] = share_of(k, 0, voxel[0] + x);
+        trip_gradient_at(r->values + x, k->step, share, gradient);
         c->normals[at] = compact ? trip_compact_normal_pack(compact, gradient)
                                  : full_normal(k->s, gradient, c->magnitudes + at);
     }
@@ -252,7 +263,7 @@ static unsigned put_row(const work *k, const uint8_t *flags, int64_t y, int64_t 
     trip_splat_cell_mark(c, c->first[1] + y, z, r.x, r.count);
     put_values(k, &r);
     if (normals)
-        put_normals(k, &r);
+        put_normals(k, &r, voxel);
     return r.count;
 }
 
