@@ -23,7 +23,9 @@ void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_fu
 
     double strength = fmin(1, magnitude / gradient_full);
     double diffuse = fabs(trip_dot(normal, light));
+    double facing = TRIP_FACING * trip_dot(normal, light) * trip_dot(normal, eye);
     double specular = pow(fabs(trip_dot(normal, half)), TRIP_SHININESS);
+    specular *= fmin(1, fmax(0, facing));
     double matt = 1 + strength * (TRIP_AMBIENT + TRIP_DIFFUSE * diffuse - 1);
     for (int i = 0; i < 3; i++) {
         double lit = rgb[i] * matt + strength * TRIP_SPECULAR * specular;

@@ -1,9 +1,15 @@
 /* Light on a splat: Blinn-Phong from the stored world-space gradient, the same numbers in every
  * renderer. A surface faces down the gradient (values fall outwards); both sides are lit alike.
  *     strength = min(1, |gradient| / gradient_full)        flat regions are left unshaded
- *     diffuse  = |n . l|,  specular = |n . half|^TRIP_SHININESS
+ *     diffuse  = |n . l|,  specular = facing |n . half|^TRIP_SHININESS
+ *     facing   = min(1, max(0, TRIP_FACING (n . l) (n . eye)))
  *     colour'  = colour (1 + strength (AMBIENT + DIFFUSE diffuse - 1)) + strength SPECULAR specular
- * clamped to [0, 1]; l towards the light, half between l and the direction to the eye. */
+ * clamped to [0, 1]; l towards the light, half between l and the direction to the eye. Only the
+ * side that the light falls on has a highlight, and it is seen when light and eye are on the same
+ * side of the surface. Where the angle between them is 120 degrees or less, a highlight is as
+ * bright at its middle as without `facing`, which lets it fade towards grazing light. With light
+ * from the eye `facing` changes no colour by more than 2e-8: where it is not 1, |n . half| < 1/2.
+ */
 #ifndef TRIP_SHADE_H
 #define TRIP_SHADE_H
 
@@ -16,6 +22,7 @@
 #define TRIP_DIFFUSE 0.7
 #define TRIP_SPECULAR 0.2
 #define TRIP_SHININESS 24.0
+#define TRIP_FACING 4.0
 
 /* |gradient| in value per world unit at which shading is full. */
 static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world)

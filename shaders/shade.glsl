@@ -1,6 +1,6 @@
 // Light on a splat. Mirrors trip_shade() in render/shade.c and trip_normal_unpack(), or with
-// COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR and SHININESS
-// come from render/shade.h.
+// COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS and
+// FACING come from render/shade.h.
 #include "real.glsl"
 
 #ifdef SHADED
@@ -49,6 +49,9 @@ vec3 shade(vec3 colour, uint normal, vec3 from_eye)
     float strength = min(1.0, gradient.w);
     float diffuse = abs(dot(gradient.xyz, towards_light));
     float specular = pow(abs(dot(gradient.xyz, middle)), SHININESS);
+#ifndef HEADLIGHT
+    specular *= clamp(FACING * dot(gradient.xyz, towards_light) * dot(gradient.xyz, eye), 0.0, 1.0);
+#endif
     float matt = 1.0 + strength * (AMBIENT + DIFFUSE * diffuse - 1.0);
     return clamp(colour * matt + strength * SPECULAR * specular, 0.0, 1.0);
 }

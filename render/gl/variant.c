@@ -49,8 +49,8 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
     if (variant->effects & TRIP_GL_SHADED)
         fprintf(out,
                 "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"
-                "#define SHININESS %f\n",
-                TRIP_AMBIENT, TRIP_DIFFUSE, TRIP_SPECULAR, TRIP_SHININESS);
+                "#define SHININESS %f\n#define FACING %f\n",
+                TRIP_AMBIENT, TRIP_DIFFUSE, TRIP_SPECULAR, TRIP_SHININESS, TRIP_FACING);
     fclose(out);
     return TRIP_OK;
 }

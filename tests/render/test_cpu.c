@@ -150,7 +150,8 @@ static void kernels_light_and_background_agree_with_the_reference(void **state)
         settings.kernel_radius = radii[i];
         settings.shading = i != 2;
         settings.headlight = i % 2 == 0;
-        settings.light_direction = trip_normalize(trip_v3(0.3, -0.8, 0.5));
+        settings.light_direction =
+            trip_normalize(i == 3 ? trip_v3(1, -0.2, -0.4) : trip_v3(0.3, -0.8, 0.5));
         for (int c = 0; c < 4; c++)
             settings.background[c] = 0.2 + 0.15 * c;
         compare(&s, &view, &settings);

@@ -172,6 +172,8 @@ static void light_and_kernel_settings_agree_with_the_reference(void **state)
     settings.headlight = false;
     settings.light_direction = trip_normalize(trip_v3(1, -2, 1));
     compare("directional light", &s, &view, &settings);
+    settings.light_direction = trip_normalize(trip_v3(1, -0.2, -0.4));
+    compare("light from behind", &s, &view, &settings);
     settings.shading = false;
     settings.background[0] = 0.8;
     settings.background[3] = 0.5;

@@ -362,6 +362,51 @@ static double error_of_ball(const scene *s, double radius, const making *how)
     return most;
 }
 
+/* Light at so many degrees from the eye: what is lit is seen, and does not shine, from behind. */
+static void a_ball_shines_where_the_light_falls_on_what_is_seen(void **state)
+{
+    (void)state;
+    enum { SIZE = 31 };
+    scene s;
+    double radius = 24;
+    scene_create(
+        &s, &(scene_params){
+                .dims = { 57, 57, 57 }, .normals = true, .voxel = ball_voxel, .user = &radius });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 0.6F, 0.6F, 0.6F, code < 32768 ? 0 : 1000 };
+    trip_settings settings = exact(1e-4);
+    settings.shading = true;
+    settings.headlight = false;
+    trip_camera_params view = scene_view(&s, trip_v3(0.2, -1, 0.4), 200, 20, SIZE);
+    view.ortho_height = 2 * radius;
+    trip_vec3 eye = trip_normalize(trip_sub(view.eye, view.look));
+    trip_vec3 right = trip_normalize(trip_cross(view.up, eye)), up = trip_cross(eye, right);
+    for (int degrees = 20; degrees < 180; degrees += 50) {
+        double angle = degrees * (3.14159265358979323846 / 180), most = 0, brightest = 0;
+        settings.light_direction =
+            trip_add(trip_scale(eye, cos(angle)), trip_scale(right, sin(angle)));
+        scene_picture p = integrate(&s, &view, &settings);
+        for (int n = 0; n < SIZE * SIZE; n++) {
+            double x = (n % SIZE + 0.5) / SIZE * 2 - 1, y = 1 - (n / SIZE + 0.5) / SIZE * 2;
+            if (x * x + y * y > 0.81)
+                continue;
+            trip_vec3 normal = trip_add(trip_scale(right, x), trip_scale(up, y));
+            normal = trip_add(normal, trip_scale(eye, sqrt(1 - x * x - y * y)));
+            double to_light = trip_dot(normal, settings.light_direction);
+            trip_vec3 half = trip_normalize(trip_add(eye, settings.light_direction));
+            double shine = TRIP_SPECULAR * pow(trip_dot(normal, half), TRIP_SHININESS);
+            shine *= fmin(1, fmax(0, 4 * to_light * trip_dot(normal, eye)));
+            double red = 0.6 * (TRIP_AMBIENT + TRIP_DIFFUSE * fabs(to_light)) + shine;
+            most = fmax(most, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
+            brightest = fmax(brightest, shine);
+        }
+        assert_true(most < 0.002);
+        assert_true(degrees <= 120 ? brightest > 0.15 : brightest < 0.01);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
 static void put_ball(trip_field *f, double radius)
 {
     const int64_t *dims = trip_field_dims(f);
@@ -673,6 +718,7 @@ int main(void)
         cmocka_unit_test(a_narrow_peak_of_the_function_is_not_missed),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
         cmocka_unit_test(cubic_goes_through_a_parabola_and_linear_through_its_chords),
+        cmocka_unit_test(a_ball_shines_where_the_light_falls_on_what_is_seen),
         cmocka_unit_test(a_lit_ball_has_its_colours_the_closer_the_finer_it_is),
         cmocka_unit_test(a_splat_is_a_gaussian_cut_off_and_lowered),
         cmocka_unit_test(of_a_splat_at_the_eye_the_half_in_front_counts),

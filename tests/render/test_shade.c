@@ -64,11 +64,37 @@ static void a_given_light_shines_from_its_direction(void **state)
     trip_settings s = trip_settings_default();
     s.headlight = false;
     s.light_direction = trip_v3(1, 0, 0);
-    /* Facing the light; half way between it and the eye is 45 degrees off. */
-    double expected =
-        0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE) + TRIP_SPECULAR * pow(sqrt(0.5), TRIP_SHININESS);
-    assert_close(lit(&s, 9, 0, 0), expected, 1e-12);
+    assert_close(lit(&s, 9, 0, 0), 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE), 1e-12);
     assert_close(lit(&s, 0, 7, 0), 0.5 * TRIP_AMBIENT, 1e-12);
+    /* Half way between the light and the eye. */
+    double matt = 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE * sqrt(0.5));
+    assert_close(lit(&s, 7, 0, 7), matt + TRIP_SPECULAR, 1e-12);
+}
+
+/* Normals of a sphere at an angle from the eye in the plane of eye and light, these `light` degrees
+ * apart. */
+static void a_sphere_shines_on_the_side_that_light_and_eye_share(void **state)
+{
+    (void)state;
+    const double degree = 3.14159265358979323846 / 180;
+    trip_settings s = trip_settings_default();
+    s.headlight = false;
+    for (int light = 0; light < 180; light += 10) {
+        s.light_direction = trip_v3(sin(light * degree), 0, cos(light * degree));
+        for (int angle = -90; angle <= 90; angle += 3) {
+            double to_eye = cos(angle * degree), to_light = cos((angle - light) * degree);
+            double matt = 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE * fabs(to_light));
+            double shine = TRIP_SPECULAR * pow(cos((angle - 0.5 * light) * degree), TRIP_SHININESS);
+            double rgb = lit(&s, 9 * sin(angle * degree), 0, 9 * to_eye);
+            assert_close(lit(&s, -9 * sin(angle * degree), 0, -9 * to_eye), rgb, 1e-12);
+            if (to_light <= 0)
+                assert_close(rgb, matt, 1e-12);
+            else if (to_light * to_eye >= 0.25)
+                assert_close(rgb, matt + shine, 1e-12);
+            else
+                assert_close(rgb, matt + shine * 4 * to_light * to_eye, 1e-12);
+        }
+    }
 }
 
 static void the_result_stays_within_the_colours_range(void **state)
@@ -171,6 +197,7 @@ int main(void)
         cmocka_unit_test(at_the_silhouette_only_ambient_light_is_left),
         cmocka_unit_test(weak_gradients_are_shaded_in_proportion),
         cmocka_unit_test(a_given_light_shines_from_its_direction),
+        cmocka_unit_test(a_sphere_shines_on_the_side_that_light_and_eye_share),
         cmocka_unit_test(the_result_stays_within_the_colours_range),
         cmocka_unit_test(a_parallel_view_is_lit_alike_everywhere),
         cmocka_unit_test(three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step),

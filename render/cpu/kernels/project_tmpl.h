@@ -362,7 +362,7 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
 }
 
 /* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
- */
+ * With light from the eye `facing` changes nothing that a float keeps. */
 INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
 {
     const trip_settings *s = view->of->settings;
@@ -375,18 +375,22 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
         magnitude = magnitude * v_set(view->gradient_most);
     }
     eye = unit(eye);
-    v3 light = eye, half = eye;
+    v3 half = eye;
+    vf strength = v_min(v_set(1), magnitude), shining = strength;
+    vf to_light = dot(normal, eye);
     if (!s->headlight) {
-        light = v3_of(s->light_direction);
+        v3 light = v3_of(s->light_direction);
         half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
+        vf to_eye = to_light * v_set((float)TRIP_FACING);
+        to_light = dot(normal, light);
+        shining = strength * v_min(v_set(1), v_max(v_set(0), to_light * to_eye));
     }
-    vf strength = v_min(v_set(1), magnitude);
-    vf diffuse = v_abs(dot(normal, light));
+    vf diffuse = v_abs(to_light);
     /* Processors are slow with numbers below 2^-126, as a 24th power soon is. */
     vf h2 = v_max(dot(normal, half) * dot(normal, half), v_set(0x1p-8f));
     vf h8 = (h2 * h2) * (h2 * h2);
     static_assert((int)TRIP_SHININESS == 24, "the power below");
-    vf gloss = strength * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
+    vf gloss = shining * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
     vf matt = v_fma(diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
     matt = v_fma(strength, matt, v_set(1));
     return (colour){ v_min(v_set(1), v_fma(c.r, matt, gloss)),
