@@ -42,6 +42,8 @@ enum {
     KEY_KERNEL_RADIUS,
     KEY_TARGET,
     KEY_RENDERER,
+    KEY_CLASSIFY,
+    KEY_SLICES,
     KEY_METHOD,
     KEY_SUBMIT,
     KEY_TRAVERSAL,
@@ -100,6 +102,11 @@ static const struct argp_option options[] = {
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
     { NULL, 0, NULL, 0, "Method:", 3 },
+    { "classify", KEY_CLASSIFY, "pre|post", 0,
+      "pre: voxels are classified and drawn as splats; post: values are interpolated in sheets and "
+      "classified at each pixel, closer to the integral (default: pre)",
+      3 },
+    { "slices", KEY_SLICES, "N", 0, "Slices of a sheet, 1 to 16 (default: 2); post only", 3 },
     { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
     { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
       3 },
@@ -157,7 +164,8 @@ static const struct argp_option options[] = {
 typedef struct parse {
     render_options *o;
     bool h, target, background, lists, forms, side, light, level, kernel_radius;
-    bool order;            /* --method or --traversal */
+    bool order; /* --method or --traversal */
+    bool slices;
     bool kernel, integral; /* options of the integral renderer */
 } parse;
 
@@ -329,11 +337,19 @@ static int parse_view(int key, char *arg, parse *p)
 
 static int parse_method(int key, char *arg, parse *p)
 {
+    static const char *const classifications[] = { "pre", "post", NULL };
     static const char *const methods[] = { "merge", "clip", "axis", NULL };
     static const char *const traversals[] = { "outward", "ascending", NULL };
     triptych_settings *s = &p->o->settings;
     int which = 0, status;
     switch (key) {
+    case KEY_CLASSIFY:
+        status = trip_option_choice("--classify", arg, classifications, &which);
+        s->classify = (triptych_classify)which;
+        return status;
+    case KEY_SLICES:
+        p->slices = true;
+        return trip_option_integer("--slices", arg, 1, 16, &s->slices);
     case KEY_METHOD:
         status = trip_option_choice("--method", arg, methods, &which);
         s->method = (triptych_method)which;
@@ -496,6 +512,22 @@ static int check_integral(parse *p)
     return 0;
 }
 
+static int check_classify(const parse *p)
+{
+    const render_options *o = p->o;
+    if (o->settings.classify == TRIPTYCH_PRE)
+        return p->slices ? trip_option_fail("--slices", "applies to --classify post only") : 0;
+    if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_option_fail("--classify", "does not apply to --renderer integral");
+    if (o->settings.traversal != TRIPTYCH_OUTWARD)
+        return trip_option_fail("--traversal", "is outward with --classify post");
+    if (p->kernel_radius)
+        return trip_option_fail("--kernel-radius", "applies to splats: give --classify pre");
+    if (p->target || p->lists || p->forms)
+        return trip_option_fail("--target, --submit", "apply to splats: give --classify pre");
+    return 0;
+}
+
 /* Options that cannot apply together; what one implies for another. */
 static int check(parse *p)
 {
@@ -521,6 +553,8 @@ static int check(parse *p)
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     status = check_integral(p);
+    if (!status)
+        status = check_classify(p);
     if (status)
         return status;
     if (p->target &&

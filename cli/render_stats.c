@@ -198,6 +198,10 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         return status;
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
+    cJSON_AddStringToObject(root, "classify",
+                            o->settings.classify == TRIPTYCH_POST ? "post" : "pre");
+    if (o->settings.classify == TRIPTYCH_POST)
+        cJSON_AddNumberToObject(root, "slices", o->settings.slices);
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);

@@ -44,6 +44,8 @@ triptych_settings triptych_default_settings(void)
 {
     const trip_settings s = trip_settings_default();
     return (triptych_settings){
+        .classify = (triptych_classify)s.classify,
+        .slices = s.slices,
         .method = (triptych_method)s.method,
         .traversal = (triptych_traversal)s.traversal,
         .target = (triptych_target)s.target,
@@ -80,6 +82,10 @@ static const char *fault_of_settings(const triptych_settings *s)
         s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
         s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
         return "there is no such method, traversal or target";
+    if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_POST)
+        return "there is no such classification";
+    if (!(s->slices >= 1 && s->slices <= TRIP_SLICES_MAX))
+        return "a sheet has 1 to 16 slices";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
         return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1))
@@ -104,6 +110,8 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
     if (status)
         return trip_context_leave(before, status);
     t->settings = (trip_settings){
+        .classify = (trip_classify)s->classify,
+        .slices = s->slices,
         .method = (trip_method)s->method,
         .traversal = (trip_traversal)s->traversal,
         .target = (trip_target)s->target,

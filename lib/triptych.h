@@ -199,7 +199,15 @@ typedef enum triptych_kernel {
     TRIPTYCH_CUBIC,  /* Catmull and Rom's, between 64 */
 } triptych_kernel;
 
+/* What comes first. */
+typedef enum triptych_classify {
+    TRIPTYCH_PRE,  /* voxels are classified, and their splats drawn */
+    TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
+} triptych_classify;
+
 typedef struct triptych_settings {
+    triptych_classify classify;
+    int slices; /* of a sheet, post: 1 to 16; more come closer to the integral */
     triptych_method method;
     triptych_traversal traversal;
     triptych_target target; /* of the layers; not of the reference */
@@ -220,8 +228,8 @@ typedef struct triptych_settings {
                   too */
 } triptych_settings;
 
-/* Merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black; values, linear,
- * 1e-4, one ray a pixel. */
+/* Pre, 2 slices, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black;
+ * values, linear, 1e-4, one ray a pixel. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 

@@ -220,6 +220,10 @@ int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *read
                          .begun_ms = now_ms() };
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = check_camera(frame->camera);
+    if (!status && frame->settings->classify == TRIP_CLASSIFY_POST && !frame->plan->gathers &&
+        !renderer->ops->classifies_post)
+        status = trip_fail(TRIP_USAGE, "render", renderer->ops->name,
+                           "does not classify after interpolation");
     if (!status) {
         d->begun = true;
         status = renderer->ops->begin_frame(renderer, frame);

@@ -5,6 +5,7 @@
 
 #include "plan_cull.h"
 #include "report.h"
+#include "sheet.h"
 #include "weight.h"
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
@@ -17,14 +18,19 @@ typedef struct planning {
     const trip_settings *settings;
     const trip_tf_entry *table;
     trip_budget *budget;
+    trip_brick_ranges *about; /* post: of the lists along the axis at hand; else NULL */
 } planning;
 
 /* The sheets on one side of the eye, or all. */
 typedef enum sides { ALL, BEYOND, BELOW } sides;
 
-static bool is_in_layer(const trip_list *list, int axis)
+static bool is_in_layer(const planning *p, const trip_list *list, int axis)
 {
-    return list->axis == axis && trip_kind_of(list->kind)->splatted;
+    if (list->axis != axis)
+        return false;
+    if (p->settings->classify == TRIP_CLASSIFY_POST)
+        return list->level == 0 && trip_kind_of(list->kind)->lattice;
+    return trip_kind_of(list->kind)->splatted;
 }
 
 /* First sheet that is not below the eye, cut to [0, sheets]. */
@@ -38,10 +44,14 @@ static int add_selection(const planning *p, trip_plan_pass *pass, const trip_lis
     trip_plan *plan = p->plan;
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
     double eye = trip_component(plan->lists[list->index].camera.eye, list->axis);
+    /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round. */
+    int64_t over = p->about ? TRIP_SHEET_REACH : 0;
     if (side == BEYOND)
-        first = first_sheet_beyond(eye, sheets);
+        first = first_sheet_beyond(eye, sheets) - over;
     else if (side == BELOW)
-        last = first_sheet_beyond(eye, sheets) - 1;
+        last = first_sheet_beyond(eye, sheets) - 1 + over;
+    first = first > 0 ? first : 0;
+    last = last < sheets ? last : sheets - 1;
     if (first > last)
         return 0;
     trip_selection *s = &plan->selections[plan->selection_count];
@@ -65,7 +75,7 @@ static int add_pass(const planning *p, int axis, sides side, bool descending, bo
         .front_to_back = front_to_back,
     };
     for (unsigned i = 0; i < p->data->list_count && !status; i++)
-        if (is_in_layer(&p->data->lists[i], axis))
+        if (is_in_layer(p, &p->data->lists[i], axis))
             status = add_selection(p, pass, &p->data->lists[i], side);
     layer->pass_count += pass->pass.selection_count > 0;
     return status;
@@ -162,7 +172,7 @@ static int select_bricks(const planning *p, const trip_list *list)
     trip_plan_list *planned = &plan->lists[list->index];
     selecting of = { .p = p, .list = list, .planned = planned };
     of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
-                             plan->axis_of_view, p->table);
+                             plan->axis_of_view, p->table, p->about);
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
     planned->bricks = list->brick_count;
@@ -219,15 +229,27 @@ static int plan_layer(const planning *p, int axis)
 {
     int status = 0;
     for (unsigned i = 0; i < p->data->list_count && !status; i++)
-        if (is_in_layer(&p->data->lists[i], axis))
+        if (is_in_layer(p, &p->data->lists[i], axis))
             status = place_list(p, &p->data->lists[i]);
     if (!status)
         status = add_passes(p, axis);
     for (unsigned i = 0; i < p->data->list_count && !status; i++)
-        if (is_in_layer(&p->data->lists[i], axis))
+        if (is_in_layer(p, &p->data->lists[i], axis))
             status = select_bricks(p, &p->data->lists[i]);
     if (!status)
         drop_empty(p->plan, &p->plan->layers[axis], p->budget);
+    return status;
+}
+
+/* The layer of lists whose values are interpolated. */
+static int plan_sheets(const planning *p, int axis)
+{
+    planning with = *p;
+    trip_brick_ranges about;
+    trip_brick_ranges_create(&about, p->data, axis, p->budget);
+    with.about = &about;
+    int status = plan_layer(&with, axis);
+    trip_brick_ranges_destroy(&about);
     return status;
 }
 
@@ -242,16 +264,18 @@ static int take_lists(trip_plan *plan, unsigned count, trip_budget *budget)
                      "%u lists do not fit the memory given; raise --memory", count);
 }
 
+/* Sheets that are classified after interpolation are lit by differences of values. */
 static unsigned planes_of(const trip_dataset *data, const trip_settings *settings)
 {
-    unsigned normals = settings->shading ? 1u << TRIP_PLANE_NORMALS : 0;
+    bool read = settings->shading && settings->classify == TRIP_CLASSIFY_PRE;
+    unsigned normals = read ? 1u << TRIP_PLANE_NORMALS : 0;
     return 1u << TRIP_PLANE_VOXELS | (data->header.planes & normals);
 }
 
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
-    const planning p = { plan, data, camera, settings, table, budget };
+    const planning p = { plan, data, camera, settings, table, budget, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .planes = planes_of(data, settings) };
     int status = trip_settings_check(settings);
@@ -261,7 +285,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
         trip_plan_layer *layer = &plan->layers[axis];
         layer->used = trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
         if (layer->used)
-            status = plan_layer(&p, axis);
+            status = settings->classify == TRIP_CLASSIFY_POST ? plan_sheets(&p, axis)
+                                                              : plan_layer(&p, axis);
     }
     if (status)
         trip_plan_release(plan, budget);
@@ -311,7 +336,7 @@ static int gather_lists(const planning *p, unsigned kinds)
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                          const trip_settings *settings, unsigned kinds, trip_budget *budget)
 {
-    const planning p = { plan, data, camera, settings, NULL, budget };
+    const planning p = { plan, data, camera, settings, NULL, budget, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .gathers = true,
                          .planes = planes_of(data, settings) };
@@ -341,6 +366,9 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
                 s->tolerance);
         return;
     }
+    if (s->classify == TRIP_CLASSIFY_POST)
+        fprintf(out, "classify    post: values are interpolated in %d slice%s a sheet\n", s->slices,
+                s->slices == 1 ? "" : "s");
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out, "method      merge: layers of up to three lists, blended by w^2 with h = %g\n",
@@ -445,7 +473,8 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
 {
     const char *light = s->headlight ? "from the eye" : "from the direction given";
     char bytes[32];
-    if (plan->gathers && plan->selection_count == 0)
+    bool differences = s->classify == TRIP_CLASSIFY_POST && !plan->gathers;
+    if (differences || (plan->gathers && plan->selection_count == 0))
         fprintf(out, "shading     %s, by differences of the values\n",
                 s->shading ? "runs" : "does not run");
     else if (plan->planes & 1u << TRIP_PLANE_NORMALS)

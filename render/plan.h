@@ -13,8 +13,8 @@
 
 /* A list of the data set as the frame sees it. */
 typedef struct trip_plan_list {
-    bool drawn;          /* splatted, and some ray of the view has weight in its layer; where it is
-                            not, what follows is not set */
+    bool drawn;          /* of a layer in which some ray of the view has weight: splatted, or where
+                            values are interpolated; where it is not, what follows is not set */
     trip_list_grid grid; /* in that of level 0 */
     trip_camera camera;  /* the view in the list's own index space */
     uint64_t bricks, bricks_selected;

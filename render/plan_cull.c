@@ -1,6 +1,7 @@
 #include "plan_cull.h"
 
 #include "brick_box.h"
+#include "sheet.h"
 #include "weight.h"
 
 enum { RANGE_CODES = 256 };
@@ -29,8 +30,9 @@ static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, do
 
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
-                         int axis_of_view, const trip_tf_entry *table)
+                         int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about)
 {
+    double radius = about ? TRIP_SHEET_RADIUS : settings->kernel_radius;
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
     return (trip_cull){
         .camera = camera,
@@ -41,11 +43,12 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
                    side(camera, camera->to_x, camera->width - 0.5, -1),
                    side(camera, camera->to_y, camera->height - 0.5, -1) },
-        .radius2 = settings->kernel_radius * settings->kernel_radius,
+        .radius2 = radius * radius,
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
         .low_pass2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
         .table = table,
+        .about = about,
     };
 }
 
@@ -129,10 +132,22 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
     return trip_weight_may_lie(cull->settings, cull->axis_of_view, &bounds, axis);
 }
 
+/* Cells between the brick's voxels and its neighbours' may show what neither of them does. */
+static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
+                           const trip_file_slab *slab)
+{
+    if (some_visible(cull, brick->code_min, brick->code_max))
+        return false;
+    if (!cull->about)
+        return true;
+    trip_code_range range = trip_brick_ranges_about(cull->about, slab->slab, brick);
+    return !some_visible(cull, range.least, range.most);
+}
+
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  const trip_file_slab *slab)
 {
-    if (!some_visible(cull, brick->code_min, brick->code_max))
+    if (is_transparent(cull, brick, slab))
         return TRIP_CULL_TRANSPARENT;
     trip_brick_box place = trip_brick_box_of(cull->header, slab, brick);
     box b = place_box(cull, axis, &place);

@@ -3,6 +3,7 @@
 #ifndef TRIP_PLAN_CULL_H
 #define TRIP_PLAN_CULL_H
 
+#include "brick_ranges.h"
 #include "camera.h"
 #include "dataset.h"
 #include "list_grid.h"
@@ -31,14 +32,15 @@ typedef struct trip_cull {
     trip_cull_plane sides[4];  /* through the outermost pixel centres */
     double radius2, low_pass2; /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */
     const trip_tf_entry *table;
+    trip_brick_ranges *about; /* where what bricks lie next to counts; NULL: they alone do */
     uint8_t ranges[256]; /* of 256 codes each, as far as looked at: whether some have extinction */
 } trip_cull;
 
 /* For a list of the data set: `camera` views its index space, `grid` is its place in that of level
- * 0. What it is made from outlives it. */
+ * 0; `about` NULL where voxels are drawn one by one. What it is made from outlives it. */
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
-                         int axis_of_view, const trip_tf_entry *table);
+                         int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about);
 
 /* `slab` is the one that the brick is in. */
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,

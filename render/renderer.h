@@ -59,7 +59,8 @@ enum {
 };
 
 typedef struct trip_renderer_ops {
-    const char *name; /* "reference", "gl", "cpu", "integral" */
+    const char *name;     /* "reference", "gl", "cpu", "integral" */
+    bool classifies_post; /* draws frames whose settings say so (sheet.h) */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);

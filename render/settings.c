@@ -5,6 +5,8 @@
 trip_settings trip_settings_default(void)
 {
     return (trip_settings){
+        .classify = TRIP_CLASSIFY_PRE,
+        .slices = 2,
         .method = TRIP_METHOD_MERGE,
         .traversal = TRIP_TRAVERSAL_OUTWARD,
         .target = TRIP_TARGET_RGBA32F,
@@ -24,5 +26,13 @@ int trip_settings_check(const trip_settings *s)
     if (s->depth && s->target != TRIP_TARGET_RGBA32F)
         return trip_fail(TRIP_USAGE, "render", "depth",
                          "rounded layers have no depth; leave the target at rgba32f");
+    if (s->classify == TRIP_CLASSIFY_PRE)
+        return 0;
+    if (s->traversal == TRIP_TRAVERSAL_ASCENDING)
+        return trip_fail(TRIP_USAGE, "render", "traversal",
+                         "sheets that are classified after interpolation are composited outward");
+    if (s->target != TRIP_TARGET_RGBA32F || s->indexed || s->triangles)
+        return trip_fail(TRIP_USAGE, "render", "settings",
+                         "targets and forms of submission are of splats; classify pre");
     return 0;
 }

@@ -46,7 +46,18 @@ typedef enum trip_kernel {
     TRIP_KERNEL_CUBIC,  /* Catmull and Rom's, between 64 */
 } trip_kernel;
 
+/* What comes first: the transfer function, or the reconstruction from voxels. */
+typedef enum trip_classify {
+    TRIP_CLASSIFY_PRE,  /* voxels are classified, and their splats drawn (splat.h) */
+    TRIP_CLASSIFY_POST, /* values are interpolated in sheets, and classified at pixels (sheet.h) */
+} trip_classify;
+
+/* Slices of a sheet: the most that settings may have. */
+#define TRIP_SLICES_MAX 16
+
 typedef struct trip_settings {
+    trip_classify classify;
+    int slices; /* of a sheet, post: 1 to TRIP_SLICES_MAX */
     trip_method method;
     trip_traversal traversal;
     trip_target target;
@@ -66,8 +77,8 @@ typedef struct trip_settings {
     int samples;        /* rays of a pixel, along x and along y; their mean is its colour */
 } trip_settings;
 
-/* The defaults: merge, outward, h 0.85, kernel radius 2, shading by headlight, rgba32f, no depth,
- * black; values, linear, to 1e-4, one ray a pixel. */
+/* The defaults: pre, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by headlight,
+ * rgba32f, no depth, black; values, linear, to 1e-4, one ray a pixel. */
 trip_settings trip_settings_default(void);
 
 /* Fails (usage) for settings that exclude one another. */

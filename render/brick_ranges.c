@@ -1,0 +1,131 @@
+#include "brick_ranges.h"
+
+#include <string.h>
+
+/* Of 4 bytes each, three slabs of them. */
+#define TILES_MAX (INT64_C(1) << 24)
+
+static const trip_code_range nothing = { 65535, 0 };
+
+static bool is_of(const trip_brick_ranges *r, const trip_list *list)
+{
+    return list->axis == r->axis && list->level == 0;
+}
+
+static trip_code_range both(trip_code_range a, trip_code_range b)
+{
+    return (trip_code_range){ a.least < b.least ? a.least : b.least,
+                              a.most > b.most ? a.most : b.most };
+}
+
+/* The tiles that have bricks, grown by one. */
+static void find_tiles(trip_brick_ranges *r)
+{
+    int64_t lo[2] = { INT64_MAX, INT64_MAX }, hi[2] = { -1, -1 };
+    for (unsigned i = 0; i < r->data->list_count; i++) {
+        const trip_list *list = &r->data->lists[i];
+        for (uint64_t k = 0; is_of(r, list) && k < list->brick_count; k++) {
+            const int64_t at[2] = { list->bricks[k].tile_u, list->bricks[k].tile_v };
+            for (int a = 0; a < 2; a++) {
+                lo[a] = at[a] < lo[a] ? at[a] : lo[a];
+                hi[a] = at[a] > hi[a] ? at[a] : hi[a];
+            }
+        }
+    }
+    if (hi[0] < 0)
+        return;
+    r->first_u = lo[0] - 1;
+    r->first_v = lo[1] - 1;
+    r->across = hi[0] - lo[0] + 3;
+    r->down = hi[1] - lo[1] + 3;
+}
+
+void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data, int axis,
+                              trip_budget *budget)
+{
+    *r = (trip_brick_ranges){ .data = data, .axis = axis, .middle = -3, .budget = budget };
+    find_tiles(r);
+    if (r->across == 0 || r->down > TILES_MAX / r->across)
+        return;
+    size_t tiles = (size_t)(r->across * r->down);
+    r->bytes = 3 * tiles * sizeof *r->tiles[0];
+    trip_code_range *memory = trip_budget_take(budget, r->bytes);
+    for (size_t i = 0; i < 3 && memory; i++)
+        r->tiles[i] = memory + i * tiles;
+}
+
+void trip_brick_ranges_destroy(trip_brick_ranges *r)
+{
+    trip_code_range *memory = r->tiles[0];
+    for (int i = 1; i < 3; i++)
+        memory = r->tiles[i] < memory ? r->tiles[i] : memory;
+    trip_budget_release(r->budget, memory, r->bytes);
+    r->tiles[0] = NULL;
+}
+
+static trip_code_range *tile_at(const trip_brick_ranges *r, int layer, int64_t u, int64_t v)
+{
+    return &r->tiles[layer][(v - r->first_v) * r->across + u - r->first_u];
+}
+
+static void fill_from(trip_brick_ranges *r, int layer, const trip_list *list, int64_t slab)
+{
+    uint64_t lo = 0, hi = list->slab_count;
+    while (lo < hi) {
+        uint64_t middle = (lo + hi) / 2;
+        if (list->slabs[middle].slab < slab)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    if (lo == list->slab_count || list->slabs[lo].slab != slab)
+        return;
+    const trip_file_slab *s = &list->slabs[lo];
+    for (uint64_t k = s->first_brick; k < s->first_brick + s->brick_count; k++) {
+        const trip_file_brick *b = &list->bricks[k];
+        trip_code_range *tile = tile_at(r, layer, b->tile_u, b->tile_v);
+        *tile = both(*tile, (trip_code_range){ b->code_min, b->code_max });
+    }
+}
+
+static void fill(trip_brick_ranges *r, int layer, int64_t slab)
+{
+    for (int64_t i = 0; i < r->across * r->down; i++)
+        r->tiles[layer][i] = nothing;
+    for (unsigned i = 0; i < r->data->list_count; i++)
+        if (is_of(r, &r->data->lists[i]))
+            fill_from(r, layer, &r->data->lists[i], slab);
+}
+
+/* The slab and those before and behind it; the next slab keeps two of them. */
+static void move_to(trip_brick_ranges *r, int64_t slab)
+{
+    if (slab == r->middle)
+        return;
+    if (slab == r->middle + 1) {
+        trip_code_range *first = r->tiles[0];
+        r->tiles[0] = r->tiles[1];
+        r->tiles[1] = r->tiles[2];
+        r->tiles[2] = first;
+        fill(r, 2, slab + 1);
+    } else {
+        for (int i = 0; i < 3; i++)
+            fill(r, i, slab - 1 + i);
+    }
+    r->middle = slab;
+}
+
+trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
+                                        const trip_file_brick *brick)
+{
+    trip_code_range range = nothing;
+    if (!r->tiles[0])
+        return (trip_code_range){ 0, 65535 };
+    move_to(r, slab);
+    for (int layer = 0; layer < 3; layer++)
+        for (int dv = -1; dv <= 1; dv++)
+            for (int du = -1; du <= 1; du++)
+                range = both(range, *tile_at(r, layer, (int64_t)brick->tile_u + du,
+                                             (int64_t)brick->tile_v + dv));
+    return range;
+}

@@ -1,0 +1,33 @@
+/* The codes that cells of a brick's voxels may lie between: those of the brick and of the 26 about
+ * it, of all lists of voxels and halo along an axis. A part of the plan; owned by it. */
+#ifndef TRIP_BRICK_RANGES_H
+#define TRIP_BRICK_RANGES_H
+
+#include "dataset.h"
+
+typedef struct trip_code_range {
+    uint16_t least, most; /* least > most: no codes */
+} trip_code_range;
+
+/* Tiles of three slabs in a row. */
+typedef struct trip_brick_ranges {
+    const trip_dataset *data;
+    int axis;
+    int64_t first_u, first_v, across, down; /* tiles with bricks, and one more on every side */
+    trip_code_range *tiles[3];              /* of slabs middle - 1, middle, middle + 1 */
+    int64_t middle;
+    trip_budget *budget;
+    size_t bytes;
+} trip_brick_ranges;
+
+/* Of the lists along an axis at level 0. Without memory for it, or with tiles too far apart, any
+ * range is taken to hold all codes. */
+void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data, int axis,
+                              trip_budget *budget);
+void trip_brick_ranges_destroy(trip_brick_ranges *r);
+
+/* Of a brick and those about it. Fast where slabs are gone through in order. */
+trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
+                                        const trip_file_brick *brick);
+
+#endif

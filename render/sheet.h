@@ -1,0 +1,44 @@
+/* What a sheet classified after interpolation is, in numbers. This page is the definition of `post`
+ * that all renderers follow; reference.c evaluates it in double precision as written. After
+ * Mueller, Moller & Crawfis 1999 (splatting without the blur), with the three lists and w^2.
+ *
+ * Field. Voxel (i, j, k) of level 0, kept or of the halo, has its code c and a gradient g (index
+ * space, codes per index): along each axis the central difference where both neighbours are there,
+ * the difference to the one that is there otherwise, 0 without neighbours. A cell is the cube
+ * between eight voxels, and is empty unless all of them are there. Within it codes and gradients
+ * are interpolated linearly between its corners.
+ *
+ * Slices. Along the axis of a list slices lie at the coordinates n / S, S = settings.slices; in
+ * perspective the eye's own coordinate is one more. A layer's ray is cut by them into segments, and
+ * only the field at the slices is used: at one lies, with the cells on both sides of it where n / S
+ * is whole, the sample (c, g) of each end of a segment. A segment is in the cell layer between two
+ * sheets; it is empty where either end lies in an empty cell of that layer, or beyond the grid.
+ *
+ * A segment from code a to code b, L world units long, has with the extinction k and the colour q
+ * of the transfer function (transfer_function.h), linear between codes (segments.h), depth  = L
+ * mean of k over [a, b] alpha  = 1 - exp(-depth) colour = integral of k q over [a, b] / integral of
+ * k over [a, b] where  = how far from a to b the mean of the codes lies, weighted by k; 1/2 where a
+ * = b and is lit by the gradient interpolated between those of its ends at `where` (shade.h).
+ * Values between the ends are taken to run straight from a to b, which is the error of a slice;
+ * what lies in front within the segment does not hide what lies behind in it, which is the error of
+ * an opaque segment's colour.
+ *
+ * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
+ * below TRIP_SHEET_SATURATION takes no more: its colour is divided by its opacity, which becomes
+ * 1. So no component is off by more than that. */
+#ifndef TRIP_SHEET_H
+#define TRIP_SHEET_H
+
+#include "settings.h"
+
+/* Half of 1/255. */
+#define TRIP_SHEET_SATURATION (1.0 / 512.0)
+
+/* How far in indices, along each axis, a voxel changes what is drawn: it is a corner of the cells
+ * about it, and the gradients of its neighbours depend on it. */
+#define TRIP_SHEET_REACH 2
+
+/* The distance in indices of the farthest ray that a voxel changes. */
+#define TRIP_SHEET_RADIUS (TRIP_SHEET_REACH * 1.7320508075688772)
+
+#endif
