@@ -80,6 +80,8 @@ RENDER = {
     "--renderer": NAMES,
     "--method": NAMES,
     "--submit": NAMES + ["sprites,", ",", "sprites,triangles", "sprites,sprites"],
+    "--classify": NAMES,
+    "--slices": COUNTS + ["17"],
     "--traversal": NAMES,
     "--hidden": NAMES,
     "--field": NAMES,
