@@ -216,8 +216,8 @@ typedef struct triptych_settings {
     int headlight;          /* light from the eye; else from light[] */
     double light[3];        /* world direction to the light, not zero */
     double h;               /* where layers begin to blend, 0 to below 1 */
-    double kernel_radius;   /* of a splat, voxels, 0.1 to 100 */
-    double background[4];   /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
+    double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
+    double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     int depth; /* not 0: frames have distances too; not with rounded targets or the integral */
     /* Of the integral renderer alone. */
     triptych_field field;   /* what it integrates */

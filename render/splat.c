@@ -138,3 +138,24 @@ double trip_splat_stretch(const trip_splat_frame *f, double x, double y)
     return trip_camera_ray_length(&f->camera, x, y) /
            trip_length(trip_camera_ray(&f->camera, x, y));
 }
+
+/* The footprints of all voxels of a sheet at a place in a cell. */
+static double sum_of_footprints(const trip_splat_frame *f, double kernel_radius, double u, double v)
+{
+    int reach = (int)kernel_radius + 1;
+    double sum = 0;
+    for (int i = -reach; i <= reach; i++)
+        for (int j = -reach; j <= reach; j++) {
+            double m = ((i - u) * (i - u) + (j - v) * (j - v)) / (f->sigma * f->sigma);
+            sum += m < f->cutoff2 ? f->amplitude * (exp(-m / 2) - f->edge) : 0;
+        }
+    return sum;
+}
+
+trip_splat_ripple trip_splat_ripple_of(double kernel_radius)
+{
+    trip_settings settings = { .kernel_radius = kernel_radius };
+    trip_splat_frame f = trip_splat_frame_make(&(trip_camera){ 0 }, &settings);
+    return (trip_splat_ripple){ sum_of_footprints(&f, kernel_radius, 0, 0),
+                                sum_of_footprints(&f, kernel_radius, 0.5, 0.5) };
+}

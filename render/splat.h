@@ -78,4 +78,12 @@ double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double
 /* World units per index length along the ray of a pixel position. */
 double trip_splat_stretch(const trip_splat_frame *f, double x, double y);
 
+/* What voxels of one extinction add up to, over that extinction, along rays parallel to an axis of
+ * the grid: those through voxels, and those midway between four. Without low-pass. */
+typedef struct trip_splat_ripple {
+    double through, between;
+} trip_splat_ripple;
+
+trip_splat_ripple trip_splat_ripple_of(double kernel_radius);
+
 #endif

@@ -506,6 +506,37 @@ static void messages_go_to_whoever_takes_them(void **state)
     triptych_destroy(t);
 }
 
+static void keep_message(void *user, const char *line)
+{
+    snprintf(user, 400, "%s", line);
+}
+
+/* By the formula of the kernel a radius of 1 gives 1.807 and 0.423 of the extinction. */
+static void a_kernel_too_small_to_be_smooth_is_warned_of_once(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    char line[400] = "";
+    triptych_settings settings = triptych_default_settings();
+    triptych_set_messages(t, keep_message, line);
+    for (int i = 0; i < 3; i++) {
+        const double radii[3] = { 2, 1.5, 30 };
+        settings.kernel_radius = radii[i];
+        assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+        assert_string_equal(line, "");
+    }
+    settings.kernel_radius = 1;
+    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    assert_non_null(strstr(line, "warning"));
+    assert_non_null(strstr(line, "+81 %"));
+    assert_non_null(strstr(line, "-58 %"));
+    line[0] = 0;
+    settings.h = 0.5;
+    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    assert_string_equal(line, "");
+    triptych_destroy(t);
+}
+
 static void steps_draw_what_one_call_draws(void **state)
 {
     (void)state;
@@ -690,6 +721,7 @@ int main(void)
         cmocka_unit_test(bricking_says_what_it_made),
         cmocka_unit_test(volumes_are_identified_by_content_and_by_state),
         cmocka_unit_test(what_fails_says_why_and_the_context_goes_on),
+        cmocka_unit_test(a_kernel_too_small_to_be_smooth_is_warned_of_once),
         cmocka_unit_test(messages_go_to_whoever_takes_them),
         cmocka_unit_test(steps_draw_what_one_call_draws),
         cmocka_unit_test(a_frame_given_up_leaves_the_next_one_as_it_is),

@@ -1,5 +1,6 @@
 /* What every renderer must show, run over all of them: order, opacity, counts, geometry. */
 #include "scenes.h"
+#include "splat.h"
 #include "test.h"
 #include "weight.h"
 
@@ -61,6 +62,40 @@ static void the_nearest_sheet_is_in_front_for_every_axis_side_and_method(void **
         }
         scene_destroy(&s);
     }
+}
+
+/* Through voxels and between them, of a block of one extinction; pixels so small that the low-pass
+ * does not count. */
+static void small_kernels_leave_the_ripple_that_the_formula_gives(void **state)
+{
+    (void)state;
+    enum { SHEETS = 6 };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { SHEETS, 16, 16 } });
+    for (int i = 0; i < 5; i++) {
+        const double radii[5] = { 0.5, 0.8, 1, 1.5, 2 };
+        trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.5);
+        settings.kernel_radius = radii[i];
+        trip_splat_ripple ripple = trip_splat_ripple_of(radii[i]);
+        double most = ripple.through > 1 ? ripple.through : 1;
+        s.table[65535] = (trip_tf_entry){ 1, 1, 1, (float)(0.2 / most) };
+        for (int between = 0; between < 2; between++) {
+            trip_camera_params view = { .eye = { -20, 8 - 0.5 * between, 8 - 0.5 * between },
+                                        .up = { 0, 0, 1 },
+                                        .ortho_height = 0.001,
+                                        .width = 1,
+                                        .height = 1 };
+            view.look = trip_add(view.eye, trip_v3(1, 0, 0));
+            for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+                scene_picture p = scene_draw(&s, r, &view, &settings);
+                double depth = -log1p(-(double)p.rgba[3]);
+                double sum = between ? ripple.between : ripple.through;
+                assert_close(depth * most / (0.2 * SHEETS), sum, 1e-3);
+                scene_picture_free(&p);
+            }
+        }
+    }
+    scene_destroy(&s);
 }
 
 /* A room with green walls, and red ones behind them. */
@@ -576,6 +611,7 @@ static void the_reference_picture_is_the_same_to_the_bit_however_it_is_stored_an
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(small_kernels_leave_the_ripple_that_the_formula_gives),
         cmocka_unit_test(the_nearest_sheet_is_in_front_for_every_axis_side_and_method),
         cmocka_unit_test(inside_a_room_outward_order_is_right_and_ascending_order_fails),
         cmocka_unit_test(large_kernels_show_lines_when_clipped_and_none_when_merged),
