@@ -1,0 +1,39 @@
+/* What a segment of a ray between two codes shows, codes running straight from one to the other:
+ * exact integrals of a transfer function that is linear between the entries of its table, colour
+ * and extinction alike. So extinction times colour is a polynomial of degree two between entries,
+ * and is integrated as such. All sums are of numbers that are not negative: nothing cancels,
+ * however near the codes are. Read-only once made. */
+#ifndef TRIP_SEGMENTS_H
+#define TRIP_SEGMENTS_H
+
+#include "transfer_function.h"
+
+enum { TRIP_SEGMENT_CODES = 65536 };
+
+/* Over an aligned block of codes: integrals of extinction k, of k times colour, and of k times the
+ * distance from the block's first code. */
+typedef struct trip_segment_sums {
+    double k, kq[3], kv;
+} trip_segment_sums;
+
+typedef struct trip_segments {
+    const trip_tf_entry *table;
+    /* A binary tree: node n is the sum of nodes 2n and 2n + 1, node TRIP_SEGMENT_CODES + i is from
+     * code i to i + 1. */
+    trip_segment_sums nodes[2 * TRIP_SEGMENT_CODES];
+} trip_segments;
+
+/* Means over codes from a to b. Without extinction colour and `where` mean nothing. */
+typedef struct trip_segment {
+    double extinction; /* per world unit */
+    double rgb[3];     /* weighted by extinction */
+    double where;      /* the mean place from a (0) to b (1), weighted by extinction */
+} trip_segment;
+
+/* `table` has TRIP_SEGMENT_CODES entries and outlives it. */
+void trip_segments_make(trip_segments *s, const trip_tf_entry *table);
+
+/* Codes are in [0, 65535], whole or not, in any order; where they are equal `where` is 1/2. */
+trip_segment trip_segment_of(const trip_segments *s, double a, double b);
+
+#endif
