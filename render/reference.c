@@ -1,5 +1,6 @@
 /* The definition of the picture: double precision, every splat of every batch against every pixel
- * of its bounds, as splat.h, weight.h and shade.h are written. Slow, and meant to be read. */
+ * of its bounds, as splat.h, weight.h and shade.h are written; of frames that classify after
+ * interpolation the layers are reference_sheets.c's. Slow, and meant to be read. */
 #include "renderer.h"
 
 #include <string.h>
@@ -7,12 +8,13 @@
 #include "layer.h"
 #include "normal.h"
 #include "pixels.h"
+#include "reference_sheets.h"
 #include "report.h"
 #include "shade.h"
 #include "splat.h"
 #include "weight.h"
 
-/* One pixel: the layer being drawn, and the sum over the layers before it. */
+/* One pixel of splats: the layer being drawn, and the sum over the layers before it. */
 typedef struct pixel {
     double layer[TRIP_CHANNELS_MAX]; /* over-composite; depths are distances here */
     double weight;                   /* of the layer at this pixel */
@@ -33,9 +35,10 @@ typedef struct reference {
     trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
     size_t pixels_bytes;
-    int axis;               /* of the layer being drawn; -1 before the first */
-    bool broken;            /* some splat's numbers are not finite */
-    trip_list_stats *stats; /* by the data set's lists: room for */
+    trip_reference_sheets *sheets; /* of frames that classify after interpolation; else NULL */
+    int axis;                      /* of the layer being drawn; -1 before the first */
+    bool broken;                   /* some splat's numbers are not finite */
+    trip_list_stats *stats;        /* by the data set's lists: room for */
     unsigned stats_room;
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } reference;
@@ -44,6 +47,7 @@ static void destroy(trip_renderer *base)
 {
     reference *r = (reference *)base;
     trip_budget *budget = r->budget;
+    trip_reference_sheets_destroy(r->sheets);
     trip_budget_release(budget, r->pixels, r->pixels_bytes);
     trip_budget_release(budget, r->stats, r->stats_room * sizeof *r->stats);
     trip_budget_release(budget, r, sizeof *r);
@@ -94,10 +98,23 @@ static pixel *row_of(const reference *r, int y)
     return &r->pixels[(size_t)y * (size_t)r->frame->camera->width];
 }
 
+static int clear_pixels(reference *r)
+{
+    const trip_camera *camera = r->frame->camera;
+    int status = take_pixels(r, (size_t)camera->width * (size_t)camera->height);
+    for (int y = 0; y < camera->height && !status; y++) {
+        memset(row_of(r, y), 0, (size_t)camera->width * sizeof(pixel));
+        status = trip_frame_poll();
+    }
+    return status;
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     reference *r = (reference *)base;
     const trip_file_header *header = &frame->data->header;
+    trip_reference_sheets_destroy(r->sheets);
+    r->sheets = NULL;
     r->frame = frame;
     r->channels = trip_layer_channels(frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
@@ -106,21 +123,19 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->axis = -1;
     r->broken = false;
     int status = take_stats(r, frame->data->list_count);
-    if (!status)
-        status = take_pixels(r, (size_t)frame->camera->width * (size_t)frame->camera->height);
-    for (int y = 0; y < frame->camera->height && !status; y++) {
-        memset(row_of(r, y), 0, (size_t)frame->camera->width * sizeof(pixel));
-        status = trip_frame_poll();
-    }
-    return status;
+    if (status)
+        return status;
+    if (frame->settings->classify == TRIP_CLASSIFY_POST)
+        return trip_reference_sheets_create(&r->sheets, frame, r->budget);
+    return clear_pixels(r);
 }
 
-/* Adds a pixel's layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. Without a layer its
- * weight is 0. */
-static void merge_pixel(const reference *r, const pixel *p, double merged[TRIP_CHANNELS_MAX])
+/* Adds a layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. */
+static void add_layer(const reference *r, const double layer[TRIP_CHANNELS_MAX], double weight,
+                      double merged[TRIP_CHANNELS_MAX])
 {
     for (unsigned c = 0; c < r->channels; c++)
-        merged[c] = p->merged[c] + p->weight * p->weight * p->layer[c];
+        merged[c] += weight * weight * layer[c];
 }
 
 static int fold_layer(reference *r)
@@ -132,7 +147,7 @@ static int fold_layer(reference *r)
     for (int y = 0; y < camera->height && !status; y++) {
         pixel *row = row_of(r, y);
         for (int x = 0; x < camera->width; x++)
-            merge_pixel(r, &row[x], row[x].merged);
+            add_layer(r, row[x].layer, row[x].weight, row[x].merged);
         status = trip_frame_poll();
     }
     return status;
@@ -142,6 +157,8 @@ static int begin_layer(trip_renderer *base, int axis)
 {
     reference *r = (reference *)base;
     const trip_camera *camera = r->frame->camera;
+    if (r->sheets)
+        return 0;
     int status = fold_layer(r);
     r->axis = axis;
     r->list = NULL;
@@ -288,9 +305,22 @@ static void draw_run(reference *r, const trip_batch *batch, const trip_run *run,
     }
 }
 
+static int put_batch(reference *r, const trip_batch *batch)
+{
+    int status = trip_frame_poll();
+    for (size_t i = 0; i < batch->run_count && !status; i++) {
+        const trip_run *run = &batch->runs[i];
+        status = trip_reference_sheets_put(r->sheets, batch, run);
+        r->stats[trip_batch_list(batch, run)->index].splats_read += run->count;
+    }
+    return status;
+}
+
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     reference *r = (reference *)base;
+    if (r->sheets)
+        return put_batch(r, batch);
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         int status = use_list(r, trip_batch_list(batch, run));
@@ -331,15 +361,40 @@ static void finish_colour(const reference *r, const double merged[4], double sum
         rgba[c] = (float)(merged[c] / sum + transmittance * behind[c]);
 }
 
+static void merge_sheets(const reference *r, int x, int y, double merged[TRIP_CHANNELS_MAX])
+{
+    const trip_frame *frame = r->frame;
+    trip_vec3 ray = trip_camera_ray(frame->camera, x + 0.5, y + 0.5);
+    for (int axis = 0; axis < 3; axis++) {
+        double w = trip_weight(frame->settings, frame->plan->axis_of_view, ray, axis);
+        double layer[TRIP_CHANNELS_MAX];
+        if (!(w > 0))
+            continue;
+        trip_reference_sheets_layer(r->sheets, axis, x, y, layer);
+        add_layer(r, layer, w, merged);
+    }
+}
+
+/* Of the splats drawn so far. */
+static void merge_splats(const reference *r, int x, int y, double merged[TRIP_CHANNELS_MAX])
+{
+    const pixel *p = &row_of(r, y)[x];
+    memcpy(merged, p->merged, sizeof p->merged);
+    add_layer(r, p->layer, p->weight, merged);
+}
+
 static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     reference *r = (reference *)base;
     const trip_camera *camera = r->frame->camera;
     int status = 0;
     for (int y = 0; y < camera->height && !status; y++) {
-        for (int x = 0; x < camera->width; x++) {
-            double merged[TRIP_CHANNELS_MAX];
-            merge_pixel(r, &row_of(r, y)[x], merged);
+        for (int x = 0; x < camera->width && !trip_interrupted(); x++) {
+            double merged[TRIP_CHANNELS_MAX] = { 0 };
+            if (r->sheets)
+                merge_sheets(r, x, y, merged);
+            else
+                merge_splats(r, x, y, merged);
             finish_colour(r, merged, weight_sum(r, x, y), rgba);
             rgba += 4;
             if (depth)
@@ -357,6 +412,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 
 static const trip_renderer_ops reference_ops = {
     .name = "reference",
+    .classifies_post = true,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

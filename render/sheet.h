@@ -1,5 +1,5 @@
 /* What a sheet classified after interpolation is, in numbers. This page is the definition of `post`
- * that all renderers follow; reference.c evaluates it in double precision as written. After
+ * that all renderers follow; reference_sheets.c evaluates it in double precision as written. After
  * Mueller, Moller & Crawfis 1999 (splatting without the blur), with the three lists and w^2.
  *
  * Field. Voxel (i, j, k) of level 0, kept or of the halo, has its code c and a gradient g (index
@@ -13,15 +13,18 @@
  * only the field at the slices is used: at one lies, with the cells on both sides of it where n / S
  * is whole, the sample (c, g) of each end of a segment. A segment is in the cell layer between two
  * sheets; it is empty where either end lies in an empty cell of that layer, or beyond the grid.
+ * Rays begin at the eye, in parallel views at its plane: what begins behind that is left out.
  *
  * A segment from code a to code b, L world units long, has with the extinction k and the colour q
- * of the transfer function (transfer_function.h), linear between codes (segments.h), depth  = L
- * mean of k over [a, b] alpha  = 1 - exp(-depth) colour = integral of k q over [a, b] / integral of
- * k over [a, b] where  = how far from a to b the mean of the codes lies, weighted by k; 1/2 where a
- * = b and is lit by the gradient interpolated between those of its ends at `where` (shade.h).
+ * of the transfer function (transfer_function.h), linear between codes (segments.h),
+ *     depth  = L mean of k over [a, b]
+ *     alpha  = 1 - exp(-depth)
+ *     colour = integral of k q over [a, b] / integral of k over [a, b]
+ *     where  = how far from a to b the mean of the codes lies, weighted by k; 1/2 where a = b
+ * and is lit at `where` between its ends, by the gradient interpolated between theirs (shade.h).
  * Values between the ends are taken to run straight from a to b, which is the error of a slice;
  * what lies in front within the segment does not hide what lies behind in it, which is the error of
- * an opaque segment's colour.
+ * an opaque segment's colour. Its distance from the eye is that of `where`, too.
  *
  * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
  * below TRIP_SHEET_SATURATION takes no more: its colour is divided by its opacity, which becomes

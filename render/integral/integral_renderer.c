@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cpu/pool.h"
+#include "field_fill.h"
 #include "integrand.h"
 #include "report.h"
 #include "shade.h"
@@ -26,12 +27,11 @@ typedef struct integral {
     uint64_t put;
 
     const trip_frame *frame;
-    trip_compact_normals compact;
     trip_integrand in;
     uint64_t splats[TRIP_KINDS]; /* handed over, by the kind of their list */
     float *rgba;                 /* of the picture being made */
     _Atomic bool failed;         /* set by any thread: the picture is given up */
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
+    trip_field_fill fill;
 } integral;
 
 static void drop_field(integral *r)
@@ -83,7 +83,10 @@ static int begin_field(integral *r)
     r->field_data = data;
     r->has_halo = halo;
     r->planes = planes;
-    return trip_field_create(&r->field, dims, r->budget);
+    int status = trip_field_create(&r->field, dims, r->budget);
+    if (!status)
+        trip_field_fill_begin(&r->fill, data, r->field);
+    return status;
 }
 
 static int check_frame(const trip_frame *frame)
@@ -106,8 +109,6 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     const trip_file_header *header = &frame->data->header;
     r->frame = frame;
     memset(r->splats, 0, sizeof r->splats);
-    r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
-                                           header->gradient_step);
     int status = check_frame(frame);
     if (!status)
         status = begin_field(r);
@@ -130,37 +131,6 @@ static int begin_layer(trip_renderer *base, int axis)
     return 0;
 }
 
-static void unpack_gradient(const integral *r, uint32_t normal, double gradient[3])
-{
-    const trip_file_header *header = &r->frame->data->header;
-    if (header->normal_bytes == 3)
-        trip_compact_normal_unpack(&r->compact, normal, gradient);
-    else
-        trip_normal_unpack(normal, header->gradient_scale, gradient);
-}
-
-static int put_run(integral *r, const trip_batch *batch, const trip_run *run)
-{
-    const trip_block block = trip_block_of(batch, run);
-    int axis = trip_batch_list(batch, run)->axis, status = 0;
-    trip_block_voxels(&block, 0, run->count, r->voxels);
-    if (block.normals)
-        trip_block_normals(&block, 0, run->count, r->normals);
-    for (uint32_t n = 0; n < run->count && !status; n++) {
-        int64_t at[3];
-        double gradient[3];
-        at[axis] = run->sheet;
-        at[(axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(r->voxels[n]);
-        at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(r->voxels[n]);
-        if (block.normals)
-            unpack_gradient(r, r->normals[n], gradient);
-        status = trip_field_put(r->field, at, trip_voxel_code(r->voxels[n]),
-                                block.normals ? gradient : NULL);
-    }
-    r->put += run->count;
-    return status;
-}
-
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     integral *r = (integral *)base;
@@ -169,8 +139,10 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     for (size_t i = 0; i < batch->run_count && !status; i++) {
         const trip_run *run = &batch->runs[i];
         r->splats[trip_batch_list(batch, run)->kind] += run->count;
-        if (!base->resident)
-            status = put_run(r, batch, run);
+        if (base->resident)
+            continue;
+        status = trip_field_fill_run(&r->fill, batch, run);
+        r->put += run->count;
     }
     return status;
 }

@@ -40,7 +40,7 @@ typedef struct trip_field trip_field;
 int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budget);
 void trip_field_destroy(trip_field *f);
 
-/* Puts a voxel in the grid, once; gradient NULL: that of the values, by differences. Fails when the
+/* Puts a voxel in the grid; gradient NULL: that of the values, by differences. Fails when the
  * memory given does not suffice. */
 int trip_field_put(trip_field *f, const int64_t at[3], double code, const double gradient[3]);
 

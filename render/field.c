@@ -26,9 +26,9 @@ static size_t chunks_of(size_t cubes)
 
 static int fail_memory(const char *what)
 {
-    return trip_fail(TRIP_ERROR, "render", "integral",
-                     "%s does not fit the memory given: the integral holds the whole volume, 16 "
-                     "bytes a voxel; raise --memory",
+    return trip_fail(TRIP_ERROR, "render", "field",
+                     "%s does not fit the memory given: the whole volume is held, 16 bytes a "
+                     "voxel; raise --memory",
                      what);
 }
 
@@ -214,10 +214,10 @@ int trip_field_finish(trip_field *f, const trip_field_map *map)
 {
     trip_affine to_index;
     if (!trip_affine_invert(&map->index_to_world, &to_index))
-        return trip_fail(TRIP_ERROR, "render", "integral", "the map to the world is singular");
+        return trip_fail(TRIP_ERROR, "render", "field", "the map to the world is singular");
     for (size_t i = 0; i < f->count; i++) {
         if (trip_interrupted())
-            return trip_fail(TRIP_INTERRUPTED, "render", "integral", "interrupted");
+            return trip_fail(TRIP_INTERRUPTED, "render", "field", "interrupted");
         finish_cube(f, map, &to_index, cube_by_number(f, i));
     }
     return 0;

@@ -1,0 +1,231 @@
+#include "reference_sheets.h"
+
+#include <string.h>
+
+#include "field_fill.h"
+#include "segments.h"
+#include "shade.h"
+#include "sheet.h"
+
+struct trip_reference_sheets {
+    trip_budget *budget;
+    const trip_frame *frame;
+    trip_affine to_index;
+    double value_per_code, gradient_full;
+    trip_field *field;
+    trip_field_fill fill;
+    trip_segments segments;
+};
+
+int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *frame,
+                                 trip_budget *budget)
+{
+    const trip_dataset *data = frame->data;
+    const trip_file_header *h = &data->header;
+    const int64_t dims[3] = { (int64_t)h->dims[0], (int64_t)h->dims[1], (int64_t)h->dims[2] };
+    trip_reference_sheets *s = *out = trip_budget_take(budget, sizeof *s);
+    if (!s)
+        return trip_fail(TRIP_ERROR, "render", "reference renderer",
+                         "out of memory; raise --memory");
+    s->budget = budget;
+    s->frame = frame;
+    trip_affine_invert(&data->index_to_world, &s->to_index); /* it was checked on opening */
+    s->value_per_code = (h->code_hi - h->code_lo) / 65535;
+    s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world);
+    int status = trip_field_create(&s->field, dims, budget);
+    if (status) {
+        trip_reference_sheets_destroy(s);
+        *out = NULL;
+        return status;
+    }
+    trip_field_fill_begin(&s->fill, data, s->field);
+    trip_segments_make(&s->segments, frame->table);
+    return 0;
+}
+
+void trip_reference_sheets_destroy(trip_reference_sheets *s)
+{
+    if (!s)
+        return;
+    trip_field_destroy(s->field);
+    trip_budget_release(s->budget, s, sizeof *s);
+}
+
+int trip_reference_sheets_put(trip_reference_sheets *s, const trip_batch *batch,
+                              const trip_run *run)
+{
+    return trip_field_fill_run(&s->fill, batch, run);
+}
+
+/* A ray on its way through the cells between sheets. */
+typedef struct passage {
+    const trip_reference_sheets *s;
+    int axis;
+    trip_vec3 origin, direction;
+    double world_per_t;
+    double layer[TRIP_CHANNELS_MAX];
+} passage;
+
+/* Where the ray is at t, in a cell: the eight corners, i fastest, and their weights. */
+typedef struct place {
+    int64_t cell[3];
+    double weights[8];
+    double code;
+} place;
+
+static trip_vec3 point_at(const passage *p, double t)
+{
+    return trip_add(p->origin, trip_scale(p->direction, t));
+}
+
+static void set_weights(place *at, trip_vec3 point)
+{
+    for (int n = 0; n < 8; n++) {
+        at->weights[n] = 1;
+        for (int a = 0; a < 3; a++) {
+            double f = trip_component(point, a) - (double)at->cell[a];
+            at->weights[n] *= n >> a & 1 ? f : 1 - f;
+        }
+    }
+}
+
+/* False where the cell is empty. */
+static bool interpolate(const trip_field *field, place *at)
+{
+    at->code = 0;
+    for (int n = 0; n < 8; n++) {
+        const trip_field_voxel *v = trip_field_at(
+            field, at->cell[0] + (n & 1), at->cell[1] + (n >> 1 & 1), at->cell[2] + (n >> 2));
+        if (!v)
+            return false;
+        at->code += at->weights[n] * v->code;
+    }
+    return true;
+}
+
+/* At t, where the ray is at the sheet of `cells` or between it and the next. False in empty cells
+ * and beyond the grid. */
+static bool find_place(const passage *p, double t, int64_t cells, place *at)
+{
+    const trip_field *field = p->s->field;
+    const int64_t *dims = trip_field_dims(field);
+    trip_vec3 point = point_at(p, t);
+    for (int a = 0; a < 3; a++) {
+        double x = trip_component(point, a), last = (double)dims[a] - 1;
+        if (a != p->axis && !(x >= 0 && x <= last))
+            return false;
+        at->cell[a] = a == p->axis ? cells : (int64_t)fmin(floor(x), last - 1);
+    }
+    set_weights(at, point);
+    return interpolate(field, at);
+}
+
+/* Codes per index along an axis; of a voxel that is there. */
+static double difference(const trip_field *field, const int64_t at[3], int axis)
+{
+    const int64_t d[3] = { axis == 0, axis == 1, axis == 2 };
+    double here = trip_field_at(field, at[0], at[1], at[2])->code;
+    const trip_field_voxel *after = trip_field_at(field, at[0] + d[0], at[1] + d[1], at[2] + d[2]);
+    const trip_field_voxel *before = trip_field_at(field, at[0] - d[0], at[1] - d[1], at[2] - d[2]);
+    if (after && before)
+        return ((double)after->code - before->code) / 2;
+    return after ? after->code - here : before ? here - before->code : 0;
+}
+
+/* Codes per index. */
+static trip_vec3 gradient_at(const passage *p, const place *at)
+{
+    double g[3] = { 0 };
+    for (int n = 0; n < 8; n++) {
+        const int64_t corner[3] = { at->cell[0] + (n & 1), at->cell[1] + (n >> 1 & 1),
+                                    at->cell[2] + (n >> 2) };
+        for (int a = 0; a < 3; a++)
+            g[a] += at->weights[n] * difference(p->s->field, corner, a);
+    }
+    return trip_v3(g[0], g[1], g[2]);
+}
+
+static void light(const passage *p, const place ends[2], double where, trip_vec3 point,
+                  double rgb[3])
+{
+    const trip_reference_sheets *s = p->s;
+    const trip_frame *frame = s->frame;
+    trip_vec3 codes = trip_add(trip_scale(gradient_at(p, &ends[0]), 1 - where),
+                               trip_scale(gradient_at(p, &ends[1]), where));
+    trip_vec3 g = trip_affine_transpose_vector(&s->to_index, trip_scale(codes, s->value_per_code));
+    trip_shade(frame->settings, frame->camera, s->gradient_full, point,
+               (double[3]){ g.x, g.y, g.z }, rgb);
+}
+
+/* False once the pixel is saturated. */
+static bool composite(double layer[TRIP_CHANNELS_MAX], const double fragment[TRIP_CHANNELS_MAX],
+                      double alpha)
+{
+    double through = 1 - layer[TRIP_CHANNEL_ALPHA];
+    for (int c = 0; c < TRIP_CHANNELS_MAX; c++)
+        layer[c] += fragment[c] * alpha * through;
+    double opacity = layer[TRIP_CHANNEL_ALPHA];
+    if (!(1 - opacity < TRIP_SHEET_SATURATION))
+        return true;
+    for (int c = 0; c < TRIP_CHANNELS_MAX; c++)
+        layer[c] /= opacity;
+    return false;
+}
+
+/* Between two slices. False once the pixel is saturated. */
+static bool add_segment(passage *p, double t0, double t1, int64_t cells)
+{
+    place ends[2];
+    if (!find_place(p, t0, cells, &ends[0]) || !find_place(p, t1, cells, &ends[1]))
+        return true;
+    trip_segment segment = trip_segment_of(&p->s->segments, ends[0].code, ends[1].code);
+    if (!(segment.extinction > 0))
+        return true;
+    double t = t0 + segment.where * (t1 - t0);
+    if (p->s->frame->settings->shading)
+        light(p, ends, segment.where, point_at(p, t), segment.rgb);
+    const double fragment[TRIP_CHANNELS_MAX] = {
+        [TRIP_CHANNEL_RED] = segment.rgb[0],       [TRIP_CHANNEL_GREEN] = segment.rgb[1],
+        [TRIP_CHANNEL_BLUE] = segment.rgb[2],      [TRIP_CHANNEL_ALPHA] = 1,
+        [TRIP_CHANNEL_DEPTH] = t * p->world_per_t,
+    };
+    return composite(p->layer, fragment, -expm1(-segment.extinction * (t1 - t0) * p->world_per_t));
+}
+
+/* Between the slices at coordinates n / slices that lie before the eye, and from the eye itself to
+ * the first of them. Coordinate c is reached at t = (c - o) / d. */
+static void add_segments(passage *p)
+{
+    const double slices = p->s->frame->settings->slices;
+    const double top = (double)trip_field_dims(p->s->field)[p->axis] - 1;
+    const double o = trip_component(p->origin, p->axis), d = trip_component(p->direction, p->axis);
+    const double step = d > 0 ? 1 : -1, last = d > 0 ? top * slices : 0;
+    double n = d > 0 ? fmax(0, ceil(o * slices)) : fmin(top * slices, floor(o * slices));
+    bool eye_within = !p->s->frame->camera->ortho && o > 0 && o < top;
+    double from = eye_within ? o : n / slices;
+    for (; (last - n) * step >= 0; n += step) {
+        double to = n / slices;
+        int64_t cells = (int64_t)fmin(floor(0.5 * (from + to)), top - 1);
+        if (from != to && !add_segment(p, (from - o) / d, (to - o) / d, cells))
+            return;
+        from = to;
+    }
+}
+
+void trip_reference_sheets_layer(const trip_reference_sheets *s, int axis, int x, int y,
+                                 double layer[TRIP_CHANNELS_MAX])
+{
+    const trip_camera *c = s->frame->camera;
+    passage p = {
+        .s = s,
+        .axis = axis,
+        .origin = c->eye,
+        .direction = trip_camera_ray(c, x + 0.5, y + 0.5),
+        .world_per_t = trip_camera_ray_length(c, x + 0.5, y + 0.5),
+    };
+    if (c->ortho)
+        p.origin =
+            trip_add(c->eye, trip_add(trip_scale(c->rx, x + 0.5), trip_scale(c->ry, y + 0.5)));
+    add_segments(&p);
+    memcpy(layer, p.layer, sizeof p.layer);
+}
