@@ -145,15 +145,14 @@ static trip_vec3 gradient_at(const passage *p, const place *at)
     return trip_v3(g[0], g[1], g[2]);
 }
 
-static void light(const passage *p, const place ends[2], double where, trip_vec3 point,
-                  double rgb[3])
+/* At the middle between two places. */
+static void light(const passage *p, const place ends[2], trip_vec3 middle, double rgb[3])
 {
     const trip_reference_sheets *s = p->s;
     const trip_frame *frame = s->frame;
-    trip_vec3 codes = trip_add(trip_scale(gradient_at(p, &ends[0]), 1 - where),
-                               trip_scale(gradient_at(p, &ends[1]), where));
+    trip_vec3 codes = trip_scale(trip_add(gradient_at(p, &ends[0]), gradient_at(p, &ends[1])), 0.5);
     trip_vec3 g = trip_affine_transpose_vector(&s->to_index, trip_scale(codes, s->value_per_code));
-    trip_shade(frame->settings, frame->camera, s->gradient_full, point,
+    trip_shade(frame->settings, frame->camera, s->gradient_full, middle,
                (double[3]){ g.x, g.y, g.z }, rgb);
 }
 
@@ -181,9 +180,9 @@ static bool add_segment(passage *p, double t0, double t1, int64_t cells)
     trip_segment segment = trip_segment_of(&p->s->segments, ends[0].code, ends[1].code);
     if (!(segment.extinction > 0))
         return true;
-    double t = t0 + segment.where * (t1 - t0);
+    double t = 0.5 * (t0 + t1);
     if (p->s->frame->settings->shading)
-        light(p, ends, segment.where, point_at(p, t), segment.rgb);
+        light(p, ends, point_at(p, t), segment.rgb);
     const double fragment[TRIP_CHANNELS_MAX] = {
         [TRIP_CHANNEL_RED] = segment.rgb[0],       [TRIP_CHANNEL_GREEN] = segment.rgb[1],
         [TRIP_CHANNEL_BLUE] = segment.rgb[2],      [TRIP_CHANNEL_ALPHA] = 1,

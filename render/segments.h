@@ -10,10 +10,9 @@
 
 enum { TRIP_SEGMENT_CODES = 65536 };
 
-/* Over an aligned block of codes: integrals of extinction k, of k times colour, and of k times the
- * distance from the block's first code. */
+/* Over some codes: integrals of extinction k and of k times colour. */
 typedef struct trip_segment_sums {
-    double k, kq[3], kv;
+    double k, kq[3];
 } trip_segment_sums;
 
 typedef struct trip_segments {
@@ -23,17 +22,16 @@ typedef struct trip_segments {
     trip_segment_sums nodes[2 * TRIP_SEGMENT_CODES];
 } trip_segments;
 
-/* Means over codes from a to b. Without extinction colour and `where` mean nothing. */
+/* Means over codes from a to b. Without extinction the colour is 0. */
 typedef struct trip_segment {
     double extinction; /* per world unit */
     double rgb[3];     /* weighted by extinction */
-    double where;      /* the mean place from a (0) to b (1), weighted by extinction */
 } trip_segment;
 
 /* `table` has TRIP_SEGMENT_CODES entries and outlives it. */
 void trip_segments_make(trip_segments *s, const trip_tf_entry *table);
 
-/* Codes are in [0, 65535], whole or not, in any order; where they are equal `where` is 1/2. */
+/* Codes are in [0, 65535], whole or not, in any order. */
 trip_segment trip_segment_of(const trip_segments *s, double a, double b);
 
 #endif

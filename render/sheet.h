@@ -20,11 +20,12 @@
  *     depth  = L mean of k over [a, b]
  *     alpha  = 1 - exp(-depth)
  *     colour = integral of k q over [a, b] / integral of k over [a, b]
- *     where  = how far from a to b the mean of the codes lies, weighted by k; 1/2 where a = b
- * and is lit at `where` between its ends, by the gradient interpolated between theirs (shade.h).
- * Values between the ends are taken to run straight from a to b, which is the error of a slice;
- * what lies in front within the segment does not hide what lies behind in it, which is the error of
- * an opaque segment's colour. Its distance from the eye is that of `where`, too.
+ * and is lit at its middle, by the mean of the gradients of its ends (shade.h); its distance from
+ * the eye is that of its middle, too. Values between the ends are taken to run straight from a to
+ * b, which is the error of a slice; what lies in front within the segment does not hide what lies
+ * behind in it, which is the error of an opaque segment's colour. Light where the mean of what is
+ * seen of the segment lies, or colours attenuated within it, come closer to the integral with some
+ * volumes and less close with others.
  *
  * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
  * below TRIP_SHEET_SATURATION takes no more: its colour is divided by its opacity, which becomes

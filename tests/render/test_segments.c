@@ -29,7 +29,7 @@ static trip_tf_entry constant(int code)
     return (trip_tf_entry){ 0.25F, 0.5F, 1, 0.375F };
 }
 
-static void a_constant_function_is_itself_and_in_the_middle(void **state)
+static void a_constant_function_is_itself(void **state)
 {
     (void)state;
     make(constant);
@@ -42,7 +42,6 @@ static void a_constant_function_is_itself_and_in_the_middle(void **state)
         assert_close(s.rgb[0], 0.25, 1e-14);
         assert_close(s.rgb[1], 0.5, 1e-14);
         assert_close(s.rgb[2], 1, 1e-14);
-        assert_close(s.where, 0.5, 1e-13);
     }
 }
 
@@ -51,7 +50,7 @@ static trip_tf_entry ramp(int code)
     return (trip_tf_entry){ (float)code / 65536, 1 - (float)code / 65536, 0, (float)code / 1024 };
 }
 
-/* Means over [a, b] of v and of v squared; of v weighted by v, as a fraction of the way. */
+/* Means over [a, b] of v and of v squared. */
 static void a_ramp_has_the_means_of_polynomials_however_near_the_codes_are(void **state)
 {
     (void)state;
@@ -60,16 +59,13 @@ static void a_ramp_has_the_means_of_polynomials_however_near_the_codes_are(void 
         double a, b;
         pick(i % 20, &a, &b);
         double mean = (a + b) / 2, square = (a * a + a * b + b * b) / 3;
-        double where = (a + 2 * b) / (3 * (a + b));
         trip_segment up = trip_segment_of(&segments, a, b), down = trip_segment_of(&segments, b, a);
         assert_close(up.extinction * 1024 / mean, 1, 1e-12);
         assert_close(up.rgb[0] / (square / mean / 65536), 1, 1e-12);
         assert_close(up.rgb[1], 1 - square / mean / 65536, 1e-12);
         assert_true(up.rgb[2] == 0);
-        if (a < b)
-            assert_close(up.where, where, 1e-12);
         assert_close(down.extinction, up.extinction, 1e-15);
-        assert_close(down.where, 1 - up.where, 1e-15);
+        assert_close(down.rgb[0], up.rgb[0], 1e-15);
     }
 }
 
@@ -89,16 +85,12 @@ static void a_step_counts_for_what_is_beyond_it(void **state)
     assert_close(s.extinction, (2 * 599.5 + 1) / 1099.5, 1e-13);
     assert_close(s.rgb[0], (2 * 599.5 + 2.0 / 3) / (2 * 599.5 + 1), 1e-13);
     assert_close(s.rgb[2], 1.0 / 3 / (2 * 599.5 + 1), 1e-13);
-    /* 599.5 codes about their middle, and 1 a third of a code behind their end. */
-    assert_close(s.where, (2 * 599.5 * 599.5 / 2 + 599.5 + 1.0 / 3) / (2 * 599.5 + 1) / 1099.5,
-                 1e-13);
 
     s = trip_segment_of(&segments, 1001, 2000);
     assert_true(s.extinction == 0);
     s = trip_segment_of(&segments, 3000, 1999);
     assert_close(s.extinction, (4 * 999 + 2) / 1001.0, 1e-13);
     assert_close(s.rgb[2], 1, 1e-13);
-    assert_close(s.where, (4 * 999 * 499.5 + 2 * (999 + 1.0 / 3)) / (4 * 999 + 2) / 1001, 1e-13);
 }
 
 static int peak;
@@ -117,12 +109,10 @@ static void a_peak_of_one_code_is_counted_whole_wherever_it_is(void **state)
         make(triangle);
         trip_segment s = trip_segment_of(&segments, 0, LAST);
         assert_close(s.extinction * LAST, 3, 1e-13);
-        assert_close(s.where, (double)peak / LAST, 1e-13);
         s = trip_segment_of(&segments, peak - 0.5, peak + 0.75);
         assert_close(s.extinction * 1.25, 3 * (0.375 + 15.0 / 32), 1e-13);
         s = trip_segment_of(&segments, peak + 0.5, peak + 1);
         assert_close(s.extinction, 0.75, 1e-13);
-        assert_close(s.where, 1.0 / 3, 1e-12);
     }
 }
 
@@ -145,13 +135,11 @@ static trip_segment sum_up(double a, double b)
             const trip_tf_entry *e = &table[(int)v];
             double t = v - floor(v), k = (1 - t) * e[0].extinction + t * e[1].extinction;
             s.extinction += k * dv;
-            s.where += k * dv * (v - a) / (b - a);
             s.rgb[0] += k * dv * ((1 - t) * e[0].r + t * e[1].r);
             s.rgb[1] += k * dv * ((1 - t) * e[0].g + t * e[1].g);
             s.rgb[2] += k * dv * ((1 - t) * e[0].b + t * e[1].b);
         }
     }
-    s.where /= s.extinction;
     for (int c = 0; c < 3; c++)
         s.rgb[c] /= s.extinction;
     s.extinction /= b - a;
@@ -169,7 +157,6 @@ static void a_rough_function_is_what_many_small_steps_add_up_to(void **state)
         assert_close(s.extinction, expected.extinction, 1e-4);
         if (!(expected.extinction > 1e-3))
             continue;
-        assert_close(s.where, expected.where, 1e-4);
         for (int c = 0; c < 3; c++)
             assert_close(s.rgb[c], expected.rgb[c], 1e-4);
     }
@@ -182,7 +169,6 @@ static void one_code_is_the_function_between_entries(void **state)
     trip_segment s = trip_segment_of(&segments, 1024.25, 1024.25);
     assert_close(s.extinction, 1024.25 / 1024, 1e-15);
     assert_close(s.rgb[0], 1024.25 / 65536, 1e-15);
-    assert_true(s.where == 0.5);
     s = trip_segment_of(&segments, LAST, LAST);
     assert_close(s.extinction, LAST / 1024.0, 1e-15);
     s = trip_segment_of(&segments, 0, 0);
@@ -192,7 +178,7 @@ static void one_code_is_the_function_between_entries(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_constant_function_is_itself_and_in_the_middle),
+        cmocka_unit_test(a_constant_function_is_itself),
         cmocka_unit_test(a_ramp_has_the_means_of_polynomials_however_near_the_codes_are),
         cmocka_unit_test(a_step_counts_for_what_is_beyond_it),
         cmocka_unit_test(a_peak_of_one_code_is_counted_whole_wherever_it_is),
