@@ -243,6 +243,30 @@ const scene_renderer *scene_renderers(void)
     return all;
 }
 
+static bool classifies_post(const scene_renderer *renderer)
+{
+    trip_budget *budget;
+    trip_renderer *r;
+    assert_int_equal(trip_budget_create(&budget, UINT64_C(1) << 30), 0);
+    assert_int_equal(renderer->create(&r, budget), 0);
+    bool does = r->ops->classifies_post;
+    r->ops->destroy(r);
+    trip_budget_destroy(budget);
+    return does;
+}
+
+const scene_renderer *scene_renderers_post(void)
+{
+    static scene_renderer some[4];
+    if (some[0].name)
+        return some;
+    scene_renderer *next = some;
+    for (const scene_renderer *r = scene_renderers(); r->name; r++)
+        if (classifies_post(r))
+            *next++ = *r;
+    return some;
+}
+
 scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                               const trip_camera_params *view, const trip_settings *settings,
                               const trip_reader_params *reader_params)
@@ -289,6 +313,38 @@ scene_picture scene_draw(const scene *s, const scene_renderer *renderer,
     return scene_draw_with(s, renderer, view, settings, &(trip_reader_params){ 0 });
 }
 
+scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
+                              const trip_settings *settings, const scene_making *how)
+{
+    trip_camera camera;
+    trip_plan plan;
+    trip_renderer *r;
+    trip_reader *reader;
+    scene_picture p = { .width = view->width, .height = view->height };
+    unsigned kinds = settings->field == TRIP_FIELD_SPLATS ? 1 : 3;
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(
+        trip_plan_make_field(&plan, s->data, &camera, settings, how->field ? 0 : kinds, s->budget),
+        0);
+    assert_int_equal(trip_reader_create(&reader, s->data,
+                                        &(trip_reader_params){ .planes = plan.planes }, s->budget),
+                     0);
+    assert_int_equal(trip_integral_create(&r, s->budget, how->threads ? how->threads : 1), 0);
+    trip_frame frame = { .data = s->data,
+                         .camera = &camera,
+                         .settings = settings,
+                         .plan = &plan,
+                         .field = how->field,
+                         .table = s->table };
+    p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
+    assert_non_null(p.rgba);
+    assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, NULL, &p.stats), 0);
+    r->ops->destroy(r);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s->budget);
+    return p;
+}
+
 void scene_picture_free(scene_picture *p)
 {
     free(p->rgba);
@@ -329,4 +385,39 @@ trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distan
     /* Any up that is not along the view. */
     p.up = fabs(direction.z) < 0.9 * trip_length(direction) ? trip_v3(0, 0, 1) : trip_v3(0, 1, 0);
     return p;
+}
+
+void scene_ray(const scene *s, const trip_camera_params *view, int x, int y, trip_vec3 *origin,
+               trip_vec3 *direction)
+{
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, view, &s->data->index_to_world), 0);
+    *origin = c.eye;
+    if (c.ortho)
+        *origin = trip_add(c.eye, trip_add(trip_scale(c.rx, x + 0.5), trip_scale(c.ry, y + 0.5)));
+    *direction = trip_normalize(trip_camera_ray(&c, x + 0.5, y + 0.5));
+}
+
+bool scene_ray_in_grid(const scene *s, trip_vec3 origin, trip_vec3 direction, double *from,
+                       double *to)
+{
+    *from = 0;
+    *to = INFINITY;
+    for (int a = 0; a < 3; a++) {
+        double o = trip_component(origin, a), d = trip_component(direction, a);
+        double last = (double)s->data->header.dims[a] - 1, t0 = -o / d, t1 = (last - o) / d;
+        if (d == 0 && (o < 0 || o > last))
+            return false;
+        if (d == 0)
+            continue;
+        *from = fmax(*from, fmin(t0, t1));
+        *to = fmin(*to, fmax(t0, t1));
+    }
+    return *from < *to;
+}
+
+double scene_ray_stretch(const scene *s, trip_vec3 direction)
+{
+    return trip_length(trip_affine_vector(&s->data->index_to_world, direction)) /
+           trip_length(direction);
 }

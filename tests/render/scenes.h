@@ -3,6 +3,7 @@
 #ifndef SCENES_H
 #define SCENES_H
 
+#include "field.h"
 #include "frame.h"
 #include "writer.h"
 
@@ -69,6 +70,9 @@ typedef struct scene_renderer {
 /* Every renderer this machine can run, ended by an entry without name. */
 const scene_renderer *scene_renderers(void);
 
+/* Of those the ones that classify after interpolation. */
+const scene_renderer *scene_renderers_post(void);
+
 typedef struct scene_picture {
     int width, height;
     float *rgba;
@@ -83,6 +87,15 @@ scene_picture scene_draw(const scene *s, const scene_renderer *renderer,
 scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                               const trip_camera_params *view, const trip_settings *settings,
                               const trip_reader_params *reader);
+
+/* How the integral is made; zero: one thread, the data set's field. */
+typedef struct scene_making {
+    unsigned threads;
+    const trip_field *field;
+} scene_making;
+
+scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
+                              const trip_settings *settings, const scene_making *how);
 void scene_picture_free(scene_picture *p);
 
 static inline const float *scene_pixel(const scene_picture *p, int x, int y)
@@ -102,5 +115,14 @@ void scene_compare_counts(const trip_list_stats *expected, const trip_list_stats
 /* A view of the volume's middle from a direction (world space, from the middle to the eye). */
 trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distance,
                               double fov_degrees, int size);
+
+/* Of the ray of a pixel's centre in index space: origin and unit direction. */
+void scene_ray(const scene *s, const trip_camera_params *view, int x, int y, trip_vec3 *origin,
+               trip_vec3 *direction);
+/* Where it is in the box of all voxel centres: distances from its origin; false: nowhere. */
+bool scene_ray_in_grid(const scene *s, trip_vec3 origin, trip_vec3 direction, double *from,
+                       double *to);
+/* World units per index length along it. */
+double scene_ray_stretch(const scene *s, trip_vec3 direction);
 
 #endif

@@ -11,48 +11,10 @@
 
 enum { EDGE = 20 }; /* voxels of most volumes here; between their centres EDGE - 1 */
 
-/* How a picture is made; zero: one thread, the data set's field. */
-typedef struct making {
-    unsigned threads;
-    const trip_field *field;
-} making;
-
-static scene_picture integrate_with(const scene *s, const trip_camera_params *view,
-                                    const trip_settings *settings, const making *how)
-{
-    trip_camera camera;
-    trip_plan plan;
-    trip_renderer *r;
-    trip_reader *reader;
-    scene_picture p = { .width = view->width, .height = view->height };
-    unsigned kinds = settings->field == TRIP_FIELD_SPLATS ? 1 : 3;
-    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
-    assert_int_equal(
-        trip_plan_make_field(&plan, s->data, &camera, settings, how->field ? 0 : kinds, s->budget),
-        0);
-    assert_int_equal(trip_reader_create(&reader, s->data,
-                                        &(trip_reader_params){ .planes = plan.planes }, s->budget),
-                     0);
-    assert_int_equal(trip_integral_create(&r, s->budget, how->threads ? how->threads : 1), 0);
-    trip_frame frame = { .data = s->data,
-                         .camera = &camera,
-                         .settings = settings,
-                         .plan = &plan,
-                         .field = how->field,
-                         .table = s->table };
-    p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
-    assert_non_null(p.rgba);
-    assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, NULL, &p.stats), 0);
-    r->ops->destroy(r);
-    trip_reader_destroy(reader);
-    trip_plan_release(&plan, s->budget);
-    return p;
-}
-
 static scene_picture integrate(const scene *s, const trip_camera_params *view,
                                const trip_settings *settings)
 {
-    return integrate_with(s, view, settings, &(making){ 0 });
+    return scene_integrate(s, view, settings, &(scene_making){ 0 });
 }
 
 static trip_settings exact(double tolerance)
@@ -62,45 +24,6 @@ static trip_settings exact(double tolerance)
     s.tolerance = tolerance;
     s.background[3] = 0;
     return s;
-}
-
-/* Of the ray of a pixel's centre in index space: unit direction and origin. */
-static void get_ray(const scene *s, const trip_camera_params *view, int x, int y, trip_vec3 *origin,
-                    trip_vec3 *direction)
-{
-    trip_camera c;
-    assert_int_equal(trip_camera_make(&c, view, &s->data->index_to_world), 0);
-    *origin = c.eye;
-    if (c.ortho)
-        *origin = trip_add(c.eye, trip_add(trip_scale(c.rx, x + 0.5), trip_scale(c.ry, y + 0.5)));
-    *direction = trip_normalize(trip_camera_ray(&c, x + 0.5, y + 0.5));
-}
-
-/* Where a ray is in the box of all voxel centres: distances from its origin; false: nowhere. */
-static bool in_box(const scene *s, trip_vec3 o, trip_vec3 d, double *from, double *to)
-{
-    *from = 0;
-    *to = INFINITY;
-    for (int a = 0; a < 3; a++) {
-        double t0 = -trip_component(o, a) / trip_component(d, a);
-        double t1 =
-            ((double)s->data->header.dims[a] - 1 - trip_component(o, a)) / trip_component(d, a);
-        if (trip_component(d, a) != 0) {
-            *from = fmax(*from, fmin(t0, t1));
-            *to = fmin(*to, fmax(t0, t1));
-        } else if (trip_component(o, a) < 0 ||
-                   trip_component(o, a) > (double)s->data->header.dims[a] - 1) {
-            return false;
-        }
-    }
-    return *from < *to;
-}
-
-/* World units per index length. */
-static double stretch(const scene *s, trip_vec3 direction)
-{
-    return trip_length(trip_affine_vector(&s->data->index_to_world, direction)) /
-           trip_length(direction);
 }
 
 static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
@@ -125,9 +48,9 @@ static void a_constant_block_has_the_opacity_of_the_path_in_it(void **state)
         for (int n = 0; n < 81; n++) {
             trip_vec3 o, d;
             double from, to, alpha = 0;
-            get_ray(&s, &view, n % 9, n / 9, &o, &d);
-            if (in_box(&s, o, d, &from, &to))
-                alpha = 1 - exp(-0.05F * (to - from) * stretch(&s, d));
+            scene_ray(&s, &view, n % 9, n / 9, &o, &d);
+            if (scene_ray_in_grid(&s, o, d, &from, &to))
+                alpha = 1 - exp(-0.05F * (to - from) * scene_ray_stretch(&s, d));
             crossed += alpha > 0;
             const float *c = scene_pixel(&p, n % 9, n / 9);
             assert_close(c[3], alpha, 1e-6);
@@ -171,8 +94,8 @@ static void a_ramp_is_integrated_in_extinction_and_in_colour(void **state)
             trip_vec3 o, d;
             double from, to;
             const float *c = scene_pixel(&p, n % 7, n / 7);
-            get_ray(&s, &view, n % 7, n / 7, &o, &d);
-            if (!in_box(&s, o, d, &from, &to))
+            scene_ray(&s, &view, n % 7, n / 7, &o, &d);
+            if (!scene_ray_in_grid(&s, o, d, &from, &to))
                 continue;
             double length = to - from, value = 3000 * (o.x + from * d.x) / 65535,
                    rise = 3000 * d.x / 65535, k = 0.11F, through = exp(-k * length);
@@ -340,14 +263,14 @@ static bool ball_voxel(void *user, int i, int j, int k, unsigned *code, double g
 }
 
 /* The greatest error within 0.8 of a ball's radius: its surface is opaque, and lit from the eye. */
-static double error_of_ball(const scene *s, double radius, const making *how)
+static double error_of_ball(const scene *s, double radius, const scene_making *how)
 {
     enum { SIZE = 31 };
     trip_settings settings = exact(1e-4);
     settings.shading = true;
     trip_camera_params view = scene_view(s, trip_v3(0.2, -1, 0.4), 200, 20, SIZE);
     view.ortho_height = 2 * radius;
-    scene_picture p = integrate_with(s, &view, &settings, how);
+    scene_picture p = scene_integrate(s, &view, &settings, how);
     double most = 0;
     for (int n = 0; n < SIZE * SIZE; n++) {
         double x = (n % SIZE + 0.5) / SIZE * 2 - 1, y = (n / SIZE + 0.5) / SIZE * 2 - 1;
@@ -443,7 +366,7 @@ static void a_lit_ball_has_its_colours_the_closer_the_finer_it_is(void **state)
                     trip_field_create(&field, (int64_t[3]){ edge, edge, edge }, s.budget), 0);
                 put_ball(field, radius);
             }
-            errors[i] = error_of_ball(&s, radius, &(making){ .threads = 2, .field = field });
+            errors[i] = error_of_ball(&s, radius, &(scene_making){ .threads = 2, .field = field });
             trip_field_destroy(field);
             scene_destroy(&s);
         }
@@ -484,13 +407,13 @@ static void a_splat_is_a_gaussian_cut_off_and_lowered(void **state)
         scene_picture p = integrate(&s, &view, &settings);
         for (int n = 0; n < 225; n++) {
             trip_vec3 o, d;
-            get_ray(&s, &view, n % 15, n / 15, &o, &d);
+            scene_ray(&s, &view, n % 15, n / 15, &o, &d);
             trip_vec3 across = trip_cross(trip_sub(trip_v3(9, 10, 8), o), d);
             double d2 = trip_dot(across, across);
             double footprint = d2 < k * k * sigma * sigma ? exp(-d2 / twice) - edge : 0;
             /* Of unit integral over the plane. */
             footprint /= 3.14159265358979323846 * twice * (1 - edge * (1 + k * k / 2));
-            double alpha = 1 - exp(-3 * stretch(&s, d) * footprint);
+            double alpha = 1 - exp(-3 * scene_ray_stretch(&s, d) * footprint);
             covered += alpha > 0.01;
             assert_close(scene_pixel(&p, n % 15, n / 15)[3], alpha, 1e-6);
             assert_close(scene_pixel(&p, n % 15, n / 15)[1], 0.4F * alpha, 1e-6);
@@ -583,8 +506,8 @@ static void threads_and_tiles_change_no_bit(void **state)
             trip_settings settings = exact(1e-4);
             settings.shading = true;
             settings.field = (trip_field_kind)field;
-            scene_picture p = integrate_with(&s, &view, &settings,
-                                             &(making){ .threads = 1 + 2 * (unsigned)(i % 2) });
+            scene_picture p = scene_integrate(
+                &s, &view, &settings, &(scene_making){ .threads = 1 + 2 * (unsigned)(i % 2) });
             if (i == 0)
                 first = p;
             else
@@ -640,7 +563,7 @@ static void codes_lose_what_rounding_to_them_can(void **state)
     const trip_settings settings = exact(1e-9);
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 60, 20, 16);
     scene_picture stored = integrate(&s, &view, &settings);
-    scene_picture source = integrate_with(&s, &view, &settings, &(making){ .field = field });
+    scene_picture source = scene_integrate(&s, &view, &settings, &(scene_making){ .field = field });
     double depth = rise * 0.5 / 65535 * 2 * (radius + 1),
            apart = scene_difference(&stored, &source);
     assert_true(apart > 1e-7 && apart < depth);

@@ -1,0 +1,633 @@
+/* What every renderer that classifies after interpolation must show: closed forms, order, and the
+ * integral, which it comes closer to as slices go up. */
+#include "scenes.h"
+#include "test.h"
+
+#include "shade.h"
+#include "sheet.h"
+
+enum { EDGE = 20 }; /* voxels of most volumes here; between their centres EDGE - 1 */
+
+static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
+
+static trip_settings post(int slices)
+{
+    trip_settings s = trip_settings_default();
+    s.classify = TRIP_CLASSIFY_POST;
+    s.slices = slices;
+    s.shading = false;
+    s.background[3] = 0;
+    return s;
+}
+
+static void fill_table(scene *s, double r, double g, double b, double extinction)
+{
+    for (int code = 0; code < 65536; code++)
+        s->table[code] = (trip_tf_entry){ (float)r, (float)g, (float)b, (float)extinction };
+}
+
+/* From a direction in index space. */
+static trip_camera_params view_along(const scene *s, trip_vec3 direction, double fov, int size)
+{
+    return scene_view(s, trip_affine_vector(&s->data->index_to_world, direction), 80, fov, size);
+}
+
+static bool is_at_face(const scene *s, trip_vec3 o, trip_vec3 d, double t, int axis)
+{
+    double x = trip_component(o, axis) + t * trip_component(d, axis);
+    return fabs(x) < 1e-9 || fabs(x - (double)s->data->header.dims[axis] + 1) < 1e-9;
+}
+
+static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 48; i++) {
+        int axis = i % 3;
+        bool diagonal = i / 3 % 4 == 3; /* layers of two axes are merged */
+        double d[3] = { diagonal ? 0.95 : 0.4, diagonal ? 0.95 : 0.4, diagonal ? 0.95 : 0.4 };
+        scene_params params = { .dims = { 60, 60, 60 } };
+        params.dims[axis] = 9;
+        params.index_to_world = i / 12 % 2 ? sheared : trip_affine_identity();
+        d[axis] = i % 2 ? 1 : -1;
+        d[(axis + 1) % 3] *= 0.3;
+        scene s;
+        scene_create(&s, &params);
+        fill_table(&s, 1, 0.5, 0.25, 0.06);
+        trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 5, 5);
+        view.ortho_height = i / 24 ? 3 : 0;
+        trip_settings settings = post(diagonal ? 16 : 1 + i / 3 % 4);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            for (int n = 0; n < 25; n++) {
+                trip_vec3 o, ray;
+                double from, to;
+                scene_ray(&s, &view, n % 5, n / 5, &o, &ray);
+                assert_true(scene_ray_in_grid(&s, o, ray, &from, &to));
+                assert_true(is_at_face(&s, o, ray, from, axis) && is_at_face(&s, o, ray, to, axis));
+                double alpha = 1 - exp(-0.06F * (to - from) * scene_ray_stretch(&s, ray));
+                double tolerance = (diagonal ? 0.01 * alpha : 1e-6) + r->tolerance;
+                const float *c = scene_pixel(&p, n % 5, n / 5);
+                assert_close(c[3], alpha, tolerance);
+                assert_close(c[0], alpha, tolerance);
+                assert_close(c[1], alpha / 2, tolerance);
+                assert_close(c[2], alpha / 4, tolerance);
+            }
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+enum { RISE = 3000 }; /* codes a voxel */
+
+/* Along the axis *user. */
+static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)gradient;
+    *code = RISE * (unsigned)(const int[3]){ i, j, k }[*(int *)user];
+    return true;
+}
+
+/* A peak much narrower than a slice counts whole, wherever it lies between slices: its depth is its
+ * integral over codes, by how fast the ray passes codes. */
+static void a_narrow_peak_is_seen_whole_at_any_slices(void **state)
+{
+    (void)state;
+    enum { HALF = 20 };
+    for (int i = 0; i < 36; i++) {
+        int axis = i % 3, peak = 30000 + 137 * i;
+        scene s;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = ramp, .user = &axis });
+        for (int code = peak - HALF; code <= peak + HALF; code++) {
+            double k = RISE * 0.7 * (HALF - abs(code - peak)) / (HALF * HALF);
+            s.table[code] = (trip_tf_entry){ (float)code / 65535, 0, 0, (float)k };
+        }
+        trip_camera_params view =
+            scene_view(&s, trip_v3(1, i / 3 % 2 ? 0.9 : -0.3, 0.4 - 0.1 * (i % 5)), 60, 10, 5);
+        view.ortho_height = i / 6 % 2 ? 8 : 0;
+        trip_settings settings = post(1 + i / 12);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            for (int n = 0; n < 25; n++) {
+                trip_vec3 o, d;
+                double from, to;
+                scene_ray(&s, &view, n % 5, n / 5, &o, &d);
+                /* Where it meets the peak, which must lie well within the grid. */
+                double t =
+                    ((double)peak / RISE - trip_component(o, axis)) / trip_component(d, axis);
+                if (!scene_ray_in_grid(&s, o, d, &from, &to) || t < from + 3 || t > to - 3 ||
+                    fabs(trip_component(d, axis)) < 0.2)
+                    continue;
+                double alpha = 1 - exp(-0.7 / fabs(trip_component(d, axis)));
+                const float *c = scene_pixel(&p, n % 5, n / 5);
+                assert_close(c[3], alpha, 1e-5 + r->tolerance);
+                assert_close(c[0], alpha * peak / 65535, 4e-4 + r->tolerance);
+            }
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+static bool is_within(int i, int j, int k, int lo, int hi)
+{
+    return i >= lo && j >= lo && k >= lo && i <= hi && j <= hi && k <= hi;
+}
+
+static bool block(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 40000;
+    return is_within(i, j, k, 6, 13);
+}
+
+static bool around_block(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 0;
+    return is_within(i, j, k, 5, 14) && !is_within(i, j, k, 6, 13);
+}
+
+static void values_fall_to_those_of_the_halo_and_end_without_it(void **state)
+{
+    (void)state;
+    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_block };
+    const trip_vec3 directions[] = { { 1, 0, 0 }, { 0, -1, 0 }, { 0, 0, 1 } };
+    for (unsigned parts = 0; parts < 2; parts++) {
+        scene s;
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .voxel = block,
+                                          .parts = &halo,
+                                          .part_count = parts });
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ 1, 1, 1, 0.1F * (float)code / 40000 };
+        for (int i = 0; i < 9; i++) {
+            trip_camera_params view = scene_view(&s, directions[i % 3], 60, 20, 1);
+            view.ortho_height = 0.1;
+            trip_settings settings = post(1 + i / 3);
+            for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+                scene_picture p = scene_draw(&s, r, &view, &settings);
+                assert_close(p.rgba[3], 1 - exp(-0.1 * (parts ? 8 : 7)), 1e-6 + r->tolerance);
+                scene_picture_free(&p);
+            }
+        }
+        scene_destroy(&s);
+    }
+}
+
+/* All but (9, 9, 9). */
+static bool all_but_one(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 65535;
+    return !(i == 9 && j == 9 && k == 9);
+}
+
+static void a_cell_without_a_corner_is_empty(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = all_but_one });
+    fill_table(&s, 1, 1, 1, 0.1);
+    for (int i = 0; i < 36; i++) { /* through the cells around it, then beside them */
+        int axis = i % 3, beside = i / 3 % 3;
+        double at[3], d[3] = { 0 };
+        at[axis] = 9.5;
+        at[(axis + 1) % 3] = 8.2 + beside;
+        at[(axis + 2) % 3] = 9.4;
+        d[axis] = i / 9 % 2 ? 50 : -50;
+        trip_camera_params view = scene_view(&s, trip_v3(d[0], d[1], d[2]), 60, 20, 1);
+        view.ortho_height = 0.01;
+        view.look = trip_v3(at[0], at[1], at[2]);
+        view.eye = trip_add(view.look, trip_v3(d[0], d[1], d[2]));
+        trip_settings settings = post(1 + i / 9);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            double length = beside < 2 ? EDGE - 3 : EDGE - 1;
+            assert_close(p.rgba[3], 1 - exp(-0.1F * length), 1e-6 + r->tolerance);
+            scene_picture_free(&p);
+        }
+    }
+    scene_destroy(&s);
+}
+
+static void from_within_what_lies_before_the_eye_is_seen(void **state)
+{
+    (void)state;
+    const trip_vec3 eyes[] = { { 7.3, 9.1, 12.7 }, { 7, 9, 12 }, { 7.5, 9.5, 12.5 } };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
+    fill_table(&s, 1, 1, 1, 0.1);
+    for (int i = 0; i < 36; i++) {
+        double d[3] = { 0.1, -0.05, 0.07 };
+        d[i % 3] = i / 3 % 2 ? 1 : -1;
+        trip_camera_params view = { .eye = eyes[i / 6 % 3],
+                                    .up = { 0.3, 0.5, 0.7 },
+                                    .fov_degrees = 30,
+                                    .width = 5,
+                                    .height = 5 };
+        view.look = trip_add(view.eye, trip_v3(d[0], d[1], d[2]));
+        trip_settings settings = post(1 + i / 18 * 2);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            for (int n = 0; n < 25; n++) {
+                trip_vec3 o, ray;
+                double from, to;
+                scene_ray(&s, &view, n % 5, n / 5, &o, &ray);
+                assert_true(scene_ray_in_grid(&s, o, ray, &from, &to) && from == 0);
+                assert_close(scene_pixel(&p, n % 5, n / 5)[3], 1 - exp(-0.1F * to),
+                             1e-6 + r->tolerance);
+            }
+            scene_picture_free(&p);
+        }
+    }
+    scene_destroy(&s);
+}
+
+/* Opaque walls in a ramp. */
+static void colour_walls(scene *s)
+{
+    for (int code = 4 * RISE; code < 5 * RISE; code++)
+        s->table[code] = (trip_tf_entry){ 1, 0, 0, 50 };
+    for (int code = 10 * RISE; code < 11 * RISE; code++)
+        s->table[code] = (trip_tf_entry){ 0, 1, 0, 50 };
+    for (int code = 15 * RISE; code < 16 * RISE; code++)
+        s->table[code] = (trip_tf_entry){ 0, 0, 1, 50 };
+}
+
+static void expect_colour(const scene_picture *p, int channel, const char *name)
+{
+    for (int n = 0; n < p->width * p->height; n++)
+        for (int c = 0; c < 3; c++)
+            if (!(fabs((c == channel) - p->rgba[4 * n + c]) < 0.01))
+                fail_msg("%s: component %d of pixel %d is %g", name, c, n, p->rgba[4 * n + c]);
+}
+
+static void the_nearest_wall_hides_those_behind_it(void **state)
+{
+    (void)state;
+    for (int axis = 0; axis < 3; axis++) {
+        scene s;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = ramp, .user = &axis });
+        colour_walls(&s);
+        for (int i = 0; i < 24; i++) {
+            double d[3] = { 0.5, 0.3, -0.4 };
+            d[axis] = i % 2 ? 1 : -1;
+            trip_camera_params view = scene_view(&s, trip_v3(d[0], d[1], d[2]), 60, 2, 3);
+            view.ortho_height = i / 6 % 2 ? 2 : 0;
+            trip_settings settings = post(1 + i / 12);
+            settings.method = (trip_method)(i / 2 % 3);
+            settings.h = 0.5;
+            for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+                scene_picture p = scene_draw(&s, r, &view, &settings);
+                expect_colour(&p, i % 2 ? 2 : 0, r->name);
+                scene_picture_free(&p);
+            }
+        }
+        scene_destroy(&s);
+    }
+}
+
+static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        int axis = i % 3;
+        double d[3] = { 0.1, -0.1, 0.1 };
+        scene s;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = ramp, .user = &axis });
+        colour_walls(&s);
+        d[axis] = i / 3 % 2 ? 1 : -1;
+        trip_camera_params view = { .eye = { 7.6, 7.3, 7.1 },
+                                    .up = { 0.3, 0.5, 0.7 },
+                                    .fov_degrees = 60,
+                                    .width = 8,
+                                    .height = 8 };
+        view.look = trip_add(view.eye, trip_v3(d[0], d[1], d[2]));
+        trip_settings settings = post(1 + i / 6);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            expect_colour(&p, i / 3 % 2, r->name);
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+/* Of two blocks one is a little below the transmittance at which pixels are saturated. */
+static void a_saturated_pixel_is_opaque(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        scene s;
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
+        double through = TRIP_SHEET_SATURATION * (i ? 0.9 : 1.1);
+        fill_table(&s, 0.75, 1, 1, -log(through) / (EDGE - 1));
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 60, 20, 1);
+        view.ortho_height = 0.1;
+        trip_settings settings = post(2);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            if (i)
+                assert_true(p.rgba[3] == 1);
+            else
+                assert_close(p.rgba[3], 1 - through, 1e-6 + r->tolerance / 16);
+            assert_close(p.rgba[0], 0.75 * (i ? 1 : 1 - through), 1e-6 + r->tolerance);
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+static void light_comes_by_differences_of_values(void **state)
+{
+    double most = 0;
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        int axis = i % 3;
+        scene s;
+        scene_create(
+            &s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                 .index_to_world = i / 3 % 2 ? sheared : trip_affine_identity(),
+                                 .voxel = ramp,
+                                 .user = &axis });
+        fill_table(&s, 0.6, 0.3, 0.1, 0.05);
+        double d[3] = { 0.3, 0.2, -0.3 };
+        d[axis] = 1;
+        trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 5, 1);
+        view.ortho_height = 0.1;
+        trip_settings settings = post(2);
+        settings.shading = true;
+        settings.headlight = i / 6;
+        settings.light_direction = trip_normalize(trip_v3(0.5, 0.6, 0.7));
+
+        trip_camera camera;
+        trip_affine to_index;
+        const trip_affine *map = &s.data->index_to_world;
+        double rgb[3] = { 0.6F, 0.3F, 0.1F }, unlit[3] = { rgb[0], rgb[1], rgb[2] };
+        assert_int_equal(trip_camera_make(&camera, &view, map), 0);
+        assert_true(trip_affine_invert(map, &to_index));
+        const double *row = to_index.m[axis]; /* the world gradient of the index along the axis */
+        const double rise = RISE / 65535.0, g[3] = { row[0] * rise, row[1] * rise, row[2] * rise };
+        trip_shade(&settings, &camera,
+                   trip_shade_gradient_full(&s.data->header, camera.voxel_world), trip_v3(0, 0, 0),
+                   g, rgb);
+        most = fmax(most, fabs(rgb[0] - unlit[0]));
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            for (int c = 0; c < 3; c++)
+                assert_close(p.rgba[c] / p.rgba[3], rgb[c], 1e-5 + 2 * r->tolerance);
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+    assert_true(most > 0.1); /* by light, not by nothing */
+}
+
+/* The mean distance of what a constant block shows. */
+static void depth_is_the_mean_distance_of_what_is_seen(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        scene s;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .index_to_world = i % 2 ? sheared : trip_affine_identity() });
+        fill_table(&s, 1, 1, 1, 0.3);
+        double d[3] = { 0.2, 0.1, -0.2 };
+        d[i / 4] = i / 2 % 2 ? 1 : -1;
+        trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 4, 5);
+        view.ortho_height = i % 3 == 0 ? 2 : 0;
+        trip_settings settings = post(2);
+        settings.depth = true;
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            for (int n = 0; n < 25; n++) {
+                trip_vec3 o, ray;
+                double from, to;
+                scene_ray(&s, &view, n % 5, n / 5, &o, &ray);
+                assert_true(scene_ray_in_grid(&s, o, ray, &from, &to));
+                double unit = scene_ray_stretch(&s, ray), k = 0.3F, length = (to - from) * unit;
+                double expected = from * unit + 1 / k - length / expm1(k * length);
+                /* Segments count from their middles, and the last 1/512 is left out. */
+                assert_close(p.depth[n] - expected, 0, 0.15 + 80 * r->tolerance);
+            }
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+/* A volume with one of its axes reversed, or its axes in turn. */
+typedef struct arrangement {
+    int64_t dims[3]; /* as first arranged */
+    int mirrored;    /* axis; -1: none */
+    int turned;      /* axis a is what axis a + turned was */
+} arrangement;
+
+static trip_vec3 arrange(const arrangement *to, trip_vec3 p, bool direction)
+{
+    double first[3] = { p.x, p.y, p.z }, n[3];
+    if (to->mirrored >= 0)
+        first[to->mirrored] =
+            (direction ? 0 : (double)to->dims[to->mirrored] - 1) - first[to->mirrored];
+    for (int a = 0; a < 3; a++)
+        n[a] = first[(a + to->turned) % 3];
+    return trip_v3(n[0], n[1], n[2]);
+}
+
+/* Smooth lumps. */
+static double lumps(double x, double y, double z)
+{
+    return 30000 + 9000 * sin(0.5 * x + 0.3) + 9000 * sin(0.4 * y + 0.2 * z) +
+           9000 * cos(0.6 * z - 0.1 * x * y);
+}
+
+static bool arranged_lumps(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const arrangement *as = user;
+    const int at[3] = { i, j, k };
+    int first[3];
+    (void)gradient;
+    for (int a = 0; a < 3; a++)
+        first[(a + as->turned) % 3] = at[a];
+    if (as->mirrored >= 0)
+        first[as->mirrored] = (int)as->dims[as->mirrored] - 1 - first[as->mirrored];
+    *code = (unsigned)lround(lumps(first[0], first[1], first[2]));
+    return true;
+}
+
+static void create_lumps(scene *s, arrangement *as)
+{
+    scene_params params = { .voxel = arranged_lumps, .user = as };
+    for (int a = 0; a < 3; a++)
+        params.dims[a] = as->dims[(a + as->turned) % 3];
+    scene_create(s, &params);
+    for (int code = 30000; code < 65536; code++)
+        s->table[code] = code < 45000 ? (trip_tf_entry){ 0.9F, 0.5F, 0.2F, 0.05F }
+                                      : (trip_tf_entry){ 0.2F, 0.6F, 1, 0.8F };
+}
+
+/* A view of it, arranged likewise. */
+static scene_picture draw_lumps(const scene_renderer *r, arrangement as, bool parallel)
+{
+    scene s;
+    create_lumps(&s, &as);
+    trip_settings settings = post(2);
+    settings.shading = true;
+    settings.h = 0.3;
+    trip_camera_params view = { .eye = arrange(&as, trip_v3(40, -27, 35), false),
+                                .look = arrange(&as, trip_v3(8.2, 11.1, 12.7), false),
+                                .up = arrange(&as, trip_v3(0.1, 0.2, 1), true),
+                                .fov_degrees = 30,
+                                .ortho_height = parallel ? 25 : 0,
+                                .width = 32,
+                                .height = 32 };
+    scene_picture p = scene_draw(&s, r, &view, &settings);
+    scene_destroy(&s);
+    return p;
+}
+
+static void flip(scene_picture *p)
+{
+    for (int y = 0; y < p->height; y++)
+        for (int x = 0; x < p->width / 2; x++)
+            for (int c = 0; c < 4; c++) {
+                float *a = &p->rgba[4 * (y * p->width + x) + c];
+                float *b = &p->rgba[4 * (y * p->width + p->width - 1 - x) + c];
+                float kept = *a;
+                *a = *b;
+                *b = kept;
+            }
+}
+
+static void mirrored_and_with_axes_in_turn_it_is_the_same_picture(void **state)
+{
+    (void)state;
+    for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+        for (int parallel = 0; parallel < 2; parallel++) {
+            arrangement as = { { 18, 22, 26 }, -1, 0 };
+            scene_picture first = draw_lumps(r, as, parallel);
+            for (int i = 1; i < 6; i++) {
+                as.mirrored = i < 4 ? i - 1 : -1;
+                as.turned = i < 4 ? 0 : i - 3;
+                scene_picture p = draw_lumps(r, as, parallel);
+                if (as.mirrored >= 0)
+                    flip(&p);
+                assert_true(scene_difference(&p, &first) < 1e-5 + r->tolerance);
+                scene_picture_free(&p);
+            }
+            scene_picture_free(&first);
+        }
+    }
+}
+
+/* Three lumps, of nothing at the border. */
+static bool blobs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const double at[3][3] = { { 11, 12, 9 }, { 17, 14, 15 }, { 12, 18, 18 } };
+    double sum = 0;
+    (void)user;
+    (void)gradient;
+    for (int n = 0; n < 3; n++) {
+        double x = i - at[n][0], y = j - at[n][1], z = k - at[n][2];
+        sum += 40000 * exp(-(x * x + y * y + z * z) / 14);
+    }
+    *code = (unsigned)lround(sum);
+    return true;
+}
+
+static void put_blobs(trip_field **field, const scene *s)
+{
+    const int edge = (int)s->data->header.dims[0];
+    assert_int_equal(trip_field_create(field, (int64_t[3]){ edge, edge, edge }, s->budget), 0);
+    for (int n = 0; n < edge * edge * edge; n++) {
+        const int at[3] = { n % edge, n / edge % edge, n / edge / edge };
+        unsigned code;
+        blobs(NULL, at[0], at[1], at[2], &code, NULL);
+        assert_int_equal(trip_field_put(*field, (int64_t[3]){ at[0], at[1], at[2] }, code, NULL),
+                         0);
+    }
+    const trip_field_map map = { s->data->index_to_world, 1.0 / 65535, false };
+    assert_int_equal(trip_field_finish(*field, &map), 0);
+}
+
+static double mean_apart(const scene_picture *a, const scene_picture *b)
+{
+    double sum = 0;
+    int count = 4 * a->width * a->height;
+    for (int n = 0; n < count; n++)
+        sum += fabs((double)a->rgba[n] - (double)b->rgba[n]);
+    return sum / count;
+}
+
+/* Of 1, 4 and 16 slices: the integral is of the same field, by the same light. Translucent, so that
+ * nothing is saturated. */
+static void compare_with_integral(bool lit, bool parallel, trip_vec3 direction)
+{
+    trip_field *field;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 28, 28, 28 }, .normals = true, .voxel = blobs });
+    put_blobs(&field, &s);
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ (float)code / 65535, 0.5F, 1 - (float)code / 65535,
+                                         0.25F * (float)fmax(0, code - 10000) / 30000 };
+    trip_settings settings = post(1);
+    settings.tolerance = 1e-6;
+    settings.shading = lit;
+    trip_camera_params view = scene_view(&s, direction, 60, 18, 20);
+    view.ortho_height = parallel ? 18 : 0;
+    scene_picture truth = scene_integrate(&s, &view, &settings, &(scene_making){ 1, field });
+    double errors[3] = { 0 };
+    for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+        for (int n = 0; n < 3; n++) {
+            settings.slices = 1 << 2 * n;
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            double error = mean_apart(&p, &truth);
+            if (r->tolerance > 0) /* after the reference */
+                assert_true(error < errors[n] + r->tolerance);
+            else
+                errors[n] = error;
+            scene_picture_free(&p);
+        }
+    }
+    assert_true(errors[0] < 2.0 / 255 && errors[0] > 0.05 / 255);
+    assert_true(errors[1] < errors[0] / 12 && errors[2] < errors[1] / 12);
+    scene_picture_free(&truth);
+    trip_field_destroy(field);
+    scene_destroy(&s);
+}
+
+static void the_error_falls_with_the_square_of_the_slices(void **state)
+{
+    (void)state;
+    compare_with_integral(false, false, trip_v3(1, 0.2, -0.3));
+    compare_with_integral(false, true, trip_v3(-1, 0.9, 0.8));
+    compare_with_integral(true, false, trip_v3(0.3, 1, -0.9));
+    compare_with_integral(true, true, trip_v3(0.2, 0.1, -1));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_slab_has_the_opacity_of_the_path_through_it),
+        cmocka_unit_test(a_narrow_peak_is_seen_whole_at_any_slices),
+        cmocka_unit_test(values_fall_to_those_of_the_halo_and_end_without_it),
+        cmocka_unit_test(a_cell_without_a_corner_is_empty),
+        cmocka_unit_test(from_within_what_lies_before_the_eye_is_seen),
+        cmocka_unit_test(the_nearest_wall_hides_those_behind_it),
+        cmocka_unit_test(walls_are_seen_on_both_sides_of_an_eye_between_them),
+        cmocka_unit_test(a_saturated_pixel_is_opaque),
+        cmocka_unit_test(light_comes_by_differences_of_values),
+        cmocka_unit_test(depth_is_the_mean_distance_of_what_is_seen),
+        cmocka_unit_test(mirrored_and_with_axes_in_turn_it_is_the_same_picture),
+        cmocka_unit_test(the_error_falls_with_the_square_of_the_slices),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
