@@ -246,7 +246,8 @@ class Options(program.ProgramTest):
             done = list(
                 pool.map(
                     lambda n: program.call(
-                        "render", "a.trip", "-o", f"v{n}.png", *render, *runs[n]
+                        *("render", "a.trip", "-o", f"v{n}.exr", *render, *runs[n]),
+                        program=program.QUICK_PROGRAM,
                     ),
                     range(len(runs)),
                 )

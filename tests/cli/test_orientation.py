@@ -254,7 +254,9 @@ class Orientation(program.ProgramTest):
             expected = self.picture("a.trip", "--renderer=reference", *options)
             for renderer in "cpu", "gl":
                 given = f"--renderer={renderer}", *options
-                run = program.call("render", "a.trip", "-o", "b.exr", *given)
+                run = program.call(
+                    "render", "a.trip", "-o", "b.exr", *given, program=program.QUICK_PROGRAM
+                )
                 if "no device here offers OpenGL" in run.stderr:
                     self.skipTest("no OpenGL 4.5 here")
                 self.assertEqual(run.returncode, 0, run.stderr)

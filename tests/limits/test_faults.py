@@ -44,7 +44,7 @@ class Faults(limits.Test):
         """An error that names the file, or the same picture."""
         path = self.path("o.exr")
         engine = self.random.choice(["io_uring", "pread", "null"])
-        r = limits.run("triptych", "render", self.data, "-o", path, "--size", SIZE, "--renderer",
+        r = limits.run("quick", "render", self.data, "-o", path, "--size", SIZE, "--renderer",
                        renderer, "--engine", engine)
         self.renders += 1
         if r.status == 0 and not must_fail:

@@ -15,7 +15,7 @@ class Together(limits.Test):
         limits.run("triptych-generate", "shells", "--size", "96", "-o", cls.volume)
 
     def start(self, *arguments):
-        return subprocess.Popen([limits.program("triptych"), *map(str, arguments)],
+        return subprocess.Popen([limits.program("quick"), *map(str, arguments)],
                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                 stderr=subprocess.PIPE, text=True)
 
@@ -55,7 +55,7 @@ class Together(limits.Test):
         failures = 0
         path = self.path("r.exr")
         for _ in range(limits.rounds(30)):
-            r = limits.run("triptych", "render", data, "-o", path, "--size", "60x60", "--renderer",
+            r = limits.run("quick", "render", data, "-o", path, "--size", "60x60", "--renderer",
                            "cpu")
             if r.status == 0:
                 seen.add(limits.picture_hash(path))
