@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SIZE = 32, FLIPS = 1000, CUTS = 190 };
+enum { SIZE = 32, FLIPS = 500, CUTS = 95 };
 
 static const size_t picture_bytes = (size_t)SIZE * SIZE * 4 * sizeof(float);
 
@@ -261,7 +261,7 @@ static long happen(void *user, void *data, uint64_t offset, size_t bytes, long r
     }
 }
 
-/* One read of the frame in five, another one for each mishap. A frame gets over what is short or
+/* One read of the frame in fifteen, another one for each mishap. A frame gets over what is short or
  * interrupted. */
 static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
                           const float *wanted)
@@ -274,7 +274,7 @@ static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
         .engine = engine, .slots = 3, .slot_bytes = 8192, .fault = happen, .fault_user = &m
     };
     assert_int_equal(open_drawing(&d, kind, params), 0);
-    for (int at = what;; at += TEST_BY_TURNS ? 15 : 5) {
+    for (int at = what;; at += 15) {
         m.countdown = at;
         test_catch_reports();
         int status = draw_frame(&d, rgba);

@@ -56,8 +56,9 @@ static void any_number_of_threads_draws_the_same(void **state)
     (void)state;
     scene s;
     cpu_scenes_blobs(&s, 32, NULL);
-    for (unsigned threads = 2; threads <= 8; threads++)
-        check_same(&s, &s, threads, &(trip_reader_params){ 0 });
+    const unsigned threads[] = { 2, 3, 5, 8 };
+    for (int i = 0; i < 4; i++)
+        check_same(&s, &s, threads[i], &(trip_reader_params){ 0 });
     scene_destroy(&s);
 }
 

@@ -397,7 +397,7 @@ static void check_many_stops(const scene *s, const scene_renderer *kind, trip_re
     params.fault_user = &count;
     set_up(&d, s, kind, params);
     draw_whole(&d, whole);
-    for (int i = 0; i < 30; i++) {
+    for (int i = 0; i < 20; i++) {
         trip_drawing drawing;
         assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
         for (uint32_t steps = scene_hash(i, 1, 2) % 12; steps > 0; steps--)
@@ -543,13 +543,14 @@ static void cancelling_costs_little_of_what_drawing_costs(void **state)
 {
     (void)state;
     static const scene_renderer cpu = { "cpu", create_cpu, 0 };
+    const int size = 512;
     scene s;
     scene_create(&s, &(scene_params){ .dims = { 64, 64, 64 } });
     scene_colour(&s, 0, 65535, 1, 0.8, 0.6, 0.0001);
     desk d;
     set_up(&d, &s, &cpu, (trip_reader_params){ .engine = TRIP_ENGINE_NULL });
-    trip_camera_params view = scene_view(&s, trip_v3(1, 1.2, 0.9), 90, 60, 1024);
-    float *rgba = calloc(4, 1024 * 1024 * sizeof *rgba);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 1.2, 0.9), 90, 60, size);
+    float *rgba = calloc(4, (size_t)size * (size_t)size * sizeof *rgba);
     assert_non_null(rgba);
     trip_plan_release(&d.plan, s.budget);
     assert_int_equal(trip_camera_make(&d.camera, &view, &s.data->index_to_world), 0);
@@ -557,7 +558,7 @@ static void cancelling_costs_little_of_what_drawing_costs(void **state)
     double start = cpu_seconds();
     draw_whole(&d, rgba);
     double whole = cpu_seconds() - start;
-    for (int steps = 5; steps <= 35; steps += 3) {
+    for (int steps = 5; steps <= 35; steps += 10) {
         trip_drawing drawing;
         assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
         for (int i = 0; i < steps; i++)

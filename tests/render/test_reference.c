@@ -132,7 +132,7 @@ static void inside_a_room_outward_order_is_right_and_ascending_order_fails(void 
         { 1, 0.1, 0.2 }, { 0.1, -1, 0.1 }, { 0.1, 1, -0.2 }, { 0.1, 0.2, -1 }
     };
     for (int i = 0; i < 12; i++) {
-        trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 1, fields[i % 3], 160);
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 1, fields[i % 3], 96);
         view.eye = trip_v3(38.3, 40.1, 41.2);
         view.look = trip_add(view.eye, gazes[i / 3]);
         view.up = trip_v3(0.3, 0.2, 0.5);

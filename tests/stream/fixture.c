@@ -20,16 +20,30 @@ static uint64_t plain_morton(uint32_t u, uint32_t v)
     return m;
 }
 
-static int sort_axis;
+/* A voxel and its place in a list: by sheet, and by Morton order there. */
+typedef struct ranked {
+    uint64_t rank;
+    fixture_voxel voxel;
+} ranked;
 
-static int by_list_order(const void *a, const void *b)
+static int by_rank(const void *a, const void *b)
 {
-    const fixture_voxel *x = a, *y = b;
-    int n = sort_axis, u = (n + 1) % 3, v = (n + 2) % 3;
-    if (x->p[n] != y->p[n])
-        return x->p[n] < y->p[n] ? -1 : 1;
-    uint64_t m = plain_morton(x->p[u], x->p[v]), o = plain_morton(y->p[u], y->p[v]);
-    return (m > o) - (m < o);
+    const ranked *x = a, *y = b;
+    return (x->rank > y->rank) - (x->rank < y->rank);
+}
+
+static void sort_list(fixture_voxel *list, size_t count, int axis)
+{
+    ranked *all = calloc(count + 1, sizeof *all);
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t *p = list[i].p, u = p[(axis + 1) % 3], v = p[(axis + 2) % 3];
+        assert_true(p[axis] < 1 << 20 && u < 1 << 22 && v < 1 << 22);
+        all[i] = (ranked){ (uint64_t)p[axis] << 44 | plain_morton(u, v), list[i] };
+    }
+    qsort(all, count, sizeof *all, by_rank);
+    for (size_t i = 0; i < count; i++)
+        list[i] = all[i].voxel;
+    free(all);
 }
 
 static void make_voxels(fixture *f)
@@ -56,8 +70,8 @@ static void make_voxels(fixture *f)
         f->lists[a] = calloc(room, sizeof *list);
         memcpy(f->lists[a], list, f->count * sizeof *list);
     }
-    for (sort_axis = 0; sort_axis < 3; sort_axis++)
-        qsort(f->lists[sort_axis], f->count, sizeof *list, by_list_order);
+    for (int a = 0; a < 3; a++)
+        sort_list(f->lists[a], f->count, a);
 }
 
 static int write_list(fixture *f, trip_writer *w, int axis)

@@ -252,7 +252,7 @@ static void every_engine_and_ring_hands_out_the_same_runs(void **state)
                                       .fault = i / 4 % 3 ? disturb : NULL,
                                       .fault_user = &counter };
         if (params.engine != TRIP_ENGINE_URING || uring)
-            check_random_passes(&f, d, &params, (unsigned)i % params.slots, 6);
+            check_random_passes(&f, d, &params, (unsigned)i % params.slots, 3);
     }
     close_fixture(&f, d);
 }
@@ -626,7 +626,7 @@ static void a_second_pass_reads_only_what_the_cache_has_no_room_for(void **state
         trip_reader_params params = { .cache_bytes = cached * 4096 }; /* a slot holds all */
         assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
         assert_int_equal(read_bytes(r, &s, out), whole);
-        for (int again = 0; again < 30; again++) {
+        for (int again = 0; again < 10; again++) {
             uint64_t left = cached >= pages ? 0 : whole - cached * 4096;
             uint64_t bytes = read_bytes(r, &s, out);
             /* The short last page may be among those kept. */
