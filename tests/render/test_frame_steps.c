@@ -32,11 +32,13 @@ static trip_camera_params view_of(const scene *s)
     return scene_view(s, trip_v3(1, 1.2, 0.9), 60, 40, SIZE);
 }
 
-static void set_up(desk *d, const scene *s, const scene_renderer *kind, trip_reader_params params)
+static void set_up_to(desk *d, const scene *s, const scene_renderer *kind,
+                      trip_reader_params params, trip_classify classify)
 {
     trip_camera_params view = view_of(s);
     *d = (desk){ .scene = s, .settings = trip_settings_default() };
     d->settings.h = 0.2;
+    d->settings.classify = classify;
     assert_int_equal(trip_camera_make(&d->camera, &view, &s->data->index_to_world), 0);
     assert_int_equal(
         trip_plan_make(&d->plan, s->data, &d->camera, &d->settings, s->table, s->budget), 0);
@@ -48,6 +50,11 @@ static void set_up(desk *d, const scene *s, const scene_renderer *kind, trip_rea
                              .settings = &d->settings,
                              .plan = &d->plan,
                              .table = s->table };
+}
+
+static void set_up(desk *d, const scene *s, const scene_renderer *kind, trip_reader_params params)
+{
+    set_up_to(d, s, kind, params, TRIP_CLASSIFY_PRE);
 }
 
 static void put_away(desk *d)
@@ -103,27 +110,33 @@ static void step_by_step(desk *d, bool look, float *rgba, int *steps)
     trip_frame_end(&drawing);
 }
 
+static void take_steps(const scene *s, const scene_renderer *kind, trip_classify classify)
+{
+    static float whole[4 * PIXELS], stepped[4 * PIXELS];
+    desk d;
+    int steps = 0;
+    set_up_to(&d, s, kind, small_slots, classify);
+    for (int axis = 0; axis < 3; axis++)
+        assert_true(d.plan.layers[axis].pass_count > 0);
+    draw_whole(&d, whole);
+    check_range(whole);
+    step_by_step(&d, false, stepped, &steps);
+    assert_true(steps > 20);
+    assert_memory_equal(whole, stepped, sizeof whole);
+    step_by_step(&d, true, stepped, &steps);
+    assert_memory_equal(whole, stepped, sizeof whole);
+    put_away(&d);
+}
+
 static void steps_and_looks_leave_the_picture_the_same(void **state)
 {
     (void)state;
     scene s;
     make_scene(&s);
-    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++) {
-        static float whole[4 * PIXELS], stepped[4 * PIXELS];
-        desk d;
-        int steps = 0;
-        set_up(&d, &s, kind, small_slots);
-        for (int axis = 0; axis < 3; axis++)
-            assert_true(d.plan.layers[axis].pass_count > 0);
-        draw_whole(&d, whole);
-        check_range(whole);
-        step_by_step(&d, false, stepped, &steps);
-        assert_true(steps > 20);
-        assert_memory_equal(whole, stepped, sizeof whole);
-        step_by_step(&d, true, stepped, &steps);
-        assert_memory_equal(whole, stepped, sizeof whole);
-        put_away(&d);
-    }
+    for (const scene_renderer *kind = scene_renderers(); kind->name; kind++)
+        take_steps(&s, kind, TRIP_CLASSIFY_PRE);
+    for (const scene_renderer *kind = scene_renderers_post(); kind->name; kind++)
+        take_steps(&s, kind, TRIP_CLASSIFY_POST);
     scene_destroy(&s);
 }
 
