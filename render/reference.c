@@ -387,7 +387,7 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     reference *r = (reference *)base;
     const trip_camera *camera = r->frame->camera;
-    int status = 0;
+    int status = r->sheets ? trip_reference_sheets_prepare(r->sheets) : 0;
     for (int y = 0; y < camera->height && !status; y++) {
         for (int x = 0; x < camera->width && !trip_interrupted(); x++) {
             double merged[TRIP_CHANNELS_MAX] = { 0 };

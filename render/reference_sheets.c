@@ -12,7 +12,8 @@ struct trip_reference_sheets {
     const trip_frame *frame;
     trip_affine to_index;
     double value_per_code, gradient_full;
-    trip_field *field;
+    trip_field *field; /* gradients are in index space, codes per index */
+    bool has_gradients;
     trip_field_fill fill;
     trip_segments segments;
 };
@@ -54,7 +55,50 @@ void trip_reference_sheets_destroy(trip_reference_sheets *s)
 int trip_reference_sheets_put(trip_reference_sheets *s, const trip_batch *batch,
                               const trip_run *run)
 {
+    s->has_gradients = false;
     return trip_field_fill_run(&s->fill, batch, run);
+}
+
+/* Codes per index along an axis; of a voxel that is there. */
+static double difference(const trip_field *field, const int64_t at[3], int axis)
+{
+    const int64_t d[3] = { axis == 0, axis == 1, axis == 2 };
+    double here = trip_field_at(field, at[0], at[1], at[2])->code;
+    const trip_field_voxel *after = trip_field_at(field, at[0] + d[0], at[1] + d[1], at[2] + d[2]);
+    const trip_field_voxel *before = trip_field_at(field, at[0] - d[0], at[1] - d[1], at[2] - d[2]);
+    if (after && before)
+        return ((double)after->code - before->code) / 2;
+    return after ? after->code - here : before ? here - before->code : 0;
+}
+
+/* Differences of codes are exact in the field's single precision. */
+static int set_gradient(trip_field *field, const int64_t at[3])
+{
+    const trip_field_voxel *v = trip_field_at(field, at[0], at[1], at[2]);
+    if (!v)
+        return 0;
+    const double g[3] = { difference(field, at, 0), difference(field, at, 1),
+                          difference(field, at, 2) };
+    return trip_field_put(field, at, v->code, g);
+}
+
+int trip_reference_sheets_prepare(trip_reference_sheets *s)
+{
+    enum { EDGE = TRIP_FIELD_EDGE };
+    int status = 0;
+    if (s->has_gradients || !s->frame->settings->shading)
+        return 0;
+    for (size_t i = 0; i < trip_field_cubes(s->field) && !status; i++) {
+        const int64_t *first = trip_field_cube_by_number(s->field, i)->at;
+        for (int n = 0; n < EDGE * EDGE * EDGE && !status; n++) {
+            const int64_t at[3] = { first[0] + n % EDGE, first[1] + n / EDGE % EDGE,
+                                    first[2] + n / (EDGE * EDGE) };
+            status = set_gradient(s->field, at);
+        }
+        status = status ? status : trip_frame_poll();
+    }
+    s->has_gradients = status == 0;
+    return status;
 }
 
 /* A ray on its way through the cells between sheets. */
@@ -69,6 +113,7 @@ typedef struct passage {
 /* Where the ray is at t, in a cell: the eight corners, i fastest, and their weights. */
 typedef struct place {
     int64_t cell[3];
+    const trip_field_voxel *corners[8];
     double weights[8];
     double code;
 } place;
@@ -94,11 +139,11 @@ static bool interpolate(const trip_field *field, place *at)
 {
     at->code = 0;
     for (int n = 0; n < 8; n++) {
-        const trip_field_voxel *v = trip_field_at(
-            field, at->cell[0] + (n & 1), at->cell[1] + (n >> 1 & 1), at->cell[2] + (n >> 2));
-        if (!v)
+        at->corners[n] = trip_field_at(field, at->cell[0] + (n & 1), at->cell[1] + (n >> 1 & 1),
+                                       at->cell[2] + (n >> 2));
+        if (!at->corners[n])
             return false;
-        at->code += at->weights[n] * v->code;
+        at->code += at->weights[n] * at->corners[n]->code;
     }
     return true;
 }
@@ -120,28 +165,12 @@ static bool find_place(const passage *p, double t, int64_t cells, place *at)
     return interpolate(field, at);
 }
 
-/* Codes per index along an axis; of a voxel that is there. */
-static double difference(const trip_field *field, const int64_t at[3], int axis)
-{
-    const int64_t d[3] = { axis == 0, axis == 1, axis == 2 };
-    double here = trip_field_at(field, at[0], at[1], at[2])->code;
-    const trip_field_voxel *after = trip_field_at(field, at[0] + d[0], at[1] + d[1], at[2] + d[2]);
-    const trip_field_voxel *before = trip_field_at(field, at[0] - d[0], at[1] - d[1], at[2] - d[2]);
-    if (after && before)
-        return ((double)after->code - before->code) / 2;
-    return after ? after->code - here : before ? here - before->code : 0;
-}
-
-/* Codes per index. */
-static trip_vec3 gradient_at(const passage *p, const place *at)
+static trip_vec3 gradient_at(const place *at)
 {
     double g[3] = { 0 };
-    for (int n = 0; n < 8; n++) {
-        const int64_t corner[3] = { at->cell[0] + (n & 1), at->cell[1] + (n >> 1 & 1),
-                                    at->cell[2] + (n >> 2) };
+    for (int n = 0; n < 8; n++)
         for (int a = 0; a < 3; a++)
-            g[a] += at->weights[n] * difference(p->s->field, corner, a);
-    }
+            g[a] += at->weights[n] * at->corners[n]->gradient[a];
     return trip_v3(g[0], g[1], g[2]);
 }
 
@@ -150,7 +179,7 @@ static void light(const passage *p, const place ends[2], trip_vec3 middle, doubl
 {
     const trip_reference_sheets *s = p->s;
     const trip_frame *frame = s->frame;
-    trip_vec3 codes = trip_scale(trip_add(gradient_at(p, &ends[0]), gradient_at(p, &ends[1])), 0.5);
+    trip_vec3 codes = trip_scale(trip_add(gradient_at(&ends[0]), gradient_at(&ends[1])), 0.5);
     trip_vec3 g = trip_affine_transpose_vector(&s->to_index, trip_scale(codes, s->value_per_code));
     trip_shade(frame->settings, frame->camera, s->gradient_full, middle,
                (double[3]){ g.x, g.y, g.z }, rgb);

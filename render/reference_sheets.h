@@ -17,8 +17,10 @@ void trip_reference_sheets_destroy(trip_reference_sheets *s);
 int trip_reference_sheets_put(trip_reference_sheets *s, const trip_batch *batch,
                               const trip_run *run);
 
-/* The layer of `axis` at the centre of pixel (x, y), which has weight there, of what was put so
- * far; depths are distances. */
+/* Before the layers of what was put so far. */
+int trip_reference_sheets_prepare(trip_reference_sheets *s);
+/* The layer of `axis` at the centre of pixel (x, y), which has weight there; depths are distances.
+ */
 void trip_reference_sheets_layer(const trip_reference_sheets *s, int axis, int x, int y,
                                  double layer[TRIP_CHANNELS_MAX]);
 
