@@ -1,5 +1,5 @@
 #!/bin/sh
-# The tests, and every fuzzer over its corpus for a few seconds (TRIP_FUZZ_SECONDS each, default 10),
+# The tests, and every fuzzer over its corpus for a few seconds (TRIP_FUZZ_SECONDS each, default 5),
 # under AddressSanitizer with UBSan, and those in which threads meet under ThreadSanitizer. What is
 # left out of the first, and why, is in tests/CMakeLists.txt; of the second, OpenVDB and GL, which
 # none of its tests use.
@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 
 scripts/install-dependencies.sh --tests
 
-cmake --preset asan -DTRIP_FUZZ_SECONDS="${TRIP_FUZZ_SECONDS:-10}"
+cmake --preset asan -DTRIP_FUZZ_SECONDS="${TRIP_FUZZ_SECONDS:-5}"
 cmake --build --preset asan
 ctest --preset asan -j "$(nproc)" -LE unsanitized
 

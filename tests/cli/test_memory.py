@@ -32,12 +32,12 @@ class Memory(program.ProgramTest):
         slice_ = numpy.random.default_rng(1).integers(0, 256, (512, 512), "u1")
         slice_[slice_ < 246] = 0
         with open("large.raw", "wb") as f:
-            for z in range(1024):
+            for z in range(512):
                 f.write(numpy.roll(slice_, (z, 7 * z), (0, 1)).tobytes())
-        cls.raw = ("brick", "large.raw", "--size", "512,512,1024", "-q", "--force")
+        cls.raw = ("brick", "large.raw", "--size", "512,512,512", "-q", "--force")
 
-    def test_bricking_and_drawing_a_volume_of_256_mib_with_64(self):
-        self.assertEqual(os.path.getsize("large.raw"), 256 * MIB)
+    def test_bricking_and_drawing_a_volume_of_128_mib_with_64(self):
+        self.assertEqual(os.path.getsize("large.raw"), 128 * MIB)
         for envelope in [], ["--range=250:255", "--normals=none"]:
             rss = peak_rss(*self.raw, "-o", "a.trip", "--memory", "64M", *envelope)
             self.assertLess(rss, 64 * MIB + PROGRAM_BYTES, envelope)

@@ -24,10 +24,10 @@ class Memory(limits.Test):
         except OSError as e:
             raise unittest.SkipTest(f"no memory cgroup can be made here: {e}")
 
-    def test_a_volume_of_eight_times_the_limit_and_more(self):
+    def test_a_volume_of_four_times_the_limit_and_more(self):
         bounded = Bounded(self.folder, self.limit, self.memory, self.tell)
-        volume = bounded.generate(8 * self.limit)
-        self.assertGreaterEqual(os.path.getsize(volume), 8 * self.limit)
+        volume = bounded.generate(4 * self.limit)
+        self.assertGreaterEqual(os.path.getsize(volume), 4 * self.limit)
         bounded.brick(volume)
         bounded.render("cpu", "256x256")
         bounded.render("cpu", "256x256", "--orbit", 3)
