@@ -4,7 +4,7 @@
  * of Hofsetz, Max & Bastos 2008).
  *
  * Depth: the plane of a splat's depth z (camera.h) meets the ray of pixel p at the distance
- *     d(p) = z |J r(p)|
+ *     d(p) = max(0, z) |J r(p)|
  * from the eye, in parallel views from the eye's plane, in world units. z is one number a splat,
  * and |J r(p)| one a pixel, so that layers hold z as the camera of level 0 has it. The picture's
  * depth is |J r(p)| sum of alpha_i T_i z_i / sum of alpha_i T_i of the merged sums: the mean

@@ -1,6 +1,7 @@
 #include "plan_cull.h"
 
 #include "brick_box.h"
+#include "splat.h"
 #include "sheet.h"
 #include "weight.h"
 
@@ -28,6 +29,13 @@ static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, do
                               c->ortho ? sign * pixel / length : 0 };
 }
 
+static double behind_eye(const trip_camera *camera, const trip_settings *settings)
+{
+    const trip_splat_frame f = trip_splat_frame_make(camera, settings);
+    double behind = camera->ortho ? trip_splat_parallel_near(&f) : trip_splat_behind(&f);
+    return behind * (1 + 1e-9);
+}
+
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
                          int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about)
@@ -47,6 +55,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
         .low_pass2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
+        .behind = about ? 0 : behind_eye(camera, settings),
         .table = table,
         .about = about,
     };
@@ -106,12 +115,10 @@ static bool eye_within(const box *b, double margin)
     return true;
 }
 
-/* A splat touches a pixel only when it lies within `radius` of a ray of the image, in front of the
- * eye; only about the eye itself can the nearest point of the ray lie behind. */
+/* A splat that is not about the eye touches a pixel only when it lies within `radius` of a ray of
+ * the image, in front of the eye. */
 static bool outside(const trip_cull *cull, const box *b, double radius)
 {
-    if (!cull->camera->ortho && eye_within(b, radius))
-        return false;
     for (int i = 0; i < 4; i++)
         if (farthest_along(b, cull->sides[i].normal) + radius < cull->sides[i].offset)
             return true;
@@ -151,11 +158,16 @@ trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_bric
         return TRIP_CULL_TRANSPARENT;
     trip_brick_box place = trip_brick_box_of(cull->header, slab, brick);
     box b = place_box(cull, axis, &place);
-    double depth = farthest_along(&b, cull->camera->forward);
-    if (!(depth > 0))
+    double depth = farthest_along(&b, cull->camera->forward), front = larger(depth, 0);
+    if (!(depth > -cull->behind))
         return TRIP_CULL_OUTSIDE;
-    double low_pass2 = cull->camera->ortho ? cull->low_pass2 : cull->low_pass2 * depth * depth;
-    double radius = sqrt(cull->radius2 + low_pass2) * (1 + 1e-9); /* room for rounding */
+    double low_pass2 = cull->camera->ortho ? cull->low_pass2 : cull->low_pass2 * front * front;
+    double room = 1 + 1e-9; /* for rounding */
+    double radius = sqrt(cull->radius2 + low_pass2) * room;
+    /* Of splats about the eye the nearest point of a ray may lie behind, and any ray may be near.
+     */
+    if (!cull->camera->ortho && eye_within(&b, sqrt(2 * cull->radius2 + low_pass2) * room))
+        return TRIP_CULL_KEEP;
     if (outside(cull, &b, radius))
         return TRIP_CULL_OUTSIDE;
     return may_weigh(cull, &b, radius, axis) ? TRIP_CULL_KEEP : TRIP_CULL_NO_WEIGHT;

@@ -31,6 +31,7 @@ typedef struct trip_cull {
     int axis_of_view;
     trip_cull_plane sides[4];  /* through the outermost pixel centres */
     double radius2, low_pass2; /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */
+    double behind;             /* how deep behind the eye splats may still show */
     const trip_tf_entry *table;
     trip_brick_ranges *about; /* where what bricks lie next to counts; NULL: they alone do */
     uint8_t ranges[256]; /* of 256 codes each, as far as looked at: whether some have extinction */

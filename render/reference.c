@@ -226,9 +226,10 @@ static bool draw_footprint(reference *r, const trip_splat *s, double fragment[TR
             if (!(p->weight > 0 && m <= r->constants.cutoff2))
                 continue;
             touched = true;
-            double footprint = s->amplitude * (exp(-m / 2) - r->constants.edge);
+            double front = trip_splat_front(&r->constants, s, x + 0.5, y + 0.5);
+            double footprint = front * s->amplitude * (exp(-m / 2) - r->constants.edge);
             double alpha = -expm1(-extinction * p->stretch * footprint);
-            fragment[TRIP_CHANNEL_DEPTH] = s->z * p->ray_length;
+            fragment[TRIP_CHANNEL_DEPTH] = fmax(0, s->z) * p->ray_length;
             composite(r, p->layer, fragment, alpha, front_to_back);
         }
     }

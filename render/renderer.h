@@ -16,7 +16,7 @@ struct trip_field;
 /* Of a list in one frame. Where frames classify after interpolation nothing is projected: 0. */
 typedef struct trip_list_stats {
     uint64_t splats_read;      /* handed to the renderer */
-    uint64_t splats_projected; /* of those, not culled by w +- dw or the plane of the eye */
+    uint64_t splats_projected; /* of those, not culled by w +- dw or behind the eye */
     uint64_t splats_drawn;     /* of those, with a pixel centre of the image in their support where
                                   the layer has weight (whatever their opacity) */
     uint64_t bytes_read;

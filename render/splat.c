@@ -18,19 +18,16 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
         .rxrx = trip_dot(camera->rx, camera->rx),
         .rxry = trip_dot(camera->rx, camera->ry),
         .ryry = trip_dot(camera->ry, camera->ry),
+        .front = 1 / erf(sqrt(0.5 * cutoff2)),
     };
 }
 
-/* Centre, depth and ray2; the ray through the centre and `c`, the vector whose cross products with
- * rx and ry are A and B. */
-static bool place(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *s, trip_vec3 *ray,
+/* Centre and ray2 for a depth; the ray through the centre and `c`, the vector whose cross products
+ * with rx and ry are A and B. */
+static void place(const trip_splat_frame *f, trip_vec3 v, trip_splat *s, trip_vec3 *ray,
                   trip_vec3 *c)
 {
     const trip_camera *camera = &f->camera;
-    trip_vec3 v = trip_sub(voxel, camera->eye);
-    s->z = trip_dot(camera->forward, v);
-    if (!(s->z > 0))
-        return false;
     if (camera->ortho) {
         s->x = trip_dot(camera->to_x, v);
         s->y = trip_dot(camera->to_y, v);
@@ -43,7 +40,6 @@ static bool place(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *s, tri
         *c = v;
         s->ray2 = trip_dot(*ray, *ray);
     }
-    return true;
 }
 
 /* S, S', amplitude and the radius: the rays of {q : g q^T S'^-1 q <= k^2} lie within
@@ -97,24 +93,158 @@ static bool set_bounds(const trip_splat_frame *f, trip_vec3 ray, trip_splat *s)
     return true;
 }
 
-bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out)
+/* Two unit vectors at right angles to v and to one another; any where v is zero. */
+static void set_across(trip_vec3 v, trip_vec3 e[2])
 {
-    trip_vec3 ray, c;
-    if (!place(f, voxel, out, &ray, &c))
-        return false;
-    set_footprint(f, ray, c, out);
-    return set_bounds(f, ray, out);
+    double x = fabs(v.x), y = fabs(v.y), z = fabs(v.z);
+    trip_vec3 other = trip_v3(x <= y && x <= z, y < x && y <= z, z < x && z < y);
+    if (!(trip_length(v) > 0))
+        v = trip_v3(1, 0, 0), other = trip_v3(0, 1, 0);
+    e[0] = trip_normalize(trip_cross(v, other));
+    e[1] = trip_normalize(trip_cross(v, e[0]));
 }
 
-/* Voxels in front of the eye. So near the plane of the eye every support crosses it and is no
- * ellipse, whatever divides by what rounding left of 0. */
-static const double nearest = 1e-6;
+/* A linear form of a pixel position: e . (r0 + x rx + y ry) times `scale`. */
+static void set_form(double form[3], trip_vec3 e, trip_vec3 r0, trip_vec3 rx, trip_vec3 ry,
+                     double scale)
+{
+    form[0] = scale * trip_dot(e, r0);
+    form[1] = scale * trip_dot(e, rx);
+    form[2] = scale * trip_dot(e, ry);
+}
+
+/* a, b, amplitude and radius, by the factor of W^-1 whose lower left entry is 0. `origin`, `x` and
+ * `y` are what rho is taken of: its pixel's is origin + px x + py y. */
+static void set_across_forms(const trip_splat_frame *f, const trip_vec3 e[2], trip_vec3 origin,
+                             trip_vec3 x, trip_vec3 y, double scale, double low_pass2,
+                             trip_splat *s)
+{
+    double x0 = trip_dot(e[0], x), x1 = trip_dot(e[1], x);
+    double y0 = trip_dot(e[0], y), y1 = trip_dot(e[1], y);
+    double w00 = 1 + low_pass2 * (x0 * x0 + y0 * y0), w01 = low_pass2 * (x0 * x1 + y0 * y1);
+    double w11 = 1 + low_pass2 * (x1 * x1 + y1 * y1), cross = low_pass2 * (x0 * y1 - x1 * y0);
+    /* |W|, without the cancellation of w00 w11 - w01^2. */
+    double det = w00 + w11 - 1 + cross * cross;
+    double along = sqrt(w11 / det);
+    set_form(s->b, e[1], origin, x, y, scale / sqrt(w11));
+    set_form(s->a, trip_sub(e[0], trip_scale(e[1], w01 / w11)), origin, x, y, scale * along);
+    s->amplitude = f->amplitude / sqrt(det);
+    double mean = 0.5 * (w00 + w11);
+    s->radius = f->sigma * sqrt(f->cutoff2 * (mean + hypot(0.5 * (w00 - w11), w01)));
+}
+
+/* The least and greatest p of [0, size] with (X - p z)^2 <= reach^2 |to - p forward|^2, X = to . c:
+ * those whose plane of rays, all pixels of a column or a row, passes within `reach` of c. False
+ * when there are none. */
+static bool bound_along(const trip_splat_frame *f, trip_vec3 to, trip_vec3 c, double z,
+                        double reach, int size, double *lo, double *hi)
+{
+    trip_vec3 forward = f->camera.forward;
+    double x = trip_dot(to, c), r2 = reach * reach;
+    double q2 = z * z - r2 * trip_dot(forward, forward);
+    double q1 = x * z - r2 * trip_dot(to, forward);
+    double q0 = x * x - r2 * trip_dot(to, to);
+    /* q2 p^2 - 2 q1 p + q0 <= 0; q1^2 - q2 q0 without its cancellation. */
+    trip_vec3 across = trip_sub(trip_scale(to, z), trip_scale(forward, x));
+    trip_vec3 normal = trip_cross(to, forward);
+    double root = r2 * (trip_dot(across, across) - r2 * trip_dot(normal, normal));
+    bool lowest = q0 <= 0, highest = (q2 * size - 2 * q1) * size + q0 <= 0;
+    *lo = 0;
+    *hi = size;
+    if ((lowest && highest) || !(root >= 0))
+        return lowest || highest || q2 <= 0 || !isfinite(root);
+    double half = q1 + copysign(sqrt(root), q1), roots[2] = { q0 / half, half / q2 };
+    if (half == 0)
+        return true;
+    double first = fmin(roots[0], roots[1]), last = fmax(roots[0], roots[1]);
+    if (!lowest)
+        *lo = first > 0 ? first : last;
+    if (!highest)
+        *hi = last < size ? last : first;
+    return *lo <= size && *hi >= 0 && *lo <= *hi;
+}
+
+double trip_splat_behind(const trip_splat_frame *f)
+{
+    return sqrt(2 * f->cutoff2) * f->sigma * trip_length(f->camera.forward);
+}
+
+/* A splat in perspective by the forms of near ones. */
+static bool set_near(const trip_splat_frame *f, trip_vec3 c, trip_splat *s)
+{
+    const trip_camera *camera = &f->camera;
+    double length = trip_length(c), front = fmax(s->z, 0) / f->sigma;
+    trip_vec3 e[2];
+    *s = (trip_splat){ .z = s->z, .near = true };
+    set_across(c, e);
+    set_across_forms(f, e, camera->r0, camera->rx, camera->ry, length / f->sigma,
+                     f->low_pass2 * front * front, s);
+    set_form(s->along, c, camera->r0, camera->rx, camera->ry, 1 / f->sigma);
+    bool seen = bound_along(f, camera->to_x, c, s->z, s->radius, camera->width, &s->x0, &s->x1) &&
+                bound_along(f, camera->to_y, c, s->z, s->radius, camera->height, &s->y0, &s->y1);
+    s->radius = INFINITY;
+    return seen && !(s->z < -trip_splat_behind(f));
+}
+
+/* By how much s may differ over the support from that of its centre. */
+static double slant(const trip_splat_frame *f, const trip_splat *s)
+{
+    double scale = 1 / (trip_length(f->camera.r0) * f->sigma);
+    return 0.5 * scale *
+           (fabs(trip_dot(f->camera.r0, f->camera.rx)) * (s->x1 - s->x0) +
+            fabs(trip_dot(f->camera.r0, f->camera.ry)) * (s->y1 - s->y0));
+}
+
+double trip_splat_parallel_near(const trip_splat_frame *f)
+{
+    trip_splat s = { .z = 1 };
+    trip_vec3 ray, c;
+    place(f, f->camera.r0, &s, &ray, &c);
+    set_footprint(f, ray, c, &s);
+    set_bounds(f, ray, &s);
+    return (sqrt(f->cutoff2) + slant(f, &s)) * f->sigma / trip_length(f->camera.r0);
+}
+
+static bool project_parallel(const trip_splat_frame *f, trip_vec3 v, trip_splat *s)
+{
+    trip_vec3 ray, c;
+    place(f, v, s, &ray, &c);
+    set_footprint(f, ray, c, s);
+    set_bounds(f, ray, s);
+    double unit = f->sigma / trip_length(f->camera.r0);
+    double reach = (sqrt(f->cutoff2) + slant(f, s)) * unit;
+    s->near = !(s->z >= reach);
+    set_form(s->along, f->camera.r0, v, trip_scale(f->camera.rx, -1), trip_scale(f->camera.ry, -1),
+             1 / (trip_length(f->camera.r0) * f->sigma));
+    return !(s->z <= -reach);
+}
+
+bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out)
+{
+    trip_vec3 ray, c, v = trip_sub(voxel, f->camera.eye);
+    *out = (trip_splat){ .z = trip_dot(f->camera.forward, v) };
+    if (f->camera.ortho)
+        return project_parallel(f, v, out);
+    if (out->z > 0) {
+        place(f, v, out, &ray, &c);
+        set_footprint(f, ray, c, out);
+        double kernel2 = f->cutoff2 * f->sigma * f->sigma;
+        bool ellipse = set_bounds(f, ray, out);
+        if (ellipse && trip_dot(v, v) >= kernel2 + out->radius * out->radius)
+            return true;
+    }
+    return set_near(f, v, out);
+}
 
 bool trip_splat_is_broken(const trip_splat *s)
 {
-    if (s->z <= nearest)
-        return false;
-    return !isfinite(s->x + s->y + s->conic_xx + s->conic_xy + s->conic_yy + s->amplitude);
+    double sum = s->amplitude;
+    if (s->near)
+        for (int i = 0; i < 3; i++)
+            sum += s->a[i] + s->b[i] + s->along[i];
+    else
+        sum += s->x + s->y + s->conic_xx + s->conic_xy + s->conic_yy;
+    return !isfinite(sum);
 }
 
 int trip_splat_fail(void)
@@ -123,14 +253,41 @@ int trip_splat_fail(void)
                      "numbers are not finite; the view or the grid is out of any range");
 }
 
-double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y)
+static double form_at(const double form[3], double x, double y)
+{
+    return form[0] + form[1] * x + form[2] * y;
+}
+
+/* s(p) of a near splat. */
+static double distance_along(const trip_splat_frame *f, const trip_splat *s, double x, double y)
+{
+    double along = form_at(s->along, x, y);
+    return f->camera.ortho ? along : along / trip_length(trip_camera_ray(&f->camera, x, y));
+}
+
+double trip_splat_front(const trip_splat_frame *f, const trip_splat *s, double x, double y)
+{
+    if (!s->near)
+        return 1;
+    double t = distance_along(f, s, x, y) * sqrt(0.5), end = sqrt(0.5 * f->cutoff2);
+    return t >= end ? 1 : t <= -end ? 0 : 0.5 + 0.5 * f->front * erf(t);
+}
+
+/* m(p), wherever the eye is. */
+static double radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y)
 {
     double dx = x - s->x, dy = y - s->y;
     double q = s->conic_xx * dx * dx + 2 * s->conic_xy * dx * dy + s->conic_yy * dy * dy;
     if (f->camera.ortho)
         return q;
     trip_vec3 ray = trip_camera_ray(&f->camera, x, y);
-    return q * s->ray2 / trip_dot(ray, ray);
+    double a = form_at(s->a, x, y), b = form_at(s->b, x, y);
+    return (s->near ? a * a + b * b : q * s->ray2) / trip_dot(ray, ray);
+}
+
+double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y)
+{
+    return trip_splat_front(f, s, x, y) > 0 ? radius2(f, s, x, y) : INFINITY;
 }
 
 double trip_splat_stretch(const trip_splat_frame *f, double x, double y)

@@ -18,7 +18,8 @@
  *     m(p)       = g(p) q^T S'^-1 q                                    squared radius, in std devs
  *     edge       = exp(-TRIP_CUTOFF^2 / 2)
  *     amplitude  = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) / (1 - edge (1 + TRIP_CUTOFF^2 / 2))
- *     footprint' = amplitude (exp(-m(p) / 2) - edge)    where m(p) <= TRIP_CUTOFF^2, else nothing
+ *     footprint' = front(p) amplitude (exp(-m(p) / 2) - edge)
+ *                                                       where m(p) <= TRIP_CUTOFF^2, else nothing
  * (the footprint ends at zero, so that rounding at its edge shows nowhere; the last factor of the
  * amplitude gives back the mass that the cut-off takes). A ray covers
  * stretch(p) = |J r(p)| / |r(p)| world units per index length, J being the linear part of
@@ -29,9 +30,23 @@
  *     E = S'^-1 - (k^2 / |r_c|^2) [rx.rx rx.ry; rx.ry ry.ry],  l = (k^2 / |r_c|^2) (r_c.rx, r_c.ry)
  * (no second terms in parallel views) it is, when E is positive definite, the ellipse
  *     (q - E^-1 l)^T E (q - E^-1 l) <= k^2 + l^T E^-1 l
- * whose half extents are sqrt((k^2 + l^T E^-1 l) (E^-1)_xx) and _yy. Splats with z <= 0, or whose
- * support is not an ellipse (it crosses the plane of the eye, Hofsetz & Max 2005 section 4), are
- * not drawn. */
+ * whose half extents are sqrt((k^2 + l^T E^-1 l) (E^-1)_xx) and _yy.
+ *
+ * Of a splat near the eye counts what lies in front: front(p) is the share of the Gaussian on the
+ * ray from where it begins, at the eye or, in parallel views, in the eye's plane. With s(p) the
+ * distance along the ray at which it passes nearest to v, in standard deviations,
+ *     front(p) = 1/2 (1 + erf(s / sqrt 2) / erf(k / sqrt 2)),  0 below s = -k and 1 above s = k.
+ * It is 1 all over the support of a splat farther from the eye than sqrt(R^2 + radius^2), R being
+ * the kernel's radius and `radius` that of trip_splat. The others, and those whose support is no
+ * ellipse (it crosses the plane of the eye, Hofsetz & Max 2005 section 4), are "near": their m(p)
+ * and |S'| are the same numbers worked out across the ray, since z may be 0. With c = v - eye, e1
+ * and e2 of unit length at right angles to c and to one another, and rho(a) = (e1.a, e2.a),
+ *     W    = I + (TRIP_LOW_PASS_PX max(0, z) / sigma)^2 (rho(rx) rho(rx)^T + rho(ry) rho(ry)^T)
+ *     m(p) = (|c| / sigma)^2 rho(r(p))^T W^-1 rho(r(p)) / |r(p)|^2,   |S| / |S'| = 1 / |W|
+ *     s(p) = c.r(p) / (sigma |r(p)|)
+ * so that behind the eye there is no low-pass. In parallel views all of this holds with e1 and e2
+ * at right angles to r0, the vector from where the ray of p begins to v in place of |c| r(p) / |r|,
+ * and 1 in place of z. */
 #ifndef TRIP_SPLAT_H
 #define TRIP_SPLAT_H
 
@@ -49,6 +64,7 @@ typedef struct trip_splat_frame {
     double edge;      /* exp(-cutoff2 / 2) */
     double amplitude; /* 1 / (2 pi sigma^2) / (1 - edge (1 + cutoff2 / 2)) */
     double rxrx, rxry, ryry;
+    double front; /* 1 / erf(cutoff / sqrt 2) */
 } trip_splat_frame;
 
 /* A projected splat. */
@@ -58,12 +74,17 @@ typedef struct trip_splat {
     double conic_xx, conic_xy, conic_yy; /* S'^-1 */
     double amplitude;
     double x0, y0, x1, y1; /* bounds of the support in pixel positions */
-    double radius;         /* index-space radius that contains every ray of the support */
+    double radius; /* index-space radius that contains every ray of the support; infinite: any */
+    /* Of near splats in perspective the numbers above, but for z, amplitude, bounds and radius, are
+     * not set, and m = (a^2 + b^2) / |r|^2 and s = along / |r|; in parallel views s = along. */
+    bool near;
+    double a[3], b[3], along[3]; /* of a pixel position (x, y): the dot products with (1, x, y) */
 } trip_splat;
 
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings);
 
-/* False when the splat is not drawn (behind or across the plane of the eye). */
+/* False when the splat is not drawn (behind the eye, or out of the picture beside it). The bounds
+ * of near splats may be wider than their support. */
 bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out);
 
 /* Whether numbers of a splat just projected are not finite, so that it can neither be drawn nor be
@@ -72,8 +93,18 @@ bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *
 bool trip_splat_is_broken(const trip_splat *s);
 int trip_splat_fail(void);
 
-/* m(p) for a pixel position. */
+/* m(p) for a pixel position; infinite where front(p) is 0. */
 double trip_splat_radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y);
+
+/* front(p) for a pixel position. */
+double trip_splat_front(const trip_splat_frame *f, const trip_splat *s, double x, double y);
+
+/* How far behind the plane of the eye (as a depth z) no splat is drawn any more. */
+double trip_splat_behind(const trip_splat_frame *f);
+
+/* In parallel views: the depth from which on splats are not near, and up to which, negated, they
+ * are not drawn. */
+double trip_splat_parallel_near(const trip_splat_frame *f);
 
 /* World units per index length along the ray of a pixel position. */
 double trip_splat_stretch(const trip_splat_frame *f, double x, double y);

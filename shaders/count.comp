@@ -24,9 +24,15 @@ bool touches(splat s, ivec2 pixel)
     real m = s.conic.x * q.x * q.x + 2.0 * s.conic.y * q.x * q.y + s.conic.z * q.y * q.y;
 #ifndef PARALLEL
     real ray2 = dot(ray2_a, real4(1.0, p, p.x * p.x)) + dot(ray2_b.xy, p.y * p);
+    real3 at = real3(1.0, p);
+    if (s.near)
+        m = dot(s.a, at) * dot(s.a, at) + dot(s.b, at) * dot(s.b, at);
     m *= s.ray2 / ray2;
+    bool front = !s.near || dot(s.along, at) > -sqrt(kernel.y * ray2);
+#else
+    bool front = !s.near || dot(s.along, real3(1.0, p)) > -sqrt(kernel.y);
 #endif
-    return m <= kernel.y && weight_of(p + screen.xy, int(weight.z)) > 0.0;
+    return front && m <= kernel.y && weight_of(p + screen.xy, int(weight.z)) > 0.0;
 }
 
 bool drawn(splat s)

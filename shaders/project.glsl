@@ -1,8 +1,13 @@
 // The projection of a splat. Mirrors trip_splat_project() in render/splat.c with the rays scaled,
 // A, B taken per unit of depth and of `step`, and all covariances times u, which alone carries the
 // size of a splat in pixels: no number leaves a float's range. See render/splat.h for the formulas.
-// `c` and `place` are a record's (fetch.glsl).
+// `c` and `place` are a record's (fetch.glsl). With NEAR, and wherever splats are counted, some may be
+// near: then all have the numbers of near ones.
 #include "real.glsl"
+
+#if defined(TRIP_DOUBLE) && !defined(NEAR)
+#define NEAR
+#endif
 
 struct splat {
     real2 centre;     // pixels from the image's centre
@@ -11,7 +16,92 @@ struct splat {
     real amplitude;
     real4 bounds;     // x0, y0, x1, y1
     real radius;      // index space
+#ifdef NEAR
+    bool near;
+    real3 a, b, along; // dot products with (1, x, y), (x, y) pixels from the image's centre
+#endif
 };
+
+#ifdef NEAR
+#ifdef PARALLEL
+// Sets `along`; false where all of the splat is behind the plane of the eye.
+bool project_near(real3 place, inout splat s)
+{
+    real unit = 1.0 / (length(ray_0.xyz) * sqrt(kernel.x)), k = sqrt(kernel.y);
+    real2 slope = real2(dot(ray_0.xyz, ray_x.xyz), dot(ray_0.xyz, ray_y.xyz)) * (-ray_x.w * unit);
+    real middle = place.z * dot(ray_0.xyz, ray_0.xyz) * unit;
+    real reach = k + dot(abs(slope), parallel_size.xy);
+    s.near = !(middle >= reach);
+    s.along = real3(middle - dot(slope, s.centre), slope);
+    return middle > -reach;
+}
+#else
+// The least and greatest p of [-half_size, half_size] with
+// (x - p z)^2 <= reach^2 |to - p forward|^2; false where there are none.
+bool bound_along(real3 to, real x, real z, real reach, real half_size, out real2 bounds)
+{
+    real r2 = reach * reach, q2 = z * z - r2 * dot(forward.xyz, forward.xyz);
+    real q1 = x * z - r2 * dot(to, forward.xyz), q0 = x * x - r2 * dot(to, to);
+    real3 across = to * z - forward.xyz * x, normal = cross(to, forward.xyz);
+    real root = r2 * (dot(across, across) - r2 * dot(normal, normal));
+    bool lowest = (q2 * half_size + 2.0 * q1) * half_size + q0 <= 0.0;
+    bool highest = (q2 * half_size - 2.0 * q1) * half_size + q0 <= 0.0;
+    bounds = real2(-half_size, half_size);
+    if (lowest && highest || !(root >= 0.0))
+        return lowest || highest || q2 <= 0.0;
+    real h = q1 + (q1 < 0.0 ? -sqrt(root) : sqrt(root));
+    if (h == 0.0 || q2 == 0.0)
+        return true;
+    real first = min(q0 / h, h / q2), last = max(q0 / h, h / q2);
+    if (!lowest)
+        bounds.x = first > -half_size ? first : last;
+    if (!highest)
+        bounds.y = last < half_size ? last : first;
+    return bounds.x <= half_size && bounds.y >= -half_size && bounds.x <= bounds.y;
+}
+
+real3 form_of(real3 e, real scale)
+{
+    return real3(dot(e, ray_0.xyz), real2(dot(e, ray_x.xyz), dot(e, ray_y.xyz)) * ray_x.w) * scale;
+}
+
+// The forms, and of near splats the bounds and the amplitude too; false where nothing shows.
+bool project_near(real3 c, real3 place, inout splat s)
+{
+    real3 size = abs(c), v = c;
+    real3 other = size.x <= size.y && size.x <= size.z ? real3(1.0, 0.0, 0.0)
+                  : size.y <= size.z                   ? real3(0.0, 1.0, 0.0)
+                                                       : real3(0.0, 0.0, 1.0);
+    if (!(dot(v, v) > 0.0))
+        v = other.yzx;
+    real3 e0 = normalize(cross(v, other)), e1 = normalize(cross(v, e0));
+    real depth = max(place.z, real(0.0)) * ray_x.w, low = kernel.z * depth * depth / kernel.x;
+    real2 x = real2(dot(e0, ray_x.xyz), dot(e1, ray_x.xyz));
+    real2 y = real2(dot(e0, ray_y.xyz), dot(e1, ray_y.xyz));
+    real w00 = 1.0 + low * (x.x * x.x + y.x * y.x), w11 = 1.0 + low * (x.y * x.y + y.y * y.y);
+    real w01 = low * (x.x * x.y + y.x * y.y), area = low * (x.x * y.y - x.y * y.x);
+    real det = w00 + w11 - 1.0 + area * area, scale = length(c) / sqrt(kernel.x);
+    s.a = form_of(e0 - e1 * (w01 / w11), scale * sqrt(w11 / det));
+    s.b = form_of(e1, scale / sqrt(w11));
+    s.along = form_of(c, 1.0 / sqrt(kernel.x));
+    if (!s.near)
+        return true;
+    s.amplitude = kernel.w / sqrt(det);
+    s.ray2 = 1.0;
+    s.centre = real2(0.0);
+    s.conic = real3(0.0);
+    real half_difference = 0.5 * (w00 - w11);
+    real largest = 0.5 * (w00 + w11) + sqrt(half_difference * half_difference + w01 * w01);
+    real reach = sqrt(kernel.x * kernel.y * largest);
+    s.radius = 1e18;
+    real2 columns, rows;
+    bool seen = bound_along(to_x.xyz, place.x, place.z, reach, screen.x, columns) &&
+                bound_along(to_y.xyz, place.y, place.z, reach, screen.y, rows);
+    s.bounds = real4(columns.x, rows.x, columns.y, rows.y);
+    return seen && place.z >= -sqrt(2.0 * kernel.x * kernel.y * dot(forward.xyz, forward.xyz));
+}
+#endif
+#endif
 
 #ifdef PARALLEL
 bool project(real3 c, real3 place, out splat s)
@@ -22,10 +112,14 @@ bool project(real3 c, real3 place, out splat s)
     s.amplitude = parallel.w;
     s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
     s.radius = parallel_size.z;
+#ifdef NEAR
+    return project_near(place, s);
+#else
     return place.z > 0.0;
+#endif
 }
 #else
-bool project(real3 c, real3 place, out splat s)
+bool project_far(real3 c, real3 place, out splat s)
 {
     if (!(place.z > 0.0))
         return false;
@@ -65,6 +159,17 @@ bool project(real3 c, real3 place, out splat s)
     real2 half_size = real2(sqrt(size * eyy), sqrt(size * exx));
     s.bounds = real4(s.centre + middle - half_size, s.centre + middle + half_size);
     return true;
+}
+
+bool project(real3 c, real3 place, out splat s)
+{
+    bool far = project_far(c, place, s);
+#ifdef NEAR
+    s.near = !(far && dot(c, c) >= kernel.x * kernel.y + s.radius * s.radius);
+    return project_near(c, place, s);
+#else
+    return far;
+#endif
 }
 #endif
 

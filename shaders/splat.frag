@@ -14,6 +14,20 @@ layout(location = 3) flat in float centre_depth;
 layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // its opacity is what is blended by
 #endif
 
+#ifdef NEAR
+layout(location = 4) flat in mat3 forms; // as in splat.vert
+
+// front(p) of render/splat.h by s(p). The error function is by Abramowitz and Stegun 1964, 7.1.26,
+// within 1.5e-7.
+float front_of(float s)
+{
+    float end = sqrt(kernel.y), x = min(abs(s), end) * 0.70710678, t = 1.0 / (1.0 + 0.3275911 * x);
+    float sum = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))));
+    float half_share = (1.0 - sum * exp(-x * x)) * edge.z;
+    return abs(s) >= end ? (s > 0.0 ? 1.0 : 0.0) : 0.5 + (s < 0.0 ? -half_share : half_share);
+}
+#endif
+
 // 1 - exp(-x) without the cancellation at small x.
 float opacity(float x)
 {
@@ -31,11 +45,22 @@ void main()
     float inverse_ray2 = 1.0 / (dot(ray2_a, terms) + dot(ray2_b.xy, more));
     m *= inverse_ray2;
     stretch = sqrt((dot(world2_a, terms) + dot(world2_b.xy, more)) * inverse_ray2);
-#elif !defined(PARALLEL)
+#elif !defined(PARALLEL) && !defined(NEAR)
     m /= 1.0 + ray2_a.w * dot(p, p);
 #endif
+    float front = 1.0;
+#ifdef NEAR
+    vec3 at = vec3(1.0, p) * forms;
+#ifdef PARALLEL
+    front = front_of(at.z);
+#else
+    float inverse = 1.0 / (dot(ray2_a, vec4(1.0, p, p.x * p.x)) + dot(ray2_b.xy, p.y * p));
+    m = dot(at.xy, at.xy) * inverse;
+    front = front_of(at.z * sqrt(inverse));
+#endif
+#endif
     float falloff = max(exp(-0.5 * m) - edge.x, 0.0);
-    float alpha = opacity(colour.a * stretch * falloff);
+    float alpha = opacity(colour.a * stretch * front * falloff);
     fragment = vec4(colour.rgb * alpha, alpha);
 #ifdef DEPTH
     fragment_depth = vec4(centre_depth * alpha, 0.0, 0.0, alpha);

@@ -15,6 +15,9 @@ layout(location = 2) flat out float shear;     // 2 conic xy times ray2
 #ifdef DEPTH
 layout(location = 3) flat out float centre_depth;  // of the centre's plane, as layers hold it
 #endif
+#ifdef NEAR
+layout(location = 4) flat out mat3 forms; // a, b and along of project.glsl
+#endif
 
 out gl_PerVertex
 {
@@ -45,6 +48,9 @@ void drop()
 #ifdef DEPTH
     centre_depth = 0.0;
 #endif
+#ifdef NEAR
+    forms = mat3(0.0);
+#endif
 }
 
 void main()
@@ -73,6 +79,11 @@ void main()
 #endif
     colour = vec4(entry.rgb, entry.a * s.amplitude);
 #ifdef DEPTH
-    centre_depth = r.place.z * depth.x;
+    centre_depth = max(r.place.z, 0.0) * depth.x;
+#endif
+#if defined(NEAR) && defined(PARALLEL)
+    forms = mat3(vec3(0.0), vec3(0.0), s.along);
+#elif defined(NEAR)
+    forms = mat3(s.a, s.b, s.along);
 #endif
 }

@@ -5,8 +5,8 @@
 #include "weight.h"
 
 /* The kernels leave out no single splat for its weight, so that they have no bound of their own to
- * count by: this is the definition's. What the plane of the eye leaves out is the same by both:
- * wherever a support is near it, trip_splat_project() decides for the kernels too. */
+ * count by: this is the definition's. What lies behind the eye is the same by both: wherever a
+ * support is near it, trip_splat_project() decides for the kernels too. */
 static bool is_projected(const trip_cpu_view *view, int u, int v, int sheet)
 {
     const trip_camera *camera = &view->splat.camera;

@@ -118,7 +118,7 @@ static trip_cpu_occlusion find_outline(const trip_cpu_view *view, const trip_cpu
         double radius = view->of->settings->kernel_radius * view->forward_length;
         double z = dot(along_z, box->middle) + along_z[3], deep = reach(along_z, box->half);
         if (z - deep < (NEAREST_RADII + 1) * radius)
-            return z + deep + radius <= 0 ? TRIP_CPU_OCCLUDED : TRIP_CPU_PARTLY;
+            return z + deep <= (double)view->behind ? TRIP_CPU_OCCLUDED : TRIP_CPU_PARTLY;
         inverse = 1 / z;
         out->z = z;
         out->inverse_nearest = 1 / (z - deep);

@@ -14,6 +14,24 @@ uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across)
            (uint32_t)(below > 0) << TRIP_CPU_TILES_BELOW_SHIFT;
 }
 
+/* Of a near splat, whose forms are of the image's corner. Turned so that b does not change with x,
+ * which a^2 + b^2 does not show. */
+static void set_near(const trip_splat *s, trip_cpu_splat *out)
+{
+    double length = hypot(s->a[1], s->b[1]), c = length > 0 ? s->a[1] / length : 1;
+    double sine = length > 0 ? s->b[1] / length : 0, form[2][3];
+    for (int i = 0; i < 3; i++) {
+        form[0][i] = (c * s->a[i] + sine * s->b[i]) / TRIP_CUTOFF;
+        form[1][i] = (c * s->b[i] - sine * s->a[i]) / TRIP_CUTOFF;
+    }
+    double x = out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE, y = out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    out->l11 = (float)form[0][1];
+    out->l21 = (float)form[0][2];
+    out->l22 = (float)form[1][2];
+    out->l1 = (float)(form[0][0] + form[0][1] * x + form[0][2] * y);
+    out->l2 = (float)(form[1][0] + form[1][2] * y);
+}
+
 void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
 {
     double unit = s->ray2 / (TRIP_CUTOFF * TRIP_CUTOFF);
@@ -24,13 +42,24 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
     out->l22 = (float)sqrt(fmax(0, yy - l21 * l21));
 }
 
+/* Of any other, by its centre. */
+static void set_centre(const trip_splat *s, trip_cpu_splat *out)
+{
+    trip_cpu_set_conic(s, out);
+    double x = s->x - out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    double y = s->y - out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    out->l1 = (float)-((double)out->l11 * x + (double)out->l21 * y);
+    out->l2 = (float)-((double)out->l22 * y);
+}
+
 /* Room for the rounding of a support's bounds. */
-#define SLACK_PX 1e-3
+#define SLACK 1e-3
 
 /* False when there are no pixels. */
 static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *last)
 {
-    trip_pixels p = trip_pixels_within(lo - SLACK_PX, hi + SLACK_PX, size);
+    double slack = SLACK * (1 + 0.5 * (hi - lo)) + 1e-6 * fmax(fabs(lo), fabs(hi));
+    trip_pixels p = trip_pixels_within(lo - slack, hi + slack, size);
     *first = (uint16_t)p.first;
     *last = (uint16_t)p.last;
     return p.first <= p.last;
@@ -51,9 +80,10 @@ const float trip_cpu_thin[TRIP_CPU_TERMS][4] = {
 
 static void set_opacity(const trip_cpu_view *view, double depth, trip_cpu_splat *out)
 {
-    if (depth > (double)view->thin)
+    bool thick = depth > (double)view->thin || out->tiles & TRIP_CPU_TILES_NEAR;
+    if (thick)
         out->tiles |= 1u << TRIP_CPU_TILES_THICK_SHIFT;
-    if (depth > (double)view->thin || view->rays == TRIP_CPU_STRETCHED) {
+    if (thick || view->rays == TRIP_CPU_STRETCHED) {
         double least = log2(depth) + 127 - (double)view->cutoff / TRIP_CPU_EXP_UNIT;
         out->c[TRIP_CPU_LEAST] = (float)(least * TRIP_CPU_EXP_UNIT);
         out->c[TRIP_CPU_EDGE] = (float)(depth * view->splat.edge);
@@ -84,13 +114,17 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
     if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
-    trip_cpu_set_conic(&s, out);
-    double x = s.x - out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    double y = s.y - out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    out->l1 = (float)-((double)out->l11 * x + (double)out->l21 * y);
-    out->l2 = (float)-((double)out->l22 * y);
     double depth = extinction * s.amplitude * view->stretch;
     out->tiles = trip_cpu_tiles(out, view->tiles_across);
+    if (s.near) {
+        out->tiles |= TRIP_CPU_TILES_NEAR;
+        for (int i = 0; i < 3; i++)
+            out->c[TRIP_CPU_ALONG + i] = (float)s.along[i];
+    }
+    if (s.near && !camera->ortho)
+        set_near(&s, out);
+    else
+        set_centre(&s, out);
     set_opacity(view, depth, out);
     return depth > 0x1p-60;
 }

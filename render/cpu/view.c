@@ -88,6 +88,7 @@ static void set_limits(trip_cpu_view *view)
     if (view->stretch_varies)
         most = most_stretch(&camera->index_to_world) / view->stretch;
     view->thin = (float)((double)TRIP_CPU_THIN / most);
+    view->behind = (float)(-trip_splat_behind(&view->splat) * (1 + 1e-6));
     view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
     view->tiles_across = (camera->width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
 }
@@ -96,8 +97,11 @@ static void set_limits(trip_cpu_view *view)
 static void set_parallel(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
-    if (camera->ortho)
-        trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
+    if (!camera->ortho)
+        return;
+    trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
+    view->near = (float)(trip_splat_parallel_near(&view->splat) * (1 + 1e-6));
+    view->behind = -view->near;
 }
 
 static void set_compact_normals(trip_cpu_view *view, const trip_dataset *data, double full)

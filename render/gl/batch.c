@@ -189,12 +189,17 @@ static double nearest_depth(const trip_gl_placing *p, const trip_run *run)
            fmin(0, trip_component(forward, v) * far);
 }
 
-/* Whether splats of that depth may be larger than sprites can be drawn. */
+static bool is_near(const trip_gl_placing *p, double depth)
+{
+    return !(depth >= p->near_depth);
+}
+
+/* Whether splats of that depth may be larger than sprites can be drawn: near ones may cover all. */
 static bool needs_quads(const trip_gl_placing *p, double depth)
 {
     if (p->quads || p->sprite_depth == HUGE_VAL)
         return true;
-    return p->sprite_depth > 0 && depth < p->sprite_depth;
+    return p->sprite_depth > 0 && (depth < p->sprite_depth || is_near(p, depth));
 }
 
 /* A bound on the length of a splat of that depth along a step of one pixel of the camera. */
@@ -210,6 +215,8 @@ static uint32_t cost_at(const trip_gl_placing *p, double depth)
     const trip_camera *c = p->camera;
     if (c->ortho)
         depth = 1;
+    else if (is_near(p, depth))
+        depth = 0;
     double pixels = length_px(p, c->rx, depth, c->width) * length_px(p, c->ry, depth, c->height);
     uint32_t cost = 1;
     while (cost < TRIP_GL_PART_COST && cost * (double)TRIP_GL_COST_PX < pixels)
@@ -220,7 +227,8 @@ static uint32_t cost_at(const trip_gl_placing *p, double depth)
 static void add_piece(trip_gl_batch *b, trip_gl_piece piece)
 {
     trip_gl_piece *last = b->piece_count ? &b->pieces[b->piece_count - 1] : NULL;
-    if (last && last->quads == piece.quads && last->cost == piece.cost && last->list == piece.list)
+    if (last && last->quads == piece.quads && last->near == piece.near &&
+        last->cost == piece.cost && last->list == piece.list)
         last->count += piece.count;
     else
         b->pieces[b->piece_count++] = piece;
@@ -247,7 +255,8 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
                                       .count = run->count,
                                       .cost = cost_at(p, depth),
                                       .list = list,
-                                      .quads = needs_quads(p, depth) });
+                                      .quads = needs_quads(p, depth),
+                                      .near = is_near(p, depth) });
         for (uint32_t k = 0; k < run->count && resident; k++)
             f.entries[position + k] = (uint32_t)i;
         if (!resident)

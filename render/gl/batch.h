@@ -22,6 +22,7 @@ typedef struct trip_gl_placing {
     double kernel_radius;
     bool quads;          /* always */
     double sprite_depth; /* and where voxels may be nearer, trip_gl_frame_sprite_depth() */
+    double near_depth;   /* likewise, trip_gl_frame_near_depth() */
 } trip_gl_placing;
 
 /* Draw positions [first, first + count), all of one list. */
@@ -30,6 +31,7 @@ typedef struct trip_gl_piece {
     uint32_t cost; /* of each splat, a power of two: at least its pixels over TRIP_GL_COST_PX */
     unsigned list; /* its number in the data set */
     bool quads;
+    bool near; /* some of them may be near (render/splat.h) */
 } trip_gl_piece;
 
 /* What a part of the GPU's work may cost: a step passes its deadline by the time of one. Splats of

@@ -54,6 +54,7 @@ static void fill_list(trip_gl_constants *c, const trip_frame *frame, const trip_
         .kernel_radius = settings->kernel_radius,
         .quads = settings->triangles,
         .sprite_depth = trip_gl_frame_sprite_depth(settings, camera, point_size_px),
+        .near_depth = trip_gl_frame_near_depth(settings, camera),
     };
     trip_gl_frame_make(&p->constants, frame, list);
     upload(c, LAYER_BLOCKS + list->index, &p->constants);

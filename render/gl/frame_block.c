@@ -66,6 +66,7 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
         to_y = trip_sub(to_y, trip_scale(forward, py));
     }
     set_steps(f, axis, forward, r0, rx, ry, sigma);
+    f->ray_0 = in_list_axes(r0, axis, 0);
     f->to_x = in_list_axes(to_x, axis, 0);
     f->to_y = in_list_axes(to_y, axis, 0);
     if (c->ortho)
@@ -142,6 +143,7 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
     out->edge.v[0] = constants.edge;
     out->edge.v[1] = frame->data->header.code_bytes;
+    out->edge.v[2] = 0.5 * constants.front;
     out->depth = (trip_gl_double4){ { trip_layer_depth_unit(c, whole) * centre_length(whole) /
                                           centre_length(c),
                                       whole->voxel_world } };
@@ -235,4 +237,18 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
     double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
     double wide = fmax(trip_length(c->rx), trip_length(c->ry));
     return room > 0 ? settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
+}
+
+/* With r = |r_c|, r_min the least |ray| of the image's plane, the splat of a depth z is not near
+ * where  (z r)^2 >= 2 R^2 (r^2 / r_min^2 + 1) + 2 k^2 low-pass^2 z^2 (rx.rx + ry.ry):  that is the
+ * condition of render/cpu/kernels/project_tmpl.h. */
+double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *c)
+{
+    const trip_splat_frame f = trip_splat_frame_make(c, settings);
+    if (c->ortho)
+        return trip_splat_parallel_near(&f);
+    trip_vec3 normal = trip_cross(c->rx, c->ry);
+    double r_min2 = pow(trip_dot(c->r0, normal), 2) / trip_dot(normal, normal);
+    double room = 1 - 2 * f.cutoff2 * f.low_pass2 * (f.rxrx + f.ryry) / r_min2;
+    return room > 0 ? 2 * settings->kernel_radius / sqrt(r_min2 * room) : HUGE_VAL;
 }

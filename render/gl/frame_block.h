@@ -19,7 +19,8 @@ enum trip_gl_effect {
     TRIP_GL_UNCULLED = 64, /* every pixel has weight in the list */
     TRIP_GL_COMPACT = 128, /* normals of 3 bytes; only with TRIP_GL_SHADED */
     TRIP_GL_DEPTH = 256,   /* layers have depths (layer.h) */
-    TRIP_GL_EFFECT_SETS = 512,
+    TRIP_GL_NEAR = 512,    /* some splats may be near (render/splat.h) */
+    TRIP_GL_EFFECT_SETS = 1024,
 };
 
 /* Of a list that the plan draws. */
@@ -28,12 +29,16 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
 void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis);
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in);
 
-/* The effects of a list viewed by `camera`, TRIP_GL_QUADS aside. */
+/* The effects of a list viewed by `camera`, TRIP_GL_QUADS and TRIP_GL_NEAR aside. */
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis);
 
 /* The depth (world units) from which on the part of a support that lies in the image fits a sprite
  * of the given size; 0 where every support does, infinity where none need. */
 double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *camera,
                                   double point_size_px);
+
+/* The depth (as z of the camera) from which on no splat that may show is near; infinity where any
+ * may be. */
+double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *camera);
 
 #endif

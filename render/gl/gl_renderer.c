@@ -249,7 +249,8 @@ static void draw_quads(const trip_gl_piece *piece)
 
 static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
 {
-    unsigned effects = r->constants.lists[piece->list].effects | (piece->quads ? TRIP_GL_QUADS : 0);
+    unsigned effects = r->constants.lists[piece->list].effects |
+                       (piece->quads ? TRIP_GL_QUADS : 0) | (piece->near ? TRIP_GL_NEAR : 0);
     int status = use_program(r, TRIP_GL_PASS_SPLAT, effects);
     if (status)
         return status;

@@ -38,6 +38,7 @@
     R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective) */                          \
     R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's       \
                           centre; w: step, and (r . ray_x x ray_y)^2 */                            \
+    R4 ray_0;          /* xyz: the ray at the image's centre */                                    \
     R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */               \
     R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                      \
     R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                \
@@ -51,8 +52,9 @@
                       gradient over that at full shading */                                        \
     R4 screen;     /* xy: the image's centre, pixels; zw: width, height */                         \
     R4 kernel;     /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */          \
-    R4 edge; /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code */   \
-    R4 parallel;      /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */      \
+    R4 edge;     /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code; \
+                    z: 1 / (2 erf(cutoff / sqrt 2)) */                                             \
+    R4 parallel; /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */           \
     R4 parallel_size; /* its half extents in x and y, its radius in index space */                 \
     R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;    \
                          w: the largest of them */                                                 \

@@ -30,7 +30,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_SHADED, "SHADED" },     { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
         { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
         { TRIP_GL_UNCULLED, "UNCULLED" }, { TRIP_GL_COMPACT, "COMPACT" },
-        { TRIP_GL_DEPTH, "DEPTH" },
+        { TRIP_GL_DEPTH, "DEPTH" },       { TRIP_GL_NEAR, "NEAR" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

@@ -444,6 +444,35 @@ static void of_a_splat_at_the_eye_the_half_in_front_counts(void **state)
     scene_destroy(&s);
 }
 
+/* The integral counts the splat's own density from the eye on, front() that of a Gaussian. */
+static void one_splat_about_the_eye_comes_to_its_integral(void **state)
+{
+    (void)state;
+    enum { SIZE = 24 };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = one_voxel });
+    s.table[7] = (trip_tf_entry){ 1, 1, 1, 2 };
+    trip_settings settings = exact(1e-6);
+    settings.field = TRIP_FIELD_SPLATS;
+    for (int i = 0; i < 9; i++) {
+        trip_camera_params view = { .eye = { 6.6 + 0.5 * i, 10.3, 8.4 },
+                                    .up = { 0, 0, 1 },
+                                    .fov_degrees = 100,
+                                    .width = SIZE,
+                                    .height = SIZE };
+        view.look = trip_add(view.eye, trip_v3(1, 0.1, 0.2));
+        scene_picture exact = integrate(&s, &view, &settings);
+        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            double most = scene_difference(&exact, &p);
+            assert_true(most < 0.008);
+            scene_picture_free(&p);
+        }
+        scene_picture_free(&exact);
+    }
+    scene_destroy(&s);
+}
+
 /* Noise in every voxel, with gradients. */
 static bool noise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -644,6 +673,7 @@ int main(void)
         cmocka_unit_test(a_ball_shines_where_the_light_falls_on_what_is_seen),
         cmocka_unit_test(a_lit_ball_has_its_colours_the_closer_the_finer_it_is),
         cmocka_unit_test(a_splat_is_a_gaussian_cut_off_and_lowered),
+        cmocka_unit_test(one_splat_about_the_eye_comes_to_its_integral),
         cmocka_unit_test(of_a_splat_at_the_eye_the_half_in_front_counts),
         cmocka_unit_test(the_error_is_within_the_tolerance),
         cmocka_unit_test(threads_and_tiles_change_no_bit),

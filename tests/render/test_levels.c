@@ -165,13 +165,14 @@ static void collect(brute *b, int axis)
     qsort(b->items, b->count, sizeof *b->items, by_place);
 }
 
-/* Along the ray of a pixel to the plane of the splat's centre that faces the eye's. */
+/* Along the ray of a pixel to the plane of the splat's centre that faces the eye's; not behind it.
+ */
 static double distance_of(const brute *b, const item *i, double x, double y)
 {
     const trip_camera *c = &b->frames[0].camera;
     trip_vec3 ray = trip_affine_vector(&c->index_to_world, trip_camera_ray(c, x, y));
     trip_vec3 from_eye = trip_sub(i->place, c->params.eye);
-    return trip_dot(from_eye, c->world_forward) * trip_length(ray) /
+    return fmax(0, trip_dot(from_eye, c->world_forward)) * trip_length(ray) /
            trip_dot(ray, c->world_forward);
 }
 
@@ -184,7 +185,7 @@ static void put_behind(const brute *b, const item *i, double x, double y, double
         1 - layer[3] < TRIP_SATURATION)
         return;
     double depth = (double)i->entry->extinction * trip_splat_stretch(f, x, y) * s->amplitude *
-                   (exp(-m / 2) - f->edge);
+                   (exp(-m / 2) - f->edge) * trip_splat_front(f, s, x, y);
     double add = (1 - layer[3]) * -expm1(-depth);
     const float rgb[3] = { i->entry->r, i->entry->g, i->entry->b };
     for (int c = 0; c < 3; c++)

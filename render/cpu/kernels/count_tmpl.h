@@ -18,9 +18,12 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
         set_rays(s, number);
     patch p = { .x = stamp_x(number),
                 .y = stamp_y(number),
-                .ray = v_load(s->rays + 2 * V * number) };
+                .ray = v_load(s->rays + 2 * V * number),
+                .tile = s };
     vm in = vm_and(v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)),
                    in_image(&view->splat.camera, s->x, s->y, column, row));
+    if (splat->tiles & TRIP_CPU_TILES_NEAR)
+        in = vm_and(in, v_gt(front_of(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)));
     return vm_any(in) &&
            vm_any(vm_and(in, v_gt(weight(view, view->axis, s->x, s->y, column, row), v_set(0))));
 }

@@ -32,15 +32,17 @@
 /* Opacities of thin splats in views with one stretch are u (c[0] + c[1] u + ... + c[4] u^4)^2. */
 #define TRIP_CPU_TERMS 5
 
-/* What is kept instead of c[] by a splat that is thick or in a view whose stretch varies. */
-enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE };
+/* What is kept instead of c[] by a splat that is thick, near or in a view whose stretch varies; of
+ * near splats (splat.h) alone, what `along` is at the image's corner and its change by x and y. */
+enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE, TRIP_CPU_ALONG, TRIP_CPU_ALONG_X, TRIP_CPU_ALONG_Y };
 
 /* One splat, ready to blend; 64 bytes, a cache line. With (x, y) a pixel's position from the corner
  * of the tile at hand (of the first that the splat lies in, until tile_blend() takes it up),
  *     a = l11 x + l21 y + l1,  b = l22 y + l2,  u = max(0, 1 - G (a^2 + b^2)),
  * G as in trip_cpu_rays: u = 1 - m / k^2 of splat.h, 1 at the centre and 0 outside the support. Its
  * opacity there is that of c[]; or its optical depth, times the stretch where it
- * varies, is what 2^(least + u cutoff) exceeds `edge` by, `cutoff` as in trip_cpu_view. */
+ * varies, is what 2^(least + u cutoff) exceeds `edge` by, `cutoff` as in trip_cpu_view; and of near
+ * splats front(p) of splat.h of that. */
 typedef struct trip_cpu_splat {
     float l11, l21, l22, l1, l2;
     float r, g, b;
@@ -51,14 +53,15 @@ typedef struct trip_cpu_splat {
 
 static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
 
-/* trip_cpu_splat.tiles: the number of the first tile (top left); whether the splat also lies in the
- * one to the right of it and in the one below it, or in more than these two by two; and whether it
- * is not thin. */
+/* trip_cpu_splat.tiles: the number of the first tile (top left); whether the splat is near; whether
+ * it also lies in the tile to the right of the first and in the one below it, or in more than these
+ * two by two; and whether it is not thin, which near splats never count as. */
+#define TRIP_CPU_TILES_NEAR (1u << 27)
 #define TRIP_CPU_TILES_RIGHT_SHIFT 28
 #define TRIP_CPU_TILES_BELOW_SHIFT 29
 #define TRIP_CPU_TILES_MORE (1u << 30)
 #define TRIP_CPU_TILES_THICK_SHIFT 31
-#define TRIP_CPU_TILES_FIRST ((1u << 28) - 1)
+#define TRIP_CPU_TILES_FIRST ((1u << 27) - 1)
 
 /* Where the rays of a view are alike, their tables are not needed. */
 typedef enum trip_cpu_rays {
@@ -93,6 +96,8 @@ typedef struct trip_cpu_view {
     double world[3][3];  /* index_to_world's columns for u, v, sheet, over voxel_world */
     double depth_unit;   /* by which z is to be multiplied to be that of layers */
     trip_splat parallel; /* the footprint of all, in parallel views */
+    float behind;        /* splats at this depth or less do not show */
+    float near;          /* in parallel views: splats of less depth are near */
 } trip_cpu_view;
 
 /* A square of 8 x 8 voxels of a run, as its block (block.h) has it. */

@@ -253,8 +253,9 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     out.l22 = v_sqrt(unit * inverse_syy);
     out.det_ratio = det_s * inverse_det;
 
-    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. What is
-     * not a number is not usual. */
+    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. Where E is
+     * positive definite by twice that, |v - eye|^2 also exceeds 4 R^2 and R^2 + radius^2 of
+     * splat.h, so that no near splat is usual. What is not a number is not usual. */
     vf trace = v_fma(p->XX, sxx, v_fma(p->YY, syy, (p->XY + p->XY) * sxy));
     out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
     vf t = p->reach / rr_u, t_step = t * p->step;
@@ -277,7 +278,6 @@ INLINE footprint footprint_parallel(const trip_cpu_view *view)
         .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
         .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
         .half_y = v_set((float)(0.5 * (s->y1 - s->y0))),
-        .usual = vm_first(V),
     };
 }
 
@@ -587,7 +587,7 @@ INLINE void store_depths_of(const trip_cpu_view *view, const trip_cpu_lanes *lan
                             const uint32_t row[V], float *depths)
 {
     float z[V];
-    v_store(z, v_load(lanes->z + at) * v_set((float)view->depth_unit));
+    v_store(z, v_max(v_load(lanes->z + at), v_set(0)) * v_set((float)view->depth_unit));
     for (int i = 0; i < V; i++)
         depths[row[i] / 16] = z[i];
 }
@@ -629,8 +629,10 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
         footprint f = parallel;
         if (!view->splat.camera.ortho)
             f = footprint_of(&persp, &view->splat, lanes, i);
+        else
+            f.usual = v_ge(v_load(lanes->z + i), v_set(view->near));
         unsigned valid = vm_bits(vm_first(count - i));
-        unsigned behind = vm_bits(v_ge(v_set(0), v_load(lanes->z + i)));
+        unsigned behind = vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
         unsigned scalar = valid & ~behind & ~vm_bits(f.usual);
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
         unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~scalar;
