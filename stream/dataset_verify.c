@@ -58,12 +58,23 @@ static int fail_run(const trip_dataset *d, const trip_list *list, const trip_run
 
 /* ---- streams of runs ---- */
 
+/* Slots that hold all of a small list, where the usual ones would be cleared for nothing. */
+static size_t slot_bytes_for(const trip_list *list)
+{
+    const uint64_t small = 1 << 19;
+    uint64_t bytes = 1;
+    for (int plane = 0; plane < TRIP_PLANES && bytes < small; plane++)
+        bytes += list->plane_bytes[plane];
+    return bytes < small ? (size_t)bytes : 0;
+}
+
 static int open_stream(run_stream *s, const trip_dataset *d, const trip_list *list,
                        trip_budget *budget)
 {
+    const trip_reader_params params = { .planes = list->planes,
+                                        .slot_bytes = slot_bytes_for(list) };
     *s = (run_stream){ 0 };
-    int status =
-        trip_reader_create(&s->reader, d, &(trip_reader_params){ .planes = list->planes }, budget);
+    int status = trip_reader_create(&s->reader, d, &params, budget);
     if (status == TRIP_OK)
         status = trip_selection_create_whole(&s->all, d, list, false, budget);
     s->pass = trip_pass_of(&s->all);
