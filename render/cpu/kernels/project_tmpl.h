@@ -178,14 +178,17 @@ typedef struct perspective {
     vf inverse_sigma;          /* of a splat at depth 1, in pixels: step (r . X x Y) / sigma */
     vf reach, inverse_step;    /* cutoff^2 step; 1 / step */
     vf near;                   /* 2 cutoff^2 step^2 */
+    bool uneven;               /* not cubes, whose footprints may be any number of times as long as
+                                  wide */
 } perspective;
 
 /* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
  */
 #define FARTHEST 1e12f
 
-INLINE perspective perspective_of(const trip_splat_frame *f)
+INLINE perspective perspective_of(const trip_cpu_view *view)
 {
+    const trip_splat_frame *f = &view->splat;
     const trip_camera *c = &f->camera;
     trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
     double step = sqrt(fmax(f->rxrx, f->ryry));
@@ -206,6 +209,7 @@ INLINE perspective perspective_of(const trip_splat_frame *f)
         .reach = v_set((float)(f->cutoff2 * step)),
         .inverse_step = v_set((float)(1 / step)),
         .near = v_set((float)(2 * f->cutoff2 * step * step)),
+        .uneven = view->stretch_varies,
     };
 }
 
@@ -219,6 +223,12 @@ INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
     vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
     f->half_x = v_sqrt(size * eyy);
     f->half_y = v_sqrt(size * exx);
+}
+
+/* Whether a difference from `whole` has kept most of its digits. */
+INLINE vm is_exact(vf difference, vf whole)
+{
+    return v_ge(difference, whole * v_set(1e-2f));
 }
 
 /* With D = r_c . X x Y, constant over the image, and u = (step D z / sigma)^2,
@@ -239,6 +249,9 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     vf low_pass = v_set((float)f->low_pass2) * u;
     vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
     vf sxy = v_fnma(rr, p->XY, rx * ry);
+    vm exact = vm_first(V);
+    if (p->uneven)
+        exact = vm_and(is_exact(sxx, rr * p->YY), is_exact(syy, rr * p->XX));
     vf det_s = p->det * rr;
     vf det = v_fma(low_pass, sxx + syy + low_pass, det_s);
     sxx = sxx + low_pass;
@@ -259,8 +272,13 @@ INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
     vf trace = v_fma(p->XX, sxx, v_fma(p->YY, syy, (p->XY + p->XY) * sxy));
     out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
     vf t = p->reach / rr_u, t_step = t * p->step;
-    bound(&out, v_fnma(t_step, p->XX, syy * inverse_det), v_fnma(t_step, p->XY, -sxy * inverse_det),
-          v_fnma(t_step, p->YY, sxx * inverse_det), t * rx, t * ry, t * rr * p->inverse_step);
+    vf exx = v_fnma(t_step, p->XX, syy * inverse_det),
+       eyy = v_fnma(t_step, p->YY, sxx * inverse_det);
+    vf exy = v_fnma(t_step, p->XY, -sxy * inverse_det);
+    if (p->uneven)
+        out.usual =
+            vm_and(vm_and(out.usual, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
+    bound(&out, exx, exy, eyy, t * rx, t * ry, t * rr * p->inverse_step);
     return out;
 }
 
@@ -622,7 +640,7 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
     uint32_t n = 0;
     const float *extinction = &view->of->table[0].extinction;
     footprint parallel = footprint_parallel(view);
-    perspective persp = perspective_of(&view->splat);
+    perspective persp = perspective_of(view);
     for (uint32_t i = 0; i < count; i += V)
         place(view, staged, i, lanes);
     for (uint32_t i = 0; i < count; i += V) {
