@@ -134,6 +134,13 @@ static unsigned may_hold(const trip_drawing *d)
     return half < HELD_MAX ? half : HELD_MAX - 1;
 }
 
+static int end_passes(trip_drawing *d)
+{
+    int status = begin_layers(d, 2);
+    return status || !d->renderer->ops->end_passes ? status
+                                                   : d->renderer->ops->end_passes(d->renderer);
+}
+
 /* The next batch, once the last one is drawn; TRIP_FRAME_DONE when there is none. */
 static int next_batch(trip_drawing *d)
 {
@@ -146,7 +153,7 @@ static int next_batch(trip_drawing *d)
     if (status > 0)
         status = begin_batch(d, &batch);
     else
-        status = begin_layers(d, 2);
+        status = end_passes(d);
     return status < 0 ? status : d->in_batch ? TRIP_FRAME_MORE : TRIP_FRAME_DONE;
 }
 

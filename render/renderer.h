@@ -74,6 +74,9 @@ typedef struct trip_renderer_ops {
     int (*begin_layer)(trip_renderer *r, int axis);
     /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
     int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
+    /* Every batch of the frame was drawn, and every layer begun. NULL: nothing is left to do then.
+     */
+    int (*end_passes)(trip_renderer *r);
     /* Whether draw() is given whole batches and draws them in parts: it returns 1 until the batch
      * is drawn, and is called again with the same batch. Else it is given pieces of batches. */
     bool in_parts;

@@ -12,13 +12,20 @@
 #include "cpu/batch.h"
 #include "cpu/count.h"
 #include "cpu/occlusion.h"
+#include "cpu/sheets/sheets.h"
 #include "cpu/tiles.h"
 #include "cpu/view.h"
 #include "report.h"
+#include "sheet.h"
 
 enum { MAX_SPLATS = 1 << 17, MIN_SPLATS = 1 << 13 };
 
 /* ---- layers ---- */
+
+static bool classifies_post(const trip_cpu *r)
+{
+    return r->frame->settings->classify == TRIP_CLASSIFY_POST;
+}
 
 /* The views of the layer's lists. */
 static void make_views(trip_cpu *r, bool front_to_back, bool shading)
@@ -31,7 +38,8 @@ static void make_views(trip_cpu *r, bool front_to_back, bool shading)
         const trip_list *list = &data->lists[i];
         if (list->axis != axis || !r->frame->plan->lists[i].drawn)
             continue;
-        trip_cpu_view_make(&r->views[i], r->frame, list, front_to_back);
+        trip_cpu_view_make(&r->views[i], classifies_post(r) ? &r->sheet_frame : r->frame, list,
+                           front_to_back);
         r->views[i].shading = shading;
         if (r->frame->count)
             trip_cpu_view_make(&r->counted_views[i], &r->counted_frame, list, front_to_back);
@@ -41,6 +49,8 @@ static void make_views(trip_cpu *r, bool front_to_back, bool shading)
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     trip_cpu *r = (trip_cpu *)base;
+    if (classifies_post(r))
+        return trip_cpu_sheets_draw(r->sheets, batch);
     bool shading = r->frame->settings->shading && batch->planes[TRIP_PLANE_NORMALS];
     if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
         trip_cpu_finish_blending(r);
@@ -53,6 +63,9 @@ static int end_layer(trip_cpu *r)
 {
     if (!r->in_layer)
         return 0;
+    int status = classifies_post(r) ? trip_cpu_sheets_end_layer(r->sheets) : 0;
+    if (status)
+        return status;
     trip_cpu_merge_layer(r);
     r->in_layer = false;
     return trip_frame_poll();
@@ -69,7 +82,13 @@ static int begin_layer(trip_renderer *base, int axis)
     trip_cpu_begin_tile_layer(r);
     r->in_layer = true;
     r->visible_per_voxel = 1;
-    return 0;
+    return classifies_post(r) ? trip_cpu_sheets_begin_layer(r->sheets, axis) : 0;
+}
+
+static int end_passes(trip_renderer *base)
+{
+    trip_cpu *r = (trip_cpu *)base;
+    return r->in_layer && classifies_post(r) ? trip_cpu_sheets_end_layer(r->sheets) : 0;
 }
 
 /* ---- frames ---- */
@@ -107,6 +126,16 @@ static int fit_lists(trip_cpu *r)
                      "%u lists do not fit the memory given; raise --memory", wanted);
 }
 
+static int begin_sheets(trip_cpu *r)
+{
+    int status = r->sheets ? 0 : trip_cpu_sheets_create(&r->sheets, r);
+    r->sheet_settings = *r->frame->settings;
+    r->sheet_settings.kernel_radius = TRIP_SHEET_RADIUS;
+    r->sheet_frame = *r->frame;
+    r->sheet_frame.settings = &r->sheet_settings;
+    return status ? status : trip_cpu_sheets_begin_frame(r->sheets, r);
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     trip_cpu *r = (trip_cpu *)base;
@@ -121,6 +150,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         status = fit_lists(r);
     if (!status && frame->count)
         status = trip_cpu_begin_counting(r);
+    if (!status && classifies_post(r))
+        status = begin_sheets(r);
     if (status)
         return status;
     trip_cpu_layer_view_make(&r->view, frame, frame->plan->axis_of_view, true);
@@ -156,6 +187,7 @@ static void destroy(trip_renderer *base)
 {
     trip_cpu *r = (trip_cpu *)base;
     trip_budget *budget = r->budget;
+    trip_cpu_sheets_destroy(r->sheets);
     trip_cpu_pool_destroy(r->pool);
     trip_cpu_release_tiles(r);
     release_lists(r);
@@ -168,11 +200,13 @@ static void destroy(trip_renderer *base)
 
 static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
+    .classifies_post = true,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
     .begin_layer = begin_layer,
     .draw = draw,
+    .end_passes = end_passes,
     .picture = picture,
     .end_frame = end_frame,
     .stats = stats,

@@ -35,6 +35,9 @@ typedef struct trip_cpu_portion {
     uint32_t splats;
 } trip_cpu_portion;
 
+/* Of frames that classify after interpolation. */
+typedef struct trip_cpu_sheets trip_cpu_sheets;
+
 typedef struct trip_cpu {
     trip_renderer base;
     trip_budget *budget;
@@ -71,6 +74,11 @@ typedef struct trip_cpu {
     double visible_per_voxel; /* of late */
     uint32_t portion_count;
     float *rgba, *depth;
+
+    trip_cpu_sheets *sheets; /* NULL until wanted */
+    /* Of these frames: as the frame, with kernels that reach as far as voxels do in sheets. */
+    trip_frame sheet_frame;
+    trip_settings sheet_settings;
     trip_cpu_job project_job, blend_job, tile_job;
 } trip_cpu;
 

@@ -7,7 +7,9 @@
 #include "cpu/kernels/isa.h"
 #include "cpu/kernels/merge_tmpl.h"
 #include "cpu/kernels/project_tmpl.h"
+#include "cpu/kernels/sheet_tmpl.h"
 #include "cpu/kernels/simd_tmpl.h"
+#include "cpu/kernels/slice_tmpl.h"
 #include "cpu/kernels/squares_tmpl.h"
 
 /* Defines the table `name` of the instruction set called `isa`, or with depth the one that `name`
@@ -26,6 +28,8 @@
         .squares = squares, .stage = stage, .project = project, .tile_clear = tile_clear,          \
         .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
         .tile_merge = tile_merge, .tile_finish = tile_finish, .drawn = drawn,                      \
+        .sheet_ranges = sheet_ranges, .sheet_gradients = sheet_gradients,                          \
+        .sheet_between = sheet_between, .sheet_tile = sheet_tile,                                  \
     }
 
 #endif

@@ -1,0 +1,653 @@
+/* The kernel that draws a group of slices into the pixels of a tile (sheet.h): included by
+ * table_tmpl.h after merge_tmpl.h. For each patch of 8 x 8 pixels it finds the segments in which
+ * something may show; then each stamp takes those one after the other, its pixels all the while in
+ * registers. Positions are worked out from the tile's own corner at each slice, so that they do not
+ * depend on how slices are grouped or blocks laid out. */
+#ifndef TRIP_CPU_SHEET_H
+#define TRIP_CPU_SHEET_H
+
+#include "cpu/kernels/blend_tmpl.h"
+#include "cpu/kernels/kernels.h"
+#include "cpu/kernels/simd_tmpl.h"
+#include "shade.h"
+#include "sheet.h"
+
+/* Weights of two neighbours are whole numbers of this sum. */
+#define WEIGHT_LOG2 14
+
+/* exp(-x), x >= 0, within 3e-7 of itself and exact at 0. */
+INLINE vf exp_of_minus(vf x)
+{
+    vf y = v_max(x * v_set(-1.44269504088896340736f), v_set(-126));
+    vf whole = v_from_int(v_truncate(y - v_set(0.5f))); /* so that y - whole is in (-0.5, 0.5] */
+    vf f = y - whole;
+    vf p = v_fma(f, v_set(1.3333558e-3f), v_set(9.6181291e-3f));
+    p = v_fma(p, f, v_set(5.5504109e-2f));
+    p = v_fma(p, f, v_set(2.4022651e-1f));
+    p = v_fma(p, f, v_set(6.9314718e-1f));
+    p = v_fma(p, f, v_set(1));
+    return v_from_bits(v_bits(p) + (v_truncate(whole) << 23));
+}
+
+/* ---- where the tile lies in the slices ---- */
+
+/* The rays' positions at the slices, in voxels from the first of the grid of blocks. */
+typedef struct tile_path {
+    /* A lane is at base + first + along * its slope + its shift, `along` from the eye. */
+    int32_t base[2][TRIP_CPU_SEGMENTS + 1];
+    float first[2][TRIP_CPU_SEGMENTS + 1];
+    float along[TRIP_CPU_SEGMENTS + 1];
+    double slope[2], start[2]; /* of the tile's corner */
+} tile_path;
+
+/* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
+ * over a sheet; false where it does not go the pass's way, or is too steep. */
+INLINE bool ray_slope(const trip_cpu_sheet_view *view, double x, double y, double start[2],
+                      double slope[2])
+{
+    double r[3];
+    for (int i = 0; i < 3; i++)
+        r[i] = view->ortho ? view->r0[i] : view->r0[i] + x * view->rx[i] + y * view->ry[i];
+    bool along = r[2] * view->direction > 0;
+    for (int i = 0; i < 2; i++) {
+        slope[i] = along ? r[i] / r[2] : 0;
+        start[i] = view->eye[i];
+        if (view->ortho) { /* from where the ray passes sheet 0 */
+            double sheet = view->eye[2] + x * view->rx[2] + y * view->ry[2];
+            start[i] += x * view->rx[i] + y * view->ry[i] - sheet * slope[i];
+        }
+    }
+    return along;
+}
+
+/* Along the sheets from where rays start. */
+INLINE double from_start(const trip_cpu_sheet_view *view, double coordinate)
+{
+    return view->ortho ? coordinate : coordinate - view->eye[2];
+}
+
+/* The rays of a rectangle of pixel positions: bounds of what ray_slope() gives. */
+typedef struct beam {
+    double start[4][2], slope[4][2];
+} beam;
+
+static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double size)
+{
+    beam b;
+    bool all = true;
+    for (int i = 0; i < 4; i++)
+        all &= ray_slope(view, x + (i & 1) * size, y + (i >> 1) * size, b.start[i], b.slope[i]);
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < 2; a++) {
+            double s = b.slope[i][a], most = view->steepest;
+            if (!all) /* some rays may go any way */
+                s = (a ? i >> 1 : i & 1) ? most : -most;
+            b.slope[i][a] = s < -most ? -most : s > most ? most : s;
+        }
+    return b;
+}
+
+/* Least and greatest position of a beam along u (0) or v (1). */
+INLINE void beam_bounds(const beam *b, int a, double along, double bounds[2])
+{
+    bounds[0] = INFINITY;
+    bounds[1] = -INFINITY;
+    for (int i = 0; i < 4; i++) {
+        double at = b->start[i][a] + along * b->slope[i][a];
+        bounds[0] = at < bounds[0] ? at : bounds[0];
+        bounds[1] = at > bounds[1] ? at : bounds[1];
+    }
+}
+
+static double within(double a, double least, double most)
+{
+    return a < least ? least : a > most ? most : a;
+}
+
+static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
+                      tile_path *path)
+{
+    const double origin[2] = { (double)g->first_u, (double)g->first_v };
+    beam b = beam_of(view, x, y, TRIP_CPU_TILE);
+    for (int a = 0; a < 2; a++) {
+        path->slope[a] = b.slope[0][a];
+        path->start[a] = b.start[0][a];
+    }
+    for (unsigned n = 0; n <= g->segments; n++) {
+        double along = from_start(view, g->slices[n].coordinate);
+        path->along[n] = (float)along;
+        for (int a = 0; a < 2; a++) {
+            double bounds[2];
+            beam_bounds(&b, a, along, bounds);
+            double base = floor(bounds[0]);
+            path->first[a][n] = (float)(path->start[a] + along * path->slope[a] - base);
+            path->base[a][n] = (int32_t)within(base - origin[a], -0x1p28, 0x1p28);
+        }
+    }
+}
+
+/* ---- which segments may show ---- */
+
+/* Whether some square between two places of the grid (voxels, inclusive) may show. */
+INLINE bool may_show(const trip_cpu_group *g, unsigned segment, const int64_t lo[2],
+                     const int64_t hi[2])
+{
+    int64_t last_u = (int64_t)g->across * 8 - 1, last_v = (int64_t)g->down * 8 - 1;
+    int64_t u0 = lo[0] >> 3, u1 = hi[0] >> 3, v0 = lo[1] >> 3, v1 = hi[1] >> 3;
+    u0 = u0 < 0 ? 0 : u0;
+    v0 = v0 < 0 ? 0 : v0;
+    u1 = u1 > last_u ? last_u : u1;
+    v1 = v1 > last_v ? last_v : v1;
+    for (int64_t v = v0; v <= v1; v++) {
+        const uint64_t *row = g->visible[segment] + (v >> 3) * g->across;
+        for (int64_t u = u0; u <= u1;) {
+            int64_t end = u | 7; /* of the block */
+            end = end > u1 ? u1 : end;
+            uint64_t bits = row[u >> 3] >> (v & 7) * 8 & 255;
+            if (bits >> (u & 7) & ((2u << (end - u)) - 1))
+                return true;
+            u = end + 1;
+        }
+    }
+    return false;
+}
+
+static uint64_t segments_of_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x,
+                                  int y)
+{
+    const double origin[2] = { (double)g->first_u, (double)g->first_v };
+    beam b = beam_of(view, x, y, 8);
+    int64_t lo[2][2], hi[2][2];
+    uint64_t some = 0;
+    for (unsigned n = 0; n <= g->segments; n++) {
+        double along = from_start(view, g->slices[n].coordinate);
+        for (int a = 0; a < 2; a++) {
+            double bounds[2];
+            beam_bounds(&b, a, along, bounds);
+            /* A little more for what single precision makes of them. */
+            lo[n % 2][a] = (int64_t)within(floor(bounds[0] - origin[a] - 0x1p-6), -0x1p28, 0x1p28);
+            hi[n % 2][a] = (int64_t)within(floor(bounds[1] - origin[a] + 0x1p-6), -0x1p28, 0x1p28);
+        }
+        if (n == 0)
+            continue;
+        int64_t least[2], most[2];
+        for (int a = 0; a < 2; a++) {
+            least[a] = lo[0][a] < lo[1][a] ? lo[0][a] : lo[1][a];
+            most[a] = hi[0][a] > hi[1][a] ? hi[0][a] : hi[1][a];
+        }
+        if (may_show(g, n - 1, least, most))
+            some |= UINT64_C(1) << (n - 1);
+    }
+    return some;
+}
+
+/* ---- the samples at a slice ---- */
+
+typedef struct sample {
+    vf code;
+    vf gradient[3];
+    vi index; /* the nearest code */
+    vm there; /* all corners are */
+} sample;
+
+/* The rays of a stamp. */
+typedef struct stamp_rays {
+    vf slope[2], shift[2]; /* from the tile's corner's */
+    vf length;             /* world units over a sheet */
+    vf depth;              /* z over a sheet, and at the eye */
+    vf depth_at_start;
+    vm along; /* they go the pass's way */
+    vf light[3], to_eye[3], half[3];
+} stamp_rays;
+
+/* Corners of each lane's cell: of the four, where the first lies in the pool. */
+typedef struct corners {
+    int32_t at[V];
+    vf u, v; /* place in the cell */
+} corners;
+
+INLINE vi vi_within(vi a, int32_t least, int32_t most)
+{
+    vi low = (vi)(a < least), high = (vi)(a > most);
+    return (a & ~(low | high)) | (low & least) | (high & most);
+}
+
+INLINE corners corners_at(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l,
+                          unsigned n)
+{
+    vi whole[2];
+    vf part[2];
+    const int32_t size[2] = { g->across, g->down };
+    for (int a = 0; a < 2; a++) {
+        vf at = v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
+        whole[a] = v_truncate(at);
+        part[a] = at - v_from_int(whole[a]);
+        whole[a] = vi_within(whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_BLOCK - 1);
+    }
+    vi block = (whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (whole[0] >> TRIP_CPU_BLOCK_LOG2);
+    vi within_block = (whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
+                      (whole[0] & (TRIP_CPU_BLOCK - 1));
+    corners c = { .u = part[0], .v = part[1] };
+    const int32_t *blocks = g->slices[n].blocks;
+    vi same = (vi)(block == block[0] - (vi){ 0 });
+    bool one = true;
+    int32_t numbers[V];
+    vi_store(numbers, same);
+    for (int i = 0; i < V; i++)
+        one &= numbers[i] != 0;
+    if (one) {
+        vi_store(c.at, within_block + blocks[block[0]]);
+        return c;
+    }
+    vi_store(numbers, block);
+    vi_store(c.at, within_block);
+    for (int i = 0; i < V; i++)
+        c.at[i] += blocks[numbers[i]];
+    return c;
+}
+
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+
+/* Two voxels beside each other, of lanes i and i + 4, as numbers of 16 bits: code, code, gradient
+ * along u twice, ... */
+INLINE __m256i two_corners(const trip_cpu_voxel *pool, const int32_t at[V], int i, int32_t more)
+{
+    const __m256i order = _mm256_broadcastsi128_si256(
+        _mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
+    __m128i low = _mm_loadu_si128((const void *)(pool + at[i] + more));
+    __m128i high = _mm_loadu_si128((const void *)(pool + at[i + 4] + more));
+    return _mm256_shuffle_epi8(_mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1),
+                               order);
+}
+
+INLINE sample sample_at(const trip_cpu_group *g, const corners *c)
+{
+    const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
+    /* w << 16 | 2^14 - w */
+    vi w = v_truncate(v_fma(c->u, v_set(1 << WEIGHT_LOG2), v_set(0.5f)));
+    vi weights = w * 0xffff + (1 << WEIGHT_LOG2);
+    __m256 rows[4];
+    __m256i lack[4];
+    for (int i = 0; i < 4; i++) {
+        const __m256i lane = _mm256_setr_epi32(i, i, i, i, i + 4, i + 4, i + 4, i + 4);
+        __m256i weight = _mm256_permutevar8x32_epi32((__m256i)weights, lane);
+        __m256 down = _mm256_permutevar8x32_ps((__m256)c->v, lane);
+        __m256i a = two_corners(g->pool, c->at, i, 0);
+        __m256i b = two_corners(g->pool, c->at, i, TRIP_CPU_BLOCK_STRIDE);
+        lack[i] = _mm256_or_si256(_mm256_cmpeq_epi16(a, missing), _mm256_cmpeq_epi16(b, missing));
+        __m256 top = _mm256_cvtepi32_ps(_mm256_madd_epi16(a, weight));
+        __m256 bottom = _mm256_cvtepi32_ps(_mm256_madd_epi16(b, weight));
+        rows[i] = _mm256_fmadd_ps(_mm256_sub_ps(bottom, top), down, top);
+    }
+    __m256 ab0 = _mm256_unpacklo_ps(rows[0], rows[1]), ab1 = _mm256_unpackhi_ps(rows[0], rows[1]);
+    __m256 cd0 = _mm256_unpacklo_ps(rows[2], rows[3]), cd1 = _mm256_unpackhi_ps(rows[2], rows[3]);
+    const vf unit = v_set(1.0f / (1 << WEIGHT_LOG2));
+    sample s;
+    s.code = v_fma((vf)_mm256_shuffle_ps(ab0, cd0, 0x44), unit, v_set(TRIP_CPU_CODE_BIAS));
+    s.gradient[0] = (vf)_mm256_shuffle_ps(ab0, cd0, 0xee) * unit;
+    s.gradient[1] = (vf)_mm256_shuffle_ps(ab1, cd1, 0x44) * unit;
+    s.gradient[2] = (vf)_mm256_shuffle_ps(ab1, cd1, 0xee) * unit;
+    s.index = v_truncate(s.code + v_set(0.5f));
+    s.there = ~(vm){ 0 };
+    __m256i any =
+        _mm256_or_si256(_mm256_or_si256(lack[0], lack[1]), _mm256_or_si256(lack[2], lack[3]));
+    const __m256i code_lane = _mm256_setr_epi32(-1, 0, 0, 0, -1, 0, 0, 0);
+    if (!_mm256_testz_si256(any, code_lane)) {
+        for (int i = 0; i < 4; i++) {
+            const __m256i half = _mm256_and_si256(lack[i], code_lane);
+            s.there[i] = _mm256_extract_epi32(half, 0) ? 0 : -1;
+            s.there[i + 4] = _mm256_extract_epi32(half, 4) ? 0 : -1;
+        }
+    }
+    return s;
+}
+
+/* Rows of four numbers by lane, as four vectors; less those of other rows. */
+INLINE void row_differences(int32_t (*rows)[4], vi to, vi from, vi out[4])
+{
+    int32_t a[V], b[V];
+    vi_store(a, to);
+    vi_store(b, from);
+    __m256 d[4];
+    for (int i = 0; i < 4; i++) {
+        __m256i x = _mm256_castsi128_si256(_mm_loadu_si128((const void *)rows[a[i]]));
+        x = _mm256_inserti128_si256(x, _mm_loadu_si128((const void *)rows[a[i + 4]]), 1);
+        __m256i y = _mm256_castsi128_si256(_mm_loadu_si128((const void *)rows[b[i]]));
+        y = _mm256_inserti128_si256(y, _mm_loadu_si128((const void *)rows[b[i + 4]]), 1);
+        d[i] = _mm256_castsi256_ps(_mm256_sub_epi32(x, y));
+    }
+    __m256 ab0 = _mm256_unpacklo_ps(d[0], d[1]), ab1 = _mm256_unpackhi_ps(d[0], d[1]);
+    __m256 cd0 = _mm256_unpacklo_ps(d[2], d[3]), cd1 = _mm256_unpackhi_ps(d[2], d[3]);
+    out[0] = (vi)_mm256_shuffle_ps(ab0, cd0, 0x44);
+    out[1] = (vi)_mm256_shuffle_ps(ab0, cd0, 0xee);
+    out[2] = (vi)_mm256_shuffle_ps(ab1, cd1, 0x44);
+    out[3] = (vi)_mm256_shuffle_ps(ab1, cd1, 0xee);
+}
+
+#else
+
+INLINE float4 between_corners(const trip_cpu_voxel *at, float u)
+{
+    float4 a = { at[0].code, at[0].gradient[0], at[0].gradient[1], at[0].gradient[2] };
+    float4 b = { at[1].code, at[1].gradient[0], at[1].gradient[1], at[1].gradient[2] };
+    return a + (b - a) * u;
+}
+
+INLINE sample sample_at(const trip_cpu_group *g, const corners *c)
+{
+    float of[4][V];
+    int32_t there[V];
+    for (int i = 0; i < V; i++) {
+        const trip_cpu_voxel *at = g->pool + c->at[i], *below = at + TRIP_CPU_BLOCK_STRIDE;
+        int steps = (int)(c->u[i] * (1 << WEIGHT_LOG2) + 0.5f);
+        float u = (float)steps / (1 << WEIGHT_LOG2);
+        float4 top = between_corners(at, u), bottom = between_corners(below, u);
+        float4 all = top + (bottom - top) * c->v[i];
+        for (int k = 0; k < 4; k++)
+            of[k][i] = all[k];
+        there[i] = at[0].code != TRIP_CPU_CODE_MISSING && at[1].code != TRIP_CPU_CODE_MISSING &&
+                           below[0].code != TRIP_CPU_CODE_MISSING &&
+                           below[1].code != TRIP_CPU_CODE_MISSING
+                       ? 1
+                       : 0;
+    }
+    sample s = { .code = v_load(of[0]) + v_set(TRIP_CPU_CODE_BIAS) };
+    for (int k = 0; k < 3; k++)
+        s.gradient[k] = v_load(of[k + 1]);
+    s.index = v_truncate(s.code + v_set(0.5f));
+    s.there = v_gt(v_from_int(vi_load(there)), v_set(0.5f));
+    return s;
+}
+
+INLINE void row_differences(int32_t (*rows)[4], vi to, vi from, vi out[4])
+{
+    int32_t of[4][V];
+    for (int i = 0; i < V; i++)
+        for (int k = 0; k < 4; k++)
+            of[k][i] = rows[to[i]][k] - rows[from[i]][k];
+    for (int k = 0; k < 4; k++)
+        out[k] = vi_load(of[k]);
+}
+
+#endif
+
+/* ---- a segment ---- */
+
+/* What the transfer function makes of a segment. */
+typedef struct shown {
+    vf extinction; /* 0: nothing */
+    vf rgb[3];
+    vf where;
+} shown;
+
+/* Where both ends have the same code, what the function is there. */
+INLINE void use_codes_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
+{
+    int32_t at[V], of[4][V];
+    vi_store(at, index);
+    for (int k = 0; k < 4; k++)
+        vi_store(of[k], sums[k]);
+    unsigned bits = vm_bits(same);
+    for (; bits; bits &= bits - 1) {
+        int i = __builtin_ctz(bits);
+        for (int k = 0; k < 4; k++)
+            of[k][i] = in->at[at[i]][k];
+    }
+    for (int k = 0; k < 4; k++)
+        sums[k] = vi_load(of[k]);
+}
+
+INLINE vm vi_equal(vi a, vi b)
+{
+    return v_ge(v_set(0), v_abs(v_from_int(a - b)));
+}
+
+INLINE vf mean_place(const trip_cpu_integrals *in, const sample *a, const sample *b, vf extinction,
+                     vf codes)
+{
+    int32_t from[V], to[V], sums[V];
+    vi_store(from, a->index);
+    vi_store(to, b->index);
+    for (int i = 0; i < V; i++)
+        sums[i] = in->codes[to[i]] - in->codes[from[i]];
+    vf mean = v_from_int(vi_load(sums)) / extinction * v_set(in->code);
+    vf where = (mean - v_from_int(a->index)) / codes;
+    where = v_min(v_max(where, v_set(0)), v_set(1));
+    return v_select(v_gt(v_abs(codes), v_set(64)), where, v_set(0.5f));
+}
+
+INLINE shown classified(const trip_cpu_integrals *in, const sample *a, const sample *b, bool place)
+{
+    vi sums[4];
+    vf codes = v_from_int(b->index - a->index);
+    vm same = vi_equal(a->index, b->index);
+    row_differences(in->sums, b->index, a->index, sums);
+    if (vm_any(same)) {
+        use_codes_alone(in, a->index, same, sums);
+        codes = v_select(same, v_set(1), codes);
+    }
+    vf extinction = v_from_int(sums[0]);
+    vm some = v_gt(v_abs(extinction), v_set(0));
+    shown s = { .extinction = v_set(0), .where = v_set(0.5f) };
+    if (!vm_any(some))
+        return s;
+    vf inverse = v_set(1) / v_select(some, extinction, v_set(1));
+    for (int k = 0; k < 3; k++)
+        s.rgb[k] = v_from_int(sums[k + 1]) * inverse;
+    s.extinction = extinction / codes * v_set(in->extinction);
+    if (place)
+        s.where = mean_place(in, a, b, v_select(some, extinction, v_set(1)), codes);
+    return s;
+}
+
+INLINE vf dot3(const vf a[3], const vf b[3])
+{
+    return v_fma(a[0], b[0], v_fma(a[1], b[1], a[2] * b[2]));
+}
+
+/* As trip_shade(), with the gradient between those of the ends. */
+INLINE void light_segment(const trip_cpu_sheet_view *view, const stamp_rays *l, const sample *a,
+                          const sample *b, shown *s)
+{
+    vf g[3], n[3];
+    for (int k = 0; k < 3; k++)
+        g[k] = v_fma(b->gradient[k] - a->gradient[k], s->where, a->gradient[k]);
+    for (int k = 0; k < 3; k++)
+        n[k] = v_fma(g[0], v_set(view->gradient[k][0]),
+                     v_fma(g[1], v_set(view->gradient[k][1]), g[2] * v_set(view->gradient[k][2])));
+    vf length2 = dot3(n, n);
+    vf length = v_sqrt(length2);
+    vm lit = v_gt(length2, v_set(1e-20f));
+    vf strength = v_select(lit, v_min(length, v_set(1)), v_set(0));
+    vf inverse = v_set(1) / v_select(lit, length, v_set(1));
+    vf to_light = dot3(n, l->light) * inverse;
+    vf to_half = to_light, facing = to_light * to_light;
+    if (!view->headlight) {
+        to_half = dot3(n, l->half) * inverse;
+        facing = to_light * dot3(n, l->to_eye) * inverse;
+    }
+    facing = v_min(v_set(1), v_max(v_set(0), facing * v_set((float)TRIP_FACING)));
+    static_assert(TRIP_SHININESS == 24, "the powers below");
+    vf p2 = to_half * to_half, p4 = p2 * p2, p8 = p4 * p4;
+    vf highlight = strength * v_set((float)TRIP_SPECULAR) * p8 * p8 * p8 * facing;
+    vf matt =
+        v_fma(v_fma(v_abs(to_light), v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1))),
+              strength, v_set(1));
+    for (int k = 0; k < 3; k++)
+        s->rgb[k] = v_min(v_set(1), v_max(v_set(0), v_fma(s->rgb[k], matt, highlight)));
+}
+
+/* Puts a segment behind what the pixels hold. */
+INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays *l,
+                              const tile_path *path, unsigned n, const sample *a, const sample *b,
+                              vf pixel[CHANNELS])
+{
+    vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
+    open = vm_and(open, l->along);
+    if (!vm_any(open))
+        return;
+    shown s = classified(view->integrals, a, b, view->shading || TRIP_CPU_DEPTH);
+    open = vm_and(open, v_gt(s.extinction, v_set(0)));
+    if (!vm_any(open))
+        return;
+    if (view->shading)
+        light_segment(view, l, a, b, &s);
+    float sheets = path->along[n + 1] - path->along[n];
+    sheets = sheets < 0 ? -sheets : sheets;
+    vf opacity = v_set(1) - exp_of_minus(s.extinction * l->length * v_set(sheets));
+    vf add = v_select(open, opacity * pixel[3], v_set(0));
+    for (int k = 0; k < 3; k++)
+        pixel[k] = v_fma(add, s.rgb[k], pixel[k]);
+    if (TRIP_CPU_DEPTH) {
+        vf at = v_fma(s.where, v_set(path->along[n + 1] - path->along[n]), v_set(path->along[n]));
+        vf z = v_fma(at, l->depth, l->depth_at_start);
+        pixel[CHANNELS - 1] = v_fma(add, z, pixel[CHANNELS - 1]);
+    }
+    pixel[3] = pixel[3] - add;
+}
+
+/* A pixel of which this is left is saturated: it takes no more, and its colour counts for all. */
+INLINE void close_saturated(vf pixel[CHANNELS])
+{
+    vm saturated =
+        vm_and(v_gt(v_set((float)TRIP_SHEET_SATURATION), pixel[3]), v_gt(pixel[3], v_set(0)));
+    if (!vm_any(saturated))
+        return;
+    vf whole = v_set(1) / (v_set(1) - pixel[3]);
+    for (int k = 0; k < CHANNELS; k++)
+        if (k != 3)
+            pixel[k] = v_select(saturated, pixel[k] * whole, pixel[k]);
+    pixel[3] = v_select(saturated, v_set(0), pixel[3]);
+}
+
+/* ---- stamps ---- */
+
+INLINE void set_unit(vf v[3])
+{
+    vf inverse = v_set(1) / v_sqrt(v_max(dot3(v, v), v_set(1e-30f)));
+    for (int k = 0; k < 3; k++)
+        v[k] = v[k] * inverse;
+}
+
+INLINE void set_light(const trip_cpu_sheet_view *view, stamp_rays *l)
+{
+    for (int k = 0; k < 3; k++)
+        l->light[k] = view->headlight ? l->to_eye[k] : v_set(view->light[k]);
+    for (int k = 0; k < 3; k++)
+        l->half[k] = l->light[k] + l->to_eye[k];
+    if (view->headlight)
+        return;
+    set_unit(l->half);
+}
+
+/* The rays through the pixel centres of a stamp. */
+static void find_lanes(const trip_cpu_sheet_view *view, const tile_path *path, int x, int y,
+                       unsigned number, stamp_rays *l)
+{
+    float of[9][V];
+    vf across = stamp_x(number), down = stamp_y(number);
+    for (int i = 0; i < V; i++) {
+        double px = x + (double)across[i], py = y + (double)down[i], start[2], slope[2], r[3];
+        bool along = ray_slope(view, px, py, start, slope);
+        for (int a = 0; a < 2; a++) {
+            along &= fabs(slope[a]) <= view->steepest * (1 + 1e-9);
+            of[a][i] = (float)(slope[a] - path->slope[a]);
+            of[2 + a][i] = (float)(start[a] - path->start[a]);
+        }
+        for (int k = 0; k < 3; k++)
+            r[k] = view->ortho ? view->r0[k] : view->r0[k] + px * view->rx[k] + py * view->ry[k];
+        double world[3], length = 0;
+        for (int k = 0; k < 3; k++) {
+            world[k] =
+                view->world[k][0] * r[0] + view->world[k][1] * r[1] + view->world[k][2] * r[2];
+            length += world[k] * world[k];
+        }
+        length = sqrt(length);
+        double sheets = fabs(r[2]) > 0 ? 1 / r[2] : 0;
+        of[4][i] = along ? (float)(length * fabs(sheets)) : -1;
+        for (int k = 0; k < 3; k++)
+            of[5 + k][i] = view->ortho ? view->to_eye[k] : (float)(-world[k] / length);
+        of[8][i] = (float)sheets;
+        if (TRIP_CPU_DEPTH && view->ortho) {
+            /* Depth 0 is where the ray's own origin lies. */
+            double sheet = view->eye[2] + px * view->rx[2] + py * view->ry[2];
+            l->depth_at_start[i] = (float)(-sheet * sheets);
+        }
+    }
+    for (int a = 0; a < 2; a++) {
+        l->slope[a] = v_load(of[a]);
+        l->shift[a] = v_load(of[2 + a]);
+    }
+    l->length = v_load(of[4]);
+    l->along = v_ge(l->length, v_set(0));
+    l->length = v_max(l->length, v_set(0));
+    for (int k = 0; k < 3; k++)
+        l->to_eye[k] = v_load(of[5 + k]);
+    l->depth = v_load(of[8]);
+    if (!view->ortho)
+        l->depth_at_start = v_set(0);
+    set_light(view, l);
+}
+
+static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const tile_path *path, const stamp_rays *l, uint64_t segments, float *stamp)
+{
+    vf pixel[CHANNELS];
+    sample ends[2];
+    unsigned last = UINT32_MAX; /* the slice of which ends[last % 2] is */
+    for (int k = 0; k < CHANNELS; k++)
+        pixel[k] = v_load(stamp + k * V);
+    for (; segments; segments &= segments - 1) {
+        unsigned n = (unsigned)__builtin_ctzll(segments);
+        if (last != n) {
+            corners c = corners_at(g, path, l, n);
+            ends[n % 2] = sample_at(g, &c);
+        }
+        last = n + 1;
+        corners c = corners_at(g, path, l, last);
+        ends[last % 2] = sample_at(g, &c);
+        composite_segment(view, l, path, n, &ends[n % 2], &ends[last % 2], pixel);
+        close_saturated(pixel);
+        if (!vm_any(v_gt(pixel[3], v_set(0))))
+            break;
+    }
+    for (int k = 0; k < CHANNELS; k++)
+        v_store(stamp + k * V, pixel[k]);
+}
+
+/* The stamps of a patch, of those of the tile. */
+static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const tile_path *path, int x, int y, unsigned place, float *pixels)
+{
+    unsigned column = place % 4 * 2, row = place / 4 * (8 / STAMP_ROWS);
+    uint64_t segments =
+        segments_of_patch(view, g, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8);
+    if (!segments)
+        return;
+    for (unsigned i = 0; i < 2 * 8 / STAMP_ROWS; i++) {
+        unsigned number = (row + i / 2) * STAMPS_ACROSS + column + i % 2;
+        float *stamp = pixels + STAMP_FLOATS * number;
+        if (!vm_any(v_gt(v_load(stamp + 3 * V), v_set(0))))
+            continue;
+        stamp_rays l;
+        find_lanes(view, path, x, y, number, &l);
+        if (vm_any(l.along))
+            draw_stamp(view, g, path, &l, segments, stamp);
+    }
+}
+
+static uint64_t sheet_tile(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
+                           float *pixels)
+{
+    tile_path path;
+    uint64_t open = 0;
+    find_path(view, g, x, y, &path);
+    for (unsigned place = 0; place < TRIP_CPU_TILE_PIXELS / 64; place++)
+        draw_patch(view, g, &path, x, y, place, pixels);
+    for (unsigned i = 0; i < STAMPS; i++)
+        if (vm_any(v_gt(v_load(pixels + STAMP_FLOATS * i + 3 * V), v_set(0))))
+            open |= UINT64_C(1) << (i / STAMPS_ACROSS * STAMP_ROWS / 4 * 8 + i % STAMPS_ACROSS);
+    return open;
+}
+
+#endif

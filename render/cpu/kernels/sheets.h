@@ -1,0 +1,89 @@
+/* What the kernels of `post` (sheet.h) share: the values of sheets in blocks, the slices cut from
+ * them, the transfer function's integrals, and the constants of a pass. */
+#ifndef TRIP_CPU_SHEETS_H
+#define TRIP_CPU_SHEETS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "camera.h"
+#include "settings.h"
+
+struct trip_frame;
+
+/* A voxel: its code less 32768, at least TRIP_CPU_CODE_LEAST (so that code 0 is taken for 1); and
+ * the differences of codes an index along u, v and the sheets, rounded down. */
+typedef struct trip_cpu_voxel {
+    int16_t code, gradient[3];
+} trip_cpu_voxel;
+
+#define TRIP_CPU_CODE_BIAS 32768
+#define TRIP_CPU_CODE_MISSING INT16_MIN
+#define TRIP_CPU_CODE_LEAST (INT16_MIN + 1)
+
+/* A block is an aligned square of 64 x 64 voxels of a sheet or slice, and the first column and row
+ * of those to the right and below, so that it holds all corners of the cells that start in it.
+ * Vectors of voxels are read and written up to TRIP_CPU_BLOCK_ROOM voxels beyond the last. */
+#define TRIP_CPU_BLOCK 64
+#define TRIP_CPU_BLOCK_LOG2 6
+#define TRIP_CPU_BLOCK_STRIDE (TRIP_CPU_BLOCK + 2)
+#define TRIP_CPU_BLOCK_ROOM 14
+#define TRIP_CPU_BLOCK_VOXELS ((TRIP_CPU_BLOCK + 1) * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK_ROOM)
+
+/* A block is divided into 8 x 8 squares, a bit each, row by row. */
+#define TRIP_CPU_SQUARES_ACROSS (TRIP_CPU_BLOCK / 8)
+
+/* What the cells that start in a square lie between at one sheet, as biased codes; least > most
+ * where there are none. */
+typedef struct trip_cpu_square_ranges {
+    int16_t least[64], most[64];
+} trip_cpu_square_ranges;
+
+/* The blocks of a sheet or slice in a grid of `across` x `down`, the outermost of which are absent:
+ * where each starts in the pool; 0 is the block in which every voxel is missing. */
+typedef struct trip_cpu_slice {
+    const int32_t *blocks;
+    double coordinate; /* along the list's axis */
+} trip_cpu_slice;
+
+/* Integrals of the transfer function from code 0 to each code, times factors that make the greatest
+ * of each 2^30: of extinction, extinction times each colour component (the same factor), and
+ * extinction times code. Differences of them are exact but for the rounding of each. */
+typedef struct trip_cpu_integrals {
+    int32_t (*sums)[4]; /* 65536: extinction, red, green, blue */
+    int32_t (*at)[4];   /* what they grow by from one code to the next, at a code */
+    int32_t *codes;     /* of extinction times code */
+    float extinction;   /* 1 of sums[0], per world unit */
+    float code;         /* 1 of codes[] in 1 of sums[][0] */
+} trip_cpu_integrals;
+
+/* Segments of a group: at most so many, and one slice more. */
+#define TRIP_CPU_SEGMENTS 64
+
+typedef struct trip_cpu_group {
+    const trip_cpu_voxel *pool;
+    int64_t first_u, first_v; /* voxels: of the grid of blocks */
+    int32_t across, down;
+    unsigned segments;
+    trip_cpu_slice slices[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
+    /* For each segment and block of the grid: the squares in which some cell may show. */
+    const uint64_t *visible[TRIP_CPU_SEGMENTS];
+} trip_cpu_group;
+
+/* Constants of a pass over the sheets of a list. Vectors are by the list's own axes: u, v, sheet.
+ */
+typedef struct trip_cpu_sheet_view {
+    const struct trip_frame *of;
+    const trip_cpu_integrals *integrals;
+    int axis;
+    bool ortho, shading, headlight;
+    double direction; /* 1: ascending; -1 */
+    double eye[3], r0[3], rx[3], ry[3];
+    double steepest;      /* rays move at most so far along u or v from one sheet to the next */
+    double world[3][3];   /* row, column: index_to_world of u, v, sheet */
+    float gradient[3][3]; /* from differences of codes to world space, over gradient_full */
+    float light[3];       /* without headlight, or in parallel views towards the eye */
+    float to_eye[3];      /* in parallel views */
+} trip_cpu_sheet_view;
+
+#endif

@@ -1,0 +1,29 @@
+/* The transfer function's integrals over codes, as the kernels take them (kernels/sheets.h). Made
+ * anew for every frame, read-only then. */
+#ifndef TRIP_CPU_SHEETS_INTEGRALS_H
+#define TRIP_CPU_SHEETS_INTEGRALS_H
+
+#include "budget.h"
+#include "cpu/kernels/sheets.h"
+#include "transfer_function.h"
+
+typedef struct trip_cpu_function {
+    trip_cpu_integrals integrals;
+    uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
+} trip_cpu_function;
+
+/* Memory from the budget; false where it does not suffice. */
+bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget);
+void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
+
+/* Of a table of 65536 entries. */
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table);
+
+/* Whether some code of [least, most] has extinction; biased codes. */
+static inline bool trip_cpu_function_shows(const trip_cpu_function *f, int16_t least, int16_t most)
+{
+    return least <= most &&
+           f->next_visible[least + TRIP_CPU_CODE_BIAS] <= (uint32_t)(most + TRIP_CPU_CODE_BIAS);
+}
+
+#endif

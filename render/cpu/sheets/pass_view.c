@@ -1,0 +1,80 @@
+#include "cpu/sheets/pass_view.h"
+
+#include <math.h>
+
+#include "shade.h"
+#include "weight.h"
+
+/* Rays that move farther along u or v from sheet to sheet are not drawn: their weight in the list
+ * is below 1 / STEEPEST, by w^2 less than a tenth of 1/255 of the picture. */
+#define STEEPEST 64.0
+
+static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = trip_component(v, (view->axis + 1 + i) % 3);
+}
+
+/* World-space gradients from those of index space: the inverse transpose of the map. Differences
+ * are of codes, and lengths are over that of full shading. */
+static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame)
+{
+    const trip_file_header *h = &frame->data->header;
+    double full = trip_shade_gradient_full(h, frame->camera->voxel_world);
+    double unit = (h->code_hi - h->code_lo) / 65535 / full;
+    double m[3][3], adjugate[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            m[i][k] = view->world[i][k];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            adjugate[i][k] = m[(i + 1) % 3][(k + 1) % 3] * m[(i + 2) % 3][(k + 2) % 3] -
+                             m[(i + 1) % 3][(k + 2) % 3] * m[(i + 2) % 3][(k + 1) % 3];
+    double determinant =
+        m[0][0] * adjugate[0][0] + m[0][1] * adjugate[0][1] + m[0][2] * adjugate[0][2];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            view->gradient[i][k] = (float)(unit * adjugate[i][k] / determinant);
+}
+
+static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
+{
+    const trip_vec3 light = frame->settings->light_direction;
+    const trip_vec3 forward = frame->camera->world_forward;
+    for (int k = 0; k < 3; k++) {
+        view->light[k] = (float)trip_component(light, k);
+        view->to_eye[k] = (float)-trip_component(forward, k);
+    }
+}
+
+void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
+                             bool descending, const trip_cpu_integrals *integrals)
+{
+    const trip_camera *c = frame->camera;
+    const trip_settings *s = frame->settings;
+    double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
+    *view = (trip_cpu_sheet_view){
+        .of = frame,
+        .integrals = integrals,
+        .axis = axis,
+        .ortho = c->ortho,
+        .shading = s->shading,
+        .headlight = s->headlight,
+        .direction = descending ? -1 : 1,
+        .steepest = h * STEEPEST > 1 ? 1 / h : STEEPEST,
+    };
+    by_list(view, c->eye, view->eye);
+    by_list(view, c->r0, view->r0);
+    by_list(view, c->rx, view->rx);
+    by_list(view, c->ry, view->ry);
+    for (int i = 0; i < 3; i++) {
+        double unit[3] = { 0 };
+        unit[(axis + 1 + i) % 3] = 1;
+        trip_vec3 column =
+            trip_affine_vector(&c->index_to_world, trip_v3(unit[0], unit[1], unit[2]));
+        for (int k = 0; k < 3; k++)
+            view->world[k][i] = trip_component(column, k);
+    }
+    set_gradient(view, frame);
+    set_light(view, frame);
+}

@@ -1,0 +1,12 @@
+/* The constants of a pass over sheets, as the kernels take them (kernels/sheets.h). Pure functions.
+ */
+#ifndef TRIP_CPU_SHEETS_PASS_VIEW_H
+#define TRIP_CPU_SHEETS_PASS_VIEW_H
+
+#include "cpu/kernels/sheets.h"
+#include "renderer.h"
+
+void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
+                             bool descending, const trip_cpu_integrals *integrals);
+
+#endif

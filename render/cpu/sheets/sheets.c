@@ -1,0 +1,430 @@
+#include "cpu/sheets/sheets.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "cpu/occlusion.h"
+#include "cpu/sheets/pass_view.h"
+#include "cpu/sheets/store.h"
+#include "cpu/tiles.h"
+#include "report.h"
+
+/* Sheets that are drawn at a time, at most; and runs decoded at a time. */
+enum { GROUP_SHEETS = TRIP_CPU_SHEETS_MAX - 4, RUNS_MAX = 256 };
+
+struct trip_cpu_sheets {
+    trip_cpu *of;
+    trip_cpu_store store;
+    trip_cpu_function function;
+    trip_cpu_group group;
+    trip_cpu_sheet_view view;
+    int axis;
+    const trip_pass *pass; /* being drawn; NULL: none */
+    int64_t way;           /* from one sheet to the next: 1 or -1 */
+    /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[0] all
+     * is drawn. */
+    int held[TRIP_CPU_SHEETS_MAX];
+    int count;
+    const trip_batch *batch;
+    const trip_run *runs[RUNS_MAX]; /* to be decoded, of the last sheet */
+    unsigned run_count;
+};
+
+static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
+{
+    return &s->store.sheets[s->held[i]];
+}
+
+static int no_memory(void)
+{
+    return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                     "three sheets and a slice do not fit the memory given; raise --memory");
+}
+
+/* ---- creation, frames ---- */
+
+int trip_cpu_sheets_create(trip_cpu_sheets **out, const trip_cpu *r)
+{
+    trip_cpu_sheets *s = trip_budget_take(r->budget, sizeof *s);
+    *out = s;
+    if (!s)
+        return no_memory();
+    s->store.budget = r->budget;
+    s->store.pool = r->pool;
+    if (trip_cpu_function_create(&s->function, r->budget))
+        return 0;
+    trip_cpu_sheets_destroy(s);
+    *out = NULL;
+    return no_memory();
+}
+
+void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
+{
+    if (!s)
+        return;
+    trip_budget *budget = s->store.budget;
+    trip_cpu_store_release(&s->store);
+    trip_cpu_function_destroy(&s->function, budget);
+    trip_budget_release(budget, s, sizeof *s);
+}
+
+int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
+{
+    s->of = r;
+    s->store.kernels = r->kernels;
+    s->pass = NULL;
+    s->count = 0;
+    s->run_count = 0;
+    trip_cpu_function_set(&s->function, r->frame->table);
+    return 0;
+}
+
+/* ---- layers and passes ---- */
+
+/* The blocks that the layer's bricks lie in. */
+static bool find_blocks(const trip_cpu_sheets *s, int64_t first[2], int64_t last[2])
+{
+    const trip_plan_layer *layer = &s->of->frame->plan->layers[s->axis];
+    unsigned tile_log2 = s->of->frame->data->header.tile_log2;
+    bool some = false;
+    for (int i = 0; i < layer->pass_count; i++)
+        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++) {
+            const trip_selection *selection = &layer->passes[i].pass.selections[k];
+            for (uint64_t b = 0; b < selection->list->brick_count; b++) {
+                if (!trip_selection_has(selection, b))
+                    continue;
+                const trip_file_brick *brick = &selection->list->bricks[b];
+                const int64_t tile[2] = { brick->tile_u, brick->tile_v };
+                for (int a = 0; a < 2; a++) {
+                    int64_t from = tile[a] << tile_log2 >> TRIP_CPU_BLOCK_LOG2;
+                    int64_t to = (((tile[a] + 1) << tile_log2) - 1) >> TRIP_CPU_BLOCK_LOG2;
+                    first[a] = !some || from < first[a] ? from : first[a];
+                    last[a] = !some || to > last[a] ? to : last[a];
+                }
+                some = true;
+            }
+        }
+    return some;
+}
+
+int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis)
+{
+    int64_t first[2] = { 0, 0 }, last[2] = { 0, 0 };
+    s->axis = axis;
+    s->pass = NULL;
+    s->count = 0;
+    find_blocks(s, first, last);
+    return trip_cpu_store_fit(&s->store, first, last);
+}
+
+static void drop_all(trip_cpu_sheets *s)
+{
+    for (int i = 0; i < s->count; i++)
+        trip_cpu_store_drop(&s->store, sheet_of(s, i));
+    s->count = 0;
+}
+
+/* ---- drawing sheets ---- */
+
+/* Whether something between two sheets lies before the eye. */
+static bool is_ahead(const trip_cpu_sheets *s, int64_t to)
+{
+    return s->view.ortho || ((double)to - s->view.eye[2]) * (double)s->way > 0;
+}
+
+/* Of complete sheets: ranges, and what may show between them. */
+static void find_visible(trip_cpu_sheets *s, int complete)
+{
+    for (int i = 0; i < complete; i++) {
+        trip_cpu_sheet *sheet = sheet_of(s, i);
+        if (!sheet->prepared)
+            trip_cpu_store_prepare(&s->store, sheet);
+        if (i > 0 && is_ahead(s, sheet->number))
+            trip_cpu_store_find_visible(&s->store, sheet_of(s, i - 1), sheet, &s->function);
+    }
+}
+
+/* Gradients of held[0] to held[last]; those of held[0] may be there from before. */
+static void find_gradients(trip_cpu_sheets *s, int last, int complete)
+{
+    for (int i = 0; i <= last; i++) {
+        trip_cpu_sheet *sheet = sheet_of(s, i);
+        const trip_cpu_sheet *before = i > 0 ? sheet_of(s, i - 1) : NULL;
+        const trip_cpu_sheet *after = i + 1 < complete ? sheet_of(s, i + 1) : NULL;
+        if (sheet->shaded)
+            continue;
+        trip_cpu_store_shade(&s->store, sheet, s->way > 0 ? before : after,
+                             s->way > 0 ? after : before, before ? before->visible : NULL);
+    }
+}
+
+static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coordinate,
+                      const uint64_t *visible)
+{
+    trip_cpu_group *g = &s->group;
+    if (visible)
+        g->visible[g->segments++] = visible;
+    g->slices[g->segments] = (trip_cpu_slice){ at->blocks, coordinate };
+}
+
+/* Cuts a slice at weight `part` of held[i + 1]; false when memory is full. */
+static bool cut_slice(trip_cpu_sheets *s, int i, double part, bool first, int *cut)
+{
+    const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
+    trip_cpu_sheet *slice = &s->store.slices[*cut];
+    if (!trip_cpu_store_cut(&s->store, slice, from, to, from->visible, part))
+        return false;
+    (*cut)++;
+    add_slice(s, slice, (double)from->number + part * (double)s->way, first ? NULL : from->visible);
+    return true;
+}
+
+/* Slices between held[i] and held[i + 1], and that sheet itself; `first` of the group, which starts
+ * at held[i] or where the eye is between both. `cut` counts the store's slices. False when memory
+ * is full: then none of them is there. */
+static bool cut_interval(trip_cpu_sheets *s, int i, bool first, int *cut)
+{
+    const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
+    const int slices = s->of->frame->settings->slices, cut_before = *cut;
+    const trip_cpu_group before = s->group;
+    double eye = s->view.ortho ? 0 : (s->view.eye[2] - (double)from->number) * (double)s->way;
+    bool fits = true;
+    if (first && eye <= 0)
+        add_slice(s, from, (double)from->number, NULL);
+    else if (first)
+        fits = cut_slice(s, i, eye, true, cut);
+    for (int n = 1; n < slices && fits; n++)
+        if (n > eye * slices)
+            fits = cut_slice(s, i, (double)n / slices, false, cut);
+    if (fits) {
+        add_slice(s, to, (double)to->number, from->visible);
+        return true;
+    }
+    while (*cut > cut_before)
+        trip_cpu_store_drop(&s->store, &s->store.slices[--*cut]);
+    s->group = before;
+    return false;
+}
+
+static void draw_tile(void *context, unsigned task, unsigned thread)
+{
+    trip_cpu_sheets *s = context;
+    trip_cpu *r = s->of;
+    (void)thread;
+    if (trip_interrupted() || !(r->axes[task] >> s->axis & 1) ||
+        trip_cpu_tile_is_saturated(&r->mask, task))
+        return;
+    float *pixels = trip_cpu_tile_pixels(r, task);
+    int x = trip_cpu_tile_x(r, task), y = trip_cpu_tile_y(r, task);
+    if (!(r->states[task] & TRIP_CPU_TILE_BEGUN)) {
+        r->kernels->tile_clear(&r->view, x, y, trip_cpu_is_alone(r, task), pixels);
+        r->states[task] |= TRIP_CPU_TILE_BEGUN;
+    }
+    uint64_t open = r->kernels->sheet_tile(&s->view, &s->group, x, y, pixels);
+    atomic_store_explicit(&r->mask.tiles[task], open, memory_order_relaxed);
+}
+
+static bool shows(const trip_cpu_sheets *s)
+{
+    size_t grid = trip_cpu_store_grid(&s->store);
+    for (unsigned n = 0; n < s->group.segments; n++)
+        for (size_t i = 0; i < grid; i++)
+            if (s->group.visible[n][i])
+                return true;
+    return false;
+}
+
+static void draw_tiles(trip_cpu_sheets *s)
+{
+    if (!shows(s))
+        return;
+    trip_cpu_job job = { .run = draw_tile, .context = s, .tasks = trip_cpu_tile_count(s->of) };
+    trip_cpu_pool_start(s->of->pool, &job);
+    trip_cpu_pool_wait(s->of->pool, &job);
+}
+
+/* Lets go of the first sheets. */
+static void drop_first(trip_cpu_sheets *s, int count)
+{
+    for (int i = 0; i < count; i++)
+        trip_cpu_store_drop(&s->store, sheet_of(s, i));
+    s->count -= count;
+    memmove(s->held, s->held + count, (size_t)s->count * sizeof *s->held);
+}
+
+/* Draws from held[0] on, at most to held[last]; 0 when not one interval fits the memory, or how
+ * many were drawn. */
+static int draw_some(trip_cpu_sheets *s, int last)
+{
+    const trip_cpu_store *store = &s->store;
+    int cut = 0, done = 0;
+    bool first = true;
+    const unsigned segments = (unsigned)s->of->frame->settings->slices;
+    s->group = (trip_cpu_group){ .pool = store->voxels,
+                                 .first_u = store->first_u * TRIP_CPU_BLOCK,
+                                 .first_v = store->first_v * TRIP_CPU_BLOCK,
+                                 .across = store->across,
+                                 .down = store->down };
+    for (; done < last && s->group.segments + segments < TRIP_CPU_SEGMENTS; done++) {
+        if (!is_ahead(s, sheet_of(s, done + 1)->number))
+            continue;
+        if (!cut_interval(s, done, first, &cut))
+            break;
+        first = false;
+    }
+    draw_tiles(s);
+    while (cut > 0)
+        trip_cpu_store_drop(&s->store, &s->store.slices[--cut]);
+    return done;
+}
+
+/* Draws what the complete sheets held allow: to the last but one, whose gradients depend on the
+ * last, or to the last one when none follows it. */
+static int draw_complete(trip_cpu_sheets *s, int complete, bool all)
+{
+    int last = all ? complete - 1 : complete - 2;
+    if (last < 1)
+        return 0;
+    find_visible(s, complete);
+    if (s->view.shading)
+        find_gradients(s, last, complete);
+    while (last > 0) {
+        int done = draw_some(s, last);
+        if (done == 0)
+            return no_memory();
+        drop_first(s, done);
+        last -= done;
+        int status = trip_frame_poll();
+        if (status)
+            return status;
+    }
+    return 0;
+}
+
+/* ---- from runs to sheets ---- */
+
+static void decode_run(void *context, unsigned task, unsigned thread)
+{
+    trip_cpu_sheets *s = context;
+    (void)thread;
+    if (trip_interrupted())
+        return;
+    const trip_run *run = s->runs[task];
+    const trip_block block = trip_block_of(s->batch, run);
+    trip_cpu_store_decode(&s->store, sheet_of(s, s->count - 1), &block, run,
+                          s->of->frame->data->header.tile_log2);
+}
+
+static void decode_runs(trip_cpu_sheets *s)
+{
+    if (s->run_count == 0)
+        return;
+    trip_cpu_job job = { .run = decode_run, .context = s, .tasks = s->run_count };
+    trip_cpu_pool_start(s->of->pool, &job);
+    trip_cpu_pool_wait(s->of->pool, &job);
+    s->run_count = 0;
+}
+
+/* All sheets held are complete. */
+static int finish_row(trip_cpu_sheets *s)
+{
+    int status = draw_complete(s, s->count, true);
+    drop_all(s);
+    return status;
+}
+
+/* The sheet that the next runs are of: those held are complete. */
+static int begin_sheet(trip_cpu_sheets *s, int64_t number)
+{
+    int status = 0;
+    if (s->count > 0 && sheet_of(s, s->count - 1)->number + s->way != number)
+        status = finish_row(s);
+    else if (s->count >= GROUP_SHEETS)
+        status = draw_complete(s, s->count, false);
+    if (status)
+        return status;
+    bool taken[TRIP_CPU_SHEETS_MAX] = { false };
+    for (int i = 0; i < s->count; i++)
+        taken[s->held[i]] = true;
+    int next = 0;
+    while (taken[next])
+        next++;
+    s->held[s->count++] = next;
+    s->store.sheets[next].number = number;
+    return 0;
+}
+
+/* Blocks of the last sheet for a run's voxels. */
+static int take_blocks(trip_cpu_sheets *s, const trip_run *run)
+{
+    int edge = 1 << s->of->frame->data->header.tile_log2;
+    for (int v = run->v; v < run->v + edge; v += TRIP_CPU_BLOCK)
+        for (int u = run->u; u < run->u + edge; u += TRIP_CPU_BLOCK) {
+            size_t at =
+                trip_cpu_store_at(&s->store, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2);
+            while (!sheet_of(s, s->count - 1)->blocks[at] &&
+                   !trip_cpu_store_take(&s->store, sheet_of(s, s->count - 1), at)) {
+                int before = s->count;
+                decode_runs(s);
+                int status = draw_complete(s, s->count - 1, false);
+                if (status || s->count == before)
+                    return status ? status : no_memory();
+            }
+        }
+    return 0;
+}
+
+static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
+{
+    const trip_cpu *r = s->of;
+    const trip_cpu_view *view = &r->views[trip_batch_list(s->batch, run)->index];
+    trip_cpu_box box = trip_cpu_brick_box(view, run->brick, run->sheet, run->sheet);
+    return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
+}
+
+static int add_run(trip_cpu_sheets *s, const trip_run *run)
+{
+    int status = 0;
+    if (s->count == 0 || sheet_of(s, s->count - 1)->number != run->sheet) {
+        decode_runs(s);
+        status = begin_sheet(s, run->sheet);
+    }
+    if (status || is_occluded(s, run))
+        return status;
+    if (s->run_count == RUNS_MAX)
+        decode_runs(s);
+    status = take_blocks(s, run);
+    if (!status)
+        s->runs[s->run_count++] = run;
+    return status;
+}
+
+static int begin_pass(trip_cpu_sheets *s, const trip_pass *pass)
+{
+    int status = s->pass ? finish_row(s) : 0;
+    s->pass = pass;
+    s->way = pass->descending ? -1 : 1;
+    trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending,
+                            &s->function.integrals);
+    return status;
+}
+
+int trip_cpu_sheets_draw(trip_cpu_sheets *s, const trip_batch *batch)
+{
+    int status = batch->pass == s->pass ? 0 : begin_pass(s, batch->pass);
+    s->batch = batch;
+    for (size_t i = 0; i < batch->run_count && !status; i++) {
+        const trip_run *run = &batch->runs[i];
+        s->of->stats[trip_batch_list(batch, run)->index].splats_read += run->count;
+        status = add_run(s, run);
+    }
+    decode_runs(s);
+    return status ? status : trip_frame_poll();
+}
+
+int trip_cpu_sheets_end_layer(trip_cpu_sheets *s)
+{
+    int status = s->pass ? finish_row(s) : 0;
+    s->pass = NULL;
+    return status ? status : trip_frame_poll();
+}

@@ -1,0 +1,372 @@
+#include "cpu/sheets/store.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "cpu/squares.h"
+#include "report.h"
+
+/* A share of the memory that is left, and the least that is of use. */
+enum { LEFT_OVER = 4, LEAST_BLOCKS = 64 };
+
+#define COLUMN_0 UINT64_C(0x0101010101010101)
+#define COLUMN_7 UINT64_C(0x8080808080808080)
+
+static const size_t block_bytes = TRIP_CPU_BLOCK_VOXELS * sizeof(trip_cpu_voxel);
+
+/* ---- memory ---- */
+
+static void clear_block(const trip_cpu_store *s, int32_t at)
+{
+    const trip_cpu_voxel nothing = { .code = TRIP_CPU_CODE_MISSING };
+    trip_cpu_voxel *voxels = s->voxels + at;
+    for (int i = 0; i < TRIP_CPU_BLOCK_VOXELS; i++)
+        voxels[i] = nothing;
+}
+
+static void free_all(trip_cpu_store *s)
+{
+    s->free_count = 0;
+    for (uint32_t i = s->blocks; i-- > 1;)
+        s->free[s->free_count++] = (int32_t)(i * TRIP_CPU_BLOCK_VOXELS);
+}
+
+static void release_voxels(trip_cpu_store *s)
+{
+    trip_budget_release(s->budget, s->voxels, s->voxels_bytes);
+    trip_budget_release(s->budget, s->free, s->blocks * sizeof *s->free);
+    s->voxels = NULL;
+    s->free = NULL;
+    s->voxels_bytes = 0;
+    s->blocks = 0;
+}
+
+/* Ends with as many blocks as all sheets and slices can take, or as memory has room for. */
+static bool take_voxels(trip_cpu_store *s, uint64_t wanted)
+{
+    uint64_t most = INT32_MAX / TRIP_CPU_BLOCK_VOXELS;
+    uint64_t room = trip_budget_left_bytes(s->budget) / LEFT_OVER * (LEFT_OVER - 1);
+    wanted = wanted < most ? wanted : most;
+    if (s->blocks >= wanted)
+        return true;
+    room = (room + s->voxels_bytes) / (block_bytes + sizeof *s->free);
+    wanted = wanted < room ? wanted : room;
+    if (s->blocks >= wanted)
+        return s->blocks >= LEAST_BLOCKS;
+    release_voxels(s);
+    s->blocks = (uint32_t)wanted;
+    s->voxels_bytes = wanted * block_bytes;
+    s->voxels = trip_budget_take(s->budget, s->voxels_bytes);
+    s->free = trip_budget_take(s->budget, s->blocks * sizeof *s->free);
+    if (!s->voxels || !s->free)
+        release_voxels(s);
+    return s->voxels != NULL;
+}
+
+static void *part(char *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? memory + *at : NULL;
+    *at += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+static size_t lay_out(trip_cpu_store *s, char *memory)
+{
+    size_t at = 0, grid = trip_cpu_store_grid(s);
+    for (int i = 0; i < TRIP_CPU_SHEETS_MAX; i++) {
+        trip_cpu_sheet *sheet = &s->sheets[i];
+        sheet->blocks = part(memory, &at, grid * sizeof *sheet->blocks);
+        sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
+        sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
+    }
+    for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++)
+        s->slices[i].blocks = part(memory, &at, grid * sizeof *s->slices[i].blocks);
+    return at;
+}
+
+static void release_grids(trip_cpu_store *s)
+{
+    trip_budget_release(s->budget, s->grids, s->grids_bytes);
+    s->grids = NULL;
+    s->grids_bytes = 0;
+}
+
+void trip_cpu_store_release(trip_cpu_store *s)
+{
+    release_grids(s);
+    release_voxels(s);
+}
+
+static bool take_grids(trip_cpu_store *s)
+{
+    size_t bytes = lay_out(s, NULL);
+    if (bytes > s->grids_bytes) {
+        release_grids(s);
+        s->grids = trip_budget_take(s->budget, bytes);
+        s->grids_bytes = s->grids ? bytes : 0;
+    }
+    if (!s->grids)
+        return false;
+    memset(s->grids, 0, bytes);
+    lay_out(s, s->grids);
+    return true;
+}
+
+int trip_cpu_store_fit(trip_cpu_store *s, const int64_t first[2], const int64_t last[2])
+{
+    s->first_u = first[0] - 1;
+    s->first_v = first[1] - 1;
+    int64_t across = last[0] - first[0] + 3, down = last[1] - first[1] + 3;
+    bool fits = across < (1 << 20) && down < (1 << 20) && across * down < (1 << 24);
+    s->across = fits ? (int32_t)across : 0;
+    s->down = fits ? (int32_t)down : 0;
+    uint64_t wanted = 1 + (uint64_t)(across - 2) * (uint64_t)(down - 2) *
+                              (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
+    if (!fits || !take_grids(s) || !take_voxels(s, wanted < LEAST_BLOCKS ? LEAST_BLOCKS : wanted))
+        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                         "sheets of %lld x %lld voxels do not fit the memory given; raise --memory",
+                         (long long)(across - 2) * TRIP_CPU_BLOCK,
+                         (long long)(down - 2) * TRIP_CPU_BLOCK);
+    free_all(s);
+    clear_block(s, 0);
+    return 0;
+}
+
+bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
+{
+    if (s->free_count == 0)
+        return false;
+    sheet->blocks[at] = s->free[--s->free_count];
+    clear_block(s, sheet->blocks[at]);
+    return true;
+}
+
+void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
+{
+    size_t grid = trip_cpu_store_grid(s);
+    for (size_t i = 0; i < grid; i++) {
+        if (sheet->blocks[i])
+            s->free[s->free_count++] = sheet->blocks[i];
+        sheet->blocks[i] = 0;
+        if (sheet->visible)
+            sheet->visible[i] = 0;
+    }
+    sheet->prepared = sheet->shaded = false;
+}
+
+/* ---- from a run to voxels ---- */
+
+static int16_t biased(unsigned code)
+{
+    int c = (int)code - TRIP_CPU_CODE_BIAS;
+    return (int16_t)(c < TRIP_CPU_CODE_LEAST ? TRIP_CPU_CODE_LEAST : c);
+}
+
+static int16_t code_of(const unsigned char *codes, unsigned code_bytes, uint32_t i)
+{
+    uint16_t code;
+    if (code_bytes == 1)
+        return biased(257u * codes[i]);
+    memcpy(&code, codes + 2 * (size_t)i, 2);
+    return biased(code);
+}
+
+static void decode_square(trip_cpu_voxel *to, const trip_cpu_walk *at, const trip_block *b)
+{
+    uint32_t record = at->first;
+    for (uint64_t rest = at->mask; rest; rest &= rest - 1) {
+        unsigned number = (unsigned)__builtin_ctzll(rest);
+        int u = trip_cpu_square_u(number), v = trip_cpu_square_v(number);
+        to[v * TRIP_CPU_BLOCK_STRIDE + u].code = code_of(b->codes, b->code_bytes, record++);
+    }
+}
+
+void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
+                           const trip_block *block, const trip_run *run, unsigned tile_log2)
+{
+    (void)tile_log2;
+    trip_cpu_walk at = trip_cpu_walk_begin(block, false);
+    while (trip_cpu_walk_next(&at)) {
+        int u = run->u + 8 * trip_cpu_square_u(at.number);
+        int v = run->v + 8 * trip_cpu_square_v(at.number);
+        int32_t in =
+            sheet->blocks[trip_cpu_store_at(s, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2)];
+        u &= TRIP_CPU_BLOCK - 1;
+        v &= TRIP_CPU_BLOCK - 1;
+        if (in) /* what is occluded has none */
+            decode_square(s->voxels + in + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block);
+    }
+}
+
+/* ---- what lies beside ---- */
+
+/* A job of the rows of the grid, without the outermost. */
+typedef struct rows_job {
+    trip_cpu_store *store;
+    trip_cpu_sheet *sheet;
+    const trip_cpu_sheet *other, *third;
+    const uint64_t *visible, *visible_before;
+    const trip_cpu_function *function;
+    int32_t weights;
+    void (*each)(const struct rows_job *job, size_t at); /* of the blocks that are there */
+} rows_job;
+
+static void run_row(void *context, unsigned task, unsigned thread)
+{
+    const rows_job *job = context;
+    const trip_cpu_store *s = job->store;
+    (void)thread;
+    if (trip_interrupted())
+        return;
+    for (int32_t u = 1; u < s->across - 1; u++) {
+        size_t at = (size_t)(task + 1) * (size_t)s->across + (size_t)u;
+        if (job->sheet->blocks[at])
+            job->each(job, at);
+    }
+}
+
+static void run_rows(rows_job *job)
+{
+    trip_cpu_job rows = { .run = run_row, .context = job, .tasks = (unsigned)job->store->down - 2 };
+    trip_cpu_pool_start(job->store->pool, &rows);
+    trip_cpu_pool_wait(job->store->pool, &rows);
+}
+
+static trip_cpu_voxel *block_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
+{
+    return s->voxels + (sheet ? sheet->blocks[at] : 0);
+}
+
+/* The first column of the block to the right, the first row of the one below, the voxel between. */
+static void copy_beside(const rows_job *job, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    size_t across = (size_t)s->across;
+    trip_cpu_voxel *to = block_at(s, job->sheet, at);
+    const trip_cpu_voxel *right = block_at(s, job->sheet, at + 1);
+    const trip_cpu_voxel *below = block_at(s, job->sheet, at + across);
+    for (int v = 0; v < TRIP_CPU_BLOCK; v++)
+        to[v * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK] = right[v * TRIP_CPU_BLOCK_STRIDE];
+    trip_cpu_voxel *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
+    memcpy(last, below, TRIP_CPU_BLOCK * sizeof *last);
+    last[TRIP_CPU_BLOCK] = *block_at(s, job->sheet, at + across + 1);
+}
+
+static void find_ranges(const rows_job *job, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    copy_beside(job, at);
+    s->kernels->sheet_ranges(block_at(s, job->sheet, at), UINT64_MAX, &job->sheet->ranges[at]);
+}
+
+void trip_cpu_store_prepare(trip_cpu_store *s, trip_cpu_sheet *sheet)
+{
+    run_rows(&(rows_job){ .store = s, .sheet = sheet, .each = find_ranges });
+    sheet->prepared = true;
+}
+
+static void find_visible(const rows_job *job, size_t at)
+{
+    const trip_cpu_square_ranges *a = &job->sheet->ranges[at], *b = &job->other->ranges[at];
+    uint64_t visible = 0;
+    if (job->other->blocks[at])
+        for (int i = 0; i < 64; i++) {
+            bool any = a->least[i] <= a->most[i] && b->least[i] <= b->most[i];
+            int16_t least = a->least[i] < b->least[i] ? a->least[i] : b->least[i];
+            int16_t most = a->most[i] > b->most[i] ? a->most[i] : b->most[i];
+            if (any && trip_cpu_function_shows(job->function, least, most))
+                visible |= UINT64_C(1) << i;
+        }
+    job->sheet->visible[at] = visible;
+}
+
+void trip_cpu_store_find_visible(trip_cpu_store *s, trip_cpu_sheet *from, const trip_cpu_sheet *to,
+                                 const trip_cpu_function *f)
+{
+    run_rows(
+        &(rows_job){ .store = s, .sheet = from, .other = to, .function = f, .each = find_visible });
+}
+
+/* A block's squares and those beside them along u; `at` is of any block but the outermost. */
+static uint64_t wider(const uint64_t *squares, size_t at)
+{
+    uint64_t s = squares[at];
+    return s | (s << 1 & ~COLUMN_0) | (s >> 1 & ~COLUMN_7) | (squares[at - 1] >> 7 & COLUMN_0) |
+           (squares[at + 1] << 7 & COLUMN_7);
+}
+
+/* A square of the outermost blocks is never visible: nor are those beyond. */
+static uint64_t row_wider(const trip_cpu_store *s, const uint64_t *squares, size_t at)
+{
+    size_t row = at / (size_t)s->across;
+    return row == 0 || row == (size_t)s->down - 1 ? 0 : wider(squares, at);
+}
+
+/* The squares of a block and those about them: both ends of a segment that meets a square lie in
+ * these, and all corners of their cells. */
+static uint64_t about(const trip_cpu_store *s, const uint64_t *squares, size_t at)
+{
+    size_t across = (size_t)s->across;
+    if (!squares)
+        return 0;
+    uint64_t here = wider(squares, at);
+    return here | here << 8 | here >> 8 | row_wider(s, squares, at - across) >> 56 |
+           row_wider(s, squares, at + across) << 56;
+}
+
+static void find_gradients(const rows_job *job, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    uint64_t squares = about(s, job->visible, at) | about(s, job->visible_before, at);
+    if (squares)
+        s->kernels->sheet_gradients(block_at(s, job->sheet, at), squares,
+                                    block_at(s, job->sheet, at - 1),
+                                    block_at(s, job->sheet, at - (size_t)s->across),
+                                    block_at(s, job->other, at), block_at(s, job->third, at));
+}
+
+void trip_cpu_store_shade(trip_cpu_store *s, trip_cpu_sheet *sheet, const trip_cpu_sheet *below,
+                          const trip_cpu_sheet *above, const uint64_t *visible_before)
+{
+    run_rows(&(rows_job){ .store = s,
+                          .sheet = sheet,
+                          .other = below,
+                          .third = above,
+                          .visible = sheet->visible,
+                          .visible_before = visible_before,
+                          .each = find_gradients });
+    run_rows(&(rows_job){ .store = s, .sheet = sheet, .each = copy_beside });
+    sheet->shaded = true;
+}
+
+static void cut_block(const rows_job *job, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    s->kernels->sheet_between(block_at(s, job->other, at), block_at(s, job->third, at),
+                              about(s, job->visible, at), job->weights,
+                              block_at(s, job->sheet, at));
+}
+
+bool trip_cpu_store_cut(trip_cpu_store *s, trip_cpu_sheet *slice, const trip_cpu_sheet *from,
+                        const trip_cpu_sheet *to, const uint64_t *visible, double part)
+{
+    int32_t w = (int32_t)lrint(part * 16384);
+    for (int32_t v = 1; v < s->down - 1; v++)
+        for (int32_t u = 1; u < s->across - 1; u++) {
+            size_t at = (size_t)v * (size_t)s->across + (size_t)u;
+            if (!from->blocks[at] || !to->blocks[at] || !about(s, visible, at))
+                continue;
+            if (!trip_cpu_store_take(s, slice, at)) {
+                trip_cpu_store_drop(s, slice);
+                return false;
+            }
+        }
+    run_rows(&(rows_job){ .store = s,
+                          .sheet = slice,
+                          .other = from,
+                          .third = to,
+                          .visible = visible,
+                          .weights = w << 16 | (16384 - w),
+                          .each = cut_block });
+    return true;
+}
