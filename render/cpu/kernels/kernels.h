@@ -225,6 +225,10 @@ typedef struct trip_cpu_kernels {
     /* Of a block's squares, a bit each: what their cells lie between. */
     void (*sheet_ranges)(const trip_cpu_voxel *block, uint64_t squares,
                          trip_cpu_square_ranges *out);
+    /* Which cells of the squares lie, between two sheets, on some code from `least` to `most`
+     * (biased): none that lacks a corner. */
+    void (*sheet_cells)(const trip_cpu_voxel *from, const trip_cpu_voxel *to, uint64_t squares,
+                        int16_t least, int16_t most, trip_cpu_cells *out);
     /* Gradients of the squares' voxels. Beside the block lie those to the left of it and above, of
      * the same sheet, and those of the sheets before and behind in index order. */
     void (*sheet_gradients)(trip_cpu_voxel *block, uint64_t squares, const trip_cpu_voxel *left,

@@ -128,20 +128,55 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
 
 /* ---- which segments may show ---- */
 
-/* Whether some square between two places of the grid (voxels, inclusive) may show. */
-INLINE bool may_show(const trip_cpu_group *g, unsigned segment, const int64_t lo[2],
-                     const int64_t hi[2])
+/* A box of voxels of the grid, inclusive. */
+typedef struct voxel_box {
+    int32_t lo[2], hi[2];
+} voxel_box;
+
+/* What a beam passes at a slice: a little more for what single precision makes of it. */
+INLINE voxel_box beam_box(const trip_cpu_group *g, const beam *b, double along)
 {
-    int64_t last_u = (int64_t)g->across * 8 - 1, last_v = (int64_t)g->down * 8 - 1;
-    int64_t u0 = lo[0] >> 3, u1 = hi[0] >> 3, v0 = lo[1] >> 3, v1 = hi[1] >> 3;
-    u0 = u0 < 0 ? 0 : u0;
-    v0 = v0 < 0 ? 0 : v0;
-    u1 = u1 > last_u ? last_u : u1;
-    v1 = v1 > last_v ? last_v : v1;
-    for (int64_t v = v0; v <= v1; v++) {
-        const uint64_t *row = g->visible[segment] + (v >> 3) * g->across;
-        for (int64_t u = u0; u <= u1;) {
-            int64_t end = u | 7; /* of the block */
+    const double origin[2] = { (double)g->first_u, (double)g->first_v };
+    voxel_box box;
+    for (int a = 0; a < 2; a++) {
+        double bounds[2];
+        beam_bounds(b, a, along, bounds);
+        box.lo[a] = (int32_t)within(floor(bounds[0] - origin[a] - 0x1p-6), -0x1p28, 0x1p28);
+        box.hi[a] = (int32_t)within(floor(bounds[1] - origin[a] + 0x1p-6), -0x1p28, 0x1p28);
+    }
+    return box;
+}
+
+INLINE voxel_box both_boxes(voxel_box a, voxel_box b)
+{
+    for (int i = 0; i < 2; i++) {
+        a.lo[i] = b.lo[i] < a.lo[i] ? b.lo[i] : a.lo[i];
+        a.hi[i] = b.hi[i] > a.hi[i] ? b.hi[i] : a.hi[i];
+    }
+    return a;
+}
+
+/* Cut to the grid; false where nothing is left. */
+INLINE bool cut_box(const trip_cpu_group *g, voxel_box *box)
+{
+    const int32_t last[2] = { g->across * TRIP_CPU_BLOCK - 1, g->down * TRIP_CPU_BLOCK - 1 };
+    for (int i = 0; i < 2; i++) {
+        box->lo[i] = box->lo[i] < 0 ? 0 : box->lo[i];
+        box->hi[i] = box->hi[i] > last[i] ? last[i] : box->hi[i];
+    }
+    return box->lo[0] <= box->hi[0] && box->lo[1] <= box->hi[1];
+}
+
+/* Whether some square of the box may show. */
+INLINE bool squares_show(const trip_cpu_group *g, const uint64_t *visible, voxel_box box)
+{
+    if (!cut_box(g, &box))
+        return false;
+    int32_t u0 = box.lo[0] >> 3, u1 = box.hi[0] >> 3, v1 = box.hi[1] >> 3;
+    for (int32_t v = box.lo[1] >> 3; v <= v1; v++) {
+        const uint64_t *row = visible + (size_t)(v >> 3) * (size_t)g->across;
+        for (int32_t u = u0; u <= u1;) {
+            int32_t end = u | 7; /* of the block */
             end = end > u1 ? u1 : end;
             uint64_t bits = row[u >> 3] >> (v & 7) * 8 & 255;
             if (bits >> (u & 7) & ((2u << (end - u)) - 1))
@@ -152,31 +187,45 @@ INLINE bool may_show(const trip_cpu_group *g, unsigned segment, const int64_t lo
     return false;
 }
 
+/* Whether some cell of the box may show. */
+INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, voxel_box box)
+{
+    if (!cut_box(g, &box))
+        return false;
+    for (int32_t v = box.lo[1] >> 3; v <= box.hi[1] >> 3; v++) {
+        int32_t top = v == box.lo[1] >> 3 ? box.lo[1] & 7 : 0;
+        int32_t bottom = v == box.hi[1] >> 3 ? box.hi[1] & 7 : 7;
+        uint64_t rows = UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
+        for (int32_t u = box.lo[0] >> 3; u <= box.hi[0] >> 3; u++) {
+            size_t at = (size_t)(v >> 3) * (size_t)g->across + (size_t)(u >> 3);
+            int square = (v & 7) * TRIP_CPU_SQUARES_ACROSS + (u & 7);
+            if (!(g->visible[segment][at] >> square & 1))
+                continue;
+            int32_t left = u == box.lo[0] >> 3 ? box.lo[0] & 7 : 0;
+            int32_t right = u == box.hi[0] >> 3 ? box.hi[0] & 7 : 7;
+            uint64_t columns =
+                (0xffu << left & 0xffu >> (7 - right)) * UINT64_C(0x0101010101010101);
+            if (g->cells[segment][at].squares[square] & rows & columns)
+                return true;
+        }
+    }
+    return false;
+}
+
 static uint64_t segments_of_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x,
                                   int y)
 {
-    const double origin[2] = { (double)g->first_u, (double)g->first_v };
     beam b = beam_of(view, x, y, 8);
-    int64_t lo[2][2], hi[2][2];
     uint64_t some = 0;
-    for (unsigned n = 0; n <= g->segments; n++) {
-        double along = from_start(view, g->slices[n].coordinate);
-        for (int a = 0; a < 2; a++) {
-            double bounds[2];
-            beam_bounds(&b, a, along, bounds);
-            /* A little more for what single precision makes of them. */
-            lo[n % 2][a] = (int64_t)within(floor(bounds[0] - origin[a] - 0x1p-6), -0x1p28, 0x1p28);
-            hi[n % 2][a] = (int64_t)within(floor(bounds[1] - origin[a] + 0x1p-6), -0x1p28, 0x1p28);
-        }
-        if (n == 0)
-            continue;
-        int64_t least[2], most[2];
-        for (int a = 0; a < 2; a++) {
-            least[a] = lo[0][a] < lo[1][a] ? lo[0][a] : lo[1][a];
-            most[a] = hi[0][a] > hi[1][a] ? hi[0][a] : hi[1][a];
-        }
-        if (may_show(g, n - 1, least, most))
-            some |= UINT64_C(1) << (n - 1);
+    voxel_box last = beam_box(g, &b, from_start(view, g->slices[0].coordinate));
+    voxel_box end = beam_box(g, &b, from_start(view, g->slices[g->segments].coordinate));
+    if (!squares_show(g, g->some, both_boxes(last, end)))
+        return 0;
+    for (unsigned n = 0; n < g->segments; n++) {
+        voxel_box next = beam_box(g, &b, from_start(view, g->slices[n + 1].coordinate));
+        if (squares_show(g, g->visible[n], both_boxes(last, next)))
+            some |= UINT64_C(1) << n;
+        last = next;
     }
     return some;
 }
@@ -200,10 +249,61 @@ typedef struct stamp_rays {
     vf light[3], to_eye[3], half[3];
 } stamp_rays;
 
+INLINE vi vi_lesser(vi a, vi b)
+{
+    vi m = (vi)(a < b);
+    return (a & m) | (b & ~m);
+}
+
+INLINE vi vi_greater(vi a, vi b)
+{
+    vi m = (vi)(a > b);
+    return (a & m) | (b & ~m);
+}
+
+/* Of all lanes. */
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+
+INLINE int32_t vi_least(vi a)
+{
+    __m128i m =
+        _mm_min_epi32(_mm256_castsi256_si128((__m256i)a), _mm256_extracti128_si256((__m256i)a, 1));
+    m = _mm_min_epi32(m, _mm_shuffle_epi32(m, 0x4e));
+    return _mm_cvtsi128_si32(_mm_min_epi32(m, _mm_shuffle_epi32(m, 0xb1)));
+}
+
+INLINE int32_t vi_most(vi a)
+{
+    __m128i m =
+        _mm_max_epi32(_mm256_castsi256_si128((__m256i)a), _mm256_extracti128_si256((__m256i)a, 1));
+    m = _mm_max_epi32(m, _mm_shuffle_epi32(m, 0x4e));
+    return _mm_cvtsi128_si32(_mm_max_epi32(m, _mm_shuffle_epi32(m, 0xb1)));
+}
+
+#else
+
+INLINE int32_t vi_least(vi a)
+{
+    int32_t least = a[0];
+    for (int i = 1; i < V; i++)
+        least = a[i] < least ? a[i] : least;
+    return least;
+}
+
+INLINE int32_t vi_most(vi a)
+{
+    int32_t most = a[0];
+    for (int i = 1; i < V; i++)
+        most = a[i] > most ? a[i] : most;
+    return most;
+}
+
+#endif
+
 /* Corners of each lane's cell: of the four, where the first lies in the pool. */
 typedef struct corners {
-    int32_t at[V];
-    vf u, v; /* place in the cell */
+    vi whole[2]; /* of the grid */
+    vf part[2];  /* place in the cell */
 } corners;
 
 INLINE vi vi_within(vi a, int32_t least, int32_t most)
@@ -215,35 +315,47 @@ INLINE vi vi_within(vi a, int32_t least, int32_t most)
 INLINE corners corners_at(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l,
                           unsigned n)
 {
-    vi whole[2];
-    vf part[2];
     const int32_t size[2] = { g->across, g->down };
+    corners c;
     for (int a = 0; a < 2; a++) {
         vf at = v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
-        whole[a] = v_truncate(at);
-        part[a] = at - v_from_int(whole[a]);
-        whole[a] = vi_within(whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_BLOCK - 1);
+        at = v_max(at, v_set(0)); /* rays that are not drawn may lie anywhere */
+        c.whole[a] = v_truncate(at);
+        c.part[a] = at - v_from_int(c.whole[a]);
+        c.whole[a] = vi_within(c.whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_BLOCK - 1);
     }
-    vi block = (whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (whole[0] >> TRIP_CPU_BLOCK_LOG2);
-    vi within_block = (whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
-                      (whole[0] & (TRIP_CPU_BLOCK - 1));
-    corners c = { .u = part[0], .v = part[1] };
-    const int32_t *blocks = g->slices[n].blocks;
-    vi same = (vi)(block == block[0] - (vi){ 0 });
-    bool one = true;
-    int32_t numbers[V];
-    vi_store(numbers, same);
-    for (int i = 0; i < V; i++)
-        one &= numbers[i] != 0;
-    if (one) {
-        vi_store(c.at, within_block + blocks[block[0]]);
-        return c;
-    }
-    vi_store(numbers, block);
-    vi_store(c.at, within_block);
-    for (int i = 0; i < V; i++)
-        c.at[i] += blocks[numbers[i]];
     return c;
+}
+
+/* The cells that a stamp's rays pass between two slices. */
+INLINE voxel_box box_between(const corners *a, const corners *b)
+{
+    voxel_box box;
+    for (int i = 0; i < 2; i++) {
+        box.lo[i] = vi_least(vi_lesser(a->whole[i], b->whole[i]));
+        box.hi[i] = vi_most(vi_greater(a->whole[i], b->whole[i]));
+    }
+    return box;
+}
+
+/* Where the first corners lie in the pool. */
+INLINE void find_places(const trip_cpu_group *g, unsigned n, const corners *c, int32_t at[V])
+{
+    vi block =
+        (c->whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (c->whole[0] >> TRIP_CPU_BLOCK_LOG2);
+    vi within_block = (c->whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
+                      (c->whole[0] & (TRIP_CPU_BLOCK - 1));
+    const int32_t *blocks = g->slices[n].blocks;
+    int32_t numbers[V];
+    vi_store(numbers, block);
+    vi other = block ^ vi_set(numbers[0]);
+    if (vi_most(other) == 0 && vi_least(other) == 0) {
+        vi_store(at, within_block + blocks[numbers[0]]);
+        return;
+    }
+    vi_store(at, within_block);
+    for (int i = 0; i < V; i++)
+        at[i] += blocks[numbers[i]];
 }
 
 #if TRIP_SIMD == TRIP_SIMD_AVX2
@@ -260,20 +372,22 @@ INLINE __m256i two_corners(const trip_cpu_voxel *pool, const int32_t at[V], int 
                                order);
 }
 
-INLINE sample sample_at(const trip_cpu_group *g, const corners *c)
+INLINE sample sample_at(const trip_cpu_group *g, unsigned n, const corners *c)
 {
+    int32_t places[V];
+    find_places(g, n, c, places);
     const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
     /* w << 16 | 2^14 - w */
-    vi w = v_truncate(v_fma(c->u, v_set(1 << WEIGHT_LOG2), v_set(0.5f)));
+    vi w = v_truncate(v_fma(c->part[0], v_set(1 << WEIGHT_LOG2), v_set(0.5f)));
     vi weights = w * 0xffff + (1 << WEIGHT_LOG2);
     __m256 rows[4];
     __m256i lack[4];
     for (int i = 0; i < 4; i++) {
         const __m256i lane = _mm256_setr_epi32(i, i, i, i, i + 4, i + 4, i + 4, i + 4);
         __m256i weight = _mm256_permutevar8x32_epi32((__m256i)weights, lane);
-        __m256 down = _mm256_permutevar8x32_ps((__m256)c->v, lane);
-        __m256i a = two_corners(g->pool, c->at, i, 0);
-        __m256i b = two_corners(g->pool, c->at, i, TRIP_CPU_BLOCK_STRIDE);
+        __m256 down = _mm256_permutevar8x32_ps((__m256)c->part[1], lane);
+        __m256i a = two_corners(g->pool, places, i, 0);
+        __m256i b = two_corners(g->pool, places, i, TRIP_CPU_BLOCK_STRIDE);
         lack[i] = _mm256_or_si256(_mm256_cmpeq_epi16(a, missing), _mm256_cmpeq_epi16(b, missing));
         __m256 top = _mm256_cvtepi32_ps(_mm256_madd_epi16(a, weight));
         __m256 bottom = _mm256_cvtepi32_ps(_mm256_madd_epi16(b, weight));
@@ -333,16 +447,18 @@ INLINE float4 between_corners(const trip_cpu_voxel *at, float u)
     return a + (b - a) * u;
 }
 
-INLINE sample sample_at(const trip_cpu_group *g, const corners *c)
+INLINE sample sample_at(const trip_cpu_group *g, unsigned n, const corners *c)
 {
+    int32_t places[V];
+    find_places(g, n, c, places);
     float of[4][V];
     int32_t there[V];
     for (int i = 0; i < V; i++) {
-        const trip_cpu_voxel *at = g->pool + c->at[i], *below = at + TRIP_CPU_BLOCK_STRIDE;
-        int steps = (int)(c->u[i] * (1 << WEIGHT_LOG2) + 0.5f);
+        const trip_cpu_voxel *at = g->pool + places[i], *below = at + TRIP_CPU_BLOCK_STRIDE;
+        int steps = (int)(c->part[0][i] * (1 << WEIGHT_LOG2) + 0.5f);
         float u = (float)steps / (1 << WEIGHT_LOG2);
         float4 top = between_corners(at, u), bottom = between_corners(below, u);
-        float4 all = top + (bottom - top) * c->v[i];
+        float4 all = top + (bottom - top) * c->part[1][i];
         for (int k = 0; k < 4; k++)
             of[k][i] = all[k];
         there[i] = at[0].code != TRIP_CPU_CODE_MISSING && at[1].code != TRIP_CPU_CODE_MISSING &&
@@ -467,7 +583,7 @@ INLINE void light_segment(const trip_cpu_sheet_view *view, const stamp_rays *l, 
         facing = to_light * dot3(n, l->to_eye) * inverse;
     }
     facing = v_min(v_set(1), v_max(v_set(0), facing * v_set((float)TRIP_FACING)));
-    static_assert(TRIP_SHININESS == 24, "the powers below");
+    static_assert((int)TRIP_SHININESS == 24, "the powers below");
     vf p2 = to_half * to_half, p4 = p2 * p2, p8 = p4 * p4;
     vf highlight = strength * v_set((float)TRIP_SPECULAR) * p8 * p8 * p8 * facing;
     vf matt =
@@ -593,20 +709,24 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const tile_path *path, const stamp_rays *l, uint64_t segments, float *stamp)
 {
     vf pixel[CHANNELS];
+    corners at[2];
     sample ends[2];
-    unsigned last = UINT32_MAX; /* the slice of which ends[last % 2] is */
+    unsigned placed = UINT32_MAX, sampled = UINT32_MAX; /* slices: at[n % 2], ends[n % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
     for (; segments; segments &= segments - 1) {
-        unsigned n = (unsigned)__builtin_ctzll(segments);
-        if (last != n) {
-            corners c = corners_at(g, path, l, n);
-            ends[n % 2] = sample_at(g, &c);
-        }
-        last = n + 1;
-        corners c = corners_at(g, path, l, last);
-        ends[last % 2] = sample_at(g, &c);
-        composite_segment(view, l, path, n, &ends[n % 2], &ends[last % 2], pixel);
+        unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
+        if (placed != n)
+            at[n % 2] = corners_at(g, path, l, n);
+        at[next % 2] = corners_at(g, path, l, next);
+        placed = next;
+        if (!cells_show(g, n, box_between(&at[0], &at[1])))
+            continue;
+        if (sampled != n)
+            ends[n % 2] = sample_at(g, n, &at[n % 2]);
+        ends[next % 2] = sample_at(g, next, &at[next % 2]);
+        sampled = next;
+        composite_segment(view, l, path, n, &ends[n % 2], &ends[next % 2], pixel);
         close_saturated(pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
             break;

@@ -39,6 +39,11 @@ typedef struct trip_cpu_square_ranges {
     int16_t least[64], most[64];
 } trip_cpu_square_ranges;
 
+/* The cells of a block's squares, between a sheet and the next: a bit each, row by row. */
+typedef struct trip_cpu_cells {
+    uint64_t squares[64];
+} trip_cpu_cells;
+
 /* The blocks of a sheet or slice in a grid of `across` x `down`, the outermost of which are absent:
  * where each starts in the pool; 0 is the block in which every voxel is missing. */
 typedef struct trip_cpu_slice {
@@ -66,8 +71,11 @@ typedef struct trip_cpu_group {
     int32_t across, down;
     unsigned segments;
     trip_cpu_slice slices[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
-    /* For each segment and block of the grid: the squares in which some cell may show. */
+    /* For each segment and block of the grid: the squares in which some cell may show, and those
+     * cells, of squares that have some. */
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
+    const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];
+    const uint64_t *some; /* squares visible in any segment */
 } trip_cpu_group;
 
 /* Constants of a pass over the sheets of a list. Vectors are by the list's own axes: u, v, sheet.

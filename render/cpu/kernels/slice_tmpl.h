@@ -48,6 +48,17 @@ INLINE vh vh_is_missing(vh a)
     return _mm256_cmpeq_epi16(a, _mm256_set1_epi16(TRIP_CPU_CODE_MISSING));
 }
 
+INLINE vh vh_greater(vh a, vh b)
+{
+    return _mm256_cmpgt_epi16(a, b);
+}
+
+/* A bit for each voxel of which the code's number is set. */
+INLINE unsigned vh_code_bits(vh m)
+{
+    return ((unsigned)_mm256_movemask_epi8(m) & 0x01010101u) * 0x10204080u >> 28;
+}
+
 /* b where m is set, else a. */
 INLINE vh vh_select(vh m, vh a, vh b)
 {
@@ -188,6 +199,16 @@ INLINE vh vh_is_missing(vh a)
     return (vh)(a == TRIP_CPU_CODE_MISSING);
 }
 
+INLINE vh vh_greater(vh a, vh b)
+{
+    return (vh)(a > b);
+}
+
+INLINE unsigned vh_code_bits(vh m)
+{
+    return (m[0] & 1u) | (m[4] & 2u);
+}
+
 INLINE vh vh_codes(vh a)
 {
     return (vh){ a[0], a[0], a[0], a[0], a[4], a[4], a[4], a[4] };
@@ -287,6 +308,42 @@ static void sheet_ranges(const trip_cpu_voxel *block, uint64_t squares, trip_cpu
         int low = vh_least_code(least);
         out->least[square] = (int16_t)(low == INT16_MAX ? low : low + 1);
         out->most[square] = vh_most_code(most);
+    }
+}
+
+/* The least and greatest of two voxels beside each other at two sheets. */
+typedef struct extremes {
+    vh least, most;
+} extremes;
+
+INLINE extremes extremes_at(const trip_cpu_voxel *from, const trip_cpu_voxel *to)
+{
+    vh a = vh_load(from), b = vh_load(from + 1), c = vh_load(to), d = vh_load(to + 1);
+    return (extremes){ vh_min(vh_min(a, b), vh_min(c, d)), vh_max(vh_max(a, b), vh_max(c, d)) };
+}
+
+static void sheet_cells(const trip_cpu_voxel *from, const trip_cpu_voxel *to, uint64_t squares,
+                        int16_t least, int16_t most, trip_cpu_cells *out)
+{
+    const vh lowest = vh_set(least), highest = vh_set(most);
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        int square = __builtin_ctzll(rest);
+        int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_BLOCK_STRIDE +
+                    square % TRIP_CPU_SQUARES_ACROSS * 8;
+        uint64_t seen = 0;
+        for (int u = 0; u < 8; u += HV) {
+            extremes above = extremes_at(from + first + u, to + first + u);
+            for (int v = 0; v < 8; v++) {
+                int at = first + (v + 1) * TRIP_CPU_BLOCK_STRIDE + u;
+                extremes below = extremes_at(from + at, to + at);
+                vh low = vh_min(above.least, below.least), high = vh_max(above.most, below.most);
+                vh out_of = vh_or(vh_or(vh_greater(low, highest), vh_greater(lowest, high)),
+                                  vh_is_missing(low));
+                seen |= (uint64_t)(~vh_code_bits(out_of) & ((1u << HV) - 1)) << (8 * v + u);
+                above = below;
+            }
+        }
+        out->squares[square] = seen;
     }
 }
 

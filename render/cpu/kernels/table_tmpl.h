@@ -28,8 +28,9 @@
         .squares = squares, .stage = stage, .project = project, .tile_clear = tile_clear,          \
         .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
         .tile_merge = tile_merge, .tile_finish = tile_finish, .drawn = drawn,                      \
-        .sheet_ranges = sheet_ranges, .sheet_gradients = sheet_gradients,                          \
-        .sheet_between = sheet_between, .sheet_tile = sheet_tile,                                  \
+        .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
+        .sheet_gradients = sheet_gradients, .sheet_between = sheet_between,                        \
+        .sheet_tile = sheet_tile,                                                                  \
     }
 
 #endif

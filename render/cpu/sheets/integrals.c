@@ -69,6 +69,12 @@ static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
         next = table[code].extinction > 0 ? (uint32_t)code : next;
         f->next_visible[code] = next;
     }
+    uint32_t first = f->next_visible[0], last = first;
+    while (last + 1 < CODES && f->next_visible[last + 1] == last + 1)
+        last++;
+    f->in_a_row = first < CODES && (last + 1 >= CODES || f->next_visible[last + 1] == CODES);
+    f->first_visible = (int16_t)((int)first - TRIP_CPU_CODE_BIAS);
+    f->last_visible = (int16_t)((int)last - TRIP_CPU_CODE_BIAS);
 }
 
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table)

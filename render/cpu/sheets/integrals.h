@@ -9,6 +9,8 @@
 
 typedef struct trip_cpu_function {
     trip_cpu_integrals integrals;
+    bool in_a_row; /* codes with extinction, first_visible to last_visible, biased */
+    int16_t first_visible, last_visible;
     uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
 } trip_cpu_function;
 

@@ -158,12 +158,16 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
     }
 }
 
+/* `from` is where the interval starts that the segment before the slice lies in; NULL: the slice
+ * is the group's first. */
 static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coordinate,
-                      const uint64_t *visible)
+                      const trip_cpu_sheet *from)
 {
     trip_cpu_group *g = &s->group;
-    if (visible)
-        g->visible[g->segments++] = visible;
+    if (from) {
+        g->visible[g->segments] = from->visible;
+        g->cells[g->segments++] = from->cells;
+    }
     g->slices[g->segments] = (trip_cpu_slice){ at->blocks, coordinate };
 }
 
@@ -175,7 +179,7 @@ static bool cut_slice(trip_cpu_sheets *s, int i, double part, bool first, int *c
     if (!trip_cpu_store_cut(&s->store, slice, from, to, from->visible, part))
         return false;
     (*cut)++;
-    add_slice(s, slice, (double)from->number + part * (double)s->way, first ? NULL : from->visible);
+    add_slice(s, slice, (double)from->number + part * (double)s->way, first ? NULL : from);
     return true;
 }
 
@@ -197,7 +201,7 @@ static bool cut_interval(trip_cpu_sheets *s, int i, bool first, int *cut)
         if (n > eye * slices)
             fits = cut_slice(s, i, (double)n / slices, false, cut);
     if (fits) {
-        add_slice(s, to, (double)to->number, from->visible);
+        add_slice(s, to, (double)to->number, from);
         return true;
     }
     while (*cut > cut_before)
@@ -224,19 +228,25 @@ static void draw_tile(void *context, unsigned task, unsigned thread)
     atomic_store_explicit(&r->mask.tiles[task], open, memory_order_relaxed);
 }
 
-static bool shows(const trip_cpu_sheets *s)
+/* Gathers the squares that are visible in some segment; false when there are none. */
+static bool find_some(trip_cpu_sheets *s)
 {
     size_t grid = trip_cpu_store_grid(&s->store);
-    for (unsigned n = 0; n < s->group.segments; n++)
-        for (size_t i = 0; i < grid; i++)
-            if (s->group.visible[n][i])
-                return true;
-    return false;
+    uint64_t any = 0;
+    for (size_t i = 0; i < grid; i++) {
+        uint64_t some = 0;
+        for (unsigned n = 0; n < s->group.segments; n++)
+            some |= s->group.visible[n][i];
+        s->store.some[i] = some;
+        any |= some;
+    }
+    s->group.some = s->store.some;
+    return any != 0;
 }
 
 static void draw_tiles(trip_cpu_sheets *s)
 {
-    if (!shows(s))
+    if (!find_some(s))
         return;
     trip_cpu_job job = { .run = draw_tile, .context = s, .tasks = trip_cpu_tile_count(s->of) };
     trip_cpu_pool_start(s->of->pool, &job);

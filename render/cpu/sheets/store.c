@@ -78,9 +78,11 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->blocks = part(memory, &at, grid * sizeof *sheet->blocks);
         sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
         sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
+        sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
     }
     for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++)
         s->slices[i].blocks = part(memory, &at, grid * sizeof *s->slices[i].blocks);
+    s->some = part(memory, &at, grid * sizeof *s->some);
     return at;
 }
 
@@ -265,6 +267,48 @@ void trip_cpu_store_prepare(trip_cpu_store *s, trip_cpu_sheet *sheet)
     sheet->prepared = true;
 }
 
+/* Which cells of a square may show, one by one: of functions that show here and there. */
+static uint64_t square_cells(const rows_job *job, size_t at, int square)
+{
+    const trip_cpu_store *s = job->store;
+    const trip_cpu_voxel *of[2] = { block_at(s, job->sheet, at), block_at(s, job->other, at) };
+    int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_BLOCK_STRIDE +
+                square % TRIP_CPU_SQUARES_ACROSS * 8;
+    uint64_t cells = 0;
+    for (int i = 0; i < 64; i++) {
+        int16_t least = INT16_MAX, most = INT16_MIN;
+        for (int k = 0; k < 8; k++) {
+            const trip_cpu_voxel *voxel = of[k >> 2] + first +
+                                          (i / 8 + (k >> 1 & 1)) * TRIP_CPU_BLOCK_STRIDE + i % 8 +
+                                          (k & 1);
+            least = voxel->code < least ? voxel->code : least;
+            most = voxel->code > most ? voxel->code : most;
+        }
+        if (least != TRIP_CPU_CODE_MISSING && trip_cpu_function_shows(job->function, least, most))
+            cells |= UINT64_C(1) << i;
+    }
+    return cells;
+}
+
+/* Finds the cells that may show, of squares that do: those that then have some. */
+static uint64_t cells_of(const rows_job *job, size_t at, uint64_t squares)
+{
+    const trip_cpu_store *s = job->store;
+    const trip_cpu_function *f = job->function;
+    trip_cpu_cells *cells = &job->sheet->cells[at];
+    if (f->in_a_row)
+        s->kernels->sheet_cells(block_at(s, job->sheet, at), block_at(s, job->other, at), squares,
+                                f->first_visible, f->last_visible, cells);
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        int square = __builtin_ctzll(rest);
+        if (!f->in_a_row)
+            cells->squares[square] = square_cells(job, at, square);
+        if (!cells->squares[square])
+            squares &= ~(UINT64_C(1) << square);
+    }
+    return squares;
+}
+
 static void find_visible(const rows_job *job, size_t at)
 {
     const trip_cpu_square_ranges *a = &job->sheet->ranges[at], *b = &job->other->ranges[at];
@@ -277,7 +321,7 @@ static void find_visible(const rows_job *job, size_t at)
             if (any && trip_cpu_function_shows(job->function, least, most))
                 visible |= UINT64_C(1) << i;
         }
-    job->sheet->visible[at] = visible;
+    job->sheet->visible[at] = visible ? cells_of(job, at, visible) : 0;
 }
 
 void trip_cpu_store_find_visible(trip_cpu_store *s, trip_cpu_sheet *from, const trip_cpu_sheet *to,

@@ -16,6 +16,7 @@ typedef struct trip_cpu_sheet {
     int32_t *blocks;                /* where each starts in the pool; 0: absent */
     trip_cpu_square_ranges *ranges; /* of sheets; of blocks that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
+    trip_cpu_cells *cells;          /* those of squares that are visible */
     bool prepared, shaded;          /* ranges are there; gradients are */
 } trip_cpu_sheet;
 
@@ -40,7 +41,7 @@ typedef struct trip_cpu_store {
     char *grids; /* of the sheets and slices below */
     size_t grids_bytes;
     trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], slices[TRIP_CPU_SLICES_MAX];
-    uint32_t *cleared; /* blocks of the grid: to be cleared before the next runs are decoded */
+    uint64_t *some; /* squares visible in any of the segments drawn at a time */
 } trip_cpu_store;
 
 /* Room for lists whose voxels lie in [first, last] along u and v (blocks, inclusive); every sheet
