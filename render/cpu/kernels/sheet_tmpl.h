@@ -493,7 +493,6 @@ INLINE void row_differences(int32_t (*rows)[4], vi to, vi from, vi out[4])
 typedef struct shown {
     vf extinction; /* 0: nothing */
     vf rgb[3];
-    vf where;
 } shown;
 
 /* Where both ends have the same code, what the function is there. */
@@ -518,21 +517,7 @@ INLINE vm vi_equal(vi a, vi b)
     return v_ge(v_set(0), v_abs(v_from_int(a - b)));
 }
 
-INLINE vf mean_place(const trip_cpu_integrals *in, const sample *a, const sample *b, vf extinction,
-                     vf codes)
-{
-    int32_t from[V], to[V], sums[V];
-    vi_store(from, a->index);
-    vi_store(to, b->index);
-    for (int i = 0; i < V; i++)
-        sums[i] = in->codes[to[i]] - in->codes[from[i]];
-    vf mean = v_from_int(vi_load(sums)) / extinction * v_set(in->code);
-    vf where = (mean - v_from_int(a->index)) / codes;
-    where = v_min(v_max(where, v_set(0)), v_set(1));
-    return v_select(v_gt(v_abs(codes), v_set(64)), where, v_set(0.5f));
-}
-
-INLINE shown classified(const trip_cpu_integrals *in, const sample *a, const sample *b, bool place)
+INLINE shown classified(const trip_cpu_integrals *in, const sample *a, const sample *b)
 {
     vi sums[4];
     vf codes = v_from_int(b->index - a->index);
@@ -544,15 +529,13 @@ INLINE shown classified(const trip_cpu_integrals *in, const sample *a, const sam
     }
     vf extinction = v_from_int(sums[0]);
     vm some = v_gt(v_abs(extinction), v_set(0));
-    shown s = { .extinction = v_set(0), .where = v_set(0.5f) };
+    shown s = { .extinction = v_set(0) };
     if (!vm_any(some))
         return s;
     vf inverse = v_set(1) / v_select(some, extinction, v_set(1));
     for (int k = 0; k < 3; k++)
         s.rgb[k] = v_from_int(sums[k + 1]) * inverse;
     s.extinction = extinction / codes * v_set(in->extinction);
-    if (place)
-        s.where = mean_place(in, a, b, v_select(some, extinction, v_set(1)), codes);
     return s;
 }
 
@@ -561,13 +544,13 @@ INLINE vf dot3(const vf a[3], const vf b[3])
     return v_fma(a[0], b[0], v_fma(a[1], b[1], a[2] * b[2]));
 }
 
-/* As trip_shade(), with the gradient between those of the ends. */
+/* As trip_shade(), with the mean of the gradients of the ends. */
 INLINE void light_segment(const trip_cpu_sheet_view *view, const stamp_rays *l, const sample *a,
                           const sample *b, shown *s)
 {
     vf g[3], n[3];
     for (int k = 0; k < 3; k++)
-        g[k] = v_fma(b->gradient[k] - a->gradient[k], s->where, a->gradient[k]);
+        g[k] = a->gradient[k] + b->gradient[k]; /* twice their mean */
     for (int k = 0; k < 3; k++)
         n[k] = v_fma(g[0], v_set(view->gradient[k][0]),
                      v_fma(g[1], v_set(view->gradient[k][1]), g[2] * v_set(view->gradient[k][2])));
@@ -602,7 +585,7 @@ INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays 
     open = vm_and(open, l->along);
     if (!vm_any(open))
         return;
-    shown s = classified(view->integrals, a, b, view->shading || TRIP_CPU_DEPTH);
+    shown s = classified(view->integrals, a, b);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
     if (!vm_any(open))
         return;
@@ -615,8 +598,8 @@ INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays 
     for (int k = 0; k < 3; k++)
         pixel[k] = v_fma(add, s.rgb[k], pixel[k]);
     if (TRIP_CPU_DEPTH) {
-        vf at = v_fma(s.where, v_set(path->along[n + 1] - path->along[n]), v_set(path->along[n]));
-        vf z = v_fma(at, l->depth, l->depth_at_start);
+        vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
+        vf z = v_fma(middle, l->depth, l->depth_at_start);
         pixel[CHANNELS - 1] = v_fma(add, z, pixel[CHANNELS - 1]);
     }
     pixel[3] = pixel[3] - add;

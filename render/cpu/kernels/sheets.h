@@ -51,15 +51,13 @@ typedef struct trip_cpu_slice {
     double coordinate; /* along the list's axis */
 } trip_cpu_slice;
 
-/* Integrals of the transfer function from code 0 to each code, times factors that make the greatest
- * of each 2^30: of extinction, extinction times each colour component (the same factor), and
- * extinction times code. Differences of them are exact but for the rounding of each. */
+/* Integrals of the transfer function from code 0 to each code, times a factor that makes the
+ * greatest 2^30: of extinction, and of extinction times each colour component. Differences of them
+ * are exact but for the rounding of each. */
 typedef struct trip_cpu_integrals {
     int32_t (*sums)[4]; /* 65536: extinction, red, green, blue */
     int32_t (*at)[4];   /* what they grow by from one code to the next, at a code */
-    int32_t *codes;     /* of extinction times code */
     float extinction;   /* 1 of sums[0], per world unit */
-    float code;         /* 1 of codes[] in 1 of sums[][0] */
 } trip_cpu_integrals;
 
 /* Segments of a group: at most so many, and one slice more. */
@@ -89,7 +87,7 @@ typedef struct trip_cpu_sheet_view {
     double eye[3], r0[3], rx[3], ry[3];
     double steepest;      /* rays move at most so far along u or v from one sheet to the next */
     double world[3][3];   /* row, column: index_to_world of u, v, sheet */
-    float gradient[3][3]; /* from differences of codes to world space, over gradient_full */
+    float gradient[3][3]; /* from differences of codes to half of world space, over gradient_full */
     float light[3];       /* without headlight, or in parallel views towards the eye */
     float to_eye[3];      /* in parallel views */
 } trip_cpu_sheet_view;

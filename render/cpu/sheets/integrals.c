@@ -4,7 +4,7 @@
 
 enum { CODES = 65536 };
 
-/* The greatest of each kind of integral, so that differences fit 32 bits with a sign. */
+/* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
 
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
@@ -13,9 +13,8 @@ bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
     *f = (trip_cpu_function){ 0 };
     in->sums = trip_budget_take(budget, CODES * sizeof *in->sums);
     in->at = trip_budget_take(budget, CODES * sizeof *in->at);
-    in->codes = trip_budget_take(budget, CODES * sizeof *in->codes);
     f->next_visible = trip_budget_take(budget, CODES * sizeof *f->next_visible);
-    if (in->sums && in->at && in->codes && f->next_visible)
+    if (in->sums && in->at && f->next_visible)
         return true;
     trip_cpu_function_destroy(f, budget);
     return false;
@@ -26,7 +25,6 @@ void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget)
     trip_cpu_integrals *in = &f->integrals;
     trip_budget_release(budget, in->sums, CODES * sizeof *in->sums);
     trip_budget_release(budget, in->at, CODES * sizeof *in->at);
-    trip_budget_release(budget, in->codes, CODES * sizeof *in->codes);
     trip_budget_release(budget, f->next_visible, CODES * sizeof *f->next_visible);
     *f = (trip_cpu_function){ 0 };
 }
@@ -42,14 +40,13 @@ static double product(double a0, double a1, double b0, double b1)
     return (a0 * (2 * b0 + b1) + a1 * (b0 + 2 * b1)) / 6;
 }
 
-/* From one code to the next: of extinction, extinction times colour, extinction times code. */
-static void step(const trip_tf_entry *table, int code, double out[5])
+/* From one code to the next: of extinction, and of extinction times each component of colour. */
+static void step(const trip_tf_entry *table, int code, double out[4])
 {
     const trip_tf_entry *a = &table[code], *b = &table[code + 1];
     out[0] = 0.5 * ((double)a->extinction + b->extinction);
     for (int i = 0; i < 3; i++)
         out[1 + i] = product(a->extinction, b->extinction, component(a, i), component(b, i));
-    out[4] = product(a->extinction, b->extinction, code, code + 1);
 }
 
 static void set_at(trip_cpu_integrals *in, const trip_tf_entry *table, double factor)
@@ -80,27 +77,23 @@ static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table)
 {
     trip_cpu_integrals *in = &f->integrals;
-    double all[5] = { 0 }, sum[5] = { 0 }, add[5];
+    double all = 0, sum[4] = { 0 }, add[4];
     for (int code = 0; code < CODES - 1; code++) {
         step(table, code, add);
-        for (int i = 0; i < 5; i++)
-            all[i] += add[i];
+        all += add[0];
     }
     /* A function of one code alone still has what at[] is in units of. */
-    double factor = all[0] > 0 ? GREATEST / all[0] : 1;
-    double code_factor = all[4] > 0 ? GREATEST / all[4] : 1;
+    double factor = all > 0 ? GREATEST / all : 1;
     for (int code = 0; code < CODES; code++) {
         for (int i = 0; i < 4; i++)
             in->sums[code][i] = (int32_t)lrint(factor * sum[i]);
-        in->codes[code] = (int32_t)lrint(code_factor * sum[4]);
         if (code == CODES - 1)
             break;
         step(table, code, add);
-        for (int i = 0; i < 5; i++)
+        for (int i = 0; i < 4; i++)
             sum[i] += add[i];
     }
     set_at(in, table, factor);
     set_next_visible(f, table);
     in->extinction = (float)(1 / factor);
-    in->code = (float)(factor / code_factor);
 }

@@ -16,12 +16,12 @@ static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
 }
 
 /* World-space gradients from those of index space: the inverse transpose of the map. Differences
- * are of codes, and lengths are over that of full shading. */
+ * are of codes, lengths over that of full shading; half of it, for what takes the sum of two. */
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame)
 {
     const trip_file_header *h = &frame->data->header;
     double full = trip_shade_gradient_full(h, frame->camera->voxel_world);
-    double unit = (h->code_hi - h->code_lo) / 65535 / full;
+    double unit = 0.5 * (h->code_hi - h->code_lo) / 65535 / full;
     double m[3][3], adjugate[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)

@@ -7,7 +7,7 @@
 #include "report.h"
 
 /* A share of the memory that is left, and the least that is of use. */
-enum { LEFT_OVER = 4, LEAST_BLOCKS = 64 };
+enum { LEFT_OVER = 4, LEAST_BLOCKS = 6 };
 
 #define COLUMN_0 UINT64_C(0x0101010101010101)
 #define COLUMN_7 UINT64_C(0x8080808080808080)

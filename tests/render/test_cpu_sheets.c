@@ -1,0 +1,414 @@
+/* Frames of the CPU renderer that classify after interpolation: what must not change a bit of them
+ * (threads, memory, tiles, batches, what is occluded), and the kernels that prepare sheets, against
+ * sheet.h worked out voxel by voxel. */
+#include "cpu/cpu_renderer.h"
+#include "cpu/kernels/isa.h"
+#include "cpu_scenes.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE_I = 70, SIDE_J = 45, SIDE_K = 40 };
+
+/* Waves, of which the crests are kept. */
+static double wave(int i, int j, int k)
+{
+    return 0.5 + 0.25 * sin(0.31 * i + 0.2) + 0.25 * sin(0.27 * j) * cos(0.35 * k);
+}
+
+static bool is_kept(int i, int j, int k)
+{
+    return wave(i, j, k) > 0.5;
+}
+
+static bool crest(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)(65535 * wave(i, j, k));
+    return is_kept(i, j, k);
+}
+
+/* The neighbours of crests, but for a few that are missing. */
+static bool beside(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    bool some = false;
+    crest(user, i, j, k, code, gradient);
+    for (int n = 0; n < 27 && !some; n++) {
+        int a = i + n % 3 - 1, b = j + n / 3 % 3 - 1, c = k + n / 9 - 1;
+        some = a >= 0 && b >= 0 && c >= 0 && a < SIDE_I && b < SIDE_J && c < SIDE_K &&
+               is_kept(a, b, c);
+    }
+    return some && !is_kept(i, j, k) && scene_hash(i, j, k) % 200 != 0;
+}
+
+static void make_waves(scene *s, unsigned tile, double opacity)
+{
+    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = beside };
+    scene_create(s, &(scene_params){ .dims = { SIDE_I, SIDE_J, SIDE_K },
+                                     .tile_voxels = tile,
+                                     .slab_sheets = 8,
+                                     .voxel = crest,
+                                     .parts = &halo,
+                                     .part_count = 1 });
+    scene_colour(s, 33000, 45000, 0.2, 0.5, 1, opacity / 4);
+    scene_colour(s, 45001, 55000, 0.9, 0.4, 0.1, opacity / 2);
+    scene_colour(s, 57000, 65535, 1, 1, 0.6, opacity);
+}
+
+static trip_settings post(int slices)
+{
+    trip_settings settings = trip_settings_default();
+    settings.classify = TRIP_CLASSIFY_POST;
+    settings.slices = slices;
+    return settings;
+}
+
+static trip_camera_params from_outside(const scene *s)
+{
+    return scene_view(s, trip_v3(1, 0.8, 0.6), 90, 50, 120);
+}
+
+static trip_camera_params from_inside(const scene *s)
+{
+    return scene_view(s, trip_v3(1, 0.8, 0.6), 6.3, 100, 120);
+}
+
+static trip_camera_params parallel(const scene *s)
+{
+    trip_camera_params view = from_outside(s);
+    view.ortho_height = 60;
+    return view;
+}
+
+static void assert_same(const scene_picture *a, const scene_picture *b)
+{
+    assert_memory_equal(a->rgba, b->rgba, 16 * (size_t)a->width * (size_t)a->height);
+}
+
+static void assert_shows(const scene_picture *p)
+{
+    double sum = 0;
+    for (int i = 0; i < p->width * p->height; i++)
+        sum += (double)p->rgba[4 * i];
+    assert_true(sum > 0.01 * p->width * p->height);
+}
+
+/* Pictures of `a` by one thread and of `b` as said are the same, with every instruction set. */
+static void check_same(const scene *a, const scene *b, unsigned threads,
+                       const trip_reader_params *reader)
+{
+    const trip_camera_params views[3] = { from_outside(a), from_inside(a), parallel(a) };
+    trip_settings settings = post(2);
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+        for (int i = 0; i < 3; i++) {
+            cpu_scenes_threads = 1;
+            scene_picture p = scene_draw(a, &cpu_scenes_cpu, &views[i], &settings);
+            cpu_scenes_threads = threads;
+            scene_picture q = scene_draw_with(b, &cpu_scenes_cpu, &views[i], &settings, reader);
+            assert_shows(&p);
+            assert_same(&p, &q);
+            scene_picture_free(&p);
+            scene_picture_free(&q);
+        }
+    }
+    unsetenv("TRIPTYCH_ISA");
+}
+
+static void any_number_of_threads_draws_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    make_waves(&s, 32, 0.4);
+    for (unsigned threads = 2; threads <= 5; threads++)
+        check_same(&s, &s, threads, &(trip_reader_params){ 0 });
+    scene_destroy(&s);
+}
+
+static void any_tile_of_the_data_and_any_batch_draw_the_same(void **state)
+{
+    (void)state;
+    scene first;
+    make_waves(&first, 16, 0.4);
+    for (unsigned tile = 32; tile <= 128; tile *= 2) {
+        scene s;
+        make_waves(&s, tile, 0.4);
+        check_same(&first, &s, 3, &(trip_reader_params){ .slots = 2, .slot_bytes = 4096 });
+        scene_destroy(&s);
+    }
+    scene_destroy(&first);
+}
+
+/* Draws with so much memory; a negative status where it does not suffice. */
+static int draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
+                       const trip_camera_params *view, float *rgba)
+{
+    trip_budget *budget;
+    trip_renderer *renderer = NULL;
+    trip_reader *reader = NULL;
+    trip_plan plan = { 0 };
+    trip_camera camera;
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_budget_create(&budget, bytes), 0);
+    trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = settings, .plan = &plan, .table = s->table
+    };
+    trip_frame_stats stats;
+    int status = trip_plan_make(&plan, s->data, &camera, settings, s->table, budget);
+    if (!status)
+        status = trip_cpu_create(&renderer, budget, 2);
+    if (!status)
+        status = trip_reader_create(
+            &reader, s->data,
+            &(trip_reader_params){ .planes = plan.planes, .slots = 2, .slot_bytes = 65536 },
+            budget);
+    if (!status)
+        status = trip_frame_draw(renderer, reader, &frame, rgba, NULL, &stats);
+    trip_reader_destroy(reader);
+    if (renderer)
+        renderer->ops->destroy(renderer);
+    trip_plan_release(&plan, budget);
+    trip_budget_destroy(budget);
+    return status;
+}
+
+/* From too little upwards, in steps of less than a sheet: each either fails with a message or draws
+ * the same, whether it holds one pair of sheets at a time or all. */
+static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state)
+{
+    (void)state;
+    scene s;
+    make_waves(&s, 32, 0.4);
+    trip_settings settings = post(3);
+    trip_camera_params view = from_outside(&s);
+    size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
+    float *whole = malloc(bytes), *some = malloc(bytes);
+    assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
+    int drawn = 0, refused = 0;
+    for (uint64_t memory = 4 << 20; memory < 20 << 20; memory += 200000) {
+        memset(some, 0, bytes);
+        int status = draw_within(&s, memory, &settings, &view, some);
+        if (status == 0)
+            assert_memory_equal(some, whole, bytes);
+        drawn += status == 0;
+        refused += status != 0;
+    }
+    print_message("%d memories drew, %d were too little\n", drawn, refused);
+    assert_true(drawn > 10 && refused > 0);
+    free(whole);
+    free(some);
+    scene_destroy(&s);
+}
+
+static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)(i * 1000 + j * 300 + k);
+    return true;
+}
+
+/* A block that hides what lies behind its face, from the reader's side too. */
+static void leaving_out_what_is_occluded_draws_the_same(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s,
+                 &(scene_params){
+                     .dims = { 48, 48, 48 }, .tile_voxels = 16, .slab_sheets = 4, .voxel = solid });
+    scene_colour(&s, 0, 65535, 0.4, 0.7, 0.2, 0.95);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
+    trip_settings settings = post(2);
+    trip_renderer *renderer;
+    trip_reader *reader;
+    trip_plan plan;
+    trip_camera camera;
+    trip_frame_stats stats;
+    cpu_scenes_threads = 2;
+    scene_picture all = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s.data, &camera, &settings, s.table, s.budget), 0);
+    assert_int_equal(trip_cpu_create(&renderer, s.budget, 2), 0);
+    trip_frame frame = {
+        .data = s.data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s.table
+    };
+    const trip_reader_params params = { .planes = plan.planes,
+                                        .slots = 2,
+                                        .slot_bytes = 4096,
+                                        .skip = trip_cpu_occluded,
+                                        .skip_user = renderer };
+    assert_int_equal(trip_reader_create(&reader, s.data, &params, s.budget), 0);
+    size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
+    float *rgba = malloc(bytes);
+    assert_int_equal(trip_frame_draw(renderer, reader, &frame, rgba, NULL, &stats), 0);
+    assert_memory_equal(rgba, all.rgba, bytes);
+    assert_true(stats.reader.runs_skipped > 0);
+    free(rgba);
+    trip_reader_destroy(reader);
+    renderer->ops->destroy(renderer);
+    trip_plan_release(&plan, s.budget);
+    scene_picture_free(&all);
+    scene_destroy(&s);
+}
+
+/* Other roundings, no more. */
+static void instruction_sets_agree(void **state)
+{
+    (void)state;
+    scene s;
+    make_waves(&s, 32, 0.4);
+    trip_settings settings = post(2);
+    const trip_camera_params views[3] = { from_outside(&s), from_inside(&s), parallel(&s) };
+    for (int i = 0; i < 3; i++) {
+        setenv("TRIPTYCH_ISA", "plain", 1);
+        scene_picture plain = scene_draw(&s, &cpu_scenes_cpu, &views[i], &settings);
+        for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+            setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+            scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &views[i], &settings);
+            print_message("%s: %g\n", (*isa)->isa, scene_difference(&plain, &p));
+            assert_true(scene_difference(&plain, &p) < 0.5 / 255);
+            scene_picture_free(&p);
+        }
+        scene_picture_free(&plain);
+    }
+    unsetenv("TRIPTYCH_ISA");
+    scene_destroy(&s);
+}
+
+/* ---- kernels ---- */
+
+enum { BLOCKS = 5 }; /* here, to the left, above, the sheets before and behind */
+
+static trip_cpu_voxel blocks[BLOCKS][TRIP_CPU_BLOCK_VOXELS], out[TRIP_CPU_BLOCK_VOXELS];
+
+static int code_at(int block, int u, int v)
+{
+    return blocks[block][v * TRIP_CPU_BLOCK_STRIDE + u].code;
+}
+
+/* Few different codes, the greatest and least among them, and missing ones. */
+static void fill_blocks(void)
+{
+    static const int16_t codes[] = { TRIP_CPU_CODE_LEAST,  -20000, -1, 0, 1, 2, 300, INT16_MAX,
+                                     TRIP_CPU_CODE_MISSING };
+    memset(blocks, 0, sizeof blocks);
+    for (int b = 0; b < BLOCKS; b++)
+        for (int i = 0; i < TRIP_CPU_BLOCK_VOXELS; i++) {
+            uint32_t x = scene_hash(i, b, 7);
+            bool smooth = i / 1000 % 2;
+            blocks[b][i].code = smooth ? (int16_t)(x % 900) : codes[x % 9];
+        }
+}
+
+static bool is_missing(int code)
+{
+    return code == TRIP_CPU_CODE_MISSING;
+}
+
+/* As sheet.h says, rounded down and kept within 16 bits. */
+static int difference(int below, int here, int above)
+{
+    if (!is_missing(below) && !is_missing(above))
+        return (above - below) >> 1;
+    int d = !is_missing(above) ? above - here : !is_missing(below) ? here - below : 0;
+    return d > INT16_MAX ? INT16_MAX : d < INT16_MIN ? INT16_MIN : d;
+}
+
+static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
+{
+    memcpy(out, blocks[0], sizeof out);
+    k->sheet_gradients(out, squares, blocks[1], blocks[2], blocks[3], blocks[4]);
+    for (int v = 0; v < 64; v++)
+        for (int u = 0; u < 64; u++) {
+            const trip_cpu_voxel *voxel = &out[v * TRIP_CPU_BLOCK_STRIDE + u];
+            int here = code_at(0, u, v);
+            assert_int_equal(voxel->code, here);
+            if (!(squares >> (v / 8 * 8 + u / 8) & 1) || is_missing(here))
+                continue;
+            int left = u ? code_at(0, u - 1, v) : code_at(1, 63, v);
+            int above = v ? code_at(0, u, v - 1) : code_at(2, u, 63);
+            assert_int_equal(voxel->gradient[0], difference(left, here, code_at(0, u + 1, v)));
+            assert_int_equal(voxel->gradient[1], difference(above, here, code_at(0, u, v + 1)));
+            assert_int_equal(voxel->gradient[2],
+                             difference(code_at(3, u, v), here, code_at(4, u, v)));
+        }
+}
+
+static void check_ranges(const trip_cpu_kernels *k)
+{
+    trip_cpu_square_ranges ranges;
+    k->sheet_ranges(blocks[0], UINT64_MAX, &ranges);
+    for (int square = 0; square < 64; square++) {
+        int least = INT16_MAX, most = INT16_MIN;
+        for (int i = 0; i < 81; i++) {
+            int code = code_at(0, square % 8 * 8 + i % 9, square / 8 * 8 + i / 9);
+            least = !is_missing(code) && code < least ? code : least;
+            most = code > most ? code : most;
+        }
+        assert_int_equal(ranges.least[square], least);
+        assert_int_equal(ranges.most[square], most);
+    }
+}
+
+static void check_cells(const trip_cpu_kernels *k, int16_t least, int16_t most)
+{
+    trip_cpu_cells cells;
+    k->sheet_cells(blocks[0], blocks[4], UINT64_MAX, least, most, &cells);
+    for (int v = 0; v < 64; v++)
+        for (int u = 0; u < 64; u++) {
+            int low = INT16_MAX, high = INT16_MIN;
+            for (int i = 0; i < 8; i++) {
+                int code = code_at(i & 4 ? 4 : 0, u + (i & 1), v + (i >> 1 & 1));
+                low = code < low ? code : low;
+                high = code > high ? code : high;
+            }
+            bool expected = !is_missing(low) && low <= most && high >= least;
+            uint64_t square = cells.squares[v / 8 * 8 + u / 8];
+            assert_int_equal(square >> (v % 8 * 8 + u % 8) & 1, expected);
+        }
+}
+
+static void check_between(const trip_cpu_kernels *k, int w)
+{
+    k->sheet_between(blocks[3], blocks[4], UINT64_MAX, w << 16 | (16384 - w), out);
+    for (int v = 0; v <= 64; v++)
+        for (int u = 0; u <= 64; u++) {
+            int a = code_at(3, u, v), b = code_at(4, u, v);
+            int64_t expected = ((int64_t)a * (16384 - w) + (int64_t)b * w) >> 14;
+            int code = out[v * TRIP_CPU_BLOCK_STRIDE + u].code;
+            assert_int_equal(code,
+                             is_missing(a) || is_missing(b) ? TRIP_CPU_CODE_MISSING : expected);
+        }
+}
+
+static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
+{
+    (void)state;
+    fill_blocks();
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        check_ranges(*isa);
+        check_gradients(*isa, UINT64_MAX);
+        check_gradients(*isa, UINT64_C(0x8040201008040281));
+        check_cells(*isa, -5, 1);
+        check_cells(*isa, TRIP_CPU_CODE_LEAST, INT16_MAX);
+        check_cells(*isa, 2, 290);
+        check_between(*isa, 8192);
+        check_between(*isa, 5461);
+        check_between(*isa, 0);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(kernels_prepare_sheets_as_worked_out_voxel_by_voxel),
+        cmocka_unit_test(any_number_of_threads_draws_the_same),
+        cmocka_unit_test(any_tile_of_the_data_and_any_batch_draw_the_same),
+        cmocka_unit_test(any_memory_draws_the_same_or_says_that_it_is_too_little),
+        cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
+        cmocka_unit_test(instruction_sets_agree),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
