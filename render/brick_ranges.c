@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* Of 4 bytes each, three slabs of them. */
+/* Of 4 bytes each, a few slabs of them. */
 #define TILES_MAX (INT64_C(1) << 24)
 
 static const trip_code_range nothing = { 65535, 0 };
@@ -43,21 +43,27 @@ static void find_tiles(trip_brick_ranges *r)
 void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data, int axis,
                               trip_budget *budget)
 {
-    *r = (trip_brick_ranges){ .data = data, .axis = axis, .middle = -3, .budget = budget };
+    int sheets = (int)data->header.slab_sheets;
+    *r = (trip_brick_ranges){ .data = data,
+                              .axis = axis,
+                              .reach = (TRIP_SHEET_REACH + sheets - 1) / sheets,
+                              .middle = INT64_MIN / 2,
+                              .budget = budget };
+    r->slabs = 2 * r->reach + 1;
     find_tiles(r);
     if (r->across == 0 || r->down > TILES_MAX / r->across)
         return;
     size_t tiles = (size_t)(r->across * r->down);
-    r->bytes = 3 * tiles * sizeof *r->tiles[0];
+    r->bytes = (size_t)r->slabs * tiles * sizeof *r->tiles[0];
     trip_code_range *memory = trip_budget_take(budget, r->bytes);
-    for (size_t i = 0; i < 3 && memory; i++)
-        r->tiles[i] = memory + i * tiles;
+    for (int i = 0; i < r->slabs && memory; i++)
+        r->tiles[i] = memory + (size_t)i * tiles;
 }
 
 void trip_brick_ranges_destroy(trip_brick_ranges *r)
 {
     trip_code_range *memory = r->tiles[0];
-    for (int i = 1; i < 3; i++)
+    for (int i = 1; i < r->slabs; i++)
         memory = r->tiles[i] < memory ? r->tiles[i] : memory;
     trip_budget_release(r->budget, memory, r->bytes);
     r->tiles[0] = NULL;
@@ -97,20 +103,19 @@ static void fill(trip_brick_ranges *r, int layer, int64_t slab)
             fill_from(r, layer, &r->data->lists[i], slab);
 }
 
-/* The slab and those before and behind it; the next slab keeps two of them. */
+/* The slab and those before and behind it; the next slab keeps all but one of them. */
 static void move_to(trip_brick_ranges *r, int64_t slab)
 {
     if (slab == r->middle)
         return;
     if (slab == r->middle + 1) {
         trip_code_range *first = r->tiles[0];
-        r->tiles[0] = r->tiles[1];
-        r->tiles[1] = r->tiles[2];
-        r->tiles[2] = first;
-        fill(r, 2, slab + 1);
+        memmove(r->tiles, r->tiles + 1, (size_t)(r->slabs - 1) * sizeof *r->tiles);
+        r->tiles[r->slabs - 1] = first;
+        fill(r, r->slabs - 1, slab + r->reach);
     } else {
-        for (int i = 0; i < 3; i++)
-            fill(r, i, slab - 1 + i);
+        for (int i = 0; i < r->slabs; i++)
+            fill(r, i, slab - r->reach + i);
     }
     r->middle = slab;
 }
@@ -122,7 +127,7 @@ trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
     if (!r->tiles[0])
         return (trip_code_range){ 0, 65535 };
     move_to(r, slab);
-    for (int layer = 0; layer < 3; layer++)
+    for (int layer = 0; layer < r->slabs; layer++)
         for (int dv = -1; dv <= 1; dv++)
             for (int du = -1; du <= 1; du++)
                 range = both(range, *tile_at(r, layer, (int64_t)brick->tile_u + du,

@@ -1,20 +1,26 @@
-/* The codes that cells of a brick's voxels may lie between: those of the brick and of the 26 about
- * it, of all lists of voxels and halo along an axis. A part of the plan; owned by it. */
+/* The codes that cells may lie between which a brick's voxels change (sheet.h): those of the brick
+ * and of the bricks about it, of all lists of voxels and halo along an axis. A part of the plan;
+ * owned by it. */
 #ifndef TRIP_BRICK_RANGES_H
 #define TRIP_BRICK_RANGES_H
 
 #include "dataset.h"
+#include "sheet.h"
 
 typedef struct trip_code_range {
     uint16_t least, most; /* least > most: no codes */
 } trip_code_range;
 
-/* Tiles of three slabs in a row. */
+/* Slabs on each side that a voxel may reach into: those of one sheet, into two. */
+enum { TRIP_BRICK_RANGES_SLABS = 2 * TRIP_SHEET_REACH + 1 };
+
+/* Tiles of a few slabs in a row. */
 typedef struct trip_brick_ranges {
     const trip_dataset *data;
     int axis;
     int64_t first_u, first_v, across, down; /* tiles with bricks, and one more on every side */
-    trip_code_range *tiles[3];              /* of slabs middle - 1, middle, middle + 1 */
+    int reach, slabs;                       /* on each side; in all */
+    trip_code_range *tiles[TRIP_BRICK_RANGES_SLABS]; /* of slabs from middle - reach on */
     int64_t middle;
     trip_budget *budget;
     size_t bytes;

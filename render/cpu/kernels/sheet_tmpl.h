@@ -576,6 +576,12 @@ INLINE void light_segment(const trip_cpu_sheet_view *view, const stamp_rays *l, 
         s->rgb[k] = v_min(v_set(1), v_max(v_set(0), v_fma(s->rgb[k], matt, highlight)));
 }
 
+/* z where the rays are so far along. */
+INLINE vf ray_depth(const stamp_rays *l, float along)
+{
+    return v_fma(v_set(along), l->depth, l->depth_at_start);
+}
+
 /* Puts a segment behind what the pixels hold. */
 INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays *l,
                               const tile_path *path, unsigned n, const sample *a, const sample *b,
@@ -583,6 +589,8 @@ INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays 
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, l->along);
+    if (view->ortho) /* what begins behind the eye's plane is left out */
+        open = vm_and(open, v_ge(ray_depth(l, path->along[n]), v_set(0)));
     if (!vm_any(open))
         return;
     shown s = classified(view->integrals, a, b);
@@ -598,8 +606,7 @@ INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays 
     for (int k = 0; k < 3; k++)
         pixel[k] = v_fma(add, s.rgb[k], pixel[k]);
     if (TRIP_CPU_DEPTH) {
-        vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
-        vf z = v_fma(middle, l->depth, l->depth_at_start);
+        vf z = ray_depth(l, 0.5f * (path->along[n] + path->along[n + 1]));
         pixel[CHANNELS - 1] = v_fma(add, z, pixel[CHANNELS - 1]);
     }
     pixel[3] = pixel[3] - add;
@@ -667,7 +674,7 @@ static void find_lanes(const trip_cpu_sheet_view *view, const tile_path *path, i
         for (int k = 0; k < 3; k++)
             of[5 + k][i] = view->ortho ? view->to_eye[k] : (float)(-world[k] / length);
         of[8][i] = (float)sheets;
-        if (TRIP_CPU_DEPTH && view->ortho) {
+        if (view->ortho) {
             /* Depth 0 is where the ray's own origin lies. */
             double sheet = view->eye[2] + px * view->rx[2] + py * view->ry[2];
             l->depth_at_start[i] = (float)(-sheet * sheets);
