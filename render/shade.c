@@ -1,5 +1,7 @@
 #include "shade.h"
 
+#include <assert.h>
+
 /* World-space unit vector from a voxel to the eye: from their difference in index space, which is
  * exact however far the volume lies from the world's origin. */
 static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
@@ -9,26 +11,49 @@ static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
     return trip_normalize(trip_affine_vector(&c->index_to_world, trip_sub(c->eye, voxel)));
 }
 
+trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gradient_full,
+                         trip_vec3 voxel)
+{
+    trip_vec3 eye = towards_eye(c, voxel), light = s->headlight ? eye : s->light_direction;
+    return (trip_light){ eye, light, trip_normalize(trip_add(light, eye)), gradient_full };
+}
+
+/* To the power TRIP_SHININESS. */
+static double shininess_power(double x)
+{
+    static_assert((int)TRIP_SHININESS == 24, "the power below");
+    double x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
+    return x8 * x8 * x8;
+}
+
+static double clamp(double x)
+{
+    return x > 0 ? x < 1 ? x : 1 : 0;
+}
+
+unsigned trip_light_colour(const trip_light *l, const double gradient[3], double rgb[3])
+{
+    trip_vec3 g = { gradient[0], gradient[1], gradient[2] };
+    double magnitude = trip_length(g), scale = 1 / magnitude;
+    if (!(magnitude > 0))
+        return 0;
+    double light = scale * trip_dot(g, l->light), eye = scale * trip_dot(g, l->eye);
+    double half = scale * trip_dot(g, l->half);
+    double strength = clamp(magnitude / l->gradient_full);
+    double specular = clamp(TRIP_FACING * light * eye) * shininess_power(half);
+    double matt = 1 + strength * (TRIP_AMBIENT + TRIP_DIFFUSE * fabs(light) - 1);
+    unsigned form = 1 + (light < 0) + 2 * (strength < 1);
+    for (int i = 0; i < 3; i++) {
+        double lit = rgb[i] * matt + strength * TRIP_SPECULAR * specular;
+        rgb[i] = clamp(lit);
+        form += 4u * (lit < 1) << i;
+    }
+    return form;
+}
+
 void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full, trip_vec3 voxel,
                 const double gradient[3], double rgb[3])
 {
-    trip_vec3 g = { gradient[0], gradient[1], gradient[2] };
-    double magnitude = trip_length(g);
-    if (!(magnitude > 0))
-        return;
-    trip_vec3 normal = trip_scale(g, 1 / magnitude);
-    trip_vec3 eye = towards_eye(c, voxel);
-    trip_vec3 light = s->headlight ? eye : s->light_direction;
-    trip_vec3 half = trip_normalize(trip_add(light, eye));
-
-    double strength = fmin(1, magnitude / gradient_full);
-    double diffuse = fabs(trip_dot(normal, light));
-    double facing = TRIP_FACING * trip_dot(normal, light) * trip_dot(normal, eye);
-    double specular = pow(fabs(trip_dot(normal, half)), TRIP_SHININESS);
-    specular *= fmin(1, fmax(0, facing));
-    double matt = 1 + strength * (TRIP_AMBIENT + TRIP_DIFFUSE * diffuse - 1);
-    for (int i = 0; i < 3; i++) {
-        double lit = rgb[i] * matt + strength * TRIP_SPECULAR * specular;
-        rgb[i] = fmin(1, fmax(0, lit));
-    }
+    const trip_light light = trip_light_at(s, c, gradient_full, voxel);
+    trip_light_colour(&light, gradient, rgb);
 }

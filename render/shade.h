@@ -32,7 +32,22 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
     return TRIP_GRADIENT_FULL * range / voxel_world;
 }
 
-/* Lights the colour `rgb` (not premultiplied) of the splat of a voxel (index space) with the given
+/* What is the same for all gradients at a point: unit vectors in world space. Along a ray from the
+ * eye it does not change. */
+typedef struct trip_light {
+    trip_vec3 eye, light, half; /* towards them */
+    double gradient_full;
+} trip_light;
+
+/* At a point in index space. */
+trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gradient_full,
+                         trip_vec3 voxel);
+/* Lights the colour `rgb` (not premultiplied) of what has a world-space gradient. Returns a number
+ * that stays the same while the gradient, the colour or both change and what comes of them is a
+ * smooth function: it has kinks where a surface turns from the light and at the bounds. */
+unsigned trip_light_colour(const trip_light *l, const double gradient[3], double rgb[3]);
+
+/* Both: lights the colour `rgb` of the splat of a voxel (index space) with the given
  * world-space gradient. */
 void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full, trip_vec3 voxel,
                 const double gradient[3], double rgb[3]);
