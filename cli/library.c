@@ -19,6 +19,8 @@ static const char *things_of(const char *stage)
     for (size_t i = 0; i < sizeof splats / sizeof *splats; i++)
         if (!strcmp(stage, splats[i]))
             return "splats";
+    if (!strcmp(stage, "integrate"))
+        return "pixels";
     return strcmp(stage, "look") ? "voxels" : "bytes";
 }
 

@@ -6,10 +6,10 @@
 #include "cpu/cpu_renderer.h"
 #include "report.h"
 
-static void show_splats(void *user, uint64_t splats, uint64_t total)
+static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     triptych *t = user;
-    t->show(t->show_user, t->counting ? "count" : "draw", splats, total);
+    t->show(t->show_user, t->counting ? "count" : stage, done, total);
 }
 
 void trip_context_drop_reader(triptych *t)
@@ -113,7 +113,7 @@ static int start(triptych *t)
         .table = t->session.table,
         .field = t->source,
         .count = t->counting,
-        .progress = t->show ? show_splats : NULL,
+        .progress = t->show ? show_progress : NULL,
         .progress_user = t,
     };
     t->drawn = status == 0;

@@ -95,9 +95,8 @@ const trip_field_cube *trip_field_cube_by_number(const trip_field *f, size_t num
 
 static uint32_t *place_of(const trip_field *f, const int64_t at[3])
 {
-    return &f->directory[((size_t)(at[2] / EDGE) * (size_t)f->cubes[1] + (size_t)(at[1] / EDGE)) *
-                             (size_t)f->cubes[0] +
-                         (size_t)(at[0] / EDGE)];
+    const size_t i = (size_t)at[0] / EDGE, j = (size_t)at[1] / EDGE, k = (size_t)at[2] / EDGE;
+    return &f->directory[(k * (size_t)f->cubes[1] + j) * (size_t)f->cubes[0] + i];
 }
 
 static bool is_in_grid(const trip_field *f, const int64_t at[3])
@@ -114,7 +113,7 @@ const trip_field_cube *trip_field_cube_at(const trip_field *f, const int64_t at[
 
 static size_t index_in_cube(const int64_t at[3])
 {
-    return (size_t)((at[2] % EDGE * EDGE + at[1] % EDGE) * EDGE + at[0] % EDGE);
+    return ((size_t)at[2] % EDGE * EDGE + (size_t)at[1] % EDGE) * EDGE + (size_t)at[0] % EDGE;
 }
 
 const trip_field_voxel *trip_field_at(const trip_field *f, int64_t i, int64_t j, int64_t k)
@@ -235,18 +234,42 @@ void trip_field_code_bounds(trip_kernel kernel, double least, double most, doubl
 
 static void set_bounds(trip_kernel kernel, trip_field_cell *cell)
 {
-    double lo = INFINITY, hi = -INFINITY, bounds[2];
+    float lo = INFINITY, hi = -INFINITY;
+    double bounds[2];
     for (int n = 0; n < cell->edge * cell->edge * cell->edge; n++) {
-        lo = fmin(lo, cell->voxels[n]->code);
-        hi = fmax(hi, cell->voxels[n]->code);
+        float code = cell->voxels[n]->code;
+        lo = code < lo ? code : lo;
+        hi = code > hi ? code : hi;
     }
     trip_field_code_bounds(kernel, lo, hi, bounds);
     cell->least = bounds[0];
     cell->most = bounds[1];
 }
 
+static bool is_within_cube(const int64_t at[3])
+{
+    return at[0] % EDGE < EDGE - 1 && at[1] % EDGE < EDGE - 1 && at[2] % EDGE < EDGE - 1;
+}
+
+static bool take_corners_in_cube(const trip_field_cube *cube, const int64_t at[3],
+                                 const trip_field_voxel **corners)
+{
+    bool there = true;
+    for (int n = 0; n < 8; n++) {
+        int next = (n & 1) + (n >> 1 & 1) * EDGE + (n >> 2) * EDGE * EDGE;
+        corners[n] = &cube->voxels[index_in_cube(at) + (size_t)next];
+        there &= !isnan(corners[n]->code);
+    }
+    return there;
+}
+
 static bool take_corners(const trip_field *f, const int64_t at[3], const trip_field_voxel **corners)
 {
+    const trip_field_cube *cube = trip_field_cube_at(f, at);
+    if (!cube)
+        return false;
+    if (is_within_cube(at))
+        return take_corners_in_cube(cube, at, corners);
     for (int n = 0; n < 8; n++) {
         corners[n] = trip_field_at(f, at[0] + (n & 1), at[1] + (n >> 1 & 1), at[2] + (n >> 2));
         if (!corners[n])
@@ -294,51 +317,4 @@ bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t
         take_surroundings(f, at, corners, out->voxels);
     set_bounds(kernel, out);
     return true;
-}
-
-/* Of a position `t` of the way from one corner to the next. */
-static void set_weights(int edge, double t, double w[4])
-{
-    if (edge == 2) {
-        w[0] = 1 - t;
-        w[1] = t;
-        return;
-    }
-    double t2 = t * t, t3 = t2 * t;
-    w[0] = (-t + 2 * t2 - t3) / 2;
-    w[1] = (2 - 5 * t2 + 3 * t3) / 2;
-    w[2] = (t + 4 * t2 - 3 * t3) / 2;
-    w[3] = (-t2 + t3) / 2;
-}
-
-static void set_all_weights(const trip_field_cell *cell, trip_vec3 p, double w[3][4])
-{
-    set_weights(cell->edge, p.x - (double)cell->at[0], w[0]);
-    set_weights(cell->edge, p.y - (double)cell->at[1], w[1]);
-    set_weights(cell->edge, p.z - (double)cell->at[2], w[2]);
-}
-
-double trip_field_code(const trip_field_cell *cell, trip_vec3 p)
-{
-    double w[3][4], sum = 0;
-    const trip_field_voxel *const *v = cell->voxels;
-    set_all_weights(cell, p, w);
-    for (int z = 0; z < cell->edge; z++)
-        for (int y = 0; y < cell->edge; y++)
-            for (int x = 0; x < cell->edge; x++)
-                sum += w[2][z] * w[1][y] * w[0][x] * (double)(*v++)->code;
-    return sum;
-}
-
-void trip_field_gradient(const trip_field_cell *cell, trip_vec3 p, double gradient[3])
-{
-    double w[3][4];
-    const trip_field_voxel *const *v = cell->voxels;
-    set_all_weights(cell, p, w);
-    gradient[0] = gradient[1] = gradient[2] = 0;
-    for (int z = 0; z < cell->edge; z++)
-        for (int y = 0; y < cell->edge; y++)
-            for (int x = 0; x < cell->edge; x++, v++)
-                for (int a = 0; a < 3; a++)
-                    gradient[a] += w[2][z] * w[1][y] * w[0][x] * (double)(*v)->gradient[a];
 }

@@ -78,8 +78,5 @@ void trip_field_code_bounds(trip_kernel kernel, double least, double most, doubl
 /* False where the cell is empty. */
 bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t at[3],
                           trip_field_cell *out);
-/* At a position in the cell, in index coordinates of the grid. */
-double trip_field_code(const trip_field_cell *cell, trip_vec3 p);
-void trip_field_gradient(const trip_field_cell *cell, trip_vec3 p, double gradient[3]);
 
 #endif

@@ -29,7 +29,8 @@ static void report_progress(trip_drawing *d, const trip_batch *batch)
         return;
     for (size_t i = 0; i < batch->run_count; i++)
         d->splats += batch->runs[i].count;
-    d->frame->progress(d->frame->progress_user, d->splats, trip_plan_splats(d->frame->plan));
+    d->frame->progress(d->frame->progress_user, "draw", d->splats,
+                       trip_plan_splats(d->frame->plan));
 }
 
 /* Passes are read one behind the other, so that the next is on its way while the last batches of

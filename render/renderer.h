@@ -32,8 +32,9 @@ typedef struct trip_frame {
     /* For the integral renderer: integrate this instead of what batches hold; NULL: those. */
     const struct trip_field *field;
     bool count; /* splats projected and drawn, too: counting costs time */
-    /* Called between batches with how many splats were drawn, of how many. May be NULL. */
-    void (*progress)(void *user, uint64_t splats, uint64_t total);
+    /* Called between batches with how many splats were drawn, of how many: "draw"; and by the
+     * integral renderer with how many pixels: "integrate". May be NULL. */
+    void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);
     void *progress_user;
 } trip_frame;
 

@@ -4,7 +4,7 @@
 
 enum { COMPONENTS = 4 };
 
-#define LINE_TOLERANCE 1e-3
+#define KNOT_TOLERANCE 0.25
 
 static void get_components(const trip_tf_entry *e, double out[COMPONENTS])
 {
@@ -42,69 +42,88 @@ static bool cone_holds(const cone *c, const trip_tf_entry *e, double steps)
     return true;
 }
 
-static void narrow_cone(cone *c, const trip_tf_entry *e, double steps,
-                        const double tolerance[COMPONENTS])
+/* Times what the components may be off. */
+typedef struct slack {
+    double colour, extinction;
+} slack;
+
+static slack slack_at(const trip_tf_entry *e, double voxel_world, double tolerance)
+{
+    double depth = e->extinction * voxel_world, least = KNOT_TOLERANCE * tolerance;
+    return (slack){ .colour = depth < 1 ? least / depth : least,
+                    .extinction = least * fmax(1, depth) / voxel_world };
+}
+
+static void narrow_cone(cone *c, const trip_tf_entry *e, double steps, slack s)
 {
     double to[COMPONENTS];
     get_components(e, to);
     for (int i = 0; i < COMPONENTS; i++) {
-        c->least[i] = fmax(c->least[i], (to[i] - tolerance[i] - c->from[i]) / steps);
-        c->most[i] = fmin(c->most[i], (to[i] + tolerance[i] - c->from[i]) / steps);
+        double off = i == 3 ? s.extinction : s.colour;
+        c->least[i] = fmax(c->least[i], (to[i] - off - c->from[i]) / steps);
+        c->most[i] = fmin(c->most[i], (to[i] + off - c->from[i]) / steps);
     }
 }
 
-static void find_knots(trip_classes *c, const double tolerance[COMPONENTS])
+static void find_knots(trip_classes *c, double voxel_world, double tolerance)
 {
     unsigned from = 0;
     cone lines = begin_cone(&c->table[0]);
     c->knot_count = 0;
     for (unsigned code = 1; code < TRIP_CLASS_CODES; code++) {
-        if (!cone_holds(&lines, &c->table[code], code - from)) {
+        const trip_tf_entry *e = &c->table[code];
+        if (!cone_holds(&lines, e, code - from)) {
             from = code - 1;
-            c->knots[c->knot_count++] = from;
+            c->knots[c->knot_count++] = (uint16_t)from;
             lines = begin_cone(&c->table[from]);
         }
-        narrow_cone(&lines, &c->table[code], code - from, tolerance);
+        narrow_cone(&lines, e, code - from, slack_at(e, voxel_world, tolerance));
     }
 }
 
-void trip_classes_make(trip_classes *c, const trip_tf_entry *table)
+static void count_knots(trip_classes *c)
 {
-    double tolerance[COMPONENTS] = { 0 };
+    size_t count = 0;
+    for (unsigned code = 0; code < TRIP_CLASS_CODES; code++) {
+        while (count < c->knot_count && c->knots[count] <= code)
+            count++;
+        c->knots_up_to[code] = (uint16_t)count;
+    }
+}
+
+void trip_classes_make(trip_classes *c, const trip_tf_entry *table, double voxel_world,
+                       double tolerance)
+{
     uint32_t next = TRIP_CLASS_CODES;
     c->table = table;
     for (unsigned code = TRIP_CLASS_CODES; code-- > 0;) {
-        double e[COMPONENTS];
-        get_components(&table[code], e);
-        for (int i = 0; i < COMPONENTS; i++)
-            tolerance[i] = fmax(tolerance[i], LINE_TOLERANCE * e[i]);
         next = table[code].extinction > 0 ? code : next;
         c->next_visible[code] = next;
     }
-    find_knots(c, tolerance);
+    find_knots(c, voxel_world, tolerance);
+    count_knots(c);
 }
 
 static double clamp(double code)
 {
-    return fmin(TRIP_CLASS_CODES - 1, fmax(0, code));
+    const double last = TRIP_CLASS_CODES - 1;
+    return code < 0 ? 0 : code > last ? last : code;
 }
 
 bool trip_classes_visible(const trip_classes *c, double least, double most)
 {
-    return c->next_visible[(unsigned)clamp(least)] <= (unsigned)ceil(clamp(most));
+    return c->next_visible[(unsigned)clamp(least)] < clamp(most) + 1;
 }
 
 size_t trip_classes_knot_above(const trip_classes *c, double code)
 {
-    size_t low = 0, high = c->knot_count;
-    while (low < high) {
-        size_t middle = low + (high - low) / 2;
-        if (c->knots[middle] > code)
-            high = middle;
-        else
-            low = middle + 1;
-    }
-    return low;
+    return code < 0 ? 0 : c->knots_up_to[(unsigned)clamp(code)];
+}
+
+size_t trip_classes_knot_from(const trip_classes *c, double code)
+{
+    size_t above = trip_classes_knot_above(c, code);
+    return above > 0 && c->knots[above - 1] == code ? above - 1 : above;
 }
 
 double trip_classes_at(const trip_classes *c, double code, double rgb[3])
@@ -114,10 +133,7 @@ double trip_classes_at(const trip_classes *c, double code, double rgb[3])
     double t = at - i;
     get_components(&c->table[i], here);
     get_components(&c->table[i + 1], next);
-    for (int k = 0; k < COMPONENTS; k++)
-        here[k] += t * (next[k] - here[k]);
-    rgb[0] = here[0];
-    rgb[1] = here[1];
-    rgb[2] = here[2];
-    return here[3];
+    for (int k = 0; k < 3; k++)
+        rgb[k] = here[k] + t * (next[k] - here[k]);
+    return here[3] + t * (next[3] - here[3]);
 }

@@ -30,7 +30,9 @@ typedef struct integral {
     trip_integrand in;
     uint64_t splats[TRIP_KINDS]; /* handed over, by the kind of their list */
     float *rgba;                 /* of the picture being made */
+    int tile_px, tiles_x;        /* which is shared out among threads in squares */
     _Atomic bool failed;         /* set by any thread: the picture is given up */
+    _Atomic uint64_t done;       /* pixels, by any thread */
     trip_field_fill fill;
 } integral;
 
@@ -113,7 +115,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     if (!status)
         status = begin_field(r);
     base->resident = r->complete;
-    trip_classes_make(r->classes, frame->table);
+    trip_classes_make(r->classes, frame->table, frame->camera->voxel_world,
+                      frame->settings->tolerance);
     r->in = (trip_integrand){
         .classes = r->classes,
         .settings = frame->settings,
@@ -189,22 +192,59 @@ static int integrate_pixel(integral *r, int x, int y, trip_splat_hits *hits, dou
     return 0;
 }
 
-/* The rows of a picture, shared out among threads. */
-static void make_row(void *context, unsigned row, unsigned thread)
+static void make_pixel(integral *r, int x, int y, unsigned thread)
+{
+    const double *background = r->in.settings->background;
+    float *out = r->rgba + ((size_t)y * (size_t)r->in.camera->width + (size_t)x) * 4;
+    double rgba[4] = { 0 };
+    if (r->in.field && integrate_pixel(r, x, y, &r->hits[thread], rgba))
+        r->failed = true;
+    double through = (1 - rgba[3]) * background[3];
+    for (int c = 0; c < 3; c++)
+        out[c] = (float)(rgba[c] + through * background[c]);
+    out[3] = (float)(rgba[3] + through);
+}
+
+static int smaller(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+/* The first thread is the one that the frame is drawn by. */
+static void show_progress(integral *r, uint64_t pixels, unsigned thread)
+{
+    const trip_frame *frame = r->frame;
+    uint64_t total = (uint64_t)r->in.camera->width * (uint64_t)r->in.camera->height;
+    uint64_t done = atomic_fetch_add(&r->done, pixels) + pixels;
+    if (thread == 0 && frame->progress)
+        frame->progress(frame->progress_user, "integrate", done, total);
+}
+
+static void make_tile(void *context, unsigned tile, unsigned thread)
 {
     integral *r = context;
-    const int width = r->in.camera->width;
-    const double *background = r->in.settings->background;
-    float *out = r->rgba + (size_t)row * (size_t)width * 4;
-    for (int x = 0; x < width && !trip_interrupted() && !r->failed; x++) {
-        double rgba[4] = { 0 };
-        if (r->in.field && integrate_pixel(r, x, (int)row, &r->hits[thread], rgba))
-            r->failed = true;
-        double through = (1 - rgba[3]) * background[3];
-        for (int c = 0; c < 3; c++)
-            *out++ = (float)(rgba[c] + through * background[c]);
-        *out++ = (float)(rgba[3] + through);
-    }
+    const trip_camera *c = r->in.camera;
+    const int x0 = (int)tile % r->tiles_x * r->tile_px, y0 = (int)tile / r->tiles_x * r->tile_px;
+    const int x1 = smaller(x0 + r->tile_px, c->width), y1 = smaller(y0 + r->tile_px, c->height);
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1 && !trip_interrupted() && !r->failed; x++)
+            make_pixel(r, x, y, thread);
+    show_progress(r, (uint64_t)(x1 - x0) * (uint64_t)(y1 - y0), thread);
+}
+
+/* Small, so that threads are busy to the end, but for the pool's bound of their number. */
+static unsigned divide_picture(integral *r)
+{
+    enum { FIRST_TILE_PX = 8, MOST_TILES = 1 << 19 };
+    const trip_camera *c = r->in.camera;
+    int64_t tiles;
+    r->tile_px = FIRST_TILE_PX / 2;
+    do {
+        r->tile_px *= 2;
+        r->tiles_x = (c->width + r->tile_px - 1) / r->tile_px;
+        tiles = (int64_t)r->tiles_x * ((c->height + r->tile_px - 1) / r->tile_px);
+    } while (tiles > MOST_TILES);
+    return (unsigned)tiles;
 }
 
 /* Before all voxels are there the picture is its background. */
@@ -218,7 +258,8 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
     r->in.field = r->frame->field ? r->frame->field : r->complete ? r->field : NULL;
     r->rgba = rgba;
     r->failed = false;
-    trip_cpu_job job = { .run = make_row, .context = r, .tasks = (unsigned)r->in.camera->height };
+    r->done = 0;
+    trip_cpu_job job = { .run = make_tile, .context = r, .tasks = divide_picture(r) };
     trip_cpu_pool_start(r->pool, &job);
     trip_cpu_pool_wait(r->pool, &job);
     return r->failed ? TRIP_ERROR : trip_frame_poll();

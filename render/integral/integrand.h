@@ -7,6 +7,7 @@
 #include "field.h"
 #include "quadrature.h"
 #include "ray.h"
+#include "shade.h"
 
 typedef struct trip_integrand {
     const trip_field *field; /* finished */
@@ -20,9 +21,8 @@ typedef struct trip_integrand {
 /* Through the values: those of a cell are classified where the ray is, and lit by the gradient
  * there. The ray is divided at the faces of cells, where the value turns, and where it passes a
  * knot of the transfer function, so that a piece is smooth but for kinks of the light. Along a ray
- * a linear cell is a cubic polynomial, whose turns are found; a cubic one has degree 9, and is cut
- * into eighths. Stored normals of 3 bytes are no longer than gradient_full, and are interpolated as
- * they are. */
+ * a linear cell is a polynomial of degree 3, a cubic one of degree 9, of code and gradient alike.
+ * Stored normals of 3 bytes are no longer than gradient_full, and are interpolated as they are. */
 trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray);
 
 /* Splats that a ray meets: a thread's memory, from the budget, kept from ray to ray. */

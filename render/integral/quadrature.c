@@ -5,104 +5,136 @@
 /* After so many halvings a piece is too short to matter. */
 enum { MOST_HALVINGS = 40 };
 
+/* How many times closer halves bring Simpson's rule to the integral of what is smooth. */
+#define CLOSER 15.0
+
 /* What a piece does to light: what it adds in front, and how much it lets through. */
 typedef struct part {
-    double rgb[3], depth;
+    double rgb[3], depth, through; /* exp(-depth) */
 } part;
 
 typedef struct piece {
-    double from, to;
-    trip_ray_sample ends[2], middle;
+    const trip_ray_end *from, *to;
+    trip_ray_end middle;
     part whole; /* by Simpson's rule */
-    int halvings;
 } piece;
 
-/* Depths at the middle and the end are those of the parabola through the three extinctions. */
-static part simpson(double length, const trip_ray_sample *a, const trip_ray_sample *m,
-                    const trip_ray_sample *b)
+/* exp(-depth), 1 below 0: light that is let through, not made. Small depths, which most pieces
+ * have, by the series, whose terms left out are below the last bit. */
+static double let_through(double depth)
 {
-    double half = length * (5 * a->extinction + 8 * m->extinction - b->extinction) / 24;
-    part p = { .depth = length * (a->extinction + 4 * m->extinction + b->extinction) / 6 };
-    double wa = length / 6 * a->extinction;
-    double wm = length / 6 * 4 * m->extinction * exp(-fmax(0, half));
-    double wb = length / 6 * b->extinction * exp(-p.depth);
-    for (int i = 0; i < 3; i++)
-        p.rgb[i] = wa * a->rgb[i] + wm * m->rgb[i] + wb * b->rgb[i];
-    return p;
+    if (depth > 1.0 / 16)
+        return exp(-depth);
+    if (depth <= 0)
+        return 1;
+    double x = -depth, sum = 1;
+    for (int i = 9; i >= 1; i--)
+        sum = 1 + x * (1.0 / i) * sum;
+    return sum;
 }
 
-static part behind(const part *front, const part *back)
+/* Depths at the middle and the end are those of the parabola through the three extinctions. */
+static void set_simpson(part *p, double length, const trip_ray_sample *a, const trip_ray_sample *m,
+                        const trip_ray_sample *b)
 {
-    part p = { .depth = front->depth + back->depth };
-    double through = exp(-front->depth);
+    const double sixth = length * (1.0 / 6);
+    double half = 0.25 * sixth * (5 * a->extinction + 8 * m->extinction - b->extinction);
+    p->depth = sixth * (a->extinction + 4 * m->extinction + b->extinction);
+    p->through = let_through(p->depth);
+    double wa = sixth * a->extinction;
+    double wm = sixth * 4 * m->extinction * let_through(half);
+    double wb = sixth * b->extinction * p->through;
     for (int i = 0; i < 3; i++)
-        p.rgb[i] = front->rgb[i] + through * back->rgb[i];
-    return p;
+        p->rgb[i] = wa * a->rgb[i] + wm * m->rgb[i] + wb * b->rgb[i];
+}
+
+static void set_both(part *p, const part *front, const part *back)
+{
+    p->depth = front->depth + back->depth;
+    p->through = front->through * back->through;
+    for (int i = 0; i < 3; i++)
+        p->rgb[i] = front->rgb[i] + front->through * back->rgb[i];
 }
 
 static double distance(const part *a, const part *b)
 {
     double most = 0;
+    for (int i = 0; i < 3; i++) {
+        double apart = fabs(a->rgb[i] - b->rgb[i]);
+        most = apart > most ? apart : most;
+    }
+    return most + fabs(a->through - b->through);
+}
+
+/* What both come to where the integrand is smooth. */
+static double correct(double whole, double finer)
+{
+    return finer + (finer - whole) * (1 / CLOSER);
+}
+
+static void append(trip_ray_sum *s, const part *whole, const part *finer)
+{
+    double depth = correct(whole->depth, finer->depth);
     for (int i = 0; i < 3; i++)
-        most = fmax(most, fabs(a->rgb[i] - b->rgb[i]));
-    return most + fabs(exp(-a->depth) - exp(-b->depth));
+        s->rgb[i] += s->transmittance * correct(whole->rgb[i], finer->rgb[i]);
+    s->transmittance *= let_through(depth);
 }
 
-static void append(trip_ray_sum *s, const part *p)
+static void set_piece(piece *p, const trip_ray_end *from, const trip_ray_end *to,
+                      trip_ray_sampler sampler, void *user)
 {
-    for (int i = 0; i < 3; i++)
-        s->rgb[i] += s->transmittance * p->rgb[i];
-    s->transmittance *= exp(-p->depth);
+    p->from = from;
+    p->to = to;
+    p->middle.t = 0.5 * (from->t + to->t);
+    sampler(user, p->middle.t, &p->middle.sample);
+    set_simpson(&p->whole, to->t - from->t, &from->sample, &p->middle.sample, &to->sample);
 }
 
-static piece make_piece(double from, double to, const trip_ray_sample *a, const trip_ray_sample *m,
-                        const trip_ray_sample *b, int halvings)
+/* The form of its samples, 0 where they differ. */
+static unsigned form_of(const piece *p)
 {
-    return (piece){ from, to, { *a, *b }, *m, simpson(to - from, a, m, b), halvings };
+    unsigned form = p->middle.sample.form;
+    return p->from->sample.form == form && p->to->sample.form == form ? form : 0;
 }
 
-static void halve(const piece *p, trip_ray_sampler sampler, void *user, piece halves[2])
+static bool is_smooth(const piece *first, const piece *last)
 {
-    double middle = 0.5 * (p->from + p->to);
-    trip_ray_sample at[2];
-    sampler(user, 0.5 * (p->from + middle), &at[0]);
-    sampler(user, 0.5 * (middle + p->to), &at[1]);
-    halves[0] = make_piece(p->from, middle, &p->ends[0], &at[0], &p->middle, p->halvings + 1);
-    halves[1] = make_piece(middle, p->to, &p->middle, &at[1], &p->ends[1], p->halvings + 1);
+    return form_of(first) && form_of(first) == form_of(last);
 }
 
-static bool is_close(const trip_ray_sum *s, const piece *p, const part *finer)
+/* `smooth`: whether the finer is known to be closer than the difference. */
+static bool is_close(const trip_ray_sum *s, const piece *p, const part *finer, bool smooth)
 {
-    double length_share = (p->to - p->from) / s->length;
-    double opacity_share = s->transmittance * -expm1(-finer->depth);
-    return s->transmittance * distance(&p->whole, finer) <=
-           s->tolerance / 4 * (length_share + opacity_share);
+    double error = distance(&p->whole, finer) * (smooth ? 1 / CLOSER : 1);
+    double length_share = (p->to->t - p->from->t) / s->length;
+    double opacity_share = s->transmittance * (1 - finer->through);
+    return s->transmittance * error <= s->tolerance / 4 * (length_share + opacity_share);
 }
 
 /* The nearer half first, so that what is added is behind all before. */
-static void add(trip_ray_sum *s, const piece *p, trip_ray_sampler sampler, void *user)
+static void add(trip_ray_sum *s, const piece *p, int halvings, trip_ray_sampler sampler, void *user)
 {
-    piece halves[2];
+    piece first, last;
+    part finer;
     if (trip_ray_sum_is_over(s))
         return;
-    halve(p, sampler, user, halves);
-    part finer = behind(&halves[0].whole, &halves[1].whole);
-    if (p->halvings == MOST_HALVINGS || is_close(s, p, &finer)) {
-        append(s, &finer);
+    set_piece(&first, p->from, &p->middle, sampler, user);
+    set_piece(&last, &p->middle, p->to, sampler, user);
+    set_both(&finer, &first.whole, &last.whole);
+    if (halvings == MOST_HALVINGS || is_close(s, p, &finer, is_smooth(&first, &last))) {
+        append(s, &p->whole, &finer);
         return;
     }
-    add(s, &halves[0], sampler, user);
-    add(s, &halves[1], sampler, user);
+    add(s, &first, halvings + 1, sampler, user);
+    add(s, &last, halvings + 1, sampler, user);
 }
 
-void trip_ray_sum_add(trip_ray_sum *s, double from, double to, trip_ray_sampler sampler, void *user)
+void trip_ray_sum_add(trip_ray_sum *s, const trip_ray_end *from, const trip_ray_end *to,
+                      trip_ray_sampler sampler, void *user)
 {
-    trip_ray_sample a, m, b;
-    if (!(from < to) || trip_ray_sum_is_over(s))
+    piece p;
+    if (!(from->t < to->t) || trip_ray_sum_is_over(s))
         return;
-    sampler(user, from, &a);
-    sampler(user, 0.5 * (from + to), &m);
-    sampler(user, to, &b);
-    piece p = make_piece(from, to, &a, &m, &b, 0);
-    add(s, &p, sampler, user);
+    set_piece(&p, from, to, sampler, user);
+    add(s, &p, 0, sampler, user);
 }

@@ -1,13 +1,13 @@
 /* The emission-absorption integral along a ray, front to back, piece by piece:
  *     colour        = integral of c(t) k(t) T(t) dt,   T(t) = exp(-integral of k before t)
  *     transmittance = T at the end
- * with extinction k and colour c. A piece is halved until Simpson's rule over its halves and over
- * all of it differ, in colour and transmittance together, by less than its share of the tolerance:
- * half of that goes by length, half by the opacity that the piece adds in the picture. What is
- * behind a transmittance of half the tolerance is left out. So the differences of all pieces add up
- * to at most half the tolerance, and with what is left out to the tolerance; Simpson's rule
- * over halves is itself some fifteen times closer than the difference says, where the integrand is
- * smooth. */
+ * with extinction k and colour c. A piece is halved until Simpson's rule over its halves is within
+ * the piece's share of the tolerance: half of that goes by length, half by the opacity that the
+ * piece adds in the picture. How close it is, in colour and transmittance together, is estimated
+ * by how much it differs from the rule over all of the piece: where the integrand is smooth it is
+ * fifteen times closer than that, elsewhere it is taken for no closer; and it is corrected by that
+ * fifteenth. What is behind a transmittance of half the tolerance is left out. So the errors of all
+ * pieces add up to at most half the tolerance, and with what is left out to the tolerance. */
 #ifndef TRIP_QUADRATURE_H
 #define TRIP_QUADRATURE_H
 
@@ -16,6 +16,7 @@
 typedef struct trip_ray_sample {
     double extinction; /* per unit of t */
     double rgb[3];     /* of what is there, not multiplied by it */
+    unsigned form;     /* the same where both are a smooth function of t; 0: not known to be */
 } trip_ray_sample;
 
 typedef void (*trip_ray_sampler)(void *user, double t, trip_ray_sample *out);
@@ -36,8 +37,20 @@ static inline bool trip_ray_sum_is_over(const trip_ray_sum *s)
     return s->transmittance <= s->tolerance / 2;
 }
 
-/* Adds the piece [from, to] of the ray, which lies behind all before. */
-void trip_ray_sum_add(trip_ray_sum *s, double from, double to, trip_ray_sampler sampler,
-                      void *user);
+typedef struct trip_ray_end {
+    double t;
+    trip_ray_sample sample;
+} trip_ray_end;
+
+static inline trip_ray_end trip_ray_end_at(double t, trip_ray_sampler sampler, void *user)
+{
+    trip_ray_end end = { .t = t };
+    sampler(user, t, &end.sample);
+    return end;
+}
+
+/* Adds the piece between two ends, which lies behind all before. */
+void trip_ray_sum_add(trip_ray_sum *s, const trip_ray_end *from, const trip_ray_end *to,
+                      trip_ray_sampler sampler, void *user);
 
 #endif

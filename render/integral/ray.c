@@ -1,10 +1,16 @@
 #include "ray.h"
 
+static double inverse(double x)
+{
+    return x != 0 ? 1 / x : NAN;
+}
+
 trip_ray trip_ray_make(const trip_camera *c, double x, double y)
 {
     trip_ray r = { .origin = c->eye, .direction = trip_camera_ray(c, x, y) };
     if (c->ortho)
         r.origin = trip_add(r.origin, trip_add(trip_scale(c->rx, x), trip_scale(c->ry, y)));
+    r.inverse = trip_v3(inverse(r.direction.x), inverse(r.direction.y), inverse(r.direction.z));
     r.world_per_t = trip_length(trip_affine_vector(&c->index_to_world, r.direction));
     return r;
 }
@@ -19,8 +25,10 @@ bool trip_ray_clip(const trip_ray *r, const int64_t lo[3], const int64_t hi[3], 
             return false;
         if (d == 0)
             continue;
-        *from = fmax(*from, (near - o) / d);
-        *to = fmin(*to, (far - o) / d);
+        double enter = (near - o) * trip_component(r->inverse, a);
+        double leave = (far - o) * trip_component(r->inverse, a);
+        *from = enter > *from ? enter : *from;
+        *to = leave < *to ? leave : *to;
     }
     return *from < *to;
 }
@@ -36,15 +44,30 @@ static void find_box(const trip_ray_boxes *b, trip_vec3 p, int64_t at[3])
     }
 }
 
+/* The walk along an axis. */
+typedef struct pace {
+    double origin, inverse; /* of the ray */
+    int64_t step, to_face; /* from box to box; from a box's first corner to the face it leaves by */
+} pace;
+
+static pace make_pace(const trip_ray *r, int axis, int64_t edge)
+{
+    double d = trip_component(r->direction, axis);
+    return (pace){ .origin = trip_component(r->origin, axis),
+                   .inverse = trip_component(r->inverse, axis),
+                   .step = d > 0 ? edge : -edge,
+                   .to_face = d > 0 ? edge : 0 };
+}
+
 /* Where the ray leaves a box, at most `to`; the axis of that face, or -1. */
-static int find_exit(const trip_ray *r, const trip_ray_boxes *b, const int64_t at[3], double *to)
+static int find_exit(const pace paces[3], const int64_t hi[3], const int64_t at[3], double *to)
 {
     int axis = -1;
     for (int a = 0; a < 3; a++) {
-        double o = trip_component(r->origin, a), d = trip_component(r->direction, a);
-        int64_t face = at[a] + (d > 0 ? b->edge : 0);
-        double t = d != 0 ? ((double)(face < b->hi[a] ? face : b->hi[a]) - o) / d : INFINITY;
-        if (t < *to) {
+        int64_t face = at[a] + paces[a].to_face;
+        double away = (double)(face < hi[a] ? face : hi[a]) - paces[a].origin;
+        double t = away * paces[a].inverse;
+        if (t < *to) { /* not where it is not a number */
             *to = t;
             axis = a;
         }
@@ -56,18 +79,21 @@ bool trip_ray_walk(const trip_ray *r, const trip_ray_boxes *boxes, double from, 
                    trip_ray_visit visit, void *user)
 {
     int64_t at[3];
+    pace paces[3];
     if (!trip_ray_clip(r, boxes->lo, boxes->hi, &from, &to))
         return true;
     find_box(boxes, trip_ray_at(r, from), at);
+    for (int a = 0; a < 3; a++)
+        paces[a] = make_pace(r, a, boxes->edge);
     while (from < to) {
         double exit = to;
-        int axis = find_exit(r, boxes, at, &exit);
-        exit = fmax(exit, from); /* rounding */
+        int axis = find_exit(paces, boxes->hi, at, &exit);
+        exit = exit > from ? exit : from; /* rounding */
         if (!visit(user, at, from, exit))
             return false;
         if (axis < 0)
             break;
-        at[axis] += trip_component(r->direction, axis) > 0 ? boxes->edge : -boxes->edge;
+        at[axis] += paces[axis].step;
         if (at[axis] < boxes->lo[axis] || at[axis] >= boxes->hi[axis])
             break;
         from = exit;

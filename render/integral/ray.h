@@ -7,6 +7,7 @@
 /* The points origin + t direction, t >= 0. */
 typedef struct trip_ray {
     trip_vec3 origin, direction;
+    trip_vec3 inverse;  /* of the direction's components; of 0: not a number */
     double world_per_t; /* length of `direction` in the world */
 } trip_ray;
 

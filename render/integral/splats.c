@@ -157,14 +157,15 @@ static void add_pieces(passage *p, trip_ray_sum *sum)
     for (size_t i = 0; i < count; i++)
         end = fmax(end, hits[i].leave);
     sum->length = end - hits[0].enter;
-    for (double at = hits[0].enter; at < end && !trip_ray_sum_is_over(sum);) {
-        while (p->first < count && hits[p->first].enter < at - longest)
+    trip_ray_end from = trip_ray_end_at(hits[0].enter, sample, p);
+    while (from.t < end && !trip_ray_sum_is_over(sum)) {
+        while (p->first < count && hits[p->first].enter < from.t - longest)
             p->first++;
-        if (p->first < count && hits[p->first].enter > at)
-            at = hits[p->first].enter;
-        double next = fmin(at + step, end);
-        trip_ray_sum_add(sum, at, next, sample, p);
-        at = next;
+        if (p->first < count && hits[p->first].enter > from.t)
+            from = trip_ray_end_at(hits[p->first].enter, sample, p);
+        const trip_ray_end to = trip_ray_end_at(fmin(from.t + step, end), sample, p);
+        trip_ray_sum_add(sum, &from, &to, sample, p);
+        from = to;
     }
 }
 

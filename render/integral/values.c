@@ -1,123 +1,84 @@
+#include "cell.h"
 #include "integrand.h"
-
-#include "shade.h"
-
-enum { MOST_TURNS = 7 };
 
 /* A ray on its way through the values. */
 typedef struct passage {
     const trip_integrand *in;
     const trip_ray *ray;
-    trip_field_cell cell; /* where it is */
+    trip_light light;    /* the same all along the ray */
+    trip_cell_line line; /* of the cell where it is */
     trip_ray_sum sum;
 } passage;
-
-static double code_at(const passage *p, double t)
-{
-    return trip_field_code(&p->cell, trip_ray_at(p->ray, t));
-}
 
 static void sample(void *user, double t, trip_ray_sample *out)
 {
     const passage *p = user;
-    const trip_integrand *in = p->in;
-    trip_vec3 at = trip_ray_at(p->ray, t);
-    double extinction = trip_classes_at(in->classes, trip_field_code(&p->cell, at), out->rgb);
+    double here[4]; /* code, gradient */
+    trip_cell_line_at(&p->line, t, here);
+    double extinction = trip_classes_at(p->in->classes, here[0], out->rgb);
     out->extinction = extinction * p->ray->world_per_t;
-    if (in->shaded && extinction > 0) {
-        double gradient[3];
-        trip_field_gradient(&p->cell, at, gradient);
-        trip_shade(in->settings, in->camera, in->gradient_full, at, gradient, out->rgb);
-    }
+    out->form = 1;
+    if (p->in->shaded && extinction > 0)
+        out->form = trip_light_colour(&p->light, here + 1, out->rgb);
 }
 
-/* Where the code is `code` between two places, at one of which it is at most that and at the other
- * at least: by halving, to the last bits that matter. */
-static double find_code(const passage *p, double code, double a, double b)
+/* A place in a cell: 0 to 1 of its line, and the code there. */
+typedef struct place {
+    double x, code;
+} place;
+
+static place place_at(const passage *p, double x)
 {
-    bool rises = code_at(p, a) < code_at(p, b);
-    for (int i = 0; i < 30; i++) {
-        double middle = 0.5 * (a + b);
-        if ((code_at(p, middle) < code) == rises)
-            a = middle;
-        else
-            b = middle;
-    }
-    return 0.5 * (a + b);
+    return (place){ x, trip_polynomial_at(&p->line.code, x) };
 }
 
-static void add_visible(passage *p, double from, double to)
+static trip_ray_end end_at(passage *p, double x)
 {
-    double a = code_at(p, from), b = code_at(p, to);
-    if (trip_classes_visible(p->in->classes, fmin(a, b), fmax(a, b)))
-        trip_ray_sum_add(&p->sum, from, to, sample, p);
+    return trip_ray_end_at(trip_cell_line_t(&p->line, x), sample, p);
 }
 
-/* A part of a cell in which the code only rises or only falls: from knot to knot. */
-static void add_part(passage *p, double from, double to)
+/* Between two places from which to which the code only rises or only falls, knot by knot. */
+static void add_between(passage *p, place first, place last)
 {
     const trip_classes *c = p->in->classes;
-    double first = code_at(p, from), last = code_at(p, to);
-    double lo = fmin(first, last), hi = fmax(first, last);
+    const bool rises = first.code < last.code;
+    const double lo = rises ? first.code : last.code, hi = rises ? last.code : first.code;
     if (!trip_classes_visible(c, lo, hi))
         return;
-    size_t begin = trip_classes_knot_above(c, lo), end = begin;
-    while (end < c->knot_count && c->knots[end] < hi)
-        end++;
-    double at = from;
-    for (size_t i = 0; i < end - begin; i++) {
-        size_t knot = first < last ? begin + i : end - 1 - i;
-        double next = find_code(p, c->knots[knot], at, to);
-        add_visible(p, at, next);
-        at = next;
+    size_t begin = trip_classes_knot_above(c, lo), end = trip_classes_knot_from(c, hi);
+    end = end < begin ? begin : end; /* flat, on a knot */
+    trip_ray_end from = end_at(p, first.x);
+    for (size_t n = begin; n < end + 1 && !trip_ray_sum_is_over(&p->sum); n++) {
+        place next = last;
+        if (n < end) {
+            next.code = c->knots[rises ? n : begin + end - 1 - n];
+            next.x = trip_polynomial_find(&p->line.code, next.code, first.x, last.x);
+        }
+        const trip_ray_end to = end_at(p, next.x);
+        if (trip_classes_visible(c, rises ? first.code : next.code, rises ? next.code : first.code))
+            trip_ray_sum_add(&p->sum, &from, &to, sample, p);
+        from = to;
+        first = next;
     }
-    add_visible(p, at, to);
-}
-
-/* Where the cubic polynomial through the codes at 0, 1, 2, 3 thirds of the way turns: the roots of
- * its derivative by s in (0, 3), from Newton's form with differences d1, d2, d3. */
-static int find_turns(const passage *p, double from, double to, double turns[MOST_TURNS])
-{
-    double f[4];
-    for (int i = 0; i < 4; i++)
-        f[i] = code_at(p, from + (to - from) * i / 3);
-    double d1 = f[1] - f[0], d2 = f[2] - 2 * f[1] + f[0], d3 = f[3] - 3 * f[2] + 3 * f[1] - f[0];
-    double a = d3 / 2, b = d2 - d3, c = d1 - d2 / 2 + d3 / 3, root = b * b - 4 * a * c;
-    if (!(root > 0))
-        return 0;
-    double q = -0.5 * (b + copysign(sqrt(root), b));
-    double s[2] = { c / q, q / a };
-    int count = 0;
-    for (int i = 0; i < 2; i++) {
-        double at = s[s[0] > s[1] ? 1 - i : i];
-        if (at > 0 && at < 3)
-            turns[count++] = from + (to - from) * at / 3;
-    }
-    return count;
-}
-
-static int cut_evenly(double from, double to, double turns[MOST_TURNS])
-{
-    for (int i = 0; i < MOST_TURNS; i++)
-        turns[i] = from + (to - from) * (i + 1) / (MOST_TURNS + 1);
-    return MOST_TURNS;
 }
 
 static bool visit_cell(void *user, const int64_t at[3], double from, double to)
 {
     passage *p = user;
     const trip_integrand *in = p->in;
-    double turns[MOST_TURNS];
-    if (!trip_field_take_cell(in->field, in->settings->kernel, at, &p->cell) ||
-        !trip_classes_visible(in->classes, p->cell.least, p->cell.most))
+    trip_field_cell cell;
+    double turns[TRIP_POLYNOMIAL_DEGREE];
+    if (!(from < to) || !trip_field_take_cell(in->field, in->settings->kernel, at, &cell) ||
+        !trip_classes_visible(in->classes, cell.least, cell.most))
         return true;
-    int count = p->cell.edge == 2 ? find_turns(p, from, to, turns) : cut_evenly(from, to, turns);
-    double begin = from;
-    for (int i = 0; i < count; i++) {
-        add_part(p, begin, turns[i]);
-        begin = turns[i];
+    p->line = trip_cell_along(&cell, p->ray, from, to);
+    int count = trip_polynomial_turns(&p->line.code, turns);
+    place here = place_at(p, 0);
+    for (int i = 0; i <= count; i++) {
+        place next = place_at(p, i < count ? turns[i] : 1);
+        add_between(p, here, next);
+        here = next;
     }
-    add_part(p, begin, to);
     return !trip_ray_sum_is_over(&p->sum);
 }
 
@@ -150,6 +111,7 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
     double from = 0, to = INFINITY;
     passage p = { .in = in, .ray = ray, .sum = trip_ray_sum_begin(in->settings->tolerance, 1) };
     if (trip_ray_clip(ray, cubes.lo, cubes.hi, &from, &to)) {
+        p.light = trip_light_at(in->settings, in->camera, in->gradient_full, trip_ray_at(ray, 1));
         p.sum.length = to - from;
         trip_ray_walk(ray, &cubes, from, to, visit_cube, &p);
     }

@@ -335,7 +335,9 @@ scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
                          .settings = settings,
                          .plan = &plan,
                          .field = how->field,
-                         .table = s->table };
+                         .table = s->table,
+                         .progress = how->progress,
+                         .progress_user = how->progress_user };
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
     assert_non_null(p.rgba);
     assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, NULL, &p.stats), 0);

@@ -92,6 +92,8 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
 typedef struct scene_making {
     unsigned threads;
     const trip_field *field;
+    void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);
+    void *progress_user;
 } scene_making;
 
 scene_picture scene_integrate(const scene *s, const trip_camera_params *view,

@@ -99,9 +99,10 @@ static void bytes_and_splats_are_counted_for_each_list(void **state)
     scene_destroy(&s);
 }
 
-static void keep_progress(void *user, uint64_t splats, uint64_t total)
+static void keep_progress(void *user, const char *stage, uint64_t splats, uint64_t total)
 {
     uint64_t *last = user;
+    assert_string_equal(stage, "draw");
     assert_true(splats > last[0] && splats <= total);
     last[0] = splats;
     last[1] = total;

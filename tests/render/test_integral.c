@@ -549,6 +549,32 @@ static void threads_and_tiles_change_no_bit(void **state)
     }
 }
 
+static void keep_progress(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    uint64_t *last = user;
+    if (strcmp(stage, "integrate"))
+        return;
+    assert_true(done > last[0] && done <= total);
+    last[0] = done;
+    last[1] = total;
+}
+
+static void progress_rises_to_the_number_of_pixels(void **state)
+{
+    (void)state;
+    scene s;
+    uint64_t last[2] = { 0 };
+    scene_create(&s, &(scene_params){ .dims = { 10, 10, 10 }, .voxel = noise });
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 20, 40, 21);
+    const trip_settings settings = exact(1e-2);
+    scene_picture p = scene_integrate(
+        &s, &view, &settings, &(scene_making){ .progress = keep_progress, .progress_user = last });
+    assert_int_equal(last[0], 21 * 21);
+    assert_int_equal(last[1], 21 * 21);
+    scene_picture_free(&p);
+    scene_destroy(&s);
+}
+
 static void samples_are_the_mean_of_a_finer_picture(void **state)
 {
     (void)state;
@@ -677,6 +703,7 @@ int main(void)
         cmocka_unit_test(of_a_splat_at_the_eye_the_half_in_front_counts),
         cmocka_unit_test(the_error_is_within_the_tolerance),
         cmocka_unit_test(threads_and_tiles_change_no_bit),
+        cmocka_unit_test(progress_rises_to_the_number_of_pixels),
         cmocka_unit_test(samples_are_the_mean_of_a_finer_picture),
         cmocka_unit_test(codes_lose_what_rounding_to_them_can),
         cmocka_unit_test(the_reference_comes_to_the_integral_of_its_splats),

@@ -583,7 +583,7 @@ static void compare_with_integral(bool lit, bool parallel, trip_vec3 direction)
     settings.shading = lit;
     trip_camera_params view = scene_view(&s, direction, 60, 18, 20);
     view.ortho_height = parallel ? 18 : 0;
-    scene_picture truth = scene_integrate(&s, &view, &settings, &(scene_making){ 1, field });
+    scene_picture truth = scene_integrate(&s, &view, &settings, &(scene_making){ .threads = 1, .field = field });
     double errors[3] = { 0 };
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
         for (int n = 0; n < 3; n++) {
