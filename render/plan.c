@@ -272,6 +272,16 @@ static unsigned planes_of(const trip_dataset *data, const trip_settings *setting
     return 1u << TRIP_PLANE_VOXELS | (data->header.planes & normals);
 }
 
+int trip_plan_check_cells(const trip_dataset *data, const char *instead)
+{
+    for (int a = 0; a < 3; a++)
+        if (data->header.dims[a] < 2)
+            return trip_fail(TRIP_ERROR, "render", data->path,
+                             "has one voxel along %c, and no cell to interpolate in; %s draws it",
+                             "ijk"[a], instead);
+    return 0;
+}
+
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
@@ -279,6 +289,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .planes = planes_of(data, settings) };
     int status = trip_settings_check(settings);
+    if (!status && settings->classify == TRIP_CLASSIFY_POST)
+        status = trip_plan_check_cells(data, "--classify pre");
     if (!status)
         status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {

@@ -57,6 +57,10 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
                          const trip_settings *settings, unsigned kinds, trip_budget *budget);
 void trip_plan_release(trip_plan *plan, trip_budget *budget);
 
+/* Fails (reported) for grids one voxel thick, in which no value lies between voxels; `instead` is
+ * the option that draws them. */
+int trip_plan_check_cells(const trip_dataset *data, const char *instead);
+
 /* Selected in all lists. */
 uint64_t trip_plan_splats(const trip_plan *plan);
 

@@ -93,15 +93,10 @@ static int begin_field(integral *r)
 
 static int check_frame(const trip_frame *frame)
 {
-    const uint64_t *dims = frame->data->header.dims;
     if (frame->settings->depth)
         return trip_fail(TRIP_USAGE, "render", "depth", "the integral gives no distances");
-    for (int a = 0; a < 3 && frame->settings->field == TRIP_FIELD_VALUES; a++)
-        if (dims[a] < 2)
-            return trip_fail(TRIP_ERROR, "render", frame->data->path,
-                             "has one voxel along %c, and no cell to interpolate in; "
-                             "--field splats draws it",
-                             "ijk"[a]);
+    if (frame->settings->field == TRIP_FIELD_VALUES)
+        return trip_plan_check_cells(frame->data, "--field splats");
     return 0;
 }
 

@@ -344,6 +344,30 @@ static void the_plan_explains_what_runs_and_why(void **state)
     scene_destroy(&s);
 }
 
+static void grids_one_voxel_thick_have_no_values_between_voxels(void **state)
+{
+    static const char *const along[] = { "along i", "along j", "along k" };
+    (void)state;
+    for (int axis = 0; axis < 3; axis++) {
+        scene_params params = { .dims = { 20, 20, 20 } };
+        params.dims[axis] = 1;
+        scene s;
+        scene_create(&s, &params);
+        scene_colour(&s, 0, 65535, 1, 1, 1, 0.2);
+        trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.4, 0.5), 60, 30, 8);
+        trip_camera camera = make_camera(&s, &view);
+        trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+        trip_plan plan = make_plan(&s, &camera, &settings);
+        trip_plan_release(&plan, s.budget);
+        settings.classify = TRIP_CLASSIFY_POST;
+        test_catch_reports();
+        assert_int_equal(trip_plan_make(&plan, s.data, &camera, &settings, s.table, s.budget),
+                         TRIP_ERROR);
+        assert_one_report(along[axis]);
+        scene_destroy(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -356,6 +380,7 @@ int main(void)
         cmocka_unit_test(a_brick_is_transparent_when_no_code_of_its_range_has_extinction),
         cmocka_unit_test(normals_are_planned_only_for_shading),
         cmocka_unit_test(the_plan_explains_what_runs_and_why),
+        cmocka_unit_test(grids_one_voxel_thick_have_no_values_between_voxels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
