@@ -19,25 +19,34 @@ enum {
     KEY_ENGINE,
     KEY_MEMORY,
     KEY_NO_COUNTS,
+    KEY_TOLERANCE,
+    KEY_BUDGET,
     KEY_JSON,
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
+#define OF_ACCURACY (BIT(KEY_TOLERANCE) | BIT(KEY_BUDGET))
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
       "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
-      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024)", 0 },
+      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; "
+      "accuracy 256x256)",
+      0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are)", 0 },
+      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; accuracy "
+      "cpu)",
+      0 },
     { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
       0 },
     { "repeat", KEY_REPEAT, "N", 0,
-      "Runs, in turns, to take the middle one of (default: 5; renderers 1)", 0 },
-    { "views", KEY_VIEWS, "N", 0, "Views round the object (default: 20); renderers only", 0 },
+      "Runs, in turns, to take the middle one of (default: 5; renderers, accuracy 1)", 0 },
+    { "views", KEY_VIEWS, "N", 0,
+      "Views round the object (default: 20; accuracy 8); renderers and accuracy only", 0 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
-    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0,
+      "Reach of a splat (default: 2); not accuracy", 0 },
     { "hidden", KEY_HIDDEN, "skip|draw", 0,
       "Whether bricks behind what is opaque are read (default: stream draw, renderers skip); skip "
       "by cpu only",
@@ -47,6 +56,10 @@ static const struct argp_option options[] = {
       0 },
     { "no-counts", KEY_NO_COUNTS, NULL, 0,
       "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
+    { "tolerance", KEY_TOLERANCE, "T", 0, "Of the integral, of 1 (default: 1e-4); accuracy only",
+      0 },
+    { "budget", KEY_BUDGET, "SECONDS", 0,
+      "No view is begun after so long (default: all are drawn); accuracy only", 0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -56,6 +69,7 @@ static const struct table {
     unsigned refused; /* options that have no meaning here */
     bool lists;       /* takes several sizes, renderers and thread counts */
     int repeat;
+    int views; /* 0: 20 */
     bool draw_hidden;
     int sizes[2], size_count;
     trip_renderer_kind renderers[3];
@@ -63,7 +77,8 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused = BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
+        .refused =
+            OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -73,8 +88,8 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) |
-                   BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+        .refused = OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
+                   BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -84,7 +99,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 1024 },
@@ -94,13 +109,24 @@ static const struct table {
     },
     {
         .name = "renderers",
-        .refused = BIT(KEY_ENGINE),
+        .refused = OF_ACCURACY | BIT(KEY_ENGINE),
         .lists = true,
         .repeat = 1,
         .sizes = { 512, 1024 },
         .size_count = 2,
         .renderers = { TRIP_RENDERER_CPU, TRIP_RENDERER_GL, TRIP_RENDERER_REFERENCE },
         .renderer_count = 3,
+    },
+    {
+        .name = "accuracy",
+        .refused = BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) | BIT(KEY_KERNEL_RADIUS),
+        .draw_hidden = true,
+        .repeat = 1,
+        .views = 8,
+        .sizes = { 256 },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_CPU },
+        .renderer_count = 1,
     },
 };
 
@@ -198,6 +224,10 @@ static int parse_option(int key, char *arg, bench_options *o)
     case KEY_NO_COUNTS:
         o->no_counts = true;
         return 0;
+    case KEY_TOLERANCE:
+        return trip_option_number("--tolerance", arg, 1e-8, 0.01, &o->tolerance);
+    case KEY_BUDGET:
+        return trip_option_number("--budget", arg, 0, 1e9, &o->budget_seconds);
     case KEY_JSON:
         o->json = true;
         return 0;
@@ -208,6 +238,8 @@ static int parse_option(int key, char *arg, bench_options *o)
 
 static void fill_defaults(bench_options *o, const struct table *t)
 {
+    if (!o->views)
+        o->views = t->views ? t->views : 20;
     if (!o->repeat)
         o->repeat = t->repeat;
     if (!o->size_count)
@@ -251,7 +283,9 @@ static void be_short(parse *p)
 
 static int check(parse *p)
 {
-    static const char *const names[] = { "orders", "submit", "stream", "renderers", NULL };
+    static const char *const names[] = {
+        "orders", "submit", "stream", "renderers", "accuracy", NULL
+    };
     bench_options *o = p->o;
     int which;
     if (!o->table)
@@ -306,7 +340,9 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                "than a minute, the renderers cpu and gl. What is compared takes turns, so that a "
                "machine busy for a while slows all of them.",
     };
-    *o = (bench_options){ .views = 20, .settings = trip_settings_default() };
+    *o = (bench_options){ .tolerance = 1e-4,
+                          .budget_seconds = 1e9,
+                          .settings = trip_settings_default() };
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);
 }

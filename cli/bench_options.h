@@ -19,6 +19,8 @@ typedef struct bench_options {
     int renderer_count;
     int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
     int repeat, views;
+    double tolerance;      /* of the integral */
+    double budget_seconds; /* views are begun so long */
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
@@ -33,7 +35,8 @@ typedef struct bench_options {
     "  orders     the list methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
     "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                \
     "  stream     reading and drawing against the disk's bandwidth\n"                              \
-    "  renderers  the renderers there are, over views round the object\n"
+    "  renderers  the renderers there are, over views round the object\n"                          \
+    "  accuracy   how far settings are from the integral, and what they take\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

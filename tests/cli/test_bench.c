@@ -256,6 +256,41 @@ static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_
     assert_fails(&r, 2);
 }
 
+/* Of the integral at ten times the tolerance the tolerance is known; the settings are farther off.
+ */
+static void accuracy_finds_the_settings_far_and_near(void **state)
+{
+    (void)state;
+    cJSON *root = bench("accuracy block.trip --size 32x32 --views 4 --tolerance 1e-4 --no-shading");
+    const cJSON *rows = rows_of(root, "accuracy"), *row;
+    const cJSON *integral = cJSON_GetArrayItem(rows, 0);
+    assert_true(cJSON_GetArraySize(rows) > 5);
+    assert_true(number(integral, "most") <= 255 * 1e-3);
+    double least = 255;
+    cJSON_ArrayForEach(row, rows)
+    {
+        assert_true(number(row, "ms") > 0);
+        assert_true(number(row, "channels") > 4 * 100);
+        assert_true(number(row, "median") <= number(row, "percentile_99"));
+        assert_true(number(row, "percentile_99") <= number(row, "most") + 0.005);
+        assert_true(number(row, "mean") <= number(row, "most"));
+        if (row != integral)
+            least = fmin(least, number(row, "mean"));
+    }
+    assert_true(number(integral, "mean") < least);
+    cJSON_Delete(root);
+}
+
+static void accuracy_begins_no_view_after_its_seconds(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r,
+                 "bench accuracy block.trip --size 8x8 --views 100 --tolerance 0.01 --budget 0");
+    assert_works(&r);
+    assert_non_null(strstr(r.out, "Views: 1, "));
+}
+
 static void tables_for_people_name_the_command_and_their_limits(void **state)
 {
     (void)state;
@@ -283,6 +318,9 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench renderers block.trip --engine pread",
         "bench renderers block.trip --renderer none",
         "bench stream block.trip --views 2",
+        "bench renderers block.trip --tolerance 1e-3",
+        "bench accuracy block.trip --tolerance 0",
+        "bench accuracy block.trip --kernel-radius 3",
         "bench stream block.trip --hidden skip --renderer gl",
         "bench stream block.trip --hidden skip --renderer reference",
         "bench renderers block.trip --hidden skip --renderer gl,reference",
@@ -318,6 +356,8 @@ int main(void)
         cmocka_unit_test(submit_compares_forms_where_there_is_gl),
         cmocka_unit_test(
             without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
+        cmocka_unit_test(accuracy_finds_the_settings_far_and_near),
+        cmocka_unit_test(accuracy_begins_no_view_after_its_seconds),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
         cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),
