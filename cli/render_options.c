@@ -137,7 +137,7 @@ static const struct argp_option options[] = {
       "Interpolation of values, linear or cubic (default: linear); integral only", 4 },
     { "tolerance", KEY_TOLERANCE, "E", 0,
       "Error of a pixel's components, 1e-12 to 0.1 (default: 1e-4); integral only", 4 },
-    { "samples", KEY_SAMPLES, "N", 0, "N x N rays a pixel (default: 1); integral only", 4 },
+    { "samples", KEY_SAMPLES, "N", 0, "N x N rays a pixel, for antialiasing (default: 1)", 4 },
     { NULL, 0, NULL, 0, "Results:", 5 },
     { "depth", KEY_DEPTH, "FILE", 0,
       "Mean distance from the eye to what is seen at each pixel, in world units, infinite where "
@@ -420,8 +420,7 @@ static int parse_integral(int key, char *arg, parse *p)
         status = trip_option_number("--tolerance", arg, 1e-12, 0.1, &o->settings.tolerance);
         break;
     case KEY_SAMPLES:
-        status = trip_option_integer("--samples", arg, 1, 64, &o->settings.samples);
-        break;
+        return trip_option_integer("--samples", arg, 1, 64, &o->settings.samples);
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -488,6 +487,8 @@ static int check_depth(const render_options *o)
         return trip_option_fail("--depth", "does not apply to --renderer integral");
     if (o->settings.target != TRIPTYCH_RGBA32F)
         return trip_option_fail("--depth", "goes with --target rgba32f");
+    if (o->settings.samples > 1)
+        return trip_option_fail("--depth", "goes with one ray a pixel, without --samples");
     return 0;
 }
 
@@ -497,7 +498,7 @@ static int check_integral(parse *p)
     bool integral = o->renderer == TRIPTYCH_RENDERER_INTEGRAL;
     o->settings.field = o->field == RENDER_FIELD_SPLATS ? TRIPTYCH_SPLATS : TRIPTYCH_VALUES;
     if (p->integral && !integral)
-        return trip_option_fail("--field, --kernel, --tolerance, --samples",
+        return trip_option_fail("--field, --kernel, --tolerance",
                                 "apply to --renderer integral only");
     if (p->kernel && o->field == RENDER_FIELD_SPLATS)
         return trip_option_fail("--kernel", "does not apply to --field splats");

@@ -50,6 +50,21 @@ static int make_reader(triptych *t, unsigned planes)
     return session_make_reader(&t->session, &t->reader, &wanted);
 }
 
+/* Pixels of the frame along each side of one of the picture: where more than one ray a pixel is
+ * wanted, renderers but the integral, which has them itself, draw a larger picture. */
+static int pixels_a_side(const triptych *t)
+{
+    return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->settings.samples;
+}
+
+static int make_camera(triptych *t)
+{
+    trip_camera_params view = t->turned;
+    view.width *= pixels_a_side(t);
+    view.height *= pixels_a_side(t);
+    return trip_camera_make(&t->camera, &view, &t->session.data->index_to_world);
+}
+
 static int prepare(triptych *t)
 {
     session *s = &t->session;
@@ -65,7 +80,7 @@ static int prepare(triptych *t)
         status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
                                       s->budget);
     if (!status)
-        status = trip_camera_make(&t->camera, &t->turned, &s->data->index_to_world);
+        status = make_camera(t);
     return status;
 }
 
@@ -87,9 +102,8 @@ static int plan_frame(triptych *t)
     session *s = &t->session;
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return plan_field(t);
-    if (t->settings.samples > 1)
-        return trip_fail(TRIP_USAGE, "render", "samples",
-                         "only the integral renderer takes more than one a pixel yet");
+    if (t->settings.samples > 1 && t->settings.depth)
+        return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
     return trip_plan_make(&t->plan, s->data, &t->camera, &t->settings, s->table, s->budget);
 }
 
@@ -166,6 +180,42 @@ int triptych_await(triptych *t, uint64_t timeout_ns)
     return trip_context_leave(before, status);
 }
 
+/* The mean of each square of `side` x `side` pixels of `fine`. */
+static void take_means(const float *fine, int side, int width, int height, float *rgba)
+{
+    const size_t row = (size_t)width * (size_t)side * 4;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++, rgba += 4) {
+            const float *corner = fine + (size_t)(y * side) * row + (size_t)(x * side) * 4;
+            double sum[4] = { 0 };
+            for (int n = 0; n < side * side; n++)
+                for (int c = 0; c < 4; c++)
+                    sum[c] += (double)corner[(size_t)(n / side) * row + (size_t)(n % side * 4 + c)];
+            for (int c = 0; c < 4; c++)
+                rgba[c] = (float)(sum[c] / (side * side));
+        }
+}
+
+static int take_colours(triptych *t, float *rgba, float *depth)
+{
+    const int side = pixels_a_side(t);
+    if (side == 1)
+        return trip_frame_picture(&t->drawing, rgba, depth);
+    trip_budget *budget = t->session.budget;
+    size_t bytes = (size_t)t->camera.width * (size_t)t->camera.height * 4 * sizeof *rgba;
+    float *fine = trip_budget_take(budget, bytes);
+    if (!fine)
+        return trip_fail(TRIP_ERROR, "render", "samples",
+                         "a picture %d times as wide and high does not fit the memory given; raise "
+                         "--memory or take fewer",
+                         side);
+    int status = trip_frame_picture(&t->drawing, fine, NULL);
+    if (!status)
+        take_means(fine, side, t->turned.width, t->turned.height, rgba);
+    trip_budget_release(budget, fine, bytes);
+    return status;
+}
+
 /* Distances go with a frame that has them, and only with that. */
 static int take_picture(triptych *t, float *rgba, float *depth)
 {
@@ -175,7 +225,7 @@ static int take_picture(triptych *t, float *rgba, float *depth)
             trip_fail(TRIP_USAGE, "render", "depth", "%s",
                       depth ? "the frame was begun without" : "is to be taken with the picture");
     if (!status)
-        status = trip_frame_picture(&t->drawing, rgba, depth);
+        status = take_colours(t, rgba, depth);
     if (!status && t->drawing.done)
         status = trip_context_note_stats(t);
     return status;

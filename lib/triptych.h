@@ -219,11 +219,12 @@ typedef struct triptych_settings {
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     int depth; /* not 0: frames have distances too; not with rounded targets or the integral */
-    /* Of the integral renderer alone. */
+    /* Of the integral renderer alone, but for samples. */
     triptych_field field;   /* what it integrates */
     triptych_kernel kernel; /* of values */
     double tolerance;       /* of a component of a pixel, 1e-12 to 0.1 */
-    int samples;            /* rays along each side of a pixel, 1 to 64; other renderers: 1 */
+    int samples;            /* rays along each side of a pixel, 1 to 64; without depth. Renderers
+                               but the integral draw a picture so many times as wide and high */
     int count; /* not 0: triptych_list_stats has exact counts, which takes time, of hidden bricks
                   too */
 } triptych_settings;

@@ -74,7 +74,8 @@ typedef struct trip_settings {
     trip_field_kind field;
     trip_kernel kernel; /* of values */
     double tolerance;   /* of a component of a pixel, 0 to 1 */
-    int samples;        /* rays of a pixel, along x and along y; their mean is its colour */
+    int samples;        /* rays of a pixel, along x and along y; their mean is its colour. Frames
+                           of other renderers are that much larger instead */
 } trip_settings;
 
 /* The defaults: pre, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by headlight,

@@ -634,16 +634,34 @@ static void the_integral_of_what_is_kept_is_that_of_the_volume(void **state)
     triptych_destroy(t);
 }
 
-static void more_samples_a_pixel_are_the_integrals_alone(void **state)
+static void more_samples_are_the_mean_of_a_larger_picture(void **state)
 {
     (void)state;
-    static float rgba[FLOATS];
+    enum { SIDE = 3, LARGE = SIDE * SIZE };
+    static float rgba[FLOATS], large[SIDE * SIDE * FLOATS];
     triptych *t = new_context();
     triptych_settings s = triptych_default_settings();
-    s.samples = 2;
+    const triptych_view view = { .width = LARGE, .height = LARGE, .side = TRIPTYCH_ISO };
     open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, large), TRIPTYCH_OK);
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    s.samples = SIDE;
     assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
-    assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "only the integral");
+    assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+    double most = 0;
+    for (int n = 0; n < FLOATS; n++) {
+        int x = n / 4 % SIZE * SIDE, y = n / 4 / SIZE * SIDE;
+        double sum = 0;
+        for (int i = 0; i < SIDE * SIDE; i++)
+            sum += (double)large[4 * ((y + i / SIDE) * LARGE + x + i % SIDE) + n % 4];
+        assert_float_equal(rgba[n], sum / (SIDE * SIDE), 1e-6);
+        most = fmax(most, fabs((double)large[4 * (y * LARGE + x) + n % 4] - (double)rgba[n]));
+    }
+    assert_true(most > 0.01);
+    s.depth = 1;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "one a pixel");
     s.samples = 0;
     assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "samples");
     s.samples = 1;
@@ -727,7 +745,7 @@ int main(void)
         cmocka_unit_test(a_frame_given_up_leaves_the_next_one_as_it_is),
         cmocka_unit_test(a_turned_view_can_be_turned_back),
         cmocka_unit_test(the_integral_of_what_is_kept_is_that_of_the_volume),
-        cmocka_unit_test(more_samples_a_pixel_are_the_integrals_alone),
+        cmocka_unit_test(more_samples_are_the_mean_of_a_larger_picture),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);
