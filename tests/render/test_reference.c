@@ -98,6 +98,77 @@ static void small_kernels_leave_the_ripple_that_the_formula_gives(void **state)
     scene_destroy(&s);
 }
 
+static bool lone_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 65535;
+    return i == 3 && j == 3 && k == 3;
+}
+
+/* The integral over the plane of the opacity of a splat without low-pass, by Simpson's rule over
+ * the squared radius, which area is in proportion to. */
+static double area_covered(double extinction)
+{
+    enum { STEPS = 20000 };
+    const double k2 = TRIP_CUTOFF * TRIP_CUTOFF, edge = exp(-k2 / 2), pi = 3.14159265358979323846;
+    const double sigma2 = TRIP_KERNEL_RADIUS_VOXELS * TRIP_KERNEL_RADIUS_VOXELS / k2;
+    double amplitude = 1 / (2 * pi * sigma2) / (1 - edge * (1 + k2 / 2)), sum = 0;
+    for (int i = 0; i <= STEPS; i++) {
+        double m = k2 * i / STEPS, weight = i == 0 || i == STEPS ? 1 : 2 + 2 * (i % 2);
+        sum -= weight * expm1(-extinction * amplitude * (exp(-m / 2) - edge));
+    }
+    return pi * sigma2 * sum * k2 / STEPS / 3;
+}
+
+static void a_lone_voxel_covers_its_area_where_it_is_a_few_pixels_wide(void **state)
+{
+    (void)state;
+    enum { SIZE = 64, VOXEL_PX = 8 };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 7, 7, 7 }, .voxel = lone_voxel });
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.5);
+    settings.background[3] = 0;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.2, 0.3), 20, 0, SIZE);
+    view.ortho_height = (double)SIZE / VOXEL_PX;
+    for (double extinction = 0.1; extinction < 2000; extinction *= 10) {
+        s.table[65535] = (trip_tf_entry){ 1, 1, 1, (float)extinction };
+        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            double sum = 0;
+            for (int n = 0; n < SIZE * SIZE; n++)
+                sum += (double)p.rgba[4 * n + 3];
+            double area = area_covered(extinction);
+            assert_true(fabs(sum / (VOXEL_PX * VOXEL_PX) - area) < 0.02 * area);
+            scene_picture_free(&p);
+        }
+    }
+    scene_destroy(&s);
+}
+
+/* However small it is drawn. */
+static void a_sheet_of_voxels_has_its_opacity_at_any_zoom(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 1, 200, 200 } });
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.5);
+    settings.background[3] = 0;
+    for (int i = 0; i < 12; i++) {
+        const double opacities[3] = { 0.05, 0.5, 0.9 }, pixels[4] = { 0.05, 0.3, 1, 2 };
+        double opacity = opacities[i % 3], size = 9 / pixels[i / 3];
+        scene_colour(&s, 0, 65535, 1, 1, 1, opacity);
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 20, 0, 9);
+        view.ortho_height = size;
+        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            assert_close(scene_pixel(&p, 4, 4)[3] / opacity, 1, 0.01);
+            scene_picture_free(&p);
+        }
+    }
+    scene_destroy(&s);
+}
+
 /* A room with green walls, and red ones behind them. */
 static bool double_walls(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -612,6 +683,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(small_kernels_leave_the_ripple_that_the_formula_gives),
+        cmocka_unit_test(a_lone_voxel_covers_its_area_where_it_is_a_few_pixels_wide),
+        cmocka_unit_test(a_sheet_of_voxels_has_its_opacity_at_any_zoom),
         cmocka_unit_test(the_nearest_sheet_is_in_front_for_every_axis_side_and_method),
         cmocka_unit_test(inside_a_room_outward_order_is_right_and_ascending_order_fails),
         cmocka_unit_test(large_kernels_show_lines_when_clipped_and_none_when_merged),
