@@ -19,12 +19,15 @@ enum {
     KEY_ENGINE,
     KEY_MEMORY,
     KEY_NO_COUNTS,
+    KEY_CLASSIFY,
+    KEY_SLICES,
     KEY_TOLERANCE,
     KEY_BUDGET,
     KEY_JSON,
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
+#define OF_RENDERERS (BIT(KEY_CLASSIFY) | BIT(KEY_SLICES))
 #define OF_ACCURACY (BIT(KEY_TOLERANCE) | BIT(KEY_BUDGET))
 
 static const struct argp_option options[] = {
@@ -56,6 +59,9 @@ static const struct argp_option options[] = {
       0 },
     { "no-counts", KEY_NO_COUNTS, NULL, 0,
       "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
+    { "classify", KEY_CLASSIFY, "pre|post", 0,
+      "As of `triptych render` (default: pre); renderers only", 0 },
+    { "slices", KEY_SLICES, "N", 0, "Slices of a sheet, post (default: 2); renderers only", 0 },
     { "tolerance", KEY_TOLERANCE, "T", 0, "Of the integral, of 1 (default: 1e-4); accuracy only",
       0 },
     { "budget", KEY_BUDGET, "SECONDS", 0,
@@ -77,8 +83,8 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused =
-            OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
+        .refused = OF_RENDERERS | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -88,8 +94,8 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
-                   BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+        .refused = OF_RENDERERS | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -99,7 +105,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_RENDERERS | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 1024 },
@@ -119,7 +125,8 @@ static const struct table {
     },
     {
         .name = "accuracy",
-        .refused = BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) | BIT(KEY_KERNEL_RADIUS),
+        .refused = OF_RENDERERS | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_KERNEL_RADIUS),
         .draw_hidden = true,
         .repeat = 1,
         .views = 8,
@@ -194,6 +201,14 @@ static int parse_hidden(const char *text, bench_options *o)
     return status;
 }
 
+static int parse_classify(const char *text, bench_options *o)
+{
+    static const char *const names[] = { "pre", "post", NULL };
+    int which = 0, status = trip_option_choice("--classify", text, names, &which);
+    o->settings.classify = which ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+    return status;
+}
+
 static int parse_option(int key, char *arg, bench_options *o)
 {
     switch (key) {
@@ -224,6 +239,10 @@ static int parse_option(int key, char *arg, bench_options *o)
     case KEY_NO_COUNTS:
         o->no_counts = true;
         return 0;
+    case KEY_CLASSIFY:
+        return parse_classify(arg, o);
+    case KEY_SLICES:
+        return trip_option_integer("--slices", arg, 1, TRIP_SLICES_MAX, &o->settings.slices);
     case KEY_TOLERANCE:
         return trip_option_number("--tolerance", arg, 1e-8, 0.01, &o->tolerance);
     case KEY_BUDGET:

@@ -320,6 +320,8 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench stream block.trip --views 2",
         "bench renderers block.trip --tolerance 1e-3",
         "bench accuracy block.trip --tolerance 0",
+        "bench stream block.trip --classify post",
+        "bench renderers block.trip --classify never",
         "bench accuracy block.trip --kernel-radius 3",
         "bench stream block.trip --hidden skip --renderer gl",
         "bench stream block.trip --hidden skip --renderer reference",

@@ -37,17 +37,17 @@ def _numbers(values):
 class Triptych:
     """`triptych bench renderers`: each frame in turn from the data set in memory."""
 
-    def __init__(self, prepared, renderer, threads):
+    def __init__(self, prepared, renderer, threads, name=None, look=()):
         self.prepared, self.renderer, self.threads = prepared, renderer, threads
-        self.name = "triptych-" + renderer
-        self.shading = [] if prepared.scene.shading else ["--no-shading"]
+        self.name = name or "triptych-" + renderer
+        self.look = list(look) + ([] if prepared.scene.shading else ["--no-shading"])
         self.device = None
 
     def time_views(self, size, views):
         text = _run([self.prepared.triptych, "bench", "renderers", self.prepared.dataset,
                      "--renderer", self.renderer, "--threads", str(self.threads), "--size",
                      "%dx%d" % (size, size), "--views", str(views), "--no-counts", "--json"] +
-                    self.shading, env=_environment(self.threads))
+                    self.look, env=_environment(self.threads))
         report = json.loads(text[text.index("{"):])
         rows = report["tables"]["renderers"]["rows"]
         if not rows:
@@ -60,7 +60,7 @@ class Triptych:
               self.renderer, "--threads", str(self.threads), "--size", "%dx%d" % (size, size),
               "--eye=" + _numbers(view["eye"]), "--look=" + _numbers(view["look"]),
               "--up=" + _numbers(view["up"]), "--fov", repr(view["fov_degrees"]), "--background",
-              "none"] + self.shading)
+              "none"] + self.look)
 
     def close(self):
         pass
@@ -69,9 +69,9 @@ class Triptych:
 class Vtk:
     """A process that keeps the volume and the window, vtk_worker.py."""
 
-    def __init__(self, prepared, mapper, threads):
-        self.name = "vtk-" + mapper
-        job = {"mapper": mapper, "volume": prepared.array(), "threads": threads,
+    def __init__(self, prepared, mapper, threads, name=None, step=1):
+        self.name = name or "vtk-" + mapper
+        job = {"mapper": mapper, "step": step, "volume": prepared.array(), "threads": threads,
                "index_to_world": prepared.info["index_to_world"],
                "function": prepared.function, "shading": prepared.scene.shading}
         self.process = subprocess.Popen(
@@ -144,10 +144,15 @@ class VdbRender:
         pass
 
 
-NAMES = ["triptych-cpu", "triptych-gl", "vtk-cpu", "vtk-gpu", "vdb_render"]
+NAMES = ["triptych-cpu", "triptych-post", "triptych-gl", "vtk-cpu", "vtk-cpu-half", "vtk-gpu",
+         "vdb_render"]
 
 
 def make(name, prepared, threads):
+    if name == "triptych-post":
+        return Triptych(prepared, "cpu", threads, name, ["--classify", "post"])
+    if name == "vtk-cpu-half":
+        return Vtk(prepared, "cpu", threads, name, 0.5)
     if name.startswith("triptych-"):
         return Triptych(prepared, name[len("triptych-"):], threads)
     if name.startswith("vtk-"):

@@ -24,6 +24,22 @@ def difference(a, b):
     return {"mean": float(np.abs(a - b).mean()), "max": float(np.abs(a - b).max())}
 
 
+def _figures(apart):
+    if not apart.size:
+        return {"median": 0.0, "mean": 0.0, "percentile_99": 0.0, "most": 0.0}
+    return {"median": float(np.median(apart)), "mean": float(apart.mean()),
+            "percentile_99": float(np.percentile(apart, 99)), "most": float(apart.max())}
+
+
+def distance(picture, truth):
+    """Of 255, over the pixels where either picture's opacity is above 1/255: of all channels, and of
+    opacity, which no light changes."""
+    covered = np.maximum(picture[..., 3], truth[..., 3]) > 1 / 255
+    apart = 255 * np.abs(picture - truth)[covered]
+    opacity = _figures(apart[:, 3])
+    return dict(_figures(apart), opacity_median=opacity["median"], opacity_mean=opacity["mean"])
+
+
 def _as_image(values):
     if values.ndim == 2:
         values = np.repeat(values[..., None], 3, axis=2)

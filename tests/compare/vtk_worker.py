@@ -1,10 +1,12 @@
 """Draws one volume by one of VTK's mappers, as told by JSON lines on standard input:
   {"mapper": "cpu" | "gpu", "volume": FILE.npy, "index_to_world": 3 x 4, "function": [[value, r, g, b,
-   opacity], ...], "shading": bool, "threads": N}
+   opacity], ...], "shading": bool, "threads": N,
+   "step": voxels}
 then any number of
   {"eye": .., "look": .., "up": .., "fov_degrees": .., "size": N, "picture": FILE.png | null}
 and answers each by a line: {"version", "device"}, then {"ms", "display_ms"}."""
 import json
+import math
 import os
 import sys
 import time
@@ -63,18 +65,19 @@ def make_property(job, voxel):
 
 
 def make_mapper(job, voxel):
-    """One sample a voxel and one ray a pixel, whatever the time it takes."""
+    """One sample every `step` voxels and one ray a pixel, whatever the time it takes."""
+    distance = job["step"] * voxel
     if job["mapper"] == "cpu":
         mapper = vtkFixedPointVolumeRayCastMapper()
         mapper.SetNumberOfThreads(job["threads"])
-        mapper.SetInteractiveSampleDistance(voxel)
+        mapper.SetInteractiveSampleDistance(distance)
     else:
         mapper = vtkmodules.vtkRenderingVolumeOpenGL2.vtkOpenGLGPUVolumeRayCastMapper()
         mapper.SetUseJittering(False)
         mapper.SetMaxMemoryInBytes(4 << 30)
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetImageSampleDistance(1)
-    mapper.SetSampleDistance(voxel)
+    mapper.SetSampleDistance(distance)
     return mapper
 
 
@@ -112,12 +115,20 @@ class Stage:
         return "%s, OpenGL %s" % (facts["OpenGL renderer string"].strip(),
                                   facts["OpenGL version string"].strip())
 
+    def angle(self, view):
+        """The ray caster's picture is larger by a pixel than the view asks for: the first and the
+        last of N rays along an edge are as far apart as N pixels are wide. The angle makes up for it."""
+        if not self.display:
+            return view["fov_degrees"]
+        slope = math.tan(math.radians(view["fov_degrees"]) / 2)
+        return math.degrees(2 * math.atan(slope * view["size"] / (view["size"] - 1)))
+
     def look_from(self, view):
         camera = self.renderer.GetActiveCamera()
         camera.SetPosition(view["eye"])
         camera.SetFocalPoint(view["look"])
         camera.SetViewUp(view["up"])
-        camera.SetViewAngle(view["fov_degrees"])
+        camera.SetViewAngle(self.angle(view))
         if self.window.GetSize() != (view["size"], view["size"]):
             self.window.SetSize(view["size"], view["size"])
         self.renderer.ResetCameraClippingRange()
