@@ -8,6 +8,7 @@
 #include "bench_error.h"
 #include "bench_view.h"
 #include "report.h"
+#include "source_field.h"
 
 /* The settings, a line each. */
 static const struct row {
@@ -47,6 +48,7 @@ typedef struct measuring {
     const bench_options *options;
     bench_scene scene;
     trip_renderer *integral;
+    trip_field *source; /* NULL: the integral is of the values stored */
     float *truth;
     entry entries[1 + ROWS]; /* the integral's first */
     int views;               /* done */
@@ -94,17 +96,22 @@ static int draw_integral(measuring *m, double tolerance, float *rgba, double *ms
     trip_camera camera;
     trip_plan plan;
     trip_frame_stats stats;
+    unsigned kinds = m->source ? 0 : 1u << TRIP_KIND_VOXELS | 1u << TRIP_KIND_HALO;
     bench_progress_step(m->options->progress, "integral");
     settings.tolerance = tolerance;
     double start = bench_now_ms();
     int status = trip_camera_make(&camera, &m->scene.frame.view, &s->data->index_to_world);
     if (!status)
-        status = trip_plan_make_field(&plan, s->data, &camera, &settings,
-                                      1u << TRIP_KIND_VOXELS | 1u << TRIP_KIND_HALO, s->budget);
+        status = trip_plan_make_field(&plan, s->data, &camera, &settings, kinds, s->budget);
     if (status)
         return status;
     const trip_frame frame = {
-        .data = s->data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s->table
+        .data = s->data,
+        .camera = &camera,
+        .settings = &settings,
+        .plan = &plan,
+        .table = s->table,
+        .field = m->source,
     };
     status = trip_frame_draw(m->integral, m->scene.frame.reader, &frame, rgba, NULL, &stats);
     *ms = bench_now_ms() - start;
@@ -231,10 +238,12 @@ static void add_table(measuring *m, bench_report *r)
 static void add_limits(const measuring *m, bench_report *r)
 {
     bench_report_limit(r,
-                       "The truth is the integral through the values that the data set stores, "
-                       "interpolated linearly, one ray a pixel, to a tolerance of %g (%.2g of "
-                       "255); what storing loses is in no figure.",
-                       m->options->tolerance, 255 * m->options->tolerance);
+                       "The truth is the integral through the values %s, interpolated linearly, "
+                       "one ray a pixel, to a tolerance of %g (%.2g of 255); what storing loses is "
+                       "in %s figure.",
+                       m->source ? "of the source volume" : "that the data set stores",
+                       m->options->tolerance, 255 * m->options->tolerance,
+                       m->source ? "every" : "no");
     bench_report_limit(r, "Errors are of red, green, blue (premultiplied) and alpha over the "
                           "pixels that the object covers, where alpha of either picture is above "
                           "1/255, all views together; median and 99 %% to 0.01.");
@@ -253,6 +262,9 @@ static int begin(measuring *m, bench_report *r)
         status = session_take_image(s, m->scene.size[0], m->scene.size[1], &m->truth);
     if (!status)
         status = trip_integral_create(&m->integral, s->budget, (unsigned)o->threads[0]);
+    if (!status && o->source)
+        status = trip_source_field_read(&m->source, s->data, o->source, &(trip_volume_params){ 0 },
+                                        s->budget);
     for (int i = 0; i < 1 + ROWS && !status; i++)
         if (!(m->entries[i].ms = calloc(frames, sizeof *m->entries[i].ms)))
             status = trip_fail(TRIP_ERROR, "bench", "accuracy", "out of memory");
@@ -264,6 +276,7 @@ static void end(measuring *m)
     for (int i = 0; i < 1 + ROWS; i++)
         free(m->entries[i].ms);
     bench_renderer_destroy(m->integral);
+    trip_field_destroy(m->source);
     session_release_image(m->session, m->scene.size[0], m->scene.size[1], m->truth);
     bench_scene_close(&m->scene);
     free(m);

@@ -23,12 +23,13 @@ enum {
     KEY_SLICES,
     KEY_TOLERANCE,
     KEY_BUDGET,
+    KEY_SOURCE,
     KEY_JSON,
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
 #define OF_RENDERERS (BIT(KEY_CLASSIFY) | BIT(KEY_SLICES))
-#define OF_ACCURACY (BIT(KEY_TOLERANCE) | BIT(KEY_BUDGET))
+#define OF_ACCURACY (BIT(KEY_TOLERANCE) | BIT(KEY_BUDGET) | BIT(KEY_SOURCE))
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
@@ -66,6 +67,10 @@ static const struct argp_option options[] = {
       0 },
     { "budget", KEY_BUDGET, "SECONDS", 0,
       "No view is begun after so long (default: all are drawn); accuracy only", 0 },
+    { "source", KEY_SOURCE, "VOLUME", 0,
+      "The integral is of this volume, which the data set was made of, in place of the values "
+      "stored; accuracy only",
+      0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -247,6 +252,9 @@ static int parse_option(int key, char *arg, bench_options *o)
         return trip_option_number("--tolerance", arg, 1e-8, 0.01, &o->tolerance);
     case KEY_BUDGET:
         return trip_option_number("--budget", arg, 0, 1e9, &o->budget_seconds);
+    case KEY_SOURCE:
+        o->source = arg;
+        return 0;
     case KEY_JSON:
         o->json = true;
         return 0;

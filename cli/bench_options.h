@@ -20,6 +20,7 @@ typedef struct bench_options {
     int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
     int repeat, views;
     double tolerance;      /* of the integral */
+    const char *source;    /* the volume that it is of; NULL: the values stored */
     double budget_seconds; /* views are begun so long */
     trip_settings settings;
     trip_engine engine;

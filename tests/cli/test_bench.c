@@ -281,6 +281,32 @@ static void accuracy_finds_the_settings_far_and_near(void **state)
     cJSON_Delete(root);
 }
 
+/* Of whole values, all of which are kept, nothing is lost when they are stored but gradients, and
+ * nothing is lit here. */
+static void accuracy_is_against_the_source_where_it_is_given(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r, "bench accuracy block.trip --size 8x8 --views 1 --tolerance 0.01 "
+                     "--no-shading --source missing.nrrd");
+    assert_fails(&r, 1);
+    FILE *f = fopen("block.nhdr", "w");
+    assert_non_null(f);
+    fprintf(f, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 18 16\nencoding: raw\n"
+               "data file: block.raw\n");
+    assert_int_equal(fclose(f), 0);
+    cJSON *stored = bench("accuracy block.trip --size 16x16 --views 2 --no-shading");
+    cJSON *source =
+        bench("accuracy block.trip --size 16x16 --views 2 --no-shading --source block.nhdr");
+    const cJSON *a = rows_of(stored, "accuracy"), *b = rows_of(source, "accuracy");
+    assert_int_equal(cJSON_GetArraySize(a), cJSON_GetArraySize(b));
+    for (int i = 1; i < cJSON_GetArraySize(a); i++)
+        assert_true(fabs(number(cJSON_GetArrayItem(a, i), "mean") -
+                         number(cJSON_GetArrayItem(b, i), "mean")) < 0.1);
+    cJSON_Delete(stored);
+    cJSON_Delete(source);
+}
+
 static void accuracy_begins_no_view_after_its_seconds(void **state)
 {
     (void)state;
@@ -359,6 +385,7 @@ int main(void)
         cmocka_unit_test(
             without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
         cmocka_unit_test(accuracy_finds_the_settings_far_and_near),
+        cmocka_unit_test(accuracy_is_against_the_source_where_it_is_given),
         cmocka_unit_test(accuracy_begins_no_view_after_its_seconds),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
