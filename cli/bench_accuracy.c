@@ -80,7 +80,7 @@ static trip_camera_params make_view(const measuring *m, int index)
         break;
     }
     case 3:
-        v.eye = towards(v.eye, v.look, 0.7);
+        v.eye = towards(v.eye, v.look, 0.82);
         v.fov_degrees = 110;
         break;
     default:
