@@ -223,7 +223,7 @@ static uint64_t segments_of_patch(const trip_cpu_sheet_view *view, const trip_cp
         return 0;
     for (unsigned n = 0; n < g->segments; n++) {
         voxel_box next = beam_box(g, &b, from_start(view, g->slices[n + 1].coordinate));
-        if (squares_show(g, g->visible[n], both_boxes(last, next)))
+        if (cells_show(g, n, both_boxes(last, next)))
             some |= UINT64_C(1) << n;
         last = next;
     }
@@ -646,52 +646,63 @@ INLINE void set_light(const trip_cpu_sheet_view *view, stamp_rays *l)
     set_unit(l->half);
 }
 
-/* The rays through the pixel centres of a stamp. */
-static void find_lanes(const trip_cpu_sheet_view *view, const tile_path *path, int x, int y,
-                       unsigned number, stamp_rays *l)
+/* The rays through the pixel centres of a stamp. Loops over lanes without branches, which compilers
+ * make vectors of. */
+static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, int x, int y,
+                      unsigned number, stamp_rays *l)
 {
-    float of[9][V];
+    float slope[2][V], shift[2][V], to_eye[3][V], length[V], depth[V], start[V], along[V];
+    double px[V], py[V], r[3][V], world2[V], per_sheet[V];
     vf across = stamp_x(number), down = stamp_y(number);
+    const double turns = view->ortho ? 0 : 1, moves = view->ortho ? 1 : 0;
     for (int i = 0; i < V; i++) {
-        double px = x + (double)across[i], py = y + (double)down[i], start[2], slope[2], r[3];
-        bool along = ray_slope(view, px, py, start, slope);
-        for (int a = 0; a < 2; a++) {
-            along &= fabs(slope[a]) <= view->steepest * (1 + 1e-9);
-            of[a][i] = (float)(slope[a] - path->slope[a]);
-            of[2 + a][i] = (float)(start[a] - path->start[a]);
-        }
-        for (int k = 0; k < 3; k++)
-            r[k] = view->ortho ? view->r0[k] : view->r0[k] + px * view->rx[k] + py * view->ry[k];
-        double world[3], length = 0;
-        for (int k = 0; k < 3; k++) {
-            world[k] =
-                view->world[k][0] * r[0] + view->world[k][1] * r[1] + view->world[k][2] * r[2];
-            length += world[k] * world[k];
-        }
-        length = sqrt(length);
-        double sheets = fabs(r[2]) > 0 ? 1 / r[2] : 0;
-        of[4][i] = along ? (float)(length * fabs(sheets)) : -1;
-        for (int k = 0; k < 3; k++)
-            of[5 + k][i] = view->ortho ? view->to_eye[k] : (float)(-world[k] / length);
-        of[8][i] = (float)sheets;
-        if (view->ortho) {
-            /* Depth 0 is where the ray's own origin lies. */
-            double sheet = view->eye[2] + px * view->rx[2] + py * view->ry[2];
-            l->depth_at_start[i] = (float)(-sheet * sheets);
-        }
+        px[i] = x + (double)across[i];
+        py[i] = y + (double)down[i];
+        world2[i] = 0;
     }
-    for (int a = 0; a < 2; a++) {
-        l->slope[a] = v_load(of[a]);
-        l->shift[a] = v_load(of[2 + a]);
-    }
-    l->length = v_load(of[4]);
-    l->along = v_ge(l->length, v_set(0));
-    l->length = v_max(l->length, v_set(0));
     for (int k = 0; k < 3; k++)
-        l->to_eye[k] = v_load(of[5 + k]);
-    l->depth = v_load(of[8]);
-    if (!view->ortho)
-        l->depth_at_start = v_set(0);
+        for (int i = 0; i < V; i++)
+            r[k][i] = view->r0[k] + turns * (px[i] * view->rx[k] + py[i] * view->ry[k]);
+    for (int i = 0; i < V; i++) {
+        double toward = r[2][i] * view->direction;
+        per_sheet[i] = 1 / (toward > 0 ? r[2][i] : view->direction);
+        along[i] = toward > 0 ? 1 : 0;
+        depth[i] = (float)per_sheet[i];
+    }
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < V; i++) {
+            double w = view->world[k][0] * r[0][i] + view->world[k][1] * r[1][i] +
+                       view->world[k][2] * r[2][i];
+            to_eye[k][i] = (float)-w;
+            world2[i] += w * w;
+        }
+    for (int i = 0; i < V; i++)
+        length[i] = (float)(sqrt(world2[i]) * (per_sheet[i] < 0 ? -per_sheet[i] : per_sheet[i]));
+    for (int i = 0; i < V; i++) {
+        double sheet = view->eye[2] + px[i] * view->rx[2] + py[i] * view->ry[2];
+        start[i] = (float)(-moves * sheet * per_sheet[i]); /* depth 0 is at the ray's origin */
+    }
+    for (int a = 0; a < 2; a++)
+        for (int i = 0; i < V; i++) {
+            double m = r[a][i] * per_sheet[i], most = view->steepest * (1 + 1e-9);
+            double sheet = view->eye[2] + px[i] * view->rx[2] + py[i] * view->ry[2];
+            double at =
+                view->eye[a] + moves * (px[i] * view->rx[a] + py[i] * view->ry[a] - sheet * m);
+            along[i] *= m <= most && m >= -most ? 1 : 0;
+            slope[a][i] = (float)(m - path->slope[a]);
+            shift[a][i] = (float)(at - path->start[a]);
+        }
+    for (int a = 0; a < 2; a++) {
+        l->slope[a] = v_load(slope[a]);
+        l->shift[a] = v_load(shift[a]);
+    }
+    l->length = v_load(length);
+    l->depth = v_load(depth);
+    l->depth_at_start = v_load(start);
+    l->along = v_gt(v_load(along), v_set(0));
+    for (int k = 0; k < 3; k++)
+        l->to_eye[k] = view->ortho ? v_set(view->to_eye[k]) : v_load(to_eye[k]);
+    set_unit(l->to_eye);
     set_light(view, l);
 }
 
@@ -740,7 +751,7 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (!vm_any(v_gt(v_load(stamp + 3 * V), v_set(0))))
             continue;
         stamp_rays l;
-        find_lanes(view, path, x, y, number, &l);
+        find_rays(view, path, x, y, number, &l);
         if (vm_any(l.along))
             draw_stamp(view, g, path, &l, segments, stamp);
     }

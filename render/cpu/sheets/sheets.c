@@ -135,27 +135,39 @@ static bool is_ahead(const trip_cpu_sheets *s, int64_t to)
 /* Of complete sheets: ranges, and what may show between them. */
 static void find_visible(trip_cpu_sheets *s, int complete)
 {
-    for (int i = 0; i < complete; i++) {
-        trip_cpu_sheet *sheet = sheet_of(s, i);
-        if (!sheet->prepared)
-            trip_cpu_store_prepare(&s->store, sheet);
-        if (i > 0 && is_ahead(s, sheet->number))
-            trip_cpu_store_find_visible(&s->store, sheet_of(s, i - 1), sheet, &s->function);
-    }
+    trip_cpu_sheet_work work[TRIP_CPU_SHEETS_MAX] = { 0 };
+    unsigned count = 0;
+    for (int i = 0; i < complete; i++)
+        if (!sheet_of(s, i)->prepared)
+            work[count++] = (trip_cpu_sheet_work){ .sheet = sheet_of(s, i) };
+    trip_cpu_store_prepare(&s->store, work, count);
+    count = 0;
+    for (int i = 0; i + 1 < complete; i++)
+        if (is_ahead(s, sheet_of(s, i + 1)->number))
+            work[count++] =
+                (trip_cpu_sheet_work){ .sheet = sheet_of(s, i), .other = sheet_of(s, i + 1) };
+    trip_cpu_store_find_visible(&s->store, work, count, &s->function);
 }
 
 /* Gradients of held[0] to held[last]; those of held[0] may be there from before. */
 static void find_gradients(trip_cpu_sheets *s, int last, int complete)
 {
+    trip_cpu_sheet_work work[TRIP_CPU_SHEETS_MAX] = { 0 };
+    unsigned count = 0;
     for (int i = 0; i <= last; i++) {
         trip_cpu_sheet *sheet = sheet_of(s, i);
         const trip_cpu_sheet *before = i > 0 ? sheet_of(s, i - 1) : NULL;
         const trip_cpu_sheet *after = i + 1 < complete ? sheet_of(s, i + 1) : NULL;
-        if (sheet->shaded)
-            continue;
-        trip_cpu_store_shade(&s->store, sheet, s->way > 0 ? before : after,
-                             s->way > 0 ? after : before, before ? before->visible : NULL);
+        if (!sheet->shaded)
+            work[count++] = (trip_cpu_sheet_work){
+                .sheet = sheet,
+                .other = s->way > 0 ? before : after,
+                .third = s->way > 0 ? after : before,
+                .visible = sheet->visible,
+                .visible_before = before ? before->visible : NULL,
+            };
     }
+    trip_cpu_store_find_gradients(&s->store, work, count);
 }
 
 /* `from` is where the interval starts that the segment before the slice lies in; NULL: the slice
@@ -171,41 +183,51 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coord
     g->slices[g->segments] = (trip_cpu_slice){ at->blocks, coordinate };
 }
 
-/* Cuts a slice at weight `part` of held[i + 1]; false when memory is full. */
-static bool cut_slice(trip_cpu_sheets *s, int i, double part, bool first, int *cut)
+/* Slices of a group, which are cut once all of them have blocks. */
+typedef struct cutting {
+    trip_cpu_sheet_work work[TRIP_CPU_SLICES_MAX];
+    unsigned count;
+} cutting;
+
+/* A slice at weight `part` of held[i + 1]; false when memory is full. */
+static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
-    trip_cpu_sheet *slice = &s->store.slices[*cut];
-    if (!trip_cpu_store_cut(&s->store, slice, from, to, from->visible, part))
+    trip_cpu_sheet *slice = &s->store.slices[cut->count];
+    const trip_cpu_sheet_work w = {
+        .sheet = slice, .other = from, .third = to, .visible = from->visible, .part = part
+    };
+    if (!trip_cpu_store_take_slice(&s->store, &w))
         return false;
-    (*cut)++;
+    cut->work[cut->count++] = w;
     add_slice(s, slice, (double)from->number + part * (double)s->way, first ? NULL : from);
     return true;
 }
 
 /* Slices between held[i] and held[i + 1], and that sheet itself; `first` of the group, which starts
- * at held[i] or where the eye is between both. `cut` counts the store's slices. False when memory
- * is full: then none of them is there. */
-static bool cut_interval(trip_cpu_sheets *s, int i, bool first, int *cut)
+ * at held[i] or where the eye is between both. False when memory is full: then none of
+ * them is there. */
+static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
-    const int slices = s->of->frame->settings->slices, cut_before = *cut;
+    const int slices = s->of->frame->settings->slices;
+    const unsigned count_before = cut->count;
     const trip_cpu_group before = s->group;
     double eye = s->view.ortho ? 0 : (s->view.eye[2] - (double)from->number) * (double)s->way;
     bool fits = true;
     if (first && eye <= 0)
         add_slice(s, from, (double)from->number, NULL);
     else if (first)
-        fits = cut_slice(s, i, eye, true, cut);
+        fits = take_slice(s, i, eye, true, cut);
     for (int n = 1; n < slices && fits; n++)
         if (n > eye * slices)
-            fits = cut_slice(s, i, (double)n / slices, false, cut);
+            fits = take_slice(s, i, (double)n / slices, false, cut);
     if (fits) {
         add_slice(s, to, (double)to->number, from);
         return true;
     }
-    while (*cut > cut_before)
-        trip_cpu_store_drop(&s->store, &s->store.slices[--*cut]);
+    while (cut->count > count_before)
+        trip_cpu_store_drop(&s->store, &s->store.slices[--cut->count]);
     s->group = before;
     return false;
 }
@@ -267,7 +289,8 @@ static void drop_first(trip_cpu_sheets *s, int count)
 static int draw_some(trip_cpu_sheets *s, int last)
 {
     const trip_cpu_store *store = &s->store;
-    int cut = 0, done = 0;
+    cutting cut = { .count = 0 };
+    int done = 0;
     bool first = true;
     const unsigned segments = (unsigned)s->of->frame->settings->slices;
     s->group = (trip_cpu_group){ .pool = store->voxels,
@@ -278,13 +301,14 @@ static int draw_some(trip_cpu_sheets *s, int last)
     for (; done < last && s->group.segments + segments < TRIP_CPU_SEGMENTS; done++) {
         if (!is_ahead(s, sheet_of(s, done + 1)->number))
             continue;
-        if (!cut_interval(s, done, first, &cut))
+        if (!take_interval(s, done, first, &cut))
             break;
         first = false;
     }
+    trip_cpu_store_cut(&s->store, cut.work, cut.count);
     draw_tiles(s);
-    while (cut > 0)
-        trip_cpu_store_drop(&s->store, &s->store.slices[--cut]);
+    while (cut.count > 0)
+        trip_cpu_store_drop(&s->store, &s->store.slices[--cut.count]);
     return done;
 }
 

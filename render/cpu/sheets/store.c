@@ -202,34 +202,38 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
 
 /* ---- what lies beside ---- */
 
-/* A job of the rows of the grid, without the outermost. */
-typedef struct rows_job {
+/* A job over sheets, and the rows of the grid but the outermost. */
+typedef struct work_job {
     trip_cpu_store *store;
-    trip_cpu_sheet *sheet;
-    const trip_cpu_sheet *other, *third;
-    const uint64_t *visible, *visible_before;
+    const trip_cpu_sheet_work *work;
     const trip_cpu_function *function;
-    int32_t weights;
-    void (*each)(const struct rows_job *job, size_t at); /* of the blocks that are there */
-} rows_job;
+    /* Of the blocks that are there. */
+    void (*each)(const struct work_job *job, const trip_cpu_sheet_work *w, size_t at);
+} work_job;
 
-static void run_row(void *context, unsigned task, unsigned thread)
+static void work_row(void *context, unsigned task, unsigned thread)
 {
-    const rows_job *job = context;
+    const work_job *job = context;
     const trip_cpu_store *s = job->store;
+    unsigned rows = (unsigned)s->down - 2;
+    const trip_cpu_sheet_work *w = &job->work[task / rows];
     (void)thread;
     if (trip_interrupted())
         return;
     for (int32_t u = 1; u < s->across - 1; u++) {
-        size_t at = (size_t)(task + 1) * (size_t)s->across + (size_t)u;
-        if (job->sheet->blocks[at])
-            job->each(job, at);
+        size_t at = (size_t)(task % rows + 1) * (size_t)s->across + (size_t)u;
+        if (w->sheet->blocks[at])
+            job->each(job, w, at);
     }
 }
 
-static void run_rows(rows_job *job)
+static void run_work(work_job *job, unsigned count)
 {
-    trip_cpu_job rows = { .run = run_row, .context = job, .tasks = (unsigned)job->store->down - 2 };
+    trip_cpu_job rows = { .run = work_row,
+                          .context = job,
+                          .tasks = count * ((unsigned)job->store->down - 2) };
+    if (count == 0)
+        return;
     trip_cpu_pool_start(job->store->pool, &rows);
     trip_cpu_pool_wait(job->store->pool, &rows);
 }
@@ -240,38 +244,40 @@ static trip_cpu_voxel *block_at(const trip_cpu_store *s, const trip_cpu_sheet *s
 }
 
 /* The first column of the block to the right, the first row of the one below, the voxel between. */
-static void copy_beside(const rows_job *job, size_t at)
+static void copy_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     size_t across = (size_t)s->across;
-    trip_cpu_voxel *to = block_at(s, job->sheet, at);
-    const trip_cpu_voxel *right = block_at(s, job->sheet, at + 1);
-    const trip_cpu_voxel *below = block_at(s, job->sheet, at + across);
+    trip_cpu_voxel *to = block_at(s, w->sheet, at);
+    const trip_cpu_voxel *right = block_at(s, w->sheet, at + 1);
+    const trip_cpu_voxel *below = block_at(s, w->sheet, at + across);
     for (int v = 0; v < TRIP_CPU_BLOCK; v++)
         to[v * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK] = right[v * TRIP_CPU_BLOCK_STRIDE];
     trip_cpu_voxel *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
     memcpy(last, below, TRIP_CPU_BLOCK * sizeof *last);
-    last[TRIP_CPU_BLOCK] = *block_at(s, job->sheet, at + across + 1);
+    last[TRIP_CPU_BLOCK] = *block_at(s, w->sheet, at + across + 1);
 }
 
-static void find_ranges(const rows_job *job, size_t at)
+static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    copy_beside(job, at);
-    s->kernels->sheet_ranges(block_at(s, job->sheet, at), UINT64_MAX, &job->sheet->ranges[at]);
+    copy_beside(job, w, at);
+    s->kernels->sheet_ranges(block_at(s, w->sheet, at), UINT64_MAX, &w->sheet->ranges[at]);
 }
 
-void trip_cpu_store_prepare(trip_cpu_store *s, trip_cpu_sheet *sheet)
+void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
 {
-    run_rows(&(rows_job){ .store = s, .sheet = sheet, .each = find_ranges });
-    sheet->prepared = true;
+    run_work(&(work_job){ .store = s, .work = work, .each = find_ranges }, count);
+    for (unsigned i = 0; i < count; i++)
+        work[i].sheet->prepared = true;
 }
 
 /* Which cells of a square may show, one by one: of functions that show here and there. */
-static uint64_t square_cells(const rows_job *job, size_t at, int square)
+static uint64_t square_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
+                             int square)
 {
     const trip_cpu_store *s = job->store;
-    const trip_cpu_voxel *of[2] = { block_at(s, job->sheet, at), block_at(s, job->other, at) };
+    const trip_cpu_voxel *of[2] = { block_at(s, w->sheet, at), block_at(s, w->other, at) };
     int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_BLOCK_STRIDE +
                 square % TRIP_CPU_SQUARES_ACROSS * 8;
     uint64_t cells = 0;
@@ -291,29 +297,30 @@ static uint64_t square_cells(const rows_job *job, size_t at, int square)
 }
 
 /* Finds the cells that may show, of squares that do: those that then have some. */
-static uint64_t cells_of(const rows_job *job, size_t at, uint64_t squares)
+static uint64_t cells_of(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
+                         uint64_t squares)
 {
     const trip_cpu_store *s = job->store;
     const trip_cpu_function *f = job->function;
-    trip_cpu_cells *cells = &job->sheet->cells[at];
+    trip_cpu_cells *cells = &w->sheet->cells[at];
     if (f->in_a_row)
-        s->kernels->sheet_cells(block_at(s, job->sheet, at), block_at(s, job->other, at), squares,
+        s->kernels->sheet_cells(block_at(s, w->sheet, at), block_at(s, w->other, at), squares,
                                 f->first_visible, f->last_visible, cells);
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         int square = __builtin_ctzll(rest);
         if (!f->in_a_row)
-            cells->squares[square] = square_cells(job, at, square);
+            cells->squares[square] = square_cells(job, w, at, square);
         if (!cells->squares[square])
             squares &= ~(UINT64_C(1) << square);
     }
     return squares;
 }
 
-static void find_visible(const rows_job *job, size_t at)
+static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
-    const trip_cpu_square_ranges *a = &job->sheet->ranges[at], *b = &job->other->ranges[at];
+    const trip_cpu_square_ranges *a = &w->sheet->ranges[at], *b = &w->other->ranges[at];
     uint64_t visible = 0;
-    if (job->other->blocks[at])
+    if (w->other->blocks[at])
         for (int i = 0; i < 64; i++) {
             bool any = a->least[i] <= a->most[i] && b->least[i] <= b->most[i];
             int16_t least = a->least[i] < b->least[i] ? a->least[i] : b->least[i];
@@ -321,14 +328,13 @@ static void find_visible(const rows_job *job, size_t at)
             if (any && trip_cpu_function_shows(job->function, least, most))
                 visible |= UINT64_C(1) << i;
         }
-    job->sheet->visible[at] = visible ? cells_of(job, at, visible) : 0;
+    w->sheet->visible[at] = visible ? cells_of(job, w, at, visible) : 0;
 }
 
-void trip_cpu_store_find_visible(trip_cpu_store *s, trip_cpu_sheet *from, const trip_cpu_sheet *to,
+void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f)
 {
-    run_rows(
-        &(rows_job){ .store = s, .sheet = from, .other = to, .function = f, .each = find_visible });
+    run_work(&(work_job){ .store = s, .work = work, .function = f, .each = find_visible }, count);
 }
 
 /* A block's squares and those beside them along u; `at` is of any block but the outermost. */
@@ -358,59 +364,51 @@ static uint64_t about(const trip_cpu_store *s, const uint64_t *squares, size_t a
            row_wider(s, squares, at + across) << 56;
 }
 
-static void find_gradients(const rows_job *job, size_t at)
+static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    uint64_t squares = about(s, job->visible, at) | about(s, job->visible_before, at);
+    uint64_t squares = about(s, w->visible, at) | about(s, w->visible_before, at);
     if (squares)
-        s->kernels->sheet_gradients(block_at(s, job->sheet, at), squares,
-                                    block_at(s, job->sheet, at - 1),
-                                    block_at(s, job->sheet, at - (size_t)s->across),
-                                    block_at(s, job->other, at), block_at(s, job->third, at));
+        s->kernels->sheet_gradients(block_at(s, w->sheet, at), squares,
+                                    block_at(s, w->sheet, at - 1),
+                                    block_at(s, w->sheet, at - (size_t)s->across),
+                                    block_at(s, w->other, at), block_at(s, w->third, at));
 }
 
-void trip_cpu_store_shade(trip_cpu_store *s, trip_cpu_sheet *sheet, const trip_cpu_sheet *below,
-                          const trip_cpu_sheet *above, const uint64_t *visible_before)
+void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                   unsigned count)
 {
-    run_rows(&(rows_job){ .store = s,
-                          .sheet = sheet,
-                          .other = below,
-                          .third = above,
-                          .visible = sheet->visible,
-                          .visible_before = visible_before,
-                          .each = find_gradients });
-    run_rows(&(rows_job){ .store = s, .sheet = sheet, .each = copy_beside });
-    sheet->shaded = true;
+    run_work(&(work_job){ .store = s, .work = work, .each = find_gradients }, count);
+    run_work(&(work_job){ .store = s, .work = work, .each = copy_beside }, count);
+    for (unsigned i = 0; i < count; i++)
+        work[i].sheet->shaded = true;
 }
 
-static void cut_block(const rows_job *job, size_t at)
+bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
 {
-    const trip_cpu_store *s = job->store;
-    s->kernels->sheet_between(block_at(s, job->other, at), block_at(s, job->third, at),
-                              about(s, job->visible, at), job->weights,
-                              block_at(s, job->sheet, at));
-}
-
-bool trip_cpu_store_cut(trip_cpu_store *s, trip_cpu_sheet *slice, const trip_cpu_sheet *from,
-                        const trip_cpu_sheet *to, const uint64_t *visible, double part)
-{
-    int32_t w = (int32_t)lrint(part * 16384);
     for (int32_t v = 1; v < s->down - 1; v++)
         for (int32_t u = 1; u < s->across - 1; u++) {
             size_t at = (size_t)v * (size_t)s->across + (size_t)u;
-            if (!from->blocks[at] || !to->blocks[at] || !about(s, visible, at))
+            if (!w->other->blocks[at] || !w->third->blocks[at] || !about(s, w->visible, at))
                 continue;
-            if (!trip_cpu_store_take(s, slice, at)) {
-                trip_cpu_store_drop(s, slice);
+            if (!trip_cpu_store_take(s, w->sheet, at)) {
+                trip_cpu_store_drop(s, w->sheet);
                 return false;
             }
         }
-    run_rows(&(rows_job){ .store = s,
-                          .sheet = slice,
-                          .other = from,
-                          .third = to,
-                          .visible = visible,
-                          .weights = w << 16 | (16384 - w),
-                          .each = cut_block });
     return true;
+}
+
+static void cut_block(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    int32_t to = (int32_t)lrint(w->part * 16384);
+    s->kernels->sheet_between(block_at(s, w->other, at), block_at(s, w->third, at),
+                              about(s, w->visible, at), to << 16 | (16384 - to),
+                              block_at(s, w->sheet, at));
+}
+
+void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
+{
+    run_work(&(work_job){ .store = s, .work = work, .each = cut_block }, count);
 }

@@ -69,19 +69,30 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run, unsigned tile_log2);
 
-/* A complete sheet's blocks get the first voxels of those beside them, and ranges. */
-void trip_cpu_store_prepare(trip_cpu_store *s, trip_cpu_sheet *sheet);
-/* Which squares may show from a prepared sheet to the next. */
-void trip_cpu_store_find_visible(trip_cpu_store *s, trip_cpu_sheet *from, const trip_cpu_sheet *to,
+/* What is done with a sheet or slice: several of them at a time, block by block. */
+typedef struct trip_cpu_sheet_work {
+    trip_cpu_sheet *sheet;
+    /* Cells and slices: the sheets on both sides. Gradients: those before and after in index order,
+     * NULL where there is none. */
+    const trip_cpu_sheet *other, *third;
+    /* Squares in which cells may show: of gradients on both sides of the sheet, NULL where there is
+     * nothing; of slices between the sheets. */
+    const uint64_t *visible, *visible_before;
+    double part; /* of slices: the weight of `third` */
+} trip_cpu_sheet_work;
+
+/* Complete sheets' blocks get the first voxels of those beside them, and ranges. */
+void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
+/* Which squares and cells may show from prepared sheets to the next, `other`. */
+void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
-/* Gradients of the voxels of cells that may show on either side of a prepared sheet; `below` and
- * `above` are the sheets before and after it in index order, NULL where there is none. `visible`
- * are those of the intervals on both sides. */
-void trip_cpu_store_shade(trip_cpu_store *s, trip_cpu_sheet *sheet, const trip_cpu_sheet *below,
-                          const trip_cpu_sheet *above, const uint64_t *visible_before);
-/* A slice at weight `part` of `to`, where cells may show between both. False when the pool is full;
- * then it is empty. */
-bool trip_cpu_store_cut(trip_cpu_store *s, trip_cpu_sheet *slice, const trip_cpu_sheet *from,
-                        const trip_cpu_sheet *to, const uint64_t *visible, double part);
+/* Gradients of prepared sheets' voxels, where cells may show. */
+void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                   unsigned count);
+/* Blocks for a slice between two sheets, where cells may show. False when the pool is full; then it
+ * is empty. */
+bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
+/* The voxels of slices. */
+void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
 
 #endif
