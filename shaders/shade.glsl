@@ -1,5 +1,5 @@
-// Light on a splat. Mirrors trip_shade() in render/shade.c and trip_normal_unpack(), or with
-// COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS and
+// Light on a splat or a segment. Mirrors trip_shade() in render/shade.c and trip_normal_unpack(), or
+// with COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS and
 // FACING come from render/shade.h.
 #include "real.glsl"
 
@@ -31,15 +31,20 @@ vec4 unpack_normal(uint normal)
 }
 #endif
 
-vec3 shade(vec3 colour, uint normal, vec3 from_eye)
+// World space, of what lies in a direction from the eye in list axes.
+vec3 towards_eye(vec3 from_eye)
 {
-    vec4 gradient = unpack_normal(normal);
 #ifdef PARALLEL
-    vec3 eye = to_eye.xyz;
+    return to_eye.xyz;
 #else
-    vec3 eye = -normalize(world_0.xyz * from_eye.x + world_1.xyz * from_eye.y +
-                          world_2.xyz * from_eye.z);
+    return -normalize(world_0.xyz * from_eye.x + world_1.xyz * from_eye.y +
+                      world_2.xyz * from_eye.z);
 #endif
+}
+
+// With a gradient as unpack_normal() has it.
+vec3 lit(vec3 colour, vec4 gradient, vec3 eye)
+{
 #ifdef HEADLIGHT
     vec3 towards_light = eye, middle = eye;
 #else
@@ -54,5 +59,10 @@ vec3 shade(vec3 colour, uint normal, vec3 from_eye)
 #endif
     float matt = 1.0 + strength * (AMBIENT + DIFFUSE * diffuse - 1.0);
     return clamp(colour * matt + strength * SPECULAR * specular, 0.0, 1.0);
+}
+
+vec3 shade(vec3 colour, uint normal, vec3 from_eye)
+{
+    return lit(colour, unpack_normal(normal), towards_eye(from_eye));
 }
 #endif

@@ -2,6 +2,7 @@
 // blending in list order, and with DEPTH the distance likewise (render/layer.h). Mirrors
 // trip_splat_radius2() and the opacity in render/splat.h; beyond the cut-off nothing is added.
 #include "real.glsl"
+#include "opacity.glsl"
 
 layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
 
@@ -27,12 +28,6 @@ float front_of(float s)
     return abs(s) >= end ? (s > 0.0 ? 1.0 : 0.0) : 0.5 + (s < 0.0 ? -half_share : half_share);
 }
 #endif
-
-// 1 - exp(-x) without the cancellation at small x.
-float opacity(float x)
-{
-    return x < 1e-3 ? x * (1.0 - x * (0.5 - x * (1.0 / 6.0))) : 1.0 - exp(-x);
-}
 
 void main()
 {

@@ -1,7 +1,8 @@
 /* trip_gl_create(): the picture by OpenGL. Splats are drawn in list order and blended into one
- * layer per list, pixels where the list has no weight masked by the stencil; a full-screen pass
- * merges the layers. The shaders (shaders/) mirror the reference; nothing is computed here but a
- * frame's constants and the places of runs. */
+ * layer per list, pixels where the list has no weight masked by the stencil, or sheets are drawn
+ * into it slice by slice (gl/sheets.h); a full-screen pass merges the layers. The shaders
+ * (shaders/) mirror the reference; nothing is computed here but a frame's constants and the places
+ * of runs. */
 #include "renderer.h"
 
 #include <epoxy/gl.h>
@@ -17,6 +18,7 @@
 #include "gl/queue.h"
 #include "gl/resident.h"
 #include "gl/ring.h"
+#include "gl/sheets.h"
 #include "gl/slots.h"
 #include "gl/target.h"
 #include "gl/variant.h"
@@ -47,7 +49,9 @@ typedef struct gl_renderer {
     GLuint vertex_array, quad_indices;
     GLuint counts;
     trip_gl_constants constants;
+    trip_gl_sheets sheets; /* frames that classify after interpolation only */
     const trip_frame *frame;
+    bool in_layer;          /* whose sheets may not all be drawn */
     int axis;               /* of the layer being drawn */
     unsigned layers;        /* bit a: the layer of axis a was begun */
     bool masked;            /* the layer being drawn, by the stencil */
@@ -72,6 +76,7 @@ static void destroy(trip_renderer *base)
         trip_gl_slots_release(&r->slots);
         trip_gl_resident_release(&r->resident);
         trip_gl_constants_release(&r->constants);
+        trip_gl_sheets_release(&r->sheets);
     }
     trip_gl_batch_release(&r->batch);
     free(r->stats);
@@ -107,6 +112,11 @@ static int fit_stats(gl_renderer *r, unsigned lists)
     return trip_gl_check(r->context, "counts");
 }
 
+static bool classifies_post(const gl_renderer *r)
+{
+    return r->frame->settings->classify == TRIP_CLASSIFY_POST;
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     gl_renderer *r = (gl_renderer *)base;
@@ -131,11 +141,16 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->layers = 0;
     r->quads = 0;
     r->in_batch = false;
+    r->in_layer = false;
     memset(r->stats, 0, frame->data->list_count * sizeof *r->stats);
     if (frame->count) {
         static const GLuint zero = 0;
         glClearNamedBufferData(r->counts, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
     }
+    if (classifies_post(r))
+        status = trip_gl_sheets_begin_frame(&r->sheets, frame);
+    if (status)
+        return status;
     return trip_gl_check(r->context, "frame");
 }
 
@@ -201,10 +216,37 @@ static int mask_region(gl_renderer *r, int axis)
     return status;
 }
 
+/* The last sheets of the layer begun. */
+static int end_passes(trip_renderer *base)
+{
+    gl_renderer *r = (gl_renderer *)base;
+    int status = trip_gl_context_use(r->context);
+    if (!status && r->in_layer && classifies_post(r))
+        status = trip_gl_sheets_end_layer(&r->sheets);
+    r->in_layer = false;
+    return status;
+}
+
+static int begin_sheet_layer(gl_renderer *r, int axis)
+{
+    int status = end_passes(&r->base);
+    if (!status)
+        status = trip_gl_target_begin_layer(&r->target, axis, false);
+    if (!status)
+        status = trip_gl_sheets_begin_layer(&r->sheets, axis);
+    if (status)
+        return status;
+    r->layers |= 1u << axis;
+    r->in_layer = true;
+    return trip_gl_check(r->context, "layer");
+}
+
 static int begin_layer(trip_renderer *base, int axis)
 {
     gl_renderer *r = (gl_renderer *)base;
     const trip_frame *frame = r->frame;
+    if (classifies_post(r))
+        return begin_sheet_layer(r, axis);
     bool whole =
         trip_weight_is_everywhere(frame->settings, frame->camera, frame->plan->axis_of_view, axis);
     int status = trip_gl_context_use(r->context);
@@ -328,6 +370,13 @@ static int draw_part(gl_renderer *r, bool front_to_back)
     return status;
 }
 
+static void count_read(gl_renderer *r, const trip_batch *batch)
+{
+    for (size_t i = 0; i < batch->run_count; i++)
+        r->stats[trip_batch_list(batch, &batch->runs[i])->index].splats_read +=
+            batch->runs[i].count;
+}
+
 static int begin_batch(gl_renderer *r, const trip_batch *batch)
 {
     trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
@@ -335,9 +384,7 @@ static int begin_batch(gl_renderer *r, const trip_batch *batch)
                                     r->frame->settings->indexed ? r->resident.lists : NULL);
     if (status)
         return status;
-    for (size_t i = 0; i < batch->run_count; i++)
-        r->stats[trip_batch_list(batch, &batch->runs[i])->index].splats_read +=
-            batch->runs[i].count;
+    count_read(r, batch);
     for (size_t i = 0; i < r->batch.piece_count && !r->frame->settings->triangles; i++)
         r->quads += r->batch.pieces[i].quads ? r->batch.pieces[i].count : 0;
     r->at = (trip_gl_cursor){ 0 };
@@ -345,10 +392,20 @@ static int begin_batch(gl_renderer *r, const trip_batch *batch)
     return TRIP_OK;
 }
 
+static int draw_sheets(gl_renderer *r, const trip_batch *batch)
+{
+    int status = trip_gl_sheets_draw(&r->sheets, batch);
+    if (status == 0)
+        count_read(r, batch);
+    return status;
+}
+
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
+    if (!status && classifies_post(r))
+        return draw_sheets(r, batch);
     if (!status && !r->in_batch)
         status = begin_batch(r, batch);
     if (!status)
@@ -473,6 +530,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 
 static const trip_renderer_ops gl_ops = {
     .name = "gl",
+    .classifies_post = true,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
@@ -480,6 +538,7 @@ static const trip_renderer_ops gl_ops = {
     .await_load = await_load,
     .begin_layer = begin_layer,
     .draw = draw,
+    .end_passes = end_passes,
     .in_parts = true,
     .take_slots = take_slots,
     .drop_slots = drop_slots,
@@ -527,6 +586,17 @@ static int choose_slots(gl_renderer *r)
                      slots);
 }
 
+static void set_up_sheets(gl_renderer *r)
+{
+    trip_gl_sheets *s = &r->sheets;
+    s->ring = &r->ring;
+    s->queue = &r->queue;
+    s->variants = &r->variants;
+    s->constants = &r->constants;
+    s->target = &r->target;
+    s->textures.budget = s->function.budget = r->budget;
+}
+
 int trip_gl_create(trip_renderer **out, trip_budget *budget)
 {
     gl_renderer *r = calloc(1, sizeof *r);
@@ -537,9 +607,11 @@ int trip_gl_create(trip_renderer **out, trip_budget *budget)
     r->budget = r->ring.budget = r->target.budget = r->resident.budget = budget;
     r->slots.budget = budget;
     r->ring.queue = &r->queue;
+    set_up_sheets(r);
     int status = choose_slots(r);
     if (!status)
         status = trip_gl_context_create(&r->context);
+    r->sheets.context = r->context;
     if (!status)
         status = make_buffers(r);
     if (status) {

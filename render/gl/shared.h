@@ -7,6 +7,8 @@
 
 /* Uniform blocks. */
 #define TRIP_GL_FRAME 0
+#define TRIP_GL_SHEET_PASS 1
+#define TRIP_GL_SHEET_ENDS 2
 /* Storage blocks. */
 #define TRIP_GL_VOXELS 0
 #define TRIP_GL_NORMALS 1
@@ -18,9 +20,16 @@
 /* The same number, for indexed lists. */
 #define TRIP_GL_VERTICES 6
 #define TRIP_GL_ORDER 7
+/* Likewise, for frames that classify after interpolation. */
+#define TRIP_GL_SUMS 7
 /* Texture units: the layer of axis a is unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
+#define TRIP_GL_SHEET_CODES 6
+#define TRIP_GL_SHEET_GRADIENTS 7
+/* Image units. */
+#define TRIP_GL_IMAGE 0 /* of a layer, or a sheet */
+#define TRIP_GL_IMAGE_DEPTH 1
 /* Of a layer, and of the merged image: colour and opacity, and depths with settings.depth. */
 #define TRIP_GL_OUT_COLOUR 0
 #define TRIP_GL_OUT_DEPTH 1
@@ -28,8 +37,14 @@
 #define TRIP_GL_ROW 0
 #define TRIP_GL_ROW_IN_BAND 1
 #define TRIP_GL_PIECE 0
+#define TRIP_GL_SHEET 0
+#define TRIP_GL_SHEET_SIZE 1
 /* Invocations of a counting work group. */
 #define TRIP_GL_COUNT_GROUP 64
+/* Of those over a sheet or an image, each way. */
+#define TRIP_GL_SQUARE_GROUP 8
+/* Ends of segments that are drawn at a time, at most. */
+#define TRIP_GL_ENDS_MAX 160
 
 /* Constants of one list of a frame, or of a layer by level 0's map; R is float for drawing, double
  * for counting and weights. */
@@ -63,6 +78,27 @@
     R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                 \
     R4 background; /* r, g, b, a; not premultiplied */
 
+/* Constants of a pass over the sheets of a list (render/sheet.h). Linear functions of a pixel are
+ * xyz . (1, x, y) from the image's centre; lengths of rays are those of trip_gl_frame. */
+#define TRIP_GL_SHEET_PASS_FIELDS(R4, I4)                                                          \
+    R4 along;              /* how far a ray goes along the list; w: which way, 1 or -1 */          \
+    R4 across_u, across_v; /* and farther along u and v than slope_ref says; in parallel views how \
+                              far apart rays start. w of the first: 1 of the sums, per world unit  \
+                            */                                                                     \
+    R4 start;              /* parallel views: where rays start along the list, from the one at the \
+                              image's centre */                                                    \
+    R4 gradient_0, gradient_1, gradient_2; /* xyz: columns of the map from differences of codes,   \
+                                              list axes, to world space, over full shading */      \
+    I4 extent; /* voxels of u and v from the first on; the grid's last, from that */
+
+/* The end of a segment: where rays pass a slice. `step` is how far along the list it is from the
+ * end before; 0: no segment lies between them. A ray's u is base + first + what it moves along
+ * `along`; the sheets before and behind the slice lie in two layers, and `part` is the weight of
+ * the latter. */
+#define TRIP_GL_SHEET_END_FIELDS(INT, FLOAT)                                                       \
+    INT base_u, base_v, before, behind;                                                            \
+    FLOAT first_u, first_v, along, step, part, unused_0, unused_1, unused_2;
+
 #ifdef TRIP_GLSL
 #define TRIP_GL_VEC3 vec3
 #define TRIP_GL_INT int
@@ -85,6 +121,15 @@ typedef struct trip_gl_frame_float {
 typedef struct trip_gl_frame_double {
     TRIP_GL_FRAME_FIELDS(trip_gl_double4)
 } trip_gl_frame_double;
+typedef struct trip_gl_int4 {
+    int32_t v[4];
+} trip_gl_int4;
+typedef struct trip_gl_sheet_pass {
+    TRIP_GL_SHEET_PASS_FIELDS(trip_gl_float4, trip_gl_int4)
+} trip_gl_sheet_pass;
+typedef struct trip_gl_sheet_end {
+    TRIP_GL_SHEET_END_FIELDS(int32_t, float)
+} trip_gl_sheet_end;
 #endif
 
 #ifdef TRIP_GLSL
@@ -100,6 +145,20 @@ struct trip_gl_square {
     TRIP_GL_UINT codes, normals; /* bytes up to those of its first voxel */
     TRIP_GL_UINT run;
     TRIP_GL_UINT corner; /* u and v in the tile, 16 bits each */
+};
+
+/* A square of a block to put into a sheet: where its codes begin, in bytes, and u and v of its
+ * corner in the sheet, 16 bits each. */
+struct trip_gl_sheet_square {
+    TRIP_GL_UINT mask_low, mask_high;
+    TRIP_GL_UINT codes;
+    TRIP_GL_UINT corner;
+};
+
+/* Integrals of the transfer function from code 0 to a code: of extinction times red, green and
+ * blue, and of extinction; 64 bits each. */
+struct trip_gl_sum {
+    TRIP_GL_UINT low[4], high[4];
 };
 
 /* A run of a list to draw; of indexed lists draw position i is record first + step * i. Its origin

@@ -8,6 +8,7 @@
 #include "gl/program.h"
 #include "report.h"
 #include "shade.h"
+#include "sheet.h"
 
 static const struct {
     const char *vertex, *fragment, *compute;
@@ -18,6 +19,12 @@ static const struct {
     [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp", TRIP_GL_PARALLEL | TRIP_GL_INDEXED, true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
+    [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", 0, false },
+    [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", 0, false },
+    [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
+                                  TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
+                                      TRIP_GL_DEPTH,
+                                  false },
 };
 
 static void write_effects(FILE *out, unsigned effects)
@@ -45,6 +52,7 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
     if (passes[variant->pass].in_double)
         fprintf(out, "#define TRIP_DOUBLE\n");
     fprintf(out, "#define METHOD %d\n#define LAYERS %u\n", (int)variant->method, variant->layers);
+    fprintf(out, "#define SHEET_SATURATION %.9f\n", TRIP_SHEET_SATURATION);
     write_effects(out, variant->effects);
     if (variant->effects & TRIP_GL_SHADED)
         fprintf(out,

@@ -14,6 +14,9 @@ typedef enum trip_gl_pass {
     TRIP_GL_PASS_COUNT,
     TRIP_GL_PASS_REGION,
     TRIP_GL_PASS_MERGE,
+    TRIP_GL_PASS_SHEET_DECODE,
+    TRIP_GL_PASS_SHEET_GRADIENT,
+    TRIP_GL_PASS_SHEET_DRAW,
 } trip_gl_pass;
 
 typedef struct trip_gl_variant {

@@ -100,13 +100,17 @@ static void add(tally *t, const scene_picture *a, const scene_picture *b, const 
     t->components += (double)n;
 }
 
-static void check_view(const scene *s, int i, tally *tallies)
+/* With post by gl alone: what others are held to there, test_sheets.c has. */
+static void check_view(const scene *s, int i, trip_classify classify, tally *tallies)
 {
     trip_camera_params view = make_view(s, i);
     trip_settings settings = trip_settings_default();
+    settings.classify = classify;
     const scene_renderer *all = scene_renderers();
     scene_picture expected = scene_draw(s, &all[0], &view, &settings);
     for (int r = 1; all[r].name; r++) {
+        if (classify == TRIP_CLASSIFY_POST && strcmp(all[r].name, "gl") != 0)
+            continue;
         scene_picture p = scene_draw(s, &all[r], &view, &settings);
         add(&tallies[r], &expected, &p, views[i].name);
         for (int axis = 0; axis < 3; axis++)
@@ -130,7 +134,7 @@ static void set_hard_contrast(scene *s)
 }
 
 /* Views from `first` on, each or every so many; where things are taken by turns, every fourth. */
-static void check_volume(const char *name, bool hard, int first, int step)
+static void check_volume(const char *name, trip_classify classify, bool hard, int first, int step)
 {
     scene s;
     tally tallies[4] = { { 0, 0, 0 } };
@@ -138,24 +142,25 @@ static void check_volume(const char *name, bool hard, int first, int step)
     if (hard)
         set_hard_contrast(&s);
     for (int i = first; i < VIEWS; i += TEST_BY_TURNS ? 4 : step)
-        check_view(&s, i, tallies);
+        check_view(&s, i, classify, tallies);
     for (int r = 1; scene_renderers()[r].name; r++)
-        print_message("%s, %llu splats: %s most %.4f mean %.5f of 1/255\n", name,
-                      (unsigned long long)s.data->header.kept, scene_renderers()[r].name,
-                      255 * tallies[r].most, 255 * tallies[r].sum / tallies[r].components);
+        if (tallies[r].components > 0)
+            print_message("%s, %llu splats: %s most %.4f mean %.5f of 1/255\n", name,
+                          (unsigned long long)s.data->header.kept, scene_renderers()[r].name,
+                          255 * tallies[r].most, 255 * tallies[r].sum / tallies[r].components);
     scene_destroy(&s);
 }
 
 static void twelve_views_of_a_tooth_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("tooth.nhdr", false, 0, 1);
+    check_volume("tooth.nhdr", TRIP_CLASSIFY_PRE, false, 0, 1);
 }
 
 static void views_of_a_stent_agree_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("stent.nrrd", false, 1, 2);
+    check_volume("stent.nrrd", TRIP_CLASSIFY_PRE, false, 1, 2);
 }
 
 static void views_of_a_cloud_agree_with_the_reference(void **state)
@@ -164,13 +169,22 @@ static void views_of_a_cloud_agree_with_the_reference(void **state)
 #ifdef TRIP_WITHOUT_OPENVDB
     skip();
 #endif
-    check_volume("wdas_cloud_sixteenth.vdb", false, 0, 2);
+    check_volume("wdas_cloud_sixteenth.vdb", TRIP_CLASSIFY_PRE, false, 0, 2);
 }
 
 static void nearly_opaque_black_and_white_agrees_with_the_reference(void **state)
 {
     (void)state;
-    check_volume("tooth.nhdr", true, 2, 3);
+    check_volume("tooth.nhdr", TRIP_CLASSIFY_PRE, true, 2, 3);
+}
+
+/* The stent is cut off at the border of the grid. In view 6 a ray is within a millionth of a voxel
+ * of that at a slice, which single precision does not tell from being there. */
+static void views_classified_after_interpolation_agree_with_the_reference(void **state)
+{
+    (void)state;
+    check_volume("tooth.nhdr", TRIP_CLASSIFY_POST, false, 1, 2);
+    check_volume("stent.nrrd", TRIP_CLASSIFY_POST, false, 1, 3);
 }
 
 int main(void)
@@ -180,6 +194,7 @@ int main(void)
         cmocka_unit_test(views_of_a_stent_agree_with_the_reference),
         cmocka_unit_test(views_of_a_cloud_agree_with_the_reference),
         cmocka_unit_test(nearly_opaque_black_and_white_agrees_with_the_reference),
+        cmocka_unit_test(views_classified_after_interpolation_agree_with_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,31 @@
+/* The transfer function's integrals over codes in GL memory, for frames that classify after
+ * interpolation, and where it shows anything. Owned by one renderer; needs its context current.
+ * Their bytes count against the budget. */
+#ifndef TRIP_GL_SHEET_FUNCTION_H
+#define TRIP_GL_SHEET_FUNCTION_H
+
+#include <epoxy/gl.h>
+#include <stdbool.h>
+
+#include "budget.h"
+#include "transfer_function.h"
+
+typedef struct trip_gl_sheet_function {
+    trip_budget *budget;
+    GLuint sums;            /* 65536 of struct trip_gl_sum */
+    double unit;            /* 1 of the sums, per world unit */
+    uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
+} trip_gl_sheet_function;
+
+/* Of a table of 65536 entries; fails without memory. */
+int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *table);
+void trip_gl_sheet_function_release(trip_gl_sheet_function *f);
+
+/* Whether some code of [least, most] has extinction. */
+static inline bool trip_gl_sheet_function_shows(const trip_gl_sheet_function *f, unsigned least,
+                                                unsigned most)
+{
+    return least <= most && f->next_visible[least] <= most;
+}
+
+#endif

@@ -1,0 +1,84 @@
+#include "gl/sheet_textures.h"
+
+#include "report.h"
+
+/* More than the least only take their share of the memory that is left. */
+enum { SHARE = 4, CODE_BYTES = 4, GRADIENT_BYTES = 8 };
+
+void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
+{
+    glDeleteTextures(1, &t->codes);
+    glDeleteTextures(1, &t->gradients);
+    trip_budget_discharge(t->budget, t->bytes);
+    *t = (trip_gl_sheet_textures){ .budget = t->budget };
+}
+
+static int no_memory(int64_t width, int64_t height)
+{
+    return trip_fail(TRIP_ERROR, "gl", "sheets",
+                     "%d sheets of %lld x %lld voxels do not fit the memory given; raise --memory",
+                     TRIP_GL_SHEETS_LEAST, (long long)width, (long long)height);
+}
+
+static int check_size(int64_t width, int64_t height)
+{
+    GLint most = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+    if (width <= most && height <= most)
+        return TRIP_OK;
+    return trip_fail(TRIP_ERROR, "gl", "sheets",
+                     "%lld x %lld voxels exceed the %d either way that this driver's textures "
+                     "hold; use another renderer",
+                     (long long)width, (long long)height, most);
+}
+
+static GLuint make_texture(const trip_gl_sheet_textures *t, GLenum format)
+{
+    GLuint texture;
+    glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &texture);
+    glTextureStorage3D(texture, 1, format, t->width, t->height, t->layers);
+    glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTextureParameteri(texture, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTextureParameteri(texture, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return texture;
+}
+
+static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, bool gradients)
+{
+    uint64_t sheet = (uint64_t)width * (uint64_t)height;
+    sheet *= gradients ? CODE_BYTES + GRADIENT_BYTES : CODE_BYTES;
+    uint64_t layers = trip_budget_left_bytes(t->budget) / SHARE / sheet;
+    layers = layers < TRIP_GL_SHEETS_LEAST ? TRIP_GL_SHEETS_LEAST : layers;
+    layers = layers > TRIP_GL_SHEETS_MAX ? TRIP_GL_SHEETS_MAX : layers;
+    if (!trip_budget_charge(t->budget, layers * sheet))
+        return no_memory(width, height);
+    t->bytes = layers * sheet;
+    t->width = (int)width;
+    t->height = (int)height;
+    t->layers = (int)layers;
+    t->codes = make_texture(t, GL_R32F);
+    t->gradients = gradients ? make_texture(t, GL_RGBA16F) : 0;
+    if (glGetError() == GL_NO_ERROR)
+        return TRIP_OK;
+    trip_gl_sheet_textures_release(t);
+    return trip_fail(TRIP_ERROR, "gl", "sheets",
+                     "the driver has no memory for sheets of %lld x %lld voxels", (long long)width,
+                     (long long)height);
+}
+
+int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
+                               bool gradients)
+{
+    if (t->codes && width <= t->width && height <= t->height && gradients == (t->gradients != 0))
+        return TRIP_OK;
+    trip_gl_sheet_textures_release(t);
+    int status = check_size(width, height);
+    return status ? status : make(t, width, height, gradients);
+}
+
+void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height)
+{
+    static const GLfloat none = -1;
+    glClearTexSubImage(t->codes, 0, 0, 0, layer, width, height, 1, GL_RED, GL_FLOAT, &none);
+}

@@ -1,0 +1,476 @@
+#include "gl/sheets.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "gl/frame_block.h"
+#include "report.h"
+
+/* Of a part of the work: pixels times ends, squares that are decoded, voxels that get gradients. */
+enum { PART_ENDS = 1 << 20, PART_SQUARES = 1 << 14, PART_VOXELS = 1 << 20 };
+
+/* ---- frames, layers, passes ---- */
+
+static unsigned effects_of(const trip_frame *frame)
+{
+    const trip_settings *s = frame->settings;
+    return (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
+           (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0);
+}
+
+static void forget(trip_gl_sheets *s)
+{
+    s->pass = NULL;
+    s->count = 0;
+    s->batch = (trip_gl_sheet_batch){ 0 };
+    s->drawing = (trip_gl_sheet_drawing){ 0 };
+}
+
+int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
+{
+    s->frame = frame;
+    s->effects = effects_of(frame);
+    forget(s);
+    if (!s->ends_block) {
+        glCreateBuffers(1, &s->pass_block);
+        glNamedBufferStorage(s->pass_block, sizeof(trip_gl_sheet_pass), NULL,
+                             GL_DYNAMIC_STORAGE_BIT);
+        glCreateBuffers(1, &s->ends_block);
+        glNamedBufferStorage(s->ends_block, TRIP_GL_ENDS_MAX * sizeof(trip_gl_sheet_end), NULL,
+                             GL_DYNAMIC_STORAGE_BIT);
+    }
+    return trip_gl_sheet_function_set(&s->function, frame->table);
+}
+
+void trip_gl_sheets_release(trip_gl_sheets *s)
+{
+    trip_gl_sheet_textures_release(&s->textures);
+    trip_gl_sheet_function_release(&s->function);
+    glDeleteBuffers(1, &s->pass_block);
+    glDeleteBuffers(1, &s->ends_block);
+    s->pass_block = s->ends_block = 0;
+}
+
+/* A rectangle of voxels of a list's u and v, inclusive. */
+typedef struct rectangle {
+    int64_t lo[2], hi[2];
+} rectangle;
+
+static void widen(rectangle *r, const trip_selection *selection, unsigned tile_log2)
+{
+    for (uint64_t i = 0; i < selection->list->brick_count; i++) {
+        const trip_file_brick *b = &selection->list->bricks[i];
+        if (!trip_selection_has(selection, i))
+            continue;
+        const int64_t corner[2] = { (int64_t)b->tile_u << tile_log2,
+                                    (int64_t)b->tile_v << tile_log2 };
+        const int64_t lo[2] = { corner[0] + b->u_min, corner[1] + b->v_min };
+        const int64_t hi[2] = { corner[0] + b->u_max, corner[1] + b->v_max };
+        for (int a = 0; a < 2; a++) {
+            r->lo[a] = lo[a] < r->lo[a] ? lo[a] : r->lo[a];
+            r->hi[a] = hi[a] > r->hi[a] ? hi[a] : r->hi[a];
+        }
+    }
+}
+
+/* Of all that the layer's passes read; one voxel where that is nothing. */
+static void find_extent(trip_gl_sheets *s)
+{
+    const trip_plan_layer *layer = &s->frame->plan->layers[s->axis];
+    rectangle r = { { INT64_MAX, INT64_MAX }, { INT64_MIN, INT64_MIN } };
+    for (int i = 0; i < layer->pass_count; i++)
+        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++)
+            widen(&r, &layer->passes[i].pass.selections[k], s->frame->data->header.tile_log2);
+    for (int a = 0; a < 2; a++) {
+        s->first[a] = r.lo[a] <= r.hi[a] ? r.lo[a] : 0;
+        s->size[a] = r.lo[a] <= r.hi[a] ? r.hi[a] - r.lo[a] + 1 : 1;
+    }
+}
+
+int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis)
+{
+    s->axis = axis;
+    forget(s);
+    find_extent(s);
+    return trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1],
+                                      s->frame->settings->shading);
+}
+
+static void begin_pass(trip_gl_sheets *s, const trip_pass *pass)
+{
+    s->pass = pass;
+    s->way = pass->descending ? -1 : 1;
+    s->view = trip_gl_sheet_view_make(s->frame, s->axis, pass->descending, s->first, s->size,
+                                      s->function.unit);
+    glNamedBufferSubData(s->pass_block, 0, sizeof s->view.constants, &s->view.constants);
+}
+
+static int use_program(trip_gl_sheets *s, trip_gl_pass pass)
+{
+    GLuint program = 0;
+    trip_gl_variant variant = { pass, s->frame->settings->method, s->effects, 0 };
+    int status = trip_gl_variants_get(s->variants, variant, &program);
+    if (!status)
+        glUseProgram(program);
+    return status;
+}
+
+static GLuint groups_over(int length)
+{
+    return (GLuint)(length + TRIP_GL_SQUARE_GROUP - 1) / TRIP_GL_SQUARE_GROUP;
+}
+
+/* ---- from runs to sheets ---- */
+
+/* u and v in the tile of a square's corner, by its Morton number. */
+static void corner_of(uint32_t number, uint32_t at[2])
+{
+    at[0] = at[1] = 0;
+    for (unsigned bit = 0; bit < 8; bit++)
+        at[bit % 2] |= (number >> bit & 1) << (bit / 2 + 3);
+}
+
+/* The squares of a run, whose codes are at `codes` of the slot's; returns how many. */
+static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const trip_block *block,
+                             size_t codes, struct trip_gl_sheet_square *out)
+{
+    uint32_t n = 0;
+    for (unsigned w = 0; w < block->present_words; w++)
+        for (uint64_t bits = block->present[w]; bits; bits &= bits - 1, n++) {
+            uint32_t at[2];
+            uint64_t mask = block->masks[n];
+            corner_of(64 * w + (uint32_t)__builtin_ctzll(bits), at);
+            /* A square may begin before the sheet's first voxels: 16 bits go round. */
+            uint32_t u = (uint32_t)(run->u - s->first[0]) + at[0];
+            uint32_t v = (uint32_t)(run->v - s->first[1]) + at[1];
+            out[n] = (struct trip_gl_sheet_square){ .mask_low = (uint32_t)mask,
+                                                    .mask_high = (uint32_t)(mask >> 32),
+                                                    .codes = (uint32_t)codes,
+                                                    .corner = (u & 0xffff) | v << 16 };
+            codes += (size_t)__builtin_popcountll(mask) * block->code_bytes;
+        }
+    return n;
+}
+
+static size_t code_bytes(const trip_block *block)
+{
+    return ((size_t)block->count * block->code_bytes + 3) / 4 * 4;
+}
+
+/* Squares and codes of all runs into a slot. */
+static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
+{
+    size_t squares = 0, bytes = 0;
+    for (size_t i = 0; i < batch->run_count; i++) {
+        const trip_block block = trip_block_of(batch, &batch->runs[i]);
+        squares += block.squares;
+        bytes += code_bytes(&block);
+    }
+    size_t codes = trip_gl_ring_after(0, squares * sizeof(struct trip_gl_sheet_square));
+    if (codes + bytes > trip_gl_context_limits(s->context)->storage_block_bytes)
+        return trip_fail(TRIP_ERROR, "gl", "batch",
+                         "%llu splats at a time are too many; read in smaller pieces",
+                         (unsigned long long)batch->splats);
+    trip_gl_slot *slot;
+    int status = trip_gl_ring_take(s->ring, codes + bytes, &slot);
+    if (status)
+        return status;
+    s->batch = (trip_gl_sheet_batch){ .slot = slot, .codes_offset = codes, .begun = true };
+    void *memory = slot->memory;
+    struct trip_gl_sheet_square *square = memory;
+    for (size_t i = 0, at = 0; i < batch->run_count; i++) {
+        const trip_block block = trip_block_of(batch, &batch->runs[i]);
+        square += fill_squares(s, &batch->runs[i], &block, at, square);
+        memcpy(slot->memory + codes + at, block.codes, (size_t)block.count * block.code_bytes);
+        at += code_bytes(&block);
+    }
+    return TRIP_OK;
+}
+
+static void begin_sheet(trip_gl_sheets *s, int64_t number)
+{
+    unsigned taken = 0;
+    for (int i = 0; i < s->count; i++)
+        taken |= 1u << s->held[i].layer;
+    int layer = __builtin_ctz(~taken);
+    s->held[s->count++] = (trip_gl_sheet){ .number = number, .layer = layer, .least = UINT16_MAX };
+    trip_gl_sheet_textures_clear(&s->textures, layer, (int)s->size[0], (int)s->size[1]);
+}
+
+/* The codes of a run's brick are among those of the sheet. */
+static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_run *run)
+{
+    const trip_file_brick *brick = &trip_batch_list(batch, run)->bricks[run->brick];
+    trip_gl_sheet *sheet = &s->held[s->count - 1];
+    sheet->least = brick->code_min < sheet->least ? brick->code_min : sheet->least;
+    sheet->most = brick->code_max > sheet->most ? brick->code_max : sheet->most;
+}
+
+static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
+{
+    const trip_gl_slot *slot = s->batch.slot;
+    int status = use_program(s, TRIP_GL_PASS_SHEET_DECODE);
+    if (status)
+        return status;
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SQUARES, slot->buffer, 0,
+                      (GLsizeiptr)s->batch.codes_offset);
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_VOXELS, slot->buffer,
+                      (GLintptr)s->batch.codes_offset,
+                      (GLsizeiptr)(slot->bytes - s->batch.codes_offset));
+    glBindImageTexture(TRIP_GL_IMAGE, s->textures.codes, 0, GL_FALSE, s->held[s->count - 1].layer,
+                       GL_WRITE_ONLY, GL_R32F);
+    glUniform2ui(TRIP_GL_SHEET, first, s->frame->data->header.code_bytes);
+    glDispatchCompute(count, 1, 1);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
+    status = trip_gl_queue_end_part(s->queue);
+    s->batch.slot->part = s->queue->ended;
+    return status;
+}
+
+/* The batch's next runs of the last sheet, a part of them. */
+static int decode_runs(trip_gl_sheets *s, const trip_batch *batch)
+{
+    trip_gl_sheet_batch *b = &s->batch;
+    int64_t number = s->held[s->count - 1].number;
+    uint32_t count = 0;
+    for (; b->next_run < batch->run_count && count < PART_SQUARES; b->next_run++) {
+        const trip_run *run = &batch->runs[b->next_run];
+        if (run->sheet != number)
+            break;
+        count += trip_block_of(batch, run).squares;
+        widen_range(s, batch, run);
+    }
+    uint32_t first = b->next_square;
+    b->next_square += count;
+    return decode_squares(s, first, count);
+}
+
+/* ---- drawing sheets ---- */
+
+/* Where the eye is behind held[i], in sheets; below 0: before it. In parallel views rays begin
+ * elsewhere each. */
+static double eye_behind(const trip_gl_sheets *s, int i)
+{
+    if (s->frame->camera->ortho)
+        return 0;
+    return (s->view.eye[0] - (double)s->held[i].number) * (double)s->way;
+}
+
+/* Whether something between held[i] and the next may show. */
+static bool shows(const trip_gl_sheets *s, int i)
+{
+    const trip_gl_sheet *a = &s->held[i], *b = &s->held[i + 1];
+    if (a->least > a->most || b->least > b->most || eye_behind(s, i) >= 1)
+        return false;
+    unsigned least = a->least < b->least ? a->least : b->least;
+    unsigned most = a->most > b->most ? a->most : b->most;
+    return trip_gl_sheet_function_shows(&s->function, least, most);
+}
+
+static int make_gradients(trip_gl_sheets *s, int i)
+{
+    const int before = i > 0 ? s->held[i - 1].layer : -1;
+    const int after = i + 1 < s->count ? s->held[i + 1].layer : -1;
+    trip_gl_sheet *sheet = &s->held[i];
+    int status = use_program(s, TRIP_GL_PASS_SHEET_GRADIENT);
+    if (status)
+        return status;
+    glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
+    glBindImageTexture(TRIP_GL_IMAGE, s->textures.gradients, 0, GL_FALSE, sheet->layer,
+                       GL_WRITE_ONLY, GL_RGBA16F);
+    glUniform3i(TRIP_GL_SHEET, sheet->layer, s->way > 0 ? before : after,
+                s->way > 0 ? after : before);
+    const int width = (int)s->size[0], height = (int)s->size[1];
+    const int rows = PART_VOXELS / width < 1 ? 1 : PART_VOXELS / width;
+    for (int y = 0; y < height && !status; y += rows) {
+        glUniform3i(TRIP_GL_SHEET_SIZE, width, height, y);
+        glDispatchCompute(groups_over(width), groups_over(height - y < rows ? height - y : rows),
+                          1);
+        glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+        status = trip_gl_queue_end_part(s->queue);
+    }
+    sheet->has_gradients = true;
+    return status;
+}
+
+/* Of the sheets up to the last one to be drawn, the first that something shows beside and that has
+ * no gradients: from the next group on, those before it are not at hand. -1: there is none. All
+ * held are complete. */
+static int without_gradients(const trip_gl_sheets *s)
+{
+    for (int i = 0; i <= s->drawing.to && s->textures.gradients; i++)
+        if (!s->held[i].has_gradients &&
+            ((i > 0 && shows(s, i - 1)) || (i + 1 < s->count && shows(s, i))))
+            return i;
+    return -1;
+}
+
+/* The ends of the slices from held[i] to the next; returns how many there are then. */
+static int add_ends(const trip_gl_sheets *s, int i, trip_gl_sheet_end *ends, int count)
+{
+    const trip_gl_sheet *from = &s->held[i], *to = &s->held[i + 1];
+    const int slices = s->frame->settings->slices, layers[2] = { from->layer, to->layer };
+    const double eye = fmax(0, eye_behind(s, i)), way = (double)s->way;
+    double last = eye;
+    ends[count++] =
+        trip_gl_sheet_end_at(&s->view, (double)from->number + eye * way, 0, layers, eye);
+    for (int n = 1; n <= slices; n++) {
+        double part = (double)n / slices;
+        if (n <= eye * slices)
+            continue;
+        ends[count++] = trip_gl_sheet_end_at(&s->view, (double)from->number + part * way,
+                                             (part - last) * way, layers, part);
+        last = part;
+    }
+    return count;
+}
+
+/* Takes as many of the intervals that are to be drawn as fit. */
+static void begin_group(trip_gl_sheets *s)
+{
+    trip_gl_sheet_end ends[TRIP_GL_ENDS_MAX];
+    trip_gl_sheet_drawing *d = &s->drawing;
+    const int most = s->frame->settings->slices + 1;
+    d->in_group = true;
+    d->band = d->row = d->ends = d->done = 0;
+    for (; d->done < d->to && d->ends + most <= TRIP_GL_ENDS_MAX; d->done++)
+        if (shows(s, d->done))
+            d->ends = add_ends(s, d->done, ends, d->ends);
+    if (d->ends)
+        glNamedBufferSubData(s->ends_block, 0, (GLsizeiptr)((size_t)d->ends * sizeof *ends), ends);
+}
+
+static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
+{
+    const trip_gl_surface *layer = &band->layers[s->axis];
+    int status = use_program(s, TRIP_GL_PASS_SHEET_DRAW);
+    if (status)
+        return status;
+    trip_gl_constants_bind_layer(s->constants, s->axis, false);
+    glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_PASS, s->pass_block);
+    glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_ENDS, s->ends_block);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SUMS, s->function.sums);
+    glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
+    glBindTextureUnit(TRIP_GL_SHEET_GRADIENTS, s->textures.gradients);
+    glBindImageTexture(TRIP_GL_IMAGE, layer->colour, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+    if (layer->depth)
+        glBindImageTexture(TRIP_GL_IMAGE_DEPTH, layer->depth, 0, GL_FALSE, 0, GL_READ_WRITE,
+                           GL_RGBA32F);
+    return TRIP_OK;
+}
+
+/* Some rows of the group. */
+static int draw_rows(trip_gl_sheets *s)
+{
+    trip_gl_sheet_drawing *d = &s->drawing;
+    const trip_gl_band *band = &s->target->bands[d->band];
+    int width = s->target->width, rows = PART_ENDS / d->ends / width;
+    int end = d->row + (rows < 1 ? 1 : rows);
+    end = end < band->rows ? end : band->rows;
+    int status = bind_drawing(s, band);
+    if (status)
+        return status;
+    glUniform4i(TRIP_GL_ROW, band->first_row, d->row, end, d->ends);
+    glDispatchCompute(groups_over(width), groups_over(end - d->row), 1);
+    glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
+                    GL_FRAMEBUFFER_BARRIER_BIT);
+    d->row = end < band->rows ? end : 0;
+    d->band += d->row == 0;
+    return trip_gl_queue_end_part(s->queue);
+}
+
+/* Lets go of what is drawn. */
+static void end_group(trip_gl_sheets *s)
+{
+    trip_gl_sheet_drawing *d = &s->drawing;
+    s->count -= d->done;
+    memmove(s->held, s->held + d->done, (size_t)s->count * sizeof *s->held);
+    d->to -= d->done;
+    d->in_group = false;
+    if (d->to == 0 && d->all)
+        s->count = 0;
+}
+
+/* A part of what is to be drawn. */
+static int draw_part(trip_gl_sheets *s)
+{
+    trip_gl_sheet_drawing *d = &s->drawing;
+    int status = TRIP_OK, bare = d->in_group ? -1 : without_gradients(s);
+    if (bare >= 0)
+        return make_gradients(s, bare);
+    if (!d->in_group)
+        begin_group(s);
+    if (d->ends)
+        status = draw_rows(s);
+    if (!status && (d->ends == 0 || d->band == s->target->band_count))
+        end_group(s);
+    return status;
+}
+
+/* Has the complete sheets drawn: up to the last one when `all`, after which none is held; else up
+ * to the last but one, whose gradients depend on the last. */
+static void begin_drawing(trip_gl_sheets *s, bool all)
+{
+    const int to = all ? s->count - 1 : s->count - 2;
+    s->drawing = (trip_gl_sheet_drawing){ .to = to > 0 ? to : 0, .all = all };
+    if (to <= 0 && all)
+        s->count = 0;
+}
+
+/* ---- batches ---- */
+
+/* The batch's next run is of no sheet at hand: a sheet for it, or what is to be drawn before. */
+static void make_place(trip_gl_sheets *s, const trip_batch *batch)
+{
+    int64_t number = batch->runs[s->batch.next_run].sheet;
+    bool new_pass = batch->pass != s->pass;
+    if (s->count > 0 && (new_pass || s->held[s->count - 1].number + s->way != number)) {
+        begin_drawing(s, true);
+        return;
+    }
+    if (s->count == s->textures.layers) {
+        begin_drawing(s, false);
+        return;
+    }
+    if (new_pass)
+        begin_pass(s, batch->pass);
+    begin_sheet(s, number);
+}
+
+static bool is_at_hand(const trip_gl_sheets *s, const trip_batch *batch)
+{
+    return s->count > 0 && batch->pass == s->pass &&
+           s->held[s->count - 1].number == batch->runs[s->batch.next_run].sheet;
+}
+
+int trip_gl_sheets_draw(trip_gl_sheets *s, const trip_batch *batch)
+{
+    int status = TRIP_OK;
+    if (s->drawing.to > 0)
+        status = draw_part(s);
+    else if (!s->batch.begun)
+        status = begin_batch(s, batch);
+    else if (!is_at_hand(s, batch))
+        make_place(s, batch);
+    else
+        status = decode_runs(s, batch);
+    if (status)
+        return status;
+    if (s->drawing.to > 0 || s->batch.next_run < batch->run_count)
+        return 1;
+    s->batch = (trip_gl_sheet_batch){ 0 };
+    return trip_gl_check(s->context, "sheets");
+}
+
+int trip_gl_sheets_end_layer(trip_gl_sheets *s)
+{
+    int status = TRIP_OK;
+    if (s->pass && s->drawing.to == 0)
+        begin_drawing(s, true);
+    while (!status && s->drawing.to > 0) {
+        status = draw_part(s);
+        status = status ? status : trip_frame_poll();
+    }
+    forget(s);
+    return status ? status : trip_gl_check(s->context, "sheets");
+}

@@ -1,0 +1,41 @@
+// What a segment between two codes shows. Mirrors trip_segment_of() in render/segments.c: all terms
+// of a sum have the same sign, and differences of the integrals between whole codes are exact.
+#include "shared.h"
+
+layout(std430, binding = TRIP_GL_TABLE) readonly buffer trip_gl_table { vec4 table[]; }; // r, g, b, extinction
+layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_sums { uvec4 sums[]; }; // low, high
+
+// Extinction times colour, and extinction.
+vec4 products(vec4 entry)
+{
+    return vec4(entry.rgb * entry.a, entry.a);
+}
+
+// Their means from t0 to t1 between a code and the next, by Simpson's rule, which is exact.
+vec4 means_within(int code, float t0, float t1)
+{
+    vec4 a = table[code], b = table[code + 1];
+    return (products(mix(a, b, t0)) + 4.0 * products(mix(a, b, 0.5 * (t0 + t1))) + products(mix(a, b, t1))) / 6.0;
+}
+
+// Of the sums' unit.
+vec4 integral_between(int from, int to)
+{
+    uvec4 borrow, low = usubBorrow(sums[2 * to], sums[2 * from], borrow);
+    uvec4 high = sums[2 * to + 1] - sums[2 * from + 1] - borrow;
+    return vec4(high) * 4294967296.0 + vec4(low);
+}
+
+// Means over codes from a to b, in any order.
+vec4 segment_means(float a, float b, float unit)
+{
+    float from = clamp(min(a, b), 0.0, 65535.0), to = clamp(max(a, b), 0.0, 65535.0);
+    int first = min(int(from), 65534), last = min(int(to), 65534);
+    float f = from - float(first), g = to - float(last);
+    if (first == last)
+        return means_within(first, f, g);
+    vec4 sum = means_within(first, f, 1.0) * (1.0 - f) + means_within(last, 0.0, g) * g;
+    if (last > first + 1)
+        sum += integral_between(first + 1, last) * unit;
+    return sum / (to - from);
+}

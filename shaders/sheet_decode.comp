@@ -1,0 +1,30 @@
+// Puts the codes of a block's squares into a sheet: a work group a square, an invocation a voxel.
+// In: squares and their codes, bytes as in the files. Out: codes where voxels are. Mirrors
+// trip_block_voxels() in stream/block.c.
+#include "shared.h"
+
+layout(local_size_x = 64) in;
+layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint voxels[]; };
+layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_sheet_square squares[]; };
+layout(r32f, binding = TRIP_GL_IMAGE) writeonly uniform image2D sheet;
+layout(location = TRIP_GL_SHEET) uniform uvec2 form; // the first square, bytes of a code
+
+// Every second bit of a Morton number in a square.
+uint even_bits(uint n)
+{
+    return (n & 1u) | (n >> 1 & 2u) | (n >> 2 & 4u);
+}
+
+void main()
+{
+    uint n = gl_LocalInvocationID.x, bit = 1u << (n & 31u);
+    trip_gl_sheet_square square = squares[form.x + gl_WorkGroupID.x];
+    uint word = n < 32u ? square.mask_low : square.mask_high;
+    if ((word & bit) == 0u)
+        return;
+    uint before = uint(bitCount(word & (bit - 1u))) + (n < 32u ? 0u : uint(bitCount(square.mask_low)));
+    uint at = square.codes + form.y * before, bytes = voxels[at >> 2] >> (at & 3u) * 8u;
+    uint code = form.y == 1u ? (bytes & 255u) * 257u : bytes & 0xffffu;
+    uvec2 place = uvec2(square.corner, square.corner >> 16) + uvec2(even_bits(n), even_bits(n >> 1));
+    imageStore(sheet, ivec2(place & 0xffffu), vec4(code));
+}

@@ -1,0 +1,208 @@
+// Draws some slices of the sheets into a band of a layer, front to back: an invocation a pixel
+// (render/sheet.h). In: codes and gradients of sheets, ends of segments in draw order. In and out:
+// the layer, and with DEPTH its depths (render/layer.h). Mirrors render/reference_sheets.c.
+#include "segments.glsl"
+#include "shade.glsl"
+#include "opacity.glsl"
+#include "weight.glsl"
+
+layout(local_size_x = TRIP_GL_SQUARE_GROUP, local_size_y = TRIP_GL_SQUARE_GROUP) in;
+
+struct trip_gl_sheet_end {
+    TRIP_GL_SHEET_END_FIELDS(int, float)
+};
+layout(std140, binding = TRIP_GL_SHEET_PASS) uniform trip_gl_sheet_pass
+{
+    TRIP_GL_SHEET_PASS_FIELDS(vec4, ivec4)
+};
+layout(std140, binding = TRIP_GL_SHEET_ENDS) uniform trip_gl_sheet_ends
+{
+    trip_gl_sheet_end ends[TRIP_GL_ENDS_MAX];
+};
+layout(binding = TRIP_GL_SHEET_CODES) uniform sampler2DArray codes;
+layout(rgba32f, binding = TRIP_GL_IMAGE) uniform image2D layer;
+#ifdef DEPTH
+layout(rgba32f, binding = TRIP_GL_IMAGE_DEPTH) uniform image2D layer_depths;
+#endif
+#ifdef SHADED
+layout(binding = TRIP_GL_SHEET_GRADIENTS) uniform sampler2DArray gradients;
+#endif
+// x: of the image, in which the band's row 0 lies; y, z: rows of the band, the latter not drawn;
+// w: ends.
+layout(location = TRIP_GL_ROW) uniform ivec4 rows;
+
+struct ray {
+    vec2 shift;    // along u and v, from what an end has: over a sheet, or in parallel views
+    float along;   // per depth
+    float start;   // parallel views: where it begins along the list
+    float world;   // units over a sheet
+    vec3 eye;      // towards it
+};
+
+// Of a ray at an end.
+struct place {
+    ivec2 cell;
+    vec2 part; // of it
+    bool there; // all corners of the cell are
+    float code;
+};
+
+ray ray_of(vec2 p)
+{
+    vec3 q = vec3(1.0, p);
+    ray r;
+    r.along = dot(along.xyz, q);
+    r.shift = vec2(dot(across_u.xyz, q), dot(across_v.xyz, q));
+    r.start = 0.0;
+    vec4 terms = vec4(1.0, p, p.x * p.x);
+    r.world = depth.y * sqrt(dot(world2_a, terms) + dot(world2_b.xy, p.y * p)) / abs(r.along);
+#ifdef PARALLEL
+    r.start = dot(start.xyz, q);
+#else
+    r.shift /= r.along;
+#endif
+#ifdef SHADED
+    r.eye = towards_eye(ray_0.xyz + (ray_x.xyz * p.x + ray_y.xyz * p.y) * ray_x.w);
+#endif
+    return r;
+}
+
+// Whether the list may have weight at a pixel position from the image's corner: merging decides.
+bool may_weigh(vec2 pixel)
+{
+#if METHOD == 2
+    return true;
+#else
+    vec3 r = camera_r0.xyz + (camera_rx.xyz * pixel.x + camera_ry.xyz * pixel.y);
+    return abs(r[int(weight.z)]) >= largest_of(r) * (weight.x - 1e-5);
+#endif
+}
+
+// The corners of a cell at a sheet as textureGather() orders them.
+vec4 corners_at(ivec2 cell, int sheet)
+{
+    vec2 middle = vec2(cell + 1) / vec2(textureSize(codes, 0).xy);
+    return textureGather(codes, vec3(middle, sheet));
+}
+
+vec4 corner_weights(vec2 part)
+{
+    vec2 rest = 1.0 - part;
+    return vec4(rest.x * part.y, part.x * part.y, part.x * rest.y, rest.x * rest.y);
+}
+
+place place_at(ray r, trip_gl_sheet_end end)
+{
+    place at;
+#ifdef PARALLEL
+    vec2 p = vec2(end.first_u, end.first_v) + r.shift;
+#else
+    vec2 p = vec2(end.first_u, end.first_v) + end.along * r.shift;
+#endif
+    p = clamp(p, -268435456.0, 268435456.0);
+    vec2 whole = floor(p);
+    at.cell = ivec2(end.base_u, end.base_v) + ivec2(whole);
+    at.part = p - whole;
+    // The grid's last voxels are within it.
+    for (int i = 0; i < 2; i++)
+        if (at.cell[i] == extent[2 + i] && at.part[i] == 0.0) {
+            at.cell[i]--;
+            at.part[i] = 1.0;
+        }
+    at.there = false;
+    at.code = 0.0;
+    if (any(lessThan(at.cell, ivec2(0))) || any(greaterThanEqual(at.cell + 1, extent.xy)))
+        return at;
+    vec4 before = corners_at(at.cell, end.before), behind = corners_at(at.cell, end.behind);
+    at.there = all(greaterThanEqual(min(before, behind), vec4(0.0)));
+    vec4 weights = corner_weights(at.part);
+    at.code = mix(dot(weights, before), dot(weights, behind), end.part);
+    return at;
+}
+
+#ifdef SHADED
+vec3 sheet_gradient(place at, int sheet)
+{
+    vec4 w = corner_weights(at.part);
+    return w.x * texelFetch(gradients, ivec3(at.cell + ivec2(0, 1), sheet), 0).xyz +
+           w.y * texelFetch(gradients, ivec3(at.cell + ivec2(1, 1), sheet), 0).xyz +
+           w.z * texelFetch(gradients, ivec3(at.cell + ivec2(1, 0), sheet), 0).xyz +
+           w.w * texelFetch(gradients, ivec3(at.cell, sheet), 0).xyz;
+}
+
+vec3 gradient_at(place at, trip_gl_sheet_end end)
+{
+    vec3 g = vec3(0.0);
+    if (end.part < 1.0)
+        g += (1.0 - end.part) * sheet_gradient(at, end.before);
+    if (end.part > 0.0)
+        g += end.part * sheet_gradient(at, end.behind);
+    return g;
+}
+
+// Of a segment, by the mean of the gradients of its ends.
+vec3 lit_between(vec3 colour, ray r, vec3 gradient_sum)
+{
+    vec3 g = 0.5 * (gradient_0.xyz * gradient_sum.x + gradient_1.xyz * gradient_sum.y +
+                    gradient_2.xyz * gradient_sum.z);
+    float strength = length(g);
+    return lit(colour, vec4(g / max(strength, 1e-15), strength), r.eye);
+}
+#endif
+
+// Puts the segment between two ends behind what a pixel holds: colour and opacity, and depth.
+void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, place b, inout vec4 pixel,
+                 inout float pixel_depth)
+{
+    vec4 means = segment_means(a.code, b.code, across_u.w);
+    if (!(means.a > 0.0))
+        return;
+    vec3 colour = means.rgb / means.a;
+#ifdef SHADED
+    colour = lit_between(colour, r, gradient_at(a, from) + gradient_at(b, to));
+#endif
+    float through = 1.0 - pixel.a, add = opacity(means.a * abs(to.step) * r.world) * through;
+    pixel += vec4(colour * add, add);
+    pixel_depth += (to.along - 0.5 * to.step - r.start) / r.along * add;
+    if (1.0 - pixel.a < SHEET_SATURATION) {
+        pixel_depth /= pixel.a;
+        pixel = vec4(pixel.rgb / pixel.a, 1.0);
+    }
+}
+
+void main()
+{
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, rows.y);
+    if (at.y >= rows.z || at.x >= int(screen.z))
+        return;
+    vec2 pixel_at = vec2(at) + 0.5 + vec2(0.0, rows.x);
+    vec4 pixel = imageLoad(layer, at);
+    ray r = ray_of(pixel_at - screen.xy);
+    if (pixel.a >= 1.0 || !(r.along * along.w > 0.0) || !may_weigh(pixel_at))
+        return;
+    float pixel_depth = 0.0;
+#ifdef DEPTH
+    pixel_depth = imageLoad(layer_depths, at).r;
+#endif
+    bool drawn = false;
+    place last;
+    last.there = false;
+    for (int i = 0; i < rows.w && pixel.a < 1.0; i++) {
+        place next = place_at(r, ends[i]);
+        bool visible = ends[i].step != 0.0 && next.there && last.there;
+#ifdef PARALLEL
+        // What begins behind the eye's plane is left out.
+        visible = visible && (ends[i].along - ends[i].step - r.start) * along.w >= 0.0;
+#endif
+        if (visible)
+            add_segment(r, ends[i - 1], ends[i], last, next, pixel, pixel_depth);
+        drawn = drawn || visible;
+        last = next;
+    }
+    if (!drawn)
+        return;
+    imageStore(layer, at, pixel);
+#ifdef DEPTH
+    imageStore(layer_depths, at, vec4(pixel_depth, 0.0, 0.0, pixel.a));
+#endif
+}
