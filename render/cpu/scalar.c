@@ -114,7 +114,8 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
     if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
-    double depth = extinction * s.amplitude * view->stretch;
+    /* What is opaque anyway stays within what exponents of floats hold. */
+    double depth = fmin(0x1p90, extinction * s.amplitude * view->stretch);
     out->tiles = trip_cpu_tiles(out, view->tiles_across);
     if (s.near) {
         out->tiles |= TRIP_CPU_TILES_NEAR;

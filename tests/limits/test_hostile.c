@@ -73,8 +73,8 @@ static int draw_planned(trip_renderer *renderer, const trip_frame *frame, trip_b
     return status;
 }
 
-static int draw(const trip_dataset *data, const scene_renderer *by, trip_budget *budget,
-                float *rgba)
+static int draw(const trip_dataset *data, const scene_renderer *by, trip_classify classify,
+                trip_budget *budget, float *rgba)
 {
     trip_camera camera;
     trip_plan plan;
@@ -82,6 +82,7 @@ static int draw(const trip_dataset *data, const scene_renderer *by, trip_budget 
     trip_settings settings = trip_settings_default();
     trip_camera_params view = scene_view(&shared.scene, trip_v3(1, 0.8, -0.3), 45, 45, SIZE);
     settings.h = 0.8;
+    settings.classify = classify;
     int status = trip_camera_make(&camera, &view, &data->index_to_world);
     if (!status)
         status = trip_plan_make(&plan, data, &camera, &settings, shared.scene.table, budget);
@@ -102,18 +103,19 @@ static int draw(const trip_dataset *data, const scene_renderer *by, trip_budget 
 }
 
 static void check_picture(const char *what, const trip_dataset *data, const scene_renderer *by,
-                          trip_budget *budget)
+                          trip_classify classify, trip_budget *budget)
 {
     static float rgba[SIZE * SIZE * 4];
     test_catch_reports();
-    int status = draw(data, by, budget, rgba);
+    int status = draw(data, by, classify, budget, rgba);
     check_reports(what, by->name, status);
     if (status)
         return;
     counts.drawn++;
     for (int i = 0; i < SIZE * SIZE * 4; i++)
         if (!(rgba[i] >= -0.001 && rgba[i] <= 1.001))
-            fail_msg("%s: %s draws %g", what, by->name, (double)rgba[i]);
+            fail_msg("%s: %s, %s draws %g", what, by->name,
+                     classify == TRIP_CLASSIFY_POST ? "post" : "pre", (double)rgba[i]);
 }
 
 static void check_text(const char *what, const trip_dataset *data)
@@ -156,7 +158,10 @@ static void judge(const char *what, bool slow)
         counts.verified += verified == 0;
         for (const scene_renderer *r = shared.renderers; r->name; r++)
             if (takes_part(r, slow))
-                check_picture(what, data, r, budget);
+                check_picture(what, data, r, TRIP_CLASSIFY_PRE, budget);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++)
+            if (takes_part(r, slow))
+                check_picture(what, data, r, TRIP_CLASSIFY_POST, budget);
         trip_dataset_close(data);
     }
     trip_budget_destroy(budget);

@@ -57,7 +57,7 @@ typedef struct trip_cpu_slice {
 typedef struct trip_cpu_integrals {
     int32_t (*sums)[4]; /* 65536: extinction, red, green, blue */
     int32_t (*at)[4];   /* what they grow by from one code to the next, at a code */
-    float extinction;   /* 1 of sums[0], per world unit */
+    float extinction;   /* 1 of sums[0], per voxel_world */
 } trip_cpu_integrals;
 
 /* Segments of a group: at most so many, and one slice more. */
@@ -86,7 +86,7 @@ typedef struct trip_cpu_sheet_view {
     double direction; /* 1: ascending; -1 */
     double eye[3], r0[3], rx[3], ry[3];
     double steepest;      /* rays move at most so far along u or v from one sheet to the next */
-    double world[3][3];   /* row, column: index_to_world of u, v, sheet */
+    double world[3][3];   /* row, column: index_to_world of u, v, sheet, over voxel_world */
     float gradient[3][3]; /* from differences of codes to half of world space, over gradient_full */
     float light[3];       /* without headlight, or in parallel views towards the eye */
     float to_eye[3];      /* in parallel views */

@@ -74,7 +74,7 @@ static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
     f->last_visible = (int16_t)((int)last - TRIP_CPU_CODE_BIAS);
 }
 
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table)
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, double voxel_world)
 {
     trip_cpu_integrals *in = &f->integrals;
     double all = 0, sum[4] = { 0 }, add[4];
@@ -95,5 +95,5 @@ void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table)
     }
     set_at(in, table, factor);
     set_next_visible(f, table);
-    in->extinction = (float)(1 / factor);
+    in->extinction = (float)fmin(1e25, voxel_world / factor); /* opaque anyway */
 }

@@ -18,8 +18,8 @@ typedef struct trip_cpu_function {
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget);
 void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
 
-/* Of a table of 65536 entries. */
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table);
+/* Of a table of 65536 entries, whose extinction is per world unit. */
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, double voxel_world);
 
 /* Whether some code of [least, most] has extinction; biased codes. */
 static inline bool trip_cpu_function_shows(const trip_cpu_function *f, int16_t least, int16_t most)

@@ -15,17 +15,22 @@ static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
         out[i] = trip_component(v, (view->axis + 1 + i) % 3);
 }
 
+/* So that squares of 65536 times it are floats: gradients that are steeper still are as well lit.
+ */
+static float within_floats(double x)
+{
+    return (float)fmin(1e12, fmax(-1e12, x));
+}
+
 /* World-space gradients from those of index space: the inverse transpose of the map. Differences
  * are of codes, lengths over that of full shading; half of it, for what takes the sum of two. */
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame)
 {
     const trip_file_header *h = &frame->data->header;
-    double full = trip_shade_gradient_full(h, frame->camera->voxel_world);
+    double full = trip_shade_gradient_full(h, 1);
     double unit = 0.5 * (h->code_hi - h->code_lo) / 65535 / full;
-    double m[3][3], adjugate[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            m[i][k] = view->world[i][k];
+    const double(*m)[3] = (const double(*)[3])view->world;
+    double adjugate[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             adjugate[i][k] = m[(i + 1) % 3][(k + 1) % 3] * m[(i + 2) % 3][(k + 2) % 3] -
@@ -34,7 +39,7 @@ static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame)
         m[0][0] * adjugate[0][0] + m[0][1] * adjugate[0][1] + m[0][2] * adjugate[0][2];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
-            view->gradient[i][k] = (float)(unit * adjugate[i][k] / determinant);
+            view->gradient[i][k] = within_floats(unit * adjugate[i][k] / determinant);
 }
 
 static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
@@ -73,7 +78,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         trip_vec3 column =
             trip_affine_vector(&c->index_to_world, trip_v3(unit[0], unit[1], unit[2]));
         for (int k = 0; k < 3; k++)
-            view->world[k][i] = trip_component(column, k);
+            view->world[k][i] = trip_component(column, k) / c->voxel_world;
     }
     set_gradient(view, frame);
     set_light(view, frame);

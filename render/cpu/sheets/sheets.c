@@ -75,7 +75,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->pass = NULL;
     s->count = 0;
     s->run_count = 0;
-    trip_cpu_function_set(&s->function, r->frame->table);
+    trip_cpu_function_set(&s->function, r->frame->table, r->frame->camera->voxel_world);
     return 0;
 }
 
