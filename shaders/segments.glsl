@@ -2,10 +2,14 @@
 // of a sum have the same sign, and differences of the integrals between whole codes are exact.
 #include "shared.h"
 
-layout(std430, binding = TRIP_GL_TABLE) readonly buffer trip_gl_table { vec4 table[]; }; // r, g, b, extinction
-layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_sums { uvec4 sums[]; }; // low, high
+// As trip_gl_sum has it.
+struct code_sums {
+    uvec4 low, high;
+    vec4 entry;
+};
+layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_sums { code_sums sums[]; };
 
-// Extinction times colour, and extinction.
+// Extinction times colour, and extinction; of a voxel's length.
 vec4 products(vec4 entry)
 {
     return vec4(entry.rgb * entry.a, entry.a);
@@ -14,15 +18,15 @@ vec4 products(vec4 entry)
 // Their means from t0 to t1 between a code and the next, by Simpson's rule, which is exact.
 vec4 means_within(int code, float t0, float t1)
 {
-    vec4 a = table[code], b = table[code + 1];
+    vec4 a = sums[code].entry, b = sums[code + 1].entry;
     return (products(mix(a, b, t0)) + 4.0 * products(mix(a, b, 0.5 * (t0 + t1))) + products(mix(a, b, t1))) / 6.0;
 }
 
 // Of the sums' unit.
 vec4 integral_between(int from, int to)
 {
-    uvec4 borrow, low = usubBorrow(sums[2 * to], sums[2 * from], borrow);
-    uvec4 high = sums[2 * to + 1] - sums[2 * from + 1] - borrow;
+    uvec4 borrow, low = usubBorrow(sums[to].low, sums[from].low, borrow);
+    uvec4 high = sums[to].high - sums[from].high - borrow;
     return vec4(high) * 4294967296.0 + vec4(low);
 }
 

@@ -35,7 +35,7 @@ struct ray {
     vec2 shift;    // along u and v, from what an end has: over a sheet, or in parallel views
     float along;   // per depth
     float start;   // parallel views: where it begins along the list
-    float world;   // units over a sheet
+    float world;   // voxels' lengths over a sheet
     vec3 eye;      // towards it
 };
 
@@ -55,7 +55,7 @@ ray ray_of(vec2 p)
     r.shift = vec2(dot(across_u.xyz, q), dot(across_v.xyz, q));
     r.start = 0.0;
     vec4 terms = vec4(1.0, p, p.x * p.x);
-    r.world = depth.y * sqrt(dot(world2_a, terms) + dot(world2_b.xy, p.y * p)) / abs(r.along);
+    r.world = sqrt(dot(world2_a, terms) + dot(world2_b.xy, p.y * p)) / abs(r.along);
 #ifdef PARALLEL
     r.start = dot(start.xyz, q);
 #else

@@ -83,8 +83,7 @@
 #define TRIP_GL_SHEET_PASS_FIELDS(R4, I4)                                                          \
     R4 along;              /* how far a ray goes along the list; w: which way, 1 or -1 */          \
     R4 across_u, across_v; /* and farther along u and v than slope_ref says; in parallel views how \
-                              far apart rays start. w of the first: 1 of the sums, per world unit  \
-                            */                                                                     \
+                              far apart rays start. w of the first: 1 of the sums  */              \
     R4 start;              /* parallel views: where rays start along the list, from the one at the \
                               image's centre */                                                    \
     R4 gradient_0, gradient_1, gradient_2; /* xyz: columns of the map from differences of codes,   \
@@ -134,8 +133,10 @@ typedef struct trip_gl_sheet_end {
 
 #ifdef TRIP_GLSL
 #define TRIP_GL_UINT uint
+#define TRIP_GL_FLOAT float
 #else
 #define TRIP_GL_UINT uint32_t
+#define TRIP_GL_FLOAT float
 #endif
 
 /* An 8 x 8 square of a run's block (stream/block.h); draw position i is number i % 64 of the voxels
@@ -155,10 +156,11 @@ struct trip_gl_sheet_square {
     TRIP_GL_UINT corner;
 };
 
-/* Integrals of the transfer function from code 0 to a code: of extinction times red, green and
- * blue, and of extinction; 64 bits each. */
+/* The transfer function at a code: red, green, blue and extinction, here of a voxel's length; and
+ * its integrals from code 0 on, of extinction times the colours and of extinction, 64 bits each. */
 struct trip_gl_sum {
     TRIP_GL_UINT low[4], high[4];
+    TRIP_GL_FLOAT entry[4];
 };
 
 /* A run of a list to draw; of indexed lists draw position i is record first + step * i. Its origin

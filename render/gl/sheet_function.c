@@ -10,6 +10,12 @@ enum { CODES = 65536, SUMS_BYTES = CODES * sizeof(struct trip_gl_sum) };
 /* The greatest of the sums, about: they are whole numbers, so that differences are exact. */
 #define GREATEST 0x1p62
 
+static int no_memory(void)
+{
+    return trip_fail(TRIP_ERROR, "gl", "transfer function",
+                     "its integrals do not fit the memory given; raise --memory");
+}
+
 static int make(trip_gl_sheet_function *f)
 {
     if (f->sums)
@@ -18,12 +24,24 @@ static int make(trip_gl_sheet_function *f)
     if (!f->next_visible || !trip_budget_charge(f->budget, SUMS_BYTES)) {
         trip_budget_release(f->budget, f->next_visible, CODES * sizeof *f->next_visible);
         f->next_visible = NULL;
-        return trip_fail(TRIP_ERROR, "gl", "transfer function",
-                         "its integrals do not fit the memory given; raise --memory");
+        return no_memory();
     }
     glCreateBuffers(1, &f->sums);
     glNamedBufferStorage(f->sums, SUMS_BYTES, NULL, GL_DYNAMIC_STORAGE_BIT);
     return TRIP_OK;
+}
+
+/* Extinction of a voxel's length, within floats: more is opaque anyway. */
+static void fill_entries(struct trip_gl_sum *sums, const trip_tf_entry *table, double voxel_world)
+{
+    for (int code = 0; code < CODES; code++) {
+        const trip_tf_entry *e = &table[code];
+        float *entry = sums[code].entry;
+        entry[0] = e->r;
+        entry[1] = e->g;
+        entry[2] = e->b;
+        entry[3] = (float)fmin(1e25, e->extinction * voxel_world);
+    }
 }
 
 /* The integral from 0 to 1 of the product of two functions that are linear between these values. */
@@ -33,25 +51,25 @@ static double product(double a0, double a1, double b0, double b1)
 }
 
 /* From a code to the next: of extinction times each component of colour, and of extinction. */
-static void integrate_step(const trip_tf_entry *e, double out[4])
+static void integrate_step(const struct trip_gl_sum *at, double out[4])
 {
-    out[0] = product(e[0].extinction, e[1].extinction, e[0].r, e[1].r);
-    out[1] = product(e[0].extinction, e[1].extinction, e[0].g, e[1].g);
-    out[2] = product(e[0].extinction, e[1].extinction, e[0].b, e[1].b);
-    out[3] = 0.5 * ((double)e[0].extinction + e[1].extinction);
+    const float *a = at[0].entry, *b = at[1].entry;
+    for (int i = 0; i < 3; i++)
+        out[i] = product(a[3], b[3], a[i], b[i]);
+    out[3] = 0.5 * ((double)a[3] + b[3]);
 }
 
-static double whole_integral(const trip_tf_entry *table)
+static double whole_integral(const struct trip_gl_sum *sums)
 {
     double all = 0, step[4];
     for (int code = 0; code < CODES - 1; code++) {
-        integrate_step(&table[code], step);
+        integrate_step(&sums[code], step);
         all += step[3];
     }
     return all;
 }
 
-static void fill_sums(struct trip_gl_sum *sums, const trip_tf_entry *table, double factor)
+static void fill_sums(struct trip_gl_sum *sums, double factor)
 {
     uint64_t sum[4] = { 0 };
     double step[4];
@@ -62,35 +80,36 @@ static void fill_sums(struct trip_gl_sum *sums, const trip_tf_entry *table, doub
         }
         if (code == CODES - 1)
             return;
-        integrate_step(&table[code], step);
+        integrate_step(&sums[code], step);
         for (int i = 0; i < 4; i++)
             sum[i] += (uint64_t)llrint(factor * step[i]);
     }
 }
 
-static void set_next_visible(trip_gl_sheet_function *f, const trip_tf_entry *table)
+static void set_next_visible(trip_gl_sheet_function *f, const struct trip_gl_sum *sums)
 {
     uint32_t next = CODES;
     for (int code = CODES - 1; code >= 0; code--) {
-        next = table[code].extinction > 0 ? (uint32_t)code : next;
+        next = sums[code].entry[3] > 0 ? (uint32_t)code : next;
         f->next_visible[code] = next;
     }
 }
 
-int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *table)
+int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *table,
+                               double voxel_world)
 {
     int status = make(f);
     struct trip_gl_sum *sums = status ? NULL : trip_budget_take(f->budget, SUMS_BYTES);
     if (status)
         return status;
     if (!sums)
-        return trip_fail(TRIP_ERROR, "gl", "transfer function",
-                         "its integrals do not fit the memory given; raise --memory");
-    double all = whole_integral(table);
+        return no_memory();
+    fill_entries(sums, table, voxel_world);
+    double all = whole_integral(sums);
     double factor = all > 0 ? GREATEST / all : 1;
     f->unit = 1 / factor;
-    fill_sums(sums, table, factor);
-    set_next_visible(f, table);
+    fill_sums(sums, factor);
+    set_next_visible(f, sums);
     glNamedBufferSubData(f->sums, 0, SUMS_BYTES, sums);
     trip_budget_release(f->budget, sums, SUMS_BYTES);
     return TRIP_OK;

@@ -39,7 +39,7 @@ int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
         glNamedBufferStorage(s->ends_block, TRIP_GL_ENDS_MAX * sizeof(trip_gl_sheet_end), NULL,
                              GL_DYNAMIC_STORAGE_BIT);
     }
-    return trip_gl_sheet_function_set(&s->function, frame->table);
+    return trip_gl_sheet_function_set(&s->function, frame->table, frame->camera->voxel_world);
 }
 
 void trip_gl_sheets_release(trip_gl_sheets *s)

@@ -24,6 +24,8 @@ static bool shells(void *user, int i, int j, int k, unsigned *code, double gradi
 static const trip_affine sheared = {
     { { 0.8, 0.25, 0.05, 3 }, { -0.1, 1.1, 0.4, -7 }, { 0.1, 0.1, 1.4, 1 } }
 };
+/* Floats must not run out of range. */
+static const trip_affine huge = { { { 0, 0, 1e30, 0 }, { 0, 1e30, 0, 0 }, { -1e30, 0, 0, 0 } } };
 /* A rotated grid of voxels a micrometre wide, in metres. */
 static const trip_affine tiny = {
     { { 0.6e-6, -0.8e-6, 0, 0.01 }, { 0.8e-6, 0.6e-6, 0, -0.02 }, { 0, 0, 1e-6, 0.03 } }
@@ -91,9 +93,9 @@ static bool has_gl(void)
 static void grids_of_any_shape_agree_with_the_reference(void **state)
 {
     (void)state;
-    const trip_affine maps[] = { trip_affine_identity(), sheared, tiny };
-    const char *const names[] = { "cubes", "sheared", "tiny" };
-    for (int i = 0; i < 3; i++) {
+    const trip_affine maps[] = { trip_affine_identity(), sheared, tiny, huge };
+    const char *const names[] = { "cubes", "sheared", "tiny", "huge" };
+    for (int i = 0; i < 4; i++) {
         scene s;
         make_shells(&s, &maps[i], 2);
         const double unit = cbrt(fabs(trip_affine_determinant(&maps[i])));
@@ -328,20 +330,20 @@ static bool waves(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Sheets take 12 bytes a voxel, about 1 MiB: ten are at hand at a time where there is memory, or
+/* Sheets take 12 bytes a voxel, almost 2 MiB: eight are at hand at a time where there is memory, or
  * three. */
 static void memory_changes_no_bit_and_too_little_is_refused(void **state)
 {
     (void)state;
     static float rgba[2][4 * SIZE * SIZE];
     scene s;
-    scene_create(&s, &(scene_params){ .dims = { 14, 300, 300 }, .voxel = waves });
+    scene_create(&s, &(scene_params){ .dims = { 14, 400, 400 }, .voxel = waves });
     scene_colour(&s, 30000, 40000, 0.2, 0.5, 1, 0.02);
     scene_colour(&s, 40001, 65535, 0.9, 0.4, 0.1, 0.2);
     for (int i = 0; i < 2; i++) {
         bench b;
         set_up(&b, &s, trip_v3(1, 0.1, 0.1), 140, TRIP_METHOD_AXIS);
-        assert_int_equal(draw_with(&b, UINT64_C(1) << (i ? 23 : 26), rgba[i]), 0);
+        assert_int_equal(draw_with(&b, (i ? UINT64_C(12) : 64) << 20, rgba[i]), 0);
         put_away(&b);
     }
     assert_memory_equal(rgba[0], rgba[1], sizeof rgba[0]);
@@ -349,10 +351,10 @@ static void memory_changes_no_bit_and_too_little_is_refused(void **state)
 
     bench b;
     set_up(&b, &s, trip_v3(1, 0.1, 0.1), 140, TRIP_METHOD_AXIS);
-    assert_true(draw_with(&b, UINT64_C(5) << 20, rgba[1]) < 0);
+    assert_true(draw_with(&b, UINT64_C(7) << 20, rgba[1]) < 0);
     assert_non_null(
-        strstr(last_line, "3 sheets of 300 x 300 voxels do not fit the memory given; raise"));
-    assert_int_equal(draw_with(&b, UINT64_C(1) << 26, rgba[1]), 0);
+        strstr(last_line, "3 sheets of 400 x 400 voxels do not fit the memory given; raise"));
+    assert_int_equal(draw_with(&b, UINT64_C(64) << 20, rgba[1]), 0);
     assert_memory_equal(rgba[0], rgba[1], sizeof rgba[0]);
     put_away(&b);
     scene_destroy(&s);
