@@ -81,40 +81,41 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
 
 /* ---- layers and passes ---- */
 
-/* The blocks that the layer's bricks lie in. */
-static bool find_blocks(const trip_cpu_sheets *s, int64_t first[2], int64_t last[2])
+/* Blocks along u and v, inclusive. */
+typedef struct block_bounds {
+    int64_t first[2], last[2];
+    bool some;
+} block_bounds;
+
+static void add_bricks(block_bounds *b, const trip_selection *selection)
 {
-    const trip_plan_layer *layer = &s->of->frame->plan->layers[s->axis];
-    unsigned tile_log2 = s->of->frame->data->header.tile_log2;
-    bool some = false;
-    for (int i = 0; i < layer->pass_count; i++)
-        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++) {
-            const trip_selection *selection = &layer->passes[i].pass.selections[k];
-            for (uint64_t b = 0; b < selection->list->brick_count; b++) {
-                if (!trip_selection_has(selection, b))
-                    continue;
-                const trip_file_brick *brick = &selection->list->bricks[b];
-                const int64_t tile[2] = { brick->tile_u, brick->tile_v };
-                for (int a = 0; a < 2; a++) {
-                    int64_t from = tile[a] << tile_log2 >> TRIP_CPU_BLOCK_LOG2;
-                    int64_t to = (((tile[a] + 1) << tile_log2) - 1) >> TRIP_CPU_BLOCK_LOG2;
-                    first[a] = !some || from < first[a] ? from : first[a];
-                    last[a] = !some || to > last[a] ? to : last[a];
-                }
-                some = true;
-            }
+    unsigned tile_log2 = selection->data->header.tile_log2;
+    for (uint64_t i = 0; i < selection->list->brick_count; i++) {
+        const trip_file_brick *brick = &selection->list->bricks[i];
+        const int64_t tile[2] = { brick->tile_u, brick->tile_v };
+        if (!trip_selection_has(selection, i))
+            continue;
+        for (int a = 0; a < 2; a++) {
+            int64_t from = tile[a] << tile_log2 >> TRIP_CPU_BLOCK_LOG2;
+            int64_t to = (((tile[a] + 1) << tile_log2) - 1) >> TRIP_CPU_BLOCK_LOG2;
+            b->first[a] = !b->some || from < b->first[a] ? from : b->first[a];
+            b->last[a] = !b->some || to > b->last[a] ? to : b->last[a];
         }
-    return some;
+        b->some = true;
+    }
 }
 
 int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis)
 {
-    int64_t first[2] = { 0, 0 }, last[2] = { 0, 0 };
+    const trip_plan_layer *layer = &s->of->frame->plan->layers[axis];
+    block_bounds bounds = { .some = false };
     s->axis = axis;
     s->pass = NULL;
     s->count = 0;
-    find_blocks(s, first, last);
-    return trip_cpu_store_fit(&s->store, first, last);
+    for (int i = 0; i < layer->pass_count; i++)
+        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++)
+            add_bricks(&bounds, &layer->passes[i].pass.selections[k]);
+    return trip_cpu_store_fit(&s->store, bounds.first, bounds.last);
 }
 
 static void drop_all(trip_cpu_sheets *s)
@@ -345,8 +346,7 @@ static void decode_run(void *context, unsigned task, unsigned thread)
         return;
     const trip_run *run = s->runs[task];
     const trip_block block = trip_block_of(s->batch, run);
-    trip_cpu_store_decode(&s->store, sheet_of(s, s->count - 1), &block, run,
-                          s->of->frame->data->header.tile_log2);
+    trip_cpu_store_decode(&s->store, sheet_of(s, s->count - 1), &block, run);
 }
 
 static void decode_runs(trip_cpu_sheets *s)

@@ -184,9 +184,8 @@ static void decode_square(trip_cpu_voxel *to, const trip_cpu_walk *at, const tri
 }
 
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
-                           const trip_block *block, const trip_run *run, unsigned tile_log2)
+                           const trip_block *block, const trip_run *run)
 {
-    (void)tile_log2;
     trip_cpu_walk at = trip_cpu_walk_begin(block, false);
     while (trip_cpu_walk_next(&at)) {
         int u = run->u + 8 * trip_cpu_square_u(at.number);

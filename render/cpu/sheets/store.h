@@ -67,7 +67,7 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 
 /* A run's voxels into blocks of a sheet that are there. May run beside those of other runs. */
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
-                           const trip_block *block, const trip_run *run, unsigned tile_log2);
+                           const trip_block *block, const trip_run *run);
 
 /* What is done with a sheet or slice: several of them at a time, block by block. */
 typedef struct trip_cpu_sheet_work {
