@@ -122,7 +122,7 @@ static void any_number_of_threads_draws_the_same(void **state)
     (void)state;
     scene s;
     make_waves(&s, 32, 0.4);
-    for (unsigned threads = 2; threads <= 5; threads++)
+    for (unsigned threads = 2; threads <= (TEST_BY_TURNS ? 3 : 5); threads++)
         check_same(&s, &s, threads, &(trip_reader_params){ 0 });
     scene_destroy(&s);
 }
@@ -132,7 +132,7 @@ static void any_tile_of_the_data_and_any_batch_draw_the_same(void **state)
     (void)state;
     scene first;
     make_waves(&first, 16, 0.4);
-    for (unsigned tile = 32; tile <= 128; tile *= 2) {
+    for (unsigned tile = 32; tile <= 128; tile *= TEST_BY_TURNS ? 4 : 2) {
         scene s;
         make_waves(&s, tile, 0.4);
         check_same(&first, &s, 3, &(trip_reader_params){ .slots = 2, .slot_bytes = 4096 });
@@ -187,7 +187,7 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
     float *whole = malloc(bytes), *some = malloc(bytes);
     assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
     int drawn = 0, refused = 0;
-    for (uint64_t memory = 4 << 20; memory < 20 << 20; memory += 200000) {
+    for (uint64_t memory = 4 << 20; memory < 20 << 20; memory += TEST_BY_TURNS ? 800000 : 200000) {
         memset(some, 0, bytes);
         int status = draw_within(&s, memory, &settings, &view, some);
         if (status == 0)
@@ -196,7 +196,7 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
         refused += status != 0;
     }
     print_message("%d memories drew, %d were too little\n", drawn, refused);
-    assert_true(drawn > 10 && refused > 0);
+    assert_true(drawn > 2 && refused > 0);
     free(whole);
     free(some);
     scene_destroy(&s);
