@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE_I = 70, SIDE_J = 45, SIDE_K = 40 };
+enum { SIDE_I = 70, SIDE_J = 45, SIDE_K = 40, PIXELS = TEST_BY_TURNS ? 64 : 120 };
 
 /* Waves, of which the crests are kept. */
 static double wave(int i, int j, int k)
@@ -67,12 +67,12 @@ static trip_settings post(int slices)
 
 static trip_camera_params from_outside(const scene *s)
 {
-    return scene_view(s, trip_v3(1, 0.8, 0.6), 90, 50, 120);
+    return scene_view(s, trip_v3(1, 0.8, 0.6), 90, 50, PIXELS);
 }
 
 static trip_camera_params from_inside(const scene *s)
 {
-    return scene_view(s, trip_v3(1, 0.8, 0.6), 6.3, 100, 120);
+    return scene_view(s, trip_v3(1, 0.8, 0.6), 6.3, 100, PIXELS);
 }
 
 static trip_camera_params parallel(const scene *s)
@@ -95,7 +95,8 @@ static void assert_shows(const scene_picture *p)
     assert_true(sum > 0.01 * p->width * p->height);
 }
 
-/* Pictures of `a` by one thread and of `b` as said are the same, with every instruction set. */
+/* Pictures of `a` by one thread and of `b` as said are the same, with every instruction set (one of
+ * them, where they are taken by turns). */
 static void check_same(const scene *a, const scene *b, unsigned threads,
                        const trip_reader_params *reader)
 {
@@ -113,6 +114,8 @@ static void check_same(const scene *a, const scene *b, unsigned threads,
             scene_picture_free(&p);
             scene_picture_free(&q);
         }
+        if (TEST_BY_TURNS)
+            break;
     }
     unsetenv("TRIPTYCH_ISA");
 }
