@@ -190,7 +190,7 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
     float *whole = malloc(bytes), *some = malloc(bytes);
     assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
     int drawn = 0, refused = 0;
-    for (uint64_t memory = 4 << 20; memory < 20 << 20; memory += TEST_BY_TURNS ? 800000 : 200000) {
+    for (uint64_t memory = 4 << 20; memory < 20 << 20; memory += TEST_BY_TURNS ? 4000000 : 200000) {
         memset(some, 0, bytes);
         int status = draw_within(&s, memory, &settings, &view, some);
         if (status == 0)
@@ -199,7 +199,7 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
         refused += status != 0;
     }
     print_message("%d memories drew, %d were too little\n", drawn, refused);
-    assert_true(drawn > 2 && refused > 0);
+    assert_true(drawn > 1 && refused > 0);
     free(whole);
     free(some);
     scene_destroy(&s);
@@ -264,7 +264,7 @@ static void instruction_sets_agree(void **state)
     make_waves(&s, 32, 0.4);
     trip_settings settings = post(2);
     const trip_camera_params views[3] = { from_outside(&s), from_inside(&s), parallel(&s) };
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < (TEST_BY_TURNS ? 1 : 3); i++) {
         setenv("TRIPTYCH_ISA", "plain", 1);
         scene_picture plain = scene_draw(&s, &cpu_scenes_cpu, &views[i], &settings);
         for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
