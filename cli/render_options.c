@@ -524,6 +524,8 @@ static int check_classify(const parse *p)
         return trip_option_fail("--traversal", "is outward with --classify post");
     if (p->kernel_radius)
         return trip_option_fail("--kernel-radius", "applies to splats: give --classify pre");
+    if (o->count)
+        return trip_option_fail("--count", "counts splats: give --classify pre");
     if (p->target || p->lists || p->forms)
         return trip_option_fail("--target, --submit", "apply to splats: give --classify pre");
     return 0;

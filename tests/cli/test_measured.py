@@ -152,6 +152,8 @@ class Measured(program.ProgramTest):
 
     def test_count_alone_is_refused(self):
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", says="--stats or --explain")
+        self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", "--explain",
+                   "--classify", "post", says="counts splats")
 
 
 if __name__ == "__main__":
