@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "commands.h"
+#include "brick.h"
 #include "report.h"
 
 #define VOLUME "tooth.nhdr"
@@ -53,8 +53,8 @@ int bench_sample_make(bench_sample *s)
     int status = make_folder(s);
     if (status)
         return status;
-    char *brick[] = { "brick", path, "-o", s->data, "-q", NULL };
-    return trip_command_brick(5, brick) ? TRIP_ERROR : 0;
+    trip_brick_summary summary;
+    return trip_brick(&(trip_brick_params){ .input = path, .output = s->data }, &summary);
 }
 
 static int remove_one(const char *path, const struct stat *st, int type, struct FTW *at)

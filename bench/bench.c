@@ -1,0 +1,104 @@
+/* Uses the parts beneath the library, which it times one by one (reading alone, drawing alone,
+ * several renderers over one copy of the data in memory) where the library joins them to frames. */
+#include "bench.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "bench_sample.h"
+#include "bench_tables.h"
+
+static const struct {
+    const char *name;
+    int (*run)(const session *s, const bench_options *o, bench_report *r);
+} tables[] = {
+    { "orders", bench_orders },       { "submit", bench_submit },     { "stream", bench_stream },
+    { "renderers", bench_renderers }, { "accuracy", bench_accuracy },
+};
+
+static void describe(const session *s, const bench_options *o, bool included, bench_report *r)
+{
+    cJSON *settings = bench_report_settings(r);
+    const trip_file_header *h = &s->data->header;
+    char text[64];
+    snprintf(text, sizeof text, "%llu x %llu x %llu", (unsigned long long)h->dims[0],
+             (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
+    cJSON_AddStringToObject(settings, "data_set", included ? "tooth, included" : o->input);
+    cJSON_AddStringToObject(settings, "grid", text);
+    cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
+    cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
+    snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
+    if (o->size_count == 1)
+        cJSON_AddStringToObject(settings, "size", text);
+    cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
+    cJSON_AddBoolToObject(settings, "shading",
+                          bench_planes(s, &o->settings) >> TRIP_PLANE_NORMALS & 1);
+    cJSON_AddNumberToObject(settings, "repeat", o->repeat);
+}
+
+/* "triptych bench orders ...", cut where it is too long. */
+static void join(int argc, char **argv, char *text, size_t bytes)
+{
+    size_t used = (size_t)snprintf(text, bytes, "triptych");
+    for (int i = 0; i < argc && used < bytes; i++)
+        used += (size_t)snprintf(text + used, bytes - used, " %s", argv[i]);
+}
+
+static int measure_table(const session *s, const bench_options *o, bench_report *r)
+{
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
+        if (!strcmp(tables[i].name, o->table))
+            return tables[i].run(s, o, r);
+    return 0;
+}
+
+/* Where no data set is named, of the included volume, which is made for it. */
+static int measure(bench_options *o, bench_report *r)
+{
+    session s = { 0 };
+    bench_sample sample = { 0 };
+    bool included = !o->input;
+    int status = 0;
+    o->progress = bench_progress_start(o->table);
+    if (included) {
+        status = bench_sample_make(&sample);
+        o->input = sample.data;
+    }
+    if (!status)
+        status = session_open(&s, o->input, &(session_look){ .tf = o->tf }, o->memory_bytes);
+    if (!status) {
+        describe(&s, o, included, r);
+        status = measure_table(&s, o, r);
+    }
+    session_close(&s);
+    bench_sample_remove(&sample);
+    bench_progress_end(o->progress);
+    return status;
+}
+
+static void print_tables(void)
+{
+    printf("`triptych bench TABLE NAME.trip` measures a data set; the tables:\n%s\n"
+           "In short, on the included tooth, what renderers takes:\n\n",
+           BENCH_TABLES);
+    fflush(stdout);
+}
+
+int trip_bench(int argc, char **argv)
+{
+    char command[4096];
+    bench_options o;
+    bench_report *report = NULL;
+    join(argc, argv, command, sizeof command);
+    int status = bench_options_parse(&o, argc, argv);
+    if (!status && o.in_short && !o.json)
+        print_tables();
+    if (!status)
+        status = bench_report_create(&report, o.table, command);
+    if (!status)
+        status = measure(&o, report);
+    if (!status)
+        status = bench_report_print(report, o.json);
+    bench_report_destroy(report);
+    return status;
+}
