@@ -1,0 +1,50 @@
+#include "pace.h"
+
+#include <math.h>
+
+/* What a frame's sums keep when the next is noted. */
+static const double kept = 0.7;
+
+void trip_pace_note(trip_pace *p, double pixels, double ms)
+{
+    const double x = pixels * 1e-6;
+    p->weight = p->weight * kept + 1;
+    p->px = p->px * kept + x;
+    p->px_px = p->px_px * kept + x * x;
+    p->ms = p->ms * kept + ms;
+    p->px_ms = p->px_ms * kept + x * ms;
+}
+
+/* The line of least squares through the frames: ms = fixed + slope * megapixels, neither below 0.
+ * Frames of one size do not tell the two apart: all is then taken to be of pixels. */
+static void fit(const trip_pace *p, double *fixed, double *slope)
+{
+    const double mean_px = p->px / p->weight, mean_ms = p->ms / p->weight;
+    const double spread = p->px_px / p->weight - mean_px * mean_px;
+    const double both = p->px_ms / p->weight - mean_px * mean_ms;
+    const double most = mean_ms / mean_px;
+    *slope = spread > 1e-4 * mean_px * mean_px ? both / spread : most;
+    *slope = fmin(fmax(*slope, 0), most);
+    *fixed = fmax(mean_ms - *slope * mean_px, 0);
+}
+
+double trip_pace_expect_ms(const trip_pace *p, double pixels)
+{
+    double fixed, slope;
+    if (!(p->weight > 0))
+        return 0;
+    fit(p, &fixed, &slope);
+    return fixed + slope * pixels * 1e-6;
+}
+
+double trip_pace_scale(const trip_pace *p, double pixels, double target_ms)
+{
+    double fixed, slope;
+    if (!(p->weight > 0))
+        return 0.5;
+    fit(p, &fixed, &slope);
+    const double left = fmax(target_ms - fixed, fixed / 4);
+    const double all = slope * pixels * 1e-6;
+    const double part = all > left ? sqrt(left / all) : 1;
+    return fmin(fmax(part, TRIP_PACE_LEAST), 1);
+}

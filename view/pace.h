@@ -1,0 +1,32 @@
+/* How large frames may be while the view moves, from how long the last ones took: a frame costs
+ * something whatever its size, and something for each pixel. Plain values, one thread. */
+#ifndef TRIP_VIEW_PACE_H
+#define TRIP_VIEW_PACE_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Zeroed at first: nothing is known. Sums over the frames noted, of which older ones count less. */
+typedef struct trip_pace {
+    double weight, px, px_px, ms, px_ms;
+} trip_pace;
+
+/* A frame of so many pixels took so long. */
+void trip_pace_note(trip_pace *p, double pixels, double ms);
+/* What a frame of so many pixels would take; 0 where nothing is known. */
+double trip_pace_expect_ms(const trip_pace *p, double pixels);
+
+/* Smaller pictures show nothing. */
+#define TRIP_PACE_LEAST 0.125
+
+/* The part of the width and height of a picture of so many pixels with which a frame keeps to
+ * `target_ms`, TRIP_PACE_LEAST to 1; a half where nothing is known. Where what every frame costs
+ * leaves too little, pixels get a quarter of that cost: fewer would gain nothing. */
+double trip_pace_scale(const trip_pace *p, double pixels, double target_ms);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
