@@ -14,6 +14,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define TRIP_OPACITY_MAX 0.9999
 
 typedef struct trip_tf trip_tf;
@@ -159,5 +163,9 @@ typedef struct trip_tf_entry {
 } trip_tf_entry;
 void trip_tf_fill_table(const trip_tf *tf, double lo, double hi, double voxel_world,
                         trip_tf_entry table[65536]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,0 +1,297 @@
+#include "test.h"
+
+#include "navigation.h"
+
+enum { WIDTH = 640, HEIGHT = 480 };
+
+#define PI 3.14159265358979323846
+
+/* From (0, -10, 0) at the origin, z up: x is to the right. */
+static trip_navigation front(void)
+{
+    const triptych_camera camera = {
+        .eye = { 0, -10, 0 }, .up = { 0, 0, 1 }, .fov_degrees = 60, .width = WIDTH, .height = HEIGHT
+    };
+    return trip_navigation_from_camera(&camera, NULL);
+}
+
+static trip_navigation oblique(bool parallel)
+{
+    const triptych_camera camera = { .eye = { 3, -7, 4 },
+                                     .look = { 1, 2, -1 },
+                                     .up = { 0.1, 0.2, 1 },
+                                     .fov_degrees = 40,
+                                     .ortho_height = parallel ? 5 : 0 };
+    return trip_navigation_from_camera(&camera, (const double[3]){ 0, 0, 2 });
+}
+
+static void assert_point(const double p[3], double x, double y, double z)
+{
+    assert_close(p[0], x, 1e-12);
+    assert_close(p[1], y, 1e-12);
+    assert_close(p[2], z, 1e-12);
+}
+
+static void assert_pixel(const trip_navigation *n, const double p[3], double x, double y)
+{
+    double pixel[2];
+    trip_navigation_project(n, WIDTH, HEIGHT, p, pixel);
+    assert_close(pixel[0], x, 1e-9);
+    assert_close(pixel[1], y, 1e-9);
+}
+
+static void a_view_points_at_the_state(void **state)
+{
+    (void)state;
+    trip_navigation n = oblique(false);
+    triptych_view v = trip_navigation_view(&n, 3, 4);
+    assert_ptr_equal(v.eye, n.eye);
+    assert_ptr_equal(v.look, n.look);
+    assert_ptr_equal(v.up, n.up);
+    assert_int_equal(v.width, 3);
+    assert_int_equal(v.height, 4);
+    assert_true(v.fov_degrees == 40 && v.ortho_height == 0);
+    assert_point(n.upright, 0, 0, 1);
+}
+
+static void points_are_projected_as_by_a_lens(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    double k = HEIGHT / 2 / tan(PI / 6); /* px per unit at distance 1 */
+    assert_pixel(&n, (const double[3]){ 0, 0, 0 }, WIDTH / 2, HEIGHT / 2);
+    assert_pixel(&n, (const double[3]){ 1, 0, 2 }, WIDTH / 2 + k / 10, HEIGHT / 2 - 2 * k / 10);
+    assert_pixel(&n, (const double[3]){ 1, -5, 0 }, WIDTH / 2 + k / 5, HEIGHT / 2);
+    trip_navigation_set_parallel(&n, true);
+    assert_close(n.ortho_height, 20 * tan(PI / 6), 1e-12);
+    assert_pixel(&n, (const double[3]){ 1, -5, 0 }, WIDTH / 2 + k / 10, HEIGHT / 2);
+}
+
+/* Points of a pixel's ray fall on the pixel again, and lie along it. */
+static void a_ray_is_where_a_pixel_looks(void **state)
+{
+    (void)state;
+    for (int parallel = 0; parallel < 2; parallel++) {
+        trip_navigation n = oblique(parallel);
+        const double pixel[2] = { 17.5, 400.25 };
+        double origin[3], direction[3], p[3], q[2];
+        trip_navigation_ray(&n, WIDTH, HEIGHT, pixel, origin, direction);
+        for (int i = 0; i < 3; i++)
+            p[i] = origin[i] + 6 * direction[i];
+        double depth = trip_navigation_project(&n, WIDTH, HEIGHT, p, q);
+        assert_close(q[0], pixel[0], 1e-10);
+        assert_close(q[1], pixel[1], 1e-10);
+        trip_navigation_point(&n, WIDTH, HEIGHT, pixel, depth, origin);
+        assert_point(origin, p[0], p[1], p[2]);
+        assert_close(hypot(hypot(direction[0], direction[1]), direction[2]), 1, 1e-12);
+    }
+}
+
+static void an_orbit_goes_round_the_point_looked_at(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    trip_navigation_orbit(&n, 90, 0);
+    assert_point(n.eye, 10, 0, 0);
+    trip_navigation_orbit(&n, 0, 30);
+    assert_point(n.eye, 10 * cos(PI / 6), 0, 5);
+    assert_point(n.look, 0, 0, 0);
+    for (int i = 0; i < 100; i++)
+        trip_navigation_orbit(&n, 7.3, -11.9);
+    assert_close(trip_navigation_distance(&n), 10, 1e-12);
+    assert_point(n.look, 0, 0, 0);
+}
+
+static void an_orbit_passes_over_the_top(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    trip_navigation_orbit(&n, 0, 135);
+    assert_point(n.eye, 0, 10 * sin(PI / 4), 10 * sin(PI / 4));
+    assert_true(n.up[2] < 0);
+    /* Upside down, a drag still moves what is near in its direction. */
+    trip_navigation_orbit(&n, 90, 0);
+    assert_point(n.eye, 10 * sin(PI / 4), 0, 10 * sin(PI / 4));
+}
+
+static void what_is_grabbed_stays_under_the_cursor(void **state)
+{
+    (void)state;
+    for (int parallel = 0; parallel < 2; parallel++) {
+        trip_navigation n = oblique(parallel);
+        const double p[3] = { 1.5, 1, 0.25 };
+        double before[2], depth = trip_navigation_project(&n, WIDTH, HEIGHT, p, before);
+        trip_navigation_pan(&n, 31, -12.5, HEIGHT, depth);
+        assert_pixel(&n, p, before[0] + 31, before[1] - 12.5);
+    }
+}
+
+static void a_dolly_goes_to_the_point_under_the_cursor(void **state)
+{
+    (void)state;
+    for (int parallel = 0; parallel < 2; parallel++) {
+        trip_navigation n = oblique(parallel);
+        const double p[3] = { 1.5, 1, 0.25 };
+        double pixel[2], again[2], depth = trip_navigation_project(&n, WIDTH, HEIGHT, p, pixel);
+        double size = trip_navigation_pixel(&n, HEIGHT, depth);
+        trip_navigation_dolly(&n, 0.5, p);
+        assert_close(trip_navigation_project(&n, WIDTH, HEIGHT, p, again), depth / 2, 1e-12);
+        assert_close(again[0], pixel[0], 1e-10);
+        assert_close(again[1], pixel[1], 1e-10);
+        assert_close(trip_navigation_pixel(&n, HEIGHT, depth / 2), size / 2, 1e-12);
+    }
+}
+
+static void flying_moves_eye_and_point_looked_at(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    trip_navigation_fly(&n, 25, 2, -3);
+    assert_point(n.eye, 2, 15, -3);
+    assert_point(n.look, 2, 25, -3);
+}
+
+static void turning_keeps_the_eye(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    trip_navigation_turn(&n, 90, 0);
+    assert_point(n.eye, 0, -10, 0);
+    assert_point(n.look, 10, -10, 0);
+    trip_navigation_turn(&n, 0, 30);
+    assert_point(n.look, 10 * cos(PI / 6), -10, 5);
+}
+
+static void a_roll_turns_the_picture_clockwise(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    const double up[3] = { 0, 0, 1 };
+    double k = HEIGHT / 2 / tan(PI / 6) / 10;
+    trip_navigation_roll(&n, 90);
+    assert_pixel(&n, up, WIDTH / 2 + k, HEIGHT / 2); /* what was above is at the right */
+}
+
+static void another_lens_keeps_the_size_of_what_is_looked_at(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    const double p[3] = { 1, 0, 1 };
+    double pixel[2];
+    trip_navigation_project(&n, WIDTH, HEIGHT, p, pixel);
+    trip_navigation_set_fov(&n, 20);
+    assert_close(trip_navigation_distance(&n), 10 * tan(PI / 6) / tan(PI / 18), 1e-12);
+    assert_pixel(&n, p, pixel[0], pixel[1]);
+    trip_navigation_set_parallel(&n, true);
+    assert_pixel(&n, p, pixel[0], pixel[1]);
+    trip_navigation_set_fov(&n, 90);
+    assert_pixel(&n, p, pixel[0], pixel[1]);
+    trip_navigation_set_parallel(&n, false);
+    assert_close(trip_navigation_distance(&n), 10 * tan(PI / 6), 1e-12);
+    assert_pixel(&n, p, pixel[0], pixel[1]);
+}
+
+static void sides_are_seen_upright(void **state)
+{
+    (void)state;
+    trip_navigation n = oblique(false);
+    double distance = trip_navigation_distance(&n);
+    trip_navigation_look_from(&n, (const double[3]){ -3, 0, 0 });
+    assert_point(n.eye, 1 - distance, 2, -1);
+    assert_point(trip_navigation_get_axes(&n).up, 0, 0, 1);
+    assert_point(trip_navigation_get_axes(&n).right, 0, -1, 0);
+    trip_navigation_look_from(&n, (const double[3]){ 0, 0, 1 });
+    assert_point(n.eye, 1, 2, distance - 1);
+    assert_point(trip_navigation_get_axes(&n).up, 0, 1, 0);
+    assert_point(trip_navigation_get_axes(&n).right, 1, 0, 0);
+}
+
+/* All corners are in the part of the picture that is to be filled, and they touch two opposite
+ * borders of it. */
+static void assert_fits(const trip_navigation *n, const double lo[3], const double hi[3], int width,
+                        double fill)
+{
+    double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+    for (int i = 0; i < 8; i++) {
+        const double p[3] = { i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2] };
+        double q[2];
+        assert_true(trip_navigation_project(n, width, HEIGHT, p, q) > 0);
+        x0 = fmin(x0, q[0] / width);
+        x1 = fmax(x1, q[0] / width);
+        y0 = fmin(y0, q[1] / HEIGHT);
+        y1 = fmax(y1, q[1] / HEIGHT);
+    }
+    double margin = (1 - fill) / 2, near = 1e-9;
+    assert_true(x0 > margin - near && x1 < 1 - margin + near);
+    assert_true(y0 > margin - near && y1 < 1 - margin + near);
+    bool wide = fabs(x0 - margin) < near && fabs(x1 - 1 + margin) < near;
+    bool high = fabs(y0 - margin) < near && fabs(y1 - 1 + margin) < near;
+    assert_true(wide || high);
+}
+
+static void a_box_is_fitted_exactly(void **state)
+{
+    (void)state;
+    const double lo[3] = { -4, 10, 3 }, hi[3] = { 8, 13, 4 };
+    static const int widths[] = { 100, 480, 2000 };
+    for (int parallel = 0; parallel < 2; parallel++)
+        for (int i = 0; i < 3; i++) {
+            trip_navigation n = oblique(parallel);
+            trip_navigation_axes axes = trip_navigation_get_axes(&n);
+            trip_navigation_fit(&n, lo, hi, widths[i], HEIGHT, 0.9);
+            assert_fits(&n, lo, hi, widths[i], 0.9);
+            trip_navigation_axes after = trip_navigation_get_axes(&n);
+            assert_point(after.forward, axes.forward[0], axes.forward[1], axes.forward[2]);
+        }
+}
+
+static void what_is_no_view_is_left_out(void **state)
+{
+    (void)state;
+    trip_navigation n = oblique(false), before = n;
+    trip_navigation_dolly(&n, 0, n.look);
+    trip_navigation_dolly(&n, NAN, n.look);
+    trip_navigation_dolly(&n, INFINITY, n.look);
+    trip_navigation_dolly(&n, 1e-300, n.look);
+    trip_navigation_fly(&n, INFINITY, 0, 0);
+    trip_navigation_set_fov(&n, 180);
+    trip_navigation_set_fov(&n, NAN);
+    trip_navigation_look_from(&n, (const double[3]){ 0, 0, 0 });
+    trip_navigation_orbit(&n, NAN, 0);
+    assert_memory_equal(&n, &before, sizeof n);
+}
+
+static void the_point_looked_at_can_always_be_left_again(void **state)
+{
+    (void)state;
+    trip_navigation n = oblique(false);
+    for (int i = 0; i < 1000; i++)
+        trip_navigation_dolly(&n, 0.5, n.look);
+    assert_true(trip_navigation_distance(&n) > 0);
+    for (int i = 0; i < 1000; i++)
+        trip_navigation_dolly(&n, 2, n.look);
+    assert_true(isfinite(trip_navigation_distance(&n)));
+    assert_close(n.look[0], 1, 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_view_points_at_the_state),
+        cmocka_unit_test(points_are_projected_as_by_a_lens),
+        cmocka_unit_test(a_ray_is_where_a_pixel_looks),
+        cmocka_unit_test(an_orbit_goes_round_the_point_looked_at),
+        cmocka_unit_test(an_orbit_passes_over_the_top),
+        cmocka_unit_test(what_is_grabbed_stays_under_the_cursor),
+        cmocka_unit_test(a_dolly_goes_to_the_point_under_the_cursor),
+        cmocka_unit_test(flying_moves_eye_and_point_looked_at),
+        cmocka_unit_test(turning_keeps_the_eye),
+        cmocka_unit_test(a_roll_turns_the_picture_clockwise),
+        cmocka_unit_test(another_lens_keeps_the_size_of_what_is_looked_at),
+        cmocka_unit_test(sides_are_seen_upright),
+        cmocka_unit_test(a_box_is_fitted_exactly),
+        cmocka_unit_test(what_is_no_view_is_left_out),
+        cmocka_unit_test(the_point_looked_at_can_always_be_left_again),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

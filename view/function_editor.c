@@ -1,0 +1,294 @@
+#include "function_editor.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "new_file.h"
+#include "report.h"
+
+enum { MOST_POINTS = 65536 };
+
+/* Steps lie in a ring: those before `at` can be undone, those behind it redone. */
+struct trip_function_editor {
+    trip_tf *steps[TRIP_FUNCTION_EDITOR_STEPS + 1];
+    size_t first, at, last; /* counted from the start; modulo the ring's length their places */
+    bool open, begun;       /* between begin and end; that has a step already */
+    uint64_t revision;
+};
+
+static trip_tf **place(trip_function_editor *e, size_t step)
+{
+    return &e->steps[step % (TRIP_FUNCTION_EDITOR_STEPS + 1)];
+}
+
+static const trip_tf *now(const trip_function_editor *e)
+{
+    return e->steps[e->at % (TRIP_FUNCTION_EDITOR_STEPS + 1)];
+}
+
+trip_function_editor *trip_function_editor_create(void)
+{
+    const trip_tf_point none = { 0 };
+    trip_function_editor *e = calloc(1, sizeof *e);
+    if (e && trip_tf_from_points(&e->steps[0], &none, 1, false, 0)) {
+        free(e);
+        return NULL;
+    }
+    return e;
+}
+
+void trip_function_editor_destroy(trip_function_editor *e)
+{
+    for (int i = 0; e && i <= TRIP_FUNCTION_EDITOR_STEPS; i++)
+        trip_tf_destroy(e->steps[i]);
+    free(e);
+}
+
+static void forget(trip_function_editor *e, size_t step)
+{
+    trip_tf_destroy(*place(e, step));
+    *place(e, step) = NULL;
+}
+
+/* Takes over `tf` as the function from now on. */
+static void take(trip_function_editor *e, trip_tf *tf)
+{
+    while (e->last > e->at)
+        forget(e, e->last--);
+    if (e->open && e->begun) {
+        forget(e, e->at);
+    } else {
+        e->last = ++e->at;
+        if (e->last - e->first > TRIP_FUNCTION_EDITOR_STEPS)
+            forget(e, e->first++);
+    }
+    *place(e, e->at) = tf;
+    e->begun = true;
+    e->revision++;
+}
+
+int trip_function_editor_set_text(trip_function_editor *e, const char *name, const char *text)
+{
+    trip_tf *tf = NULL;
+    int status = trip_tf_parse(&tf, name, text, strlen(text));
+    if (!status && trip_tf_is_normalised(tf)) {
+        trip_tf_destroy(tf);
+        return trip_fail(TRIP_ERROR, "transfer function", name,
+                         "is over the data's range, not in data units");
+    }
+    if (!status)
+        take(e, tf);
+    return status;
+}
+
+char *trip_function_editor_text(const trip_function_editor *e)
+{
+    return trip_tf_to_text(now(e));
+}
+
+static int write_all(int fd, const char *text, const char *path)
+{
+    for (size_t left = strlen(text); left > 0;) {
+        ssize_t written = write(fd, text, left);
+        if (written < 0 && errno != EINTR)
+            return trip_fail_errno("write", path, NULL);
+        text += written > 0 ? written : 0;
+        left -= written > 0 ? (size_t)written : 0;
+    }
+    return 0;
+}
+
+int trip_function_editor_save(const trip_function_editor *e, const char *path)
+{
+    trip_new_file file;
+    char *text = trip_function_editor_text(e);
+    int status = text ? trip_new_file_begin(&file, "write", path)
+                      : trip_fail(TRIP_ERROR, "write", path, "out of memory");
+    if (!status) {
+        status = write_all(file.fd, text, path);
+        if (!status)
+            status = trip_new_file_finish(&file);
+        else
+            trip_new_file_abandon(&file);
+    }
+    free(text);
+    return status;
+}
+
+const trip_tf_point *trip_function_editor_points(const trip_function_editor *e, size_t *count)
+{
+    return trip_tf_points(now(e), count);
+}
+
+trip_rgba trip_function_editor_evaluate(const trip_function_editor *e, double value)
+{
+    return trip_tf_evaluate(now(e), value);
+}
+
+uint64_t trip_function_editor_revision(const trip_function_editor *e)
+{
+    return e->revision;
+}
+
+int trip_function_editor_find(const trip_function_editor *e, double value, double opacity,
+                              double value_reach, double opacity_reach)
+{
+    size_t count;
+    const trip_tf_point *points = trip_function_editor_points(e, &count);
+    double best = 1;
+    int found = -1;
+    for (size_t i = 0; i < count; i++) {
+        double distance = hypot((points[i].value - value) / value_reach,
+                                (points[i].colour.opacity - opacity) / opacity_reach);
+        if (distance <= best) {
+            best = distance;
+            found = (int)i;
+        }
+    }
+    return found;
+}
+
+void trip_function_editor_begin(trip_function_editor *e)
+{
+    e->open = true;
+    e->begun = false;
+}
+
+void trip_function_editor_end(trip_function_editor *e)
+{
+    e->open = e->begun = false;
+}
+
+/* A copy of the points with room for `more`, for free(); NULL without memory. */
+static trip_tf_point *copy_points(const trip_function_editor *e, size_t more, size_t *count)
+{
+    const trip_tf_point *points = trip_function_editor_points(e, count);
+    trip_tf_point *copy = malloc((*count + more) * sizeof *copy);
+    if (copy)
+        memcpy(copy, points, *count * sizeof *copy);
+    return copy;
+}
+
+/* The points become the function; frees them. */
+static void use_points(trip_function_editor *e, trip_tf_point *points, size_t count)
+{
+    trip_tf *tf = NULL;
+    if (trip_tf_from_points(&tf, points, count, false, trip_tf_unit_world(now(e))) == 0)
+        take(e, tf);
+    free(points);
+}
+
+static double clamp(double x, double lo, double hi)
+{
+    return fmin(fmax(x, lo), hi);
+}
+
+int trip_function_editor_add(trip_function_editor *e, double value, double opacity)
+{
+    size_t count, at = 0;
+    trip_tf_point *points = isfinite(value) ? copy_points(e, 1, &count) : NULL;
+    if (!points || count == MOST_POINTS) {
+        free(points);
+        return -1;
+    }
+    while (at < count && points[at].value <= value)
+        at++;
+    memmove(points + at + 1, points + at, (count - at) * sizeof *points);
+    points[at] = (trip_tf_point){ value, trip_function_editor_evaluate(e, value) };
+    points[at].colour.opacity = clamp(opacity, 0, 1);
+    use_points(e, points, count + 1);
+    return (int)at;
+}
+
+static bool has_point(const trip_function_editor *e, int point)
+{
+    size_t count;
+    trip_function_editor_points(e, &count);
+    return point >= 0 && (size_t)point < count;
+}
+
+void trip_function_editor_move(trip_function_editor *e, int point, double value, double opacity)
+{
+    size_t count, i = (size_t)point;
+    if (!has_point(e, point) || !isfinite(value))
+        return;
+    trip_tf_point *points = copy_points(e, 0, &count);
+    if (!points)
+        return;
+    points[i].value = clamp(value, i > 0 ? points[i - 1].value : -INFINITY,
+                            i + 1 < count ? points[i + 1].value : INFINITY);
+    points[i].colour.opacity = clamp(opacity, 0, 1);
+    use_points(e, points, count);
+}
+
+void trip_function_editor_set_colour(trip_function_editor *e, int point, double r, double g,
+                                     double b)
+{
+    size_t count;
+    trip_tf_point *points = has_point(e, point) ? copy_points(e, 0, &count) : NULL;
+    if (!points)
+        return;
+    double opacity = points[point].colour.opacity;
+    points[point].colour = (trip_rgba){ clamp(r, 0, 1), clamp(g, 0, 1), clamp(b, 0, 1), opacity };
+    use_points(e, points, count);
+}
+
+void trip_function_editor_remove(trip_function_editor *e, int point)
+{
+    size_t count;
+    trip_tf_point *points = has_point(e, point) ? copy_points(e, 0, &count) : NULL;
+    if (points && count > 1) {
+        memmove(points + point, points + point + 1, (count - (size_t)point - 1) * sizeof *points);
+        use_points(e, points, count - 1);
+    } else {
+        free(points);
+    }
+}
+
+void trip_function_editor_stretch(trip_function_editor *e, double from, double factor,
+                                  double centre)
+{
+    size_t count;
+    trip_tf_point *points = factor > 0 ? copy_points(e, 0, &count) : NULL;
+    bool finite = points != NULL;
+    for (size_t i = 0; points && i < count; i++) {
+        points[i].value = centre + (points[i].value - from) * factor;
+        finite &= isfinite(points[i].value);
+    }
+    if (finite)
+        use_points(e, points, count);
+    else
+        free(points);
+}
+
+bool trip_function_editor_can_undo(const trip_function_editor *e)
+{
+    return e->at > e->first;
+}
+
+bool trip_function_editor_can_redo(const trip_function_editor *e)
+{
+    return e->at < e->last;
+}
+
+void trip_function_editor_undo(trip_function_editor *e)
+{
+    trip_function_editor_end(e);
+    if (trip_function_editor_can_undo(e)) {
+        e->at--;
+        e->revision++;
+    }
+}
+
+void trip_function_editor_redo(trip_function_editor *e)
+{
+    trip_function_editor_end(e);
+    if (trip_function_editor_can_redo(e)) {
+        e->at++;
+        e->revision++;
+    }
+}
