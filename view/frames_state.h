@@ -1,0 +1,62 @@
+/* What the files of frames.h share: the mailbox, under its lock, and what the drawing thread alone
+ * uses. */
+#ifndef TRIP_VIEW_FRAMES_STATE_H
+#define TRIP_VIEW_FRAMES_STATE_H
+
+#include <pthread.h>
+
+#include "frames.h"
+#include "pace.h"
+#include "scope.h"
+
+struct trip_frames {
+    trip_frames_params params; /* constant */
+    pthread_t thread;
+    trip_scope scope; /* the thread's */
+    triptych *t;      /* the thread's, but for triptych_cancel() */
+
+    pthread_mutex_t lock;
+    pthread_cond_t come;
+    /* Under lock: */
+    trip_wanted wanted;
+    uint64_t asked; /* how often something was wanted */
+    bool quit;
+    bool ends_early; /* what goes on is given up for what comes */
+    char *save;      /* a file to write the whole picture to; NULL: none */
+    trip_frames_status status;
+    trip_opened opened;
+    bool has_opened;
+    char *plan;
+
+    /* The window looks at it only where it gets this lock at once; the drawing thread holds it only
+     * while it copies a picture. */
+    pthread_mutex_t picture_lock;
+    trip_picture picture;
+    float *depth; /* of the whole picture; NULL: none */
+
+    /* The drawing thread's own. */
+    trip_wanted now; /* what it works on */
+    uint64_t taken;  /* asked when that was wanted; of what was worked on last: */
+    uint64_t served;
+    bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
+    unsigned document;
+    const char *source; /* that was found for what is named; NULL: nothing is held */
+    char *function;     /* that the context has, as a key */
+    bool has_settings;
+    triptych_settings settings; /* that the context has */
+    float *rgba, *distances;    /* of this size: */
+    int width, height;
+    uint8_t *shown; /* the picture's pixels */
+    trip_pace pace;
+    bool whole;      /* rgba is the whole picture of what is wanted */
+    double shown_ms; /* when a picture was last shown */
+};
+
+/* The drawing thread; `user` is the trip_frames. */
+void *trip_frames_run(void *user);
+
+/* Copies texts; release it. False without memory. */
+bool trip_wanted_copy(trip_wanted *to, const trip_wanted *from);
+void trip_wanted_release(trip_wanted *w);
+
+#endif

@@ -1,0 +1,582 @@
+/* The drawing thread of frames.h. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "frames_state.h"
+#include "report.h"
+
+static double now_ms(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+static void wake(trip_frames *f)
+{
+    f->params.wake(f->params.user);
+}
+
+/* ---- what there is to say ---- */
+
+static const char prefix[] = "triptych: ";
+
+static const char *without_prefix(const char *line)
+{
+    return line + (strncmp(line, prefix, sizeof prefix - 1) ? 0 : sizeof prefix - 1);
+}
+
+static void say(trip_frames *f, const char *line, bool failed)
+{
+    pthread_mutex_lock(&f->lock);
+    snprintf(f->status.message, sizeof f->status.message, "%.500s", without_prefix(line));
+    f->status.failed = failed;
+    f->status.messages++;
+    pthread_mutex_unlock(&f->lock);
+    wake(f);
+}
+
+/* Of the context: its failures come with the status of the call that failed. */
+static void take_line(void *user, const char *line)
+{
+    const char *text = without_prefix(line);
+    if (!strncmp(text, "warning: ", 9) || !strncmp(text, "note: ", 6))
+        say(user, line, false);
+}
+
+static void take_report(const char *line, void *user)
+{
+    say(user, line, false);
+}
+
+static void take_failure(void *user, int status, const char *line)
+{
+    if (status != TRIP_INTERRUPTED)
+        say(user, line, true);
+}
+
+static void show_stage(trip_frames *f, const char *stage, double done)
+{
+    pthread_mutex_lock(&f->lock);
+    snprintf(f->status.stage, sizeof f->status.stage, "%s", stage);
+    f->status.done = done;
+    pthread_mutex_unlock(&f->lock);
+    const double ms = now_ms();
+    if (ms - f->shown_ms > 50) {
+        f->shown_ms = ms;
+        wake(f);
+    }
+}
+
+static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    show_stage(user, stage, total ? (double)done / (double)total : 0);
+}
+
+/* ---- the mailbox ---- */
+
+static bool has_newer(trip_frames *f)
+{
+    pthread_mutex_lock(&f->lock);
+    const bool newer = f->quit || f->asked != f->taken;
+    pthread_mutex_unlock(&f->lock);
+    return newer;
+}
+
+/* Whether a wish that came is about another data set, or the end. */
+static bool has_other(trip_frames *f)
+{
+    pthread_mutex_lock(&f->lock);
+    const bool other = f->quit || f->wanted.document != f->document;
+    pthread_mutex_unlock(&f->lock);
+    return other;
+}
+
+/* From here on a new wish ends the work that goes on, or does not. */
+static void set_ends_early(trip_frames *f, bool ends)
+{
+    pthread_mutex_lock(&f->lock);
+    f->ends_early = ends;
+    pthread_mutex_unlock(&f->lock);
+}
+
+/* Waits for a wish, or for a file to write of what is there; false at the end. */
+static bool take_wanted(trip_frames *f)
+{
+    pthread_mutex_lock(&f->lock);
+    f->status.stage[0] = 0; /* nothing goes on */
+    while (!f->quit && f->asked == f->taken && !f->save)
+        pthread_cond_wait(&f->come, &f->lock);
+    const bool goes_on = !f->quit;
+    if (goes_on)
+        trip_scope_renew(&f->scope);
+    if (goes_on && f->asked != f->taken) {
+        trip_wanted_release(&f->now);
+        f->taken = f->asked;
+        f->whole = false;
+        if (!trip_wanted_copy(&f->now, &f->wanted))
+            trip_wanted_release(&f->now);
+    }
+    pthread_mutex_unlock(&f->lock);
+    return goes_on && f->now.input;
+}
+
+/* ---- the data set ---- */
+
+static void drop_picture(trip_frames *f)
+{
+    pthread_mutex_lock(&f->picture_lock);
+    f->picture.rgba = NULL;
+    f->depth = NULL;
+    pthread_mutex_unlock(&f->picture_lock);
+    f->rgba = f->distances = NULL;
+    f->shown = NULL;
+    f->width = f->height = 0;
+}
+
+static void close_data(trip_frames *f)
+{
+    drop_picture(f);
+    triptych_end(f->t);
+    triptych_close(f->t); /* the pictures, too */
+    if (f->source && f->params.release)
+        f->params.release(f->params.user);
+    f->source = NULL;
+    free(f->function);
+    f->function = NULL;
+    f->has_settings = f->open = f->announced = f->warm = false;
+    f->pace = (trip_pace){ 0 };
+    pthread_mutex_lock(&f->lock);
+    f->status.open = false;
+    pthread_mutex_unlock(&f->lock);
+}
+
+static int open_data(trip_frames *f)
+{
+    const trip_frames_params *p = &f->params;
+    const trip_wanted *w = &f->now;
+    int status = 0;
+    f->source = w->input;
+    f->document = w->document;
+    pthread_mutex_lock(&f->lock);
+    f->status = (trip_frames_status){ .document = w->document,
+                                      .frames = f->status.frames,
+                                      .moving = f->status.moving,
+                                      .messages = f->status.messages };
+    pthread_mutex_unlock(&f->lock);
+    show_stage(f, "open", 0);
+    if (p->find)
+        status = p->find(p->user, f->t, w->input, &f->source);
+    if (!status)
+        status = triptych_open(f->t, f->source,
+                               &(triptych_resources){ .memory_bytes = p->memory_bytes,
+                                                      .threads = p->threads,
+                                                      .renderer = p->renderer,
+                                                      .engine = p->engine,
+                                                      .keep_pages = 1,
+                                                      .name = w->input });
+    f->open = status == 0;
+    return status;
+}
+
+/* The text of a function goes by a file in memory. */
+static int use_text(trip_frames *f, const char *text)
+{
+    char path[64];
+    int fd = memfd_create("transfer function", MFD_CLOEXEC);
+    size_t bytes = strlen(text);
+    if (fd < 0 || write(fd, text, bytes) != (ssize_t)bytes) {
+        if (fd >= 0)
+            close(fd);
+        return trip_fail_errno("transfer function", "", "cannot keep a copy");
+    }
+    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    int status = triptych_set_function(
+        f->t, &(triptych_function){ .name = path, .opacity_scale = f->now.opacity_scale });
+    close(fd);
+    return status;
+}
+
+static int use_function(trip_frames *f)
+{
+    const trip_wanted *w = &f->now;
+    char *key = NULL;
+    if (asprintf(&key, "%a %s%s", w->opacity_scale, w->text ? "=" : "",
+                 w->text       ? w->text
+                 : w->function ? w->function
+                               : "") < 0)
+        return trip_fail(TRIP_ERROR, "view", w->input, "out of memory");
+    if (f->function && !strcmp(f->function, key)) {
+        free(key);
+        return 0;
+    }
+    int status = w->text ? use_text(f, w->text)
+                         : triptych_set_function(
+                               f->t, &(triptych_function){ .name = w->function,
+                                                           .opacity_scale = w->opacity_scale });
+    free(f->function);
+    f->function = status ? NULL : key;
+    if (status)
+        free(key);
+    return status;
+}
+
+static int use_settings(trip_frames *f)
+{
+    int status = 0;
+    if (!f->has_settings || memcmp(&f->settings, &f->now.settings, sizeof f->settings))
+        status = triptych_set_settings(f->t, &f->now.settings);
+    f->settings = f->now.settings;
+    f->has_settings = status == 0;
+    return status;
+}
+
+/* The view that it was opened with, found by the library. */
+static int find_navigation(trip_frames *f, trip_navigation *out)
+{
+    const trip_wanted *w = &f->now;
+    triptych_view view = w->start ? *w->start : (triptych_view){ 0 };
+    triptych_camera camera;
+    if (w->has_navigation) {
+        *out = w->navigation;
+        return 0;
+    }
+    view.width = w->width;
+    view.height = w->height;
+    int status = triptych_set_view(f->t, &view);
+    if (!status)
+        status = triptych_get_camera(f->t, &camera);
+    if (!status)
+        *out = trip_navigation_from_camera(&camera, NULL);
+    return status;
+}
+
+/* The function in data units, for an editor; not every one can be had so. */
+static char *text_of_function(trip_frames *f)
+{
+    char *text = NULL;
+    if (f->now.text)
+        return strdup(f->now.text);
+    if (triptych_convert(f->t, &(triptych_conversion){ .function = f->now.function }, &text))
+        return NULL;
+    return text;
+}
+
+static int announce(trip_frames *f)
+{
+    trip_opened o = { .document = f->now.document };
+    int status = triptych_get_info(f->t, &o.info);
+    if (!status)
+        status = find_navigation(f, &o.navigation);
+    if (status)
+        return status;
+    o.notes = o.info.notes ? strdup(o.info.notes) : NULL;
+    o.info.notes = NULL;
+    o.function = text_of_function(f);
+    o.source = strdup(f->source);
+    f->now.navigation = o.navigation;
+    f->now.has_navigation = f->announced = true;
+    pthread_mutex_lock(&f->lock);
+    trip_opened_free(&f->opened);
+    f->opened = o;
+    f->has_opened = true;
+    f->status.open = true;
+    if (f->wanted.document == f->document && !f->wanted.has_navigation) {
+        f->wanted.navigation = o.navigation;
+        f->wanted.has_navigation = true;
+    }
+    pthread_mutex_unlock(&f->lock);
+    wake(f);
+    return 0;
+}
+
+/* ---- pictures ---- */
+
+static int take_pictures(trip_frames *f)
+{
+    const trip_wanted *w = &f->now;
+    const bool fits = f->rgba && f->width >= w->width && f->height >= w->height &&
+                      (f->distances || !w->settings.depth);
+    float *pixels = NULL;
+    if (fits)
+        return 0;
+    float *old[] = { f->rgba, f->distances, (float *)f->shown };
+    drop_picture(f);
+    for (int i = 0; i < 3; i++)
+        if (old[i])
+            triptych_release_picture(f->t, old[i]);
+    int status = triptych_new_picture(f->t, w->width, w->height, 1, &pixels);
+    f->shown = (uint8_t *)pixels;
+    if (!status)
+        status = triptych_new_picture(f->t, w->width, w->height, 4, &f->rgba);
+    if (!status && w->settings.depth)
+        status = triptych_new_picture(f->t, w->width, w->height, 1, &f->distances);
+    f->width = status ? 0 : w->width;
+    f->height = status ? 0 : w->height;
+    return status;
+}
+
+static uint8_t byte_of(float x)
+{
+    return (uint8_t)(x > 0 ? (x < 1 ? x * 255 + 0.5f : 255) : 0);
+}
+
+static void show(trip_frames *f, int width, int height, bool whole)
+{
+    const trip_wanted *w = &f->now;
+    const size_t pixels = (size_t)width * (size_t)height;
+    pthread_mutex_lock(&f->picture_lock);
+    for (size_t i = 0; i < pixels; i++) {
+        for (size_t c = 0; c < 3; c++)
+            f->shown[4 * i + c] = byte_of(f->rgba[4 * i + c]);
+        f->shown[4 * i + 3] = 255;
+    }
+    f->picture = (trip_picture){ .rgba = f->shown,
+                                 .width = width,
+                                 .height = height,
+                                 .full_width = w->width,
+                                 .full_height = w->height,
+                                 .navigation = w->navigation,
+                                 .document = w->document,
+                                 .whole = whole,
+                                 .number = f->picture.number + 1 };
+    f->depth = whole && w->settings.depth ? f->distances : NULL;
+    pthread_mutex_unlock(&f->picture_lock);
+    f->shown_ms = now_ms();
+    wake(f);
+}
+
+static int take_picture(trip_frames *f)
+{
+    return f->settings.depth ? triptych_picture_and_depth(f->t, f->rgba, f->distances)
+                             : triptych_picture(f->t, f->rgba);
+}
+
+/* ---- frames ---- */
+
+typedef struct frame {
+    int width, height;
+    bool whole; /* of the size that is wanted */
+    bool first; /* there is no picture of this view: parts of it are shown, and it is finished */
+    double begun_ms;
+} frame;
+
+enum { STEP_NS = 10000000, PART_MS = 150, MOST_MS = 1000 };
+
+/* Frames that show that the view moves are given up only where they take long. */
+static bool gives_up(trip_frames *f, const frame *d)
+{
+    return has_newer(f) && (!d->first || now_ms() - d->begun_ms > MOST_MS || has_other(f));
+}
+
+static int step(trip_frames *f, const frame *d)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    const uint64_t ns = (uint64_t)t.tv_sec * 1000000000 + (uint64_t)t.tv_nsec;
+    int status = triptych_step(f->t, ns + STEP_NS);
+    if (status == TRIPTYCH_WAITS)
+        triptych_await(f->t, STEP_NS);
+    if (status > 0 && d->first && now_ms() - f->shown_ms > PART_MS) {
+        int taken = take_picture(f);
+        if (taken)
+            return taken;
+        show(f, d->width, d->height, false);
+    }
+    return status;
+}
+
+static int draw_steps(trip_frames *f, const frame *d)
+{
+    int status = TRIPTYCH_MORE;
+    while (status > 0) {
+        if (gives_up(f, d))
+            return TRIPTYCH_CANCELLED;
+        status = step(f, d);
+    }
+    return status ? status : take_picture(f);
+}
+
+static void keep_plan(trip_frames *f)
+{
+    char *plan = NULL;
+    if (triptych_explain(f->t, &plan))
+        return;
+    pthread_mutex_lock(&f->lock);
+    free(f->plan);
+    f->plan = plan;
+    pthread_mutex_unlock(&f->lock);
+}
+
+static void note_frame(trip_frames *f, const frame *d, double ms)
+{
+    triptych_frame_stats stats = { 0 };
+    const double pixels = (double)d->width * d->height;
+    if (f->warm)
+        trip_pace_note(&f->pace, pixels, ms);
+    f->warm = true;
+    const bool counted = triptych_get_frame_stats(f->t, &stats) == 0;
+    pthread_mutex_lock(&f->lock);
+    trip_frames_status *s = &f->status;
+    s->frames++;
+    s->moving += d->first;
+    if (d->first) {
+        s->moving_ms = ms;
+        s->scale = (double)d->width / f->now.width;
+    }
+    if (d->whole)
+        s->whole_ms = ms;
+    if (counted) {
+        snprintf(s->renderer, sizeof s->renderer, "%s", stats.renderer);
+        snprintf(s->device, sizeof s->device, "%s", stats.device);
+        snprintf(s->engine, sizeof s->engine, "%s", stats.engine);
+        snprintf(s->ring, sizeof s->ring, "%s", stats.ring);
+        s->stats = stats;
+        s->stats.renderer = s->stats.device = s->stats.engine = s->stats.ring = NULL;
+    }
+    s->exact = d->whole && f->asked == f->taken;
+    s->failed = false;
+    pthread_mutex_unlock(&f->lock);
+}
+
+static int draw(trip_frames *f, double scale, bool first)
+{
+    const trip_wanted *w = &f->now;
+    frame d = { .width = (int)ceil(w->width * scale),
+                .height = (int)ceil(w->height * scale),
+                .whole = scale == 1,
+                .first = first,
+                .begun_ms = now_ms() };
+    const triptych_view view = trip_navigation_view(&w->navigation, d.width, d.height);
+    f->shown_ms = first ? d.begun_ms : f->shown_ms;
+    set_ends_early(f, !first);
+    int status = triptych_set_view(f->t, &view);
+    if (!status)
+        status = triptych_begin(f->t);
+    if (!status && d.whole)
+        keep_plan(f);
+    if (!status)
+        status = draw_steps(f, &d);
+    triptych_end(f->t);
+    set_ends_early(f, false);
+    if (status)
+        return status;
+    note_frame(f, &d, now_ms() - d.begun_ms);
+    f->whole = d.whole;
+    show(f, d.width, d.height, d.whole);
+    return 0;
+}
+
+/* A picture at once, then the whole one; between them one of half the size where that is long in
+ * coming. */
+static int draw_wanted(trip_frames *f)
+{
+    enum { LONG_MS = 1500 };
+    const double pixels = (double)f->now.width * f->now.height;
+    const double scale = trip_pace_scale(&f->pace, pixels, 1000 / f->params.frames_per_second);
+    int status = draw(f, scale, true);
+    if (!status && scale < 0.3 && trip_pace_expect_ms(&f->pace, pixels) > LONG_MS && !has_newer(f))
+        status = draw(f, 0.5, false);
+    if (!status && scale < 1 && !has_newer(f))
+        status = draw(f, 1, false);
+    return status;
+}
+
+static int prepare(trip_frames *f)
+{
+    int status = 0;
+    if (!f->open || f->document != f->now.document) {
+        close_data(f);
+        status = open_data(f);
+    }
+    if (!status)
+        status = take_pictures(f);
+    if (!status)
+        status = use_settings(f);
+    if (!status)
+        status = use_function(f);
+    if (!status && !f->announced)
+        status = announce(f);
+    return status;
+}
+
+static int serve_wanted(trip_frames *f)
+{
+    int status = prepare(f);
+    return status ? status : draw_wanted(f);
+}
+
+/* Writes the picture that is there, as `triptych render` would. */
+static int write_picture(trip_frames *f, const char *path)
+{
+    char line[512];
+    int status = triptych_write(f->t, path, f->now.width, f->now.height, f->rgba);
+    snprintf(line, sizeof line, "wrote %.480s", path);
+    if (!status)
+        say(f, line, false);
+    return status;
+}
+
+/* A file that is to be written, when the picture is whole or will not be. */
+static int save(trip_frames *f)
+{
+    pthread_mutex_lock(&f->lock);
+    char *path = f->save && f->asked == f->taken ? strdup(f->save) : NULL;
+    pthread_mutex_unlock(&f->lock);
+    if (!path)
+        return 0;
+    int status = f->whole ? write_picture(f, path)
+                          : trip_fail(TRIP_ERROR, "view", path, "there is no picture to write");
+    pthread_mutex_lock(&f->lock);
+    if (f->save && !strcmp(f->save, path)) {
+        free(f->save);
+        f->save = NULL;
+    }
+    pthread_mutex_unlock(&f->lock);
+    free(path);
+    wake(f);
+    return status;
+}
+
+/* What failed is shown, and tried again when something else is wanted: data sets come back. */
+static void fail(trip_frames *f, int status)
+{
+    char line[512];
+    snprintf(line, sizeof line, "%s", triptych_error(f->t));
+    if (*line)
+        say(f, line, true);
+    if (status == TRIPTYCH_ERROR)
+        close_data(f);
+}
+
+/* Without a new wish there is a file to write of what is there. */
+static void serve(trip_frames *f)
+{
+    const bool fresh = f->served != f->taken;
+    f->served = f->taken;
+    int status = fresh ? serve_wanted(f) : 0;
+    if (status && status != TRIPTYCH_CANCELLED)
+        fail(f, status);
+    if (status != TRIPTYCH_CANCELLED && save(f))
+        fail(f, TRIPTYCH_USAGE);
+}
+
+void *trip_frames_run(void *user)
+{
+    trip_frames *f = user;
+    f->scope = (trip_scope){ .failed = take_failure, .sink = take_report, .user = f };
+    trip_scope *before = trip_scope_enter(&f->scope);
+    triptych_set_messages(f->t, take_line, f);
+    triptych_set_progress(f->t, show_progress, f);
+    while (take_wanted(f))
+        serve(f);
+    close_data(f);
+    trip_wanted_release(&f->now);
+    trip_scope_enter(before);
+    return NULL;
+}
