@@ -1,4 +1,6 @@
 /* Transfer functions as things of their own: the built-in ones, and as text for other programs. */
+#include <string.h>
+
 #include "context.h"
 #include "report.h"
 #include "volume_function.h"
@@ -8,6 +10,23 @@ int triptych_get_preset(unsigned number, triptych_preset *out)
     *out = (triptych_preset){ trip_tf_preset_name(number), trip_tf_preset_basis(number),
                               trip_tf_preset_summary(number) };
     return out->name != NULL;
+}
+
+int triptych_get_histogram(triptych *t, triptych_histogram *out)
+{
+    trip_scope *before = trip_context_enter(t);
+    trip_histogram histogram;
+    *out = (triptych_histogram){ 0 };
+    int status = trip_context_check_open(t);
+    if (!status)
+        status = session_read_text(&t->session);
+    if (!status && trip_dataset_text_histogram(t->session.text, &histogram)) {
+        *out = (triptych_histogram){ .lo = histogram.value_min,
+                                     .hi = histogram.value_max,
+                                     .total = histogram.total };
+        memcpy(out->counts, histogram.counts, sizeof out->counts);
+    }
+    return trip_context_leave(before, status);
 }
 
 static int load_for_data_set(triptych *t, const char *function, trip_tf **tf)

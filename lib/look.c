@@ -10,6 +10,7 @@ int trip_context_use_function(triptych *t, const triptych_function *f)
 {
     bool missing = false;
     const session_look look = { .tf = f->name,
+                                .tf_text = f->text,
                                 .opacity_scale = f->opacity_scale,
                                 .window = f->window,
                                 .level = f->level,
@@ -24,6 +25,9 @@ int trip_context_use_function(triptych *t, const triptych_function *f)
 static int check_function(const triptych_function *f)
 {
     bool finite = isfinite(f->opacity_scale) && isfinite(f->window) && isfinite(f->level);
+    if (f->name && f->text)
+        return trip_fail(TRIP_USAGE, "render", "function",
+                         "is given by a name or as text, not both");
     return finite && f->opacity_scale >= 0 && f->window >= 0
                ? 0
                : trip_fail(TRIP_USAGE, "render", "function",

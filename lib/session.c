@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "brick_command.h"
 #include "report.h"
@@ -43,7 +44,9 @@ static void scale_extinction(trip_tf_entry *table, double scale)
 /* The function in data units, with its window. */
 static int load_function(const session *s, const session_look *look, trip_tf **tf)
 {
-    int status = look->tf ? trip_tf_load(tf, look->tf) : trip_dataset_text_tf(s->text, s->data, tf);
+    int status = look->tf_text ? trip_tf_parse(tf, s->input, look->tf_text, strlen(look->tf_text))
+                 : look->tf    ? trip_tf_load(tf, look->tf)
+                               : trip_dataset_text_tf(s->text, s->data, tf);
     bool window = look->window > 0;
     if (!status && !(window && trip_tf_is_normalised(*tf))) /* a window replaces the range */
         status = trip_dataset_text_adapt(s->text, s->data, *tf);

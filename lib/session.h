@@ -20,6 +20,7 @@ typedef struct session {
 /* The transfer function; zero means the one kept in the data set, as it is. */
 typedef struct session_look {
     const char *tf;       /* file or preset */
+    const char *tf_text;  /* in its place a `.tf` text */
     double opacity_scale; /* of extinction; 0: 1 */
     double window, level; /* what the function's domain spans; window 0: not moved */
     bool *missing;        /* set, in the place of a warning, where values that show were left out */

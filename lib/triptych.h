@@ -56,7 +56,8 @@ TRIPTYCH_API const char *triptych_error(const triptych *t);
 TRIPTYCH_API void triptych_set_messages(triptych *t, void (*take)(void *user, const char *line),
                                         void *user);
 /* Calls `show` now and then during long work, on the calling thread: how much of a stage is done.
- * Stages are "draw" and "count" (of splats), "integrate" (of pixels), and those of triptych_brick.h. NULL: no calls. */
+ * Stages are "draw" and "count" (of splats), "integrate" (of pixels), and those of
+ * triptych_brick.h. NULL: no calls. */
 TRIPTYCH_API void triptych_set_progress(triptych *t,
                                         void (*show)(void *user, const char *stage, uint64_t done,
                                                      uint64_t total),
@@ -132,6 +133,17 @@ TRIPTYCH_API int triptych_get_list(triptych *t, unsigned number, triptych_list *
 /* Reads everything and checks it against its checksums and the index. */
 TRIPTYCH_API int triptych_verify(triptych *t);
 
+enum { TRIPTYCH_HISTOGRAM_BINS = 1024 };
+
+typedef struct triptych_histogram {
+    double lo, hi;                            /* what the bins divide equally */
+    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* of finite values of the volume, kept or not */
+    uint64_t total;
+} triptych_histogram;
+
+/* As it is kept in the data set, nothing is read for it; total 0: none is. */
+TRIPTYCH_API int triptych_get_histogram(triptych *t, triptych_histogram *out);
+
 /* ---- what is drawn ---- */
 
 typedef struct triptych_function {
@@ -140,6 +152,7 @@ typedef struct triptych_function {
     double window, level; /* window > 0: stretched over level - window / 2 to level + window / 2 */
     int *left_out;        /* not NULL: set to 1 (else 0), in place of a warning, where values that
                              would show were not kept; the function is then not taken */
+    const char *text;     /* the function itself, as the text of a `.tf`; not with a name */
 } triptych_function;
 
 /* From the next frame on; NULL: the default. */
@@ -278,6 +291,21 @@ typedef struct triptych_camera {
 
 /* The view that frames are drawn from. */
 TRIPTYCH_API int triptych_get_camera(triptych *t, triptych_camera *out);
+
+/* What is seen at a place of the picture: where half of what the ray loses is lost. */
+typedef struct triptych_hit {
+    double opacity; /* of the whole ray, unshaded; 0: nothing is seen, what follows is not set */
+    double position[3]; /* world space */
+    double index[3];    /* the same in voxels */
+    double value;       /* of the data there, interpolated */
+    double depth;       /* from the eye along the ray, in parallel views from the eye's plane */
+    double depth_first; /* where what shows begins */
+} triptych_hit;
+
+/* Of the view, function and data set, whatever was drawn; x and y in pixels from the picture's top
+ * left corner, pixel centres at + 0.5, also beyond its edges. Reads the bricks along the ray. Not
+ * while a frame is begun. */
+TRIPTYCH_API int triptych_probe(triptych *t, double x, double y, triptych_hit *out);
 
 /* ---- frames ---- */
 

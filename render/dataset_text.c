@@ -109,8 +109,7 @@ static trip_tf_kind kind_of(const trip_dataset_text *t)
     return kind == TRIP_TF_AUTOMATIC ? TRIP_TF_SIMULATION : kind;
 }
 
-/* False when the text holds nothing that can be one. */
-static bool read_histogram(const trip_dataset_text *t, trip_histogram *out)
+bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out)
 {
     const cJSON *histogram = cJSON_GetObjectItemCaseSensitive(t->root, "histogram");
     const cJSON *counts = cJSON_GetObjectItemCaseSensitive(histogram, "counts");
@@ -138,7 +137,7 @@ static bool read_histogram(const trip_dataset_text *t, trip_histogram *out)
 int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, trip_tf *tf)
 {
     trip_histogram histogram;
-    bool given = trip_tf_needs_data(tf) && read_histogram(t, &histogram);
+    bool given = trip_tf_needs_data(tf) && trip_dataset_text_histogram(t, &histogram);
     const trip_tf_data data = { d->header.value_min, d->header.value_max, given ? &histogram : NULL,
                                 kind_of(t) };
     return trip_tf_adapt(tf, &data, t->path);

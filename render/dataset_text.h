@@ -42,6 +42,9 @@ int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, t
 /* The stored function; without one, a grey ramp over the values, faint as fog. */
 int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip_tf **out);
 
+/* False, and nothing counted, where the text holds none. */
+bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out);
+
 /* How many voxels hold values that `tf` shows but that were left out when the data set was made,
  * and the range of those values. An estimate from the histogram (bins count in proportion); 0 when
  * the text does not tell. */

@@ -282,6 +282,115 @@ static void depth_is_the_distance_of_what_is_seen(void **state)
     triptych_destroy(t);
 }
 
+/* Within 3 world units of the pixel's the distances of the pixels around are, too. */
+static int is_smooth(const float *depth, int i)
+{
+    static const int around[] = { -SIZE - 1, -SIZE, -SIZE + 1, -1, 1, SIZE - 1, SIZE, SIZE + 1 };
+    int x = i % SIZE, y = i / SIZE;
+    for (size_t n = 0; n < sizeof around / sizeof *around; n++)
+        if (x < 1 || y < 1 || x > SIZE - 2 || y > SIZE - 2 ||
+            !(fabsf(depth[i + around[n]] - depth[i]) <= 3))
+            return 0;
+    return 1;
+}
+
+/* Of a surface that hides nearly all behind it, the mean and the median are close together. */
+static void a_probe_finds_what_is_seen(void **state)
+{
+    (void)state;
+    static float rgba[FLOATS], depth[SIZE * SIZE];
+    triptych *t = new_context();
+    triptych_settings settings = triptych_default_settings();
+    triptych_info info;
+    triptych_hit hit;
+    int surface = 0;
+    settings.depth = 1;
+    settings.background[3] = 0;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(
+        triptych_set_function(t, &(triptych_function){ .text = "700 0 0 0 0\n701 1 1 1 0.99\n" }),
+        TRIPTYCH_OK);
+    for (int parallel = 0; parallel < 2; parallel++) {
+        const triptych_view view = {
+            .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO, .ortho_fit = parallel
+        };
+        assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
+        assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
+        assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+        assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+        assert_fails(t, triptych_probe(t, 1, 1, &hit), TRIPTYCH_USAGE, "end it first");
+        while (triptych_step(t, UINT64_MAX) == TRIPTYCH_WAITS)
+            triptych_await(t, UINT64_MAX);
+        assert_int_equal(triptych_picture_and_depth(t, rgba, depth), TRIPTYCH_OK);
+        triptych_end(t);
+        double voxel = info.index_to_world[0][0];
+        for (int i = 7; i < SIZE * SIZE; i += 61) {
+            if (!is_smooth(depth, i) || rgba[4 * i + 3] < 0.99f)
+                continue;
+            assert_int_equal(triptych_probe(t, i % SIZE + 0.5, i / SIZE + 0.5, &hit), TRIPTYCH_OK);
+            assert_float_equal(hit.depth, depth[i], 3 * voxel);
+            assert_true(hit.opacity > 0.9);
+            surface++;
+            assert_true(hit.value > 700);
+            assert_true(hit.depth_first <= hit.depth);
+            for (int a = 0; a < 3; a++)
+                assert_float_equal(
+                    hit.position[a],
+                    info.index_to_world[a][a] * hit.index[a] + info.index_to_world[a][3], 1e-9);
+        }
+    }
+    assert_true(surface > 30);
+    assert_int_equal(triptych_probe(t, -1000, 5, &hit), TRIPTYCH_OK);
+    assert_true(hit.opacity == 0);
+    assert_fails(t, triptych_probe(t, NAN, 5, &hit), TRIPTYCH_USAGE, "not finite");
+    triptych_destroy(t);
+}
+
+static void the_histogram_counts_all_voxels(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_histogram histogram;
+    triptych_info info;
+    uint64_t sum = 0;
+    assert_fails(t, triptych_get_histogram(t, &histogram), TRIPTYCH_USAGE, "no data set");
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_get_histogram(t, &histogram), TRIPTYCH_OK);
+    assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
+    assert_true(histogram.lo == info.value_min && histogram.hi == info.value_max);
+    for (int i = 0; i < TRIPTYCH_HISTOGRAM_BINS; i++)
+        sum += histogram.counts[i];
+    assert_int_equal(sum, 103 * 94 * 161);
+    assert_int_equal(histogram.total, sum);
+    triptych_destroy(t);
+}
+
+/* What a name gives, its text gives. */
+static void a_function_is_taken_as_text(void **state)
+{
+    (void)state;
+    static float named[FLOATS], worded[FLOATS];
+    triptych *t = new_context();
+    char *text = NULL;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    triptych_function f = { .name = "bone" };
+    assert_int_equal(triptych_set_function(t, &f), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, named), TRIPTYCH_OK);
+    assert_int_equal(triptych_convert(t, &(triptych_conversion){ .function = "bone" }, &text),
+                     TRIPTYCH_OK);
+    assert_int_equal(triptych_set_function(t, NULL), TRIPTYCH_OK);
+    f.text = text;
+    assert_fails(t, triptych_set_function(t, &f), TRIPTYCH_USAGE, "not both");
+    f.name = NULL;
+    assert_int_equal(triptych_set_function(t, &f), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, worded), TRIPTYCH_OK);
+    assert_memory_equal(named, worded, sizeof named);
+    f.text = "0 0 0 0 2\n";
+    assert_fails(t, triptych_set_function(t, &f), TRIPTYCH_ERROR, "line 1");
+    free(text);
+    triptych_destroy(t);
+}
+
 static void functions_are_listed_and_converted(void **state)
 {
     (void)state;
@@ -734,6 +843,9 @@ int main(void)
         cmocka_unit_test(the_view_found_gives_the_same_picture_again),
         cmocka_unit_test(pictures_take_of_the_memory_given),
         cmocka_unit_test(depth_is_the_distance_of_what_is_seen),
+        cmocka_unit_test(a_probe_finds_what_is_seen),
+        cmocka_unit_test(the_histogram_counts_all_voxels),
+        cmocka_unit_test(a_function_is_taken_as_text),
         cmocka_unit_test(functions_are_listed_and_converted),
         cmocka_unit_test(progress_goes_by_stages),
         cmocka_unit_test(bricking_says_what_it_made),

@@ -1,0 +1,80 @@
+/* What is seen at a place of the picture, by a ray of its own. */
+#include "context.h"
+#include "ray_probe.h"
+#include "report.h"
+
+/* In parallel views a ray begins in the plane of the eye. */
+static trip_vec3 origin_of(const trip_camera *c, double x, double y)
+{
+    if (!c->ortho)
+        return c->eye;
+    return trip_add(c->eye, trip_add(trip_scale(c->rx, x), trip_scale(c->ry, y)));
+}
+
+static void put(double out[3], trip_vec3 v)
+{
+    out[0] = v.x;
+    out[1] = v.y;
+    out[2] = v.z;
+}
+
+static triptych_hit hit_of(const trip_ray_probe *probe, const trip_ray_hit *found)
+{
+    const trip_file_header *h = &probe->data->header;
+    trip_vec3 index = trip_add(probe->origin, trip_scale(probe->direction, found->z));
+    triptych_hit hit = { .opacity = found->opacity,
+                         .value = h->code_lo + (h->code_hi - h->code_lo) * found->code / 65535,
+                         .depth = found->z * probe->world_per_z,
+                         .depth_first = found->first_z * probe->world_per_z };
+    put(hit.index, index);
+    put(hit.position, trip_affine_point(&probe->data->index_to_world, index));
+    return hit;
+}
+
+/* With a reader that is gone before the one of the frames is made. */
+static int find_hit(triptych *t, trip_ray_probe *probe, triptych_hit *out)
+{
+    const triptych_resources *r = &t->resources;
+    trip_engine engine = (trip_engine)r->engine;
+    const session_reader wanted = {
+        .engine = engine == TRIP_ENGINE_NULL ? TRIP_ENGINE_AUTO : engine,
+        .threads = (int)trip_context_threads(r->threads),
+    };
+    trip_ray_hit found;
+    int status = session_make_reader(&t->session, &probe->reader, &wanted);
+    if (!status)
+        status = trip_ray_probe_find(probe, &found);
+    trip_reader_destroy(probe->reader);
+    if (!status && found.opacity > 0)
+        *out = hit_of(probe, &found);
+    return status;
+}
+
+static int prepare(triptych *t, double x, double y, trip_camera *camera)
+{
+    int status = trip_context_check_idle(t, true);
+    if (!status && !(isfinite(x) && isfinite(y)))
+        status = trip_fail(TRIP_USAGE, "render", "probe", "the place is not finite");
+    if (!status && !t->has_view)
+        status = trip_context_find_view(t, &(triptych_view){ 0 });
+    if (!status)
+        status = trip_camera_make(camera, &t->turned, &t->session.data->index_to_world);
+    return status;
+}
+
+int triptych_probe(triptych *t, double x, double y, triptych_hit *out)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    trip_camera camera;
+    *out = (triptych_hit){ 0 };
+    int status = prepare(t, x, y, &camera);
+    if (status)
+        return trip_context_leave(before, status);
+    trip_ray_probe probe = { .data = t->session.data,
+                             .budget = t->session.budget,
+                             .table = t->session.table,
+                             .origin = origin_of(&camera, x, y),
+                             .direction = trip_camera_ray(&camera, x, y),
+                             .world_per_z = trip_camera_ray_length(&camera, x, y) };
+    return trip_context_leave(before, find_hit(t, &probe, out));
+}

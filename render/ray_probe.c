@@ -1,0 +1,237 @@
+#include "ray_probe.h"
+
+#include <string.h>
+
+#include "brick_box.h"
+#include "report.h"
+
+#define NOTHING UINT32_MAX
+
+/* Sheets first to first + count - 1, four voxels each: codes, or NOTHING. */
+typedef struct samples {
+    const trip_ray_probe *probe;
+    int axis;
+    int64_t first, count;
+    uint32_t *codes;
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
+} samples;
+
+static int longest_axis(trip_vec3 v)
+{
+    double x = fabs(v.x), y = fabs(v.y), z = fabs(v.z);
+    return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+}
+
+/* Where the ray meets a sheet. */
+static double z_of(const samples *s, double sheet)
+{
+    const trip_ray_probe *p = s->probe;
+    return (sheet - trip_component(p->origin, s->axis)) / trip_component(p->direction, s->axis);
+}
+
+/* There, a coordinate by the list's own: 0 is u, 1 is v. */
+static double across(const samples *s, double sheet, int which)
+{
+    const trip_ray_probe *p = s->probe;
+    int axis = (s->axis + 1 + which) % 3;
+    return trip_component(p->origin, axis) + z_of(s, sheet) * trip_component(p->direction, axis);
+}
+
+/* Narrows [from, to] to where o + z d lies in [lo, hi]. */
+static void narrow(double o, double d, double lo, double hi, double *from, double *to)
+{
+    if (d == 0) {
+        if (o < lo || o > hi)
+            *to = -INFINITY;
+        return;
+    }
+    double a = (lo - o) / d, b = (hi - o) / d;
+    *from = fmax(*from, fmin(a, b));
+    *to = fmin(*to, fmax(a, b));
+}
+
+/* The sheets that the ray meets in the grid; none where it passes by. */
+static void find_sheets(samples *s)
+{
+    const trip_ray_probe *p = s->probe;
+    const trip_list *list = trip_dataset_find(p->data, s->axis, 0, TRIP_KIND_VOXELS);
+    double from = 0, to = INFINITY;
+    if (!list)
+        return;
+    for (int a = 0; a < 3; a++)
+        narrow(trip_component(p->origin, a), trip_component(p->direction, a), -0.5,
+               (double)list->dims[a] - 0.5, &from, &to);
+    if (!(from <= to))
+        return;
+    double o = trip_component(p->origin, s->axis), d = trip_component(p->direction, s->axis);
+    double lo = fmin(o + from * d, o + to * d), hi = fmax(o + from * d, o + to * d);
+    const double last = (double)(list->dims[s->axis] - 1);
+    s->first = (int64_t)fmin(fmax(round(lo), 0), last);
+    s->count = (int64_t)fmin(fmax(round(hi), 0), last) - s->first + 1;
+}
+
+static bool overlaps(double a, double b, double lo, double hi)
+{
+    return fmax(a, b) + 1 >= lo && fmin(a, b) - 1 <= hi;
+}
+
+static bool may_hold(const samples *s, const trip_brick_box *box)
+{
+    double from = fmax(box->lo[2], (double)s->first);
+    double to = fmin(box->hi[2], (double)(s->first + s->count - 1));
+    return from <= to && overlaps(across(s, from, 0), across(s, to, 0), box->lo[0], box->hi[0]) &&
+           overlaps(across(s, from, 1), across(s, to, 1), box->lo[1], box->hi[1]);
+}
+
+static bool select_bricks(const samples *s, trip_selection *selection)
+{
+    const trip_list *list = selection->list;
+    bool some = false;
+    for (const trip_file_slab *slab = list->slabs; slab < list->slabs + list->slab_count; slab++)
+        for (uint64_t b = slab->first_brick; b < slab->first_brick + slab->brick_count; b++) {
+            const trip_brick_box box =
+                trip_brick_box_of(&s->probe->data->header, slab, &list->bricks[b]);
+            if (may_hold(s, &box)) {
+                trip_selection_add(selection, b);
+                some = true;
+            }
+        }
+    return some;
+}
+
+/* Keeps the voxels of a run that are next to the ray. */
+static void take_run(samples *s, const trip_batch *batch, const trip_run *run)
+{
+    if (run->sheet < s->first || run->sheet >= s->first + s->count)
+        return;
+    const trip_block block = trip_block_of(batch, run);
+    uint32_t *codes = s->codes + 4 * (run->sheet - s->first);
+    double u = floor(across(s, run->sheet, 0)) - run->u,
+           v = floor(across(s, run->sheet, 1)) - run->v;
+    double tile = (double)(1u << s->probe->data->header.tile_log2);
+    if (u < -1 || v < -1 || u >= tile || v >= tile)
+        return;
+    trip_block_voxels(&block, 0, run->count, s->voxels);
+    for (uint32_t n = 0; n < run->count; n++) {
+        double du = (double)trip_voxel_u(s->voxels[n]) - u;
+        double dv = (double)trip_voxel_v(s->voxels[n]) - v;
+        if ((du == 0 || du == 1) && (dv == 0 || dv == 1))
+            codes[(int)du + 2 * (int)dv] = trip_voxel_code(s->voxels[n]);
+    }
+}
+
+static int read_selected(samples *s, const trip_selection *selection)
+{
+    trip_reader *reader = s->probe->reader;
+    trip_batch batch;
+    const trip_pass pass = trip_pass_of(selection);
+    int status = trip_reader_begin(reader, &pass);
+    while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
+        for (size_t i = 0; i < batch.run_count; i++)
+            take_run(s, &batch, &batch.runs[i]);
+        trip_reader_release(reader, &batch);
+        status =
+            trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "render", "probe", "interrupted") : 0;
+    }
+    trip_reader_begin(reader, NULL);
+    return status;
+}
+
+static int read_list(samples *s, trip_kind kind)
+{
+    const trip_ray_probe *p = s->probe;
+    const trip_list *list = trip_dataset_find(p->data, s->axis, 0, kind);
+    trip_selection selection;
+    if (!list)
+        return 0;
+    int status = trip_selection_create(&selection, p->data, list, false, 0, INT32_MAX, p->budget);
+    if (status)
+        return status;
+    if (select_bricks(s, &selection))
+        status = read_selected(s, &selection);
+    trip_selection_destroy(&selection, p->budget);
+    return status;
+}
+
+/* The code where the ray meets a sheet; false where there is none. */
+static bool code_at(const samples *s, int64_t sheet, double *code)
+{
+    const uint32_t *c = s->codes + 4 * (sheet - s->first);
+    double u = across(s, (double)sheet, 0), v = across(s, (double)sheet, 1);
+    u -= floor(u);
+    v -= floor(v);
+    uint32_t nearest = c[(u >= 0.5) + 2 * (v >= 0.5)];
+    *code = nearest;
+    if (c[0] != NOTHING && c[1] != NOTHING && c[2] != NOTHING && c[3] != NOTHING)
+        *code = (1 - v) * ((1 - u) * c[0] + u * c[1]) + v * ((1 - u) * c[2] + u * c[3]);
+    return nearest != NOTHING;
+}
+
+static double extinction(const trip_tf_entry *table, double code)
+{
+    unsigned lower = (unsigned)code;
+    unsigned upper = lower < 65535 ? lower + 1 : lower;
+    double t = code - lower;
+    return (1 - t) * (double)table[lower].extinction + t * (double)table[upper].extinction;
+}
+
+/* A sheet's piece of the ray. */
+typedef struct piece {
+    double from, to, code;
+    double depth; /* optical */
+} piece;
+
+/* The n-th piece from the eye; false where nothing shows. */
+static bool piece_at(const samples *s, int64_t n, piece *out)
+{
+    bool ascends = trip_component(s->probe->direction, s->axis) > 0;
+    int64_t sheet = s->first + (ascends ? n : s->count - 1 - n);
+    double a = z_of(s, (double)sheet - 0.5), b = z_of(s, (double)sheet + 0.5);
+    *out = (piece){ .from = fmax(0, fmin(a, b)), .to = fmax(a, b) };
+    if (!(out->from < out->to) || !code_at(s, sheet, &out->code))
+        return false;
+    out->depth =
+        extinction(s->probe->table, out->code) * (out->to - out->from) * s->probe->world_per_z;
+    return out->depth > 0;
+}
+
+static void find_hit(const samples *s, trip_ray_hit *out)
+{
+    double whole = 0, sum = 0;
+    piece p;
+    *out = (trip_ray_hit){ 0 };
+    for (int64_t n = s->count - 1; n >= 0; n--)
+        if (piece_at(s, n, &p)) {
+            whole += p.depth;
+            out->first_z = p.from;
+        }
+    out->opacity = -expm1(-whole);
+    double wanted = -log1p(-out->opacity / 2);
+    for (int64_t n = 0; n < s->count && sum < wanted; n++)
+        if (piece_at(s, n, &p)) {
+            out->z = p.from + (p.to - p.from) * fmin(1, (wanted - sum) / p.depth);
+            out->code = p.code;
+            sum += p.depth;
+        }
+}
+
+int trip_ray_probe_find(const trip_ray_probe *probe, trip_ray_hit *out)
+{
+    samples s = { .probe = probe, .axis = longest_axis(probe->direction) };
+    *out = (trip_ray_hit){ 0 };
+    find_sheets(&s);
+    if (s.count == 0)
+        return 0;
+    size_t bytes = (size_t)s.count * 4 * sizeof *s.codes;
+    s.codes = trip_budget_take(probe->budget, bytes);
+    if (!s.codes)
+        return trip_fail(TRIP_ERROR, "render", "probe", "the ray does not fit the memory given");
+    memset(s.codes, 0xff, bytes);
+    int status = read_list(&s, TRIP_KIND_VOXELS);
+    if (!status)
+        status = read_list(&s, TRIP_KIND_HALO);
+    if (!status)
+        find_hit(&s, out);
+    trip_budget_release(probe->budget, s.codes, bytes);
+    return status;
+}
