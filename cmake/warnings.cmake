@@ -25,7 +25,7 @@ function(trip_sanitize_lightly)
 endfunction()
 # What the fuzzers follow: the parsers of outside bytes. Elsewhere it would only slow the tests.
 if(TRIP_FUZZ)
-    set(parsers trip_common trip_images trip_stream trip_preprocess)
+    set(parsers trip_common trip_images trip_stream trip_preprocess trip_view_model)
     target_compile_options(trip_flags INTERFACE
         "$<$<IN_LIST:$<TARGET_PROPERTY:NAME>,${parsers}>:-fsanitize=fuzzer-no-link>")
 endif()
