@@ -51,6 +51,8 @@ typedef enum trip_event_kind {
     TRIP_EVENT_PICTURE,    /* text: a file for the whole picture, as `triptych render` writes it */
     TRIP_EVENT_RANDOM,     /* count events of the kinds above wait, by `seed` */
     TRIP_EVENT_STATUS,     /* text: a file for what the gauges say, as JSON */
+    TRIP_EVENT_CLICK, /* text: the label of a control of the panel; x: how far along it, 0 to 1;
+                         done as by hand, with the left button */
 } trip_event_kind;
 
 typedef struct trip_event {

@@ -1,6 +1,5 @@
 #include "frames.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,7 +33,6 @@ void trip_wanted_release(trip_wanted *w)
 
 void trip_opened_free(trip_opened *o)
 {
-    free(o->notes);
     free(o->function);
     free(o->source);
     *o = (trip_opened){ 0 };
@@ -125,6 +123,18 @@ trip_frames_status trip_frames_get_status(trip_frames *f)
     return status;
 }
 
+int trip_frames_get_times(trip_frames *f, int most, float *ms)
+{
+    pthread_mutex_lock(&f->lock);
+    const uint64_t moving = f->status.moving;
+    uint64_t count = moving < TRIP_FRAMES_TIMES ? moving : TRIP_FRAMES_TIMES;
+    count = count < (uint64_t)most ? count : (uint64_t)most;
+    for (uint64_t i = 0; i < count; i++)
+        ms[i] = f->times[(moving - count + i) % TRIP_FRAMES_TIMES];
+    pthread_mutex_unlock(&f->lock);
+    return (int)count;
+}
+
 char *trip_frames_explain(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
@@ -163,14 +173,20 @@ bool trip_frames_saving(trip_frames *f)
     return saving;
 }
 
-double trip_frames_depth(trip_frames *f, int x, int y)
+void trip_frames_probe(trip_frames *f, double x, double y)
 {
-    double depth = NAN;
-    if (pthread_mutex_trylock(&f->picture_lock))
-        return depth;
-    const trip_picture *p = &f->picture;
-    if (f->depth && p->whole && x >= 0 && y >= 0 && x < p->width && y < p->height)
-        depth = (double)f->depth[(size_t)y * (size_t)p->width + (size_t)x];
-    pthread_mutex_unlock(&f->picture_lock);
-    return depth;
+    pthread_mutex_lock(&f->lock);
+    f->looks = true;
+    f->place[0] = x;
+    f->place[1] = y;
+    pthread_cond_signal(&f->come);
+    pthread_mutex_unlock(&f->lock);
+}
+
+trip_probed trip_frames_get_probed(trip_frames *f)
+{
+    pthread_mutex_lock(&f->lock);
+    const trip_probed probed = f->probed;
+    pthread_mutex_unlock(&f->lock);
+    return probed;
 }

@@ -25,14 +25,15 @@ typedef struct trip_frames_params {
     triptych_renderer renderer;
     triptych_engine engine;
     double frames_per_second; /* while the view moves */
-    void *user;
     /* By the drawing thread: something has come. */
     void (*wake)(void *user);
+    void *wake_user;
     /* The same: the data set to open for what the user named, which stays where it is until
      * release(). NULL: names are data sets. A failure is reported in the context or the thread's
      * scope. */
     int (*find)(void *user, triptych *t, const char *input, const char **path);
     void (*release)(void *user);
+    void *user;
 } trip_frames_params;
 
 /* NULL without memory or threads. */
@@ -58,17 +59,18 @@ typedef struct trip_wanted {
 /* From now on this is wanted. */
 void trip_frames_want(trip_frames *f, const trip_wanted *wanted);
 
-/* What is known of a data set once it is open. */
+/* What is known of a data set once it is open, and where a view that had to be found looks from. */
 typedef struct trip_opened {
     unsigned document;
-    triptych_info info; /* without notes: */
-    char *notes;
+    bool view_only;     /* it was open before: nothing but its navigation is set */
+    triptych_info info; /* without notes */
+    triptych_histogram histogram;
     char *function; /* its text; NULL where it has none in data units */
     trip_navigation navigation;
     char *source; /* the path that was opened */
 } trip_opened;
 
-/* True when a data set was opened since; free with trip_opened_free(). */
+/* True when a data set was opened or a view found since; free with trip_opened_free(). */
 bool trip_frames_take_opened(trip_frames *f, trip_opened *out);
 void trip_opened_free(trip_opened *o);
 
@@ -91,6 +93,10 @@ typedef struct trip_frames_status {
 } trip_frames_status;
 
 trip_frames_status trip_frames_get_status(trip_frames *f);
+
+/* How long the last frames of moving views took, in ms, the latest last: so many, up to `most`. */
+enum { TRIP_FRAMES_TIMES = 4096 };
+int trip_frames_get_times(trip_frames *f, int most, float *ms);
 /* The plan of the last whole picture, in words, for free(); NULL: there is none. */
 char *trip_frames_explain(trip_frames *f);
 
@@ -117,9 +123,17 @@ void trip_frames_save(trip_frames *f, const char *path);
 /* Whether one is yet to be written. */
 bool trip_frames_saving(trip_frames *f);
 
-/* Distance to what is seen at a pixel of the whole picture, in world units; +infinity where nothing
- * is, NAN where it is not known: settings.depth was not set, or the picture is not whole. */
-double trip_frames_depth(trip_frames *f, int x, int y);
+/* What is seen at a place of the picture, in its pixels, once the whole picture is there; until
+ * then the last answer. */
+typedef struct trip_probed {
+    bool valid; /* something was looked at, */
+    double x, y;
+    trip_navigation navigation; /* seen from there */
+    triptych_hit hit;
+} trip_probed;
+
+void trip_frames_probe(trip_frames *f, double x, double y);
+trip_probed trip_frames_get_probed(trip_frames *f);
 
 #ifdef __cplusplus
 }

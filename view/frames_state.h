@@ -24,15 +24,18 @@ struct trip_frames {
     bool ends_early; /* what goes on is given up for what comes */
     char *save;      /* a file to write the whole picture to; NULL: none */
     trip_frames_status status;
+    float times[TRIP_FRAMES_TIMES]; /* round */
     trip_opened opened;
     bool has_opened;
     char *plan;
+    bool looks; /* at a place: */
+    double place[2];
+    trip_probed probed;
 
     /* The window looks at it only where it gets this lock at once; the drawing thread holds it only
      * while it copies a picture. */
     pthread_mutex_t picture_lock;
     trip_picture picture;
-    float *depth; /* of the whole picture; NULL: none */
 
     /* The drawing thread's own. */
     trip_wanted now; /* what it works on */
@@ -44,7 +47,7 @@ struct trip_frames {
     char *function;     /* that the context has, as a key */
     bool has_settings;
     triptych_settings settings; /* that the context has */
-    float *rgba, *distances;    /* of this size: */
+    float *rgba;                /* of this size: */
     int width, height;
     uint8_t *shown; /* the picture's pixels */
     trip_pace pace;

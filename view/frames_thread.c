@@ -3,9 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "frames_state.h"
 #include "report.h"
@@ -19,7 +17,7 @@ static double now_ms(void)
 
 static void wake(trip_frames *f)
 {
-    f->params.wake(f->params.user);
+    f->params.wake(f->params.wake_user);
 }
 
 /* ---- what there is to say ---- */
@@ -110,7 +108,7 @@ static bool take_wanted(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
     f->status.stage[0] = 0; /* nothing goes on */
-    while (!f->quit && f->asked == f->taken && !f->save)
+    while (!f->quit && f->asked == f->taken && !f->save && !(f->looks && f->whole))
         pthread_cond_wait(&f->come, &f->lock);
     const bool goes_on = !f->quit;
     if (goes_on)
@@ -132,9 +130,8 @@ static void drop_picture(trip_frames *f)
 {
     pthread_mutex_lock(&f->picture_lock);
     f->picture.rgba = NULL;
-    f->depth = NULL;
     pthread_mutex_unlock(&f->picture_lock);
-    f->rgba = f->distances = NULL;
+    f->rgba = NULL;
     f->shown = NULL;
     f->width = f->height = 0;
 }
@@ -184,24 +181,6 @@ static int open_data(trip_frames *f)
     return status;
 }
 
-/* The text of a function goes by a file in memory. */
-static int use_text(trip_frames *f, const char *text)
-{
-    char path[64];
-    int fd = memfd_create("transfer function", MFD_CLOEXEC);
-    size_t bytes = strlen(text);
-    if (fd < 0 || write(fd, text, bytes) != (ssize_t)bytes) {
-        if (fd >= 0)
-            close(fd);
-        return trip_fail_errno("transfer function", "", "cannot keep a copy");
-    }
-    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
-    int status = triptych_set_function(
-        f->t, &(triptych_function){ .name = path, .opacity_scale = f->now.opacity_scale });
-    close(fd);
-    return status;
-}
-
 static int use_function(trip_frames *f)
 {
     const trip_wanted *w = &f->now;
@@ -215,10 +194,10 @@ static int use_function(trip_frames *f)
         free(key);
         return 0;
     }
-    int status = w->text ? use_text(f, w->text)
-                         : triptych_set_function(
-                               f->t, &(triptych_function){ .name = w->function,
-                                                           .opacity_scale = w->opacity_scale });
+    int status =
+        triptych_set_function(f->t, &(triptych_function){ .name = w->text ? NULL : w->function,
+                                                          .text = w->text,
+                                                          .opacity_scale = w->opacity_scale });
     free(f->function);
     f->function = status ? NULL : key;
     if (status)
@@ -267,29 +246,37 @@ static char *text_of_function(trip_frames *f)
     return text;
 }
 
-static int announce(trip_frames *f)
+static int describe(trip_frames *f, trip_opened *o)
 {
-    trip_opened o = { .document = f->now.document };
-    int status = triptych_get_info(f->t, &o.info);
-    if (!status)
-        status = find_navigation(f, &o.navigation);
+    int status = triptych_get_info(f->t, &o->info);
     if (status)
         return status;
-    o.notes = o.info.notes ? strdup(o.info.notes) : NULL;
-    o.info.notes = NULL;
-    o.function = text_of_function(f);
-    o.source = strdup(f->source);
+    o->info.notes = NULL;
+    status = triptych_get_histogram(f->t, &o->histogram);
+    o->function = text_of_function(f);
+    o->source = strdup(f->source);
+    return status;
+}
+
+static int announce(trip_frames *f)
+{
+    trip_opened o = { .document = f->now.document, .view_only = f->announced };
+    int status = find_navigation(f, &o.navigation);
+    if (!status && !f->announced)
+        status = describe(f, &o);
+    if (status)
+        return status;
     f->now.navigation = o.navigation;
     f->now.has_navigation = f->announced = true;
     pthread_mutex_lock(&f->lock);
-    trip_opened_free(&f->opened);
-    f->opened = o;
+    if (o.view_only && f->has_opened && f->opened.document == o.document) {
+        f->opened.navigation = o.navigation;
+    } else {
+        trip_opened_free(&f->opened);
+        f->opened = o;
+    }
     f->has_opened = true;
     f->status.open = true;
-    if (f->wanted.document == f->document && !f->wanted.has_navigation) {
-        f->wanted.navigation = o.navigation;
-        f->wanted.has_navigation = true;
-    }
     pthread_mutex_unlock(&f->lock);
     wake(f);
     return 0;
@@ -300,22 +287,19 @@ static int announce(trip_frames *f)
 static int take_pictures(trip_frames *f)
 {
     const trip_wanted *w = &f->now;
-    const bool fits = f->rgba && f->width >= w->width && f->height >= w->height &&
-                      (f->distances || !w->settings.depth);
+    const bool fits = f->rgba && f->width >= w->width && f->height >= w->height;
     float *pixels = NULL;
     if (fits)
         return 0;
-    float *old[] = { f->rgba, f->distances, (float *)f->shown };
+    float *old[] = { f->rgba, (float *)f->shown };
     drop_picture(f);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 2; i++)
         if (old[i])
             triptych_release_picture(f->t, old[i]);
     int status = triptych_new_picture(f->t, w->width, w->height, 1, &pixels);
     f->shown = (uint8_t *)pixels;
     if (!status)
         status = triptych_new_picture(f->t, w->width, w->height, 4, &f->rgba);
-    if (!status && w->settings.depth)
-        status = triptych_new_picture(f->t, w->width, w->height, 1, &f->distances);
     f->width = status ? 0 : w->width;
     f->height = status ? 0 : w->height;
     return status;
@@ -345,16 +329,9 @@ static void show(trip_frames *f, int width, int height, bool whole)
                                  .document = w->document,
                                  .whole = whole,
                                  .number = f->picture.number + 1 };
-    f->depth = whole && w->settings.depth ? f->distances : NULL;
     pthread_mutex_unlock(&f->picture_lock);
     f->shown_ms = now_ms();
     wake(f);
-}
-
-static int take_picture(trip_frames *f)
-{
-    return f->settings.depth ? triptych_picture_and_depth(f->t, f->rgba, f->distances)
-                             : triptych_picture(f->t, f->rgba);
 }
 
 /* ---- frames ---- */
@@ -383,7 +360,7 @@ static int step(trip_frames *f, const frame *d)
     if (status == TRIPTYCH_WAITS)
         triptych_await(f->t, STEP_NS);
     if (status > 0 && d->first && now_ms() - f->shown_ms > PART_MS) {
-        int taken = take_picture(f);
+        int taken = triptych_picture(f->t, f->rgba);
         if (taken)
             return taken;
         show(f, d->width, d->height, false);
@@ -399,7 +376,7 @@ static int draw_steps(trip_frames *f, const frame *d)
             return TRIPTYCH_CANCELLED;
         status = step(f, d);
     }
-    return status ? status : take_picture(f);
+    return status ? status : triptych_picture(f->t, f->rgba);
 }
 
 static void keep_plan(trip_frames *f)
@@ -424,8 +401,8 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
     pthread_mutex_lock(&f->lock);
     trip_frames_status *s = &f->status;
     s->frames++;
-    s->moving += d->first;
     if (d->first) {
+        f->times[s->moving++ % TRIP_FRAMES_TIMES] = (float)ms;
         s->moving_ms = ms;
         s->scale = (double)d->width / f->now.width;
     }
@@ -466,9 +443,10 @@ static int draw(trip_frames *f, double scale, bool first)
     set_ends_early(f, false);
     if (status)
         return status;
-    note_frame(f, &d, now_ms() - d.begun_ms);
-    f->whole = d.whole;
     show(f, d.width, d.height, d.whole);
+    f->whole = d.whole;
+    note_frame(f, &d, now_ms() - d.begun_ms);
+    wake(f);
     return 0;
 }
 
@@ -500,7 +478,7 @@ static int prepare(trip_frames *f)
         status = use_settings(f);
     if (!status)
         status = use_function(f);
-    if (!status && !f->announced)
+    if (!status && !(f->announced && f->now.has_navigation))
         status = announce(f);
     return status;
 }
@@ -554,6 +532,24 @@ static void fail(trip_frames *f, int status)
         close_data(f);
 }
 
+/* At a place that the pointer is at. */
+static void look(trip_frames *f)
+{
+    pthread_mutex_lock(&f->lock);
+    const bool looks = f->looks && f->whole;
+    trip_probed probed = {
+        .valid = true, .x = f->place[0], .y = f->place[1], .navigation = f->now.navigation
+    };
+    f->looks = f->looks && !looks;
+    pthread_mutex_unlock(&f->lock);
+    if (!looks || triptych_probe(f->t, probed.x, probed.y, &probed.hit))
+        return;
+    pthread_mutex_lock(&f->lock);
+    f->probed = probed;
+    pthread_mutex_unlock(&f->lock);
+    wake(f);
+}
+
 /* Without a new wish there is a file to write of what is there. */
 static void serve(trip_frames *f)
 {
@@ -564,6 +560,8 @@ static void serve(trip_frames *f)
         fail(f, status);
     if (status != TRIPTYCH_CANCELLED && save(f))
         fail(f, TRIPTYCH_USAGE);
+    if (!status)
+        look(f);
 }
 
 void *trip_frames_run(void *user)

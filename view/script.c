@@ -236,6 +236,20 @@ static int parse_file(parser *p)
     return add(p, (trip_event){ .kind = kinds[find(p->words[0], names)], .text = text });
 }
 
+static int parse_click(parser *p)
+{
+    char *label = NULL;
+    const double part = strtod(p->words[1], &label);
+    label += strspn(label, " \t");
+    if (label == p->words[1] || !(part >= 0 && part <= 1) || !*label)
+        return fail_at(p, "`%.40s` is not how far along, 0 to 1, and a control's label",
+                       p->words[1]);
+    char *text = strdup(label);
+    if (!text)
+        return fail_at(p, "out of memory");
+    return add(p, (trip_event){ .kind = TRIP_EVENT_CLICK, .x = part, .text = text });
+}
+
 enum { REST = -1 }; /* in place of a count: the rest of the line */
 
 static const struct command {
@@ -264,6 +278,7 @@ static const struct command {
     { "picture", REST, false, parse_file },
     { "random", 2, false, parse_random },
     { "status", REST, false, parse_file },
+    { "click", REST, false, parse_click },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 

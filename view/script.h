@@ -20,6 +20,7 @@
  *   picture FILE                 the whole picture, as `triptych render` writes it
  *   random COUNT SEED            so many events by chance, the same for the same seed
  *   status FILE                  what the gauges say, as JSON
+ *   click PART LABEL             a control of the panel, so far along it, 0 to 1
  *
  * TEXT and FILE are the rest of the line. `#` at the beginning of a line makes it a comment. */
 #ifndef TRIP_VIEW_SCRIPT_H

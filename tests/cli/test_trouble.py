@@ -258,16 +258,13 @@ class Trouble(program.ProgramTest):
 
     # Ctrl-C
 
-    def interrupt(self, seconds, signals, *arguments):
-        """As soon as it has taken so many seconds of processors, however long that lasts."""
+    def interrupt(self, delay, signals, *arguments):
         process = program.start(*arguments)
-        program.await_handler(process)
-        while process.poll() is None and program.processor_seconds(process) < seconds:
-            time.sleep(0.01)
+        time.sleep(delay)
         for number in signals:
             process.send_signal(number)
         try:
-            _, err = process.communicate(timeout=120)
+            _, err = process.communicate(timeout=20)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
@@ -277,14 +274,17 @@ class Trouble(program.ProgramTest):
     def check_interrupted(self, signals, *arguments):
         """At several moments; at least once it must have come before the end."""
         met = 0
-        for seconds in 0, 0.1, 0.2, 0.4, 0.8, 1.6:
-            status, err = self.interrupt(seconds, signals, *arguments)
+        for delay in 0.03, 0.1, 0.2, 0.4, 0.8, 1.6:
+            status, err = self.interrupt(delay, signals, *arguments)
             if status == 0:
                 break
-            self.assertEqual(status, 1)
-            self.assertRegex(err, r"\Atriptych: [^\n]*interrupted[^\n]*\n\Z")
+            if status == 1:
+                self.assertRegex(err, r"\Atriptych: [^\n]*interrupted[^\n]*\n\Z")
+            else:  # before the handler was there
+                self.assertEqual(status, -signals[0])
+                self.assertEqual(err, "")
             self.assertFalse(os.path.exists(arguments[3]))
-            met += 1
+            met += status == 1
         self.assertGreater(met, 0)
 
     def test_interrupted_bricking(self):

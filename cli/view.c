@@ -1,0 +1,304 @@
+/* triptych view: data sets and volumes -> a window. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cached_volume.h"
+#include "commands.h"
+#include "geometry.h"
+#include "library.h"
+#include "options.h"
+#include "report.h"
+#include "view.h"
+#include "volume_options.h"
+
+enum {
+    KEY_SIZE = 256,
+    KEY_EYE,
+    KEY_LOOK,
+    KEY_UP,
+    KEY_FOV,
+    KEY_ORTHO,
+    KEY_VIEW,
+    KEY_TF,
+    KEY_OPACITY_SCALE,
+    KEY_CLASSIFY,
+    KEY_FPS,
+    KEY_SCALE,
+    KEY_NO_PANEL,
+    KEY_SCRIPT,
+    KEY_RENDERER,
+    KEY_MEMORY,
+    KEY_ENGINE,
+    KEY_THREADS,
+    KEY_GRID,
+    KEY_LEVEL_SET,
+    KEY_SPACING,
+    KEY_ALLOW_GAPS,
+};
+
+static const struct argp_option options[] = {
+    { NULL, 0, NULL, 0, "Window:", 1 },
+    { "size", KEY_SIZE, "WxH", 0, "Of the window (default: 1100x720)", 1 },
+    { "scale", KEY_SCALE, "X", 0, "Of texts and controls (default: the screen's)", 1 },
+    { "no-panel", KEY_NO_PANEL, NULL, 0, "Begin without the panel; t shows it", 1 },
+    { "fps", KEY_FPS, "N", 0,
+      "Frames a second while the view moves, which are as small as that takes (default: 30)", 1 },
+    { "script", KEY_SCRIPT, "FILE", 0, "Replay events, then end", 1 },
+    { NULL, 0, NULL, 0, "View and look, as of `triptych render`:", 2 },
+    { "view", KEY_VIEW, "SIDE", 0, "front, back, left, right, top, bottom or iso", 2 },
+    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 2 },
+    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at", 2 },
+    { "up", KEY_UP, "X,Y,Z", 0, "What is up", 2 },
+    { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (default: 30)", 2 },
+    { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, so many world units high", 2 },
+    { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 2 },
+    { "opacity-scale", KEY_OPACITY_SCALE, "X", 0, "Multiplies extinction", 2 },
+    { "classify", KEY_CLASSIFY, "pre|post", 0, "Before splatting, or after interpolation", 2 },
+    { NULL, 0, NULL, 0, "Renderer:", 3 },
+    { "renderer", KEY_RENDERER, "NAME", 0,
+      "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
+      3 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 3 },
+    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 3 },
+    { NULL, 0, NULL, 0, "Volumes (not for data sets, which have it settled):", 4 },
+    { "grid", KEY_GRID, "NAME", 0, "OpenVDB grid", 4 },
+    { "level-set", KEY_LEVEL_SET, "HOW", 0,
+      "What to make of an OpenVDB level set: filled or band (default: filled)", 4 },
+    { "spacing", KEY_SPACING, "X,Y,Z", 0, "Distance of voxels along each axis", 4 },
+    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", 4 },
+    { 0 },
+};
+
+typedef struct view_options {
+    trip_view_params params;
+    const char **inputs;
+    int argc;
+    double eye[3], look[3], up[3];
+    triptych_brick_options volume;
+    cached_volume cached; /* of the volume that is shown */
+} view_options;
+
+static int parse_size(const char *text, view_options *o)
+{
+    int used = 0, width = 0, height = 0;
+    if (sscanf(text, "%5dx%5d%n", &width, &height, &used) != 2 || text[used] || width < 1 ||
+        height < 1)
+        return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
+    o->params.width = width;
+    o->params.height = height;
+    return 0;
+}
+
+static int parse_point(const char *option, const char *text, double point[3], const double **place)
+{
+    int count;
+    *place = point;
+    return trip_option_numbers(option, text, 3, 3, point, &count);
+}
+
+static int parse_up(const char *text, view_options *o)
+{
+    int status = parse_point("--up", text, o->up, &o->params.start.up);
+    const trip_vec3 up = trip_v3(o->up[0], o->up[1], o->up[2]);
+    if (!status && !(trip_length(up) > 0))
+        return trip_option_fail("--up", "the direction is zero");
+    return status;
+}
+
+static int parse_view(int key, char *arg, view_options *o)
+{
+    static const char *const sides[] = { "front", "back",   "left", "right",
+                                         "top",   "bottom", "iso",  NULL };
+    triptych_view *v = &o->params.start;
+    int which = 0, status;
+    switch (key) {
+    case KEY_VIEW:
+        status = trip_option_choice("--view", arg, sides, &which);
+        v->side = (triptych_side)(TRIPTYCH_FRONT + which);
+        return status;
+    case KEY_EYE:
+        return parse_point("--eye", arg, o->eye, &v->eye);
+    case KEY_LOOK:
+        return parse_point("--look", arg, o->look, &v->look);
+    case KEY_UP:
+        return parse_up(arg, o);
+    case KEY_FOV:
+        return trip_option_number("--fov", arg, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES,
+                                  &v->fov_degrees);
+    case KEY_ORTHO:
+        return trip_option_number("--ortho", arg, 1e-100, 1e100, &v->ortho_height);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int parse_look(int key, char *arg, view_options *o)
+{
+    static const char *const classifications[] = { "pre", "post", NULL };
+    int which = 0, status;
+    switch (key) {
+    case KEY_TF:
+        o->params.function = arg;
+        return 0;
+    case KEY_OPACITY_SCALE:
+        return trip_option_number("--opacity-scale", arg, 1e-6, 1e6, &o->params.opacity_scale);
+    case KEY_CLASSIFY:
+        status = trip_option_choice("--classify", arg, classifications, &which);
+        o->params.settings.classify = (triptych_classify)which;
+        return status;
+    default:
+        return parse_view(key, arg, o);
+    }
+}
+
+static int parse_renderer(int key, char *arg, view_options *o)
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", NULL };
+    static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
+    int which = 0, status;
+    switch (key) {
+    case KEY_RENDERER:
+        status = trip_option_choice("--renderer", arg, renderers, &which);
+        o->params.renderer = (triptych_renderer)which;
+        return status;
+    case KEY_MEMORY:
+        return trip_option_bytes("--memory", arg, &o->params.memory_bytes);
+    case KEY_ENGINE:
+        status = trip_option_choice("--engine", arg, engines, &which);
+        o->params.engine = (triptych_engine)which;
+        return status;
+    case KEY_THREADS:
+        status = trip_option_integer("--threads", arg, 1, 256, &which);
+        o->params.threads = (unsigned)which;
+        return status;
+    default:
+        return parse_look(key, arg, o);
+    }
+}
+
+static int parse_volume(int key, char *arg, view_options *o)
+{
+    switch (key) {
+    case KEY_GRID:
+        return trip_option_grid(arg, &o->volume.grid);
+    case KEY_LEVEL_SET:
+        return trip_option_level_set(arg, &o->volume.level_set);
+    case KEY_SPACING:
+        return trip_option_spacing(arg, o->volume.spacing);
+    case KEY_ALLOW_GAPS:
+        o->volume.allow_gaps = 1;
+        return 0;
+    default:
+        return parse_renderer(key, arg, o);
+    }
+}
+
+static int check(const view_options *o)
+{
+    const triptych_view *v = &o->params.start;
+    if (v->fov_degrees > 0 && v->ortho_height > 0)
+        return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
+    if (v->eye && v->side)
+        return trip_option_fail("--eye", "says where to look from, and so does --view: give one or "
+                                         "the other");
+    return 0;
+}
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    view_options *o = state->input;
+    switch (key) {
+    case KEY_SIZE:
+        return parse_size(arg, o);
+    case KEY_SCALE:
+        return trip_option_number("--scale", arg, 0.5, 8, &o->params.scale);
+    case KEY_NO_PANEL:
+        o->params.no_panel = true;
+        return 0;
+    case KEY_FPS:
+        return trip_option_number("--fps", arg, 1, 1000, &o->params.frames_per_second);
+    case KEY_SCRIPT:
+        o->params.script = arg;
+        return 0;
+    case ARGP_KEY_ARG:
+        o->inputs[o->params.count++] = arg;
+        return 0;
+    case ARGP_KEY_END:
+        return check(o);
+    default:
+        return parse_volume(key, arg, o);
+    }
+}
+
+static int parse(view_options *o, int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse_key,
+        .args_doc = "[VOLUME|NAME.trip...]",
+        .doc = "Shows volumes, or data sets made of them by `triptych brick`, in a window: turned, "
+               "flown through and classified by hand. A moving view is drawn as large as its time "
+               "allows; at rest it becomes the picture that `triptych render` draws, bit for bit. "
+               "A volume is bricked into a cache first, which `triptych cache` lists and clears."
+               "\vF1 lists the keys. Files can be dropped on the window.",
+    };
+    o->params.settings = triptych_default_settings();
+    return trip_options_parse(&argp, argc, argv, o);
+}
+
+/* As `triptych render` keeps volumes; by the drawing thread. */
+static int find(void *user, triptych *t, const char *input, const char **path)
+{
+    view_options *o = user;
+    triptych_brick_options wanted = o->volume;
+    *path = input;
+    if (!cached_volume_wanted(input))
+        return 0;
+    wanted.functions = &o->params.function;
+    wanted.function_count = o->params.function != NULL;
+    wanted.automatic = 1;
+    wanted.memory_bytes = o->params.memory_bytes;
+    wanted.threads = o->params.threads;
+    const int status = cached_volume_open(&o->cached, t, input, &wanted);
+    *path = o->cached.path;
+    return status;
+}
+
+static void release(void *user)
+{
+    view_options *o = user;
+    cached_volume_close(&o->cached);
+}
+
+/* A data set that cannot be opened is found here, before there is a window. */
+static int check_inputs(const view_options *o)
+{
+    triptych *t = NULL;
+    int status = library_create(&t, NULL);
+    for (int i = 0; i < o->params.count && !status; i++)
+        if (!cached_volume_wanted(o->inputs[i]))
+            status = triptych_open(t, o->inputs[i],
+                                   &(triptych_resources){ .memory_bytes = o->params.memory_bytes });
+    triptych_destroy(t);
+    return status;
+}
+
+int trip_command_view(int argc, char **argv)
+{
+    view_options o = { .inputs = calloc((size_t)argc + 1, sizeof *o.inputs) };
+    if (!o.inputs)
+        return trip_exit_status(trip_fail(TRIP_ERROR, "usage", "view", "out of memory"));
+    int status = parse(&o, argc, argv);
+    o.params.inputs = o.inputs;
+    o.params.user = &o;
+    o.params.find = find;
+    o.params.release = release;
+    if (!status)
+        status = check_inputs(&o);
+    if (!status)
+        status = trip_view_run(&o.params);
+    free(o.inputs);
+    return trip_exit_status(status);
+}

@@ -1,0 +1,883 @@
+/* The panel by Dear ImGui, in the order in which it stands on the screen. */
+#include "panel.h"
+
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <cfloat>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <new>
+#include <string>
+#include <unistd.h>
+
+#include "annotation.h"
+#include "report.h"
+
+namespace
+{
+
+struct Box {
+    ImVec2 lo, hi;
+    bool seen;
+};
+
+const int TIMES = 120;
+
+} // namespace
+
+struct trip_panel {
+    ImGuiContext *context;
+    double scale;
+    std::map<std::string, Box> boxes; /* of the controls of the last frame */
+    std::string sought;               /* to be moved into sight */
+    int point;                        /* of the function that is chosen; -1: none */
+    bool dragging;
+    char path[512]; /* of a function */
+};
+
+namespace
+{
+
+// ---- small things ----
+
+// The control that was just made can be found by its label.
+bool mark(trip_panel *p, const char *label, bool result)
+{
+    const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
+    p->boxes[label] = Box{ lo, hi, ImGui::IsItemVisible() };
+    if (p->sought == label)
+        ImGui::SetScrollHereY();
+    return result;
+}
+
+bool check(trip_panel *p, const char *label, int *value)
+{
+    bool on = *value != 0;
+    const bool changed = mark(p, label, ImGui::Checkbox(label, &on));
+    *value = on;
+    return changed;
+}
+
+bool check(trip_panel *p, const char *label, bool *value)
+{
+    return mark(p, label, ImGui::Checkbox(label, value));
+}
+
+bool button(trip_panel *p, const char *label)
+{
+    return mark(p, label, ImGui::Button(label));
+}
+
+bool slide(trip_panel *p, const char *label, double *value, double lo, double hi,
+           const char *format, ImGuiSliderFlags flags = 0)
+{
+    const ImGuiSliderFlags all = flags | ImGuiSliderFlags_AlwaysClamp;
+    return mark(p, label,
+                ImGui::SliderScalar(label, ImGuiDataType_Double, value, &lo, &hi, format, all));
+}
+
+// Of a few names.
+template <typename Choice>
+bool choose(trip_panel *p, const char *label, Choice *value, const char *const *names, int count)
+{
+    bool changed = false;
+    const bool open = ImGui::BeginCombo(label, names[static_cast<int>(*value)]);
+    mark(p, label, open);
+    for (int i = 0; open && i < count; i++)
+        if (mark(p, names[i], ImGui::Selectable(names[i], i == static_cast<int>(*value)))) {
+            *value = static_cast<Choice>(i);
+            changed = true;
+        }
+    if (open)
+        ImGui::EndCombo();
+    return changed;
+}
+
+std::string bytes_text(double bytes)
+{
+    char text[32];
+    const char *units[] = { "B", "kB", "MB", "GB", "TB" };
+    int unit = 0;
+    for (; bytes >= 1000 && unit < 4; unit++)
+        bytes /= 1000;
+    std::snprintf(text, sizeof text, bytes < 10 && unit ? "%.1f %s" : "%.0f %s", bytes,
+                  units[unit]);
+    return text;
+}
+
+bool section(trip_panel *p, const char *name, bool open = true)
+{
+    const bool shown = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+    return mark(p, name, shown);
+}
+
+// ---- data sets and views ----
+
+void draw_documents(trip_panel *p, trip_viewer *v)
+{
+    for (int i = 0; i < v->count; i++) {
+        const char *name = v->documents[i]->input;
+        const char *slash = std::strrchr(name, '/');
+        ImGui::PushID(i);
+        const char *label = slash && slash[1] ? slash + 1 : name;
+        if (mark(p, label, ImGui::Selectable(label, i == v->shown)))
+            trip_viewer_show(v, i);
+        if (ImGui::IsItemHovered())
+            ImGui::SetTooltip("%s", name);
+        ImGui::PopID();
+    }
+    if (v->count == 0)
+        ImGui::TextWrapped("Drop a data set or a volume here.");
+    else if (button(p, "Close"))
+        trip_viewer_close(v);
+}
+
+void draw_sides(trip_panel *p, trip_viewer *v)
+{
+    const char *names[] = { "Front", "Back", "Left", "Right", "Top", "Bottom" };
+    for (int i = 0; i < 6; i++) {
+        if (i % 3)
+            ImGui::SameLine();
+        if (mark(p, names[i],
+                 ImGui::Button(names[i], ImVec2(76 * static_cast<float>(p->scale), 0))))
+            trip_viewer_see_side(v, static_cast<triptych_side>(TRIPTYCH_FRONT + i));
+    }
+}
+
+void draw_view(trip_panel *p, trip_viewer *v, trip_document *d)
+{
+    trip_navigation *n = &d->navigation;
+    draw_sides(p, v);
+    if (button(p, "Fit"))
+        trip_viewer_fit(v);
+    if (!d->has_navigation)
+        return;
+    bool parallel = n->ortho_height > 0;
+    ImGui::SameLine();
+    if (check(p, "Parallel", &parallel)) {
+        trip_navigation_set_parallel(n, parallel);
+        v->changed = true;
+    }
+    double fov = n->fov_degrees;
+    if (!parallel && slide(p, "Field of view", &fov, 1, 150, "%.1f°")) {
+        trip_navigation_set_fov(n, fov);
+        v->changed = true;
+    }
+}
+
+// ---- the transfer function ----
+
+// Opacities of fog are small: the axis is of their cube roots.
+double height_of(double opacity)
+{
+    return std::cbrt(opacity);
+}
+
+struct Canvas {
+    ImVec2 lo, hi;
+    double value_lo, value_hi;
+
+    float x(double value) const
+    {
+        return lo.x +
+               static_cast<float>((value - value_lo) / (value_hi - value_lo)) * (hi.x - lo.x);
+    }
+    float y(double opacity) const
+    {
+        return hi.y - static_cast<float>(height_of(opacity)) * (hi.y - lo.y);
+    }
+    double value(float at) const
+    {
+        return value_lo + static_cast<double>((at - lo.x) / (hi.x - lo.x)) * (value_hi - value_lo);
+    }
+    double opacity(float at) const
+    {
+        const double h = static_cast<double>((hi.y - at) / (hi.y - lo.y));
+        return h > 0 ? h < 1 ? h * h * h : 1 : 0;
+    }
+};
+
+ImU32 colour_of(const trip_rgba &c, double alpha)
+{
+    return ImGui::ColorConvertFloat4ToU32(ImVec4(static_cast<float>(c.r), static_cast<float>(c.g),
+                                                 static_cast<float>(c.b),
+                                                 static_cast<float>(alpha)));
+}
+
+void draw_histogram(ImDrawList *list, const Canvas &c, const triptych_histogram &h)
+{
+    uint64_t most = 0;
+    for (uint64_t count : h.counts)
+        most = count > most ? count : most;
+    if (!h.total || !(h.lo < h.hi))
+        return;
+    for (float x = c.lo.x; x < c.hi.x; x++) {
+        const double place = (c.value(x + 0.5f) - h.lo) / (h.hi - h.lo) * TRIPTYCH_HISTOGRAM_BINS;
+        if (!(place >= 0 && place < TRIPTYCH_HISTOGRAM_BINS))
+            continue;
+        const double part = std::log1p(static_cast<double>(h.counts[static_cast<int>(place)])) /
+                            std::log1p(static_cast<double>(most));
+        const float top = c.hi.y - static_cast<float>(part) * (c.hi.y - c.lo.y);
+        list->AddLine(ImVec2(x, c.hi.y), ImVec2(x, top), IM_COL32(90, 96, 110, 255));
+    }
+}
+
+void draw_curve(ImDrawList *list, const Canvas &c, const trip_function_editor *e)
+{
+    for (float x = c.lo.x; x < c.hi.x; x++) {
+        const trip_rgba from = trip_function_editor_evaluate(e, c.value(x));
+        const trip_rgba to = trip_function_editor_evaluate(e, c.value(x + 1));
+        list->AddLine(ImVec2(x, c.hi.y), ImVec2(x, c.y(from.opacity)), colour_of(from, 0.45));
+        list->AddLine(ImVec2(x, c.y(from.opacity)), ImVec2(x + 1, c.y(to.opacity)),
+                      colour_of(from, 1), 1.5f);
+    }
+}
+
+void draw_points(ImDrawList *list, const Canvas &c, const trip_panel *p,
+                 const trip_function_editor *e)
+{
+    size_t count;
+    const trip_tf_point *points = trip_function_editor_points(e, &count);
+    const float r = 4 * static_cast<float>(p->scale);
+    for (size_t i = 0; i < count; i++) {
+        const ImVec2 at(c.x(points[i].value), c.y(points[i].colour.opacity));
+        if (at.x < c.lo.x - 1 || at.x > c.hi.x + 1)
+            continue;
+        list->AddCircleFilled(at, r, colour_of(points[i].colour, 1));
+        list->AddCircle(
+            at, r, static_cast<int>(i) == p->point ? IM_COL32_WHITE : IM_COL32(200, 200, 200, 160));
+    }
+}
+
+void edit_points(trip_panel *p, const Canvas &c, trip_document *d)
+{
+    trip_function_editor *e = d->editor;
+    const ImVec2 at = ImGui::GetIO().MousePos;
+    const double reach = 8 * p->scale, width = static_cast<double>(c.hi.x - c.lo.x);
+    const double value = c.value(at.x), opacity = c.opacity(at.y);
+    auto nearest = [&] {
+        size_t count;
+        int found = -1;
+        double best = reach * reach;
+        const trip_tf_point *points = trip_function_editor_points(e, &count);
+        for (size_t i = 0; i < count; i++) {
+            const double dx = static_cast<double>(c.x(points[i].value) - at.x);
+            const double dy = static_cast<double>(c.y(points[i].colour.opacity) - at.y);
+            if (dx * dx + dy * dy <= best) {
+                best = dx * dx + dy * dy;
+                found = static_cast<int>(i);
+            }
+        }
+        return found;
+    };
+    (void)width;
+    if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(0)) {
+        trip_function_editor_begin(e);
+        p->dragging = true;
+        p->point = nearest();
+        if (p->point < 0) {
+            p->point = trip_function_editor_add(e, value, opacity);
+            d->edited = true;
+        }
+    }
+    if (p->dragging && ImGui::IsMouseDragging(0, 1)) {
+        trip_function_editor_move(e, p->point, value, opacity);
+        d->edited = true;
+    }
+    if (p->dragging && !ImGui::IsMouseDown(0)) {
+        trip_function_editor_end(e);
+        p->dragging = false;
+    }
+    if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(1) && !p->dragging) {
+        const int found = nearest();
+        if (found >= 0) {
+            trip_function_editor_remove(e, found);
+            d->edited = true;
+            p->point = -1;
+        }
+    }
+}
+
+void draw_editor(trip_panel *p, trip_document *d)
+{
+    const float height = 120 * static_cast<float>(p->scale);
+    Canvas c;
+    c.lo = ImGui::GetCursorScreenPos();
+    c.hi = ImVec2(c.lo.x + ImGui::GetContentRegionAvail().x, c.lo.y + height);
+    c.value_lo = d->info.value_min;
+    c.value_hi = d->info.value_max > d->info.value_min ? d->info.value_max : d->info.value_min + 1;
+    ImGui::InvisibleButton("Function editor", ImVec2(c.hi.x - c.lo.x, height),
+                           ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+    mark(p, "Function editor", false);
+    ImDrawList *list = ImGui::GetWindowDrawList();
+    list->AddRectFilled(c.lo, c.hi, IM_COL32(24, 25, 29, 255));
+    list->PushClipRect(c.lo, c.hi, true);
+    draw_histogram(list, c, d->histogram);
+    draw_curve(list, c, d->editor);
+    draw_points(list, c, p, d->editor);
+    list->PopClipRect();
+    edit_points(p, c, d);
+    if (ImGui::IsItemHovered())
+        ImGui::SetTooltip("%.6g, opacity %.3g\ndrag points; click adds one; right click removes",
+                          c.value(ImGui::GetIO().MousePos.x), c.opacity(ImGui::GetIO().MousePos.y));
+    ImGui::Text("%.6g", c.value_lo);
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", c.value_hi);
+    ImGui::SameLine(ImGui::GetContentRegionAvail().x - ImGui::CalcTextSize(text).x);
+    ImGui::TextUnformatted(text);
+}
+
+void draw_point(trip_panel *p, trip_document *d)
+{
+    size_t count;
+    const trip_tf_point *points = trip_function_editor_points(d->editor, &count);
+    if (p->point < 0 || static_cast<size_t>(p->point) >= count)
+        return;
+    const trip_rgba c = points[p->point].colour;
+    float rgb[3] = { static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b) };
+    const bool changed = ImGui::ColorEdit3("Colour", rgb);
+    if (ImGui::IsItemActivated())
+        trip_function_editor_begin(d->editor);
+    mark(p, "Colour", changed);
+    if (changed) {
+        trip_function_editor_set_colour(d->editor, p->point, static_cast<double>(rgb[0]),
+                                        static_cast<double>(rgb[1]), static_cast<double>(rgb[2]));
+        d->edited = true;
+    }
+    if (ImGui::IsItemDeactivated())
+        trip_function_editor_end(d->editor);
+}
+
+void draw_presets(trip_panel *p, trip_viewer *v, trip_document *d)
+{
+    const char *now = d->edited ? "edited" : d->function ? d->function : "the data set's own";
+    const bool open = ImGui::BeginCombo("Preset", now);
+    mark(p, "Preset", open);
+    if (!open)
+        return;
+    if (mark(p, "the data set's own", ImGui::Selectable("the data set's own")))
+        trip_viewer_set_function(v, nullptr);
+    triptych_preset preset;
+    for (unsigned i = 0; triptych_get_preset(i, &preset); i++) {
+        if (mark(p, preset.name, ImGui::Selectable(preset.name)))
+            trip_viewer_set_function(v, preset.name);
+        if (ImGui::IsItemHovered())
+            ImGui::SetTooltip("%s", preset.summary);
+    }
+    ImGui::EndCombo();
+}
+
+void draw_function_file(trip_panel *p, trip_viewer *v, trip_document *d)
+{
+    char line[600];
+    ImGui::InputText("File", p->path, sizeof p->path);
+    mark(p, "File", false);
+    if (button(p, "Load") && p->path[0])
+        trip_viewer_set_function(v, p->path);
+    ImGui::SameLine();
+    if (button(p, "Save") && p->path[0]) {
+        const bool wrote = trip_function_editor_save(d->editor, p->path) == 0;
+        std::snprintf(line, sizeof line, wrote ? "wrote %s" : "%s cannot be written", p->path);
+        trip_viewer_say(v, line);
+    }
+}
+
+void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
+{
+    draw_presets(p, v, d);
+    draw_editor(p, d);
+    draw_point(p, d);
+    if (button(p, "Undo") && trip_function_editor_can_undo(d->editor)) {
+        trip_function_editor_undo(d->editor);
+        d->edited = true;
+    }
+    ImGui::SameLine();
+    if (button(p, "Redo") && trip_function_editor_can_redo(d->editor)) {
+        trip_function_editor_redo(d->editor);
+        d->edited = true;
+    }
+    v->changed |=
+        slide(p, "Opacity", &d->opacity_scale, 0.01, 100, "x %.3g", ImGuiSliderFlags_Logarithmic);
+    draw_function_file(p, v, d);
+}
+
+// ---- light, quality ----
+
+// By two angles: round, and up.
+bool draw_direction(trip_panel *p, double light[3])
+{
+    const double length = std::hypot(light[0], light[1], light[2]);
+    double round = std::atan2(light[1], light[0]) * 180 / M_PI;
+    double up = length > 0 ? std::asin(light[2] / length) * 180 / M_PI : 90;
+    bool changed = slide(p, "Light round", &round, -180, 180, "%.0f°");
+    changed |= slide(p, "Light up", &up, -89, 89, "%.0f°");
+    if (changed) {
+        light[0] = std::cos(up * M_PI / 180) * std::cos(round * M_PI / 180);
+        light[1] = std::cos(up * M_PI / 180) * std::sin(round * M_PI / 180);
+        light[2] = std::sin(up * M_PI / 180);
+    }
+    return changed;
+}
+
+bool draw_light(trip_panel *p, trip_document *d)
+{
+    triptych_settings *s = &d->settings;
+    bool changed = false;
+    if (d->info.normal_bytes)
+        changed |= check(p, "Shading", &s->shading);
+    else
+        ImGui::TextDisabled("No normals: it cannot be shaded.");
+    if (s->shading && d->info.normal_bytes) {
+        changed |= check(p, "Light from the eye", &s->headlight);
+        if (!s->headlight)
+            changed |= draw_direction(p, s->light);
+    }
+    float rgb[3];
+    for (int i = 0; i < 3; i++)
+        rgb[i] = static_cast<float>(s->background[i]);
+    if (mark(p, "Background", ImGui::ColorEdit3("Background", rgb))) {
+        for (int i = 0; i < 3; i++)
+            s->background[i] = static_cast<double>(rgb[i]);
+        changed = true;
+    }
+    return changed;
+}
+
+bool draw_quality(trip_panel *p, trip_document *d)
+{
+    triptych_settings *s = &d->settings;
+    static const char *const classes[] = { "Before splatting", "After interpolation" };
+    static const char *const methods[] = { "Merge", "Clip", "Axis" };
+    bool changed = choose(p, "Classify", &s->classify, classes, 2);
+    if (s->classify == TRIPTYCH_POST) {
+        changed |= mark(p, "Slices", ImGui::SliderInt("Slices", &s->slices, 1, 16));
+    } else {
+        changed |= slide(p, "Kernel radius", &s->kernel_radius, 1.5, 6, "%.2f voxels");
+    }
+    changed |= choose(p, "Method", &s->method, methods, 3);
+    if (s->method == TRIPTYCH_MERGE)
+        changed |= slide(p, "h", &s->h, 0, 0.99, "%.2f");
+    changed |= mark(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
+    return changed;
+}
+
+void draw_marks(trip_panel *p, trip_viewer *v)
+{
+    check(p, "Box", &v->box);
+    ImGui::SameLine();
+    check(p, "Axes", &v->axes);
+    ImGui::SameLine();
+    check(p, "Scale bar", &v->scale_bar);
+    check(p, "Probe", &v->probe);
+}
+
+// ---- gauges ----
+
+void draw_gauges(trip_panel *p, trip_viewer *v)
+{
+    const trip_frames_status &s = v->status;
+    const triptych_frame_stats &f = s.stats;
+    char text[96];
+    float times[TIMES];
+    const int count = trip_frames_get_times(v->frames, TIMES, times);
+    const double part = f.memory_bytes ? static_cast<double>(f.peak_memory_bytes) /
+                                             static_cast<double>(f.memory_bytes)
+                                       : 0;
+    std::snprintf(text, sizeof text, "at most %s of %s",
+                  bytes_text(static_cast<double>(f.peak_memory_bytes)).c_str(),
+                  bytes_text(static_cast<double>(f.memory_bytes)).c_str());
+    ImGui::ProgressBar(static_cast<float>(part), ImVec2(-70 * static_cast<float>(p->scale), 0),
+                       text);
+    ImGui::SameLine();
+    ImGui::TextUnformatted("Memory");
+    const double all = static_cast<double>(f.bytes_read + f.bytes_cached);
+    std::snprintf(text, sizeof text, "%s of %s",
+                  bytes_text(static_cast<double>(f.bytes_cached)).c_str(), bytes_text(all).c_str());
+    ImGui::ProgressBar(all > 0 ? static_cast<float>(static_cast<double>(f.bytes_cached) / all) : 0,
+                       ImVec2(-70 * static_cast<float>(p->scale), 0), text);
+    ImGui::SameLine();
+    ImGui::TextUnformatted("Cached");
+    ImGui::Text("%s read, %s/s; %.3g million splats",
+                bytes_text(static_cast<double>(f.bytes_read)).c_str(),
+                bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
+                static_cast<double>(f.splats) * 1e-6);
+    ImGui::Text("moving %.0f ms at 1/%.1f, whole %.0f ms", s.moving_ms,
+                s.scale > 0 ? 1 / s.scale : 1.0, s.whole_ms);
+    ImGui::PlotLines("##times", times, count, 0, "ms", 0, FLT_MAX,
+                     ImVec2(-1, 40 * static_cast<float>(p->scale)));
+    ImGui::TextWrapped("%s, %s; %s", s.renderer, s.device, s.engine);
+}
+
+void draw_plan(trip_panel *, trip_viewer *v)
+{
+    char *plan = trip_frames_explain(v->frames);
+    ImGui::PushTextWrapPos(0);
+    ImGui::TextUnformatted(plan ? plan : "");
+    ImGui::PopTextWrapPos();
+    std::free(plan);
+}
+
+// ---- over the picture ----
+
+ImVec2 at(const double pixel[2])
+{
+    return ImVec2(static_cast<float>(pixel[0]), static_cast<float>(pixel[1]));
+}
+
+void draw_box(ImDrawList *list, trip_viewer *v, const trip_document *d)
+{
+    trip_annotation_edge edges[TRIP_ANNOTATION_EDGES];
+    const trip_annotation_box box = trip_annotation_box_of(&d->info);
+    trip_annotation_edges(&box, &d->navigation, v->picture_width, v->height, edges);
+    for (const trip_annotation_edge &e : edges)
+        if (e.drawn)
+            list->AddLine(at(e.from), at(e.to), IM_COL32(255, 255, 255, e.hidden ? 60 : 150));
+}
+
+void put_text(ImDrawList *list, const double middle[2], const char *text)
+{
+    const ImVec2 size = ImGui::CalcTextSize(text);
+    const ImVec2 corner(static_cast<float>(middle[0]) - size.x / 2,
+                        static_cast<float>(middle[1]) - size.y / 2);
+    list->AddText(ImVec2(corner.x + 1, corner.y + 1), IM_COL32(0, 0, 0, 200), text);
+    list->AddText(corner, IM_COL32(235, 235, 235, 255), text);
+}
+
+void draw_axes(ImDrawList *list, trip_viewer *v, const trip_document *d)
+{
+    trip_annotation_axis axes[3];
+    const trip_annotation_box box = trip_annotation_box_of(&d->info);
+    trip_annotation_axes(&box, &d->navigation, v->picture_width, v->height, nullptr, axes);
+    for (const trip_annotation_axis &a : axes) {
+        for (int i = 0; i < a.count; i++) {
+            list->AddLine(at(a.ticks[i].from), at(a.ticks[i].to), IM_COL32(235, 235, 235, 200));
+            put_text(list, a.ticks[i].label, a.ticks[i].text);
+        }
+        if (a.count)
+            put_text(list, a.title, a.name);
+    }
+}
+
+void draw_scale_bar(ImDrawList *list, trip_viewer *v, const trip_document *d, double scale)
+{
+    const trip_annotation_bar bar = trip_annotation_scale_bar(
+        &d->navigation, v->height, trip_navigation_distance(&d->navigation), v->picture_width / 4.0,
+        nullptr);
+    const float x = 20 * static_cast<float>(scale);
+    const float y = static_cast<float>(v->height) - 24 * static_cast<float>(scale);
+    const float end = x + static_cast<float>(bar.px), tick = 4 * static_cast<float>(scale);
+    const ImU32 white = IM_COL32(235, 235, 235, 255);
+    list->AddLine(ImVec2(x, y), ImVec2(end, y), white, 2);
+    list->AddLine(ImVec2(x, y - tick), ImVec2(x, y + tick), white, 2);
+    list->AddLine(ImVec2(end, y - tick), ImVec2(end, y + tick), white, 2);
+    const double middle[2] = { static_cast<double>(x + end) / 2,
+                               static_cast<double>(y) - 10 * scale };
+    put_text(list, middle, bar.text);
+}
+
+void draw_probe(ImDrawList *list, trip_viewer *v, const trip_document *d)
+{
+    const trip_probed probed = trip_frames_get_probed(v->frames);
+    if (!probed.valid || std::memcmp(&probed.navigation, &d->navigation, sizeof d->navigation))
+        return;
+    const triptych_hit &h = probed.hit;
+    const ImVec2 place(static_cast<float>(probed.x), static_cast<float>(probed.y));
+    list->AddCircle(place, 5, IM_COL32_WHITE);
+    if (!(h.opacity > 0)) {
+        ImGui::SetTooltip("nothing is seen here");
+        return;
+    }
+    ImGui::SetTooltip("value %.6g\nat %.6g, %.6g, %.6g\nvoxel %.1f, %.1f, %.1f\n%.6g from the "
+                      "eye, begins at %.6g\nopacity of the ray %.3g",
+                      h.value, h.position[0], h.position[1], h.position[2], h.index[0], h.index[1],
+                      h.index[2], h.depth, h.depth_first, h.opacity);
+}
+
+// What goes on, along the lower edge of the picture.
+void draw_progress(ImDrawList *list, trip_viewer *v, double scale)
+{
+    const trip_frames_status &s = v->status;
+    const float y = static_cast<float>(v->height), width = static_cast<float>(v->picture_width);
+    if (!s.stage[0] || s.exact)
+        return;
+    const float thick = 3 * static_cast<float>(scale);
+    list->AddRectFilled(ImVec2(0, y - thick), ImVec2(width * static_cast<float>(s.done), y),
+                        IM_COL32(80, 160, 255, 220));
+    if (!s.open) {
+        char text[64];
+        std::snprintf(text, sizeof text, "%s: %.0f %%", s.stage, 100 * s.done);
+        const double middle[2] = { static_cast<double>(width) / 2, v->height / 2.0 };
+        put_text(list, middle, text);
+    }
+}
+
+void draw_message(ImDrawList *list, trip_viewer *v, double scale)
+{
+    if (!v->message[0])
+        return;
+    const float wrap = static_cast<float>(v->picture_width) - 40 * static_cast<float>(scale);
+    const ImVec2 size = ImGui::CalcTextSize(v->message, nullptr, false, wrap);
+    const float pad = 8 * static_cast<float>(scale);
+    const ImVec2 corner(20 * static_cast<float>(scale), 16 * static_cast<float>(scale));
+    const ImU32 ground = v->status.failed ? IM_COL32(120, 24, 24, 235) : IM_COL32(30, 32, 38, 225);
+    list->AddRectFilled(ImVec2(corner.x - pad, corner.y - pad),
+                        ImVec2(corner.x + size.x + pad, corner.y + size.y + pad), ground, 4);
+    list->AddText(ImGui::GetFont(), ImGui::GetFontSize(), corner, IM_COL32_WHITE, v->message,
+                  nullptr, wrap);
+}
+
+void draw_keys(trip_viewer *v)
+{
+    static const char *const keys[][2] = {
+        { "left drag", "orbit" },
+        { "shift left drag, middle drag", "pan" },
+        { "control left drag", "roll" },
+        { "wheel", "nearer, farther" },
+        { "right drag", "look around" },
+        { "w a s d, arrows, page up and down", "fly; shift: faster" },
+        { "f", "fit the data into the picture" },
+        { "x y z", "along an axis; shift: from the other end" },
+        { "1 2 3 4 5 6", "front, back, left, right, top, bottom" },
+        { "0, home", "the view at the start" },
+        { "o", "perspective or parallel" },
+        { "[ ]", "field of view" },
+        { "b", "box" },
+        { "p", "write the picture" },
+        { "c", "copy the camera as options" },
+        { "t", "panel" },
+        { "tab", "next data set" },
+        { "F1, ?", "these keys" },
+        { "q, escape", "quit" },
+    };
+    ImGui::SetNextWindowPos(
+        ImVec2(static_cast<float>(v->picture_width) / 2, static_cast<float>(v->height) / 2), 0,
+        ImVec2(0.5f, 0.5f));
+    ImGui::Begin("Keys", nullptr,
+                 ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_AlwaysAutoResize |
+                     ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
+    if (ImGui::BeginTable("keys", 2)) {
+        for (const auto &line : keys) {
+            ImGui::TableNextRow();
+            ImGui::TableNextColumn();
+            ImGui::TextUnformatted(line[0]);
+            ImGui::TableNextColumn();
+            ImGui::TextUnformatted(line[1]);
+        }
+        ImGui::EndTable();
+    }
+    ImGui::End();
+}
+
+void draw_over(trip_panel *p, trip_viewer *v)
+{
+    const trip_document *d = trip_viewer_document(v);
+    ImDrawList *list = ImGui::GetBackgroundDrawList();
+    list->PushClipRect(ImVec2(0, 0),
+                       ImVec2(static_cast<float>(v->picture_width), static_cast<float>(v->height)));
+    if (d && d->opened && d->has_navigation) {
+        if (v->box)
+            draw_box(list, v, d);
+        if (v->axes && v->box)
+            draw_axes(list, v, d);
+        if (v->scale_bar)
+            draw_scale_bar(list, v, d, p->scale);
+        if (v->probe)
+            draw_probe(list, v, d);
+    }
+    draw_progress(list, v, p->scale);
+    draw_message(list, v, p->scale);
+    list->PopClipRect();
+    if (v->keys)
+        draw_keys(v);
+}
+
+// ---- all of it ----
+
+void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
+{
+    if (section(p, "View"))
+        draw_view(p, v, d);
+    if (!d->opened)
+        return;
+    if (section(p, "Function"))
+        draw_function(p, v, d);
+    if (section(p, "Light"))
+        v->changed |= draw_light(p, d);
+    if (section(p, "Quality"))
+        v->changed |= draw_quality(p, d);
+    if (section(p, "Show"))
+        draw_marks(p, v);
+    if (section(p, "Gauges"))
+        draw_gauges(p, v);
+    if (section(p, "Plan", false))
+        draw_plan(p, v);
+}
+
+void draw_panel(trip_panel *p, trip_viewer *v)
+{
+    const float left = static_cast<float>(v->picture_width < v->width ? v->picture_width
+                                                                      : v->width - 330 * p->scale);
+    ImGui::SetNextWindowPos(ImVec2(left, 0));
+    ImGui::SetNextWindowSize(
+        ImVec2(static_cast<float>(v->width) - left, static_cast<float>(v->height)));
+    ImGui::Begin("Panel", nullptr,
+                 ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
+                     ImGuiWindowFlags_NoTitleBar);
+    ImGui::PushItemWidth(170 * static_cast<float>(p->scale));
+    if (section(p, "Data"))
+        draw_documents(p, v);
+    trip_document *d = trip_viewer_document(v);
+    if (d)
+        draw_document(p, v, d);
+    ImGui::Separator();
+    if (button(p, "Write picture"))
+        trip_viewer_take_picture(v);
+    ImGui::SameLine();
+    if (button(p, "Copy camera"))
+        trip_viewer_copy_camera(v);
+    ImGui::SameLine();
+    if (button(p, "Keys"))
+        v->keys = !v->keys;
+    ImGui::PopItemWidth();
+    ImGui::End();
+}
+
+void style(double scale)
+{
+    ImGuiIO &io = ImGui::GetIO();
+    static const char font[] = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+    ImGui::StyleColorsDark();
+    ImGui::GetStyle().WindowRounding = 0;
+    ImGui::GetStyle().FrameRounding = 3;
+    ImGui::GetStyle().ScaleAllSizes(static_cast<float>(scale));
+    ImFontConfig config;
+    config.SizePixels = std::floor(13 * static_cast<float>(scale));
+    if (access(font, R_OK) == 0)
+        io.Fonts->AddFontFromFileTTF(font, config.SizePixels);
+    else
+        io.Fonts->AddFontDefault(&config);
+}
+
+void map_keys(ImGuiIO &io)
+{
+    io.KeyMap[ImGuiKey_Tab] = TRIP_KEY_TAB;
+    io.KeyMap[ImGuiKey_LeftArrow] = TRIP_KEY_LEFT;
+    io.KeyMap[ImGuiKey_RightArrow] = TRIP_KEY_RIGHT;
+    io.KeyMap[ImGuiKey_UpArrow] = TRIP_KEY_UP;
+    io.KeyMap[ImGuiKey_DownArrow] = TRIP_KEY_DOWN;
+    io.KeyMap[ImGuiKey_Home] = TRIP_KEY_HOME;
+    io.KeyMap[ImGuiKey_End] = TRIP_KEY_END;
+    io.KeyMap[ImGuiKey_Delete] = TRIP_KEY_DELETE;
+    io.KeyMap[ImGuiKey_Backspace] = TRIP_KEY_BACKSPACE;
+    io.KeyMap[ImGuiKey_Enter] = TRIP_KEY_ENTER;
+    io.KeyMap[ImGuiKey_Escape] = TRIP_KEY_ESCAPE;
+    io.KeyMap[ImGuiKey_A] = 'a';
+    io.KeyMap[ImGuiKey_C] = 'c';
+    io.KeyMap[ImGuiKey_V] = 'v';
+    io.KeyMap[ImGuiKey_X] = 'x';
+    io.KeyMap[ImGuiKey_Y] = 'y';
+    io.KeyMap[ImGuiKey_Z] = 'z';
+}
+
+} // namespace
+
+int trip_panel_create(trip_panel **out, double scale)
+{
+    trip_panel *p = *out = new (std::nothrow) trip_panel();
+    if (!p)
+        return trip_fail(TRIP_ERROR, "view", "panel", "out of memory");
+    p->scale = scale;
+    p->point = -1;
+    p->context = ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;
+    map_keys(ImGui::GetIO());
+    style(scale);
+    if (ImGui_ImplOpenGL3_Init("#version 150"))
+        return 0;
+    ImGui::DestroyContext(p->context);
+    delete p;
+    *out = nullptr;
+    return trip_fail(TRIP_ERROR, "view", "panel", "OpenGL does not take it");
+}
+
+void trip_panel_destroy(trip_panel *p)
+{
+    if (!p)
+        return;
+    ImGui_ImplOpenGL3_Shutdown();
+    ImGui::DestroyContext(p->context);
+    delete p;
+}
+
+void trip_panel_event(trip_panel *, const trip_event *e)
+{
+    ImGuiIO &io = ImGui::GetIO();
+    switch (e->kind) {
+    case TRIP_EVENT_MOVE:
+        io.MousePos = ImVec2(static_cast<float>(e->x), static_cast<float>(e->y));
+        break;
+    case TRIP_EVENT_BUTTON:
+        if (e->code >= 0 && e->code < TRIP_BUTTONS)
+            io.MouseDown[e->code] = e->down;
+        break;
+    case TRIP_EVENT_WHEEL:
+        io.MouseWheel += static_cast<float>(e->y);
+        break;
+    case TRIP_EVENT_KEY:
+        if (e->code >= 0 && e->code < TRIP_KEYS)
+            io.KeysDown[e->code] = e->down;
+        break;
+    case TRIP_EVENT_TEXT:
+        io.AddInputCharacter(static_cast<unsigned>(e->code));
+        break;
+    default:
+        break;
+    }
+    io.KeyShift = e->modifiers & TRIP_SHIFT;
+    io.KeyCtrl = e->modifiers & TRIP_CONTROL;
+    io.KeyAlt = e->modifiers & TRIP_ALT;
+}
+
+bool trip_panel_has_pointer(const trip_panel *)
+{
+    return ImGui::GetIO().WantCaptureMouse;
+}
+
+bool trip_panel_has_keys(const trip_panel *)
+{
+    return ImGui::GetIO().WantTextInput;
+}
+
+void trip_panel_draw(trip_panel *p, trip_viewer *v, double seconds)
+{
+    ImGuiIO &io = ImGui::GetIO();
+    io.DisplaySize = ImVec2(static_cast<float>(v->width), static_cast<float>(v->height));
+    io.DeltaTime = seconds > 1e-4 ? static_cast<float>(seconds) : 1e-4f;
+    p->boxes.clear();
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui::NewFrame();
+    draw_over(p, v);
+    if (v->panel)
+        draw_panel(p, v);
+    ImGui::Render();
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+}
+
+bool trip_panel_find(trip_panel *p, const char *label, double box[4])
+{
+    const auto found = p->boxes.find(label);
+    if (found == p->boxes.end())
+        return false;
+    const Box &b = found->second;
+    p->sought = b.seen ? "" : label;
+    box[0] = static_cast<double>(b.lo.x);
+    box[1] = static_cast<double>(b.lo.y);
+    box[2] = static_cast<double>(b.hi.x);
+    box[3] = static_cast<double>(b.hi.y);
+    return b.seen;
+}

@@ -1,0 +1,11 @@
+// In: a place in the picture, 0 to 1. Out: its colour, opaque.
+#version 150
+
+uniform sampler2D picture;
+in vec2 place;
+out vec4 colour;
+
+void main()
+{
+    colour = vec4(texture(picture, place).rgb, 1);
+}

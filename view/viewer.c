@@ -1,0 +1,565 @@
+#include "viewer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "camera_text.h"
+
+enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
+
+/* ---- data sets ---- */
+
+void trip_viewer_init(trip_viewer *v, trip_frames *frames)
+{
+    *v = (trip_viewer){ .frames = frames,
+                        .shown = -1,
+                        .scale = 1,
+                        .panel = true,
+                        .axes = true,
+                        .opacity_scale = 1,
+                        .settings = triptych_default_settings() };
+}
+
+static void free_document(trip_document *d)
+{
+    if (!d)
+        return;
+    free(d->input);
+    free(d->source);
+    free(d->function);
+    trip_function_editor_destroy(d->editor);
+    free(d);
+}
+
+void trip_viewer_release(trip_viewer *v)
+{
+    for (int i = 0; i < v->count; i++)
+        free_document(v->documents[i]);
+    *v = (trip_viewer){ .shown = -1 };
+}
+
+trip_document *trip_viewer_document(trip_viewer *v)
+{
+    return v->shown >= 0 ? v->documents[v->shown] : NULL;
+}
+
+void trip_viewer_say(trip_viewer *v, const char *text)
+{
+    snprintf(v->message, sizeof v->message, "%s", text);
+    v->message_seconds = 0;
+}
+
+static trip_document *make_document(trip_viewer *v, const char *input)
+{
+    trip_document *d = calloc(1, sizeof *d);
+    if (!d)
+        return NULL;
+    *d = (trip_document){ .input = strdup(input),
+                          .function = v->function ? strdup(v->function) : NULL,
+                          .editor = trip_function_editor_create(),
+                          .start = v->start,
+                          .settings = v->settings,
+                          .opacity_scale = v->opacity_scale };
+    if (d->input && d->editor && (d->function || !v->function))
+        return d;
+    free_document(d);
+    return NULL;
+}
+
+void trip_viewer_show(trip_viewer *v, int which)
+{
+    v->shown = which >= 0 && which < v->count ? which : v->count - 1;
+    v->changed = true;
+    trip_viewer_let_go(v);
+}
+
+void trip_viewer_open(trip_viewer *v, const char *input)
+{
+    int which = 0;
+    while (which < v->count && strcmp(v->documents[which]->input, input))
+        which++;
+    if (which == TRIP_DOCUMENTS) {
+        trip_viewer_say(v, "no more data sets can be open at once: close one");
+        return;
+    }
+    if (which == v->count) {
+        if (!(v->documents[which] = make_document(v, input)))
+            return;
+        v->count++;
+    }
+    v->documents[which]->number = ++v->numbers;
+    v->documents[which]->opened = false;
+    trip_viewer_show(v, which);
+}
+
+void trip_viewer_close(trip_viewer *v)
+{
+    if (v->shown < 0)
+        return;
+    free_document(v->documents[v->shown]);
+    v->count--;
+    memmove(v->documents + v->shown, v->documents + v->shown + 1,
+            (size_t)(v->count - v->shown) * sizeof *v->documents);
+    trip_viewer_show(v, v->shown);
+}
+
+/* ---- what is wanted ---- */
+
+/* The drawing thread has the text of the editor's function only where it was edited. */
+static void want(trip_viewer *v)
+{
+    trip_document *d = trip_viewer_document(v);
+    if (!d || v->picture_width < 1 || v->height < 1)
+        return;
+    char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    trip_frames_want(v->frames, &(trip_wanted){ .document = d->number,
+                                                .input = d->input,
+                                                .has_navigation = d->has_navigation,
+                                                .navigation = d->navigation,
+                                                .start = &d->start,
+                                                .width = v->picture_width,
+                                                .height = v->height,
+                                                .function = d->function,
+                                                .text = text,
+                                                .opacity_scale = d->opacity_scale,
+                                                .settings = d->settings });
+    d->revision = trip_function_editor_revision(d->editor);
+    free(text);
+    v->changed = false;
+}
+
+static void take_opened(trip_viewer *v)
+{
+    trip_opened o;
+    trip_document *d = NULL;
+    if (!trip_frames_take_opened(v->frames, &o))
+        return;
+    for (int i = 0; i < v->count; i++)
+        d = v->documents[i]->number == o.document ? v->documents[i] : d;
+    if (d && !d->has_navigation)
+        d->navigation = o.navigation;
+    if (d)
+        d->has_navigation = true;
+    if (d && !o.view_only) {
+        d->opened = true;
+        d->info = o.info;
+        free(d->source);
+        d->source = o.source;
+        o.source = NULL;
+        d->histogram = o.histogram;
+        if (o.function && !d->edited)
+            trip_function_editor_set_text(d->editor, d->input, o.function);
+        d->revision = trip_function_editor_revision(d->editor);
+    }
+    trip_opened_free(&o);
+}
+
+static void take_status(trip_viewer *v)
+{
+    v->status = trip_frames_get_status(v->frames);
+    if (v->status.messages != v->messages)
+        trip_viewer_say(v, v->status.message);
+    v->messages = v->status.messages;
+}
+
+bool trip_viewer_rests(trip_viewer *v)
+{
+    const trip_document *d = trip_viewer_document(v);
+    const trip_frames_status s = trip_frames_get_status(v->frames);
+    if (!d || v->changed || v->picture_width < 1 || v->height < 1)
+        return !d || !v->changed;
+    return s.document == d->number && (s.exact || (s.failed && !s.stage[0])) &&
+           !trip_frames_saving(v->frames);
+}
+
+static void lay_out(trip_viewer *v)
+{
+    const int panel = (int)(PANEL_WIDTH * v->scale);
+    const int width = v->panel && v->width > 2 * panel ? v->width - panel : v->width;
+    v->changed |= width != v->picture_width;
+    v->picture_width = width;
+}
+
+void trip_viewer_resize(trip_viewer *v, int width, int height)
+{
+    v->changed |= width != v->width || height != v->height;
+    v->width = width;
+    v->height = height;
+    lay_out(v);
+}
+
+void trip_viewer_set_panel(trip_viewer *v, bool shown)
+{
+    v->panel = shown;
+    lay_out(v);
+}
+
+/* ---- input ---- */
+
+/* Whether something can be done to the view. */
+static trip_document *navigable(trip_viewer *v)
+{
+    trip_document *d = trip_viewer_document(v);
+    return d && d->has_navigation && v->picture_width > 0 && v->height > 0 ? d : NULL;
+}
+
+static double depth_of(const trip_document *d)
+{
+    return trip_navigation_distance(&d->navigation);
+}
+
+/* Half a turn is a drag across the shorter side of the picture. */
+static void drag(trip_viewer *v, trip_document *d, double dx, double dy)
+{
+    trip_navigation *n = &d->navigation;
+    const double side = v->picture_width < v->height ? v->picture_width : v->height;
+    const double degrees = 180 / side;
+    const bool pans = v->buttons[TRIP_BUTTON_MIDDLE] ||
+                      (v->buttons[TRIP_BUTTON_LEFT] && v->modifiers & TRIP_SHIFT);
+    if (pans)
+        trip_navigation_pan(n, dx, dy, v->height, depth_of(d));
+    else if (v->buttons[TRIP_BUTTON_LEFT] && v->modifiers & TRIP_CONTROL)
+        trip_navigation_roll(n, dx * degrees);
+    else if (v->buttons[TRIP_BUTTON_LEFT])
+        trip_navigation_orbit(n, -dx * degrees, dy * degrees);
+    else if (v->buttons[TRIP_BUTTON_RIGHT])
+        trip_navigation_turn(n, dx * degrees / 3, -dy * degrees / 3);
+    else
+        return;
+    v->changed = true;
+}
+
+static void move(trip_viewer *v, double x, double y)
+{
+    trip_document *d = navigable(v);
+    const double dx = x - v->at[0], dy = y - v->at[1];
+    v->at[0] = x;
+    v->at[1] = y;
+    if (d && (dx != 0 || dy != 0))
+        drag(v, d, dx, dy);
+    if (d && v->probe)
+        trip_frames_probe(v->frames, x, y);
+}
+
+/* Towards what is under the pointer. */
+static void wheel(trip_viewer *v, double steps)
+{
+    trip_document *d = navigable(v);
+    double point[3];
+    if (!d || steps == 0)
+        return;
+    trip_navigation_point(&d->navigation, v->picture_width, v->height, v->at, depth_of(d), point);
+    trip_navigation_dolly(&d->navigation, pow(0.88, steps), point);
+    v->changed = true;
+}
+
+static void look_along(trip_viewer *v, int axis)
+{
+    trip_document *d = navigable(v);
+    double direction[3] = { 0 };
+    direction[axis] = v->modifiers & TRIP_SHIFT ? -1 : 1;
+    if (d)
+        trip_navigation_look_from(&d->navigation, direction);
+    v->changed |= d != NULL;
+}
+
+static void change_fov(trip_viewer *v, double factor)
+{
+    trip_document *d = navigable(v);
+    if (d && !(d->navigation.ortho_height > 0))
+        trip_navigation_set_fov(&d->navigation,
+                                fmin(fmax(d->navigation.fov_degrees * factor, 1), 150));
+    v->changed |= d != NULL;
+}
+
+static void toggle_parallel(trip_viewer *v)
+{
+    trip_document *d = navigable(v);
+    if (d)
+        trip_navigation_set_parallel(&d->navigation, !(d->navigation.ortho_height > 0));
+    v->changed |= d != NULL;
+}
+
+void trip_viewer_see_side(trip_viewer *v, triptych_side side)
+{
+    trip_document *d = trip_viewer_document(v);
+    if (!d)
+        return;
+    const double fov = d->has_navigation ? d->navigation.fov_degrees : 0;
+    const bool parallel = d->has_navigation && d->navigation.ortho_height > 0;
+    d->start = (triptych_view){ .side = side, .ortho_fit = parallel };
+    d->start.fov_degrees = parallel ? 0 : fov;
+    d->has_navigation = false;
+    v->changed = true;
+}
+
+void trip_viewer_fit(trip_viewer *v)
+{
+    trip_document *d = navigable(v);
+    if (d && d->opened)
+        trip_navigation_fit(&d->navigation, d->info.lo, d->info.hi, v->picture_width, v->height,
+                            0.9);
+    v->changed |= d != NULL;
+}
+
+/* The name of a data set without folders and ending. */
+static void name_of(const char *input, char name[256])
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s", input);
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/')
+        path[--length] = 0;
+    const char *slash = strrchr(path, '/');
+    snprintf(name, 256, "%.200s", slash ? slash + 1 : path);
+    char *dot = strrchr(name, '.');
+    if (dot && dot != name)
+        *dot = 0;
+}
+
+void trip_viewer_take_picture(trip_viewer *v)
+{
+    const trip_document *d = trip_viewer_document(v);
+    char name[256], path[300];
+    if (!d)
+        return;
+    name_of(d->input, name);
+    for (int i = 1; i < 10000; i++) {
+        snprintf(path, sizeof path, "%s-%03d.png", name, i);
+        if (access(path, F_OK))
+            break;
+    }
+    trip_frames_save(v->frames, path);
+    trip_viewer_say(v, "the picture is written when it is whole");
+}
+
+char *trip_viewer_camera_options(trip_viewer *v)
+{
+    const trip_document *d = navigable(v);
+    return d ? trip_camera_text(&d->navigation, v->picture_width, v->height) : NULL;
+}
+
+void trip_viewer_copy_camera(trip_viewer *v)
+{
+    char *text = trip_viewer_camera_options(v);
+    if (text && v->copy)
+        v->copy(v->user, text);
+    if (text)
+        trip_viewer_say(v, "copied: the camera, as options of triptych render");
+    free(text);
+}
+
+void trip_viewer_set_function(trip_viewer *v, const char *function)
+{
+    trip_document *d = trip_viewer_document(v);
+    char *copy = function ? strdup(function) : NULL;
+    if (!d || (function && !copy))
+        return;
+    free(d->function);
+    d->function = copy;
+    d->edited = false;
+    v->changed = true;
+}
+
+static void show_next(trip_viewer *v)
+{
+    if (v->count > 1)
+        trip_viewer_show(v, (v->shown + 1) % v->count);
+}
+
+/* Keys of digits and letters that choose where to look from. */
+static bool press_view(trip_viewer *v, int key)
+{
+    if (key >= '1' && key <= '6')
+        trip_viewer_see_side(v, (triptych_side)(TRIPTYCH_FRONT + key - '1'));
+    else if (key == '0' || key == TRIP_KEY_HOME)
+        trip_viewer_see_side(v, TRIPTYCH_SIDE_DEFAULT);
+    else if (key >= 'x' && key <= 'z')
+        look_along(v, key - 'x');
+    else if (key == 'f')
+        trip_viewer_fit(v);
+    else if (key == 'o')
+        toggle_parallel(v);
+    else if (key == '[' || key == ']')
+        change_fov(v, key == '[' ? 1 / 1.1 : 1.1);
+    else
+        return false;
+    return true;
+}
+
+static void escape(trip_viewer *v)
+{
+    v->quits = !v->keys;
+    v->keys = false;
+}
+
+static void press(trip_viewer *v, int key)
+{
+    if (press_view(v, key))
+        return;
+    switch (key) {
+    case TRIP_KEY_F1:
+    case '?':
+    case '/':
+        v->keys = !v->keys;
+        break;
+    case TRIP_KEY_ESCAPE:
+        escape(v);
+        break;
+    case TRIP_KEY_TAB:
+        show_next(v);
+        break;
+    case 'q':
+        v->quits = true;
+        break;
+    case 't':
+        trip_viewer_set_panel(v, !v->panel);
+        break;
+    case 'p':
+        trip_viewer_take_picture(v);
+        break;
+    case 'c':
+        trip_viewer_copy_camera(v);
+        break;
+    case 'b':
+        v->box = !v->box;
+        break;
+    default:
+        break;
+    }
+}
+
+static void on_key(trip_viewer *v, const trip_event *e)
+{
+    if (e->code < 0 || e->code >= TRIP_KEYS)
+        return;
+    v->modifiers = e->modifiers;
+    v->held[e->code] = e->down;
+    if (e->down)
+        press(v, e->code);
+}
+
+void trip_viewer_let_go(trip_viewer *v)
+{
+    memset(v->buttons, 0, sizeof v->buttons);
+    memset(v->held, 0, sizeof v->held);
+}
+
+void trip_viewer_event(trip_viewer *v, const trip_event *e)
+{
+    switch (e->kind) {
+    case TRIP_EVENT_MOVE:
+        move(v, e->x, e->y);
+        break;
+    case TRIP_EVENT_BUTTON:
+        v->modifiers = e->modifiers;
+        if (e->code >= 0 && e->code < TRIP_BUTTONS)
+            v->buttons[e->code] = e->down;
+        break;
+    case TRIP_EVENT_WHEEL:
+        wheel(v, e->y);
+        break;
+    case TRIP_EVENT_KEY:
+        on_key(v, e);
+        break;
+    case TRIP_EVENT_RESIZE:
+        trip_viewer_resize(v, (int)e->x, (int)e->y);
+        break;
+    case TRIP_EVENT_DROP:
+        trip_viewer_open(v, e->text);
+        break;
+    case TRIP_EVENT_CLOSE:
+        v->quits = true;
+        break;
+    default:
+        break;
+    }
+}
+
+/* ---- time ---- */
+
+/* By the distance looked at in a second and a half; four times as fast with shift. */
+static bool fly(trip_viewer *v, double seconds)
+{
+    trip_document *d = navigable(v);
+    const bool *k = v->held;
+    if (!d)
+        return false;
+    const double way = depth_of(d) / 1.5 * fmin(seconds, 0.1) * (v->modifiers & TRIP_SHIFT ? 4 : 1);
+    const double forward = (k['w'] || k[TRIP_KEY_UP]) - (k['s'] || k[TRIP_KEY_DOWN]);
+    const double right = (k['d'] || k[TRIP_KEY_RIGHT]) - (k['a'] || k[TRIP_KEY_LEFT]);
+    const double up = k[TRIP_KEY_PAGE_UP] - k[TRIP_KEY_PAGE_DOWN];
+    if (forward == 0 && right == 0 && up == 0)
+        return false;
+    trip_navigation_fly(&d->navigation, forward * way, right * way, up * way);
+    v->changed = true;
+    return true;
+}
+
+bool trip_viewer_tick(trip_viewer *v, double seconds)
+{
+    const trip_document *d = trip_viewer_document(v);
+    take_opened(v);
+    take_status(v);
+    v->message_seconds += seconds;
+    if (v->message_seconds > SECONDS_SAID && !v->status.failed)
+        v->message[0] = 0;
+    if (d && d->edited && d->revision != trip_function_editor_revision(d->editor))
+        v->changed = true;
+    const bool flies = fly(v, seconds);
+    if (v->changed)
+        want(v);
+    return flies || v->message[0];
+}
+
+/* ---- where a picture lies ---- */
+
+bool trip_viewer_is_current(const trip_viewer *v, const trip_picture *p)
+{
+    const trip_document *d = v->shown >= 0 ? v->documents[v->shown] : NULL;
+    return d && d->number == p->document && p->full_width == v->picture_width &&
+           p->full_height == v->height &&
+           !memcmp(&p->navigation, &d->navigation, sizeof d->navigation);
+}
+
+/* Of the picture's own corner, where it fills its part of the window. */
+static void plain_corner(const trip_viewer *v, int i, float corner[4])
+{
+    corner[0] = (float)(i & 1 ? 2.0 * v->picture_width / v->width - 1 : -1);
+    corner[1] = i & 2 ? -1 : 1;
+    corner[2] = 0;
+    corner[3] = 1;
+}
+
+static bool moved_corner(const trip_viewer *v, const trip_document *d, const trip_picture *p, int i,
+                         float corner[4])
+{
+    const double depth = trip_navigation_distance(&p->navigation);
+    const double from[2] = { i & 1 ? p->full_width : 0, i & 2 ? p->full_height : 0 };
+    double point[3], to[2];
+    trip_navigation_point(&p->navigation, p->full_width, p->full_height, from, depth, point);
+    const double w =
+        trip_navigation_project(&d->navigation, v->picture_width, v->height, point, to);
+    if (!(w > 0.01 * depth) && !(d->navigation.ortho_height > 0))
+        return false;
+    const double scale = d->navigation.ortho_height > 0 ? 1 : w / depth;
+    corner[0] = (float)((2 * to[0] / v->width - 1) * scale);
+    corner[1] = (float)((1 - 2 * to[1] / v->height) * scale);
+    corner[2] = 0;
+    corner[3] = (float)scale;
+    return true;
+}
+
+void trip_viewer_corners(const trip_viewer *v, const trip_picture *p, float corners[4][4])
+{
+    const trip_document *d = v->shown >= 0 ? v->documents[v->shown] : NULL;
+    bool moves =
+        d && d->has_navigation && d->number == p->document && !trip_viewer_is_current(v, p);
+    for (int i = 0; i < 4 && moves; i++)
+        moves = moved_corner(v, d, p, i, corners[i]);
+    for (int i = 0; i < 4 && !moves; i++)
+        plain_corner(v, i, corners[i]);
+}

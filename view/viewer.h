@@ -1,0 +1,113 @@
+/* The viewer without its window: data sets, what each is shown by, what people's input does to it,
+ * and what is wanted of the drawing thread. The window's thread only. */
+#ifndef TRIP_VIEW_VIEWER_H
+#define TRIP_VIEW_VIEWER_H
+
+#include "event.h"
+#include "frames.h"
+#include "function_editor.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A data set, and how it is shown. */
+typedef struct trip_document {
+    unsigned number; /* no two have the same */
+    char *input;     /* as the user named it */
+    bool opened;     /* what follows is known */
+    triptych_info info;
+    char *source; /* the path of the data set */
+    triptych_histogram histogram;
+    bool has_navigation; /* else it is being found, by: */
+    triptych_view start;
+    trip_navigation navigation;
+    char *function; /* preset or file; NULL: its own */
+    bool edited;    /* the editor's in its place */
+    trip_function_editor *editor;
+    uint64_t revision; /* of the editor, that is wanted */
+    double opacity_scale;
+    triptych_settings settings;
+} trip_document;
+
+enum { TRIP_DOCUMENTS = 64 };
+
+typedef struct trip_viewer {
+    trip_frames *frames;
+    trip_document *documents[TRIP_DOCUMENTS];
+    int count, shown;                              /* the one in the window; -1: none */
+    unsigned numbers;                              /* given out */
+    int width, height;                             /* of the window's contents, px */
+    double scale;                                  /* of texts and controls */
+    int picture_width;                             /* of its left, which the picture takes */
+    bool panel, keys, box, axes, scale_bar, probe; /* shown */
+    bool quits;
+    double at[2];               /* the pointer's */
+    bool buttons[TRIP_BUTTONS]; /* held, and pressed in the picture */
+    bool held[TRIP_KEYS];       /* keys */
+    unsigned modifiers;
+    bool changed; /* something else is to be wanted */
+    trip_frames_status status;
+    char message[512];      /* the last, */
+    double message_seconds; /* ago */
+    uint64_t messages;
+    /* By the window: */
+    void *user;
+    void (*copy)(void *user, const char *text); /* into the clipboard */
+    /* What documents begin with. */
+    triptych_view start;
+    triptych_settings settings;
+    const char *function;
+    double opacity_scale;
+} trip_viewer;
+
+/* Frames stay the caller's. */
+void trip_viewer_init(trip_viewer *v, trip_frames *frames);
+void trip_viewer_release(trip_viewer *v);
+
+/* NULL where none is shown. */
+trip_document *trip_viewer_document(trip_viewer *v);
+/* Opens a data set or volume beside the others, and shows it; one that is open already is opened
+ * anew. */
+void trip_viewer_open(trip_viewer *v, const char *input);
+void trip_viewer_close(trip_viewer *v);
+void trip_viewer_show(trip_viewer *v, int which);
+
+void trip_viewer_resize(trip_viewer *v, int width, int height);
+/* Not those of scripts alone. The panel's own input is not given. */
+void trip_viewer_event(trip_viewer *v, const trip_event *e);
+/* Lets go of what is held, as where the panel takes the input. */
+void trip_viewer_let_go(trip_viewer *v);
+
+/* Takes what the drawing thread has, moves what flies, and says what is wanted. Returns whether
+ * something goes on by itself. */
+bool trip_viewer_tick(trip_viewer *v, double seconds);
+/* Whether the picture of what is wanted is there and whole, or will not come. */
+bool trip_viewer_rests(trip_viewer *v);
+
+/* ---- what keys and the panel do ---- */
+
+void trip_viewer_say(trip_viewer *v, const char *text);
+void trip_viewer_set_panel(trip_viewer *v, bool shown);
+/* The view from there, found by the library. */
+void trip_viewer_see_side(trip_viewer *v, triptych_side side);
+void trip_viewer_fit(trip_viewer *v);
+/* Writes the whole picture into the folder it was started in, under a name of its own. */
+void trip_viewer_take_picture(trip_viewer *v);
+void trip_viewer_copy_camera(trip_viewer *v);
+/* A preset or file; NULL: the data set's own. */
+void trip_viewer_set_function(trip_viewer *v, const char *function);
+/* The camera as options of `triptych render`, for free(); NULL: there is none. */
+char *trip_viewer_camera_options(trip_viewer *v);
+
+/* Where a picture of another view lies in the window, in clip coordinates, as trip_blit_draw()
+ * takes them: as a plane through the point that was looked at. */
+void trip_viewer_corners(const trip_viewer *v, const trip_picture *p, float corners[4][4]);
+/* Whether the picture shows the view that is wanted, at its size. */
+bool trip_viewer_is_current(const trip_viewer *v, const trip_picture *p);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,518 @@
+#include <GLFW/glfw3.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "blit.h"
+#include "gauges.h"
+#include "panel.h"
+#include "player.h"
+#include "report.h"
+#include "view.h"
+#include "viewer.h"
+
+enum { WIDTH = 1100, HEIGHT = 720 };
+
+/* While nothing goes on by itself the window sleeps; signals are looked for in between. */
+static const double sleep_seconds = 0.1, script_seconds = 0.002;
+/* Dear ImGui takes up to so many pictures to settle after input. */
+enum { SETTLES = 4 };
+
+typedef struct window {
+    const trip_view_params *params;
+    GLFWwindow *glfw;
+    trip_viewer viewer;
+    trip_frames *frames;
+    trip_panel *panel;
+    trip_blit *blit;
+    atomic_bool woken;
+    int to_draw;        /* pictures of the window yet to be drawn */
+    bool hidden;        /* minimised */
+    trip_picture shown; /* in the texture; its pixels are not there any more */
+    double last;        /* seconds: when time last passed for the viewer */
+    double input_at;    /* when input came that no picture of the window follows yet; 0: none */
+    trip_gauges gauges;
+    trip_player player;
+    bool plays;
+    char *shot;  /* a file for what is drawn next; NULL: none */
+    triptych *t; /* writes that */
+    char title[512];
+} window;
+
+static int fail_of_glfw(const char *where)
+{
+    const char *why = NULL;
+    glfwGetError(&why);
+    return trip_fail(TRIP_ERROR, "view", where, "%s", why ? why : "failed");
+}
+
+/* ---- input ---- */
+
+static void note_input(window *w)
+{
+    w->to_draw = SETTLES;
+    if (w->input_at == 0)
+        w->input_at = glfwGetTime();
+}
+
+static bool is_of_pointer(const trip_event *e)
+{
+    return e->kind == TRIP_EVENT_MOVE || e->kind == TRIP_EVENT_WHEEL ||
+           (e->kind == TRIP_EVENT_BUTTON && e->down);
+}
+
+static bool is_held(const trip_viewer *v)
+{
+    bool held = false;
+    for (int i = 0; i < TRIP_BUTTONS; i++)
+        held |= v->buttons[i];
+    return held;
+}
+
+/* What the panel takes is not for the picture, but for a drag that began there, and releases. */
+static void send(window *w, const trip_event *e)
+{
+    trip_viewer *v = &w->viewer;
+    note_input(w);
+    if (e->kind == TRIP_EVENT_ICONIFY)
+        w->hidden = e->down;
+    if (!is_held(v) || !e->down)
+        trip_panel_event(w->panel, e);
+    const bool taken = (is_of_pointer(e) && trip_panel_has_pointer(w->panel) && !is_held(v)) ||
+                       (e->kind == TRIP_EVENT_KEY && e->down && trip_panel_has_keys(w->panel));
+    if (!taken)
+        trip_viewer_event(v, e);
+    else if (e->kind == TRIP_EVENT_MOVE)
+        memcpy(v->at, (double[2]){ e->x, e->y }, sizeof v->at);
+}
+
+static unsigned modifiers_of(int mods)
+{
+    return (mods & GLFW_MOD_SHIFT ? TRIP_SHIFT : 0) | (mods & GLFW_MOD_CONTROL ? TRIP_CONTROL : 0) |
+           (mods & GLFW_MOD_ALT ? TRIP_ALT : 0);
+}
+
+/* Pixels for a unit of the window's positions. */
+static double pixels_a_unit(const window *w)
+{
+    int units, unit_height;
+    glfwGetWindowSize(w->glfw, &units, &unit_height);
+    return units > 0 && w->viewer.width > 0 ? (double)w->viewer.width / units : 1;
+}
+
+static void on_move(GLFWwindow *glfw, double x, double y)
+{
+    window *w = glfwGetWindowUserPointer(glfw);
+    const double ratio = pixels_a_unit(w);
+    send(w, &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = x * ratio, .y = y * ratio });
+}
+
+static void on_button(GLFWwindow *glfw, int button, int action, int mods)
+{
+    if (button >= TRIP_BUTTONS)
+        return;
+    send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_BUTTON,
+                                                        .code = button,
+                                                        .modifiers = modifiers_of(mods),
+                                                        .down = action == GLFW_PRESS });
+}
+
+static void on_wheel(GLFWwindow *glfw, double x, double y)
+{
+    (void)x;
+    send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_WHEEL, .y = y });
+}
+
+/* Letters and digits by what is printed on the key, so that they are where the user's keyboard has
+ * them. */
+static int key_of(int key, int scancode)
+{
+    static const int keys[][2] = {
+        { GLFW_KEY_ESCAPE, TRIP_KEY_ESCAPE },
+        { GLFW_KEY_ENTER, TRIP_KEY_ENTER },
+        { GLFW_KEY_KP_ENTER, TRIP_KEY_ENTER },
+        { GLFW_KEY_TAB, TRIP_KEY_TAB },
+        { GLFW_KEY_BACKSPACE, TRIP_KEY_BACKSPACE },
+        { GLFW_KEY_DELETE, TRIP_KEY_DELETE },
+        { GLFW_KEY_LEFT, TRIP_KEY_LEFT },
+        { GLFW_KEY_RIGHT, TRIP_KEY_RIGHT },
+        { GLFW_KEY_UP, TRIP_KEY_UP },
+        { GLFW_KEY_DOWN, TRIP_KEY_DOWN },
+        { GLFW_KEY_HOME, TRIP_KEY_HOME },
+        { GLFW_KEY_END, TRIP_KEY_END },
+        { GLFW_KEY_PAGE_UP, TRIP_KEY_PAGE_UP },
+        { GLFW_KEY_PAGE_DOWN, TRIP_KEY_PAGE_DOWN },
+        { GLFW_KEY_F1, TRIP_KEY_F1 },
+        { GLFW_KEY_SPACE, ' ' },
+    };
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        if (keys[i][0] == key)
+            return keys[i][1];
+    const char *name = glfwGetKeyName(key, scancode);
+    if (!name || !name[0] || name[1])
+        return -1;
+    return name[0] >= 'A' && name[0] <= 'Z' ? name[0] - 'A' + 'a' : (unsigned char)name[0];
+}
+
+static void on_key(GLFWwindow *glfw, int key, int scancode, int action, int mods)
+{
+    const int code = key_of(key, scancode);
+    if (code < 0 || action == GLFW_REPEAT)
+        return;
+    send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_KEY,
+                                                        .code = code,
+                                                        .modifiers = modifiers_of(mods),
+                                                        .down = action == GLFW_PRESS });
+}
+
+static void on_text(GLFWwindow *glfw, unsigned code)
+{
+    window *w = glfwGetWindowUserPointer(glfw);
+    send(w, &(trip_event){ .kind = TRIP_EVENT_TEXT, .code = (int)code });
+}
+
+static void on_size(GLFWwindow *glfw, int width, int height)
+{
+    window *w = glfwGetWindowUserPointer(glfw);
+    send(w, &(trip_event){ .kind = TRIP_EVENT_RESIZE, .x = width, .y = height });
+}
+
+static void on_drop(GLFWwindow *glfw, int count, const char **paths)
+{
+    for (int i = 0; i < count; i++) {
+        char *path = strdup(paths[i]);
+        if (path)
+            send(glfwGetWindowUserPointer(glfw),
+                 &(trip_event){ .kind = TRIP_EVENT_DROP, .text = path });
+        free(path);
+    }
+}
+
+static void on_iconify(GLFWwindow *glfw, int iconified)
+{
+    window *w = glfwGetWindowUserPointer(glfw);
+    send(w, &(trip_event){ .kind = TRIP_EVENT_ICONIFY, .down = iconified });
+}
+
+static void on_focus(GLFWwindow *glfw, int focused)
+{
+    window *w = glfwGetWindowUserPointer(glfw);
+    if (!focused && !w->plays)
+        trip_viewer_let_go(&w->viewer);
+}
+
+static void on_refresh(GLFWwindow *glfw)
+{
+    window *w = glfwGetWindowUserPointer(glfw);
+    w->to_draw = SETTLES;
+}
+
+static void listen(window *w)
+{
+    GLFWwindow *g = w->glfw;
+    glfwSetWindowUserPointer(g, w);
+    glfwSetCursorPosCallback(g, on_move);
+    glfwSetMouseButtonCallback(g, on_button);
+    glfwSetScrollCallback(g, on_wheel);
+    glfwSetKeyCallback(g, on_key);
+    glfwSetCharCallback(g, on_text);
+    glfwSetFramebufferSizeCallback(g, on_size);
+    glfwSetDropCallback(g, on_drop);
+    glfwSetWindowIconifyCallback(g, on_iconify);
+    glfwSetWindowFocusCallback(g, on_focus);
+    glfwSetWindowRefreshCallback(g, on_refresh);
+}
+
+/* ---- what scripts do ---- */
+
+static void play_event(void *user, const trip_event *e)
+{
+    window *w = user;
+    if (e->kind == TRIP_EVENT_RESIZE) {
+        const double ratio = pixels_a_unit(w);
+        glfwSetWindowSize(w->glfw, (int)(e->x / ratio), (int)(e->y / ratio));
+        return;
+    }
+    if (e->kind == TRIP_EVENT_ICONIFY && e->down)
+        glfwIconifyWindow(w->glfw);
+    else if (e->kind == TRIP_EVENT_ICONIFY)
+        glfwRestoreWindow(w->glfw);
+    send(w, e);
+}
+
+/* Whole, and in the texture. */
+static bool play_rests(void *user)
+{
+    window *w = user;
+    if (!trip_viewer_rests(&w->viewer))
+        return false;
+    return w->viewer.status.failed || !trip_viewer_document(&w->viewer) || w->hidden ||
+           (trip_viewer_is_current(&w->viewer, &w->shown) && w->shown.whole);
+}
+
+static bool play_has_size(void *user, int width, int height)
+{
+    const window *w = user;
+    return w->viewer.width == width && w->viewer.height == height;
+}
+
+static bool play_find(void *user, const char *label, double box[4])
+{
+    window *w = user;
+    w->to_draw = SETTLES;
+    return trip_panel_find(w->panel, label, box);
+}
+
+static void play_shoot(void *user, const char *path)
+{
+    window *w = user;
+    free(w->shot);
+    w->shot = strdup(path);
+    w->to_draw = SETTLES;
+}
+
+static void play_save(void *user, const char *path)
+{
+    window *w = user;
+    trip_frames_save(w->frames, path);
+}
+
+static int play_report(void *user, const char *path)
+{
+    window *w = user;
+    return trip_gauges_write(&w->gauges, &w->viewer, path);
+}
+
+static int play(window *w)
+{
+    const trip_player_window methods = { w,         play_event, play_rests, play_has_size,
+                                         play_find, play_shoot, play_save,  play_report };
+    if (!w->plays || w->shot)
+        return 0;
+    w->player.width = w->viewer.width;
+    w->player.height = w->viewer.height;
+    const int more = trip_player_step(&w->player, &methods, glfwGetTime() + 1);
+    w->viewer.quits |= more == 0;
+    return more < 0 ? more : 0;
+}
+
+/* ---- pictures of the window ---- */
+
+static void upload(void *user, const trip_picture *p)
+{
+    window *w = user;
+    trip_blit_upload(w->blit, p->rgba, p->width, p->height);
+    w->shown = *p;
+    w->shown.rgba = NULL;
+    w->to_draw = w->to_draw > 1 ? w->to_draw : 1;
+}
+
+static int write_shot(window *w)
+{
+    const int width = w->viewer.width, height = w->viewer.height;
+    float *rgba = malloc((size_t)width * (size_t)height * 4 * sizeof *rgba);
+    if (!rgba)
+        return trip_fail(TRIP_ERROR, "view", w->shot, "out of memory");
+    trip_blit_read(width, height, rgba);
+    int status = w->t ? 0 : triptych_create(&w->t);
+    if (!status)
+        status = triptych_write(w->t, w->shot, width, height, rgba);
+    if (status)
+        trip_report_line(triptych_error(w->t));
+    free(rgba);
+    free(w->shot);
+    w->shot = NULL;
+    return status;
+}
+
+static void draw_picture(window *w)
+{
+    const trip_document *d = trip_viewer_document(&w->viewer);
+    float corners[4][4];
+    if (!d || w->shown.document != d->number)
+        return;
+    trip_viewer_corners(&w->viewer, &w->shown, corners);
+    const bool exact = w->shown.whole && trip_viewer_is_current(&w->viewer, &w->shown);
+    trip_blit_draw(w->blit, corners, exact);
+}
+
+static int draw(window *w, double seconds)
+{
+    const trip_viewer *v = &w->viewer;
+    if (w->hidden || v->width < 1 || v->height < 1)
+        return 0;
+    trip_blit_clear(v->width, v->height, 0.07f, 0.07f, 0.08f);
+    draw_picture(w);
+    trip_panel_draw(w->panel, &w->viewer, seconds);
+    int status = w->shot ? write_shot(w) : 0;
+    glfwSwapBuffers(w->glfw);
+    if (w->input_at > 0)
+        trip_gauges_note_answer(&w->gauges, (glfwGetTime() - w->input_at) * 1e3);
+    w->input_at = 0;
+    return status;
+}
+
+/* ---- the window ---- */
+
+static void wake(void *user)
+{
+    window *w = user;
+    atomic_store(&w->woken, true);
+    glfwPostEmptyEvent();
+}
+
+static void copy(void *user, const char *text)
+{
+    const window *w = user;
+    glfwSetClipboardString(w->glfw, text);
+}
+
+static int open_window(window *w)
+{
+    const trip_view_params *p = w->params;
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    w->glfw = glfwCreateWindow(p->width ? p->width : WIDTH, p->height ? p->height : HEIGHT,
+                               "Triptych", NULL, NULL);
+    if (!w->glfw)
+        return fail_of_glfw("window");
+    glfwMakeContextCurrent(w->glfw);
+    glfwSwapInterval(p->script ? 0 : 1);
+    return trip_blit_create(&w->blit);
+}
+
+static int open_panel(window *w)
+{
+    float x = 1, y = 1;
+    glfwGetWindowContentScale(w->glfw, &x, &y);
+    const double scale = w->params->scale > 0 ? w->params->scale : (double)fmaxf(x, y);
+    w->viewer.scale = scale > 0.5 && scale < 8 ? scale : 1;
+    return trip_panel_create(&w->panel, w->viewer.scale);
+}
+
+static int start_frames(window *w)
+{
+    const trip_view_params *p = w->params;
+    const trip_frames_params params = {
+        .memory_bytes = p->memory_bytes,
+        .threads = p->threads,
+        .renderer = p->renderer,
+        .engine = p->engine,
+        .frames_per_second = p->frames_per_second > 0 ? p->frames_per_second : 30,
+        .wake = wake,
+        .wake_user = w,
+        .find = p->find,
+        .release = p->release,
+        .user = p->user,
+    };
+    w->frames = trip_frames_start(&params);
+    return w->frames ? 0 : trip_fail(TRIP_ERROR, "view", "window", "out of memory");
+}
+
+static void open_documents(window *w)
+{
+    const trip_view_params *p = w->params;
+    trip_viewer *v = &w->viewer;
+    int width, height;
+    v->user = w;
+    v->copy = copy;
+    v->start = p->start;
+    v->settings = p->settings;
+    v->function = p->function;
+    v->opacity_scale = p->opacity_scale > 0 ? p->opacity_scale : 1;
+    v->panel = !p->no_panel;
+    for (int i = 0; i < p->count; i++)
+        trip_viewer_open(v, p->inputs[i]);
+    if (v->count > 1)
+        trip_viewer_show(v, 0);
+    glfwGetFramebufferSize(w->glfw, &width, &height);
+    trip_viewer_resize(v, width, height);
+}
+
+static void show_title(window *w)
+{
+    const trip_document *d = trip_viewer_document(&w->viewer);
+    char title[512];
+    snprintf(title, sizeof title, "%.400s%sTriptych", d ? d->input : "", d ? " - " : "");
+    if (strcmp(title, w->title))
+        glfwSetWindowTitle(w->glfw, title);
+    memcpy(w->title, title, sizeof title);
+}
+
+/* Takes what came, and shows it where there is something new to show. */
+static int pass(window *w)
+{
+    int status = play(w);
+    if (status)
+        return status;
+    const double now = glfwGetTime(), seconds = now - w->last;
+    w->last = now;
+    if (atomic_exchange(&w->woken, false) && !w->to_draw)
+        w->to_draw = 1;
+    const bool goes_on = trip_viewer_tick(&w->viewer, seconds);
+    trip_frames_use_picture(w->frames, w->shown.number, upload, w);
+    show_title(w);
+    if (w->to_draw || goes_on || w->plays)
+        status = draw(w, seconds);
+    w->to_draw -= w->to_draw > 0;
+    if (w->plays)
+        glfwWaitEventsTimeout(script_seconds);
+    else if (w->to_draw || goes_on)
+        glfwWaitEventsTimeout(0.008);
+    else
+        glfwWaitEventsTimeout(sleep_seconds);
+    return 0;
+}
+
+static int run(window *w)
+{
+    int status = 0;
+    while (!status && !w->viewer.quits && !glfwWindowShouldClose(w->glfw)) {
+        status = pass(w);
+        if (!status && trip_interrupted())
+            status = trip_fail(TRIP_INTERRUPTED, "view", "interrupted", "by a signal");
+    }
+    return status;
+}
+
+static void close_window(window *w)
+{
+    trip_frames_stop(w->frames);
+    trip_viewer_release(&w->viewer);
+    trip_panel_destroy(w->panel);
+    trip_blit_destroy(w->blit);
+    trip_script_free(&w->player.script);
+    triptych_destroy(w->t);
+    free(w->shot);
+    if (w->glfw)
+        glfwDestroyWindow(w->glfw);
+    glfwTerminate();
+}
+
+int trip_view_run(const trip_view_params *params)
+{
+    window w = { .params = params, .plays = params->script };
+    int status = params->script ? trip_script_load(&w.player.script, params->script) : 0;
+    if (status)
+        return status;
+    if (!glfwInit())
+        return fail_of_glfw("display");
+    status = open_window(&w);
+    if (!status)
+        status = start_frames(&w);
+    if (!status) {
+        trip_viewer_init(&w.viewer, w.frames);
+        status = open_panel(&w);
+    }
+    if (!status) {
+        listen(&w);
+        open_documents(&w);
+        status = run(&w);
+    }
+    close_window(&w);
+    return status;
+}
