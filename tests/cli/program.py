@@ -7,10 +7,12 @@ import json
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import zlib
 
@@ -41,6 +43,23 @@ def start(*arguments, program=PROGRAM, **options):
     options.setdefault("stdout", subprocess.PIPE)
     options.setdefault("stderr", subprocess.PIPE)
     return subprocess.Popen([program, *map(str, arguments)], **options)
+
+
+def await_handler(process):
+    """Until the program has said what Ctrl-C does to it, or has ended."""
+    caught = 0
+    while process.poll() is None and not caught >> (signal.SIGINT - 1) & 1:
+        with open(f"/proc/{process.pid}/status", encoding="ascii") as status:
+            (line,) = (l for l in status if l.startswith("SigCgt:"))
+        caught = int(line.split()[1], 16)
+        time.sleep(0.01)
+
+
+def processor_seconds(process):
+    """That a process which was not waited for has taken."""
+    with open(f"/proc/{process.pid}/stat", encoding="ascii") as stat:
+        fields = stat.read().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def skip_what_is_switched_off(arguments):

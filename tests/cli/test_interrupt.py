@@ -10,13 +10,6 @@ import program
 SIZE = "4096x4096"
 LIMIT_S = 5 * (4 if program.SANITIZED else 1)  # of processors
 HANGS_S = 60
-TICK_S = 1 / os.sysconf("SC_CLK_TCK")
-
-
-def processor_seconds(process):
-    with open(f"/proc/{process.pid}/stat", encoding="ascii") as stat:
-        fields = stat.read().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) * TICK_S
 
 
 class Ended:
@@ -40,20 +33,11 @@ class Interrupt(program.ProgramTest):
         program.write_nrrd("a.nrrd", program.noise((48, 48, 48)))
         assert program.call("brick", "a.nrrd", "-o", "a.trip", "-q").returncode == 0
 
-    def await_handler(self, process):
-        """Until the program has said what a signal does to it."""
-        caught = 0
-        while process.poll() is None and not caught >> (signal.SIGINT - 1) & 1:
-            with open(f"/proc/{process.pid}/status", encoding="ascii") as status:
-                (line,) = (l for l in status if l.startswith("SigCgt:"))
-            caught = int(line.split()[1], 16)
-            time.sleep(0.01)
-
     def interrupt(self, made, seconds, *arguments):
         """Of processors from the signal to the end; None where it had ended before."""
         before = set(os.listdir("."))
         process = program.start(*arguments)
-        self.await_handler(process)
+        program.await_handler(process)
         try:
             process.wait(seconds)
         except program.subprocess.TimeoutExpired:
@@ -62,7 +46,7 @@ class Interrupt(program.ProgramTest):
             process.communicate()
             self.remove(made)
             return None
-        taken = processor_seconds(process)
+        taken = program.processor_seconds(process)
         process.send_signal(signal.SIGINT)
         ended = Ended(process, HANGS_S)
         if not ended.pid:

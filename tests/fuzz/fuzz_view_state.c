@@ -1,0 +1,42 @@
+/* What the viewer keeps of a data set: no crash, and what is accepted is a view, and is the same
+ * once it is written and read again. */
+#include "fuzz.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "state_file.h"
+
+static trip_view_state usual(void)
+{
+    return (trip_view_state){ .opacity_scale = 1, .settings = triptych_default_settings() };
+}
+
+static void check_again(const trip_view_state *s)
+{
+    trip_view_state again = usual();
+    char *text = trip_view_state_print(s, "/d");
+    FUZZ_PROMISE(text && trip_view_state_parse(&again, "/d", text, "again") == 1);
+    FUZZ_PROMISE(memcmp(&again.navigation, &s->navigation, sizeof s->navigation) == 0);
+    FUZZ_PROMISE(memcmp(again.settings.light, s->settings.light, sizeof s->settings.light) == 0);
+    FUZZ_PROMISE(again.opacity_scale == s->opacity_scale && again.panel == s->panel);
+    trip_view_state_release(&again);
+    free(text);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    trip_view_state s = usual();
+    char *text = calloc(1, size + 1);
+    memcpy(text, data, size);
+    if (trip_view_state_parse(&s, "/d", text, "fuzz") == 1) {
+        FUZZ_PROMISE(!s.has_navigation || trip_navigation_distance(&s.navigation) > 0);
+        FUZZ_PROMISE(s.settings.samples >= 1 && s.settings.samples <= 64);
+        check_again(&s);
+    } else {
+        FUZZ_PROMISE(s.text == NULL && s.function == NULL);
+    }
+    trip_view_state_release(&s);
+    free(text);
+    return 0;
+}

@@ -1,0 +1,178 @@
+#include "test.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "state_file.h"
+
+static trip_view_state usual(void)
+{
+    return (trip_view_state){ .opacity_scale = 1, .settings = triptych_default_settings() };
+}
+
+static trip_view_state unusual(void)
+{
+    trip_view_state s = usual();
+    s.has_navigation = true;
+    s.navigation = (trip_navigation){ .eye = { 1.0 / 3, -2e-17, 5e20 },
+                                      .look = { 0, 1e-3, 4 },
+                                      .up = { 0.1, 0.7, 0 },
+                                      .upright = { 0, 1, 0 },
+                                      .fov_degrees = 30.000000000000004,
+                                      .ortho_height = 0.1 };
+    s.text = strdup("unit voxel\nvalues data\n0 0 0 0 0\n1 1 1 1 0.5\n");
+    s.opacity_scale = 2.5;
+    s.settings.classify = TRIPTYCH_POST;
+    s.settings.slices = 3;
+    s.settings.headlight = 0;
+    s.settings.light[1] = -1.0 / 7;
+    s.settings.background[2] = 0.2;
+    s.panel = s.axes = true;
+    return s;
+}
+
+static void assert_same(const trip_view_state *a, const trip_view_state *b)
+{
+    char *p = trip_view_state_print(a, "/d"), *q = trip_view_state_print(b, "/d");
+    assert_string_equal(p, q);
+    free(p);
+    free(q);
+    assert_memory_equal(&a->navigation, &b->navigation, sizeof a->navigation);
+    assert_memory_equal(a->settings.light, b->settings.light, sizeof a->settings.light);
+    assert_true(a->settings.background[2] == b->settings.background[2]);
+    assert_int_equal(a->settings.classify, b->settings.classify);
+    assert_int_equal(a->settings.slices, b->settings.slices);
+}
+
+static int use_folder(void **state)
+{
+    (void)state;
+    char here[4096], folder[4200];
+    if (!getcwd(here, sizeof here))
+        return -1;
+    snprintf(folder, sizeof folder, "%s/state_home/deeper", here);
+    return setenv("XDG_STATE_HOME", folder, 1);
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    return system("rm -rf state_home");
+}
+
+static void what_is_kept_is_found_again_to_the_last_bit(void **state)
+{
+    (void)state;
+    trip_view_state kept = unusual(), found = usual();
+    found.function = strdup("bone");
+    assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 0);
+    assert_string_equal(found.function, "bone");
+    assert_int_equal(trip_state_file_save(&kept, "/data/head.trip"), 0);
+    assert_int_equal(trip_state_file_load(&found, "/data/other.trip"), 0);
+    assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 1);
+    assert_same(&found, &kept);
+    assert_null(found.function);
+    /* And replaced. */
+    kept.settings.samples = 2;
+    assert_int_equal(trip_state_file_save(&kept, "/data/head.trip"), 0);
+    assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 1);
+    assert_int_equal(found.settings.samples, 2);
+    trip_view_state_release(&found);
+    trip_view_state_release(&kept);
+}
+
+static void the_same_data_set_by_another_name_has_the_same_state(void **state)
+{
+    (void)state;
+    char *a, *b;
+    assert_int_equal(mkdir("set.trip", 0700), 0);
+    assert_int_equal(symlink("set.trip", "link.trip"), 0);
+    assert_int_equal(trip_state_file_path(&a, "set.trip"), 0);
+    assert_int_equal(trip_state_file_path(&b, "./link.trip"), 0);
+    assert_string_equal(a, b);
+    free(a);
+    free(b);
+    unlink("link.trip");
+    rmdir("set.trip");
+}
+
+static void assert_refused(const char *from, const char *to, const char *why)
+{
+    trip_view_state s = unusual(), before = s;
+    char *text = trip_view_state_print(&s, "/d"), *at = strstr(text, from), *changed;
+    assert_non_null(at);
+    assert_true(asprintf(&changed, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from)) > 0);
+    test_catch_reports();
+    assert_int_equal(trip_view_state_parse(&s, "/d", changed, "state.json"), TRIP_ERROR);
+    assert_one_report(why);
+    assert_memory_equal(&s, &before, sizeof s);
+    free(changed);
+    free(text);
+    trip_view_state_release(&s);
+}
+
+static void what_is_no_state_is_refused_whole(void **state)
+{
+    (void)state;
+    assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t1e9", "opacity_scale");
+    assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t\"2\"", "opacity_scale");
+    assert_refused("\"slices\":\t3", "\"slices\":\t2.5", "slices");
+    assert_refused("\"slices\":\t3", "\"slices\":\t17", "slices");
+    assert_refused("\"fov_degrees\":\t30", "\"fov_degrees\":\t230", "fov_degrees");
+    assert_refused("\"fov_degrees\":\t30", "\"fow\":\t30", "fov_degrees");
+    assert_refused("5e+20", "1e999", "eye");
+    assert_refused("5e+20", "5, 3", "eye");
+    assert_refused("[0.1, 0.7, 0]", "[0, 0, 0]", "its camera is none");
+    assert_refused("[0, 1, 0]", "[0, 0.5, 0]", "its camera is none");
+    assert_refused("\"panel\":\ttrue", "\"panel\":\t1", "panel");
+    assert_refused("1 1 1 1 0.5", "1 1 1 1 7.5", "opacity");
+    assert_refused("-0.142", "x", "is not what the viewer keeps");
+    assert_refused("\"triptych_view\":\t1", "\"triptych_view\":\t\"1\"", "is not what the viewer");
+    trip_view_state s = usual();
+    test_catch_reports();
+    assert_int_equal(trip_view_state_parse(&s, "/d", "[[[", "state.json"), TRIP_ERROR);
+    assert_one_report("is not what the viewer keeps");
+}
+
+static void other_versions_and_data_sets_are_no_state(void **state)
+{
+    (void)state;
+    trip_view_state s = usual(), before = s;
+    char *text = trip_view_state_print(&s, "/d");
+    assert_int_equal(trip_view_state_parse(&s, "/e", text, "f"), 0);
+    assert_int_equal(
+        trip_view_state_parse(&s, "/d", "{\"triptych_view\": 2, \"data\": \"/d\"}", "f"), 0);
+    assert_memory_equal(&s, &before, sizeof s);
+    assert_int_equal(
+        trip_view_state_parse(&s, "/d", "{\"triptych_view\": 1, \"data\": \"/d\"}", "f"), 1);
+    assert_memory_equal(&s, &before, sizeof s);
+    free(text);
+}
+
+static void a_folder_in_its_place_is_reported(void **state)
+{
+    (void)state;
+    trip_view_state s = usual();
+    char *path;
+    assert_int_equal(trip_state_file_path(&path, "/data/folder.trip"), 0);
+    assert_int_equal(trip_state_file_save(&s, "/data/folder.trip"), 0);
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(mkdir(path, 0700), 0);
+    test_catch_reports();
+    assert_int_equal(trip_state_file_load(&s, "/data/folder.trip"), TRIP_ERROR);
+    assert_one_report("is not a file");
+    rmdir(path);
+    free(path);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_kept_is_found_again_to_the_last_bit),
+        cmocka_unit_test(the_same_data_set_by_another_name_has_the_same_state),
+        cmocka_unit_test(what_is_no_state_is_refused_whole),
+        cmocka_unit_test(other_versions_and_data_sets_are_no_state),
+        cmocka_unit_test(a_folder_in_its_place_is_reported),
+    };
+    return cmocka_run_group_tests(tests, use_folder, remove_folder);
+}

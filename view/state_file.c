@@ -1,0 +1,386 @@
+#include "state_file.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "input_file.h"
+#include "json.h"
+#include "new_file.h"
+#include "report.h"
+#include "text.h"
+#include "transfer_function.h"
+
+enum { MOST_BYTES = 16 << 20, VERSION = 1 };
+
+/* What numbers a state has, where they lie in it, and between what. */
+typedef enum kind { NUMBERS, WHOLE, YES_OR_NO } kind;
+
+typedef struct entry {
+    const char *key;
+    size_t at;
+    kind kind;
+    int count; /* of NUMBERS: an array where it is above 1 */
+    double lo, hi;
+} entry;
+
+#define FAR 1e300
+#define CAMERA(name) offsetof(trip_view_state, navigation.name)
+#define SETTING(name) offsetof(trip_view_state, settings.name)
+
+static const entry camera_entries[] = {
+    { "eye", CAMERA(eye), NUMBERS, 3, -FAR, FAR },
+    { "look", CAMERA(look), NUMBERS, 3, -FAR, FAR },
+    { "up", CAMERA(up), NUMBERS, 3, -FAR, FAR },
+    { "upright", CAMERA(upright), NUMBERS, 3, -1, 1 },
+    { "fov_degrees", CAMERA(fov_degrees), NUMBERS, 1, TRIPTYCH_FOV_MIN_DEGREES,
+      TRIPTYCH_FOV_MAX_DEGREES },
+    { "ortho_height", CAMERA(ortho_height), NUMBERS, 1, 0, 1e100 },
+};
+
+static const entry setting_entries[] = {
+    { "classify", SETTING(classify), WHOLE, 1, TRIPTYCH_PRE, TRIPTYCH_POST },
+    { "slices", SETTING(slices), WHOLE, 1, 1, 16 },
+    { "method", SETTING(method), WHOLE, 1, TRIPTYCH_MERGE, TRIPTYCH_AXIS },
+    { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
+    { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },
+    { "light", SETTING(light), NUMBERS, 3, -FAR, FAR },
+    { "h", SETTING(h), NUMBERS, 1, 0, 0.999999 },
+    { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
+    { "background", SETTING(background), NUMBERS, 4, 0, 1 },
+    { "samples", SETTING(samples), WHOLE, 1, 1, 64 },
+};
+
+static const entry other_entries[] = {
+    { "opacity_scale", offsetof(trip_view_state, opacity_scale), NUMBERS, 1, 1e-6, 1e6 },
+    { "panel", offsetof(trip_view_state, panel), YES_OR_NO, 1, 0, 1 },
+    { "box", offsetof(trip_view_state, box), YES_OR_NO, 1, 0, 1 },
+    { "axes", offsetof(trip_view_state, axes), YES_OR_NO, 1, 0, 1 },
+    { "scale_bar", offsetof(trip_view_state, scale_bar), YES_OR_NO, 1, 0, 1 },
+};
+
+#define ENTRIES(table) table, sizeof table / sizeof *table
+
+/* ---- to text ---- */
+
+/* All digits that it takes to read the same number again. */
+static cJSON *exact(double value)
+{
+    char text[32];
+    return cJSON_CreateRaw(trip_text_from_double(value, text));
+}
+
+static cJSON *value_of(const trip_view_state *s, const entry *e)
+{
+    const void *at = (const char *)s + e->at;
+    if (e->kind == YES_OR_NO)
+        return cJSON_CreateBool(*(const bool *)at);
+    if (e->kind == WHOLE)
+        return exact(*(const int *)at);
+    const double *numbers = at;
+    cJSON *array = e->count > 1 ? cJSON_CreateArray() : NULL;
+    for (int i = 0; array && i < e->count; i++)
+        cJSON_AddItemToArray(array, exact(numbers[i]));
+    return e->count > 1 ? array : exact(*numbers);
+}
+
+static void add_entries(cJSON *object, const trip_view_state *s, const entry *entries, size_t count)
+{
+    for (size_t i = 0; object && i < count; i++)
+        cJSON_AddItemToObject(object, entries[i].key, value_of(s, &entries[i]));
+}
+
+char *trip_view_state_print(const trip_view_state *s, const char *data)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddItemToObject(root, "triptych_view", exact(VERSION));
+    cJSON_AddStringToObject(root, "data", data);
+    if (s->has_navigation)
+        add_entries(cJSON_AddObjectToObject(root, "camera"), s, ENTRIES(camera_entries));
+    if (s->text)
+        cJSON_AddStringToObject(root, "function_text", s->text);
+    else if (s->function)
+        cJSON_AddStringToObject(root, "function", s->function);
+    add_entries(cJSON_AddObjectToObject(root, "settings"), s, ENTRIES(setting_entries));
+    add_entries(root, s, ENTRIES(other_entries));
+    char *text = root ? trip_json_print(root, true) : NULL;
+    cJSON_Delete(root);
+    return text;
+}
+
+/* ---- from text ---- */
+
+static bool read_number(const cJSON *item, const entry *e, double *out)
+{
+    if (!cJSON_IsNumber(item))
+        return false;
+    *out = item->valuedouble;
+    return *out >= e->lo && *out <= e->hi && (e->kind == NUMBERS || *out == floor(*out));
+}
+
+static bool read_numbers(const cJSON *item, const entry *e, double *out)
+{
+    if (e->count == 1)
+        return read_number(item, e, out);
+    bool good = cJSON_IsArray(item) && cJSON_GetArraySize(item) == e->count;
+    for (int i = 0; good && i < e->count; i++)
+        good = read_number(cJSON_GetArrayItem(item, i), e, &out[i]);
+    return good;
+}
+
+static bool read_entry(trip_view_state *s, const cJSON *item, const entry *e)
+{
+    void *at = (char *)s + e->at;
+    double whole = 0;
+    if (e->kind == NUMBERS)
+        return read_numbers(item, e, at);
+    if (e->kind == WHOLE && read_number(item, e, &whole))
+        *(int *)at = (int)whole;
+    else if (e->kind == YES_OR_NO && cJSON_IsBool(item))
+        *(bool *)at = cJSON_IsTrue(item);
+    else
+        return false;
+    return true;
+}
+
+/* What is missing stays as it is, unless all are needed. */
+static int read_entries(trip_view_state *s, const cJSON *object, const entry *entries, size_t count,
+                        bool all, const char *path)
+{
+    for (size_t i = 0; i < count; i++) {
+        const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, entries[i].key);
+        if ((item || all) && !(item && read_entry(s, item, &entries[i])))
+            return trip_fail(TRIP_ERROR, "read", path, "\"%s\" is not what a view has there",
+                             entries[i].key);
+    }
+    return 0;
+}
+
+static double length_of(const double v[3])
+{
+    return hypot(hypot(v[0], v[1]), v[2]);
+}
+
+static int read_camera(trip_view_state *s, const cJSON *camera, const char *path)
+{
+    trip_navigation *n = &s->navigation;
+    if (!camera)
+        return 0;
+    int status = read_entries(s, camera, ENTRIES(camera_entries), true, path);
+    if (status)
+        return status;
+    trip_navigation_axes axes = trip_navigation_get_axes(n);
+    s->has_navigation = true;
+    if (fabs(length_of(n->upright) - 1) < 1e-6 && fabs(length_of(axes.up) - 1) < 1e-6)
+        return 0;
+    return trip_fail(TRIP_ERROR, "read", path, "its camera is none");
+}
+
+/* A string for free(), or NULL without one. */
+static int read_string(const cJSON *root, const char *key, char **out, const char *path)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, key);
+    *out = NULL;
+    if (!item)
+        return 0;
+    if (!cJSON_IsString(item))
+        return trip_fail(TRIP_ERROR, "read", path, "\"%s\" is not a text", key);
+    *out = strdup(item->valuestring);
+    return *out ? 0 : trip_fail(TRIP_ERROR, "read", path, "out of memory");
+}
+
+static int read_function(trip_view_state *s, const cJSON *root, const char *path)
+{
+    trip_tf *tf = NULL;
+    int status = read_string(root, "function", &s->function, path);
+    if (!status)
+        status = read_string(root, "function_text", &s->text, path);
+    if (!status && s->text)
+        status = trip_tf_parse(&tf, path, s->text, strlen(s->text));
+    trip_tf_destroy(tf);
+    return status;
+}
+
+static int read_root(trip_view_state *s, const cJSON *root, const char *path)
+{
+    int status = read_function(s, root, path);
+    if (!status)
+        status = read_camera(s, cJSON_GetObjectItemCaseSensitive(root, "camera"), path);
+    if (!status)
+        status = read_entries(s, cJSON_GetObjectItemCaseSensitive(root, "settings"),
+                              ENTRIES(setting_entries), false, path);
+    if (!status)
+        status = read_entries(s, root, ENTRIES(other_entries), false, path);
+    const triptych_settings *t = &s->settings;
+    if (!status && t->shading && !t->headlight && !(length_of(t->light) > 0))
+        status = trip_fail(TRIP_ERROR, "read", path, "its light has no direction");
+    return status;
+}
+
+/* Whether it is a state, of this version, and of this data set; negative where it is none. */
+static int check_root(const cJSON *root, const char *data, const char *path)
+{
+    const cJSON *version = cJSON_GetObjectItemCaseSensitive(root, "triptych_view");
+    const char *of = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(root, "data"));
+    if (!cJSON_IsObject(root) || !cJSON_IsNumber(version) || !of)
+        return trip_fail(TRIP_ERROR, "read", path, "is not what the viewer keeps of a data set");
+    return version->valuedouble == VERSION && !strcmp(of, data);
+}
+
+int trip_view_state_parse(trip_view_state *s, const char *data, const char *text, const char *path)
+{
+    trip_json json;
+    trip_view_state next = *s;
+    next.function = next.text = NULL;
+    next.has_navigation = false;
+    int status = trip_json_parse(&json, text, path, NULL);
+    if (status)
+        return status;
+    int same = check_root(json.root, data, path);
+    status = same > 0 ? read_root(&next, json.root, path) : same;
+    trip_json_free(&json);
+    trip_view_state_release(same > 0 && !status ? s : &next);
+    if (same > 0 && !status)
+        *s = next;
+    return status ? status : same;
+}
+
+void trip_view_state_release(trip_view_state *s)
+{
+    free(s->function);
+    free(s->text);
+    s->function = s->text = NULL;
+}
+
+/* ---- files ---- */
+
+/* Where the data set is, whatever name led to it; for free(). */
+static char *real_path(const char *data)
+{
+    char *real = realpath(data, NULL);
+    return real ? real : strdup(data);
+}
+
+static int fail_of_memory(const char *data)
+{
+    return trip_fail(TRIP_ERROR, "view", data, "out of memory");
+}
+
+int trip_state_file_path(char **path, const char *data)
+{
+    const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
+    bool own = state && state[0] == '/'; /* others are to be ignored, as its specification has it */
+    char *real = real_path(data);
+    *path = NULL;
+    if (!real)
+        return fail_of_memory(data);
+    unsigned long long hash = XXH3_64bits(real, strlen(real));
+    free(real);
+    if (!own && !(home && home[0] == '/'))
+        return trip_fail(TRIP_ERROR, "view", "HOME",
+                         "is not set, so there is no folder for what the viewer keeps: set "
+                         "XDG_STATE_HOME to one");
+    if (asprintf(path, "%s%s/triptych/%016llx.json", own ? state : home, own ? "" : "/.local/state",
+                 hash) < 0) {
+        *path = NULL;
+        return fail_of_memory(data);
+    }
+    return 0;
+}
+
+/* The folders that the file is in, which need not be there on a new account. */
+static int make_folders(char *path)
+{
+    for (char *slash = strchr(path + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
+        *slash = 0;
+        int made = mkdir(path, 0700);
+        if (made < 0 && errno != EEXIST && errno != EROFS && errno != EACCES && errno != EPERM) {
+            trip_fail_errno("view", path, "cannot make");
+            return TRIP_ERROR;
+        }
+        *slash = '/';
+    }
+    return 0;
+}
+
+static int write_file(const char *path, const char *text)
+{
+    trip_new_file file;
+    int status = trip_new_file_begin(&file, "write", path);
+    if (status)
+        return status;
+    for (size_t left = strlen(text); left > 0 && !status;) {
+        ssize_t written = write(file.fd, text, left);
+        if (written < 0 && errno != EINTR)
+            status = trip_fail_errno("write", path, NULL);
+        text += written > 0 ? written : 0;
+        left -= written > 0 ? (size_t)written : 0;
+    }
+    if (!status)
+        return trip_new_file_finish(&file);
+    trip_new_file_abandon(&file);
+    return status;
+}
+
+int trip_state_file_save(const trip_view_state *s, const char *data)
+{
+    char *path, *real = real_path(data);
+    char *text = real ? trip_view_state_print(s, real) : NULL;
+    free(real);
+    int status = trip_state_file_path(&path, data);
+    if (!status && !text)
+        status = fail_of_memory(data);
+    if (!status)
+        status = make_folders(path);
+    if (!status)
+        status = write_file(path, text);
+    free(text);
+    free(path);
+    return status;
+}
+
+/* Its text, for free(); 0 where there is no file, else 1 or a reported failure. */
+static int read_file(const char *path, char **text)
+{
+    int fd = trip_input_open(path);
+    struct stat st;
+    *text = NULL;
+    if (fd < 0)
+        return errno == ENOENT ? 0 : trip_fail_errno("read", path, "cannot open");
+    bool regular = fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size <= MOST_BYTES;
+    size_t room = regular ? (size_t)st.st_size : 0;
+    char *bytes = regular ? calloc(room + 1, 1) : NULL;
+    ssize_t got = bytes ? trip_input_read(fd, bytes, room) : -1;
+    close(fd);
+    if (got >= 0) {
+        *text = bytes;
+        return 1;
+    }
+    free(bytes);
+    return trip_fail(TRIP_ERROR, "read", path, "is not a file of at most %d MiB that can be read",
+                     MOST_BYTES >> 20);
+}
+
+int trip_state_file_load(trip_view_state *s, const char *data)
+{
+    char *path, *text = NULL, *real = real_path(data);
+    int status = real ? trip_state_file_path(&path, data) : fail_of_memory(data);
+    if (status) {
+        free(real);
+        return status;
+    }
+    status = read_file(path, &text);
+    if (status > 0)
+        status = trip_view_state_parse(s, real, text, path);
+    free(text);
+    free(path);
+    free(real);
+    return status;
+}
