@@ -85,6 +85,9 @@ int trip_tf_mr_from_histogram(trip_tf **out, const trip_histogram *histogram);
 int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *histogram);
 /* The one of these for a kind other than TRIP_TF_AUTOMATIC. */
 int trip_tf_make_automatic(trip_tf **out, trip_tf_kind kind, const trip_histogram *histogram);
+/* Share 1 - t of the function `a` and share t of `b`, both in data units, t from 0 to 1: colours
+ * and opacities mixed at every value. Refuses functions of different units of opacity. */
+int trip_tf_mix(trip_tf **out, const trip_tf *a, const trip_tf *b, double t);
 void trip_tf_destroy(trip_tf *tf);
 
 /* The built-in presets, by number from 0; NULL beyond the last. The basis is what the values are

@@ -11,11 +11,11 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "exact_json.h"
 #include "input_file.h"
 #include "json.h"
 #include "new_file.h"
 #include "report.h"
-#include "text.h"
 #include "transfer_function.h"
 
 enum { MOST_BYTES = 16 << 20, VERSION = 1 };
@@ -70,25 +70,14 @@ static const entry other_entries[] = {
 
 /* ---- to text ---- */
 
-/* All digits that it takes to read the same number again. */
-static cJSON *exact(double value)
-{
-    char text[32];
-    return cJSON_CreateRaw(trip_text_from_double(value, text));
-}
-
 static cJSON *value_of(const trip_view_state *s, const entry *e)
 {
     const void *at = (const char *)s + e->at;
     if (e->kind == YES_OR_NO)
         return cJSON_CreateBool(*(const bool *)at);
     if (e->kind == WHOLE)
-        return exact(*(const int *)at);
-    const double *numbers = at;
-    cJSON *array = e->count > 1 ? cJSON_CreateArray() : NULL;
-    for (int i = 0; array && i < e->count; i++)
-        cJSON_AddItemToArray(array, exact(numbers[i]));
-    return e->count > 1 ? array : exact(*numbers);
+        return trip_exact_number(*(const int *)at);
+    return e->count > 1 ? trip_exact_numbers(at, e->count) : trip_exact_number(*(const double *)at);
 }
 
 static void add_entries(cJSON *object, const trip_view_state *s, const entry *entries, size_t count)
@@ -100,7 +89,7 @@ static void add_entries(cJSON *object, const trip_view_state *s, const entry *en
 char *trip_view_state_print(const trip_view_state *s, const char *data)
 {
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddItemToObject(root, "triptych_view", exact(VERSION));
+    cJSON_AddItemToObject(root, "triptych_view", trip_exact_number(VERSION));
     cJSON_AddStringToObject(root, "data", data);
     if (s->has_navigation)
         add_entries(cJSON_AddObjectToObject(root, "camera"), s, ENTRIES(camera_entries));
@@ -117,37 +106,26 @@ char *trip_view_state_print(const trip_view_state *s, const char *data)
 
 /* ---- from text ---- */
 
-static bool read_number(const cJSON *item, const entry *e, double *out)
+static bool read_whole(const cJSON *item, const entry *e, int *out)
 {
-    if (!cJSON_IsNumber(item))
+    double number;
+    if (!trip_exact_read(item, e->lo, e->hi, &number) || number != floor(number))
         return false;
-    *out = item->valuedouble;
-    return *out >= e->lo && *out <= e->hi && (e->kind == NUMBERS || *out == floor(*out));
-}
-
-static bool read_numbers(const cJSON *item, const entry *e, double *out)
-{
-    if (e->count == 1)
-        return read_number(item, e, out);
-    bool good = cJSON_IsArray(item) && cJSON_GetArraySize(item) == e->count;
-    for (int i = 0; good && i < e->count; i++)
-        good = read_number(cJSON_GetArrayItem(item, i), e, &out[i]);
-    return good;
+    *out = (int)number;
+    return true;
 }
 
 static bool read_entry(trip_view_state *s, const cJSON *item, const entry *e)
 {
     void *at = (char *)s + e->at;
-    double whole = 0;
+    if (e->kind == NUMBERS && e->count > 1)
+        return trip_exact_read_numbers(item, e->count, e->lo, e->hi, at);
     if (e->kind == NUMBERS)
-        return read_numbers(item, e, at);
-    if (e->kind == WHOLE && read_number(item, e, &whole))
-        *(int *)at = (int)whole;
-    else if (e->kind == YES_OR_NO && cJSON_IsBool(item))
-        *(bool *)at = cJSON_IsTrue(item);
-    else
-        return false;
-    return true;
+        return trip_exact_read(item, e->lo, e->hi, at);
+    if (e->kind == WHOLE)
+        return read_whole(item, e, at);
+    *(bool *)at = cJSON_IsTrue(item);
+    return cJSON_IsBool(item);
 }
 
 /* What is missing stays as it is, unless all are needed. */

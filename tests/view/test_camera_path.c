@@ -1,0 +1,286 @@
+#include "test.h"
+
+#include <unistd.h>
+
+#include "camera_path.h"
+
+#define PI 3.14159265358979323846
+
+/* From so many degrees round the z axis, 10 units away. */
+static trip_navigation around(double degrees)
+{
+    const triptych_camera camera = { .eye = { 3 + 10 * cos(degrees * PI / 180),
+                                              4 + 10 * sin(degrees * PI / 180), 5 },
+                                     .look = { 3, 4, 5 },
+                                     .up = { 0, 0, 1 },
+                                     .fov_degrees = 30 };
+    return trip_navigation_from_camera(&camera, NULL);
+}
+
+static void add(trip_camera_path *p, double seconds, trip_navigation n, const char *text)
+{
+    assert_int_equal(trip_camera_path_add(p, seconds, &n, text), 0);
+}
+
+static void assert_eye(const trip_navigation *n, double x, double y, double z)
+{
+    assert_close(n->eye[0], x, 1e-12);
+    assert_close(n->eye[1], y, 1e-12);
+    assert_close(n->eye[2], z, 1e-12);
+}
+
+static void keys_are_their_views_to_the_last_bit(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    for (int i = 0; i < 5; i++) {
+        trip_navigation n = around(77 * i);
+        n.eye[2] += i * i / 3.0;
+        n.fov_degrees = 20 + 7.1 * i;
+        add(&p, i * 0.7, n, NULL);
+    }
+    for (int i = 0; i < 5; i++) {
+        trip_navigation n = trip_camera_path_view(&p, p.keys[i].seconds);
+        assert_memory_equal(&n, &p.keys[i].camera, sizeof n);
+    }
+    trip_navigation before = trip_camera_path_view(&p, -1), after = trip_camera_path_view(&p, 9);
+    assert_memory_equal(&before, &p.keys[0].camera, sizeof before);
+    assert_memory_equal(&after, &p.keys[4].camera, sizeof after);
+    trip_camera_path_release(&p);
+}
+
+/* Keys on a circle at equal speed: the path is the circle, at that speed, whatever the steps. */
+static void a_turn_about_an_axis_has_constant_speed(void **state)
+{
+    (void)state;
+    static const double steps[] = { 0, 1, 2.5, 3, 5.5 };
+    trip_camera_path p = { 0 };
+    for (int i = 0; i < 5; i++)
+        add(&p, steps[i], around(60 * steps[i]), NULL);
+    for (double s = 0; s <= 5.5; s += 0.1) {
+        trip_navigation n = trip_camera_path_view(&p, s);
+        trip_navigation expected = around(60 * s);
+        assert_eye(&n, expected.eye[0], expected.eye[1], 5);
+        assert_close(n.look[0], 3, 1e-14);
+        assert_close(n.up[2], 1, 1e-12);
+        assert_close(n.fov_degrees, 30, 1e-12);
+    }
+    trip_camera_path_release(&p);
+}
+
+static void a_flight_straight_on_is_straight(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    for (int i = 0; i < 4; i++) {
+        trip_navigation n = around(0);
+        trip_navigation_fly(&n, 3 * i, 2 * i, -i);
+        add(&p, 2 * i, n, NULL);
+    }
+    for (double s = 0; s <= 6; s += 0.25) {
+        trip_navigation n = trip_camera_path_view(&p, s), expected = around(0);
+        trip_navigation_fly(&expected, 1.5 * s, s, -s / 2);
+        assert_eye(&n, expected.eye[0], expected.eye[1], expected.eye[2]);
+    }
+    trip_camera_path_release(&p);
+}
+
+/* Going nearer by equal factors: the distance falls exponentially. */
+static void distances_go_by_factors(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    for (int i = 0; i < 4; i++) {
+        trip_navigation n = around(40);
+        trip_navigation_dolly(&n, pow(0.5, i), n.look);
+        n.ortho_height = 8 * pow(0.5, i);
+        add(&p, i, n, NULL);
+    }
+    for (double s = 0; s <= 3; s += 0.2) {
+        trip_navigation n = trip_camera_path_view(&p, s);
+        assert_close(trip_navigation_distance(&n), 10 * pow(0.5, s), 1e-12);
+        assert_close(n.ortho_height, 8 * pow(0.5, s), 1e-12);
+    }
+    trip_camera_path_release(&p);
+}
+
+/* The derivatives of both sides of a key agree: there is no jerk. */
+static void the_eye_passes_keys_smoothly(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    for (int i = 0; i < 6; i++) {
+        trip_navigation n = around(50 * i + 20 * (i % 2));
+        n.look[2] += i % 3;
+        n.eye[0] += sin(i);
+        add(&p, i + 0.3 * (i % 2), n, NULL);
+    }
+    const double h = 1e-5;
+    for (int i = 1; i < 5; i++) {
+        double at = p.keys[i].seconds;
+        trip_navigation a = trip_camera_path_view(&p, at - h), b = p.keys[i].camera;
+        trip_navigation c = trip_camera_path_view(&p, at + h);
+        for (int k = 0; k < 3; k++)
+            assert_close((b.look[k] - a.look[k]) / h, (c.look[k] - b.look[k]) / h, 2e-3);
+    }
+    trip_camera_path_release(&p);
+}
+
+/* Any turn between two keys, half a turn included, begins and ends at them. */
+static void turns_end_at_their_keys(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 300; i++) {
+        trip_camera_path p = { 0 };
+        trip_navigation n[2];
+        for (int k = 0; k < 2; k++) {
+            n[k] = around(i == 0 ? 180 * k : 360 * test_random());
+            if (i > 0)
+                trip_navigation_orbit(&n[k], 0, 360 * test_random());
+            if (i > 0)
+                trip_navigation_roll(&n[k], 360 * test_random());
+            add(&p, k, n[k], NULL);
+        }
+        trip_navigation end = trip_camera_path_view(&p, 1 - 1e-12);
+        trip_navigation_axes got = trip_navigation_get_axes(&end);
+        trip_navigation_axes expected = trip_navigation_get_axes(&n[1]);
+        for (int k = 0; k < 3; k++) {
+            assert_close(got.right[k], expected.right[k], 1e-9);
+            assert_close(got.up[k], expected.up[k], 1e-9);
+        }
+        trip_camera_path_release(&p);
+    }
+}
+
+static void frames_divide_the_time_equally(void **state)
+{
+    (void)state;
+    trip_camera_path p = { .frames_per_second = 10 };
+    assert_int_equal(trip_camera_path_frames(&p), 0);
+    add(&p, 1, around(0), NULL);
+    assert_int_equal(trip_camera_path_frames(&p), 1);
+    assert_close(trip_camera_path_seconds(&p, 0), 1, 0);
+    add(&p, 3, around(20), NULL);
+    assert_int_equal(trip_camera_path_frames(&p), 21);
+    assert_close(trip_camera_path_seconds(&p, 5), 1.5, 1e-15);
+    assert_true(trip_camera_path_seconds(&p, 20) == 3);
+    p.frames_per_second = 0;
+    assert_int_equal(trip_camera_path_frames(&p), 61);
+    test_catch_reports();
+    trip_navigation n = around(0);
+    assert_int_equal(trip_camera_path_add(&p, 3, &n, NULL), TRIP_USAGE);
+    assert_one_report("not later");
+    trip_camera_path_release(&p);
+}
+
+static void functions_go_over_between_keys_that_have_others(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    static const char *const texts[] = { NULL, "a", NULL, "b", NULL };
+    for (int i = 0; i < 5; i++)
+        add(&p, i, around(i), texts[i]);
+    static const struct {
+        double seconds;
+        int from, to;
+        double t;
+    } mixes[] = { { 0, -1, -1, 0 },     { 0.25, -1, 1, 0.25 }, { 1, 1, 1, 0 },   { 1.5, 1, 1, 0 },
+                  { 2.75, 1, 3, 0.75 }, { 3, 3, 3, 0 },        { 3.5, 3, 3, 0 }, { 9, 3, 3, 0 } };
+    for (size_t i = 0; i < sizeof mixes / sizeof *mixes; i++) {
+        trip_path_mix mix = trip_camera_path_mix(&p, mixes[i].seconds);
+        assert_int_equal(mix.from, mixes[i].from);
+        assert_int_equal(mix.to, mixes[i].to);
+        assert_close(mix.t, mixes[i].t, 1e-15);
+    }
+    trip_camera_path_release(&p);
+}
+
+static void a_path_is_read_as_it_was_written(void **state)
+{
+    (void)state;
+    trip_camera_path p = { .frames_per_second = 24 }, q = { 0 };
+    for (int i = 0; i < 20; i++) {
+        trip_navigation n = around(360 * test_random());
+        trip_navigation_orbit(&n, 0, 100 * test_random());
+        memset(n.upright, 0, sizeof n.upright);
+        add(&p, i / 3.0, n, i % 4 == 1 ? "0 0 0 0 0\n" : NULL);
+    }
+    p.keys[2].function = strdup("bone");
+    assert_int_equal(trip_camera_path_save(&p, "path.json"), 0);
+    assert_int_equal(trip_camera_path_load(&q, "path.json"), 0);
+    unlink("path.json");
+    assert_int_equal(q.count, 20);
+    assert_true(q.frames_per_second == 24);
+    for (int i = 0; i < 20; i++) {
+        assert_memory_equal(&q.keys[i].camera, &p.keys[i].camera, sizeof p.keys[i].camera);
+        assert_true(q.keys[i].seconds == p.keys[i].seconds);
+        assert_int_equal(q.keys[i].text != NULL, i % 4 == 1);
+    }
+    assert_string_equal(q.keys[2].function, "bone");
+    trip_camera_path_release(&p);
+    trip_camera_path_release(&q);
+}
+
+#define KEY(seconds, more)                                                                         \
+    "{\"seconds\": " seconds ", \"eye\": [0,0,1], \"look\": [0,0,0], \"up\": [0,1,0], " more "}"
+#define PATH(keys) "{\"triptych_path\": 1, \"keys\": [" keys "]}"
+
+static void assert_refused(const char *text, const char *why)
+{
+    trip_camera_path p = { 0 };
+    test_catch_reports();
+    if (trip_camera_path_parse(&p, "flight.json", text) != TRIP_ERROR)
+        fail_msg("taken: %s", text);
+    assert_one_report(why);
+    assert_null(p.keys);
+}
+
+static void what_is_no_path_is_refused_by_its_key(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    assert_int_equal(trip_camera_path_parse(&p, "f", PATH(KEY("0", "\"fov\": 30"))), 0);
+    trip_camera_path_release(&p);
+    assert_refused("", "is not a path");
+    assert_refused("[]", "is not a path");
+    assert_refused("{\"triptych_path\": 2}", "is of version 2");
+    assert_refused("{\"triptych_path\": 1}", "has not 1 to");
+    assert_refused(PATH(""), "has not 1 to");
+    assert_refused(PATH("3"), "key 1: is not an object");
+    assert_refused(PATH(KEY("\"0\"", "\"fov\": 30")), "key 1: \"seconds\" is not a time");
+    assert_refused(PATH(KEY("1e999", "\"fov\": 30")), "key 1: \"seconds\" is not a time");
+    assert_refused(PATH(KEY("0", "\"fov\": 180")), "\"fov\" is not an angle");
+    assert_refused(PATH(KEY("0", "\"ortho\": 0")), "\"ortho\" is not a height");
+    assert_refused(PATH(KEY("0", "\"x\": 0")), "either \"fov\" or \"ortho\"");
+    assert_refused(PATH(KEY("0", "\"fov\": 3, \"ortho\": 3")), "either \"fov\" or \"ortho\"");
+    assert_refused(PATH(KEY("0", "\"fov\": 3") "," KEY("0", "\"fov\": 3")), "key 2: is not later");
+    assert_refused(PATH(KEY("0", "\"fov\": 3") "," KEY("1", "\"ortho\": 3")), "all parallel");
+    assert_refused(PATH(KEY("0", "\"fov\": 3, \"function\": 4")), "are texts");
+    assert_refused(PATH(KEY("0", "\"fov\": 3, \"function\": \"a\", \"function_text\": \"b\"")),
+                   "exclude one another");
+    assert_refused(PATH("{\"seconds\": 0, \"eye\": [0,0], \"fov\": 3}"), "three numbers");
+    assert_refused(PATH("{\"seconds\": 0, \"eye\": [0,0,1], \"look\": [0,0,1], \"up\": [0,1,0], "
+                        "\"fov\": 3}"),
+                   "is no view");
+    assert_refused(PATH("{\"seconds\": 0, \"eye\": [0,0,1], \"look\": [0,0,0], \"up\": [0,0,7], "
+                        "\"fov\": 3}"),
+                   "is no view");
+    assert_refused(PATH(KEY("0", "\"fov\": 3") "," KEY("100000", "\"fov\": 3")), "frames long");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(keys_are_their_views_to_the_last_bit),
+        cmocka_unit_test(a_turn_about_an_axis_has_constant_speed),
+        cmocka_unit_test(a_flight_straight_on_is_straight),
+        cmocka_unit_test(distances_go_by_factors),
+        cmocka_unit_test(the_eye_passes_keys_smoothly),
+        cmocka_unit_test(turns_end_at_their_keys),
+        cmocka_unit_test(frames_divide_the_time_equally),
+        cmocka_unit_test(functions_go_over_between_keys_that_have_others),
+        cmocka_unit_test(a_path_is_read_as_it_was_written),
+        cmocka_unit_test(what_is_no_path_is_refused_by_its_key),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,220 @@
+/* Paths of the camera as JSON, and its files. */
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "camera_path.h"
+#include "exact_json.h"
+#include "input_file.h"
+#include "json.h"
+#include "new_file.h"
+#include "report.h"
+
+enum { MOST_BYTES = 64 << 20, VERSION = 1 };
+
+#define FAR 1e300
+#define MOST_SECONDS 1e6
+#define MOST_FPS 1000
+#define MOST_HEIGHT 1e100
+
+/* ---- to text ---- */
+
+static void add_key(cJSON *keys, const trip_path_key *k)
+{
+    cJSON *key = cJSON_CreateObject();
+    const trip_navigation *n = &k->camera;
+    bool parallel = n->ortho_height > 0;
+    cJSON_AddItemToArray(keys, key);
+    cJSON_AddItemToObject(key, "seconds", trip_exact_number(k->seconds));
+    cJSON_AddItemToObject(key, "eye", trip_exact_numbers(n->eye, 3));
+    cJSON_AddItemToObject(key, "look", trip_exact_numbers(n->look, 3));
+    cJSON_AddItemToObject(key, "up", trip_exact_numbers(n->up, 3));
+    cJSON_AddItemToObject(key, parallel ? "ortho" : "fov",
+                          trip_exact_number(parallel ? n->ortho_height : n->fov_degrees));
+    if (k->text)
+        cJSON_AddStringToObject(key, "function_text", k->text);
+    else if (k->function)
+        cJSON_AddStringToObject(key, "function", k->function);
+}
+
+char *trip_camera_path_print(const trip_camera_path *p)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddItemToObject(root, "triptych_path", trip_exact_number(VERSION));
+    if (p->frames_per_second > 0)
+        cJSON_AddItemToObject(root, "frames_per_second", trip_exact_number(p->frames_per_second));
+    cJSON *keys = cJSON_AddArrayToObject(root, "keys");
+    for (size_t i = 0; keys && i < p->count; i++)
+        add_key(keys, &p->keys[i]);
+    char *text = root ? trip_json_print(root, true) : NULL;
+    cJSON_Delete(root);
+    return text;
+}
+
+static int write_all(int fd, const char *text, const char *path)
+{
+    for (size_t left = strlen(text); left > 0;) {
+        ssize_t written = write(fd, text, left);
+        if (written < 0 && errno != EINTR)
+            return trip_fail_errno("write", path, NULL);
+        text += written > 0 ? written : 0;
+        left -= written > 0 ? (size_t)written : 0;
+    }
+    return 0;
+}
+
+int trip_camera_path_save(const trip_camera_path *p, const char *path)
+{
+    trip_new_file file;
+    char *text = trip_camera_path_print(p);
+    int status = text ? trip_new_file_begin(&file, "write", path)
+                      : trip_fail(TRIP_ERROR, "write", path, "out of memory");
+    if (!status) {
+        status = write_all(file.fd, text, path);
+        if (!status)
+            status = trip_new_file_finish(&file);
+        else
+            trip_new_file_abandon(&file);
+    }
+    free(text);
+    return status;
+}
+
+/* ---- from text ---- */
+
+static int fail_at(const char *name, size_t key, const char *why)
+{
+    return trip_fail(TRIP_ERROR, "path", name, "key %zu: %s", key + 1, why);
+}
+
+static const cJSON *item_of(const cJSON *object, const char *key)
+{
+    return cJSON_GetObjectItemCaseSensitive(object, key);
+}
+
+/* What is wrong with a key's view, or NULL. */
+static const char *read_camera(trip_navigation *n, const cJSON *key)
+{
+    const cJSON *fov = item_of(key, "fov"), *ortho = item_of(key, "ortho");
+    if (!trip_exact_read_numbers(item_of(key, "eye"), 3, -FAR, FAR, n->eye) ||
+        !trip_exact_read_numbers(item_of(key, "look"), 3, -FAR, FAR, n->look) ||
+        !trip_exact_read_numbers(item_of(key, "up"), 3, -FAR, FAR, n->up))
+        return "\"eye\", \"look\" and \"up\" are three numbers each";
+    if (!fov == !ortho)
+        return "has either \"fov\" or \"ortho\"";
+    if (fov &&
+        !trip_exact_read(fov, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES, &n->fov_degrees))
+        return "\"fov\" is not an angle from 1e-6 to 179.999 degrees";
+    if (ortho && !trip_exact_read(ortho, 1 / MOST_HEIGHT, MOST_HEIGHT, &n->ortho_height))
+        return "\"ortho\" is not a height above 0";
+    trip_navigation_axes axes = trip_navigation_get_axes(n);
+    double length = hypot(hypot(axes.up[0], axes.up[1]), axes.up[2]);
+    return fabs(length - 1) < 1e-6 ? NULL
+                                   : "is no view: where to look, or what is up, is not clear";
+}
+
+static const char *read_function(trip_path_key *k, const cJSON *key)
+{
+    const cJSON *function = item_of(key, "function"), *text = item_of(key, "function_text");
+    if ((function && !cJSON_IsString(function)) || (text && !cJSON_IsString(text)) ||
+        (function && text))
+        return "\"function\" and \"function_text\" are texts, and exclude one another";
+    k->function = function ? strdup(function->valuestring) : NULL;
+    k->text = text ? strdup(text->valuestring) : NULL;
+    return (function && !k->function) || (text && !k->text) ? "out of memory" : NULL;
+}
+
+static const char *read_key(trip_camera_path *p, const cJSON *key)
+{
+    trip_path_key *k = &p->keys[p->count];
+    *k = (trip_path_key){ 0 };
+    const trip_path_key *before = p->count ? k - 1 : NULL;
+    if (!cJSON_IsObject(key))
+        return "is not an object";
+    if (!trip_exact_read(item_of(key, "seconds"), -MOST_SECONDS, MOST_SECONDS, &k->seconds))
+        return "\"seconds\" is not a time";
+    if (before && !(k->seconds > before->seconds))
+        return "is not later than the key before";
+    const char *fault = read_camera(&k->camera, key);
+    if (fault)
+        return fault;
+    if (before && (before->camera.ortho_height > 0) != (k->camera.ortho_height > 0))
+        return "keys are all parallel (\"ortho\") or all in perspective (\"fov\")";
+    fault = read_function(k, key);
+    p->count++; /* its texts are the path's from here on */
+    return fault;
+}
+
+static int read_keys(trip_camera_path *p, const cJSON *keys, const char *name)
+{
+    int count = cJSON_IsArray(keys) ? cJSON_GetArraySize(keys) : 0;
+    if (count < 1 || count > TRIP_CAMERA_PATH_KEYS)
+        return trip_fail(TRIP_ERROR, "path", name, "has not 1 to %d \"keys\"",
+                         TRIP_CAMERA_PATH_KEYS);
+    p->keys = calloc((size_t)count, sizeof *p->keys);
+    if (!p->keys)
+        return trip_fail(TRIP_ERROR, "path", name, "out of memory");
+    const cJSON *key;
+    cJSON_ArrayForEach(key, keys)
+    {
+        size_t number = p->count;
+        const char *fault = read_key(p, key);
+        if (fault)
+            return fail_at(name, number, fault);
+    }
+    return 0;
+}
+
+static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
+{
+    const cJSON *fps = item_of(root, "frames_per_second");
+    double version;
+    if (!cJSON_IsObject(root) || !trip_exact_read(item_of(root, "triptych_path"), 0, FAR, &version))
+        return trip_fail(TRIP_ERROR, "path", name, "is not a path: there is no \"triptych_path\"");
+    if (version != VERSION)
+        return trip_fail(TRIP_ERROR, "path", name, "is of version %g; %d can be read", version,
+                         VERSION);
+    if (fps && !trip_exact_read(fps, 1e-3, MOST_FPS, &p->frames_per_second))
+        return trip_fail(TRIP_ERROR, "path", name, "\"frames_per_second\" is not from 0.001 to %d",
+                         MOST_FPS);
+    int status = read_keys(p, item_of(root, "keys"), name);
+    if (!status && trip_camera_path_frames(p) == TRIP_CAMERA_PATH_FRAMES)
+        return trip_fail(TRIP_ERROR, "path", name, "is %d frames long, or longer",
+                         TRIP_CAMERA_PATH_FRAMES);
+    return status;
+}
+
+int trip_camera_path_parse(trip_camera_path *p, const char *name, const char *text)
+{
+    trip_json json;
+    int status = trip_json_parse(&json, text, name, NULL);
+    if (!status)
+        status = read_root(p, json.root, name);
+    trip_json_free(&json);
+    if (status)
+        trip_camera_path_release(p);
+    return status;
+}
+
+int trip_camera_path_load(trip_camera_path *p, const char *path)
+{
+    int fd = trip_input_open(path);
+    char *text = fd < 0 ? NULL : malloc(MOST_BYTES + 1);
+    ssize_t bytes = text ? trip_input_read(fd, text, MOST_BYTES + 1) : -1;
+    int status = 0;
+    if (bytes < 0)
+        status = trip_fail_errno("path", path, "cannot read");
+    else if (bytes > MOST_BYTES)
+        status = trip_fail(TRIP_ERROR, "path", path, "is longer than %d MiB", MOST_BYTES >> 20);
+    else
+        text[bytes] = 0;
+    if (fd >= 0)
+        close(fd);
+    if (!status)
+        status = trip_camera_path_parse(p, path, text);
+    free(text);
+    return status;
+}
