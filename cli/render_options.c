@@ -43,6 +43,7 @@ enum {
     KEY_TARGET,
     KEY_RENDERER,
     KEY_CLASSIFY,
+    KEY_COMPOSITING,
     KEY_SLICES,
     KEY_METHOD,
     KEY_SUBMIT,
@@ -106,6 +107,11 @@ static const struct argp_option options[] = {
       "pre: voxels are classified and drawn as splats; post: values are interpolated in sheets and "
       "classified at each pixel, closer to the integral (default: pre)",
       3 },
+    { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
+      "splat: each splat goes over those behind it, as in the papers; sheet: the splats of a sheet "
+      "are summed and go over those behind together, so that a mirrored volume gives the mirrored "
+      "picture (default: splat); pre only",
+      3 },
     { "slices", KEY_SLICES, "N", 0, "Slices of a sheet, 1 to 16 (default: 2); post only", 3 },
     { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
     { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
@@ -165,7 +171,7 @@ typedef struct parse {
     render_options *o;
     bool h, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
-    bool slices;
+    bool slices, compositing;
     bool kernel, integral; /* options of the integral renderer */
 } parse;
 
@@ -338,6 +344,7 @@ static int parse_view(int key, char *arg, parse *p)
 static int parse_method(int key, char *arg, parse *p)
 {
     static const char *const classifications[] = { "pre", "post", NULL };
+    static const char *const compositings[] = { "splat", "sheet", NULL };
     static const char *const methods[] = { "merge", "clip", "axis", NULL };
     static const char *const traversals[] = { "outward", "ascending", NULL };
     triptych_settings *s = &p->o->settings;
@@ -346,6 +353,11 @@ static int parse_method(int key, char *arg, parse *p)
     case KEY_CLASSIFY:
         status = trip_option_choice("--classify", arg, classifications, &which);
         s->classify = (triptych_classify)which;
+        return status;
+    case KEY_COMPOSITING:
+        p->compositing = true;
+        status = trip_option_choice("--compositing", arg, compositings, &which);
+        s->compositing = (triptych_compositing)which;
         return status;
     case KEY_SLICES:
         p->slices = true;
@@ -505,8 +517,8 @@ static int check_integral(parse *p)
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");
-    if (integral && (p->h || p->order))
-        return trip_option_fail("--method, --h, --traversal",
+    if (integral && (p->h || p->order || p->compositing))
+        return trip_option_fail("--method, --h, --traversal, --compositing",
                                 "do not apply to --renderer integral, which has no layers");
     if (integral && p->kernel_radius && o->field != RENDER_FIELD_SPLATS)
         return trip_option_fail("--kernel-radius", "applies to splats: give --field splats");
@@ -522,8 +534,9 @@ static int check_classify(const parse *p)
         return trip_option_fail("--classify", "does not apply to --renderer integral");
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
         return trip_option_fail("--traversal", "is outward with --classify post");
-    if (p->kernel_radius)
-        return trip_option_fail("--kernel-radius", "applies to splats: give --classify pre");
+    if (p->kernel_radius || p->compositing)
+        return trip_option_fail("--kernel-radius, --compositing",
+                                "apply to splats: give --classify pre");
     if (o->count)
         return trip_option_fail("--count", "counts splats: give --classify pre");
     if (p->target || p->lists || p->forms)

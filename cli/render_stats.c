@@ -202,6 +202,9 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
                             o->settings.classify == TRIPTYCH_POST ? "post" : "pre");
     if (o->settings.classify == TRIPTYCH_POST)
         cJSON_AddNumberToObject(root, "slices", o->settings.slices);
+    else
+        cJSON_AddStringToObject(root, "compositing",
+                                o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);

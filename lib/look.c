@@ -50,6 +50,7 @@ triptych_settings triptych_default_settings(void)
     const trip_settings s = trip_settings_default();
     return (triptych_settings){
         .classify = (triptych_classify)s.classify,
+        .compositing = (triptych_compositing)s.compositing,
         .slices = s.slices,
         .method = (triptych_method)s.method,
         .traversal = (triptych_traversal)s.traversal,
@@ -89,6 +90,8 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "there is no such method, traversal or target";
     if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_POST)
         return "there is no such classification";
+    if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
+        return "there is no such compositing";
     if (!(s->slices >= 1 && s->slices <= TRIP_SLICES_MAX))
         return "a sheet has 1 to 16 slices";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
@@ -133,6 +136,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         warn_of_ripple(s->kernel_radius);
     t->settings = (trip_settings){
         .classify = (trip_classify)s->classify,
+        .compositing = (trip_compositing)s->compositing,
         .slices = s->slices,
         .method = (trip_method)s->method,
         .traversal = (trip_traversal)s->traversal,

@@ -218,8 +218,15 @@ typedef enum triptych_classify {
     TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
 } triptych_classify;
 
+/* What of splats (pre) is composited. */
+typedef enum triptych_compositing {
+    TRIPTYCH_BY_SPLAT, /* each, in list order */
+    TRIPTYCH_BY_SHEET, /* the sum of those of each sheet, whose order does not matter then */
+} triptych_compositing;
+
 typedef struct triptych_settings {
     triptych_classify classify;
+    triptych_compositing compositing; /* pre */
     int slices; /* of a sheet, post: 1 to 16; more come closer to the integral */
     triptych_method method;
     triptych_traversal traversal;
@@ -242,8 +249,8 @@ typedef struct triptych_settings {
                   too */
 } triptych_settings;
 
-/* Pre, 2 slices, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black;
- * values, linear, 1e-4, one ray a pixel. */
+/* Pre, by splat, 2 slices, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight,
+ * black; values, linear, 1e-4, one ray a pixel. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 

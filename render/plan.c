@@ -381,6 +381,9 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     if (s->classify == TRIP_CLASSIFY_POST)
         fprintf(out, "classify    post: values are interpolated in %d slice%s a sheet\n", s->slices,
                 s->slices == 1 ? "" : "s");
+    if (trip_settings_sum_sheets(s))
+        fprintf(out,
+                "compositing sheet: the splats of a sheet are summed, and composited as one\n");
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out, "method      merge: layers of up to three lists, blended by w^2 with h = %g\n",

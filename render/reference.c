@@ -3,6 +3,7 @@
  * interpolation the layers are reference_sheets.c's. Slow, and meant to be read. */
 #include "renderer.h"
 
+#include <limits.h>
 #include <string.h>
 
 #include "layer.h"
@@ -17,6 +18,8 @@
 /* One pixel of splats: the layer being drawn, and the sum over the layers before it. */
 typedef struct pixel {
     double layer[TRIP_CHANNELS_MAX]; /* over-composite; depths are distances here */
+    double sheet[TRIP_CHANNELS_MAX]; /* of the open sheet: sums of optical depth times the channels,
+                                        where splats are summed */
     double weight;                   /* of the layer at this pixel */
     double stretch;    /* world units per index length of the list at hand, along the ray */
     double ray_length; /* |J r(p)| of it */
@@ -37,6 +40,10 @@ typedef struct reference {
     size_t pixels_bytes;
     trip_reference_sheets *sheets; /* of frames that classify after interpolation; else NULL */
     int axis;                      /* of the layer being drawn; -1 before the first */
+    bool sums;                     /* splats, sheet by sheet */
+    int64_t sheet;                 /* that is open, of `list` */
+    trip_pixels rows;              /* that it may have touched */
+    bool front_to_back;            /* of the splats last drawn */
     bool broken;                   /* some splat's numbers are not finite */
     trip_list_stats *stats;        /* by the data set's lists: room for */
     unsigned stats_room;
@@ -93,6 +100,8 @@ static int take_stats(reference *r, unsigned lists)
     return 0;
 }
 
+static const trip_pixels no_rows = { INT_MAX, -1 };
+
 static pixel *row_of(const reference *r, int y)
 {
     return &r->pixels[(size_t)y * (size_t)r->frame->camera->width];
@@ -122,12 +131,56 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                            header->gradient_step);
     r->axis = -1;
     r->broken = false;
+    r->sums = trip_settings_sum_sheets(frame->settings);
+    r->rows = no_rows;
     int status = take_stats(r, frame->data->list_count);
     if (status)
         return status;
     if (frame->settings->classify == TRIP_CLASSIFY_POST)
         return trip_reference_sheets_create(&r->sheets, frame, r->budget);
     return clear_pixels(r);
+}
+
+/* Puts a fragment behind what is there (front to back) or over it. */
+static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
+                      const double fragment[TRIP_CHANNELS_MAX], double alpha, bool front_to_back)
+{
+    double keep = 1 - alpha, add = alpha;
+    if (front_to_back) {
+        double through = 1 - layer[TRIP_CHANNEL_ALPHA];
+        keep = 1;
+        add = alpha * through;
+        if (through < TRIP_SATURATION)
+            return;
+    }
+    for (unsigned c = 0; c < r->channels; c++)
+        layer[c] = layer[c] * keep + fragment[c] * add;
+}
+
+/* The open sheet's sums at a pixel into the layer. */
+static void composite_sheet(const reference *r, const double sheet[TRIP_CHANNELS_MAX],
+                            double layer[TRIP_CHANNELS_MAX])
+{
+    double depth = sheet[TRIP_CHANNEL_ALPHA], mean[TRIP_CHANNELS_MAX];
+    if (!(depth > 0))
+        return;
+    for (unsigned c = 0; c < r->channels; c++)
+        mean[c] = sheet[c] / depth;
+    composite(r, layer, mean, -expm1(-depth), r->front_to_back);
+}
+
+static void end_sheet(reference *r)
+{
+    if (!r->sums)
+        return;
+    for (int y = r->rows.first; y <= r->rows.last; y++) {
+        pixel *row = row_of(r, y);
+        for (int x = 0; x < r->frame->camera->width; x++) {
+            composite_sheet(r, row[x].sheet, row[x].layer);
+            memset(row[x].sheet, 0, sizeof row[x].sheet);
+        }
+    }
+    r->rows = no_rows;
 }
 
 /* Adds a layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. */
@@ -144,6 +197,7 @@ static int fold_layer(reference *r)
     int status = 0;
     if (r->axis < 0)
         return 0;
+    end_sheet(r);
     for (int y = 0; y < camera->height && !status; y++) {
         pixel *row = row_of(r, y);
         for (int x = 0; x < camera->width; x++)
@@ -181,6 +235,7 @@ static int use_list(reference *r, const trip_list *of)
     int status = 0;
     if (list == r->list)
         return 0;
+    end_sheet(r);
     r->list = list;
     r->number = of->index;
     r->constants = trip_splat_frame_make(&list->camera, r->frame->settings);
@@ -195,30 +250,26 @@ static int use_list(reference *r, const trip_list *of)
     return status;
 }
 
-/* Puts a fragment behind what is there (front to back) or over it. */
-static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
-                      const double fragment[TRIP_CHANNELS_MAX], double alpha, bool front_to_back)
+/* A splat's fragment of an optical depth: composited, or added to its sheet. */
+static void put_fragment(const reference *r, pixel *p, const double fragment[TRIP_CHANNELS_MAX],
+                         double depth)
 {
-    double keep = 1 - alpha, add = alpha;
-    if (front_to_back) {
-        double through = 1 - layer[TRIP_CHANNEL_ALPHA];
-        keep = 1;
-        add = alpha * through;
-        if (through < TRIP_SATURATION)
-            return;
-    }
-    for (unsigned c = 0; c < r->channels; c++)
-        layer[c] = layer[c] * keep + fragment[c] * add;
+    if (!r->sums)
+        composite(r, p->layer, fragment, -expm1(-depth), r->front_to_back);
+    for (unsigned c = 0; c < r->channels && r->sums; c++)
+        p->sheet[c] += depth * fragment[c];
 }
 
 /* True when some pixel centre is in the support where the layer has weight. */
 static bool draw_footprint(reference *r, const trip_splat *s, double fragment[TRIP_CHANNELS_MAX],
-                           double extinction, bool front_to_back)
+                           double extinction)
 {
     const trip_camera *camera = r->frame->camera;
     trip_pixels columns = trip_pixels_within(s->x0, s->x1, camera->width);
     trip_pixels rows = trip_pixels_within(s->y0, s->y1, camera->height);
     bool touched = false;
+    r->rows.first = rows.first < r->rows.first ? rows.first : r->rows.first;
+    r->rows.last = rows.last > r->rows.last ? rows.last : r->rows.last;
     for (int y = rows.first; y <= rows.last && !trip_interrupted(); y++) {
         for (int x = columns.first; x <= columns.last; x++) {
             pixel *p = &row_of(r, y)[x];
@@ -228,9 +279,8 @@ static bool draw_footprint(reference *r, const trip_splat *s, double fragment[TR
             touched = true;
             double front = trip_splat_front(&r->constants, s, x + 0.5, y + 0.5);
             double footprint = front * s->amplitude * (exp(-m / 2) - r->constants.edge);
-            double alpha = -expm1(-extinction * p->stretch * footprint);
             fragment[TRIP_CHANNEL_DEPTH] = fmax(0, s->z) * p->ray_length;
-            composite(r, p->layer, fragment, alpha, front_to_back);
+            put_fragment(r, p, fragment, extinction * p->stretch * footprint);
         }
     }
     return touched;
@@ -264,8 +314,7 @@ static bool may_reach(const reference *r, trip_vec3 voxel, double radius)
                                  from_eye, radius * trip_list_grid_growth(grid));
 }
 
-static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal,
-                       bool front_to_back)
+static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal)
 {
     const trip_frame *frame = r->frame;
     trip_list_stats *stats = &r->stats[r->number];
@@ -280,7 +329,7 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     const trip_tf_entry *entry = &frame->table[trip_voxel_code(record)];
     double fragment[TRIP_CHANNELS_MAX] = { [TRIP_CHANNEL_ALPHA] = 1 };
     colour(r, voxel, entry, normal, fragment);
-    stats->splats_drawn += draw_footprint(r, &s, fragment, entry->extinction, front_to_back);
+    stats->splats_drawn += draw_footprint(r, &s, fragment, entry->extinction);
 }
 
 /* Index position of a record: sheet along the list's axis, u and v along the next two. */
@@ -293,8 +342,11 @@ static trip_vec3 voxel_position(int axis, const trip_run *run, uint32_t record)
     return trip_v3(p[0], p[1], p[2]);
 }
 
-static void draw_run(reference *r, const trip_batch *batch, const trip_run *run, bool front_to_back)
+static void draw_run(reference *r, const trip_batch *batch, const trip_run *run)
 {
+    if (run->sheet != r->sheet)
+        end_sheet(r);
+    r->sheet = run->sheet;
     const trip_block block = trip_block_of(batch, run);
     trip_block_voxels(&block, 0, run->count, r->voxels);
     if (block.normals)
@@ -302,7 +354,7 @@ static void draw_run(reference *r, const trip_batch *batch, const trip_run *run,
     for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
         uint32_t at = batch->pass->descending ? run->count - 1 - k : k;
         draw_splat(r, voxel_position(r->axis, run, r->voxels[at]), r->voxels[at],
-                   block.normals ? &r->normals[at] : NULL, front_to_back);
+                   block.normals ? &r->normals[at] : NULL);
     }
 }
 
@@ -322,12 +374,15 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     reference *r = (reference *)base;
     if (r->sheets)
         return put_batch(r, batch);
+    if (front_to_back != r->front_to_back)
+        end_sheet(r);
+    r->front_to_back = front_to_back;
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         int status = use_list(r, trip_batch_list(batch, run));
         if (status)
             return status;
-        draw_run(r, batch, run, front_to_back);
+        draw_run(r, batch, run);
     }
     return r->broken ? trip_splat_fail() : trip_frame_poll();
 }
@@ -380,8 +435,11 @@ static void merge_sheets(const reference *r, int x, int y, double merged[TRIP_CH
 static void merge_splats(const reference *r, int x, int y, double merged[TRIP_CHANNELS_MAX])
 {
     const pixel *p = &row_of(r, y)[x];
+    double layer[TRIP_CHANNELS_MAX];
+    memcpy(layer, p->layer, sizeof layer);
+    composite_sheet(r, p->sheet, layer);
     memcpy(merged, p->merged, sizeof p->merged);
-    add_layer(r, p->layer, p->weight, merged);
+    add_layer(r, layer, p->weight, merged);
 }
 
 static int picture(trip_renderer *base, float *rgba, float *depth)

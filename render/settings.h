@@ -15,7 +15,8 @@
 /* Standard deviation of the low-pass Gaussian in pixels (the h of Zwicker et al. 2001, EWA volume
  * resampling filter), so that a splat never falls between pixel centres. */
 #define TRIP_LOW_PASS_PX 0.4
-/* Compositing front to back, a pixel whose transmittance is below this takes no more splats. */
+/* Compositing front to back, a pixel whose transmittance is below this takes no more splats, or
+ * sheets of splats. */
 #define TRIP_SATURATION (1.0 / 8192.0)
 
 typedef enum trip_method {
@@ -52,12 +53,19 @@ typedef enum trip_classify {
     TRIP_CLASSIFY_POST, /* values are interpolated in sheets, and classified at pixels (sheet.h) */
 } trip_classify;
 
+/* What of the splats of a list is composited (pre; splat.h). */
+typedef enum trip_compositing {
+    TRIP_COMPOSITING_SPLAT, /* each, in list order, as the papers do */
+    TRIP_COMPOSITING_SHEET, /* the sum of each sheet's */
+} trip_compositing;
+
 /* Slices of a sheet: the most that settings may have. */
 #define TRIP_SLICES_MAX 16
 
 typedef struct trip_settings {
     trip_classify classify;
-    int slices; /* of a sheet, post: 1 to TRIP_SLICES_MAX */
+    trip_compositing compositing; /* of splats */
+    int slices;                   /* of a sheet, post: 1 to TRIP_SLICES_MAX */
     trip_method method;
     trip_traversal traversal;
     trip_target target;
@@ -78,9 +86,15 @@ typedef struct trip_settings {
                            of other renderers are that much larger instead */
 } trip_settings;
 
-/* The defaults: pre, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by headlight,
- * rgba32f, no depth, black; values, linear, to 1e-4, one ray a pixel. */
+/* The defaults: pre, splat by splat, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by
+ * headlight, rgba32f, no depth, black; values, linear, to 1e-4, one ray a pixel. */
 trip_settings trip_settings_default(void);
+
+/* Whether splats are summed sheet by sheet. */
+static inline bool trip_settings_sum_sheets(const trip_settings *s)
+{
+    return s->classify == TRIP_CLASSIFY_PRE && s->compositing == TRIP_COMPOSITING_SHEET;
+}
 
 /* Fails (usage) for settings that exclude one another. */
 int trip_settings_check(const trip_settings *s);

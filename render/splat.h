@@ -24,7 +24,15 @@
  * amplitude gives back the mass that the cut-off takes). A ray covers
  * stretch(p) = |J r(p)| / |r(p)| world units per index length, J being the linear part of
  * index_to_world, so
- *     alpha(p) = 1 - exp(-tau * stretch(p) * footprint').
+ *     alpha(p) = 1 - exp(-depth(p)),  depth(p) = tau * stretch(p) * footprint'.
+ *
+ * Splats are composited by *over* one by one, in list order (settings.compositing: splat), or sheet
+ * by sheet (sheet), the splats i of one sheet of one list together as
+ *     depth(p) = sum of depth_i(p),  alpha(p) = 1 - exp(-depth(p)),
+ *     v(p) = sum of depth_i(p) v_i / depth(p)
+ * for each channel v of layer.h, so that their order within the sheet does not matter: a mirrored
+ * volume gives the mirrored picture. Sheets are composited in list order. Front to back, a pixel
+ * whose transmittance is below TRIP_SATURATION takes no more of what is composited.
  *
  * The support {m(p) <= TRIP_CUTOFF^2} is the inside of a conic. Writing k = TRIP_CUTOFF,
  *     E = S'^-1 - (k^2 / |r_c|^2) [rx.rx rx.ry; rx.ry ry.ry],  l = (k^2 / |r_c|^2) (r_c.rx, r_c.ry)

@@ -1,5 +1,6 @@
 // A splat's colour and opacity at a pixel. In: the footprint, flat. Out: premultiplied colour, for
-// blending in list order, and with DEPTH the distance likewise (render/layer.h). Mirrors
+// blending in list order, and with DEPTH the distance likewise (render/layer.h); with SUMS optical
+// depth in the place of opacity, to be added up. Mirrors
 // trip_splat_radius2() and the opacity in render/splat.h; beyond the cut-off nothing is added.
 #include "real.glsl"
 #include "opacity.glsl"
@@ -55,7 +56,11 @@ void main()
 #endif
 #endif
     float falloff = max(exp(-0.5 * m) - edge.x, 0.0);
+#ifdef SUMS
+    float alpha = min(colour.a, 1e25) * stretch * front * falloff; // sums stay within a float's range
+#else
     float alpha = opacity(colour.a * stretch * front * falloff);
+#endif
     fragment = vec4(colour.rgb * alpha, alpha);
 #ifdef DEPTH
     fragment_depth = vec4(centre_depth * alpha, 0.0, 0.0, alpha);

@@ -78,8 +78,13 @@ const float trip_cpu_thin[TRIP_CPU_TERMS][4] = {
     { 0.641818106f, -3.9144907f, 1.08012068f, 2.11197734f },
 };
 
-static void set_opacity(const trip_cpu_view *view, double depth, trip_cpu_splat *out)
+static void set_opacity(const trip_cpu_view *view, double depth, int sheet, trip_cpu_splat *out)
 {
+    if (view->sums) {
+        out->peak = (float)depth;
+        out->sheet = sheet;
+        return;
+    }
     bool thick = depth > (double)view->thin || out->tiles & TRIP_CPU_TILES_NEAR;
     if (thick)
         out->tiles |= 1u << TRIP_CPU_TILES_THICK_SHIFT;
@@ -126,6 +131,6 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
         set_near(&s, out);
     else
         set_centre(&s, out);
-    set_opacity(view, depth, out);
+    set_opacity(view, depth, sheet, out);
     return depth > 0x1p-60;
 }

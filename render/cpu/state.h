@@ -25,6 +25,7 @@ typedef struct trip_cpu_worker {
     trip_cpu_sorting sorting;
     /* Of a tile of a picture, where the frame goes on with its own. */
     _Alignas(64) float sum[TRIP_CHANNELS_MAX * TRIP_CPU_TILE_PIXELS];
+    _Alignas(64) float layer[TRIP_CHANNELS_MAX * TRIP_CPU_TILE_PIXELS];
     _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
 } trip_cpu_worker;
 
@@ -52,6 +53,8 @@ typedef struct trip_cpu {
     size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
     unsigned channels;  /* that there is room for */
     float *pixels, *sums;
+    float *open_sheets; /* of tiles, where splats are summed; else NULL */
+    bool has_open_sheets;
     uint8_t *states;
     uint8_t *axes; /* whose layers may have weight in a tile, a bit each */
     trip_cpu_portion *portions;
@@ -105,6 +108,12 @@ static inline size_t trip_cpu_tile_floats(const trip_cpu *r)
 static inline float *trip_cpu_tile_pixels(const trip_cpu *r, uint32_t tile)
 {
     return r->pixels + tile * trip_cpu_tile_floats(r);
+}
+
+/* Its open sheet; NULL where splats are not summed. */
+static inline float *trip_cpu_tile_sheet(const trip_cpu *r, uint32_t tile)
+{
+    return r->open_sheets ? r->open_sheets + tile * TRIP_CPU_SHEET_FLOATS(r->channels) : NULL;
 }
 
 /* Whether one layer alone has weight in a tile, and so it is 1 all over. */

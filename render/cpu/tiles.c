@@ -20,6 +20,10 @@ static size_t lay_out(trip_cpu *r, char *memory)
     size_t at = 0, tiles = trip_cpu_tile_count(r);
     r->pixels = part(memory, &at, tiles * trip_cpu_tile_floats(r) * sizeof *r->pixels);
     r->sums = part(memory, &at, tiles * trip_cpu_tile_floats(r) * sizeof *r->sums);
+    r->open_sheets = NULL;
+    if (r->has_open_sheets)
+        r->open_sheets =
+            part(memory, &at, tiles * TRIP_CPU_SHEET_FLOATS(r->channels) * sizeof *r->open_sheets);
     r->states = part(memory, &at, tiles);
     r->axes = part(memory, &at, tiles);
     r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
@@ -34,21 +38,23 @@ static size_t lay_out(trip_cpu *r, char *memory)
 void trip_cpu_release_tiles(trip_cpu *r)
 {
     trip_budget_release(r->budget, r->pixels, r->tiles_bytes);
-    r->pixels = NULL;
+    r->pixels = r->open_sheets = NULL;
     r->tiles_bytes = 0;
     r->mask.grid = (trip_cpu_grid){ 0, 0 };
 }
 
 int trip_cpu_fit_tiles(trip_cpu *r, int width, int height)
 {
+    bool sums = trip_settings_sum_sheets(r->frame->settings);
     trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE,
                            ((uint32_t)height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE };
     if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down &&
-        r->channels == r->kernels->channels)
+        r->channels == r->kernels->channels && r->has_open_sheets == sums)
         return 0;
     trip_cpu_release_tiles(r);
     r->mask.grid = grid;
     r->channels = r->kernels->channels;
+    r->has_open_sheets = sums;
     size_t bytes = lay_out(r, NULL);
     char *memory = trip_budget_take(r->budget, bytes);
     if (!memory) {
@@ -134,9 +140,12 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
     if (!(r->states[p->tile] & TRIP_CPU_TILE_BEGUN)) {
         r->kernels->tile_clear(&r->view, x, y, trip_cpu_is_alone(r, p->tile),
                                trip_cpu_tile_pixels(r, p->tile));
+        if (r->open_sheets)
+            r->kernels->sheet_clear(trip_cpu_tile_sheet(r, p->tile));
         r->states[p->tile] |= TRIP_CPU_TILE_BEGUN;
     }
-    r->kernels->tile_begin(&r->view, s, x, y, p->quarters, trip_cpu_tile_pixels(r, p->tile));
+    r->kernels->tile_begin(&r->view, s, x, y, p->quarters, trip_cpu_tile_pixels(r, p->tile),
+                           trip_cpu_tile_sheet(r, p->tile));
     trip_cpu_tile_list_each(r->blending, p->tile, blend_some, &(blend_context){ r, s });
     uint64_t open = r->kernels->tile_end(s) | ~bits_of_quarters(p->quarters);
     atomic_fetch_and_explicit(&r->mask.tiles[p->tile], open, memory_order_relaxed);
@@ -207,11 +216,21 @@ static bool is_to_merge(const trip_cpu *r, uint32_t tile)
     return r->states[tile] & TRIP_CPU_TILE_BEGUN && !trip_cpu_is_alone(r, tile);
 }
 
-static void merge_tile(trip_cpu *r, uint32_t tile)
+/* The layer's pixels, with the open sheet. */
+static const float *layer_of_tile(const trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+{
+    const float *pixels = trip_cpu_tile_pixels(r, tile);
+    if (!r->open_sheets)
+        return pixels;
+    r->kernels->sheet_composite(&r->view, pixels, trip_cpu_tile_sheet(r, tile), w->layer);
+    return w->layer;
+}
+
+static void merge_tile(trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
 {
     bool first = !(r->states[tile] & TRIP_CPU_TILE_MERGED);
     r->kernels->tile_merge(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile),
-                           trip_cpu_tile_pixels(r, tile), first, tile_sum(r, tile));
+                           layer_of_tile(r, w, tile), first, tile_sum(r, tile));
     r->states[tile] = TRIP_CPU_TILE_MERGED;
 }
 
@@ -224,7 +243,7 @@ static const float *sum_so_far(const trip_cpu *r, trip_cpu_worker *w, uint32_t t
     if (!first)
         memcpy(w->sum, tile_sum(r, tile), trip_cpu_tile_floats(r) * sizeof *w->sum);
     r->kernels->tile_merge(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile),
-                           trip_cpu_tile_pixels(r, tile), first, w->sum);
+                           layer_of_tile(r, w, tile), first, w->sum);
     return w->sum;
 }
 
@@ -235,7 +254,7 @@ static void finish_tile(trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
     const float *pixels = NULL;
     if (r->states[tile] & TRIP_CPU_TILE_BEGUN && trip_cpu_is_alone(r, tile)) {
         content = TRIP_CPU_LAYER;
-        pixels = trip_cpu_tile_pixels(r, tile);
+        pixels = layer_of_tile(r, w, tile);
     } else if (r->states[tile]) {
         content = TRIP_CPU_SUM;
         pixels = sum_so_far(r, w, tile);
@@ -248,10 +267,9 @@ static void finish_tile(trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
 static void merge_row(void *context, unsigned task, unsigned thread)
 {
     trip_cpu *r = context;
-    (void)thread;
     for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
         if (!trip_interrupted() && is_to_merge(r, t))
-            merge_tile(r, t);
+            merge_tile(r, &r->workers[thread], t);
 }
 
 static void finish_row(void *context, unsigned task, unsigned thread)

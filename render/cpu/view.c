@@ -65,12 +65,13 @@ static void set_forms(trip_cpu_view *view)
              trip_scale(trip_affine_vector(world, ry), unit));
 }
 
-/* Tables of G and stretch where they vary, and always in the rarer ways of blending. */
+/* Tables of G and stretch where they vary, and always in the rarer ways of blending splats. */
 static void set_rays(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
     bool alike = is_similarity(&camera->index_to_world);
     bool usual = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
+    usual |= view->sums;
     view->stretch_varies = !(camera->ortho || alike);
     view->stretch =
         view->stretch_varies ? camera->voxel_world : trip_splat_stretch(&view->splat, 0, 0);
@@ -127,6 +128,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         .of = frame,
         .splat = trip_splat_frame_make(camera, frame->settings),
         .front_to_back = front_to_back,
+        .sums = trip_settings_sum_sheets(frame->settings),
         .axis = axis,
         .u_axis = (axis + 1) % 3,
         .v_axis = (axis + 2) % 3,

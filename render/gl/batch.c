@@ -227,8 +227,11 @@ static uint32_t cost_at(const trip_gl_placing *p, double depth)
 static void add_piece(trip_gl_batch *b, trip_gl_piece piece)
 {
     trip_gl_piece *last = b->piece_count ? &b->pieces[b->piece_count - 1] : NULL;
-    if (last && last->quads == piece.quads && last->near == piece.near &&
-        last->cost == piece.cost && last->list == piece.list)
+    bool same_sheet = last && last->list == piece.list && last->sheet == piece.sheet;
+    if (same_sheet)
+        piece.before = 0;
+    if (same_sheet && last->quads == piece.quads && last->near == piece.near &&
+        last->cost == piece.cost)
         last->count += piece.count;
     else
         b->pieces[b->piece_count++] = piece;
@@ -255,6 +258,8 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
                                       .count = run->count,
                                       .cost = cost_at(p, depth),
                                       .list = list,
+                                      .sheet = p->sheet_cost ? run->sheet : 0,
+                                      .before = p->sheet_cost,
                                       .quads = needs_quads(p, depth),
                                       .near = is_near(p, depth) });
         for (uint32_t k = 0; k < run->count && resident; k++)
@@ -284,6 +289,8 @@ int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placi
 trip_gl_piece trip_gl_batch_next(const trip_gl_batch *b, trip_gl_cursor *at, uint32_t *room)
 {
     trip_gl_piece next = b->pieces[at->piece];
+    if (at->done == 0)
+        *room -= next.before < *room ? next.before : *room;
     uint32_t most = *room < next.cost ? 1 : *room / next.cost, left = next.count - at->done;
     next.first += at->done;
     next.count = left < most ? left : most;

@@ -23,13 +23,16 @@ typedef struct trip_gl_placing {
     bool quads;          /* always */
     double sprite_depth; /* and where voxels may be nearer, trip_gl_frame_sprite_depth() */
     double near_depth;   /* likewise, trip_gl_frame_near_depth() */
+    uint32_t sheet_cost; /* of compositing a sheet, where splats are summed; else 0 */
 } trip_gl_placing;
 
 /* Draw positions [first, first + count), all of one list. */
 typedef struct trip_gl_piece {
     uint32_t first, count;
-    uint32_t cost; /* of each splat, a power of two: at least its pixels over TRIP_GL_COST_PX */
-    unsigned list; /* its number in the data set */
+    uint32_t cost;   /* of each splat, a power of two: at least its pixels over TRIP_GL_COST_PX */
+    unsigned list;   /* its number in the data set */
+    int32_t sheet;   /* where splats are summed; else 0 */
+    uint32_t before; /* cost of the sheet that ends before it */
     bool quads;
     bool near; /* some of them may be near (render/splat.h) */
 } trip_gl_piece;

@@ -40,6 +40,13 @@ static void upload(const trip_gl_constants *c, unsigned block, const trip_gl_fra
     glNamedBufferSubData(c->blocks, offset_of(c, block, true), sizeof *exact, exact);
 }
 
+/* Of compositing a sheet: all of the image. */
+static uint32_t sheet_cost(const trip_camera *camera)
+{
+    int64_t pixels = (int64_t)camera->width * camera->height, cost = pixels / TRIP_GL_COST_PX + 1;
+    return cost < TRIP_GL_PART_COST ? (uint32_t)cost : TRIP_GL_PART_COST;
+}
+
 static void fill_list(trip_gl_constants *c, const trip_frame *frame, const trip_list *list,
                       double point_size_px)
 {
@@ -50,6 +57,7 @@ static void fill_list(trip_gl_constants *c, const trip_frame *frame, const trip_
         .camera = camera,
         .effects = trip_gl_frame_effects(frame, camera, list->axis),
         .axis = list->axis,
+        .sheet_cost = trip_settings_sum_sheets(settings) ? sheet_cost(frame->camera) : 0,
         .tile_voxels = (double)(1u << frame->data->header.tile_log2),
         .kernel_radius = settings->kernel_radius,
         .quads = settings->triangles,

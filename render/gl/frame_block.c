@@ -206,6 +206,8 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_INDEXED;
     if (s->depth)
         effects |= TRIP_GL_DEPTH;
+    if (trip_settings_sum_sheets(s))
+        effects |= TRIP_GL_SUMMED;
     if (trip_weight_is_everywhere(s, frame->camera, frame->plan->axis_of_view, axis))
         effects |= TRIP_GL_UNCULLED;
     return effects;

@@ -20,7 +20,8 @@ enum trip_gl_effect {
     TRIP_GL_COMPACT = 128, /* normals of 3 bytes; only with TRIP_GL_SHADED */
     TRIP_GL_DEPTH = 256,   /* layers have depths (layer.h) */
     TRIP_GL_NEAR = 512,    /* some splats may be near (render/splat.h) */
-    TRIP_GL_EFFECT_SETS = 1024,
+    TRIP_GL_SUMMED = 1024, /* splats are summed sheet by sheet */
+    TRIP_GL_EFFECT_SETS = 2048,
 };
 
 /* Of a list that the plan draws. */

@@ -20,6 +20,7 @@
 #include "gl/ring.h"
 #include "gl/sheets.h"
 #include "gl/slots.h"
+#include "gl/sums.h"
 #include "gl/target.h"
 #include "gl/variant.h"
 #include "report.h"
@@ -50,6 +51,7 @@ typedef struct gl_renderer {
     GLuint counts;
     trip_gl_constants constants;
     trip_gl_sheets sheets; /* frames that classify after interpolation only */
+    trip_gl_sums sums;     /* frames that composite splats sheet by sheet only */
     const trip_frame *frame;
     bool in_layer;          /* whose sheets may not all be drawn */
     int axis;               /* of the layer being drawn */
@@ -117,6 +119,11 @@ static bool classifies_post(const gl_renderer *r)
     return r->frame->settings->classify == TRIP_CLASSIFY_POST;
 }
 
+static bool sums_sheets(const gl_renderer *r)
+{
+    return trip_settings_sum_sheets(r->frame->settings);
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     gl_renderer *r = (gl_renderer *)base;
@@ -142,6 +149,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->quads = 0;
     r->in_batch = false;
     r->in_layer = false;
+    r->sums.method = frame->settings->method;
     memset(r->stats, 0, frame->data->list_count * sizeof *r->stats);
     if (frame->count) {
         static const GLuint zero = 0;
@@ -216,13 +224,15 @@ static int mask_region(gl_renderer *r, int axis)
     return status;
 }
 
-/* The last sheets of the layer begun. */
+/* The last sheets of the layer begun, if any are open. */
 static int end_passes(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
     if (!status && r->in_layer && classifies_post(r))
         status = trip_gl_sheets_end_layer(&r->sheets);
+    else if (!status && r->in_layer && sums_sheets(r))
+        status = trip_gl_sums_end_layer(&r->sums);
     r->in_layer = false;
     return status;
 }
@@ -231,7 +241,7 @@ static int begin_sheet_layer(gl_renderer *r, int axis)
 {
     int status = end_passes(&r->base);
     if (!status)
-        status = trip_gl_target_begin_layer(&r->target, axis, false);
+        status = trip_gl_target_begin_layer(&r->target, axis, false, false);
     if (!status)
         status = trip_gl_sheets_begin_layer(&r->sheets, axis);
     if (status)
@@ -249,9 +259,10 @@ static int begin_layer(trip_renderer *base, int axis)
         return begin_sheet_layer(r, axis);
     bool whole =
         trip_weight_is_everywhere(frame->settings, frame->camera, frame->plan->axis_of_view, axis);
-    int status = trip_gl_context_use(r->context);
+    int status = end_passes(base);
     if (!status)
-        status = trip_gl_target_begin_layer(&r->target, axis, !whole);
+        status = trip_gl_target_begin_layer(&r->target, axis, !whole, sums_sheets(r));
+    trip_gl_sums_begin_layer(&r->sums, axis);
     glDisable(GL_BLEND);
     glDisable(GL_STENCIL_TEST);
     glBindVertexArray(r->vertex_array);
@@ -262,6 +273,7 @@ static int begin_layer(trip_renderer *base, int axis)
     r->layers |= 1u << axis;
     r->axis = axis;
     r->masked = !whole;
+    r->in_layer = true;
     if (frame->settings->indexed)
         trip_gl_resident_bind(&r->resident, axis);
     return trip_gl_check(r->context, "layer");
@@ -293,7 +305,10 @@ static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
 {
     unsigned effects = r->constants.lists[piece->list].effects |
                        (piece->quads ? TRIP_GL_QUADS : 0) | (piece->near ? TRIP_GL_NEAR : 0);
-    int status = use_program(r, TRIP_GL_PASS_SPLAT, effects);
+    int status =
+        sums_sheets(r) ? trip_gl_sums_use(&r->sums, r->band, piece->list, piece->sheet) : TRIP_OK;
+    if (!status)
+        status = use_program(r, TRIP_GL_PASS_SPLAT, effects);
     if (status)
         return status;
     trip_gl_constants_bind_list(&r->constants, piece->list, false);
@@ -341,6 +356,7 @@ static void prepare_drawing(gl_renderer *r, bool front_to_back)
         glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
     if (r->masked)
         glEnable(GL_STENCIL_TEST);
+    r->sums.front_to_back = front_to_back;
     bind_batch(&r->batch);
 }
 
@@ -594,6 +610,8 @@ static void set_up_sheets(gl_renderer *r)
     s->variants = &r->variants;
     s->constants = &r->constants;
     s->target = &r->target;
+    r->sums.variants = &r->variants;
+    r->sums.target = &r->target;
     s->textures.budget = s->function.budget = r->budget;
 }
 

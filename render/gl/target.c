@@ -146,9 +146,45 @@ static int fit_layer(const trip_gl_target *t, trip_gl_band *band, int axis)
     return status;
 }
 
-static int begin_band(const trip_gl_target *t, trip_gl_band *band, int axis, bool stencil)
+static const GLfloat nothing[4] = { 0, 0, 0, 0 };
+
+static int set_stencil(GLuint framebuffer, GLuint stencil)
 {
-    static const GLfloat nothing[4] = { 0, 0, 0, 0 };
+    glNamedFramebufferRenderbuffer(framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER,
+                                   stencil);
+    return check_complete(framebuffer, "layer");
+}
+
+static void clear(const trip_gl_target *t, const trip_gl_surface *s)
+{
+    glClearNamedFramebufferfv(s->framebuffer, GL_COLOR, TRIP_GL_OUT_COLOUR, nothing);
+    if (t->depth)
+        glClearNamedFramebufferfv(s->framebuffer, GL_COLOR, TRIP_GL_OUT_DEPTH, nothing);
+}
+
+void trip_gl_target_clear_sheet(const trip_gl_target *t, const trip_gl_band *band)
+{
+    clear(t, &band->sheet);
+}
+
+/* Of floats, whatever the layers hold. */
+static int begin_sheet(const trip_gl_target *t, trip_gl_band *band, bool stencil)
+{
+    trip_gl_surface *sheet = &band->sheet;
+    int status =
+        sheet->framebuffer ? TRIP_OK : make_surface(t, sheet, band->rows, GL_RGBA32F, GL_R32F);
+    if (!status)
+        status = set_stencil(sheet->framebuffer, stencil ? band->stencil : 0);
+    if (status)
+        release_surface(t, sheet);
+    else
+        clear(t, sheet);
+    return status;
+}
+
+static int begin_band(const trip_gl_target *t, trip_gl_band *band, int axis, bool stencil,
+                      bool sums)
+{
     static const GLint zero = 0;
     int status = fit_layer(t, band, axis);
     if (!status && stencil)
@@ -156,30 +192,34 @@ static int begin_band(const trip_gl_target *t, trip_gl_band *band, int axis, boo
     if (status)
         return status;
     GLuint framebuffer = band->layers[axis].framebuffer;
-    glNamedFramebufferRenderbuffer(framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER,
-                                   stencil ? band->stencil : 0);
-    status = check_complete(framebuffer, "layer");
+    status = set_stencil(framebuffer, stencil ? band->stencil : 0);
+    if (!status && sums)
+        status = begin_sheet(t, band, stencil);
     if (status)
         return status;
-    glClearNamedFramebufferfv(framebuffer, GL_COLOR, TRIP_GL_OUT_COLOUR, nothing);
-    if (t->depth)
-        glClearNamedFramebufferfv(framebuffer, GL_COLOR, TRIP_GL_OUT_DEPTH, nothing);
+    clear(t, &band->layers[axis]);
     if (stencil)
         glClearNamedFramebufferiv(framebuffer, GL_STENCIL, 0, &zero);
     return trip_frame_poll();
 }
 
-int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil)
+int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil, bool sums)
 {
     int status = TRIP_OK;
     for (int i = 0; i < t->band_count && !status; i++)
-        status = begin_band(t, &t->bands[i], axis, stencil);
+        status = begin_band(t, &t->bands[i], axis, stencil, sums);
     return status;
 }
 
 void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band)
 {
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, band->layers[axis].framebuffer);
+    glViewport(0, -band->first_row, t->width, t->height);
+}
+
+void trip_gl_target_bind_sheet(const trip_gl_target *t, const trip_gl_band *band)
+{
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, band->sheet.framebuffer);
     glViewport(0, -band->first_row, t->width, t->height);
 }
 
@@ -205,6 +245,7 @@ void trip_gl_target_release(trip_gl_target *t)
     for (int i = 0; i < t->band_count; i++) {
         for (int axis = 0; axis < 3; axis++)
             release_surface(t, &t->bands[i].layers[axis]);
+        release_surface(t, &t->bands[i].sheet);
         glDeleteRenderbuffers(1, &t->bands[i].stencil);
         trip_budget_discharge(t->budget, t->bands[i].stencil_bytes);
     }

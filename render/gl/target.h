@@ -31,6 +31,7 @@ typedef struct trip_gl_band {
     trip_gl_surface layers[3]; /* by axis */
     GLuint stencil;            /* shared by the layers */
     uint64_t stencil_bytes;
+    trip_gl_surface sheet; /* sums of a sheet's splats, shared too; rgba32f and r32f */
 } trip_gl_band;
 
 typedef struct trip_gl_target {
@@ -46,11 +47,15 @@ typedef struct trip_gl_target {
 
 /* Readies an image of this size for layers of this type, with depths or without. */
 int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type, bool depth);
-/* Empties the layer of an axis; with `stencil` it has one, all zero. */
-int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil);
+/* Empties the layer of an axis; with `stencil` it has one, all zero; with `sums` the bands' sheets
+ * are empty, too, and have the same stencil. */
+int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil, bool sums);
 /* Binds a band of a layer for drawing: positions are those of the image, but row first_row of the
  * image is row 0 of the fragments. */
 void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band);
+/* The same of the band's sheet. */
+void trip_gl_target_bind_sheet(const trip_gl_target *t, const trip_gl_band *band);
+void trip_gl_target_clear_sheet(const trip_gl_target *t, const trip_gl_band *band);
 /* Binds the first `rows` rows of the strip for drawing. */
 void trip_gl_target_bind_strip(const trip_gl_target *t, int rows);
 /* Reads them when they are drawn, width * 4 floats each; and width depths where there are any. */

@@ -16,6 +16,7 @@ static const struct {
     bool in_double;
 } passes[] = {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
+    [TRIP_GL_PASS_SUM] = { "screen.vert", "sum.frag", NULL, TRIP_GL_DEPTH, false },
     [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp", TRIP_GL_PARALLEL | TRIP_GL_INDEXED, true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
@@ -38,6 +39,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
         { TRIP_GL_UNCULLED, "UNCULLED" }, { TRIP_GL_COMPACT, "COMPACT" },
         { TRIP_GL_DEPTH, "DEPTH" },       { TRIP_GL_NEAR, "NEAR" },
+        { TRIP_GL_SUMMED, "SUMS" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

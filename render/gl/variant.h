@@ -11,6 +11,7 @@
 
 typedef enum trip_gl_pass {
     TRIP_GL_PASS_SPLAT,
+    TRIP_GL_PASS_SUM,
     TRIP_GL_PASS_COUNT,
     TRIP_GL_PASS_REGION,
     TRIP_GL_PASS_MERGE,

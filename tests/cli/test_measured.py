@@ -155,6 +155,15 @@ class Measured(program.ProgramTest):
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", "--explain",
                    "--classify", "post", says="counts splats")
 
+    def test_compositing_is_in_the_plan_and_the_stats(self):
+        stats = self.stats("cube.trip", *VIEW, "--compositing", "sheet")
+        self.assertEqual((stats["classify"], stats["compositing"]), ("pre", "sheet"))
+        said = self.render("--explain", "--compositing", "sheet")[0]
+        self.assertRegex(said, "(?m)^compositing sheet: ")
+        for more in ["--classify", "post"], ["--renderer", "integral"]:
+            self.fails(2, "render", "cube.trip", "-o", "b.png", "--compositing", "sheet", *more,
+                       says="--compositing")
+
 
 if __name__ == "__main__":
     program.main()

@@ -81,6 +81,7 @@ RENDER = {
     "--method": NAMES,
     "--submit": NAMES + ["sprites,", ",", "sprites,triangles", "sprites,sprites"],
     "--classify": NAMES,
+    "--compositing": NAMES + ["sheets"],
     "--slices": COUNTS + ["17"],
     "--traversal": NAMES,
     "--hidden": NAMES,

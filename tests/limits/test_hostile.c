@@ -83,6 +83,7 @@ static int draw(const trip_dataset *data, const scene_renderer *by, trip_classif
     trip_camera_params view = scene_view(&shared.scene, trip_v3(1, 0.8, -0.3), 45, 45, SIZE);
     settings.h = 0.8;
     settings.classify = classify;
+    settings.compositing = (trip_compositing)(counts.tried / 2 % 2);
     int status = trip_camera_make(&camera, &view, &data->index_to_world);
     if (!status)
         status = trip_plan_make(&plan, data, &camera, &settings, shared.scene.table, budget);

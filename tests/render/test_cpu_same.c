@@ -19,19 +19,21 @@ static void assert_same(const scene_picture *a, const scene_picture *b)
     assert_memory_equal(a->rgba, b->rgba, 16 * (size_t)a->width * (size_t)a->height);
 }
 
-/* With every instruction set and target, the picture of `a` by one thread and that of `b` by
- * another number of threads, from batches as `reader` says. */
+/* With every instruction set and target, and by sheets, the picture of `a` by one thread and that
+ * of `b` by another number of threads, from batches as `reader` says. */
 static void check_view(const scene *a, const scene *b, trip_camera_params view, unsigned threads,
                        const trip_reader_params *reader)
 {
-    static int turn = TRIP_TARGET_RGBA32F; /* the target, where they are taken by turns */
+    enum { TARGETS = TRIP_TARGET_RGBA8 + 1, FORMS }; /* the last is by sheets */
+    static int turn;                                 /* the form, where they are taken by turns */
     trip_settings settings = trip_settings_default();
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
-        for (int target = TRIP_TARGET_RGBA32F; target <= TRIP_TARGET_RGBA8; target++) {
-            if (TEST_BY_TURNS && target != turn % (TRIP_TARGET_RGBA8 + 1))
+        for (int form = 0; form < FORMS; form++) {
+            if (TEST_BY_TURNS && form != turn % FORMS)
                 continue;
-            settings.target = (trip_target)target;
+            settings.target = (trip_target)(form % TARGETS);
+            settings.compositing = (trip_compositing)(form / TARGETS);
             cpu_scenes_threads = 1;
             scene_picture p = scene_draw(a, &cpu_scenes_cpu, &view, &settings);
             cpu_scenes_threads = threads;
@@ -128,9 +130,10 @@ typedef struct frame_by_hand {
 } frame_by_hand;
 
 static void begin_by_hand(frame_by_hand *f, const scene *s, const trip_camera_params *view,
-                          unsigned threads)
+                          unsigned threads, trip_compositing compositing)
 {
     f->settings = trip_settings_default();
+    f->settings.compositing = compositing;
     f->splats = f->occluded = 0;
     assert_int_equal(trip_camera_make(&f->camera, view, &s->data->index_to_world), 0);
     assert_int_equal(
@@ -196,24 +199,31 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, size_t piece, bool sk
     trip_reader_destroy(reader);
 }
 
-static void batches_cut_anywhere_draw_the_same(void **state)
+static void check_pieces(trip_compositing compositing)
 {
-    (void)state;
     scene s;
     cpu_scenes_blobs(&s, 32, NULL);
     trip_settings settings = trip_settings_default();
+    settings.compositing = compositing;
     trip_camera_params view = side_view(&s);
     scene_picture whole = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
     const size_t pieces[3] = { 1, 3, 17 };
     for (int i = 0; i < 3; i++) {
         frame_by_hand f;
-        begin_by_hand(&f, &s, &view, 3);
+        begin_by_hand(&f, &s, &view, 3, compositing);
         draw_by_hand(&f, &s, pieces[i], false);
         assert_memory_equal(f.rgba, whole.rgba, 16 * (size_t)view.width * (size_t)view.height);
         end_by_hand(&f, &s);
     }
     scene_picture_free(&whole);
     scene_destroy(&s);
+}
+
+static void batches_cut_anywhere_draw_the_same(void **state)
+{
+    (void)state;
+    check_pieces(TRIP_COMPOSITING_SPLAT);
+    check_pieces(TRIP_COMPOSITING_SHEET);
 }
 
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -228,9 +238,8 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
 }
 
 /* A block of opaque voxels, filling the view: what lies behind its face is occluded. */
-static void leaving_out_what_is_occluded_draws_the_same(void **state)
+static void check_occluded(trip_compositing compositing)
 {
-    (void)state;
     scene s;
     frame_by_hand all, some;
     scene_create(&s,
@@ -239,13 +248,13 @@ static void leaving_out_what_is_occluded_draws_the_same(void **state)
     scene_colour(&s, 0, 65535, 0.4, 0.7, 0.2, 0.95);
     scene_colour(&s, 0, 20000, 0.9, 0.3, 0.2, 0.9);
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
-    begin_by_hand(&all, &s, &view, 1);
+    begin_by_hand(&all, &s, &view, 1, compositing);
     draw_by_hand(&all, &s, UINT32_MAX / 2, false);
     /* Small buffers let tiles close early. */
     for (unsigned threads = 1; threads <= 4; threads++) {
         trip_budget *budget = s.budget;
         assert_int_equal(trip_budget_create(&s.budget, UINT64_C(64) << 20), 0);
-        begin_by_hand(&some, &s, &view, threads);
+        begin_by_hand(&some, &s, &view, threads, compositing);
         draw_by_hand(&some, &s, 1, true);
         assert_memory_equal(all.rgba, some.rgba, 16 * (size_t)view.width * (size_t)view.height);
         if (threads == 1)
@@ -260,6 +269,13 @@ static void leaving_out_what_is_occluded_draws_the_same(void **state)
     scene_destroy(&s);
 }
 
+static void leaving_out_what_is_occluded_draws_the_same(void **state)
+{
+    (void)state;
+    check_occluded(TRIP_COMPOSITING_SPLAT);
+    check_occluded(TRIP_COMPOSITING_SHEET);
+}
+
 static void frames_follow_one_another_on_one_renderer(void **state)
 {
     (void)state;
@@ -269,7 +285,7 @@ static void frames_follow_one_another_on_one_renderer(void **state)
     trip_settings settings = trip_settings_default();
     trip_camera_params view = side_view(&s);
     scene_picture alone = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
-    begin_by_hand(&f, &s, &view, 3);
+    begin_by_hand(&f, &s, &view, 3, TRIP_COMPOSITING_SPLAT);
     draw_by_hand(&f, &s, 5000, false);
     /* A frame given up half-way, with splats still on their way, leaves nothing behind. */
     assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);

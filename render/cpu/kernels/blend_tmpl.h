@@ -85,6 +85,9 @@ typedef struct patch {
     vf stretch;
     vf cutoff;                    /* as in trip_cpu_view */
     const trip_cpu_scratch *tile; /* that the stamp is of */
+    /* Of sums (sum_tmpl.h): those in place of the pixels, their sheet, the stamp's number. */
+    int32_t sheet;
+    unsigned number;
 } patch;
 
 /* u of trip_cpu_splat. */
@@ -225,9 +228,10 @@ INLINE bool all_open(vf t)
 
 static void set_rays(trip_cpu_scratch *s, unsigned number);
 
-INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays)
+/* Of the tile's pixels, or of numbers that lie as they do. */
+INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays, const float *tile)
 {
-    const float *pixels = s->pixels + STAMP_FLOATS * number;
+    const float *pixels = tile + STAMP_FLOATS * number;
     patch p = {
         .r = v_load(pixels),
         .g = v_load(pixels + V),
@@ -250,9 +254,9 @@ INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     return p;
 }
 
-INLINE void store_stamp(trip_cpu_scratch *s, unsigned number, const patch *p)
+INLINE void store_stamp(float *tile, unsigned number, const patch *p)
 {
-    float *pixels = s->pixels + STAMP_FLOATS * number;
+    float *pixels = tile + STAMP_FLOATS * number;
     v_store(pixels, p->r);
     v_store(pixels + V, p->g);
     v_store(pixels + 2 * V, p->b);
@@ -345,7 +349,7 @@ INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
                         bool front_to_back, trip_target target)
 {
-    patch p = load_stamp(s, number, rays);
+    patch p = load_stamp(s, number, rays, s->pixels);
     touching t = { .local = s->local, .depths = s->local_depths };
     uint64_t thick = 0;
     for (unsigned word = 0; word < (s->splats + 63) / 64; word++) {
@@ -355,7 +359,7 @@ INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     bool simple = front_to_back && target == TRIP_TARGET_RGBA32F && !thick;
     if (!simple || !blend_open(&p, &t, rays))
         blend_each(&p, &t, blend_any, rays, front_to_back, target);
-    store_stamp(s, number, &p);
+    store_stamp(s->pixels, number, &p);
     return !front_to_back || any_open(p.t);
 }
 
@@ -385,11 +389,16 @@ BLEND(over_half, TRIP_CPU_STRETCHED, false, TRIP_TARGET_RGBA16F)
 BLEND(over_unorm8, TRIP_CPU_STRETCHED, false, TRIP_TARGET_RGBA8)
 #undef BLEND
 
-static void (*choose_blend(const trip_cpu_view *view))(trip_cpu_scratch *)
+typedef void blend_group_fn(trip_cpu_scratch *s);
+
+static blend_group_fn *choose_sum(const trip_cpu_view *view);
+
+static blend_group_fn *choose_blend(const trip_cpu_view *view)
 {
-    static void (*const behind[])(trip_cpu_scratch *) = { behind_stretched, behind_half,
-                                                          behind_unorm8 };
-    static void (*const over[])(trip_cpu_scratch *) = { over_float, over_half, over_unorm8 };
+    static blend_group_fn *const behind[] = { behind_stretched, behind_half, behind_unorm8 };
+    static blend_group_fn *const over[] = { over_float, over_half, over_unorm8 };
+    if (view->sums)
+        return choose_sum(view);
     if (view->rays == TRIP_CPU_PARALLEL)
         return behind_parallel;
     if (view->rays == TRIP_CPU_PERSPECTIVE)
@@ -589,8 +598,10 @@ static void use_view(trip_cpu_scratch *s, const trip_cpu_view *view)
 {
     if (s->view == view)
         return;
-    if (!has_same_rays(s->view, view)) {
+    bool same_rays = has_same_rays(s->view, view);
+    if (!same_rays || view->sums)
         end_group(s);
+    if (!same_rays) {
         memset(s->rays_known, 0, sizeof s->rays_known);
         s->blend = choose_blend(view);
     }
@@ -677,12 +688,13 @@ static void find_open(trip_cpu_scratch *s, unsigned quarters)
 }
 
 static void tile_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
-                       unsigned quarters, float *pixels)
+                       unsigned quarters, float *pixels, float *sums)
 {
     s->view = view;
     s->x = x;
     s->y = y;
     s->pixels = pixels;
+    s->sums = sums;
     s->splats = 0;
     s->blend = choose_blend(view);
     memset(s->rays_known, 0, sizeof s->rays_known);

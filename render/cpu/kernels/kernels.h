@@ -43,11 +43,19 @@ enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE, TRIP_CPU_ALONG, TRIP_CPU_ALONG_X, TRIP_CPU
  * G as in trip_cpu_rays: u = 1 - m / k^2 of splat.h, 1 at the centre and 0 outside the support. Its
  * opacity there is that of c[]; or its optical depth, times the stretch where it
  * varies, is what 2^(least + u cutoff) exceeds `edge` by, `cutoff` as in trip_cpu_view; and of near
- * splats front(p) of splat.h of that. */
+ * splats front(p) of splat.h of that. Where sheets are summed its optical depth is the falloff
+ * exp(-m / 2) - edge of splat.h times `peak`, likewise, and the colour is times `peak` too. */
 typedef struct trip_cpu_splat {
     float l11, l21, l22, l1, l2;
     float r, g, b;
-    float c[TRIP_CPU_TERMS];
+    union {
+        float c[TRIP_CPU_TERMS];
+        struct { /* where sheets are summed */
+            float peak;
+            int32_t sheet; /* of the list */
+            float along[3];
+        };
+    };
     uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
     uint32_t tiles;          /* those that it lies in, see below */
 } trip_cpu_splat;
@@ -78,6 +86,7 @@ typedef struct trip_cpu_view {
     trip_splat_frame splat; /* by the camera of the list */
     trip_cpu_rays rays;
     bool front_to_back, shading;
+    bool sums; /* splats are summed sheet by sheet */
     bool stretch_varies;
     unsigned code_bytes, normal_bytes; /* of the data set */
     int axis, u_axis, v_axis;
@@ -143,6 +152,14 @@ typedef struct trip_cpu_lanes {
 #define TRIP_CPU_LOCAL 256
 #define TRIP_CPU_BANDS 4
 
+/* Stamps of a tile at most; floats of a tile's open sheet (sum_tmpl.h), of so many channels. */
+#define TRIP_CPU_STAMPS_MAX 256
+#define TRIP_CPU_SHEET_FLOATS(channels)                                                            \
+    ((channels)*TRIP_CPU_TILE_PIXELS + 2 * (size_t)TRIP_CPU_STAMPS_MAX)
+
+/* What a stamp's open sheet is where none is. */
+#define TRIP_CPU_NO_SHEET UINT64_MAX
+
 /* What one thread needs while it blends a tile. */
 typedef struct trip_cpu_scratch {
     _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by stamp: G[V], stretch[V] */
@@ -155,8 +172,8 @@ typedef struct trip_cpu_scratch {
     uint64_t rays_known[TRIP_CPU_BANDS]; /* those whose `rays` are filled in */
     uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats are not thin */
     uint32_t splats;
-    int x, y; /* of the tile's first pixel */
-    float *pixels;
+    int x, y;             /* of the tile's first pixel */
+    float *pixels, *sums; /* of the tile; sums of its open sheet, where those are wanted */
     void (*blend)(struct trip_cpu_scratch *s); /* the group, in order */
     const trip_cpu_view *view;                 /* of the splats gathered, or of the layer */
     trip_cpu_staged staged;
@@ -199,16 +216,22 @@ typedef struct trip_cpu_kernels {
     /* Empties a tile's pixels: transparent where the list has weight, saturated elsewhere; `alone`
      * says that its weight is 1 all over the tile. */
     void (*tile_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
-    /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. */
+    /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. `sums`:
+     * of its open sheet, where sheets are summed. */
     void (*tile_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
-                       unsigned quarters, float *pixels);
+                       unsigned quarters, float *pixels, float *sums);
     /* Blends splats[order[i]] in order, or splats[i] where order is NULL, that were projected with
      * this view. */
     void (*tile_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                        const float *depths, const uint16_t *order, uint32_t count);
-    /* Ends with every splat in the pixels. Returns which cells of the quarters are open, as
-     * trip_cpu_mask has them. */
+    /* Ends with every splat in the pixels, or in the open sheet. Returns which cells of the
+     * quarters are open, as trip_cpu_mask has them. */
     uint64_t (*tile_end)(trip_cpu_scratch *s);
+    /* Empties a tile's open sheet. */
+    void (*sheet_clear)(float *sums);
+    /* The tile's pixels with its open sheet composited, to `out`; both stay as they are. */
+    void (*sheet_composite)(const trip_cpu_view *view, const float *pixels, const float *sums,
+                            float *out);
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
     void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum);

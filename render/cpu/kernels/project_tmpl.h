@@ -514,9 +514,11 @@ INLINE uint32_t rank(unsigned bits, uint32_t row[V])
     return n;
 }
 
-/* Lanes that are projected one by one; returns those that are drawn. */
+/* Lanes that are projected one by one; returns those that are drawn. Where sheets are summed
+ * `depths` are set to their peaks. */
 static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged *staged,
-                               uint32_t at, unsigned lanes, trip_cpu_splat splats[V], bool *broken)
+                               uint32_t at, unsigned lanes, trip_cpu_splat splats[V], float *depths,
+                               bool *broken)
 {
     unsigned drawn = 0;
     for (; lanes; lanes &= lanes - 1) {
@@ -526,6 +528,8 @@ static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged 
         if (trip_cpu_project_scalar(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
                                     &splats[i], broken))
             drawn |= 1u << i;
+        if (view->sums)
+            depths[i] = splats[i].peak;
     }
     return drawn;
 }
@@ -578,6 +582,22 @@ INLINE void long_terms(const trip_cpu_view *view, vf depth, vm which, vf c[TRIP_
     c[TRIP_CPU_EDGE] = v_select(which, exp2_biased(least), c[TRIP_CPU_EDGE]);
 }
 
+/* The lanes that are kept, as splats to be summed. */
+INLINE void store_summed(const trip_cpu_lanes *lanes, const trip_cpu_staged *staged, uint32_t at,
+                         const uint32_t row[V], colour light, trip_cpu_splat *out)
+{
+    float *base = &out->l11;
+    /* What is opaque anyway stays within what floats hold. */
+    vf peak = v_min(v_load(lanes->depth + at), v_set(0x1p90f));
+    v_store_rows(base, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
+                 v_load(lanes->l22 + at), v_load(lanes->l1 + at));
+    v_store_rows(base + 4, row, v_load(lanes->l2 + at), light.r * peak, light.g * peak,
+                 light.b * peak);
+    v_store_rows(base + 8, row, peak, v_from_bits(vi_load(staged->sheet + at)), v_set(0), v_set(0));
+    v_store_rows(base + 12, row, v_set(0), v_load(lanes->first + at), v_load(lanes->last + at),
+                 v_load(lanes->tiles + at));
+}
+
 /* The lanes that are kept, as splats. */
 INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
                   const uint32_t row[V], colour light, trip_cpu_splat *out)
@@ -617,12 +637,16 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
     unsigned kept = lanes->kept[at / V], scalar = lanes->scalar[at / V];
     trip_cpu_splat replaced[V];
     if (scalar)
-        scalar = project_scalar(view, staged, at, scalar, replaced, &lanes->broken);
+        scalar =
+            project_scalar(view, staged, at, scalar, replaced, lanes->depth + at, &lanes->broken);
     kept |= scalar;
     if (kept == 0)
         return 0;
     uint32_t n = rank(kept, row);
-    store(view, lanes, at, row, colour_of(view, staged, at), out);
+    if (view->sums)
+        store_summed(lanes, staged, at, row, colour_of(view, staged, at), out);
+    else
+        store(view, lanes, at, row, colour_of(view, staged, at), out);
     if (TRIP_CPU_DEPTH)
         store_depths_of(view, lanes, at, row, depths);
     if (scalar)

@@ -11,6 +11,7 @@
 #include "cpu/kernels/simd_tmpl.h"
 #include "cpu/kernels/slice_tmpl.h"
 #include "cpu/kernels/squares_tmpl.h"
+#include "cpu/kernels/sum_tmpl.h"
 
 /* Defines the table `name` of the instruction set called `isa`, or with depth the one that `name`
  * names for layers with depth. */
@@ -28,6 +29,7 @@
         .squares = squares, .stage = stage, .project = project, .tile_clear = tile_clear,          \
         .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
         .tile_merge = tile_merge, .tile_finish = tile_finish, .drawn = drawn,                      \
+        .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,                            \
         .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
         .sheet_gradients = sheet_gradients, .sheet_between = sheet_between,                        \
         .sheet_tile = sheet_tile,                                                                  \

@@ -1,0 +1,224 @@
+/* Kernels that sum the splats of a sheet at each pixel and composite the sum (splat.h): included by
+ * table_tmpl.h after blend_tmpl.h. A tile has its open sheet beside its pixels: stamp by stamp the
+ * sums of optical depth times each channel, in the pixels' order with optical depth in the place of
+ * 1 - alpha, and behind all stamps which sheet each stamp's sums are of. The sheet of a stamp is
+ * composited when a splat of another one is to be added, so that the picture depends on the order
+ * of the splats alone. */
+#ifndef TRIP_CPU_SUM_H
+#define TRIP_CPU_SUM_H
+
+#include "cpu/kernels/blend_tmpl.h"
+#include "cpu/kernels/exp_tmpl.h"
+#include "cpu/kernels/kernels.h"
+
+#define SHEET_FLOATS (STAMPS * STAMP_FLOATS)
+
+static_assert(STAMPS <= TRIP_CPU_STAMPS_MAX, "room for the stamps' sheets");
+
+INLINE uint64_t sheet_of_stamp(const float *sums, unsigned number)
+{
+    uint64_t sheet;
+    memcpy(&sheet, sums + SHEET_FLOATS + 2 * number, sizeof sheet);
+    return sheet;
+}
+
+INLINE void set_sheet_of_stamp(float *sums, unsigned number, uint64_t sheet)
+{
+    memcpy(sums + SHEET_FLOATS + 2 * number, &sheet, sizeof sheet);
+}
+
+/* ---- compositing a sheet ---- */
+
+/* (1 - exp(-x)) / x, x >= 0. */
+INLINE vf mean_transmittance(vf x)
+{
+    vf thick = (v_set(1) - exp_minus(x)) / v_max(x, v_set(TRIP_CPU_THIN));
+    return v_select(v_gt(v_set(TRIP_CPU_THIN), x), thin_ratio(x), thick);
+}
+
+/* A sum of optical depth times a channel, front to back: w of it is seen. */
+INLINE void add_behind(float *channel, vf w, vf sum, trip_target target)
+{
+    v_store(channel, kept(v_fma(w, sum, v_load(channel)), target));
+}
+
+INLINE void put_sheet_behind(float *pixels, const patch *sum, trip_target target)
+{
+    vf t = v_load(pixels + 3 * V), w = t * mean_transmittance(sum->t);
+    w = v_select(v_ge(t, v_set((float)TRIP_SATURATION)), w, v_set(0));
+    add_behind(pixels, w, sum->r, target);
+    add_behind(pixels + V, w, sum->g, target);
+    add_behind(pixels + 2 * V, w, sum->b, target);
+    if (TRIP_CPU_DEPTH)
+        add_behind(pixels + TRIP_CHANNEL_DEPTH * V, w, sum->depth, TRIP_TARGET_RGBA32F);
+    vf left = v_max(v_fnma(w, sum->t, t), v_set(0));
+    if (target != TRIP_TARGET_RGBA32F)
+        left = v_set(1) - kept(v_set(1) - left, target);
+    v_store(pixels + 3 * V, left);
+}
+
+/* The same back to front, where there is something of the sheet. */
+INLINE void add_over(float *channel, const patch *sum, vf of, vf keep, vf w, trip_target target)
+{
+    vf behind = v_load(channel), over = kept(v_fma(w, of, behind * keep), target);
+    v_store(channel, v_select(v_gt(sum->t, v_set(0)), over, behind));
+}
+
+INLINE void put_sheet_over(float *pixels, const patch *sum, trip_target target)
+{
+    vf keep = exp_minus(sum->t), w = mean_transmittance(sum->t), t = v_load(pixels + 3 * V);
+    add_over(pixels, sum, sum->r, keep, w, target);
+    add_over(pixels + V, sum, sum->g, keep, w, target);
+    add_over(pixels + 2 * V, sum, sum->b, keep, w, target);
+    if (TRIP_CPU_DEPTH)
+        add_over(pixels + TRIP_CHANNEL_DEPTH * V, sum, sum->depth, keep, w, TRIP_TARGET_RGBA32F);
+    vf left = t * keep;
+    if (target != TRIP_TARGET_RGBA32F)
+        left = v_set(1) - kept(v_set(1) - left, target);
+    v_store(pixels + 3 * V, v_select(v_gt(sum->t, v_set(0)), left, t));
+}
+
+INLINE void put_sheet(const trip_cpu_view *view, float *pixels, const patch *sum)
+{
+    trip_target target = view->of->settings->target;
+    if (view->front_to_back)
+        put_sheet_behind(pixels, sum, target);
+    else
+        put_sheet_over(pixels, sum, target);
+}
+
+INLINE void empty_sums(patch *p)
+{
+    p->r = p->g = p->b = p->t = v_set(0);
+    if (TRIP_CPU_DEPTH)
+        p->depth = v_set(0);
+}
+
+/* Composites the open sheet of a patch's stamp. Seldom: some 15 splats of a sheet meet a pixel. */
+static void end_sheet(patch *p)
+{
+    put_sheet(p->tile->view, p->tile->pixels + STAMP_FLOATS * p->number, p);
+    empty_sums(p);
+}
+
+/* ---- summing ---- */
+
+/* exp(-m / 2) - edge of splat.h within 1.4e-5, 0 outside the support; its integral over the plane
+ * is within 1e-7 of itself. Found by least squares, reweighted to even out the error. */
+INLINE vf falloff(vf u)
+{
+    vf sum = v_fma(u, v_set(0.311556676f), v_set(-0.357823259f));
+    sum = v_fma(u, sum, v_set(0.591253442f));
+    sum = v_fma(u, sum, v_set(0.0745626079f));
+    sum = v_fma(u, sum, v_set(0.23392554f));
+    sum = v_fma(u, sum, v_set(0.144584394f));
+    return u * sum * sum;
+}
+
+/* A blend_one: the patch holds the sums of its stamp's open sheet. */
+INLINE void add_to_sheet(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays kind,
+                         bool front_to_back, trip_target target)
+{
+    (void)front_to_back;
+    (void)target;
+    if (splat->sheet != p->sheet) {
+        end_sheet(p);
+        p->sheet = splat->sheet;
+    }
+    vf share = falloff(nearness(p, splat, kind));
+    if (kind == TRIP_CPU_STRETCHED)
+        share = share * p->stretch;
+    if (is_near(splat))
+        share = share * front_of(p, splat, kind);
+    p->r = v_fma(share, v_set(splat->r), p->r);
+    p->g = v_fma(share, v_set(splat->g), p->g);
+    p->b = v_fma(share, v_set(splat->b), p->b);
+    p->t = v_fma(share, v_set(splat->peak), p->t);
+    if (TRIP_CPU_DEPTH)
+        p->depth = v_fma(share, v_set(depth * splat->peak), p->depth);
+}
+
+/* Sheets of a list; no list has this many. */
+INLINE uint64_t sheet_key(const trip_cpu_view *view, int32_t sheet)
+{
+    return (uint64_t)view->list->index << 32 | (uint32_t)sheet;
+}
+
+/* All splats of the group, which are of one list, that may touch a stamp, in order; false when its
+ * pixels are all saturated. */
+INLINE bool sum_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays kind)
+{
+    patch p = load_stamp(s, number, kind, s->sums);
+    uint64_t before = sheet_of_stamp(s->sums, number);
+    touching t = { .local = s->local, .depths = s->local_depths };
+    for (unsigned word = 0; word < (s->splats + 63) / 64; word++)
+        t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
+    p.number = number;
+    p.sheet = (int32_t)before;
+    if (before >> 32 != s->view->list->index && before != TRIP_CPU_NO_SHEET)
+        end_sheet(&p);
+    blend_each(&p, &t, add_to_sheet, kind, true, TRIP_TARGET_RGBA32F);
+    store_stamp(s->sums, number, &p);
+    set_sheet_of_stamp(s->sums, number, sheet_key(s->view, p.sheet));
+    return !s->view->front_to_back || any_open(v_load(s->pixels + STAMP_FLOATS * number + 3 * V));
+}
+
+INLINE void sum_group(trip_cpu_scratch *s, trip_cpu_rays kind)
+{
+    for (unsigned band = 0; band < BANDS; band++)
+        for (uint64_t rest = s->any[band] & s->open[band]; rest; rest &= rest - 1) {
+            unsigned bit = (unsigned)__builtin_ctzll(rest);
+            if (!sum_stamp(s, 64 * band + bit, kind))
+                s->open[band] &= ~(UINT64_C(1) << bit);
+        }
+}
+
+static void sum_parallel(trip_cpu_scratch *s)
+{
+    sum_group(s, TRIP_CPU_PARALLEL);
+}
+
+static void sum_perspective(trip_cpu_scratch *s)
+{
+    sum_group(s, TRIP_CPU_PERSPECTIVE);
+}
+
+static void sum_stretched(trip_cpu_scratch *s)
+{
+    sum_group(s, TRIP_CPU_STRETCHED);
+}
+
+static blend_group_fn *choose_sum(const trip_cpu_view *view)
+{
+    static blend_group_fn *const by_rays[] = { [TRIP_CPU_PARALLEL] = sum_parallel,
+                                               [TRIP_CPU_PERSPECTIVE] = sum_perspective,
+                                               [TRIP_CPU_STRETCHED] = sum_stretched };
+    return by_rays[view->rays];
+}
+
+/* ---- tiles ---- */
+
+static void sheet_clear(float *sums)
+{
+    for (unsigned i = 0; i < SHEET_FLOATS; i += V)
+        v_store(sums + i, v_set(0));
+    for (unsigned number = 0; number < STAMPS; number++)
+        set_sheet_of_stamp(sums, number, TRIP_CPU_NO_SHEET);
+}
+
+static void sheet_composite(const trip_cpu_view *view, const float *pixels, const float *sums,
+                            float *out)
+{
+    memcpy(out, pixels, SHEET_FLOATS * sizeof *out);
+    for (unsigned number = 0; number < STAMPS; number++) {
+        const float *of = sums + STAMP_FLOATS * number;
+        patch p = {
+            .r = v_load(of), .g = v_load(of + V), .b = v_load(of + 2 * V), .t = v_load(of + 3 * V)
+        };
+        if (TRIP_CPU_DEPTH)
+            p.depth = v_load(of + TRIP_CHANNEL_DEPTH * V);
+        put_sheet(view, out + STAMP_FLOATS * number, &p);
+    }
+}
+
+#endif
