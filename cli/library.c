@@ -39,6 +39,16 @@ int library_create(triptych **out, trip_progress *progress)
     return 0;
 }
 
+int library_set_function_quietly(triptych *t, const triptych_function *function)
+{
+    triptych_set_messages(t, NULL, NULL);
+    int status = triptych_set_function(t, function);
+    triptych_set_messages(t, pass_message, NULL);
+    if (status)
+        trip_report_line(triptych_error(t));
+    return status;
+}
+
 char *library_note(triptych *t, const char *key)
 {
     triptych_info info;

@@ -10,6 +10,9 @@
 /* `progress`, which may be NULL, outlives the context. 0, or a reported failure. */
 int library_create(triptych **out, trip_progress *progress);
 
+/* The function without its warnings; failures are reported. */
+int library_set_function_quietly(triptych *t, const triptych_function *function);
+
 /* A text among the notes of the data set that is open, for free(); NULL where there is none. */
 char *library_note(triptych *t, const char *key);
 

@@ -1,4 +1,4 @@
-/* triptych render: data set -> plan -> reader -> renderer -> merge -> image files. */
+/* triptych render: data set -> plan -> reader -> renderer -> merge -> image files or a video. */
 #include "commands.h"
 
 #include <stdio.h>
@@ -6,12 +6,15 @@
 #include <string.h>
 
 #include "cached_volume.h"
+#include "flight.h"
 #include "library.h"
 #include "piped_function.h"
 #include "render_options.h"
 #include "render_stats.h"
 #include "render_view.h"
 #include "report.h"
+#include "sequence.h"
+#include "video.h"
 
 /* The context, whose helper for pictures ends with the program. */
 static triptych *context;
@@ -23,6 +26,9 @@ typedef struct drawing {
     cached_volume volume; /* where the input is one */
     triptych *t;
     float *rgba, *depth; /* depth: NULL without --depth */
+    sequence sequence;
+    bool by_cameras; /* frames are set by the sequence, not by turning the view that was found */
+    video *video;    /* NULL: pictures are written */
     render_stats *stats;
     trip_progress progress;
 } drawing;
@@ -62,7 +68,7 @@ static int open_data(drawing *d, const char *path)
                                                 .threads = (unsigned)o->threads,
                                                 .renderer = o->renderer,
                                                 .engine = o->engine,
-                                                .keep_pages = o->orbit > 1,
+                                                .keep_pages = d->sequence.frames > 1,
                                                 .read_hidden = o->hidden == RENDER_HIDDEN_DRAW,
                                                 .name = o->input });
 }
@@ -130,20 +136,29 @@ static int create_context(drawing *d)
     return status;
 }
 
-static int open_drawing(drawing *d)
+static const char *data_path(const drawing *d)
+{
+    return d->volume.path ? d->volume.path : d->o.input;
+}
+
+static int take_pictures(drawing *d)
 {
     const render_options *o = &d->o;
-    const triptych_view view = render_view(o);
-    int status = open_input(d);
-    if (!status)
-        status = triptych_new_picture(d->t, o->width, o->height, 4, &d->rgba);
+    int status = triptych_new_picture(d->t, o->width, o->height, 4, &d->rgba);
     if (!status && o->depth)
         status = triptych_new_picture(d->t, o->width, o->height, 1, &d->depth);
+    return status ? status : triptych_set_settings(d->t, &o->settings);
+}
+
+static int open_drawing(drawing *d)
+{
+    const triptych_view view = render_view(&d->o);
+    int status = open_input(d);
     if (!status)
-        status = triptych_set_settings(d->t, &o->settings);
-    if (!status)
+        status = take_pictures(d);
+    if (!status && !d->o.path)
         status = triptych_set_view(d->t, &view);
-    if (!status && o->stats)
+    if (!status && d->o.stats)
         status = render_stats_create(&d->stats);
     return status;
 }
@@ -151,6 +166,8 @@ static int open_drawing(drawing *d)
 static void close_drawing(drawing *d)
 {
     render_stats_destroy(d->stats);
+    video_abandon(d->video);
+    sequence_release(&d->sequence);
     if (d->t) {
         triptych_end(d->t);
         triptych_close(d->t); /* the pictures too */
@@ -160,22 +177,25 @@ static void close_drawing(drawing *d)
 
 enum { PATH_BYTES = 4096 };
 
-/* Of an orbit, image.png -> image-007.png. */
+/* Of several, image.png -> image-007.png. */
 static int image_path(const drawing *d, const char *output, int index, char path[PATH_BYTES])
 {
     const char *extension = strrchr(output, '.');
     size_t bytes = PATH_BYTES;
-    int length = d->o.orbit ? snprintf(path, bytes, "%.*s-%03d%s", (int)(extension - output),
-                                       output, index, extension)
-                            : snprintf(path, bytes, "%s", output);
+    int length = d->o.orbit || d->o.path
+                     ? snprintf(path, bytes, "%.*s-%03d%s", (int)(extension - output), output,
+                                index, extension)
+                     : snprintf(path, bytes, "%s", output);
     if (length < 0 || (size_t)length >= bytes)
         return trip_fail(TRIP_USAGE, "render", output, "the name is too long");
     return 0;
 }
 
-/* A view of the orbit. */
-static int turn(drawing *d, int index)
+/* A view of the orbit or the path. */
+static int set_frame(drawing *d, int index)
 {
+    if (d->by_cameras)
+        return sequence_set_frame(&d->sequence, d->t, index, false);
     return triptych_turn(d->t, d->o.orbit ? 360.0 * index / d->o.orbit : 0);
 }
 
@@ -197,7 +217,7 @@ static int draw_frame(drawing *d)
 /* The plan before the frame is drawn, what it cost afterwards. */
 static int draw_planned(drawing *d, int index)
 {
-    int status = turn(d, index);
+    int status = set_frame(d, index);
     if (!status)
         status = triptych_begin(d->t);
     if (!status && d->o.explain)
@@ -210,35 +230,115 @@ static int draw_planned(drawing *d, int index)
     return status;
 }
 
-static int write_image(drawing *d, const char *path, int index)
+/* The picture and its distances, if the frame goes into files of its own. */
+static int write_image(void *user, triptych *t, int index, const float *rgba, const float *depth)
 {
-    char depth_path[PATH_BYTES];
-    int status = triptych_write(d->t, path, d->o.width, d->o.height, d->rgba);
-    if (!status && d->depth)
-        status = image_path(d, d->o.depth, index, depth_path);
-    if (!status && d->depth)
-        status = triptych_write_depth(d->t, depth_path, d->o.width, d->o.height, d->depth);
+    const drawing *d = user;
+    char path[PATH_BYTES];
+    int status = d->video ? 0 : image_path(d, d->o.output, index, path);
+    if (!status && !d->video)
+        status = triptych_write(t, path, d->o.width, d->o.height, rgba);
+    if (!status && depth)
+        status = image_path(d, d->o.depth, index, path);
+    if (!status && depth)
+        status = triptych_write_depth(t, path, d->o.width, d->o.height, depth);
+    return status;
+}
+
+/* What follows in the order of the frames. */
+static int finish_image(void *user, triptych *t, int index, const float *rgba)
+{
+    const drawing *d = user;
+    char path[PATH_BYTES];
+    int status = d->video ? video_add(d->video, rgba) : 0;
+    if (!status)
+        status = image_path(d, d->o.output, index, path);
+    if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
+        status = render_stats_summary(path, &d->o, t, stdout);
     return status;
 }
 
 static int draw_image(drawing *d, int index)
 {
-    char path[PATH_BYTES];
-    int status = image_path(d, d->o.output, index, path);
-    if (!status)
-        status = draw_planned(d, index);
+    int status = draw_planned(d, index);
     if (!status && d->stats)
         status = render_stats_add_frame(d->stats, d->t);
     if (!status)
-        status = write_image(d, path, index);
-    if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
-        status = render_stats_summary(path, &d->o, d->t, stdout);
+        status = write_image(d, d->t, index, d->rgba, d->depth);
+    return status ? status : finish_image(d, d->t, index, d->rgba);
+}
+
+/* How many frames are drawn at once: one where their times are to be told apart, or where a second
+ * would take what the first needs. */
+static int contexts_of(const drawing *d)
+{
+    enum { USUAL = 2 };
+    const render_options *o = &d->o;
+    bool slow = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ||
+                o->renderer == TRIPTYCH_RENDERER_REFERENCE || o->engine == TRIPTYCH_ENGINE_NULL;
+    if (d->sequence.frames < 2 || o->stats || o->explain || o->field == RENDER_FIELD_SOURCE)
+        return 1;
+    return o->in_flight ? o->in_flight : slow ? 1 : USUAL;
+}
+
+/* With all of the memory again, after frames in flight. */
+static int reopen(drawing *d)
+{
+    int status = open_data(d, data_path(d));
+    if (!status)
+        status = library_set_function_quietly(d->t, &d->o.function);
+    return status ? status : take_pictures(d);
+}
+
+/* From frame *first on, which is counted up. */
+static int draw_in_flight(drawing *d, int *first)
+{
+    const flight f = { .o = &d->o,
+                       .sequence = &d->sequence,
+                       .data = data_path(d),
+                       .contexts = contexts_of(d),
+                       .write = write_image,
+                       .then = finish_image,
+                       .user = d };
+    if (f.contexts < 2)
+        return 0;
+    triptych_close(d->t);
+    d->rgba = d->depth = NULL;
+    d->by_cameras = true;
+    int status = flight_draw(&f, first);
+    return status > 0 ? reopen(d) : status;
+}
+
+static int start_video(drawing *d)
+{
+    const render_options *o = &d->o;
+    if (!video_is_named(o->output))
+        return 0;
+    return video_create(&d->video, o->output, o->width, o->height,
+                        sequence_frames_per_second(&d->sequence));
+}
+
+static int draw_images(drawing *d)
+{
+    int first = 0,
+        status = d->sequence.frames > 1 || d->o.path ? sequence_prepare(&d->sequence, d->t) : 0;
+    d->by_cameras = d->o.path;
+    if (!status)
+        status = start_video(d);
+    if (!status)
+        status = draw_in_flight(d, &first);
+    for (int i = first; i < d->sequence.frames && !status; i++)
+        status = draw_image(d, i);
+    if (!status && d->video) {
+        status = video_finish(d->video);
+        d->video = NULL;
+    }
     return status;
 }
 
 static int count_image(drawing *d, int index)
 {
-    int status = turn(d, index);
+    int status = set_frame(d, index);
     if (!status)
         status = triptych_begin(d->t);
     if (!status)
@@ -263,6 +363,16 @@ static int count_images(drawing *d, int images)
     return status;
 }
 
+/* What can be known before any work: that the program can write what it is to draw. */
+static int check_output(drawing *d)
+{
+    const render_options *o = &d->o;
+    bool is_video = video_is_named(o->output);
+    int status = is_video ? video_check(o->output, o->width, o->height)
+                          : triptych_prepare_write(d->t, o->output, o->depth);
+    return status ? status : render_options_check_outputs(o);
+}
+
 int trip_command_render(int argc, char **argv)
 {
     drawing d = { 0 };
@@ -270,20 +380,19 @@ int trip_command_render(int argc, char **argv)
     if (!status)
         status = create_context(&d);
     if (!status)
-        status = triptych_prepare_write(d.t, d.o.output, d.o.depth);
+        status = check_output(&d);
     if (!status)
-        status = render_options_check_outputs(&d.o);
+        status = sequence_load(&d.sequence, &d.o);
     if (!status)
         status = piped_function_keep(&d.function, d.t, &d.o.function.name);
     if (!status)
         status = open_drawing(&d);
-    int images = d.o.orbit ? d.o.orbit : 1;
-    for (int i = 0; i < images && !status; i++)
-        status = draw_image(&d, i);
+    if (!status)
+        status = draw_images(&d);
     if (!status && d.stats)
         status = render_stats_describe(d.stats, &d.o, d.t);
     if (!status && d.o.count)
-        status = count_images(&d, images);
+        status = count_images(&d, d.sequence.frames);
     if (!status && d.stats)
         status = render_stats_write(d.stats, &d.o);
     if (status == TRIP_ERROR && d.volume.hold >= 0 && d.volume.path)

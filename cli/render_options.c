@@ -12,6 +12,7 @@
 #include "options.h"
 #include "report.h"
 #include "text.h"
+#include "video.h"
 #include "volume_options.h"
 
 enum {
@@ -26,6 +27,9 @@ enum {
     KEY_FOV,
     KEY_ORTHO,
     KEY_ORBIT,
+    KEY_PATH,
+    KEY_FPS,
+    KEY_IN_FLIGHT,
     KEY_VIEW,
     KEY_AZIMUTH,
     KEY_ELEVATION,
@@ -63,7 +67,10 @@ enum {
 };
 
 static const struct argp_option options[] = {
-    { "output", 'o', "FILE", 0, "Image to write: .png, .exr, .tif or .jpg", 0 },
+    { "output", 'o', "FILE", 0,
+      "Image to write: .png, .exr, .tif or .jpg; of --orbit and --path also a video: .mp4, .mov, "
+      ".mkv or .webm, by ffmpeg",
+      0 },
     { NULL, 0, NULL, 0, "View:", 1 },
     { "size", KEY_SIZE, "WxH", 0, "Pixels (default: 1024x1024)", 1 },
     { "view", KEY_VIEW, "SIDE", 0,
@@ -84,7 +91,13 @@ static const struct argp_option options[] = {
     { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (default: 30)", 1 },
     { "ortho", KEY_ORTHO, "HEIGHT|fit", 0,
       "Parallel view, HEIGHT world units high, or so that all is in view", 1 },
-    { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...", 1 },
+    { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...; or a video", 1 },
+    { "path", KEY_PATH, "FILE.json", 0,
+      "Images along a path of the camera, as triptych-render(1) describes it: FILE-000.png, ...; "
+      "or "
+      "a video",
+      1 },
+    { "fps", KEY_FPS, "N", 0, "Images a second of a video (default: the path's, else 30)", 1 },
     { NULL, 0, NULL, 0, "Look:", 2 },
     { "tf", KEY_TF, "NAME|FILE", 0,
       "Transfer function (default: kept in the data set): auto, ct, mr, fog, labels or simulation, "
@@ -135,6 +148,10 @@ static const struct argp_option options[] = {
       4 },
     { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 4 },
     { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 4 },
+    { "in-flight", KEY_IN_FLIGHT, "N", 0,
+      "Images drawn at once, which divide the memory, 1 to 16 (default: 2; 1 with --stats, "
+      "--explain); --orbit and --path only",
+      4 },
     { "field", KEY_FIELD, "NAME", 0,
       "What is integrated: stored values, those of the source volume, or splats (default: stored); "
       "integral only",
@@ -336,6 +353,11 @@ static int parse_view(int key, char *arg, parse *p)
         return parse_ortho(arg, o);
     case KEY_ORBIT:
         return trip_option_integer("--orbit", arg, 1, 100000, &o->orbit);
+    case KEY_PATH:
+        o->path = arg;
+        return 0;
+    case KEY_FPS:
+        return trip_option_number("--fps", arg, 0.001, 1000, &o->fps);
     default:
         return parse_side(key, arg, p);
     }
@@ -472,6 +494,8 @@ static int parse_renderer(int key, char *arg, parse *p)
         return status;
     case KEY_THREADS:
         return trip_option_integer("--threads", arg, 1, 1024, &o->threads);
+    case KEY_IN_FLIGHT:
+        return trip_option_integer("--in-flight", arg, 1, 16, &o->in_flight);
     default:
         return parse_integral(key, arg, p);
     }
@@ -489,6 +513,33 @@ static int check_view(const parse *p)
     if (o->eye_given && o->ortho_fit)
         return trip_option_fail("--ortho", "fit goes without --eye; give a height");
     return 0;
+}
+
+/* What of the view a path has settled. */
+static int check_path(const parse *p)
+{
+    const render_options *o = p->o;
+    bool other = p->side || o->eye_given || o->look_given || o->up_given || o->zoom > 0 ||
+                 o->roll_degrees != 0 || o->fov_degrees > 0 || o->ortho_height > 0 || o->ortho_fit;
+    if (o->path && (other || o->orbit))
+        return trip_option_fail("--path", "has the views: of other options of the view only --size "
+                                          "goes with it");
+    return 0;
+}
+
+static int check_sequence(const parse *p)
+{
+    const render_options *o = p->o;
+    bool several = o->orbit || o->path, moving = video_is_named(o->output);
+    if (moving && !several)
+        return trip_option_fail(o->output, "is a video: --orbit or --path says of what");
+    if (o->fps > 0 && !moving)
+        return trip_option_fail("--fps", "applies to videos: -o NAME.mp4");
+    if (o->in_flight && !several)
+        return trip_option_fail("--in-flight", "applies to --orbit and --path only");
+    if (o->in_flight > 1 && (o->stats || o->explain))
+        return trip_option_fail("--in-flight", "is 1 with --stats and --explain");
+    return check_path(p);
 }
 
 static int check_depth(const render_options *o)
@@ -559,6 +610,8 @@ static int check(parse *p)
             o->input,
             "is a data set: --grid, --level-set, --spacing and --allow-gaps are for volumes");
     int status = check_view(p);
+    if (!status)
+        status = check_sequence(p);
     if (status)
         return status;
     if (p->light && !o->settings.shading)

@@ -23,7 +23,7 @@ typedef enum render_hidden {
 
 typedef struct render_options {
     const char *input,
-        *output; /* data set or volume; an image file, its name's model in an orbit */
+        *output; /* data set or volume; an image file, the model of the names of several; a video */
     triptych_brick_options volume; /* how a volume is read; nothing else of it is set */
     triptych_function function;    /* colour and opacity */
     const char *depth;             /* a file for distances, or NULL */
@@ -36,6 +36,9 @@ typedef struct render_options {
     double zoom, fov_degrees, ortho_height; /* 0: not given */
     bool ortho_fit;                         /* parallel, as high as needed */
     int orbit;                              /* images of a turntable; 0: one image */
+    const char *path;                       /* of the camera, a file; or NULL */
+    double fps;                             /* of a video; 0: not given */
+    int in_flight;                          /* frames drawn at once; 0: not given */
     triptych_settings settings;
     triptych_renderer renderer;
     render_hidden hidden;

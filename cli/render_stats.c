@@ -12,7 +12,7 @@
 #include "budget.h"
 #include "json.h"
 #include "new_file.h"
-#include "render_view.h"
+#include "camera_text.h"
 #include "report.h"
 #include "text.h"
 
@@ -120,7 +120,7 @@ static int add_camera(cJSON *frame, triptych *t)
 {
     triptych_camera view;
     int status = triptych_get_camera(t, &view);
-    char *options = status ? NULL : render_view_options(&view);
+    char *options = status ? NULL : trip_camera_text_of(&view);
     bool added = options && cJSON_AddStringToObject(frame, "camera", options);
     free(options);
     return status || added ? status : out_of_memory();
@@ -239,7 +239,7 @@ int render_stats_explain_plan(triptych *t, FILE *out)
     int status = triptych_get_camera(t, &view);
     if (!status)
         status = triptych_explain(t, &plan);
-    if (!status && !(options = render_view_options(&view)))
+    if (!status && !(options = trip_camera_text_of(&view)))
         status = out_of_memory();
     if (!status) {
         fprintf(out, "camera      %s\n", options);

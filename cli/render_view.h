@@ -1,4 +1,4 @@
-/* The view of `triptych render`, and the options that give a view again. */
+/* The view of `triptych render`. */
 #ifndef TRIP_RENDER_VIEW_H
 #define TRIP_RENDER_VIEW_H
 
@@ -6,8 +6,5 @@
 
 /* What the options say of the view; points into them. */
 triptych_view render_view(const render_options *o);
-
-/* The options that give this view again, to the last bit; for free(). NULL without memory. */
-char *render_view_options(const triptych_camera *view);
 
 #endif

@@ -63,6 +63,9 @@ RENDER = {
     "--fov": NUMBERS + ["0", "-5", "180"],
     "--ortho": NUMBERS + ["0", "-5", "Fit"],
     "--orbit": COUNTS + ["1000000"],
+    "--path": [],
+    "--fps": NUMBERS + ["0", "-1", "1e9"],
+    "--in-flight": COUNTS + ["17"],
     "--view": NAMES + ["above", "FRONT"],
     "--azimuth": NUMBERS + ["1e9"],
     "--elevation": NUMBERS + ["1e9"],
@@ -229,6 +232,7 @@ class Options(program.ProgramTest):
             "--zoom": ["0.1", "1", "1e3"],
             "--size": ["1x1", "1x50", "50x1", "333x7"],
             "--orbit": ["1", "2"],
+            "--orbit=3 --in-flight": ["1", "3", "16"],
             "--tf": [
                 "preset:" + name
                 for name in ("grey", "bone", "viridis", "fog", "auto", "mr", "labels", "ct-soft")

@@ -1,0 +1,164 @@
+#include "flight.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "budget.h"
+#include "report.h"
+
+enum { MOST_CONTEXTS = 16, REPORT_BYTES = 4096 };
+
+typedef struct flying {
+    const flight *f;
+    pthread_mutex_t lock;
+    pthread_cond_t turn; /* `then` has changed, or `status` */
+    /* Under lock: the frames to draw and to go on with next; the first failure, and its line. */
+    int next, then, status;
+    bool final; /* it is of what comes after a frame, and not to be tried again */
+    char line[REPORT_BYTES];
+} flying;
+
+/* A thread with its context. */
+typedef struct pilot {
+    flying *all;
+    pthread_t thread;
+    triptych *t;
+    float *rgba, *depth;
+} pilot;
+
+static void fail(flying *all, int status, const char *line)
+{
+    pthread_mutex_lock(&all->lock);
+    if (!all->status) {
+        all->status = status;
+        snprintf(all->line, sizeof all->line, "%s", line);
+    }
+    pthread_cond_broadcast(&all->turn);
+    pthread_mutex_unlock(&all->lock);
+}
+
+static uint64_t memory_of_each(const flight *f)
+{
+    uint64_t all = f->o->memory_bytes ? f->o->memory_bytes : trip_memory_available_bytes() / 4;
+    return all / (uint64_t)f->contexts;
+}
+
+static int open_data(pilot *p)
+{
+    const flight *f = p->all->f;
+    const render_options *o = f->o;
+    int status = triptych_create(&p->t);
+    if (!status)
+        status =
+            triptych_open(p->t, f->data,
+                          &(triptych_resources){ .memory_bytes = memory_of_each(f),
+                                                 .threads = (unsigned)o->threads,
+                                                 .renderer = o->renderer,
+                                                 .engine = o->engine,
+                                                 .keep_pages = 1,
+                                                 .read_hidden = o->hidden == RENDER_HIDDEN_DRAW,
+                                                 .name = o->input });
+    if (!status)
+        status = triptych_set_function(p->t, &o->function);
+    if (!status)
+        status = triptych_new_picture(p->t, o->width, o->height, 4, &p->rgba);
+    if (!status && o->depth)
+        status = triptych_new_picture(p->t, o->width, o->height, 1, &p->depth);
+    return status ? status : triptych_set_settings(p->t, &o->settings);
+}
+
+static int draw(pilot *p)
+{
+    enum { LOOK_NS = 20000000 };
+    int status = triptych_begin(p->t);
+    while (!status && (status = triptych_step(p->t, UINT64_MAX)) == TRIPTYCH_WAITS)
+        status = triptych_await(p->t, LOOK_NS);
+    if (!status)
+        status = p->depth ? triptych_picture_and_depth(p->t, p->rgba, p->depth)
+                          : triptych_picture(p->t, p->rgba);
+    triptych_end(p->t);
+    return status;
+}
+
+static int draw_frame(pilot *p, int frame)
+{
+    const flight *f = p->all->f;
+    int status = sequence_set_frame(f->sequence, p->t, frame, true);
+    if (!status)
+        status = draw(p);
+    return status ? status : f->write(f->user, p->t, frame, p->rgba, p->depth);
+}
+
+/* The next frame to draw; -1: there is none. */
+static int take_frame(flying *all)
+{
+    pthread_mutex_lock(&all->lock);
+    bool more = !all->status && all->next < all->f->sequence->frames;
+    int frame = more ? all->next++ : -1;
+    pthread_mutex_unlock(&all->lock);
+    return frame;
+}
+
+/* What comes after a frame, in its turn; not where one before it has failed. */
+static int go_on(pilot *p, int frame)
+{
+    flying *all = p->all;
+    int status = 0;
+    pthread_mutex_lock(&all->lock);
+    while (!all->status && all->then < frame)
+        pthread_cond_wait(&all->turn, &all->lock);
+    bool failed = all->then < frame;
+    if (!failed)
+        status = all->f->then(all->f->user, p->t, frame, p->rgba);
+    all->then += !failed && !status;
+    all->final |= status != 0;
+    pthread_cond_broadcast(&all->turn);
+    pthread_mutex_unlock(&all->lock);
+    return status;
+}
+
+static void *fly(void *argument)
+{
+    pilot *p = argument;
+    trip_held_report held;
+    int status, frame;
+    trip_report_hold(&held);
+    status = open_data(p);
+    while (!status && (frame = take_frame(p->all)) >= 0) {
+        status = draw_frame(p, frame);
+        if (!status)
+            status = go_on(p, frame);
+    }
+    if (status < 0)
+        fail(p->all, status, held.status ? held.line : p->t ? triptych_error(p->t) : "");
+    trip_report_release(&held);
+    triptych_destroy(p->t);
+    return NULL;
+}
+
+int flight_draw(const flight *f, int *done)
+{
+    flying all = { .f = f, .next = 0 };
+    pilot pilots[MOST_CONTEXTS] = { { 0 } };
+    int count = 0;
+    pthread_mutex_init(&all.lock, NULL);
+    pthread_cond_init(&all.turn, NULL);
+    for (int i = 0; i < f->contexts && i < MOST_CONTEXTS; i++) {
+        pilots[count].all = &all;
+        count += pthread_create(&pilots[count].thread, NULL, fly, &pilots[count]) == 0;
+    }
+    for (int i = 0; i < count; i++)
+        pthread_join(pilots[i].thread, NULL);
+    pthread_cond_destroy(&all.turn);
+    pthread_mutex_destroy(&all.lock);
+    *done = all.then;
+    if (count && !all.status)
+        return 0;
+    if (!all.final && all.status != TRIP_INTERRUPTED)
+        return 1;
+    if (*all.line)
+        trip_report_line(all.line);
+    return all.status;
+}

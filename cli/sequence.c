@@ -1,0 +1,185 @@
+#include "sequence.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "library.h"
+#include "report.h"
+
+int sequence_load(sequence *s, const render_options *o)
+{
+    s->o = o;
+    s->frames = o->orbit ? o->orbit : 1;
+    if (!o->path)
+        return 0;
+    int status = trip_camera_path_load(&s->path, o->path);
+    s->frames = trip_camera_path_frames(&s->path);
+    return status;
+}
+
+double sequence_frames_per_second(const sequence *s)
+{
+    enum { USUAL = 30 };
+    double own = s->path.frames_per_second;
+    return s->o->fps > 0 ? s->o->fps : own > 0 ? own : USUAL;
+}
+
+/* ---- views ---- */
+
+static triptych_camera camera_of(const sequence *s, int frame)
+{
+    double seconds = trip_camera_path_seconds(&s->path, frame);
+    trip_navigation n = trip_camera_path_view(&s->path, seconds);
+    triptych_camera camera = { .fov_degrees = n.fov_degrees,
+                               .ortho_height = n.ortho_height,
+                               .width = s->o->width,
+                               .height = s->o->height };
+    memcpy(camera.eye, n.eye, sizeof camera.eye);
+    memcpy(camera.look, n.look, sizeof camera.look);
+    memcpy(camera.up, n.up, sizeof camera.up);
+    return camera;
+}
+
+static int find_cameras(sequence *s, triptych *t)
+{
+    int status = 0;
+    s->cameras = calloc((size_t)s->frames, sizeof *s->cameras);
+    if (!s->cameras)
+        return trip_fail(TRIP_ERROR, "render", "frames", "out of memory");
+    for (int i = 0; i < s->frames && !status; i++) {
+        if (s->path.count) {
+            s->cameras[i] = camera_of(s, i);
+            continue;
+        }
+        status = triptych_turn(t, s->o->orbit ? 360.0 * i / s->o->orbit : 0);
+        if (!status)
+            status = triptych_get_camera(t, &s->cameras[i]);
+    }
+    return status;
+}
+
+/* ---- functions ---- */
+
+static bool has_functions(const sequence *s)
+{
+    for (size_t i = 0; i < s->path.count; i++)
+        if (s->path.keys[i].function || s->path.keys[i].text)
+            return true;
+    return false;
+}
+
+/* A preset, a file or, without a name, the data set's own, in data units. */
+static int find_function(triptych *t, const char *name, trip_tf **out)
+{
+    char *text = NULL;
+    int status = triptych_convert(t, &(triptych_conversion){ .function = name }, &text);
+    if (!status)
+        status = trip_tf_parse(out, name ? name : "data set", text, strlen(text));
+    free(text);
+    return status;
+}
+
+static int parse_text(const sequence *s, const char *text, trip_tf **out)
+{
+    int status = trip_tf_parse(out, s->o->path, text, strlen(text));
+    if (!status && trip_tf_is_normalised(*out))
+        return trip_fail(TRIP_ERROR, "path", s->o->path,
+                         "\"function_text\" is over the data's range, not in data units");
+    return status;
+}
+
+static triptych_function look_of(const sequence *s, const char *text)
+{
+    triptych_function f = s->o->function;
+    f.name = NULL;
+    f.text = text;
+    return f;
+}
+
+/* Taken once, so that it is warned of. */
+static int try_function(const sequence *s, triptych *t, const trip_tf *tf)
+{
+    char *text = trip_tf_to_text(tf);
+    const triptych_function f = look_of(s, text);
+    int status = text ? triptych_set_function(t, &f)
+                      : trip_fail(TRIP_ERROR, "render", "function", "out of memory");
+    free(text);
+    return status;
+}
+
+static int find_functions(sequence *s, triptych *t)
+{
+    if (!has_functions(s))
+        return 0;
+    s->functions = calloc(s->path.count + 1, sizeof *s->functions);
+    if (!s->functions)
+        return trip_fail(TRIP_ERROR, "render", "function", "out of memory");
+    int status = find_function(t, s->o->function.name, &s->functions[0]);
+    for (size_t i = 0; i < s->path.count && !status; i++) {
+        const trip_path_key *key = &s->path.keys[i];
+        trip_tf **own = &s->functions[i + 1];
+        if (key->function)
+            status = find_function(t, key->function, own);
+        else if (key->text)
+            status = parse_text(s, key->text, own);
+        if (!status && *own)
+            status = try_function(s, t, *own);
+    }
+    return status;
+}
+
+/* A frame's function as text, for free(). */
+static int mix_text(const sequence *s, int frame, char **text)
+{
+    trip_path_mix mix = trip_camera_path_mix(&s->path, trip_camera_path_seconds(&s->path, frame));
+    const trip_tf *from = s->functions[mix.from + 1], *to = s->functions[mix.to + 1];
+    trip_tf *between = NULL;
+    int status = mix.t > 0 ? trip_tf_mix(&between, from, to, mix.t) : 0;
+    *text = status ? NULL : trip_tf_to_text(between ? between : from);
+    trip_tf_destroy(between);
+    if (!status && !*text)
+        return trip_fail(TRIP_ERROR, "render", "function", "out of memory");
+    return status;
+}
+
+static int set_function(const sequence *s, triptych *t, int frame, bool quiet)
+{
+    char *text;
+    int status = mix_text(s, frame, &text);
+    const triptych_function f = look_of(s, text);
+    if (!status)
+        status = quiet ? triptych_set_function(t, &f) : library_set_function_quietly(t, &f);
+    free(text);
+    return status;
+}
+
+/* ---- frames ---- */
+
+int sequence_prepare(sequence *s, triptych *t)
+{
+    int status = find_cameras(s, t);
+    return status ? status : find_functions(s, t);
+}
+
+void sequence_release(sequence *s)
+{
+    for (size_t i = 0; s->functions && i <= s->path.count; i++)
+        trip_tf_destroy(s->functions[i]);
+    free(s->functions);
+    free(s->cameras);
+    trip_camera_path_release(&s->path);
+}
+
+int sequence_set_frame(const sequence *s, triptych *t, int frame, bool quiet)
+{
+    const triptych_camera *c = &s->cameras[frame];
+    const triptych_view view = { .width = c->width,
+                                 .height = c->height,
+                                 .eye = c->eye,
+                                 .look = c->look,
+                                 .up = c->up,
+                                 .fov_degrees = c->fov_degrees,
+                                 .ortho_height = c->ortho_height };
+    int status = s->functions ? set_function(s, t, frame, quiet) : 0;
+    return status ? status : triptych_set_view(t, &view);
+}

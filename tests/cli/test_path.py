@@ -1,0 +1,213 @@
+"""Paths of the camera, several frames at once, and videos. What stands in for ffmpeg here keeps what
+it is given."""
+import json
+import math
+import os
+import stat
+import sys
+
+import numpy
+
+import program
+
+ENCODER = """#!%s
+import os, sys
+if os.environ.get("ENCODER_FAILS"):
+    sys.stdin.buffer.read(5)
+    sys.exit("frame 1: no such codec")
+data = sys.stdin.buffer.read()
+open("given", "w").write("\\n".join(sys.argv[1:]))
+assert sys.argv[-1].startswith("file:"), sys.argv
+open(sys.argv[-1][5:], "wb").write(data)
+"""
+SIZE = ("--size", "40x30")
+
+
+def key(seconds, degrees, **more):
+    """A view from so many degrees round the volume's middle."""
+    x, y = math.sin(math.radians(degrees)), -math.cos(math.radians(degrees))
+    eye = [15.5 + 90 * x, 15.5 + 90 * y, 15.5]
+    return dict(seconds=seconds, eye=eye, look=[15.5] * 3, up=[0, 0, 1], fov=30) | more
+
+
+def options(k):
+    return [
+        *("--eye", ",".join(map(repr, k["eye"])), "--look", "15.5,15.5,15.5", "--up", "0,0,1"),
+        *("--fov", "30"),
+    ]
+
+
+class Paths(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nrrd("v.nhdr", program.noise((32, 32, 32)))
+        run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
+        assert run.returncode == 0, run.stderr
+        os.mkdir("bin")
+        program.write("bin/ffmpeg", (ENCODER % sys.executable).encode())
+        os.chmod("bin/ffmpeg", stat.S_IRWXU)
+        cls.with_encoder = dict(os.environ, PATH=os.path.abspath("bin"))
+
+    def path(self, *keys, **more):
+        path = dict(triptych_path=1, frames_per_second=4, keys=keys) | more
+        program.write("path.json", json.dumps(path).encode())
+        return "path.json"
+
+    def frames(self, *arguments, name="f.exr"):
+        """The files of the frames, in order."""
+        stem, extension = os.path.splitext(name)
+        for old in [f for f in os.listdir(".") if f.startswith(stem + "-")]:
+            os.remove(old)
+        self.works("render", "v.trip", "-o", name, *SIZE, *arguments)
+        files = sorted(f for f in os.listdir(".") if f.startswith(stem + "-"))
+        self.assertEqual(files, [f"{stem}-{i:03d}{extension}" for i in range(len(files))])
+        return [open(f, "rb").read() for f in files]
+
+    def single(self, *arguments):
+        self.works("render", "v.trip", "-o", "s.exr", *SIZE, *arguments)
+        with open("s.exr", "rb") as f:
+            return f.read()
+
+    def test_frames_are_single_pictures_however_many_are_drawn_at_once(self):
+        path = self.path(key(0, 0), key(1, 60), key(2, 120))
+        one = self.frames("--path", path, "--in-flight", "1")
+        self.assertEqual(len(one), 9)
+        for count in ("2", "3", "16"):
+            self.assertEqual(self.frames("--path", path, "--in-flight", count), one)
+        self.assertEqual(self.frames("--path", path), one)
+        self.assertEqual(self.frames("--path", path, "--stats", "s.json"), one)
+        for frame, degrees in ((0, 0), (4, 60), (8, 120)):
+            self.assertEqual(self.single(*options(key(0, degrees))), one[frame])
+        cameras = [f["camera"].split() for f in json.load(open("s.json"))["frames"]]
+        for frame in (1, 6):  # between keys: the view that is printed
+            self.assertEqual(self.single(*cameras[frame]), one[frame])
+            eye = [float(x) for x in cameras[frame][1].split(",")]
+            expected = key(0, 15 * frame)["eye"]
+            numpy.testing.assert_allclose(eye, expected, atol=1e-9)
+
+    def test_an_orbit_is_the_same_however_many_are_drawn_at_once(self):
+        one = self.frames("--orbit", "5", "--in-flight", "1")
+        self.assertEqual(len(set(one)), 5)
+        self.assertEqual(self.frames("--orbit", "5"), one)
+        self.assertEqual(self.frames("--orbit", "5", "--in-flight", "4"), one)
+
+    def test_frames_that_do_not_fit_the_memory_together_are_drawn_one_by_one(self):
+        one = self.frames("--orbit", "3", "--in-flight", "1", "--memory", "64M")
+        together = ("--orbit", "3", "--in-flight", "16", "--memory", "64M", "--size", "500x500")
+        alone = ("--orbit", "3", "--in-flight", "1", "--memory", "64M", "--size", "500x500")
+        self.assertEqual(self.frames(*together), self.frames(*alone))
+        self.assertEqual(self.frames("--orbit", "3"), one)
+
+    def test_distances_are_those_of_single_pictures(self):
+        path = self.path(key(0, 0), key(1, 60))
+        self.frames("--path", path, "--depth", "z.tif")
+        self.single(*options(key(0, 60)), "--depth", "s.tif")
+        self.assertEqual(open("z-004.tif", "rb").read(), open("s.tif", "rb").read())
+
+    def test_functions_go_over_into_one_another(self):
+        first, last = "0 1 0 0 0\n255 1 0 0 0.2\n", "0 0 0 1 0\n100 0 1 1 0.1\n255 0 0 1 0.6\n"
+        program.write("last.tf", last.encode())
+        path = self.path(
+            key(0, 30), key(0.5, 30, function_text=first), key(1.5, 30, function="last.tf")
+        )
+        frames = self.frames("--path", path, "--tf", "last.tf")
+        self.assertEqual(len(frames), 7)
+        # Of the first quarter at each of 0, 100 and 255: shares of 1/4 and 3/4.
+        middle = (1 - 0.25) * 0.2 * 100 / 255 + 0.25 * 0.1
+        quarter = (
+            f"0 0.75 0 0.25 0\n100 0.75 0.25 0.25 {middle!r}\n"
+            f"255 0.75 0 0.25 {0.75 * 0.2 + 0.25 * 0.6!r}\n"
+        )
+        for frame, text in ((0, last), (2, first), (3, quarter), (6, last)):
+            program.write("f.tf", text.encode())
+            program.write("got.exr", frames[frame])
+            program.write("expected.exr", self.single(*options(key(0, 30)), "--tf", "f.tf"))
+            numpy.testing.assert_allclose(
+                program.read_linear_exr("got.exr"),
+                program.read_linear_exr("expected.exr"),
+                atol=0 if frame != 3 else 1e-5,
+            )
+        self.assertNotEqual(frames[2], frames[3])
+
+    def test_bad_paths_are_refused_by_name(self):
+        good = key(0, 0)
+        for path, says in (
+            ("{", "path.json: is not a path"),
+            ('{"triptych_path": 9, "keys": []}', "is of version 9"),
+            ([good, good], "key 2: is not later"),
+            ([good | {"fov": "wide"}], 'key 1: "fov"'),
+            ([good | {"eye": good["look"]}], "key 1: is no view"),
+            ([good, key(1e5, 0)], "frames long"),
+            ([good | {"function": "no-such.tf"}], "no-such.tf"),
+            ([good | {"function_text": "0 0 0 0 7\n"}], "line 1"),
+            ([good | {"function_text": "values normalised\n0 0 0 0 0\n"}], "data units"),
+        ):
+            if isinstance(path, str):
+                program.write("path.json", path.encode())
+            else:
+                self.path(*path)
+            self.leaves_nothing(
+                1, "render", "v.trip", "-o", "x.png", "--path", "path.json", says=says
+            )
+        self.path(good)
+        self.leaves_nothing(1, *("render", "v.trip", "-o", "x.png", "--path", "no.json"))
+        for more in (["--zoom", "2"], ["--orbit", "3"], ["--view", "top"], ["--fov", "20"]):
+            self.leaves_nothing(
+                *(2, "render", "v.trip", "-o", "x.png", "--path", "path.json", *more),
+                says="--path",
+            )
+
+    def test_a_video_has_the_pixels_of_the_pictures(self):
+        path = self.path(key(0, 0), key(1, 60))
+        for more in (["--path", path], ["--path", path, "--in-flight", "1"]):
+            self.works(
+                *("render", "v.trip", "-o", "a.mp4", *SIZE, *more), env=self.with_encoder
+            )
+            with open("a.mp4", "rb") as f:
+                video = numpy.frombuffer(f.read(), numpy.uint8).reshape(5, 30, 40, 3)
+            given = open("given").read().split("\n")
+            self.assertEqual(given[given.index("-framerate") + 1], "4")
+            self.assertEqual(given[given.index("-video_size") + 1], "40x30")
+            self.frames("--path", path)
+            for i, frame in enumerate(video):
+                display = program.read_exr(f"f-{i:03d}.exr")[..., :3]
+                numpy.testing.assert_allclose(frame, 255 * display, atol=0.51)
+        os.remove("a.mp4")
+        self.works(
+            *("render", "v.trip", "-o", "a.webm", *SIZE, "--orbit", "3", "--fps", "12.5"),
+            env=self.with_encoder,
+        )
+        given = open("given").read().split("\n")
+        self.assertEqual(given[given.index("-framerate") + 1], "12.5")
+        self.assertEqual(os.path.getsize("a.webm"), 3 * 3600)
+        os.remove("a.webm")
+
+    def test_a_video_that_cannot_be_made_leaves_nothing(self):
+        orbit = ("--orbit", "4", *SIZE)
+        self.leaves_nothing(
+            *(1, "render", "v.trip", "-o", "b.mp4", *orbit),
+            env=dict(self.with_encoder, ENCODER_FAILS="1"),
+            says="b.mp4: ffmpeg failed: frame 1: no such codec",
+        )
+        self.leaves_nothing(
+            *(1, "render", "v.trip", "-o", "b.mp4", *orbit),
+            env=dict(os.environ, PATH="/nowhere"),
+            says="ffmpeg, which is not installed",
+        )
+        self.leaves_nothing(
+            *(2, "render", "v.trip", "-o", "b.mp4", "--orbit", "4", "--size", "41x30"),
+            env=self.with_encoder,
+            says="even",
+        )
+        self.leaves_nothing(2, "render", "v.trip", "-o", "b.mp4", says="--orbit or --path")
+        self.leaves_nothing(
+            2, "render", "v.trip", "-o", "b.png", "--orbit", "4", "--fps", "5", says="--fps"
+        )
+        self.leaves_nothing(
+            2, "render", "v.trip", "-o", "b.png", "--in-flight", "2", says="--in-flight"
+        )
+
+
+if __name__ == "__main__":
+    program.main()
