@@ -12,6 +12,7 @@
 #include "flusher.h"
 #include "folder.h"
 #include "read_at.h"
+#include "remove_files.h"
 #include "report.h"
 
 enum { ALIGNMENT_BYTES = 4096, BUFFER_BYTES = 1 << 20 };
@@ -39,12 +40,14 @@ static int fail_memory(const trip_spill *s)
                      "needs more memory than is allowed: give more with --memory");
 }
 
-/* Removes what this program makes in the folder, the files of journal.c and resume.c included. */
-static void remove_files(int folder)
+/* What this program makes in the folder, the files of journal.c and resume.c included. */
+static bool is_own_file(const char *name)
 {
     static const char *const names[] = { DATA_NAME, "journal", "runs", "z0.voxels", "z0.normals" };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        unlinkat(folder, names[i], 0);
+        if (!strcmp(name, names[i]))
+            return true;
+    return false;
 }
 
 static int open_folder(trip_spill *s, bool resume)
@@ -52,7 +55,7 @@ static int open_folder(trip_spill *s, bool resume)
     int status = trip_folder_open_own(&s->folder, s->path, 0700, "brick",
                                       "another process is at work there");
     if (status == 0 && !resume)
-        remove_files(s->folder);
+        trip_remove_files(s->folder, is_own_file);
     s->keep = status == 0 && resume && faccessat(s->folder, "journal", F_OK, 0) == 0;
     return status;
 }
@@ -89,7 +92,7 @@ void trip_spill_close(trip_spill *s)
     if (s->file >= 0)
         close(s->file);
     if (s->folder >= 0 && !s->keep) {
-        remove_files(s->folder);
+        trip_remove_files(s->folder, is_own_file);
         rmdir(s->path);
     }
     if (s->folder >= 0)

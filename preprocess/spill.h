@@ -29,8 +29,7 @@ int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count
 /* Whether the folder remains after closing. Initially it does if it was opened with `resume` and
  * holds a journal, so that a run that is refused does not lose the work of the interrupted one. */
 void trip_spill_keep(trip_spill *s, bool keep);
-/* Removes the folder and the program's files in it, unless they are kept. Freeing a large data file
- * may take the file system seconds. */
+/* Removes the folder and the program's files in it, unless they are kept. */
 void trip_spill_close(trip_spill *s);
 
 const char *trip_spill_path(const trip_spill *s);

@@ -1,6 +1,7 @@
 #include "folder.h"
 
 #include "dataset.h"
+#include "remove_files.h"
 #include "report.h"
 
 #include <dirent.h>
@@ -14,19 +15,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static void remove_files(int fd)
+static bool is_own_file(const char *name)
 {
-    int copy = openat(fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    DIR *dir = copy < 0 ? NULL : fdopendir(copy);
-    for (struct dirent *e; dir && (e = readdir(dir));)
-        if (trip_plane_file_is_named(e->d_name))
-            unlinkat(fd, e->d_name, 0);
-    if (dir)
-        closedir(dir);
-    else if (copy >= 0)
-        close(copy);
-    unlinkat(fd, TRIP_INDEX_NAME, 0);
-    unlinkat(fd, TRIP_SPOOL_NAME, 0);
+    return !strcmp(name, TRIP_INDEX_NAME) || !strcmp(name, TRIP_SPOOL_NAME) ||
+           trip_plane_file_is_named(name);
 }
 
 /* Removes a data set; a folder that holds anything else stays. */
@@ -35,7 +27,7 @@ static int remove_dataset(const char *path)
     int fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (fd < 0)
         return -1;
-    remove_files(fd);
+    trip_remove_files(fd, is_own_file);
     close(fd);
     return rmdir(path);
 }
@@ -195,7 +187,7 @@ static int open_partial(trip_folder *f)
         if (status < 0)
             return status;
     } while (!same_folder(f->fd, f->partial));
-    remove_files(f->fd);
+    trip_remove_files(f->fd, is_own_file);
     if (!is_empty(f->fd))
         return trip_fail(TRIP_ERROR, "write", f->partial,
                          "holds files that are not a data set's: remove it");
@@ -342,7 +334,7 @@ int trip_folder_commit(trip_folder *f)
 void trip_folder_close(trip_folder *f)
 {
     if (f->fd >= 0 && same_folder(f->fd, f->partial)) {
-        remove_files(f->fd);
+        trip_remove_files(f->fd, is_own_file);
         rmdir(f->partial);
     }
     free_folder(f);
