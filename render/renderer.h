@@ -108,6 +108,7 @@ typedef struct trip_renderer_ops {
 struct trip_renderer {
     const trip_renderer_ops *ops;
     bool resident; /* since begin_frame: it has the frame's splats, and takes runs alone */
+    bool software; /* what stands for a graphics device is the processor */
 };
 
 int trip_reference_create(trip_renderer **out, trip_budget *budget);

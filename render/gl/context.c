@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "report.h"
 
@@ -140,7 +141,17 @@ static void describe(trip_gl_context *c)
     snprintf(c->device, sizeof c->device, "%s, OpenGL %s", renderer, version);
 }
 
-static void read_limits(trip_gl_limits *limits)
+/* By the names that Mesa's and SwiftShader's devices give. */
+static bool is_software(const char *device)
+{
+    static const char *const names[] = { "llvmpipe", "softpipe", "swrast", "SwiftShader" };
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strstr(device, names[i]))
+            return true;
+    return false;
+}
+
+static void read_limits(trip_gl_limits *limits, const char *device)
 {
     GLfloat points[2] = { 0 };
     GLint viewport[2] = { 0 }, texture = 0;
@@ -154,6 +165,7 @@ static void read_limits(trip_gl_limits *limits)
         .point_size_px = points[1],
         .storage_block_bytes = (size_t)block,
         .image_px = side < texture ? side : texture,
+        .software = is_software(device),
     };
 }
 
@@ -183,7 +195,7 @@ int trip_gl_context_create(trip_gl_context **out)
     }
     report_debug_messages();
     describe(c);
-    read_limits(&c->limits);
+    read_limits(&c->limits, c->device);
     if (check_storage_blocks(c)) {
         trip_gl_context_destroy(c);
         return TRIP_ERROR;

@@ -5,6 +5,7 @@
 #ifndef TRIP_GL_CONTEXT_H
 #define TRIP_GL_CONTEXT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 typedef struct trip_gl_context trip_gl_context;
@@ -14,6 +15,7 @@ typedef struct trip_gl_limits {
     double point_size_px;       /* largest point sprite */
     size_t storage_block_bytes; /* largest shader storage block */
     int image_px;               /* largest layer, either way */
+    bool software;              /* it draws on the processor */
 } trip_gl_limits;
 
 /* Leaves the new context current. Fails where there is no EGL or no OpenGL 4.5 core. */

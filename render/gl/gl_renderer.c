@@ -636,6 +636,7 @@ int trip_gl_create(trip_renderer **out, trip_budget *budget)
         destroy(&r->base);
         return status;
     }
+    r->base.software = r->target.software = trip_gl_context_limits(r->context)->software;
     describe(r);
     *out = &r->base;
     return TRIP_OK;

@@ -1,5 +1,6 @@
 #include "gl/queue.h"
 
+#include "renderer.h"
 #include "report.h"
 
 /* How long a wait does not notice that the frame is cancelled. */
@@ -32,8 +33,9 @@ int trip_gl_queue_is_done(trip_gl_queue *q, uint64_t part, bool wait)
             return wait_failed();
         if (result == GL_TIMEOUT_EXPIRED && !wait)
             return 0;
-        if (result == GL_TIMEOUT_EXPIRED && trip_interrupted())
-            return trip_fail(TRIP_INTERRUPTED, "render", "frame", "interrupted");
+        int status = result == GL_TIMEOUT_EXPIRED ? trip_frame_poll() : TRIP_OK;
+        if (status)
+            return status;
     }
     return 1;
 }
@@ -42,9 +44,10 @@ int trip_gl_queue_end_part(trip_gl_queue *q)
 {
     q->fences[++q->ended % TRIP_GL_QUEUE_PARTS] = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     glFlush();
-    if (q->ended < TRIP_GL_QUEUE_PARTS)
-        return TRIP_OK;
-    int status = trip_gl_queue_is_done(q, q->ended - (TRIP_GL_QUEUE_PARTS - 1), true);
+    int status = trip_frame_poll();
+    if (status || q->ended < TRIP_GL_QUEUE_PARTS)
+        return status;
+    status = trip_gl_queue_is_done(q, q->ended - (TRIP_GL_QUEUE_PARTS - 1), true);
     return status < 0 ? status : TRIP_OK;
 }
 

@@ -17,8 +17,8 @@ typedef struct trip_gl_queue {
 } trip_gl_queue;
 
 /* Ends a part: all commands since the part before. Waits while as many are under way as the queue
- * takes; fails (reported) when the frame is cancelled meanwhile, after which
- * trip_gl_queue_drain() follows. */
+ * takes; fails (reported) when the frame is cancelled, after which trip_gl_queue_drain() follows.
+ */
 int trip_gl_queue_end_part(trip_gl_queue *q);
 /* 1: the part is done, as is part 0; 0: not yet, never where `wait` is set; negative: failed, or
  * cancelled while waiting (reported). */

@@ -106,8 +106,9 @@ static int at_least_one_at_most(int count, int most)
 
 static void lay_out(trip_gl_target *t)
 {
+    int pixels = t->software ? TRIP_GL_SOFTWARE_BAND_PIXELS : TRIP_GL_BAND_PIXELS;
     int least = (t->height + TRIP_GL_BANDS_MAX - 1) / TRIP_GL_BANDS_MAX;
-    int rows = at_least_one_at_most(TRIP_GL_BAND_PIXELS / t->width, t->height);
+    int rows = at_least_one_at_most(pixels / t->width, t->height);
     rows = rows < least ? least : rows;
     for (int y = 0; y < t->height; y += rows) {
         int left = t->height - y;
@@ -200,6 +201,8 @@ static int begin_band(const trip_gl_target *t, trip_gl_band *band, int axis, boo
     clear(t, &band->layers[axis]);
     if (stencil)
         glClearNamedFramebufferiv(framebuffer, GL_STENCIL, 0, &zero);
+    if (t->software)
+        glFinish(); /* no more than one band is left to be cleared when a frame is given up */
     return trip_frame_poll();
 }
 
@@ -250,5 +253,5 @@ void trip_gl_target_release(trip_gl_target *t)
         trip_budget_discharge(t->budget, t->bands[i].stencil_bytes);
     }
     release_surface(t, &t->strip);
-    *t = (trip_gl_target){ .budget = t->budget };
+    *t = (trip_gl_target){ .budget = t->budget, .software = t->software };
 }

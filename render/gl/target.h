@@ -13,7 +13,10 @@
 #include "settings.h"
 
 enum {
-    TRIP_GL_BAND_PIXELS = 1 << 24, /* about; more in the largest images */
+    /* About; more in the largest images. On a processor smaller ones, which it has to fill with
+     * zeros before a frame can be given up. */
+    TRIP_GL_BAND_PIXELS = 1 << 24,
+    TRIP_GL_SOFTWARE_BAND_PIXELS = 1 << 23,
     TRIP_GL_BANDS_MAX = 32,
     TRIP_GL_STRIP_PIXELS = 1 << 20, /* a pass over an image is done in strips of about so many */
 };
@@ -36,6 +39,7 @@ typedef struct trip_gl_band {
 
 typedef struct trip_gl_target {
     trip_budget *budget;
+    bool software; /* the device is the processor */
     int width, height;
     trip_target type;
     bool depth;
