@@ -1,5 +1,6 @@
 """--memory is a promise: bricking a raw volume larger than it, and drawing the data set, stay within
 it and the program's own size."""
+import glob
 import os
 import unittest
 
@@ -44,6 +45,13 @@ class Memory(program.ProgramTest):
         for output in "a.png", "a.exr":
             rss = peak_rss("render", "a.trip", "-o", output, "--memory", "64M", "--size", "300x300")
             self.assertLess(rss, 64 * MIB + PROGRAM_BYTES)
+
+    @unittest.skipIf(glob.glob("/dev/dri/*") or os.path.exists("/dev/nvidiactl"), "draws by OpenGL")
+    def test_the_choice_of_a_renderer_takes_no_memory_where_there_is_no_graphics_device(self):
+        program.write_nrrd("small.nrrd", program.noise((30, 40, 50)))
+        self.works("brick", "small.nrrd", "-o", "drawn.trip", "-q")
+        draw = ["render", "drawn.trip", "-o", "a.png", "--memory=32M", "--size=300x300"]
+        self.assertLess(peak_rss(*draw), 32 * MIB + PROGRAM_BYTES)
 
     def test_a_small_volume_takes_little_however_much_it_may(self):
         program.write_nrrd("small.nrrd", program.noise((30, 40, 50)))
