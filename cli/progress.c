@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 static const double interval_seconds = 0.25;
-static const double settled_seconds = 1; /* before that, a rate says little */
+static const double steady_seconds = 1; /* before that, a rate says little */
 
 static double now_seconds(void)
 {
@@ -57,7 +57,7 @@ void trip_progress_show(trip_progress *p, const char *stage, uint64_t done, uint
     if (now - p->last_shown < interval_seconds)
         return;
     double spent = now - p->stage_begin, share = total ? (double)done / (double)total : 0;
-    double rate = spent > settled_seconds ? (double)done / spent : 0;
+    double rate = spent > steady_seconds ? (double)done / spent : 0;
     print_line(p, share, rate, rate > 0 ? (double)(total - done) / rate : 0, things);
     p->last_shown = now;
     p->line = true;

@@ -172,7 +172,7 @@ static const struct argp_option options[] = {
       "With --stats or --explain: draw everything once more, untimed, hidden bricks too, and count "
       "the splats",
       5 },
-    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it settled):", 6 },
+    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 6 },
     { "grid", KEY_GRID, "NAME", 0,
       "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 6 },
     { "level-set", KEY_LEVEL_SET, "HOW", 0,

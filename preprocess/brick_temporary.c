@@ -63,7 +63,7 @@ int trip_brick_temporary_open(trip_brick_temporary *t, const trip_brick_input *i
 bool trip_brick_temporary_has_ordered(const trip_brick_temporary *t)
 {
     for (size_t i = 0; i < trip_spill_count(t->spill); i++)
-        if (trip_spill_segment(t->spill, i)->list == TRIP_ORDERED_LIST)
+        if (trip_spill_sequence(t->spill, i)->list == TRIP_ORDERED_LIST)
             return true;
     return false;
 }

@@ -15,12 +15,12 @@
 #include "read_at.h"
 #include "report.h"
 
-/* A record is never longer: no checkpoint adds that many segments. */
+/* A record is never longer: no checkpoint adds that many sequences. */
 enum { RUN_BUFFER = 4096, RECORD_MOST_BYTES = 4 << 20 };
 
 enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2 };
 
-/* Precedes every record. That of a checkpoint ends with its new segments. */
+/* Precedes every record. That of a checkpoint ends with its new sequences. */
 typedef struct record_head {
     uint64_t kind;
     uint64_t bytes;    /* of the record after this */
@@ -36,7 +36,7 @@ struct trip_journal {
     bool has_start, has_checkpoint;
     trip_journal_start start;
     trip_checkpoint checkpoint;
-    uint64_t recorded; /* segments in the journal so far */
+    uint64_t recorded; /* sequences in the journal so far */
     uint64_t runs, ordered_splats;
     trip_run_record buffer[RUN_BUFFER];
     size_t buffered;
@@ -116,7 +116,7 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
 static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
 {
     bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
-                c->runs >= before->runs && c->segments >= before->segments &&
+                c->runs >= before->runs && c->sequences >= before->sequences &&
                 c->ordered_splats >= before->ordered_splats;
     for (int i = 0; i < TRIP_PLANES; i++)
         fits = fits && c->ordered_bytes[i] >= before->ordered_bytes[i];
@@ -178,28 +178,28 @@ static bool has_runs(const trip_journal *j, uint64_t runs)
     return fstat(j->runs_file, &st) == 0 && runs <= (uint64_t)st.st_size / sizeof(trip_run_record);
 }
 
-/* Reads a checkpoint and its new segments. Returns 1 when it is accepted, 0 when data that it needs
- * are not there any more. */
+/* Reads a checkpoint and its new sequences. Returns 1 when it is accepted, 0 when data that it
+ * needs are not there any more. */
 static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *record, uint64_t bytes)
 {
     trip_checkpoint *c = malloc(sizeof *c);
     if (!c)
         return fail_memory(j);
-    const trip_segment *segments = (const void *)((const char *)record + sizeof *c);
-    uint64_t fresh = bytes < sizeof *c ? 0 : (bytes - sizeof *c) / sizeof *segments;
+    const trip_sequence *sequences = (const void *)((const char *)record + sizeof *c);
+    uint64_t fresh = bytes < sizeof *c ? 0 : (bytes - sizeof *c) / sizeof *sequences;
     if (bytes >= sizeof *c)
         memcpy(c, record, sizeof *c);
     int taken = 0;
-    if (bytes != sizeof *c + fresh * sizeof *segments || c->segments != j->recorded + fresh)
+    if (bytes != sizeof *c + fresh * sizeof *sequences || c->sequences != j->recorded + fresh)
         taken = fail_false(j, "a record");
     else
         taken = check_checkpoint(j, c);
     if (taken == 0 && has_ordered(j, c) && has_runs(j, c->runs))
-        taken = trip_spill_restore(spill, segments, fresh);
+        taken = trip_spill_restore(spill, sequences, fresh);
     if (taken == 1) {
         j->checkpoint = *c;
         j->has_checkpoint = true;
-        j->recorded = c->segments;
+        j->recorded = c->sequences;
     }
     free(c);
     return taken;
@@ -346,17 +346,17 @@ int trip_journal_add_run(trip_journal *j, const trip_run_record *run)
 int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill)
 {
     size_t fresh = trip_spill_count(spill) - j->recorded;
-    size_t bytes = sizeof *c + fresh * sizeof(trip_segment);
+    size_t bytes = sizeof *c + fresh * sizeof(trip_sequence);
     unsigned char *record = malloc(bytes);
     if (!record)
         return fail_memory(j);
-    c->segments = trip_spill_count(spill);
+    c->sequences = trip_spill_count(spill);
     c->runs = j->runs;
     c->ordered_splats = j->ordered_splats;
     memcpy(record, c, sizeof *c);
     if (fresh)
-        memcpy(record + sizeof *c, trip_spill_segment(spill, j->recorded),
-               fresh * sizeof(trip_segment));
+        memcpy(record + sizeof *c, trip_spill_sequence(spill, j->recorded),
+               fresh * sizeof(trip_sequence));
     j->recorded += fresh;
     int status = flush_runs(j);
     if (status == 0)

@@ -17,11 +17,11 @@ typedef struct trip_journal_start {
     trip_tally tally;
 } trip_journal_start;
 
-/* All pieces of the first part of the volume are in segments or in the ordered list. */
+/* All pieces of the first part of the volume are in sequences or in the ordered list. */
 typedef struct trip_checkpoint {
     uint64_t done;                       /* the length of that part, as trip_walk() counts it */
     uint64_t kept, halo;                 /* its splats */
-    uint64_t segments;                   /* of the spill */
+    uint64_t sequences;                  /* of the spill */
     uint64_t runs, ordered_splats;       /* appended to the ordered list */
     uint64_t ordered_bytes[TRIP_PLANES]; /* of the ordered list's planes */
     trip_tally tally;                    /* of that part's values, unless scanned */
@@ -49,7 +49,7 @@ typedef struct trip_journal_params {
 } trip_journal_params;
 
 /* Opens the journal in the folder of `spill`. With `resume`, an existing one is read up to the last
- * checkpoint whose data are all there; its segments are added to the spill, and what follows it is
+ * checkpoint whose data are all there; its sequences are added to the spill, and what follows it is
  * cut off. Another identity, and numbers that no such run writes, are reported failures. Without
  * `resume`, or if there is none, the journal is new. */
 int trip_journal_open(trip_journal **out, trip_spill *spill, const trip_journal_params *params,
@@ -66,7 +66,7 @@ int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_recor
 
 int trip_journal_write_start(trip_journal *j, const trip_journal_start *start);
 int trip_journal_add_run(trip_journal *j, const trip_run_record *run);
-/* Fills in segments, runs and ordered_splats; the caller fills the rest. */
+/* Fills in sequences, runs and ordered_splats; the caller fills the rest. */
 int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill);
 
 #endif

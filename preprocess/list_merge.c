@@ -48,21 +48,21 @@ typedef struct merge_job {
     pthread_mutex_t lock; /* guards the pool's free chain */
 } merge_job;
 
-static size_t segments_of(const trip_list_merge *m, unsigned list)
+static size_t sequences_of(const trip_list_merge *m, unsigned list)
 {
     size_t count = 0;
     for (size_t i = 0; i < trip_spill_count(m->spill); i++) {
-        const trip_segment *s = trip_spill_segment(m->spill, i);
+        const trip_sequence *s = trip_spill_sequence(m->spill, i);
         count += s->list == list && !s->retired;
     }
     return count;
 }
 
-/* Readers of segments of one list, each with a chunk as its buffer. */
+/* Readers of sequences of one list, each with a chunk as its buffer. */
 typedef struct source_set {
     merge_job *job;
-    trip_segment_reader *readers;
-    size_t *segments; /* index of each reader's */
+    trip_sequence_reader *readers;
+    size_t *sequences; /* index of each reader's */
     trip_piece_source **sources;
     size_t count;
     trip_chain buffers;
@@ -71,16 +71,16 @@ typedef struct source_set {
 static void close_sources(source_set *s)
 {
     for (size_t i = 0; i < s->count; i++)
-        trip_segment_reader_close(&s->readers[i]);
+        trip_sequence_reader_close(&s->readers[i]);
     pthread_mutex_lock(&s->job->lock);
     trip_chain_free(s->job->merge->pool, &s->buffers);
     pthread_mutex_unlock(&s->job->lock);
     free(s->readers);
-    free(s->segments);
+    free(s->sequences);
     free(s->sources);
 }
 
-static int open_segment(source_set *s, size_t index, unsigned list)
+static int open_sequence(source_set *s, size_t index, unsigned list)
 {
     const trip_list_merge *m = s->job->merge;
     trip_piece_pool *pool = m->pool;
@@ -88,31 +88,31 @@ static int open_segment(source_set *s, size_t index, unsigned list)
     uint32_t buffer = trip_chain_pop(pool, &pool->free);
     trip_chain_push(pool, &s->buffers, buffer);
     pthread_mutex_unlock(&s->job->lock);
-    trip_segment_reader *r = &s->readers[s->count];
-    int status = trip_segment_reader_open(r, m->spill, index, &pool->formats[list],
-                                          trip_chunk_memory(pool, buffer), pool->chunk_bytes);
-    s->segments[s->count] = index;
+    trip_sequence_reader *r = &s->readers[s->count];
+    int status = trip_sequence_reader_open(r, m->spill, index, &pool->formats[list],
+                                           trip_chunk_memory(pool, buffer), pool->chunk_bytes);
+    s->sequences[s->count] = index;
     s->sources[s->count++] = &r->source;
     return status;
 }
 
-/* Opens the first `limit` segments of a list, with room for one more source. */
+/* Opens the first `limit` sequences of a list, with room for one more source. */
 static int open_sources(source_set *s, merge_job *job, unsigned list, size_t limit)
 {
     const trip_list_merge *m = job->merge;
-    size_t wanted = segments_of(m, list);
+    size_t wanted = sequences_of(m, list);
     wanted = wanted < limit ? wanted : limit;
     *s = (source_set){ .job = job, .buffers = trip_chain_empty() };
     s->readers = calloc(wanted + 1, sizeof *s->readers);
-    s->segments = calloc(wanted + 1, sizeof *s->segments);
+    s->sequences = calloc(wanted + 1, sizeof *s->sequences);
     s->sources = calloc(wanted + 1, sizeof(trip_piece_source *));
-    if (!s->readers || !s->segments || !s->sources)
+    if (!s->readers || !s->sequences || !s->sources)
         return trip_fail(TRIP_ERROR, "brick", "lists", "out of memory");
     int status = 0;
     for (size_t i = 0; s->count < wanted && status == 0; i++) {
-        const trip_segment *segment = trip_spill_segment(m->spill, i);
-        if (segment->list == list && !segment->retired)
-            status = open_segment(s, i, list);
+        const trip_sequence *sequence = trip_spill_sequence(m->spill, i);
+        if (sequence->list == list && !sequence->retired)
+            status = open_sequence(s, i, list);
     }
     return status;
 }
@@ -134,7 +134,7 @@ static int merge_list(void *user, unsigned thread, uint64_t item)
     return status;
 }
 
-/* Merges segments of a list into one, as many as there are free chunks for buffers. */
+/* Merges sequences of a list into one, as many as there are free chunks for buffers. */
 static int consolidate(merge_job *job, unsigned list)
 {
     const trip_list_merge *m = job->merge;
@@ -143,31 +143,31 @@ static int consolidate(merge_job *job, unsigned list)
     if (status == 0)
         status = spill_sources(m->spill, list, &m->pool->formats[list], s.sources, s.count);
     for (size_t i = 0; i < s.count && status == 0; i++)
-        trip_spill_retire(m->spill, s.segments[i]);
+        trip_spill_retire(m->spill, s.sequences[i]);
     close_sources(&s);
     return status;
 }
 
-/* Ensures that there is a free chunk for every segment: spills all pieces in memory, then merges
- * segments until they are few enough. */
+/* Ensures that there is a free chunk for every sequence: spills all pieces in memory, then merges
+ * sequences until they are few enough. */
 static int make_room(merge_job *job)
 {
     const trip_list_merge *m = job->merge;
-    size_t segments = 0;
+    size_t sequences = 0;
     int status = 0;
     unsigned lists = 0;
     for (unsigned list = 0; list < TRIP_MOST_LISTS; list++) {
-        segments += m->lists[list] ? segments_of(m, list) : 0;
+        sequences += m->lists[list] ? sequences_of(m, list) : 0;
         lists += m->lists[list];
     }
-    if (segments <= m->pool->free.chunks)
+    if (sequences <= m->pool->free.chunks)
         return 0;
     for (unsigned list = 0; list < TRIP_MOST_LISTS && status == 0; list++) {
         status = trip_spill_chain(m->spill, list, m->pool, &m->in_memory[list]);
         trip_chain_free(m->pool, &m->in_memory[list]);
     }
     for (unsigned list = 0; list < TRIP_MOST_LISTS && status == 0; list++)
-        while (status == 0 && segments_of(m, list) > m->pool->free.chunks / (size_t)lists)
+        while (status == 0 && sequences_of(m, list) > m->pool->free.chunks / (size_t)lists)
             status = consolidate(job, list);
     return status;
 }

@@ -29,9 +29,9 @@ struct trip_spill {
     unsigned char *buffer;
     size_t used;
     _Atomic uint64_t offset; /* in the file, of the buffer; any thread may read it */
-    trip_segment *segments;
+    trip_sequence *sequences;
     size_t count, room;
-    XXH64_state_t *hash; /* of the segment being written */
+    XXH64_state_t *hash; /* of the sequence being written */
 };
 
 static int fail_memory(const trip_spill *s)
@@ -99,7 +99,7 @@ void trip_spill_close(trip_spill *s)
         close(s->folder);
     trip_budget_release(s->budget, s->buffer, BUFFER_BYTES);
     XXH64_freeState(s->hash);
-    free(s->segments);
+    free(s->sequences);
     free(s->path);
     free(s);
 }
@@ -127,16 +127,16 @@ static int make_room(trip_spill *s, size_t count)
 {
     if (count <= s->room)
         return 0;
-    trip_segment *larger = realloc(s->segments, 2 * count * sizeof *larger);
+    trip_sequence *larger = realloc(s->sequences, 2 * count * sizeof *larger);
     if (!larger)
         return fail_memory(s);
-    s->segments = larger;
+    s->sequences = larger;
     s->room = 2 * count;
     return 0;
 }
 
-/* The aligned end of a segment; 0 if it is not sound or does not begin at `offset`. */
-static uint64_t end_of_segment(const trip_segment *t, uint64_t offset)
+/* The aligned end of a sequence; 0 if it is not sound or does not begin at `offset`. */
+static uint64_t end_of_sequence(const trip_sequence *t, uint64_t offset)
 {
     uint64_t end;
     bool sound = t->offset == offset && t->list < TRIP_MOST_LISTS && t->retired == 0 &&
@@ -146,13 +146,13 @@ static uint64_t end_of_segment(const trip_segment *t, uint64_t offset)
     return sound ? end & ~((uint64_t)ALIGNMENT_BYTES - 1) : 0;
 }
 
-int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count)
+int trip_spill_restore(trip_spill *s, const trip_sequence *sequences, size_t count)
 {
     struct stat st;
     uint64_t offset = s->offset;
     int status = s->file < 0 && count ? open_file(s) : 0;
     for (size_t i = 0; i < count && status == 0; i++) {
-        offset = end_of_segment(&segments[i], offset);
+        offset = end_of_sequence(&sequences[i], offset);
         if (offset == 0)
             status = trip_fail(TRIP_ERROR, "brick", s->path,
                                "its journal describes temporary data that no run writes: without "
@@ -162,14 +162,14 @@ int trip_spill_restore(trip_spill *s, const trip_segment *segments, size_t count
         status = trip_fail_errno("brick", s->path, "cannot look at " DATA_NAME);
     if (status == 0 && count && offset > (uint64_t)st.st_size)
         return 0;
-    if (status == 0 && count > trip_budget_left_bytes(s->budget) / (4 * sizeof *segments))
+    if (status == 0 && count > trip_budget_left_bytes(s->budget) / (4 * sizeof *sequences))
         status = fail_memory(s); /* a damaged journal may have any number */
     if (status == 0)
         status = make_room(s, s->count + count);
     if (status < 0)
         return status;
     if (count)
-        memcpy(s->segments + s->count, segments, count * sizeof *segments);
+        memcpy(s->sequences + s->count, sequences, count * sizeof *sequences);
     s->count += count;
     s->offset = offset;
     return 1;
@@ -200,7 +200,7 @@ int trip_spill_begin(trip_spill *s, unsigned list)
     s->cut = true;
     if (make_room(s, s->count + 1) < 0)
         return TRIP_ERROR;
-    s->segments[s->count] = (trip_segment){ .offset = s->offset, .list = list };
+    s->sequences[s->count] = (trip_sequence){ .offset = s->offset, .list = list };
     XXH64_reset(s->hash, 0);
     return 0;
 }
@@ -209,7 +209,7 @@ int trip_spill_append(trip_spill *s, const void *piece, size_t bytes)
 {
     const unsigned char *p = piece;
     XXH64_update(s->hash, piece, bytes);
-    s->segments[s->count].bytes += bytes;
+    s->sequences[s->count].bytes += bytes;
     while (bytes > 0) {
         size_t room = BUFFER_BYTES - s->used, n = bytes < room ? bytes : room;
         memcpy(s->buffer + s->used, p, n);
@@ -228,7 +228,7 @@ int trip_spill_end(trip_spill *s)
     size_t whole = (s->used + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
     memset(s->buffer + s->used, 0, whole - s->used);
     int status = write_buffer(s, whole);
-    s->segments[s->count].checksum = XXH64_digest(s->hash);
+    s->sequences[s->count].checksum = XXH64_digest(s->hash);
     if (status == 0)
         s->count++;
     return status;
@@ -239,14 +239,14 @@ size_t trip_spill_count(const trip_spill *s)
     return s->count;
 }
 
-const trip_segment *trip_spill_segment(const trip_spill *s, size_t index)
+const trip_sequence *trip_spill_sequence(const trip_spill *s, size_t index)
 {
-    return &s->segments[index];
+    return &s->sequences[index];
 }
 
 void trip_spill_retire(trip_spill *s, size_t index)
 {
-    s->segments[index].retired = 1;
+    s->sequences[index].retired = 1;
 }
 
 uint64_t trip_spill_bytes(const trip_spill *s)
@@ -254,20 +254,20 @@ uint64_t trip_spill_bytes(const trip_spill *s)
     return s->offset;
 }
 
-static int fail_damaged(const trip_segment_reader *r)
+static int fail_damaged(const trip_sequence_reader *r)
 {
     return trip_fail(TRIP_ERROR, "brick", r->spill->path,
                      "temporary data at byte %llu is not what was written: the disk or another "
                      "program changed it",
-                     (unsigned long long)r->segment.offset);
+                     (unsigned long long)r->sequence.offset);
 }
 
 /* Moves the unused bytes to the end of the head and reads behind them, so that reads are aligned.
  */
-static int refill(trip_segment_reader *r)
+static int refill(trip_sequence_reader *r)
 {
     size_t left = r->end - r->begin;
-    uint64_t unread = r->segment.bytes - r->next;
+    uint64_t unread = r->sequence.bytes - r->next;
     size_t want = r->buffer_bytes - r->head_bytes;
     if (unread < want)
         want = (size_t)unread;
@@ -278,7 +278,7 @@ static int refill(trip_segment_reader *r)
     r->end = r->head_bytes;
     size_t whole = (want + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
     ssize_t n = trip_read_at(r->spill->file, r->buffer + r->head_bytes, whole, want,
-                             r->segment.offset + r->next);
+                             r->sequence.offset + r->next);
     if (n < 0)
         return trip_fail_errno("brick", r->spill->path, "cannot read");
     if ((size_t)n < want)
@@ -289,31 +289,31 @@ static int refill(trip_segment_reader *r)
     return 0;
 }
 
-static bool has_piece(const trip_segment_reader *r)
+static bool has_piece(const trip_sequence_reader *r)
 {
     const trip_piece *p = (const void *)(r->buffer + r->begin);
     size_t left = r->end - r->begin;
     return left >= sizeof *p && trip_piece_check(p, r->format, left);
 }
 
-static int set_piece(trip_segment_reader *r)
+static int set_piece(trip_sequence_reader *r)
 {
     int status = 0;
-    if (!has_piece(r) && r->next < r->segment.bytes)
+    if (!has_piece(r) && r->next < r->sequence.bytes)
         status = refill(r);
     if (status < 0)
         return status;
     r->source.piece = NULL;
     if (has_piece(r))
         r->source.piece = (const void *)(r->buffer + r->begin);
-    else if (r->begin < r->end || XXH64_digest(r->hash) != r->segment.checksum)
+    else if (r->begin < r->end || XXH64_digest(r->hash) != r->sequence.checksum)
         status = fail_damaged(r);
     return status;
 }
 
-static int advance_segment(trip_piece_source *source)
+static int advance_sequence(trip_piece_source *source)
 {
-    trip_segment_reader *r = (trip_segment_reader *)source;
+    trip_sequence_reader *r = (trip_sequence_reader *)source;
     uint64_t key = source->piece->key;
     r->begin += trip_piece_get_parts(r->format, source->piece).bytes;
     int status = set_piece(r);
@@ -327,32 +327,32 @@ static size_t head_bytes(const trip_piece_format *f)
     return (trip_piece_max_bytes(f) + ALIGNMENT_BYTES - 1) & ~((size_t)ALIGNMENT_BYTES - 1);
 }
 
-size_t trip_segment_buffer_bytes(const trip_piece_format *f)
+size_t trip_sequence_buffer_bytes(const trip_piece_format *f)
 {
     return 2 * head_bytes(f);
 }
 
-int trip_segment_reader_open(trip_segment_reader *r, const trip_spill *s, size_t index,
-                             const trip_piece_format *format, void *buffer, size_t buffer_bytes)
+int trip_sequence_reader_open(trip_sequence_reader *r, const trip_spill *s, size_t index,
+                              const trip_piece_format *format, void *buffer, size_t buffer_bytes)
 {
     size_t head = head_bytes(format);
-    *r = (trip_segment_reader){ .source = { .advance = advance_segment },
-                                .spill = s,
-                                .segment = s->segments[index],
-                                .format = format,
-                                .buffer = buffer,
-                                .buffer_bytes = buffer_bytes,
-                                .head_bytes = head,
-                                .begin = head,
-                                .end = head,
-                                .hash = XXH64_createState() };
+    *r = (trip_sequence_reader){ .source = { .advance = advance_sequence },
+                                 .spill = s,
+                                 .sequence = s->sequences[index],
+                                 .format = format,
+                                 .buffer = buffer,
+                                 .buffer_bytes = buffer_bytes,
+                                 .head_bytes = head,
+                                 .begin = head,
+                                 .end = head,
+                                 .hash = XXH64_createState() };
     if (!r->hash)
         return fail_memory(s);
     XXH64_reset(r->hash, 0);
     return set_piece(r);
 }
 
-void trip_segment_reader_close(trip_segment_reader *r)
+void trip_sequence_reader_close(trip_sequence_reader *r)
 {
     XXH64_freeState(r->hash);
     r->hash = NULL;

@@ -1,6 +1,7 @@
 /* The interface behind which renderers stand: begin frame, for each layer of the plan begin layer
  * and draw its batches in order, picture, end frame. All calls come from one thread at a time.
- * Created once, used for many frames; the frame path does not allocate once sizes have settled. */
+ * Created once, used for many frames; the frame path does not allocate while sizes stay the same.
+ */
 #ifndef TRIP_RENDERER_H
 #define TRIP_RENDERER_H
 

@@ -36,25 +36,25 @@ static FILE *create(const char *name)
     return f;
 }
 
-enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEGMENTS, KINDS };
+enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEQUENCES, KINDS };
 
 /* Records are long and mostly zero: the input gives how they begin, and after a byte of how many,
- * the segments of a checkpoint before that. */
+ * the sequences of a checkpoint before that. */
 static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t size)
 {
-    size_t segments = kind == CHECKPOINT_WITH_SEGMENTS && size ? data[0] % 8 : 0;
+    size_t sequences = kind == CHECKPOINT_WITH_SEQUENCES && size ? data[0] % 8 : 0;
     size_t body = kind == RAW     ? size
                   : kind == START ? sizeof(trip_journal_start)
                                   : sizeof(trip_checkpoint);
-    size_t bytes = body + segments * sizeof(trip_segment);
+    size_t bytes = body + sequences * sizeof(trip_sequence);
     unsigned char *record = calloc(1, bytes + 1);
-    if (segments && size > 1 + segments * sizeof(trip_segment)) {
-        memcpy(record + body, data + 1, segments * sizeof(trip_segment));
-        data += 1 + segments * sizeof(trip_segment);
-        size -= 1 + segments * sizeof(trip_segment);
+    if (sequences && size > 1 + sequences * sizeof(trip_sequence)) {
+        memcpy(record + body, data + 1, sequences * sizeof(trip_sequence));
+        data += 1 + sequences * sizeof(trip_sequence);
+        size -= 1 + sequences * sizeof(trip_sequence);
     }
     memcpy(record, data, size < body ? size : body);
-    const uint64_t number = kind == CHECKPOINT_WITH_SEGMENTS ? CHECKPOINT : kind;
+    const uint64_t number = kind == CHECKPOINT_WITH_SEQUENCES ? CHECKPOINT : kind;
     const uint64_t head[3] = { number, bytes, XXH64(record, bytes, number) };
     fwrite(head, sizeof head, 1, f);
     fwrite(record, bytes, 1, f);
@@ -95,11 +95,11 @@ static void use_tally(const trip_tally *t)
     }
 }
 
-static void check_segments(const trip_spill *spill)
+static void check_sequences(const trip_spill *spill)
 {
     uint64_t end = 0;
     for (size_t i = 0; i < trip_spill_count(spill); i++) {
-        const trip_segment *s = trip_spill_segment(spill, i);
+        const trip_sequence *s = trip_spill_sequence(spill, i);
         FUZZ_PROMISE(s->list < TRIP_MOST_LISTS && s->offset >= end && s->bytes <= PIECES_BYTES);
         end = s->offset + s->bytes;
         FUZZ_PROMISE(end <= PIECES_BYTES);
@@ -112,7 +112,7 @@ static void check_journal(const trip_journal *j, const trip_journal_params *p,
 {
     const trip_journal_start *start = trip_journal_get_start(j);
     const trip_checkpoint *c = trip_journal_get_checkpoint(j);
-    check_segments(spill);
+    check_sequences(spill);
     if (start && p->scanned)
         use_tally(&start->tally);
     if (!c)
@@ -122,7 +122,7 @@ static void check_journal(const trip_journal *j, const trip_journal_params *p,
     for (int i = 0; i < TRIP_PLANES; i++)
         FUZZ_PROMISE(c->ordered_bytes[i] <= p->ordered_bytes[i]);
     FUZZ_PROMISE(!p->slice_voxels || c->done <= SLICES);
-    FUZZ_PROMISE(c->runs <= 1000 && c->segments == trip_spill_count(spill));
+    FUZZ_PROMISE(c->runs <= 1000 && c->sequences == trip_spill_count(spill));
     if (!p->scanned)
         use_tally(&c->tally);
 }

@@ -153,7 +153,7 @@ static trip_checkpoint *checkpoint(void)
 }
 
 /* The first of those that came with the first checkpoint. */
-static trip_segment *segments(void)
+static trip_sequence *sequences(void)
 {
     return (void *)(records[1].body + sizeof(trip_checkpoint));
 }
@@ -202,7 +202,7 @@ static void check_attacks(const attack *attacks, size_t count, const char *why, 
 #define CHECK_ATTACKS(attacks, why, automatic)                                                     \
     check_attacks((attacks), sizeof(attacks) / sizeof *(attacks), (why), (automatic))
 
-/* A change of the start, of the last checkpoint, or of the first segment. */
+/* A change of the start, of the last checkpoint, or of the first sequence. */
 #define ATTACK(name, change)                                                                       \
     static void name(void)                                                                         \
     {                                                                                              \
@@ -239,15 +239,15 @@ ATTACK(halo_without_room, checkpoint()->halo = 1)
 ATTACK(most_halo, checkpoint()->halo = UINT64_MAX)
 ATTACK(more_in_order_than_there_are, checkpoint()->ordered_splats = N + 1)
 ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
-ATTACK(most_segments, checkpoint()->segments = UINT64_MAX)
-ATTACK(segments_that_wrap, checkpoint()->segments += UINT64_C(1) << 59)
-ATTACK(fewer_segments, checkpoint()->segments--)
-ATTACK(segment_of_no_list, segments()->list = 6)
-ATTACK(segment_elsewhere, segments()->offset = 4096)
-ATTACK(segment_that_wraps, segments()->bytes = UINT64_MAX - 4095)
-ATTACK(segment_of_nothing, segments()->bytes = 0)
-ATTACK(segment_of_odd_length, segments()->bytes += 1)
-ATTACK(segment_retired, segments()->retired = 1)
+ATTACK(most_sequences, checkpoint()->sequences = UINT64_MAX)
+ATTACK(sequences_that_wrap, checkpoint()->sequences += UINT64_C(1) << 59)
+ATTACK(fewer_sequences, checkpoint()->sequences--)
+ATTACK(sequence_of_no_list, sequences()->list = 6)
+ATTACK(sequence_elsewhere, sequences()->offset = 4096)
+ATTACK(sequence_that_wraps, sequences()->bytes = UINT64_MAX - 4095)
+ATTACK(sequence_of_nothing, sequences()->bytes = 0)
+ATTACK(sequence_of_odd_length, sequences()->bytes += 1)
+ATTACK(sequence_retired, sequences()->retired = 1)
 ATTACK(record_of_another_kind, records[record_count - 1].kind = 77)
 ATTACK(start_twice, records[record_count - 1].kind = START)
 ATTACK(start_cut_short, records[0].bytes -= 8)
@@ -284,9 +284,9 @@ static void numbers_that_no_run_writes_are_refused(void **state)
         { "most halo", most_halo },
         { "more in order than there are", more_in_order_than_there_are },
         { "most runs", most_runs },
-        { "most segments", most_segments },
-        { "segments that wrap", segments_that_wrap },
-        { "fewer segments", fewer_segments },
+        { "most sequences", most_sequences },
+        { "sequences that wrap", sequences_that_wrap },
+        { "fewer sequences", fewer_sequences },
         { "record of another kind", record_of_another_kind },
         { "start twice", start_twice },
         { "start cut short", start_cut_short },
@@ -295,16 +295,16 @@ static void numbers_that_no_run_writes_are_refused(void **state)
     CHECK_ATTACKS(attacks, "is not what such a run writes", false);
 }
 
-static void segments_that_no_run_writes_are_refused(void **state)
+static void sequences_that_no_run_writes_are_refused(void **state)
 {
     (void)state;
     static const attack attacks[] = {
-        { "segment of no list", segment_of_no_list },
-        { "segment elsewhere", segment_elsewhere },
-        { "segment that wraps", segment_that_wraps },
-        { "segment of nothing", segment_of_nothing },
-        { "segment of odd length", segment_of_odd_length },
-        { "segment retired", segment_retired },
+        { "sequence of no list", sequence_of_no_list },
+        { "sequence elsewhere", sequence_elsewhere },
+        { "sequence that wraps", sequence_that_wraps },
+        { "sequence of nothing", sequence_of_nothing },
+        { "sequence of odd length", sequence_of_odd_length },
+        { "sequence retired", sequence_retired },
     };
     CHECK_ATTACKS(attacks, "temporary data that no run writes", false);
 }
@@ -570,7 +570,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(a_journal_as_it_was_written_is_gone_on_with),
         TEST(numbers_that_no_run_writes_are_refused),
-        TEST(segments_that_no_run_writes_are_refused),
+        TEST(sequences_that_no_run_writes_are_refused),
         TEST(a_false_tally_of_all_values_is_refused),
         TEST(another_identity_is_refused),
         TEST(false_lengths_of_files_in_order_are_found_when_they_are_read),
