@@ -27,6 +27,7 @@ enum {
     KEY_SCALE,
     KEY_NO_PANEL,
     KEY_SCRIPT,
+    KEY_FRESH,
     KEY_RENDERER,
     KEY_MEMORY,
     KEY_ENGINE,
@@ -44,6 +45,8 @@ static const struct argp_option options[] = {
     { "no-panel", KEY_NO_PANEL, NULL, 0, "Begin without the panel; t shows it", 1 },
     { "fps", KEY_FPS, "N", 0,
       "Frames a second while the view moves, which are as small as that takes (default: 30)", 1 },
+    { "fresh", KEY_FRESH, NULL, 0,
+      "Begin as if the data were seen for the first time, and keep nothing of it", 1 },
     { "script", KEY_SCRIPT, "FILE", 0, "Replay events, then end", 1 },
     { NULL, 0, NULL, 0, "View and look, as of `triptych render`:", 2 },
     { "view", KEY_VIEW, "SIDE", 0, "front, back, left, right, top, bottom or iso", 2 },
@@ -113,6 +116,7 @@ static int parse_view(int key, char *arg, view_options *o)
                                          "top",   "bottom", "iso",  NULL };
     triptych_view *v = &o->params.start;
     int which = 0, status;
+    o->params.start_given |= key >= KEY_EYE && key <= KEY_VIEW;
     switch (key) {
     case KEY_VIEW:
         status = trip_option_choice("--view", arg, sides, &which);
@@ -147,6 +151,7 @@ static int parse_look(int key, char *arg, view_options *o)
     case KEY_CLASSIFY:
         status = trip_option_choice("--classify", arg, classifications, &which);
         o->params.settings.classify = (triptych_classify)which;
+        o->params.settings_given = true;
         return status;
     default:
         return parse_view(key, arg, o);
@@ -219,6 +224,9 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         return 0;
     case KEY_FPS:
         return trip_option_number("--fps", arg, 1, 1000, &o->params.frames_per_second);
+    case KEY_FRESH:
+        o->params.fresh = true;
+        return 0;
     case KEY_SCRIPT:
         o->params.script = arg;
         return 0;

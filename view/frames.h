@@ -59,13 +59,14 @@ typedef struct trip_wanted {
 /* From now on this is wanted. */
 void trip_frames_want(trip_frames *f, const trip_wanted *wanted);
 
-/* What is known of a data set once it is open, and where a view that had to be found looks from. */
+/* What is known of a data set once it is open; later, where a view that had to be found looks from,
+ * and the text of another function. */
 typedef struct trip_opened {
     unsigned document;
-    bool view_only;     /* it was open before: nothing but its navigation is set */
+    bool first;         /* it has just been opened; else only navigation and function are set */
     triptych_info info; /* without notes */
     triptych_histogram histogram;
-    char *function; /* its text; NULL where it has none in data units */
+    char *function; /* its text; NULL where it is as it was, or has none in data units */
     trip_navigation navigation;
     char *source; /* the path that was opened */
 } trip_opened;

@@ -43,8 +43,9 @@ struct trip_frames {
     uint64_t served;
     bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
     unsigned document;
-    const char *source; /* that was found for what is named; NULL: nothing is held */
-    char *function;     /* that the context has, as a key */
+    const char *source;  /* that was found for what is named; NULL: nothing is held */
+    char *function;      /* that the context has, as a key */
+    bool other_function; /* than the window's thread was given the text of */
     bool has_settings;
     triptych_settings settings; /* that the context has */
     float *rgba;                /* of this size: */

@@ -146,7 +146,7 @@ static void close_data(trip_frames *f)
     f->source = NULL;
     free(f->function);
     f->function = NULL;
-    f->has_settings = f->open = f->announced = f->warm = false;
+    f->has_settings = f->open = f->announced = f->warm = f->other_function = false;
     f->pace = (trip_pace){ 0 };
     pthread_mutex_lock(&f->lock);
     f->status.open = false;
@@ -198,6 +198,7 @@ static int use_function(trip_frames *f)
         triptych_set_function(f->t, &(triptych_function){ .name = w->text ? NULL : w->function,
                                                           .text = w->text,
                                                           .opacity_scale = w->opacity_scale });
+    f->other_function |= !status && !w->text;
     free(f->function);
     f->function = status ? NULL : key;
     if (status)
@@ -239,8 +240,6 @@ static int find_navigation(trip_frames *f, trip_navigation *out)
 static char *text_of_function(trip_frames *f)
 {
     char *text = NULL;
-    if (f->now.text)
-        return strdup(f->now.text);
     if (triptych_convert(f->t, &(triptych_conversion){ .function = f->now.function }, &text))
         return NULL;
     return text;
@@ -253,29 +252,42 @@ static int describe(trip_frames *f, trip_opened *o)
         return status;
     o->info.notes = NULL;
     status = triptych_get_histogram(f->t, &o->histogram);
-    o->function = text_of_function(f);
     o->source = strdup(f->source);
     return status;
 }
 
+/* Joins what was not taken yet. */
+static void post(trip_frames *f, trip_opened *o)
+{
+    trip_opened *to = &f->opened;
+    if (f->has_opened && to->document == o->document && !o->first) {
+        to->navigation = o->navigation;
+        if (o->function) {
+            free(to->function);
+            to->function = o->function;
+        }
+    } else {
+        trip_opened_free(to);
+        *to = *o;
+    }
+    f->has_opened = true;
+}
+
 static int announce(trip_frames *f)
 {
-    trip_opened o = { .document = f->now.document, .view_only = f->announced };
+    trip_opened o = { .document = f->now.document, .first = !f->announced };
     int status = find_navigation(f, &o.navigation);
-    if (!status && !f->announced)
+    if (!status && o.first)
         status = describe(f, &o);
     if (status)
         return status;
+    if (f->other_function)
+        o.function = text_of_function(f);
+    f->other_function = false;
     f->now.navigation = o.navigation;
     f->now.has_navigation = f->announced = true;
     pthread_mutex_lock(&f->lock);
-    if (o.view_only && f->has_opened && f->opened.document == o.document) {
-        f->opened.navigation = o.navigation;
-    } else {
-        trip_opened_free(&f->opened);
-        f->opened = o;
-    }
-    f->has_opened = true;
+    post(f, &o);
     f->status.open = true;
     pthread_mutex_unlock(&f->lock);
     wake(f);
@@ -478,7 +490,7 @@ static int prepare(trip_frames *f)
         status = use_settings(f);
     if (!status)
         status = use_function(f);
-    if (!status && !(f->announced && f->now.has_navigation))
+    if (!status && (!f->announced || !f->now.has_navigation || f->other_function))
         status = announce(f);
     return status;
 }

@@ -48,9 +48,19 @@ namespace
 bool mark(trip_panel *p, const char *label, bool result)
 {
     const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
-    p->boxes[label] = Box{ lo, hi, ImGui::IsItemVisible() };
+    const float top = ImGui::GetWindowPos().y, bottom = top + ImGui::GetWindowHeight();
+    p->boxes[label] = Box{ lo, hi, lo.y >= top && hi.y <= bottom };
     if (p->sought == label)
         ImGui::SetScrollHereY();
+    return result;
+}
+
+// The same of a control with its label beside it.
+bool mark_beside(trip_panel *p, const char *label, bool result)
+{
+    mark(p, label, result);
+    Box &box = p->boxes[label];
+    box.hi.x = box.lo.x + ImGui::CalcItemWidth();
     return result;
 }
 
@@ -76,8 +86,8 @@ bool slide(trip_panel *p, const char *label, double *value, double lo, double hi
            const char *format, ImGuiSliderFlags flags = 0)
 {
     const ImGuiSliderFlags all = flags | ImGuiSliderFlags_AlwaysClamp;
-    return mark(p, label,
-                ImGui::SliderScalar(label, ImGuiDataType_Double, value, &lo, &hi, format, all));
+    return mark_beside(
+        p, label, ImGui::SliderScalar(label, ImGuiDataType_Double, value, &lo, &hi, format, all));
 }
 
 // Of a few names.
@@ -86,7 +96,7 @@ bool choose(trip_panel *p, const char *label, Choice *value, const char *const *
 {
     bool changed = false;
     const bool open = ImGui::BeginCombo(label, names[static_cast<int>(*value)]);
-    mark(p, label, open);
+    mark_beside(p, label, open);
     for (int i = 0; open && i < count; i++)
         if (mark(p, names[i], ImGui::Selectable(names[i], i == static_cast<int>(*value)))) {
             *value = static_cast<Choice>(i);
@@ -342,7 +352,7 @@ void draw_point(trip_panel *p, trip_document *d)
     const bool changed = ImGui::ColorEdit3("Colour", rgb);
     if (ImGui::IsItemActivated())
         trip_function_editor_begin(d->editor);
-    mark(p, "Colour", changed);
+    mark_beside(p, "Colour", changed);
     if (changed) {
         trip_function_editor_set_colour(d->editor, p->point, static_cast<double>(rgb[0]),
                                         static_cast<double>(rgb[1]), static_cast<double>(rgb[2]));
@@ -356,7 +366,7 @@ void draw_presets(trip_panel *p, trip_viewer *v, trip_document *d)
 {
     const char *now = d->edited ? "edited" : d->function ? d->function : "the data set's own";
     const bool open = ImGui::BeginCombo("Preset", now);
-    mark(p, "Preset", open);
+    mark_beside(p, "Preset", open);
     if (!open)
         return;
     if (mark(p, "the data set's own", ImGui::Selectable("the data set's own")))
@@ -375,7 +385,7 @@ void draw_function_file(trip_panel *p, trip_viewer *v, trip_document *d)
 {
     char line[600];
     ImGui::InputText("File", p->path, sizeof p->path);
-    mark(p, "File", false);
+    mark_beside(p, "File", false);
     if (button(p, "Load") && p->path[0])
         trip_viewer_set_function(v, p->path);
     ImGui::SameLine();
@@ -439,7 +449,7 @@ bool draw_light(trip_panel *p, trip_document *d)
     float rgb[3];
     for (int i = 0; i < 3; i++)
         rgb[i] = static_cast<float>(s->background[i]);
-    if (mark(p, "Background", ImGui::ColorEdit3("Background", rgb))) {
+    if (mark_beside(p, "Background", ImGui::ColorEdit3("Background", rgb))) {
         for (int i = 0; i < 3; i++)
             s->background[i] = static_cast<double>(rgb[i]);
         changed = true;
@@ -454,14 +464,14 @@ bool draw_quality(trip_panel *p, trip_document *d)
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
     bool changed = choose(p, "Classify", &s->classify, classes, 2);
     if (s->classify == TRIPTYCH_POST) {
-        changed |= mark(p, "Slices", ImGui::SliderInt("Slices", &s->slices, 1, 16));
+        changed |= mark_beside(p, "Slices", ImGui::SliderInt("Slices", &s->slices, 1, 16));
     } else {
         changed |= slide(p, "Kernel radius", &s->kernel_radius, 1.5, 6, "%.2f voxels");
     }
     changed |= choose(p, "Method", &s->method, methods, 3);
     if (s->method == TRIPTYCH_MERGE)
         changed |= slide(p, "h", &s->h, 0, 0.99, "%.2f");
-    changed |= mark(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
+    changed |= mark_beside(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
     return changed;
 }
 
@@ -681,7 +691,7 @@ void draw_over(trip_panel *p, trip_viewer *v)
     if (d && d->opened && d->has_navigation) {
         if (v->box)
             draw_box(list, v, d);
-        if (v->axes && v->box)
+        if (v->axes)
             draw_axes(list, v, d);
         if (v->scale_bar)
             draw_scale_bar(list, v, d, p->scale);
@@ -689,8 +699,8 @@ void draw_over(trip_panel *p, trip_viewer *v)
             draw_probe(list, v, d);
     }
     draw_progress(list, v, p->scale);
-    draw_message(list, v, p->scale);
     list->PopClipRect();
+    draw_message(ImGui::GetForegroundDrawList(), v, p->scale);
     if (v->keys)
         draw_keys(v);
 }

@@ -87,19 +87,30 @@ static bool is_late(const trip_player *p, double seconds, double most)
     return seconds - p->since > most;
 }
 
+/* Whether a control is in sight and where it was a picture ago: it may be on its way there. */
+static bool lies_still(trip_player *p, const trip_player_window *w, const trip_event *e)
+{
+    double box[4];
+    if (!w->find(w->user, e->text, box))
+        return false;
+    const double x = box[0] + (box[2] - box[0]) * e->x, y = (box[1] + box[3]) / 2;
+    const bool still = x == p->place[0] && y == p->place[1];
+    p->place[0] = x;
+    p->place[1] = y;
+    return still;
+}
+
 /* Pressed and released in pictures of their own. */
 static int play_click(trip_player *p, const trip_player_window *w, const trip_event *e,
                       double seconds)
 {
-    double box[4];
-    if (p->phase == 0 && !w->find(w->user, e->text, box))
+    if (p->phase == 0 && !lies_still(p, w, e))
         return is_late(p, seconds, 10)
                    ? trip_fail(TRIP_ERROR, "script", e->text, "the panel has no such control")
                    : 1;
     if (p->phase == 0)
-        w->send(w->user, &(trip_event){ .kind = TRIP_EVENT_MOVE,
-                                        .x = box[0] + (box[2] - box[0]) * e->x,
-                                        .y = (box[1] + box[3]) / 2 });
+        w->send(w->user,
+                &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = p->place[0], .y = p->place[1] });
     else if (p->phase >= 2)
         w->send(w->user, &(trip_event){ .kind = TRIP_EVENT_BUTTON,
                                         .code = TRIP_BUTTON_LEFT,
@@ -159,6 +170,7 @@ int trip_player_step(trip_player *p, const trip_player_window *w, double seconds
         p->next++;
         p->phase = 0;
         p->since = 0;
+        p->place[0] = p->place[1] = -1;
     }
     return 1;
 }

@@ -17,6 +17,7 @@ typedef struct trip_player {
     double until;      /* that is slept to, in seconds */
     int phase;         /* of an event that takes several pictures */
     double since;      /* that began */
+    double place[2];   /* where a control was a picture ago */
     int width, height; /* of the window, for random events */
     const char *drops; /* what random events drop; NULL: nothing */
 } trip_player;

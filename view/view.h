@@ -23,7 +23,9 @@ typedef struct trip_view_params {
     const char *function;
     double opacity_scale;
     triptych_settings settings;
+    bool start_given, settings_given; /* else what was kept of the data set goes before */
     bool no_panel;
+    bool fresh;         /* nothing is kept of how data sets were looked at */
     const char *script; /* a file of events, after which it ends */
     void *user;
     int (*find)(void *user, triptych *t, const char *input, const char **path); /* as frames.h */

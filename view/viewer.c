@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "camera_text.h"
+#include "state_file.h"
 
 enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
 
@@ -18,8 +19,6 @@ void trip_viewer_init(trip_viewer *v, trip_frames *frames)
                         .shown = -1,
                         .scale = 1,
                         .panel = true,
-                        .axes = true,
-                        .opacity_scale = 1,
                         .settings = triptych_default_settings() };
 }
 
@@ -34,10 +33,76 @@ static void free_document(trip_document *d)
     free(d);
 }
 
+/* By the whole path, however it was named. */
+static char *path_of(const trip_document *d)
+{
+    return realpath(d->input, NULL);
+}
+
+static void keep(const trip_viewer *v, const trip_document *d)
+{
+    char *path = v->fresh || !d->opened ? NULL : path_of(d);
+    if (!path)
+        return;
+    char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    trip_state_file_save(&(trip_view_state){ .has_navigation = d->has_navigation,
+                                             .navigation = d->navigation,
+                                             .function = d->function,
+                                             .text = text,
+                                             .opacity_scale = d->opacity_scale,
+                                             .settings = d->settings,
+                                             .panel = v->panel,
+                                             .box = v->box,
+                                             .axes = v->axes,
+                                             .scale_bar = v->scale_bar },
+                         path);
+    free(text);
+    free(path);
+}
+
+/* What the command line says of the view goes before what was kept. */
+static void take_state(trip_viewer *v, trip_document *d, trip_view_state *s)
+{
+    if (!v->start_given && s->has_navigation) {
+        d->navigation = s->navigation;
+        d->has_navigation = true;
+    }
+    if (!v->settings_given)
+        d->settings = s->settings;
+    if (!(v->opacity_scale > 0))
+        d->opacity_scale = s->opacity_scale;
+    if (!v->function && s->text && trip_function_editor_set_text(d->editor, d->input, s->text) == 0)
+        d->edited = true;
+    if (!v->function && s->function) {
+        d->function = s->function;
+        s->function = NULL;
+    }
+    v->box = s->box;
+    v->axes = s->axes;
+    v->scale_bar = s->scale_bar;
+}
+
+static void recall(trip_viewer *v, trip_document *d)
+{
+    trip_view_state s = { .settings = d->settings,
+                          .opacity_scale = d->opacity_scale,
+                          .panel = v->panel,
+                          .box = v->box,
+                          .axes = v->axes,
+                          .scale_bar = v->scale_bar };
+    char *path = v->fresh ? NULL : path_of(d);
+    if (path && trip_state_file_load(&s, path) == 1)
+        take_state(v, d, &s);
+    trip_view_state_release(&s);
+    free(path);
+}
+
 void trip_viewer_release(trip_viewer *v)
 {
-    for (int i = 0; i < v->count; i++)
+    for (int i = 0; i < v->count; i++) {
+        keep(v, v->documents[i]);
         free_document(v->documents[i]);
+    }
     *v = (trip_viewer){ .shown = -1 };
 }
 
@@ -62,9 +127,11 @@ static trip_document *make_document(trip_viewer *v, const char *input)
                           .editor = trip_function_editor_create(),
                           .start = v->start,
                           .settings = v->settings,
-                          .opacity_scale = v->opacity_scale };
-    if (d->input && d->editor && (d->function || !v->function))
+                          .opacity_scale = v->opacity_scale > 0 ? v->opacity_scale : 1 };
+    if (d->input && d->editor && (d->function || !v->function)) {
+        recall(v, d);
         return d;
+    }
     free_document(d);
     return NULL;
 }
@@ -99,6 +166,7 @@ void trip_viewer_close(trip_viewer *v)
 {
     if (v->shown < 0)
         return;
+    keep(v, v->documents[v->shown]);
     free_document(v->documents[v->shown]);
     v->count--;
     memmove(v->documents + v->shown, v->documents + v->shown + 1,
@@ -131,6 +199,16 @@ static void want(trip_viewer *v)
     v->changed = false;
 }
 
+static void describe(trip_document *d, trip_opened *o)
+{
+    d->opened = true;
+    d->info = o->info;
+    d->histogram = o->histogram;
+    free(d->source);
+    d->source = o->source;
+    o->source = NULL;
+}
+
 static void take_opened(trip_viewer *v)
 {
     trip_opened o;
@@ -143,15 +221,10 @@ static void take_opened(trip_viewer *v)
         d->navigation = o.navigation;
     if (d)
         d->has_navigation = true;
-    if (d && !o.view_only) {
-        d->opened = true;
-        d->info = o.info;
-        free(d->source);
-        d->source = o.source;
-        o.source = NULL;
-        d->histogram = o.histogram;
-        if (o.function && !d->edited)
-            trip_function_editor_set_text(d->editor, d->input, o.function);
+    if (d && o.first)
+        describe(d, &o);
+    if (d && o.function && !d->edited) {
+        trip_function_editor_set_text(d->editor, d->input, o.function);
         d->revision = trip_function_editor_revision(d->editor);
     }
     trip_opened_free(&o);
@@ -240,8 +313,6 @@ static void move(trip_viewer *v, double x, double y)
     v->at[1] = y;
     if (d && (dx != 0 || dy != 0))
         drag(v, d, dx, dy);
-    if (d && v->probe)
-        trip_frames_probe(v->frames, x, y);
 }
 
 /* Towards what is under the pointer. */
@@ -448,6 +519,16 @@ void trip_viewer_let_go(trip_viewer *v)
     memset(v->held, 0, sizeof v->held);
 }
 
+/* A transfer function is for the data set that is shown. */
+static void drop(trip_viewer *v, const char *path)
+{
+    const char *dot = strrchr(path, '.');
+    if (dot && !strcmp(dot, ".tf") && trip_viewer_document(v))
+        trip_viewer_set_function(v, path);
+    else
+        trip_viewer_open(v, path);
+}
+
 void trip_viewer_event(trip_viewer *v, const trip_event *e)
 {
     switch (e->kind) {
@@ -469,7 +550,7 @@ void trip_viewer_event(trip_viewer *v, const trip_event *e)
         trip_viewer_resize(v, (int)e->x, (int)e->y);
         break;
     case TRIP_EVENT_DROP:
-        trip_viewer_open(v, e->text);
+        drop(v, e->text);
         break;
     case TRIP_EVENT_CLOSE:
         v->quits = true;
@@ -499,20 +580,38 @@ static bool fly(trip_viewer *v, double seconds)
     return true;
 }
 
+/* Once for each place of the pointer and each view that has come to rest. */
+static void probe(trip_viewer *v)
+{
+    const trip_document *d = navigable(v);
+    const bool inside =
+        v->at[0] >= 0 && v->at[1] >= 0 && v->at[0] < v->picture_width && v->at[1] < v->height;
+    if (!d || !v->probe || !inside || !v->status.exact ||
+        (!memcmp(v->at, v->probed, sizeof v->at) &&
+         !memcmp(&v->probed_from, &d->navigation, sizeof d->navigation)))
+        return;
+    memcpy(v->probed, v->at, sizeof v->at);
+    v->probed_from = d->navigation;
+    trip_frames_probe(v->frames, v->at[0], v->at[1]);
+}
+
 bool trip_viewer_tick(trip_viewer *v, double seconds)
 {
     const trip_document *d = trip_viewer_document(v);
     take_opened(v);
     take_status(v);
     v->message_seconds += seconds;
-    if (v->message_seconds > SECONDS_SAID && !v->status.failed)
+    const bool vanishes = v->message[0] && v->message_seconds > SECONDS_SAID && !v->status.failed;
+    if (vanishes)
         v->message[0] = 0;
     if (d && d->edited && d->revision != trip_function_editor_revision(d->editor))
         v->changed = true;
     const bool flies = fly(v, seconds);
     if (v->changed)
         want(v);
-    return flies || v->message[0];
+    else
+        probe(v);
+    return flies || vanishes;
 }
 
 /* ---- where a picture lies ---- */

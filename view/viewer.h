@@ -46,7 +46,9 @@ typedef struct trip_viewer {
     bool buttons[TRIP_BUTTONS]; /* held, and pressed in the picture */
     bool held[TRIP_KEYS];       /* keys */
     unsigned modifiers;
-    bool changed; /* something else is to be wanted */
+    double probed[2];            /* where the pointer was probed, */
+    trip_navigation probed_from; /* seen from there */
+    bool changed;                /* something else is to be wanted */
     trip_frames_status status;
     char message[512];      /* the last, */
     double message_seconds; /* ago */
@@ -54,15 +56,18 @@ typedef struct trip_viewer {
     /* By the window: */
     void *user;
     void (*copy)(void *user, const char *text); /* into the clipboard */
-    /* What documents begin with. */
+    bool fresh; /* how a data set was last looked at is neither read nor kept */
+    /* What documents begin with; what was given of it goes before what was kept of them. */
+    bool start_given, settings_given;
     triptych_view start;
     triptych_settings settings;
     const char *function;
-    double opacity_scale;
+    double opacity_scale; /* 0: not given */
 } trip_viewer;
 
 /* Frames stay the caller's. */
 void trip_viewer_init(trip_viewer *v, trip_frames *frames);
+/* Also keeps how the data sets were looked at. */
 void trip_viewer_release(trip_viewer *v);
 
 /* NULL where none is shown. */

@@ -339,12 +339,24 @@ static void draw_picture(window *w)
     trip_blit_draw(w->blit, corners, exact);
 }
 
+/* What no picture covers looks as if nothing were there. */
+static void clear(const window *w)
+{
+    const trip_viewer *v = &w->viewer;
+    const trip_document *d = v->shown >= 0 ? v->documents[v->shown] : NULL;
+    const double *ground = d ? d->settings.background : (const double[4]){ 0 };
+    float colour[3];
+    for (int i = 0; i < 3; i++)
+        colour[i] = (float)(ground[i] * ground[3]);
+    trip_blit_clear(v->width, v->height, colour[0], colour[1], colour[2]);
+}
+
 static int draw(window *w, double seconds)
 {
     const trip_viewer *v = &w->viewer;
     if (w->hidden || v->width < 1 || v->height < 1)
         return 0;
-    trip_blit_clear(v->width, v->height, 0.07f, 0.07f, 0.08f);
+    clear(w);
     draw_picture(w);
     trip_panel_draw(w->panel, &w->viewer, seconds);
     int status = w->shot ? write_shot(w) : 0;
@@ -423,7 +435,10 @@ static void open_documents(window *w)
     v->start = p->start;
     v->settings = p->settings;
     v->function = p->function;
-    v->opacity_scale = p->opacity_scale > 0 ? p->opacity_scale : 1;
+    v->opacity_scale = p->opacity_scale;
+    v->start_given = p->start_given;
+    v->settings_given = p->settings_given;
+    v->fresh = p->fresh;
     v->panel = !p->no_panel;
     for (int i = 0; i < p->count; i++)
         trip_viewer_open(v, p->inputs[i]);
@@ -456,7 +471,7 @@ static int pass(window *w)
     const bool goes_on = trip_viewer_tick(&w->viewer, seconds);
     trip_frames_use_picture(w->frames, w->shown.number, upload, w);
     show_title(w);
-    if (w->to_draw || goes_on || w->plays)
+    if (w->to_draw || goes_on)
         status = draw(w, seconds);
     w->to_draw -= w->to_draw > 0;
     if (w->plays)

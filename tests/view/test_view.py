@@ -1,0 +1,262 @@
+"""The viewer in a window of a virtual screen (Xvfb), by scripts: what each control does, what it
+survives, and that its picture at rest is that of `triptych render`."""
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import unittest
+
+sys.path.insert(0, os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "cli"))
+import numpy
+
+import program
+
+ROUNDS = int(os.environ.get("TRIP_LIMITS_ROUNDS", "1"))
+WIDTH, HEIGHT, PANEL = 700, 340, 330
+
+
+def skip_what_is_missing():
+    if "VIEW" in program.SWITCHED_OFF:
+        print("skipped: built without the viewer")
+    elif not shutil.which("Xvfb"):
+        print("skipped: Xvfb is not installed")
+    else:
+        return
+    sys.exit(program.SKIPPED)
+
+
+class Screen:
+    """A virtual one; Xvfb chooses its number."""
+
+    def __init__(self):
+        read, write = os.pipe()
+        self.process = subprocess.Popen(
+            ["Xvfb", "-displayfd", str(write), "-screen", "0", "1400x1000x24", "-nolisten", "tcp"],
+            pass_fds=[write], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            number = pipe.readline().strip()
+        if not number:
+            print("skipped: Xvfb does not start")
+            sys.exit(program.SKIPPED)
+        self.environment = dict(os.environ, DISPLAY=f":{number}", LIBGL_ALWAYS_SOFTWARE="1",
+                                XDG_STATE_HOME=os.path.abspath("state"))
+        self.environment.pop("WAYLAND_DISPLAY", None)
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+class View(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.screen = Screen()
+        # Without symmetry, so that no two views look the same.
+        volume = program.noise((24, 20, 28))
+        program.write_nrrd("noise.nrrd", volume)
+        program.write_nrrd("ball.nrrd", program.ball((24, 24, 24)))
+        for name in "noise", "ball":
+            run = program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "--keep-all")
+            assert run.returncode == 0, run.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.screen.close()
+        super().tearDownClass()
+
+    def view(self, script, *arguments, status=0, fresh=True, size=f"{WIDTH}x{HEIGHT}"):
+        """Plays the script; the lines on stderr."""
+        with open("script", "w") as f:
+            f.write(script)
+        fresh = ["--fresh"] if fresh else []
+        run = program.call("view", *arguments, f"--size={size}", "--threads=2", *fresh,
+                           "--script=script", env=self.screen.environment, timeout=240,
+                           program=program.QUICK_PROGRAM)
+        self.assertEqual(run.returncode, status, run.stderr)
+        return run.stderr
+
+    def pictures(self, script, names, *arguments, **options):
+        self.view(script, *arguments, **options)
+        return [program.read_exr(f"{name}.exr") for name in names]
+
+    def status(self, name="status.json"):
+        with open(name) as f:
+            return json.load(f)
+
+    def test_at_rest_it_is_the_picture_of_render(self):
+        for settings in [], ["--classify=post"]:
+            self.view("wait\ndrag left 100 100 160 130 5\nwheel 2\nwait\npicture seen.exr\n"
+                      "status status.json\n", "noise.trip", *settings)
+            camera = shlex.split(self.status()["camera"])
+            self.works("render", "noise.trip", *camera, *settings, "--background=0,0,0", "-o",
+                       "drawn.exr")
+            with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
+                self.assertEqual(seen.read(), drawn.read())
+
+    def test_the_window_shows_that_picture(self):
+        seen, shown = self.pictures("wait\nscreenshot shown.exr\npicture seen.exr\n",
+                                    ["seen", "shown"], "noise.trip")
+        self.assertEqual(seen.shape, (HEIGHT, WIDTH - PANEL, 4))
+        self.assertEqual(shown.shape, (HEIGHT, WIDTH, 4))
+        self.assertLess(numpy.abs(shown[:, : WIDTH - PANEL] - seen).max(), 0.006)
+
+    def test_each_input_changes_the_picture(self):
+        inputs = ["drag left 100 100 150 100 3", "drag left 100 100 100 150 3",
+                  "drag left 100 100 150 100 3 +shift", "drag middle 100 100 150 120 3",
+                  "drag left 100 100 150 100 3 +control", "drag right 100 100 130 100 3",
+                  "move 60 60\nwheel 3", "key z", "key x +shift", "key y", "key 2", "key 5",
+                  "key ]", "key [", "key o", "hold w\nsleep 150\nlet w", "hold a\nsleep 150\nlet a",
+                  "key f", "key 0"]
+        script = "wait\npicture 0.exr\n" + "".join(
+            f"{text}\nwait\npicture {i + 1}.exr\n" for i, text in enumerate(inputs))
+        self.each_changes(script, inputs, "noise.trip")
+
+    def test_each_control_changes_the_picture(self):
+        controls = ["click 0.5 Back", "click 0.5 Parallel", "click 0.5 Parallel",
+                    "click 0.7 Field of view", "click 0.5 Fit", "click 0.5 Preset\nclick 0.5 hot-metal",
+                    "click 0.3 Function editor", "click 0.5 Undo", "click 0.5 Redo",
+                    "click 0.4 Opacity", "click 0.5 Shading", "click 0.5 Shading",
+                    "click 0.5 Light from the eye\nclick 0.2 Light round", "click 0.9 Light up",
+                    "click 0.5 Kernel radius", "click 0.2 h",
+                    "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
+                    "click 0.4 Samples", "click 0.5 Classify\nclick 0.5 After interpolation",
+                    "click 0.9 Slices", "click 0.5 Top"]
+        script = "wait\nkey 3\nwait\npicture 0.exr\n" + "".join(
+            f"{text}\nwait\npicture {i + 1}.exr\n" for i, text in enumerate(controls))
+        self.each_changes(script, controls, "noise.trip")
+
+    def each_changes(self, script, names, *arguments):
+        pictures = self.pictures(script, range(len(names) + 1), *arguments, size="560x300")
+        for before, after, name in zip(pictures, pictures[1:], names):
+            self.assertTrue(before.shape != after.shape or (before != after).any(), name)
+
+    def test_marks_change_the_window_and_not_the_picture(self):
+        marks = ["Box", "Axes", "Scale bar", "Keys"]
+        script = "wait\nclick 0.5 Fit\nmove 10 10\nwait\npicture p.exr\nscreenshot 0.exr\n" + "".join(
+            f"click 0.5 {name}\nmove 10 10\nsleep 50\nscreenshot {i + 1}.exr\n"
+            for i, name in enumerate(marks)) + "picture q.exr\n"
+        windows = self.pictures(script, range(len(marks) + 1), "noise.trip")
+        for before, after, name in zip(windows, windows[1:], marks):
+            left = numpy.s_[:, : WIDTH - PANEL]
+            self.assertTrue((before[left] != after[left]).any(), name)
+        self.assertTrue((program.read_exr("p.exr") == program.read_exr("q.exr")).all())
+
+    def test_the_panel_comes_and_goes(self):
+        with_panel, without = self.pictures(
+            "wait\npicture with.exr\nkey t\nwait\npicture without.exr\n", ["with", "without"],
+            "ball.trip")
+        self.assertEqual(with_panel.shape[1] + PANEL, without.shape[1])
+
+    def test_resized_minimised_and_at_twice_the_scale(self):
+        sizes = [(500, 300), (90, 60), (900, 500)]
+        script = "wait\n" + "".join(
+            f"resize {w} {h}\nwait\nscreenshot {w}.exr\n" for w, h in sizes)
+        script += "minimise\ndrag left 50 50 90 90 4\nrestore\nwait\nstatus status.json\n"
+        pictures = self.pictures(script, [w for w, _ in sizes], "ball.trip")
+        self.assertEqual([p.shape[1::-1] for p in pictures], sizes)
+        self.assertTrue(self.status()["exact"])
+        self.view("wait\npicture large.exr\n", "ball.trip", "--scale=2", size="1350x300")
+        self.assertEqual(program.read_exr("large.exr").shape[1], 1350 - 2 * PANEL)
+
+    def test_what_was_seen_last_is_seen_again(self):
+        self.view("wait\nkey 2\nwait\nclick 0.5 Preset\nclick 0.5 bone\nwait\npicture last.exr\n",
+                  "noise.trip", fresh=False)
+        self.view("wait\npicture again.exr\n", "noise.trip", fresh=False)
+        self.view("wait\npicture anew.exr\n", "noise.trip")
+        last, again, anew = (program.read_exr(f"{n}.exr") for n in ("last", "again", "anew"))
+        self.assertTrue((last == again).all())
+        self.assertTrue((last != anew).any())
+
+    def test_several_data_sets(self):
+        script = ("wait\npicture a.exr\nkey tab\nwait\npicture b.exr\nkey tab\nwait\npicture c.exr\n"
+                  f"drop {os.path.abspath('ball.trip')}\nwait\nstatus status.json\n")
+        a, b, c = self.pictures(script, "abc", "noise.trip", "ball.trip")
+        self.assertTrue((a == c).all())
+        self.assertTrue((a != b).any())
+        self.assertEqual(self.status()["documents"], 3)
+
+    def test_a_volume_is_bricked_and_shown(self):
+        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
+        seen, = self.pictures("wait\npicture seen.exr\nstatus status.json\n", ["seen"], "ball.nrrd")
+        self.assertTrue(self.status()["exact"], self.status())
+        self.works("render", "ball.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
+                   "--background=0,0,0")
+        self.assertTrue((seen == program.read_exr("drawn.exr")).all())
+
+    def test_trouble_is_a_message_in_the_window(self):
+        shutil.copytree("noise.trip", "damaged.trip")
+        for name in os.listdir("damaged.trip"):
+            if name.endswith(".voxels"):
+                with open(os.path.join("damaged.trip", name), "r+b") as f:
+                    data = bytearray(f.read())
+                    for i in range(0, len(data), 512):
+                        data[i] ^= 0xFF
+                    f.seek(0)
+                    f.write(data)
+        script = (f"wait\ndrop {os.path.abspath('damaged.trip')}\nwait\nstatus damaged.json\n"
+                  "drop /nowhere/at-all.trip\nwait\nstatus missing.json\nscreenshot shown.exr\n"
+                  "key tab\nwait\nstatus good.json\n")
+        self.view(script, "noise.trip")
+        damaged, missing, good = (self.status(f"{n}.json") for n in ("damaged", "missing", "good"))
+        self.assertTrue(damaged["failed"] and "damaged.trip" in damaged["message"], damaged)
+        self.assertTrue(missing["failed"] and "/nowhere/at-all.trip" in missing["message"], missing)
+        self.assertTrue(good["exact"] and not good["failed"], good)
+
+    def test_a_data_set_that_goes_away(self):
+        # The viewer waits where it opens a pipe until this does, too.
+        shutil.copytree("noise.trip", "gone.trip")
+        for pipe in "shown", "go":
+            os.mkfifo(pipe)
+        with open("going", "w") as f:
+            f.write("wait\nkey tab\nwait\nstatus shown\nstatus go\nkey tab\nwait\nkey tab\nwait\n"
+                    "status after.json\n")
+        process = program.start("view", "noise.trip", "gone.trip", "--fresh", "--script=going",
+                                "--size=500x300", env=self.screen.environment)
+        self.assertTrue(self.status("shown")["exact"])
+        shutil.rmtree("gone.trip")
+        self.status("go")
+        _, err = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 0, err)
+        after = self.status("after.json")
+        self.assertTrue(after["failed"] and "gone.trip" in after["message"], after)
+
+    def test_random_events_leave_it_alive(self):
+        count = 250 * ROUNDS
+        self.view(f"wait\nrandom {count} 1\nwait\nresize 600 400\nwait\nstatus status.json\n"
+                  "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", size="500x300")
+        status = self.status()
+        self.assertTrue(status["exact"] or status["documents"] == 0, status)
+
+    def test_command_lines_that_are_refused(self):
+        no_display = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        self.fails(1, "view", "noise.trip", says="display", env=no_display)
+        self.fails(1, "view", "missing.trip", says="missing.trip", env=self.screen.environment)
+        self.fails(2, "view", "--size=3", says="--size", env=self.screen.environment)
+        self.fails(2, "view", "--up=0,0,0", says="--up", env=self.screen.environment)
+        with open("script", "w") as f:
+            f.write("wait\nclick 0.5 No such control\n")
+        with open("bad", "w") as f:
+            f.write("jump\n")
+        self.fails(1, "view", "--script=bad", says="line 1", env=self.screen.environment)
+
+    def test_a_signal_ends_it(self):
+        os.mkfifo("here")
+        with open("script", "w") as f:
+            f.write("wait\nstatus here\nsleep 600000\n")
+        process = program.start("view", "noise.trip", "--fresh", "--script=script",
+                                env=self.screen.environment)
+        self.status("here")
+        process.send_signal(2)
+        _, err = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 1, err)
+        self.assertIn(b"interrupted", err)
+
+
+skip_what_is_missing()
+if __name__ == "__main__":
+    program.main()
