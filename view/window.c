@@ -72,18 +72,26 @@ static bool is_held(const trip_viewer *v)
     return held;
 }
 
-/* What the panel takes is not for the picture, but for a drag that began there, and releases. */
+/* Whether it is for the panel: what begins there, until it ends, and keys while text is written. */
+static bool is_for_panel(const window *w, const trip_event *e)
+{
+    const bool drags = is_held(&w->viewer);
+    return (is_of_pointer(e) && trip_panel_has_pointer(w->panel) && !drags) ||
+           (e->kind == TRIP_EVENT_KEY && trip_panel_has_keys(w->panel));
+}
+
+/* Releases, and where the pointer is, are for both. */
 static void send(window *w, const trip_event *e)
 {
     trip_viewer *v = &w->viewer;
+    const bool for_panel = is_for_panel(w, e);
+    const bool begins = e->down && (e->kind == TRIP_EVENT_KEY || e->kind == TRIP_EVENT_BUTTON);
     note_input(w);
     if (e->kind == TRIP_EVENT_ICONIFY)
         w->hidden = e->down;
-    if (!is_held(v) || !e->down)
+    if (for_panel || !begins || (e->kind == TRIP_EVENT_BUTTON && !is_held(v)))
         trip_panel_event(w->panel, e);
-    const bool taken = (is_of_pointer(e) && trip_panel_has_pointer(w->panel) && !is_held(v)) ||
-                       (e->kind == TRIP_EVENT_KEY && e->down && trip_panel_has_keys(w->panel));
-    if (!taken)
+    if (!for_panel || !(begins || is_of_pointer(e)))
         trip_viewer_event(v, e);
     else if (e->kind == TRIP_EVENT_MOVE)
         memcpy(v->at, (double[2]){ e->x, e->y }, sizeof v->at);

@@ -110,8 +110,8 @@ class View(program.ProgramTest):
                   "drag left 100 100 150 100 3 +shift", "drag middle 100 100 150 120 3",
                   "drag left 100 100 150 100 3 +control", "drag right 100 100 130 100 3",
                   "move 60 60\nwheel 3", "key z", "key x +shift", "key y", "key 2", "key 5",
-                  "key ]", "key [", "key o", "hold w\nsleep 150\nlet w", "hold a\nsleep 150\nlet a",
-                  "key f", "key 0"]
+                  "key ]", "key [", "hold w\nsleep 150\nlet w", "hold a\nsleep 150\nlet a",
+                  "key f", "key 0", "key o"]
         script = "wait\npicture 0.exr\n" + "".join(
             f"{text}\nwait\npicture {i + 1}.exr\n" for i, text in enumerate(inputs))
         self.each_changes(script, inputs, "noise.trip")
