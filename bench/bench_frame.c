@@ -160,10 +160,15 @@ void bench_runs_describe(bench_runs *r, int frame, cJSON *row)
     cJSON_AddStringToObject(row, "bound_by", text);
 }
 
-/* Keeps the last line that would have gone to stderr. */
+/* Keeps the last line that would have gone to stderr, but for that of an interruption, which ends
+ * the program and is reported once. */
 static void keep_line(const char *line, void *user)
 {
     static const char prefix[] = "triptych: ";
+    if (trip_interrupted()) {
+        trip_report_line(line);
+        return;
+    }
     size_t skip = strncmp(line, prefix, sizeof prefix - 1) ? 0 : sizeof prefix - 1;
     snprintf(user, 256, "%.*s", (int)strcspn(line + skip, "\n"), line + skip);
 }

@@ -17,7 +17,8 @@ typedef struct job {
     uint64_t blocks;
     atomic_uint_fast64_t next;
     atomic_uint_fast64_t bytes;
-    atomic_int error; /* errno of the first fault */
+    atomic_int error;  /* errno of the first fault */
+    trip_scope *scope; /* of the caller */
     unsigned char *memory;
     atomic_uint taken; /* parts of the memory */
     atomic_uint seen;  /* what was looked at, so that the compiler does not leave it out */
@@ -57,7 +58,9 @@ static void *move_blocks(void *argument)
     unsigned char *block =
         j->memory + (size_t)PLAIN_DISK_BLOCK_BYTES * atomic_fetch_add(&j->taken, 1);
     uint64_t i;
-    while ((i = atomic_fetch_add(&j->next, 1)) < j->blocks && !atomic_load(&j->error)) {
+    trip_scope_enter(j->scope);
+    while (!trip_interrupted() && (i = atomic_fetch_add(&j->next, 1)) < j->blocks &&
+           !atomic_load(&j->error)) {
         ssize_t n = move_block(j, block, i);
         if (n < 0)
             atomic_store(&j->error, errno);
@@ -89,14 +92,17 @@ static int move_file(plain_disk *d, int fd, bool write, uint64_t bytes, const ch
               .write = write,
               .look = d->look && !write,
               .blocks = (bytes + PLAIN_DISK_BLOCK_BYTES - 1) / PLAIN_DISK_BLOCK_BYTES,
+              .scope = trip_scope_current(),
               .memory = memory };
     double begin = now_seconds();
     int error = share_out(&j);
-    if (!error && write && fsync(fd) < 0)
+    if (!error && write && !trip_interrupted() && fsync(fd) < 0)
         error = errno;
     d->seconds += now_seconds() - begin;
     d->bytes += atomic_load(&j.bytes);
     close(fd);
+    if (trip_interrupted())
+        return trip_fail(TRIP_INTERRUPTED, write ? "write" : "read", path, "interrupted");
     errno = error;
     return error ? trip_fail_errno(write ? "write" : "read", path, NULL) : 0;
 }
