@@ -34,6 +34,7 @@ enum key {
     KEY_KEEP_ALL,
     KEY_NORMALS,
     KEY_HALO,
+    KEY_LEVELS,
     KEY_TILE,
     KEY_SLAB_SHEETS,
     KEY_MEMORY,
@@ -84,6 +85,8 @@ static const struct argp_option option_table[] = {
       3 },
     { "halo", KEY_HALO, "0|1", 0,
       "Keep the transparent neighbours of what is kept, for interpolation (default: 1)", 3 },
+    { "levels", KEY_LEVELS, "N|auto", 0,
+      "Coarse levels, each of half the resolution (default: auto, down to one brick; 0: none)", 3 },
     { "tile", KEY_TILE, "N", 0, "Tile edge in voxels: 16, 32, 64 or 128 (default: 64)", 3 },
     { "slab-sheets", KEY_SLAB_SHEETS, "N", 0, "Sheets of a brick, 1 to 64 (default: 8)", 3 },
     { "limits", KEY_LIMITS, NULL, 0,
@@ -181,6 +184,15 @@ static int parse_halo(const char *text, int *no_halo)
     return status;
 }
 
+static int parse_levels(const char *text, int *levels)
+{
+    int number = 0;
+    int status = strcmp(text, "auto") ? trip_option_integer("--levels", text, 0, 24, &number) : 0;
+    if (status == 0)
+        *levels = !strcmp(text, "auto") ? 0 : number ? number : -1;
+    return status;
+}
+
 static int parse_unsigned(const char *option, const char *text, int hi, unsigned *out)
 {
     int number;
@@ -243,6 +255,8 @@ static error_t parse_output_option(int key, char *argument, options *o)
         return parse_normals(argument, &o->brick.normals);
     case KEY_HALO:
         return parse_halo(argument, &o->brick.no_halo);
+    case KEY_LEVELS:
+        return parse_levels(argument, &o->brick.levels);
     case KEY_TILE:
         return parse_tile(argument, &o->brick.tile_voxels);
     case KEY_SLAB_SHEETS:
@@ -368,6 +382,8 @@ static int print_json(const options *o, const triptych_brick_summary *s, const b
     add_number(root, "input_bytes", (double)s->input_bytes);
     add_number(root, "bytes", (double)s->bytes);
     add_number(root, "halo_bytes", (double)s->halo_bytes);
+    add_number(root, "levels", s->levels);
+    add_number(root, "level_bytes", (double)s->level_bytes);
     add_number(root, "code_bytes", s->code_bytes);
     add_number(root, "normal_bytes", s->normal_bytes);
     add_number(root, "temporary_bytes", (double)s->temporary_bytes);
@@ -375,6 +391,7 @@ static int print_json(const options *o, const triptych_brick_summary *s, const b
     add_number(root, "scan_seconds", s->stages[TRIPTYCH_STAGE_SCAN].seconds);
     add_number(root, "read_seconds", s->stages[TRIPTYCH_STAGE_READ].seconds);
     add_number(root, "merge_seconds", s->stages[TRIPTYCH_STAGE_MERGE].seconds);
+    add_number(root, "levels_seconds", s->stages[TRIPTYCH_STAGE_LEVELS].seconds);
     add_number(root, "finish_seconds", s->stages[TRIPTYCH_STAGE_FINISH].seconds);
     add_number(root, "seconds", brick_seconds(s));
     add_number(root, "memory_bytes", (double)s->memory_bytes);
@@ -407,15 +424,21 @@ static void print_text(const options *o, const triptych_brick_summary *s)
     if (s->halo)
         printf("%-9s %llu neighbours of those, %s\n", "halo", (unsigned long long)s->halo,
                trip_format_bytes(s->halo_bytes, bytes));
-    printf("%-9s %s, %.3g bytes per kept voxel%s\n", "written", trip_format_bytes(s->bytes, bytes),
-           (double)(s->bytes - s->halo_bytes) / kept, s->halo ? " without the halo" : "");
+    if (s->levels)
+        printf("%-9s %u coarse, %s\n", "levels", s->levels,
+               trip_format_bytes(s->level_bytes, bytes));
+    printf("%-9s %s, %.3g bytes per kept voxel%s%s\n", "written",
+           trip_format_bytes(s->bytes, bytes),
+           (double)(s->bytes - s->halo_bytes - s->level_bytes) / kept,
+           s->halo ? " without the halo" : "", s->levels ? " at level 0" : "");
     printf("%-9s codes %u, normals %u\n", "bytes", s->code_bytes, s->normal_bytes);
     if (s->temporary_bytes)
         printf("%-9s %s\n", "spilled", trip_format_bytes(s->temporary_bytes, temporary));
-    printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, finish %.2f), %.0f MB/s of input\n",
+    printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, levels %.2f, finish %.2f), %.0f MB/s of "
+           "input\n",
            "time", seconds, s->stages[TRIPTYCH_STAGE_SCAN].seconds,
            s->stages[TRIPTYCH_STAGE_READ].seconds, s->stages[TRIPTYCH_STAGE_MERGE].seconds,
-           s->stages[TRIPTYCH_STAGE_FINISH].seconds,
+           s->stages[TRIPTYCH_STAGE_LEVELS].seconds, s->stages[TRIPTYCH_STAGE_FINISH].seconds,
            (double)s->input_bytes / 1e6 / (seconds > 0 ? seconds : 1));
     printf("%-9s %s resident at most, %s promised for data\n", "memory",
            trip_format_bytes(trip_memory_peak_rss_bytes(), peak),

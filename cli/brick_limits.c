@@ -11,7 +11,8 @@
 /* Of a larger data set only so much is written for the limit. */
 static const uint64_t most_written_bytes = (uint64_t)4 << 30;
 
-static const char *const stage_names[TRIPTYCH_STAGES] = { "scan", "read", "merge", "finish" };
+static const char *const stage_names[TRIPTYCH_STAGES] = { "scan", "read", "merge", "levels",
+                                                          "finish" };
 
 double brick_seconds(const triptych_brick_summary *s)
 {

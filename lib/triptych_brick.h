@@ -1,7 +1,7 @@
 /* Data sets of volumes, for triptych.h: what `triptych brick` does. Zero means the default
  * everywhere. Needs no data set open; one that is open stays open. While it works, the context's
- * progress goes by the stages "sample", "scan" and "read" (of voxels), "merge" (of splats) and
- * "look" (of bytes). */
+ * progress goes by the stages "sample", "scan" and "read" (of voxels), "merge" (of splats),
+ * "levels" (of sheets) and "look" (of bytes). */
 #ifndef TRIPTYCH_BRICK_H
 #define TRIPTYCH_BRICK_H
 
@@ -57,6 +57,7 @@ typedef struct triptych_brick_options {
     /* What is made. */
     triptych_normals normals;
     int no_halo;           /* not 0: not the transparent neighbours of what is kept */
+    int levels;            /* coarse levels; 0: down to one brick, below 0: none */
     unsigned tile_voxels;  /* 16, 32, 64 or 128; default 64 */
     unsigned slab_sheets;  /* 1 to 64; default 8 */
     int replace;           /* not 0: a data set of that name */
@@ -71,6 +72,7 @@ enum {
     TRIPTYCH_STAGE_SCAN,   /* a pass over the volume, where what is kept depends on all values */
     TRIPTYCH_STAGE_READ,   /* the pass that makes splats */
     TRIPTYCH_STAGE_MERGE,  /* of what was spilled, into the lists */
+    TRIPTYCH_STAGE_LEVELS, /* coarse levels, of the lists written */
     TRIPTYCH_STAGE_FINISH, /* the index, and everything onto the disk */
     TRIPTYCH_STAGES
 };
@@ -88,6 +90,8 @@ typedef struct triptych_brick_summary {
     const char *kind, *kind_title;     /* what it was taken for: "ct", "CT in Hounsfield units" */
     uint64_t input_bytes;              /* decompressed */
     uint64_t bytes, halo_bytes;        /* of all lists, of those of the halo */
+    uint64_t level_bytes;              /* of those of coarse levels, of which there are */
+    unsigned levels;                   /* so many */
     uint64_t temporary_bytes;          /* written and removed again */
     int resumed;
     char note[512]; /* what was chosen where the file leaves a choice, or "" */

@@ -14,6 +14,7 @@
 #include "dataset.h"
 #include "estimate.h"
 #include "folder.h"
+#include "levels.h"
 #include "list_builder.h"
 #include "report.h"
 #include "splats.h"
@@ -30,6 +31,7 @@ typedef struct brick {
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
+    unsigned levels;         /* coarse ones */
     uint64_t written_before; /* up to the end of the last stage */
 } brick;
 
@@ -100,6 +102,7 @@ static int update_memory_plan(brick *b)
 
 static int open_writer(brick *b)
 {
+    trip_writer_list lists[6 * (TRIP_LEVELS_MOST + 1)];
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
                              .code_bytes = b->codes.code_bytes,
@@ -109,6 +112,9 @@ static int open_writer(brick *b)
                              .index_to_world = b->in.info->index_to_world,
                              .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
+    b->levels = trip_levels_count(p.dims, b->params->levels, 1u << b->format.tile_log2);
+    p.lists = lists;
+    p.list_count = trip_levels_lists(p.dims, &p.index_to_world, b->format.halo, b->levels, lists);
     return trip_writer_open(&b->writer, b->params->output, &p, b->in.budget);
 }
 
@@ -164,9 +170,13 @@ static int summarise_done(brick *b)
     b->summary->code_bytes = d->header.code_bytes;
     b->summary->normal_bytes = d->header.normal_bytes;
     b->summary->bytes = d->bytes - d->header.index_bytes;
-    for (unsigned i = 0; i < d->list_count; i++)
-        if (d->lists[i].kind == TRIP_KIND_HALO)
-            b->summary->halo_bytes += d->lists[i].plane_bytes[TRIP_PLANE_VOXELS];
+    for (unsigned i = 0; i < d->list_count; i++) {
+        const trip_list *l = &d->lists[i];
+        uint64_t bytes = l->plane_bytes[TRIP_PLANE_VOXELS] + l->plane_bytes[TRIP_PLANE_NORMALS];
+        b->summary->halo_bytes += l->kind == TRIP_KIND_HALO ? bytes : 0;
+        b->summary->level_bytes += l->level > 0 ? bytes : 0;
+        b->summary->levels = l->level > b->summary->levels ? l->level : b->summary->levels;
+    }
     b->summary->resumed = true;
     trip_dataset_close(d);
     return 0;
@@ -295,6 +305,38 @@ static int merge_lists(brick *b)
     return status;
 }
 
+static void on_levels_progress(void *user, uint64_t done, uint64_t total)
+{
+    const brick *b = user;
+    trip_brick_input_progress(&b->in, "levels", done, total);
+}
+
+/* Of what level 0 took memory for nothing is needed any more. */
+static int make_levels(brick *b)
+{
+    double begin = now_seconds();
+    trip_list_builder_destroy(b->builder);
+    trip_splatter_destroy(b->splatter);
+    b->builder = NULL;
+    b->splatter = NULL;
+    trip_levels_params p = { .format = b->format,
+                             .quantiser = b->codes.quantiser,
+                             .compact = b->codes.normal_bytes == 3 ? &b->codes.compact : NULL,
+                             .code_bytes = b->codes.code_bytes,
+                             .index_to_world = b->in.info->index_to_world,
+                             .levels = b->levels,
+                             .folder = b->temporary.partial_path,
+                             .writer = b->writer,
+                             .spill = b->temporary.spill,
+                             .workers = b->in.workers,
+                             .progress = on_levels_progress,
+                             .progress_user = b };
+    memcpy(p.dims, b->in.info->dims, sizeof p.dims);
+    int status = b->levels > 0 ? trip_levels_make(&p, b->in.budget) : 0;
+    end_stage(b, TRIP_BRICK_LEVELS, begin);
+    return status;
+}
+
 static int fail_count(const brick *b, const char *what, uint64_t counted, uint64_t written)
 {
     return trip_fail(TRIP_ERROR, "brick", b->params->output,
@@ -319,8 +361,13 @@ static int check_records(brick *b)
     s->code_bytes = b->codes.code_bytes;
     s->normal_bytes = b->codes.normal_bytes;
     s->bytes = trip_writer_bytes(b->writer);
-    for (unsigned list = TRIP_HALO_LISTS; list < trip_piece_list_count(&b->format); list++)
+    const unsigned lists = trip_piece_list_count(&b->format);
+    for (unsigned list = TRIP_HALO_LISTS; list < lists; list++)
         s->halo_bytes += trip_writer_plane_bytes(b->writer, list, TRIP_PLANE_VOXELS);
+    s->levels = b->levels;
+    for (unsigned list = lists; list < lists * (b->levels + 1); list++)
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            s->level_bytes += trip_writer_plane_bytes(b->writer, list, plane);
     return 0;
 }
 
@@ -400,6 +447,8 @@ static int make(brick *b)
         status = read_volume(b);
     if (status == 0)
         status = merge_lists(b);
+    if (status == 0)
+        status = make_levels(b);
     return status == 0 ? finish_output(b) : status;
 }
 

@@ -33,6 +33,9 @@ typedef struct trip_brick_params {
     bool automatic; /* adds the automatic function's, which is also what is drawn by default */
 
     trip_brick_normals normals;
+    /* Coarse levels: 0 as many as it takes until one is a single brick; below 0: none; else so
+     * many, or fewer where fewer come to one voxel. */
+    int levels;
     bool no_halo; /* leave out the transparent neighbours of kept voxels */
     bool replace; /* replace an existing data set; otherwise that is a reported failure */
     /* Resume an interrupted run with the same input and parameters, if there is one. */
@@ -44,7 +47,7 @@ typedef struct trip_brick_params {
     int64_t slices;        /* read at a time; default: by memory */
 
     /* Called on the calling thread with the progress of a stage ("sample", "scan", "read" in
-     * voxels, "merge" in records). */
+     * voxels, "merge" in records, "levels" in sheets). */
     void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);
     void *progress_user;
 } trip_brick_params;
@@ -54,6 +57,7 @@ typedef enum trip_brick_stage {
     TRIP_BRICK_SCAN,   /* reads all values, where the envelope or the normals depend on them */
     TRIP_BRICK_READ,   /* makes splats; writes the ordered list, spills what does not fit */
     TRIP_BRICK_MERGE,  /* merges the splats on disk and in memory into the other lists */
+    TRIP_BRICK_LEVELS, /* makes the coarse levels of the lists that were written */
     TRIP_BRICK_FINISH, /* writes the index and syncs all files */
     TRIP_BRICK_STAGES
 } trip_brick_stage;
@@ -75,6 +79,8 @@ typedef struct trip_brick_summary {
     uint64_t input_bytes;     /* as stored, decompressed */
     uint64_t bytes;           /* of all lists */
     uint64_t halo_bytes;      /* of these, of the lists of the halo */
+    unsigned levels;          /* coarse ones */
+    uint64_t level_bytes;     /* of these, of their lists */
     uint64_t temporary_bytes; /* spilled */
     bool resumed;             /* an interrupted run was resumed */
     char note[512];           /* that of trip_volume_info */

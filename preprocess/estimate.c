@@ -11,6 +11,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "levels.h"
 #include "report.h"
 
 /* Portions in a sample, and slices of each where memory permits. */
@@ -23,6 +24,9 @@ enum { STOPPED = -100 };
 static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
 /* Bytes of masks for each record: those of a halo have fewer bits set. */
 static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
+/* What coarse levels add: those of a body have an eighth of the voxels of the level below, those of
+ * a surface a quarter. */
+static const double with_levels = 1.2;
 /* As estimates are from a sample, a run is refused only if this part of them does not fit. */
 static const double surely = 0.7;
 
@@ -127,8 +131,13 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     double pieces = lists * (double)e->kept * piece_bytes(format, 0) +
                     3 * (double)e->halo * piece_bytes(format, TRIP_HALO_LISTS);
     double code = trip_brick_code_bytes(in), normal = trip_brick_normal_bytes(in);
-    e->bytes = (uint64_t)(3 * ((double)e->kept * (mask_bytes + code + normal) +
-                               (double)e->halo * (halo_mask_bytes + code)));
+    e->bytes =
+        (uint64_t)(3 *
+                   ((double)e->kept * (mask_bytes + code + normal) +
+                    (double)e->halo * (halo_mask_bytes + code)) *
+                   (trip_levels_count(in->info->dims, in->params->levels, 1u << format->tile_log2)
+                        ? with_levels
+                        : 1));
     e->temporary_bytes = pieces > 0.9 * (double)plan->list_bytes ? (uint64_t)pieces : 0;
     e->free_bytes = free_bytes(in->params->output);
 }

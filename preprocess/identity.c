@@ -11,7 +11,7 @@
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 4 };
+enum { BRICKER_VERSION = 5 };
 
 /* A file is identified by its name, length and time of change, a pattern by its text. */
 static void write_input(FILE *f, const trip_brick_params *p)
@@ -33,8 +33,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 
 static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
 {
-    fprintf(f, "%d %d %d %d %d %d %u %u\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
-            p->automatic, (int)p->normals, p->no_halo, p->tile_voxels, p->slab_sheets);
+    fprintf(f, "%d %d %d %d %d %d %u %u %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
+            p->automatic, (int)p->normals, p->no_halo, p->tile_voxels, p->slab_sheets, p->levels);
     for (size_t i = 0; i < p->range_count; i++)
         fprintf(f, "%a %a\n", p->ranges[i].lo, p->ranges[i].hi);
     for (size_t i = 0; i < p->function_count; i++) {

@@ -264,8 +264,8 @@ static int create_parts(trip_list_builder *b, trip_budget *budget)
     const trip_list_builder_params *p = &b->params;
     int status = trip_piece_pool_create(&b->pool, &p->format, p->dims, p->memory_bytes, budget);
     for (unsigned list = 0; list < b->lists && status == 0; list++) {
-        status = trip_list_output_create(&b->outputs[list], list, &b->pool.formats[list], p->writer,
-                                         budget);
+        status = trip_list_output_create(&b->outputs[list], p->first_list + list,
+                                         &b->pool.formats[list], p->writer, budget);
     }
     b->outputs[ORDERED_LIST].run = p->in_order ? note_run : NULL;
     b->outputs[ORDERED_LIST].run_user = p->journal;

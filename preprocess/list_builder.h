@@ -25,6 +25,7 @@ typedef struct trip_list_builder_params {
     /* The ordered list arrives in order, batch by batch: it is written as it comes and never
      * spilled. All its splats of a batch have to fit into memory. */
     bool in_order;
+    unsigned first_list;   /* of the writer: what list 0 is there */
     uint64_t memory_bytes; /* for pieces */
     trip_writer *writer;
     trip_spill *spill;

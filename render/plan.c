@@ -30,7 +30,7 @@ static bool is_in_layer(const planning *p, const trip_list *list, int axis)
         return false;
     if (p->settings->classify == TRIP_CLASSIFY_POST)
         return list->level == 0 && trip_kind_of(list->kind)->lattice;
-    return trip_kind_of(list->kind)->splatted;
+    return trip_kind_of(list->kind)->splatted && !trip_kind_of(list->kind)->coarse;
 }
 
 /* First sheet that is not below the eye, cut to [0, sheets]. */

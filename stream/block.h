@@ -19,6 +19,7 @@
 #include <stddef.h>
 
 #include "format.h"
+#include "kind.h"
 
 enum {
     TRIP_BLOCK_PRESENT_MAX = 4, /* words */
@@ -28,7 +29,7 @@ enum {
         TRIP_BLOCK_PRESENT_MAX + TRIP_BLOCK_SQUARES_MAX + TRIP_RUN_RECORDS_MAX / 4,
 };
 
-/* What the header says of all blocks. */
+/* What the header says of all blocks, and a list's kind of its own. */
 typedef struct trip_block_form {
     unsigned tile_log2, code_bytes, normal_bytes;
 } trip_block_form;
@@ -41,9 +42,10 @@ typedef struct trip_block {
     const unsigned char *codes, *normals; /* normals NULL without that plane */
 } trip_block;
 
-static inline trip_block_form trip_block_form_of(const trip_file_header *h)
+static inline trip_block_form trip_block_form_of(const trip_file_header *h, trip_kind kind)
 {
-    return (trip_block_form){ h->tile_log2, h->code_bytes, h->normal_bytes };
+    unsigned own = trip_kind_of(kind)->code_bytes;
+    return (trip_block_form){ h->tile_log2, own ? own : h->code_bytes, h->normal_bytes };
 }
 
 static inline unsigned trip_block_present_words(unsigned tile_log2)

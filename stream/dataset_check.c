@@ -241,6 +241,8 @@ static int check_list_kind(const trip_file_header *h, const trip_file_list *f, c
         return fail_at(where, at, "no such axis or kind of list");
     if (f->planes != (kind->planes & h->planes))
         return fail_at(where, at, "the list has not the planes of its kind");
+    if (f->level == 0 && kind->coarse)
+        return fail_at(where, at, "a list of level 0 is of a kind of coarse levels");
     if (f->level == 0 && f->records != (f->kind == TRIP_KIND_VOXELS ? h->kept : h->halo))
         return fail_at(where, at, "the list does not hold the voxels that were kept");
     if (!plane_bytes_fit(h, f))
@@ -449,7 +451,7 @@ int trip_dataset_check_tables(const unsigned char *index, const trip_file_header
             .where = where,
             .h = h,
             .f = &lists[i],
-            .form = trip_block_form_of(h),
+            .form = trip_block_form_of(h, (trip_kind)lists[i].kind),
             .slabs = (const void *)(index + lists[i].slabs_offset),
             .bricks = (const void *)(index + lists[i].bricks_offset),
             .runs = (const void *)(index + lists[i].runs_offset),

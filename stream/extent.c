@@ -15,8 +15,12 @@ static size_t paged_bytes(const trip_planner *p, uint64_t low, uint64_t high)
 
 size_t trip_planner_least_slot(const trip_dataset *d, unsigned planes)
 {
-    const trip_block_form form = trip_block_form_of(&d->header);
+    trip_block_form form = trip_block_form_of(&d->header, TRIP_KIND_VOXELS);
     size_t page = (size_t)1 << d->header.page_log2, bytes = 0;
+    for (unsigned i = 0; i < d->list_count; i++) {
+        unsigned own = trip_kind_of(d->lists[i].kind)->code_bytes;
+        form.code_bytes = own > form.code_bytes ? own : form.code_bytes;
+    }
     size_t most[TRIP_PLANES] = { 8 * (size_t)trip_block_most_words(&form),
                                  ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes };
     for (int plane = 0; plane < TRIP_PLANES; plane++)

@@ -1,6 +1,7 @@
 #include "kind.h"
 
 #include "format.h"
+#include "mean.h"
 
 #include <stddef.h>
 
@@ -15,6 +16,19 @@ static const trip_kind_info kinds[TRIP_KINDS] = {
                          .plane_names = { "halo" },
                          .planes = 1u << TRIP_PLANE_VOXELS,
                          .lattice = true },
+    [TRIP_KIND_MEANS] = { .name = "means",
+                          .plane_names = { "means", "mean-normals" },
+                          .planes = 1u << TRIP_PLANE_VOXELS | 1u << TRIP_PLANE_NORMALS,
+                          .splatted = true,
+                          .code_bytes = 2,
+                          .axis_bits = TRIP_MEAN_AXIS_BITS,
+                          .coarse = true,
+                          .reach = 1 },
+    [TRIP_KIND_VALUES] = { .name = "values",
+                           .plane_names = { "values" },
+                           .planes = 1u << TRIP_PLANE_VOXELS,
+                           .lattice = true,
+                           .coarse = true },
 };
 
 const trip_kind_info *trip_kind_of(trip_kind kind)

@@ -68,7 +68,7 @@ static inline const trip_list *trip_batch_list(const trip_batch *b, const trip_r
 static inline trip_block trip_block_of(const trip_batch *b, const trip_run *run)
 {
     const trip_selection *s = &b->pass->selections[run->selection];
-    const trip_block_form form = trip_block_form_of(&s->data->header);
+    const trip_block_form form = trip_block_form_of(&s->data->header, s->list->kind);
     bool normals = b->planes[TRIP_PLANE_NORMALS] && s->list->planes >> TRIP_PLANE_NORMALS & 1;
     return trip_block_make(
         &form, run->count, run->words, b->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS],

@@ -5,46 +5,16 @@
 #include "folder.h"
 #include "output.h"
 #include "report.h"
-#include "slab.h"
+#include "writer_state.h"
 
 #include <assert.h>
 #include <errno.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
 
-enum { PLANE_BUFFER_BYTES = 1 << 20, SPOOL_BUFFER_BYTES = 1 << 16, DEFAULT_LISTS = 6 };
-
-/* One list being written. Its tables go to unnamed files until the index is put together, so that
- * memory does not grow with the data. */
-typedef struct list_writer {
-    trip_writer_list is;
-    unsigned planes_present; /* bit per trip_plane */
-    trip_output planes[TRIP_PLANES];
-    trip_output checksums[TRIP_PLANES];
-    trip_output slabs, bricks, runs;
-    trip_slab slab;
-    uint64_t records, slab_count, brick_count;
-    uint64_t slab_first_record, slab_first_block;
-    uint64_t last_tile;     /* Morton code of the tile of the last run */
-    int64_t sheet;          /* of the last run; -1 before the first */
-    _Atomic uint64_t bytes; /* progress for other threads: relaxed */
-} list_writer;
-
-struct trip_writer {
-    trip_writer_params params;
-    trip_budget *budget;
-    trip_folder folder;
-    trip_flusher *flusher;
-    atomic_bool failed; /* of the outputs */
-    trip_file_header header;
-    trip_block_form form;
-    trip_writer_list default_lists[DEFAULT_LISTS];
-    list_writer *lists; /* from the budget */
-    unsigned list_count;
-};
+enum { PLANE_BUFFER_BYTES = 1 << 20, SPOOL_BUFFER_BYTES = 1 << 16, COARSE_SPOOL_BYTES = 1 << 12 };
 
 static bool is_power_of_two(unsigned x)
 {
@@ -120,6 +90,8 @@ static int check_list(const trip_writer_params *p, unsigned i, const char *path)
     if (!(l->sheet_step > 0) ||
         !isfinite(l->sheet_first + l->sheet_step * (double)l->dims[l->axis]))
         return fail_list(path, i, "its sheets have no ascending coordinates");
+    if (l->level == 0 && trip_kind_of(l->kind)->coarse)
+        return fail_list(path, i, "is of level 0 and of a kind of coarse levels");
     if (l->level == 0 && !same_grid(l, &full))
         return fail_list(path, i, "is of level 0 and not of the data set's grid");
     return TRIP_OK;
@@ -149,12 +121,12 @@ static void set_default_lists(trip_writer *w)
     trip_writer_params *p = &w->params;
     if (p->lists)
         return;
-    for (int i = 0; i < DEFAULT_LISTS; i++) {
+    for (int i = 0; i < TRIP_DEFAULT_LISTS; i++) {
         w->default_lists[i] = level_0(p, i % 3);
         w->default_lists[i].kind = i < 3 ? TRIP_KIND_VOXELS : TRIP_KIND_HALO;
     }
     p->lists = w->default_lists;
-    p->list_count = p->halo ? DEFAULT_LISTS : DEFAULT_LISTS / 2;
+    p->list_count = p->halo ? TRIP_DEFAULT_LISTS : TRIP_DEFAULT_LISTS / 2;
 }
 
 static int check_params(const trip_writer_params *p, const char *path)
@@ -212,18 +184,18 @@ static void fill_header(trip_writer *w)
     h->code_bytes = p->code_bytes;
     h->normal_bytes = p->normal_bytes;
     h->list_count = p->list_count;
-    w->form = trip_block_form_of(h);
 }
 
-static int open_spool(trip_writer *w, trip_output *o)
+static int open_spool(trip_writer *w, trip_output *o, unsigned level)
 {
-    return trip_output_create(o,
-                              &(trip_output_params){ .folder = w->folder.partial,
-                                                     .name = TRIP_SPOOL_NAME,
-                                                     .buffer_bytes = SPOOL_BUFFER_BYTES,
-                                                     .failed = &w->failed,
-                                                     .unnamed = true },
-                              w->budget);
+    return trip_output_create(
+        o,
+        &(trip_output_params){ .folder = w->folder.partial,
+                               .name = TRIP_SPOOL_NAME,
+                               .buffer_bytes = level ? COARSE_SPOOL_BYTES : SPOOL_BUFFER_BYTES,
+                               .failed = &w->failed,
+                               .unnamed = true },
+        w->budget);
 }
 
 static size_t larger(size_t a, size_t b)
@@ -232,19 +204,21 @@ static size_t larger(size_t a, size_t b)
 }
 
 /* What is written of many lists at once takes no more memory than of few. */
-static size_t plane_buffer_bytes(const trip_writer *w)
+static size_t plane_buffer_bytes(const trip_writer *w, unsigned level)
 {
-    size_t share = PLANE_BUFFER_BYTES;
-    while (share > SPOOL_BUFFER_BYTES && share * w->list_count > 3 * PLANE_BUFFER_BYTES)
+    size_t share = level ? SPOOL_BUFFER_BYTES : PLANE_BUFFER_BYTES, lists = 0;
+    for (unsigned i = 0; i < w->list_count; i++)
+        lists += w->params.lists[i].level == 0;
+    while (level == 0 && share > SPOOL_BUFFER_BYTES && share * lists > 3 * PLANE_BUFFER_BYTES)
         share /= 2;
-    return larger(w->params.page_bytes, share);
+    return larger(w->params.page_bytes, level > 1 ? 0 : share);
 }
 
-static int open_plane(trip_writer *w, list_writer *l, int plane)
+static int open_plane(trip_writer *w, trip_list_writer *l, int plane)
 {
     char name[32];
     size_t page = w->params.page_bytes;
-    int status = open_spool(w, &l->checksums[plane]);
+    int status = open_spool(w, &l->checksums[plane], l->is.level);
     if (status < 0)
         return status;
     return trip_output_create(
@@ -252,7 +226,7 @@ static int open_plane(trip_writer *w, list_writer *l, int plane)
         &(trip_output_params){
             .folder = w->folder.partial,
             .name = trip_plane_file_name(l->is.axis, l->is.level, l->is.kind, plane, name),
-            .buffer_bytes = plane_buffer_bytes(w),
+            .buffer_bytes = plane_buffer_bytes(w, l->is.level),
             .flusher = w->flusher,
             .failed = &w->failed,
             .page_bytes = page,
@@ -260,17 +234,18 @@ static int open_plane(trip_writer *w, list_writer *l, int plane)
         w->budget);
 }
 
-static int open_list(trip_writer *w, list_writer *l, const trip_writer_list *is)
+static int open_list(trip_writer *w, trip_list_writer *l, const trip_writer_list *is)
 {
     l->is = *is;
     l->planes_present = w->header.planes & trip_kind_of(is->kind)->planes;
-    int status = open_spool(w, &l->slabs);
+    l->form = trip_block_form_of(&w->header, is->kind);
+    int status = open_spool(w, &l->slabs, is->level);
     trip_slab_init(&l->slab, w->params.slab_sheets, w->budget);
     l->sheet = -1;
     if (status == TRIP_OK)
-        status = open_spool(w, &l->bricks);
+        status = open_spool(w, &l->bricks, is->level);
     if (status == TRIP_OK)
-        status = open_spool(w, &l->runs);
+        status = open_spool(w, &l->runs, is->level);
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (status == TRIP_OK && l->planes_present >> plane & 1)
             status = open_plane(w, l, plane);
@@ -321,7 +296,7 @@ int trip_writer_open(trip_writer **out, const char *path, const trip_writer_para
     return TRIP_OK;
 }
 
-static int end_slab(trip_writer *w, list_writer *l)
+int trip_writer_end_slab(trip_writer *w, trip_list_writer *l)
 {
     size_t n = l->slab.brick_count;
     if (n == 0)
@@ -347,22 +322,22 @@ static int end_slab(trip_writer *w, list_writer *l)
 }
 
 /* A run starts; ends the sheet and the slab before it where it is in another. */
-static int enter_sheet(trip_writer *w, list_writer *l, uint32_t sheet, uint64_t tile)
+static int enter_sheet(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint64_t tile)
 {
     int status = TRIP_OK;
     if (sheet != l->sheet) {
         if (l->sheet >= 0 && sheet / w->params.slab_sheets == l->sheet / w->params.slab_sheets)
             trip_slab_end_sheet(&l->slab);
         else
-            status = end_slab(w, l);
+            status = trip_writer_end_slab(w, l);
     }
     l->sheet = sheet;
     l->last_tile = tile;
     return status;
 }
 
-static int check_run(const trip_writer *w, const list_writer *l, uint32_t sheet, uint32_t tile_u,
-                     uint32_t tile_v, uint32_t count)
+static int check_run(const trip_writer *w, const trip_list_writer *l, uint32_t sheet,
+                     uint32_t tile_u, uint32_t tile_v, uint32_t count)
 {
     const int64_t *dims = l->is.dims;
     int axis = l->is.axis;
@@ -380,7 +355,7 @@ static int check_run(const trip_writer *w, const list_writer *l, uint32_t sheet,
 }
 
 /* A tile at the border reaches beyond the grid; its splats do not. */
-static int check_bounds(const trip_writer *w, const list_writer *l, uint32_t sheet,
+static int check_bounds(const trip_writer *w, const trip_list_writer *l, uint32_t sheet,
                         const trip_file_brick *b)
 {
     const int64_t *dims = l->is.dims;
@@ -394,28 +369,27 @@ static int check_bounds(const trip_writer *w, const list_writer *l, uint32_t she
                      'x' + axis, b->tile_u, b->tile_v, sheet);
 }
 
-static int append_normals(const trip_writer *w, list_writer *l, const uint32_t *normals,
-                          uint32_t count)
+static int append_normals(trip_list_writer *l, const uint32_t *normals, uint32_t count)
 {
     unsigned char packed[3 * TRIP_RUN_RECORDS_MAX];
     trip_output *o = &l->planes[TRIP_PLANE_NORMALS];
-    if (w->form.normal_bytes == sizeof *normals)
+    if (l->form.normal_bytes == sizeof *normals)
         return trip_output_append(o, normals, count * sizeof *normals);
-    trip_normals_pack(w->form.normal_bytes, normals, count, packed);
-    return trip_output_append(o, packed, (size_t)count * w->form.normal_bytes);
+    trip_normals_pack(l->form.normal_bytes, normals, count, packed);
+    return trip_output_append(o, packed, (size_t)count * l->form.normal_bytes);
 }
 
 /* A run that belongs where it comes. */
-static int append_run(trip_writer *w, list_writer *l, uint32_t sheet, uint32_t tile_u,
+static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint32_t tile_u,
                       uint32_t tile_v, const uint32_t *voxels, uint32_t count)
 {
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
-    uint32_t words = trip_block_pack(&w->form, voxels, count, block);
+    uint32_t words = trip_block_pack(&l->form, voxels, count, block);
     if (words == 0)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
                          "list %c: records of tile (%u, %u) of sheet %u are out of order, out of "
                          "the tile, or their codes have more than %u bytes",
-                         'x' + l->is.axis, tile_u, tile_v, sheet, w->form.code_bytes);
+                         'x' + l->is.axis, tile_u, tile_v, sheet, l->form.code_bytes);
     const trip_file_brick *b = trip_slab_add(&l->slab, sheet % w->params.slab_sheets, tile_u,
                                              tile_v, voxels, count, words);
     int status = b ? check_bounds(w, l, sheet, b) : TRIP_ERROR;
@@ -429,7 +403,7 @@ int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t t
                        uint32_t count)
 {
     assert(list < w->list_count);
-    list_writer *l = &w->lists[list];
+    trip_list_writer *l = &w->lists[list];
     assert(!normals == !(l->planes_present >> TRIP_PLANE_NORMALS & 1));
     if (count == 0)
         return TRIP_OK;
@@ -439,7 +413,7 @@ int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t t
     if (status == TRIP_OK)
         status = append_run(w, l, sheet, tile_u, tile_v, voxels, count);
     if (status == TRIP_OK && normals)
-        status = append_normals(w, l, normals, count);
+        status = append_normals(l, normals, count);
     l->records += count;
     atomic_store_explicit(&l->bytes,
                           l->planes[TRIP_PLANE_VOXELS].bytes + l->planes[TRIP_PLANE_NORMALS].bytes,
@@ -471,7 +445,7 @@ static uint64_t records_of(const trip_writer *w, unsigned level, trip_kind kind)
 static int check_records(const trip_writer *w)
 {
     for (unsigned i = 0; i < w->list_count; i++) {
-        const list_writer *l = &w->lists[i];
+        const trip_list_writer *l = &w->lists[i];
         uint64_t wanted = records_of(w, l->is.level, l->is.kind);
         if (l->records != wanted)
             return trip_fail(TRIP_ERROR, "write", w->folder.path,
@@ -507,9 +481,9 @@ static int sync_planes(trip_writer *w)
 {
     int status = TRIP_OK;
     for (unsigned i = 0; i < w->list_count; i++) {
-        list_writer *l = &w->lists[i];
+        trip_list_writer *l = &w->lists[i];
         if (status == TRIP_OK)
-            status = end_slab(w, l);
+            status = trip_writer_end_slab(w, l);
         for (int plane = 0; plane < TRIP_PLANES; plane++)
             if (status == TRIP_OK && l->planes_present >> plane & 1)
                 status = trip_output_sync(&l->planes[plane]);
@@ -525,7 +499,7 @@ static int append_table(trip_output *index, trip_output *table, uint64_t *offset
     return status == TRIP_OK ? trip_output_append_output(index, table) : status;
 }
 
-static void describe_list(const list_writer *l, trip_file_list *f)
+static void describe_list(const trip_list_writer *l, trip_file_list *f)
 {
     f->axis = (uint32_t)l->is.axis;
     f->level = l->is.level;
@@ -543,7 +517,7 @@ static void describe_list(const list_writer *l, trip_file_list *f)
         f->plane_bytes[plane] = l->planes[plane].bytes;
 }
 
-static int append_list(trip_output *index, list_writer *l, trip_file_list *f)
+static int append_list(trip_output *index, trip_list_writer *l, trip_file_list *f)
 {
     describe_list(l, f);
     int status = append_table(index, &l->slabs, &f->slabs_offset);
@@ -631,7 +605,7 @@ static int write_index(trip_writer *w, const char *text)
 {
     trip_output index = { .fd = -1 }, checksums = { .fd = -1 };
     size_t page = w->params.page_bytes;
-    int status = open_spool(w, &checksums);
+    int status = open_spool(w, &checksums, 0);
     if (status == TRIP_OK)
         status = trip_output_create(
             &index,
@@ -670,7 +644,7 @@ int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary)
     return status;
 }
 
-static void close_list(list_writer *l)
+static void close_list(trip_list_writer *l)
 {
     for (int plane = 0; plane < TRIP_PLANES; plane++) {
         trip_output_close(&l->planes[plane]);

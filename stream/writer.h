@@ -75,6 +75,22 @@ int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary);
 /* Removes the partial folder. Also frees `w`; finish frees it itself on success only. */
 void trip_writer_abort(trip_writer *w);
 
+/* The runs of a list that nothing is appended to any more, read back in list order: what coarser
+ * levels are made from before the data set is finished. Memory does not grow with the list. */
+typedef struct trip_list_cursor trip_list_cursor;
+
+typedef struct trip_list_run {
+    uint32_t sheet, tile_u, tile_v, count;
+    const uint32_t *voxels, *normals; /* as appended, until the next run; normals may be NULL */
+} trip_list_run;
+
+/* Sheets with sheet % 2 == `odd` alone. */
+int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list, bool odd,
+                          trip_budget *budget);
+void trip_list_cursor_close(trip_list_cursor *c);
+/* 1: *run is the next one; 0: there is none; negative: failed. */
+int trip_list_cursor_next(trip_list_cursor *c, trip_list_run *run);
+
 uint64_t trip_writer_bytes(const trip_writer *w);
 /* Of a list, by its number. */
 uint64_t trip_writer_records(const trip_writer *w, unsigned list);

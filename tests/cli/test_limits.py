@@ -11,7 +11,7 @@ class Limits(program.ProgramTest):
         run = self.works("brick", source, "-o", "a.trip", "--force", "--limits", "--json", *options)
         summary = json.loads(run.stdout)
         stages = {s["stage"]: s for s in summary["limits"]["stages"]}
-        own = [stages[name] for name in ("scan", "read", "merge", "finish")]
+        own = [stages[name] for name in ("scan", "read", "merge", "levels", "finish")]
         planes = sum(os.path.getsize(os.path.join("a.trip", name)) for name in os.listdir("a.trip")
                      if name != "index.trip")
         self.assertAlmostEqual(sum(s["seconds"] for s in own), summary["seconds"], 6)

@@ -82,7 +82,7 @@ static inline bool test_exists(const char *name)
 
 enum { TEST_LISTS = 6 };
 
-/* What a data set holds: [k][j][i] of every list (X, Y and Z of kept voxels, then of the halo),
+/* What a data set holds at level 0: [k][j][i] of every list (X, Y and Z of kept voxels, then of the halo),
  * code -1 where there is no splat. */
 typedef struct test_lists {
     trip_file_header header;
@@ -103,7 +103,7 @@ static inline void test_read_run(const trip_dataset *d, unsigned number, const t
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX] = { 0 };
     const trip_list *list = &d->lists[number];
     const int axis = list->axis;
-    const trip_block_form form = trip_block_form_of(&d->header);
+    const trip_block_form form = trip_block_form_of(&d->header, list->kind);
     size_t bytes = 8 * (size_t)run->words, normal_bytes = run->count * form.normal_bytes;
     bool has_normals = list->plane_fd[1] >= 0;
     assert_int_equal(pread(list->plane_fd[0], words, bytes, (off_t)run->at[0]), bytes);
@@ -143,7 +143,8 @@ static inline void test_read_lists(const char *name, test_lists *l)
     assert_int_equal(trip_dataset_verify(d, budget), 0);
     *l = (test_lists){ .header = d->header, .text = strdup(d->text) };
     l->voxels = (size_t)(d->header.dims[0] * d->header.dims[1] * d->header.dims[2]);
-    l->lists = d->list_count;
+    while (l->lists < d->list_count && d->lists[l->lists].level == 0)
+        l->lists++;
     assert_true(l->lists == 3 || l->lists == TEST_LISTS);
     for (unsigned i = 0; i < l->lists; i++) {
         const trip_list *list = &d->lists[i];

@@ -16,6 +16,7 @@ static trip_brick_params make_volume(void)
     return (trip_brick_params){ .input = input,
                                 .output = output,
                                 .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" },
+                                .levels = -1,
                                 .memory_bytes = (uint64_t)1 << 26,
                                 .threads = 2 };
 }

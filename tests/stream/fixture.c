@@ -139,7 +139,7 @@ void fixture_read_run(const trip_dataset *d, const trip_list *list, const trip_r
 {
     static uint64_t block[TRIP_BLOCK_WORDS_MAX];
     static unsigned char packed[4 * TRIP_RUN_RECORDS_MAX];
-    const trip_block_form form = trip_block_form_of(&d->header);
+    const trip_block_form form = trip_block_form_of(&d->header, list->kind);
     size_t bytes = 8 * (size_t)run->words, normal_bytes = run->count * form.normal_bytes;
     bool has_normals = list->planes >> TRIP_PLANE_NORMALS & 1;
     assert_int_equal(

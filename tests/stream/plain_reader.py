@@ -6,7 +6,7 @@ Checks every checksum and prints one line for every record of every list, in the
     LIST i j k code [normal gx gy gz]
 
 with the list's axis and, but for voxels of level 0, its level and kind ("x", "z0.halo", "y1.voxels"),
-the code as 16 bits, the normal's record in hexadecimal and its gradient in world space (of those
+the code as 16 bits (of means as it stands, with depth and cover), the normal's record in hexadecimal and its gradient in world space (of those
 whose direction alone is kept, of length gradient_full). Everything is read at once: it is for tests
 and for understanding the format, not for large data.
 """
@@ -20,7 +20,8 @@ except ImportError as missing:
     print(f"plain_reader: {missing} (packages python3-numpy, python3-xxhash)", file=sys.stderr)
     sys.exit(77)
 
-KINDS = (("voxels", "normals"), ("halo",))
+KINDS = (("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values",))
+CODE_BYTES = {2: 2}  # of a kind, whatever the header says
 
 
 def fail(name, place, why):
@@ -162,7 +163,7 @@ def read_plane(folder, index, header, a_list, plane):
     return data
 
 
-def decode_block(header, name, at, block, count):
+def decode_block(header, code_bytes, name, at, block, count):
     """(u, v, code) of the records of a block."""
     words = 4 if header["tile_log2"] == 7 else 1
     present = int.from_bytes(block[: 8 * words], "little")
@@ -175,7 +176,7 @@ def decode_block(header, name, at, block, count):
         if mask == 0:
             fail(name, at, "empty mask")
         places += [place(64 * square + bit) for bit in range(64) if mask >> bit & 1]
-    codes_at, size = 8 * (words + len(squares)), header["code_bytes"]
+    codes_at, size = 8 * (words + len(squares)), code_bytes
     end = codes_at + size * count
     if len(places) != count or len(block) != (end + 7) // 8 * 8 or any(block[end:]):
         fail(name, at, "block")
@@ -233,8 +234,9 @@ def print_list(folder, index, header, number, out):
     voxels = read_plane(folder, index, header, a_list, 0)
     normals, gradient = read_normals(folder, index, header, a_list)
     tile, axis = 1 << header["tile_log2"], a_list["axis"]
+    code_bytes = CODE_BYTES.get(a_list["kind"], header["code_bytes"])
     for sheet, tile_u, tile_v, first, count, at, size in runs(index, header, a_list):
-        block = decode_block(header, a_list["files"][0], at, voxels[at : at + size], count)
+        block = decode_block(header, code_bytes, a_list["files"][0], at, voxels[at : at + size], count)
         for n, (u, v, code) in enumerate(block, first):
             where = [0, 0, 0]
             where[axis] = sheet

@@ -329,7 +329,7 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
 #define RUN ((trip_file_run *)(void *)(c.bytes + c.lists[1].runs_offset))
     REFUSE(c.lists[1].axis = 0, "same axis, level and kind");
     REFUSE(c.lists[1].axis = 3, "no such axis or kind");
-    REFUSE(c.lists[1].kind = 2, "no such axis or kind");
+    REFUSE(c.lists[1].kind = 4, "no such axis or kind");
     REFUSE(c.lists[1].kind = 1, "not the planes of its kind");
     REFUSE(c.lists[1].planes = 1, "not the planes of its kind");
     REFUSE(c.lists[0].level = 1, "not there for each axis");

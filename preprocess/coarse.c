@@ -1,0 +1,77 @@
+#include "coarse.h"
+
+#include <math.h>
+#include <string.h>
+
+void trip_coarse_sum_clear(trip_coarse_sum *s)
+{
+    memset(s, 0, sizeof *s);
+    memset(s->open, 255, sizeof s->open);
+}
+
+/* Voxels of a column cover one another as if by chance, which is exact where one covers all. */
+static void cover_column(uint8_t *open, unsigned cover)
+{
+    *open = (uint8_t)(((unsigned)*open * (TRIP_COARSE_ALL - cover) + TRIP_COARSE_ALL / 2) /
+                      TRIP_COARSE_ALL);
+}
+
+static void add_gradient(trip_coarse_sum *s, double part, const double gradient[3])
+{
+    double along = 0;
+    for (int a = 0; a < 3; a++)
+        along += (double)s->gradient[a] * gradient[a];
+    for (int a = 0; a < 3; a++)
+        s->gradient[a] += (float)(copysign(part, along) * gradient[a]);
+}
+
+void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, unsigned odd,
+                         const double gradient[3])
+{
+    s->known += voxel->known;
+    s->value += (float)voxel->known * voxel->value;
+    if (voxel->kept == 0)
+        return;
+    s->kept += voxel->kept;
+    s->mean += (float)voxel->kept * voxel->mean;
+    for (int a = 0; a < 3; a++) {
+        unsigned column = (odd >> (a + 1) % 3 & 1) | (odd >> (a + 2) % 3 & 1) << 1;
+        cover_column(&s->open[a][column], voxel->cover[a]);
+    }
+    if (gradient)
+        add_gradient(s, voxel->kept, gradient);
+}
+
+/* Of a sum over eight; what there is does not become nothing. */
+static uint16_t eighth(float sum)
+{
+    double part = rint((double)sum / 8);
+    return (uint16_t)(sum > 0 && part < 1 ? 1 : part);
+}
+
+static uint16_t mean_of(float sum, float weight)
+{
+    return weight > 0 ? (uint16_t)fmin(65535, rint((double)sum / (double)weight)) : 0;
+}
+
+bool trip_coarse_sum_get(const trip_coarse_sum *s, trip_coarse_voxel *out)
+{
+    *out = (trip_coarse_voxel){ .kept = eighth(s->kept),
+                                .known = eighth(s->known),
+                                .mean = mean_of(s->mean, s->kept),
+                                .value = mean_of(s->value, s->known) };
+    for (int a = 0; a < 3 && out->kept > 0; a++) {
+        unsigned open = 0;
+        for (int column = 0; column < 4; column++)
+            open += s->open[a][column];
+        unsigned cover = (4 * 255 - open) * TRIP_COARSE_ALL / (4 * 255);
+        out->cover[a] = (uint16_t)(cover < out->kept ? out->kept : cover);
+    }
+    return s->known > 0;
+}
+
+void trip_coarse_sum_gradient(const trip_coarse_sum *s, double gradient[3])
+{
+    for (int a = 0; a < 3; a++)
+        gradient[a] = s->kept > 0 ? (double)s->gradient[a] / (double)s->kept : 0;
+}

@@ -1,0 +1,51 @@
+/* Where the voxels of a level are read from while the next one is made: runs of the finished lists
+ * along Z of level 0, or the file of voxels that a coarse level left. A source gives the even or
+ * the odd sheets, square by square, in list order. One thread. */
+#ifndef TRIP_LEVEL_SOURCE_H
+#define TRIP_LEVEL_SOURCE_H
+
+#include "coarse.h"
+#include "output.h"
+#include "piece.h"
+#include "writer.h"
+
+/* The key of a square of 2^edge_log2 voxels: sheet << TRIP_TILE_MORTON_BITS | its Morton code. */
+
+typedef struct trip_level_source {
+    trip_budget *budget;
+    unsigned odd;
+    uint64_t key; /* of the square of the next level that the voxels at hand belong to */
+    bool has;     /* some are at hand */
+    int64_t u, v; /* where their square starts in that of the next level, in voxels of this one */
+    uint32_t count;
+    const trip_coarse_voxel *voxels;
+    /* Of a list. */
+    trip_list_cursor *cursor;
+    bool kept;
+    /* Of a file. */
+    const trip_output *file;
+    uint64_t at;
+
+    unsigned edge_log2; /* of squares of the next level */
+    unsigned tile_log2; /* of squares here */
+    size_t room;
+    trip_coarse_voxel *memory;
+} trip_level_source;
+
+/* Of a list along Z; `kept`: it holds voxels that were kept, not their halo. */
+int trip_level_source_list(trip_level_source *s, trip_writer *w, unsigned list, bool kept,
+                           unsigned odd, unsigned tile_log2, unsigned edge_log2,
+                           trip_budget *budget);
+/* Of a flushed file of trip_level_file_append(). */
+int trip_level_source_file(trip_level_source *s, const trip_output *file, unsigned odd,
+                           unsigned edge_log2, trip_budget *budget);
+void trip_level_source_close(trip_level_source *s);
+
+/* Goes on to the next square; `has` says whether there is one. */
+int trip_level_source_next(trip_level_source *s);
+
+/* Appends the voxels of a square; keys ascend. */
+int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_voxel *voxels,
+                           uint32_t count);
+
+#endif

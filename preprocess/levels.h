@@ -1,0 +1,42 @@
+/* The coarse levels of a data set: each is made of the one below when that is written, from its
+ * lists along Z or, above the first, from a file of its voxels. Two sheets are read
+ * at a time, square by square, so that memory does not grow with the volume. The pieces go to a
+ * list builder, which sorts them as those of level 0. */
+#ifndef TRIP_LEVELS_H
+#define TRIP_LEVELS_H
+
+#include "list_builder.h"
+#include "normal.h"
+
+/* Levels above 0. */
+enum { TRIP_LEVELS_MOST = 24 };
+
+typedef struct trip_levels_params {
+    trip_piece_format format; /* of level 0 */
+    trip_quantiser quantiser;
+    const trip_compact_normals *compact; /* how normals of 3 bytes are encoded; NULL: they have 4 */
+    unsigned code_bytes;                 /* of values */
+    int64_t dims[3];                     /* of level 0 */
+    trip_affine index_to_world;
+    unsigned levels;
+    const char *folder;  /* for temporary files */
+    trip_writer *writer; /* with the lists of trip_levels_lists() */
+    trip_spill *spill;   /* whose segments are not needed any more */
+    trip_workers *workers;
+    /* Called now and then with how much of the work is done. */
+    void (*progress)(void *user, uint64_t done, uint64_t total);
+    void *progress_user;
+} trip_levels_params;
+
+/* How many levels trip_brick_params.levels comes to. */
+unsigned trip_levels_count(const int64_t dims[3], int wanted, unsigned tile_voxels);
+
+/* The lists of levels 0 to `levels`, as the writer takes them; returns their number. `lists` has
+ * room for 6 a level. Without a halo there are no lists of values to interpolate. */
+unsigned trip_levels_lists(const int64_t dims[3], const trip_affine *index_to_world, bool halo,
+                           unsigned levels, trip_writer_list *lists);
+
+/* Makes all levels above 0, once the lists of level 0 are complete. */
+int trip_levels_make(const trip_levels_params *params, trip_budget *budget);
+
+#endif

@@ -1,0 +1,158 @@
+#include "writer.h"
+
+#include <stdlib.h>
+
+#include "report.h"
+#include "writer_state.h"
+
+/* At a run of a slab. The tables of the slab at hand are in memory, as they are while it is
+ * written: their length is bounded by the tiles of a sheet. */
+struct trip_list_cursor {
+    trip_budget *budget;
+    const trip_writer *writer;
+    trip_list_writer *list;
+    bool odd;
+    uint64_t next_slab;
+    trip_file_slab slab;
+    trip_file_brick *bricks; /* of the slab */
+    trip_file_run *runs;     /* [brick][sheet] */
+    size_t tables_bytes;     /* of both, from the budget */
+    uint64_t sheet, brick;   /* the next run, within the slab */
+    uint64_t at[TRIP_PLANES];
+    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
+};
+
+static int flush_list(trip_writer *w, trip_list_writer *l)
+{
+    trip_output *const outputs[] = { &l->slabs, &l->bricks, &l->runs, &l->planes[TRIP_PLANE_VOXELS],
+                                     &l->planes[TRIP_PLANE_NORMALS] };
+    int status = trip_writer_end_slab(w, l);
+    for (size_t i = 0; i < sizeof outputs / sizeof *outputs && status == TRIP_OK; i++)
+        if (outputs[i]->buffer)
+            status = trip_output_flush(outputs[i]);
+    return status;
+}
+
+int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list, bool odd,
+                          trip_budget *budget)
+{
+    trip_list_cursor *c = *out = trip_budget_take(budget, sizeof *c);
+    if (!c)
+        return trip_fail(TRIP_ERROR, "brick", w->folder.path,
+                         "no memory to read a list back: give more with --memory");
+    c->budget = budget;
+    c->writer = w;
+    c->list = &w->lists[list];
+    c->odd = odd;
+    return flush_list(w, c->list);
+}
+
+void trip_list_cursor_close(trip_list_cursor *c)
+{
+    if (!c)
+        return;
+    trip_budget_release(c->budget, c->bricks, c->tables_bytes);
+    trip_budget_release(c->budget, c, sizeof *c);
+}
+
+/* Room for the tables of the slab at hand. */
+static int fit_tables(trip_list_cursor *c)
+{
+    size_t runs = (size_t)c->slab.brick_count * c->writer->params.slab_sheets;
+    size_t bricks = c->slab.brick_count * sizeof *c->bricks;
+    size_t bytes = bricks + runs * sizeof *c->runs;
+    if (bytes > c->tables_bytes) {
+        trip_budget_release(c->budget, c->bricks, c->tables_bytes);
+        c->tables_bytes = 0;
+        c->bricks = trip_budget_take(c->budget, bytes);
+        if (!c->bricks)
+            return trip_fail(TRIP_ERROR, "brick", c->writer->folder.path,
+                             "no memory to read a list back: give more with --memory");
+        c->tables_bytes = bytes;
+    }
+    c->runs = (void *)(c->bricks + c->slab.brick_count);
+    return TRIP_OK;
+}
+
+static int enter_slab(trip_list_cursor *c)
+{
+    trip_list_writer *l = c->list;
+    int status =
+        trip_output_read(&l->slabs, c->next_slab * sizeof c->slab, &c->slab, sizeof c->slab);
+    if (status == TRIP_OK)
+        status = fit_tables(c);
+    const uint64_t first = c->slab.first_brick, count = c->slab.brick_count;
+    const uint64_t sheets = c->writer->params.slab_sheets;
+    if (status == TRIP_OK)
+        status = trip_output_read(&l->bricks, first * sizeof *c->bricks, c->bricks,
+                                  count * sizeof *c->bricks);
+    if (status == TRIP_OK)
+        status = trip_output_read(&l->runs, first * sheets * sizeof *c->runs, c->runs,
+                                  count * sheets * sizeof *c->runs);
+    c->next_slab++;
+    c->sheet = c->brick = 0;
+    c->at[TRIP_PLANE_VOXELS] = c->slab.first_block;
+    c->at[TRIP_PLANE_NORMALS] = c->slab.first_record * l->form.normal_bytes;
+    return status;
+}
+
+static int read_run(trip_list_cursor *c, const trip_file_run *r, trip_list_run *run)
+{
+    const trip_list_writer *l = c->list;
+    const trip_file_brick *b = &c->bricks[c->brick];
+    const bool normals = l->planes_present >> TRIP_PLANE_NORMALS & 1;
+    int status = trip_output_read(&l->planes[TRIP_PLANE_VOXELS], c->at[TRIP_PLANE_VOXELS], c->block,
+                                  8 * (size_t)r->words);
+    if (status == TRIP_OK && normals)
+        status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], c->at[TRIP_PLANE_NORMALS],
+                                  c->packed, (size_t)r->records * l->form.normal_bytes);
+    if (status < 0)
+        return status;
+    const trip_block block =
+        trip_block_make(&l->form, r->records, r->words, c->block, normals ? c->packed : NULL);
+    if (!trip_block_words_fit(&l->form, r->records, r->words) || trip_block_check(&block, b))
+        return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,
+                         "is not what was written: the disk, or another program, changed it");
+    trip_block_voxels(&block, 0, r->records, c->voxels);
+    if (normals)
+        trip_block_normals(&block, 0, r->records, c->normals);
+    *run = (trip_list_run){
+        .sheet = (uint32_t)(c->slab.slab * (uint64_t)c->writer->params.slab_sheets + c->sheet),
+        .tile_u = b->tile_u,
+        .tile_v = b->tile_v,
+        .count = r->records,
+        .voxels = c->voxels,
+        .normals = normals ? c->normals : NULL
+    };
+    return TRIP_OK;
+}
+
+/* Goes on to the next run of the slab; 1 where *run is one that is wanted. */
+static int take_run(trip_list_cursor *c, trip_list_run *run)
+{
+    const uint64_t sheets = c->writer->params.slab_sheets;
+    const trip_file_run *r = &c->runs[c->brick * sheets + c->sheet];
+    bool odd = (c->slab.slab * sheets + c->sheet) % 2, wanted = r->records > 0 && odd == c->odd;
+    int status = wanted ? read_run(c, r, run) : TRIP_OK;
+    c->at[TRIP_PLANE_VOXELS] += 8 * (uint64_t)r->words;
+    c->at[TRIP_PLANE_NORMALS] += (uint64_t)r->records * c->list->form.normal_bytes;
+    if (++c->brick == c->slab.brick_count) {
+        c->brick = 0;
+        c->sheet++;
+    }
+    return status < 0 ? status : wanted;
+}
+
+int trip_list_cursor_next(trip_list_cursor *c, trip_list_run *run)
+{
+    int status = 0;
+    while (status == 0) {
+        bool in_slab = c->next_slab > 0 && c->sheet < c->writer->params.slab_sheets;
+        if (!in_slab && c->next_slab == c->list->slab_count)
+            return 0;
+        status = in_slab ? take_run(c, run) : enter_slab(c);
+    }
+    return status;
+}

@@ -1,0 +1,269 @@
+/* Coarse levels against plain sums over the voxels that each of theirs covers. */
+#include "brick_files.h"
+
+#include <math.h>
+
+#include "levels.h"
+#include "mean.h"
+#include "reader.h"
+
+enum { NX = 150, NY = 70, NZ = 41, N = NX * NY * NZ, LEAST = 200 };
+
+static uint8_t bytes[N];
+
+static bool is_kept(int64_t x, int64_t y, int64_t z)
+{
+    return x >= 0 && y >= 0 && z >= 0 && x < NX && y < NY && z < NZ &&
+           bytes[(z * NY + y) * NX + x] >= LEAST;
+}
+
+/* Kept, or next to what is. */
+static bool is_known(int64_t x, int64_t y, int64_t z)
+{
+    for (int n = 0; n < 27; n++)
+        if (is_kept(x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1))
+            return x < NX && y < NY && z < NZ;
+    return false;
+}
+
+/* A ball and some voxels anywhere. */
+static void make_bytes(uint64_t seed, unsigned rare)
+{
+    uint64_t random = seed;
+    for (int i = 0; i < N; i++) {
+        int x = i % NX - 60, y = i / NX % NY - 30, z = i / NX / NY - 21;
+        bool kept = x * x + y * y + z * z < 300 || test_random(&random) % rare == 0;
+        bytes[i] =
+            (uint8_t)(kept ? LEAST + test_random(&random) % 56 : test_random(&random) % LEAST);
+    }
+    test_write("v.raw", bytes, sizeof bytes);
+}
+
+static const trip_value_range high = { LEAST, 255 };
+
+static trip_brick_summary brick_to(const char *output, trip_brick_params p)
+{
+    static char input[128], path[128];
+    trip_brick_summary s;
+    strcpy(input, test_path("v.raw"));
+    strcpy(path, test_path(output));
+    p.input = input;
+    p.output = path;
+    p.ranges = &high;
+    p.range_count = 1;
+    p.replace = true;
+    p.volume = (trip_volume_params){ .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" };
+    if (trip_brick(&p, &s) != 0)
+        fail_msg("%s", test_report);
+    return s;
+}
+
+/* Sums over the cube of voxels that one of a level covers. */
+typedef struct cube {
+    int kept, known, columns; /* columns along the axis with kept voxels */
+    double mean, value;       /* codes */
+} cube;
+
+static cube sum_cube(const int64_t at[3], unsigned level, int axis)
+{
+    const int64_t edge = (int64_t)1 << level;
+    bool column[64] = { false };
+    cube c = { 0 };
+    for (int64_t n = 0; n < edge * edge * edge; n++) {
+        const int64_t in[3] = { n % edge, n / edge % edge, n / edge / edge };
+        int64_t x = at[0] * edge + in[0], y = at[1] * edge + in[1], z = at[2] * edge + in[2];
+        double code = 0;
+        if (is_known(x, y, z)) {
+            code = 257.0 * bytes[(z * NY + y) * NX + x];
+            c.known++;
+            c.value += code;
+        }
+        if (is_kept(x, y, z)) {
+            c.kept++;
+            c.mean += code;
+            column[in[(axis + 1) % 3] * edge + in[(axis + 2) % 3]] = true;
+        }
+    }
+    for (int i = 0; i < 64; i++)
+        c.columns += column[i];
+    c.mean /= c.kept ? c.kept : 1;
+    c.value /= c.known ? c.known : 1;
+    return c;
+}
+
+/* Exact but for what a code has no room for. */
+static void expect_mean(const cube *c, unsigned code, unsigned level)
+{
+    const double edge = (double)(1u << level), cover = c->columns / (edge * edge);
+    const double part = c->kept / (edge * edge * edge);
+    assert_true(fabs(trip_mean_value(code) - c->mean) < 65535.0 / 1023);
+    if (level == 1)
+        assert_int_equal(code & (TRIP_MEAN_SHARES - 1),
+                         trip_mean_pack(0, cover, part / cover) & (TRIP_MEAN_SHARES - 1));
+    else if (part == 1)
+        assert_int_equal(code & (TRIP_MEAN_SHARES - 1), TRIP_MEAN_SHARES - 1);
+}
+
+/* Visits every record of a list: counts those that are right. */
+static uint64_t check_list(const trip_dataset *d, const trip_list *list)
+{
+    static uint64_t words[TRIP_BLOCK_WORDS_MAX];
+    static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
+    const trip_block_form form = trip_block_form_of(&d->header, list->kind);
+    trip_selection all;
+    trip_run run;
+    uint64_t records = 0;
+    assert_int_equal(trip_selection_create_whole(&all, d, list, false, d->budget), 0);
+    for (trip_run_iterator it = trip_run_begin(&all); trip_run_next(&it, &run);) {
+        size_t size = 8 * (size_t)run.words;
+        assert_int_equal(pread(list->plane_fd[0], words, size, (off_t)run.at[0]), size);
+        trip_block block = trip_block_make(&form, run.count, run.words, words, NULL);
+        trip_block_voxels(&block, 0, run.count, voxels);
+        for (uint32_t i = 0; i < run.count; i++) {
+            int64_t at[3];
+            at[list->axis] = run.sheet;
+            at[(list->axis + 1) % 3] = run.u + (int64_t)trip_voxel_u(voxels[i]);
+            at[(list->axis + 2) % 3] = run.v + (int64_t)trip_voxel_v(voxels[i]);
+            cube c = sum_cube(at, list->level, list->axis);
+            unsigned code = trip_voxel_code(voxels[i]);
+            if (list->kind == TRIP_KIND_MEANS)
+                expect_mean(&c, code, list->level);
+            else
+                assert_true(fabs(code - c.value) < 257);
+            assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : c.known > 0);
+        }
+        records += run.count;
+    }
+    trip_selection_destroy(&all, d->budget);
+    return records;
+}
+
+/* How many voxels of a level cover one kept, or known. */
+static uint64_t count_cubes(const trip_list *list)
+{
+    uint64_t count = 0;
+    for (int64_t n = 0; n < list->dims[0] * list->dims[1] * list->dims[2]; n++) {
+        const int64_t at[3] = { n % list->dims[0], n / list->dims[0] % list->dims[1],
+                                n / list->dims[0] / list->dims[1] };
+        cube c = sum_cube(at, list->level, 0);
+        count += list->kind == TRIP_KIND_MEANS ? c.kept > 0 : c.known > 0;
+    }
+    return count;
+}
+
+static void check_data_set(const char *name, unsigned levels)
+{
+    trip_dataset *d;
+    trip_budget *budget;
+    assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
+    assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
+    assert_int_equal(d->list_count, 6 * (levels + 1));
+    for (unsigned i = 6; i < d->list_count; i++) {
+        const trip_list *list = &d->lists[i];
+        uint64_t records = check_list(d, list);
+        assert_true(records > 0);
+        if (list->axis == 0)
+            assert_int_equal(records, count_cubes(list));
+    }
+    assert_int_equal(trip_dataset_verify(d, budget), 0);
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+}
+
+static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
+{
+    (void)state;
+    for (int sparse = 0; sparse < 2; sparse++) {
+        make_bytes(7, sparse ? 2000 : 3);
+        trip_brick_summary s =
+            brick_to("a.trip", (trip_brick_params){ .tile_voxels = 64, .threads = 2 });
+        assert_int_equal(s.levels, 2); /* 150 voxels: 75, 38 */
+        assert_true(s.level_bytes > 0 && s.level_bytes < s.bytes);
+        check_data_set("a.trip", 2);
+    }
+}
+
+static void tiles_of_any_size_have_levels(void **state)
+{
+    (void)state;
+    make_bytes(8, 40);
+    for (unsigned tile = 16; tile <= 128; tile *= 2) {
+        brick_to("a.trip",
+                 (trip_brick_params){ .tile_voxels = tile, .slab_sheets = 3, .levels = 2 });
+        check_data_set("a.trip", 2);
+    }
+}
+
+static void memory_threads_and_slices_make_no_difference(void **state)
+{
+    (void)state;
+    make_bytes(9, 100);
+    brick_to("a.trip", (trip_brick_params){ .threads = 1 });
+    for (int way = 0; way < 3; way++) {
+        trip_brick_params p = { .threads = (unsigned[]){ 1, 4, 2 }[way],
+                                .slices = (int64_t[]){ 1, 5, 23 }[way],
+                                .memory_bytes = (uint64_t[]){ 28 << 20, 48 << 20, 0 }[way] };
+        brick_to("b.trip", p);
+        test_same_dataset("a.trip", "b.trip");
+    }
+}
+
+static void levels_can_be_left_out_and_stop_at_one_voxel(void **state)
+{
+    (void)state;
+    make_bytes(10, 100);
+    trip_brick_summary s = brick_to("a.trip", (trip_brick_params){ .levels = -1 });
+    assert_int_equal(s.levels, 0);
+    assert_int_equal(s.level_bytes, 0);
+    assert_false(test_exists("a.trip/x1.means"));
+    s = brick_to("a.trip", (trip_brick_params){ .levels = 24 });
+    assert_int_equal(s.levels, 8); /* 2^8 voxels are more than 150 */
+    s = brick_to("a.trip", (trip_brick_params){ .no_halo = true });
+    assert_int_equal(s.levels, 2);
+    assert_true(test_exists("a.trip/x1.means"));
+    assert_false(test_exists("a.trip/x1.values"));
+}
+
+/* A slab of 4 voxels along z has the normals of its faces, whatever the level. */
+static void normals_are_those_of_the_faces(void **state)
+{
+    (void)state;
+    for (int i = 0; i < N; i++)
+        bytes[i] = i / NX / NY / 4 == 3 ? 255 : 0;
+    test_write("v.raw", bytes, sizeof bytes);
+    brick_to("a.trip", (trip_brick_params){ .normals = TRIP_NORMALS_FULL });
+    trip_dataset *d;
+    trip_budget *budget;
+    assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
+    assert_int_equal(trip_dataset_open(&d, test_path("a.trip"), budget), 0);
+    const trip_list *list = trip_dataset_find(d, 2, 1, TRIP_KIND_MEANS);
+    assert_non_null(list);
+    assert_int_equal(list->records, 2 * 75 * 35);
+    uint32_t *normals = malloc(list->plane_bytes[1]);
+    assert_int_equal(pread(list->plane_fd[1], normals, list->plane_bytes[1], 0),
+                     list->plane_bytes[1]);
+    for (uint64_t i = 0; i < list->records; i++) {
+        double g[3];
+        trip_normal_unpack(normals[i], d->header.gradient_scale, g);
+        assert_true(fabs(fabs(g[2]) - 127.5 / 2) < 2); /* of the two voxels one is at the face */
+        assert_true(fabs(g[0]) < 1 && fabs(g[1]) < 1);
+    }
+    free(normals);
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(coarse_voxels_have_the_means_of_those_they_cover,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(tiles_of_any_size_have_levels, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(memory_threads_and_slices_make_no_difference, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(levels_can_be_left_out_and_stop_at_one_voxel, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(normals_are_those_of_the_faces, test_begin, test_end),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,61 @@
+#include "fixture.h"
+
+#include <math.h>
+
+#include "mean.h"
+
+static void a_cube_that_is_full_keeps_its_extinction(void **state)
+{
+    (void)state;
+    unsigned code = trip_mean_pack(65535, 1, 1);
+    assert_int_equal(code, 65535);
+    assert_int_equal(trip_mean_value(code), 65535);
+    assert_true(trip_mean_extinction(code % TRIP_MEAN_SHARES, 3.5, 0.25) == 3.5);
+}
+
+static void shares_of_two_by_two_by_two_are_exact(void **state)
+{
+    (void)state;
+    for (int columns = 1; columns <= 4; columns++)
+        for (int kept = columns; kept <= 2 * columns; kept++) {
+            double cover = columns / 4.0, depth = kept / (2.0 * columns);
+            unsigned shares = trip_mean_pack(0, cover, depth) % TRIP_MEAN_SHARES;
+            assert_true(trip_mean_cover(shares) == cover);
+            /* Thirds alone have no eighths. */
+            assert_true(fabs(trip_mean_depth(shares) - depth) <= (columns == 3 ? 1 / 23.9 : 0));
+        }
+}
+
+static void values_are_the_nearest_of_1024(void **state)
+{
+    (void)state;
+    for (unsigned value = 0; value < 65536; value++) {
+        unsigned back = trip_mean_value(trip_mean_pack(value, 0.5, 0.5));
+        assert_true(fabs((double)back - value) <= 65535.0 / 1023 / 2 + 1);
+    }
+}
+
+/* Columns of the same depth side by side: what shows through is the mean of what each lets through.
+ */
+static void opacity_is_the_mean_over_the_columns(void **state)
+{
+    (void)state;
+    for (unsigned shares = 0; shares < TRIP_MEAN_SHARES; shares++)
+        for (double k = 0.01; k < 1000; k *= 7) {
+            const double length = 1.5, cover = trip_mean_cover(shares);
+            double through = 1 - cover + cover * exp(-k * trip_mean_depth(shares) * length);
+            double own = trip_mean_extinction(shares, k, length);
+            assert_true(fabs(exp(-own * length) - through) < 1e-12);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_cube_that_is_full_keeps_its_extinction),
+        cmocka_unit_test(shares_of_two_by_two_by_two_are_exact),
+        cmocka_unit_test(values_are_the_nearest_of_1024),
+        cmocka_unit_test(opacity_is_the_mean_over_the_columns),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
