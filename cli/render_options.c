@@ -49,6 +49,7 @@ enum {
     KEY_CLASSIFY,
     KEY_COMPOSITING,
     KEY_SLICES,
+    KEY_LOD,
     KEY_METHOD,
     KEY_SUBMIT,
     KEY_TRAVERSAL,
@@ -126,6 +127,11 @@ static const struct argp_option options[] = {
       "picture (default: splat); pre only",
       3 },
     { "slices", KEY_SLICES, "N", 0, "Slices of a sheet, 1 to 16 (default: 2); post only", 3 },
+    { "lod", KEY_LOD, "PX", 0,
+      "Draw coarse levels where their voxels are at most so many pixels wide (default: 0, the "
+      "finest "
+      "alone)",
+      3 },
     { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
     { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
       3 },
@@ -381,6 +387,8 @@ static int parse_method(int key, char *arg, parse *p)
         status = trip_option_choice("--compositing", arg, compositings, &which);
         s->compositing = (triptych_compositing)which;
         return status;
+    case KEY_LOD:
+        return trip_option_number("--lod", arg, 0, 1000, &s->lod_px);
     case KEY_SLICES:
         p->slices = true;
         return trip_option_integer("--slices", arg, 1, 16, &s->slices);

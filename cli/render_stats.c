@@ -205,6 +205,8 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     else
         cJSON_AddStringToObject(root, "compositing",
                                 o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
+    if (o->settings.lod_px > 0)
+        cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);

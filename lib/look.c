@@ -61,6 +61,7 @@ triptych_settings triptych_default_settings(void)
         .h = s.h,
         .kernel_radius = s.kernel_radius,
         .background = { s.background[0], s.background[1], s.background[2], s.background[3] },
+        .lod_px = s.lod_px,
         .field = (triptych_field)s.field,
         .kernel = (triptych_kernel)s.kernel,
         .tolerance = s.tolerance,
@@ -105,6 +106,8 @@ static const char *fault_of_settings(const triptych_settings *s)
     for (int i = 0; i < 4; i++)
         if (!(s->background[i] >= 0 && s->background[i] <= 1))
             return "components of the background lie between 0 and 1";
+    if (!(s->lod_px >= 0 && s->lod_px <= 1000))
+        return "levels are chosen by 0 to 1000 pixels a voxel";
     return fault_of_integral(s);
 }
 
@@ -149,6 +152,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .h = s->h,
         .kernel_radius = s->kernel_radius,
         .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
+        .lod_px = s->lod_px,
         .field = (trip_field_kind)s->field,
         .kernel = (trip_kernel)s->kernel,
         .tolerance = s->tolerance,

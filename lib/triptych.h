@@ -238,7 +238,9 @@ typedef struct triptych_settings {
     double h;               /* where layers begin to blend, 0 to below 1 */
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
-    int depth; /* not 0: frames have distances too; not with rounded targets or the integral */
+    double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
+                      0 to 1000; 0, the default: the finest alone */
+    int depth;     /* not 0: frames have distances too; not with rounded targets or the integral */
     /* Of the integral renderer alone, but for samples. */
     triptych_field field;   /* what it integrates */
     triptych_kernel kernel; /* of values */

@@ -4,9 +4,12 @@
 #include <string.h>
 
 #include "plan_cull.h"
+#include "mean.h"
 #include "report.h"
 #include "sheet.h"
 #include "weight.h"
+
+enum { TABLE_ENTRIES = 65536 };
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
 
@@ -30,7 +33,8 @@ static bool is_in_layer(const planning *p, const trip_list *list, int axis)
         return false;
     if (p->settings->classify == TRIP_CLASSIFY_POST)
         return list->level == 0 && trip_kind_of(list->kind)->lattice;
-    return trip_kind_of(list->kind)->splatted && !trip_kind_of(list->kind)->coarse;
+    return trip_kind_of(list->kind)->splatted &&
+           (!trip_kind_of(list->kind)->coarse || trip_lod_concerns(&p->plan->lod, list));
 }
 
 /* First sheet that is not below the eye, cut to [0, sheets]. */
@@ -150,7 +154,13 @@ static void select_brick(const selecting *of, uint64_t index, int64_t slab_sheet
 
 static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t index)
 {
-    switch (trip_cull_brick(&of->cull, of->list->axis, &of->list->bricks[index], slab)) {
+    const trip_file_brick *brick = &of->list->bricks[index];
+    if (of->planned->by_level &&
+        !trip_lod_brick(&of->p->plan->lod, of->list, &of->p->data->header, brick, slab->slab)) {
+        of->planned->bricks_of_other_levels++;
+        return;
+    }
+    switch (trip_cull_brick(&of->cull, of->list->axis, brick, slab)) {
     case TRIP_CULL_KEEP:
         select_brick(of, index, (int64_t)slab->slab * of->p->data->header.slab_sheets);
         break;
@@ -172,7 +182,7 @@ static int select_bricks(const planning *p, const trip_list *list)
     trip_plan_list *planned = &plan->lists[list->index];
     selecting of = { .p = p, .list = list, .planned = planned };
     of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
-                             plan->axis_of_view, p->table, p->about);
+                             plan->axis_of_view, planned->table, p->about);
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
     planned->bricks = list->brick_count;
@@ -211,12 +221,38 @@ static void drop_empty(trip_plan *plan, trip_plan_layer *layer, trip_budget *bud
     layer->pass_count = kept;
 }
 
+/* What codes of means look like: their value as the function shows it, with the extinction by which
+ * a splat shows the part of its cube that was kept. */
+static int make_table(const planning *p, const trip_list *list, trip_plan_list *planned)
+{
+    const trip_affine *map = &list->index_to_world;
+    const int a = list->axis;
+    const double length = trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a]));
+    trip_tf_entry *to = planned->own_table =
+        trip_budget_take(p->budget, TABLE_ENTRIES * sizeof *to);
+    if (!to)
+        return trip_fail(TRIP_ERROR, "render", "plan",
+                         "tables of coarse levels do not fit the memory given; raise --memory");
+    for (unsigned code = 0; code < TABLE_ENTRIES; code++) {
+        to[code] = p->table[trip_mean_value(code)];
+        if (to[code].extinction > 0)
+            to[code].extinction = (float)trip_mean_extinction(code % TRIP_MEAN_SHARES,
+                                                              (double)to[code].extinction, length);
+    }
+    planned->table = to;
+    return 0;
+}
+
 /* The view in a list's own index space. */
 static int place_list(const planning *p, const trip_list *list)
 {
     trip_plan_list *planned = &p->plan->lists[list->index];
     planned->drawn = true;
+    planned->table = p->table;
+    planned->by_level = trip_lod_concerns(&p->plan->lod, list);
     int status = trip_list_grid_make(&planned->grid, p->data, list);
+    if (!status && trip_kind_of(list->kind)->axis_bits > 0)
+        status = make_table(p, list, planned);
     if (status)
         return status;
     planned->camera = *p->camera;
@@ -291,6 +327,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
     int status = trip_settings_check(settings);
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         status = trip_plan_check_cells(data, "--classify pre");
+    if (!status && settings->classify == TRIP_CLASSIFY_PRE)
+        status = trip_lod_make(&plan->lod, data, camera, settings, budget);
     if (!status)
         status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {
@@ -365,6 +403,11 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
     size_t count = plan->list_count;
     for (unsigned i = 0; i < plan->selection_count; i++)
         trip_selection_destroy(&plan->selections[i], budget);
+    for (unsigned i = 0; plan->lists && i < count; i++)
+        if (plan->lists[i].own_table)
+            trip_budget_release(budget, plan->lists[i].own_table,
+                                TABLE_ENTRIES * sizeof(trip_tf_entry));
+    trip_lod_release(&plan->lod, budget);
     trip_budget_release(budget, plan->selections, 2 * count * sizeof *plan->selections);
     trip_budget_release(budget, plan->lists, count * sizeof *plan->lists);
     *plan = (trip_plan){ 0 };
@@ -399,6 +442,16 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     }
 }
 
+static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *out)
+{
+    if (!(s->lod_px > 0) || plan->gathers)
+        return;
+    fprintf(out,
+            "levels      run: cells of %d voxels a side at the coarsest of %u levels whose voxels "
+            "are at most %g pixels wide\n",
+            plan->lod.level ? 1 << plan->lod.cell_log2 : 0, plan->lod.levels + 1, s->lod_px);
+}
+
 static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *out)
 {
     const trip_plan_layer *layer = &plan->layers[list->axis];
@@ -428,14 +481,25 @@ static const char *why_not_drawn(const trip_plan *plan, const trip_list *list)
 {
     if (plan->gathers)
         return "";
+    if (trip_kind_of(list->kind)->coarse && !(plan->lod.level && list->level <= plan->lod.levels))
+        return ": the finest level alone is drawn";
     return trip_kind_of(list->kind)->splatted ? ": no ray of the view has weight in it"
                                               : ": its records are not splatted";
+}
+
+static const char *of_other_levels(const trip_plan_list *planned, char text[64])
+{
+    text[0] = 0;
+    if (planned->by_level)
+        snprintf(text, 64, ", %" PRIu64 " where other levels are drawn",
+                 planned->bricks_of_other_levels);
+    return text;
 }
 
 static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out)
 {
     const trip_plan_list *planned = &plan->lists[list->index];
-    char name[24], bytes[32];
+    char name[24], bytes[32], others[64];
     fprintf(out, "list %-6s ", trip_plan_list_name(list, name));
     if (!planned->drawn) {
         fprintf(out, "not read%s\n", why_not_drawn(plan, list));
@@ -447,10 +511,11 @@ static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out
     bool read = is_read(plan, list);
     fprintf(out,
             "%s: %" PRIu64 " of %" PRIu64 " bricks, %" PRIu64 " splats, %s (left out: %" PRIu64
-            " transparent, %" PRIu64 " out of view, %" PRIu64 " without weight)\n",
+            " transparent, %" PRIu64 " out of view, %" PRIu64 " without weight%s)\n",
             read ? "read" : "empty", planned->bricks_selected, planned->bricks,
             planned->splats_selected, trip_format_bytes(bytes_read, bytes),
-            planned->bricks_transparent, planned->bricks_outside, planned->bricks_without_weight);
+            planned->bricks_transparent, planned->bricks_outside, planned->bricks_without_weight,
+            of_other_levels(planned, others));
     if (read)
         explain_passes(plan, list, out);
 }
@@ -506,6 +571,7 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
 {
     int used = 0;
     explain_method(plan, settings, out);
+    explain_levels(plan, settings, out);
     for (unsigned i = 0; i < data->list_count; i++)
         explain_list(plan, &data->lists[i], out);
     for (int axis = 0; axis < 3; axis++)

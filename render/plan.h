@@ -7,6 +7,7 @@
 
 #include "camera.h"
 #include "list_grid.h"
+#include "lod.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
@@ -17,8 +18,12 @@ typedef struct trip_plan_list {
                             values are interpolated; where it is not, what follows is not set */
     trip_list_grid grid; /* in that of level 0 */
     trip_camera camera;  /* the view in the list's own index space */
+    bool by_level;       /* of its voxels those are drawn that trip_plan.lod says */
+    const trip_tf_entry *table; /* of 65536: what its codes look like */
+    trip_tf_entry *own_table;   /* the same where it is not the frame's; from the budget */
     uint64_t bricks, bricks_selected;
-    uint64_t bricks_outside, bricks_without_weight, bricks_transparent; /* why left out */
+    uint64_t bricks_outside, bricks_without_weight, bricks_transparent,
+        bricks_of_other_levels; /* why left out */
     uint64_t splats_selected;
     uint64_t bytes_selected[TRIP_PLANES]; /* of those, in the data set's planes */
 } trip_plan_list;
@@ -39,6 +44,7 @@ typedef struct trip_plan_layer {
 typedef struct trip_plan {
     int axis_of_view;
     bool gathers;    /* trip_plan_make_field()'s */
+    trip_lod lod;    /* which level is drawn where */
     unsigned planes; /* bit per trip_plane to read */
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */

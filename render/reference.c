@@ -316,7 +316,6 @@ static bool may_reach(const reference *r, trip_vec3 voxel, double radius)
 
 static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal)
 {
-    const trip_frame *frame = r->frame;
     trip_list_stats *stats = &r->stats[r->number];
     trip_splat s;
     stats->splats_read++;
@@ -326,7 +325,7 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
         return;
     stats->splats_projected++;
 
-    const trip_tf_entry *entry = &frame->table[trip_voxel_code(record)];
+    const trip_tf_entry *entry = &r->list->table[trip_voxel_code(record)];
     double fragment[TRIP_CHANNELS_MAX] = { [TRIP_CHANNEL_ALPHA] = 1 };
     colour(r, voxel, entry, normal, fragment);
     stats->splats_drawn += draw_footprint(r, &s, fragment, entry->extinction);
@@ -351,8 +350,13 @@ static void draw_run(reference *r, const trip_batch *batch, const trip_run *run)
     trip_block_voxels(&block, 0, run->count, r->voxels);
     if (block.normals)
         trip_block_normals(&block, 0, run->count, r->normals);
+    const trip_list *list = trip_batch_list(batch, run);
     for (uint32_t k = 0; k < run->count && !trip_interrupted(); k++) {
         uint32_t at = batch->pass->descending ? run->count - 1 - k : k;
+        if (r->list->by_level && !trip_lod_has(&r->frame->plan->lod, list, run->sheet,
+                                               run->u + (int64_t)trip_voxel_u(r->voxels[at]),
+                                               run->v + (int64_t)trip_voxel_v(r->voxels[at])))
+            continue;
         draw_splat(r, voxel_position(r->axis, run, r->voxels[at]), r->voxels[at],
                    block.normals ? &r->normals[at] : NULL);
     }

@@ -26,6 +26,9 @@ int trip_settings_check(const trip_settings *s)
     if (s->depth && s->target != TRIP_TARGET_RGBA32F)
         return trip_fail(TRIP_USAGE, "render", "depth",
                          "rounded layers have no depth; leave the target at rgba32f");
+    if (s->indexed && s->lod_px > 0)
+        return trip_fail(TRIP_USAGE, "render", "levels",
+                         "one array of vertices has the finest level alone; use three lists");
     if (s->classify == TRIP_CLASSIFY_PRE)
         return 0;
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)

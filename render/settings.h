@@ -78,6 +78,8 @@ typedef struct trip_settings {
     double h;                  /* 0 <= h < 1 */
     double kernel_radius;      /* voxels (index space) */
     double background[4];      /* r, g, b, a; not premultiplied */
+    double lod_px;             /* cells are drawn at the coarsest level whose voxels are at most so
+                                  many pixels of the picture wide (lod.h); 0: all at the finest */
     /* Of the integral renderer alone. */
     trip_field_kind field;
     trip_kernel kernel; /* of values */

@@ -24,11 +24,32 @@ static bool may_read_about(const trip_batch *batch, int plane, const unsigned ch
            before + bytes + TRIP_CPU_READABLE <= batch->plane_bytes[plane];
 }
 
+/* Copies what of the square's records is drawn: the codes and normals of some of its voxels. */
+static void keep_drawn(trip_cpu_worker *w, const trip_block *b, uint64_t drawn, trip_cpu_square *s)
+{
+    unsigned char *codes = w->codes + TRIP_CPU_READABLE, *normals = w->normals + TRIP_CPU_READABLE;
+    const unsigned code = b->code_bytes, normal = b->normal_bytes;
+    uint32_t n = 0, k = 0;
+    for (uint64_t rest = s->mask; rest; rest &= rest - 1, k++) {
+        if (!(drawn & rest & -rest))
+            continue;
+        memmove(codes + (size_t)n * code, s->codes + (size_t)k * code, code);
+        if (s->normals)
+            memmove(normals + (size_t)n * normal, s->normals + (size_t)k * normal, normal);
+        n++;
+    }
+    s->mask &= drawn;
+    s->codes = codes;
+    s->normals = s->normals ? normals : NULL;
+}
+
 trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, const trip_block *b,
                                      const trip_run *run, const trip_cpu_walk *at)
 {
     size_t code = (size_t)at->first * b->code_bytes, normal = (size_t)at->first * b->normal_bytes;
     unsigned square = at->number, code_bytes = at->count * b->code_bytes;
+    const trip_plan *plan = r->frame->plan;
+    const trip_list *list = trip_batch_list(r->batch, run);
     trip_cpu_square s = {
         .u = run->u + TRIP_CPU_SQUARE * (int)trip_cpu_square_u(square),
         .v = run->v + TRIP_CPU_SQUARE * (int)trip_cpu_square_v(square),
@@ -37,11 +58,20 @@ trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, cons
         .codes = b->codes + code,
         .normals = b->normals ? b->normals + normal : NULL,
     };
+    uint64_t drawn = UINT64_MAX;
+    if (plan->lists[list->index].by_level)
+        drawn = trip_lod_square(&plan->lod, list, s.sheet, s.u, s.v);
+    if (!(s.mask & drawn)) {
+        s.mask = 0;
+        return s;
+    }
     if (!may_read_about(r->batch, TRIP_PLANE_VOXELS, s.codes, code_bytes))
         s.codes = memcpy(w->codes + TRIP_CPU_READABLE, s.codes, code_bytes);
     if (s.normals &&
         !may_read_about(r->batch, TRIP_PLANE_NORMALS, s.normals, at->count * b->normal_bytes))
         s.normals = memcpy(w->normals + TRIP_CPU_READABLE, s.normals, at->count * b->normal_bytes);
+    if (s.mask & ~drawn)
+        keep_drawn(w, b, drawn, &s);
     return s;
 }
 
@@ -93,6 +123,8 @@ static void project_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
         if (!trip_cpu_part_has(part, at.number))
             continue;
         trip_cpu_square square = trip_cpu_make_square(r, w, &block, part->run, &at);
+        if (square.mask == 0)
+            continue;
         *staged = r->kernels->stage(&r->views[chunk->list], &square, reversed, &w->scratch.staged,
                                     *staged);
         if (*staged > TRIP_CPU_STAGED - 64)

@@ -33,6 +33,8 @@ void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
         if (!trip_cpu_part_has(part, at.number))
             continue;
         trip_cpu_square square = trip_cpu_make_square(r, w, block, part->run, &at);
+        if (square.mask == 0)
+            continue;
         const trip_cpu_staged *staged = &w->scratch.staged;
         uint32_t n = r->isa->stage(view, &square, false, &w->scratch.staged, 0);
         for (uint32_t i = 0; i < n; i++)

@@ -41,6 +41,8 @@ static void make_views(trip_cpu *r, bool front_to_back, bool shading)
         trip_cpu_view_make(&r->views[i], classifies_post(r) ? &r->sheet_frame : r->frame, list,
                            front_to_back);
         r->views[i].shading = shading;
+        if (!classifies_post(r))
+            r->views[i].table = r->frame->plan->lists[i].table;
         if (r->frame->count)
             trip_cpu_view_make(&r->counted_views[i], &r->counted_frame, list, front_to_back);
     }

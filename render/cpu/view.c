@@ -1,5 +1,6 @@
 #include "cpu/view.h"
 
+#include "block.h"
 #include "normal.h"
 #include "shade.h"
 
@@ -126,6 +127,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
     const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
     *view = (trip_cpu_view){
         .of = frame,
+        .table = frame->table,
         .splat = trip_splat_frame_make(camera, frame->settings),
         .front_to_back = front_to_back,
         .sums = trip_settings_sum_sheets(frame->settings),
@@ -159,6 +161,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip
 {
     make_view(view, frame, &frame->plan->lists[list->index].camera, list->axis, front_to_back);
     view->list = list;
+    view->code_bytes = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
 }
 
 void trip_cpu_layer_view_make(trip_cpu_view *view, const trip_frame *frame, int axis,

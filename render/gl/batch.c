@@ -94,16 +94,43 @@ typedef struct filling {
     uint32_t square, position;
 } filling;
 
-static void fill_square(filling *f, struct trip_gl_square square, uint32_t count, bool reversed)
+/* Bit k of the result: whether voxel number k of those of `mask` is one of `drawn`. */
+static uint64_t ranks_of(uint64_t mask, uint64_t drawn)
 {
+    uint64_t ranks = 0;
+    for (unsigned k = 0; mask; mask &= mask - 1, k++)
+        ranks |= (uint64_t)((drawn & mask & -mask) != 0) << k;
+    return ranks;
+}
+
+/* Positions for those of the square's voxels that are drawn. */
+static void fill_square(filling *f, struct trip_gl_square square, uint64_t mask, uint64_t drawn,
+                        bool reversed)
+{
+    const uint32_t count = (uint32_t)__builtin_popcountll(mask);
+    const uint64_t ranks = (mask & ~drawn) ? ranks_of(mask, drawn) : UINT64_MAX;
     f->squares[f->square] = square;
-    for (uint32_t k = 0; k < count; k++)
-        f->entries[f->position++] = f->square << 6 | (reversed ? count - 1 - k : k);
+    for (uint32_t n = 0; n < count; n++) {
+        uint32_t k = reversed ? count - 1 - n : n;
+        if (ranks >> k & 1)
+            f->entries[f->position++] = f->square << 6 | k;
+    }
     f->square++;
 }
 
-/* The squares of a run, in draw order, with their draw positions. */
-static void fill_squares(trip_gl_batch *b, filling *f, const trip_batch *batch, uint32_t run)
+/* Which voxels of a square are drawn: not those of cells that another level is drawn in. */
+static uint64_t drawn_of(const trip_plan *plan, const trip_list *list, const trip_run *run,
+                         uint32_t corner)
+{
+    if (!plan->lists[list->index].by_level)
+        return UINT64_MAX;
+    return trip_lod_square(&plan->lod, list, run->sheet, run->u + (int64_t)(corner & 0xffff),
+                           run->v + (int64_t)(corner >> 16));
+}
+
+/* The squares of a run, in draw order, with their draw positions; returns the number of these. */
+static uint32_t fill_squares(trip_gl_batch *b, filling *f, const trip_plan *plan,
+                             const trip_batch *batch, uint32_t run)
 {
     const trip_run *of = &batch->runs[run];
     const trip_block block = trip_block_of(batch, of);
@@ -111,6 +138,7 @@ static void fill_squares(trip_gl_batch *b, filling *f, const trip_batch *batch, 
     size_t codes = b->voxels_start + (size_t)(block.codes - batch->planes[TRIP_PLANE_VOXELS]);
     size_t normals = b->normals_start + of->at[TRIP_PLANE_NORMALS];
     uint32_t numbers[TRIP_BLOCK_SQUARES_MAX], firsts[TRIP_BLOCK_SQUARES_MAX], n = 0, first = 0;
+    const uint32_t before = f->position;
     for (unsigned w = 0; w < block.present_words; w++)
         for (uint64_t bits = block.present[w]; bits; bits &= bits - 1, n++) {
             numbers[n] = 64 * w + (uint32_t)__builtin_ctzll(bits);
@@ -128,8 +156,10 @@ static void fill_squares(trip_gl_batch *b, filling *f, const trip_batch *batch, 
             .run = run,
             .corner = corner_of(numbers[i]),
         };
-        fill_square(f, square, (uint32_t)__builtin_popcountll(mask), reversed);
+        fill_square(f, square, mask, drawn_of(plan, trip_batch_list(batch, of), of, square.corner),
+                    reversed);
     }
+    return f->position - before;
 }
 
 /* One piece for each run at most. */
@@ -237,8 +267,8 @@ static void add_piece(trip_gl_batch *b, trip_gl_piece piece)
         b->pieces[b->piece_count++] = piece;
 }
 
-static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const trip_batch *batch,
-                      const trip_gl_resident_list *resident)
+static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const trip_plan *plan,
+                      const trip_batch *batch, const trip_gl_resident_list *resident)
 {
     void *memory = b->slot->memory + b->runs.offset;
     struct trip_gl_run *runs = memory;
@@ -254,24 +284,26 @@ static void fill_runs(trip_gl_batch *b, const trip_gl_placing *placings, const t
         double depth = nearest_depth(p, run);
         uint64_t first = run->first + (resident ? resident[list].order_first : 0);
         runs[i] = make_run(p, run, first, batch->pass->descending, resident, position);
-        add_piece(b, (trip_gl_piece){ .first = position,
-                                      .count = run->count,
-                                      .cost = cost_at(p, depth),
-                                      .list = list,
-                                      .sheet = p->sheet_cost ? run->sheet : 0,
-                                      .before = p->sheet_cost,
-                                      .quads = needs_quads(p, depth),
-                                      .near = is_near(p, depth) });
+        uint32_t count = run->count;
         for (uint32_t k = 0; k < run->count && resident; k++)
             f.entries[position + k] = (uint32_t)i;
         if (!resident)
-            fill_squares(b, &f, batch, (uint32_t)i);
-        position += run->count;
+            count = fill_squares(b, &f, plan, batch, (uint32_t)i);
+        if (count > 0)
+            add_piece(b, (trip_gl_piece){ .first = position,
+                                          .count = count,
+                                          .cost = cost_at(p, depth),
+                                          .list = list,
+                                          .sheet = p->sheet_cost ? run->sheet : 0,
+                                          .before = p->sheet_cost,
+                                          .quads = needs_quads(p, depth),
+                                          .near = is_near(p, depth) });
+        position += count;
     }
 }
 
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, trip_gl_slot *records,
+                       const trip_plan *plan, const trip_batch *batch, trip_gl_slot *records,
                        const trip_gl_resident_list *resident)
 {
     int status = count_positions(b, batch);
@@ -282,7 +314,7 @@ int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placi
     if (!status && !records)
         copy_planes(b, batch);
     if (!status)
-        fill_runs(b, placings, batch, resident);
+        fill_runs(b, placings, plan, batch, resident);
     return status;
 }
 

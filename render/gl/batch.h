@@ -68,7 +68,7 @@ typedef struct trip_gl_cursor {
  * the data set's lists. `resident`: by the data set's lists, whose records are in GL memory
  * already; the batch has runs only. NULL: it has its records. */
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
-                       const trip_batch *batch, trip_gl_slot *records,
+                       const trip_plan *plan, const trip_batch *batch, trip_gl_slot *records,
                        const trip_gl_resident_list *resident);
 static inline bool trip_gl_batch_is_drawn(const trip_gl_batch *b, const trip_gl_cursor *at)
 {

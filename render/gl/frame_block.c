@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "block.h"
 #include "layer.h"
 #include "normal.h"
 #include "shade.h"
@@ -154,11 +155,21 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
     out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
 }
 
+/* Of a voxel along an axis. */
+static double world_length(const trip_camera *c, int axis)
+{
+    const double(*m)[4] = c->index_to_world.m;
+    return trip_length(trip_v3(m[0][axis], m[1][axis], m[2][axis]));
+}
+
 void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, const trip_list *list)
 {
     const trip_plan_list *planned = &frame->plan->lists[list->index];
     const double *scale = planned->grid.scale;
     make(out, frame, &planned->camera, list->axis);
+    out->edge.v[1] = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
+    if (trip_kind_of(list->kind)->axis_bits > 0)
+        out->edge.v[3] = world_length(&planned->camera, list->axis);
     out->to_grid = in_list_axes(trip_v3(scale[0], scale[1], scale[2]), list->axis,
                                 trip_list_grid_growth(&planned->grid));
 }

@@ -396,8 +396,8 @@ static void count_read(gl_renderer *r, const trip_batch *batch)
 static int begin_batch(gl_renderer *r, const trip_batch *batch)
 {
     trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
-    int status = trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, batch, slot,
-                                    r->frame->settings->indexed ? r->resident.lists : NULL);
+    int status = trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, r->frame->plan, batch,
+                                    slot, r->frame->settings->indexed ? r->resident.lists : NULL);
     if (status)
         return status;
     count_read(r, batch);

@@ -174,7 +174,8 @@ static const trip_list *next_list(trip_gl_loading *l)
     const trip_dataset *data = l->to->data;
     for (; l->base < data->list_count; l->base++, l->turn = 0) {
         const trip_list *base = base_of(l), *list = NULL;
-        if (!trip_kind_of(base->kind)->splatted || trip_gl_resident_base(data, base) != base)
+        if (!trip_kind_of(base->kind)->splatted || trip_kind_of(base->kind)->coarse ||
+            trip_gl_resident_base(data, base) != base)
             continue;
         for (; l->turn < 3 && !list; l->turn += !list)
             list = trip_dataset_find(data, (base->axis + l->turn) % 3, base->level, base->kind);

@@ -19,7 +19,8 @@ const trip_list *trip_gl_resident_base(const trip_dataset *data, const trip_list
 
 static bool is_splatted(const trip_list *list)
 {
-    return trip_kind_of(list->kind)->splatted;
+    const trip_kind_info *kind = trip_kind_of(list->kind);
+    return kind->splatted && !kind->coarse;
 }
 
 /* Gives every list its place in the arrays. */

@@ -32,6 +32,7 @@ BRICK = {
     "--json": None,
     "--normals": ["", "nonsense", "3"],
     "--halo": ["", "2", "-1", "yes"],
+    "--levels": ["", "-1", "25", "1.5", "yes"],
     "--quiet": None,
     "--resume": None,
     "--dry-run": None,
@@ -40,6 +41,7 @@ BRICK = {
     "--output": [],
 }
 RENDER = {
+    "--lod": ["", "-1", "1001", "fine"],
     "--allow-gaps": None,
     "--grid": [],
     "--level-set": NAMES + ["refuse"],

@@ -35,6 +35,7 @@ static int brick(void **state)
     const triptych_brick_options options = { .functions = &grey,
                                              .function_count = 1,
                                              .automatic = 1,
+                                             .levels = -1,
                                              .replace = 1,
                                              .memory_bytes = 64 << 20,
                                              .threads = 2 };
@@ -471,6 +472,7 @@ static void bricking_says_what_it_made(void **state)
                                  .range_count = 2,
                                  .normals = TRIPTYCH_NORMALS_FULL,
                                  .no_halo = 1,
+                                 .levels = -1,
                                  .tile_voxels = 32 };
     assert_int_equal(triptych_estimate(t, VOLUME, "made.trip", &o, &e), TRIPTYCH_OK);
     assert_int_equal(triptych_brick(t, VOLUME, "made.trip", &o, &s), TRIPTYCH_OK);

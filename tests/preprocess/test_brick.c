@@ -81,7 +81,7 @@ static void kept_voxels_are_those_of_the_envelope(void **state)
     assert_int_equal(l.header.kept, kept);
     assert_int_equal(s.kept, kept);
     assert_int_equal(s.voxels, N);
-    assert_int_equal(s.bytes, bytes_of_lists("a.trip", s.halo_bytes + s.level_bytes));
+    assert_int_equal(s.bytes, bytes_of_lists("a.trip", s.halo_bytes) + s.level_bytes);
     assert_false(test_exists("a.trip.partial"));
     assert_false(test_exists("a.trip.spill"));
     test_free_lists(&l);

@@ -82,13 +82,14 @@ typedef enum trip_cpu_rays {
 /* Constants of one list of one frame, or of a layer: what tiles begin and end with. */
 typedef struct trip_cpu_view {
     const trip_frame *of;
-    const trip_list *list;  /* NULL: of a layer, by level 0's map */
-    trip_splat_frame splat; /* by the camera of the list */
+    const trip_tf_entry *table; /* of the list's codes */
+    const trip_list *list;      /* NULL: of a layer, by level 0's map */
+    trip_splat_frame splat;     /* by the camera of the list */
     trip_cpu_rays rays;
     bool front_to_back, shading;
     bool sums; /* splats are summed sheet by sheet */
     bool stretch_varies;
-    unsigned code_bytes, normal_bytes; /* of the data set */
+    unsigned code_bytes, normal_bytes; /* of the list's codes, of the data set's normals */
     int axis, u_axis, v_axis;
     float gradient_most; /* the largest magnitude of a normal, over gradient_full of shade.h */
     float compact[3][3]; /* of 3-byte normals: from steps to world space, over gradient_full */

@@ -68,7 +68,7 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
                              unsigned code_bytes, bool reversed, trip_cpu_staged *staged,
                              uint32_t filled)
 {
-    const float *extinction = &view->of->table[0].extinction;
+    const float *extinction = &view->table[0].extinction;
     const vi u = vi_set(square->u), v = vi_set(square->v), sheet = vi_set(square->sheet);
     uint8_t places[PLACES_ROOM];
     int32_t count = (int32_t)places_of(square->mask, places);
@@ -524,7 +524,7 @@ static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged 
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
         uint32_t k = at + i;
-        double extinction = (double)view->of->table[staged->code[k]].extinction;
+        double extinction = (double)view->table[staged->code[k]].extinction;
         if (trip_cpu_project_scalar(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
                                     &splats[i], broken))
             drawn |= 1u << i;
@@ -551,7 +551,7 @@ static void replace_scalar(trip_cpu_splat *out, const uint32_t row[V], unsigned 
 
 INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
-    const float *table = &view->of->table[0].r;
+    const float *table = &view->table[0].r;
     vi code = vi_load(staged->code + at);
     colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
                  v_gather(table + 2, code * 4) };
@@ -662,7 +662,7 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         trip_cpu_splat *out, float *depths)
 {
     uint32_t n = 0;
-    const float *extinction = &view->of->table[0].extinction;
+    const float *extinction = &view->table[0].extinction;
     footprint parallel = footprint_parallel(view);
     perspective persp = perspective_of(view);
     for (uint32_t i = 0; i < count; i += V)

@@ -1,0 +1,151 @@
+#include "lod.h"
+
+#include "report.h"
+
+/* Cells as small as bricks of level 0 usually are, larger where there would be too many. */
+enum { CELL_LOG2 = 6, MOST_CELLS = 1 << 22 };
+
+bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
+{
+    return lod->level && list->level <= lod->levels &&
+           list->kind == (list->level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
+}
+
+/* How many levels the data set has without a gap, each along all axes. */
+static unsigned count_levels(const trip_dataset *data)
+{
+    unsigned level = 0;
+    while (trip_dataset_find(data, 0, level + 1, TRIP_KIND_MEANS) &&
+           trip_dataset_find(data, 1, level + 1, TRIP_KIND_MEANS) &&
+           trip_dataset_find(data, 2, level + 1, TRIP_KIND_MEANS))
+        level++;
+    return level;
+}
+
+static void choose_cells(trip_lod *lod, const trip_dataset *data)
+{
+    double cells;
+    lod->cell_log2 = lod->levels > CELL_LOG2 ? (int)lod->levels : CELL_LOG2;
+    lod->cell_log2--;
+    do {
+        lod->cell_log2++;
+        cells = 1;
+        for (int a = 0; a < 3; a++) {
+            lod->cells[a] = (((int64_t)data->header.dims[a] - 1) >> lod->cell_log2) + 1;
+            cells *= (double)lod->cells[a];
+        }
+    } while (cells > MOST_CELLS);
+}
+
+double trip_lod_width_px(const trip_camera *camera, double depth)
+{
+    const trip_affine *map = &camera->index_to_world;
+    double voxel = 0, pixel = fmin(trip_length(trip_affine_vector(map, camera->rx)),
+                                   trip_length(trip_affine_vector(map, camera->ry)));
+    for (int a = 0; a < 3; a++)
+        voxel = fmax(voxel, trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a])));
+    return voxel / (pixel * (camera->ortho ? 1 : depth));
+}
+
+unsigned trip_lod_level(double width_px, double px, unsigned levels)
+{
+    unsigned level = 0;
+    while (level < levels && width_px * 2 <= px) {
+        width_px *= 2;
+        level++;
+    }
+    return level;
+}
+
+/* The least depth of a cell's voxels. */
+static double nearest_depth(const trip_lod *lod, const trip_dataset *data,
+                            const trip_camera *camera, const int64_t cell[3])
+{
+    double depth = -trip_dot(camera->forward, camera->eye);
+    for (int a = 0; a < 3; a++) {
+        double along = trip_component(camera->forward, a);
+        double lo = (double)(cell[a] << lod->cell_log2) - 0.5;
+        double hi =
+            fmin((double)((cell[a] + 1) << lod->cell_log2), (double)data->header.dims[a]) - 0.5;
+        depth += fmin(along * lo, along * hi);
+    }
+    return depth;
+}
+
+static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                        double px)
+{
+    uint8_t *to = lod->level;
+    int64_t cell[3];
+    for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
+        for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
+            for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++) {
+                double depth = nearest_depth(lod, data, camera, cell);
+                bool ahead = camera->ortho || depth > 0;
+                double width = ahead ? trip_lod_width_px(camera, depth) : HUGE_VAL;
+                *to++ = (uint8_t)trip_lod_level(width, px, lod->levels);
+            }
+}
+
+int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                  const trip_settings *settings, trip_budget *budget)
+{
+    *lod = (trip_lod){ .levels = settings->lod_px > 0 ? count_levels(data) : 0 };
+    if (lod->levels == 0)
+        return 0;
+    choose_cells(lod, data);
+    lod->bytes = (size_t)(lod->cells[0] * lod->cells[1] * lod->cells[2]);
+    lod->level = trip_budget_take(budget, lod->bytes);
+    if (!lod->level)
+        return trip_fail(TRIP_ERROR, "render", "levels",
+                         "%zu cells do not fit the memory given; raise --memory", lod->bytes);
+    fill_levels(lod, data, camera, settings->lod_px * settings->samples);
+    return 0;
+}
+
+void trip_lod_release(trip_lod *lod, trip_budget *budget)
+{
+    if (lod->level)
+        trip_budget_release(budget, lod->level, lod->bytes);
+    *lod = (trip_lod){ 0 };
+}
+
+uint64_t trip_lod_square(const trip_lod *lod, const trip_list *list, int64_t sheet, int64_t u,
+                         int64_t v)
+{
+    const int shift = lod->cell_log2 - (int)list->level;
+    const int64_t u_end = list->dims[(list->axis + 1) % 3],
+                  v_end = list->dims[(list->axis + 2) % 3];
+    uint64_t mask = 0;
+    if (shift >= 3)
+        return trip_lod_has(lod, list, sheet, u, v) ? UINT64_MAX : 0;
+    for (unsigned n = 0; n < 64; n++) {
+        int64_t at_u = u + (n & 1) + (n >> 1 & 2) + (n >> 2 & 4);
+        int64_t at_v = v + (n >> 1 & 1) + (n >> 2 & 2) + (n >> 3 & 4);
+        if (at_u < u_end && at_v < v_end && trip_lod_has(lod, list, sheet, at_u, at_v))
+            mask |= UINT64_C(1) << n;
+    }
+    return mask;
+}
+
+bool trip_lod_brick(const trip_lod *lod, const trip_list *list, const trip_file_header *header,
+                    const trip_file_brick *brick, int64_t slab)
+{
+    const int shift = lod->cell_log2 - (int)list->level, axis = list->axis;
+    const int64_t sheet = slab * header->slab_sheets;
+    const int64_t u = (int64_t)brick->tile_u << header->tile_log2;
+    const int64_t v = (int64_t)brick->tile_v << header->tile_log2;
+    int64_t lo[3], hi[3], cell[3];
+    lo[axis] = (sheet + brick->sheet_min) >> shift;
+    hi[axis] = (sheet + brick->sheet_max) >> shift;
+    lo[(axis + 1) % 3] = (u + brick->u_min) >> shift;
+    hi[(axis + 1) % 3] = (u + brick->u_max) >> shift;
+    lo[(axis + 2) % 3] = (v + brick->v_min) >> shift;
+    hi[(axis + 2) % 3] = (v + brick->v_max) >> shift;
+    for (cell[2] = lo[2]; cell[2] <= hi[2]; cell[2]++)
+        for (cell[1] = lo[1]; cell[1] <= hi[1]; cell[1]++)
+            for (cell[0] = lo[0]; cell[0] <= hi[0]; cell[0]++)
+                if (trip_lod_at(lod, cell) == list->level)
+                    return true;
+    return false;
+}
