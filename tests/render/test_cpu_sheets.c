@@ -284,11 +284,11 @@ static void instruction_sets_agree(void **state)
 
 enum { BLOCKS = 5 }; /* here, to the left, above, the sheets before and behind */
 
-static trip_cpu_voxel blocks[BLOCKS][TRIP_CPU_BLOCK_VOXELS], out[TRIP_CPU_BLOCK_VOXELS];
+static trip_cpu_voxels blocks[BLOCKS], out;
 
 static int code_at(int block, int u, int v)
 {
-    return blocks[block][v * TRIP_CPU_BLOCK_STRIDE + u].code;
+    return blocks[block].codes[v * TRIP_CPU_BLOCK_STRIDE + u];
 }
 
 /* Few different codes, the greatest and least among them, and missing ones. */
@@ -301,7 +301,9 @@ static void fill_blocks(void)
         for (int i = 0; i < TRIP_CPU_BLOCK_VOXELS; i++) {
             uint32_t x = scene_hash(i, b, 7);
             bool smooth = i / 1000 % 2;
-            blocks[b][i].code = smooth ? (int16_t)(x % 900) : codes[x % 9];
+            blocks[b].codes[i] = smooth ? (int16_t)(x % 900) : codes[x % 9];
+            for (int k = 0; k < 3; k++)
+                blocks[b].gradients[i].along[k] = (int16_t)(scene_hash(i, b, 8 + k) % 65536);
         }
 }
 
@@ -321,28 +323,31 @@ static int difference(int below, int here, int above)
 
 static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
 {
-    memcpy(out, blocks[0], sizeof out);
-    k->sheet_gradients(out, squares, blocks[1], blocks[2], blocks[3], blocks[4]);
+    out = blocks[0];
+    k->sheet_gradients(&out, squares, &blocks[1], &blocks[2], &blocks[3], &blocks[4]);
+    assert_memory_equal(out.codes, blocks[0].codes, sizeof out.codes);
     for (int v = 0; v < 64; v++)
         for (int u = 0; u < 64; u++) {
-            const trip_cpu_voxel *voxel = &out[v * TRIP_CPU_BLOCK_STRIDE + u];
-            int here = code_at(0, u, v);
-            assert_int_equal(voxel->code, here);
-            if (!(squares >> (v / 8 * 8 + u / 8) & 1) || is_missing(here))
+            int here = code_at(0, u, v), i = v * TRIP_CPU_BLOCK_STRIDE + u;
+            const int16_t *along = out.gradients[i].along;
+            if (!(squares >> (v / 8 * 8 + u / 8) & 1)) {
+                assert_memory_equal(along, blocks[0].gradients[i].along, sizeof out.gradients[i]);
+                continue;
+            }
+            if (is_missing(here))
                 continue;
             int left = u ? code_at(0, u - 1, v) : code_at(1, 63, v);
             int above = v ? code_at(0, u, v - 1) : code_at(2, u, 63);
-            assert_int_equal(voxel->gradient[0], difference(left, here, code_at(0, u + 1, v)));
-            assert_int_equal(voxel->gradient[1], difference(above, here, code_at(0, u, v + 1)));
-            assert_int_equal(voxel->gradient[2],
-                             difference(code_at(3, u, v), here, code_at(4, u, v)));
+            assert_int_equal(along[0], difference(left, here, code_at(0, u + 1, v)));
+            assert_int_equal(along[1], difference(above, here, code_at(0, u, v + 1)));
+            assert_int_equal(along[2], difference(code_at(3, u, v), here, code_at(4, u, v)));
         }
 }
 
 static void check_ranges(const trip_cpu_kernels *k)
 {
     trip_cpu_square_ranges ranges;
-    k->sheet_ranges(blocks[0], UINT64_MAX, &ranges);
+    k->sheet_ranges(&blocks[0], &ranges);
     for (int square = 0; square < 64; square++) {
         int least = INT16_MAX, most = INT16_MIN;
         for (int i = 0; i < 81; i++) {
@@ -358,7 +363,7 @@ static void check_ranges(const trip_cpu_kernels *k)
 static void check_cells(const trip_cpu_kernels *k, int16_t least, int16_t most)
 {
     trip_cpu_cells cells;
-    k->sheet_cells(blocks[0], blocks[4], UINT64_MAX, least, most, &cells);
+    k->sheet_cells(&blocks[0], &blocks[4], UINT64_MAX, least, most, &cells);
     for (int v = 0; v < 64; v++)
         for (int u = 0; u < 64; u++) {
             int low = INT16_MAX, high = INT16_MIN;
@@ -373,16 +378,23 @@ static void check_cells(const trip_cpu_kernels *k, int16_t least, int16_t most)
         }
 }
 
-static void check_between(const trip_cpu_kernels *k, int w)
+static int64_t between(int a, int b, int w)
 {
-    k->sheet_between(blocks[3], blocks[4], UINT64_MAX, w << 16 | (16384 - w), out);
+    return ((int64_t)a * (16384 - w) + (int64_t)b * w) >> 14;
+}
+
+static void check_between(const trip_cpu_kernels *k, int w, bool gradients)
+{
+    k->sheet_between(&blocks[3], &blocks[4], UINT64_MAX, w << 16 | (16384 - w), gradients, &out);
     for (int v = 0; v <= 64; v++)
         for (int u = 0; u <= 64; u++) {
-            int a = code_at(3, u, v), b = code_at(4, u, v);
-            int64_t expected = ((int64_t)a * (16384 - w) + (int64_t)b * w) >> 14;
-            int code = out[v * TRIP_CPU_BLOCK_STRIDE + u].code;
-            assert_int_equal(code,
-                             is_missing(a) || is_missing(b) ? TRIP_CPU_CODE_MISSING : expected);
+            int a = code_at(3, u, v), b = code_at(4, u, v), i = v * TRIP_CPU_BLOCK_STRIDE + u;
+            assert_int_equal(out.codes[i], is_missing(a) || is_missing(b) ? TRIP_CPU_CODE_MISSING
+                                                                          : between(a, b, w));
+            for (int n = 0; gradients && n < 3; n++)
+                assert_int_equal(
+                    out.gradients[i].along[n],
+                    between(blocks[3].gradients[i].along[n], blocks[4].gradients[i].along[n], w));
         }
 }
 
@@ -397,9 +409,9 @@ static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
         check_cells(*isa, -5, 1);
         check_cells(*isa, TRIP_CPU_CODE_LEAST, INT16_MAX);
         check_cells(*isa, 2, 290);
-        check_between(*isa, 8192);
-        check_between(*isa, 5461);
-        check_between(*isa, 0);
+        check_between(*isa, 8192, true);
+        check_between(*isa, 5461, true);
+        check_between(*isa, 0, false);
     }
 }
 

@@ -246,22 +246,22 @@ typedef struct trip_cpu_kernels {
     uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                       uint32_t count);
 
-    /* Of a block's squares, a bit each: what their cells lie between. */
-    void (*sheet_ranges)(const trip_cpu_voxel *block, uint64_t squares,
-                         trip_cpu_square_ranges *out);
-    /* Which cells of the squares lie, between two sheets, on some code from `least` to `most`
-     * (biased): none that lacks a corner. */
-    void (*sheet_cells)(const trip_cpu_voxel *from, const trip_cpu_voxel *to, uint64_t squares,
+    /* Of a block's squares: what their cells lie between. */
+    void (*sheet_ranges)(const trip_cpu_voxels *block, trip_cpu_square_ranges *out);
+    /* Which cells of the squares, a bit each, lie between two sheets on some code from `least` to
+     * `most` (biased): none that lacks a corner. */
+    void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                         int16_t least, int16_t most, trip_cpu_cells *out);
     /* Gradients of the squares' voxels. Beside the block lie those to the left of it and above, of
-     * the same sheet, and those of the sheets before and behind in index order. */
-    void (*sheet_gradients)(trip_cpu_voxel *block, uint64_t squares, const trip_cpu_voxel *left,
-                            const trip_cpu_voxel *above, const trip_cpu_voxel *sheet_before,
-                            const trip_cpu_voxel *sheet_behind);
-    /* The voxels of the squares' cells between two blocks; `weights` is w << 16 | 2^14 - w, w that
-     * of `to`. A voxel is missing where either is. */
-    void (*sheet_between)(const trip_cpu_voxel *from, const trip_cpu_voxel *to, uint64_t squares,
-                          int32_t weights, trip_cpu_voxel *out);
+     * the same sheet, and those of the sheets before and behind in index order. Codes alone are
+     * read. */
+    void (*sheet_gradients)(trip_cpu_voxels *block, uint64_t squares, const trip_cpu_voxels *left,
+                            const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
+                            const trip_cpu_voxels *sheet_behind);
+    /* The voxels of the squares' cells between two blocks, with their gradients or without;
+     * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
+    void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
+                          int32_t weights, bool gradients, trip_cpu_voxels *out);
     /* Composites a group's segments into a tile's pixels. Returns which of its cells are open, as
      * trip_cpu_mask has them. */
     uint64_t (*sheet_tile)(const trip_cpu_sheet_view *view, const trip_cpu_group *group, int x,

@@ -12,7 +12,7 @@
 #include "shade.h"
 #include "sheet.h"
 
-/* Weights of two neighbours are whole numbers of this sum. */
+/* Weights of a cell's corners are whole numbers of this sum. */
 #define WEIGHT_LOG2 14
 
 /* exp(-x), x >= 0, within 3e-7 of itself and exact at 0. */
@@ -230,14 +230,7 @@ static uint64_t segments_of_patch(const trip_cpu_sheet_view *view, const trip_cp
     return some;
 }
 
-/* ---- the samples at a slice ---- */
-
-typedef struct sample {
-    vf code;
-    vf gradient[3];
-    vi index; /* the nearest code */
-    vm there; /* all corners are */
-} sample;
+/* ---- rays at a slice ---- */
 
 /* The rays of a stamp. */
 typedef struct stamp_rays {
@@ -248,6 +241,39 @@ typedef struct stamp_rays {
     vm along; /* they go the pass's way */
     vf light[3], to_eye[3], half[3];
 } stamp_rays;
+
+INLINE vi vi_within(vi a, int32_t least, int32_t most)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+    return (vi)_mm256_min_epi32(_mm256_max_epi32((__m256i)a, _mm256_set1_epi32(least)),
+                                _mm256_set1_epi32(most));
+#else
+    vi low = (vi)(a < least), high = (vi)(a > most);
+    return (a & ~(low | high)) | (low & least) | (high & most);
+#endif
+}
+
+INLINE bool vi_all_equal_first(vi a)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+    __m256i first = _mm256_broadcastd_epi32(_mm256_castsi256_si128((__m256i)a));
+    return _mm256_movemask_epi8(_mm256_cmpeq_epi32((__m256i)a, first)) == -1;
+#else
+    bool all = true;
+    for (int i = 1; i < V; i++)
+        all &= a[i] == a[0];
+    return all;
+#endif
+}
+
+INLINE vm vi_is_0(vi a)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+    return _mm512_testn_epi32_mask((__m512i)a, (__m512i)a);
+#else
+    return (vm)(a == 0);
+#endif
+}
 
 INLINE vi vi_lesser(vi a, vi b)
 {
@@ -261,56 +287,11 @@ INLINE vi vi_greater(vi a, vi b)
     return (a & m) | (b & ~m);
 }
 
-/* Of all lanes. */
-#if TRIP_SIMD == TRIP_SIMD_AVX2
-
-INLINE int32_t vi_least(vi a)
-{
-    __m128i m =
-        _mm_min_epi32(_mm256_castsi256_si128((__m256i)a), _mm256_extracti128_si256((__m256i)a, 1));
-    m = _mm_min_epi32(m, _mm_shuffle_epi32(m, 0x4e));
-    return _mm_cvtsi128_si32(_mm_min_epi32(m, _mm_shuffle_epi32(m, 0xb1)));
-}
-
-INLINE int32_t vi_most(vi a)
-{
-    __m128i m =
-        _mm_max_epi32(_mm256_castsi256_si128((__m256i)a), _mm256_extracti128_si256((__m256i)a, 1));
-    m = _mm_max_epi32(m, _mm_shuffle_epi32(m, 0x4e));
-    return _mm_cvtsi128_si32(_mm_max_epi32(m, _mm_shuffle_epi32(m, 0xb1)));
-}
-
-#else
-
-INLINE int32_t vi_least(vi a)
-{
-    int32_t least = a[0];
-    for (int i = 1; i < V; i++)
-        least = a[i] < least ? a[i] : least;
-    return least;
-}
-
-INLINE int32_t vi_most(vi a)
-{
-    int32_t most = a[0];
-    for (int i = 1; i < V; i++)
-        most = a[i] > most ? a[i] : most;
-    return most;
-}
-
-#endif
-
-/* Corners of each lane's cell: of the four, where the first lies in the pool. */
+/* The cells that rays pass at a slice. */
 typedef struct corners {
     vi whole[2]; /* of the grid */
     vf part[2];  /* place in the cell */
 } corners;
-
-INLINE vi vi_within(vi a, int32_t least, int32_t most)
-{
-    vi low = (vi)(a < least), high = (vi)(a > most);
-    return (a & ~(low | high)) | (low & least) | (high & most);
-}
 
 INLINE corners corners_at(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l,
                           unsigned n)
@@ -327,165 +308,203 @@ INLINE corners corners_at(const trip_cpu_group *g, const tile_path *path, const 
     return c;
 }
 
-/* The cells that a stamp's rays pass between two slices. */
-INLINE voxel_box box_between(const corners *a, const corners *b)
+/* Numbers of 16 bits in a block, and where its gradients begin. */
+#define BLOCK_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
+#define GRADIENTS_FROM ((int32_t)(offsetof(trip_cpu_voxels, gradients) / sizeof(int16_t)))
+
+/* What rays meet at a slice: the nearest code, and what the rest is worked out from where it is
+ * needed. */
+typedef struct sample {
+    vi index;
+    vm there;         /* all corners are */
+    vi top, bottom;   /* weights of two corners, the right one's in the higher 16 bits */
+    vi gradient_at;   /* of the first corner, as 16-bit numbers from the pool's first */
+    vi gradient[3];   /* times 2^WEIGHT_LOG2 */
+    vi sums[4];       /* of the integrals, at the code */
+    bool lit, summed; /* gradient is there; sums are */
+} sample;
+
+/* Bilinear weights, 2^WEIGHT_LOG2 in all. */
+INLINE void set_weights(const vf part[2], sample *s)
 {
-    voxel_box box;
-    for (int i = 0; i < 2; i++) {
-        box.lo[i] = vi_least(vi_lesser(a->whole[i], b->whole[i]));
-        box.hi[i] = vi_most(vi_greater(a->whole[i], b->whole[i]));
-    }
-    return box;
+    vi u = v_truncate(v_fma(part[0], v_set(1 << WEIGHT_LOG2), v_set(0.5f)));
+    vi v = v_truncate(part[1] * v_set(1 << 15)); /* below 2^15 */
+    vi across = (u << 16) | ((1 << WEIGHT_LOG2) - u);
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+    s->bottom = (vi)_mm256_mulhrs_epi16((__m256i)across, (__m256i)(v | v << 16));
+    s->top = (vi)_mm256_sub_epi16((__m256i)across, (__m256i)s->bottom);
+#elif TRIP_SIMD == TRIP_SIMD_AVX512
+    s->bottom = (vi)_mm512_mulhrs_epi16((__m512i)across, (__m512i)(v | v << 16));
+    s->top = (vi)_mm512_sub_epi16((__m512i)across, (__m512i)s->bottom);
+#else
+    vi right = (u * v + (1 << 14)) >> 15;
+    vi left = (((1 << WEIGHT_LOG2) - u) * v + (1 << 14)) >> 15;
+    s->bottom = (right << 16) | left;
+    s->top = across - s->bottom; /* no borrow: each part is the lesser */
+#endif
 }
 
-/* Where the first corners lie in the pool. */
-INLINE void find_places(const trip_cpu_group *g, unsigned n, const corners *c, int32_t at[V])
+/* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
+ * their gradients. */
+INLINE vi find_places(const trip_cpu_group *g, unsigned n, const corners *c, sample *s)
 {
     vi block =
         (c->whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (c->whole[0] >> TRIP_CPU_BLOCK_LOG2);
     vi within_block = (c->whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
                       (c->whole[0] & (TRIP_CPU_BLOCK - 1));
     const int32_t *blocks = g->slices[n].blocks;
-    int32_t numbers[V];
-    vi_store(numbers, block);
-    vi other = block ^ vi_set(numbers[0]);
-    if (vi_most(other) == 0 && vi_least(other) == 0) {
-        vi_store(at, within_block + blocks[numbers[0]]);
-        return;
+    int32_t starts[V];
+    vi from;
+    if (vi_all_equal_first(block)) {
+        from = vi_set(blocks[block[0]] * BLOCK_NUMBERS);
+    } else {
+        vi_store(starts, block);
+        for (int i = 0; i < V; i++)
+            starts[i] = blocks[starts[i]] * BLOCK_NUMBERS;
+        from = vi_load(starts);
     }
-    vi_store(at, within_block);
-    for (int i = 0; i < V; i++)
-        at[i] += blocks[numbers[i]];
+    s->gradient_at = from + (within_block * 3 + GRADIENTS_FROM);
+    return from + within_block;
 }
 
 #if TRIP_SIMD == TRIP_SIMD_AVX2
 
-/* Two voxels beside each other, of lanes i and i + 4, as numbers of 16 bits: code, code, gradient
- * along u twice, ... */
-INLINE __m256i two_corners(const trip_cpu_voxel *pool, const int32_t at[V], int i, int32_t more)
+/* Two corners beside each other of each lane: faster than the instruction that gathers them. */
+INLINE __m256i two_codes(const int16_t *pool, const int32_t at[V])
+{
+    __m128i of[2];
+    for (int i = 0; i < 2; i++) {
+        int32_t two[4];
+        for (int k = 0; k < 4; k++)
+            memcpy(&two[k], pool + at[4 * i + k], sizeof *two);
+        of[i] = _mm_setr_epi32(two[0], two[1], two[2], two[3]);
+    }
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(of[0]), of[1], 1);
+}
+
+/* The nearest code, and which rays lack a corner. */
+INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
+{
+    const int16_t *pool = (const int16_t *)g->pool;
+    const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
+    int32_t places[V];
+    vi_store(places, at);
+    __m256i top = two_codes(pool, places), bottom = two_codes(pool + TRIP_CPU_BLOCK_STRIDE, places);
+    vi lack =
+        (vi)_mm256_or_si256(_mm256_cmpeq_epi16(top, missing), _mm256_cmpeq_epi16(bottom, missing));
+    vi sum = (vi)_mm256_madd_epi16(top, (__m256i)s->top) +
+             (vi)_mm256_madd_epi16(bottom, (__m256i)s->bottom);
+    s->there = vi_is_0(lack);
+    s->index = ((sum + (1 << (WEIGHT_LOG2 - 1))) >> WEIGHT_LOG2) + TRIP_CPU_CODE_BIAS;
+}
+
+/* Gradients of two corners beside each other, of lanes i and i + 4: along u twice, along v, ... */
+INLINE __m256i two_gradients(const int16_t *low, const int16_t *high)
 {
     const __m256i order = _mm256_broadcastsi128_si256(
-        _mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
-    __m128i low = _mm_loadu_si128((const void *)(pool + at[i] + more));
-    __m128i high = _mm_loadu_si128((const void *)(pool + at[i + 4] + more));
-    return _mm256_shuffle_epi8(_mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1),
-                               order);
+        _mm_setr_epi8(0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, -1, -1, -1, -1));
+    __m128i first = _mm_loadu_si128((const void *)low);
+    __m256i both = _mm256_inserti128_si256(_mm256_castsi128_si256(first),
+                                           _mm_loadu_si128((const void *)high), 1);
+    return _mm256_shuffle_epi8(both, order);
 }
 
-INLINE sample sample_at(const trip_cpu_group *g, unsigned n, const corners *c)
+INLINE void find_gradients(const trip_cpu_group *g, sample *s)
 {
-    int32_t places[V];
-    find_places(g, n, c, places);
-    const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
-    /* w << 16 | 2^14 - w */
-    vi w = v_truncate(v_fma(c->part[0], v_set(1 << WEIGHT_LOG2), v_set(0.5f)));
-    vi weights = w * 0xffff + (1 << WEIGHT_LOG2);
-    __m256 rows[4];
-    __m256i lack[4];
-    for (int i = 0; i < 4; i++) {
-        const __m256i lane = _mm256_setr_epi32(i, i, i, i, i + 4, i + 4, i + 4, i + 4);
-        __m256i weight = _mm256_permutevar8x32_epi32((__m256i)weights, lane);
-        __m256 down = _mm256_permutevar8x32_ps((__m256)c->part[1], lane);
-        __m256i a = two_corners(g->pool, places, i, 0);
-        __m256i b = two_corners(g->pool, places, i, TRIP_CPU_BLOCK_STRIDE);
-        lack[i] = _mm256_or_si256(_mm256_cmpeq_epi16(a, missing), _mm256_cmpeq_epi16(b, missing));
-        __m256 top = _mm256_cvtepi32_ps(_mm256_madd_epi16(a, weight));
-        __m256 bottom = _mm256_cvtepi32_ps(_mm256_madd_epi16(b, weight));
-        rows[i] = _mm256_fmadd_ps(_mm256_sub_ps(bottom, top), down, top);
-    }
-    __m256 ab0 = _mm256_unpacklo_ps(rows[0], rows[1]), ab1 = _mm256_unpackhi_ps(rows[0], rows[1]);
-    __m256 cd0 = _mm256_unpacklo_ps(rows[2], rows[3]), cd1 = _mm256_unpackhi_ps(rows[2], rows[3]);
-    const vf unit = v_set(1.0f / (1 << WEIGHT_LOG2));
-    sample s;
-    s.code = v_fma((vf)_mm256_shuffle_ps(ab0, cd0, 0x44), unit, v_set(TRIP_CPU_CODE_BIAS));
-    s.gradient[0] = (vf)_mm256_shuffle_ps(ab0, cd0, 0xee) * unit;
-    s.gradient[1] = (vf)_mm256_shuffle_ps(ab1, cd1, 0x44) * unit;
-    s.gradient[2] = (vf)_mm256_shuffle_ps(ab1, cd1, 0xee) * unit;
-    s.index = v_truncate(s.code + v_set(0.5f));
-    s.there = ~(vm){ 0 };
-    __m256i any =
-        _mm256_or_si256(_mm256_or_si256(lack[0], lack[1]), _mm256_or_si256(lack[2], lack[3]));
-    const __m256i code_lane = _mm256_setr_epi32(-1, 0, 0, 0, -1, 0, 0, 0);
-    if (!_mm256_testz_si256(any, code_lane)) {
-        for (int i = 0; i < 4; i++) {
-            const __m256i half = _mm256_and_si256(lack[i], code_lane);
-            s.there[i] = _mm256_extract_epi32(half, 0) ? 0 : -1;
-            s.there[i + 4] = _mm256_extract_epi32(half, 4) ? 0 : -1;
-        }
-    }
-    return s;
+    const int16_t *pool = (const int16_t *)g->pool;
+    const int below = 3 * TRIP_CPU_BLOCK_STRIDE;
+    int32_t at[V];
+    __m256i of[4];
+    vi_store(at, s->gradient_at);
+#define OF_LANES(i)                                                                                \
+    do {                                                                                           \
+        const int16_t *low = pool + at[i], *high = pool + at[i + 4];                               \
+        __m256i above = _mm256_madd_epi16(two_gradients(low, high),                                \
+                                          _mm256_shuffle_epi32((__m256i)s->top, 0x55 * (i)));      \
+        __m256i under = _mm256_madd_epi16(two_gradients(low + below, high + below),                \
+                                          _mm256_shuffle_epi32((__m256i)s->bottom, 0x55 * (i)));   \
+        of[i] = _mm256_add_epi32(above, under);                                                    \
+    } while (0)
+    OF_LANES(0);
+    OF_LANES(1);
+    OF_LANES(2);
+    OF_LANES(3);
+#undef OF_LANES
+    __m256i ab = _mm256_unpacklo_epi32(of[0], of[1]), cd = _mm256_unpacklo_epi32(of[2], of[3]);
+    s->gradient[0] = (vi)_mm256_unpacklo_epi64(ab, cd);
+    s->gradient[1] = (vi)_mm256_unpackhi_epi64(ab, cd);
+    s->gradient[2] = (vi)_mm256_unpacklo_epi64(_mm256_unpackhi_epi32(of[0], of[1]),
+                                               _mm256_unpackhi_epi32(of[2], of[3]));
 }
 
-/* Rows of four numbers by lane, as four vectors; less those of other rows. */
-INLINE void row_differences(int32_t (*rows)[4], vi to, vi from, vi out[4])
+/* Rows of four numbers by lane, as four vectors. */
+INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 {
-    int32_t a[V], b[V];
-    vi_store(a, to);
-    vi_store(b, from);
-    __m256 d[4];
+    int32_t at[V];
+    __m256i of[4];
+    vi_store(at, numbers);
     for (int i = 0; i < 4; i++) {
-        __m256i x = _mm256_castsi128_si256(_mm_loadu_si128((const void *)rows[a[i]]));
-        x = _mm256_inserti128_si256(x, _mm_loadu_si128((const void *)rows[a[i + 4]]), 1);
-        __m256i y = _mm256_castsi128_si256(_mm_loadu_si128((const void *)rows[b[i]]));
-        y = _mm256_inserti128_si256(y, _mm_loadu_si128((const void *)rows[b[i + 4]]), 1);
-        d[i] = _mm256_castsi256_ps(_mm256_sub_epi32(x, y));
+        __m256i row = _mm256_castsi128_si256(_mm_loadu_si128((const void *)rows[at[i]]));
+        of[i] = _mm256_inserti128_si256(row, _mm_loadu_si128((const void *)rows[at[i + 4]]), 1);
     }
-    __m256 ab0 = _mm256_unpacklo_ps(d[0], d[1]), ab1 = _mm256_unpackhi_ps(d[0], d[1]);
-    __m256 cd0 = _mm256_unpacklo_ps(d[2], d[3]), cd1 = _mm256_unpackhi_ps(d[2], d[3]);
-    out[0] = (vi)_mm256_shuffle_ps(ab0, cd0, 0x44);
-    out[1] = (vi)_mm256_shuffle_ps(ab0, cd0, 0xee);
-    out[2] = (vi)_mm256_shuffle_ps(ab1, cd1, 0x44);
-    out[3] = (vi)_mm256_shuffle_ps(ab1, cd1, 0xee);
+    __m256i ab0 = _mm256_unpacklo_epi32(of[0], of[1]), ab1 = _mm256_unpackhi_epi32(of[0], of[1]);
+    __m256i cd0 = _mm256_unpacklo_epi32(of[2], of[3]), cd1 = _mm256_unpackhi_epi32(of[2], of[3]);
+    out[0] = (vi)_mm256_unpacklo_epi64(ab0, cd0);
+    out[1] = (vi)_mm256_unpackhi_epi64(ab0, cd0);
+    out[2] = (vi)_mm256_unpacklo_epi64(ab1, cd1);
+    out[3] = (vi)_mm256_unpackhi_epi64(ab1, cd1);
 }
 
 #else
 
-INLINE float4 between_corners(const trip_cpu_voxel *at, float u)
+/* Two corners' share of a sample. */
+INLINE int32_t of_two(int16_t left, int16_t right, int32_t weights)
 {
-    float4 a = { at[0].code, at[0].gradient[0], at[0].gradient[1], at[0].gradient[2] };
-    float4 b = { at[1].code, at[1].gradient[0], at[1].gradient[1], at[1].gradient[2] };
-    return a + (b - a) * u;
+    return left * (weights & 0xffff) + right * (weights >> 16);
 }
 
-INLINE sample sample_at(const trip_cpu_group *g, unsigned n, const corners *c)
+INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
 {
-    int32_t places[V];
-    find_places(g, n, c, places);
-    float of[4][V];
-    int32_t there[V];
+    vi sum, lack;
     for (int i = 0; i < V; i++) {
-        const trip_cpu_voxel *at = g->pool + places[i], *below = at + TRIP_CPU_BLOCK_STRIDE;
-        int steps = (int)(c->part[0][i] * (1 << WEIGHT_LOG2) + 0.5f);
-        float u = (float)steps / (1 << WEIGHT_LOG2);
-        float4 top = between_corners(at, u), bottom = between_corners(below, u);
-        float4 all = top + (bottom - top) * c->part[1][i];
-        for (int k = 0; k < 4; k++)
-            of[k][i] = all[k];
-        there[i] = at[0].code != TRIP_CPU_CODE_MISSING && at[1].code != TRIP_CPU_CODE_MISSING &&
-                           below[0].code != TRIP_CPU_CODE_MISSING &&
-                           below[1].code != TRIP_CPU_CODE_MISSING
-                       ? 1
-                       : 0;
+        const int16_t *top = (const int16_t *)g->pool + at[i],
+                      *bottom = top + TRIP_CPU_BLOCK_STRIDE;
+        lack[i] = top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
+                  bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
+        sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
     }
-    sample s = { .code = v_load(of[0]) + v_set(TRIP_CPU_CODE_BIAS) };
-    for (int k = 0; k < 3; k++)
-        s.gradient[k] = v_load(of[k + 1]);
-    s.index = v_truncate(s.code + v_set(0.5f));
-    s.there = v_gt(v_from_int(vi_load(there)), v_set(0.5f));
-    return s;
+    s->there = vi_is_0(lack);
+    s->index = ((sum + (1 << (WEIGHT_LOG2 - 1))) >> WEIGHT_LOG2) + TRIP_CPU_CODE_BIAS;
 }
 
-INLINE void row_differences(int32_t (*rows)[4], vi to, vi from, vi out[4])
+INLINE void find_gradients(const trip_cpu_group *g, sample *s)
 {
-    int32_t of[4][V];
+    for (int i = 0; i < V; i++) {
+        const int16_t *top = (const int16_t *)g->pool + s->gradient_at[i];
+        const int16_t *bottom = top + 3 * TRIP_CPU_BLOCK_STRIDE;
+        for (int k = 0; k < 3; k++)
+            s->gradient[k][i] = of_two(top[k], top[3 + k], s->top[i]) +
+                                of_two(bottom[k], bottom[3 + k], s->bottom[i]);
+    }
+}
+
+INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
+{
     for (int i = 0; i < V; i++)
         for (int k = 0; k < 4; k++)
-            of[k][i] = rows[to[i]][k] - rows[from[i]][k];
-    for (int k = 0; k < 4; k++)
-        out[k] = vi_load(of[k]);
+            out[k][i] = rows[numbers[i]][k];
 }
 
 #endif
+
+INLINE void sample_at(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l,
+                      unsigned n, sample *s)
+{
+    corners c = corners_at(g, path, l, n);
+    set_weights(c.part, s);
+    find_codes(g, find_places(g, n, &c, s), s);
+    s->lit = s->summed = false;
+}
 
 /* ---- a segment ---- */
 
@@ -512,30 +531,46 @@ INLINE void use_codes_alone(const trip_cpu_integrals *in, vi index, vm same, vi 
         sums[k] = vi_load(of[k]);
 }
 
-INLINE vm vi_equal(vi a, vi b)
+/* Whether a segment between two codes may show. */
+INLINE vm may_show(const trip_cpu_integrals *in, vi a, vi b)
 {
-    return v_ge(v_set(0), v_abs(v_from_int(a - b)));
+    vi beyond = (vi)(vi_greater(a, b) < in->first) | (vi)(vi_lesser(a, b) > in->last);
+    return vi_is_0(beyond);
 }
 
-INLINE shown classified(const trip_cpu_integrals *in, const sample *a, const sample *b)
+INLINE void find_sums(const trip_cpu_integrals *in, sample *s)
 {
-    vi sums[4];
-    vf codes = v_from_int(b->index - a->index);
-    vm same = vi_equal(a->index, b->index);
-    row_differences(in->sums, b->index, a->index, sums);
+    if (!s->summed)
+        find_rows(in->sums, s->index, s->sums);
+    s->summed = true;
+}
+
+INLINE shown classified(const trip_cpu_integrals *in, sample *a, sample *b)
+{
+    vi sums[4], codes = b->index - a->index;
+    vm same = vi_is_0(codes);
+    find_sums(in, a);
+    find_sums(in, b);
+    for (int k = 0; k < 4; k++)
+        sums[k] = b->sums[k] - a->sums[k];
+    vf over = v_from_int(codes);
     if (vm_any(same)) {
         use_codes_alone(in, a->index, same, sums);
-        codes = v_select(same, v_set(1), codes);
+        over = v_select(same, v_set(1), over);
     }
     vf extinction = v_from_int(sums[0]);
     vm some = v_gt(v_abs(extinction), v_set(0));
     shown s = { .extinction = v_set(0) };
     if (!vm_any(some))
         return s;
-    vf inverse = v_set(1) / v_select(some, extinction, v_set(1));
+    extinction = v_select(some, extinction, v_set(1));
+    /* Both quotients by one division. */
+    vf inverse = v_set(1) / (extinction * over);
+    vf per_extinction = inverse * over;
     for (int k = 0; k < 3; k++)
-        s.rgb[k] = v_from_int(sums[k + 1]) * inverse;
-    s.extinction = extinction / codes * v_set(in->extinction);
+        s.rgb[k] = v_from_int(sums[k + 1]) * per_extinction;
+    s.extinction =
+        v_select(some, extinction * (inverse * extinction) * v_set(in->extinction), v_set(0));
     return s;
 }
 
@@ -549,8 +584,8 @@ INLINE void light_segment(const trip_cpu_sheet_view *view, const stamp_rays *l, 
                           const sample *b, shown *s)
 {
     vf g[3], n[3];
-    for (int k = 0; k < 3; k++)
-        g[k] = a->gradient[k] + b->gradient[k]; /* twice their mean */
+    for (int k = 0; k < 3; k++) /* twice their mean */
+        g[k] = v_from_int(a->gradient[k] + b->gradient[k]) * v_set(1.0f / (1 << WEIGHT_LOG2));
     for (int k = 0; k < 3; k++)
         n[k] = v_fma(g[0], v_set(view->gradient[k][0]),
                      v_fma(g[1], v_set(view->gradient[k][1]), g[2] * v_set(view->gradient[k][2])));
@@ -582,23 +617,33 @@ INLINE vf ray_depth(const stamp_rays *l, float along)
     return v_fma(v_set(along), l->depth, l->depth_at_start);
 }
 
-/* Puts a segment behind what the pixels hold. */
-INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays *l,
-                              const tile_path *path, unsigned n, const sample *a, const sample *b,
-                              vf pixel[CHANNELS])
+INLINE void find_light(const trip_cpu_group *g, sample *s)
+{
+    if (!s->lit)
+        find_gradients(g, s);
+    s->lit = true;
+}
+
+/* Puts a segment behind what the pixels hold; false where it shows in none of them. */
+INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                              const stamp_rays *l, const tile_path *path, unsigned n, sample *a,
+                              sample *b, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
-    open = vm_and(open, l->along);
+    open = vm_and(open, vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* what begins behind the eye's plane is left out */
         open = vm_and(open, v_ge(ray_depth(l, path->along[n]), v_set(0)));
     if (!vm_any(open))
-        return;
+        return false;
     shown s = classified(view->integrals, a, b);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
     if (!vm_any(open))
-        return;
-    if (view->shading)
+        return false;
+    if (view->shading) {
+        find_light(g, a);
+        find_light(g, b);
         light_segment(view, l, a, b, &s);
+    }
     float sheets = path->along[n + 1] - path->along[n];
     sheets = sheets < 0 ? -sheets : sheets;
     vf opacity = v_set(1) - exp_of_minus(s.extinction * l->length * v_set(sheets));
@@ -610,6 +655,7 @@ INLINE void composite_segment(const trip_cpu_sheet_view *view, const stamp_rays 
         pixel[CHANNELS - 1] = v_fma(add, z, pixel[CHANNELS - 1]);
     }
     pixel[3] = pixel[3] - add;
+    return true;
 }
 
 /* A pixel of which this is left is saturated: it takes no more, and its colour counts for all. */
@@ -710,24 +756,18 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const tile_path *path, const stamp_rays *l, uint64_t segments, float *stamp)
 {
     vf pixel[CHANNELS];
-    corners at[2];
     sample ends[2];
-    unsigned placed = UINT32_MAX, sampled = UINT32_MAX; /* slices: at[n % 2], ends[n % 2] */
+    unsigned sampled = UINT32_MAX; /* slice, in ends[sampled % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
-        if (placed != n)
-            at[n % 2] = corners_at(g, path, l, n);
-        at[next % 2] = corners_at(g, path, l, next);
-        placed = next;
-        if (!cells_show(g, n, box_between(&at[0], &at[1])))
-            continue;
         if (sampled != n)
-            ends[n % 2] = sample_at(g, n, &at[n % 2]);
-        ends[next % 2] = sample_at(g, next, &at[next % 2]);
+            sample_at(g, path, l, n, &ends[n % 2]);
+        sample_at(g, path, l, next, &ends[next % 2]);
         sampled = next;
-        composite_segment(view, l, path, n, &ends[n % 2], &ends[next % 2], pixel);
+        if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
+            continue;
         close_saturated(pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
             break;

@@ -11,15 +11,15 @@
 
 struct trip_frame;
 
-/* A voxel: its code less 32768, at least TRIP_CPU_CODE_LEAST (so that code 0 is taken for 1); and
- * the differences of codes an index along u, v and the sheets, rounded down. */
-typedef struct trip_cpu_voxel {
-    int16_t code, gradient[3];
-} trip_cpu_voxel;
-
+/* A voxel's code less 32768: at least TRIP_CPU_CODE_LEAST, so that code 0 is taken for 1. */
 #define TRIP_CPU_CODE_BIAS 32768
 #define TRIP_CPU_CODE_MISSING INT16_MIN
 #define TRIP_CPU_CODE_LEAST (INT16_MIN + 1)
+
+/* The differences of codes an index along u, v and the sheets, rounded down. */
+typedef struct trip_cpu_gradient {
+    int16_t along[3];
+} trip_cpu_gradient;
 
 /* A block is an aligned square of 64 x 64 voxels of a sheet or slice, and the first column and row
  * of those to the right and below, so that it holds all corners of the cells that start in it.
@@ -29,6 +29,14 @@ typedef struct trip_cpu_voxel {
 #define TRIP_CPU_BLOCK_STRIDE (TRIP_CPU_BLOCK + 2)
 #define TRIP_CPU_BLOCK_ROOM 14
 #define TRIP_CPU_BLOCK_VOXELS ((TRIP_CPU_BLOCK + 1) * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK_ROOM)
+
+typedef struct trip_cpu_voxels {
+    int16_t codes[TRIP_CPU_BLOCK_VOXELS];
+    trip_cpu_gradient gradients[TRIP_CPU_BLOCK_VOXELS]; /* of voxels that are there */
+} trip_cpu_voxels;
+
+/* Codes of a pool of blocks are counted in 32 bits. */
+#define TRIP_CPU_BLOCKS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 
 /* A block is divided into 8 x 8 squares, a bit each, row by row. */
 #define TRIP_CPU_SQUARES_ACROSS (TRIP_CPU_BLOCK / 8)
@@ -45,7 +53,7 @@ typedef struct trip_cpu_cells {
 } trip_cpu_cells;
 
 /* The blocks of a sheet or slice in a grid of `across` x `down`, the outermost of which are absent:
- * where each starts in the pool; 0 is the block in which every voxel is missing. */
+ * the number of each in the pool; 0 is the block in which every voxel is missing. */
 typedef struct trip_cpu_slice {
     const int32_t *blocks;
     double coordinate; /* along the list's axis */
@@ -55,16 +63,17 @@ typedef struct trip_cpu_slice {
  * greatest 2^30: of extinction, and of extinction times each colour component. Differences of them
  * are exact but for the rounding of each. */
 typedef struct trip_cpu_integrals {
-    int32_t (*sums)[4]; /* 65536: extinction, red, green, blue */
-    int32_t (*at)[4];   /* what they grow by from one code to the next, at a code */
-    float extinction;   /* 1 of sums[0], per voxel_world */
+    int32_t (*sums)[4];  /* 65536: extinction, red, green, blue */
+    int32_t (*at)[4];    /* what they grow by from one code to the next, at a code */
+    float extinction;    /* 1 of sums[0], per voxel_world */
+    int32_t first, last; /* codes with extinction are among these; first > last: none */
 } trip_cpu_integrals;
 
 /* Segments of a group: at most so many, and one slice more. */
 #define TRIP_CPU_SEGMENTS 64
 
 typedef struct trip_cpu_group {
-    const trip_cpu_voxel *pool;
+    const trip_cpu_voxels *pool;
     int64_t first_u, first_v; /* voxels: of the grid of blocks */
     int32_t across, down;
     unsigned segments;

@@ -69,6 +69,11 @@ static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
     uint32_t first = f->next_visible[0], last = first;
     while (last + 1 < CODES && f->next_visible[last + 1] == last + 1)
         last++;
+    f->integrals.first = (int32_t)first;
+    f->integrals.last = -1;
+    for (int code = 0; code < CODES; code++)
+        if (table[code].extinction > 0)
+            f->integrals.last = code;
     f->in_a_row = first < CODES && (last + 1 >= CODES || f->next_visible[last + 1] == CODES);
     f->first_visible = (int16_t)((int)first - TRIP_CPU_CODE_BIAS);
     f->last_visible = (int16_t)((int)last - TRIP_CPU_CODE_BIAS);

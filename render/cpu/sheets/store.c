@@ -12,23 +12,22 @@ enum { LEFT_OVER = 4, LEAST_BLOCKS = 6 };
 #define COLUMN_0 UINT64_C(0x0101010101010101)
 #define COLUMN_7 UINT64_C(0x8080808080808080)
 
-static const size_t block_bytes = TRIP_CPU_BLOCK_VOXELS * sizeof(trip_cpu_voxel);
+static const size_t block_bytes = sizeof(trip_cpu_voxels);
 
 /* ---- memory ---- */
 
 static void clear_block(const trip_cpu_store *s, int32_t at)
 {
-    const trip_cpu_voxel nothing = { .code = TRIP_CPU_CODE_MISSING };
-    trip_cpu_voxel *voxels = s->voxels + at;
+    int16_t *codes = s->voxels[at].codes;
     for (int i = 0; i < TRIP_CPU_BLOCK_VOXELS; i++)
-        voxels[i] = nothing;
+        codes[i] = TRIP_CPU_CODE_MISSING;
 }
 
 static void free_all(trip_cpu_store *s)
 {
     s->free_count = 0;
     for (uint32_t i = s->blocks; i-- > 1;)
-        s->free[s->free_count++] = (int32_t)(i * TRIP_CPU_BLOCK_VOXELS);
+        s->free[s->free_count++] = (int32_t)i;
 }
 
 static void release_voxels(trip_cpu_store *s)
@@ -44,7 +43,7 @@ static void release_voxels(trip_cpu_store *s)
 /* Ends with as many blocks as all sheets and slices can take, or as memory has room for. */
 static bool take_voxels(trip_cpu_store *s, uint64_t wanted)
 {
-    uint64_t most = INT32_MAX / TRIP_CPU_BLOCK_VOXELS;
+    uint64_t most = TRIP_CPU_BLOCKS_MAX;
     uint64_t room = trip_budget_left_bytes(s->budget) / LEFT_OVER * (LEFT_OVER - 1);
     wanted = wanted < most ? wanted : most;
     if (s->blocks >= wanted)
@@ -173,13 +172,13 @@ static int16_t code_of(const unsigned char *codes, unsigned code_bytes, uint32_t
     return biased(code);
 }
 
-static void decode_square(trip_cpu_voxel *to, const trip_cpu_walk *at, const trip_block *b)
+static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block *b)
 {
     uint32_t record = at->first;
     for (uint64_t rest = at->mask; rest; rest &= rest - 1) {
         unsigned number = (unsigned)__builtin_ctzll(rest);
         int u = trip_cpu_square_u(number), v = trip_cpu_square_v(number);
-        to[v * TRIP_CPU_BLOCK_STRIDE + u].code = code_of(b->codes, b->code_bytes, record++);
+        to[v * TRIP_CPU_BLOCK_STRIDE + u] = code_of(b->codes, b->code_bytes, record++);
     }
 }
 
@@ -195,7 +194,7 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         u &= TRIP_CPU_BLOCK - 1;
         v &= TRIP_CPU_BLOCK - 1;
         if (in) /* what is occluded has none */
-            decode_square(s->voxels + in + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block);
+            decode_square(s->voxels[in].codes + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block);
     }
 }
 
@@ -237,31 +236,45 @@ static void run_work(work_job *job, unsigned count)
     trip_cpu_pool_wait(job->store->pool, &rows);
 }
 
-static trip_cpu_voxel *block_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
+static trip_cpu_voxels *block_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
 {
     return s->voxels + (sheet ? sheet->blocks[at] : 0);
 }
 
 /* The first column of the block to the right, the first row of the one below, the voxel between. */
-static void copy_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     size_t across = (size_t)s->across;
-    trip_cpu_voxel *to = block_at(s, w->sheet, at);
-    const trip_cpu_voxel *right = block_at(s, w->sheet, at + 1);
-    const trip_cpu_voxel *below = block_at(s, w->sheet, at + across);
+    int16_t *to = block_at(s, w->sheet, at)->codes;
+    const int16_t *right = block_at(s, w->sheet, at + 1)->codes;
+    const int16_t *below = block_at(s, w->sheet, at + across)->codes;
     for (int v = 0; v < TRIP_CPU_BLOCK; v++)
         to[v * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK] = right[v * TRIP_CPU_BLOCK_STRIDE];
-    trip_cpu_voxel *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
+    int16_t *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
     memcpy(last, below, TRIP_CPU_BLOCK * sizeof *last);
-    last[TRIP_CPU_BLOCK] = *block_at(s, w->sheet, at + across + 1);
+    last[TRIP_CPU_BLOCK] = block_at(s, w->sheet, at + across + 1)->codes[0];
+}
+
+static void copy_gradients_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    size_t across = (size_t)s->across;
+    trip_cpu_gradient *to = block_at(s, w->sheet, at)->gradients;
+    const trip_cpu_gradient *right = block_at(s, w->sheet, at + 1)->gradients;
+    const trip_cpu_gradient *below = block_at(s, w->sheet, at + across)->gradients;
+    for (int v = 0; v < TRIP_CPU_BLOCK; v++)
+        to[v * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK] = right[v * TRIP_CPU_BLOCK_STRIDE];
+    trip_cpu_gradient *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
+    memcpy(last, below, TRIP_CPU_BLOCK * sizeof *last);
+    last[TRIP_CPU_BLOCK] = block_at(s, w->sheet, at + across + 1)->gradients[0];
 }
 
 static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    copy_beside(job, w, at);
-    s->kernels->sheet_ranges(block_at(s, w->sheet, at), UINT64_MAX, &w->sheet->ranges[at]);
+    copy_codes_beside(job, w, at);
+    s->kernels->sheet_ranges(block_at(s, w->sheet, at), &w->sheet->ranges[at]);
 }
 
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
@@ -276,18 +289,17 @@ static uint64_t square_cells(const work_job *job, const trip_cpu_sheet_work *w, 
                              int square)
 {
     const trip_cpu_store *s = job->store;
-    const trip_cpu_voxel *of[2] = { block_at(s, w->sheet, at), block_at(s, w->other, at) };
+    const int16_t *of[2] = { block_at(s, w->sheet, at)->codes, block_at(s, w->other, at)->codes };
     int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_BLOCK_STRIDE +
                 square % TRIP_CPU_SQUARES_ACROSS * 8;
     uint64_t cells = 0;
     for (int i = 0; i < 64; i++) {
         int16_t least = INT16_MAX, most = INT16_MIN;
         for (int k = 0; k < 8; k++) {
-            const trip_cpu_voxel *voxel = of[k >> 2] + first +
-                                          (i / 8 + (k >> 1 & 1)) * TRIP_CPU_BLOCK_STRIDE + i % 8 +
-                                          (k & 1);
-            least = voxel->code < least ? voxel->code : least;
-            most = voxel->code > most ? voxel->code : most;
+            int16_t code = of[k >> 2][first + (i / 8 + (k >> 1 & 1)) * TRIP_CPU_BLOCK_STRIDE +
+                                      i % 8 + (k & 1)];
+            least = code < least ? code : least;
+            most = code > most ? code : most;
         }
         if (least != TRIP_CPU_CODE_MISSING && trip_cpu_function_shows(job->function, least, most))
             cells |= UINT64_C(1) << i;
@@ -378,7 +390,7 @@ void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work 
                                    unsigned count)
 {
     run_work(&(work_job){ .store = s, .work = work, .each = find_gradients }, count);
-    run_work(&(work_job){ .store = s, .work = work, .each = copy_beside }, count);
+    run_work(&(work_job){ .store = s, .work = work, .each = copy_gradients_beside }, count);
     for (unsigned i = 0; i < count; i++)
         work[i].sheet->shaded = true;
 }
@@ -403,7 +415,7 @@ static void cut_block(const work_job *job, const trip_cpu_sheet_work *w, size_t 
     const trip_cpu_store *s = job->store;
     int32_t to = (int32_t)lrint(w->part * 16384);
     s->kernels->sheet_between(block_at(s, w->other, at), block_at(s, w->third, at),
-                              about(s, w->visible, at), to << 16 | (16384 - to),
+                              about(s, w->visible, at), to << 16 | (16384 - to), w->other->shaded,
                               block_at(s, w->sheet, at));
 }
 

@@ -13,7 +13,7 @@
 /* A sheet, or a slice between two. */
 typedef struct trip_cpu_sheet {
     int64_t number;                 /* of the sheet */
-    int32_t *blocks;                /* where each starts in the pool; 0: absent */
+    int32_t *blocks;                /* the number of each in the pool; 0: absent */
     trip_cpu_square_ranges *ranges; /* of sheets; of blocks that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
     trip_cpu_cells *cells;          /* those of squares that are visible */
@@ -30,9 +30,9 @@ typedef struct trip_cpu_store {
     const trip_cpu_kernels *kernels;
     trip_cpu_pool *pool;
 
-    trip_cpu_voxel *voxels; /* blocks of TRIP_CPU_BLOCK_VOXELS */
+    trip_cpu_voxels *voxels; /* blocks */
     size_t voxels_bytes;
-    int32_t *free; /* where free blocks start */
+    int32_t *free; /* numbers of free blocks */
     uint32_t blocks, free_count;
 
     /* The grid of blocks, the outermost of which are absent; in blocks. */
