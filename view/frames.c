@@ -92,7 +92,7 @@ void trip_frames_want(trip_frames *f, const trip_wanted *wanted)
     trip_wanted before = f->wanted;
     f->wanted = copy;
     f->asked++;
-    f->status.exact = false;
+    f->status.exact = f->status.rests = false;
     if (before.input && before.document != copy.document)
         trip_scope_cancel(&f->scope);
     if (ends)
@@ -161,6 +161,7 @@ void trip_frames_save(trip_frames *f, const char *path)
     pthread_mutex_lock(&f->lock);
     free(f->save);
     f->save = copy;
+    f->status.rests = false;
     pthread_cond_signal(&f->come);
     pthread_mutex_unlock(&f->lock);
 }

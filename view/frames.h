@@ -80,6 +80,7 @@ typedef struct trip_frames_status {
     bool open;                  /* there is a data set */
     bool exact;                 /* the picture is the one that is wanted, whole */
     bool failed;                /* for the reason `message` */
+    bool rests;                 /* nothing more comes: the picture is exact, or has failed */
     char message[512];          /* of the last failure or warning; "" */
     uint64_t messages;          /* how many there were */
     char stage[16];             /* what goes on: "draw", "read", "merge", ...; "": nothing */

@@ -108,8 +108,10 @@ static bool take_wanted(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
     f->status.stage[0] = 0; /* nothing goes on */
-    while (!f->quit && f->asked == f->taken && !f->save && !(f->looks && f->whole))
+    while (!f->quit && f->asked == f->taken && !f->save && !(f->looks && f->whole)) {
+        f->status.rests = true;
         pthread_cond_wait(&f->come, &f->lock);
+    }
     const bool goes_on = !f->quit;
     if (goes_on)
         trip_scope_renew(&f->scope);

@@ -466,6 +466,8 @@ bool draw_quality(trip_panel *p, trip_document *d)
     if (s->classify == TRIPTYCH_POST) {
         changed |= mark_beside(p, "Slices", ImGui::SliderInt("Slices", &s->slices, 1, 16));
     } else {
+        static const char *const sums[] = { "Splat by splat", "Sheet by sheet" };
+        changed |= choose(p, "Compositing", &s->compositing, sums, 2);
         changed |= slide(p, "Kernel radius", &s->kernel_radius, 1.5, 6, "%.2f voxels");
     }
     changed |= choose(p, "Method", &s->method, methods, 3);

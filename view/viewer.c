@@ -244,8 +244,7 @@ bool trip_viewer_rests(trip_viewer *v)
     const trip_frames_status s = trip_frames_get_status(v->frames);
     if (!d || v->changed || v->picture_width < 1 || v->height < 1)
         return !d || !v->changed;
-    return s.document == d->number && (s.exact || (s.failed && !s.stage[0])) &&
-           !trip_frames_saving(v->frames);
+    return s.document == d->number && s.rests && !trip_frames_saving(v->frames);
 }
 
 static void lay_out(trip_viewer *v)

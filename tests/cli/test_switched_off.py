@@ -21,6 +21,11 @@ class SwitchedOff(program.ProgramTest):
         self.refused(*draw, "--renderer=gl", says="built without OpenGL")
         self.works(*draw[1:])
 
+    def test_viewer(self):
+        if "VIEW" not in program.SWITCHED_OFF:
+            self.skipTest("built with the viewer")
+        self.refused(program.PROGRAM, "view", says="built without the viewer")
+
     def test_openvdb(self):
         if "OPENVDB" not in program.SWITCHED_OFF:
             self.skipTest("built with OpenVDB")

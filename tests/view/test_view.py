@@ -122,7 +122,8 @@ class View(program.ProgramTest):
                     "click 0.3 Function editor", "click 0.5 Undo", "click 0.5 Redo",
                     "click 0.4 Opacity", "click 0.5 Shading", "click 0.5 Shading",
                     "click 0.5 Light from the eye\nclick 0.2 Light round", "click 0.9 Light up",
-                    "click 0.5 Kernel radius", "click 0.2 h",
+                    "click 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Sheet by sheet",
+                    "click 0.2 h",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
                     "click 0.4 Samples", "click 0.5 Classify\nclick 0.5 After interpolation",
                     "click 0.9 Slices", "click 0.5 Top"]

@@ -1,0 +1,271 @@
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "frames.h"
+#include "triptych_brick.h"
+
+enum { SIDE = 20, WIDTH = 60, HEIGHT = 40 };
+
+static char folder[] = "/tmp/trip-frames-XXXXXX";
+static char data[64], other[64];
+
+/* A ball whose middle is nearer to one end, of values that differ everywhere. */
+static void write_volume(const char *path, int seed)
+{
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    for (int z = 0; z < SIDE; z++)
+        for (int y = 0; y < SIDE; y++)
+            for (int x = 0; x < SIDE; x++) {
+                const double r = hypot(hypot(x - 9.5, y - 8.5), z - 7.5);
+                fputc(r < 7 ? 60 + (x * 7 + y * 5 + z * 3 + seed) % 150 : 0, f);
+            }
+    assert_int_equal(fclose(f), 0);
+}
+
+static void brick(const char *name, char path[64], int seed)
+{
+    char volume[128];
+    triptych *t;
+    snprintf(volume, sizeof volume, "%s/%s.raw", folder, name);
+    snprintf(path, 64, "%s/%s.trip", folder, name);
+    write_volume(volume, seed);
+    assert_int_equal(triptych_create(&t), 0);
+    const triptych_brick_options options = {
+        .raw_dims = { SIDE, SIDE, SIDE }, .raw_type = "uint8", .keep_all = 1, .threads = 2
+    };
+    assert_int_equal(triptych_brick(t, volume, path, &options, NULL), 0);
+    triptych_destroy(t);
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    assert_non_null(mkdtemp(folder));
+    brick("one", data, 0);
+    brick("two", other, 40);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    char command[128];
+    (void)state;
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    return system(command);
+}
+
+static void wake(void *user)
+{
+    (void)user;
+}
+
+static trip_frames *start(void)
+{
+    const trip_frames_params params = {
+        .threads = 2, .renderer = TRIPTYCH_RENDERER_CPU, .frames_per_second = 30, .wake = wake
+    };
+    trip_frames *f = trip_frames_start(&params);
+    assert_non_null(f);
+    return f;
+}
+
+static trip_wanted wanted_of(unsigned document, const char *input)
+{
+    return (trip_wanted){ .document = document,
+                          .input = input,
+                          .width = WIDTH,
+                          .height = HEIGHT,
+                          .opacity_scale = 1,
+                          .settings = triptych_default_settings() };
+}
+
+/* Until the picture is whole or has failed. */
+static trip_frames_status await(trip_frames *f, unsigned document)
+{
+    for (;;) {
+        const trip_frames_status s = trip_frames_get_status(f);
+        if (s.document == document && s.rests)
+            return s;
+        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    }
+}
+
+typedef struct copy {
+    trip_picture picture;
+    uint8_t rgba[WIDTH * HEIGHT * 4];
+} copy;
+
+static void keep(void *user, const trip_picture *p)
+{
+    copy *c = user;
+    assert_true(p->width <= WIDTH && p->height <= HEIGHT);
+    c->picture = *p;
+    memcpy(c->rgba, p->rgba, (size_t)p->width * (size_t)p->height * 4);
+}
+
+static copy take(trip_frames *f)
+{
+    copy c = { 0 };
+    while (!trip_frames_use_picture(f, 0, keep, &c))
+        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    return c;
+}
+
+static void assert_drawn_alike(const copy *c, const char *path, const trip_wanted *w)
+{
+    triptych *t;
+    static float rgba[WIDTH * HEIGHT * 4];
+    const triptych_view view = trip_navigation_view(&c->picture.navigation, WIDTH, HEIGHT);
+    assert_int_equal(triptych_create(&t), 0);
+    assert_int_equal(
+        triptych_open(t, path, &(triptych_resources){ .renderer = TRIPTYCH_RENDERER_CPU }), 0);
+    assert_int_equal(triptych_set_function(t, &(triptych_function){ .name = w->function }), 0);
+    assert_int_equal(triptych_set_settings(t, &w->settings), 0);
+    assert_int_equal(triptych_set_view(t, &view), 0);
+    assert_int_equal(triptych_draw(t, rgba), 0);
+    triptych_destroy(t);
+    for (int i = 0; i < WIDTH * HEIGHT * 4; i++)
+        assert_int_equal(c->rgba[i], i % 4 == 3 ? 255 : (int)floor(rgba[i] * 255 + 0.5f));
+}
+
+static void at_rest_it_is_the_librarys_picture(void **state)
+{
+    (void)state;
+    trip_frames *f = start();
+    trip_wanted w = wanted_of(1, data);
+    trip_frames_want(f, &w);
+    assert_true(await(f, 1).exact);
+    copy c = take(f);
+    assert_true(c.picture.whole && c.picture.width == WIDTH);
+    assert_drawn_alike(&c, data, &w);
+    w.function = "hot-metal";
+    w.settings.classify = TRIPTYCH_POST;
+    w.has_navigation = true;
+    w.navigation = c.picture.navigation;
+    trip_navigation_orbit(&w.navigation, 40, 20);
+    trip_frames_want(f, &w);
+    assert_true(await(f, 1).exact);
+    c = take(f);
+    assert_memory_equal(&c.picture.navigation, &w.navigation, sizeof w.navigation);
+    assert_drawn_alike(&c, data, &w);
+    trip_frames_stop(f);
+}
+
+static void of_many_wishes_the_last_is_fulfilled(void **state)
+{
+    (void)state;
+    trip_opened o;
+    trip_frames *f = start();
+    trip_wanted w = wanted_of(1, data);
+    trip_frames_want(f, &w);
+    await(f, 1);
+    assert_true(trip_frames_take_opened(f, &o));
+    assert_true(o.first && o.info.voxels == SIDE * SIDE * SIDE && o.function);
+    w.has_navigation = true;
+    w.navigation = o.navigation;
+    trip_opened_free(&o);
+    for (int i = 0; i < 300; i++) {
+        trip_navigation_orbit(&w.navigation, 3, 1);
+        trip_frames_want(f, &w);
+        if (i % 20 == 0)
+            nanosleep(&(struct timespec){ .tv_nsec = 3000000 }, NULL);
+    }
+    assert_true(await(f, 1).exact);
+    const copy c = take(f);
+    assert_memory_equal(&c.picture.navigation, &w.navigation, sizeof w.navigation);
+    assert_drawn_alike(&c, data, &w);
+    trip_frames_stop(f);
+}
+
+static void failures_are_said_and_do_not_last(void **state)
+{
+    (void)state;
+    trip_frames *f = start();
+    trip_wanted w = wanted_of(1, "/nowhere/at-all.trip");
+    trip_frames_want(f, &w);
+    trip_frames_status s = await(f, 1);
+    assert_true(s.failed && !s.open && strstr(s.message, "/nowhere/at-all.trip"));
+    w = wanted_of(2, other);
+    trip_frames_want(f, &w);
+    s = await(f, 2);
+    assert_true(s.exact && !s.failed);
+    copy c = take(f);
+    assert_drawn_alike(&c, other, &w);
+    w.text = "this is no function";
+    trip_frames_want(f, &w);
+    assert_true(await(f, 2).failed);
+    w.text = NULL;
+    trip_frames_want(f, &w);
+    assert_true(await(f, 2).exact);
+    trip_frames_stop(f);
+}
+
+static void other_sizes_and_data_sets_take_turns(void **state)
+{
+    (void)state;
+    trip_frames *f = start();
+    for (unsigned i = 1; i <= 12; i++) {
+        trip_wanted w = wanted_of(1 + i % 2, i % 2 ? data : other);
+        w.width = WIDTH - (int)(i % 5);
+        w.height = HEIGHT - (int)(i % 3);
+        trip_frames_want(f, &w);
+        if (i % 3)
+            continue;
+        assert_true(await(f, 1 + i % 2).exact);
+        const copy c = take(f);
+        assert_int_equal(c.picture.width, w.width);
+        assert_int_equal(c.picture.height, w.height);
+        assert_int_equal(c.picture.document, w.document);
+    }
+    trip_frames_stop(f);
+}
+
+static void it_stops_whatever_goes_on(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 20; i++) {
+        trip_frames *f = start();
+        const trip_wanted w = wanted_of(1, data);
+        trip_frames_want(f, &w);
+        nanosleep(&(struct timespec){ .tv_nsec = i * 500000 }, NULL);
+        trip_frames_stop(f);
+    }
+}
+
+static void a_place_of_the_picture_is_looked_at(void **state)
+{
+    (void)state;
+    trip_frames *f = start();
+    const trip_wanted w = wanted_of(1, data);
+    trip_frames_want(f, &w);
+    trip_frames_probe(f, WIDTH / 2.0, HEIGHT / 2.0);
+    await(f, 1);
+    trip_probed p;
+    while (!(p = trip_frames_get_probed(f)).valid)
+        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    assert_true(p.hit.opacity > 0.5 && p.hit.value >= 30 && p.hit.value < 210);
+    trip_frames_stop(f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(at_rest_it_is_the_librarys_picture),
+        cmocka_unit_test(of_many_wishes_the_last_is_fulfilled),
+        cmocka_unit_test(failures_are_said_and_do_not_last),
+        cmocka_unit_test(other_sizes_and_data_sets_take_turns),
+        cmocka_unit_test(it_stops_whatever_goes_on),
+        cmocka_unit_test(a_place_of_the_picture_is_looked_at),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
