@@ -362,8 +362,10 @@ static void clear(const window *w)
 static int draw(window *w, double seconds)
 {
     const trip_viewer *v = &w->viewer;
-    if (w->hidden || v->width < 1 || v->height < 1)
+    if (w->hidden || v->width < 1 || v->height < 1) {
+        w->input_at = 0; /* nobody sees an answer */
         return 0;
+    }
     clear(w);
     draw_picture(w);
     trip_panel_draw(w->panel, &w->viewer, seconds);

@@ -227,7 +227,7 @@ class View(program.ProgramTest):
         self.assertTrue(after["failed"] and "gone.trip" in after["message"], after)
 
     def test_random_events_leave_it_alive(self):
-        count = 250 * ROUNDS
+        count = 150 * ROUNDS
         self.view(f"wait\nrandom {count} 1\nwait\nresize 600 400\nwait\nstatus status.json\n"
                   "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", size="500x300")
         status = self.status()
