@@ -13,7 +13,7 @@ static const struct {
     int (*run)(const session *s, const bench_options *o, bench_report *r);
 } tables[] = {
     { "orders", bench_orders },       { "submit", bench_submit },     { "stream", bench_stream },
-    { "renderers", bench_renderers }, { "accuracy", bench_accuracy },
+    { "renderers", bench_renderers }, { "accuracy", bench_accuracy }, { "popping", bench_popping },
 };
 
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)

@@ -247,6 +247,9 @@ static void add_limits(const measuring *m, bench_report *r)
     bench_report_limit(r, "Errors are of red, green, blue (premultiplied) and alpha over the "
                           "pixels that the object covers, where alpha of either picture is above "
                           "1/255, all views together; median and 99 %% to 0.01.");
+    bench_report_limit(r, "With pre, splats are composited %s.",
+                       m->options->settings.compositing == TRIP_COMPOSITING_SHEET ? "sheet by sheet"
+                                                                                  : "one by one");
     bench_report_limit(r, "Views: %d, %s.", m->views, kinds_of_views);
     bench_report_limit(r, "A frame is planning, drawing from memory and merging; the first of a "
                           "view is untimed. The integral's first frame also gathers the volume.");

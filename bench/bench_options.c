@@ -20,6 +20,7 @@ enum {
     KEY_MEMORY,
     KEY_NO_COUNTS,
     KEY_CLASSIFY,
+    KEY_COMPOSITING,
     KEY_SLICES,
     KEY_TOLERANCE,
     KEY_BUDGET,
@@ -28,7 +29,7 @@ enum {
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
-#define OF_RENDERERS (BIT(KEY_CLASSIFY) | BIT(KEY_SLICES))
+#define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES))
 #define OF_ACCURACY (BIT(KEY_TOLERANCE) | BIT(KEY_BUDGET) | BIT(KEY_SOURCE))
 
 static const struct argp_option options[] = {
@@ -36,11 +37,11 @@ static const struct argp_option options[] = {
       "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
       "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; "
-      "accuracy 256x256)",
+      "accuracy, popping 256x256)",
       0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; accuracy "
-      "cpu)",
+      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; accuracy, "
+      "popping cpu)",
       0 },
     { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
       0 },
@@ -61,8 +62,11 @@ static const struct argp_option options[] = {
     { "no-counts", KEY_NO_COUNTS, NULL, 0,
       "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
     { "classify", KEY_CLASSIFY, "pre|post", 0,
-      "As of `triptych render` (default: pre); renderers only", 0 },
-    { "slices", KEY_SLICES, "N", 0, "Slices of a sheet, post (default: 2); renderers only", 0 },
+      "As of `triptych render` (default: pre); renderers and popping only", 0 },
+    { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
+      "Likewise, pre (default: splat); renderers, accuracy and popping only", 0 },
+    { "slices", KEY_SLICES, "N", 0,
+      "Slices of a sheet, post (default: 2); renderers and popping only", 0 },
     { "tolerance", KEY_TOLERANCE, "T", 0, "Of the integral, of 1 (default: 1e-4); accuracy only",
       0 },
     { "budget", KEY_BUDGET, "SECONDS", 0,
@@ -88,8 +92,8 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused = OF_RENDERERS | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
+        .refused = OF_MODEL | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
+                   BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -99,8 +103,8 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = OF_RENDERERS | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+        .refused = OF_MODEL | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
+                   BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -110,7 +114,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = OF_RENDERERS | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_MODEL | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 1024 },
@@ -130,11 +134,22 @@ static const struct table {
     },
     {
         .name = "accuracy",
-        .refused = OF_RENDERERS | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_KERNEL_RADIUS),
+        .refused = BIT(KEY_CLASSIFY) | BIT(KEY_SLICES) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) |
+                   BIT(KEY_NO_COUNTS) | BIT(KEY_KERNEL_RADIUS),
         .draw_hidden = true,
         .repeat = 1,
         .views = 8,
+        .sizes = { 256 },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_CPU },
+        .renderer_count = 1,
+    },
+    {
+        .name = "popping",
+        .refused = OF_ACCURACY | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_VIEWS) | BIT(KEY_REPEAT),
+        .draw_hidden = true,
+        .repeat = 1,
         .sizes = { 256 },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_CPU },
@@ -214,6 +229,14 @@ static int parse_classify(const char *text, bench_options *o)
     return status;
 }
 
+static int parse_compositing(const char *text, bench_options *o)
+{
+    static const char *const names[] = { "splat", "sheet", NULL };
+    int which = 0, status = trip_option_choice("--compositing", text, names, &which);
+    o->settings.compositing = (trip_compositing)which;
+    return status;
+}
+
 static int parse_option(int key, char *arg, bench_options *o)
 {
     switch (key) {
@@ -246,6 +269,8 @@ static int parse_option(int key, char *arg, bench_options *o)
         return 0;
     case KEY_CLASSIFY:
         return parse_classify(arg, o);
+    case KEY_COMPOSITING:
+        return parse_compositing(arg, o);
     case KEY_SLICES:
         return trip_option_integer("--slices", arg, 1, TRIP_SLICES_MAX, &o->settings.slices);
     case KEY_TOLERANCE:
@@ -310,9 +335,8 @@ static void be_short(parse *p)
 
 static int check(parse *p)
 {
-    static const char *const names[] = {
-        "orders", "submit", "stream", "renderers", "accuracy", NULL
-    };
+    static const char *const names[] = { "orders",   "submit",  "stream", "renderers",
+                                         "accuracy", "popping", NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)

@@ -37,7 +37,8 @@ typedef struct bench_options {
     "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                \
     "  stream     reading and drawing against the disk's bandwidth\n"                              \
     "  renderers  the renderers there are, over views round the object\n"                          \
-    "  accuracy   how far settings are from the integral, and what they take\n"
+    "  accuracy   how far settings are from the integral, and what they take\n"                    \
+    "  popping    how much pixels jump where the axis of most weight changes\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

@@ -64,6 +64,20 @@ trip_camera_params bench_view_oblique(const session *s, const int size[2])
     return view;
 }
 
+static framing make_between(const session *s, double degrees)
+{
+    double angle = degrees * degree;
+    return make_framing(s, trip_v3(-cos(angle), -sin(angle), -0.3), trip_v3(0, 0, 1));
+}
+
+trip_camera_params bench_view_between(const session *s, const int size[2], double degrees)
+{
+    framing f = make_between(s, degrees), middle = make_between(s, 45);
+    trip_camera_params view = params(&f, size, distance_needed(&middle, size));
+    view.fov_degrees = fov_degrees;
+    return view;
+}
+
 trip_camera_params bench_view_lateral(const session *s, const int size[2])
 {
     framing f = make_framing(s, trip_v3(0, 0, -1), trip_v3(0, 1, 0));

@@ -317,6 +317,32 @@ static void accuracy_begins_no_view_after_its_seconds(void **state)
     assert_non_null(strstr(r.out, "Views: 1, "));
 }
 
+/* Of noise, which the three lists show as differently as can be. With axis all pixels jump at once;
+ * with clip those on the line between two lists, and with merge none. */
+static void popping_is_of_axis_alone(void **state)
+{
+    (void)state;
+    const char *const models[] = { "", "--compositing sheet", "--classify post --slices 1" };
+    for (int i = 0; i < 3; i++) {
+        char arguments[128];
+        snprintf(arguments, sizeof arguments, "popping block.trip --size 32x32 --no-shading %s",
+                 models[i]);
+        cJSON *root = bench(arguments);
+        const cJSON *rows = rows_of(root, "popping"), *axis = cJSON_GetArrayItem(rows, 0);
+        const cJSON *clip = cJSON_GetArrayItem(rows, 1), *row;
+        assert_true(number(axis, "mean") > 3 * number(axis, "motion"));
+        assert_true(number(clip, "mean") < number(axis, "mean") / 6);
+        cJSON_ArrayForEach(row, rows)
+        {
+            assert_true(number(row, "mean") <= number(row, "most"));
+            assert_true(number(row, "percentile_99") <= number(row, "most"));
+            if (row != axis && row != clip)
+                assert_true(number(row, "percentile_99") < number(axis, "percentile_99") / 4);
+        }
+        cJSON_Delete(root);
+    }
+}
+
 static void tables_for_people_name_the_command_and_their_limits(void **state)
 {
     (void)state;
@@ -387,6 +413,7 @@ int main(void)
         cmocka_unit_test(accuracy_finds_the_settings_far_and_near),
         cmocka_unit_test(accuracy_is_against_the_source_where_it_is_given),
         cmocka_unit_test(accuracy_begins_no_view_after_its_seconds),
+        cmocka_unit_test(popping_is_of_axis_alone),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
         cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),
