@@ -38,6 +38,14 @@ typedef struct tile_path {
     float first[2][TRIP_CPU_SEGMENTS + 1];
     float along[TRIP_CPU_SEGMENTS + 1];
     double slope[2], start[2]; /* of the tile's corner */
+    /* Linear in the place within the tile: at its corner, and a pixel along x and y. */
+    float toward[3];      /* the ray along the list's axis, of length 1 or so at the corner */
+    float aside[2][3];    /* the ray along u and v, less the corner's slope times `toward` */
+    float world[3][3];    /* the ray in world space, of length 1 or so at the corner */
+    float sheet[3];       /* parallel views: of the eye's plane */
+    float world_length;   /* world units over a sheet, where `world` and `toward` are 1 */
+    float depth;          /* z over a sheet where `toward` is 1 */
+    float gradient[3][3]; /* as the view's, of sums of weights 2^WEIGHT_LOG2 */
 } tile_path;
 
 /* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
@@ -69,6 +77,7 @@ INLINE double from_start(const trip_cpu_sheet_view *view, double coordinate)
 /* The rays of a rectangle of pixel positions: bounds of what ray_slope() gives. */
 typedef struct beam {
     double start[4][2], slope[4][2];
+    bool whole; /* its rays are all drawn, but for those outside the picture */
 } beam;
 
 static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double size)
@@ -77,12 +86,14 @@ static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double 
     bool all = true;
     for (int i = 0; i < 4; i++)
         all &= ray_slope(view, x + (i & 1) * size, y + (i >> 1) * size, b.start[i], b.slope[i]);
+    b.whole = all;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < 2; a++) {
             double s = b.slope[i][a], most = view->steepest;
             if (!all) /* some rays may go any way */
                 s = (a ? i >> 1 : i & 1) ? most : -most;
             b.slope[i][a] = s < -most ? -most : s > most ? most : s;
+            b.whole &= b.slope[i][a] == s;
         }
     return b;
 }
@@ -102,6 +113,39 @@ INLINE void beam_bounds(const beam *b, int a, double along, double bounds[2])
 static double within(double a, double least, double most)
 {
     return a < least ? least : a > most ? most : a;
+}
+
+static double greatest_of(const double v[3])
+{
+    return fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+}
+
+/* What is linear in the place within the tile at (x, y). */
+static void find_forms(const trip_cpu_sheet_view *view, int x, int y, tile_path *path)
+{
+    double corner[3], world[3][3], turns = view->ortho ? 0 : 1;
+    for (int i = 0; i < 3; i++)
+        corner[i] = view->r0[i] + turns * (x * view->rx[i] + y * view->ry[i]);
+    double unit = 1 / greatest_of(corner);
+    const double *linear[3] = { corner, view->rx, view->ry };
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            world[i][k] = view->world[k][0] * linear[i][0] + view->world[k][1] * linear[i][1] +
+                          view->world[k][2] * linear[i][2];
+    double world_unit = 1 / greatest_of(world[0]);
+    for (int i = 0; i < 3; i++) {
+        double factor = i == 0 || !view->ortho ? 1 : 0;
+        path->toward[i] = (float)(factor * unit * linear[i][2]);
+        for (int a = 0; a < 2; a++)
+            path->aside[a][i] = (float)((view->ortho && i ? 1 : unit) *
+                                        (linear[i][a] - path->slope[a] * linear[i][2]));
+        for (int k = 0; k < 3; k++)
+            path->world[k][i] = (float)(factor * world_unit * world[i][k]);
+        path->sheet[i] = (float)linear[i][2];
+    }
+    path->sheet[0] = (float)(view->eye[2] + x * view->rx[2] + y * view->ry[2]);
+    path->world_length = (float)(unit / world_unit);
+    path->depth = (float)unit;
 }
 
 static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
@@ -124,6 +168,10 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
             path->base[a][n] = (int32_t)within(base - origin[a], -0x1p28, 0x1p28);
         }
     }
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            path->gradient[k][i] = view->gradient[k][i] * (1.0f / (1 << WEIGHT_LOG2));
+    find_forms(view, x, y, path);
 }
 
 /* ---- which segments may show ---- */
@@ -133,16 +181,48 @@ typedef struct voxel_box {
     int32_t lo[2], hi[2];
 } voxel_box;
 
-/* What a beam passes at a slice: a little more for what single precision makes of it. */
-INLINE voxel_box beam_box(const trip_cpu_group *g, const beam *b, double along)
+/* A patch's beam, from the tile's corner's ray. */
+typedef struct patch_beam {
+    float4 slope[2], shift[2];
+    bool whole;
+} patch_beam;
+
+static patch_beam patch_beam_of(const trip_cpu_sheet_view *view, const tile_path *path, int x,
+                                int y)
 {
-    const double origin[2] = { (double)g->first_u, (double)g->first_v };
+    beam b = beam_of(view, x, y, 8);
+    patch_beam p = { .whole = b.whole };
+    for (int a = 0; a < 2; a++)
+        for (int i = 0; i < 4; i++) {
+            p.slope[a][i] = (float)(b.slope[i][a] - path->slope[a]);
+            p.shift[a][i] = (float)(b.start[i][a] - path->start[a]);
+        }
+    return p;
+}
+
+INLINE float least_of_4(float4 a)
+{
+    float x = a[0] < a[1] ? a[0] : a[1], y = a[2] < a[3] ? a[2] : a[3];
+    return x < y ? x : y;
+}
+
+INLINE int32_t floor_within(float a)
+{
+    a = a < -0x1p28f ? -0x1p28f : a > 0x1p28f ? 0x1p28f : a;
+    int32_t whole = (int32_t)a;
+    return whole - ((float)whole > a);
+}
+
+/* What a beam passes at a slice: a little more for what single precision makes of it. */
+INLINE voxel_box beam_box(const tile_path *path, const patch_beam *b, unsigned n)
+{
     voxel_box box;
     for (int a = 0; a < 2; a++) {
-        double bounds[2];
-        beam_bounds(b, a, along, bounds);
-        box.lo[a] = (int32_t)within(floor(bounds[0] - origin[a] - 0x1p-6), -0x1p28, 0x1p28);
-        box.hi[a] = (int32_t)within(floor(bounds[1] - origin[a] + 0x1p-6), -0x1p28, 0x1p28);
+        float4 at = b->slope[a] * path->along[n] + b->shift[a];
+        float low = least_of_4(at), high = -least_of_4(-at), first = path->first[a][n];
+        float more = 0x1p-6f + 0x1p-20f * (fabsf(low) + fabsf(high));
+        box.lo[a] = path->base[a][n] + floor_within(first + low - more);
+        box.hi[a] = path->base[a][n] + floor_within(first + high + more);
     }
     return box;
 }
@@ -212,22 +292,57 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, voxel_box box)
     return false;
 }
 
-static uint64_t segments_of_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x,
-                                  int y)
+/* Numbers of 16 bits in a block, and where its gradients begin. */
+#define BLOCK_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
+#define GRADIENTS_FROM ((int32_t)(offsetof(trip_cpu_voxels, gradients) / sizeof(int16_t)))
+
+/* What a patch passes. */
+typedef struct patch_path {
+    uint64_t segments; /* in which something may show */
+    /* At each slice of these the block that all of its rays lie in: from its start in the pool,
+     * where a ray is that is at 0 from tile_path.base; -1: several, or none. */
+    int32_t block[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
+} patch_path;
+
+static void find_block(const trip_cpu_group *g, const tile_path *path, unsigned n, bool whole,
+                       voxel_box box, patch_path *area)
 {
-    beam b = beam_of(view, x, y, 8);
-    uint64_t some = 0;
-    voxel_box last = beam_box(g, &b, from_start(view, g->slices[0].coordinate));
-    voxel_box end = beam_box(g, &b, from_start(view, g->slices[g->segments].coordinate));
+    const voxel_box all = box;
+    area->block[n] = -1;
+    if (!whole || !cut_box(g, &box))
+        return;
+    bool one = true;
+    for (int a = 0; a < 2; a++)
+        one &= box.lo[a] == all.lo[a] && box.hi[a] == all.hi[a] &&
+               box.lo[a] >> TRIP_CPU_BLOCK_LOG2 == box.hi[a] >> TRIP_CPU_BLOCK_LOG2;
+    if (!one)
+        return;
+    int32_t u = box.lo[0] >> TRIP_CPU_BLOCK_LOG2, v = box.lo[1] >> TRIP_CPU_BLOCK_LOG2;
+    area->block[n] = g->slices[n].blocks[v * g->across + u] * BLOCK_NUMBERS;
+    area->within[n] = (path->base[1][n] - (v << TRIP_CPU_BLOCK_LOG2)) * TRIP_CPU_BLOCK_STRIDE +
+                      path->base[0][n] - (u << TRIP_CPU_BLOCK_LOG2);
+}
+
+static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const tile_path *path, int x, int y, patch_path *area)
+{
+    const patch_beam b = patch_beam_of(view, path, x, y);
+    area->segments = 0;
+    voxel_box last = beam_box(path, &b, 0), end = beam_box(path, &b, g->segments);
     if (!squares_show(g, g->some, both_boxes(last, end)))
-        return 0;
+        return;
+    unsigned placed = UINT32_MAX;
     for (unsigned n = 0; n < g->segments; n++) {
-        voxel_box next = beam_box(g, &b, from_start(view, g->slices[n + 1].coordinate));
-        if (cells_show(g, n, both_boxes(last, next)))
-            some |= UINT64_C(1) << n;
+        voxel_box next = beam_box(path, &b, n + 1);
+        if (cells_show(g, n, both_boxes(last, next))) {
+            area->segments |= UINT64_C(1) << n;
+            if (placed != n)
+                find_block(g, path, n, b.whole, last, area);
+            find_block(g, path, n + 1, b.whole, next, area);
+            placed = n + 1;
+        }
         last = next;
     }
-    return some;
 }
 
 /* ---- rays at a slice ---- */
@@ -253,19 +368,6 @@ INLINE vi vi_within(vi a, int32_t least, int32_t most)
 #endif
 }
 
-INLINE bool vi_all_equal_first(vi a)
-{
-#if TRIP_SIMD == TRIP_SIMD_AVX2
-    __m256i first = _mm256_broadcastd_epi32(_mm256_castsi256_si128((__m256i)a));
-    return _mm256_movemask_epi8(_mm256_cmpeq_epi32((__m256i)a, first)) == -1;
-#else
-    bool all = true;
-    for (int i = 1; i < V; i++)
-        all &= a[i] == a[0];
-    return all;
-#endif
-}
-
 INLINE vm vi_is_0(vi a)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX512
@@ -287,30 +389,23 @@ INLINE vi vi_greater(vi a, vi b)
     return (a & m) | (b & ~m);
 }
 
-/* The cells that rays pass at a slice. */
+/* The cells that rays pass at a slice: from tile_path.base. */
 typedef struct corners {
-    vi whole[2]; /* of the grid */
-    vf part[2];  /* place in the cell */
+    vi whole[2];
+    vf part[2]; /* place in the cell */
 } corners;
 
-INLINE corners corners_at(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l,
-                          unsigned n)
+INLINE corners corners_at(const tile_path *path, const stamp_rays *l, unsigned n)
 {
-    const int32_t size[2] = { g->across, g->down };
     corners c;
     for (int a = 0; a < 2; a++) {
         vf at = v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
         at = v_max(at, v_set(0)); /* rays that are not drawn may lie anywhere */
         c.whole[a] = v_truncate(at);
         c.part[a] = at - v_from_int(c.whole[a]);
-        c.whole[a] = vi_within(c.whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_BLOCK - 1);
     }
     return c;
 }
-
-/* Numbers of 16 bits in a block, and where its gradients begin. */
-#define BLOCK_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
-#define GRADIENTS_FROM ((int32_t)(offsetof(trip_cpu_voxels, gradients) / sizeof(int16_t)))
 
 /* What rays meet at a slice: the nearest code, and what the rest is worked out from where it is
  * needed. */
@@ -344,27 +439,37 @@ INLINE void set_weights(const vf part[2], sample *s)
 #endif
 }
 
+/* Cells of the grid; of those beyond it, the nearest. */
+INLINE void find_cells(const trip_cpu_group *g, const tile_path *path, unsigned n, const corners *c,
+                       vi whole[2])
+{
+    const int32_t size[2] = { g->across, g->down };
+    for (int a = 0; a < 2; a++)
+        whole[a] = vi_within(c->whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_BLOCK - 1);
+}
+
 /* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
  * their gradients. */
-INLINE vi find_places(const trip_cpu_group *g, unsigned n, const corners *c, sample *s)
+INLINE vi find_places(const trip_cpu_group *g, const tile_path *path, const patch_path *area,
+                      unsigned n, const corners *c, sample *s)
 {
-    vi block =
-        (c->whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (c->whole[0] >> TRIP_CPU_BLOCK_LOG2);
-    vi within_block = (c->whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
-                      (c->whole[0] & (TRIP_CPU_BLOCK - 1));
-    const int32_t *blocks = g->slices[n].blocks;
-    int32_t starts[V];
-    vi from;
-    if (vi_all_equal_first(block)) {
-        from = vi_set(blocks[block[0]] * BLOCK_NUMBERS);
-    } else {
-        vi_store(starts, block);
-        for (int i = 0; i < V; i++)
-            starts[i] = blocks[starts[i]] * BLOCK_NUMBERS;
-        from = vi_load(starts);
+    if (area->block[n] >= 0) {
+        vi in = c->whole[1] * TRIP_CPU_BLOCK_STRIDE + c->whole[0] + area->within[n];
+        s->gradient_at = in * 3 + (area->block[n] + GRADIENTS_FROM);
+        return in + area->block[n];
     }
-    s->gradient_at = from + (within_block * 3 + GRADIENTS_FROM);
-    return from + within_block;
+    vi whole[2];
+    find_cells(g, path, n, c, whole);
+    vi block = (whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (whole[0] >> TRIP_CPU_BLOCK_LOG2);
+    vi in = (whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
+            (whole[0] & (TRIP_CPU_BLOCK - 1));
+    int32_t starts[V];
+    vi_store(starts, block);
+    for (int i = 0; i < V; i++)
+        starts[i] = g->slices[n].blocks[starts[i]] * BLOCK_NUMBERS;
+    vi from = vi_load(starts);
+    s->gradient_at = from + (in * 3 + GRADIENTS_FROM);
+    return from + in;
 }
 
 #if TRIP_SIMD == TRIP_SIMD_AVX2
@@ -497,12 +602,12 @@ INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 
 #endif
 
-INLINE void sample_at(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l,
-                      unsigned n, sample *s)
+INLINE void sample_at(const trip_cpu_group *g, const tile_path *path, const patch_path *area,
+                      const stamp_rays *l, unsigned n, sample *s)
 {
-    corners c = corners_at(g, path, l, n);
+    corners c = corners_at(path, l, n);
     set_weights(c.part, s);
-    find_codes(g, find_places(g, n, &c, s), s);
+    find_codes(g, find_places(g, path, area, n, &c, s), s);
     s->lit = s->summed = false;
 }
 
@@ -580,15 +685,15 @@ INLINE vf dot3(const vf a[3], const vf b[3])
 }
 
 /* As trip_shade(), with the mean of the gradients of the ends. */
-INLINE void light_segment(const trip_cpu_sheet_view *view, const stamp_rays *l, const sample *a,
-                          const sample *b, shown *s)
+INLINE void light_segment(const trip_cpu_sheet_view *view, const tile_path *path,
+                          const stamp_rays *l, const sample *a, const sample *b, shown *s)
 {
     vf g[3], n[3];
     for (int k = 0; k < 3; k++) /* twice their mean */
-        g[k] = v_from_int(a->gradient[k] + b->gradient[k]) * v_set(1.0f / (1 << WEIGHT_LOG2));
+        g[k] = v_from_int(a->gradient[k] + b->gradient[k]);
     for (int k = 0; k < 3; k++)
-        n[k] = v_fma(g[0], v_set(view->gradient[k][0]),
-                     v_fma(g[1], v_set(view->gradient[k][1]), g[2] * v_set(view->gradient[k][2])));
+        n[k] = v_fma(g[0], v_set(path->gradient[k][0]),
+                     v_fma(g[1], v_set(path->gradient[k][1]), g[2] * v_set(path->gradient[k][2])));
     vf length2 = dot3(n, n);
     vf length = v_sqrt(length2);
     vm lit = v_gt(length2, v_set(1e-20f));
@@ -642,7 +747,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     if (view->shading) {
         find_light(g, a);
         find_light(g, b);
-        light_segment(view, l, a, b, &s);
+        light_segment(view, path, l, a, b, &s);
     }
     float sheets = path->along[n + 1] - path->along[n];
     sheets = sheets < 0 ? -sheets : sheets;
@@ -692,69 +797,48 @@ INLINE void set_light(const trip_cpu_sheet_view *view, stamp_rays *l)
     set_unit(l->half);
 }
 
-/* The rays through the pixel centres of a stamp. Loops over lanes without branches, which compilers
- * make vectors of. */
-static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, int x, int y,
-                      unsigned number, stamp_rays *l)
+INLINE vf form_of(const float form[3], vf x, vf y)
 {
-    float slope[2][V], shift[2][V], to_eye[3][V], length[V], depth[V], start[V], along[V];
-    double px[V], py[V], r[3][V], world2[V], per_sheet[V];
-    vf across = stamp_x(number), down = stamp_y(number);
-    const double turns = view->ortho ? 0 : 1, moves = view->ortho ? 1 : 0;
-    for (int i = 0; i < V; i++) {
-        px[i] = x + (double)across[i];
-        py[i] = y + (double)down[i];
-        world2[i] = 0;
-    }
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < V; i++)
-            r[k][i] = view->r0[k] + turns * (px[i] * view->rx[k] + py[i] * view->ry[k]);
-    for (int i = 0; i < V; i++) {
-        double toward = r[2][i] * view->direction;
-        per_sheet[i] = 1 / (toward > 0 ? r[2][i] : view->direction);
-        along[i] = toward > 0 ? 1 : 0;
-        depth[i] = (float)per_sheet[i];
-    }
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < V; i++) {
-            double w = view->world[k][0] * r[0][i] + view->world[k][1] * r[1][i] +
-                       view->world[k][2] * r[2][i];
-            to_eye[k][i] = (float)-w;
-            world2[i] += w * w;
-        }
-    for (int i = 0; i < V; i++)
-        length[i] = (float)(sqrt(world2[i]) * (per_sheet[i] < 0 ? -per_sheet[i] : per_sheet[i]));
-    for (int i = 0; i < V; i++) {
-        double sheet = view->eye[2] + px[i] * view->rx[2] + py[i] * view->ry[2];
-        start[i] = (float)(-moves * sheet * per_sheet[i]); /* depth 0 is at the ray's origin */
-    }
-    for (int a = 0; a < 2; a++)
-        for (int i = 0; i < V; i++) {
-            double m = r[a][i] * per_sheet[i], most = view->steepest * (1 + 1e-9);
-            double sheet = view->eye[2] + px[i] * view->rx[2] + py[i] * view->ry[2];
-            double at =
-                view->eye[a] + moves * (px[i] * view->rx[a] + py[i] * view->ry[a] - sheet * m);
-            along[i] *= m <= most && m >= -most ? 1 : 0;
-            slope[a][i] = (float)(m - path->slope[a]);
-            shift[a][i] = (float)(at - path->start[a]);
-        }
+    return v_fma(x, v_set(form[1]), v_fma(y, v_set(form[2]), v_set(form[0])));
+}
+
+/* The rays through the pixel centres of a stamp. */
+static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, unsigned number,
+                      stamp_rays *l)
+{
+    const vf x = stamp_x(number), y = stamp_y(number), none = v_set(0);
+    const vf most = v_set((float)view->steepest * (1 + 1e-6f));
+    vf toward = form_of(path->toward, x, y);
+    l->along = v_gt(toward * v_set((float)view->direction), none);
+    toward = v_select(l->along, toward, v_set((float)view->direction));
+    vf inverse = v_set(1) / toward;
     for (int a = 0; a < 2; a++) {
-        l->slope[a] = v_load(slope[a]);
-        l->shift[a] = v_load(shift[a]);
+        const float *form = path->aside[a];
+        vf beside = v_fma(x, v_set(form[1]), y * v_set(form[2])), first = v_set(form[0]);
+        l->slope[a] = (view->ortho ? first : first + beside) * inverse;
+        l->shift[a] = view->ortho ? beside : none;
+        vf slope = l->slope[a] + v_set((float)path->slope[a]);
+        l->along = vm_and(l->along, v_ge(most, v_abs(slope)));
     }
-    l->length = v_load(length);
-    l->depth = v_load(depth);
-    l->depth_at_start = v_load(start);
-    l->along = v_gt(v_load(along), v_set(0));
     for (int k = 0; k < 3; k++)
-        l->to_eye[k] = view->ortho ? v_set(view->to_eye[k]) : v_load(to_eye[k]);
+        l->to_eye[k] = none - form_of(path->world[k], x, y);
+    l->length = v_sqrt(dot3(l->to_eye, l->to_eye)) * v_abs(inverse) * v_set(path->world_length);
+    l->depth = inverse * v_set(path->depth);
+    l->depth_at_start = none; /* depth 0 is at the ray's origin */
+    if (view->ortho) {
+        l->depth_at_start = none - form_of(path->sheet, x, y) * l->depth;
+        for (int k = 0; k < 3; k++)
+            l->to_eye[k] = v_set(view->to_eye[k]);
+    }
     set_unit(l->to_eye);
     set_light(view, l);
 }
 
 static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const tile_path *path, const stamp_rays *l, uint64_t segments, float *stamp)
+                       const tile_path *path, const patch_path *area, const stamp_rays *l,
+                       float *stamp)
 {
+    uint64_t segments = area->segments;
     vf pixel[CHANNELS];
     sample ends[2];
     unsigned sampled = UINT32_MAX; /* slice, in ends[sampled % 2] */
@@ -763,8 +847,8 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
         if (sampled != n)
-            sample_at(g, path, l, n, &ends[n % 2]);
-        sample_at(g, path, l, next, &ends[next % 2]);
+            sample_at(g, path, area, l, n, &ends[n % 2]);
+        sample_at(g, path, area, l, next, &ends[next % 2]);
         sampled = next;
         if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
             continue;
@@ -781,9 +865,9 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const tile_path *path, int x, int y, unsigned place, float *pixels)
 {
     unsigned column = place % 4 * 2, row = place / 4 * (8 / STAMP_ROWS);
-    uint64_t segments =
-        segments_of_patch(view, g, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8);
-    if (!segments)
+    patch_path area;
+    find_patch(view, g, path, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8, &area);
+    if (!area.segments)
         return;
     for (unsigned i = 0; i < 2 * 8 / STAMP_ROWS; i++) {
         unsigned number = (row + i / 2) * STAMPS_ACROSS + column + i % 2;
@@ -791,9 +875,9 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (!vm_any(v_gt(v_load(stamp + 3 * V), v_set(0))))
             continue;
         stamp_rays l;
-        find_rays(view, path, x, y, number, &l);
+        find_rays(view, path, number, &l);
         if (vm_any(l.along))
-            draw_stamp(view, g, path, &l, segments, stamp);
+            draw_stamp(view, g, path, &area, &l, stamp);
     }
 }
 
