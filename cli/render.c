@@ -251,10 +251,10 @@ static int finish_image(void *user, triptych *t, int index, const float *rgba)
     const drawing *d = user;
     char path[PATH_BYTES];
     int status = d->video ? video_add(d->video, rgba) : 0;
-    if (!status)
+    if (!status && !d->video)
         status = image_path(d, d->o.output, index, path);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
-        status = render_stats_summary(path, &d->o, t, stdout);
+        status = render_stats_summary(d->video ? d->o.output : path, &d->o, t, stdout);
     return status;
 }
 
