@@ -15,6 +15,7 @@ static const struct command {
     { "info", "show what is in a data set, and check it", trip_command_info },
     { "render", "draw a volume or data set into image files", trip_command_render },
     { "view", "show volumes and data sets in a window", trip_command_view },
+    { "serve", "show a data set in a browser on this machine", trip_command_serve },
     { "cache", "list or clear the data sets that render made of volumes", trip_command_cache },
     { "bench", "measure drawing and reading, as tables", trip_command_bench },
     { "tf", "list, show and convert transfer functions", trip_command_tf },

@@ -322,8 +322,8 @@ static void what_cannot_be_written_fails_and_leaves_nothing_behind(void **state)
 static void man_pages_name_every_option(void **state)
 {
     (void)state;
-    const char *const commands[] = { "brick", "info", "render", "bench" };
-    for (int i = 0; i < 4; i++) {
+    const char *const commands[] = { "brick", "info", "render", "bench", "serve" };
+    for (int i = 0; i < 5; i++) {
         static char page[65536];
         char path[512], plain[sizeof page];
         snprintf(path, sizeof path, "%s/cli/man/triptych-%s.1", TRIP_SOURCE_DIR, commands[i]);

@@ -26,6 +26,13 @@ class SwitchedOff(program.ProgramTest):
             self.skipTest("built with the viewer")
         self.refused(program.PROGRAM, "view", says="built without the viewer")
 
+    def test_serve(self):
+        if "SERVE" not in program.SWITCHED_OFF:
+            self.skipTest("built with the server")
+        program.write_nrrd("bowl.nrrd", program.ball((20, 20, 20)))
+        self.brick("bowl.nrrd", "bowl.trip")
+        self.refused(program.PROGRAM, "serve", "bowl.trip", says="built without the server")
+
     def test_openvdb(self):
         if "OPENVDB" not in program.SWITCHED_OFF:
             self.skipTest("built with OpenVDB")

@@ -1,0 +1,137 @@
+/* triptych serve: a data set -> a server for a browser on this machine. */
+#include <stdio.h>
+#include <string.h>
+
+#include "commands.h"
+#include "library.h"
+#include "options.h"
+#include "report.h"
+#include "serve.h"
+
+enum {
+    KEY_PORT = 256,
+    KEY_FPS,
+    KEY_TF,
+    KEY_CLASSIFY,
+    KEY_RENDERER,
+    KEY_MEMORY,
+    KEY_ENGINE,
+    KEY_THREADS
+};
+
+static const struct argp_option options[] = {
+    { "port", KEY_PORT, "N", 0, "Port to listen at, of 127.0.0.1 (default: one that is free)", 1 },
+    { "fps", KEY_FPS, "N", 0, "Frames a second while the view moves (default: 30)", 1 },
+    { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
+    { "classify", KEY_CLASSIFY, "pre|post", 0, "Before splatting, or after interpolation", 1 },
+    { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
+    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
+      1 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 1 },
+    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 1 },
+    { 0 },
+};
+
+static int parse_renderer(int key, char *arg, trip_serve_params *p)
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", NULL };
+    static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
+    int which = 0, status;
+    switch (key) {
+    case KEY_RENDERER:
+        status = trip_option_choice("--renderer", arg, renderers, &which);
+        p->renderer = (triptych_renderer)which;
+        return status;
+    case KEY_MEMORY:
+        return trip_option_bytes("--memory", arg, &p->memory_bytes);
+    case KEY_ENGINE:
+        status = trip_option_choice("--engine", arg, engines, &which);
+        p->engine = (triptych_engine)which;
+        return status;
+    case KEY_THREADS:
+        status = trip_option_integer("--threads", arg, 1, 256, &which);
+        p->threads = (unsigned)which;
+        return status;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int parse_rest(int key, char *arg, trip_serve_params *p)
+{
+    static const char *const classifications[] = { "pre", "post", NULL };
+    int which = 0, status;
+    switch (key) {
+    case KEY_PORT:
+        return trip_option_integer("--port", arg, 0, 65535, &p->port);
+    case KEY_FPS:
+        return trip_option_number("--fps", arg, 1, 1000, &p->frames_per_second);
+    case KEY_TF:
+        p->function = arg;
+        return 0;
+    case KEY_CLASSIFY:
+        status = trip_option_choice("--classify", arg, classifications, &which);
+        p->settings.classify = (triptych_classify)which;
+        return status;
+    default:
+        return parse_renderer(key, arg, p);
+    }
+}
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    trip_serve_params *p = state->input;
+    switch (key) {
+    case ARGP_KEY_ARG:
+        if (p->input)
+            return trip_option_fail(arg, "one data set at a time");
+        p->input = arg;
+        return 0;
+    case ARGP_KEY_END:
+        return p->input ? 0
+                        : trip_option_fail("NAME.trip", "none given: `triptych serve NAME.trip`");
+    default:
+        return parse_rest(key, arg, p);
+    }
+}
+
+/* A data set or function that cannot be taken is found here, before anybody looks. */
+static int check_input(const trip_serve_params *p)
+{
+    triptych *t = NULL;
+    int status = library_create(&t, NULL);
+    if (!status)
+        status =
+            triptych_open(t, p->input, &(triptych_resources){ .memory_bytes = p->memory_bytes });
+    if (!status)
+        status = triptych_set_function(t, &(triptych_function){ .name = p->function });
+    triptych_destroy(t);
+    return status;
+}
+
+static void say(void *user, const char *address)
+{
+    (void)user;
+    puts(address);
+    fflush(stdout);
+}
+
+int trip_command_serve(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse_key,
+        .args_doc = "NAME.trip",
+        .doc =
+            "Shows a data set in a browser on this machine, at the address that is printed, until "
+            "it is interrupted. A moving view is sent as JPEG, as large as its time allows; at "
+            "rest the picture that `triptych render` draws is sent as PNG. It listens to 127.0.0.1 "
+            "alone and answers addresses with its token alone; to look from another machine, "
+            "forward the port by ssh -L.",
+    };
+    trip_serve_params p = { .settings = triptych_default_settings(), .ready = say };
+    int status = trip_options_parse(&argp, argc, argv, &p);
+    if (!status)
+        status = check_input(&p);
+    return trip_exit_status(status ? status : trip_serve_run(&p));
+}

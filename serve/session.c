@@ -1,0 +1,283 @@
+#include "session.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "encode.h"
+#include "json.h"
+#include "report.h"
+#include "script.h"
+#include "viewer.h"
+
+enum { WIDTH = 1024, HEIGHT = 768, MOST_SIDE = 4096, LEAST_SIDE = 16, MOST_EVENTS = 1000 };
+
+struct trip_session {
+    pthread_mutex_t lock; /* for all that is a window's thread's: the viewer, and its frames */
+    trip_frames *frames;
+    trip_viewer viewer;
+    /* Taken by the drawing thread too, which may hold locks of its own: what is done with this one
+     * held takes no other. */
+    pthread_mutex_t news_lock;
+    pthread_cond_t news; /* something has come, or the end */
+    uint64_t came;       /* under news_lock: how often */
+    bool ended;          /* the same */
+    uint64_t seen;       /* of `came`, by the thread that ticks */
+};
+
+static void wake(void *user)
+{
+    trip_session *s = user;
+    pthread_mutex_lock(&s->news_lock);
+    s->came++;
+    pthread_cond_broadcast(&s->news);
+    pthread_mutex_unlock(&s->news_lock);
+}
+
+static uint64_t news_so_far(trip_session *s, bool *ended)
+{
+    pthread_mutex_lock(&s->news_lock);
+    uint64_t came = s->came;
+    *ended = s->ended;
+    pthread_mutex_unlock(&s->news_lock);
+    return came;
+}
+
+/* Waits for more than `came`, until a time; false where that has passed. */
+static bool wait_for_news(trip_session *s, uint64_t came, const struct timespec *end)
+{
+    int late = 0;
+    pthread_mutex_lock(&s->news_lock);
+    while (s->came == came && !s->ended && !late)
+        late = pthread_cond_timedwait(&s->news, &s->news_lock, end);
+    pthread_mutex_unlock(&s->news_lock);
+    return !late;
+}
+
+static void make_locks(trip_session *s)
+{
+    pthread_condattr_t monotonic;
+    pthread_mutex_init(&s->lock, NULL);
+    pthread_mutex_init(&s->news_lock, NULL);
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&s->news, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+}
+
+static void show(trip_session *s, const trip_serve_params *p)
+{
+    trip_viewer *v = &s->viewer;
+    trip_viewer_init(v, s->frames);
+    v->settings = p->settings;
+    v->function = p->function;
+    v->opacity_scale = 1;
+    trip_viewer_resize(v, WIDTH, HEIGHT);
+    trip_viewer_set_panel(v, false);
+    trip_viewer_open(v, p->input);
+}
+
+trip_session *trip_session_start(const trip_serve_params *p)
+{
+    trip_session *s = calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    make_locks(s);
+    s->frames = trip_frames_start(&(trip_frames_params){ .memory_bytes = p->memory_bytes,
+                                                         .threads = p->threads,
+                                                         .renderer = p->renderer,
+                                                         .engine = p->engine,
+                                                         .frames_per_second = p->frames_per_second,
+                                                         .wake = wake,
+                                                         .wake_user = s });
+    if (!s->frames) {
+        free(s);
+        return NULL;
+    }
+    show(s, p);
+    return s;
+}
+
+void trip_session_end(trip_session *s)
+{
+    pthread_mutex_lock(&s->news_lock);
+    s->ended = true;
+    pthread_cond_broadcast(&s->news);
+    pthread_mutex_unlock(&s->news_lock);
+}
+
+void trip_session_stop(trip_session *s)
+{
+    trip_frames_stop(s->frames);
+    trip_viewer_release(&s->viewer);
+    pthread_cond_destroy(&s->news);
+    pthread_mutex_destroy(&s->news_lock);
+    pthread_mutex_destroy(&s->lock);
+    free(s);
+}
+
+static struct timespec in_seconds(double seconds)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    double whole = floor(seconds);
+    t.tv_sec += (time_t)whole;
+    t.tv_nsec += (long)((seconds - whole) * 1e9);
+    t.tv_sec += t.tv_nsec / 1000000000;
+    t.tv_nsec %= 1000000000;
+    return t;
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void trip_session_tick(trip_session *s, double seconds)
+{
+    const struct timespec end = in_seconds(seconds);
+    bool ended;
+    double start = now();
+    wait_for_news(s, s->seen, &end);
+    s->seen = news_so_far(s, &ended);
+    pthread_mutex_lock(&s->lock);
+    trip_viewer_tick(&s->viewer, now() - start);
+    pthread_mutex_unlock(&s->lock);
+}
+
+/* Of those that a script can have. */
+static bool is_allowed(const trip_event *e)
+{
+    bool writes = e->kind == TRIP_EVENT_KEY && (e->code == 'p' || e->code == 'q' || e->code == 'c');
+    bool size = e->kind == TRIP_EVENT_RESIZE &&
+                (e->x < LEAST_SIDE || e->x > MOST_SIDE || e->y < LEAST_SIDE || e->y > MOST_SIDE);
+    return e->kind <= TRIP_EVENT_RESIZE && e->kind != TRIP_EVENT_TEXT && !writes && !size;
+}
+
+static void act(trip_session *s, const trip_script *script)
+{
+    trip_viewer *v = &s->viewer;
+    pthread_mutex_lock(&s->lock);
+    for (size_t i = 0; i < script->count; i++) {
+        const trip_event *e = &script->events[i];
+        if (e->kind == TRIP_EVENT_RESIZE)
+            trip_viewer_resize(v, (int)e->x, (int)e->y);
+        else
+            trip_viewer_event(v, e);
+    }
+    trip_viewer_tick(v, 0);
+    pthread_mutex_unlock(&s->lock);
+}
+
+static void drop_line(const char *line, void *user)
+{
+    (void)line, (void)user;
+}
+
+bool trip_session_do(trip_session *s, const char *text, size_t bytes)
+{
+    trip_script script;
+    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    bool good = trip_script_parse(&script, "events", text, bytes) == 0;
+    trip_scope_enter(before);
+    good = good && script.count <= MOST_EVENTS;
+    for (size_t i = 0; good && i < script.count; i++)
+        good = is_allowed(&script.events[i]);
+    if (good)
+        act(s, &script);
+    trip_script_free(&script);
+    return good;
+}
+
+/* The name that lasts as long as the program. */
+static const char *preset(const char *name)
+{
+    triptych_preset p;
+    for (unsigned i = 0; triptych_get_preset(i, &p); i++)
+        if (!strcmp(p.name, name))
+            return p.name;
+    return NULL;
+}
+
+bool trip_session_set_function(trip_session *s, const char *name)
+{
+    const char *known = *name ? preset(name) : NULL;
+    if (*name && !known)
+        return false;
+    pthread_mutex_lock(&s->lock);
+    trip_viewer_set_function(&s->viewer, known);
+    trip_viewer_tick(&s->viewer, 0);
+    pthread_mutex_unlock(&s->lock);
+    return true;
+}
+
+/* A copy of its pixels, so that encoding does not hold up drawing. */
+typedef struct copy {
+    uint8_t *rgba;
+    int width, height;
+    uint64_t number;
+    bool whole;
+} copy;
+
+static void take(void *user, const trip_picture *p)
+{
+    copy *c = user;
+    size_t bytes = 4 * (size_t)p->width * (size_t)p->height;
+    *c = (copy){ malloc(bytes), p->width, p->height, p->number, p->whole };
+    if (c->rgba)
+        memcpy(c->rgba, p->rgba, bytes);
+}
+
+static bool await_copy(trip_session *s, uint64_t number, double seconds, copy *c)
+{
+    const struct timespec end = in_seconds(seconds);
+    bool there = false, more = true, ended = false;
+    while (!there && more && !ended) {
+        uint64_t came = news_so_far(s, &ended);
+        pthread_mutex_lock(&s->lock);
+        there = trip_frames_use_picture(s->frames, number, take, c);
+        pthread_mutex_unlock(&s->lock);
+        more = there || wait_for_news(s, came, &end);
+    }
+    return there;
+}
+
+bool trip_session_await(trip_session *s, uint64_t number, double seconds, trip_session_picture *out)
+{
+    copy c = { NULL };
+    *out = (trip_session_picture){ NULL };
+    if (!await_copy(s, number, seconds, &c) || !c.rgba)
+        return false;
+    if (c.whole)
+        trip_encode_png(c.rgba, c.width, c.height, &out->file, &out->bytes);
+    else
+        trip_encode_jpeg(c.rgba, c.width, c.height, &out->file, &out->bytes);
+    out->number = c.number;
+    out->whole = c.whole;
+    free(c.rgba);
+    return out->file != NULL;
+}
+
+char *trip_session_status(trip_session *s)
+{
+    cJSON *root = cJSON_CreateObject();
+    pthread_mutex_lock(&s->lock);
+    trip_frames_status status = trip_frames_get_status(s->frames);
+    char *camera = trip_viewer_camera_options(&s->viewer);
+    pthread_mutex_unlock(&s->lock);
+    cJSON_AddBoolToObject(root, "exact", status.exact);
+    cJSON_AddBoolToObject(root, "failed", status.failed);
+    cJSON_AddStringToObject(root, "message", status.message);
+    cJSON_AddStringToObject(root, "stage", status.stage);
+    cJSON_AddNumberToObject(root, "done", status.done);
+    cJSON_AddStringToObject(root, "camera", camera ? camera : "");
+    char *text = root ? trip_json_print(root, false) : NULL;
+    cJSON_Delete(root);
+    free(camera);
+    return text;
+}

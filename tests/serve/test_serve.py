@@ -1,0 +1,216 @@
+"""The viewer in a browser, by requests of HTTP as a browser makes them."""
+import http.client
+import json
+import os
+import shlex
+import signal
+import struct
+import time
+import urllib.parse
+import zlib
+
+import numpy
+
+import program
+
+
+def read_png(data):
+    """Height x width x channels, 8 bits, not interlaced."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, packed = 8, b""
+    while at < len(data):
+        (size,) = struct.unpack_from(">I", data, at)
+        name, chunk = data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
+        if name == b"IHDR":
+            width, height, depth, colour = struct.unpack_from(">IIBB", chunk)
+            assert depth == 8 and colour in (2, 6)
+        packed += chunk if name == b"IDAT" else b""
+        at += size + 12
+    channels = 4 if colour == 6 else 3
+    rows = numpy.frombuffer(zlib.decompress(packed), numpy.uint8)
+    rows = rows.reshape(height, 1 + width * channels)
+    picture = numpy.zeros((height, width, channels), numpy.uint8)
+    above = numpy.zeros((width, channels), int)
+    for y, row in enumerate(rows):
+        line = row[1:].reshape(width, channels).astype(int)
+        above = unfilter(row[0], line, above)
+        picture[y] = above
+    return picture
+
+
+def unfilter(kind, line, above):
+    """A row as PNG's filters of these numbers left it."""
+    if kind == 0:
+        return line
+    if kind == 2:
+        return (line + above) & 255
+    if kind == 1:
+        return numpy.cumsum(line, axis=0) & 255
+    out = numpy.zeros_like(line)
+    zero = numpy.zeros(line.shape[1], int)
+    for x, value in enumerate(line):
+        a, b = (out[x - 1] if x else zero), above[x]
+        c = above[x - 1] if x else zero
+        if kind == 3:
+            guess = (a + b) // 2
+        else:
+            p = a + b - c
+            pa, pb, pc = abs(p - a), abs(p - b), abs(p - c)
+            guess = numpy.where((pa <= pb) & (pa <= pc), a, numpy.where(pb <= pc, b, c))
+        out[x] = (value + guess) & 255
+    return out
+
+
+class Serve(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nrrd("v.nhdr", program.noise((24, 28, 32)))
+        run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
+        assert run.returncode == 0, run.stderr
+
+    def setUp(self):
+        self.server = program.start("serve", "v.trip", "--memory", "128M", "--threads", "2")
+        self.address = self.server.stdout.readline().decode().strip()
+        url = urllib.parse.urlsplit(self.address)
+        self.host, self.port = url.hostname, url.port
+        self.token = urllib.parse.parse_qs(url.query)["token"][0]
+
+    def tearDown(self):
+        if self.server.poll() is None:
+            self.server.kill()
+        self.server.communicate()
+
+    def ask(self, path, method="GET", body=None, headers=None, **arguments):
+        """Status, headers, body."""
+        arguments.setdefault("token", self.token)
+        query = urllib.parse.urlencode({k: v for k, v in arguments.items() if v is not None})
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=60)
+        connection.request(method, f"{path}?{query}", body, headers or {})
+        answer = connection.getresponse()
+        data = answer.read()
+        connection.close()
+        return answer.status, answer.headers, data
+
+    def do(self, *lines):
+        status, _, data = self.ask("/events", "POST", "\n".join(lines))
+        self.assertEqual(status, 204, data)
+
+    def status(self):
+        return json.loads(self.ask("/status")[2])
+
+    def whole_picture(self, after=0):
+        """The next one that is whole, its number and the camera it was seen from."""
+        while True:
+            status, headers, data = self.ask("/picture", after=after)
+            self.assertIn(status, (200, 204))
+            if status == 200 and headers["X-Whole"] == "1":
+                self.assertEqual(headers["Content-Type"], "image/png")
+                return read_png(data), int(headers["X-Picture"]), self.status()["camera"]
+            if status == 200:
+                self.assertEqual(headers["Content-Type"], "image/jpeg")
+                self.assertEqual(data[:3] + data[-2:], b"\xff\xd8\xff\xff\xd9")
+                after = headers["X-Picture"]
+
+    def assert_rendered(self, picture, camera, *options):
+        self.works("render", "v.trip", "-o", "r.png", *shlex.split(camera), *options)
+        with open("r.png", "rb") as f:
+            expected = read_png(f.read())
+        numpy.testing.assert_array_equal(picture[..., :3], expected[..., :3])
+
+    def test_at_rest_the_picture_is_that_of_render(self):
+        picture, number, camera = self.whole_picture()
+        self.assertEqual(picture.shape[:2], (768, 1024))
+        self.do("resize 120 90")
+        picture, number, camera = self.whole_picture(number)
+        self.assertEqual(picture.shape[:2], (90, 120))
+        self.assert_rendered(picture, camera)
+        self.do("drag left 60 45 90 40 3")
+        turned, number, there = self.whole_picture(number)
+        self.assertNotEqual(there, camera)
+        self.assert_rendered(turned, there)
+        self.assertTrue((turned != picture).any())
+        status, _, _ = self.ask("/function", "POST", name="bone")
+        self.assertEqual(status, 204)
+        bone, number, _ = self.whole_picture(number)
+        self.assert_rendered(bone, there, "--tf", "bone")
+        self.assertTrue(self.status()["exact"])
+
+    def test_nothing_new_is_waited_for(self):
+        self.do("resize 40 30")
+        while not self.status()["exact"]:
+            time.sleep(0.01)
+        status, headers, _ = self.ask("/picture", after=0)
+        last = headers["X-Picture"]
+        self.assertEqual((status, headers["X-Whole"]), (200, "1"))
+        waiting = http.client.HTTPConnection(self.host, self.port, timeout=60)
+        waiting.request("GET", f"/picture?token={self.token}&after={last}")
+        self.do("wheel 2")
+        answer = waiting.getresponse()
+        self.assertEqual(answer.status, 200)
+        self.assertGreater(int(answer.headers["X-Picture"]), int(last))
+        answer.read()
+        waiting.close()
+
+    def test_the_page_needs_nothing_from_elsewhere(self):
+        status, headers, page = self.ask("/")
+        self.assertEqual(status, 200)
+        self.assertTrue(headers["Content-Type"].startswith("text/html"))
+        self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
+        self.assertNotIn(b"http", page.replace(b"<!doctype html>", b""))
+
+    def test_only_this_machine_with_the_token_is_answered(self):
+        for path in ("/", "/picture", "/status", "/nothing"):
+            for token in (None, "", "0" * 32, self.token[:-1], self.token.upper() + "x"):
+                self.assertEqual(self.ask(path, token=token)[0], 403, (path, token))
+        for host in ("evil.example", f"evil.example:{self.port}", f"127.0.0.1:{self.port + 1}"):
+            self.assertEqual(self.ask("/", headers={"Host": host})[0], 403)
+        self.assertEqual(self.ask("/", headers={"Host": f"localhost:{self.port}"})[0], 200)
+        listening = open("/proc/net/tcp", encoding="ascii").read().split("\n")[1:]
+        places = [l.split()[1] for l in listening if l and l.split()[3] == "0A"]
+        self.assertIn(f"0100007F:{self.port:04X}", places)
+        self.assertNotIn(f"00000000:{self.port:04X}", places)
+
+    def test_bad_requests_are_refused_and_the_server_goes_on(self):
+        before = set(os.listdir("."))
+        for body in (
+            "screenshot x.png", "picture x.png", "status x.json", "drop v.trip", "close", "wait",
+            "sleep 100000", "random 1000000 1", "type abc", "key q", "hold p", "resize 99999 10",
+            "resize 1 1", "nonsense", "move 1 nan", "move 0 0\n" * 1001, "\0", "move 1 1\nkey q",
+        ):
+            self.assertEqual(self.ask("/events", "POST", body)[0], 400, body)
+        self.assertIn(self.ask("/events", "POST", "move 1 1\n" * 20000)[0], (400, 413))
+        self.assertEqual(self.ask("/function", "POST", name="../../etc/passwd")[0], 400)
+        for after in ("", "x", "-1", "1e3", " 1"):
+            self.assertEqual(self.ask("/picture", after=after)[0], 400, after)
+        self.assertEqual(self.ask("/nothing")[0], 404)
+        self.assertEqual(self.ask("/", "DELETE")[0], 405)
+        for garbage in (b"\0\0\0\0\r\n\r\n", b"GET\r\n\r\n", b"A" * 100000 + b"\r\n\r\n"):
+            connection = http.client.HTTPConnection(self.host, self.port, timeout=60)
+            connection.connect()
+            try:
+                connection.sock.sendall(garbage)
+                connection.sock.settimeout(1)
+                connection.sock.recv(1000)
+            except OSError:
+                pass
+            connection.close()
+        self.assertEqual(self.ask("/")[0], 200)
+        self.assertEqual(set(os.listdir(".")), before)
+        self.assertIsNone(self.server.poll())
+
+    def test_an_interruption_is_its_end(self):
+        self.ask("/picture", after=0)
+        self.server.send_signal(signal.SIGINT)
+        self.assertEqual(self.server.wait(60), 0)
+
+    def test_what_cannot_be_served_is_said(self):
+        self.fails(1, "serve", "no.trip")
+        self.fails(2, "serve")
+        self.fails(2, "serve", "v.trip", "--port", "65536")
+        self.fails(1, "serve", "v.trip", "--tf", "no.tf")
+        self.fails(1, "serve", "v.trip", "--port", self.port, says="--port takes another")
+
+
+if __name__ == "__main__":
+    program.main()
