@@ -1,0 +1,269 @@
+/* Levels chosen by the width of their voxels: each place is drawn once, a body of one value looks
+ * the same at every level and where levels meet, and pictures do not depend on how it is cut up. */
+#include "scenes.h"
+
+#include "test.h"
+
+#include <string.h>
+
+#include "lod.h"
+#include "mean.h"
+
+enum { NX = 192, NY = 128, NZ = 64, SIZE_PX = 40, LEVELS = 3 };
+
+static bool all(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    (void)i;
+    (void)j;
+    (void)k;
+    *code = 65535;
+    return true;
+}
+
+/* Fog of one value, and its levels. */
+static void create(scene *s, unsigned tile, double opacity)
+{
+    const scene_part parts[LEVELS] = {
+        { .level = 1, .kind = TRIP_KIND_MEANS, .by = { 2, 2, 2 }, .voxel = all },
+        { .level = 2, .kind = TRIP_KIND_MEANS, .by = { 4, 4, 4 }, .voxel = all },
+        { .level = 3, .kind = TRIP_KIND_MEANS, .by = { 8, 8, 8 }, .voxel = all },
+    };
+    scene_create(s, &(scene_params){ .dims = { NX, NY, NZ },
+                                     .tile_voxels = tile,
+                                     .slab_sheets = 8,
+                                     .voxel = all,
+                                     .parts = parts,
+                                     .part_count = LEVELS });
+    scene_colour(s, 65535, 65535, 1, 0.5, 0.25, opacity);
+}
+
+static trip_settings settings_at(double px)
+{
+    trip_settings s = trip_settings_default();
+    s.background[3] = 0;
+    s.shading = false;
+    s.lod_px = px;
+    return s;
+}
+
+static const scene_renderer *renderer_named(const char *name)
+{
+    const scene_renderer *r = scene_renderers();
+    while (r->name && strcmp(r->name, name))
+        r++;
+    return r->name ? r : NULL;
+}
+
+/* ---- the choice ---- */
+
+static void levels_are_the_coarsest_that_are_narrow_enough(void **state)
+{
+    (void)state;
+    assert_int_equal(trip_lod_level(0.5, 1, 5), 1);
+    assert_int_equal(trip_lod_level(0.51, 1, 5), 0);
+    assert_int_equal(trip_lod_level(0.124, 1, 5), 3);
+    assert_int_equal(trip_lod_level(0.001, 1, 5), 5);
+    assert_int_equal(trip_lod_level(HUGE_VAL, 1000, 5), 0);
+}
+
+/* A voxel at distance d, seen under 2 atan(1/2) from top to bottom, is SIZE_PX / d pixels wide. */
+static void width_is_that_of_similar_triangles(void **state)
+{
+    (void)state;
+    trip_camera c;
+    const trip_affine unit = trip_affine_identity();
+    trip_camera_params view = { .eye = { 0, 0, 100 },
+                                .up = { 0, 1, 0 },
+                                .fov_degrees = 2 * atan(0.5) * 180 / M_PI,
+                                .width = SIZE_PX,
+                                .height = SIZE_PX };
+    assert_int_equal(trip_camera_make(&c, &view, &unit), 0);
+    double depth = trip_dot(c.forward, trip_sub(trip_v3(0, 0, 0), c.eye));
+    assert_float_equal(trip_lod_width_px(&c, depth), SIZE_PX / 100.0, 1e-9);
+    assert_float_equal(trip_lod_width_px(&c, 2 * depth), SIZE_PX / 200.0, 1e-9);
+    view.ortho_height = 80;
+    assert_int_equal(trip_camera_make(&c, &view, &unit), 0);
+    assert_float_equal(trip_lod_width_px(&c, depth), SIZE_PX / 80.0, 1e-9);
+}
+
+static trip_camera_params view_along(const scene *s)
+{
+    return scene_view(s, trip_v3(1, 0.3, 0.2), 260, 40, SIZE_PX);
+}
+
+/* Whatever list it is looked for in; by square and by itself. */
+static bool is_drawn(const trip_lod *lod, const trip_list *list, const int64_t voxel[3])
+{
+    int64_t sheet = voxel[list->axis] >> list->level;
+    int64_t u = voxel[(list->axis + 1) % 3] >> list->level;
+    int64_t v = voxel[(list->axis + 2) % 3] >> list->level;
+    unsigned number = (unsigned)trip_morton((uint32_t)(u & 7), (uint32_t)(v & 7));
+    bool drawn = trip_lod_has(lod, list, sheet, u, v);
+    assert_int_equal(trip_lod_square(lod, list, sheet, u & ~7, v & ~7) >> number & 1, drawn);
+    return drawn;
+}
+
+static void each_place_is_drawn_at_one_level(void **state)
+{
+    (void)state;
+    scene s;
+    trip_camera c;
+    trip_lod lod;
+    uint64_t counts[LEVELS + 1] = { 0 };
+    create(&s, 64, 0.01);
+    const trip_camera_params view = view_along(&s);
+    const trip_settings settings = settings_at(0.7);
+    assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_lod_make(&lod, s.data, &c, &settings, s.budget), 0);
+    assert_int_equal(lod.levels, LEVELS);
+    for (int64_t i = 0; i < (int64_t)NX * NY * NZ; i += 37) {
+        const int64_t voxel[3] = { i % NX, i / NX % NY, i / NX / NY };
+        int drawn[3] = { 0 };
+        for (unsigned l = 0; l < s.data->list_count; l++) {
+            const trip_list *list = &s.data->lists[l];
+            assert_true(trip_lod_concerns(&lod, list));
+            bool here = is_drawn(&lod, list, voxel);
+            drawn[list->axis] += here;
+            counts[list->level] += here;
+        }
+        assert_true(drawn[0] == 1 && drawn[1] == 1 && drawn[2] == 1);
+    }
+    assert_true((counts[0] > 0) + (counts[1] > 0) + (counts[2] > 0) + (counts[3] > 0) >= 2);
+    trip_lod_release(&lod, s.budget);
+    scene_destroy(&s);
+}
+
+/* ---- pictures ---- */
+
+/* Seen along z by parallel rays: 64 voxels of one extinction. */
+static void fog_is_as_thick_at_every_level(void **state)
+{
+    (void)state;
+    scene s;
+    create(&s, 64, 0.02);
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 300, 40, SIZE_PX);
+    view.ortho_height = 60; /* a voxel is 2/3 of a pixel wide */
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        for (double px = 0; px < 12; px = 2 * px + 0.7) { /* 0, 0.7, 2.1, 4.9: 0, 0, 1, 2 and 3 */
+            const trip_settings settings = settings_at(px);
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            float alpha = scene_pixel(&p, SIZE_PX / 2, SIZE_PX / 2)[3];
+            if (!(fabs((double)alpha - (1 - pow(0.98, NZ))) < 4e-3))
+                fail_msg("%s, %g px: %g", r->name, px, (double)alpha);
+            scene_picture_free(&p);
+        }
+    }
+    scene_destroy(&s);
+}
+
+/* Cells of several levels in one picture: the same as the finest alone but for a bound, which the
+ * wider kernels beyond a border need, and that does not grow with what is added up. */
+static void no_seam_shows_where_levels_meet(void **state)
+{
+    (void)state;
+    scene s;
+    create(&s, 64, 0.03);
+    const scene_renderer *cpu = renderer_named("cpu");
+    const trip_camera_params view = view_along(&s);
+    const trip_settings finest = settings_at(0), mixed = settings_at(0.7);
+    scene_picture a = scene_draw(&s, cpu, &view, &finest), b = scene_draw(&s, cpu, &view, &mixed);
+    assert_true(b.stats.all.splats_read < a.stats.all.splats_read / 2);
+    double most = 0, sum = 0;
+    int inside = 0;
+    for (int i = 0; i < SIZE_PX * SIZE_PX; i++) {
+        double off = fabs((double)a.rgba[4 * i + 3] - (double)b.rgba[4 * i + 3]);
+        if (a.rgba[4 * i + 3] < 0.5f)
+            continue;
+        most = fmax(most, off);
+        sum += off;
+        inside++;
+    }
+    assert_true(inside > 200);
+    if (!(most < 0.1 && sum / inside < 4e-3))
+        fail_msg("off by %g, by %g in the mean", most, sum / inside);
+    scene_picture_free(&a);
+    scene_picture_free(&b);
+    scene_destroy(&s);
+}
+
+static void renderers_agree_on_mixed_levels(void **state)
+{
+    (void)state;
+    scene s;
+    create(&s, 64, 0.03);
+    const trip_camera_params view = view_along(&s);
+    const trip_settings mixed = settings_at(2);
+    scene_picture expected = scene_draw(&s, renderer_named("reference"), &view, &mixed);
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        scene_picture p = scene_draw(&s, r, &view, &mixed);
+        double off = scene_difference(&expected, &p);
+        if (!(off <= r->tolerance))
+            fail_msg("%s: off by %g", r->name, off);
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&expected);
+    scene_destroy(&s);
+}
+
+static void tiles_make_no_difference(void **state)
+{
+    (void)state;
+    scene_picture p[2];
+    for (int i = 0; i < 2; i++) {
+        scene s;
+        create(&s, i ? 16 : 128, 0.03);
+        const trip_camera_params view = view_along(&s);
+        const trip_settings mixed = settings_at(0.7);
+        p[i] = scene_draw(&s, renderer_named("cpu"), &view, &mixed);
+        scene_destroy(&s);
+    }
+    assert_true(scene_difference(&p[0], &p[1]) == 0);
+    scene_picture_free(&p[0]);
+    scene_picture_free(&p[1]);
+}
+
+/* A code of means that covers a half shows a half, and where it is thin as much as was kept. */
+static void tables_of_means_have_their_opacity(void **state)
+{
+    (void)state;
+    scene s;
+    trip_camera c;
+    trip_plan plan;
+    create(&s, 64, 0.5);
+    const trip_camera_params view = view_along(&s);
+    const trip_settings settings = settings_at(100);
+    assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s.data, &c, &settings, s.table, s.budget), 0);
+    for (unsigned i = 0; i < s.data->list_count; i++) {
+        const trip_list *list = &s.data->lists[i];
+        double length = (double)(1u << list->level), k = -log(0.5);
+        if (!plan.lists[i].drawn)
+            continue;
+        assert_int_equal(plan.lists[i].own_table != NULL, list->level > 0);
+        if (list->level == 0)
+            continue;
+        unsigned code = trip_mean_pack(65535, 0.5, 0.75);
+        double depth = (double)plan.lists[i].table[code].extinction * length;
+        assert_float_equal(1 - exp(-depth), 0.5 * (1 - exp(-k * 0.75 * length)), 1e-6);
+        assert_float_equal(plan.lists[i].table[code].r, 1, 0);
+    }
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(levels_are_the_coarsest_that_are_narrow_enough),
+        cmocka_unit_test(width_is_that_of_similar_triangles),
+        cmocka_unit_test(each_place_is_drawn_at_one_level),
+        cmocka_unit_test(fog_is_as_thick_at_every_level),
+        cmocka_unit_test(no_seam_shows_where_levels_meet),
+        cmocka_unit_test(renderers_agree_on_mixed_levels),
+        cmocka_unit_test(tiles_make_no_difference),
+        cmocka_unit_test(tables_of_means_have_their_opacity),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
