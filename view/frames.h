@@ -1,9 +1,9 @@
 /* The thread that draws. It alone uses the library's context, of the one data set that is shown;
  * the window's thread says what it wants to see and takes what there is, and waits for neither.
  * What is wanted last counts: a frame under way is finished only where it is quick, so that motion
- * is seen, and given up otherwise. A frame of a view that just came is as small as it has to be for
- * its time; then the whole picture follows, which is that of `triptych render`, bit for bit.
- * Functions are for one thread, the window's, but for those of trip_frames_params. */
+ * is seen, and given up otherwise. A frame of a view that just came is as small and coarse as it
+ * has to be for its time; then the whole picture follows, which is that of `triptych render`, bit
+ * for bit. Functions are for one thread, the window's, but for those of trip_frames_params. */
 #ifndef TRIP_VIEW_FRAMES_H
 #define TRIP_VIEW_FRAMES_H
 
@@ -86,6 +86,7 @@ typedef struct trip_frames_status {
     char stage[16];             /* what goes on: "draw", "read", "merge", ...; "": nothing */
     double done;                /* of that, 0 to 1 */
     double scale;               /* of the last frame of a moving view */
+    double lod_px;              /* voxels that were so wide in it were drawn by coarse levels */
     double moving_ms;           /* it took */
     double whole_ms;            /* the last whole picture took */
     uint64_t frames;            /* whole or not, since the start */

@@ -50,10 +50,11 @@ struct trip_frames {
     triptych_settings settings; /* that the context has */
     float *rgba;                /* of this size: */
     int width, height;
-    uint8_t *shown; /* the picture's pixels */
-    trip_pace pace;
-    bool whole;      /* rgba is the whole picture of what is wanted */
-    double shown_ms; /* when a picture was last shown */
+    uint8_t *shown;             /* the picture's pixels */
+    trip_pace pace, whole_pace; /* of frames of moving views; of whole pictures */
+    double lod_px;              /* of moving views */
+    bool whole;                 /* rgba is the whole picture of what is wanted */
+    double shown_ms;            /* when a picture was last shown */
 };
 
 /* The drawing thread; `user` is the trip_frames. */

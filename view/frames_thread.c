@@ -20,6 +20,10 @@ static void wake(trip_frames *f)
     f->params.wake(f->params.wake_user);
 }
 
+/* Of moving views, in pixels of their frames: voxels no wider are drawn by coarse levels. */
+#define LOD_LEAST_PX 1.0
+#define LOD_MOST_PX 3.0
+
 /* ---- what there is to say ---- */
 
 static const char prefix[] = "triptych: ";
@@ -149,7 +153,8 @@ static void close_data(trip_frames *f)
     free(f->function);
     f->function = NULL;
     f->has_settings = f->open = f->announced = f->warm = f->other_function = false;
-    f->pace = (trip_pace){ 0 };
+    f->pace = f->whole_pace = (trip_pace){ 0 };
+    f->lod_px = LOD_LEAST_PX;
     pthread_mutex_lock(&f->lock);
     f->status.open = false;
     pthread_mutex_unlock(&f->lock);
@@ -208,12 +213,14 @@ static int use_function(trip_frames *f)
     return status;
 }
 
-static int use_settings(trip_frames *f)
+static int use_settings(trip_frames *f, double lod_px)
 {
+    triptych_settings wanted = f->now.settings;
     int status = 0;
-    if (!f->has_settings || memcmp(&f->settings, &f->now.settings, sizeof f->settings))
-        status = triptych_set_settings(f->t, &f->now.settings);
-    f->settings = f->now.settings;
+    wanted.lod_px = lod_px;
+    if (!f->has_settings || memcmp(&f->settings, &wanted, sizeof wanted))
+        status = triptych_set_settings(f->t, &wanted);
+    f->settings = wanted;
     f->has_settings = status == 0;
     return status;
 }
@@ -352,7 +359,8 @@ static void show(trip_frames *f, int width, int height, bool whole)
 
 typedef struct frame {
     int width, height;
-    bool whole; /* of the size that is wanted */
+    bool whole; /* of the size and detail that are wanted */
+    double lod_px;
     bool first; /* there is no picture of this view: parts of it are shown, and it is finished */
     double begun_ms;
 } frame;
@@ -409,7 +417,7 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
     triptych_frame_stats stats = { 0 };
     const double pixels = (double)d->width * d->height;
     if (f->warm)
-        trip_pace_note(&f->pace, pixels, ms);
+        trip_pace_note(d->whole ? &f->whole_pace : &f->pace, pixels, ms);
     f->warm = true;
     const bool counted = triptych_get_frame_stats(f->t, &stats) == 0;
     pthread_mutex_lock(&f->lock);
@@ -419,6 +427,7 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
         f->times[s->moving++ % TRIP_FRAMES_TIMES] = (float)ms;
         s->moving_ms = ms;
         s->scale = (double)d->width / f->now.width;
+        s->lod_px = d->lod_px;
     }
     if (d->whole)
         s->whole_ms = ms;
@@ -435,18 +444,21 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
     pthread_mutex_unlock(&f->lock);
 }
 
-static int draw(trip_frames *f, double scale, bool first)
+static int draw(trip_frames *f, double scale, double lod_px, bool first)
 {
     const trip_wanted *w = &f->now;
     frame d = { .width = (int)ceil(w->width * scale),
                 .height = (int)ceil(w->height * scale),
-                .whole = scale == 1,
+                .whole = scale == 1 && lod_px == w->settings.lod_px,
+                .lod_px = lod_px,
                 .first = first,
                 .begun_ms = now_ms() };
     const triptych_view view = trip_navigation_view(&w->navigation, d.width, d.height);
     f->shown_ms = first ? d.begun_ms : f->shown_ms;
     set_ends_early(f, !first);
-    int status = triptych_set_view(f->t, &view);
+    int status = use_settings(f, lod_px);
+    if (!status)
+        status = triptych_set_view(f->t, &view);
     if (!status)
         status = triptych_begin(f->t);
     if (!status && d.whole)
@@ -464,18 +476,34 @@ static int draw(trip_frames *f, double scale, bool first)
     return 0;
 }
 
-/* A picture at once, then the whole one; between them one of half the size where that is long in
- * coming. */
+/* A frame of a moving view: smaller first, then coarser, to keep to the time. */
+static int draw_moving(trip_frames *f, double pixels, double target_ms)
+{
+    const double scale = trip_pace_scale(&f->pace, pixels, target_ms), begun_ms = now_ms();
+    const int status = draw(f, scale, fmax(f->lod_px, f->now.settings.lod_px), true);
+    const double ms = now_ms() - begun_ms;
+    if (ms > 1.3 * target_ms && scale < 0.6)
+        f->lod_px = fmin(f->lod_px * 1.4, LOD_MOST_PX);
+    else if (ms < 0.7 * target_ms)
+        f->lod_px = fmax(f->lod_px / 1.4, LOD_LEAST_PX);
+    return status;
+}
+
+/* A picture at once, then the whole one; between them one of its size but coarser where that is
+ * long in coming. */
 static int draw_wanted(trip_frames *f)
 {
     enum { LONG_MS = 1500 };
+    const double lod_px = f->now.settings.lod_px, target_ms = 1000 / f->params.frames_per_second;
     const double pixels = (double)f->now.width * f->now.height;
-    const double scale = trip_pace_scale(&f->pace, pixels, 1000 / f->params.frames_per_second);
-    int status = draw(f, scale, true);
-    if (!status && scale < 0.3 && trip_pace_expect_ms(&f->pace, pixels) > LONG_MS && !has_newer(f))
-        status = draw(f, 0.5, false);
-    if (!status && scale < 1 && !has_newer(f))
-        status = draw(f, 1, false);
+    const double whole_ms = trip_pace_expect_ms(&f->whole_pace, pixels);
+    if (whole_ms > 0 && whole_ms < target_ms)
+        return draw(f, 1, lod_px, true);
+    int status = draw_moving(f, pixels, target_ms);
+    if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))
+        status = draw(f, 1, fmax(LOD_LEAST_PX, lod_px), false);
+    if (!status && !f->whole && !has_newer(f))
+        status = draw(f, 1, lod_px, false);
     return status;
 }
 
@@ -489,7 +517,7 @@ static int prepare(trip_frames *f)
     if (!status)
         status = take_pictures(f);
     if (!status)
-        status = use_settings(f);
+        status = use_settings(f, f->now.settings.lod_px);
     if (!status)
         status = use_function(f);
     if (!status && (!f->announced || !f->now.has_navigation || f->other_function))

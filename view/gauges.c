@@ -46,6 +46,7 @@ static void add_status(cJSON *root, const trip_frames_status *s)
     cJSON_AddNumberToObject(root, "frames", (double)s->frames);
     cJSON_AddNumberToObject(root, "whole_ms", s->whole_ms);
     cJSON_AddNumberToObject(root, "scale", s->scale);
+    cJSON_AddNumberToObject(root, "lod_px", s->lod_px);
     cJSON_AddNumberToObject(root, "splats", (double)s->stats.splats);
     cJSON_AddNumberToObject(root, "bytes_read", (double)s->stats.bytes_read);
     cJSON_AddNumberToObject(root, "bytes_cached", (double)s->stats.bytes_cached);

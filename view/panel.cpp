@@ -470,6 +470,7 @@ bool draw_quality(trip_panel *p, trip_document *d)
         changed |= choose(p, "Compositing", &s->compositing, sums, 2);
         changed |= slide(p, "Kernel radius", &s->kernel_radius, 1.5, 6, "%.2f voxels");
     }
+    changed |= slide(p, "Level of detail", &s->lod_px, 0, 8, "%.1f px");
     changed |= choose(p, "Method", &s->method, methods, 3);
     if (s->method == TRIPTYCH_MERGE)
         changed |= slide(p, "h", &s->h, 0, 0.99, "%.2f");
@@ -517,8 +518,8 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
                 bytes_text(static_cast<double>(f.bytes_read)).c_str(),
                 bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
                 static_cast<double>(f.splats) * 1e-6);
-    ImGui::Text("moving %.0f ms at 1/%.1f, whole %.0f ms", s.moving_ms,
-                s.scale > 0 ? 1 / s.scale : 1.0, s.whole_ms);
+    ImGui::Text("moving %.0f ms at 1/%.1f, detail of %.1f px; whole %.0f ms", s.moving_ms,
+                s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
     ImGui::PlotLines("##times", times, count, 0, "ms", 0, FLT_MAX,
                      ImVec2(-1, 40 * static_cast<float>(p->scale)));
     ImGui::TextWrapped("%s, %s; %s", s.renderer, s.device, s.engine);
@@ -666,7 +667,7 @@ void draw_keys(trip_viewer *v)
         { "q, escape", "quit" },
     };
     ImGui::SetNextWindowPos(
-        ImVec2(static_cast<float>(v->picture_width) / 2, static_cast<float>(v->height) / 2), 0,
+        ImVec2(static_cast<float>(v->width) / 2, static_cast<float>(v->height) / 2), 0,
         ImVec2(0.5f, 0.5f));
     ImGui::Begin("Keys", nullptr,
                  ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_AlwaysAutoResize |
