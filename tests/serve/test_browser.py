@@ -1,0 +1,148 @@
+"""The page of `triptych serve` in a browser without a window: Chromium, where there is one. It is
+driven by its protocol for developers, messages of JSON through a pair of pipes."""
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+import unittest
+
+import program
+
+
+class Browser:
+    """One page. Calls wait for their answers."""
+
+    def __init__(self, executable, folder):
+        to_browser, commands = os.pipe()
+        answers, from_browser = os.pipe()
+        words = [
+            *(executable, "--headless", "--no-sandbox", "--disable-gpu", "--window-size=400,300"),
+            *("--hide-scrollbars", f"--user-data-dir={folder}", "--remote-debugging-pipe"),
+            "about:blank",
+        ]
+        self.process = subprocess.Popen(
+            ["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh", *words],
+            pass_fds=(to_browser, from_browser),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(to_browser)
+        os.close(from_browser)
+        self.commands = os.fdopen(commands, "wb")
+        self.answers, self.rest, self.last, self.session = answers, b"", 0, None
+        pages = self.call("Target.getTargets")["targetInfos"]
+        page = next(p["targetId"] for p in pages if p["type"] == "page")
+        self.session = self.call("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+
+    def call(self, method, **parameters):
+        self.last += 1
+        message = {"id": self.last, "method": method, "params": parameters}
+        if self.session:
+            message["sessionId"] = self.session
+        self.commands.write(json.dumps(message).encode() + b"\0")
+        self.commands.flush()
+        while True:
+            while b"\0" not in self.rest:
+                data = os.read(self.answers, 1 << 20)
+                if not data:
+                    raise AssertionError("the browser has ended")
+                self.rest += data
+            line, _, self.rest = self.rest.partition(b"\0")
+            answer = json.loads(line)
+            if answer.get("id") == self.last:
+                if "error" in answer:
+                    raise AssertionError(answer["error"])
+                return answer["result"]
+
+    def value(self, expression):
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
+        return result["result"].get("value")
+
+    def close(self):
+        self.commands.close()
+        self.process.kill()
+        self.process.wait()
+        os.close(self.answers)
+
+
+class InBrowser(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        executable = shutil.which("chromium") or shutil.which("google-chrome")
+        if not executable:
+            raise unittest.SkipTest("Chromium is not installed")
+        program.write_nrrd("v.nhdr", program.noise((24, 28, 32)))
+        run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
+        assert run.returncode == 0, run.stderr
+        cls.server = program.start("serve", "v.trip", "--memory", "128M", "--threads", "2")
+        address = cls.server.stdout.readline().decode().strip()
+        cls.browser = Browser(executable, tempfile.mkdtemp(dir=cls.folder))
+        cls.browser.call("Page.navigate", url=address)
+
+    @classmethod
+    def tearDownClass(cls):
+        if hasattr(cls, "browser"):
+            cls.browser.close()
+        if hasattr(cls, "server"):
+            cls.server.kill()
+            cls.server.communicate()
+        super().tearDownClass()
+
+    def exact(self, than=None):
+        """The picture at rest, as the address of its bytes, another than that one."""
+        fits = "p.complete && p.naturalWidth === innerWidth && p.naturalHeight === innerHeight"
+        for _ in range(6000):
+            now = self.browser.value(
+                f"(p => document.body.dataset.whole === '1' && {fits} ? p.src : '')"
+                "(document.getElementById('picture'))"
+            )
+            if now and now != than:
+                return now
+            time.sleep(0.01)
+        raise AssertionError("no picture comes: " + str(self.browser.value(
+            "document.getElementById('state').textContent")))
+
+    def mouse(self, kind, x, y, **more):
+        self.browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+
+    def status(self):
+        return self.browser.call(
+            "Runtime.evaluate",
+            expression="fetch('/status?' + token).then(a => a.json())",
+            awaitPromise=True,
+            returnByValue=True,
+        )["result"]["value"]
+
+    def test_drags_wheels_keys_and_functions_change_the_picture(self):
+        before = self.exact()
+        cameras = [self.status()["camera"]]
+
+        def changed():
+            nonlocal before
+            before = self.exact(before)
+            cameras.append(self.status()["camera"])
+            self.assertNotEqual(cameras[-1], cameras[-2])
+
+        self.mouse("mousePressed", 200, 100, button="left", buttons=1, clickCount=1)
+        self.mouse("mouseMoved", 260, 120, button="left", buttons=1)
+        self.mouse("mouseReleased", 260, 120, button="left", clickCount=1)
+        changed()
+        self.mouse("mouseWheel", 200, 100, deltaX=0, deltaY=-200)
+        changed()
+        for kind in ("keyDown", "keyUp"):
+            self.browser.call("Input.dispatchKeyEvent", type=kind, key="f", code="KeyF", text="f")
+        changed()
+        self.browser.value(
+            "(s => { s.value = 'bone'; s.dispatchEvent(new Event('change')); })"
+            "(document.getElementById('function'))"
+        )
+        before = self.exact(before)
+        self.assertEqual(self.status()["camera"], cameras[-1])
+
+
+if __name__ == "__main__":
+    program.main()
