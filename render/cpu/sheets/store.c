@@ -157,29 +157,46 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 /* ---- from a run to voxels ---- */
 
-static int16_t biased(unsigned code)
-{
-    int c = (int)code - TRIP_CPU_CODE_BIAS;
-    return (int16_t)(c < TRIP_CPU_CODE_LEAST ? TRIP_CPU_CODE_LEAST : c);
-}
+/* Where a square's voxels lie in a block from its first, by Morton number. */
+#define PLACE(n)                                                                                   \
+    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_BLOCK_STRIDE +                  \
+     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
+#define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
+#define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
 
-static int16_t code_of(const unsigned char *codes, unsigned code_bytes, uint32_t i)
+static const uint16_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
+
+/* The codes of a square's records, biased; by copies, which compilers then know to be apart. */
+static void square_codes(const trip_cpu_walk *at, const trip_block *b, int16_t out[64])
 {
-    uint16_t code;
-    if (code_bytes == 1)
-        return biased(257u * codes[i]);
-    memcpy(&code, codes + 2 * (size_t)i, 2);
-    return biased(code);
+    unsigned char narrow[64];
+    uint16_t codes[64];
+    int16_t biased[64];
+    const uint32_t count = at->count;
+    if (b->code_bytes == 1) {
+        memcpy(narrow, b->codes + at->first, count);
+        for (uint32_t i = 0; i < count; i++)
+            codes[i] = (uint16_t)(257 * narrow[i]);
+    } else {
+        memcpy(codes, b->codes + 2 * (size_t)at->first, 2 * (size_t)count);
+    }
+    for (uint32_t i = 0; i < count; i++)
+        biased[i] = (int16_t)((codes[i] + (codes[i] == 0)) ^ TRIP_CPU_CODE_BIAS);
+    memcpy(out, biased, sizeof *out * count);
 }
 
 static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block *b)
 {
-    uint32_t record = at->first;
-    for (uint64_t rest = at->mask; rest; rest &= rest - 1) {
-        unsigned number = (unsigned)__builtin_ctzll(rest);
-        int u = trip_cpu_square_u(number), v = trip_cpu_square_v(number);
-        to[v * TRIP_CPU_BLOCK_STRIDE + u] = code_of(b->codes, b->code_bytes, record++);
+    int16_t codes[64];
+    const int16_t *next = codes;
+    square_codes(at, b, codes);
+    if (at->mask == UINT64_MAX) { /* two voxels in a row follow one another */
+        for (unsigned i = 0; i < 64; i += 2)
+            memcpy(to + places[i], codes + i, 2 * sizeof *codes);
+        return;
     }
+    for (uint64_t rest = at->mask; rest; rest &= rest - 1)
+        to[places[__builtin_ctzll(rest)]] = *next++;
 }
 
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
