@@ -75,6 +75,7 @@ static void show(trip_session *s, const trip_serve_params *p)
     v->settings = p->settings;
     v->function = p->function;
     v->opacity_scale = 1;
+    v->fresh = true; /* what a window showed, with its panel, is another thing */
     trip_viewer_resize(v, WIDTH, HEIGHT);
     trip_viewer_set_panel(v, false);
     trip_viewer_open(v, p->input);

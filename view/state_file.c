@@ -47,6 +47,7 @@ static const entry camera_entries[] = {
 
 static const entry setting_entries[] = {
     { "classify", SETTING(classify), WHOLE, 1, TRIPTYCH_PRE, TRIPTYCH_POST },
+    { "compositing", SETTING(compositing), WHOLE, 1, TRIPTYCH_BY_SPLAT, TRIPTYCH_BY_SHEET },
     { "slices", SETTING(slices), WHOLE, 1, 1, 16 },
     { "method", SETTING(method), WHOLE, 1, TRIPTYCH_MERGE, TRIPTYCH_AXIS },
     { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
@@ -55,6 +56,7 @@ static const entry setting_entries[] = {
     { "h", SETTING(h), NUMBERS, 1, 0, 0.999999 },
     { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
     { "background", SETTING(background), NUMBERS, 4, 0, 1 },
+    { "lod_px", SETTING(lod_px), NUMBERS, 1, 0, 1000 },
     { "samples", SETTING(samples), WHOLE, 1, 1, 64 },
 };
 

@@ -16,8 +16,8 @@ typedef struct trip_view_state {
     char *function; /* preset or file; NULL: the data set's own */
     char *text;     /* of a function, in its place; NULL: none */
     double opacity_scale;
-    /* Of these what a viewer changes: classification, slices, method, shading, light, h, kernel
-     * radius, background, samples. */
+    /* Of these what a viewer changes: classification, compositing, slices, method, shading, light,
+     * h, kernel radius, background, level of detail, samples. */
     triptych_settings settings;
     bool panel, box, axes, scale_bar; /* shown */
 } trip_view_state;

@@ -24,6 +24,8 @@ static trip_view_state unusual(void)
     s.opacity_scale = 2.5;
     s.settings.classify = TRIPTYCH_POST;
     s.settings.slices = 3;
+    s.settings.compositing = TRIPTYCH_BY_SHEET;
+    s.settings.lod_px = 1.5;
     s.settings.headlight = 0;
     s.settings.light[1] = -1.0 / 7;
     s.settings.background[2] = 0.2;
@@ -42,6 +44,8 @@ static void assert_same(const trip_view_state *a, const trip_view_state *b)
     assert_true(a->settings.background[2] == b->settings.background[2]);
     assert_int_equal(a->settings.classify, b->settings.classify);
     assert_int_equal(a->settings.slices, b->settings.slices);
+    assert_int_equal(a->settings.compositing, b->settings.compositing);
+    assert_true(a->settings.lod_px == b->settings.lod_px);
 }
 
 static int use_folder(void **state)
@@ -118,6 +122,8 @@ static void what_is_no_state_is_refused_whole(void **state)
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t\"2\"", "opacity_scale");
     assert_refused("\"slices\":\t3", "\"slices\":\t2.5", "slices");
     assert_refused("\"slices\":\t3", "\"slices\":\t17", "slices");
+    assert_refused("\"lod_px\":\t1.5", "\"lod_px\":\t-1", "lod_px");
+    assert_refused("\"compositing\":\t1", "\"compositing\":\t2", "compositing");
     assert_refused("\"fov_degrees\":\t30", "\"fov_degrees\":\t230", "fov_degrees");
     assert_refused("\"fov_degrees\":\t30", "\"fow\":\t30", "fov_degrees");
     assert_refused("5e+20", "1e999", "eye");
