@@ -87,6 +87,9 @@ static void print(const char *text)
     }
 }
 
+/* Around the outermost scope: what is reported there goes to stderr. */
+static _Thread_local trip_scope outside;
+
 /* Passes a line to the innermost scope that takes it. */
 static void emit(int status, const char *text)
 {
@@ -98,7 +101,7 @@ static void emit(int status, const char *text)
         return;
     }
     trip_scope *here =
-        trip_scope_enter(s->around); /* its functions report to the scope around it */
+        trip_scope_enter(s->around ? s->around : &outside); /* where its functions report to */
     if (s->failed && status != TRIP_OK)
         s->failed(s->user, status, text);
     else

@@ -243,6 +243,23 @@ static void a_cancelled_scope_reports_one_interruption(void **state)
     assert_one_report("triptych: render: frame: interrupted");
 }
 
+static void pass_on(const char *line, void *user)
+{
+    ++*(int *)user;
+    trip_report_line(line);
+}
+
+static void what_takes_lines_of_the_outermost_scope_may_report_itself(void **state)
+{
+    (void)state;
+    int lines = 0;
+    assert_null(trip_scope_current()->around);
+    trip_report_redirect(pass_on, &lines);
+    trip_warn("a", "b"); /* to stderr */
+    trip_report_redirect(NULL, NULL);
+    assert_int_equal(lines, 1);
+}
+
 typedef struct counter {
     trip_scope scope;
     int count, foreign;
@@ -316,6 +333,7 @@ int main(void)
         cmocka_unit_test(a_held_failure_is_reported_where_it_is_given_back),
         cmocka_unit_test(cancelling_ends_a_scope_and_those_in_it),
         cmocka_unit_test(a_cancelled_scope_reports_one_interruption),
+        cmocka_unit_test(what_takes_lines_of_the_outermost_scope_may_report_itself),
         cmocka_unit_test(threads_in_different_scopes_do_not_meet),
         cmocka_unit_test(second_signal_ends_the_process),
     };
