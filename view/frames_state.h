@@ -42,6 +42,7 @@ struct trip_frames {
     uint64_t taken;  /* asked when that was wanted; of what was worked on last: */
     uint64_t served;
     bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
+    bool frugal;                /* no pages are kept between frames of it */
     unsigned document;
     const char *source;  /* that was found for what is named; NULL: nothing is held */
     char *function;      /* that the context has, as a key */

@@ -162,6 +162,7 @@ static void close_data(trip_frames *f)
 
 static int open_data(trip_frames *f)
 {
+    f->frugal &= f->document == f->now.document;
     const trip_frames_params *p = &f->params;
     const trip_wanted *w = &f->now;
     int status = 0;
@@ -182,7 +183,7 @@ static int open_data(trip_frames *f)
                                                       .threads = p->threads,
                                                       .renderer = p->renderer,
                                                       .engine = p->engine,
-                                                      .keep_pages = 1,
+                                                      .keep_pages = !f->frugal,
                                                       .name = w->input });
     f->open = status == 0;
     return status;
@@ -525,10 +526,21 @@ static int prepare(trip_frames *f)
     return status;
 }
 
-static int serve_wanted(trip_frames *f)
+static int serve_once(trip_frames *f)
 {
     int status = prepare(f);
     return status ? status : draw_wanted(f);
+}
+
+/* Where the memory does not suffice for pictures and for pages kept between them, none are kept. */
+static int serve_wanted(trip_frames *f)
+{
+    int status = serve_once(f);
+    if (status != TRIPTYCH_ERROR || !f->open || f->frugal || has_newer(f))
+        return status;
+    close_data(f);
+    f->frugal = true;
+    return serve_once(f);
 }
 
 /* Writes the picture that is there, as `triptych render` would. */

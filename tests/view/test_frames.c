@@ -13,7 +13,7 @@
 #include "frames.h"
 #include "triptych_brick.h"
 
-enum { SIDE = 20, WIDTH = 60, HEIGHT = 40 };
+enum { SIDE = 20, WIDTH = 60, HEIGHT = 40, LARGE = 200 };
 
 static char folder[] = "/tmp/trip-frames-XXXXXX";
 static char data[64], other[64];
@@ -121,6 +121,24 @@ static copy take(trip_frames *f)
     return c;
 }
 
+/* Whether the library draws a large picture with this memory, keeping nothing for the next. */
+static bool suffices(uint64_t memory_bytes)
+{
+    triptych *t;
+    float *rgba, *other_pixels;
+    const triptych_resources resources = { .memory_bytes = memory_bytes,
+                                           .threads = 2,
+                                           .renderer = TRIPTYCH_RENDERER_CPU };
+    const triptych_view view = { .width = LARGE, .height = LARGE };
+    assert_int_equal(triptych_create(&t), 0);
+    const bool drawn = triptych_open(t, data, &resources) == 0 &&
+                       triptych_new_picture(t, LARGE, LARGE, 1, &other_pixels) == 0 &&
+                       triptych_new_picture(t, LARGE, LARGE, 4, &rgba) == 0 &&
+                       triptych_set_view(t, &view) == 0 && triptych_draw(t, rgba) == 0;
+    triptych_destroy(t);
+    return drawn;
+}
+
 static void assert_drawn_alike(const copy *c, const char *path, const trip_wanted *w)
 {
     triptych *t;
@@ -210,6 +228,30 @@ static void failures_are_said_and_do_not_last(void **state)
     trip_frames_stop(f);
 }
 
+/* What is kept between frames gives way to the picture. */
+static void the_least_memory_for_a_picture_is_enough(void **state)
+{
+    (void)state;
+    uint64_t bytes = 1 << 20;
+    while (!suffices(bytes))
+        bytes += bytes / 16;
+    const trip_frames_params params = { .memory_bytes = bytes,
+                                        .threads = 2,
+                                        .renderer = TRIPTYCH_RENDERER_CPU,
+                                        .frames_per_second = 30,
+                                        .wake = wake };
+    trip_frames *f = trip_frames_start(&params);
+    assert_non_null(f);
+    trip_wanted w = wanted_of(1, data);
+    w.width = w.height = LARGE;
+    trip_frames_want(f, &w);
+    const trip_frames_status s = await(f, 1);
+    if (!s.exact)
+        print_message("%s\n", s.message);
+    assert_true(s.exact);
+    trip_frames_stop(f);
+}
+
 static void other_sizes_and_data_sets_take_turns(void **state)
 {
     (void)state;
@@ -263,6 +305,7 @@ int main(void)
         cmocka_unit_test(at_rest_it_is_the_librarys_picture),
         cmocka_unit_test(of_many_wishes_the_last_is_fulfilled),
         cmocka_unit_test(failures_are_said_and_do_not_last),
+        cmocka_unit_test(the_least_memory_for_a_picture_is_enough),
         cmocka_unit_test(other_sizes_and_data_sets_take_turns),
         cmocka_unit_test(it_stops_whatever_goes_on),
         cmocka_unit_test(a_place_of_the_picture_is_looked_at),
