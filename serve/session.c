@@ -154,7 +154,7 @@ void trip_session_tick(trip_session *s, double seconds)
 /* Of those that a script can have. */
 static bool is_allowed(const trip_event *e)
 {
-    bool writes = e->kind == TRIP_EVENT_KEY && (e->code == 'p' || e->code == 'q' || e->code == 'c');
+    bool writes = e->kind == TRIP_EVENT_KEY && e->code < 128 && strchr("pqcm", e->code);
     bool size = e->kind == TRIP_EVENT_RESIZE &&
                 (e->x < LEAST_SIDE || e->x > MOST_SIDE || e->y < LEAST_SIDE || e->y > MOST_SIDE);
     return e->kind <= TRIP_EVENT_RESIZE && e->kind != TRIP_EVENT_TEXT && !writes && !size;

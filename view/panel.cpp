@@ -661,6 +661,7 @@ void draw_keys(trip_viewer *v)
         { "b", "box" },
         { "p", "write the picture" },
         { "c", "copy the camera as options" },
+        { "m", "mark the view as key of a path" },
         { "t", "panel" },
         { "tab", "next data set" },
         { "F1, ?", "these keys" },

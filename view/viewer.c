@@ -30,6 +30,8 @@ static void free_document(trip_document *d)
     free(d->source);
     free(d->function);
     trip_function_editor_destroy(d->editor);
+    trip_camera_path_release(&d->path);
+    free(d->path_file);
     free(d);
 }
 
@@ -390,20 +392,71 @@ static void name_of(const char *input, char name[256])
         *dot = 0;
 }
 
-void trip_viewer_take_picture(trip_viewer *v)
+/* NAME, a number and the ending, of a file that is not there yet. */
+static void new_name(const trip_document *d, const char *ending, char path[300])
 {
-    const trip_document *d = trip_viewer_document(v);
-    char name[256], path[300];
-    if (!d)
-        return;
+    char name[256];
     name_of(d->input, name);
     for (int i = 1; i < 10000; i++) {
-        snprintf(path, sizeof path, "%s-%03d.png", name, i);
+        snprintf(path, 300, "%s-%03d%s", name, i, ending);
         if (access(path, F_OK))
             break;
     }
+}
+
+void trip_viewer_take_picture(trip_viewer *v)
+{
+    const trip_document *d = trip_viewer_document(v);
+    char path[300];
+    if (!d)
+        return;
+    new_name(d, ".png", path);
     trip_frames_save(v->frames, path);
     trip_viewer_say(v, "the picture is written when it is whole");
+}
+
+/* Keys are so far apart; the file can be edited. */
+#define SECONDS_BETWEEN_KEYS 2
+
+static int add_key(trip_document *d)
+{
+    trip_camera_path *p = &d->path;
+    char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    int status =
+        trip_camera_path_add(p, SECONDS_BETWEEN_KEYS * (double)p->count, &d->navigation, text);
+    if (!status && !text && d->function)
+        p->keys[p->count - 1].function = strdup(d->function);
+    free(text);
+    return status;
+}
+
+static int save_path(trip_document *d)
+{
+    char path[300];
+    if (!d->path_file) {
+        new_name(d, ".json", path);
+        d->path_file = strdup(path);
+    }
+    return d->path_file ? trip_camera_path_save(&d->path, d->path_file) : -1;
+}
+
+void trip_viewer_mark(trip_viewer *v)
+{
+    trip_document *d = navigable(v);
+    char text[400];
+    if (!d)
+        return;
+    const trip_navigation *first = d->path.count ? &d->path.keys[0].camera : &d->navigation;
+    if ((first->ortho_height > 0) != (d->navigation.ortho_height > 0)) {
+        trip_viewer_say(v, "the keys of a path are all parallel or all in perspective");
+        return;
+    }
+    if (add_key(d) || save_path(d)) {
+        trip_viewer_say(v, "the path cannot be written");
+        return;
+    }
+    snprintf(text, sizeof text, "key %zu of %s", d->path.count, d->path_file);
+    trip_viewer_say(v, text);
 }
 
 char *trip_viewer_camera_options(trip_viewer *v)
@@ -493,6 +546,9 @@ static void press(trip_viewer *v, int key)
         break;
     case 'c':
         trip_viewer_copy_camera(v);
+        break;
+    case 'm':
+        trip_viewer_mark(v);
         break;
     case 'b':
         v->box = !v->box;

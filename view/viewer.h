@@ -3,6 +3,7 @@
 #ifndef TRIP_VIEW_VIEWER_H
 #define TRIP_VIEW_VIEWER_H
 
+#include "camera_path.h"
 #include "event.h"
 #include "frames.h"
 #include "function_editor.h"
@@ -28,6 +29,8 @@ typedef struct trip_document {
     uint64_t revision; /* of the editor, that is wanted */
     double opacity_scale;
     triptych_settings settings;
+    trip_camera_path path; /* of the views that were marked, */
+    char *path_file;       /* in this file; NULL: none was */
 } trip_document;
 
 enum { TRIP_DOCUMENTS = 64 };
@@ -100,6 +103,9 @@ void trip_viewer_fit(trip_viewer *v);
 /* Writes the whole picture into the folder it was started in, under a name of its own. */
 void trip_viewer_take_picture(trip_viewer *v);
 void trip_viewer_copy_camera(trip_viewer *v);
+/* The present view and function become the next key of a path of the camera, for
+ * `triptych render --path`, which is written into a file of its own in the same folder. */
+void trip_viewer_mark(trip_viewer *v);
 /* A preset or file; NULL: the data set's own. */
 void trip_viewer_set_function(trip_viewer *v, const char *function);
 /* The camera as options of `triptych render`, for free(); NULL: there is none. */

@@ -175,7 +175,7 @@ class Serve(program.ProgramTest):
         before = set(os.listdir("."))
         for body in (
             "screenshot x.png", "picture x.png", "status x.json", "drop v.trip", "close", "wait",
-            "sleep 100000", "random 1000000 1", "type abc", "key q", "hold p", "resize 99999 10",
+            "sleep 100000", "random 1000000 1", "type abc", "key q", "hold p", "key m", "key c", "resize 99999 10",
             "resize 1 1", "nonsense", "move 1 nan", "move 0 0\n" * 1001, "\0", "move 1 1\nkey q",
         ):
             self.assertEqual(self.ask("/events", "POST", body)[0], 400, body)

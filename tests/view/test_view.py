@@ -98,6 +98,22 @@ class View(program.ProgramTest):
             with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
                 self.assertEqual(seen.read(), drawn.read())
 
+    def test_marked_views_are_the_keys_of_a_path(self):
+        if os.path.exists("noise-001.json"):
+            os.remove("noise-001.json")
+        self.view("wait\npicture first.exr\nwait\nkey m\ndrag left 100 100 160 130 5\nkey m\n"
+                  "wait\npicture last.exr\n", "noise.trip", "--tf=bone")
+        with open("noise-001.json") as f:
+            path = json.load(f)
+        self.assertEqual([k["seconds"] for k in path["keys"]], [0, 2])
+        with open("path.json", "w") as f:
+            json.dump(path | {"frames_per_second": 0.5}, f)
+        self.works("render", "noise.trip", "--path=path.json", f"--size={WIDTH - PANEL}x{HEIGHT}",
+                   "--background=0,0,0", "-o", "flown.exr")
+        for frame, seen in ("000", "first"), ("001", "last"):
+            with open(f"flown-{frame}.exr", "rb") as a, open(f"{seen}.exr", "rb") as b:
+                self.assertEqual(a.read(), b.read())
+
     def test_the_window_shows_that_picture(self):
         seen, shown = self.pictures("wait\nscreenshot shown.exr\npicture seen.exr\n",
                                     ["seen", "shown"], "noise.trip")
