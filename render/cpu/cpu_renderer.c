@@ -128,6 +128,50 @@ static int fit_lists(trip_cpu *r)
                      "%u lists do not fit the memory given; raise --memory", wanted);
 }
 
+/* An eighth of the memory given goes to the two buffers of splats. */
+static uint32_t buffer_capacity(const trip_budget *budget)
+{
+    uint64_t each = trip_budget_limit_bytes(budget) / 16 / 100; /* bytes a splat, roughly */
+    return each < MIN_SPLATS ? MIN_SPLATS : each > MAX_SPLATS ? MAX_SPLATS : (uint32_t)each;
+}
+
+static void release_buffers(trip_cpu *r)
+{
+    for (int i = 0; i < 2; i++) {
+        trip_cpu_buffer_destroy(&r->buffers[i], r->budget);
+        r->buffers[i] = (trip_cpu_buffer){ 0 };
+    }
+    r->filling = NULL;
+}
+
+static int create_buffers(trip_cpu *r)
+{
+    int status = 0;
+    for (int i = 0; i < 2 && !status; i++)
+        status = trip_cpu_buffer_create(&r->buffers[i], buffer_capacity(r->budget), r->budget);
+    r->filling = &r->buffers[0];
+    return status;
+}
+
+/* Ends with empty buffers of splats for the frame's tiles, or without any where it has no splats.
+ */
+static int fit_buffers(trip_cpu *r)
+{
+    if (classifies_post(r)) {
+        release_buffers(r);
+        return 0;
+    }
+    int status = r->buffers[1].splats ? 0 : create_buffers(r);
+    for (int i = 0; i < 2 && !status; i++)
+        status = trip_cpu_buffer_fit(&r->buffers[i], trip_cpu_tile_count(r),
+                                     r->channels > TRIP_CHANNEL_DEPTH, r->budget);
+    if (status)
+        release_buffers(r);
+    else
+        trip_cpu_buffer_empty(r->filling);
+    return status;
+}
+
 static int begin_sheets(trip_cpu *r)
 {
     int status = r->sheets ? 0 : trip_cpu_sheets_create(&r->sheets, r);
@@ -141,13 +185,16 @@ static int begin_sheets(trip_cpu *r)
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     trip_cpu *r = (trip_cpu *)base;
-    trip_cpu_buffer_empty(r->filling);
     r->in_layer = false;
     r->frame = frame;
     r->kernels = frame->settings->depth ? r->isa->with_depth : r->isa;
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
+    if (classifies_post(r))
+        release_buffers(r);
     int status = trip_cpu_fit_tiles(r, frame->camera->width, frame->camera->height);
+    if (!status)
+        status = fit_buffers(r);
     if (!status)
         status = fit_lists(r);
     if (!status && frame->count)
@@ -193,8 +240,7 @@ static void destroy(trip_renderer *base)
     trip_cpu_pool_destroy(r->pool);
     trip_cpu_release_tiles(r);
     release_lists(r);
-    for (int i = 0; i < 2; i++)
-        trip_cpu_buffer_destroy(&r->buffers[i], budget);
+    release_buffers(r);
     trip_budget_release(budget, r->workers, r->workers_bytes);
     trip_budget_release(budget, r->visible, TRIP_CPU_COUNT_TABLE_BYTES);
     trip_budget_release(budget, r, sizeof *r);
@@ -228,13 +274,6 @@ bool trip_cpu_occluded(void *renderer, const trip_selection *selection, uint32_t
 
 /* ---- creation ---- */
 
-/* An eighth of the memory given goes to the two buffers of splats. */
-static uint32_t buffer_capacity(const trip_budget *budget)
-{
-    uint64_t each = trip_budget_limit_bytes(budget) / 16 / 100; /* bytes a splat, roughly */
-    return each < MIN_SPLATS ? MIN_SPLATS : each > MAX_SPLATS ? MAX_SPLATS : (uint32_t)each;
-}
-
 static int create_parts(trip_cpu *r, unsigned threads)
 {
     int status = trip_cpu_pool_create(&r->pool, threads);
@@ -249,9 +288,7 @@ static int create_parts(trip_cpu *r, unsigned threads)
                          "the memory given does not suffice for %u threads; raise --memory",
                          threads);
     }
-    for (int i = 0; i < 2 && !status; i++)
-        status = trip_cpu_buffer_create(&r->buffers[i], buffer_capacity(r->budget), r->budget);
-    r->filling = &r->buffers[0];
+    status = create_buffers(r);
     snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->isa->isa, threads,
              threads == 1 ? "" : "s");
     return status;

@@ -85,6 +85,13 @@ typedef struct trip_cpu {
     trip_cpu_job project_job, blend_job, tile_job;
 } trip_cpu;
 
+/* What --memory has to be, in MiB, for so many bytes besides what is taken. */
+static inline unsigned long long trip_cpu_memory_mib(const trip_budget *budget, uint64_t bytes)
+{
+    uint64_t left = trip_budget_left_bytes(budget);
+    return ((trip_budget_limit_bytes(budget) - left + bytes) >> 20) + 1;
+}
+
 static inline uint32_t trip_cpu_tile_count(const trip_cpu *r)
 {
     return r->mask.grid.across * r->mask.grid.down;

@@ -60,19 +60,13 @@ int trip_cpu_fit_tiles(trip_cpu *r, int width, int height)
     if (!memory) {
         r->mask.grid = (trip_cpu_grid){ 0, 0 };
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                         "%zu bytes of pixels do not fit the memory given; raise --memory or draw "
-                         "a smaller image",
-                         bytes);
+                         "%zu bytes of pixels do not fit the memory given; raise --memory to more "
+                         "than %llu MiB or draw a smaller image",
+                         bytes, trip_cpu_memory_mib(r->budget, bytes));
     }
     lay_out(r, memory);
     r->tiles_bytes = bytes;
-    int status = 0;
-    for (int i = 0; i < 2 && !status; i++)
-        status = trip_cpu_buffer_fit(&r->buffers[i], trip_cpu_tile_count(r),
-                                     r->channels > TRIP_CHANNEL_DEPTH, r->budget);
-    if (status)
-        trip_cpu_release_tiles(r);
-    return status;
+    return 0;
 }
 
 /* ---- frames and layers ---- */
@@ -185,7 +179,7 @@ static void make_portions(trip_cpu *r, const trip_cpu_buffer *f)
 void trip_cpu_blend_filled(trip_cpu *r)
 {
     trip_cpu_buffer *full = r->filling;
-    if (full->chunk_count == 0)
+    if (!full || full->chunk_count == 0)
         return;
     trip_cpu_link_tile_lists(full, &r->mask);
     trip_cpu_pool_wait(r->pool, &r->blend_job);

@@ -205,6 +205,51 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
     scene_destroy(&s);
 }
 
+enum { WIDE_I = 640, WIDE_J = 320, WIDE_K = TEST_BY_TURNS ? 6 : 12 };
+
+static bool wide(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)(65535 * wave(i / 3, j / 2, k));
+    return true;
+}
+
+/* Three decoded sheets of the wide grid, 8 bytes a voxel, and a slice between them would take more
+ * than there is: the picture, buffers and table need that already. */
+static void grids_too_wide_for_the_memory_are_drawn_in_windows(void **state)
+{
+    (void)state;
+    enum { LITTLE = 9 << 20, SHEETS = 4 * 8 * WIDE_I * WIDE_J };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { WIDE_I, WIDE_J, WIDE_K },
+                                      .tile_voxels = 128,
+                                      .slab_sheets = 4,
+                                      .voxel = wide });
+    scene_colour(&s, 33000, 55000, 0.2, 0.5, 1, 0.1);
+    scene_colour(&s, 57000, 65535, 1, 1, 0.6, 0.4);
+    const trip_camera_params views[3] = { scene_view(&s, trip_v3(0.6, 0.3, 1), 700, 50, PIXELS),
+                                          scene_view(&s, trip_v3(0.2, 0.1, 1), 4.3, 120, PIXELS),
+                                          scene_view(&s, trip_v3(0.9, -0.7, 1), 700, 50, PIXELS) };
+    for (int i = 0; i < 3; i++) {
+        trip_settings settings = post(2);
+        trip_camera_params view = views[i];
+        view.ortho_height = i == 2 ? 300 : 0;
+        settings.h = i == 1 ? 0 : settings.h;
+        size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
+        float *much = malloc(bytes), *little = malloc(bytes);
+        assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, much), 0);
+        assert_int_equal(draw_within(&s, LITTLE, &settings, &view, little), 0);
+        const scene_picture p = { .width = view.width, .height = view.height, .rgba = much };
+        assert_shows(&p);
+        assert_memory_equal(much, little, bytes);
+        free(much);
+        free(little);
+    }
+    static_assert((int)SHEETS > (int)LITTLE - (4 << 20), "decoded whole it would fit");
+    scene_destroy(&s);
+}
+
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -422,6 +467,7 @@ int main(void)
         cmocka_unit_test(any_number_of_threads_draws_the_same),
         cmocka_unit_test(any_tile_of_the_data_and_any_batch_draw_the_same),
         cmocka_unit_test(any_memory_draws_the_same_or_says_that_it_is_too_little),
+        cmocka_unit_test(grids_too_wide_for_the_memory_are_drawn_in_windows),
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
     };

@@ -834,6 +834,19 @@ static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, un
     set_light(view, l);
 }
 
+/* The rays whose cell at the first slice is in the group's window. */
+INLINE vm in_window(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l)
+{
+    corners c = corners_at(path, l, 0);
+    vm in = l->along;
+    for (int a = 0; a < 2; a++) {
+        vf at = v_from_int(c.whole[a] + path->base[a][0]);
+        in = vm_and(in, v_ge(at, v_set((float)g->lo[a])));
+        in = vm_and(in, v_gt(v_set((float)g->hi[a]), at));
+    }
+    return in;
+}
+
 static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const tile_path *path, const patch_path *area, const stamp_rays *l,
                        float *stamp)
@@ -876,6 +889,8 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             continue;
         stamp_rays l;
         find_rays(view, path, number, &l);
+        if (g->windowed)
+            l.along = in_window(g, path, &l);
         if (vm_any(l.along))
             draw_stamp(view, g, path, &area, &l, stamp);
     }

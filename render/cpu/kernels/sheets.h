@@ -83,6 +83,10 @@ typedef struct trip_cpu_group {
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
     const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];
     const uint64_t *some; /* squares visible in any segment */
+    /* Only rays whose cell at the first slice is in [lo, hi) are drawn; voxels, as positions are.
+     */
+    bool windowed;
+    int32_t lo[2], hi[2];
 } trip_cpu_group;
 
 /* Constants of a pass over the sheets of a list. Vectors are by the list's own axes: u, v, sheet.

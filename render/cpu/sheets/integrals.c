@@ -7,6 +7,11 @@ enum { CODES = 65536 };
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
 
+uint64_t trip_cpu_function_bytes(void)
+{
+    return CODES * (sizeof(int32_t[4]) * 2 + sizeof(uint32_t));
+}
+
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
 {
     trip_cpu_integrals *in = &f->integrals;

@@ -14,6 +14,8 @@ typedef struct trip_cpu_function {
     uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
 } trip_cpu_function;
 
+/* What it takes. */
+uint64_t trip_cpu_function_bytes(void);
 /* Memory from the budget; false where it does not suffice. */
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget);
 void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);

@@ -52,12 +52,17 @@ static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
     }
 }
 
+double trip_cpu_pass_steepest(const trip_settings *s)
+{
+    double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
+    return h * STEEPEST > 1 ? 1 / h : STEEPEST;
+}
+
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
                              bool descending, const trip_cpu_integrals *integrals)
 {
     const trip_camera *c = frame->camera;
     const trip_settings *s = frame->settings;
-    double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
     *view = (trip_cpu_sheet_view){
         .of = frame,
         .integrals = integrals,
@@ -66,7 +71,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         .shading = s->shading,
         .headlight = s->headlight,
         .direction = descending ? -1 : 1,
-        .steepest = h * STEEPEST > 1 ? 1 / h : STEEPEST,
+        .steepest = trip_cpu_pass_steepest(s),
     };
     by_list(view, c->eye, view->eye);
     by_list(view, c->r0, view->r0);

@@ -5,40 +5,32 @@
 
 #include "cpu/occlusion.h"
 #include "cpu/sheets/pass_view.h"
-#include "cpu/sheets/store.h"
+#include "cpu/sheets/state.h"
 #include "cpu/tiles.h"
 #include "report.h"
 
-/* Sheets that are drawn at a time, at most; and runs decoded at a time. */
-enum { GROUP_SHEETS = TRIP_CPU_SHEETS_MAX - 4, RUNS_MAX = 256 };
-
-struct trip_cpu_sheets {
-    trip_cpu *of;
-    trip_cpu_store store;
-    trip_cpu_function function;
-    trip_cpu_group group;
-    trip_cpu_sheet_view view;
-    int axis;
-    const trip_pass *pass; /* being drawn; NULL: none */
-    int64_t way;           /* from one sheet to the next: 1 or -1 */
-    /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[0] all
-     * is drawn. */
-    int held[TRIP_CPU_SHEETS_MAX];
-    int count;
-    const trip_batch *batch;
-    const trip_run *runs[RUNS_MAX]; /* to be decoded, of the last sheet */
-    unsigned run_count;
-};
+/* Of the memory that is left, what the frame goes on with besides. */
+enum { LEFT_OVER = 4, LEFT_OVER_OF_WINDOWS = 16 };
 
 static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
 {
     return &s->store.sheets[s->held[i]];
 }
 
-static int no_memory(void)
+/* For the function's integrals. */
+static int no_memory(const trip_budget *budget)
 {
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                     "three sheets and a slice do not fit the memory given; raise --memory");
+                     "the transfer function's integrals do not fit the memory given; raise "
+                     "--memory to more than %llu MiB",
+                     trip_cpu_memory_mib(budget, trip_cpu_function_bytes()));
+}
+
+/* What is set aside holds all that the index says. */
+static int too_many_voxels(void)
+{
+    return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                     "sheets have more voxels than the index says");
 }
 
 /* ---- creation, frames ---- */
@@ -48,14 +40,14 @@ int trip_cpu_sheets_create(trip_cpu_sheets **out, const trip_cpu *r)
     trip_cpu_sheets *s = trip_budget_take(r->budget, sizeof *s);
     *out = s;
     if (!s)
-        return no_memory();
+        return no_memory(r->budget);
     s->store.budget = r->budget;
     s->store.pool = r->pool;
     if (trip_cpu_function_create(&s->function, r->budget))
         return 0;
     trip_cpu_sheets_destroy(s);
     *out = NULL;
-    return no_memory();
+    return no_memory(r->budget);
 }
 
 void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
@@ -64,6 +56,7 @@ void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
         return;
     trip_budget *budget = s->store.budget;
     trip_cpu_store_release(&s->store);
+    trip_cpu_windows_release(&s->windows, budget);
     trip_cpu_function_destroy(&s->function, budget);
     trip_budget_release(budget, s, sizeof *s);
 }
@@ -81,13 +74,8 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
 
 /* ---- layers and passes ---- */
 
-/* Blocks along u and v, inclusive. */
-typedef struct block_bounds {
-    int64_t first[2], last[2];
-    bool some;
-} block_bounds;
-
-static void add_bricks(block_bounds *b, const trip_selection *selection)
+/* Begins empty: first > last. */
+static void add_bricks(trip_cpu_blocks *b, const trip_selection *selection)
 {
     unsigned tile_log2 = selection->data->header.tile_log2;
     for (uint64_t i = 0; i < selection->list->brick_count; i++) {
@@ -95,27 +83,83 @@ static void add_bricks(block_bounds *b, const trip_selection *selection)
         const int64_t tile[2] = { brick->tile_u, brick->tile_v };
         if (!trip_selection_has(selection, i))
             continue;
+        bool some = b->first[0] <= b->last[0];
         for (int a = 0; a < 2; a++) {
             int64_t from = tile[a] << tile_log2 >> TRIP_CPU_BLOCK_LOG2;
             int64_t to = (((tile[a] + 1) << tile_log2) - 1) >> TRIP_CPU_BLOCK_LOG2;
-            b->first[a] = !b->some || from < b->first[a] ? from : b->first[a];
-            b->last[a] = !b->some || to > b->last[a] ? to : b->last[a];
+            b->first[a] = !some || from < b->first[a] ? from : b->first[a];
+            b->last[a] = !some || to > b->last[a] ? to : b->last[a];
         }
-        b->some = true;
     }
+}
+
+static trip_cpu_blocks blocks_of_layer(const trip_plan_layer *layer)
+{
+    trip_cpu_blocks all = { .first = { 1, 1 } };
+    for (int i = 0; i < layer->pass_count; i++)
+        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++)
+            add_bricks(&all, &layer->passes[i].pass.selections[k]);
+    return all.first[0] <= all.last[0] ? all : (trip_cpu_blocks){ .last = { 0, 0 } };
+}
+
+/* As many sheets at a time as fit beside twice the blocks that are needed. */
+static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_blocks *all, const trip_cpu_need *need,
+                       uint64_t room)
+{
+    s->slice_blocks = need->of_sheet * (uint64_t)s->of->frame->settings->slices;
+    const uint64_t least = need->blocks + s->slice_blocks;
+    const uint64_t grid =
+        (uint64_t)((all->last[0] - all->first[0] + 1) * (all->last[1] - all->first[1] + 1));
+    const uint64_t most = grid * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
+    unsigned sheets = TRIP_CPU_SHEETS_MAX;
+    while (sheets > TRIP_CPU_SHEETS_LEAST && trip_cpu_store_bytes(all, sheets, 2 * least) > room)
+        sheets--;
+    s->most = sheets > TRIP_CPU_SHEETS_LEAST + 2 ? (int)sheets - 4 : 3;
+    return trip_cpu_store_fit(&s->store, all, sheets, least, most, room);
+}
+
+static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all, uint64_t needed)
+{
+    return trip_fail(TRIP_ERROR, "render", "CPU renderer",
+                     "sheets of %lld x %lld voxels do not fit the memory given; raise --memory to "
+                     "%llu MiB",
+                     (long long)(all->last[0] - all->first[0] + 1) * TRIP_CPU_BLOCK,
+                     (long long)(all->last[1] - all->first[1] + 1) * TRIP_CPU_BLOCK,
+                     trip_cpu_memory_mib(s->store.budget, needed / (LEFT_OVER_OF_WINDOWS - 1) *
+                                                              LEFT_OVER_OF_WINDOWS));
+}
+
+/* Whole sheets where they fit for certain, else windows of them. */
+static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
+{
+    const trip_settings *settings = s->of->frame->settings;
+    const trip_cpu_blocks all = blocks_of_layer(layer);
+    const uint64_t grid =
+        (uint64_t)((all.last[0] - all.first[0] + 1) * (all.last[1] - all.first[1] + 1));
+    const int64_t reach = ((int64_t)trip_cpu_pass_steepest(settings) + 4) / TRIP_CPU_BLOCK + 1;
+    trip_cpu_windows_release(&s->windows, s->store.budget);
+    uint64_t left = trip_budget_left_bytes(s->store.budget) + trip_cpu_store_held_bytes(&s->store);
+    uint64_t room = left / LEFT_OVER * (LEFT_OVER - 1);
+    s->windows.used = false;
+    trip_cpu_need need = { .blocks = 4 * grid, .of_sheet = grid };
+    if (fit_sheets(s, &all, &need, room))
+        return 0;
+    int status = trip_cpu_need_find(&need, layer, grid, s->store.budget);
+    if (status || fit_sheets(s, &all, &need, room))
+        return status;
+    trip_cpu_store_release(&s->store);
+    room = left / LEFT_OVER_OF_WINDOWS * (LEFT_OVER_OF_WINDOWS - 1);
+    if (trip_cpu_windows_fit(s, &all, reach, &need, room))
+        return 0;
+    return refuse(s, &all, trip_cpu_windows_least_bytes(&all, reach, &need, settings->slices));
 }
 
 int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis)
 {
-    const trip_plan_layer *layer = &s->of->frame->plan->layers[axis];
-    block_bounds bounds = { .some = false };
     s->axis = axis;
     s->pass = NULL;
     s->count = 0;
-    for (int i = 0; i < layer->pass_count; i++)
-        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++)
-            add_bricks(&bounds, &layer->passes[i].pass.selections[k]);
-    return trip_cpu_store_fit(&s->store, bounds.first, bounds.last);
+    return fit_layer(s, &s->of->frame->plan->layers[axis]);
 }
 
 static void drop_all(trip_cpu_sheets *s)
@@ -127,8 +171,7 @@ static void drop_all(trip_cpu_sheets *s)
 
 /* ---- drawing sheets ---- */
 
-/* Whether something between two sheets lies before the eye. */
-static bool is_ahead(const trip_cpu_sheets *s, int64_t to)
+bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to)
 {
     return s->view.ortho || ((double)to - s->view.eye[2]) * (double)s->way > 0;
 }
@@ -144,7 +187,7 @@ static void find_visible(trip_cpu_sheets *s, int complete)
     trip_cpu_store_prepare(&s->store, work, count);
     count = 0;
     for (int i = 0; i + 1 < complete; i++)
-        if (is_ahead(s, sheet_of(s, i + 1)->number))
+        if (trip_cpu_sheets_are_ahead(s, sheet_of(s, i + 1)->number))
             work[count++] =
                 (trip_cpu_sheet_work){ .sheet = sheet_of(s, i), .other = sheet_of(s, i + 1) };
     trip_cpu_store_find_visible(&s->store, work, count, &s->function);
@@ -285,22 +328,24 @@ static void drop_first(trip_cpu_sheets *s, int count)
     memmove(s->held, s->held + count, (size_t)s->count * sizeof *s->held);
 }
 
-/* Draws from held[0] on, at most to held[last]; 0 when not one interval fits the memory, or how
- * many were drawn. */
-static int draw_some(trip_cpu_sheets *s, int last)
+int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
 {
     const trip_cpu_store *store = &s->store;
     cutting cut = { .count = 0 };
     int done = 0;
     bool first = true;
     const unsigned segments = (unsigned)s->of->frame->settings->slices;
+    const trip_cpu_group given = s->group;
     s->group = (trip_cpu_group){ .pool = store->voxels,
                                  .first_u = store->first_u * TRIP_CPU_BLOCK,
                                  .first_v = store->first_v * TRIP_CPU_BLOCK,
                                  .across = store->across,
-                                 .down = store->down };
+                                 .down = store->down,
+                                 .windowed = s->windows.used,
+                                 .lo = { given.lo[0], given.lo[1] },
+                                 .hi = { given.hi[0], given.hi[1] } };
     for (; done < last && s->group.segments + segments < TRIP_CPU_SEGMENTS; done++) {
-        if (!is_ahead(s, sheet_of(s, done + 1)->number))
+        if (!trip_cpu_sheets_are_ahead(s, sheet_of(s, done + 1)->number))
             continue;
         if (!take_interval(s, done, first, &cut))
             break;
@@ -324,9 +369,9 @@ static int draw_complete(trip_cpu_sheets *s, int complete, bool all)
     if (s->view.shading)
         find_gradients(s, last, complete);
     while (last > 0) {
-        int done = draw_some(s, last);
+        int done = trip_cpu_sheets_draw_some(s, last);
         if (done == 0)
-            return no_memory();
+            return too_many_voxels();
         drop_first(s, done);
         last -= done;
         int status = trip_frame_poll();
@@ -362,6 +407,8 @@ static void decode_runs(trip_cpu_sheets *s)
 /* All sheets held are complete. */
 static int finish_row(trip_cpu_sheets *s)
 {
+    if (s->windows.used)
+        return trip_cpu_windows_finish_row(s);
     int status = draw_complete(s, s->count, true);
     drop_all(s);
     return status;
@@ -373,7 +420,7 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
     int status = 0;
     if (s->count > 0 && sheet_of(s, s->count - 1)->number + s->way != number)
         status = finish_row(s);
-    else if (s->count >= GROUP_SHEETS)
+    else if (s->count >= s->most)
         status = draw_complete(s, s->count, false);
     if (status)
         return status;
@@ -388,6 +435,13 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
     return 0;
 }
 
+/* A block of the last sheet; false where none is left but for slices. */
+static bool take_block(trip_cpu_sheets *s, size_t at)
+{
+    return s->store.free_count > s->slice_blocks &&
+           trip_cpu_store_take(&s->store, sheet_of(s, s->count - 1), at);
+}
+
 /* Blocks of the last sheet for a run's voxels. */
 static int take_blocks(trip_cpu_sheets *s, const trip_run *run)
 {
@@ -396,13 +450,12 @@ static int take_blocks(trip_cpu_sheets *s, const trip_run *run)
         for (int u = run->u; u < run->u + edge; u += TRIP_CPU_BLOCK) {
             size_t at =
                 trip_cpu_store_at(&s->store, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2);
-            while (!sheet_of(s, s->count - 1)->blocks[at] &&
-                   !trip_cpu_store_take(&s->store, sheet_of(s, s->count - 1), at)) {
+            while (!sheet_of(s, s->count - 1)->blocks[at] && !take_block(s, at)) {
                 int before = s->count;
                 decode_runs(s);
                 int status = draw_complete(s, s->count - 1, false);
                 if (status || s->count == before)
-                    return status ? status : no_memory();
+                    return status ? status : too_many_voxels();
             }
         }
     return 0;
@@ -419,13 +472,15 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
 static int add_run(trip_cpu_sheets *s, const trip_run *run)
 {
     int status = 0;
+    if (s->windows.used)
+        return is_occluded(s, run) ? 0 : trip_cpu_windows_add_run(s, run);
     if (s->count == 0 || sheet_of(s, s->count - 1)->number != run->sheet) {
         decode_runs(s);
         status = begin_sheet(s, run->sheet);
     }
     if (status || is_occluded(s, run))
         return status;
-    if (s->run_count == RUNS_MAX)
+    if (s->run_count == TRIP_CPU_SHEETS_RUNS)
         decode_runs(s);
     status = take_blocks(s, run);
     if (!status)

@@ -6,9 +6,6 @@
 #include "cpu/squares.h"
 #include "report.h"
 
-/* A share of the memory that is left, and the least that is of use. */
-enum { LEFT_OVER = 4, LEAST_BLOCKS = 6 };
-
 #define COLUMN_0 UINT64_C(0x0101010101010101)
 #define COLUMN_7 UINT64_C(0x8080808080808080)
 
@@ -40,18 +37,11 @@ static void release_voxels(trip_cpu_store *s)
     s->blocks = 0;
 }
 
-/* Ends with as many blocks as all sheets and slices can take, or as memory has room for. */
-static bool take_voxels(trip_cpu_store *s, uint64_t wanted)
+/* Ends with so many blocks, or as many as there are where that is not far less. */
+static bool take_voxels(trip_cpu_store *s, uint64_t least, uint64_t wanted)
 {
-    uint64_t most = TRIP_CPU_BLOCKS_MAX;
-    uint64_t room = trip_budget_left_bytes(s->budget) / LEFT_OVER * (LEFT_OVER - 1);
-    wanted = wanted < most ? wanted : most;
-    if (s->blocks >= wanted)
+    if (s->blocks >= least && s->blocks >= wanted / 2)
         return true;
-    room = (room + s->voxels_bytes) / (block_bytes + sizeof *s->free);
-    wanted = wanted < room ? wanted : room;
-    if (s->blocks >= wanted)
-        return s->blocks >= LEAST_BLOCKS;
     release_voxels(s);
     s->blocks = (uint32_t)wanted;
     s->voxels_bytes = wanted * block_bytes;
@@ -72,7 +62,7 @@ static void *part(char *memory, size_t *at, size_t bytes)
 static size_t lay_out(trip_cpu_store *s, char *memory)
 {
     size_t at = 0, grid = trip_cpu_store_grid(s);
-    for (int i = 0; i < TRIP_CPU_SHEETS_MAX; i++) {
+    for (unsigned i = 0; i < s->sheet_room; i++) {
         trip_cpu_sheet *sheet = &s->sheets[i];
         sheet->blocks = part(memory, &at, grid * sizeof *sheet->blocks);
         sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
@@ -106,31 +96,67 @@ static bool take_grids(trip_cpu_store *s)
         s->grids = trip_budget_take(s->budget, bytes);
         s->grids_bytes = s->grids ? bytes : 0;
     }
-    if (!s->grids)
-        return false;
-    memset(s->grids, 0, bytes);
-    lay_out(s, s->grids);
-    return true;
+    return s->grids != NULL;
 }
 
-int trip_cpu_store_fit(trip_cpu_store *s, const int64_t first[2], const int64_t last[2])
+static bool has_grid(const trip_cpu_blocks *all)
 {
-    s->first_u = first[0] - 1;
-    s->first_v = first[1] - 1;
-    int64_t across = last[0] - first[0] + 3, down = last[1] - first[1] + 3;
-    bool fits = across < (1 << 20) && down < (1 << 20) && across * down < (1 << 24);
-    s->across = fits ? (int32_t)across : 0;
-    s->down = fits ? (int32_t)down : 0;
-    uint64_t wanted = 1 + (uint64_t)(across - 2) * (uint64_t)(down - 2) *
-                              (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
-    if (!fits || !take_grids(s) || !take_voxels(s, wanted < LEAST_BLOCKS ? LEAST_BLOCKS : wanted))
-        return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                         "sheets of %lld x %lld voxels do not fit the memory given; raise --memory",
-                         (long long)(across - 2) * TRIP_CPU_BLOCK,
-                         (long long)(down - 2) * TRIP_CPU_BLOCK);
+    int64_t across = all->last[0] - all->first[0] + 3, down = all->last[1] - all->first[1] + 3;
+    return across < (1 << 20) && down < (1 << 20) && across * down < (1 << 24);
+}
+
+static void set_grid(trip_cpu_store *s, const trip_cpu_blocks *all)
+{
+    s->first_u = all->first[0] - 1;
+    s->first_v = all->first[1] - 1;
+    s->across = (int32_t)(all->last[0] - all->first[0] + 3);
+    s->down = (int32_t)(all->last[1] - all->first[1] + 3);
+}
+
+void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_blocks *to)
+{
+    set_grid(s, to);
+    memset(s->grids, 0, lay_out(s, s->grids));
+    for (unsigned i = 0; i < s->sheet_room; i++)
+        s->sheets[i].prepared = s->sheets[i].shaded = false;
     free_all(s);
     clear_block(s, 0);
-    return 0;
+}
+
+static uint64_t grid_bytes(const trip_cpu_blocks *all, unsigned sheets)
+{
+    trip_cpu_store of = { .sheet_room = sheets };
+    set_grid(&of, all);
+    return lay_out(&of, NULL);
+}
+
+uint64_t trip_cpu_store_bytes(const trip_cpu_blocks *all, unsigned sheets, uint64_t blocks)
+{
+    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets) : UINT64_MAX / 2;
+    return grids + (blocks + 1) * (block_bytes + sizeof(int32_t));
+}
+
+uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
+{
+    return s->voxels_bytes + s->blocks * sizeof *s->free + s->grids_bytes;
+}
+
+bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_blocks *all, unsigned sheets,
+                        uint64_t least, uint64_t most, uint64_t room)
+{
+    const uint64_t greatest = TRIP_CPU_BLOCKS_MAX - 1;
+    if (least > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, least) > room)
+        return false;
+    most = most < greatest ? most : greatest;
+    uint64_t fit = (room - grid_bytes(all, sheets)) / (block_bytes + sizeof *s->free) - 1;
+    s->sheet_room = sheets;
+    set_grid(s, all);
+    if (s->blocks > fit + 1)
+        release_voxels(s);
+    if (!take_grids(s) || !take_voxels(s, 1 + least, 1 + (most < fit ? most : fit)))
+        return false;
+    trip_cpu_store_move(s, all);
+    return true;
 }
 
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
@@ -199,6 +225,14 @@ static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block
         to[places[__builtin_ctzll(rest)]] = *next++;
 }
 
+/* The number of block (u, v) of a sheet; 0 beyond the grid. */
+static int32_t block_of(const trip_cpu_store *s, const trip_cpu_sheet *sheet, int64_t u, int64_t v)
+{
+    bool within = u >= s->first_u && v >= s->first_v && u < s->first_u + s->across &&
+                  v < s->first_v + s->down;
+    return within ? sheet->blocks[trip_cpu_store_at(s, u, v)] : 0;
+}
+
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run)
 {
@@ -206,11 +240,10 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
     while (trip_cpu_walk_next(&at)) {
         int u = run->u + 8 * trip_cpu_square_u(at.number);
         int v = run->v + 8 * trip_cpu_square_v(at.number);
-        int32_t in =
-            sheet->blocks[trip_cpu_store_at(s, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2)];
+        int32_t in = block_of(s, sheet, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2);
         u &= TRIP_CPU_BLOCK - 1;
         v &= TRIP_CPU_BLOCK - 1;
-        if (in) /* what is occluded has none */
+        if (in) /* what is occluded has none, nor has what lies beyond the grid */
             decode_square(s->voxels[in].codes + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block);
     }
 }

@@ -22,8 +22,14 @@ typedef struct trip_cpu_sheet {
 
 enum {
     TRIP_CPU_SHEETS_MAX = 20,                /* at hand at once */
+    TRIP_CPU_SHEETS_LEAST = 5,               /* for groups of one interval */
     TRIP_CPU_SLICES_MAX = TRIP_CPU_SEGMENTS, /* between sheets */
 };
+
+/* A rectangle of blocks along u and v, inclusive. */
+typedef struct trip_cpu_blocks {
+    int64_t first[2], last[2];
+} trip_cpu_blocks;
 
 typedef struct trip_cpu_store {
     trip_budget *budget;
@@ -40,14 +46,27 @@ typedef struct trip_cpu_store {
     int32_t across, down;
     char *grids; /* of the sheets and slices below */
     size_t grids_bytes;
+    unsigned sheet_room; /* sheets that there is room for */
     trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], slices[TRIP_CPU_SLICES_MAX];
     uint64_t *some; /* squares visible in any of the segments drawn at a time */
 } trip_cpu_store;
 
-/* Room for lists whose voxels lie in [first, last] along u and v (blocks, inclusive); every sheet
- * is absent then. */
-int trip_cpu_store_fit(trip_cpu_store *s, const int64_t first[2], const int64_t last[2]);
+/* What so many sheets of a rectangle take, with a pool of so many blocks. */
+uint64_t trip_cpu_store_bytes(const trip_cpu_blocks *all, unsigned sheets, uint64_t blocks);
+/* What is taken of the budget. */
+uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
+/* Room for so many sheets of a rectangle, and for `least` to `most` blocks in at most `room` bytes;
+ * every sheet is absent then. False where that is too little. */
+bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_blocks *all, unsigned sheets,
+                        uint64_t least, uint64_t most, uint64_t room);
+/* Moves to a rectangle that is no larger than the one there is room for; every sheet is absent. */
+void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_blocks *to);
 void trip_cpu_store_release(trip_cpu_store *s);
+
+static inline bool trip_cpu_blocks_have(const trip_cpu_blocks *b, int64_t u, int64_t v)
+{
+    return u >= b->first[0] && u <= b->last[0] && v >= b->first[1] && v <= b->last[1];
+}
 
 /* Where block (u, v), in blocks, is in the grid's tables. */
 static inline size_t trip_cpu_store_at(const trip_cpu_store *s, int64_t u, int64_t v)

@@ -1,0 +1,18 @@
+/* What a layer's sheets take at most, by its plan, so that what does not suffice is known before
+ * anything is drawn. Pure functions. */
+#ifndef TRIP_CPU_SHEETS_NEED_H
+#define TRIP_CPU_SHEETS_NEED_H
+
+#include "budget.h"
+#include "plan.h"
+
+typedef struct trip_cpu_need {
+    uint64_t blocks;                /* of the sheets at hand when an interval is drawn */
+    uint64_t of_sheet, runs, words; /* blocks and so on of the sheet that has most */
+} trip_cpu_need;
+
+/* Of sheets of so many blocks each at most; TRIP_ERROR without the memory to find it. */
+int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t blocks,
+                       trip_budget *budget);
+
+#endif

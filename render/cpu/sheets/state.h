@@ -1,0 +1,40 @@
+/* What the parts of frames that classify after interpolation share: sheets.c (sheets as they come),
+ * windows.c (where memory does not suffice for these) and need.c (what suffices). Of the renderer's
+ * thread alone, but for what its jobs say. */
+#ifndef TRIP_CPU_SHEETS_STATE_H
+#define TRIP_CPU_SHEETS_STATE_H
+
+#include "cpu/sheets/store.h"
+#include "cpu/sheets/windows.h"
+#include "cpu/state.h"
+
+/* Runs decoded at a time. */
+enum { TRIP_CPU_SHEETS_RUNS = 256 };
+
+struct trip_cpu_sheets {
+    trip_cpu *of;
+    trip_cpu_store store;
+    trip_cpu_function function;
+    trip_cpu_group group;
+    trip_cpu_sheet_view view;
+    int axis;
+    const trip_pass *pass; /* being drawn; NULL: none */
+    int64_t way;           /* from one sheet to the next: 1 or -1 */
+    /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[0] all
+     * is drawn. */
+    int held[TRIP_CPU_SHEETS_MAX];
+    int count, most;       /* held; and drawn at a time, at most */
+    uint64_t slice_blocks; /* set aside for slices */
+    const trip_batch *batch;
+    const trip_run *runs[TRIP_CPU_SHEETS_RUNS]; /* to be decoded, of the last sheet */
+    unsigned run_count;
+    trip_cpu_windows windows;
+};
+
+/* Draws from held[0] on, at most to held[last]: 0 when not one interval fits the memory, or how
+ * many were drawn. What is visible, and gradients, were found. */
+int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last);
+/* Whether something between two sheets lies before the eye; of the first, `to` is the farther. */
+bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to);
+
+#endif

@@ -1,0 +1,297 @@
+#include "cpu/sheets/windows.h"
+
+#include <string.h>
+
+#include "cpu/sheets/state.h"
+#include "report.h"
+
+/* ---- memory ---- */
+
+static int64_t lesser(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+static int64_t greater(int64_t a, int64_t b)
+{
+    return a > b ? a : b;
+}
+
+static size_t sheet_bytes(const trip_cpu_need *need)
+{
+    return (size_t)(need->runs * sizeof(trip_cpu_kept_run) + need->words * 8);
+}
+
+/* What is at hand of windows of a size, as a rectangle at 0. */
+static trip_cpu_blocks at_hand(const trip_cpu_blocks *all, const int64_t size[2], int64_t reach)
+{
+    trip_cpu_blocks b = { .first = { 0, 0 } };
+    for (int a = 0; a < 2; a++)
+        b.last[a] = lesser(size[a] + 2 * reach, all->last[a] - all->first[a] + 1) - 1;
+    return b;
+}
+
+static uint64_t blocks_of(const trip_cpu_blocks *b, int slices)
+{
+    return (uint64_t)((b->last[0] - b->first[0] + 1) * (b->last[1] - b->first[1] + 1)) *
+           (uint64_t)(TRIP_CPU_WINDOW_SHEETS + slices);
+}
+
+static uint64_t bytes_of(const trip_cpu_blocks *all, const int64_t size[2], int64_t reach,
+                         int slices)
+{
+    trip_cpu_blocks b = at_hand(all, size, reach);
+    return trip_cpu_store_bytes(&b, TRIP_CPU_WINDOW_SHEETS, blocks_of(&b, slices));
+}
+
+uint64_t trip_cpu_windows_least_bytes(const trip_cpu_blocks *all, int64_t reach,
+                                      const trip_cpu_need *need, int slices)
+{
+    const int64_t one[2] = { 1, 1 };
+    return TRIP_CPU_WINDOW_SHEETS * sheet_bytes(need) + bytes_of(all, one, reach, slices);
+}
+
+static bool take_runs(trip_cpu_windows *w, const trip_cpu_need *need, trip_budget *budget)
+{
+    trip_cpu_windows_release(w, budget);
+    w->bytes = TRIP_CPU_WINDOW_SHEETS * sheet_bytes(need);
+    w->memory = trip_budget_take(budget, w->bytes);
+    if (!w->memory)
+        w->bytes = 0;
+    for (int i = 0; i < TRIP_CPU_WINDOW_SHEETS && w->memory; i++) {
+        void *sheet = w->memory + (size_t)i * sheet_bytes(need);
+        w->sheets[i] = (trip_cpu_kept_sheet){ .words = sheet };
+        void *runs = w->sheets[i].words + need->words;
+        w->sheets[i].runs = runs;
+    }
+    return w->memory != NULL;
+}
+
+void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget)
+{
+    trip_budget_release(budget, w->memory, w->bytes);
+    w->memory = NULL;
+    w->bytes = 0;
+}
+
+bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_blocks *all, int64_t reach,
+                          const trip_cpu_need *need, uint64_t room)
+{
+    trip_cpu_windows *w = &s->windows;
+    const int slices = s->of->frame->settings->slices;
+    uint64_t kept = TRIP_CPU_WINDOW_SHEETS * sheet_bytes(need);
+    if (trip_cpu_windows_least_bytes(all, reach, need, slices) > room)
+        return false;
+    w->all = *all;
+    w->reach = reach;
+    w->count = w->from = 0;
+    for (int a = 0; a < 2; a++)
+        w->size[a] = all->last[a] - all->first[a] + 1;
+    while (bytes_of(all, w->size, reach, slices) > room - kept) {
+        int longer = w->size[0] > w->size[1] ? 0 : 1;
+        w->size[longer] = (w->size[longer] + 1) / 2;
+    }
+    trip_cpu_blocks hand = at_hand(all, w->size, reach);
+    uint64_t blocks = blocks_of(&hand, slices);
+    w->used =
+        take_runs(w, need, s->store.budget) &&
+        trip_cpu_store_fit(&s->store, &hand, TRIP_CPU_WINDOW_SHEETS, blocks, blocks, room - kept);
+    return w->used;
+}
+
+/* ---- a window ---- */
+
+/* Runs of a kept sheet, decoded into a sheet of the store. */
+typedef struct decoding {
+    const trip_cpu_sheets *s;
+    const trip_cpu_kept_sheet *from;
+    const trip_cpu_sheet *to;
+} decoding;
+
+static int64_t block_of(int64_t voxel)
+{
+    return voxel >> TRIP_CPU_BLOCK_LOG2;
+}
+
+static void decode_run(void *context, unsigned task, unsigned thread)
+{
+    const decoding *d = context;
+    const trip_cpu_kept_run *kept = &d->from->runs[task];
+    const trip_block_form form = trip_block_form_of(&d->s->of->frame->data->header);
+    (void)thread;
+    const trip_block block =
+        trip_block_make(&form, kept->count, kept->words, d->from->words + kept->at, NULL);
+    trip_cpu_store_decode(&d->s->store, d->to, &block, &(trip_run){ .u = kept->u, .v = kept->v });
+}
+
+/* Blocks for a run's voxels, where they are at hand. */
+static void take_blocks(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_cpu_kept_run *run,
+                        const trip_cpu_blocks *hand)
+{
+    const int64_t last = (1 << s->of->frame->data->header.tile_log2) - 1;
+    for (int64_t v = block_of(run->v); v <= block_of(run->v + last); v++)
+        for (int64_t u = block_of(run->u); u <= block_of(run->u + last); u++)
+            if (trip_cpu_blocks_have(hand, u, v)) {
+                size_t at = trip_cpu_store_at(&s->store, u, v);
+                if (!sheet->blocks[at])
+                    trip_cpu_store_take(&s->store, sheet, at);
+            }
+}
+
+/* Whether some run of a kept sheet has voxels at hand. */
+static bool is_at_hand(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *sheet,
+                       const trip_cpu_blocks *hand)
+{
+    const int64_t last = (1 << s->of->frame->data->header.tile_log2) - 1;
+    for (size_t n = 0; n < sheet->run_count; n++) {
+        const trip_cpu_kept_run *run = &sheet->runs[n];
+        if (block_of(run->u) <= hand->last[0] && block_of(run->u + last) >= hand->first[0] &&
+            block_of(run->v) <= hand->last[1] && block_of(run->v + last) >= hand->first[1])
+            return true;
+    }
+    return false;
+}
+
+static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_blocks *hand)
+{
+    const trip_cpu_kept_sheet *from = &s->windows.sheets[i];
+    trip_cpu_sheet *to = &s->store.sheets[i];
+    to->number = from->number;
+    for (size_t n = 0; n < from->run_count; n++)
+        take_blocks(s, to, &from->runs[n], hand);
+    decoding d = { s, from, to };
+    trip_cpu_job job = { .run = decode_run, .context = &d, .tasks = (unsigned)from->run_count };
+    trip_cpu_pool_start(s->of->pool, &job);
+    trip_cpu_pool_wait(s->of->pool, &job);
+}
+
+/* Of the interval's two sheets: what may show between them, and gradients there. */
+static void find_interval(trip_cpu_sheets *s)
+{
+    const trip_cpu_windows *w = &s->windows;
+    trip_cpu_sheet *sheet = s->store.sheets, *a = &sheet[w->from], *b = a + 1;
+    const trip_cpu_sheet *before = w->from > 0 ? a - 1 : NULL;
+    const trip_cpu_sheet *behind = w->from + 2 < w->count ? b + 1 : NULL;
+    bool up = s->way > 0;
+    const trip_cpu_sheet_work both[2] = {
+        { .sheet = a, .other = up ? before : b, .third = up ? b : before, .visible = a->visible },
+        { .sheet = b,
+          .other = up ? a : behind,
+          .third = up ? behind : a,
+          .visible_before = a->visible },
+    };
+    trip_cpu_store_prepare(&s->store, both, 2);
+    trip_cpu_store_find_visible(&s->store, &(trip_cpu_sheet_work){ .sheet = a, .other = b }, 1,
+                                &s->function);
+    if (s->view.shading)
+        trip_cpu_store_find_gradients(&s->store, both, 2);
+}
+
+/* Rays that start beside all windows are of the outermost. */
+static void set_window(trip_cpu_sheets *s, const trip_cpu_blocks *inner)
+{
+    const trip_cpu_blocks *all = &s->windows.all;
+    const int64_t origin[2] = { s->store.first_u, s->store.first_v };
+    for (int a = 0; a < 2; a++) {
+        int64_t lo = (inner->first[a] - origin[a]) * TRIP_CPU_BLOCK;
+        int64_t hi = (inner->last[a] + 1 - origin[a]) * TRIP_CPU_BLOCK;
+        s->group.lo[a] = inner->first[a] == all->first[a] ? INT32_MIN : (int32_t)lo;
+        s->group.hi[a] = inner->last[a] == all->last[a] ? INT32_MAX : (int32_t)hi;
+    }
+}
+
+static int draw_window(trip_cpu_sheets *s, const trip_cpu_blocks *inner)
+{
+    const trip_cpu_windows *w = &s->windows;
+    trip_cpu_blocks hand;
+    for (int a = 0; a < 2; a++) {
+        hand.first[a] = greater(inner->first[a] - w->reach, w->all.first[a]);
+        hand.last[a] = lesser(inner->last[a] + w->reach, w->all.last[a]);
+    }
+    if (!is_at_hand(s, &w->sheets[w->from], &hand) ||
+        !is_at_hand(s, &w->sheets[w->from + 1], &hand))
+        return 0;
+    trip_cpu_store_move(&s->store, &hand);
+    load_sheet(s, w->from, &hand);
+    load_sheet(s, w->from + 1, &hand);
+    if (w->from > 0)
+        load_sheet(s, w->from - 1, &hand);
+    if (w->from + 2 < w->count)
+        load_sheet(s, w->from + 2, &hand);
+    find_interval(s);
+    s->held[0] = w->from;
+    s->held[1] = w->from + 1;
+    set_window(s, inner);
+    trip_cpu_sheets_draw_some(s, 1);
+    return trip_frame_poll();
+}
+
+/* ---- sheets ---- */
+
+/* The interval that begins at `from`, of which that behind is complete, too. */
+static int draw_interval(trip_cpu_sheets *s)
+{
+    trip_cpu_windows *w = &s->windows;
+    int status = 0;
+    if (trip_cpu_sheets_are_ahead(s, w->sheets[w->from + 1].number))
+        for (int64_t v = w->all.first[1]; v <= w->all.last[1] && !status; v += w->size[1])
+            for (int64_t u = w->all.first[0]; u <= w->all.last[0] && !status; u += w->size[0])
+                status = draw_window(
+                    s,
+                    &(trip_cpu_blocks){ .first = { u, v },
+                                        .last = { lesser(u + w->size[0] - 1, w->all.last[0]),
+                                                  lesser(v + w->size[1] - 1, w->all.last[1]) } });
+    if (w->from == 1) {
+        trip_cpu_kept_sheet first = w->sheets[0];
+        w->count--;
+        memmove(w->sheets, w->sheets + 1, (size_t)w->count * sizeof first);
+        w->sheets[w->count] = first;
+    }
+    w->from = 1;
+    return status;
+}
+
+int trip_cpu_windows_finish_row(trip_cpu_sheets *s)
+{
+    trip_cpu_windows *w = &s->windows;
+    int status = 0;
+    while (w->from + 1 < w->count && !status)
+        status = draw_interval(s);
+    w->count = w->from = 0;
+    return status;
+}
+
+/* A sheet for runs that are of none at hand: those are complete. */
+static int begin_sheet(trip_cpu_sheets *s, int64_t number)
+{
+    trip_cpu_windows *w = &s->windows;
+    int status = 0;
+    if (w->count > 0 && w->sheets[w->count - 1].number + s->way != number)
+        status = trip_cpu_windows_finish_row(s);
+    else if (w->from + 2 < w->count)
+        status = draw_interval(s);
+    if (status)
+        return status;
+    trip_cpu_kept_sheet *sheet = &w->sheets[w->count++];
+    sheet->number = number;
+    sheet->run_count = sheet->word_count = 0;
+    return 0;
+}
+
+int trip_cpu_windows_add_run(trip_cpu_sheets *s, const trip_run *run)
+{
+    trip_cpu_windows *w = &s->windows;
+    int status = 0;
+    if (w->count == 0 || w->sheets[w->count - 1].number != run->sheet)
+        status = begin_sheet(s, run->sheet);
+    if (status)
+        return status;
+    trip_cpu_kept_sheet *sheet = &w->sheets[w->count - 1];
+    const unsigned char *from = s->batch->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
+    sheet->runs[sheet->run_count++] = (trip_cpu_kept_run){
+        .u = run->u, .v = run->v, .count = run->count, .words = run->words, .at = sheet->word_count
+    };
+    memcpy(sheet->words + sheet->word_count, from, (size_t)run->words * 8);
+    sheet->word_count += run->words;
+    return 0;
+}
