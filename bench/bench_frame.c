@@ -7,6 +7,7 @@
 
 #include "cpu/cpu_renderer.h"
 #include "report.h"
+#include "slices.h"
 
 double bench_now_ms(void)
 {
@@ -55,10 +56,14 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
                         bench_cost *cost)
 {
     trip_plan plan;
+    trip_settings settings = f->settings;
+    if (!settings.slices)
+        settings.slices =
+            trip_slices_of_view(camera, &settings, f->session->data->header.dims).slices;
     if (f->covering)
         *f->covering = count ? NULL : f->renderer;
     double start = bench_now_ms();
-    int status = trip_plan_make(&plan, f->session->data, camera, &f->settings, f->session->table,
+    int status = trip_plan_make(&plan, f->session->data, camera, &settings, f->session->table,
                                 f->session->budget);
     if (status)
         return status;
@@ -66,7 +71,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     trip_frame frame = {
         .data = f->session->data,
         .camera = camera,
-        .settings = &f->settings,
+        .settings = &settings,
         .plan = &plan,
         .table = f->session->table,
         .count = count,

@@ -66,7 +66,7 @@ static const struct argp_option options[] = {
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
       "Likewise, pre (default: splat); renderers, accuracy and popping only", 0 },
     { "slices", KEY_SLICES, "N", 0,
-      "Slices of a sheet, post (default: 2); renderers and popping only", 0 },
+      "Slices of a sheet, post (default: by the view); renderers and popping only", 0 },
     { "tolerance", KEY_TOLERANCE, "T", 0, "Of the integral, of 1 (default: 1e-4); accuracy only",
       0 },
     { "budget", KEY_BUDGET, "SECONDS", 0,
@@ -394,6 +394,7 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
     *o = (bench_options){ .tolerance = 1e-4,
                           .budget_seconds = 1e9,
                           .settings = trip_settings_default() };
+    o->settings.slices = 0;
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);
 }

@@ -117,16 +117,20 @@ static const struct argp_option options[] = {
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
     { NULL, 0, NULL, 0, "Method:", 3 },
-    { "classify", KEY_CLASSIFY, "pre|post", 0,
-      "pre: voxels are classified and drawn as splats; post: values are interpolated in sheets and "
-      "classified at each pixel, closer to the integral (default: pre)",
+    { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
+      "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
+      "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
+      "pre with what only splats have: --kernel-radius, --compositing, --target, --submit, "
+      "--count, "
+      "--traversal ascending (default: pre)",
       3 },
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
       "splat: each splat goes over those behind it, as in the papers; sheet: the splats of a sheet "
       "are summed and go over those behind together, so that a mirrored volume gives the mirrored "
       "picture (default: splat); pre only",
       3 },
-    { "slices", KEY_SLICES, "N", 0, "Slices of a sheet, 1 to 16 (default: 2); post only", 3 },
+    { "slices", KEY_SLICES, "N|auto", 0,
+      "Slices of a sheet, 1 to 16 (default: auto, by the view); post only", 3 },
     { "lod", KEY_LOD, "PX", 0,
       "Draw coarse levels where their voxels are at most so many pixels wide (default: 0, the "
       "finest "
@@ -371,7 +375,7 @@ static int parse_view(int key, char *arg, parse *p)
 
 static int parse_method(int key, char *arg, parse *p)
 {
-    static const char *const classifications[] = { "pre", "post", NULL };
+    static const char *const classifications[] = { "pre", "post", "auto", NULL };
     static const char *const compositings[] = { "splat", "sheet", NULL };
     static const char *const methods[] = { "merge", "clip", "axis", NULL };
     static const char *const traversals[] = { "outward", "ascending", NULL };
@@ -391,7 +395,8 @@ static int parse_method(int key, char *arg, parse *p)
         return trip_option_number("--lod", arg, 0, 1000, &s->lod_px);
     case KEY_SLICES:
         p->slices = true;
-        return trip_option_integer("--slices", arg, 1, 16, &s->slices);
+        s->slices = 0;
+        return strcmp(arg, "auto") ? trip_option_integer("--slices", arg, 1, 16, &s->slices) : 0;
     case KEY_METHOD:
         status = trip_option_choice("--method", arg, methods, &which);
         s->method = (triptych_method)which;
@@ -584,9 +589,30 @@ static int check_integral(parse *p)
     return 0;
 }
 
+/* What only splats have implies them. */
+static int choose_classify(parse *p)
+{
+    render_options *o = p->o;
+    bool splats = o->settings.traversal != TRIPTYCH_OUTWARD || p->kernel_radius || o->count ||
+                  p->compositing || p->target || p->lists || p->forms;
+    if (o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
+        return 0;
+    if (splats && p->slices)
+        return trip_option_fail(
+            "--slices", "does not go with --kernel-radius, --compositing, --target, --submit, "
+                        "--count or --traversal ascending, which are of splats");
+    if (splats)
+        o->settings.classify = TRIPTYCH_PRE;
+    else if (p->slices)
+        o->settings.classify = TRIPTYCH_POST;
+    return 0;
+}
+
 static int check_classify(const parse *p)
 {
     const render_options *o = p->o;
+    if (o->settings.classify == TRIPTYCH_CLASSIFY_AUTO)
+        return 0;
     if (o->settings.classify == TRIPTYCH_PRE)
         return p->slices ? trip_option_fail("--slices", "applies to --classify post only") : 0;
     if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
@@ -630,6 +656,8 @@ static int check(parse *p)
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     status = check_integral(p);
+    if (!status)
+        status = choose_classify(p);
     if (!status)
         status = check_classify(p);
     if (status)

@@ -198,10 +198,9 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         return status;
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
-    cJSON_AddStringToObject(root, "classify",
-                            o->settings.classify == TRIPTYCH_POST ? "post" : "pre");
-    if (o->settings.classify == TRIPTYCH_POST)
-        cJSON_AddNumberToObject(root, "slices", o->settings.slices);
+    cJSON_AddStringToObject(root, "classify", frame.classify == TRIPTYCH_POST ? "post" : "pre");
+    if (frame.classify == TRIPTYCH_POST)
+        cJSON_AddNumberToObject(root, "slices", frame.slices);
     else
         cJSON_AddStringToObject(root, "compositing",
                                 o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");

@@ -57,7 +57,7 @@ static const struct argp_option options[] = {
     { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, so many world units high", 2 },
     { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 2 },
     { "opacity-scale", KEY_OPACITY_SCALE, "X", 0, "Multiplies extinction", 2 },
-    { "classify", KEY_CLASSIFY, "pre|post", 0, "Before splatting, or after interpolation", 2 },
+    { "classify", KEY_CLASSIFY, "pre|post", 0, "Before splatting, or after interpolation (default: pre)", 2 },
     { NULL, 0, NULL, 0, "Renderer:", 3 },
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },

@@ -10,6 +10,7 @@
 #include "image_file.h"
 #include "renderer_choice.h"
 #include "session.h"
+#include "slices.h"
 #include "triptych.h"
 
 enum { TRIP_CONTEXT_MOST_THREADS = 256 };
@@ -39,7 +40,8 @@ struct triptych {
     trip_renderer *renderer; /* NULL until a frame is begun */
     trip_reader *reader;     /* the same; of these planes: */
     unsigned planes;
-    trip_settings settings;
+    trip_settings settings; /* slices 0: by the view */
+    bool classify_auto;     /* settings.classify is what that has come to for a frame */
     bool counting; /* frames count exactly, and draw what is hidden too; the reader is for that: */
     bool reader_counts;
 
@@ -48,7 +50,10 @@ struct triptych {
     trip_vec3 axis;      /* that a turn goes about */
     uint64_t fit_splats; /* looked at to fit the view */
 
-    bool begun, drawn; /* the camera and the plan are there; the drawing, too */
+    trip_settings drawn_settings; /* of the frame that is begun, with what was chosen */
+    const char *why_pre;          /* where pre was; else NULL */
+    trip_view_slices slices;      /* that the view calls for */
+    bool begun, drawn;            /* the camera and the plan are there; the drawing, too */
     trip_camera camera;
     trip_plan plan;
     double plan_ms;

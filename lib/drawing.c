@@ -84,6 +84,45 @@ static int prepare(triptych *t)
     return status;
 }
 
+/* What of the frame only splats have; NULL: nothing. */
+static const char *needs_splats(const triptych *t)
+{
+    const trip_settings *s = &t->settings;
+    const trip_file_header *h = &t->session.data->header;
+    if (t->counting)
+        return "splats are counted";
+    if (s->traversal != TRIP_TRAVERSAL_OUTWARD)
+        return "lists are traversed ascending";
+    if (s->target != TRIP_TARGET_RGBA32F)
+        return "the target is rounded";
+    if (s->indexed || s->triangles)
+        return "a form of submission is set";
+    if (s->lod_px > 0)
+        return "coarse levels are to be drawn";
+    if (s->compositing != TRIP_COMPOSITING_SPLAT)
+        return "splats are to be composited by sheets";
+    if (s->kernel_radius != TRIP_KERNEL_RADIUS_VOXELS)
+        return "a kernel radius is set";
+    if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
+        return "the grid is one voxel thick";
+    if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
+        return "voxels were left out, and their halo is not in the data set";
+    return NULL;
+}
+
+/* The frame's settings: those that are set, with what is chosen by itself. */
+static void choose_settings(triptych *t)
+{
+    bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    t->drawn_settings = t->settings;
+    t->why_pre = t->classify_auto && !integral ? needs_splats(t) : NULL;
+    if (t->why_pre || (t->classify_auto && integral))
+        t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
+    t->slices = trip_slices_of_view(&t->camera, &t->settings, t->session.data->header.dims);
+    if (!t->settings.slices)
+        t->drawn_settings.slices = t->slices.slices;
+}
+
 /* The plan of a frame by the integral renderer: what its field is made of. */
 static int plan_field(triptych *t)
 {
@@ -94,7 +133,8 @@ static int plan_field(triptych *t)
     else if (t->source)
         return trip_fail(TRIP_USAGE, "render", "field",
                          "splats are made of what the data set holds, not of the volume itself");
-    return trip_plan_make_field(&t->plan, s->data, &t->camera, &t->settings, kinds, s->budget);
+    return trip_plan_make_field(&t->plan, s->data, &t->camera, &t->drawn_settings, kinds,
+                                s->budget);
 }
 
 static int plan_frame(triptych *t)
@@ -104,12 +144,13 @@ static int plan_frame(triptych *t)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
         return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
-    return trip_plan_make(&t->plan, s->data, &t->camera, &t->settings, s->table, s->budget);
+    return trip_plan_make(&t->plan, s->data, &t->camera, &t->drawn_settings, s->table, s->budget);
 }
 
 static int plan(triptych *t)
 {
     uint64_t start = trip_frame_now_ns();
+    choose_settings(t);
     int status = plan_frame(t);
     t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
     t->begun = status == 0;
@@ -122,7 +163,7 @@ static int start(triptych *t)
     t->frame = (trip_frame){
         .data = t->session.data,
         .camera = &t->camera,
-        .settings = &t->settings,
+        .settings = &t->drawn_settings,
         .plan = &t->plan,
         .table = t->session.table,
         .field = t->source,

@@ -51,7 +51,6 @@ triptych_settings triptych_default_settings(void)
     return (triptych_settings){
         .classify = (triptych_classify)s.classify,
         .compositing = (triptych_compositing)s.compositing,
-        .slices = s.slices,
         .method = (triptych_method)s.method,
         .traversal = (triptych_traversal)s.traversal,
         .target = (triptych_target)s.target,
@@ -89,12 +88,12 @@ static const char *fault_of_settings(const triptych_settings *s)
         s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
         s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
         return "there is no such method, traversal or target";
-    if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_POST)
+    if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_CLASSIFY_AUTO)
         return "there is no such classification";
     if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
         return "there is no such compositing";
-    if (!(s->slices >= 1 && s->slices <= TRIP_SLICES_MAX))
-        return "a sheet has 1 to 16 slices";
+    if (!(s->slices >= 0 && s->slices <= TRIP_SLICES_MAX))
+        return "a sheet has 1 to 16 slices, or as many as the view calls for (0)";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
         return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1))
@@ -137,8 +136,9 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         return trip_context_leave(before, status);
     if (s->kernel_radius < SMOOTH_KERNEL_VOXELS && s->kernel_radius != t->settings.kernel_radius)
         warn_of_ripple(s->kernel_radius);
+    t->classify_auto = s->classify == TRIPTYCH_CLASSIFY_AUTO;
     t->settings = (trip_settings){
-        .classify = (trip_classify)s->classify,
+        .classify = s->classify == TRIPTYCH_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST,
         .compositing = (trip_compositing)s->compositing,
         .slices = s->slices,
         .method = (trip_method)s->method,

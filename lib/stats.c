@@ -5,6 +5,20 @@
 #include "context.h"
 #include "report.h"
 
+/* What was not set, and what it came to. */
+static void explain_choices(const triptych *t, FILE *out)
+{
+    if (t->plan.gathers)
+        return;
+    if (t->why_pre)
+        fprintf(out, "default     pre in place of post: %s\n", t->why_pre);
+    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.slices)
+        fprintf(out,
+                "slices      %d by the view: rays move up to %.2f voxels along a sheet to the "
+                "next, voxels are up to %.3g px wide\n",
+                t->slices.slices, t->slices.slope, t->slices.voxel_px);
+}
+
 int triptych_explain(triptych *t, char **text)
 {
     trip_scope *before = trip_context_enter(t);
@@ -13,7 +27,9 @@ int triptych_explain(triptych *t, char **text)
     int status = t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "none is begun");
     FILE *f = status ? NULL : open_memstream(text, &bytes);
     if (f)
-        trip_plan_explain(&t->plan, t->session.data, &t->settings, f);
+        explain_choices(t, f);
+    if (f)
+        trip_plan_explain(&t->plan, t->session.data, &t->drawn_settings, f);
     if (!status && (!f || fclose(f) != 0)) {
         free(*text);
         *text = NULL;
@@ -67,6 +83,8 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .renderer = t->renderer->ops->name,
         .device = t->renderer->ops->device(t->renderer),
         .engine = trip_reader_engine_name(t->reader),
+        .classify = (triptych_classify)t->drawn_settings.classify,
+        .slices = t->drawn_settings.classify == TRIP_CLASSIFY_POST ? t->drawn_settings.slices : 0,
         .ring = ring_text(t->renderer, t->reader),
     };
 }

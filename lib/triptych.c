@@ -39,6 +39,7 @@ int triptych_create(triptych **out)
     t->scope = (trip_scope){ .failed = keep_failure, .sink = pass_line, .user = t };
     pthread_mutex_init(&t->lock, NULL);
     t->settings = trip_settings_default();
+    t->settings.slices = 0;
     return TRIPTYCH_OK;
 }
 

@@ -216,6 +216,11 @@ typedef enum triptych_kernel {
 typedef enum triptych_classify {
     TRIPTYCH_PRE,  /* voxels are classified, and their splats drawn */
     TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
+    /* Post, but pre where something is set that only splats have (ascending traversal, a rounded
+     * target, indexed, triangles, coarse levels, by sheet, another kernel radius than 2, count), or
+     * the data has no cells to interpolate in: one voxel thick, or culled without a halo.
+     * triptych_explain() says which. */
+    TRIPTYCH_CLASSIFY_AUTO,
 } triptych_classify;
 
 /* What of splats (pre) is composited. */
@@ -227,7 +232,7 @@ typedef enum triptych_compositing {
 typedef struct triptych_settings {
     triptych_classify classify;
     triptych_compositing compositing; /* pre */
-    int slices; /* of a sheet, post: 1 to 16; more come closer to the integral */
+    int slices; /* of a sheet, post: 1 to 16, more come closer to the integral; 0: by the view */
     triptych_method method;
     triptych_traversal traversal;
     triptych_target target; /* of the layers; not of the reference */
@@ -251,8 +256,8 @@ typedef struct triptych_settings {
                   too */
 } triptych_settings;
 
-/* Pre, by splat, 2 slices, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by headlight,
- * black; values, linear, 1e-4, one ray a pixel. */
+/* Pre, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by
+ * headlight, black; values, linear, 1e-4, one ray a pixel. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 
@@ -366,6 +371,8 @@ typedef struct triptych_frame_stats {
     uint64_t memory_bytes, peak_memory_bytes; /* that may be taken, and were since it was opened */
     const char *renderer, *device, *engine;   /* "cpu", "8 threads, AVX2", "io_uring+O_DIRECT" */
     const char *ring;                         /* where reads land, in words */
+    triptych_classify classify;               /* pre or post, what was drawn */
+    int slices;                               /* of a sheet, post; else 0 */
 } triptych_frame_stats;
 
 TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);

@@ -421,7 +421,9 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
                 s->tolerance);
         return;
     }
-    if (s->classify == TRIP_CLASSIFY_POST)
+    if (s->classify == TRIP_CLASSIFY_PRE)
+        fprintf(out, "classify    pre: voxels are classified, then splatted\n");
+    else
         fprintf(out, "classify    post: values are interpolated in %d slice%s a sheet\n", s->slices,
                 s->slices == 1 ? "" : "s");
     if (trip_settings_sum_sheets(s))

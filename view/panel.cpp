@@ -464,7 +464,9 @@ bool draw_quality(trip_panel *p, trip_document *d)
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
     bool changed = choose(p, "Classify", &s->classify, classes, 2);
     if (s->classify == TRIPTYCH_POST) {
-        changed |= mark_beside(p, "Slices", ImGui::SliderInt("Slices", &s->slices, 1, 16));
+        changed |= mark_beside(
+            p, "Slices",
+            ImGui::SliderInt("Slices", &s->slices, 0, 16, s->slices ? "%d" : "by the view"));
     } else {
         static const char *const sums[] = { "Splat by splat", "Sheet by sheet" };
         changed |= choose(p, "Compositing", &s->compositing, sums, 2);

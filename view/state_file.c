@@ -46,9 +46,9 @@ static const entry camera_entries[] = {
 };
 
 static const entry setting_entries[] = {
-    { "classify", SETTING(classify), WHOLE, 1, TRIPTYCH_PRE, TRIPTYCH_POST },
+    { "classify", SETTING(classify), WHOLE, 1, TRIPTYCH_PRE, TRIPTYCH_CLASSIFY_AUTO },
     { "compositing", SETTING(compositing), WHOLE, 1, TRIPTYCH_BY_SPLAT, TRIPTYCH_BY_SHEET },
-    { "slices", SETTING(slices), WHOLE, 1, 1, 16 },
+    { "slices", SETTING(slices), WHOLE, 1, 0, 16 },
     { "method", SETTING(method), WHOLE, 1, TRIPTYCH_MERGE, TRIPTYCH_AXIS },
     { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
     { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },

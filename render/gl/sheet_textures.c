@@ -13,11 +13,15 @@ void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
     *t = (trip_gl_sheet_textures){ .budget = t->budget };
 }
 
-static int no_memory(int64_t width, int64_t height)
+static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height,
+                     uint64_t bytes)
 {
+    uint64_t taken = trip_budget_limit_bytes(t->budget) - trip_budget_left_bytes(t->budget);
     return trip_fail(TRIP_ERROR, "gl", "sheets",
-                     "%d sheets of %lld x %lld voxels do not fit the memory given; raise --memory",
-                     TRIP_GL_SHEETS_LEAST, (long long)width, (long long)height);
+                     "%d sheets of %lld x %lld voxels do not fit the memory given; raise --memory "
+                     "to more than %llu MiB, or use --renderer cpu",
+                     TRIP_GL_SHEETS_LEAST, (long long)width, (long long)height,
+                     (unsigned long long)((taken + bytes) >> 20));
 }
 
 static int check_size(int64_t width, int64_t height)
@@ -52,7 +56,7 @@ static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, bool g
     layers = layers < TRIP_GL_SHEETS_LEAST ? TRIP_GL_SHEETS_LEAST : layers;
     layers = layers > TRIP_GL_SHEETS_MAX ? TRIP_GL_SHEETS_MAX : layers;
     if (!trip_budget_charge(t->budget, layers * sheet))
-        return no_memory(width, height);
+        return no_memory(t, width, height, layers * sheet);
     t->bytes = layers * sheet;
     t->width = (int)width;
     t->height = (int)height;

@@ -40,7 +40,8 @@ class Triptych:
     def __init__(self, prepared, renderer, threads, name=None, look=()):
         self.prepared, self.renderer, self.threads = prepared, renderer, threads
         self.name = name or "triptych-" + renderer
-        self.look = list(look) + ([] if prepared.scene.shading else ["--no-shading"])
+        look = list(look) if "--classify" in look else ["--classify", "pre", *look]
+        self.look = look + ([] if prepared.scene.shading else ["--no-shading"])
         self.device = None
 
     def time_views(self, size, views):

@@ -108,7 +108,8 @@ class Frames:
         profile = os.path.join(folder, "callgrind.out")
         run(["valgrind", "--tool=callgrind", "--callgrind-out-file=" + profile,
              self.options.triptych, "render", self.options.dataset, "--output",
-             os.path.join(folder, "frame.tif"), "--renderer=cpu", "--threads=1", "--hidden=draw",
+             os.path.join(folder, "frame.tif"), "--classify=pre", "--renderer=cpu", "--threads=1",
+             "--hidden=draw",
              "--engine=pread", "--size=" + self.options.size] + view_options(view)
             + self.options.look, env=dict(os.environ, TRIPTYCH_ISA=isa))
         with open(profile, encoding="utf-8", errors="replace") as file:

@@ -234,6 +234,57 @@ static void pictures_take_of_the_memory_given(void **state)
     triptych_destroy(t); /* with the picture */
 }
 
+/* What a frame with these settings was classified as, as its plan has it in words, too. */
+static void check_classified(triptych *t, const triptych_settings *s, triptych_classify expected,
+                             const char *words)
+{
+    static float rgba[FLOATS];
+    triptych_frame_stats frame;
+    char *text;
+    assert_int_equal(triptych_set_settings(t, s), TRIPTYCH_OK);
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
+    assert_non_null(strstr(text, words));
+    free(text);
+    triptych_end(t);
+    assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+    assert_int_equal(triptych_get_frame_stats(t, &frame), TRIPTYCH_OK);
+    assert_int_equal(frame.classify, expected);
+    assert_int_equal(frame.slices > 0, expected == TRIPTYCH_POST);
+}
+
+static void what_only_splats_have_is_drawn_by_them(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_settings usual = triptych_default_settings(), s;
+    usual.classify = TRIPTYCH_CLASSIFY_AUTO;
+    s = usual;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    check_classified(t, &s, TRIPTYCH_POST, "by the view");
+    s.slices = 4;
+    check_classified(t, &s, TRIPTYCH_POST, "in 4 slices");
+    s = usual;
+    s.kernel_radius = 1.75;
+    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: a kernel radius");
+    s = usual;
+    s.lod_px = 2;
+    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: coarse levels");
+    s = usual;
+    s.target = TRIPTYCH_RGBA8;
+    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: the target");
+    s = usual;
+    s.traversal = TRIPTYCH_ASCENDING;
+    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: lists");
+    s = usual;
+    s.count = 1;
+    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: splats are counted");
+    s.count = 0;
+    s.classify = TRIPTYCH_PRE;
+    check_classified(t, &s, TRIPTYCH_PRE, "classify    pre");
+    triptych_destroy(t);
+}
+
 /* The eye looks at the box of what is kept from outside: what is seen lies within it. */
 static void depth_is_the_distance_of_what_is_seen(void **state)
 {
@@ -859,6 +910,7 @@ int main(void)
         cmocka_unit_test(a_frame_given_up_leaves_the_next_one_as_it_is),
         cmocka_unit_test(a_turned_view_can_be_turned_back),
         cmocka_unit_test(the_integral_of_what_is_kept_is_that_of_the_volume),
+        cmocka_unit_test(what_only_splats_have_is_drawn_by_them),
         cmocka_unit_test(more_samples_are_the_mean_of_a_larger_picture),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
     };

@@ -117,7 +117,8 @@ static void decode_run(void *context, unsigned task, unsigned thread)
 {
     const decoding *d = context;
     const trip_cpu_kept_run *kept = &d->from->runs[task];
-    const trip_block_form form = trip_block_form_of(&d->s->of->frame->data->header);
+    const trip_block_form form =
+        trip_block_form_of(&d->s->of->frame->data->header, (trip_kind)kept->kind);
     (void)thread;
     const trip_block block =
         trip_block_make(&form, kept->count, kept->words, d->from->words + kept->at, NULL);
@@ -288,9 +289,13 @@ int trip_cpu_windows_add_run(trip_cpu_sheets *s, const trip_run *run)
         return status;
     trip_cpu_kept_sheet *sheet = &w->sheets[w->count - 1];
     const unsigned char *from = s->batch->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
-    sheet->runs[sheet->run_count++] = (trip_cpu_kept_run){
-        .u = run->u, .v = run->v, .count = run->count, .words = run->words, .at = sheet->word_count
-    };
+    sheet->runs[sheet->run_count++] =
+        (trip_cpu_kept_run){ .u = run->u,
+                             .v = run->v,
+                             .kind = trip_batch_list(s->batch, run)->kind,
+                             .count = run->count,
+                             .words = run->words,
+                             .at = sheet->word_count };
     memcpy(sheet->words + sheet->word_count, from, (size_t)run->words * 8);
     sheet->word_count += run->words;
     return 0;

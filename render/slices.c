@@ -1,0 +1,60 @@
+#include "slices.h"
+
+#include "weight.h"
+
+/* Over a sheet of list `axis`; 0 where the ray has no weight in it. */
+static double slope_of(const trip_settings *s, int axis_of_view, trip_vec3 ray, int axis)
+{
+    if (!(trip_weight(s, axis_of_view, ray, axis) > 0))
+        return 0;
+    double along = fabs(trip_component(ray, axis)), most = 0;
+    for (int a = 0; a < 3; a++)
+        if (a != axis)
+            most = fmax(most, fabs(trip_component(ray, a)) / along);
+    return most;
+}
+
+/* Among rays through a grid of pixel positions, corners included; where slopes vary, they are
+ * steepest at corners or where lists meet, and there they are far above what is straight. */
+static double steepest(const trip_camera *c, const trip_settings *s)
+{
+    enum { ACROSS = 16 };
+    const int axis_of_view = trip_weight_axis_of_view(c);
+    double most = 0;
+    for (int i = 0; i < (ACROSS + 1) * (ACROSS + 1); i++) {
+        double x = (double)(i % (ACROSS + 1)) / ACROSS, y = (double)(i / (ACROSS + 1)) / ACROSS;
+        trip_vec3 ray = trip_camera_ray(c, x * c->width, y * c->height);
+        for (int axis = 0; axis < 3; axis++)
+            most = fmax(most, slope_of(s, axis_of_view, ray, axis));
+    }
+    return most;
+}
+
+/* Index-space distance from the eye to the nearest point of the grid. */
+static double distance_to(const trip_camera *c, const uint64_t dims[3])
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        double eye = trip_component(c->eye, a), last = (double)dims[a] - 1;
+        double beyond = eye < 0 ? -eye : eye > last ? eye - last : 0;
+        sum += beyond * beyond;
+    }
+    return sqrt(sum);
+}
+
+/* A pixel is as wide as directions of neighbouring rays are apart, at depth 1 in perspective. */
+static double voxel_px(const trip_camera *c, const uint64_t dims[3])
+{
+    double pixel = fmin(trip_length(c->rx), trip_length(c->ry));
+    return c->ortho ? 1 / pixel : 1 / (pixel * distance_to(c, dims));
+}
+
+trip_view_slices trip_slices_of_view(const trip_camera *camera, const trip_settings *settings,
+                                     const uint64_t dims[3])
+{
+    trip_view_slices v = { .slope = steepest(camera, settings),
+                           .voxel_px = voxel_px(camera, dims) };
+    bool straight = v.slope <= TRIP_SLICES_STRAIGHT, large = v.voxel_px >= TRIP_SLICES_LARGE_PX;
+    v.slices = straight ? 1 : large ? 3 : 2;
+    return v;
+}

@@ -1,0 +1,29 @@
+/* How many slices of a sheet a view calls for (sheet.h), where none are given. A function of the
+ * view and the grid alone. Pure. */
+#ifndef TRIP_SLICES_H
+#define TRIP_SLICES_H
+
+#include <stdint.h>
+
+#include "camera.h"
+#include "settings.h"
+
+typedef struct trip_view_slices {
+    int slices;
+    double slope;    /* the steepest ray with weight moves so far along u or v over a sheet */
+    double voxel_px; /* of a voxel where the grid is nearest to the eye, infinite within it */
+} trip_view_slices;
+
+/* Between two slices values are taken to run straight. A ray along an axis meets them so; one of
+ * slope s bends within a cell, and its error falls with the square of the slices. So it is
+ *     1  where no ray is steeper than TRIP_SLICES_STRAIGHT,
+ *     3  where a voxel is TRIP_SLICES_LARGE_PX or wider somewhere, so that an error shows as a
+ *        shape,
+ *     2  elsewhere. */
+trip_view_slices trip_slices_of_view(const trip_camera *camera, const trip_settings *settings,
+                                     const uint64_t dims[3]);
+
+#define TRIP_SLICES_STRAIGHT 0.125
+#define TRIP_SLICES_LARGE_PX 4.0
+
+#endif
