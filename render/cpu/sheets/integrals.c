@@ -54,13 +54,19 @@ static void step(const trip_tf_entry *table, int code, double out[4])
         out[1 + i] = product(a->extinction, b->extinction, component(a, i), component(b, i));
 }
 
+/* The nearest whole number of one that is not negative. */
+static int32_t rounded(double x)
+{
+    return (int32_t)(x + 0.5);
+}
+
 static void set_at(trip_cpu_integrals *in, const trip_tf_entry *table, double factor)
 {
     for (int code = 0; code < CODES; code++) {
         const trip_tf_entry *e = &table[code];
-        in->at[code][0] = (int32_t)lrint(factor * e->extinction);
+        in->at[code][0] = rounded(factor * e->extinction);
         for (int i = 0; i < 3; i++)
-            in->at[code][1 + i] = (int32_t)lrint(factor * e->extinction * component(e, i));
+            in->at[code][1 + i] = rounded(factor * e->extinction * component(e, i));
     }
 }
 
@@ -88,17 +94,17 @@ void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, dou
 {
     trip_cpu_integrals *in = &f->integrals;
     double all = 0, sum[4] = { 0 }, add[4];
-    for (int code = 0; code < CODES - 1; code++) {
-        step(table, code, add);
-        all += add[0];
-    }
+    for (int code = 0; code < CODES - 1; code++)
+        all += 0.5 * ((double)table[code].extinction + table[code + 1].extinction);
     /* A function of one code alone still has what at[] is in units of. */
     double factor = all > 0 ? GREATEST / all : 1;
     for (int code = 0; code < CODES; code++) {
         for (int i = 0; i < 4; i++)
-            in->sums[code][i] = (int32_t)lrint(factor * sum[i]);
+            in->sums[code][i] = rounded(factor * sum[i]);
         if (code == CODES - 1)
             break;
+        if (table[code].extinction == 0 && table[code + 1].extinction == 0)
+            continue;
         step(table, code, add);
         for (int i = 0; i < 4; i++)
             sum[i] += add[i];
