@@ -23,6 +23,16 @@ STAGES = {
     "merge": ["tile_merge", "tile_finish"],
 }
 
+# Of frames that classify after interpolation (render/cpu/sheets/).
+POST_STAGES = {
+    "decoding": ["trip_cpu_store_decode"],
+    "preparing": ["sheet_ranges", "sheet_cells"],
+    "gradients": ["sheet_gradients"],
+    "slices": ["sheet_between"],
+    "drawing": ["tile_clear", "sheet_tile"],
+    "merge": ["tile_merge", "tile_finish"],
+}
+
 CALL = re.compile(r"calls=")
 COST = re.compile(r"[+*\-\d]\S* (\d+)$")
 NAME = re.compile(r"(c?fn)=\((\d+)\)(?: (.*))?")
@@ -64,12 +74,13 @@ def function_costs(lines):
     return costs, total
 
 
-def stage_costs(costs, total):
+def stage_costs(costs, total, of=None):
     """By stage; a view may leave a function uncalled, but never all of a stage."""
-    for names in STAGES.values():
+    of = of or STAGES
+    for names in of.values():
         if not any(name in costs for name in names):
             fail("no function %s in the program's profile; is it stripped?" % " or ".join(names))
-    stages = {stage: sum(costs.get(name, 0) for name in names) for stage, names in STAGES.items()}
+    stages = {stage: sum(costs.get(name, 0) for name in names) for stage, names in of.items()}
     stages["rest"] = total - sum(stages.values())
     return stages
 
@@ -88,9 +99,16 @@ class Frames:
         self.options = options
         text = run([options.triptych, "bench", "renderers", options.dataset, "--renderer=cpu",
                     "--threads=1", "--hidden=draw", "--json", "--size=" + options.size,
-                    "--views=%d" % options.views] + options.look)
-        row = json.loads(text)["tables"]["renderers"]["rows"][0]
+                    "--views=%d" % options.views] + options.look
+                   + (["--no-counts"] if options.post else []))
+        result = json.loads(text)
+        row = result["tables"]["renderers"]["rows"][0]
         self.views = row["each_view"]
+        if options.post:
+            width, height = options.size.split("x")
+            self.splats = result["settings"]["kept"] * len(self.views)
+            self.pixels = int(width) * int(height) * len(self.views)
+            return
         self.splats = row["splats_drawn"] * len(self.views)
         self.pixels = self.splats * row.get("pixels_per_splat", 0)
         if not self.splats:
@@ -113,18 +131,25 @@ class Frames:
              "--engine=pread", "--size=" + self.options.size] + view_options(view)
             + self.options.look, env=dict(os.environ, TRIPTYCH_ISA=isa))
         with open(profile, encoding="utf-8", errors="replace") as file:
-            return stage_costs(*function_costs(file))
+            return stage_costs(*function_costs(file), POST_STAGES if self.options.post else STAGES)
 
 
 def print_table(frames, counts):
-    print("%s, %s, %d view%s: %d splats, %.1f pixels each\n" % (
+    post = frames.options.post
+    print("%s, %s, %d view%s: %d %s, %.1f pixels each\n" % (
         os.path.basename(frames.options.dataset), frames.options.size, len(frames.views),
-        "" if len(frames.views) == 1 else "s", frames.splats, frames.pixels / frames.splats))
-    print("%-8s %-11s %16s %12s %12s" % ("set", "stage", "instructions", "per splat", "per pixel"))
+        "" if len(frames.views) == 1 else "s", frames.splats, "voxels" if post else "splats",
+        frames.pixels / frames.splats))
+    print("%-8s %-11s %16s %12s %12s" % ("set", "stage", "instructions",
+                                         "per voxel" if post else "per splat", "per pixel"))
     for isa, stages in counts.items():
         for stage, n in stages.items():
             print("%-8s %-11s %16d %12.1f %12.2f" % (isa, stage, n, n / frames.splats,
                                                      n / frames.pixels))
+    if post:
+        print("\nVoxels are those kept, pixels those of the picture. The rest is reading, checking, "
+              "planning,\nthe function's integrals and writing the picture.")
+        return
     print("\nSplats and pixels are those of `triptych bench renderers`, hidden ones too. The rest is "
           "reading,\nchecking, planning, leaving out what is hidden and writing the picture. valgrind has "
           "no AVX-512, so\nthat is not counted.")
@@ -132,7 +157,7 @@ def print_table(frames, counts):
 
 def as_json(frames, counts):
     return {"data_set": frames.options.dataset, "size": frames.options.size,
-            "views": len(frames.views), "splats": frames.splats, "pixels": frames.pixels,
+            "views": len(frames.views), "voxels" if frames.options.post else "splats": frames.splats, "pixels": frames.pixels,
             "instructions": counts}
 
 
@@ -146,11 +171,17 @@ def parse():
     parser.add_argument("--views", type=int, default=1, help="round the object (default: 1)")
     parser.add_argument("--isa", choices=ISAS, action="append",
                         help="instruction set; may be repeated (default: both)")
+    parser.add_argument("--classify", choices=["pre", "post"], default="pre",
+                        help="as in `triptych render`; post counts per kept voxel and per pixel of "
+                        "the picture (default: pre)")
     parser.add_argument("--no-shading", action="store_true", help="as in `triptych render`")
     parser.add_argument("--kernel-radius", help="as in `triptych render`")
     parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
     options.look = ["--no-shading"] if options.no_shading else []
+    options.post = options.classify == "post"
+    if options.post:
+        options.look.append("--classify=post")
     if options.kernel_radius:
         options.look.append("--kernel-radius=" + options.kernel_radius)
     return options

@@ -51,9 +51,7 @@ class InstructionsTest(unittest.TestCase):
         with self.assertRaises(SystemExit):
             instructions.stage_costs(dict(stage=10, trip_cpu_sort_chunk=7, tile_blend=40), 100)
 
-    @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
-    @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
-    def test_every_stage_of_a_frame_is_counted(self):
+    def count(self, *options):
         with tempfile.TemporaryDirectory() as folder:
             volume, data = os.path.join(folder, "v.raw"), os.path.join(folder, "v.trip")
             with open(volume, "wb") as file:
@@ -62,13 +60,27 @@ class InstructionsTest(unittest.TestCase):
             subprocess.run([program, "brick", volume, "-o", data, "--size=16,16,16", "--type=uint8",
                             "-q"], check=True)
             done = subprocess.run([sys.executable, "-B", os.path.join(HERE, "instructions.py"), data,
-                                   "--triptych=" + program, "--isa=plain", "--size=64x64", "--json"],
-                                  check=True, stdout=subprocess.PIPE)
-        result = json.loads(done.stdout)
+                                   "--triptych=" + program, "--isa=plain", "--size=64x64", "--json",
+                                   *options], check=True, stdout=subprocess.PIPE)
+        return json.loads(done.stdout)
+
+    @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
+    @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
+    def test_every_stage_of_a_frame_is_counted(self):
+        result = self.count()
         self.assertGreater(result["splats"], 1000)
         self.assertGreater(result["pixels"], result["splats"])
         for stage, n in result["instructions"]["plain"].items():
             self.assertGreater(n, result["splats"] if stage != "merge" else 64 * 64, stage)
+
+    @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
+    @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
+    def test_every_stage_of_a_frame_that_classifies_after_interpolation_is_counted(self):
+        result = self.count("--classify=post")
+        self.assertEqual(result["pixels"], 64 * 64)
+        self.assertGreater(result["voxels"], 1000)
+        for stage, n in result["instructions"]["plain"].items():
+            self.assertGreater(n, result["voxels"], stage)
 
 
 if __name__ == "__main__":
