@@ -40,6 +40,9 @@ struct triptych {
     trip_renderer *renderer; /* NULL until a frame is begun */
     trip_reader *reader;     /* the same; of these planes: */
     unsigned planes;
+    trip_dataset
+        *at_level;  /* what frames are drawn from that have a coarse level alone; else NULL */
+    unsigned level; /* that */
     trip_settings settings; /* slices 0: by the view */
     bool classify_auto;     /* settings.classify is what that has come to for a frame */
     bool counting; /* frames count exactly, and draw what is hidden too; the reader is for that: */
@@ -85,6 +88,8 @@ int trip_context_check_list(const triptych *t, unsigned number);
 int trip_context_use_function(triptych *t, const triptych_function *f);
 int trip_context_find_view(triptych *t, const triptych_view *given);
 void trip_context_drop_reader(triptych *t);
+/* Frames are drawn from the data set itself again. */
+void trip_context_drop_level(triptych *t);
 /* And the reader, which may be in its memory. */
 void trip_context_drop_renderer(triptych *t);
 /* What the frame has come to, once its picture is complete. */

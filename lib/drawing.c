@@ -4,6 +4,8 @@
 
 #include "context.h"
 #include "cpu/cpu_renderer.h"
+#include "dataset_level.h"
+#include "lod.h"
 #include "report.h"
 
 static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
@@ -16,6 +18,23 @@ void trip_context_drop_reader(triptych *t)
 {
     trip_reader_destroy(t->reader);
     t->reader = NULL;
+}
+
+void trip_context_drop_level(triptych *t)
+{
+    if (t->at_level)
+        trip_context_drop_reader(t);
+    trip_dataset_level_close(t->at_level);
+    t->at_level = NULL;
+    t->level = 0;
+}
+
+/* What frames are drawn from. */
+static session drawn_session(const triptych *t)
+{
+    session s = t->session;
+    s.data = t->at_level ? t->at_level : s.data;
+    return s;
 }
 
 void trip_context_drop_renderer(triptych *t)
@@ -47,7 +66,8 @@ static int make_reader(triptych *t, unsigned planes)
     trip_context_drop_reader(t);
     t->planes = planes;
     t->reader_counts = t->counting;
-    return session_make_reader(&t->session, &t->reader, &wanted);
+    const session s = drawn_session(t);
+    return session_make_reader(&s, &t->reader, &wanted);
 }
 
 /* Pixels of the frame along each side of one of the picture: where more than one ray a pixel is
@@ -62,7 +82,35 @@ static int make_camera(triptych *t)
     trip_camera_params view = t->turned;
     view.width *= pixels_a_side(t);
     view.height *= pixels_a_side(t);
-    return trip_camera_make(&t->camera, &view, &t->session.data->index_to_world);
+    return trip_camera_make(&t->camera, &view, &drawn_session(t).data->index_to_world);
+}
+
+/* The coarse level of a frame that has one alone. */
+static unsigned choose_level(const triptych *t, const trip_camera *camera)
+{
+    const trip_dataset *data = t->session.data;
+    if (t->settings.classify != TRIP_CLASSIFY_POST || t->classify_auto ||
+        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return 0;
+    return trip_lod_of_all(data, camera, &t->settings, trip_dataset_value_levels(data));
+}
+
+/* Takes up the level of the frame, by the view of level 0, and makes its camera. */
+static int place_camera(triptych *t)
+{
+    trip_dataset *before = t->at_level;
+    t->at_level = NULL;
+    int status = make_camera(t);
+    t->at_level = before;
+    unsigned level = status ? t->level : choose_level(t, &t->camera);
+    if (level != t->level) {
+        trip_context_drop_reader(t);
+        trip_context_drop_level(t);
+        if (level > 0)
+            status = trip_dataset_level_open(&t->at_level, t->session.data, level);
+        t->level = t->at_level ? level : 0;
+    }
+    return !status && t->at_level ? make_camera(t) : status;
 }
 
 static int prepare(triptych *t)
@@ -80,7 +128,7 @@ static int prepare(triptych *t)
         status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
                                       s->budget);
     if (!status)
-        status = make_camera(t);
+        status = place_camera(t);
     return status;
 }
 
@@ -118,7 +166,7 @@ static void choose_settings(triptych *t)
     t->why_pre = t->classify_auto && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || (t->classify_auto && integral))
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
-    t->slices = trip_slices_of_view(&t->camera, &t->settings, t->session.data->header.dims);
+    t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
     if (!t->settings.slices)
         t->drawn_settings.slices = t->slices.slices;
 }
@@ -144,7 +192,10 @@ static int plan_frame(triptych *t)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
         return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
-    return trip_plan_make(&t->plan, s->data, &t->camera, &t->drawn_settings, s->table, s->budget);
+    int status = trip_plan_make(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
+                                s->table, s->budget);
+    t->plan.level = t->level;
+    return status;
 }
 
 static int plan(triptych *t)
@@ -161,7 +212,7 @@ static int start(triptych *t)
 {
     int status = make_reader(t, t->plan.planes);
     t->frame = (trip_frame){
-        .data = t->session.data,
+        .data = drawn_session(t).data,
         .camera = &t->camera,
         .settings = &t->drawn_settings,
         .plan = &t->plan,

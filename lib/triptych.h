@@ -244,7 +244,8 @@ typedef struct triptych_settings {
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
-                      0 to 1000; 0, the default: the finest alone */
+                      0 to 1000; 0, the default: the finest alone. Post has one level for all of a
+                      frame. Not with indexed */
     int depth;     /* not 0: frames have distances too; not with rounded targets or the integral */
     /* Of the integral renderer alone, but for samples. */
     triptych_field field;   /* what it integrates */

@@ -57,19 +57,27 @@ unsigned trip_lod_level(double width_px, double px, unsigned levels)
     return level;
 }
 
-/* The least depth of a cell's voxels. */
-static double nearest_depth(const trip_lod *lod, const trip_dataset *data,
-                            const trip_camera *camera, const int64_t cell[3])
+/* The least depth of the voxels from `first` to before `past`, and how wide they are there. */
+static double width_in(const trip_camera *camera, const int64_t first[3], const int64_t past[3])
 {
     double depth = -trip_dot(camera->forward, camera->eye);
     for (int a = 0; a < 3; a++) {
         double along = trip_component(camera->forward, a);
-        double lo = (double)(cell[a] << lod->cell_log2) - 0.5;
-        double hi =
-            fmin((double)((cell[a] + 1) << lod->cell_log2), (double)data->header.dims[a]) - 0.5;
-        depth += fmin(along * lo, along * hi);
+        depth += fmin(along * ((double)first[a] - 0.5), along * ((double)past[a] - 0.5));
     }
-    return depth;
+    return camera->ortho || depth > 0 ? trip_lod_width_px(camera, depth) : HUGE_VAL;
+}
+
+static double width_in_cell(const trip_lod *lod, const trip_dataset *data,
+                            const trip_camera *camera, const int64_t cell[3])
+{
+    int64_t first[3], past[3];
+    for (int a = 0; a < 3; a++) {
+        first[a] = cell[a] << lod->cell_log2;
+        past[a] = (cell[a] + 1) << lod->cell_log2;
+        past[a] = past[a] < (int64_t)data->header.dims[a] ? past[a] : (int64_t)data->header.dims[a];
+    }
+    return width_in(camera, first, past);
 }
 
 static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
@@ -80,9 +88,7 @@ static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_came
     for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
         for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
             for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++) {
-                double depth = nearest_depth(lod, data, camera, cell);
-                bool ahead = camera->ortho || depth > 0;
-                double width = ahead ? trip_lod_width_px(camera, depth) : HUGE_VAL;
+                double width = width_in_cell(lod, data, camera, cell);
                 *to++ = (uint8_t)trip_lod_level(width, px, lod->levels);
             }
 }
@@ -148,4 +154,15 @@ bool trip_lod_brick(const trip_lod *lod, const trip_list *list, const trip_file_
                 if (trip_lod_at(lod, cell) == list->level)
                     return true;
     return false;
+}
+
+unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, unsigned most)
+{
+    const int64_t first[3] = { 0, 0, 0 };
+    const int64_t past[3] = { (int64_t)data->header.dims[0], (int64_t)data->header.dims[1],
+                              (int64_t)data->header.dims[2] };
+    double width = width_in(camera, first, past);
+    return settings->lod_px > 0 ? trip_lod_level(width, settings->lod_px * settings->samples, most)
+                                : 0;
 }

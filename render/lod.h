@@ -28,6 +28,11 @@ int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *ca
                   const trip_settings *settings, trip_budget *budget);
 void trip_lod_release(trip_lod *lod, trip_budget *budget);
 
+/* The level of all of the grid where a frame has one alone, as those that classify after
+ * interpolation do: the finest of its places' levels, at most `most`. */
+unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, unsigned most);
+
 /* Whether voxels of the list are chosen by level: those that `brick` makes for splats. All others
  * are drawn whatever the levels. */
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list);

@@ -448,10 +448,19 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
 {
     if (!(s->lod_px > 0) || plan->gathers)
         return;
-    fprintf(out,
-            "levels      run: cells of %d voxels a side at the coarsest of %u levels whose voxels "
-            "are at most %g pixels wide\n",
-            plan->lod.level ? 1 << plan->lod.cell_log2 : 0, plan->lod.levels + 1, s->lod_px);
+    if (s->classify == TRIP_CLASSIFY_POST)
+        fprintf(out,
+                "levels      %s: level %u for all of the grid, whose voxels are at most %g pixels "
+                "wide\n",
+                plan->level ? "run" : "do not run", plan->level, s->lod_px);
+    else if (plan->lod.level)
+        fprintf(
+            out,
+            "levels      run: cells of %d voxels a side, each at the coarsest of %u levels whose "
+            "voxels are at most %g pixels wide\n",
+            1 << plan->lod.cell_log2, plan->lod.levels + 1, s->lod_px);
+    else
+        fprintf(out, "levels      do not run: the data set has none\n");
 }
 
 static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *out)

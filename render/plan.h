@@ -45,6 +45,7 @@ typedef struct trip_plan {
     int axis_of_view;
     bool gathers;    /* trip_plan_make_field()'s */
     trip_lod lod;    /* which level is drawn where */
+    unsigned level;  /* post: of all of the frame; the data set it was made for is of that level */
     unsigned planes; /* bit per trip_plane to read */
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */

@@ -6,6 +6,7 @@
 
 #include <string.h>
 
+#include "dataset_level.h"
 #include "lod.h"
 #include "mean.h"
 
@@ -224,6 +225,46 @@ static void tiles_make_no_difference(void **state)
     scene_picture_free(&p[1]);
 }
 
+/* Post draws one level, between the outermost centres of its voxels. */
+static void interpolated_fog_is_as_thick_at_a_coarse_level(void **state)
+{
+    (void)state;
+    scene s, at;
+    const scene_part part = {
+        .level = 1, .kind = TRIP_KIND_VALUES, .by = { 2, 2, 2 }, .voxel = all
+    };
+    scene_create(&s, &(scene_params){ .dims = { 64, 64, NZ },
+                                      .tile_voxels = 64,
+                                      .slab_sheets = 8,
+                                      .voxel = all,
+                                      .parts = &part,
+                                      .part_count = 1 });
+    scene_colour(&s, 0, 65535, 1, 0.5, 0.25, 0.02);
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 300, 40, SIZE_PX);
+    view.ortho_height = 60;
+    trip_settings settings = settings_at(2);
+    settings.classify = TRIP_CLASSIFY_POST;
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_dataset_value_levels(s.data), 1);
+    assert_int_equal(trip_lod_of_all(s.data, &c, &settings, 1), 1);
+    at = s;
+    assert_int_equal(trip_dataset_level_open(&at.data, s.data, 1), 0);
+    assert_int_equal(at.data->header.dims[2], NZ / 2);
+    for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+        scene_picture fine = scene_draw(&s, r, &view, &settings);
+        scene_picture coarse = scene_draw(&at, r, &view, &settings);
+        float a = scene_pixel(&fine, SIZE_PX / 2, SIZE_PX / 2)[3];
+        float b = scene_pixel(&coarse, SIZE_PX / 2, SIZE_PX / 2)[3];
+        assert_float_equal(a, 1 - pow(0.98, NZ - 1), 1e-3);
+        assert_float_equal(b, 1 - pow(0.98, NZ - 2), 1e-3);
+        scene_picture_free(&fine);
+        scene_picture_free(&coarse);
+    }
+    trip_dataset_level_close(at.data);
+    scene_destroy(&s);
+}
+
 /* A code of means that covers a half shows a half, and where it is thin as much as was kept. */
 static void tables_of_means_have_their_opacity(void **state)
 {
@@ -263,6 +304,7 @@ int main(void)
         cmocka_unit_test(no_seam_shows_where_levels_meet),
         cmocka_unit_test(renderers_agree_on_mixed_levels),
         cmocka_unit_test(tiles_make_no_difference),
+        cmocka_unit_test(interpolated_fog_is_as_thick_at_a_coarse_level),
         cmocka_unit_test(tables_of_means_have_their_opacity),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,16 @@
+/* A data set as it is at one coarse level: its lists of values stand for level 0, on that level's
+ * grid, so that what draws values interpolated at level 0 draws them. Lists keep their numbers. It
+ * shares everything with the data set, which must outlive it. */
+#ifndef TRIP_DATASET_LEVEL_H
+#define TRIP_DATASET_LEVEL_H
+
+#include "dataset.h"
+
+/* How many coarse levels have values along each axis, without a gap. */
+unsigned trip_dataset_value_levels(const trip_dataset *d);
+
+/* `level`: from 1 to that number. */
+int trip_dataset_level_open(trip_dataset **out, const trip_dataset *d, unsigned level);
+void trip_dataset_level_close(trip_dataset *d);
+
+#endif
