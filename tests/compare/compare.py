@@ -34,7 +34,7 @@ NOTES = [
     "its ray tracing took. It has no transfer function: its grid holds the extinction of every "
     "voxel, so it shows the same opacity, in grey and unlit, without shadows (-shadowstep 1e9). It "
     "stops a ray at 4 % transmittance, VTK's ray caster at 0.8 %, Triptych at 0.012 %.",
-    "triptych-post: triptych-cpu with --classify post. vtk-cpu-half: vtk-cpu with a sample every half "
+    "triptych-post: triptych-cpu with --classify post, 2 slices. vtk-cpu-half: vtk-cpu with a sample every half "
     "voxel. VTK's ray caster is given a view wider by a pixel, which it needs to show the same.",
     "Errors: of 255, against the integral through the source volume (linear interpolation, tolerance "
     "%g, 8 bits a channel), over red, green, blue (premultiplied) and opacity of the pixels where "

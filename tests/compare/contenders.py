@@ -151,7 +151,7 @@ NAMES = ["triptych-cpu", "triptych-post", "triptych-gl", "vtk-cpu", "vtk-cpu-hal
 
 def make(name, prepared, threads):
     if name == "triptych-post":
-        return Triptych(prepared, "cpu", threads, name, ["--classify", "post"])
+        return Triptych(prepared, "cpu", threads, name, ["--classify", "post", "--slices", "2"])
     if name == "vtk-cpu-half":
         return Vtk(prepared, "cpu", threads, name, 0.5)
     if name.startswith("triptych-"):
