@@ -390,6 +390,50 @@ static void light_comes_by_differences_of_values(void **state)
     assert_true(most > 0.1); /* by light, not by nothing */
 }
 
+/* Far to the left two cells with a gap between them, one below what shows and one above; far to the
+ * right what shows. */
+static bool gap(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    static const unsigned left[] = { 1000, 20000, 0, 45000, 64000 };
+    (void)user, (void)j, (void)k, (void)gradient;
+    if (i == 2 || (i > 4 && i < 40))
+        return false;
+    *code = i < 5 ? left[i] : 32000;
+    return true;
+}
+
+/* With one slice a sheet, rays far aside pass from one of the cells to the other in one segment, in
+ * which all between both is seen: lit by gradients of cells that show nothing. */
+static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 48, 48, 16 }, .voxel = gap });
+    for (int code = 30000; code <= 35000; code++)
+        s.table[code] = (trip_tf_entry){ 0.6F, 0.3F, 0.1F, 0.5F };
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, -1), 60, 150, 8);
+    view.eye = trip_v3(21.8, 24.3, -2);
+    view.look = trip_v3(21.8, 24.3, 8);
+    trip_settings settings = post(1);
+    settings.method = TRIP_METHOD_AXIS;
+    for (int lit = 0; lit < 2; lit++) {
+        settings.shading = lit;
+        scene_picture expected = { 0 };
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            if (!expected.rgba) {
+                expected = p;                                  /* the reference's */
+                assert_true(scene_pixel(&p, 6, 4)[3] > 0.01F); /* between the cells */
+                continue;
+            }
+            assert_true(scene_difference(&expected, &p) <= r->tolerance);
+            scene_picture_free(&p);
+        }
+        scene_picture_free(&expected);
+    }
+    scene_destroy(&s);
+}
+
 /* The mean distance of what a constant block shows. */
 static void depth_is_the_mean_distance_of_what_is_seen(void **state)
 {
@@ -730,6 +774,7 @@ int main(void)
         cmocka_unit_test(walls_are_seen_on_both_sides_of_an_eye_between_them),
         cmocka_unit_test(a_saturated_pixel_is_opaque),
         cmocka_unit_test(light_comes_by_differences_of_values),
+        cmocka_unit_test(what_a_segment_leaps_over_is_seen_and_lit),
         cmocka_unit_test(depth_is_the_mean_distance_of_what_is_seen),
         cmocka_unit_test(mirrored_turned_and_moved_it_is_the_same_picture),
         cmocka_unit_test(the_error_falls_with_the_square_of_the_slices),

@@ -176,6 +176,11 @@ bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to)
     return s->view.ortho || ((double)to - s->view.eye[2]) * (double)s->way > 0;
 }
 
+bool trip_cpu_sheets_leap(const trip_cpu_sheets *s)
+{
+    return s->view.steepest > 0.999 * s->of->frame->settings->slices;
+}
+
 /* Of complete sheets: ranges, and what may show between them. */
 static void find_visible(trip_cpu_sheets *s, int complete)
 {
@@ -209,6 +214,7 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
                 .third = s->way > 0 ? after : before,
                 .visible = sheet->visible,
                 .visible_before = before ? before->visible : NULL,
+                .everywhere = trip_cpu_sheets_leap(s),
             };
     }
     trip_cpu_store_find_gradients(&s->store, work, count);

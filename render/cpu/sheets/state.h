@@ -36,5 +36,8 @@ struct trip_cpu_sheets {
 int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last);
 /* Whether something between two sheets lies before the eye; of the first, `to` is the farther. */
 bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to);
+/* Whether the ends of a segment may lie in cells that do not touch. Then something may show between
+ * two cells in neither of which anything does. */
+bool trip_cpu_sheets_leap(const trip_cpu_sheets *s);
 
 #endif

@@ -428,7 +428,8 @@ static uint64_t about(const trip_cpu_store *s, const uint64_t *squares, size_t a
 static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    uint64_t squares = about(s, w->visible, at) | about(s, w->visible_before, at);
+    uint64_t squares =
+        w->everywhere ? UINT64_MAX : about(s, w->visible, at) | about(s, w->visible_before, at);
     if (squares)
         s->kernels->sheet_gradients(block_at(s, w->sheet, at), squares,
                                     block_at(s, w->sheet, at - 1),

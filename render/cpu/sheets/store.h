@@ -97,7 +97,8 @@ typedef struct trip_cpu_sheet_work {
     /* Squares in which cells may show: of gradients on both sides of the sheet, NULL where there is
      * nothing; of slices between the sheets. */
     const uint64_t *visible, *visible_before;
-    double part; /* of slices: the weight of `third` */
+    bool everywhere; /* gradients: of all squares */
+    double part;     /* of slices: the weight of `third` */
 } trip_cpu_sheet_work;
 
 /* Complete sheets' blocks get the first voxels of those beside them, and ranges. */
@@ -105,7 +106,7 @@ void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, 
 /* Which squares and cells may show from prepared sheets to the next, `other`. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
-/* Gradients of prepared sheets' voxels, where cells may show. */
+/* Gradients of prepared sheets' voxels, where cells may show or everywhere. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
 /* Blocks for a slice between two sheets, where cells may show. False when the pool is full; then it

@@ -173,13 +173,18 @@ static void find_interval(trip_cpu_sheets *s)
     trip_cpu_sheet *sheet = s->store.sheets, *a = &sheet[w->from], *b = a + 1;
     const trip_cpu_sheet *before = w->from > 0 ? a - 1 : NULL;
     const trip_cpu_sheet *behind = w->from + 2 < w->count ? b + 1 : NULL;
-    bool up = s->way > 0;
+    bool up = s->way > 0, leap = trip_cpu_sheets_leap(s);
     const trip_cpu_sheet_work both[2] = {
-        { .sheet = a, .other = up ? before : b, .third = up ? b : before, .visible = a->visible },
+        { .sheet = a,
+          .other = up ? before : b,
+          .third = up ? b : before,
+          .visible = a->visible,
+          .everywhere = leap },
         { .sheet = b,
           .other = up ? a : behind,
           .third = up ? behind : a,
-          .visible_before = a->visible },
+          .visible_before = a->visible,
+          .everywhere = leap },
     };
     trip_cpu_store_prepare(&s->store, both, 2);
     trip_cpu_store_find_visible(&s->store, &(trip_cpu_sheet_work){ .sheet = a, .other = b }, 1,
