@@ -164,7 +164,7 @@ class Drawn(program.ProgramTest):
                     stats = self.stats(*view, "--count", "--hidden", "draw")
                     self.assertEqual(program.splats_drawn(stats), kept, view)
                     read = [c["splats_read"] for c in stats["frames"][0]["lists"].values()]
-                    self.assertEqual(sorted(read), [0, 0, kept], view)
+                    self.assertEqual([n for n in read if n], [kept], view)
 
     def test_drawn_falls_with_h_then_clip_then_axis(self):
         for name, kept in self.kept.items():
@@ -200,7 +200,7 @@ class Drawn(program.ProgramTest):
             "50x50",
         ]
         stats = self.stats(*away)
-        self.assertEqual([c["bytes_read"] for c in stats["frames"][0]["lists"].values()], [0] * 3)
+        self.assertFalse(any(c["bytes_read"] for c in stats["frames"][0]["lists"].values()))
         close = [
             "tooth.trip",
             "--eye",
