@@ -165,11 +165,10 @@ static void kernels_decode_squares_in_draw_order(void **state)
     assert_non_null(table);
     for (int i = 22000; i < 65536; i++)
         table[i].extinction = 1;
-    const trip_frame frame = { .table = table };
     for (int i = 0; i < 64; i++) {
         unsigned code_bytes = 1 + (unsigned)i % 2, normal_bytes = 3 + (unsigned)i / 2 % 2;
         fill(f, 4 + (unsigned)i / 16, code_bytes, normal_bytes);
-        const trip_cpu_view view = { .of = &frame,
+        const trip_cpu_view view = { .table = table,
                                      .shading = i / 4 % 2,
                                      .code_bytes = code_bytes,
                                      .normal_bytes = normal_bytes };
