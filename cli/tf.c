@@ -2,14 +2,12 @@
  * converts between the forms of other programs. */
 #include "commands.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "library.h"
 #include "new_file.h"
@@ -210,32 +208,13 @@ static int choose_form(const options *o, triptych_form *form)
                             "which by --format");
 }
 
-static int write_all(const char *path, int fd, const char *text)
-{
-    for (size_t length = strlen(text); length > 0;) {
-        ssize_t written = write(fd, text, length);
-        if (written < 0 && errno != EINTR)
-            return trip_fail_errno("write", path, NULL);
-        text += written > 0 ? written : 0;
-        length -= written > 0 ? (size_t)written : 0;
-    }
-    return fsync(fd) == 0 ? 0 : trip_fail_errno("write", path, NULL);
-}
-
 static int write_file(const options *o, const char *text)
 {
     const char *path = o->words[2];
     struct stat st;
-    trip_new_file file;
     if (lstat(path, &st) == 0 && !o->force)
         return trip_fail(TRIP_ERROR, "tf", path, "is there already; --force replaces it");
-    int status = trip_new_file_begin(&file, "write", path);
-    if (!status)
-        status = write_all(path, file.fd, text);
-    if (!status)
-        return trip_new_file_finish(&file);
-    trip_new_file_abandon(&file);
-    return status;
+    return trip_new_file_of_text("write", path, text);
 }
 
 static int convert(const options *o)

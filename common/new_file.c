@@ -86,3 +86,28 @@ void trip_new_file_abandon(trip_new_file *f)
     f->fd = -1;
     unlink(f->temporary);
 }
+
+static int write_text(const trip_new_file *f, const char *text)
+{
+    for (size_t left = strlen(text); left > 0;) {
+        ssize_t written = write(f->fd, text, left);
+        if (written < 0 && errno != EINTR)
+            return trip_fail_errno(f->what, f->path, NULL);
+        text += written > 0 ? written : 0;
+        left -= written > 0 ? (size_t)written : 0;
+    }
+    return fsync(f->fd) == 0 ? 0 : trip_fail_errno(f->what, f->path, NULL);
+}
+
+int trip_new_file_of_text(const char *what, const char *path, const char *text)
+{
+    trip_new_file file;
+    int status = trip_new_file_begin(&file, what, path);
+    if (status)
+        return status;
+    status = write_text(&file, text);
+    if (!status)
+        return trip_new_file_finish(&file);
+    trip_new_file_abandon(&file);
+    return status;
+}

@@ -24,4 +24,7 @@ int trip_new_file_finish(trip_new_file *f);
 /* Removes it, unless it is finished. */
 void trip_new_file_abandon(trip_new_file *f);
 
+/* Makes a file of a text, which is on the disk when it gets its name. */
+int trip_new_file_of_text(const char *what, const char *path, const char *text);
+
 #endif

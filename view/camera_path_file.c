@@ -1,6 +1,5 @@
 /* Paths of the camera as JSON, and its files. */
 #include <cjson/cJSON.h>
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,31 +53,11 @@ char *trip_camera_path_print(const trip_camera_path *p)
     return text;
 }
 
-static int write_all(int fd, const char *text, const char *path)
-{
-    for (size_t left = strlen(text); left > 0;) {
-        ssize_t written = write(fd, text, left);
-        if (written < 0 && errno != EINTR)
-            return trip_fail_errno("write", path, NULL);
-        text += written > 0 ? written : 0;
-        left -= written > 0 ? (size_t)written : 0;
-    }
-    return 0;
-}
-
 int trip_camera_path_save(const trip_camera_path *p, const char *path)
 {
-    trip_new_file file;
     char *text = trip_camera_path_print(p);
-    int status = text ? trip_new_file_begin(&file, "write", path)
+    int status = text ? trip_new_file_of_text("write", path, text)
                       : trip_fail(TRIP_ERROR, "write", path, "out of memory");
-    if (!status) {
-        status = write_all(file.fd, text, path);
-        if (!status)
-            status = trip_new_file_finish(&file);
-        else
-            trip_new_file_abandon(&file);
-    }
     free(text);
     return status;
 }

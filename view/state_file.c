@@ -290,25 +290,6 @@ static int make_folders(char *path)
     return 0;
 }
 
-static int write_file(const char *path, const char *text)
-{
-    trip_new_file file;
-    int status = trip_new_file_begin(&file, "write", path);
-    if (status)
-        return status;
-    for (size_t left = strlen(text); left > 0 && !status;) {
-        ssize_t written = write(file.fd, text, left);
-        if (written < 0 && errno != EINTR)
-            status = trip_fail_errno("write", path, NULL);
-        text += written > 0 ? written : 0;
-        left -= written > 0 ? (size_t)written : 0;
-    }
-    if (!status)
-        return trip_new_file_finish(&file);
-    trip_new_file_abandon(&file);
-    return status;
-}
-
 int trip_state_file_save(const trip_view_state *s, const char *data)
 {
     char *path, *real = real_path(data);
@@ -320,7 +301,7 @@ int trip_state_file_save(const trip_view_state *s, const char *data)
     if (!status)
         status = make_folders(path);
     if (!status)
-        status = write_file(path, text);
+        status = trip_new_file_of_text("write", path, text);
     free(text);
     free(path);
     return status;

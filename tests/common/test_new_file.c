@@ -94,6 +94,20 @@ static void a_link_is_replaced_and_what_it_points_to_stays(void **state)
     unlink("link");
 }
 
+static void a_text_is_written_whole_or_not_at_all(void **state)
+{
+    (void)state;
+    assert_int_equal(trip_new_file_of_text("write", "a", "one\n"), 0);
+    assert_holds("a", "one\n");
+    assert_int_equal(trip_new_file_of_text("write", "a", ""), 0);
+    assert_holds("a", "");
+    unlink("a");
+    test_catch_reports();
+    assert_int_equal(trip_new_file_of_text("keep", "missing/a", "one"), TRIP_ERROR);
+    assert_one_report("keep: missing/a: cannot create a file beside it");
+    assert_int_equal(count_files(), 0);
+}
+
 static void files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way(void **state)
 {
     (void)state;
@@ -127,6 +141,7 @@ int main(void)
         cmocka_unit_test(a_file_is_there_only_once_it_is_finished),
         cmocka_unit_test(what_is_replaced_hands_on_its_mode_and_stays_until_then),
         cmocka_unit_test(a_link_is_replaced_and_what_it_points_to_stays),
+        cmocka_unit_test(a_text_is_written_whole_or_not_at_all),
         cmocka_unit_test(files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way),
         cmocka_unit_test(what_cannot_be_written_is_one_report_and_leaves_nothing),
     };
