@@ -190,7 +190,7 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
     float *whole = malloc(bytes), *some = malloc(bytes);
     assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
     int drawn = 0, refused = 0;
-    for (uint64_t memory = 4 << 20; memory < 20 << 20; memory += TEST_BY_TURNS ? 4000000 : 200000) {
+    for (uint64_t memory = 1 << 20; memory < 20 << 20; memory += TEST_BY_TURNS ? 4000000 : 200000) {
         memset(some, 0, bytes);
         int status = draw_within(&s, memory, &settings, &view, some);
         if (status == 0)
