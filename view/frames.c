@@ -60,6 +60,7 @@ trip_frames *trip_frames_start(const trip_frames_params *params)
     pthread_mutex_init(&f->lock, NULL);
     pthread_mutex_init(&f->picture_lock, NULL);
     pthread_cond_init(&f->come, NULL);
+    trip_frames_prepare(f);
     if (triptych_create(&f->t) == 0 && pthread_create(&f->thread, NULL, trip_frames_run, f) == 0)
         return f;
     destroy(f);

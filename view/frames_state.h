@@ -58,6 +58,8 @@ struct trip_frames {
     double shown_ms;            /* when a picture was last shown */
 };
 
+/* Before the drawing thread starts: what may be given up from then on. */
+void trip_frames_prepare(trip_frames *f);
 /* The drawing thread; `user` is the trip_frames. */
 void *trip_frames_run(void *user);
 

@@ -618,10 +618,14 @@ static void serve(trip_frames *f)
         look(f);
 }
 
+void trip_frames_prepare(trip_frames *f)
+{
+    f->scope = (trip_scope){ .failed = take_failure, .sink = take_report, .user = f };
+}
+
 void *trip_frames_run(void *user)
 {
     trip_frames *f = user;
-    f->scope = (trip_scope){ .failed = take_failure, .sink = take_report, .user = f };
     trip_scope *before = trip_scope_enter(&f->scope);
     triptych_set_messages(f->t, take_line, f);
     triptych_set_progress(f->t, show_progress, f);
