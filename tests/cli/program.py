@@ -330,6 +330,31 @@ def write_png(path, image):
     )
 
 
+def write_exr(path, image):
+    """Of one float channel, Y, not packed; the values as they are."""
+    rows, columns = image.shape
+    window = struct.pack("<4i", 0, 0, columns - 1, rows - 1)
+    attributes = [
+        ("channels", "chlist", b"Y\0" + struct.pack("<iB3xii", 2, 0, 1, 1) + b"\0"),
+        ("compression", "compression", b"\0"),
+        ("dataWindow", "box2i", window),
+        ("displayWindow", "box2i", window),
+        ("lineOrder", "lineOrder", b"\0"),
+        ("pixelAspectRatio", "float", struct.pack("<f", 1)),
+        ("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
+        ("screenWindowWidth", "float", struct.pack("<f", 1)),
+    ]
+    head = struct.pack("<2I", 20000630, 2)
+    for name, kind, value in attributes:
+        head += f"{name}\0{kind}\0".encode() + struct.pack("<i", len(value)) + value
+    head += b"\0"
+    at, line = len(head) + 8 * rows, 8 + 4 * columns
+    offsets = b"".join(struct.pack("<Q", at + line * y) for y in range(rows))
+    lines = [struct.pack("<2i", y, 4 * columns) + image[y].astype("<f4").tobytes()
+             for y in range(rows)]
+    write(path, head + offsets + b"".join(lines))
+
+
 def write_stack(folder, volume, write_image, extension):
     os.makedirs(folder, exist_ok=True)
     for z, image in enumerate(volume):

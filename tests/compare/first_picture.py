@@ -73,10 +73,13 @@ def write_forms(values):
         program.write_vol("packed.vol", values)
         forms.append((".vol", "packed.vol"))
     program.write_stack("tiff", values, program.write_tiff, "tif")
+    program.write_stack("png", values, program.write_png, "png")
+    program.write_stack("exr", values, program.write_exr, "exr")
     os.makedirs("dicom")
     for k, image in enumerate(values):
         program.write_dicom(f"dicom/{k:04d}.dcm", image.astype(numpy.uint16), k)
-    return forms + [("TIFF stack", "tiff"), ("DICOM series", "dicom")]
+    stacks = [(name, name.split()[0].lower()) for name in ("TIFF stack", "PNG stack", "EXR stack")]
+    return forms + stacks + [("DICOM series", "dicom")]
 
 
 def size_of(path):
