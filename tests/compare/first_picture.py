@@ -23,7 +23,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 ROUNDS = 3
 
-for name in "TRIP_PROGRAM", "TRIP_GENERATE":
+for name in "TRIP_PROGRAM", "TRIP_QUICK_PROGRAM", "TRIP_GENERATE":
     os.environ.setdefault(name, "")
 os.environ.setdefault("TRIP_SOURCE_DIR", ROOT)
 sys.path.insert(0, os.path.join(ROOT, "tests", "cli"))
