@@ -56,7 +56,7 @@ static void *take_memory(const session *s, size_t bytes, bool large_pages)
     }
     if (!trip_budget_charge(s->budget, bytes))
         return NULL;
-    void *memory = aligned_alloc(PLAIN_DISK_BLOCK_BYTES, bytes);
+    void *memory = aligned_alloc(PLAIN_DISK_TRANSFER_BYTES, bytes);
     if (memory)
         return memset(memory, 0, bytes);
     trip_budget_discharge(s->budget, bytes);

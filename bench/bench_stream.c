@@ -256,8 +256,8 @@ static void describe(const stream *t, bench_report *r)
     cJSON_AddStringToObject(machine, "device", renderer->ops->device(renderer));
     cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(t->frame.reader));
     cJSON_AddStringToObject(machine, "plain_read",
-                            t->direct ? "8 threads, blocks of 1 MiB, O_DIRECT"
-                                      : "8 threads, blocks of 1 MiB, through the page cache "
+                            t->direct ? "8 threads, transfers of 1 MiB, O_DIRECT"
+                                      : "8 threads, transfers of 1 MiB, through the page cache "
                                         "(O_DIRECT refused), dropped before each run");
     bench_report_limit(r, "Plain read: the plane files of the lists that the view needs, each from "
                           "end to end, into the same kind of memory as the ring's (pages of 2 MiB "

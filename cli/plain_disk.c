@@ -10,11 +10,11 @@
 
 #include "report.h"
 
-/* One file at a time, its blocks shared out among threads. */
+/* One file at a time, its transfers shared out among threads. */
 typedef struct job {
     int fd;
     bool write, look;
-    uint64_t blocks;
+    uint64_t transfers;
     atomic_uint_fast64_t next;
     atomic_uint_fast64_t bytes;
     atomic_int error;  /* errno of the first fault */
@@ -31,43 +31,43 @@ static double now_seconds(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-static ssize_t move_block(const job *j, unsigned char *block, uint64_t i)
+static ssize_t move_transfer(const job *j, unsigned char *transfer, uint64_t i)
 {
-    off_t offset = (off_t)(i * PLAIN_DISK_BLOCK_BYTES);
-    ssize_t n = j->write ? pwrite(j->fd, block, PLAIN_DISK_BLOCK_BYTES, offset)
-                         : pread(j->fd, block, PLAIN_DISK_BLOCK_BYTES, offset);
-    if (j->write && n >= 0 && n < PLAIN_DISK_BLOCK_BYTES) {
+    off_t offset = (off_t)(i * PLAIN_DISK_TRANSFER_BYTES);
+    ssize_t n = j->write ? pwrite(j->fd, transfer, PLAIN_DISK_TRANSFER_BYTES, offset)
+                         : pread(j->fd, transfer, PLAIN_DISK_TRANSFER_BYTES, offset);
+    if (j->write && n >= 0 && n < PLAIN_DISK_TRANSFER_BYTES) {
         errno = ENOSPC;
         return -1;
     }
     return n;
 }
 
-static unsigned look_at(const unsigned char *block, size_t bytes)
+static unsigned look_at(const unsigned char *transfer, size_t bytes)
 {
     enum { LINE = 64 };
     unsigned seen = 0;
     for (size_t i = 0; i < bytes; i += LINE)
-        seen += block[i];
+        seen += transfer[i];
     return seen;
 }
 
-static void *move_blocks(void *argument)
+static void *move_transfers(void *argument)
 {
     job *j = argument;
-    unsigned char *block =
-        j->memory + (size_t)PLAIN_DISK_BLOCK_BYTES * atomic_fetch_add(&j->taken, 1);
+    unsigned char *transfer =
+        j->memory + (size_t)PLAIN_DISK_TRANSFER_BYTES * atomic_fetch_add(&j->taken, 1);
     uint64_t i;
     trip_scope_enter(j->scope);
-    while (!trip_interrupted() && (i = atomic_fetch_add(&j->next, 1)) < j->blocks &&
+    while (!trip_interrupted() && (i = atomic_fetch_add(&j->next, 1)) < j->transfers &&
            !atomic_load(&j->error)) {
-        ssize_t n = move_block(j, block, i);
+        ssize_t n = move_transfer(j, transfer, i);
         if (n < 0)
             atomic_store(&j->error, errno);
         else
             atomic_fetch_add(&j->bytes, (uint64_t)n);
         if (j->look && n > 0)
-            atomic_fetch_add(&j->seen, look_at(block, (size_t)n));
+            atomic_fetch_add(&j->seen, look_at(transfer, (size_t)n));
     }
     return NULL;
 }
@@ -78,7 +78,7 @@ static int share_out(job *j)
     pthread_t threads[PLAIN_DISK_THREADS];
     int started = 0, error = 0;
     for (; started < PLAIN_DISK_THREADS && !error; started += !error)
-        error = pthread_create(&threads[started], NULL, move_blocks, j);
+        error = pthread_create(&threads[started], NULL, move_transfers, j);
     for (int i = 0; i < started; i++)
         pthread_join(threads[i], NULL);
     return error ? error : atomic_load(&j->error);
@@ -91,7 +91,7 @@ static int move_file(plain_disk *d, int fd, bool write, uint64_t bytes, const ch
     job j = { .fd = fd,
               .write = write,
               .look = d->look && !write,
-              .blocks = (bytes + PLAIN_DISK_BLOCK_BYTES - 1) / PLAIN_DISK_BLOCK_BYTES,
+              .transfers = (bytes + PLAIN_DISK_TRANSFER_BYTES - 1) / PLAIN_DISK_TRANSFER_BYTES,
               .scope = trip_scope_current(),
               .memory = memory };
     double begin = now_seconds();

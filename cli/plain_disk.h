@@ -1,5 +1,5 @@
 /* What the disk gives a program that does nothing else: a file from end to end, past the page cache
- * where that is possible, in large blocks, several at once. */
+ * where that is possible, in large transfers, several at once. */
 #ifndef TRIP_CLI_PLAIN_DISK_H
 #define TRIP_CLI_PLAIN_DISK_H
 
@@ -7,8 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { PLAIN_DISK_THREADS = 8, PLAIN_DISK_BLOCK_BYTES = 1 << 20 };
-#define PLAIN_DISK_MEMORY_BYTES ((size_t)PLAIN_DISK_THREADS * PLAIN_DISK_BLOCK_BYTES)
+enum { PLAIN_DISK_THREADS = 8, PLAIN_DISK_TRANSFER_BYTES = 1 << 20 };
+#define PLAIN_DISK_MEMORY_BYTES ((size_t)PLAIN_DISK_THREADS * PLAIN_DISK_TRANSFER_BYTES)
 
 /* Adds up over calls. */
 typedef struct plain_disk {
@@ -20,7 +20,7 @@ typedef struct plain_disk {
 
 /* `memory`: PLAIN_DISK_MEMORY_BYTES, aligned to 4096. */
 int plain_disk_read(plain_disk *d, const char *path, void *memory);
-/* `bytes` of an unnamed file in `folder`, up to whole blocks, until the disk has them. */
+/* `bytes` of an unnamed file in `folder`, up to whole transfers, until the disk has them. */
 int plain_disk_write(plain_disk *d, const char *folder, uint64_t bytes, void *memory);
 
 /* Asks the system to forget what it holds of a file, if that is one. */

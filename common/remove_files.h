@@ -1,4 +1,4 @@
-/* Removes files of a folder. Their names are gone at once; freeing the blocks of large ones takes
+/* Removes files of a folder. Their names are gone at once; freeing the space of large ones takes
  * some file systems seconds, in which no signal ends the process that does it. */
 #ifndef TRIP_REMOVE_FILES_H
 #define TRIP_REMOVE_FILES_H

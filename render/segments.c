@@ -54,7 +54,7 @@ void trip_segments_make(trip_segments *s, const trip_tf_entry *table)
     }
 }
 
-/* Adds codes [first, end), by blocks as large as fit. */
+/* Adds codes [first, end), by nodes as large as fit. */
 static void add_whole(trip_segment_sums *sums, const trip_segments *s, int first, int end,
                       double scale)
 {

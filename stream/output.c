@@ -106,7 +106,7 @@ static int send_buffer(trip_output *o)
     return TRIP_OK;
 }
 
-/* What is left need not be whole blocks, so it goes through the page cache. */
+/* What is left need not be whole sectors, so it goes through the page cache. */
 int trip_output_flush(trip_output *o)
 {
     uint64_t offset = o->bytes - o->used_bytes;
@@ -164,13 +164,13 @@ int trip_output_read(const trip_output *o, uint64_t offset, void *data, size_t b
 
 int trip_output_append_output(trip_output *o, trip_output *from)
 {
-    unsigned char block[16384];
+    unsigned char part[16384];
     int status = trip_output_flush(from);
     for (uint64_t at = 0; status == TRIP_OK && at < from->bytes;) {
-        size_t n = from->bytes - at < sizeof block ? (size_t)(from->bytes - at) : sizeof block;
-        status = trip_output_read(from, at, block, n);
+        size_t n = from->bytes - at < sizeof part ? (size_t)(from->bytes - at) : sizeof part;
+        status = trip_output_read(from, at, part, n);
         if (status == TRIP_OK)
-            status = trip_output_append(o, block, n);
+            status = trip_output_append(o, part, n);
         at += n;
     }
     return status;

@@ -19,7 +19,7 @@ void trip_request_start(trip_request *q)
     q->fault = TRIP_REQUEST_OK;
 }
 
-/* A direct read takes whole blocks: at the file's end it goes beyond. */
+/* A direct read takes whole sectors: at the file's end it goes beyond. */
 trip_read trip_request_read(const trip_request *q)
 {
     size_t bytes = q->bytes - q->done_bytes;

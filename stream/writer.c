@@ -563,16 +563,16 @@ static int append_tables(trip_writer *w, trip_output *index, const char *text)
 
 static int hash_range(trip_output *o, uint64_t first, uint64_t end, uint64_t *hash)
 {
-    unsigned char block[16384];
+    unsigned char part[16384];
     XXH64_state_t *state = XXH64_createState();
     int status = TRIP_OK;
     if (!state)
         return trip_fail(TRIP_ERROR, "write", o->path, "out of memory");
     XXH64_reset(state, 0);
     while (first < end && status == TRIP_OK) {
-        size_t n = end - first < sizeof block ? (size_t)(end - first) : sizeof block;
-        status = trip_output_read(o, first, block, n);
-        XXH64_update(state, block, n);
+        size_t n = end - first < sizeof part ? (size_t)(end - first) : sizeof part;
+        status = trip_output_read(o, first, part, n);
+        XXH64_update(state, part, n);
         first += n;
     }
     *hash = XXH64_digest(state);

@@ -5,7 +5,7 @@
 
 #include "cpu/count.h"
 #include "cpu/cull.h"
-#include "cpu/tiles.h"
+#include "cpu/panes.h"
 
 /* Fewer voxels are not worth a chunk. */
 enum { LEAST_CHUNK = 512 };
@@ -105,7 +105,7 @@ static bool much_is_occluded(const trip_cpu *r)
 static void empty_staged(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
                          uint32_t *staged)
 {
-    const _Atomic uint64_t *open = much_is_occluded(r) ? r->mask.tiles : NULL;
+    const _Atomic uint64_t *open = much_is_occluded(r) ? r->mask.panes : NULL;
     uint32_t at = chunk->splat + chunk->splats;
     chunk->splats += r->kernels->project(&r->views[chunk->list], open, &w->scratch.staged, *staged,
                                          &w->scratch.lanes, r->filling->splats + at,

@@ -1,4 +1,4 @@
-/* From a batch to splats: cuts it into chunks, which the workers cull, project and sort by tile
+/* From a batch to splats: cuts it into chunks, which the workers cull, project and sort by pane
  * while the splats before them are blended. Called by the renderer's thread. */
 #ifndef TRIP_CPU_BATCH_H
 #define TRIP_CPU_BATCH_H

@@ -1,5 +1,5 @@
-/* The CPU renderer: its threads project the voxels of a batch into splats, sort them by screen tile
- * and blend each tile's splats in list order, while the next batch is projected. What a pixel gets
+/* The CPU renderer: its threads project the voxels of a batch into splats, sort them by pane
+ * and blend each pane's splats in list order, while the next batch is projected. What a pixel gets
  * depends on the order of the splats alone, never on where a batch, chunk or splat buffer ends, so
  * that the picture is the same bit for bit for any number of threads, memory, tile and batch size.
  * Once the program is interrupted no task does anything, and waiting for them ends at once. */
@@ -13,7 +13,7 @@
 #include "cpu/count.h"
 #include "cpu/occlusion.h"
 #include "cpu/sheets/sheets.h"
-#include "cpu/tiles.h"
+#include "cpu/panes.h"
 #include "cpu/view.h"
 #include "report.h"
 #include "sheet.h"
@@ -81,7 +81,7 @@ static int begin_layer(trip_renderer *base, int axis)
         return status;
     r->view.axis = axis;
     make_views(r, true, false);
-    trip_cpu_begin_tile_layer(r);
+    trip_cpu_begin_pane_layer(r);
     r->in_layer = true;
     r->visible_per_voxel = 1;
     return classifies_post(r) ? trip_cpu_sheets_begin_layer(r->sheets, axis) : 0;
@@ -153,7 +153,7 @@ static int create_buffers(trip_cpu *r)
     return status;
 }
 
-/* Ends with empty buffers of splats for the frame's tiles, or without any where it has no splats.
+/* Ends with empty buffers of splats for the frame's panes, or without any where it has no splats.
  */
 static int fit_buffers(trip_cpu *r)
 {
@@ -163,7 +163,7 @@ static int fit_buffers(trip_cpu *r)
     }
     int status = r->buffers[1].splats ? 0 : create_buffers(r);
     for (int i = 0; i < 2 && !status; i++)
-        status = trip_cpu_buffer_fit(&r->buffers[i], trip_cpu_tile_count(r),
+        status = trip_cpu_buffer_fit(&r->buffers[i], trip_cpu_pane_count(r),
                                      r->channels > TRIP_CHANNEL_DEPTH, r->budget);
     if (status)
         release_buffers(r);
@@ -192,7 +192,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         r->workers[i].scratch.lanes.broken = false;
     if (classifies_post(r))
         release_buffers(r);
-    int status = trip_cpu_fit_tiles(r, frame->camera->width, frame->camera->height);
+    int status = trip_cpu_fit_panes(r, frame->camera->width, frame->camera->height);
     if (!status)
         status = fit_buffers(r);
     if (!status)
@@ -204,7 +204,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     if (status)
         return status;
     trip_cpu_layer_view_make(&r->view, frame, frame->plan->axis_of_view, true);
-    trip_cpu_begin_tiles(r);
+    trip_cpu_begin_panes(r);
     return 0;
 }
 
@@ -238,7 +238,7 @@ static void destroy(trip_renderer *base)
     trip_budget *budget = r->budget;
     trip_cpu_sheets_destroy(r->sheets);
     trip_cpu_pool_destroy(r->pool);
-    trip_cpu_release_tiles(r);
+    trip_cpu_release_panes(r);
     release_lists(r);
     release_buffers(r);
     trip_budget_release(budget, r->workers, r->workers_bytes);

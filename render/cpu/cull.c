@@ -15,7 +15,7 @@ static uint64_t visible_squares(const trip_cpu_culling *c, const trip_run *run, 
     trip_cpu_occlusion occlusion = trip_cpu_region_make(c->view, u, v, run->sheet, &where);
     if (occlusion != TRIP_CPU_VISIBLE)
         return occlusion == TRIP_CPU_OCCLUDED ? 0 : UINT64_MAX;
-    return c->kernels->squares(c->view, &where, c->mask->tiles, c->lanes);
+    return c->kernels->squares(c->view, &where, c->mask->panes, c->lanes);
 }
 
 static uint32_t count_voxels(const trip_block *block, const trip_cpu_part *part)

@@ -11,7 +11,7 @@
 #define NEAREST_RADII 8.0
 #define MOST_GROWTH 0.23
 
-enum { CELL = 4, CELLS = TRIP_CPU_TILE / CELL };
+enum { CELL = 4, CELLS = TRIP_CPU_PANE / CELL };
 
 static double dot(const double along[3], const double at[3])
 {
@@ -58,10 +58,10 @@ static uint64_t bits_of(int left, int right, int top, int bottom)
     return columns & UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
 }
 
-/* What of the cells [first, last] lies in a tile, counted from its first. */
-static trip_pixels in_tile(trip_pixels cells, int tile)
+/* What of the cells [first, last] lies in a pane, counted from its first. */
+static trip_pixels in_pane(trip_pixels cells, int pane)
 {
-    int first = cells.first - tile * CELLS, last = cells.last - tile * CELLS;
+    int first = cells.first - pane * CELLS, last = cells.last - pane * CELLS;
     return (trip_pixels){ first > 0 ? first : 0, last < CELLS - 1 ? last : CELLS - 1 };
 }
 
@@ -74,11 +74,11 @@ static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px
         return TRIP_CPU_OCCLUDED;
     for (int ty = y.first / CELLS; ty <= y.last / CELLS; ty++)
         for (int tx = x.first / CELLS; tx <= x.last / CELLS; tx++) {
-            trip_pixels h = in_tile(x, tx), v = in_tile(y, ty);
+            trip_pixels h = in_pane(x, tx), v = in_pane(y, ty);
             uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
             uint64_t rest =
                 bits &
-                atomic_load_explicit(&mask->tiles[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
+                atomic_load_explicit(&mask->panes[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
                                      memory_order_relaxed);
             open |= rest != 0;
             saturated |= rest != bits;

@@ -8,21 +8,21 @@
 
 #include "cpu/kernels/kernels.h"
 
-/* Tiles across the image and down. */
+/* Panes across the image and down. */
 typedef struct trip_cpu_grid {
     uint32_t across, down;
 } trip_cpu_grid;
 
 /* An occlusion map of cells of 4 x 4 pixels, a bit each: 1 where some pixel is open, 0 where all
- * are saturated. Of each tile eight rows of eight, the first row lowest. */
+ * are saturated. Of each pane eight rows of eight, the first row lowest. */
 typedef struct trip_cpu_mask {
     trip_cpu_grid grid;
-    _Atomic uint64_t *tiles;
+    _Atomic uint64_t *panes;
 } trip_cpu_mask;
 
-static inline bool trip_cpu_tile_is_saturated(const trip_cpu_mask *mask, uint32_t tile)
+static inline bool trip_cpu_pane_is_saturated(const trip_cpu_mask *mask, uint32_t pane)
 {
-    return atomic_load_explicit(&mask->tiles[tile], memory_order_relaxed) == 0;
+    return atomic_load_explicit(&mask->panes[pane], memory_order_relaxed) == 0;
 }
 
 /* A box of index space by the list's own coordinates: [u, v, sheet]. */

@@ -4,14 +4,14 @@
 
 #include "pixels.h"
 
-uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across)
+uint32_t trip_cpu_panes(const trip_cpu_splat *s, int panes_across)
 {
-    uint32_t x = s->x0 / TRIP_CPU_TILE, y = s->y0 / TRIP_CPU_TILE;
-    uint32_t right = s->x1 / TRIP_CPU_TILE - x, below = s->y1 / TRIP_CPU_TILE - y;
-    uint32_t more = right > 1 || below > 1 ? TRIP_CPU_TILES_MORE : 0;
-    return (y * (uint32_t)tiles_across + x) | more |
-           (uint32_t)(right > 0) << TRIP_CPU_TILES_RIGHT_SHIFT |
-           (uint32_t)(below > 0) << TRIP_CPU_TILES_BELOW_SHIFT;
+    uint32_t x = s->x0 / TRIP_CPU_PANE, y = s->y0 / TRIP_CPU_PANE;
+    uint32_t right = s->x1 / TRIP_CPU_PANE - x, below = s->y1 / TRIP_CPU_PANE - y;
+    uint32_t more = right > 1 || below > 1 ? TRIP_CPU_PANES_MORE : 0;
+    return (y * (uint32_t)panes_across + x) | more |
+           (uint32_t)(right > 0) << TRIP_CPU_PANES_RIGHT_SHIFT |
+           (uint32_t)(below > 0) << TRIP_CPU_PANES_BELOW_SHIFT;
 }
 
 /* Of a near splat, whose forms are of the image's corner. Turned so that b does not change with x,
@@ -24,7 +24,7 @@ static void set_near(const trip_splat *s, trip_cpu_splat *out)
         form[0][i] = (c * s->a[i] + sine * s->b[i]) / TRIP_CUTOFF;
         form[1][i] = (c * s->b[i] - sine * s->a[i]) / TRIP_CUTOFF;
     }
-    double x = out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE, y = out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    double x = out->x0 / TRIP_CPU_PANE * TRIP_CPU_PANE, y = out->y0 / TRIP_CPU_PANE * TRIP_CPU_PANE;
     out->l11 = (float)form[0][1];
     out->l21 = (float)form[0][2];
     out->l22 = (float)form[1][2];
@@ -46,8 +46,8 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
 static void set_centre(const trip_splat *s, trip_cpu_splat *out)
 {
     trip_cpu_set_conic(s, out);
-    double x = s->x - out->x0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
-    double y = s->y - out->y0 / TRIP_CPU_TILE * TRIP_CPU_TILE;
+    double x = s->x - out->x0 / TRIP_CPU_PANE * TRIP_CPU_PANE;
+    double y = s->y - out->y0 / TRIP_CPU_PANE * TRIP_CPU_PANE;
     out->l1 = (float)-((double)out->l11 * x + (double)out->l21 * y);
     out->l2 = (float)-((double)out->l22 * y);
 }
@@ -85,9 +85,9 @@ static void set_opacity(const trip_cpu_view *view, double depth, int sheet, trip
         out->sheet = sheet;
         return;
     }
-    bool thick = depth > (double)view->thin || out->tiles & TRIP_CPU_TILES_NEAR;
+    bool thick = depth > (double)view->thin || out->panes & TRIP_CPU_PANES_NEAR;
     if (thick)
-        out->tiles |= 1u << TRIP_CPU_TILES_THICK_SHIFT;
+        out->panes |= 1u << TRIP_CPU_PANES_THICK_SHIFT;
     if (thick || view->rays == TRIP_CPU_STRETCHED) {
         double least = log2(depth) + 127 - (double)view->cutoff / TRIP_CPU_EXP_UNIT;
         out->c[TRIP_CPU_LEAST] = (float)(least * TRIP_CPU_EXP_UNIT);
@@ -121,9 +121,9 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
         return false;
     /* What is opaque anyway stays within what exponents of floats hold. */
     double depth = fmin(0x1p90, extinction * s.amplitude * view->stretch);
-    out->tiles = trip_cpu_tiles(out, view->tiles_across);
+    out->panes = trip_cpu_panes(out, view->panes_across);
     if (s.near) {
-        out->tiles |= TRIP_CPU_TILES_NEAR;
+        out->panes |= TRIP_CPU_PANES_NEAR;
         for (int i = 0; i < 3; i++)
             out->c[TRIP_CPU_ALONG + i] = (float)s.along[i];
     }

@@ -17,7 +17,7 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);
  * [i][j] A^j. */
 extern const float trip_cpu_thin[TRIP_CPU_TERMS][4];
 
-/* The tiles of a splat whose pixels are set, for an image so many tiles across. */
-uint32_t trip_cpu_tiles(const trip_cpu_splat *s, int tiles_across);
+/* The panes of a splat whose pixels are set, for an image so many panes across. */
+uint32_t trip_cpu_panes(const trip_cpu_splat *s, int panes_across);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "report.h"
 
-/* Room for a splat's places in the tiles' orders, on average; chunks whose splats are so wide that
+/* Room for a splat's places in the panes' orders, on average; chunks whose splats are so wide that
  * they need more are left unsorted. */
 enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_BUCKET = 4, SMALLEST_CHUNK = 64 };
 
@@ -55,29 +55,29 @@ static size_t depth_bytes(const trip_cpu_buffer *f)
 void trip_cpu_buffer_destroy(trip_cpu_buffer *f, trip_budget *budget)
 {
     trip_budget_release(budget, f->splats, f->bytes);
-    trip_budget_release(budget, f->tile_lists, f->tile_list_bytes);
+    trip_budget_release(budget, f->pane_lists, f->pane_list_bytes);
     trip_budget_release(budget, f->depths, depth_bytes(f));
 }
 
-static int fit_tile_lists(trip_cpu_buffer *f, uint32_t tiles, trip_budget *budget)
+static int fit_pane_lists(trip_cpu_buffer *f, uint32_t panes, trip_budget *budget)
 {
-    if (tiles <= f->tile_capacity)
+    if (panes <= f->pane_capacity)
         return 0;
-    trip_budget_release(budget, f->tile_lists, f->tile_list_bytes);
-    f->tile_capacity = 0;
-    f->tile_list_bytes = tiles * sizeof *f->tile_lists;
-    f->tile_lists = trip_budget_take(budget, f->tile_list_bytes);
-    if (!f->tile_lists) {
-        f->tile_list_bytes = 0;
+    trip_budget_release(budget, f->pane_lists, f->pane_list_bytes);
+    f->pane_capacity = 0;
+    f->pane_list_bytes = panes * sizeof *f->pane_lists;
+    f->pane_lists = trip_budget_take(budget, f->pane_list_bytes);
+    if (!f->pane_lists) {
+        f->pane_list_bytes = 0;
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                         "the image's tiles do not fit the memory given; raise --memory or draw a "
+                         "the image's panes do not fit the memory given; raise --memory or draw a "
                          "smaller image");
     }
-    f->tile_capacity = tiles;
+    f->pane_capacity = panes;
     return 0;
 }
 
-int trip_cpu_buffer_fit(trip_cpu_buffer *f, uint32_t tiles, bool depths, trip_budget *budget)
+int trip_cpu_buffer_fit(trip_cpu_buffer *f, uint32_t panes, bool depths, trip_budget *budget)
 {
     if (depths && !f->depths)
         f->depths = trip_budget_take(budget, depth_bytes(f));
@@ -85,7 +85,7 @@ int trip_cpu_buffer_fit(trip_cpu_buffer *f, uint32_t tiles, bool depths, trip_bu
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                          "depths of %u splats do not fit the memory given; raise --memory",
                          f->capacity);
-    return fit_tile_lists(f, tiles, budget);
+    return fit_pane_lists(f, panes, budget);
 }
 
 void trip_cpu_buffer_empty(trip_cpu_buffer *f)
@@ -130,32 +130,32 @@ uint32_t trip_cpu_buffer_cut(trip_cpu_buffer *f)
  * of squares of voxels, five to ten to a series. */
 static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_series *series)
 {
-    uint32_t found = 0, before = splats[0].tiles;
+    uint32_t found = 0, before = splats[0].panes;
     series[0] = (trip_cpu_series){ before, 1 };
     for (uint32_t i = 1; i < n; i++) {
-        uint32_t tiles = splats[i].tiles;
-        found += (tiles != before) | (tiles & TRIP_CPU_TILES_MORE) / TRIP_CPU_TILES_MORE;
-        before = tiles;
-        series[found] = (trip_cpu_series){ tiles, (uint16_t)(i + 1) };
+        uint32_t panes = splats[i].panes;
+        found += (panes != before) | (panes & TRIP_CPU_PANES_MORE) / TRIP_CPU_PANES_MORE;
+        before = panes;
+        series[found] = (trip_cpu_series){ panes, (uint16_t)(i + 1) };
     }
     return found + 1;
 }
 
 typedef struct span {
-    uint32_t first, last; /* tiles counted, inclusive */
+    uint32_t first, last; /* panes counted, inclusive */
     uint64_t places;
 } span;
 
-/* Tiles of a splat that lies in many. */
+/* Panes of a splat that lies in many. */
 typedef struct reach {
     uint32_t first, across, down;
 } reach;
 
 static reach reach_of(const trip_cpu_splat *s)
 {
-    return (reach){ s->tiles & TRIP_CPU_TILES_FIRST,
-                    s->x1 / TRIP_CPU_TILE - s->x0 / TRIP_CPU_TILE + 1,
-                    s->y1 / TRIP_CPU_TILE - s->y0 / TRIP_CPU_TILE + 1 };
+    return (reach){ s->panes & TRIP_CPU_PANES_FIRST,
+                    s->x1 / TRIP_CPU_PANE - s->x0 / TRIP_CPU_PANE + 1,
+                    s->y1 / TRIP_CPU_PANE - s->y0 / TRIP_CPU_PANE + 1 };
 }
 
 static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *counts, span *s)
@@ -169,15 +169,15 @@ static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *c
     s->places += (uint64_t)r.across * r.down;
 }
 
-/* Whether it also lies in the tile to the right, and in the one below: 0 or 1. */
-static uint32_t right_of(uint32_t tiles)
+/* Whether it also lies in the pane to the right, and in the one below: 0 or 1. */
+static uint32_t right_of(uint32_t panes)
 {
-    return tiles >> TRIP_CPU_TILES_RIGHT_SHIFT & 1;
+    return panes >> TRIP_CPU_PANES_RIGHT_SHIFT & 1;
 }
 
-static uint32_t below_of(uint32_t tiles)
+static uint32_t below_of(uint32_t panes)
 {
-    return tiles >> TRIP_CPU_TILES_BELOW_SHIFT & 1;
+    return panes >> TRIP_CPU_PANES_BELOW_SHIFT & 1;
 }
 
 /* Few lie in more than 2 x 2, so four counts without a branch are cheaper than a loop whose length
@@ -188,11 +188,11 @@ static span count(const trip_cpu_splat *splats, const trip_cpu_series *series, u
     span s = { UINT32_MAX, 0, 0 };
     uint32_t places = 0, last = 0, from = 0;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t tiles = series[i].tiles, first = tiles & TRIP_CPU_TILES_FIRST;
-        uint32_t right = right_of(tiles), below = below_of(tiles), here = series[i].end - from;
+        uint32_t panes = series[i].panes, first = panes & TRIP_CPU_PANES_FIRST;
+        uint32_t right = right_of(panes), below = below_of(panes), here = series[i].end - from;
         s.first = first < s.first ? first : s.first;
         last = first > last ? first : last;
-        if (tiles & TRIP_CPU_TILES_MORE) {
+        if (panes & TRIP_CPU_PANES_MORE) {
             count_wide(&splats[from], across, counts, &s);
         } else {
             uint32_t *c = counts + first;
@@ -221,19 +221,19 @@ static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *n
 
 typedef uint16_t places __attribute__((vector_size(2 * AT_A_TIME)));
 
-/* `count` splats from `first` on to the next places of a tile; more may be written behind them. */
+/* `count` splats from `first` on to the next places of a pane; more may be written behind them. */
 static inline void put(uint16_t *order, uint32_t *next, places first, uint32_t count)
 {
     memcpy(order + *next, &first, sizeof first);
     *next += count;
 }
 
-/* The next `count` places, of all tiles that the splats lie in. */
-static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uint32_t tiles,
+/* The next `count` places, of all panes that the splats lie in. */
+static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uint32_t panes,
                            places first, uint32_t count)
 {
-    uint32_t *c = next + (tiles & TRIP_CPU_TILES_FIRST);
-    uint32_t right = right_of(tiles), below = below_of(tiles);
+    uint32_t *c = next + (panes & TRIP_CPU_PANES_FIRST);
+    uint32_t right = right_of(panes), below = below_of(panes);
     put(order, c, first, count);
     if (right)
         put(order, c + 1, first, count);
@@ -243,7 +243,7 @@ static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uin
         put(order, c + across + 1, first, count);
 }
 
-/* `next` holds where each tile's next place is. */
+/* `next` holds where each pane's next place is. */
 static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
                   uint32_t across, uint32_t *next, uint16_t *order)
 {
@@ -252,20 +252,20 @@ static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, u
     for (uint16_t i = 0; i < AT_A_TIME; i++)
         ahead[i] = i;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t tiles = series[i].tiles, end = series[i].end;
-        if (tiles & TRIP_CPU_TILES_MORE) {
+        uint32_t panes = series[i].panes, end = series[i].end;
+        if (panes & TRIP_CPU_PANES_MORE) {
             place_wide(&splats[from], across, next, order, (uint16_t)from);
             from = end;
             continue;
         }
         for (; end - from > AT_A_TIME; from += AT_A_TIME)
-            put_all(order, next, across, tiles, ahead + (uint16_t)from, AT_A_TIME);
-        put_all(order, next, across, tiles, ahead + (uint16_t)from, end - from);
+            put_all(order, next, across, panes, ahead + (uint16_t)from, AT_A_TIME);
+        put_all(order, next, across, panes, ahead + (uint16_t)from, end - from);
         from = end;
     }
 }
 
-/* Turns counts into places and makes a bucket of every tile that has some. Behind each is room for
+/* Turns counts into places and makes a bucket of every pane that has some. Behind each is room for
  * what put() writes too much. */
 static uint32_t make_buckets(trip_cpu_buffer *f, const trip_cpu_chunk *chunk, const span *s,
                              uint32_t place_at, uint32_t *counts)
@@ -276,7 +276,7 @@ static uint32_t make_buckets(trip_cpu_buffer *f, const trip_cpu_chunk *chunk, co
         if (n == 0)
             continue;
         f->buckets[made++] = (trip_cpu_bucket){
-            .tile = t,
+            .pane = t,
             .chunk = (uint32_t)(chunk - f->chunks),
             .first = place_at,
             .count = n,
@@ -319,7 +319,7 @@ void trip_cpu_sort_chunk(trip_cpu_buffer *f, trip_cpu_chunk *chunk, trip_cpu_gri
 
 static void append(trip_cpu_buffer *f, uint32_t bucket)
 {
-    trip_cpu_tile_list *list = &f->tile_lists[f->buckets[bucket].tile];
+    trip_cpu_pane_list *list = &f->pane_lists[f->buckets[bucket].pane];
     f->buckets[bucket].next = TRIP_CPU_NONE;
     if (list->head == TRIP_CPU_NONE)
         list->head = bucket;
@@ -329,33 +329,33 @@ static void append(trip_cpu_buffer *f, uint32_t bucket)
     list->splats += f->buckets[bucket].count;
 }
 
-void trip_cpu_link_tile_lists(trip_cpu_buffer *f, const trip_cpu_mask *mask)
+void trip_cpu_link_pane_lists(trip_cpu_buffer *f, const trip_cpu_mask *mask)
 {
-    uint32_t tiles = mask->grid.across * mask->grid.down;
-    for (uint32_t t = 0; t < tiles; t++)
-        f->tile_lists[t] = (trip_cpu_tile_list){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
+    uint32_t panes = mask->grid.across * mask->grid.down;
+    for (uint32_t t = 0; t < panes; t++)
+        f->pane_lists[t] = (trip_cpu_pane_list){ TRIP_CPU_NONE, TRIP_CPU_NONE, 0 };
     for (uint32_t c = 0; c < f->chunk_count; c++) {
         const trip_cpu_chunk *chunk = &f->chunks[c];
         if (chunk->unsorted)
             f->unsorted[f->unsorted_count++] = c;
         for (uint32_t i = 0; i < chunk->buckets; i++) {
             uint32_t bucket = chunk->first_bucket + i;
-            if (!trip_cpu_tile_is_saturated(mask, f->buckets[bucket].tile))
+            if (!trip_cpu_pane_is_saturated(mask, f->buckets[bucket].pane))
                 append(f, bucket);
         }
     }
     for (uint32_t i = 0; i < f->unsorted_count; i++)
-        for (uint32_t t = 0; t < tiles; t++)
-            f->tile_lists[t].splats += f->chunks[f->unsorted[i]].splats;
+        for (uint32_t t = 0; t < panes; t++)
+            f->pane_lists[t].splats += f->chunks[f->unsorted[i]].splats;
 }
 
-void trip_cpu_tile_list_each(const trip_cpu_buffer *f, uint32_t tile,
+void trip_cpu_pane_list_each(const trip_cpu_buffer *f, uint32_t pane,
                              void (*take)(void *user, const trip_cpu_chunk *chunk,
                                           const trip_cpu_splat *splats, const uint16_t *order,
                                           uint32_t count),
                              void *user)
 {
-    uint32_t bucket = f->tile_lists[tile].head, unsorted = 0;
+    uint32_t bucket = f->pane_lists[pane].head, unsorted = 0;
     while (bucket != TRIP_CPU_NONE || unsorted < f->unsorted_count) {
         const trip_cpu_bucket *s = bucket == TRIP_CPU_NONE ? NULL : &f->buckets[bucket];
         if (unsorted < f->unsorted_count && (!s || f->unsorted[unsorted] < s->chunk)) {

@@ -1,6 +1,6 @@
 /* What the parts of the CPU renderer share: cpu_renderer.c (frames and layers), batch.c (from a
- * batch to splats), tiles.c (from splats to pixels) and count.c. Written by the renderer's thread
- * alone, but for each worker's memory, the chunks that it fills and the tiles that it draws. */
+ * batch to splats), panes.c (from splats to pixels) and count.c. Written by the renderer's thread
+ * alone, but for each worker's memory, the chunks that it fills and the panes that it draws. */
 #ifndef TRIP_CPU_STATE_H
 #define TRIP_CPU_STATE_H
 
@@ -9,10 +9,10 @@
 #include "cpu/splat_buffer.h"
 #include "cpu/squares.h"
 
-/* What has become of a tile's pixels. */
-enum trip_cpu_tile_state {
-    TRIP_CPU_TILE_BEGUN = 1,  /* in the layer being drawn */
-    TRIP_CPU_TILE_MERGED = 2, /* the sum holds earlier layers */
+/* What has become of a pane's pixels. */
+enum trip_cpu_pane_state {
+    TRIP_CPU_PANE_BEGUN = 1,  /* in the layer being drawn */
+    TRIP_CPU_PANE_MERGED = 2, /* the sum holds earlier layers */
 };
 
 /* One thread's own memory. */
@@ -23,15 +23,15 @@ typedef struct trip_cpu_worker {
     unsigned char codes[2 * 64 + 2 * TRIP_CPU_READABLE];
     unsigned char normals[4 * 64 + 2 * TRIP_CPU_READABLE];
     trip_cpu_sorting sorting;
-    /* Of a tile of a picture, where the frame goes on with its own. */
-    _Alignas(64) float sum[TRIP_CHANNELS_MAX * TRIP_CPU_TILE_PIXELS];
-    _Alignas(64) float layer[TRIP_CHANNELS_MAX * TRIP_CPU_TILE_PIXELS];
+    /* Of a pane of a picture, where the frame goes on with its own. */
+    _Alignas(64) float sum[TRIP_CHANNELS_MAX * TRIP_CPU_PANE_PIXELS];
+    _Alignas(64) float layer[TRIP_CHANNELS_MAX * TRIP_CPU_PANE_PIXELS];
     _Alignas(64) trip_cpu_splat counted[TRIP_CPU_STAGED + 16];
 } trip_cpu_worker;
 
-/* A tile to blend, or a quarter of one. */
+/* A pane to blend, or a quarter of one. */
 typedef struct trip_cpu_portion {
-    uint32_t tile;
+    uint32_t pane;
     unsigned quarters;
     uint32_t splats;
 } trip_cpu_portion;
@@ -49,14 +49,14 @@ typedef struct trip_cpu {
     trip_cpu_worker *workers;
     size_t workers_bytes;
 
-    trip_cpu_mask mask; /* bits are cleared by the thread that blends the tile */
-    size_t tiles_bytes; /* of everything below and the mask, which grow with the image */
+    trip_cpu_mask mask; /* bits are cleared by the thread that blends the pane */
+    size_t panes_bytes; /* of everything below and the mask, which grow with the image */
     unsigned channels;  /* that there is room for */
     float *pixels, *sums;
-    float *open_sheets; /* of tiles, where splats are summed; else NULL */
+    float *open_sheets; /* of panes, where splats are summed; else NULL */
     bool has_open_sheets;
     uint8_t *states;
-    uint8_t *axes; /* whose layers may have weight in a tile, a bit each */
+    uint8_t *axes; /* whose layers may have weight in a pane, a bit each */
     trip_cpu_portion *portions;
 
     const trip_frame *frame;
@@ -82,7 +82,7 @@ typedef struct trip_cpu {
     /* Of these frames: as the frame, with kernels that reach as far as voxels do in sheets. */
     trip_frame sheet_frame;
     trip_settings sheet_settings;
-    trip_cpu_job project_job, blend_job, tile_job;
+    trip_cpu_job project_job, blend_job, pane_job;
 } trip_cpu;
 
 /* What --memory has to be, in MiB, for so many bytes besides what is taken. */
@@ -92,41 +92,41 @@ static inline unsigned long long trip_cpu_memory_mib(const trip_budget *budget, 
     return ((trip_budget_limit_bytes(budget) - left + bytes) >> 20) + 1;
 }
 
-static inline uint32_t trip_cpu_tile_count(const trip_cpu *r)
+static inline uint32_t trip_cpu_pane_count(const trip_cpu *r)
 {
     return r->mask.grid.across * r->mask.grid.down;
 }
 
-static inline int trip_cpu_tile_x(const trip_cpu *r, uint32_t tile)
+static inline int trip_cpu_pane_x(const trip_cpu *r, uint32_t pane)
 {
-    return (int)(tile % r->mask.grid.across) * TRIP_CPU_TILE;
+    return (int)(pane % r->mask.grid.across) * TRIP_CPU_PANE;
 }
 
-static inline int trip_cpu_tile_y(const trip_cpu *r, uint32_t tile)
+static inline int trip_cpu_pane_y(const trip_cpu *r, uint32_t pane)
 {
-    return (int)(tile / r->mask.grid.across) * TRIP_CPU_TILE;
+    return (int)(pane / r->mask.grid.across) * TRIP_CPU_PANE;
 }
 
-static inline size_t trip_cpu_tile_floats(const trip_cpu *r)
+static inline size_t trip_cpu_pane_floats(const trip_cpu *r)
 {
-    return r->channels * TRIP_CPU_TILE_PIXELS;
+    return r->channels * TRIP_CPU_PANE_PIXELS;
 }
 
-static inline float *trip_cpu_tile_pixels(const trip_cpu *r, uint32_t tile)
+static inline float *trip_cpu_pane_pixels(const trip_cpu *r, uint32_t pane)
 {
-    return r->pixels + tile * trip_cpu_tile_floats(r);
+    return r->pixels + pane * trip_cpu_pane_floats(r);
 }
 
 /* Its open sheet; NULL where splats are not summed. */
-static inline float *trip_cpu_tile_sheet(const trip_cpu *r, uint32_t tile)
+static inline float *trip_cpu_pane_sheet(const trip_cpu *r, uint32_t pane)
 {
-    return r->open_sheets ? r->open_sheets + tile * TRIP_CPU_SHEET_FLOATS(r->channels) : NULL;
+    return r->open_sheets ? r->open_sheets + pane * TRIP_CPU_SHEET_FLOATS(r->channels) : NULL;
 }
 
-/* Whether one layer alone has weight in a tile, and so it is 1 all over. */
-static inline bool trip_cpu_is_alone(const trip_cpu *r, uint32_t tile)
+/* Whether one layer alone has weight in a pane, and so it is 1 all over. */
+static inline bool trip_cpu_is_alone(const trip_cpu *r, uint32_t pane)
 {
-    return (r->axes[tile] & (r->axes[tile] - 1)) == 0;
+    return (r->axes[pane] & (r->axes[pane] - 1)) == 0;
 }
 
 #endif

@@ -92,7 +92,7 @@ static void set_limits(trip_cpu_view *view)
     view->thin = (float)((double)TRIP_CPU_THIN / most);
     view->behind = (float)(-trip_splat_behind(&view->splat) * (1 + 1e-6));
     view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
-    view->tiles_across = (camera->width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE;
+    view->panes_across = (camera->width + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE;
 }
 
 /* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */

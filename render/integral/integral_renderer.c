@@ -30,7 +30,7 @@ typedef struct integral {
     trip_integrand in;
     uint64_t splats[TRIP_KINDS]; /* handed over, by the kind of their list */
     float *rgba;                 /* of the picture being made */
-    int tile_px, tiles_x;        /* which is shared out among threads in squares */
+    int pane_px, panes_x;        /* which is shared out among threads in squares */
     _Atomic bool failed;         /* set by any thread: the picture is given up */
     _Atomic uint64_t done;       /* pixels, by any thread */
     trip_field_fill fill;
@@ -215,12 +215,12 @@ static void show_progress(integral *r, uint64_t pixels, unsigned thread)
         frame->progress(frame->progress_user, "integrate", done, total);
 }
 
-static void make_tile(void *context, unsigned tile, unsigned thread)
+static void make_pane(void *context, unsigned pane, unsigned thread)
 {
     integral *r = context;
     const trip_camera *c = r->in.camera;
-    const int x0 = (int)tile % r->tiles_x * r->tile_px, y0 = (int)tile / r->tiles_x * r->tile_px;
-    const int x1 = smaller(x0 + r->tile_px, c->width), y1 = smaller(y0 + r->tile_px, c->height);
+    const int x0 = (int)pane % r->panes_x * r->pane_px, y0 = (int)pane / r->panes_x * r->pane_px;
+    const int x1 = smaller(x0 + r->pane_px, c->width), y1 = smaller(y0 + r->pane_px, c->height);
     for (int y = y0; y < y1; y++)
         for (int x = x0; x < x1 && !trip_interrupted() && !r->failed; x++)
             make_pixel(r, x, y, thread);
@@ -230,16 +230,16 @@ static void make_tile(void *context, unsigned tile, unsigned thread)
 /* Small, so that threads are busy to the end, but for the pool's bound of their number. */
 static unsigned divide_picture(integral *r)
 {
-    enum { FIRST_TILE_PX = 8, MOST_TILES = 1 << 19 };
+    enum { FIRST_PANE_PX = 8, MOST_PANES = 1 << 19 };
     const trip_camera *c = r->in.camera;
-    int64_t tiles;
-    r->tile_px = FIRST_TILE_PX / 2;
+    int64_t panes;
+    r->pane_px = FIRST_PANE_PX / 2;
     do {
-        r->tile_px *= 2;
-        r->tiles_x = (c->width + r->tile_px - 1) / r->tile_px;
-        tiles = (int64_t)r->tiles_x * ((c->height + r->tile_px - 1) / r->tile_px);
-    } while (tiles > MOST_TILES);
-    return (unsigned)tiles;
+        r->pane_px *= 2;
+        r->panes_x = (c->width + r->pane_px - 1) / r->pane_px;
+        panes = (int64_t)r->panes_x * ((c->height + r->pane_px - 1) / r->pane_px);
+    } while (panes > MOST_PANES);
+    return (unsigned)panes;
 }
 
 /* Before all voxels are there the picture is its background. */
@@ -254,7 +254,7 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
     r->rgba = rgba;
     r->failed = false;
     r->done = 0;
-    trip_cpu_job job = { .run = make_tile, .context = r, .tasks = divide_picture(r) };
+    trip_cpu_job job = { .run = make_pane, .context = r, .tasks = divide_picture(r) };
     trip_cpu_pool_start(r->pool, &job);
     trip_cpu_pool_wait(r->pool, &job);
     return r->failed ? TRIP_ERROR : trip_frame_poll();

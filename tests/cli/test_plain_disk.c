@@ -7,7 +7,7 @@
 #include "report.h"
 #include "test.h"
 
-enum { BYTES = 3 * PLAIN_DISK_BLOCK_BYTES };
+enum { BYTES = 3 * PLAIN_DISK_TRANSFER_BYTES };
 
 static char path[] = "plain_disk-XXXXXX";
 

@@ -18,9 +18,9 @@ ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain
 STAGES = {
     "hiding": ["trip_cpu_cull"],
     "projection": ["stage", "project"],
-    "binning": ["trip_cpu_sort_chunk", "trip_cpu_link_tile_lists"],
-    "blend": ["tile_clear", "tile_begin", "tile_blend", "tile_end"],
-    "merge": ["tile_merge", "tile_finish"],
+    "binning": ["trip_cpu_sort_chunk", "trip_cpu_link_pane_lists"],
+    "blend": ["pane_clear", "pane_begin", "pane_blend", "pane_end"],
+    "merge": ["pane_merge", "pane_finish"],
 }
 
 # Of frames that classify after interpolation (render/cpu/sheets/).
@@ -29,8 +29,8 @@ POST_STAGES = {
     "preparing": ["sheet_ranges", "sheet_cells"],
     "gradients": ["sheet_gradients"],
     "slices": ["sheet_between"],
-    "drawing": ["tile_clear", "sheet_tile"],
-    "merge": ["tile_merge", "tile_finish"],
+    "drawing": ["pane_clear", "sheet_pane"],
+    "merge": ["pane_merge", "pane_finish"],
 }
 
 CALL = re.compile(r"calls=")

@@ -41,15 +41,15 @@ class InstructionsTest(unittest.TestCase):
 
     def test_a_stage_is_the_sum_of_its_functions(self):
         costs = dict(trip_cpu_cull=3, stage=10, project=20, trip_cpu_sort_chunk=7,
-                     trip_cpu_link_tile_lists=1, tile_begin=2, tile_blend=40, tile_end=8,
-                     tile_finish=7, other=2)
+                     trip_cpu_link_pane_lists=1, pane_begin=2, pane_blend=40, pane_end=8,
+                     pane_finish=7, other=2)
         stages = instructions.stage_costs(costs, 100)
         self.assertEqual(stages, {"hiding": 3, "projection": 30, "binning": 8, "blend": 50,
                                   "merge": 7, "rest": 2})
 
     def test_a_stage_without_functions_is_an_error(self):
         with self.assertRaises(SystemExit):
-            instructions.stage_costs(dict(stage=10, trip_cpu_sort_chunk=7, tile_blend=40), 100)
+            instructions.stage_costs(dict(stage=10, trip_cpu_sort_chunk=7, pane_blend=40), 100)
 
     def count(self, *options):
         with tempfile.TemporaryDirectory() as folder:

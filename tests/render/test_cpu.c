@@ -91,7 +91,7 @@ static void the_eye_may_be_inside_and_the_view_wide(void **state)
     scene_destroy(&s);
 }
 
-static void a_voxel_may_cover_many_tiles_and_many_voxels_a_pixel(void **state)
+static void a_voxel_may_cover_many_panes_and_many_voxels_a_pixel(void **state)
 {
     (void)state;
     scene s;
@@ -210,7 +210,7 @@ int main(void)
         cmocka_unit_test(views_from_all_sides_agree_with_the_reference),
         cmocka_unit_test(sheared_grids_agree_with_the_reference),
         cmocka_unit_test(the_eye_may_be_inside_and_the_view_wide),
-        cmocka_unit_test(a_voxel_may_cover_many_tiles_and_many_voxels_a_pixel),
+        cmocka_unit_test(a_voxel_may_cover_many_panes_and_many_voxels_a_pixel),
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
         cmocka_unit_test(lists_that_begin_next_to_1_merge_as_in_the_reference),
         cmocka_unit_test(kernels_light_and_background_agree_with_the_reference),

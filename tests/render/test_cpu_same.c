@@ -101,8 +101,8 @@ static void little_memory_draws_the_same(void **state)
     scene_destroy(&s);
 }
 
-/* All of it in one tile of the screen, which threads share by quarters. */
-static void a_scene_in_one_tile_draws_the_same(void **state)
+/* All of it in one pane of the picture, which threads share by quarters. */
+static void a_scene_in_one_pane_draws_the_same(void **state)
 {
     (void)state;
     scene s, small;
@@ -250,7 +250,7 @@ static void check_occluded(trip_compositing compositing)
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
     begin_by_hand(&all, &s, &view, 1, compositing);
     draw_by_hand(&all, &s, UINT32_MAX / 2, false);
-    /* Small buffers let tiles close early. */
+    /* Small buffers let panes close early. */
     for (unsigned threads = 1; threads <= 4; threads++) {
         trip_budget *budget = s.budget;
         assert_int_equal(trip_budget_create(&s.budget, UINT64_C(64) << 20), 0);
@@ -308,7 +308,7 @@ int main(void)
         cmocka_unit_test(any_size_of_batch_draws_the_same),
         cmocka_unit_test(any_tile_of_the_data_draws_the_same),
         cmocka_unit_test(little_memory_draws_the_same),
-        cmocka_unit_test(a_scene_in_one_tile_draws_the_same),
+        cmocka_unit_test(a_scene_in_one_pane_draws_the_same),
         cmocka_unit_test(batches_cut_anywhere_draw_the_same),
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(frames_follow_one_another_on_one_renderer),

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* 4 x 3 tiles, the last ones not full. */
-enum { WIDTH = 109, HEIGHT = 90, ACROSS = 4, TILES = 12, LEFT_OVER = 16 };
+/* 4 x 3 panes, the last ones not full. */
+enum { WIDTH = 109, HEIGHT = 90, ACROSS = 4, PANES = 12, LEFT_OVER = 16 };
 
 typedef struct fixture {
     scene scene;
@@ -20,7 +20,7 @@ typedef struct fixture {
     trip_cpu_view view;
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;
-    _Atomic uint64_t open[TILES];
+    _Atomic uint64_t open[PANES];
     trip_cpu_splat all[TRIP_CPU_STAGED + LEFT_OVER], some[TRIP_CPU_STAGED + LEFT_OVER];
     uint32_t occluded, visible, kept_occluded;
 } fixture;
@@ -60,7 +60,7 @@ static void look(fixture *f, double distance, double ortho_height, int axis)
     f->occluded = f->visible = f->kept_occluded = 0;
 }
 
-/* Voxels from anywhere, and cells open, one in sixteen, in half of the tiles. */
+/* Voxels from anywhere, and cells open, one in sixteen, in half of the panes. */
 static uint32_t stage_some(fixture *f, int seed)
 {
     uint32_t count = TRIP_CPU_STAGED - (uint32_t)seed % 40;
@@ -71,7 +71,7 @@ static uint32_t stage_some(fixture *f, int seed)
         f->staged.sheet[i] = h / 1024 % 32;
         f->staged.code[i] = 65535;
     }
-    for (int t = 0; t < TILES; t++) {
+    for (int t = 0; t < PANES; t++) {
         uint64_t bits = 0;
         for (int i = 0; i < 64; i++)
             bits |= (uint64_t)(scene_hash(t, i, seed) % 16 == 0) << i;
@@ -82,8 +82,8 @@ static uint32_t stage_some(fixture *f, int seed)
 
 static bool is_open(const fixture *f, int x, int y)
 {
-    int cell = y % TRIP_CPU_TILE / 4 * 8 + x % TRIP_CPU_TILE / 4;
-    return f->open[y / TRIP_CPU_TILE * ACROSS + x / TRIP_CPU_TILE] >> cell & 1;
+    int cell = y % TRIP_CPU_PANE / 4 * 8 + x % TRIP_CPU_PANE / 4;
+    return f->open[y / TRIP_CPU_PANE * ACROSS + x / TRIP_CPU_PANE] >> cell & 1;
 }
 
 static bool shows(const fixture *f, const trip_cpu_splat *s)
@@ -110,7 +110,7 @@ static void check(fixture *f, const trip_cpu_kernels *k, int seed)
             f->occluded++;
             f->kept_occluded += kept;
             if (kept)
-                assert_true(f->all[i].tiles & (TRIP_CPU_TILES_MORE | TRIP_CPU_TILES_NEAR));
+                assert_true(f->all[i].panes & (TRIP_CPU_PANES_MORE | TRIP_CPU_PANES_NEAR));
         }
     }
     assert_int_equal(next, some);
@@ -130,7 +130,7 @@ static void what_has_an_open_block_stays_and_nothing_else(void **state)
         }
 }
 
-/* Splats of up to the whole image: those in more than two by two tiles may stay. */
+/* Splats of up to the whole image: those in more than two by two panes may stay. */
 static void large_splats_stay_where_they_show(void **state)
 {
     fixture *f = *state;

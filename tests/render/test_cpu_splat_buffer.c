@@ -1,5 +1,5 @@
 /* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
- * first, and in which order tiles get their splats back. */
+ * first, and in which order panes get their splats back. */
 #include "cpu/splat_buffer.h"
 #include "cpu/scalar.h"
 #include "test.h"
@@ -7,14 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ACROSS = 4, TILES = ACROSS * ACROSS, CAPACITY = 2 * TRIP_CPU_CHUNK };
+enum { ACROSS = 4, PANES = ACROSS * ACROSS, CAPACITY = 2 * TRIP_CPU_CHUNK };
 
 typedef struct fixture {
     trip_budget *budget;
     trip_cpu_buffer buffer;
-    uint32_t counts[TILES + ACROSS + 2];
+    uint32_t counts[PANES + ACROSS + 2];
     trip_cpu_sorting sorting;
-    _Atomic uint64_t open[TILES];
+    _Atomic uint64_t open[PANES];
     trip_cpu_mask mask;
 } fixture;
 
@@ -24,11 +24,11 @@ static int set_up(void **state)
     assert_non_null(f);
     assert_int_equal(trip_budget_create(&f->budget, UINT64_C(1) << 24), 0);
     assert_int_equal(trip_cpu_buffer_create(&f->buffer, CAPACITY, f->budget), 0);
-    assert_int_equal(trip_cpu_buffer_fit(&f->buffer, TILES, false, f->budget), 0);
+    assert_int_equal(trip_cpu_buffer_fit(&f->buffer, PANES, false, f->budget), 0);
     trip_cpu_buffer_empty(&f->buffer);
     f->sorting.counts = f->counts;
     f->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, f->open };
-    for (int i = 0; i < TILES; i++)
+    for (int i = 0; i < PANES; i++)
         f->open[i] = UINT64_MAX;
     *state = f;
     return 0;
@@ -52,7 +52,7 @@ static uint32_t reserve(fixture *f, uint32_t count)
     return reserved;
 }
 
-/* Fills a chunk with `count` splats, the i-th in tile i mod TILES; `mark` tells them from others'.
+/* Fills a chunk with `count` splats, the i-th in pane i mod PANES; `mark` tells them from others'.
  */
 static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
 {
@@ -62,7 +62,7 @@ static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
     chunk->splats = count;
     for (uint32_t i = 0; i < count; i++)
         f->buffer.splats[chunk->splat + i] =
-            (trip_cpu_splat){ .r = mark, .g = (float)i, .tiles = i % TILES };
+            (trip_cpu_splat){ .r = mark, .g = (float)i, .panes = i % PANES };
     trip_cpu_sort_chunk(&f->buffer, chunk, f->mask.grid, &f->sorting);
 }
 
@@ -98,7 +98,7 @@ static void a_first_chunk_that_always_comes_last_finds_room_in_the_end(void **st
 }
 
 typedef struct taken {
-    uint32_t tile, count;
+    uint32_t pane, count;
     float mark, number;
 } taken;
 
@@ -109,14 +109,14 @@ static void take(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *
     taken *t = user;
     for (uint32_t i = 0; i < count; i++, t->count++) {
         const trip_cpu_splat *s = &splats[order ? order[i] : i];
-        assert_int_equal(s->tiles, t->tile);
+        assert_int_equal(s->panes, t->pane);
         assert_true(t->count == 0 || s->r > t->mark || (s->r >= t->mark && s->g > t->number));
         t->mark = s->r;
         t->number = s->g;
     }
 }
 
-static void tiles_get_their_splats_in_the_chunks_order_whoever_came_first(void **state)
+static void panes_get_their_splats_in_the_chunks_order_whoever_came_first(void **state)
 {
     fixture *f = *state;
     const uint32_t order[3] = { 2, 0, 1 };
@@ -125,16 +125,16 @@ static void tiles_get_their_splats_in_the_chunks_order_whoever_came_first(void *
     for (int i = 0; i < 3; i++)
         fill(f, order[i], 100, (float)order[i]);
     assert_int_equal(trip_cpu_buffer_cut(&f->buffer), 3);
-    trip_cpu_link_tile_lists(&f->buffer, &f->mask);
-    for (uint32_t tile = 0; tile < TILES; tile++) {
-        taken t = { .tile = tile };
-        trip_cpu_tile_list_each(&f->buffer, tile, take, &t);
-        uint32_t each = 100 / TILES + (tile < 100 % TILES);
-        assert_int_equal(t.count, tile == 5 ? 0 : 3 * each);
+    trip_cpu_link_pane_lists(&f->buffer, &f->mask);
+    for (uint32_t pane = 0; pane < PANES; pane++) {
+        taken t = { .pane = pane };
+        trip_cpu_pane_list_each(&f->buffer, pane, take, &t);
+        uint32_t each = 100 / PANES + (pane < 100 % PANES);
+        assert_int_equal(t.count, pane == 5 ? 0 : 3 * each);
     }
 }
 
-/* Number `i` of a chunk of splats that lie in the same tiles for 1 to 40 at a time: in one tile,
+/* Number `i` of a chunk of splats that lie in the same panes for 1 to 40 at a time: in one pane,
  * two, four or more. */
 static trip_cpu_splat mixed(uint32_t i)
 {
@@ -147,17 +147,17 @@ static trip_cpu_splat mixed(uint32_t i)
     trip_cpu_splat s = { .g = (float)i, .x0 = x, .y0 = y };
     s.x1 = (uint16_t)(x + size[0] - 1);
     s.y1 = (uint16_t)(y + size[1] - 1);
-    if (s.y1 >= ACROSS * TRIP_CPU_TILE)
-        s.y1 = ACROSS * TRIP_CPU_TILE - 1;
-    s.tiles = trip_cpu_tiles(&s, ACROSS);
+    if (s.y1 >= ACROSS * TRIP_CPU_PANE)
+        s.y1 = ACROSS * TRIP_CPU_PANE - 1;
+    s.panes = trip_cpu_panes(&s, ACROSS);
     return s;
 }
 
-static bool lies_in(const trip_cpu_splat *s, uint32_t tile)
+static bool lies_in(const trip_cpu_splat *s, uint32_t pane)
 {
-    uint32_t x = tile % ACROSS, y = tile / ACROSS;
-    return s->x0 / TRIP_CPU_TILE <= x && x <= s->x1 / TRIP_CPU_TILE && s->y0 / TRIP_CPU_TILE <= y &&
-           y <= s->y1 / TRIP_CPU_TILE;
+    uint32_t x = pane % ACROSS, y = pane / ACROSS;
+    return s->x0 / TRIP_CPU_PANE <= x && x <= s->x1 / TRIP_CPU_PANE && s->y0 / TRIP_CPU_PANE <= y &&
+           y <= s->y1 / TRIP_CPU_PANE;
 }
 
 static void take_mixed(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *splats,
@@ -168,12 +168,12 @@ static void take_mixed(void *user, const trip_cpu_chunk *chunk, const trip_cpu_s
     assert_non_null(order);
     for (uint32_t i = 0; i < count; i++, t->count++) {
         const trip_cpu_splat *s = &splats[order[i]];
-        assert_true(lies_in(s, t->tile) && (t->count == 0 || s->g > t->number));
+        assert_true(lies_in(s, t->pane) && (t->count == 0 || s->g > t->number));
         t->number = s->g;
     }
 }
 
-static void every_tile_that_a_splat_lies_in_gets_it_once(void **state)
+static void every_pane_that_a_splat_lies_in_gets_it_once(void **state)
 {
     fixture *f = *state;
     enum { SPLATS = 3000 };
@@ -184,16 +184,16 @@ static void every_tile_that_a_splat_lies_in_gets_it_once(void **state)
     for (uint32_t i = 0; i < SPLATS; i++)
         f->buffer.splats[chunk->splat + i] = mixed(i);
     trip_cpu_sort_chunk(&f->buffer, chunk, f->mask.grid, &f->sorting);
-    trip_cpu_link_tile_lists(&f->buffer, &f->mask);
-    for (uint32_t tile = 0; tile < TILES; tile++) {
-        taken t = { .tile = tile };
+    trip_cpu_link_pane_lists(&f->buffer, &f->mask);
+    for (uint32_t pane = 0; pane < PANES; pane++) {
+        taken t = { .pane = pane };
         uint32_t expected = 0;
         for (uint32_t i = 0; i < SPLATS; i++)
-            expected += lies_in(&f->buffer.splats[chunk->splat + i], tile);
-        trip_cpu_tile_list_each(&f->buffer, tile, take_mixed, &t);
+            expected += lies_in(&f->buffer.splats[chunk->splat + i], pane);
+        trip_cpu_pane_list_each(&f->buffer, pane, take_mixed, &t);
         assert_int_equal(t.count, expected);
     }
-    for (int i = 0; i < TILES + ACROSS + 2; i++)
+    for (int i = 0; i < PANES + ACROSS + 2; i++)
         assert_int_equal(f->counts[i], 0);
 }
 
@@ -203,8 +203,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(the_chunks_before_the_first_that_found_no_room_are_kept),
         TEST(a_first_chunk_that_always_comes_last_finds_room_in_the_end),
-        TEST(tiles_get_their_splats_in_the_chunks_order_whoever_came_first),
-        TEST(every_tile_that_a_splat_lies_in_gets_it_once),
+        TEST(panes_get_their_splats_in_the_chunks_order_whoever_came_first),
+        TEST(every_pane_that_a_splat_lies_in_gets_it_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

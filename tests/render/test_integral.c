@@ -518,7 +518,7 @@ static void the_error_is_within_the_tolerance(void **state)
     scene_destroy(&s);
 }
 
-static void threads_and_tiles_change_no_bit(void **state)
+static void threads_and_panes_change_no_bit(void **state)
 {
     (void)state;
     for (int field = 0; field < 2; field++) {
@@ -702,7 +702,7 @@ int main(void)
         cmocka_unit_test(one_splat_about_the_eye_comes_to_its_integral),
         cmocka_unit_test(of_a_splat_at_the_eye_the_half_in_front_counts),
         cmocka_unit_test(the_error_is_within_the_tolerance),
-        cmocka_unit_test(threads_and_tiles_change_no_bit),
+        cmocka_unit_test(threads_and_panes_change_no_bit),
         cmocka_unit_test(progress_rises_to_the_number_of_pixels),
         cmocka_unit_test(samples_are_the_mean_of_a_finer_picture),
         cmocka_unit_test(codes_lose_what_rounding_to_them_can),

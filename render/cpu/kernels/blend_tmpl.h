@@ -1,4 +1,4 @@
-/* Kernels that blend projected splats into the pixels of a tile: included by table_tmpl.h after
+/* Kernels that blend projected splats into the pixels of a pane: included by table_tmpl.h after
  * simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the stamps of
  * pixels that they may touch, in their order; then stamp after stamp takes its splats, its pixels
  * all the while in registers. */
@@ -12,8 +12,8 @@
 #include "cpu/kernels/simd_tmpl.h"
 
 #define STAMP_ROWS (V / 4)
-#define STAMPS_ACROSS (TRIP_CPU_TILE / 4)
-#define STAMPS_DOWN (TRIP_CPU_TILE / STAMP_ROWS)
+#define STAMPS_ACROSS (TRIP_CPU_PANE / 4)
+#define STAMPS_DOWN (TRIP_CPU_PANE / STAMP_ROWS)
 #define STAMPS (STAMPS_ACROSS * STAMPS_DOWN)
 #define CHANNELS (TRIP_CPU_DEPTH ? TRIP_CHANNELS_MAX : TRIP_CHANNEL_DEPTH)
 #define STAMP_FLOATS (CHANNELS * V)
@@ -51,7 +51,7 @@ INLINE vf kept(vf a, trip_target target)
 
 /* ---- where pixels lie ---- */
 
-/* Pixel centres of a stamp from the tile's corner. */
+/* Pixel centres of a stamp from the pane's corner. */
 INLINE vf stamp_x(unsigned number)
 {
     vf x;
@@ -80,11 +80,11 @@ INLINE unsigned place_of(unsigned word)
 typedef struct patch {
     vf r, g, b, t;
     vf depth; /* of layers with depth */
-    vf x, y;  /* pixel centres from the tile's corner */
+    vf x, y;  /* pixel centres from the pane's corner */
     vf ray;   /* G */
     vf stretch;
     vf cutoff;                    /* as in trip_cpu_view */
-    const trip_cpu_scratch *tile; /* that the stamp is of */
+    const trip_cpu_scratch *pane; /* that the stamp is of */
     /* Of sums (sum_tmpl.h): those in place of the pixels, their sheet, the stamp's number. */
     int32_t sheet;
     unsigned number;
@@ -121,14 +121,14 @@ INLINE vf thin_opacity(const trip_cpu_splat *splat, vf u)
 
 INLINE bool is_near(const trip_cpu_splat *splat)
 {
-    return __builtin_expect((splat->tiles & TRIP_CPU_TILES_NEAR) != 0, 0);
+    return __builtin_expect((splat->panes & TRIP_CPU_PANES_NEAR) != 0, 0);
 }
 
 /* front(p) of splat.h of a near splat. The error function is 1 - (a polynomial) exp(-t^2), within
  * 2e-5 (Abramowitz and Stegun 1964, 7.1.25), exp_minus() aside. */
 INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
-    vf x = p->x + v_set((float)p->tile->x), y = p->y + v_set((float)p->tile->y);
+    vf x = p->x + v_set((float)p->pane->x), y = p->y + v_set((float)p->pane->y);
     vf along = v_fma(x, v_set(splat->c[TRIP_CPU_ALONG_X]), v_set(splat->c[TRIP_CPU_ALONG]));
     along = v_fma(y, v_set(splat->c[TRIP_CPU_ALONG_Y]), along);
     if (rays != TRIP_CPU_PARALLEL)
@@ -138,7 +138,7 @@ INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays ra
     vf sum = v_fma(t, v_set(0.7478556f), v_set(-0.0958798f));
     sum = v_fma(t, sum, v_set(0.3480242f)) * t;
     vf half = v_fnma(sum, exp_minus(s * s * v_set(0.5f)), v_set(1));
-    half = half * v_set((float)(0.5 * p->tile->view->splat.front));
+    half = half * v_set((float)(0.5 * p->pane->view->splat.front));
     vf front = v_set(0.5f) + v_copysign(half, along);
     front = v_select(v_ge(along, end), v_set(1), front);
     return v_select(v_gt(along, -end), front, v_set(0));
@@ -228,10 +228,10 @@ INLINE bool all_open(vf t)
 
 static void set_rays(trip_cpu_scratch *s, unsigned number);
 
-/* Of the tile's pixels, or of numbers that lie as they do. */
-INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays, const float *tile)
+/* Of the pane's pixels, or of numbers that lie as they do. */
+INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays, const float *pane)
 {
-    const float *pixels = tile + STAMP_FLOATS * number;
+    const float *pixels = pane + STAMP_FLOATS * number;
     patch p = {
         .r = v_load(pixels),
         .g = v_load(pixels + V),
@@ -240,7 +240,7 @@ INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
         .x = stamp_x(number),
         .y = stamp_y(number),
         .cutoff = v_set(s->view->cutoff),
-        .tile = s,
+        .pane = s,
     };
     if (TRIP_CPU_DEPTH)
         p.depth = v_load(pixels + TRIP_CHANNEL_DEPTH * V);
@@ -254,9 +254,9 @@ INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     return p;
 }
 
-INLINE void store_stamp(float *tile, unsigned number, const patch *p)
+INLINE void store_stamp(float *pane, unsigned number, const patch *p)
 {
-    float *pixels = tile + STAMP_FLOATS * number;
+    float *pixels = pane + STAMP_FLOATS * number;
     v_store(pixels, p->r);
     v_store(pixels + V, p->g);
     v_store(pixels + 2 * V, p->b);
@@ -323,7 +323,7 @@ INLINE void blend_thin_open(patch *p, const trip_cpu_splat *splat, float depth, 
 INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays rays,
                       bool front_to_back, trip_target target)
 {
-    bool thick = splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT;
+    bool thick = splat->panes >> TRIP_CPU_PANES_THICK_SHIFT;
     if (front_to_back)
         put_behind(p, splat, depth, opacity(p, splat, thick, rays), target);
     else
@@ -478,7 +478,7 @@ static bool is_open(const trip_cpu_scratch *s)
     return any != 0;
 }
 
-/* The splat as seen from this tile's corner, which is so far from its first tile's. */
+/* The splat as seen from this pane's corner, which is so far from its first pane's. */
 INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int4 from)
 {
     float4 f = __builtin_convertvector(from, float4);
@@ -498,7 +498,7 @@ INLINE uint64_t from_column(uint32_t column)
     return bits[column];
 }
 
-/* Bits of the stamps of a band that lie in a row of the tile's or further down, a byte a row. */
+/* Bits of the stamps of a band that lie in a row of the pane's or further down, a byte a row. */
 INLINE uint64_t from_row(unsigned band, uint32_t row)
 {
     static const uint8_t bits[64] = { [32 ... 63] = 0xff };
@@ -511,15 +511,15 @@ INLINE uint64_t from_row(unsigned band, uint32_t row)
 
 static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
 {
-    return splat->x0 < s->x + TRIP_CPU_TILE && splat->x1 >= s->x &&
-           splat->y0 < s->y + TRIP_CPU_TILE && splat->y1 >= s->y;
+    return splat->x0 < s->x + TRIP_CPU_PANE && splat->x1 >= s->x &&
+           splat->y0 < s->y + TRIP_CPU_PANE && splat->y1 >= s->y;
 }
 
-/* What tile_blend() keeps in registers. */
+/* What pane_blend() keeps in registers. */
 typedef struct gathering {
     uint32_t splats;
     uint64_t thick; /* which of the last 64 are, the last one highest */
-    int4 corner;    /* of the tile: x, y, x, y */
+    int4 corner;    /* of the pane: x, y, x, y */
 } gathering;
 
 /* Splats[i]. Splats whose stamps are all saturated are left out. */
@@ -532,7 +532,7 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
     uint64_t four, stamps[BANDS], any = 0;
     memcpy(&four, (const char *)splat + offsetof(trip_cpu_splat, x0), sizeof four);
     int4 bounds = int4_widened(four);
-    int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_TILE - 1) >> to_stamp;
+    int4 in = int4_within(bounds - g->corner, 0, TRIP_CPU_PANE - 1) >> to_stamp;
     uint32_t left = (uint32_t)in[0], right = (uint32_t)in[2];
     uint32_t top = (uint32_t)in[1], bottom = (uint32_t)in[3];
     uint64_t columns = from_column(left) & ~from_column(right + 1);
@@ -543,10 +543,10 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
     }
     if (any == 0)
         return;
-    make_local(&s->local[at], splat, g->corner - (bounds & ~(TRIP_CPU_TILE - 1)));
+    make_local(&s->local[at], splat, g->corner - (bounds & ~(TRIP_CPU_PANE - 1)));
     if (TRIP_CPU_DEPTH)
         s->local_depths[at] = depths[i];
-    g->thick = g->thick >> 1 | (uint64_t)(splat->tiles >> TRIP_CPU_TILES_THICK_SHIFT) << 63;
+    g->thick = g->thick >> 1 | (uint64_t)(splat->panes >> TRIP_CPU_PANES_THICK_SHIFT) << 63;
     for (unsigned band = 0; band < BANDS; band++)
         s->touched[band][at / 64][at % 64] = stamps[band];
     g->splats = ++at;
@@ -560,7 +560,7 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
     }
 }
 
-/* Splats to fetch ahead: they lie scattered among those of other tiles. */
+/* Splats to fetch ahead: they lie scattered among those of other panes. */
 #define AHEAD 32
 
 INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
@@ -608,7 +608,7 @@ static void use_view(trip_cpu_scratch *s, const trip_cpu_view *view)
     s->view = view;
 }
 
-static void tile_blend(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
+static void pane_blend(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                        const float *depths, const uint16_t *order, uint32_t count)
 {
     use_view(s, view);
@@ -625,7 +625,7 @@ static void tile_blend(const trip_cpu_view *view, trip_cpu_scratch *s, const tri
     s->thick[g.splats / 64] = g.thick;
 }
 
-static uint64_t tile_end(trip_cpu_scratch *s)
+static uint64_t pane_end(trip_cpu_scratch *s)
 {
     uint64_t open = 0;
     end_group(s);
@@ -636,7 +636,7 @@ static uint64_t tile_end(trip_cpu_scratch *s)
     return open;
 }
 
-/* ---- taking up a tile ---- */
+/* ---- taking up a pane ---- */
 
 INLINE vf form_at(const float form[6], vf x, vf y)
 {
@@ -687,7 +687,7 @@ static void find_open(trip_cpu_scratch *s, unsigned quarters)
     }
 }
 
-static void tile_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
+static void pane_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
                        unsigned quarters, float *pixels, float *sums)
 {
     s->view = view;

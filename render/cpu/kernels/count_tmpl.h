@@ -8,8 +8,8 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/merge_tmpl.h"
 
-/* Whether some pixel of a stamp of the tile at hand lies in the image, in the support of `splat`,
- * which is local to the tile, and where the list has weight. */
+/* Whether some pixel of a stamp of the pane at hand lies in the image, in the support of `splat`,
+ * which is local to the pane, and where the list has weight. */
 static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsigned number)
 {
     const trip_cpu_view *view = s->view;
@@ -19,19 +19,19 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
     patch p = { .x = stamp_x(number),
                 .y = stamp_y(number),
                 .ray = v_load(s->rays + 2 * V * number),
-                .tile = s };
+                .pane = s };
     vm in = vm_and(v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)),
                    in_image(&view->splat.camera, s->x, s->y, column, row));
-    if (splat->tiles & TRIP_CPU_TILES_NEAR)
+    if (splat->panes & TRIP_CPU_PANES_NEAR)
         in = vm_and(in, v_gt(front_of(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)));
     return vm_any(in) &&
            vm_any(vm_and(in, v_gt(weight(view, view->axis, s->x, s->y, column, row), v_set(0))));
 }
 
-/* Whether some pixel of the tile at (x, y) does. */
-static bool touches_tile(trip_cpu_scratch *s, const trip_cpu_splat *splat, int x, int y)
+/* Whether some pixel of the pane at (x, y) does. */
+static bool touches_pane(trip_cpu_scratch *s, const trip_cpu_splat *splat, int x, int y)
 {
-    const int mask = ~(TRIP_CPU_TILE - 1), last = TRIP_CPU_TILE - 1;
+    const int mask = ~(TRIP_CPU_PANE - 1), last = TRIP_CPU_PANE - 1;
     trip_cpu_splat local;
     int right = splat->x1 - x < last ? splat->x1 - x : last;
     int bottom = splat->y1 - y < last ? splat->y1 - y : last;
@@ -50,10 +50,10 @@ static bool touches_tile(trip_cpu_scratch *s, const trip_cpu_splat *splat, int x
 
 static bool is_drawn(trip_cpu_scratch *s, const trip_cpu_splat *splat)
 {
-    const int mask = ~(TRIP_CPU_TILE - 1);
-    for (int y = splat->y0 & mask; y <= splat->y1; y += TRIP_CPU_TILE)
-        for (int x = splat->x0 & mask; x <= splat->x1; x += TRIP_CPU_TILE)
-            if (touches_tile(s, splat, x, y))
+    const int mask = ~(TRIP_CPU_PANE - 1);
+    for (int y = splat->y0 & mask; y <= splat->y1; y += TRIP_CPU_PANE)
+        for (int x = splat->x0 & mask; x <= splat->x1; x += TRIP_CPU_PANE)
+            if (touches_pane(s, splat, x, y))
                 return true;
     return false;
 }

@@ -1,5 +1,5 @@
 /* What the CPU renderer's inner loops share: a projected splat, the constants of a list, the pixels
- * of a screen tile, and the table of loops that each instruction set provides. The kernels are pure
+ * of a pane, and the table of loops that each instruction set provides. The kernels are pure
  * functions of their arguments; threads give each its own scratch. isa.h chooses a table. */
 #ifndef TRIP_CPU_KERNELS_H
 #define TRIP_CPU_KERNELS_H
@@ -16,12 +16,12 @@
 /* A pixel is saturated when its transmittance is below TRIP_SATURATION, or where its layer has no
  * weight: it takes no more splats, front to back. Until then it is open.
  *
- * Edge of a screen tile in pixels; `tile` is that in this folder, and a square of a sheet is a tile
- * of the sheet. Its pixels are kept as V-lane vectors of four columns times V / 4 rows (a stamp),
- * so that a small footprint meets few vectors and all of them aligned: stamp after stamp, row by
- * row of stamps, each a vector for every channel of layer.h; of alpha, 1 - alpha is kept. */
-#define TRIP_CPU_TILE 32
-#define TRIP_CPU_TILE_PIXELS (TRIP_CPU_TILE * TRIP_CPU_TILE)
+ * Edge in pixels of a pane, an aligned square of the picture (tiles are squares of a sheet). Its
+ * pixels are kept as V-lane vectors of four columns times V / 4 rows (a stamp), so that a small
+ * footprint meets few vectors and all of them aligned: stamp after stamp, row by row of stamps,
+ * each a vector for every channel of layer.h; of alpha, 1 - alpha is kept. */
+#define TRIP_CPU_PANE 32
+#define TRIP_CPU_PANE_PIXELS (TRIP_CPU_PANE * TRIP_CPU_PANE)
 
 /* Exponents are kept ready for the conversion to a float's bits: y stands for
  * 2^(y / TRIP_CPU_EXP_UNIT - 127). */
@@ -38,7 +38,7 @@
 enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE, TRIP_CPU_ALONG, TRIP_CPU_ALONG_X, TRIP_CPU_ALONG_Y };
 
 /* One splat, ready to blend; 64 bytes, a cache line. With (x, y) a pixel's position from the corner
- * of the tile at hand (of the first that the splat lies in, until tile_blend() takes it up),
+ * of the pane at hand (of the first that the splat lies in, until pane_blend() takes it up),
  *     a = l11 x + l21 y + l1,  b = l22 y + l2,  u = max(0, 1 - G (a^2 + b^2)),
  * G as in trip_cpu_rays: u = 1 - m / k^2 of splat.h, 1 at the centre and 0 outside the support. Its
  * opacity there is that of c[]; or its optical depth, times the stretch where it
@@ -57,20 +57,20 @@ typedef struct trip_cpu_splat {
         };
     };
     uint16_t x0, y0, x1, y1; /* pixels that contain the support, inclusive, inside the image */
-    uint32_t tiles;          /* those that it lies in, see below */
+    uint32_t panes;          /* those that it lies in, see below */
 } trip_cpu_splat;
 
 static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
 
-/* trip_cpu_splat.tiles: the number of the first tile (top left); whether the splat is near; whether
- * it also lies in the tile to the right of the first and in the one below it, or in more than these
+/* trip_cpu_splat.panes: the number of the first pane (top left); whether the splat is near; whether
+ * it also lies in the pane to the right of the first and in the one below it, or in more than these
  * two by two; and whether it is not thin, which near splats never count as. */
-#define TRIP_CPU_TILES_NEAR (1u << 27)
-#define TRIP_CPU_TILES_RIGHT_SHIFT 28
-#define TRIP_CPU_TILES_BELOW_SHIFT 29
-#define TRIP_CPU_TILES_MORE (1u << 30)
-#define TRIP_CPU_TILES_THICK_SHIFT 31
-#define TRIP_CPU_TILES_FIRST ((1u << 27) - 1)
+#define TRIP_CPU_PANES_NEAR (1u << 27)
+#define TRIP_CPU_PANES_RIGHT_SHIFT 28
+#define TRIP_CPU_PANES_BELOW_SHIFT 29
+#define TRIP_CPU_PANES_MORE (1u << 30)
+#define TRIP_CPU_PANES_THICK_SHIFT 31
+#define TRIP_CPU_PANES_FIRST ((1u << 27) - 1)
 
 /* Where the rays of a view are alike, their tables are not needed. */
 typedef enum trip_cpu_rays {
@@ -79,7 +79,7 @@ typedef enum trip_cpu_rays {
     TRIP_CPU_STRETCHED,   /* G(p) and stretch(p) */
 } trip_cpu_rays;
 
-/* Constants of one list of one frame, or of a layer: what tiles begin and end with. */
+/* Constants of one list of one frame, or of a layer: what panes begin and end with. */
 typedef struct trip_cpu_view {
     const trip_frame *of;
     const trip_tf_entry *table; /* of the list's codes */
@@ -100,7 +100,7 @@ typedef struct trip_cpu_view {
     float ray2[6], world2[6];
     float cutoff; /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
     float thin;   /* the largest optical depth, stretch aside, of thin splats */
-    int tiles_across;
+    int panes_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double forward_length;                     /* most that z changes by over an index length */
     double eye[3];                             /* [u, v, sheet] */
@@ -143,27 +143,27 @@ typedef struct trip_cpu_lanes {
     float l1[TRIP_CPU_STAGED], l2[TRIP_CPU_STAGED];
     float depth[TRIP_CPU_STAGED]; /* the largest optical depth, edge and all, stretch aside */
     float first[TRIP_CPU_STAGED], last[TRIP_CPU_STAGED]; /* two uint16 each */
-    float tiles[TRIP_CPU_STAGED];                        /* uint32 */
+    float panes[TRIP_CPU_STAGED];                        /* uint32 */
     /* Bits of a vector's lanes: those that are kept, and those to project one by one. */
     uint32_t kept[TRIP_CPU_STAGED / 4], scalar[TRIP_CPU_STAGED / 4];
     bool broken; /* set for good when the numbers of some splat are not finite */
 } trip_cpu_lanes;
 
-/* Splats that are sorted by stamps of a tile together, and bands of 64 stamps at most. */
+/* Splats that are sorted by stamps of a pane together, and bands of 64 stamps at most. */
 #define TRIP_CPU_LOCAL 256
 #define TRIP_CPU_BANDS 4
 
-/* Stamps of a tile at most; floats of a tile's open sheet (sum_tmpl.h), of so many channels. */
+/* Stamps of a pane at most; floats of a pane's open sheet (sum_tmpl.h), of so many channels. */
 #define TRIP_CPU_STAMPS_MAX 256
 #define TRIP_CPU_SHEET_FLOATS(channels)                                                            \
-    ((channels)*TRIP_CPU_TILE_PIXELS + 2 * (size_t)TRIP_CPU_STAMPS_MAX)
+    ((channels)*TRIP_CPU_PANE_PIXELS + 2 * (size_t)TRIP_CPU_STAMPS_MAX)
 
 /* What a stamp's open sheet is where none is. */
 #define TRIP_CPU_NO_SHEET UINT64_MAX
 
-/* What one thread needs while it blends a tile. */
+/* What one thread needs while it blends a pane. */
 typedef struct trip_cpu_scratch {
-    _Alignas(64) float rays[2 * TRIP_CPU_TILE_PIXELS]; /* by stamp: G[V], stretch[V] */
+    _Alignas(64) float rays[2 * TRIP_CPU_PANE_PIXELS]; /* by stamp: G[V], stretch[V] */
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
     float local_depths[TRIP_CPU_LOCAL]; /* of layers with depth */
     /* By band and 64 splats: first each splat's stamps, then each stamp's splats. */
@@ -173,15 +173,15 @@ typedef struct trip_cpu_scratch {
     uint64_t rays_known[TRIP_CPU_BANDS]; /* those whose `rays` are filled in */
     uint64_t thick[TRIP_CPU_LOCAL / 64]; /* which splats are not thin */
     uint32_t splats;
-    int x, y;             /* of the tile's first pixel */
-    float *pixels, *sums; /* of the tile; sums of its open sheet, where those are wanted */
+    int x, y;             /* of the pane's first pixel */
+    float *pixels, *sums; /* of the pane; sums of its open sheet, where those are wanted */
     void (*blend)(struct trip_cpu_scratch *s); /* the group, in order */
     const trip_cpu_view *view;                 /* of the splats gathered, or of the layer */
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;
 } trip_cpu_scratch;
 
-/* What a tile holds when all lists are drawn. */
+/* What a pane holds when all lists are drawn. */
 typedef enum trip_cpu_content {
     TRIP_CPU_NOTHING,
     TRIP_CPU_LAYER, /* of the only list with weight there, as blended */
@@ -207,38 +207,38 @@ typedef struct trip_cpu_kernels {
     uint32_t (*stage)(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
-     * order. With `open`, a word a tile as in trip_cpu_mask, those over saturated cells alone may
+     * order. With `open`, a word a pane as in trip_cpu_mask, those over saturated cells alone may
      * be left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many.
      */
     uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
                         trip_cpu_splat *out, float *depths);
 
-    /* Empties a tile's pixels: transparent where the list has weight, saturated elsewhere; `alone`
-     * says that its weight is 1 all over the tile. */
-    void (*tile_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
-    /* Takes up a tile for blending; `quarters` says which of its 16 x 16 quarters to draw. `sums`:
+    /* Empties a pane's pixels: transparent where the list has weight, saturated elsewhere; `alone`
+     * says that its weight is 1 all over the pane. */
+    void (*pane_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
+    /* Takes up a pane for blending; `quarters` says which of its 16 x 16 quarters to draw. `sums`:
      * of its open sheet, where sheets are summed. */
-    void (*tile_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
+    void (*pane_begin)(const trip_cpu_view *view, trip_cpu_scratch *s, int x, int y,
                        unsigned quarters, float *pixels, float *sums);
     /* Blends splats[order[i]] in order, or splats[i] where order is NULL, that were projected with
      * this view. */
-    void (*tile_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
+    void (*pane_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                        const float *depths, const uint16_t *order, uint32_t count);
     /* Ends with every splat in the pixels, or in the open sheet. Returns which cells of the
      * quarters are open, as trip_cpu_mask has them. */
-    uint64_t (*tile_end)(trip_cpu_scratch *s);
-    /* Empties a tile's open sheet. */
+    uint64_t (*pane_end)(trip_cpu_scratch *s);
+    /* Empties a pane's open sheet. */
     void (*sheet_clear)(float *sums);
-    /* The tile's pixels with its open sheet composited, to `out`; both stay as they are. */
+    /* The pane's pixels with its open sheet composited, to `out`; both stay as they are. */
     void (*sheet_composite)(const trip_cpu_view *view, const float *pixels, const float *sums,
                             float *out);
     /* sum += w^2 layer, or sum = w^2 layer when it is the first. */
-    void (*tile_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
+    void (*pane_merge)(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum);
-    /* The finished picture of a tile into an image, from what the lists came to there; `depth` is
+    /* The finished picture of a pane into an image, from what the lists came to there; `depth` is
      * one float a pixel of the image, and nothing without depth. */
-    void (*tile_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
+    void (*pane_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
                         const float *pixels, float *rgba, float *depth);
 
     /* How many of so many splats that project() made have a pixel centre of the image in their
@@ -262,9 +262,9 @@ typedef struct trip_cpu_kernels {
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);
-    /* Composites a group's segments into a tile's pixels. Returns which of its cells are open, as
+    /* Composites a group's segments into a pane's pixels. Returns which of its cells are open, as
      * trip_cpu_mask has them. */
-    uint64_t (*sheet_tile)(const trip_cpu_sheet_view *view, const trip_cpu_group *group, int x,
+    uint64_t (*sheet_pane)(const trip_cpu_sheet_view *view, const trip_cpu_group *group, int x,
                            int y, float *pixels);
 } trip_cpu_kernels;
 

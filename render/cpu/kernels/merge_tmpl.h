@@ -1,4 +1,4 @@
-/* Kernels that begin and finish the pixels of a tile: weights of the lists, the merge (equation 3
+/* Kernels that begin and finish the pixels of a pane: weights of the lists, the merge (equation 3
  * of Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
  * The weights are computed in double precision by the operations of weight.c in their order, so
  * that a list begins at the same pixel wherever that is computed, and what is near there is exact
@@ -72,7 +72,7 @@ INLINE vd_pair centres(int first, const float offsets[V])
     return (vd_pair){ vd_low(f) + vd_set(first), vd_high(f) + vd_set(first) };
 }
 
-/* The list's weight at the pixels of stamp (column, row) of the tile at (x, y). */
+/* The list's weight at the pixels of stamp (column, row) of the pane at (x, y). */
 INLINE vf weight(const trip_cpu_view *view, int axis, int x, int y, int column, int row)
 {
     float across[V], down[V];
@@ -97,7 +97,7 @@ INLINE vm in_image(const trip_camera *camera, int x, int y, int column, int row)
     return vm_and(v_gt(v_set((float)camera->width), px), v_gt(v_set((float)camera->height), py));
 }
 
-static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, float *pixels)
+static void pane_clear(const trip_cpu_view *view, int x, int y, bool alone, float *pixels)
 {
     for (int b = 0; b < STAMPS; b++) {
         float *stamp = pixels + STAMP_FLOATS * b;
@@ -117,7 +117,7 @@ static void tile_clear(const trip_cpu_view *view, int x, int y, bool alone, floa
     }
 }
 
-static void tile_merge(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
+static void pane_merge(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum)
 {
     for (int b = 0; b < STAMPS; b++) {
@@ -147,7 +147,7 @@ INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
     return v_set(1) / sum;
 }
 
-/* Block b of the picture before the background. */
+/* Stamp b of the picture before the background. */
 INLINE void merged_stamp(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
                          const float *pixels, vf out[CHANNELS])
 {
@@ -186,14 +186,14 @@ INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, 
                16 * (size_t)(count < 4 ? count : 4));
 }
 
-/* A tile where no list has drawn; `width` pixels from line to line, of which the first `count`
+/* A pane where no list has drawn; `width` pixels from line to line, of which the first `count`
  * columns and `lines` lines lie in the image. */
-static void tile_background(const trip_cpu_view *view, float *rgba, float *depth, size_t width,
+static void pane_background(const trip_cpu_view *view, float *rgba, float *depth, size_t width,
                             int count, int lines)
 {
     const float pixel[4] = { behind(view, 0), behind(view, 1), behind(view, 2), behind(view, 3) };
-    count = count < TRIP_CPU_TILE ? count : TRIP_CPU_TILE;
-    for (int r = 0; r < lines && r < TRIP_CPU_TILE; r++)
+    count = count < TRIP_CPU_PANE ? count : TRIP_CPU_PANE;
+    for (int r = 0; r < lines && r < TRIP_CPU_PANE; r++)
         for (int i = 0; i < count; i++) {
             memcpy(rgba + 4 * ((size_t)r * width + (size_t)i), pixel, sizeof pixel);
             if (TRIP_CPU_DEPTH)
@@ -223,7 +223,7 @@ INLINE void store_depths(float *depth, size_t width, int count, int lines, vf di
             depth[(size_t)r * width + (size_t)i] = stamp[4 * r + i];
 }
 
-static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
+static void pane_finish(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
                         const float *pixels, float *rgba, float *depth)
 {
     const trip_camera *camera = &view->splat.camera;
@@ -232,7 +232,7 @@ static void tile_finish(const trip_cpu_view *view, int x, int y, trip_cpu_conten
     if (TRIP_CPU_DEPTH)
         depth += first;
     if (content == TRIP_CPU_NOTHING) {
-        tile_background(view, rgba, depth, width, camera->width - x, camera->height - y);
+        pane_background(view, rgba, depth, width, camera->width - x, camera->height - y);
         return;
     }
     for (int b = 0; b < STAMPS; b++) {

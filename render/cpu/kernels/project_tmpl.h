@@ -457,22 +457,22 @@ INLINE vm less_or_equal(vi a, vi b)
     return v_ge(v_from_int(b), v_from_int(a));
 }
 
-/* As trip_cpu_tiles(). */
-INLINE vi tiles_of(vi x0, vi y0, vi x1, vi y1, int across)
+/* As trip_cpu_panes(). */
+INLINE vi panes_of(vi x0, vi y0, vi x1, vi y1, int across)
 {
     const vi one = vi_set(1);
-    static_assert(TRIP_CPU_TILE == 32, "the shifts below");
+    static_assert(TRIP_CPU_PANE == 32, "the shifts below");
     vi x = x0 >> 5, y = y0 >> 5, right = (x1 >> 5) - x, below = (y1 >> 5) - y;
     vi more = v_shift_right((one - right) | (one - below), 31); /* the sign: either is above 1 */
     vi any_right = v_shift_right(-right, 31), any_below = v_shift_right(-below, 31);
-    return y * across + x + (any_right << TRIP_CPU_TILES_RIGHT_SHIFT) +
-           (any_below << TRIP_CPU_TILES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_TILES_MORE;
+    return y * across + x + (any_right << TRIP_CPU_PANES_RIGHT_SHIFT) +
+           (any_below << TRIP_CPU_PANES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_PANES_MORE;
 }
 
-/* Where the tile of a pixel begins. */
-INLINE vf first_of_tile(vi pixel)
+/* Where the pane of a pixel begins. */
+INLINE vf first_of_pane(vi pixel)
 {
-    return v_from_int(pixel & ~(TRIP_CPU_TILE - 1));
+    return v_from_int(pixel & ~(TRIP_CPU_PANE - 1));
 }
 
 /* Everything but colour and opacity; the bits of the lanes that have pixels. */
@@ -487,8 +487,8 @@ INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extin
            &x0, &x1);
     pixels(v_load(lanes->whole_y + at), v_load(lanes->y + at), f->shift_y, f->half_y,
            camera->height, &y0, &y1);
-    vf x = v_load(lanes->x + at) + (v_load(lanes->whole_x + at) - first_of_tile(x0));
-    vf y = v_load(lanes->y + at) + (v_load(lanes->whole_y + at) - first_of_tile(y0));
+    vf x = v_load(lanes->x + at) + (v_load(lanes->whole_x + at) - first_of_pane(x0));
+    vf y = v_load(lanes->y + at) + (v_load(lanes->whole_y + at) - first_of_pane(y0));
     v_store(lanes->l11 + at, f->l11);
     v_store(lanes->l21 + at, f->l21);
     v_store(lanes->l22 + at, f->l22);
@@ -497,7 +497,7 @@ INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extin
     v_store(lanes->depth + at, depth);
     vi_store(lanes->first + at, x0 | y0 << 16);
     vi_store(lanes->last + at, x1 | y1 << 16);
-    vi_store(lanes->tiles + at, tiles_of(x0, y0, x1, y1, view->tiles_across));
+    vi_store(lanes->panes + at, panes_of(x0, y0, x1, y1, view->panes_across));
     vm seen = vm_and(v_gt(v_load(lanes->z + at), v_set(0)), v_gt(depth, v_set(FAINTEST)));
     return vm_bits(vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1))));
 }
@@ -595,7 +595,7 @@ INLINE void store_summed(const trip_cpu_lanes *lanes, const trip_cpu_staged *sta
                  light.b * peak);
     v_store_rows(base + 8, row, peak, v_from_bits(vi_load(staged->sheet + at)), v_set(0), v_set(0));
     v_store_rows(base + 12, row, v_set(0), v_load(lanes->first + at), v_load(lanes->last + at),
-                 v_load(lanes->tiles + at));
+                 v_load(lanes->panes + at));
 }
 
 /* The lanes that are kept, as splats. */
@@ -604,20 +604,20 @@ INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32
 {
     float *base = &out->l11;
     vf depth = v_load(lanes->depth + at), c[TRIP_CPU_TERMS];
-    vf tiles = v_load(lanes->tiles + at), limit = v_set(view->thin);
+    vf panes = v_load(lanes->panes + at), limit = v_set(view->thin);
     thin_terms(depth, c);
     if (view->rays == TRIP_CPU_STRETCHED)
         long_terms(view, depth, v_ge(depth, v_set(0)), c);
     else if (vm_any(v_gt(depth, limit)))
         long_terms(view, depth, v_gt(depth, limit), c);
     const vi thick = vi_set(INT32_MIN);
-    static_assert(TRIP_CPU_TILES_THICK_SHIFT == 31, "the bit above");
-    tiles = v_select(v_gt(depth, limit), v_from_bits(v_bits(tiles) | thick), tiles);
+    static_assert(TRIP_CPU_PANES_THICK_SHIFT == 31, "the bit above");
+    panes = v_select(v_gt(depth, limit), v_from_bits(v_bits(panes) | thick), panes);
     v_store_rows(base, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
                  v_load(lanes->l22 + at), v_load(lanes->l1 + at));
     v_store_rows(base + 4, row, v_load(lanes->l2 + at), light.r, light.g, light.b);
     v_store_rows(base + 8, row, c[0], c[1], c[2], c[3]);
-    v_store_rows(base + 12, row, c[4], v_load(lanes->first + at), v_load(lanes->last + at), tiles);
+    v_store_rows(base + 12, row, c[4], v_load(lanes->first + at), v_load(lanes->last + at), panes);
 }
 
 /* Depths of the lanes that are kept. */
@@ -679,7 +679,7 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
         unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~scalar;
         if (open && kept)
-            kept &= over_open_cells(lanes, i, open, view->tiles_across);
+            kept &= over_open_cells(lanes, i, open, view->panes_across);
         lanes->kept[i / V] = kept;
         lanes->scalar[i / V] = scalar;
     }

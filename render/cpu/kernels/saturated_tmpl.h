@@ -7,34 +7,34 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 
-/* The cells of four tiles, two by two, that each lane's support may touch. */
+/* The cells of four panes, two by two, that each lane's support may touch. */
 typedef struct cells {
-    vi tile;              /* the first; 0 in lanes without pixels */
-    vi columns;           /* bits: eight of the first tile, eight of the one to the right */
-    vi top, bottom;       /* rows, counted from the first tile's */
-    vi any_right, across; /* 1 and a row of tiles where the support goes there, else 0 */
+    vi pane;              /* the first; 0 in lanes without pixels */
+    vi columns;           /* bits: eight of the first pane, eight of the one to the right */
+    vi top, bottom;       /* rows, counted from the first pane's */
+    vi any_right, across; /* 1 and a row of panes where the support goes there, else 0 */
 } cells;
 
-INLINE cells cells_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int tiles_across)
+INLINE cells cells_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int panes_across)
 {
     vi first = vi_load(lanes->first + at), last = vi_load(lanes->last + at);
-    vi tiles = vi_load(lanes->tiles + at);
+    vi panes = vi_load(lanes->panes + at);
     vi x0 = first & 0xffff, y0 = v_shift_right(first, 16);
     vi x1 = last & 0xffff, y1 = v_shift_right(last, 16);
-    static_assert(TRIP_CPU_TILE == 32, "eight cells of four pixels, in the shifts below");
+    static_assert(TRIP_CPU_PANE == 32, "eight cells of four pixels, in the shifts below");
     vi left = x0 >> 2 & 7, right = ((x1 >> 2) - (x0 >> 5) * 8) & 15;
-    tiles &= (vi)(x0 <= x1) & (vi)(y0 <= y1);
+    panes &= (vi)(x0 <= x1) & (vi)(y0 <= y1);
     return (cells){
-        .tile = tiles & TRIP_CPU_TILES_FIRST,
+        .pane = panes & TRIP_CPU_PANES_FIRST,
         .columns = (vi_set(0xffff) << left) & (vi_set(0xffff) >> (15 - right)),
         .top = y0 >> 2 & 7,
         .bottom = ((y1 >> 2) - (y0 >> 5) * 8) & 15,
-        .any_right = v_shift_right(tiles, TRIP_CPU_TILES_RIGHT_SHIFT) & 1,
-        .across = -(v_shift_right(tiles, TRIP_CPU_TILES_BELOW_SHIFT) & 1) & tiles_across,
+        .any_right = v_shift_right(panes, TRIP_CPU_PANES_RIGHT_SHIFT) & 1,
+        .across = -(v_shift_right(panes, TRIP_CPU_PANES_BELOW_SHIFT) & 1) & panes_across,
     };
 }
 
-/* Rows of a tile's words: of the first tile from `top` to `bottom`, of the one below from its first
+/* Rows of a pane's words: of the first pane from `top` to `bottom`, of the one below from its first
  * to `bottom`. */
 INLINE vw rows_of_first(vw top, vw bottom)
 {
@@ -48,38 +48,38 @@ INLINE vw rows_of_below(vw bottom)
     return ~(vw_set(UINT64_MAX) << half << half);
 }
 
-/* The lanes, a bit each, with an open cell among those of one of the four tiles. */
-INLINE unsigned open_in(const _Atomic uint64_t *open, vi tile, vi columns, vw rows_low,
+/* The lanes, a bit each, with an open cell among those of one of the four panes. */
+INLINE unsigned open_in(const _Atomic uint64_t *open, vi pane, vi columns, vw rows_low,
                         vw rows_high)
 {
     vi bytes = (vi)((vu)(columns & 0xff) * 0x01010101u);
     vw low = vw_low(bytes), high = vw_high(bytes);
-    low = (low | low << 32) & rows_low & vw_gather(open, vw_low(tile));
-    high = (high | high << 32) & rows_high & vw_gather(open, vw_high(tile));
+    low = (low | low << 32) & rows_low & vw_gather(open, vw_low(pane));
+    high = (high | high << 32) & rows_high & vw_gather(open, vw_high(pane));
     return vw_not_0(low) | vw_not_0(high) << V / 2;
 }
 
-/* The lanes, a bit each, that may touch an open cell; `open` is a word a tile, as in
+/* The lanes, a bit each, that may touch an open cell; `open` is a word a pane, as in
  * trip_cpu_mask. Those without pixels give any bit. */
 INLINE unsigned over_open_cells(const trip_cpu_lanes *lanes, uint32_t at,
-                                const _Atomic uint64_t *open, int tiles_across)
+                                const _Atomic uint64_t *open, int panes_across)
 {
-    cells b = cells_of_lanes(lanes, at, tiles_across);
+    cells b = cells_of_lanes(lanes, at, panes_across);
     vw bottom_low = vw_low(b.bottom), bottom_high = vw_high(b.bottom);
     vw low = rows_of_first(vw_low(b.top), bottom_low);
     vw high = rows_of_first(vw_high(b.top), bottom_high);
-    unsigned seen = open_in(open, b.tile, b.columns, low, high);
-    vi beyond = v_shift_right(vi_load(lanes->tiles + at), TRIP_CPU_TILES_RIGHT_SHIFT);
+    unsigned seen = open_in(open, b.pane, b.columns, low, high);
+    vi beyond = v_shift_right(vi_load(lanes->panes + at), TRIP_CPU_PANES_RIGHT_SHIFT);
     if (!vm_any(v_gt(v_from_int(beyond), v_set(0))))
         return seen;
-    static_assert(TRIP_CPU_TILES_MORE >> TRIP_CPU_TILES_RIGHT_SHIFT == 4, "more than both");
+    static_assert(TRIP_CPU_PANES_MORE >> TRIP_CPU_PANES_RIGHT_SHIFT == 4, "more than both");
     seen |= vm_bits(v_gt(v_from_int(beyond), v_set(3)));
-    seen |= open_in(open, b.tile + b.any_right, v_shift_right(b.columns, 8), low, high);
+    seen |= open_in(open, b.pane + b.any_right, v_shift_right(b.columns, 8), low, high);
     low = rows_of_below(bottom_low);
     high = rows_of_below(bottom_high);
-    seen |= open_in(open, b.tile + b.across, b.columns, low, high);
+    seen |= open_in(open, b.pane + b.across, b.columns, low, high);
     return seen |
-           open_in(open, b.tile + b.across + b.any_right, v_shift_right(b.columns, 8), low, high);
+           open_in(open, b.pane + b.across + b.any_right, v_shift_right(b.columns, 8), low, high);
 }
 
 #endif

@@ -152,7 +152,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
                       tile_path *path)
 {
     const double origin[2] = { (double)g->first_u, (double)g->first_v };
-    beam b = beam_of(view, x, y, TRIP_CPU_TILE);
+    beam b = beam_of(view, x, y, TRIP_CPU_PANE);
     for (int a = 0; a < 2; a++) {
         path->slope[a] = b.slope[0][a];
         path->start[a] = b.start[0][a];
@@ -896,13 +896,13 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     }
 }
 
-static uint64_t sheet_tile(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
+static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
                            float *pixels)
 {
     tile_path path;
     uint64_t open = 0;
     find_path(view, g, x, y, &path);
-    for (unsigned place = 0; place < TRIP_CPU_TILE_PIXELS / 64; place++)
+    for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64; place++)
         draw_patch(view, g, &path, x, y, place, pixels);
     for (unsigned i = 0; i < STAMPS; i++)
         if (vm_any(v_gt(v_load(pixels + STAMP_FLOATS * i + 3 * V), v_set(0))))

@@ -51,10 +51,10 @@ static uint64_t squares(const trip_cpu_view *view, const trip_cpu_region *region
                 &y0, &y1);
         vi_store(lanes->first + i, x0 | y0 << 16);
         vi_store(lanes->last + i, x1 | y1 << 16);
-        vi_store(lanes->tiles + i, tiles_of(x0, y0, x1, y1, view->tiles_across));
+        vi_store(lanes->panes + i, panes_of(x0, y0, x1, y1, view->panes_across));
         unsigned any = vm_bits(vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1)));
         if (any)
-            any &= over_open_cells(lanes, i, open, view->tiles_across);
+            any &= over_open_cells(lanes, i, open, view->panes_across);
         visible |= (uint64_t)any << i;
     }
     return visible;

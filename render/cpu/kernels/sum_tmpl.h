@@ -1,5 +1,5 @@
 /* Kernels that sum the splats of a sheet at each pixel and composite the sum (splat.h): included by
- * table_tmpl.h after blend_tmpl.h. A tile has its open sheet beside its pixels: stamp by stamp the
+ * table_tmpl.h after blend_tmpl.h. A pane has its open sheet beside its pixels: stamp by stamp the
  * sums of optical depth times each channel, in the pixels' order with optical depth in the place of
  * 1 - alpha, and behind all stamps which sheet each stamp's sums are of. The sheet of a stamp is
  * composited when a splat of another one is to be added, so that the picture depends on the order
@@ -97,7 +97,7 @@ INLINE void empty_sums(patch *p)
 /* Composites the open sheet of a patch's stamp. Seldom: some 15 splats of a sheet meet a pixel. */
 static void end_sheet(patch *p)
 {
-    put_sheet(p->tile->view, p->tile->pixels + STAMP_FLOATS * p->number, p);
+    put_sheet(p->pane->view, p->pane->pixels + STAMP_FLOATS * p->number, p);
     empty_sums(p);
 }
 
@@ -196,7 +196,7 @@ static blend_group_fn *choose_sum(const trip_cpu_view *view)
     return by_rays[view->rays];
 }
 
-/* ---- tiles ---- */
+/* ---- panes ---- */
 
 static void sheet_clear(float *sums)
 {

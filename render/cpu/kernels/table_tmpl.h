@@ -26,13 +26,13 @@
 #define KERNELS(isa_name, depth_table)                                                             \
     {                                                                                              \
         .isa = isa_name, .lanes = V, .channels = CHANNELS, .with_depth = depth_table,              \
-        .squares = squares, .stage = stage, .project = project, .tile_clear = tile_clear,          \
-        .tile_begin = tile_begin, .tile_blend = tile_blend, .tile_end = tile_end,                  \
-        .tile_merge = tile_merge, .tile_finish = tile_finish, .drawn = drawn,                      \
+        .squares = squares, .stage = stage, .project = project, .pane_clear = pane_clear,          \
+        .pane_begin = pane_begin, .pane_blend = pane_blend, .pane_end = pane_end,                  \
+        .pane_merge = pane_merge, .pane_finish = pane_finish, .drawn = drawn,                      \
         .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,                            \
         .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
         .sheet_gradients = sheet_gradients, .sheet_between = sheet_between,                        \
-        .sheet_tile = sheet_tile,                                                                  \
+        .sheet_pane = sheet_pane,                                                                  \
     }
 
 #endif

@@ -6,7 +6,7 @@
 #include "cpu/occlusion.h"
 #include "cpu/sheets/pass_view.h"
 #include "cpu/sheets/state.h"
-#include "cpu/tiles.h"
+#include "cpu/panes.h"
 #include "report.h"
 
 /* Of the memory that is left, what the frame goes on with besides. */
@@ -282,22 +282,22 @@ static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
     return false;
 }
 
-static void draw_tile(void *context, unsigned task, unsigned thread)
+static void draw_pane(void *context, unsigned task, unsigned thread)
 {
     trip_cpu_sheets *s = context;
     trip_cpu *r = s->of;
     (void)thread;
     if (trip_interrupted() || !(r->axes[task] >> s->axis & 1) ||
-        trip_cpu_tile_is_saturated(&r->mask, task))
+        trip_cpu_pane_is_saturated(&r->mask, task))
         return;
-    float *pixels = trip_cpu_tile_pixels(r, task);
-    int x = trip_cpu_tile_x(r, task), y = trip_cpu_tile_y(r, task);
-    if (!(r->states[task] & TRIP_CPU_TILE_BEGUN)) {
-        r->kernels->tile_clear(&r->view, x, y, trip_cpu_is_alone(r, task), pixels);
-        r->states[task] |= TRIP_CPU_TILE_BEGUN;
+    float *pixels = trip_cpu_pane_pixels(r, task);
+    int x = trip_cpu_pane_x(r, task), y = trip_cpu_pane_y(r, task);
+    if (!(r->states[task] & TRIP_CPU_PANE_BEGUN)) {
+        r->kernels->pane_clear(&r->view, x, y, trip_cpu_is_alone(r, task), pixels);
+        r->states[task] |= TRIP_CPU_PANE_BEGUN;
     }
-    uint64_t open = r->kernels->sheet_tile(&s->view, &s->group, x, y, pixels);
-    atomic_store_explicit(&r->mask.tiles[task], open, memory_order_relaxed);
+    uint64_t open = r->kernels->sheet_pane(&s->view, &s->group, x, y, pixels);
+    atomic_store_explicit(&r->mask.panes[task], open, memory_order_relaxed);
 }
 
 /* Gathers the squares that are visible in some segment; false when there are none. */
@@ -316,11 +316,11 @@ static bool find_some(trip_cpu_sheets *s)
     return any != 0;
 }
 
-static void draw_tiles(trip_cpu_sheets *s)
+static void draw_panes(trip_cpu_sheets *s)
 {
     if (!find_some(s))
         return;
-    trip_cpu_job job = { .run = draw_tile, .context = s, .tasks = trip_cpu_tile_count(s->of) };
+    trip_cpu_job job = { .run = draw_pane, .context = s, .tasks = trip_cpu_pane_count(s->of) };
     trip_cpu_pool_start(s->of->pool, &job);
     trip_cpu_pool_wait(s->of->pool, &job);
 }
@@ -358,7 +358,7 @@ int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
         first = false;
     }
     trip_cpu_store_cut(&s->store, cut.work, cut.count);
-    draw_tiles(s);
+    draw_panes(s);
     while (cut.count > 0)
         trip_cpu_store_drop(&s->store, &s->store.slices[--cut.count]);
     return done;

@@ -1,5 +1,5 @@
 /* Frames that classify after interpolation (sheet.h): the runs of a pass become sheets, and as soon
- * as some sheets in a row are complete they are cut into slices and drawn into the tiles, and let
+ * as some sheets in a row are complete they are cut into slices and drawn into the panes, and let
  * go of. What a pixel gets depends on the slices alone, never on how many were drawn at a time.
  * Called by the renderer's thread. */
 #ifndef TRIP_CPU_SHEETS_SHEETS_H

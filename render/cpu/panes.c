@@ -1,4 +1,4 @@
-#include "cpu/tiles.h"
+#include "cpu/panes.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,41 +17,41 @@ static void *part(char *memory, size_t *at, size_t bytes)
 
 static size_t lay_out(trip_cpu *r, char *memory)
 {
-    size_t at = 0, tiles = trip_cpu_tile_count(r);
-    r->pixels = part(memory, &at, tiles * trip_cpu_tile_floats(r) * sizeof *r->pixels);
-    r->sums = part(memory, &at, tiles * trip_cpu_tile_floats(r) * sizeof *r->sums);
+    size_t at = 0, panes = trip_cpu_pane_count(r);
+    r->pixels = part(memory, &at, panes * trip_cpu_pane_floats(r) * sizeof *r->pixels);
+    r->sums = part(memory, &at, panes * trip_cpu_pane_floats(r) * sizeof *r->sums);
     r->open_sheets = NULL;
     if (r->has_open_sheets)
         r->open_sheets =
-            part(memory, &at, tiles * TRIP_CPU_SHEET_FLOATS(r->channels) * sizeof *r->open_sheets);
-    r->states = part(memory, &at, tiles);
-    r->axes = part(memory, &at, tiles);
-    r->mask.tiles = part(memory, &at, tiles * sizeof *r->mask.tiles);
-    r->portions = part(memory, &at, 4 * tiles * sizeof *r->portions);
-    /* Splats are also counted for the tile beyond the last, diagonally. */
+            part(memory, &at, panes * TRIP_CPU_SHEET_FLOATS(r->channels) * sizeof *r->open_sheets);
+    r->states = part(memory, &at, panes);
+    r->axes = part(memory, &at, panes);
+    r->mask.panes = part(memory, &at, panes * sizeof *r->mask.panes);
+    r->portions = part(memory, &at, 4 * panes * sizeof *r->portions);
+    /* Splats are also counted for the pane beyond the last, diagonally. */
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].sorting.counts = part(
-            memory, &at, (tiles + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
+            memory, &at, (panes + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
     return at;
 }
 
-void trip_cpu_release_tiles(trip_cpu *r)
+void trip_cpu_release_panes(trip_cpu *r)
 {
-    trip_budget_release(r->budget, r->pixels, r->tiles_bytes);
+    trip_budget_release(r->budget, r->pixels, r->panes_bytes);
     r->pixels = r->open_sheets = NULL;
-    r->tiles_bytes = 0;
+    r->panes_bytes = 0;
     r->mask.grid = (trip_cpu_grid){ 0, 0 };
 }
 
-int trip_cpu_fit_tiles(trip_cpu *r, int width, int height)
+int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
 {
     bool sums = trip_settings_sum_sheets(r->frame->settings);
-    trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE,
-                           ((uint32_t)height + TRIP_CPU_TILE - 1) / TRIP_CPU_TILE };
+    trip_cpu_grid grid = { ((uint32_t)width + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE,
+                           ((uint32_t)height + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE };
     if (grid.across == r->mask.grid.across && grid.down == r->mask.grid.down &&
         r->channels == r->kernels->channels && r->has_open_sheets == sums)
         return 0;
-    trip_cpu_release_tiles(r);
+    trip_cpu_release_panes(r);
     r->mask.grid = grid;
     r->channels = r->kernels->channels;
     r->has_open_sheets = sums;
@@ -65,17 +65,17 @@ int trip_cpu_fit_tiles(trip_cpu *r, int width, int height)
                          bytes, trip_cpu_memory_mib(r->budget, bytes));
     }
     lay_out(r, memory);
-    r->tiles_bytes = bytes;
+    r->panes_bytes = bytes;
     return 0;
 }
 
 /* ---- frames and layers ---- */
 
-/* The axes, a bit each, whose layers may have weight in the tile at (x, y). Where there is but one,
- * its weight is 1 all over the tile. */
-static uint8_t axes_of_tile(const trip_frame *frame, int x, int y)
+/* The axes, a bit each, whose layers may have weight in the pane at (x, y). Where there is but one,
+ * its weight is 1 all over the pane. */
+static uint8_t axes_of_pane(const trip_frame *frame, int x, int y)
 {
-    const double from[2] = { x, y }, to[2] = { x + TRIP_CPU_TILE, y + TRIP_CPU_TILE };
+    const double from[2] = { x, y }, to[2] = { x + TRIP_CPU_PANE, y + TRIP_CPU_PANE };
     trip_ray_bounds bounds = trip_ray_bounds_over(frame->camera, from, to);
     unsigned axes = 0;
     for (int axis = 0; axis < 3; axis++)
@@ -84,17 +84,17 @@ static uint8_t axes_of_tile(const trip_frame *frame, int x, int y)
     return (uint8_t)axes;
 }
 
-void trip_cpu_begin_tiles(trip_cpu *r)
+void trip_cpu_begin_panes(trip_cpu *r)
 {
-    memset(r->states, 0, trip_cpu_tile_count(r));
-    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++)
-        r->axes[t] = axes_of_tile(r->frame, trip_cpu_tile_x(r, t), trip_cpu_tile_y(r, t));
+    memset(r->states, 0, trip_cpu_pane_count(r));
+    for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++)
+        r->axes[t] = axes_of_pane(r->frame, trip_cpu_pane_x(r, t), trip_cpu_pane_y(r, t));
 }
 
-void trip_cpu_begin_tile_layer(trip_cpu *r)
+void trip_cpu_begin_pane_layer(trip_cpu *r)
 {
-    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++)
-        atomic_store_explicit(&r->mask.tiles[t], r->axes[t] >> r->view.axis & 1 ? UINT64_MAX : 0,
+    for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++)
+        atomic_store_explicit(&r->mask.panes[t], r->axes[t] >> r->view.axis & 1 ? UINT64_MAX : 0,
                               memory_order_relaxed);
 }
 
@@ -111,11 +111,11 @@ static void blend_some(void *user, const trip_cpu_chunk *chunk, const trip_cpu_s
     blend_context *c = user;
     if (trip_interrupted())
         return;
-    c->of->kernels->tile_blend(&c->of->views[chunk->list], c->scratch, splats,
+    c->of->kernels->pane_blend(&c->of->views[chunk->list], c->scratch, splats,
                                trip_cpu_depths_from(c->of->blending, chunk->splat), order, count);
 }
 
-/* The mask's bits of some quarters of a tile. */
+/* The mask's bits of some quarters of a pane. */
 static uint64_t bits_of_quarters(unsigned quarters)
 {
     static const uint64_t quarter = 0x0f0f0f0f;
@@ -130,19 +130,19 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
         return;
     const trip_cpu_portion *p = &r->portions[task];
     trip_cpu_scratch *s = &r->workers[thread].scratch;
-    int x = trip_cpu_tile_x(r, p->tile), y = trip_cpu_tile_y(r, p->tile);
-    if (!(r->states[p->tile] & TRIP_CPU_TILE_BEGUN)) {
-        r->kernels->tile_clear(&r->view, x, y, trip_cpu_is_alone(r, p->tile),
-                               trip_cpu_tile_pixels(r, p->tile));
+    int x = trip_cpu_pane_x(r, p->pane), y = trip_cpu_pane_y(r, p->pane);
+    if (!(r->states[p->pane] & TRIP_CPU_PANE_BEGUN)) {
+        r->kernels->pane_clear(&r->view, x, y, trip_cpu_is_alone(r, p->pane),
+                               trip_cpu_pane_pixels(r, p->pane));
         if (r->open_sheets)
-            r->kernels->sheet_clear(trip_cpu_tile_sheet(r, p->tile));
-        r->states[p->tile] |= TRIP_CPU_TILE_BEGUN;
+            r->kernels->sheet_clear(trip_cpu_pane_sheet(r, p->pane));
+        r->states[p->pane] |= TRIP_CPU_PANE_BEGUN;
     }
-    r->kernels->tile_begin(&r->view, s, x, y, p->quarters, trip_cpu_tile_pixels(r, p->tile),
-                           trip_cpu_tile_sheet(r, p->tile));
-    trip_cpu_tile_list_each(r->blending, p->tile, blend_some, &(blend_context){ r, s });
-    uint64_t open = r->kernels->tile_end(s) | ~bits_of_quarters(p->quarters);
-    atomic_fetch_and_explicit(&r->mask.tiles[p->tile], open, memory_order_relaxed);
+    r->kernels->pane_begin(&r->view, s, x, y, p->quarters, trip_cpu_pane_pixels(r, p->pane),
+                           trip_cpu_pane_sheet(r, p->pane));
+    trip_cpu_pane_list_each(r->blending, p->pane, blend_some, &(blend_context){ r, s });
+    uint64_t open = r->kernels->pane_end(s) | ~bits_of_quarters(p->quarters);
+    atomic_fetch_and_explicit(&r->mask.panes[p->pane], open, memory_order_relaxed);
 }
 
 static int most_first(const void *a, const void *b)
@@ -151,7 +151,7 @@ static int most_first(const void *a, const void *b)
     return p->splats < q->splats ? 1 : p->splats > q->splats ? -1 : 0;
 }
 
-/* Tiles with work, those with most of it first. One that holds so much that a thread would still be
+/* Panes with work, those with most of it first. One that holds so much that a thread would still be
  * at it when the others are done, with the next splats to project too, is given out in quarters,
  * though each goes through all of its splats; not when it is new, since then one thread has to
  * clear it. */
@@ -159,14 +159,14 @@ static void make_portions(trip_cpu *r, const trip_cpu_buffer *f)
 {
     uint64_t all = 0;
     r->portion_count = 0;
-    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++)
-        all += f->tile_lists[t].splats;
+    for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++)
+        all += f->pane_lists[t].splats;
     uint64_t large = all / trip_cpu_pool_threads(r->pool) * 2;
-    for (uint32_t t = 0; t < trip_cpu_tile_count(r); t++) {
-        uint32_t n = f->tile_lists[t].splats;
-        if (n == 0 || trip_cpu_tile_is_saturated(&r->mask, t))
+    for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++) {
+        uint32_t n = f->pane_lists[t].splats;
+        if (n == 0 || trip_cpu_pane_is_saturated(&r->mask, t))
             continue;
-        if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TRIP_CPU_TILE_BEGUN) {
+        if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TRIP_CPU_PANE_BEGUN) {
             for (unsigned q = 0; q < 4; q++)
                 r->portions[r->portion_count++] = (trip_cpu_portion){ t, 1u << q, n / 3 };
         } else {
@@ -181,7 +181,7 @@ void trip_cpu_blend_filled(trip_cpu *r)
     trip_cpu_buffer *full = r->filling;
     if (!full || full->chunk_count == 0)
         return;
-    trip_cpu_link_tile_lists(full, &r->mask);
+    trip_cpu_link_pane_lists(full, &r->mask);
     trip_cpu_pool_wait(r->pool, &r->blend_job);
     make_portions(r, full);
     r->filling = full == &r->buffers[0] ? &r->buffers[1] : &r->buffers[0];
@@ -199,71 +199,71 @@ void trip_cpu_finish_blending(trip_cpu *r)
 
 /* ---- merging ---- */
 
-static float *tile_sum(const trip_cpu *r, uint32_t tile)
+static float *pane_sum(const trip_cpu *r, uint32_t pane)
 {
-    return r->sums + tile * trip_cpu_tile_floats(r);
+    return r->sums + pane * trip_cpu_pane_floats(r);
 }
 
-/* What is alone in its tile stays as it is. */
-static bool is_to_merge(const trip_cpu *r, uint32_t tile)
+/* What is alone in its pane stays as it is. */
+static bool is_to_merge(const trip_cpu *r, uint32_t pane)
 {
-    return r->states[tile] & TRIP_CPU_TILE_BEGUN && !trip_cpu_is_alone(r, tile);
+    return r->states[pane] & TRIP_CPU_PANE_BEGUN && !trip_cpu_is_alone(r, pane);
 }
 
 /* The layer's pixels, with the open sheet. */
-static const float *layer_of_tile(const trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+static const float *layer_of_pane(const trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
-    const float *pixels = trip_cpu_tile_pixels(r, tile);
+    const float *pixels = trip_cpu_pane_pixels(r, pane);
     if (!r->open_sheets)
         return pixels;
-    r->kernels->sheet_composite(&r->view, pixels, trip_cpu_tile_sheet(r, tile), w->layer);
+    r->kernels->sheet_composite(&r->view, pixels, trip_cpu_pane_sheet(r, pane), w->layer);
     return w->layer;
 }
 
-static void merge_tile(trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+static void merge_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
-    bool first = !(r->states[tile] & TRIP_CPU_TILE_MERGED);
-    r->kernels->tile_merge(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile),
-                           layer_of_tile(r, w, tile), first, tile_sum(r, tile));
-    r->states[tile] = TRIP_CPU_TILE_MERGED;
+    bool first = !(r->states[pane] & TRIP_CPU_PANE_MERGED);
+    r->kernels->pane_merge(&r->view, trip_cpu_pane_x(r, pane), trip_cpu_pane_y(r, pane),
+                           layer_of_pane(r, w, pane), first, pane_sum(r, pane));
+    r->states[pane] = TRIP_CPU_PANE_MERGED;
 }
 
 /* The sum with the layer being drawn in it. */
-static const float *sum_so_far(const trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+static const float *sum_so_far(const trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
-    if (!is_to_merge(r, tile))
-        return tile_sum(r, tile);
-    bool first = !(r->states[tile] & TRIP_CPU_TILE_MERGED);
+    if (!is_to_merge(r, pane))
+        return pane_sum(r, pane);
+    bool first = !(r->states[pane] & TRIP_CPU_PANE_MERGED);
     if (!first)
-        memcpy(w->sum, tile_sum(r, tile), trip_cpu_tile_floats(r) * sizeof *w->sum);
-    r->kernels->tile_merge(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile),
-                           layer_of_tile(r, w, tile), first, w->sum);
+        memcpy(w->sum, pane_sum(r, pane), trip_cpu_pane_floats(r) * sizeof *w->sum);
+    r->kernels->pane_merge(&r->view, trip_cpu_pane_x(r, pane), trip_cpu_pane_y(r, pane),
+                           layer_of_pane(r, w, pane), first, w->sum);
     return w->sum;
 }
 
-/* The frame's tile stays as it is. */
-static void finish_tile(trip_cpu *r, trip_cpu_worker *w, uint32_t tile)
+/* The frame's pane stays as it is. */
+static void finish_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
     trip_cpu_content content = TRIP_CPU_NOTHING;
     const float *pixels = NULL;
-    if (r->states[tile] & TRIP_CPU_TILE_BEGUN && trip_cpu_is_alone(r, tile)) {
+    if (r->states[pane] & TRIP_CPU_PANE_BEGUN && trip_cpu_is_alone(r, pane)) {
         content = TRIP_CPU_LAYER;
-        pixels = layer_of_tile(r, w, tile);
-    } else if (r->states[tile]) {
+        pixels = layer_of_pane(r, w, pane);
+    } else if (r->states[pane]) {
         content = TRIP_CPU_SUM;
-        pixels = sum_so_far(r, w, tile);
+        pixels = sum_so_far(r, w, pane);
     }
-    r->kernels->tile_finish(&r->view, trip_cpu_tile_x(r, tile), trip_cpu_tile_y(r, tile), content,
+    r->kernels->pane_finish(&r->view, trip_cpu_pane_x(r, pane), trip_cpu_pane_y(r, pane), content,
                             pixels, r->rgba, r->depth);
 }
 
-/* Tasks of whole rows of tiles. */
+/* Tasks of whole rows of panes. */
 static void merge_row(void *context, unsigned task, unsigned thread)
 {
     trip_cpu *r = context;
     for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
         if (!trip_interrupted() && is_to_merge(r, t))
-            merge_tile(r, &r->workers[thread], t);
+            merge_pane(r, &r->workers[thread], t);
 }
 
 static void finish_row(void *context, unsigned task, unsigned thread)
@@ -271,21 +271,21 @@ static void finish_row(void *context, unsigned task, unsigned thread)
     trip_cpu *r = context;
     for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
         if (!trip_interrupted())
-            finish_tile(r, &r->workers[thread], t);
+            finish_pane(r, &r->workers[thread], t);
 }
 
 static void for_each_row(trip_cpu *r, void (*run)(void *, unsigned, unsigned))
 {
-    r->tile_job = (trip_cpu_job){ .run = run, .context = r, .tasks = r->mask.grid.down };
-    trip_cpu_pool_start(r->pool, &r->tile_job);
-    trip_cpu_pool_wait(r->pool, &r->tile_job);
+    r->pane_job = (trip_cpu_job){ .run = run, .context = r, .tasks = r->mask.grid.down };
+    trip_cpu_pool_start(r->pool, &r->pane_job);
+    trip_cpu_pool_wait(r->pool, &r->pane_job);
 }
 
 void trip_cpu_merge_layer(trip_cpu *r)
 {
     bool merge = false;
     trip_cpu_finish_blending(r);
-    for (uint32_t t = 0; t < trip_cpu_tile_count(r) && !merge; t++)
+    for (uint32_t t = 0; t < trip_cpu_pane_count(r) && !merge; t++)
         merge = is_to_merge(r, t);
     if (merge)
         for_each_row(r, merge_row);

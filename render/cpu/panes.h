@@ -1,18 +1,18 @@
-/* The screen tiles of a frame: their memory, the blending of splat buffers into them, and the merge
+/* The panes of a frame: their memory, the blending of splat buffers into them, and the merge
  * of their layers. Called by the renderer's thread. */
-#ifndef TRIP_CPU_TILES_H
-#define TRIP_CPU_TILES_H
+#ifndef TRIP_CPU_PANES_H
+#define TRIP_CPU_PANES_H
 
 #include "cpu/state.h"
 
-/* Memory for the frame's tiles, and for their lists in the splat buffers. */
-int trip_cpu_fit_tiles(trip_cpu *r, int width, int height);
-void trip_cpu_release_tiles(trip_cpu *r);
+/* Memory for the frame's panes, and for their lists in the splat buffers. */
+int trip_cpu_fit_panes(trip_cpu *r, int width, int height);
+void trip_cpu_release_panes(trip_cpu *r);
 
-/* Every tile of a frame is empty. */
-void trip_cpu_begin_tiles(trip_cpu *r);
-/* Every tile of a layer is open where the layer may have weight. */
-void trip_cpu_begin_tile_layer(trip_cpu *r);
+/* Every pane of a frame is empty. */
+void trip_cpu_begin_panes(trip_cpu *r);
+/* Every pane of a layer is open where the layer may have weight. */
+void trip_cpu_begin_pane_layer(trip_cpu *r);
 
 /* Depths of a buffer's splats from one on; NULL where it has none. */
 static inline float *trip_cpu_depths_from(const trip_cpu_buffer *f, uint32_t splat)
