@@ -1,6 +1,7 @@
 #include "frame.h"
 
 #include <assert.h>
+#include <math.h>
 #include <time.h>
 
 #include "report.h"
@@ -264,6 +265,21 @@ void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
         trip_reader_await(d->reader, timeout_ns);
 }
 
+#ifndef NDEBUG
+/* Builds with assertions look at every picture: components are numbers, distances are positive. */
+static bool is_of_numbers(const trip_camera *camera, const float *rgba, const float *depth)
+{
+    size_t pixels = (size_t)camera->width * (size_t)camera->height;
+    for (size_t i = 0; i < 4 * pixels; i++)
+        if (!isfinite(rgba[i]))
+            return false;
+    for (size_t i = 0; i < pixels && depth; i++)
+        if (!(depth[i] >= 0))
+            return false;
+    return true;
+}
+#endif
+
 int trip_frame_picture(trip_drawing *d, float *rgba, float *depth)
 {
     double start = now_ms();
@@ -271,6 +287,7 @@ int trip_frame_picture(trip_drawing *d, float *rgba, float *depth)
     int status = trip_frame_poll();
     if (!status)
         status = d->renderer->ops->picture(d->renderer, rgba, depth);
+    assert(status || is_of_numbers(d->frame->camera, rgba, depth));
     trip_scope_enter(before);
     if (status || !d->done)
         return status;

@@ -3,12 +3,14 @@
  * of float RGBA are written here, in blocks that are not packed; for any other request
  * triptych-images takes the place of this process before a byte of it is taken from the connection.
  * That triptych-images itself writes what it should is for the tests that read pictures of every
- * format and depth (test_image_file, test_formats). */
+ * format and depth (test_image_file, test_formats). Pictures that hold what is no number are
+ * refused. */
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -157,6 +159,11 @@ static void put_block(output *o, int y, int rows, int width, float *rgba)
     put_number(o, (int32_t)((size_t)rows * row_bytes));
     for (int i = 0; i < rows; i++) {
         receive(rgba, row_bytes, 0);
+        for (int k = 0; k < CHANNELS * width; k++)
+            if (!isfinite(rgba[k])) {
+                fprintf(stderr, "quick: row %d of the picture holds %g\n", y + i, (double)rgba[k]);
+                give_up();
+            }
         put_row(o, width, rgba);
     }
 }

@@ -267,6 +267,20 @@ const scene_renderer *scene_renderers_post(void)
     return some;
 }
 
+/* Every picture of every test: components are numbers from 0 to 1, rounding aside, and distances
+ * are positive. */
+static void check_numbers(const scene_picture *p, const char *name)
+{
+    for (int i = 0; i < 4 * p->width * p->height; i++)
+        if (!(p->rgba[i] >= -0.001F && p->rgba[i] <= 1.001F))
+            fail_msg("%s: component %d of pixel %d, %d is %g", name, i % 4, i / 4 % p->width,
+                     i / 4 / p->width, (double)p->rgba[i]);
+    for (int i = 0; i < p->width * p->height && p->depth; i++)
+        if (!(p->depth[i] >= 0))
+            fail_msg("%s: the distance of pixel %d, %d is %g", name, i % p->width, i / p->width,
+                     (double)p->depth[i]);
+}
+
 scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                               const trip_camera_params *view, const trip_settings *settings,
                               const trip_reader_params *reader_params)
@@ -296,6 +310,7 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
         assert_non_null(p.depth);
     }
     assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, p.depth, &p.stats), 0);
+    check_numbers(&p, renderer->name);
 
     p.lists = calloc(s->data->list_count, sizeof *p.lists);
     assert_non_null(p.lists);
@@ -341,6 +356,7 @@ scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
     assert_non_null(p.rgba);
     assert_int_equal(trip_frame_draw(r, reader, &frame, p.rgba, NULL, &p.stats), 0);
+    check_numbers(&p, "integral");
     r->ops->destroy(r);
     trip_reader_destroy(reader);
     trip_plan_release(&plan, s->budget);
