@@ -1,6 +1,5 @@
 #include "image_helper.h"
 
-#include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -16,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "companion.h"
 #include "report.h"
 
 #define PROGRAM "triptych-images"
@@ -47,32 +47,6 @@ void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms)
     stand_in_patience_ms = patience_ms;
 }
 
-/* At a place that is told from the folder of a file. */
-static bool is_at(char path[PATH_MAX], const char *file, const char *place)
-{
-    const char *slash = strrchr(file, '/');
-    int folder = slash ? (int)(slash + 1 - file) : 0;
-    int length = snprintf(path, PATH_MAX, "%.*s%s" PROGRAM, folder, file, place);
-    return slash && length < PATH_MAX && access(path, X_OK) == 0;
-}
-
-/* Beside this program, where it is installed with the program or the library, or where it was
- * built. */
-static bool find_program(char path[PATH_MAX])
-{
-    char self[PATH_MAX];
-    Dl_info library;
-    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[n > 0 ? n : 0] = 0;
-    if (is_at(path, self, "") || is_at(path, self, "../libexec/triptych/"))
-        return true;
-    if (dladdr(TRIP_IMAGE_HELPER_BUILT, &library) && library.dli_fname &&
-        is_at(path, library.dli_fname, TRIP_IMAGE_HELPER_FROM_LIBRARY))
-        return true;
-    snprintf(path, PATH_MAX, "%s", TRIP_IMAGE_HELPER_BUILT);
-    return access(path, X_OK) == 0;
-}
-
 /* The connection as descriptor 3, nothing to read or to print to, signals as they come. */
 static int spawn(const char *program, int fd, pid_t *pid)
 {
@@ -99,7 +73,7 @@ int trip_image_helper_start(trip_image_helper **out, const char *what)
 {
     char program[PATH_MAX] = "";
     int fds[2], error = ENOMEM;
-    if (!stand_in && !find_program(program))
+    if (!stand_in && !trip_companion_find(program, PROGRAM, TRIP_IMAGE_HELPER_BUILT, X_OK))
         return trip_fail(TRIP_ERROR, what, PROGRAM,
                          "is not beside this program nor in ../libexec/triptych; it reads and "
                          "writes pictures");

@@ -90,6 +90,19 @@ class Installed(unittest.TestCase):
         self.assertEqual(visible, header)
         self.assertGreater(len(header), 30)
 
+    def test_openvdb_is_loaded_from_where_it_is_installed_and_only_for_its_files(self):
+        module = os.path.join(self.prefix, "bin", "..", "libexec", "triptych", "triptych-openvdb.so")
+        if not os.path.exists(module):
+            self.skipTest("built without OpenVDB")
+        loud = dict(os.environ, LD_DEBUG="files")
+        cloud = os.path.join(SOURCE, "datasets", "wdas_cloud_sixteenth.vdb")
+        for file, wanted in (DATA, False), (cloud, True):
+            result = subprocess.run([self.program, "brick", file, "--dry-run"], env=loud,
+                                    capture_output=True, text=True, timeout=300)
+            self.assertEqual(result.returncode, 0, result.stderr[-500:])
+            self.assertEqual(f"calling init: {module}" in result.stderr, wanted)
+            self.assertEqual("libopenvdb" in result.stderr, wanted)
+
     def test_it_has_a_version_and_a_name_with_one(self):
         library = os.path.realpath(os.path.join(self.libraries, "libtriptych.so"))
         version = self.pkg_config("--modversion")[0]

@@ -10,13 +10,11 @@
 #include <new>
 #include <string>
 
-#include <strings.h>
-
 #include <openvdb/openvdb.h>
 
+#include "module.h"
 #include "report.h"
 #include "vdb_grid.h"
-#include "volume_reader.h"
 
 namespace
 {
@@ -41,13 +39,6 @@ try {
     return trip_fail(TRIP_ERROR, "read", path.c_str(), "no memory for its tree");
 } catch (const std::exception &e) {
     return trip_fail(TRIP_ERROR, "read", path.c_str(), "is corrupt or unsupported: %s", e.what());
-}
-
-bool probe(const char *path, const unsigned char *head, size_t bytes, const trip_volume_params *)
-{
-    size_t length = std::strlen(path);
-    return (bytes >= 4 && std::memcmp(head, " BDV", 4) == 0) ||
-           (length > 4 && bytes > 0 && strcasecmp(path + length - 4, ".vdb") == 0);
 }
 
 std::string list_grids(const trip_vdb_contents &contents)
@@ -281,9 +272,9 @@ void release_box(void *, trip_volume_portion *)
 
 } // namespace
 
-const trip_volume_reader trip_read_vdb = {
+extern "C" const trip_volume_reader trip_vdb_reader = {
     .format = "openvdb",
-    .probe = probe,
+    .probe = nullptr,
     .list = nullptr,
     .open = open_vdb,
     .close = close_vdb,

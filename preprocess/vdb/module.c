@@ -1,0 +1,48 @@
+#include "module.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static const trip_vdb_host *host;
+
+__attribute__((visibility("default"))) const trip_volume_reader *
+trip_vdb_module(const trip_vdb_host *program)
+{
+    if (strcmp(program->version, TRIP_VERSION) != 0)
+        return NULL;
+    host = program;
+    return &trip_vdb_reader;
+}
+
+/* The functions of the program that the module calls, under their names. */
+
+int(trip_fail)(int status, const char *what, const char *where, const char *why, ...)
+{
+    char text[2048];
+    va_list args;
+    va_start(args, why);
+    vsnprintf(text, sizeof text, why, args);
+    va_end(args);
+    return host->fail(status, what, where, "%s", text);
+}
+
+void *trip_budget_take(trip_budget *b, size_t bytes)
+{
+    return host->take(b, bytes);
+}
+
+void trip_budget_release(trip_budget *b, void *memory, size_t bytes)
+{
+    host->release(b, memory, bytes);
+}
+
+uint64_t trip_budget_left_bytes(const trip_budget *b)
+{
+    return host->left_bytes(b);
+}
+
+const char *trip_format_bytes(uint64_t bytes, char *text)
+{
+    return host->format_bytes(bytes, text);
+}
