@@ -1,7 +1,7 @@
 /* OpenVDB grids: recognised here, read by the module in vdb/, which is loaded for the first of them
  * and stays. */
 #include <dlfcn.h>
-#include <pthread.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
@@ -24,9 +24,13 @@ static bool probe(const char *path, const unsigned char *head, size_t bytes,
 
 #ifdef TRIP_VDB_MODULE_BUILT
 
-static const trip_volume_reader *module;
+typedef struct state {
+    const trip_volume_reader *module;
+    void *of_module;
+} state;
 
-static int load_module(void)
+/* Loads the module, or finds it loaded. It is never closed. */
+static int load_module(const trip_volume_reader **out)
 {
     static const trip_vdb_host host = { TRIP_VERSION,           (trip_fail),
                                         trip_budget_take,       trip_budget_release,
@@ -41,47 +45,61 @@ static int load_module(void)
     void *symbol = dlsym(library, TRIP_VDB_ENTRY);
     trip_vdb_entry_point entry;
     memcpy(&entry, &symbol, sizeof entry); /* ISO C converts no void * into a function */
-    module = symbol ? entry(&host) : NULL;
-    if (module)
+    *out = symbol ? entry(&host) : NULL;
+    if (*out)
         return 0;
-    dlclose(library);
     return trip_fail(TRIP_ERROR, "read", path, "belongs to another version of this program");
 }
 
 static int open_vdb(const char *path, const trip_volume_params *params, trip_budget *budget,
-                    trip_volume_info *info, void **state)
+                    trip_volume_info *info, void **out)
 {
-    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-    pthread_mutex_lock(&lock);
-    int status = module ? 0 : load_module();
-    pthread_mutex_unlock(&lock);
-    return status ? status : module->open(path, params, budget, info, state);
+    const trip_volume_reader *module = NULL;
+    int status = load_module(&module);
+    if (status)
+        return status;
+    state *s = malloc(sizeof *s);
+    if (!s)
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    s->module = module;
+    status = module->open(path, params, budget, info, &s->of_module);
+    if (status)
+        free(s);
+    else
+        *out = s;
+    return status;
 }
 
-static void close_vdb(void *state)
+static void close_vdb(void *opaque)
 {
-    module->close(state);
+    state *s = opaque;
+    s->module->close(s->of_module);
+    free(s);
 }
 
-static int rewind_vdb(void *state)
+static int rewind_vdb(void *opaque)
 {
-    return module->rewind(state);
+    const state *s = opaque;
+    return s->module->rewind(s->of_module);
 }
 
-static int next_box(void *state, trip_volume_portion *portion)
+static int next_box(void *opaque, trip_volume_portion *portion)
 {
-    return module->next(state, portion);
+    const state *s = opaque;
+    return s->module->next(s->of_module, portion);
 }
 
-static int decode_box(const void *state, const trip_volume_portion *portion, const int64_t lo[3],
+static int decode_box(const void *opaque, const trip_volume_portion *portion, const int64_t lo[3],
                       const int64_t size[3], float *values, uint8_t *active)
 {
-    return module->decode(state, portion, lo, size, values, active);
+    const state *s = opaque;
+    return s->module->decode(s->of_module, portion, lo, size, values, active);
 }
 
-static void release_box(void *state, trip_volume_portion *portion)
+static void release_box(void *opaque, trip_volume_portion *portion)
 {
-    module->release(state, portion);
+    const state *s = opaque;
+    s->module->release(s->of_module, portion);
 }
 
 const trip_volume_reader trip_read_vdb = {

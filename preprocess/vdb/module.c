@@ -4,7 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const trip_vdb_host *host;
+/* The same each time that the program hands it over. */
+static const trip_vdb_host *_Atomic host;
 
 __attribute__((visibility("default"))) const trip_volume_reader *
 trip_vdb_module(const trip_vdb_host *program)

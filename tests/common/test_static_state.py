@@ -10,8 +10,10 @@ REASONS = {
     "runnable": "filled before main(), then constant",
     "__ioinit": "of the C++ library, where <iostream> is included",
     "guard variable for initialized": "made once: OpenVDB's types are registered",
+    "host": "the program's functions, the same each time (preprocess/vdb/module.c)",
 }
-OTHERS = re.compile(r"^(guard variable for )?openvdb::|^DW\.ref\.")  # from headers and the compiler
+OTHERS = re.compile(r"^(guard variable for )?openvdb::|^DW\.ref\.|"  # from headers and the compiler
+                    r"^(completed\.\d+|__TMC_END__|__dso_handle)$")  # in every shared library
 WRITABLE = re.compile(r"^(\.data|\.bss|\*COM\*|\.data\.(?!rel\.ro)\S+|\.bss\.\S+)$")
 
 

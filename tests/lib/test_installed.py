@@ -103,6 +103,30 @@ class Installed(unittest.TestCase):
             self.assertEqual(f"calling init: {module}" in result.stderr, wanted)
             self.assertEqual("libopenvdb" in result.stderr, wanted)
 
+    def test_a_module_that_does_not_fit_is_refused(self):
+        if not os.path.exists(os.path.join(self.prefix, "libexec", "triptych", "triptych-openvdb.so")):
+            self.skipTest("built without OpenVDB")
+        cloud = os.path.join(SOURCE, "datasets", "wdas_cloud_sixteenth.vdb")
+        beside = os.path.join(self.prefix, "bin", "triptych-openvdb.so")
+        code = self.path("module.c")
+        for text, says in (("int nothing;", "belongs to another version of this program"),
+                           ("const void *trip_vdb_module(const void *h) { return h ? 0 : h; }",
+                            "belongs to another version of this program"),
+                           (None, "cannot load")):
+            if text:
+                with open(code, "w") as f:
+                    f.write(text)
+                run(CC, "-shared", "-fPIC", "-o", beside, code)
+            else:
+                with open(beside, "w") as f:
+                    f.write("no library")
+            result = subprocess.run([self.program, "brick", cloud, "--dry-run"],
+                                    capture_output=True, text=True, timeout=300)
+            os.remove(beside)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(says, result.stderr)
+            self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+
     def test_it_has_a_version_and_a_name_with_one(self):
         library = os.path.realpath(os.path.join(self.libraries, "libtriptych.so"))
         version = self.pkg_config("--modversion")[0]
