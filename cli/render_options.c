@@ -38,6 +38,9 @@ enum {
     KEY_BACKGROUND,
     KEY_TF,
     KEY_OPACITY_SCALE,
+    KEY_CLIP_BOX,
+    KEY_CLIP_PLANE,
+    KEY_SHOW,
     KEY_WINDOW,
     KEY_LEVEL,
     KEY_LIGHT,
@@ -116,6 +119,18 @@ static const struct argp_option options[] = {
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
+    { "clip-box", KEY_CLIP_BOX, "X,Y,Z,X,Y,Z", 0,
+      "Cut away what lies outside of the box from the first point to the second, in world units; "
+      "of "
+      "voxels:I,J,K,I,J,K in voxels",
+      2 },
+    { "clip-plane", KEY_CLIP_PLANE, "A,B,C,D", 0,
+      "Cut away what has A x + B y + C z + D < 0, in world units; up to 6 times", 2 },
+    { "show", KEY_SHOW, "WHAT", 0,
+      "What colours stand for: picture (the function), lists (along x red, y green, z blue), merge "
+      "(their weights at each pixel, nothing of the volume) or levels (of detail) (default: "
+      "picture)",
+      2 },
     { NULL, 0, NULL, 0, "Method:", 3 },
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
@@ -419,6 +434,56 @@ static int parse_method(int key, char *arg, parse *p)
     }
 }
 
+static int parse_clip_box(const char *text, triptych_clip *clip)
+{
+    static const char voxels[] = "voxels:";
+    double corners[6];
+    int count;
+    clip->box = true;
+    clip->box_of_voxels = !strncmp(text, voxels, strlen(voxels));
+    int status = trip_option_numbers(
+        "--clip-box", clip->box_of_voxels ? text + strlen(voxels) : text, 6, 6, corners, &count);
+    for (int a = 0; a < 3 && !status; a++) {
+        if (!(corners[a] < corners[3 + a]))
+            return trip_option_fail("--clip-box", "the second point is not beyond the first");
+        clip->box_lo[a] = corners[a];
+        clip->box_hi[a] = corners[3 + a];
+    }
+    return status;
+}
+
+static int parse_clip_plane(const char *text, triptych_clip *clip)
+{
+    const int most = (int)(sizeof clip->plane / sizeof *clip->plane);
+    int count;
+    if (clip->planes == most)
+        return trip_option_fail("--clip-plane", "there are at most 6");
+    double *plane = clip->plane[clip->planes++];
+    int status = trip_option_numbers("--clip-plane", text, 4, 4, plane, &count);
+    if (!status && is_zero(plane))
+        return trip_option_fail("--clip-plane", "the direction A,B,C is zero");
+    return status;
+}
+
+static int parse_cut(int key, char *arg, parse *p)
+{
+    static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
+    triptych_settings *s = &p->o->settings;
+    int which = 0, status;
+    switch (key) {
+    case KEY_CLIP_BOX:
+        return parse_clip_box(arg, &s->clip);
+    case KEY_CLIP_PLANE:
+        return parse_clip_plane(arg, &s->clip);
+    case KEY_SHOW:
+        status = trip_option_choice("--show", arg, shows, &which);
+        s->show = (triptych_show)which;
+        return status;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
 static int parse_look(int key, char *arg, parse *p)
 {
     render_options *o = p->o;
@@ -443,7 +508,7 @@ static int parse_look(int key, char *arg, parse *p)
         p->background = true;
         return parse_background(arg, &o->settings);
     default:
-        return ARGP_ERR_UNKNOWN;
+        return parse_cut(key, arg, p);
     }
 }
 
@@ -584,6 +649,9 @@ static int check_integral(parse *p)
     if (integral && (p->h || p->order || p->compositing))
         return trip_option_fail("--method, --h, --traversal, --compositing",
                                 "do not apply to --renderer integral, which has no layers");
+    if (integral && o->settings.show != TRIPTYCH_SHOW_PICTURE)
+        return trip_option_fail("--show", "does not apply to --renderer integral, which has no "
+                                          "lists and no levels");
     if (integral && p->kernel_radius && o->field != RENDER_FIELD_SPLATS)
         return trip_option_fail("--kernel-radius", "applies to splats: give --field splats");
     return 0;

@@ -84,6 +84,7 @@ static void add_list(cJSON *list, const triptych_list_stats *s)
     cJSON_AddNumberToObject(list, "bricks_transparent", (double)s->bricks_transparent);
     cJSON_AddNumberToObject(list, "bricks_outside", (double)s->bricks_outside);
     cJSON_AddNumberToObject(list, "bricks_without_weight", (double)s->bricks_without_weight);
+    cJSON_AddNumberToObject(list, "bricks_clipped", (double)s->bricks_clipped);
 }
 
 /* Calls `one` with each list that can be drawn and its statistics. */

@@ -44,6 +44,7 @@ struct triptych {
         *at_level;  /* what frames are drawn from that have a coarse level alone; else NULL */
     unsigned level; /* that */
     trip_settings settings; /* slices 0: by the view */
+    triptych_clip clip;     /* as given; frames have it in drawn_settings */
     bool classify_auto;     /* settings.classify is what that has come to for a frame */
     bool counting; /* frames count exactly, and draw what is hidden too; the reader is for that: */
     bool reader_counts;
@@ -90,6 +91,8 @@ int trip_context_find_view(triptych *t, const triptych_view *given);
 void trip_context_drop_reader(triptych *t);
 /* Frames are drawn from the data set itself again. */
 void trip_context_drop_level(triptych *t);
+/* What is cut away, in world space. */
+trip_clip trip_context_clip(const triptych *t);
 /* And the reader, which may be in its memory. */
 void trip_context_drop_renderer(triptych *t);
 /* What the frame has come to, once its picture is complete. */

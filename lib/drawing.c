@@ -7,6 +7,7 @@
 #include "dataset_level.h"
 #include "lod.h"
 #include "report.h"
+#include "tint.h"
 
 static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
 {
@@ -169,6 +170,7 @@ static void choose_settings(triptych *t)
     t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
     if (!t->settings.slices)
         t->drawn_settings.slices = t->slices.slices;
+    t->drawn_settings.clip = trip_context_clip(t);
 }
 
 /* The plan of a frame by the integral renderer: what its field is made of. */
@@ -188,6 +190,8 @@ static int plan_field(triptych *t)
 static int plan_frame(triptych *t)
 {
     session *s = &t->session;
+    if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL && t->settings.show)
+        return trip_fail(TRIP_USAGE, "render", "show", "the integral has no lists and no levels");
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
@@ -308,6 +312,21 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     return status;
 }
 
+/* Of the picture's own pixels, whatever was drawn. */
+static void draw_merge_map(const triptych *t, float *rgba)
+{
+    const int side = pixels_a_side(t), width = t->turned.width, height = t->turned.height;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++, rgba += 4) {
+            double rgb[3];
+            trip_tint_merge(&t->drawn_settings, &t->camera, t->plan.axis_of_view, (x + 0.5) * side,
+                            (y + 0.5) * side, rgb);
+            for (int c = 0; c < 3; c++)
+                rgba[c] = (float)rgb[c];
+            rgba[3] = 1;
+        }
+}
+
 /* Distances go with a frame that has them, and only with that. */
 static int take_picture(triptych *t, float *rgba, float *depth)
 {
@@ -318,6 +337,8 @@ static int take_picture(triptych *t, float *rgba, float *depth)
                       depth ? "the frame was begun without" : "is to be taken with the picture");
     if (!status)
         status = take_colours(t, rgba, depth);
+    if (!status && t->settings.show == TRIP_SHOW_MERGE)
+        draw_merge_map(t, rgba);
     if (!status && t->drawing.done)
         status = trip_context_note_stats(t);
     return status;

@@ -80,6 +80,29 @@ static const char *fault_of_integral(const triptych_settings *s)
     return NULL;
 }
 
+static bool is_a_box(const double lo[3], const double hi[3])
+{
+    for (int a = 0; a < 3; a++)
+        if (!(lo[a] < hi[a]))
+            return false;
+    return true;
+}
+
+static const char *fault_of_clip(const triptych_clip *c)
+{
+    if (c->box && !is_a_box(c->box_lo, c->box_hi))
+        return "the clipping box ends before it begins";
+    if (!(c->planes >= 0 && c->planes <= TRIP_CLIP_MOST - TRIP_CLIP_BOX_PLANES))
+        return "there are 0 to 6 clipping planes";
+    for (int i = 0; i < c->planes; i++) {
+        const double *p = c->plane[i];
+        double length = trip_length(trip_v3(p[0], p[1], p[2]));
+        if (!(length > 0 && isfinite(length) && isfinite(p[3])))
+            return "the normal of a clipping plane is zero, or not finite";
+    }
+    return NULL;
+}
+
 static const char *fault_of_settings(const triptych_settings *s)
 {
     trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
@@ -107,7 +130,25 @@ static const char *fault_of_settings(const triptych_settings *s)
             return "components of the background lie between 0 and 1";
     if (!(s->lod_px >= 0 && s->lod_px <= 1000))
         return "levels are chosen by 0 to 1000 pixels a voxel";
-    return fault_of_integral(s);
+    if (s->show < TRIPTYCH_SHOW_PICTURE || s->show > TRIPTYCH_SHOW_LEVELS)
+        return "there is nothing such to be shown";
+    const char *fault = fault_of_clip(&s->clip);
+    return fault ? fault : fault_of_integral(s);
+}
+
+trip_clip trip_context_clip(const triptych *t)
+{
+    const triptych_clip *c = &t->clip;
+    trip_affine to_box = trip_affine_identity();
+    trip_clip clip = { 0 };
+    if (c->box && c->box_of_voxels) /* the map was checked on opening */
+        trip_affine_invert(&t->session.data->index_to_world, &to_box);
+    if (c->box)
+        trip_clip_add_box(&clip, c->box_lo, c->box_hi, &to_box);
+    for (int i = 0; i < c->planes; i++)
+        trip_clip_add(&clip, trip_v3(c->plane[i][0], c->plane[i][1], c->plane[i][2]),
+                      c->plane[i][3]);
+    return clip;
 }
 
 /* Splats of a smaller radius leave a pattern that shows. */
@@ -157,7 +198,9 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .kernel = (trip_kernel)s->kernel,
         .tolerance = s->tolerance,
         .samples = s->samples,
+        .show = (trip_show)s->show,
     };
+    t->clip = s->clip;
     t->counting = s->count;
     if (!s->headlight)
         t->settings.light_direction =

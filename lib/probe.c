@@ -75,6 +75,8 @@ int triptych_probe(triptych *t, double x, double y, triptych_hit *out)
                              .table = t->session.table,
                              .origin = origin_of(&camera, x, y),
                              .direction = trip_camera_ray(&camera, x, y),
-                             .world_per_z = trip_camera_ray_length(&camera, x, y) };
+                             .world_per_z = trip_camera_ray_length(&camera, x, y),
+                             .clip = trip_context_clip(t) };
+    probe.clip = trip_clip_before(&probe.clip, &t->session.data->index_to_world);
     return trip_context_leave(before, find_hit(t, &probe, out));
 }

@@ -100,6 +100,7 @@ static triptych_list_stats list_stats(const triptych *t, unsigned i)
         .bricks_transparent = planned->bricks_transparent,
         .bricks_outside = planned->bricks_outside,
         .bricks_without_weight = planned->bricks_without_weight,
+        .bricks_clipped = planned->bricks_clipped,
         .splats_read = counts.splats_read,
         .bytes_read = counts.bytes_read,
         .counted = counted,

@@ -229,6 +229,24 @@ typedef enum triptych_compositing {
     TRIPTYCH_BY_SHEET, /* the sum of those of each sheet, whose order does not matter then */
 } triptych_compositing;
 
+/* What is cut away. Of splats (pre) those are drawn whose voxels are inside: they reach over the
+ * cut by their radius. Where values are interpolated (post, the integral) rays are cut. */
+typedef struct triptych_clip {
+    int box;                     /* not 0: what lies outside of box_lo to box_hi is cut away */
+    int box_of_voxels;           /* not 0: those are indices; else world space */
+    double box_lo[3], box_hi[3]; /* lo < hi; infinities are no bounds */
+    int planes;                  /* 0 to 6 half-spaces besides: */
+    double plane[6][4]; /* a, b, c, d: what is kept has a x + b y + c z + d >= 0, world space */
+} triptych_clip;
+
+/* What a picture is coloured by. */
+typedef enum triptych_show {
+    TRIPTYCH_SHOW_PICTURE, /* the function */
+    TRIPTYCH_SHOW_LISTS,   /* which list: x red, y green, z blue */
+    TRIPTYCH_SHOW_MERGE,   /* the weights of the lists at each pixel, alike; nothing is read */
+    TRIPTYCH_SHOW_LEVELS, /* which level: white the finest, then blue, green, yellow, orange, red */
+} triptych_show;
+
 typedef struct triptych_settings {
     triptych_classify classify;
     triptych_compositing compositing; /* pre */
@@ -255,6 +273,8 @@ typedef struct triptych_settings {
                                but the integral draw a picture so many times as wide and high */
     int count; /* not 0: triptych_list_stats has exact counts, which takes time, of hidden bricks
                   too */
+    triptych_clip clip;
+    triptych_show show; /* not of the integral, which has no lists or levels */
 } triptych_settings;
 
 /* Pre, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by
@@ -384,6 +404,7 @@ typedef struct triptych_list_stats {
     uint64_t splats_read, bytes_read;
     int counted; /* by triptych_settings.count; else what follows is 0 */
     uint64_t splats_projected, splats_drawn; /* not culled; of those, with a pixel centre in them */
+    uint64_t bricks_clipped;                 /* left out, too */
 } triptych_list_stats;
 
 /* The same frame's, by list. */

@@ -173,6 +173,9 @@ static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t i
     case TRIP_CULL_NO_WEIGHT:
         of->planned->bricks_without_weight++;
         break;
+    case TRIP_CULL_CLIPPED:
+        of->planned->bricks_clipped++;
+        break;
     }
 }
 
@@ -183,6 +186,7 @@ static int select_bricks(const planning *p, const trip_list *list)
     selecting of = { .p = p, .list = list, .planned = planned };
     of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
                              plan->axis_of_view, planned->table, p->about);
+    of.cull.clip = &planned->clip;
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
     planned->bricks = list->brick_count;
@@ -221,6 +225,15 @@ static void drop_empty(trip_plan *plan, trip_plan_layer *layer, trip_budget *bud
     layer->pass_count = kept;
 }
 
+/* Of each plane of the frame, in the list's index space. */
+static void place_clip(const planning *p, const trip_list *list, trip_plan_list *planned)
+{
+    const uint64_t dims[3] = { (uint64_t)list->dims[0], (uint64_t)list->dims[1],
+                               (uint64_t)list->dims[2] };
+    planned->clip = trip_clip_before(&p->settings->clip, &list->index_to_world);
+    trip_clip_simplify(&planned->clip, dims);
+}
+
 /* What codes of means look like: their value as the function shows it, with the extinction by which
  * a splat shows the part of its cube that was kept. */
 static int make_table(const planning *p, const trip_list *list, trip_plan_list *planned)
@@ -250,6 +263,7 @@ static int place_list(const planning *p, const trip_list *list)
     planned->drawn = true;
     planned->table = p->table;
     planned->by_level = trip_lod_concerns(&p->plan->lod, list);
+    place_clip(p, list, planned);
     int status = trip_list_grid_make(&planned->grid, p->data, list);
     if (!status && trip_kind_of(list->kind)->axis_bits > 0)
         status = make_table(p, list, planned);
@@ -318,12 +332,20 @@ int trip_plan_check_cells(const trip_dataset *data, const char *instead)
     return 0;
 }
 
+static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
+                             const trip_settings *settings)
+{
+    plan->clip = trip_clip_before(&settings->clip, &camera->index_to_world);
+    trip_clip_simplify(&plan->clip, data->header.dims);
+}
+
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
     const planning p = { plan, data, camera, settings, table, budget, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .planes = planes_of(data, settings) };
+    place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         status = trip_plan_check_cells(data, "--classify pre");
@@ -333,7 +355,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
         status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {
         trip_plan_layer *layer = &plan->layers[axis];
-        layer->used = trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
+        layer->used = settings->show != TRIP_SHOW_MERGE &&
+                      trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
         if (layer->used)
             status = settings->classify == TRIP_CLASSIFY_POST ? plan_sheets(&p, axis)
                                                               : plan_layer(&p, axis);
@@ -390,6 +413,7 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .gathers = true,
                          .planes = planes_of(data, settings) };
+    place_whole_clip(plan, data, camera, settings);
     int status = take_lists(plan, data->list_count, budget);
     if (!status)
         status = gather_lists(&p, kinds);
@@ -463,6 +487,16 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
         fprintf(out, "levels      do not run: the data set has none\n");
 }
 
+static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *out)
+{
+    if (s->clip.count == 0)
+        return;
+    if (plan->clip.count == 0)
+        fprintf(out, "clipping    does not run: nothing of the grid lies outside\n");
+    else
+        fprintf(out, "clipping    runs: %d planes cut the grid\n", plan->clip.count);
+}
+
 static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *out)
 {
     const trip_plan_layer *layer = &plan->layers[list->axis];
@@ -498,19 +532,24 @@ static const char *why_not_drawn(const trip_plan *plan, const trip_list *list)
                                               : ": its records are not splatted";
 }
 
-static const char *of_other_levels(const trip_plan_list *planned, char text[64])
+/* Reasons that not every frame has. */
+static const char *rarer_reasons(const trip_plan_list *planned, char text[96])
 {
+    int length = 0;
     text[0] = 0;
     if (planned->by_level)
-        snprintf(text, 64, ", %" PRIu64 " where other levels are drawn",
-                 planned->bricks_of_other_levels);
+        length = snprintf(text, 96, ", %" PRIu64 " where other levels are drawn",
+                          planned->bricks_of_other_levels);
+    if (planned->clip.count > 0)
+        snprintf(text + length, 96 - (size_t)length, ", %" PRIu64 " clipped",
+                 planned->bricks_clipped);
     return text;
 }
 
 static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out)
 {
     const trip_plan_list *planned = &plan->lists[list->index];
-    char name[24], bytes[32], others[64];
+    char name[24], bytes[32], others[96];
     fprintf(out, "list %-6s ", trip_plan_list_name(list, name));
     if (!planned->drawn) {
         fprintf(out, "not read%s\n", why_not_drawn(plan, list));
@@ -526,7 +565,7 @@ static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out
             read ? "read" : "empty", planned->bricks_selected, planned->bricks,
             planned->splats_selected, trip_format_bytes(bytes_read, bytes),
             planned->bricks_transparent, planned->bricks_outside, planned->bricks_without_weight,
-            of_other_levels(planned, others));
+            rarer_reasons(planned, others));
     if (read)
         explain_passes(plan, list, out);
 }
@@ -539,6 +578,18 @@ const char *trip_plan_list_name(const trip_list *list, char name[24])
     else
         snprintf(name, 24, "%c%u%s%s", "xyz"[list->axis], list -> level, *kind ? " " : "", kind);
     return name;
+}
+
+uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t sheet, int64_t u,
+                          int64_t v)
+{
+    const trip_plan_list *planned = &plan->lists[list->index];
+    uint64_t drawn = UINT64_MAX;
+    if (planned->by_level)
+        drawn = trip_lod_square(&plan->lod, list, sheet, u, v);
+    if (drawn && planned->clip.count > 0)
+        drawn &= trip_clip_square(&planned->clip, list->axis, sheet, u, v);
+    return drawn;
 }
 
 uint64_t trip_plan_splats(const trip_plan *plan)
@@ -583,6 +634,7 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
     int used = 0;
     explain_method(plan, settings, out);
     explain_levels(plan, settings, out);
+    explain_clip(plan, settings, out);
     for (unsigned i = 0; i < data->list_count; i++)
         explain_list(plan, &data->lists[i], out);
     for (int axis = 0; axis < 3; axis++)

@@ -18,12 +18,13 @@ typedef struct trip_plan_list {
                             values are interpolated; where it is not, what follows is not set */
     trip_list_grid grid; /* in that of level 0 */
     trip_camera camera;  /* the view in the list's own index space */
+    trip_clip clip;      /* of its voxels, in its own index space */
     bool by_level;       /* of its voxels those are drawn that trip_plan.lod says */
     const trip_tf_entry *table; /* of 65536: what its codes look like */
     trip_tf_entry *own_table;   /* the same where it is not the frame's; from the budget */
     uint64_t bricks, bricks_selected;
-    uint64_t bricks_outside, bricks_without_weight, bricks_transparent,
-        bricks_of_other_levels; /* why left out */
+    uint64_t bricks_outside, bricks_without_weight, bricks_transparent, bricks_of_other_levels,
+        bricks_clipped; /* why left out */
     uint64_t splats_selected;
     uint64_t bytes_selected[TRIP_PLANES]; /* of those, in the data set's planes */
 } trip_plan_list;
@@ -46,6 +47,7 @@ typedef struct trip_plan {
     bool gathers;    /* trip_plan_make_field()'s */
     trip_lod lod;    /* which level is drawn where */
     unsigned level;  /* post: of all of the frame; the data set it was made for is of that level */
+    trip_clip clip;  /* in index space: what of the grid is inside */
     unsigned planes; /* bit per trip_plane to read */
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */
@@ -67,6 +69,12 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget);
 /* Fails (reported) for grids one voxel thick, in which no value lies between voxels; `instead` is
  * the option that draws them. */
 int trip_plan_check_cells(const trip_dataset *data, const char *instead);
+
+/* Of the 8 x 8 square of a list's sheet with its corner at u and v, which voxels are splatted: not
+ * those of cells that another level is drawn in, nor those that are cut away. A bit each by Morton
+ * number, as in a block. */
+uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t sheet, int64_t u,
+                          int64_t v);
 
 /* Selected in all lists. */
 uint64_t trip_plan_splats(const trip_plan *plan);

@@ -7,6 +7,10 @@
 
 enum { RANGE_CODES = 256 };
 
+/* Voxels along u or v that a ray of a list moves at most from one sheet to the next, where its
+ * weight has no bound of its own that is lower: beyond, it is too little to show. */
+#define TRIP_CULL_STEEPEST 64.0
+
 /* What a range of RANGE_CODES codes is. */
 enum { UNKNOWN, TRANSPARENT, VISIBLE };
 
@@ -151,6 +155,23 @@ static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
     return !some_visible(cull, range.least, range.most);
 }
 
+/* Of sheets a value counts that is within reach of a slice that a ray inside the clip, or its
+ * segment's other end, passes. */
+static double reach_over_clip(const trip_cull *cull)
+{
+    const trip_settings *s = cull->settings;
+    double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
+    if (!cull->about)
+        return 0;
+    return TRIP_SHEET_REACH + (h * TRIP_CULL_STEEPEST > 1 ? 1 / h : TRIP_CULL_STEEPEST);
+}
+
+static bool is_clipped(const trip_cull *cull, const box *b)
+{
+    return cull->clip && cull->clip->count > 0 &&
+           trip_clip_misses(cull->clip, cull->camera->eye, b->lo, b->hi, reach_over_clip(cull));
+}
+
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  const trip_file_slab *slab)
 {
@@ -158,6 +179,8 @@ trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_bric
         return TRIP_CULL_TRANSPARENT;
     trip_brick_box place = trip_brick_box_of(cull->header, slab, brick);
     box b = place_box(cull, axis, &place);
+    if (is_clipped(cull, &b))
+        return TRIP_CULL_CLIPPED;
     double depth = farthest_along(&b, cull->camera->forward), front = larger(depth, 0);
     if (!(depth > -cull->behind))
         return TRIP_CULL_OUTSIDE;

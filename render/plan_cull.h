@@ -15,6 +15,7 @@ typedef enum trip_cull_reason {
     TRIP_CULL_TRANSPARENT, /* no code of its range has extinction */
     TRIP_CULL_OUTSIDE,     /* of the view */
     TRIP_CULL_NO_WEIGHT,   /* no ray near it has weight in the list */
+    TRIP_CULL_CLIPPED,     /* cut away */
 } trip_cull_reason;
 
 /* The side of a plane in index space: inside where normal . (p - eye) >= offset; unit normal. */
@@ -32,6 +33,7 @@ typedef struct trip_cull {
     trip_cull_plane sides[4];  /* through the outermost pixel centres */
     double radius2, low_pass2; /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */
     double behind;             /* how deep behind the eye splats may still show */
+    const trip_clip *clip;     /* in the list's index space; set once it is made */
     const trip_tf_entry *table;
     trip_brick_ranges *about; /* where what bricks lie next to counts; NULL: they alone do */
     uint8_t ranges[256]; /* of 256 codes each, as far as looked at: whether some have extinction */

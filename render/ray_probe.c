@@ -10,6 +10,7 @@
 /* Sheets first to first + count - 1, four voxels each: codes, or NOTHING. */
 typedef struct samples {
     const trip_ray_probe *probe;
+    double from, to; /* z: what of the ray is not cut away */
     int axis;
     int64_t first, count;
     uint32_t *codes;
@@ -187,7 +188,7 @@ static bool piece_at(const samples *s, int64_t n, piece *out)
     bool ascends = trip_component(s->probe->direction, s->axis) > 0;
     int64_t sheet = s->first + (ascends ? n : s->count - 1 - n);
     double a = z_of(s, (double)sheet - 0.5), b = z_of(s, (double)sheet + 0.5);
-    *out = (piece){ .from = fmax(0, fmin(a, b)), .to = fmax(a, b) };
+    *out = (piece){ .from = fmax(s->from, fmin(a, b)), .to = fmin(s->to, fmax(a, b)) };
     if (!(out->from < out->to) || !code_at(s, sheet, &out->code))
         return false;
     out->depth =
@@ -217,8 +218,10 @@ static void find_hit(const samples *s, trip_ray_hit *out)
 
 int trip_ray_probe_find(const trip_ray_probe *probe, trip_ray_hit *out)
 {
-    samples s = { .probe = probe, .axis = longest_axis(probe->direction) };
+    samples s = { .probe = probe, .to = INFINITY, .axis = longest_axis(probe->direction) };
     *out = (trip_ray_hit){ 0 };
+    if (!trip_clip_ray(&probe->clip, probe->origin, probe->direction, &s.from, &s.to))
+        return 0;
     find_sheets(&s);
     if (s.count == 0)
         return 0;

@@ -6,6 +6,7 @@
 #ifndef TRIP_RAY_PROBE_H
 #define TRIP_RAY_PROBE_H
 
+#include "clip.h"
 #include "reader.h"
 #include "transfer_function.h"
 
@@ -18,6 +19,7 @@ typedef struct trip_ray_probe {
      * world units long. */
     trip_vec3 origin, direction;
     double world_per_z;
+    trip_clip clip; /* index space: only what is inside counts */
 } trip_ray_probe;
 
 typedef struct trip_ray_hit {

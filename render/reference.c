@@ -13,6 +13,7 @@
 #include "report.h"
 #include "shade.h"
 #include "splat.h"
+#include "tint.h"
 #include "weight.h"
 
 /* One pixel of splats: the layer being drawn, and the sum over the layers before it. */
@@ -293,6 +294,7 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
     rgb[0] = entry->r;
     rgb[1] = entry->g;
     rgb[2] = entry->b;
+    trip_tint_of(frame->settings, r->axis, frame->data->lists[r->number].level, rgb);
     if (!frame->settings->shading || !normal)
         return;
     const trip_file_header *header = &frame->data->header;
@@ -357,8 +359,9 @@ static void draw_run(reference *r, const trip_batch *batch, const trip_run *run)
                                                run->u + (int64_t)trip_voxel_u(r->voxels[at]),
                                                run->v + (int64_t)trip_voxel_v(r->voxels[at])))
             continue;
-        draw_splat(r, voxel_position(r->axis, run, r->voxels[at]), r->voxels[at],
-                   block.normals ? &r->normals[at] : NULL);
+        trip_vec3 position = voxel_position(r->axis, run, r->voxels[at]);
+        if (trip_clip_has(&r->list->clip, position))
+            draw_splat(r, position, r->voxels[at], block.normals ? &r->normals[at] : NULL);
     }
 }
 

@@ -5,6 +5,7 @@
 #include "field_fill.h"
 #include "segments.h"
 #include "shade.h"
+#include "tint.h"
 #include "sheet.h"
 
 struct trip_reference_sheets {
@@ -107,6 +108,7 @@ typedef struct passage {
     int axis;
     trip_vec3 origin, direction;
     double world_per_t;
+    double from, to; /* t: what is not cut away */
     double layer[TRIP_CHANNELS_MAX];
 } passage;
 
@@ -200,16 +202,30 @@ static bool composite(double layer[TRIP_CHANNELS_MAX], const double fragment[TRI
     return false;
 }
 
+/* The code at t, running straight from one end of a segment to the other. */
+static double code_at(const place ends[2], double t0, double t1, double t)
+{
+    double a = ends[0].code, b = ends[1].code;
+    return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
+}
+
 /* Between two slices. False once the pixel is saturated. */
 static bool add_segment(passage *p, double t0, double t1, int64_t cells)
 {
     place ends[2];
+    const double from = fmax(t0, p->from), to = fmin(t1, p->to);
+    double own[3];
+    if (!(from < to))
+        return true;
     if (!find_place(p, t0, cells, &ends[0]) || !find_place(p, t1, cells, &ends[1]))
         return true;
-    trip_segment segment = trip_segment_of(&p->s->segments, ends[0].code, ends[1].code);
+    trip_segment segment =
+        trip_segment_of(&p->s->segments, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to));
     if (!(segment.extinction > 0))
         return true;
-    double t = 0.5 * (t0 + t1);
+    double t = 0.5 * (from + to);
+    if (trip_tint_of(p->s->frame->settings, p->axis, p->s->frame->plan->level, own))
+        memcpy(segment.rgb, own, sizeof own);
     if (p->s->frame->settings->shading)
         light(p, ends, point_at(p, t), segment.rgb);
     const double fragment[TRIP_CHANNELS_MAX] = {
@@ -217,7 +233,8 @@ static bool add_segment(passage *p, double t0, double t1, int64_t cells)
         [TRIP_CHANNEL_BLUE] = segment.rgb[2],      [TRIP_CHANNEL_ALPHA] = 1,
         [TRIP_CHANNEL_DEPTH] = t * p->world_per_t,
     };
-    return composite(p->layer, fragment, -expm1(-segment.extinction * (t1 - t0) * p->world_per_t));
+    return composite(p->layer, fragment,
+                     -expm1(-segment.extinction * (to - from) * p->world_per_t));
 }
 
 /* Between the slices at coordinates n / slices that lie before the eye, and from the eye itself to
@@ -250,10 +267,13 @@ void trip_reference_sheets_layer(const trip_reference_sheets *s, int axis, int x
         .origin = c->eye,
         .direction = trip_camera_ray(c, x + 0.5, y + 0.5),
         .world_per_t = trip_camera_ray_length(c, x + 0.5, y + 0.5),
+        .from = -INFINITY,
+        .to = INFINITY,
     };
     if (c->ortho)
         p.origin =
             trip_add(c->eye, trip_add(trip_scale(c->rx, x + 0.5), trip_scale(c->ry, y + 0.5)));
-    add_segments(&p);
+    if (trip_clip_ray(&s->frame->plan->clip, p.origin, p.direction, &p.from, &p.to))
+        add_segments(&p);
     memcpy(layer, p.layer, sizeof p.layer);
 }

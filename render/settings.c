@@ -29,6 +29,9 @@ int trip_settings_check(const trip_settings *s)
     if (s->indexed && s->lod_px > 0)
         return trip_fail(TRIP_USAGE, "render", "levels",
                          "one array of vertices has the finest level alone; use three lists");
+    if (s->indexed && s->clip.count > 0)
+        return trip_fail(TRIP_USAGE, "render", "clipping",
+                         "one array of vertices is drawn whole; use three lists");
     if (s->classify == TRIP_CLASSIFY_PRE)
         return 0;
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)

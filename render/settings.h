@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 
+#include "clip.h"
 #include "geometry.h"
 
 /* Standard deviation of the reconstruction Gaussian is kernel_radius / TRIP_CUTOFF, and every
@@ -59,6 +60,14 @@ typedef enum trip_compositing {
     TRIP_COMPOSITING_SHEET, /* the sum of each sheet's */
 } trip_compositing;
 
+/* What a picture is coloured by (tint.h). */
+typedef enum trip_show {
+    TRIP_SHOW_PICTURE, /* the transfer function */
+    TRIP_SHOW_LISTS,   /* which list: x red, y green, z blue */
+    TRIP_SHOW_MERGE,   /* the weights of the lists at each pixel, and nothing of the volume */
+    TRIP_SHOW_LEVELS,  /* which level of detail */
+} trip_show;
+
 /* Slices of a sheet: the most that settings may have. */
 #define TRIP_SLICES_MAX 16
 
@@ -86,6 +95,8 @@ typedef struct trip_settings {
     double tolerance;   /* of a component of a pixel, 0 to 1 */
     int samples;        /* rays of a pixel, along x and along y; their mean is its colour. Frames
                            of other renderers are that much larger instead */
+    trip_clip clip;     /* what is drawn lies inside; world space */
+    trip_show show;
 } trip_settings;
 
 /* The defaults: pre, splat by splat, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by

@@ -37,6 +37,7 @@ struct ray {
     float start;   // parallel views: where it begins along the list
     float world;   // voxels' lengths over a sheet
     vec3 eye;      // towards it
+    float from, to; // what of it is not cut away, in depths
 };
 
 // Of a ray at an end.
@@ -61,6 +62,17 @@ ray ray_of(vec2 p)
 #else
     r.shift /= r.along;
 #endif
+    r.from = -1e30;
+    r.to = 1e30;
+    for (int i = 0; i < clips.x; i++) {
+        float start = dot(clip_start[i].xyz, q), by = dot(clip_along[i].xyz, q);
+        if (by > 0.0)
+            r.from = max(r.from, -start / by);
+        else if (by < 0.0)
+            r.to = min(r.to, -start / by);
+        else if (start < 0.0)
+            r.to = -1e30;
+    }
 #ifdef SHADED
     r.eye = towards_eye(ray_0.xyz + (ray_x.xyz * p.x + ray_y.xyz * p.y) * ray_x.w);
 #endif
@@ -154,16 +166,26 @@ vec3 lit_between(vec3 colour, ray r, vec3 gradient_sum)
 void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, place b, inout vec4 pixel,
                  inout float pixel_depth)
 {
-    vec4 means = segment_means(a.code, b.code, across_u.w);
+    // In depths; shares of the segment are inside.
+    float start = (to.along - to.step - r.start) / r.along, end = (to.along - r.start) / r.along;
+    float first = 0.0, last = 1.0;
+    if (clips.x > 0) {
+        first = clamp((r.from - start) / (end - start), 0.0, 1.0);
+        last = clamp((r.to - start) / (end - start), 0.0, 1.0);
+    }
+    if (!(first < last))
+        return;
+    vec4 means = segment_means(first > 0.0 ? mix(a.code, b.code, first) : a.code,
+                               last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
     if (!(means.a > 0.0))
         return;
-    vec3 colour = means.rgb / means.a;
+    vec3 colour = tint.w > 0.0 ? vec3(tint.xyz) : means.rgb / means.a;
 #ifdef SHADED
     colour = lit_between(colour, r, gradient_at(a, from) + gradient_at(b, to));
 #endif
-    float through = 1.0 - pixel.a, add = opacity(means.a * abs(to.step) * r.world) * through;
+    float through = 1.0 - pixel.a, add = opacity(means.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);
-    pixel_depth += (to.along - 0.5 * to.step - r.start) / r.along * add;
+    pixel_depth += mix(start, end, 0.5 * (first + last)) * add;
     if (1.0 - pixel.a < SHEET_SATURATION) {
         pixel_depth /= pixel.a;
         pixel = vec4(pixel.rgb / pixel.a, 1.0);

@@ -92,6 +92,8 @@ void main()
     cover(pixels);
     footprint = vec4(s.centre, s.conic.xz * s.ray2);
     shear = 2.0 * s.conic.y * s.ray2;
+    if (tint.w > 0.0)
+        entry.rgb = vec3(tint.xyz);
 #ifdef SHADED
     entry.rgb = shade(entry.rgb, r.normal, r.from_eye);
 #endif

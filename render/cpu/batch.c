@@ -48,7 +48,6 @@ trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, cons
 {
     size_t code = (size_t)at->first * b->code_bytes, normal = (size_t)at->first * b->normal_bytes;
     unsigned square = at->number, code_bytes = at->count * b->code_bytes;
-    const trip_plan *plan = r->frame->plan;
     const trip_list *list = trip_batch_list(r->batch, run);
     trip_cpu_square s = {
         .u = run->u + TRIP_CPU_SQUARE * (int)trip_cpu_square_u(square),
@@ -58,9 +57,7 @@ trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, cons
         .codes = b->codes + code,
         .normals = b->normals ? b->normals + normal : NULL,
     };
-    uint64_t drawn = UINT64_MAX;
-    if (plan->lists[list->index].by_level)
-        drawn = trip_lod_square(&plan->lod, list, s.sheet, s.u, s.v);
+    uint64_t drawn = trip_plan_square(r->frame->plan, list, s.sheet, s.u, s.v);
     if (!(s.mask & drawn)) {
         s.mask = 0;
         return s;

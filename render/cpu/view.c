@@ -3,6 +3,7 @@
 #include "block.h"
 #include "normal.h"
 #include "shade.h"
+#include "tint.h"
 
 #define LOG2_E 1.44269504088896340736
 
@@ -162,6 +163,10 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip
     make_view(view, frame, &frame->plan->lists[list->index].camera, list->axis, front_to_back);
     view->list = list;
     view->code_bytes = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
+    double tint[3] = { 0 };
+    view->tinted = trip_tint_of(frame->settings, list->axis, list->level, tint);
+    for (int i = 0; i < 3; i++)
+        view->tint[i] = (float)tint[i];
 }
 
 void trip_cpu_layer_view_make(trip_cpu_view *view, const trip_frame *frame, int axis,

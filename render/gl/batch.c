@@ -118,14 +118,11 @@ static void fill_square(filling *f, struct trip_gl_square square, uint64_t mask,
     f->square++;
 }
 
-/* Which voxels of a square are drawn: not those of cells that another level is drawn in. */
 static uint64_t drawn_of(const trip_plan *plan, const trip_list *list, const trip_run *run,
                          uint32_t corner)
 {
-    if (!plan->lists[list->index].by_level)
-        return UINT64_MAX;
-    return trip_lod_square(&plan->lod, list, run->sheet, run->u + (int64_t)(corner & 0xffff),
-                           run->v + (int64_t)(corner >> 16));
+    return trip_plan_square(plan, list, run->sheet, run->u + (int64_t)(corner & 0xffff),
+                            run->v + (int64_t)(corner >> 16));
 }
 
 /* The squares of a run, in draw order, with their draw positions; returns the number of these. */

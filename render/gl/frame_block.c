@@ -7,6 +7,7 @@
 #include "normal.h"
 #include "shade.h"
 #include "splat.h"
+#include "tint.h"
 #include "weight.h"
 
 /* Components of a vector of the data's axes in list axes; an even permutation, so that cross
@@ -155,6 +156,13 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
     out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
 }
 
+static void set_tint(trip_gl_frame_double *out, const trip_settings *s, int axis, unsigned level)
+{
+    double rgb[3];
+    if (trip_tint_of(s, axis, level, rgb))
+        out->tint = (trip_gl_double4){ { rgb[0], rgb[1], rgb[2], 1 } };
+}
+
 /* Of a voxel along an axis. */
 static double world_length(const trip_camera *c, int axis)
 {
@@ -167,6 +175,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
     const trip_plan_list *planned = &frame->plan->lists[list->index];
     const double *scale = planned->grid.scale;
     make(out, frame, &planned->camera, list->axis);
+    set_tint(out, frame->settings, list->axis, list->level);
     out->edge.v[1] = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
     if (trip_kind_of(list->kind)->axis_bits > 0)
         out->edge.v[3] = world_length(&planned->camera, list->axis);
@@ -177,6 +186,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
 void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis)
 {
     make(out, frame, frame->camera, axis);
+    set_tint(out, frame->settings, axis, frame->plan->level);
 }
 
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in)

@@ -77,7 +77,8 @@
     R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along     \
                       the ray at the image's centre; y: world units a voxel of level 0 */              \
     R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                     \
-    R4 background; /* r, g, b, a; not premultiplied */
+    R4 background; /* r, g, b, a; not premultiplied */                                                 \
+    R4 tint;       /* rgb: of all that is drawn, before it is lit, where w is not 0 */
 
 /* Constants of a pass over the sheets of a list (render/sheet.h). Linear functions of a pixel are
  * xyz . (1, x, y) from the image's centre; lengths of rays are those of trip_gl_frame. */
@@ -89,7 +90,10 @@
                               image's centre */                                                    \
     R4 gradient_0, gradient_1, gradient_2; /* xyz: columns of the map from differences of codes,   \
                                               list axes, to world space, over full shading */      \
-    I4 extent; /* voxels of u and v from the first on; the grid's last, from that */
+    I4 extent; /* voxels of u and v from the first on; the grid's last, from that */               \
+    I4 clips;  /* x: half-spaces that rays are cut to: how far inside they begin, and how much     \
+                  that grows by as far as `along` and `across` say */                              \
+    R4 clip_start[12], clip_along[12];
 
 /* The end of a segment: where rays pass a slice. `step` is how far along the list it is from the
  * end before; 0: no segment lies between them. A ray's u is base + first + what it moves along

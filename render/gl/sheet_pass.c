@@ -1,5 +1,6 @@
 #include "gl/sheet_pass.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "shade.h"
@@ -78,6 +79,25 @@ static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
     }
 }
 
+static double inner(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Rays begin at `start`, at depth 0. */
+static void set_clip(trip_gl_sheet_view *v, const rays *r, const trip_clip *clip)
+{
+    static_assert((int)TRIP_CLIP_MOST == 12, "shared.h");
+    v->constants.clips.v[0] = clip->count;
+    for (int i = 0; i < clip->count; i++) {
+        double n[3];
+        by_list(clip->planes[i].normal, v->axis, n);
+        v->constants.clip_start[i] = linear(inner(n, r->start) + clip->planes[i].offset,
+                                            inner(n, r->x_start), inner(n, r->y_start), 0);
+        v->constants.clip_along[i] = linear(inner(n, r->r0), inner(n, r->rx), inner(n, r->ry), 0);
+    }
+}
+
 trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bool descending,
                                            const int64_t first[2], const int64_t size[2],
                                            double unit)
@@ -104,6 +124,7 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
     v.constants.along = linear(r.r0[0], r.rx[0], r.ry[0], way);
     v.constants.start = linear(0, r.x_start[0], r.y_start[0], 0);
     set_gradient(&v, frame);
+    set_clip(&v, &r, &frame->plan->clip);
     return v;
 }
 

@@ -116,6 +116,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .classes = r->classes,
         .settings = frame->settings,
         .camera = frame->camera,
+        .clip = &frame->plan->clip,
         .shaded = frame->settings->shading && header->planes >> TRIP_PLANE_NORMALS & 1,
         .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world),
     };

@@ -14,6 +14,7 @@ typedef struct trip_integrand {
     const trip_classes *classes;
     const trip_settings *settings;
     const trip_camera *camera; /* of the grid of the field */
+    const trip_clip *clip;     /* of the rays, or of the voxels; index space */
     bool shaded;
     double gradient_full; /* as of trip_shade() */
 } trip_integrand;

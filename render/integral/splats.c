@@ -71,7 +71,7 @@ static int add_hit(passage *p, const int64_t at[3], const trip_field_voxel *v)
     trip_splat_hit hit = { .extinction = entry->extinction };
     hit.distance2 = distance2(p, centre, &hit.middle);
     double half2 = p->radius * p->radius - hit.distance2;
-    if (!(entry->extinction > 0 && half2 > 0))
+    if (!(entry->extinction > 0 && half2 > 0 && trip_clip_has(p->in->clip, centre)))
         return 0;
     hit.enter = fmax(0, hit.middle - sqrt(half2) / p->length);
     hit.leave = hit.middle + sqrt(half2) / p->length;

@@ -110,7 +110,8 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
                                    .edge = TRIP_FIELD_EDGE };
     double from = 0, to = INFINITY;
     passage p = { .in = in, .ray = ray, .sum = trip_ray_sum_begin(in->settings->tolerance, 1) };
-    if (trip_ray_clip(ray, cubes.lo, cubes.hi, &from, &to)) {
+    if (trip_ray_clip(ray, cubes.lo, cubes.hi, &from, &to) &&
+        trip_clip_ray(in->clip, ray->origin, ray->direction, &from, &to)) {
         p.light = trip_light_at(in->settings, in->camera, in->gradient_full, trip_ray_at(ray, 1));
         p.sum.length = to - from;
         trip_ray_walk(ray, &cubes, from, to, visit_cube, &p);

@@ -87,7 +87,9 @@ typedef struct trip_cpu_view {
     trip_splat_frame splat;     /* by the camera of the list */
     trip_cpu_rays rays;
     bool front_to_back, shading;
-    bool sums; /* splats are summed sheet by sheet */
+    bool sums;   /* splats are summed sheet by sheet */
+    bool tinted; /* all have one colour before they are lit: */
+    float tint[3];
     bool stretch_varies;
     unsigned code_bytes, normal_bytes; /* of the list's codes, of the data set's normals */
     int axis, u_axis, v_axis;

@@ -555,6 +555,8 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
     vi code = vi_load(staged->code + at);
     colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
                  v_gather(table + 2, code * 4) };
+    if (view->tinted)
+        c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
     if (!view->shading)
         return c;
     v3 eye = towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),

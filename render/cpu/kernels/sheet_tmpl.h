@@ -46,6 +46,9 @@ typedef struct tile_path {
     float world_length;   /* world units over a sheet, where `world` and `toward` are 1 */
     float depth;          /* z over a sheet where `toward` is 1 */
     float gradient[3][3]; /* as the view's, of sums of weights 2^WEIGHT_LOG2 */
+    /* How far inside each half-space a ray is at 0 along the sheets, and how much that grows by
+     * along `toward`; in parallel views over a sheet. */
+    float clip_at[TRIP_CLIP_MOST][3], clip_toward[TRIP_CLIP_MOST][3];
 } tile_path;
 
 /* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
@@ -148,6 +151,37 @@ static void find_forms(const trip_cpu_sheet_view *view, int x, int y, tile_path 
     path->depth = (float)unit;
 }
 
+INLINE double dot_list(const double a[4], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Likewise of what is cut away. */
+static void find_clip(const trip_cpu_sheet_view *view, int x, int y, tile_path *path)
+{
+    double turns = view->ortho ? 0 : 1, corner[3], start[3];
+    for (int i = 0; i < 3; i++) {
+        double beside = x * view->rx[i] + y * view->ry[i];
+        corner[i] = view->r0[i] + turns * beside;
+        start[i] = view->eye[i] + (1 - turns) * beside;
+    }
+    const double *linear[3] = { corner, view->rx, view->ry };
+    const double *starts[3] = { start, view->rx, view->ry };
+    double unit = view->ortho ? (corner[2] != 0 ? 1 / corner[2] : 0) : 1 / greatest_of(corner);
+    for (int n = 0; n < view->clips; n++) {
+        const double *plane = view->clip[n];
+        double by = unit * dot_list(plane, corner);
+        for (int i = 0; i < 3; i++) {
+            double toward = i == 0 || !view->ortho ? unit * dot_list(plane, linear[i]) : 0;
+            double at = i == 0 || view->ortho ? dot_list(plane, starts[i]) : 0;
+            if (view->ortho)
+                at -= by * starts[i][2];
+            path->clip_toward[n][i] = (float)toward;
+            path->clip_at[n][i] = (float)(at + (i == 0 ? plane[3] : 0));
+        }
+    }
+}
+
 static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
                       tile_path *path)
 {
@@ -172,6 +206,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
         for (int i = 0; i < 3; i++)
             path->gradient[k][i] = view->gradient[k][i] * (1.0f / (1 << WEIGHT_LOG2));
     find_forms(view, x, y, path);
+    find_clip(view, x, y, path);
 }
 
 /* ---- which segments may show ---- */
@@ -353,7 +388,8 @@ typedef struct stamp_rays {
     vf length;             /* world units over a sheet */
     vf depth;              /* z over a sheet, and at the eye */
     vf depth_at_start;
-    vm along; /* they go the pass's way */
+    vm along;    /* they go the pass's way */
+    vf from, to; /* what of them is not cut away: along the sheets, times the direction */
     vf light[3], to_eye[3], half[3];
 } stamp_rays;
 
@@ -717,9 +753,9 @@ INLINE void light_segment(const trip_cpu_sheet_view *view, const tile_path *path
 }
 
 /* z where the rays are so far along. */
-INLINE vf ray_depth(const stamp_rays *l, float along)
+INLINE vf ray_depth(const stamp_rays *l, vf along)
 {
-    return v_fma(v_set(along), l->depth, l->depth_at_start);
+    return v_fma(along, l->depth, l->depth_at_start);
 }
 
 INLINE void find_light(const trip_cpu_group *g, sample *s)
@@ -727,6 +763,31 @@ INLINE void find_light(const trip_cpu_group *g, sample *s)
     if (!s->lit)
         find_gradients(g, s);
     s->lit = true;
+}
+
+/* What of a segment is not cut away. */
+typedef struct remnant {
+    vf from, to; /* shares of the segment: 0 to 1 */
+    vm some;
+} remnant;
+
+INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
+                          const tile_path *path, unsigned n)
+{
+    const float way = (float)view->direction, from = way * path->along[n];
+    const float length = way * path->along[n + 1] - from;
+    const vf inverse = v_set(1 / length), zero = v_set(0), one = v_set(1);
+    const vf first = v_min(one, v_max(zero, (l->from - v_set(from)) * inverse));
+    const vf last = v_min(one, v_max(zero, (l->to - v_set(from)) * inverse));
+    return (remnant){ first, last, v_gt(last, first) };
+}
+
+/* The sample at a share of the way, codes running straight. */
+INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
+{
+    vf code = v_fma(share, v_from_int(b->index - a->index), v_from_int(a->index));
+    out->index = v_truncate(code + v_set(0.5f));
+    out->summed = false;
 }
 
 /* Puts a segment behind what the pixels hold; false where it shows in none of them. */
@@ -737,10 +798,24 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* what begins behind the eye's plane is left out */
-        open = vm_and(open, v_ge(ray_depth(l, path->along[n]), v_set(0)));
+        open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
+    vf sheets = v_set(fabsf(path->along[n + 1] - path->along[n]));
+    vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
+    sample cut[2], *first = a, *last = b;
+    if (view->clips > 0) {
+        remnant r = remnant_of(view, l, path, n);
+        open = vm_and(open, r.some);
+        cut_sample(a, b, r.from, first = &cut[0]);
+        cut_sample(a, b, r.to, last = &cut[1]);
+        middle =
+            v_set(path->along[n]) + v_set(0.5f * (float)view->direction) * (r.from + r.to) * sheets;
+        sheets = sheets * (r.to - r.from);
+    }
     if (!vm_any(open))
         return false;
-    shown s = classified(view->integrals, a, b);
+    shown s = classified(view->integrals, first, last);
+    for (int k = 0; k < 3 && view->tinted; k++)
+        s.rgb[k] = v_set(view->tint[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
     if (!vm_any(open))
         return false;
@@ -749,14 +824,12 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         find_light(g, b);
         light_segment(view, path, l, a, b, &s);
     }
-    float sheets = path->along[n + 1] - path->along[n];
-    sheets = sheets < 0 ? -sheets : sheets;
-    vf opacity = v_set(1) - exp_of_minus(s.extinction * l->length * v_set(sheets));
+    vf opacity = v_set(1) - exp_of_minus(s.extinction * l->length * sheets);
     vf add = v_select(open, opacity * pixel[3], v_set(0));
     for (int k = 0; k < 3; k++)
         pixel[k] = v_fma(add, s.rgb[k], pixel[k]);
     if (TRIP_CPU_DEPTH) {
-        vf z = ray_depth(l, 0.5f * (path->along[n] + path->along[n + 1]));
+        vf z = ray_depth(l, middle);
         pixel[CHANNELS - 1] = v_fma(add, z, pixel[CHANNELS - 1]);
     }
     pixel[3] = pixel[3] - add;
@@ -802,6 +875,27 @@ INLINE vf form_of(const float form[3], vf x, vf y)
     return v_fma(x, v_set(form[1]), v_fma(y, v_set(form[2]), v_set(form[0])));
 }
 
+/* Cuts the rays to the half-spaces; `inverse` takes what grows along `toward` to sheets. */
+INLINE void clip_rays(const trip_cpu_sheet_view *view, const tile_path *path, vf x, vf y,
+                      vf inverse, stamp_rays *l)
+{
+    const vf zero = v_set(0), never = v_set(0x1p100f);
+    l->from = zero - never;
+    l->to = never;
+    for (int n = 0; n < view->clips; n++) {
+        vf at = form_of(path->clip_at[n], x, y), by = form_of(path->clip_toward[n], x, y);
+        by = by * v_set((float)view->direction);
+        if (!view->ortho)
+            by = by * inverse;
+        vm in = v_gt(by, zero), out = v_gt(zero, by);
+        vf where = (zero - at) / v_select(in, by, v_select(out, by, v_set(1)));
+        l->from = v_select(in, v_max(l->from, where), l->from);
+        l->to = v_select(out, v_min(l->to, where), l->to);
+        vf beside = v_select(in, zero, v_select(out, zero, at)); /* of rays along the plane */
+        l->from = v_select(v_gt(zero, beside), never, l->from);
+    }
+}
+
 /* The rays through the pixel centres of a stamp. */
 static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, unsigned number,
                       stamp_rays *l)
@@ -832,6 +926,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, un
     }
     set_unit(l->to_eye);
     set_light(view, l);
+    clip_rays(view, path, x, y, inverse, l);
 }
 
 /* The rays whose cell at the first slice is in the group's window. */

@@ -103,6 +103,10 @@ typedef struct trip_cpu_sheet_view {
     float gradient[3][3]; /* from differences of codes to half of world space, over gradient_full */
     float light[3];       /* without headlight, or in parallel views towards the eye */
     float to_eye[3];      /* in parallel views */
+    int clips; /* half-spaces that rays are cut to, [u, v, sheet, offset] as in trip_clip */
+    double clip[TRIP_CLIP_MOST][4];
+    bool tinted; /* all has one colour before it is lit: */
+    float tint[3];
 } trip_cpu_sheet_view;
 
 #endif

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "shade.h"
+#include "tint.h"
 #include "weight.h"
 
 /* Rays that move farther along u or v from sheet to sheet are not drawn: their weight in the list
@@ -52,6 +53,23 @@ static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
     }
 }
 
+static void set_clip(trip_cpu_sheet_view *view, const trip_clip *clip)
+{
+    view->clips = clip->count;
+    for (int i = 0; i < clip->count; i++) {
+        by_list(view, clip->planes[i].normal, view->clip[i]);
+        view->clip[i][3] = clip->planes[i].offset;
+    }
+}
+
+static void set_tint(trip_cpu_sheet_view *view, const trip_frame *frame)
+{
+    double tint[3] = { 0 };
+    view->tinted = trip_tint_of(frame->settings, view->axis, frame->plan->level, tint);
+    for (int k = 0; k < 3; k++)
+        view->tint[k] = (float)tint[k];
+}
+
 double trip_cpu_pass_steepest(const trip_settings *s)
 {
     double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
@@ -87,4 +105,6 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
     }
     set_gradient(view, frame);
     set_light(view, frame);
+    set_clip(view, &frame->plan->clip);
+    set_tint(view, frame);
 }

@@ -1,0 +1,418 @@
+/* What is cut away, by every renderer: closed forms of the path that is left, and pictures of a
+ * volume that has nothing else. */
+#include "scenes.h"
+#include "test.h"
+
+#include "clip.h"
+#include "plan.h"
+
+enum { EDGE = 20 };
+
+static trip_settings clear(trip_classify classify)
+{
+    trip_settings s = trip_settings_default();
+    s.classify = classify;
+    s.shading = false;
+    s.background[3] = 0;
+    s.tolerance = 1e-6;
+    return s;
+}
+
+static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
+
+static void a_box_is_the_inside_of_its_six_faces(void **state)
+{
+    (void)state;
+    const double lo[3] = { 1, -INFINITY, 2.5 }, hi[3] = { 7, 4, INFINITY };
+    const trip_affine same = trip_affine_identity();
+    trip_clip clip = { 0 };
+    trip_clip_add_box(&clip, lo, hi, &same);
+    assert_int_equal(clip.count, 4);
+    for (int n = 0; n < 1000; n++) {
+        int i = n % 10, j = n / 10 % 10, k = n / 100;
+        bool inside = i >= 1 && i <= 7 && j <= 4 && k >= 3;
+        assert_int_equal(trip_clip_has(&clip, trip_v3(i, j, k)), inside);
+    }
+}
+
+static void squares_hold_the_voxels_that_are_inside(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 300; n++) {
+        trip_clip clip = { 0 };
+        const int axis = n % 3;
+        for (int i = 0; i <= n % 3; i++) {
+            uint32_t r = scene_hash(n, i, 7);
+            trip_clip_add(&clip,
+                          trip_normalize(trip_v3((double)(r % 7) - 3.2, (double)(r / 7 % 7) - 2.9,
+                                                 (double)(r / 49 % 7) - 3.1)),
+                          (double)(r / 343 % 40) - 15);
+        }
+        uint64_t mask = trip_clip_square(&clip, axis, 5, 8, 16);
+        for (int v = 0; v < 8; v++)
+            for (int u = 0; u < 8; u++) {
+                double p[3];
+                p[axis] = 5;
+                p[(axis + 1) % 3] = 8 + u;
+                p[(axis + 2) % 3] = 16 + v;
+                int bit = 0;
+                for (int b = 0; b < 3; b++)
+                    bit |= (u >> b & 1) << 2 * b | (v >> b & 1) << (2 * b + 1);
+                assert_int_equal(mask >> bit & 1, trip_clip_has(&clip, trip_v3(p[0], p[1], p[2])));
+            }
+    }
+}
+
+/* Narrows an interval of the ray to one side of a plane, index space. */
+static void cut(const double plane[4], trip_vec3 o, trip_vec3 d, double *from, double *to)
+{
+    double at = plane[0] * o.x + plane[1] * o.y + plane[2] * o.z + plane[3];
+    double by = plane[0] * d.x + plane[1] * d.y + plane[2] * d.z;
+    double t = -at / by;
+    if (by > 0 && t > *from)
+        *from = t;
+    if (by < 0 && t < *to)
+        *to = t;
+}
+
+/* A plane of index space, in the world. */
+static void add_plane(trip_settings *s, const trip_affine *index_to_world, const double plane[4])
+{
+    trip_affine to_index;
+    assert_true(trip_affine_invert(index_to_world, &to_index));
+    double world[4] = { 0, 0, 0, plane[3] };
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 4; i++)
+            world[i] += plane[a] * to_index.m[a][i];
+    trip_clip_add(&s->clip, trip_v3(world[0], world[1], world[2]), world[3]);
+}
+
+static const double planes[][4] = {
+    { 0, 0, 1, -9.5 },        { 0, -1, 0, 9.25 },         { 0.3, 0.2, 1, -12 },
+    { -0.4, 1, 0.3, -8.125 }, { 0.61, -0.2, -0.77, 1.5 },
+};
+enum { PLANES = sizeof planes / sizeof *planes };
+
+/* Extinction of codes: constant, or rising with them. */
+static void fill(scene *s, bool rises)
+{
+    for (int code = 0; code < 65536; code++)
+        s->table[code] =
+            (trip_tf_entry){ 1, 0.5F, 0.25F, rises ? 0.2F * (float)code / 65535 : 0.05F };
+}
+
+/* By 3000 codes a voxel along i. */
+static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = 3000u * (unsigned)i;
+    return true;
+}
+
+static double depth_between(const scene *s, bool rises, trip_vec3 o, trip_vec3 d, double from,
+                            double to)
+{
+    double code = 3000 * (o.x + 0.5 * (from + to) * d.x);
+    double extinction = rises ? 0.2F * code / 65535 : (double)0.05F;
+    return from < to ? extinction * (to - from) * scene_ray_stretch(s, d) : 0;
+}
+
+/* Through the faces of an axis, so that no segment of a ray is at the border of the grid. */
+static void compare_with_path(const scene *s, const trip_camera_params *view,
+                              const scene_picture *p, const double plane[4], bool rises,
+                              double tolerance)
+{
+    for (int n = 0; n < p->width * p->height; n++) {
+        trip_vec3 o, d;
+        double from, to;
+        scene_ray(s, view, n % p->width, n / p->width, &o, &d);
+        assert_true(scene_ray_in_grid(s, o, d, &from, &to));
+        cut(plane, o, d, &from, &to);
+        double alpha = 1 - exp(-depth_between(s, rises, o, d, from, to));
+        const float *c = scene_pixel(p, n % p->width, n / p->width);
+        assert_close(c[3], alpha, tolerance);
+        assert_close(c[1], alpha / 2, tolerance);
+    }
+}
+
+static void what_is_left_of_the_path_has_its_opacity(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 10; i++) {
+        const int axis = i % 3, which = i % PLANES;
+        const bool rises = i / 2 % 2, skewed = i / 5;
+        scene s;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .index_to_world = skewed ? sheared : trip_affine_identity(),
+                                      .tile_voxels = 16,
+                                      .slab_sheets = 4,
+                                      .voxel = ramp });
+        fill(&s, rises);
+        double d[3] = { 0.04, -0.05, 0.03 };
+        d[axis] = i % 2 ? 1 : -1;
+        trip_vec3 direction =
+            trip_affine_vector(&s.data->index_to_world, trip_v3(d[0], d[1], d[2]));
+        trip_camera_params view = scene_view(&s, direction, 80, 4, 5);
+        view.ortho_height = i / 3 % 2 ? 4 : 0;
+        trip_settings settings = clear(TRIP_CLASSIFY_POST);
+        settings.slices = 1 + i % 4;
+        add_plane(&settings, &s.data->index_to_world, planes[which]);
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            compare_with_path(&s, &view, &p, planes[which], rises, 3e-5 + r->tolerance);
+            scene_picture_free(&p);
+        }
+        scene_picture p = scene_integrate(&s, &view, &settings, &(scene_making){ 0 });
+        compare_with_path(&s, &view, &p, planes[which], rises, 1e-5);
+        scene_picture_free(&p);
+        scene_destroy(&s);
+    }
+}
+
+/* What is inside of two planes and a box, by its own arithmetic. */
+static bool is_left(int i, int j, int k)
+{
+    return 3 * i + j - 2 * k >= -7 && 2 * k - i <= 23 && i >= 2 && j >= 3 && k >= 1 && i <= 17 &&
+           j <= 15 && k <= 18;
+}
+
+static bool blobs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    gradient[0] = sin(0.7 * i);
+    gradient[1] = cos(0.5 * j);
+    gradient[2] = sin(0.3 * k + i);
+    *code = (unsigned)(32768 + 32000 * sin(0.5 * i) * cos(0.4 * j + 0.2 * k));
+    return !user || is_left(i, j, k);
+}
+
+static void set_cut(trip_settings *settings)
+{
+    const double lo[3] = { 2, 3, 1 }, hi[3] = { 17, 15, 18 };
+    const trip_affine same = trip_affine_identity();
+    settings->clip = (trip_clip){ 0 };
+    trip_clip_add(&settings->clip, trip_v3(3, 1, -2), 7);
+    trip_clip_add(&settings->clip, trip_v3(1, 0, -2), 23);
+    trip_clip_add_box(&settings->clip, lo, hi, &same);
+}
+
+static void make_blobs(scene *s, bool cropped)
+{
+    static char yes;
+    scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                     .tile_voxels = 16,
+                                     .slab_sheets = 4,
+                                     .normals = true,
+                                     .voxel = blobs,
+                                     .user = cropped ? &yes : NULL });
+    scene_colour(s, 20000, 40000, 0.2, 0.5, 1, 0.05);
+    scene_colour(s, 40001, 65535, 0.9, 0.4, 0.1, 0.4);
+}
+
+static void splats_are_those_of_a_volume_without_the_others(void **state)
+{
+    (void)state;
+    scene all, cropped;
+    make_blobs(&all, false);
+    make_blobs(&cropped, true);
+    for (int i = 0; i < 3; i++) {
+        trip_camera_params view =
+            scene_view(&all, trip_v3(i % 2 ? 1 : -0.4, 0.8 - 0.4 * i, 0.5), 40, 35, 40);
+        view.ortho_height = i == 1 ? 25 : 0;
+        trip_settings plain = clear(TRIP_CLASSIFY_PRE), cutting;
+        plain.shading = true;
+        plain.compositing = (trip_compositing)(i % 2);
+        cutting = plain;
+        set_cut(&cutting);
+        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+            scene_picture a = scene_draw(&all, r, &view, &cutting);
+            scene_picture b = scene_draw(&cropped, r, &view, &plain);
+            scene_picture whole = scene_draw(&all, r, &view, &plain);
+            assert_memory_equal(a.rgba, b.rgba, 40 * 40 * 4 * sizeof *a.rgba);
+            assert_true(scene_difference(&a, &whole) > 0.1);
+            scene_picture_free(&a);
+            scene_picture_free(&b);
+            scene_picture_free(&whole);
+        }
+    }
+    scene_destroy(&all);
+    scene_destroy(&cropped);
+}
+
+static bool is_in_box(int i, int j, int k)
+{
+    return i >= 2 && j >= 3 && k >= 1 && i <= 17 && j <= 15 && k <= 18;
+}
+
+static bool boxed_blobs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    blobs(NULL, i, j, k, code, gradient);
+    return !user || is_in_box(i, j, k);
+}
+
+/* The volume cut to a box of whole voxels, and one that has these alone. */
+static void make_boxes(scene *all, scene *cropped, trip_settings *cutting)
+{
+    static char yes;
+    const double lo[3] = { 2, 3, 1 }, hi[3] = { 17, 15, 18 };
+    const trip_affine same = trip_affine_identity();
+    scene *const both[2] = { all, cropped };
+    for (int i = 0; i < 2; i++) {
+        scene_create(both[i], &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                               .voxel = boxed_blobs,
+                                               .user = i ? &yes : NULL });
+        scene_colour(both[i], 20000, 40000, 0.2, 0.5, 1, 0.05);
+        scene_colour(both[i], 40001, 65535, 0.9, 0.4, 0.1, 0.4);
+    }
+    trip_clip_add_box(&cutting->clip, lo, hi, &same);
+}
+
+/* Of rays along an axis: others have segments that pass its sides, of which a part is left. */
+static void sheets_cut_at_voxels_are_those_of_a_volume_without_the_others(void **state)
+{
+    (void)state;
+    scene all, cropped;
+    trip_settings plain = clear(TRIP_CLASSIFY_POST), cutting = plain;
+    make_boxes(&all, &cropped, &cutting);
+    for (int i = 0; i < 3; i++) {
+        const int axis = i, way = i % 2 ? -1 : 1;
+        trip_camera_params view = scene_view(
+            &all, trip_v3(way * (axis == 0), way * (axis == 1), way * (axis == 2)), 40, 35, 25);
+        view.ortho_height = 22.3;
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            scene_picture a = scene_draw(&all, r, &view, &cutting);
+            scene_picture b = scene_draw(&cropped, r, &view, &plain);
+            assert_true(scene_difference(&a, &b) < 1e-5);
+            assert_true(scene_pixel(&a, 12, 12)[3] > 0.1F);
+            scene_picture_free(&a);
+            scene_picture_free(&b);
+        }
+    }
+    scene_destroy(&all);
+    scene_destroy(&cropped);
+}
+
+static void the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others(void **state)
+{
+    (void)state;
+    scene all, cropped;
+    trip_settings plain = clear(TRIP_CLASSIFY_PRE), cutting = plain;
+    make_boxes(&all, &cropped, &cutting);
+    for (int i = 0; i < 4; i++) {
+        trip_camera_params view = scene_view(&all, trip_v3(1 - i, 0.4 * i, 0.7), 40, 35, 25);
+        plain.field = cutting.field = (trip_field_kind)(i % 2);
+        scene_picture a = scene_integrate(&all, &view, &cutting, &(scene_making){ 0 });
+        scene_picture b = scene_integrate(&cropped, &view, &plain, &(scene_making){ 0 });
+        assert_true(scene_difference(&a, &b) < 3e-6);
+        assert_true(scene_pixel(&a, 12, 12)[3] > 0.1F);
+        scene_picture_free(&a);
+        scene_picture_free(&b);
+    }
+    scene_destroy(&all);
+    scene_destroy(&cropped);
+}
+
+static void renderers_cut_as_the_reference_does(void **state)
+{
+    (void)state;
+    scene s;
+    make_blobs(&s, false);
+    for (int i = 0; i < 4; i++) {
+        trip_camera_params view =
+            scene_view(&s, trip_v3(i % 2 ? 1 : -0.4, 0.8 - 0.4 * i, 0.5), i < 3 ? 40 : 6, 35, 40);
+        view.ortho_height = i == 2 ? 25 : 0;
+        trip_settings settings = clear((trip_classify)(i > 0));
+        settings.shading = true;
+        settings.depth = true;
+        settings.show = (trip_show)(i % 2 ? TRIP_SHOW_LISTS : TRIP_SHOW_PICTURE);
+        set_cut(&settings);
+        const scene_renderer *r = scene_renderers();
+        scene_picture expected = scene_draw(&s, r, &view, &settings);
+        for (r++; r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            assert_true(scene_difference(&expected, &p) <= 2.0 / 255);
+            for (int n = 0; n < 40 * 40; n++)
+                if (scene_pixel(&p, n, 0)[3] > 0.05F)
+                    assert_close(p.depth[n], expected.depth[n], 0.05);
+            scene_picture_free(&p);
+        }
+        scene_picture_free(&expected);
+    }
+    scene_destroy(&s);
+}
+
+static void bricks_that_are_cut_away_are_not_read(void **state)
+{
+    (void)state;
+    scene s;
+    make_blobs(&s, false);
+    trip_camera camera;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.1, 0.2), 60, 30, 40);
+    assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
+    for (int classify = 0; classify < 2; classify++) {
+        uint64_t clipped[2] = { 0 }, selected[2] = { 0 };
+        for (int cuts = 0; cuts < 2; cuts++) {
+            trip_settings settings = clear((trip_classify)classify);
+            trip_plan plan;
+            if (cuts)
+                trip_clip_add(&settings.clip, trip_v3(1, 0, 0), -16);
+            assert_int_equal(trip_plan_make(&plan, s.data, &camera, &settings, s.table, s.budget),
+                             0);
+            for (unsigned i = 0; i < plan.list_count; i++) {
+                clipped[cuts] += plan.lists[i].bricks_clipped;
+                selected[cuts] += plan.lists[i].bricks_selected;
+            }
+            trip_plan_release(&plan, s.budget);
+        }
+        assert_int_equal(clipped[0], 0);
+        assert_true(clipped[1] > 0);
+        assert_int_equal(selected[0], selected[1] + clipped[1]);
+    }
+    scene_destroy(&s);
+}
+
+/* Where one list alone has weight its colour is that of its axis. */
+static void lists_are_shown_in_their_colours(void **state)
+{
+    (void)state;
+    scene s;
+    make_blobs(&s, false);
+    for (int i = 0; i < 6; i++) {
+        const int axis = i % 3;
+        trip_camera_params view =
+            scene_view(&s, trip_v3(axis == 0, axis == 1, axis == 2), 60, 10, 9);
+        view.ortho_height = 10;
+        trip_settings settings = clear((trip_classify)(i / 3));
+        settings.show = TRIP_SHOW_LISTS;
+        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            for (int n = 0; n < 81; n++)
+                for (int c = 0; c < 3; c++) {
+                    const float *rgba = scene_pixel(&p, n, 0);
+                    assert_close(rgba[c], c == axis ? rgba[3] : 0, 1e-5 + r->tolerance);
+                }
+            assert_true(scene_pixel(&p, 4, 4)[3] > 0.1F);
+            scene_picture_free(&p);
+        }
+    }
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_box_is_the_inside_of_its_six_faces),
+        cmocka_unit_test(squares_hold_the_voxels_that_are_inside),
+        cmocka_unit_test(what_is_left_of_the_path_has_its_opacity),
+        cmocka_unit_test(splats_are_those_of_a_volume_without_the_others),
+        cmocka_unit_test(sheets_cut_at_voxels_are_those_of_a_volume_without_the_others),
+        cmocka_unit_test(the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others),
+        cmocka_unit_test(renderers_cut_as_the_reference_does),
+        cmocka_unit_test(bricks_that_are_cut_away_are_not_read),
+        cmocka_unit_test(lists_are_shown_in_their_colours),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
