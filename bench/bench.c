@@ -12,8 +12,8 @@ static const struct {
     const char *name;
     int (*run)(const session *s, const bench_options *o, bench_report *r);
 } tables[] = {
-    { "orders", bench_orders },       { "submit", bench_submit },     { "stream", bench_stream },
-    { "renderers", bench_renderers }, { "accuracy", bench_accuracy }, { "popping", bench_popping },
+    { "orders", bench_orders },       { "submit", bench_submit },   { "stream", bench_stream },
+    { "renderers", bench_renderers }, { "popping", bench_popping },
 };
 
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)

@@ -22,36 +22,28 @@ enum {
     KEY_CLASSIFY,
     KEY_COMPOSITING,
     KEY_SLICES,
-    KEY_TOLERANCE,
-    KEY_BUDGET,
-    KEY_SOURCE,
     KEY_JSON,
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
 #define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES))
-#define OF_ACCURACY (BIT(KEY_TOLERANCE) | BIT(KEY_BUDGET) | BIT(KEY_SOURCE))
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
       "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
-      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; "
-      "accuracy, popping 256x256)",
+      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping 256x256)",
       0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; accuracy, "
-      "popping cpu)",
+      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; popping cpu)",
       0 },
     { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
       0 },
     { "repeat", KEY_REPEAT, "N", 0,
-      "Runs, in turns, to take the middle one of (default: 5; renderers, accuracy 1)", 0 },
-    { "views", KEY_VIEWS, "N", 0,
-      "Views round the object (default: 20; accuracy 8); renderers and accuracy only", 0 },
+      "Runs, in turns, to take the middle one of (default: 5; renderers 1)", 0 },
+    { "views", KEY_VIEWS, "N", 0, "Views round the object (default: 20); renderers only", 0 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
-    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0,
-      "Reach of a splat (default: 2); not accuracy", 0 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
     { "hidden", KEY_HIDDEN, "skip|draw", 0,
       "Whether bricks behind what is opaque are read (default: stream draw, renderers skip); skip "
       "by cpu only",
@@ -64,17 +56,9 @@ static const struct argp_option options[] = {
     { "classify", KEY_CLASSIFY, "pre|post", 0,
       "As of `triptych render` (default: pre); renderers and popping only", 0 },
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
-      "Likewise, pre (default: splat); renderers, accuracy and popping only", 0 },
+      "Likewise, pre (default: splat); renderers and popping only", 0 },
     { "slices", KEY_SLICES, "N", 0,
       "Slices of a sheet, post (default: by the view); renderers and popping only", 0 },
-    { "tolerance", KEY_TOLERANCE, "T", 0, "Of the integral, of 1 (default: 1e-4); accuracy only",
-      0 },
-    { "budget", KEY_BUDGET, "SECONDS", 0,
-      "No view is begun after so long (default: all are drawn); accuracy only", 0 },
-    { "source", KEY_SOURCE, "VOLUME", 0,
-      "The integral is of this volume, which the data set was made of, in place of the values "
-      "stored; accuracy only",
-      0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -84,7 +68,6 @@ static const struct table {
     unsigned refused; /* options that have no meaning here */
     bool lists;       /* takes several sizes, renderers and thread counts */
     int repeat;
-    int views; /* 0: 20 */
     bool draw_hidden;
     int sizes[2], size_count;
     trip_renderer_kind renderers[3];
@@ -92,8 +75,8 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused = OF_MODEL | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
-                   BIT(KEY_HIDDEN),
+        .refused =
+            OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -103,7 +86,7 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = OF_MODEL | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
+        .refused = OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
                    BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
@@ -114,7 +97,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = OF_MODEL | OF_ACCURACY | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 1024 },
@@ -124,7 +107,7 @@ static const struct table {
     },
     {
         .name = "renderers",
-        .refused = OF_ACCURACY | BIT(KEY_ENGINE),
+        .refused = BIT(KEY_ENGINE),
         .lists = true,
         .repeat = 1,
         .sizes = { 512, 1024 },
@@ -133,21 +116,9 @@ static const struct table {
         .renderer_count = 3,
     },
     {
-        .name = "accuracy",
-        .refused = BIT(KEY_CLASSIFY) | BIT(KEY_SLICES) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) |
-                   BIT(KEY_NO_COUNTS) | BIT(KEY_KERNEL_RADIUS),
-        .draw_hidden = true,
-        .repeat = 1,
-        .views = 8,
-        .sizes = { 256 },
-        .size_count = 1,
-        .renderers = { TRIP_RENDERER_CPU },
-        .renderer_count = 1,
-    },
-    {
         .name = "popping",
-        .refused = OF_ACCURACY | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_VIEWS) | BIT(KEY_REPEAT),
+        .refused = BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) | BIT(KEY_VIEWS) |
+                   BIT(KEY_REPEAT),
         .draw_hidden = true,
         .repeat = 1,
         .sizes = { 256 },
@@ -273,13 +244,6 @@ static int parse_option(int key, char *arg, bench_options *o)
         return parse_compositing(arg, o);
     case KEY_SLICES:
         return trip_option_integer("--slices", arg, 1, TRIP_SLICES_MAX, &o->settings.slices);
-    case KEY_TOLERANCE:
-        return trip_option_number("--tolerance", arg, 1e-8, 0.01, &o->tolerance);
-    case KEY_BUDGET:
-        return trip_option_number("--budget", arg, 0, 1e9, &o->budget_seconds);
-    case KEY_SOURCE:
-        o->source = arg;
-        return 0;
     case KEY_JSON:
         o->json = true;
         return 0;
@@ -291,7 +255,7 @@ static int parse_option(int key, char *arg, bench_options *o)
 static void fill_defaults(bench_options *o, const struct table *t)
 {
     if (!o->views)
-        o->views = t->views ? t->views : 20;
+        o->views = 20;
     if (!o->repeat)
         o->repeat = t->repeat;
     if (!o->size_count)
@@ -335,8 +299,9 @@ static void be_short(parse *p)
 
 static int check(parse *p)
 {
-    static const char *const names[] = { "orders",   "submit",  "stream", "renderers",
-                                         "accuracy", "popping", NULL };
+    static const char *const names[] = {
+        "orders", "submit", "stream", "renderers", "popping", NULL
+    };
     bench_options *o = p->o;
     int which;
     if (!o->table)
@@ -391,9 +356,7 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                "than a minute, the renderers cpu and gl. What is compared takes turns, so that a "
                "machine busy for a while slows all of them.",
     };
-    *o = (bench_options){ .tolerance = 1e-4,
-                          .budget_seconds = 1e9,
-                          .settings = trip_settings_default() };
+    *o = (bench_options){ .settings = trip_settings_default() };
     o->settings.slices = 0;
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);

@@ -19,9 +19,6 @@ typedef struct bench_options {
     int renderer_count;
     int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
     int repeat, views;
-    double tolerance;      /* of the integral */
-    const char *source;    /* the volume that it is of; NULL: the values stored */
-    double budget_seconds; /* views are begun so long */
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
@@ -37,7 +34,6 @@ typedef struct bench_options {
     "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                \
     "  stream     reading and drawing against the disk's bandwidth\n"                              \
     "  renderers  the renderers there are, over views round the object\n"                          \
-    "  accuracy   how far settings are from the integral, and what they take\n"                    \
     "  popping    how much pixels jump where the axis of most weight changes\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */

@@ -8,10 +8,11 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { INTERVAL_MS = 250 };
+enum { INTERVAL_MS = 250, LINES_INTERVAL_MS = 2000 };
 
 struct bench_progress {
     const char *name;
+    bool lines; /* one below the other, where there is no terminal */
     struct timespec begin;
     pthread_t thread;
     pthread_mutex_t lock;
@@ -33,19 +34,19 @@ static unsigned seconds_since(const struct timespec *begin)
 static void print_line(const bench_progress *p)
 {
     unsigned s = seconds_since(&p->begin);
-    fprintf(stderr, "\r\033[K%s  %u:%02u", p->name, s / 60, s % 60);
+    fprintf(stderr, "%s%s  %u:%02u", p->lines ? "" : "\r\033[K", p->name, s / 60, s % 60);
     if (p->begun)
         fprintf(stderr, "  step %d of %d: %s", p->begun, p->expected, p->what);
-    fputc('\r', stderr);
+    fputc(p->lines ? '\n' : '\r', stderr);
     fflush(stderr);
 }
 
-static struct timespec time_of_next_line(void)
+static struct timespec time_of_next_line(int interval_ms)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
-    t.tv_nsec += INTERVAL_MS * 1000000L;
-    t.tv_sec += t.tv_nsec / 1000000000L;
+    t.tv_nsec += interval_ms % 1000 * 1000000L;
+    t.tv_sec += interval_ms / 1000 + t.tv_nsec / 1000000000L;
     t.tv_nsec %= 1000000000L;
     return t;
 }
@@ -55,7 +56,7 @@ static void *show(void *argument)
     bench_progress *p = argument;
     pthread_mutex_lock(&p->lock);
     do {
-        struct timespec next = time_of_next_line();
+        struct timespec next = time_of_next_line(p->lines ? LINES_INTERVAL_MS : INTERVAL_MS);
         print_line(p);
         while (!p->stopped && pthread_cond_timedwait(&p->stop, &p->lock, &next) == 0)
             ;
@@ -82,11 +83,12 @@ static void release(bench_progress *p)
     free(p);
 }
 
-bench_progress *bench_progress_start(const char *name)
+static bench_progress *start(const char *name, bool lines)
 {
-    bench_progress *p = isatty(STDERR_FILENO) == 1 ? calloc(1, sizeof *p) : NULL;
+    bench_progress *p = calloc(1, sizeof *p);
     if (!p)
         return NULL;
+    p->lines = lines;
     pthread_condattr_t attributes;
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
@@ -99,6 +101,16 @@ bench_progress *bench_progress_start(const char *name)
         return p;
     release(p);
     return NULL;
+}
+
+bench_progress *bench_progress_start(const char *name)
+{
+    return isatty(STDERR_FILENO) == 1 ? start(name, false) : NULL;
+}
+
+bench_progress *bench_progress_start_lines(const char *name)
+{
+    return start(name, isatty(STDERR_FILENO) != 1);
 }
 
 void bench_progress_expect(bench_progress *p, int steps)
@@ -129,6 +141,7 @@ void bench_progress_end(bench_progress *p)
     pthread_cond_signal(&p->stop);
     pthread_mutex_unlock(&p->lock);
     pthread_join(p->thread, NULL);
-    fputs("\r\033[K", stderr);
+    if (!p->lines)
+        fputs("\r\033[K", stderr);
     release(p);
 }

@@ -56,7 +56,7 @@ static int cores(void)
     return sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
 }
 
-static void describe_machine(cJSON *machine)
+void bench_describe_machine(cJSON *machine)
 {
     struct utsname system = { 0 };
     char model[256], kernel[256];
@@ -83,7 +83,7 @@ int bench_report_create(bench_report **out, const char *name, const char *comman
     r->limits = cJSON_AddArrayToObject(r->root, "limits");
     if (!r->settings || !r->machine || !r->tables || !r->limits)
         return out_of_memory();
-    describe_machine(r->machine);
+    bench_describe_machine(r->machine);
     return 0;
 }
 

@@ -15,6 +15,9 @@ typedef struct bench_column {
 
 typedef struct bench_report bench_report;
 
+/* Adds the CPU, its cores, memory and kernel. */
+void bench_describe_machine(cJSON *machine);
+
 /* `command`: the command line, which the report repeats. */
 int bench_report_create(bench_report **out, const char *name, const char *command);
 void bench_report_destroy(bench_report *r);

@@ -7,7 +7,6 @@
 int bench_orders(const session *s, const bench_options *o, bench_report *r);
 int bench_submit(const session *s, const bench_options *o, bench_report *r);
 int bench_stream(const session *s, const bench_options *o, bench_report *r);
-int bench_accuracy(const session *s, const bench_options *o, bench_report *r);
 int bench_popping(const session *s, const bench_options *o, bench_report *r);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 

@@ -18,6 +18,7 @@ static const struct command {
     { "serve", "show a data set in a browser on this machine", trip_command_serve },
     { "cache", "list or clear the data sets that render made of volumes", trip_command_cache },
     { "bench", "measure drawing and reading, as tables", trip_command_bench },
+    { "accuracy", "measure what each setting errs and costs, as a report", trip_command_accuracy },
     { "tf", "list, show and convert transfer functions", trip_command_tf },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };

@@ -68,6 +68,24 @@ triptych_settings triptych_default_settings(void)
     };
 }
 
+int triptych_set_quality(triptych_settings *s, triptych_quality quality)
+{
+    const triptych_settings usual = triptych_default_settings();
+    if (quality < TRIPTYCH_DRAFT || quality > TRIPTYCH_EXACT)
+        return TRIPTYCH_USAGE;
+    s->classify = quality == TRIPTYCH_NORMAL ? usual.classify : TRIPTYCH_POST;
+    s->compositing = usual.compositing;
+    s->slices = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 4 : 0;
+    s->slices = quality == TRIPTYCH_EXACT ? 16 : s->slices;
+    s->method = usual.method;
+    s->h = usual.h;
+    s->target = usual.target;
+    s->kernel_radius = usual.kernel_radius;
+    s->lod_px = usual.lod_px;
+    s->samples = usual.samples;
+    return TRIPTYCH_OK;
+}
+
 static const char *fault_of_integral(const triptych_settings *s)
 {
     if (s->field < TRIPTYCH_VALUES || s->field > TRIPTYCH_SPLATS || s->kernel < TRIPTYCH_LINEAR ||

@@ -280,6 +280,18 @@ typedef struct triptych_settings {
 /* Pre, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by
  * headlight, black; values, linear, 1e-4, one ray a pixel. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
+/* How close to the integral pictures are to be, for the time that takes; measured by `triptych
+ * accuracy`, triptych-accuracy(1) has the figures. */
+typedef enum triptych_quality {
+    TRIPTYCH_DRAFT,
+    TRIPTYCH_NORMAL, /* the default settings */
+    TRIPTYCH_HIGH,
+    TRIPTYCH_EXACT,
+} triptych_quality;
+
+/* Changes what accuracy is traded for time by: classify, compositing, slices, method, h, target,
+ * kernel_radius, lod_px and samples; the rest stays. TRIPTYCH_USAGE: there is no such quality. */
+TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 
 /* Left and right are the object's own. */

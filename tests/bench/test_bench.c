@@ -256,67 +256,6 @@ static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_
     assert_fails(&r, 2);
 }
 
-/* Of the integral at ten times the tolerance the tolerance is known; the settings are farther off.
- */
-static void accuracy_finds_the_settings_far_and_near(void **state)
-{
-    (void)state;
-    cJSON *root = bench("accuracy block.trip --size 32x32 --views 4 --tolerance 1e-4 --no-shading");
-    const cJSON *rows = rows_of(root, "accuracy"), *row;
-    const cJSON *integral = cJSON_GetArrayItem(rows, 0);
-    assert_true(cJSON_GetArraySize(rows) > 5);
-    assert_true(number(integral, "most") <= 255 * 1e-3);
-    double least = 255;
-    cJSON_ArrayForEach(row, rows)
-    {
-        assert_true(number(row, "ms") > 0);
-        assert_true(number(row, "channels") > 4 * 100);
-        assert_true(number(row, "median") <= number(row, "percentile_99"));
-        assert_true(number(row, "percentile_99") <= number(row, "most") + 0.005);
-        assert_true(number(row, "mean") <= number(row, "most"));
-        if (row != integral)
-            least = fmin(least, number(row, "mean"));
-    }
-    assert_true(number(integral, "mean") < least);
-    cJSON_Delete(root);
-}
-
-/* Of whole values, all of which are kept, nothing is lost when they are stored but gradients, and
- * nothing is lit here. */
-static void accuracy_is_against_the_source_where_it_is_given(void **state)
-{
-    (void)state;
-    program_run r;
-    program_call(&r, "bench accuracy block.trip --size 8x8 --views 1 --tolerance 0.01 "
-                     "--no-shading --source missing.nrrd");
-    assert_fails(&r, 1);
-    FILE *f = fopen("block.nhdr", "w");
-    assert_non_null(f);
-    fprintf(f, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 18 16\nencoding: raw\n"
-               "data file: block.raw\n");
-    assert_int_equal(fclose(f), 0);
-    cJSON *stored = bench("accuracy block.trip --size 16x16 --views 2 --no-shading");
-    cJSON *source =
-        bench("accuracy block.trip --size 16x16 --views 2 --no-shading --source block.nhdr");
-    const cJSON *a = rows_of(stored, "accuracy"), *b = rows_of(source, "accuracy");
-    assert_int_equal(cJSON_GetArraySize(a), cJSON_GetArraySize(b));
-    for (int i = 1; i < cJSON_GetArraySize(a); i++)
-        assert_true(fabs(number(cJSON_GetArrayItem(a, i), "mean") -
-                         number(cJSON_GetArrayItem(b, i), "mean")) < 0.1);
-    cJSON_Delete(stored);
-    cJSON_Delete(source);
-}
-
-static void accuracy_begins_no_view_after_its_seconds(void **state)
-{
-    (void)state;
-    program_run r;
-    program_call(&r,
-                 "bench accuracy block.trip --size 8x8 --views 100 --tolerance 0.01 --budget 0");
-    assert_works(&r);
-    assert_non_null(strstr(r.out, "Views: 1, "));
-}
-
 /* Of noise, which the three lists show as differently as can be. With axis all pixels jump at once;
  * with clip those on the line between two lists, and with merge none. */
 static void popping_is_of_axis_alone(void **state)
@@ -370,11 +309,8 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench renderers block.trip --engine pread",
         "bench renderers block.trip --renderer none",
         "bench stream block.trip --views 2",
-        "bench renderers block.trip --tolerance 1e-3",
-        "bench accuracy block.trip --tolerance 0",
         "bench stream block.trip --classify post",
         "bench renderers block.trip --classify never",
-        "bench accuracy block.trip --kernel-radius 3",
         "bench stream block.trip --hidden skip --renderer gl",
         "bench stream block.trip --hidden skip --renderer reference",
         "bench renderers block.trip --hidden skip --renderer gl,reference",
@@ -410,9 +346,6 @@ int main(void)
         cmocka_unit_test(submit_compares_forms_where_there_is_gl),
         cmocka_unit_test(
             without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
-        cmocka_unit_test(accuracy_finds_the_settings_far_and_near),
-        cmocka_unit_test(accuracy_is_against_the_source_where_it_is_given),
-        cmocka_unit_test(accuracy_begins_no_view_after_its_seconds),
         cmocka_unit_test(popping_is_of_axis_alone),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),

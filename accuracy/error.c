@@ -1,10 +1,10 @@
-#include "bench_error.h"
+#include "error.h"
 
 #include <math.h>
 
-static void add_channel(bench_error *e, double error)
+static void add_channel(accuracy_error *e, double error)
 {
-    double place = fmin(BENCH_ERROR_BINS - 1, round(error * BENCH_ERROR_BINS_PER_LEVEL));
+    double place = fmin(ACCURACY_ERROR_BINS - 1, round(error * ACCURACY_ERROR_BINS_PER_LEVEL));
     e->bins[(size_t)place]++;
     e->count++;
     e->sum += error;
@@ -12,7 +12,7 @@ static void add_channel(bench_error *e, double error)
     e->most = fmax(e->most, error);
 }
 
-void bench_error_add(bench_error *e, const float *picture, const float *truth, size_t pixels)
+void accuracy_error_add(accuracy_error *e, const float *picture, const float *truth, size_t pixels)
 {
     for (size_t i = 0; i < 4 * pixels; i += 4)
         if (picture[i + 3] > 1.0F / 255 || truth[i + 3] > 1.0F / 255)
@@ -21,23 +21,23 @@ void bench_error_add(bench_error *e, const float *picture, const float *truth, s
 }
 
 /* The least error that so many channels do not exceed. */
-static double percentile(const bench_error *e, double share)
+static double percentile(const accuracy_error *e, double share)
 {
     uint64_t below = 0;
-    for (size_t i = 0; i < BENCH_ERROR_BINS; i++) {
+    for (size_t i = 0; i < ACCURACY_ERROR_BINS; i++) {
         below += e->bins[i];
         if ((double)below >= share * (double)e->count)
-            return (double)i / BENCH_ERROR_BINS_PER_LEVEL;
+            return (double)i / ACCURACY_ERROR_BINS_PER_LEVEL;
     }
     return e->most;
 }
 
-bench_error_figures bench_error_measure(const bench_error *e)
+accuracy_error_figures accuracy_error_measure(const accuracy_error *e)
 {
     if (!e->count)
-        return (bench_error_figures){ .psnr = INFINITY };
+        return (accuracy_error_figures){ .psnr = INFINITY };
     double count = (double)e->count;
-    return (bench_error_figures){
+    return (accuracy_error_figures){
         .median = percentile(e, 0.5),
         .mean = e->sum / count,
         .percentile_99 = percentile(e, 0.99),

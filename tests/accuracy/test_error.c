@@ -1,5 +1,5 @@
 /* Errors of pictures made by hand, and the figures worked out from them. */
-#include "bench_error.h"
+#include "error.h"
 #include "test.h"
 
 enum { PIXELS = 200 };
@@ -14,11 +14,11 @@ static void make_picture(float rgba[PIXELS * 4])
 static void a_picture_is_not_far_from_itself(void **state)
 {
     (void)state;
-    static bench_error e;
+    static accuracy_error e;
     float picture[PIXELS * 4];
     make_picture(picture);
-    bench_error_add(&e, picture, picture, PIXELS);
-    const bench_error_figures f = bench_error_measure(&e);
+    accuracy_error_add(&e, picture, picture, PIXELS);
+    const accuracy_error_figures f = accuracy_error_measure(&e);
     assert_int_equal(e.count, PIXELS * 2);
     assert_true(f.median == 0 && f.mean == 0 && f.percentile_99 == 0 && f.most == 0);
     assert_true(isinf(f.psnr) && f.psnr > 0);
@@ -28,15 +28,15 @@ static void a_picture_is_not_far_from_itself(void **state)
 static void errors_made_by_hand_have_the_figures_expected(void **state)
 {
     (void)state;
-    static bench_error e;
+    static accuracy_error e;
     float picture[PIXELS * 4], truth[PIXELS * 4];
     make_picture(picture);
     make_picture(truth);
     for (int i = 0; i < 240; i++)
         picture[i] += (i % 2 ? 3.0F : -3.0F) / 255;
     picture[0] = picture[101] = 0.5F + 51.0F / 255;
-    bench_error_add(&e, picture, truth, PIXELS);
-    const bench_error_figures f = bench_error_measure(&e);
+    accuracy_error_add(&e, picture, truth, PIXELS);
+    const accuracy_error_figures f = accuracy_error_measure(&e);
     assert_close(f.median, 3, 1e-6);
     assert_close(f.mean, (238 * 3 + 2 * 51) / 400.0, 1e-5);
     assert_close(f.percentile_99, 3, 1e-6);
@@ -47,14 +47,14 @@ static void errors_made_by_hand_have_the_figures_expected(void **state)
 static void pixels_count_where_either_picture_covers_them(void **state)
 {
     (void)state;
-    static bench_error e;
+    static accuracy_error e;
     float covered[4] = { 0.2F, 0, 0, 1 }, empty[4] = { 0 }, faint[4] = { 0, 0, 0, 0.9F / 255 };
-    bench_error_add(&e, covered, empty, 1);
-    bench_error_add(&e, empty, covered, 1);
+    accuracy_error_add(&e, covered, empty, 1);
+    accuracy_error_add(&e, empty, covered, 1);
     assert_int_equal(e.count, 8);
-    bench_error_add(&e, faint, empty, 1);
+    accuracy_error_add(&e, faint, empty, 1);
     assert_int_equal(e.count, 8);
-    const bench_error_figures f = bench_error_measure(&e);
+    const accuracy_error_figures f = accuracy_error_measure(&e);
     assert_close(f.mean, (51 + 255) / 4.0, 1e-5);
     assert_close(f.most, 255, 1e-6);
 }

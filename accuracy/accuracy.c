@@ -1,0 +1,103 @@
+/* options -> folder -> pictures of all settings -> figures -> report. */
+#include "accuracy.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "accuracy_options.h"
+#include "measure.h"
+#include "report.h"
+#include "accuracy_report.h"
+
+static int print_settings(void)
+{
+    accuracy_setting all[ACCURACY_SETTINGS_MAX];
+    const triptych_settings usual = triptych_default_settings();
+    int count = accuracy_settings(all, &usual);
+    for (int i = 0; i < count; i++) {
+        printf("%-20s ", all[i].name);
+        accuracy_write_options(stdout, &all[i]);
+        printf("\n");
+    }
+    return 0;
+}
+
+/* The command line again, for free(). */
+static char *join(int argc, char **argv)
+{
+    char *text = NULL;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    if (!f)
+        return NULL;
+    fputs("triptych", f);
+    for (int i = 0; i < argc; i++) {
+        fputc(' ', f);
+        accuracy_write_word(f, argv[i]);
+    }
+    fclose(f);
+    return text;
+}
+
+/* NAME.accuracy beside NAME.trip. */
+static char *usual_output(const char *data)
+{
+    size_t length = strlen(data);
+    while (length > 1 && data[length - 1] == '/')
+        length--;
+    if (length > 5 && !strncmp(data + length - 5, ".trip", 5))
+        length -= 5;
+    char *path = malloc(length + sizeof ".accuracy");
+    if (path)
+        sprintf(path, "%.*s.accuracy", (int)length, data);
+    return path;
+}
+
+static int measure(const accuracy_options *o, accuracy_folder *folder, const char *command)
+{
+    accuracy_measured m;
+    accuracy_report r = { 0 };
+    if (getloadavg(&r.load_before, 1) != 1)
+        r.load_before = NAN;
+    int status = accuracy_measure(&m, o, folder->temporary);
+    if (!status)
+        status = accuracy_report_make(&r, &m, command);
+    if (!status)
+        status = accuracy_report_write(&r, folder->temporary);
+    if (!status)
+        status = accuracy_folder_finish(folder);
+    if (!status) {
+        printf("%s: %d settings from %d views in %.0f s\n", o->output, m.row_count, m.view_count,
+               m.seconds);
+        accuracy_report_print(stdout, &r);
+    }
+    accuracy_report_free(&r);
+    accuracy_measured_free(&m);
+    return status;
+}
+
+int trip_accuracy(int argc, char **argv)
+{
+    accuracy_options o;
+    accuracy_folder folder = { 0 };
+    char *command = join(argc, argv), *output = NULL;
+    int status = accuracy_options_parse(&o, argc, argv);
+    if (!status && o.list) {
+        free(command);
+        return print_settings();
+    }
+    if (!status && !o.output)
+        o.output = output = usual_output(o.data[0]);
+    if (!status && (!command || !o.output))
+        status = trip_fail(TRIP_ERROR, "accuracy", "report", "out of memory");
+    if (!status)
+        status = accuracy_folder_begin(&folder, o.output, o.force);
+    if (!status)
+        status = measure(&o, &folder, command);
+    accuracy_folder_abandon(&folder);
+    free(output);
+    free(command);
+    return status;
+}

@@ -1,0 +1,214 @@
+#include "accuracy_options.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "options.h"
+#include "report.h"
+
+enum {
+    KEY_SOURCE = 256,
+    KEY_ALSO,
+    KEY_TF,
+    KEY_NO_SHADING,
+    KEY_SETTINGS,
+    KEY_LIST,
+    KEY_VIEWS,
+    KEY_SIZE,
+    KEY_SAMPLES,
+    KEY_REPEAT,
+    KEY_TOLERANCE,
+    KEY_NO_LADDER,
+    KEY_BUDGET,
+    KEY_THREADS,
+    KEY_MEMORY,
+    KEY_PICTURES,
+    KEY_FORCE,
+    KEY_QUIET,
+};
+
+static const struct argp_option options[] = {
+    { "output", 'o', "REPORT/", 0,
+      "Folder to write: accuracy.json, accuracy.csv, index.html (default: NAME.accuracy)", 0 },
+    { "force", KEY_FORCE, NULL, 0, "Replace a report of that name", 0 },
+    { NULL, 0, NULL, 0, "What is measured:", 1 },
+    { "settings", KEY_SETTINGS, "PATTERN[,...]", 0,
+      "Only settings of such names, as of a shell: 'post*,pre,quality-*' (default: all)", 1 },
+    { "list", KEY_LIST, NULL, 0, "Print the names of the settings", 1 },
+    { "source", KEY_SOURCE, "VOLUME", 0,
+      "The volume that the data set was made of: the integral is of it, and what storing loses is "
+      "told apart",
+      1 },
+    { "also", KEY_ALSO, "OTHER.trip", 0,
+      "A data set of the same volume kept otherwise (halo, bits, levels), drawn by the defaults; "
+      "up to 7",
+      1 },
+    { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
+    { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 1 },
+    { NULL, 0, NULL, 0, "How:", 2 },
+    { "views", KEY_VIEWS, "N", 0,
+      "Views round the object, in turns perspective, parallel, from inside, wide (default: 4)", 2 },
+    { "size", KEY_SIZE, "WxH", 0, "Pixels, 32 to 4096 a side (default: 256x256)", 2 },
+    { "samples", KEY_SAMPLES, "N", 0,
+      "N x N rays a pixel in the integral (default: 1); settings of so many samples are compared "
+      "from 2 on",
+      2 },
+    { "repeat", KEY_REPEAT, "N", 0, "Timed frames of each view and setting (default: 3)", 2 },
+    { "tolerance", KEY_TOLERANCE, "E", 0, "Of the integral, 1e-8 to 0.01 (default: 1e-4)", 2 },
+    { "no-ladder", KEY_NO_LADDER, NULL, 0,
+      "Only what ran against the integral, without the steps between, which take most of the time",
+      2 },
+    { "budget", KEY_BUDGET, "SECONDS", 0,
+      "Nothing is begun after so long; what was left out is listed (default: no end)", 2 },
+    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 2 },
+    { "memory", KEY_MEMORY, "SIZE", 0,
+      "Memory for all data (default: a quarter of what may be used)", 2 },
+    { "pictures", KEY_PICTURES, NULL, 0, "Keep every picture too, as OpenEXR", 2 },
+    { "quiet", KEY_QUIET, NULL, 0, "No progress", 2 },
+    { 0 },
+};
+
+static int parse_size(const char *text, accuracy_options *o)
+{
+    int used = 0;
+    if (sscanf(text, "%4dx%4d%n", &o->width, &o->height, &used) != 2 || text[used] ||
+        strspn(text, "0123456789x") != strlen(text))
+        return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 256x256", text);
+    if (o->width < 32 || o->width > 4096 || o->height < 32 || o->height > 4096)
+        return trip_option_fail("--size", "sides have 32 to 4096 pixels");
+    return 0;
+}
+
+static int add_data(const char *path, accuracy_options *o)
+{
+    if (o->data_count == ACCURACY_DATA_MAX)
+        return trip_option_fail("--also", "7 other data sets at most");
+    o->data[o->data_count++] = path;
+    return 0;
+}
+
+static int parse_number(int key, char *arg, accuracy_options *o)
+{
+    int threads = 0, status;
+    switch (key) {
+    case KEY_VIEWS:
+        return trip_option_integer("--views", arg, 1, 1000, &o->views);
+    case KEY_SIZE:
+        return parse_size(arg, o);
+    case KEY_SAMPLES:
+        return trip_option_integer("--samples", arg, 1, 16, &o->samples);
+    case KEY_REPEAT:
+        return trip_option_integer("--repeat", arg, 1, 100, &o->repeat);
+    case KEY_TOLERANCE:
+        return trip_option_number("--tolerance", arg, 1e-8, 0.01, &o->tolerance);
+    case KEY_BUDGET:
+        return trip_option_number("--budget", arg, 0, 1e9, &o->budget_seconds);
+    case KEY_THREADS:
+        status = trip_option_integer("--threads", arg, 1, 256, &threads);
+        o->threads = (unsigned)threads;
+        return status;
+    case KEY_MEMORY:
+        return trip_option_bytes("--memory", arg, &o->memory_bytes);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int parse_word(int key, char *arg, accuracy_options *o)
+{
+    switch (key) {
+    case 'o':
+        o->output = arg;
+        return 0;
+    case KEY_SOURCE:
+        o->source = arg;
+        return 0;
+    case KEY_TF:
+        o->tf = arg;
+        return 0;
+    case KEY_SETTINGS:
+        o->settings = arg;
+        return 0;
+    case KEY_NO_SHADING:
+        o->shading = false;
+        return 0;
+    case KEY_NO_LADDER:
+        o->ladder = false;
+        return 0;
+    case KEY_PICTURES:
+        return o->pictures = true, 0;
+    case KEY_FORCE:
+        return o->force = true, 0;
+    case KEY_QUIET:
+        return o->quiet = true, 0;
+    case KEY_LIST:
+        return o->list = true, 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* While parsing. */
+typedef struct parse {
+    accuracy_options *o;
+    const char *also[ACCURACY_DATA_MAX];
+    int also_count;
+} parse;
+
+static int check(parse *p)
+{
+    accuracy_options *o = p->o;
+    if (o->list)
+        return 0;
+    if (!o->data_count)
+        return trip_option_fail("NAME.trip",
+                                "none given: `triptych accuracy NAME.trip -o REPORT/`");
+    int status = 0;
+    for (int i = 0; i < p->also_count && !status; i++)
+        status = add_data(p->also[i], o);
+    return status;
+}
+
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    parse *p = state->input;
+    if (key == ARGP_KEY_ARG)
+        return p->o->data_count
+                   ? trip_option_fail(arg, "one data set at a time; --also adds others")
+                   : add_data(arg, p->o);
+    if (key == ARGP_KEY_END)
+        return check(p);
+    if (key == KEY_ALSO) {
+        if (p->also_count == ACCURACY_DATA_MAX - 1)
+            return trip_option_fail("--also", "7 other data sets at most");
+        p->also[p->also_count++] = arg;
+        return 0;
+    }
+    int status = parse_number(key, arg, p->o);
+    return status == ARGP_ERR_UNKNOWN ? parse_word(key, arg, p->o) : status;
+}
+
+int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse_key,
+        .args_doc = "NAME.trip",
+        .doc =
+            "Measures what each setting that trades accuracy for time costs and errs on a data "
+            "set, against the emission-absorption integral, and writes a report: JSON, CSV and "
+            "a page.\vWith the report, `triptych render --error E` draws by the fastest settings "
+            "that stay below E.",
+    };
+    *o = (accuracy_options){ .width = 256,
+                             .height = 256,
+                             .views = 4,
+                             .repeat = 3,
+                             .samples = 1,
+                             .tolerance = 1e-4,
+                             .budget_seconds = 1e9,
+                             .shading = true,
+                             .ladder = true };
+    parse p = { .o = o };
+    return trip_options_parse(&argp, argc, argv, &p);
+}

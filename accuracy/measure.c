@@ -1,0 +1,506 @@
+#include "measure.h"
+
+#include <fnmatch.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "bench_progress.h"
+#include "contexts.h"
+#include "flip.h"
+#include "picture_data.h"
+#include "report.h"
+#include "ssim.h"
+
+enum { THUMBNAIL_PX = 128 };
+
+/* Pictures of a view. */
+typedef enum which {
+    TRUTH,
+    STORED,    /* the integral of a data set's values */
+    FIELD,     /* that of its splats */
+    FINE,      /* the reference at the finest level */
+    REFERENCE, /* at the levels drawn */
+    RAN,
+    PICTURES
+} which;
+
+typedef struct sweep {
+    accuracy_measured *m;
+    const accuracy_options *o;
+    accuracy_contexts contexts;
+    triptych_settings usual;
+    bench_progress *progress;
+    float *pictures[PICTURES];
+    size_t picture_bytes;
+    double begin;
+    /* What the pictures are of: */
+    int stored_data, field_data, reference_data;
+    double field_radius;
+    triptych_settings reference;
+    accuracy_error view; /* scratch */
+} sweep;
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double accuracy_median(double *ms, int count)
+{
+    qsort(ms, (size_t)count, sizeof *ms, ascending);
+    return count ? ms[(count - 1) / 2] : NAN;
+}
+
+static bool is_over(const sweep *s)
+{
+    return now_seconds() - s->begin > s->o->budget_seconds;
+}
+
+static size_t pixels_of(const sweep *s)
+{
+    return (size_t)s->o->width * (size_t)s->o->height;
+}
+
+/* ---- which rows there are ---- */
+
+static bool is_wanted(const char *patterns, const char *name)
+{
+    char one[ACCURACY_NAME_BYTES];
+    for (const char *rest = patterns; rest;) {
+        size_t length = strcspn(rest, ",");
+        snprintf(one, sizeof one, "%.*s", (int)(length < sizeof one ? length : sizeof one - 1),
+                 rest);
+        if (fnmatch(one, name, 0) == 0)
+            return true;
+        rest = rest[length] ? rest + length + 1 : NULL;
+    }
+    return !patterns;
+}
+
+static int add_row(accuracy_measured *m, int data, const accuracy_setting *setting)
+{
+    accuracy_row *row = &m->rows[m->row_count];
+    size_t frames = (size_t)m->options->views * (size_t)m->options->repeat;
+    *row = (accuracy_row){ .setting = *setting, .data = data, .splats_drawn = -1 };
+    row->ms = calloc(frames, sizeof *row->ms);
+    m->row_count++;
+    return row->ms ? 0 : trip_fail(TRIP_ERROR, "accuracy", setting->name, "out of memory");
+}
+
+/* The other data sets, by post and by pre. */
+static int add_others(accuracy_measured *m, const triptych_settings *usual)
+{
+    int status = 0;
+    for (int d = 1; d < m->options->data_count && !status; d++)
+        for (int pre = 0; pre < 2 && !status; pre++) {
+            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU, .settings = *usual };
+            const char *slash = strrchr(m->options->data[d], '/');
+            one.settings.classify = pre ? TRIPTYCH_PRE : TRIPTYCH_POST;
+            snprintf(one.name, sizeof one.name, "%s-%.30s", pre ? "pre" : "post",
+                     slash && slash[1] ? slash + 1 : m->options->data[d]);
+            if (is_wanted(m->options->settings, one.name))
+                status = add_row(m, d, &one);
+        }
+    return status;
+}
+
+static int add_rows(accuracy_measured *m, const triptych_settings *usual)
+{
+    accuracy_setting all[ACCURACY_SETTINGS_MAX];
+    int count = accuracy_settings(all, usual), status = 0;
+    if (!(m->rows = calloc(ACCURACY_ROWS_MAX, sizeof *m->rows)) ||
+        !(m->views = calloc((size_t)m->options->views, sizeof *m->views)))
+        return trip_fail(TRIP_ERROR, "accuracy", "rows", "out of memory");
+    for (int i = 0; i < count && !status; i++)
+        if (is_wanted(m->options->settings, all[i].name))
+            status = add_row(m, 0, &all[i]);
+    if (!status)
+        status = add_others(m, usual);
+    if (!status && !m->row_count)
+        return trip_fail(TRIP_USAGE, "usage", "--settings",
+                         "\"%s\" names none; `triptych accuracy --list` prints the names",
+                         m->options->settings);
+    return status;
+}
+
+__attribute__((format(printf, 2, 3))) static void leave_out(accuracy_row *row, const char *why, ...)
+{
+    va_list arguments;
+    va_start(arguments, why);
+    vsnprintf(row->why, sizeof row->why, why, arguments);
+    va_end(arguments);
+    row->state = ACCURACY_LEFT_OUT;
+}
+
+/* What says nothing here. */
+static int leave_out_idle(sweep *s)
+{
+    triptych *t;
+    unsigned levels = 0;
+    int status = accuracy_contexts_open(&s->contexts, 0, TRIPTYCH_RENDERER_CPU, &t);
+    triptych_info info;
+    triptych_list list;
+    if (status == TRIP_ERROR)
+        return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "%s",
+                         s->contexts.why[0][TRIPTYCH_RENDERER_CPU]);
+    if (status || triptych_get_info(t, &info))
+        return status ? status : TRIP_ERROR;
+    for (unsigned i = 0; i < info.lists; i++)
+        if (triptych_get_list(t, i, &list) == 0 && list.level > levels)
+            levels = list.level;
+    for (int i = 0; i < s->m->row_count; i++) {
+        accuracy_row *row = &s->m->rows[i];
+        if (row->setting.settings.lod_px > 0 && !levels)
+            leave_out(row, "the data set has no coarse levels");
+        else if (row->setting.settings.samples > s->o->samples)
+            leave_out(row, "the integral has %d x %d rays a pixel: --samples %d compares them",
+                      s->o->samples, s->o->samples, row->setting.settings.samples);
+    }
+    return 0;
+}
+
+/* ---- pictures of the ladder ---- */
+
+static int draw_integral(sweep *s, int data, int renderer, triptych_field field, double radius,
+                         float *rgba)
+{
+    triptych_settings settings = s->usual;
+    double ms;
+    settings.field = field;
+    settings.kernel_radius = radius;
+    settings.tolerance = s->o->tolerance;
+    settings.samples = s->o->samples;
+    bench_progress_step(s->progress, "integral");
+    int status = accuracy_contexts_draw(&s->contexts, data, renderer, &settings, rgba, &ms);
+    return status == TRIP_ERROR
+               ? trip_fail(TRIP_ERROR, "accuracy",
+                           renderer == ACCURACY_SOURCE ? s->o->source : s->o->data[data],
+                           "no integral: %s", s->contexts.why[data][renderer])
+               : status;
+}
+
+static int need_stored(sweep *s, int data)
+{
+    if (s->stored_data == data)
+        return 0;
+    s->stored_data = data;
+    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, TRIPTYCH_VALUES,
+                         s->usual.kernel_radius, s->pictures[STORED]);
+}
+
+static int need_field(sweep *s, int data, double radius)
+{
+    if (s->field_data == data && s->field_radius == radius)
+        return 0;
+    s->field_data = data;
+    s->field_radius = radius;
+    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, TRIPTYCH_SPLATS, radius,
+                         s->pictures[FIELD]);
+}
+
+/* The reference of a row's settings, and at the finest level if that is another. */
+static int need_reference(sweep *s, const accuracy_row *row)
+{
+    triptych_settings settings = row->setting.settings;
+    double ms;
+    if (s->reference_data == row->data && accuracy_setting_same_reference(&settings, &s->reference))
+        return 0;
+    s->reference_data = -1;
+    s->reference = settings;
+    settings.target = TRIPTYCH_RGBA32F;
+    bench_progress_step(s->progress, "reference");
+    int status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
+                                        &settings, s->pictures[REFERENCE], &ms);
+    memcpy(s->pictures[FINE], s->pictures[REFERENCE], s->picture_bytes);
+    settings.lod_px = 0;
+    if (!status && row->setting.settings.lod_px > 0)
+        status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
+                                        &settings, s->pictures[FINE], &ms);
+    s->reference_data = status ? -1 : row->data;
+    return status;
+}
+
+static void compare(sweep *s, accuracy_row *row, accuracy_step step, which a, which b)
+{
+    row->has[step] = true;
+    accuracy_error_add(&row->error[step], s->pictures[a], s->pictures[b], pixels_of(s));
+}
+
+/* Whether what ran is classified before it is splatted. */
+static bool is_pre(const triptych_frame_stats *stats)
+{
+    return stats->classify == TRIPTYCH_PRE;
+}
+
+static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
+{
+    int status = need_stored(s, row->data);
+    if (!status && s->o->source)
+        compare(s, row, ACCURACY_STORAGE, STORED, TRUTH);
+    if (status || !s->o->ladder)
+        return status;
+    if (row->setting.renderer == TRIPTYCH_RENDERER_INTEGRAL) {
+        compare(s, row, ACCURACY_PRECISION, RAN, STORED);
+        return 0;
+    }
+    which drawn = is_pre(stats) ? FIELD : STORED;
+    if (drawn == FIELD)
+        status = need_field(s, row->data, row->setting.settings.kernel_radius);
+    if (status)
+        return status;
+    compare(s, row, ACCURACY_MODEL, drawn, STORED);
+    status = need_reference(s, row);
+    if (status) /* it does not have everything that others have */
+        return status == TRIP_ERROR ? 0 : status;
+    compare(s, row, ACCURACY_METHOD, FINE, drawn);
+    if (row->setting.settings.lod_px > 0)
+        compare(s, row, ACCURACY_LEVEL, REFERENCE, FINE);
+    compare(s, row, ACCURACY_PRECISION, RAN, REFERENCE);
+    return 0;
+}
+
+/* ---- a row ---- */
+
+static int keep_exr(sweep *s, triptych *t, which picture, int view, const char *name)
+{
+    char path[4096];
+    if (!s->o->pictures)
+        return 0;
+    if (snprintf(path, sizeof path, "%s/%s-%d.exr", s->m->folder, name, view) >= (int)sizeof path)
+        return trip_fail(TRIP_USAGE, "accuracy", s->m->folder, "the name is too long");
+    if (triptych_write(t, path, s->o->width, s->o->height, s->pictures[picture]) == 0)
+        return 0;
+    trip_report_line(triptych_error(t));
+    return TRIP_ERROR;
+}
+
+static int compare_with_truth(sweep *s, accuracy_row *row)
+{
+    double ssim, flip;
+    const float *ran = s->pictures[RAN], *truth = s->pictures[TRUTH];
+    compare(s, row, ACCURACY_TOTAL, RAN, TRUTH);
+    s->view = (accuracy_error){ 0 };
+    accuracy_error_add(&s->view, ran, truth, pixels_of(s));
+    row->worst_percentile_99 =
+        fmax(row->worst_percentile_99, accuracy_error_measure(&s->view).percentile_99);
+    int status = accuracy_ssim(ran, truth, s->o->width, s->o->height, s->contexts.budget, &ssim);
+    if (!status)
+        status = accuracy_flip(ran, truth, s->o->width, s->o->height, s->contexts.budget, &flip);
+    if (status)
+        return status;
+    row->ssim += ssim;
+    row->flip += flip;
+    if (row->views == 0) {
+        row->picture = accuracy_picture_data(ran, s->o->width, s->o->height, THUMBNAIL_PX);
+        row->difference =
+            accuracy_difference_data(ran, truth, s->o->width, s->o->height, THUMBNAIL_PX);
+    }
+    return 0;
+}
+
+/* Counted apart, so that it takes nothing of what is timed. */
+static int count_splats(sweep *s, accuracy_row *row, float *rgba)
+{
+    triptych_settings settings = row->setting.settings;
+    triptych *t = s->contexts.contexts[row->data][row->setting.renderer];
+    triptych_info info;
+    triptych_list_stats list;
+    double ms;
+    settings.count = 1;
+    int status = accuracy_contexts_draw(&s->contexts, row->data, row->setting.renderer, &settings,
+                                        rgba, &ms);
+    if (status == TRIP_ERROR)
+        return 0;
+    if (!status && triptych_get_info(t, &info) == 0) {
+        row->splats_drawn = 0;
+        for (unsigned i = 0; i < info.lists; i++)
+            if (triptych_get_list_stats(t, i, &list) == 0)
+                row->splats_drawn += (double)list.splats_drawn;
+    }
+    return status;
+}
+
+static int time_row(sweep *s, accuracy_row *row)
+{
+    int status = 0;
+    for (int i = 0; i < s->o->repeat && !status; i++)
+        status = accuracy_contexts_draw(&s->contexts, row->data, row->setting.renderer,
+                                        &row->setting.settings, s->pictures[RAN],
+                                        &row->ms[row->frames++]);
+    return status;
+}
+
+/* Untimed first, which also warms what a frame needs. */
+static int measure_row(sweep *s, accuracy_row *row, int view)
+{
+    int renderer = (int)row->setting.renderer;
+    triptych_frame_stats stats;
+    double ms;
+    bench_progress_step(s->progress, row->setting.name);
+    int status = accuracy_contexts_draw(&s->contexts, row->data, renderer, &row->setting.settings,
+                                        s->pictures[RAN], &ms);
+    if (status == TRIP_ERROR) {
+        leave_out(row, "%s", s->contexts.why[row->data][renderer]);
+        return 0;
+    }
+    triptych *t = s->contexts.contexts[row->data][renderer];
+    if (status || triptych_get_frame_stats(t, &stats))
+        return status ? status : TRIP_ERROR;
+    row->splats += (double)stats.splats;
+    row->bytes_read += (double)stats.bytes_read;
+    status = compare_with_truth(s, row);
+    if (!status)
+        status = keep_exr(s, t, RAN, view, row->setting.name);
+    if (!status)
+        status = climb(s, row, &stats);
+    if (!status)
+        status = time_row(s, row);
+    if (!status && view == 0 && is_pre(&stats) && renderer != TRIPTYCH_RENDERER_INTEGRAL)
+        status = count_splats(s, row, s->pictures[RAN]);
+    row->views++;
+    row->state = ACCURACY_MEASURED;
+    return status;
+}
+
+/* ---- views ---- */
+
+/* The integral that all is held to: of the source where it is known. */
+static int find_truth(sweep *s, int view)
+{
+    int status;
+    s->stored_data = s->field_data = s->reference_data = -1;
+    if (s->o->source)
+        status = draw_integral(s, 0, ACCURACY_SOURCE, TRIPTYCH_VALUES, s->usual.kernel_radius,
+                               s->pictures[TRUTH]);
+    else {
+        status = need_stored(s, 0);
+        memcpy(s->pictures[TRUTH], s->pictures[STORED], s->picture_bytes);
+    }
+    if (status)
+        return status;
+    if (view == 0)
+        s->m->truth =
+            accuracy_picture_data(s->pictures[TRUTH], s->o->width, s->o->height, THUMBNAIL_PX);
+    triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
+    return keep_exr(s, t, TRUTH, view, "truth");
+}
+
+/* In the first view rows are begun until the seconds are over; later ones are begun whole. */
+static int measure_view(sweep *s, int view)
+{
+    accuracy_measured *m = s->m;
+    triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
+    int status =
+        accuracy_view_find(t, s->o->width, s->o->height, view, s->o->views, &m->views[view]);
+    if (!status)
+        status = accuracy_contexts_look(&s->contexts, &m->views[view]);
+    if (status)
+        return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "no view: %s", triptych_error(t));
+    status = find_truth(s, view);
+    for (int i = 0; i < m->row_count && !status; i++)
+        if (m->rows[i].state == (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED) &&
+            (view || i == 0 || !is_over(s)))
+            status = measure_row(s, &m->rows[i], view);
+    if (!status)
+        m->view_count++;
+    return status;
+}
+
+/* A view is begun where as long as one took before is left. */
+static bool has_time_for(const sweep *s, int view)
+{
+    double spent = now_seconds() - s->begin;
+    return view == 0 || spent * (view + 1) / view <= s->o->budget_seconds;
+}
+
+static int take_pictures(sweep *s)
+{
+    s->picture_bytes = 4 * pixels_of(s) * sizeof(float);
+    for (int i = 0; i < PICTURES; i++)
+        if (!(s->pictures[i] = trip_budget_take(s->contexts.budget, s->picture_bytes)))
+            return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0],
+                             "pictures of %d x %d do not fit the memory given; raise --memory or "
+                             "make them smaller",
+                             s->o->width, s->o->height);
+    return 0;
+}
+
+static triptych_settings usual_settings(const accuracy_options *o)
+{
+    triptych_settings s = triptych_default_settings();
+    s.shading = o->shading;
+    memset(s.background, 0, sizeof s.background);
+    return s;
+}
+
+static int measure_views(sweep *s)
+{
+    int status = 0, steps = 0;
+    for (int i = 0; i < s->m->row_count; i++)
+        steps += s->m->rows[i].state == ACCURACY_NOT_REACHED;
+    bench_progress_expect(s->progress, s->o->views * (1 + steps * (s->o->ladder ? 2 : 1)));
+    for (int view = 0; view < s->o->views && !status && has_time_for(s, view); view++)
+        status = measure_view(s, view);
+    return status;
+}
+
+int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder)
+{
+    sweep *s = calloc(1, sizeof *s);
+    *m = (accuracy_measured){ .options = o, .folder = folder };
+    if (!s)
+        return trip_fail(TRIP_ERROR, "accuracy", "sweep", "out of memory");
+    s->m = m;
+    s->o = o;
+    s->usual = usual_settings(o);
+    s->begin = now_seconds();
+    int status = add_rows(m, &s->usual);
+    if (!status && !o->quiet)
+        s->progress = bench_progress_start_lines("accuracy");
+    if (!status)
+        status = accuracy_contexts_create(&s->contexts, o);
+    if (!status)
+        status = take_pictures(s);
+    if (!status)
+        status = leave_out_idle(s);
+    if (!status)
+        status = measure_views(s);
+    m->seconds = now_seconds() - s->begin;
+    bench_progress_end(s->progress);
+    for (int i = 0; i < PICTURES; i++)
+        if (s->pictures[i])
+            trip_budget_release(s->contexts.budget, s->pictures[i], s->picture_bytes);
+    accuracy_contexts_close(&s->contexts);
+    free(s);
+    return status;
+}
+
+void accuracy_measured_free(accuracy_measured *m)
+{
+    for (int i = 0; i < m->row_count; i++) {
+        free(m->rows[i].ms);
+        free(m->rows[i].picture);
+        free(m->rows[i].difference);
+    }
+    for (int i = 0; i < m->other_count; i++) {
+        free(m->others[i].ms);
+        free(m->others[i].picture);
+        free(m->others[i].difference);
+    }
+    free(m->rows);
+    free(m->views);
+    free(m->truth);
+    *m = (accuracy_measured){ 0 };
+}

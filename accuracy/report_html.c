@@ -1,0 +1,288 @@
+/* index.html: one page that holds all it shows. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "picture_data.h"
+#include "accuracy_report.h"
+
+static const char style[] =
+    "body{font:15px/1.45 system-ui,sans-serif;max-width:1180px;margin:24px auto;padding:0 16px;"
+    "color:#222}\n"
+    "h1{font-size:24px}h2{font-size:19px;margin-top:32px}\n"
+    "table{border-collapse:collapse;font-size:13px}td,th{padding:2px 7px;text-align:right;"
+    "border-bottom:1px solid #ddd;white-space:nowrap}td:first-child,th:first-child{text-align:left}"
+    "\n"
+    "tr.front td:first-child{font-weight:bold}.wide{overflow-x:auto}\n"
+    "pre{background:#f4f4f4;padding:8px;overflow-x:auto;font-size:12px}\n"
+    "figure{display:inline-block;margin:0 12px 14px 0;font-size:12px;vertical-align:top}"
+    "figcaption{max-width:262px}img{background:#000;image-rendering:pixelated;margin-right:4px}\n"
+    "svg{max-width:100%;height:auto;font:11px system-ui,sans-serif;background:#fff}"
+    ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}circle,rect{stroke:#fff}"
+    ".post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}.quality{fill:#c21f3a}"
+    ".other{fill:#7b3fb5}.key{display:inline-block;width:11px;height:11px;border-radius:6px;"
+    "margin:0 4px 0 14px}\n";
+
+static void write_escaped(FILE *f, const char *text)
+{
+    for (; *text; text++)
+        switch (*text) {
+        case '<':
+            fputs("&lt;", f);
+            break;
+        case '>':
+            fputs("&gt;", f);
+            break;
+        case '&':
+            fputs("&amp;", f);
+            break;
+        case '"':
+            fputs("&quot;", f);
+            break;
+        default:
+            if ((unsigned char)*text >= ' ')
+                fputc(*text, f);
+        }
+}
+
+static void write_number(FILE *f, double value, int decimals)
+{
+    if (isfinite(value))
+        fprintf(f, "<td>%.*f", decimals, value);
+    else
+        fputs("<td>-", f);
+}
+
+static void write_head(FILE *f, const accuracy_report *r)
+{
+    const accuracy_options *o = r->m->options;
+    fputs("<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8>\n<title>Accuracy: ", f);
+    write_escaped(f, o->data[0]);
+    fprintf(f, "</title>\n<style>\n%s</style></head><body>\n<h1>What accuracy costs: ", style);
+    write_escaped(f, o->data[0]);
+    fprintf(f,
+            "</h1>\n<p>Pictures of %d x %d pixels from %d view%s, held to the "
+            "emission&ndash;absorption integral ",
+            o->width, o->height, r->m->view_count, r->m->view_count == 1 ? "" : "s");
+    if (o->source) {
+        fputs("through the source volume ", f);
+        write_escaped(f, o->source);
+    } else
+        fputs("through the values that the data set stores (what storing loses is in no figure)",
+              f);
+    fprintf(f,
+            ", one ray for each of %d x %d places of a pixel, to a tolerance of %g. Errors are of "
+            "255, of red, green, blue (premultiplied) and alpha over the pixels that the object "
+            "covers. Load of the machine: %.1f before, %.1f after.</p>\n",
+            o->samples, o->samples, o->tolerance, r->load_before, r->load_after);
+}
+
+static void write_plots(FILE *f, const accuracy_report *r)
+{
+    fputs("<h2>Time and error</h2>\n<p><span class='key post' style='background:#1f6fc4'></span>"
+          "post<span class=key style='background:#e07b1a'></span>pre"
+          "<span class=key style='background:#2a9d4e'></span>gl"
+          "<span class=key style='background:#888'></span>reference, integral"
+          "<span class=key style='background:#c21f3a'></span>--quality"
+          "<span class=key style='background:#7b3fb5;border-radius:0'></span>VTK. "
+          "The line is the front: no setting is both faster and closer.</p>\n",
+          f);
+    accuracy_report_plot(f, r, false);
+    accuracy_report_plot(f, r, true);
+    if (r->m->why_no_vtk[0]) {
+        fputs("<p>VTK is left out: ", f);
+        write_escaped(f, r->m->why_no_vtk);
+        fputs("</p>\n", f);
+    }
+}
+
+static void write_row(FILE *f, const accuracy_report *r, int i)
+{
+    const accuracy_row *row = &r->m->rows[i];
+    const accuracy_error_figures *e = &r->figures[i][ACCURACY_TOTAL];
+    fprintf(f, "<tr%s><td title=\"", r->front[i] ? " class=front" : "");
+    accuracy_write_options(f, &row->setting);
+    fputs("\">", f);
+    write_escaped(f, row->setting.name);
+    write_number(f, r->ms[i], 1);
+    write_number(f, row->splats / row->views / 1e6, 3);
+    write_number(f, row->bytes_read / row->views / 1e6, 2);
+    write_number(f, e->most, 1);
+    write_number(f, e->mean, 2);
+    write_number(f, e->median, 2);
+    write_number(f, e->percentile_99, 2);
+    write_number(f, e->psnr, 1);
+    write_number(f, row->ssim / row->views, 4);
+    write_number(f, row->flip / row->views, 4);
+    for (int s = ACCURACY_STORAGE; s < ACCURACY_STEPS; s++) {
+        const accuracy_error_figures *step = &r->figures[i][s];
+        if (row->has[s])
+            fprintf(f, "<td>%.2f / %.2f", step->mean, step->percentile_99);
+        else
+            fputs("<td>-", f);
+    }
+    fputs("\n", f);
+}
+
+static void write_others(FILE *f, const accuracy_report *r)
+{
+    for (int i = 0; i < r->m->other_count; i++) {
+        const accuracy_other *one = &r->m->others[i];
+        const accuracy_error_figures e = accuracy_error_measure(&one->error);
+        fputs("<tr><td title=\"", f);
+        write_escaped(f, one->device);
+        fputs("\">", f);
+        write_escaped(f, one->name);
+        write_number(f, accuracy_median(one->ms, one->frames), 1);
+        fputs("<td>-<td>-", f);
+        write_number(f, e.most, 1);
+        write_number(f, e.mean, 2);
+        write_number(f, e.median, 2);
+        write_number(f, e.percentile_99, 2);
+        write_number(f, e.psnr, 1);
+        write_number(f, one->ssim / one->views, 4);
+        write_number(f, one->flip / one->views, 4);
+        fputs("<td>-<td>-<td>-<td>-<td>-\n", f);
+    }
+}
+
+static void write_table(FILE *f, const accuracy_report *r)
+{
+    fputs("<h2>Settings</h2>\n<div class=wide><table><tr><th>settings<th>ms<th>million splats"
+          "<th>MB read<th>most<th>mean<th>median<th>99 %<th>PSNR<th>SSIM<th>FLIP<th>storage"
+          "<th>model<th>method<th>level<th>precision\n",
+          f);
+    for (int i = 0; i < r->m->row_count; i++)
+        if (r->m->rows[i].state == ACCURACY_MEASURED)
+            write_row(f, r, i);
+    write_others(f, r);
+    fputs("</table></div>\n<p>Bold: on the front of the 99th percentile. The last columns are the "
+          "steps of the ladder, as mean / 99th percentile: <b>storage</b>, the integral of the "
+          "values stored to that of the source; <b>model</b>, the integral of what is drawn (the "
+          "sum of splats with pre, values with post) to that of the values stored; <b>method</b>, "
+          "the reference in double precision to that: order, sheets, slices, lists, merging; "
+          "<b>level</b>, the reference at the levels drawn to that at the finest; "
+          "<b>precision</b>, what ran to the reference. Steps do not add up where they make up for "
+          "one another. Times are whole frames from the file on, the median of all views; splats "
+          "(with post: voxels) and bytes are what a frame read. SSIM is that of Wang et al. (2004) "
+          "and FLIP that of Andersson et al. (2020) at 67 pixels a degree, of whole pictures over "
+          "black.</p>\n",
+          f);
+}
+
+static void write_figure(FILE *f, const char *name, const char *picture, const char *difference,
+                         const accuracy_error_figures *e)
+{
+    if (!picture || !difference)
+        return;
+    fprintf(f, "<figure><img alt='' src=\"%s\"><img alt='' src=\"%s\"><figcaption>", picture,
+            difference);
+    write_escaped(f, name);
+    fprintf(f, ": mean %.2f, 99 %% %.2f</figcaption></figure>\n", e->mean, e->percentile_99);
+}
+
+static void write_pictures(FILE *f, const accuracy_report *r)
+{
+    fprintf(f,
+            "<h2>Pictures of the first view</h2>\n<p>Beside each how far it is from the integral, "
+            "the most of a pixel's channels: black is none, white %g of 255 and more.</p>\n",
+            ACCURACY_DIFFERENCE_MOST);
+    if (r->m->truth)
+        fprintf(f, "<figure><img alt='' src=\"%s\"><figcaption>integral</figcaption></figure>\n",
+                r->m->truth);
+    for (int i = 0; i < r->m->row_count; i++) {
+        const accuracy_row *row = &r->m->rows[i];
+        write_figure(f, row->setting.name, row->picture, row->difference,
+                     &r->figures[i][ACCURACY_TOTAL]);
+    }
+    for (int i = 0; i < r->m->other_count; i++) {
+        const accuracy_other *one = &r->m->others[i];
+        const accuracy_error_figures e = accuracy_error_measure(&one->error);
+        write_figure(f, one->name, one->picture, one->difference, &e);
+    }
+}
+
+static void write_left_out(FILE *f, const accuracy_report *r)
+{
+    bool any = r->m->view_count < r->m->options->views;
+    for (int i = 0; i < r->m->row_count; i++)
+        any |= r->m->rows[i].state != ACCURACY_MEASURED;
+    if (!any)
+        return;
+    fputs("<h2>Left out</h2>\n<ul>\n", f);
+    if (r->m->view_count < r->m->options->views)
+        fprintf(f, "<li>views %d to %d: the seconds given were over\n", r->m->view_count + 1,
+                r->m->options->views);
+    for (int i = 0; i < r->m->row_count; i++) {
+        const accuracy_row *row = &r->m->rows[i];
+        if (row->state == ACCURACY_MEASURED)
+            continue;
+        fprintf(f, "<li>%s: ", row->setting.name);
+        write_escaped(f,
+                      row->state == ACCURACY_LEFT_OUT ? row->why : "the seconds given were over");
+        fputs("\n", f);
+    }
+    fputs("</ul>\n", f);
+}
+
+/* What a shell takes, through the escapes of HTML. */
+static void write_commands(FILE *f, const accuracy_report *r)
+{
+    const accuracy_options *o = r->m->options;
+    char *text = NULL;
+    size_t bytes;
+    FILE *memory = open_memstream(&text, &bytes);
+    if (!memory)
+        return;
+    fprintf(memory, "%s\n\n", r->command);
+    for (int i = 0; i < r->m->view_count; i++) {
+        fprintf(memory, "view%d=\"", i + 1);
+        accuracy_write_view(memory, &r->m->views[i]);
+        fprintf(memory, "\" # %s\n", r->m->views[i].name);
+    }
+    for (int i = 0; i < r->m->row_count; i++) {
+        const accuracy_row *row = &r->m->rows[i];
+        if (row->state != ACCURACY_MEASURED)
+            continue;
+        fputs("triptych render ", memory);
+        accuracy_write_word(memory, o->data[row->data]);
+        fprintf(memory, " -o %s.exr $view1%s", row->setting.name,
+                o->shading ? "" : " --no-shading");
+        if (o->tf) {
+            fputs(" --tf ", memory);
+            accuracy_write_word(memory, o->tf);
+        }
+        fputc(' ', memory);
+        accuracy_write_options(memory, &row->setting);
+        fputc('\n', memory);
+    }
+    fclose(memory);
+    fputs("<h2>To repeat</h2>\n<pre>", f);
+    for (const char *line = text; line && *line; line++)
+        if (*line == '\n')
+            fputc('\n', f);
+        else
+            write_escaped(f, (const char[2]){ *line, 0 });
+    fputs("</pre>\n", f);
+    free(text);
+}
+
+char *accuracy_report_html(const accuracy_report *r)
+{
+    char *text = NULL;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    if (!f)
+        return NULL;
+    write_head(f, r);
+    write_plots(f, r);
+    write_table(f, r);
+    write_pictures(f, r);
+    write_left_out(f, r);
+    write_commands(f, r);
+    fputs("</body></html>\n", f);
+    if (fclose(f) == 0)
+        return text;
+    free(text);
+    return NULL;
+}

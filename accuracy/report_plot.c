@@ -1,0 +1,239 @@
+/* Time and error, both logarithmic, with the front as a line through the settings that are on it.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "accuracy_report.h"
+
+enum { WIDTH = 860, HEIGHT = 480, LEFT = 64, RIGHT = 20, TOP = 16, BOTTOM = 48, LABELS_MAX = 256 };
+
+static const double least_error = 0.01; /* what is less is drawn there */
+
+typedef struct box {
+    double x0, y0, x1, y1;
+} box;
+
+typedef struct plot {
+    FILE *f;
+    const accuracy_report *r;
+    bool mean;
+    double x0, x1, y0, y1; /* decimal logarithms at the edges */
+    box taken[LABELS_MAX];
+    int taken_count;
+} plot;
+
+static bool is_shown(const plot *p, int i)
+{
+    return p->r->m->rows[i].state == ACCURACY_MEASURED;
+}
+
+static double error_of(const plot *p, const accuracy_error_figures *f)
+{
+    return fmax(least_error, p->mean ? f->mean : f->percentile_99);
+}
+
+static double row_error(const plot *p, int i)
+{
+    return error_of(p, &p->r->figures[i][ACCURACY_TOTAL]);
+}
+
+static double other_error(const plot *p, int i)
+{
+    const accuracy_error_figures f = accuracy_error_measure(&p->r->m->others[i].error);
+    return error_of(p, &f);
+}
+
+static double other_ms(const plot *p, int i)
+{
+    return accuracy_median(p->r->m->others[i].ms, p->r->m->others[i].frames);
+}
+
+static void include(plot *p, double ms, double error)
+{
+    p->x0 = fmin(p->x0, log10(ms) - 0.1);
+    p->x1 = fmax(p->x1, log10(ms) + 0.25);
+    p->y0 = fmin(p->y0, log10(error) - 0.1);
+    p->y1 = fmax(p->y1, log10(error) + 0.1);
+}
+
+static void find_edges(plot *p)
+{
+    p->x0 = p->y0 = INFINITY;
+    p->x1 = p->y1 = -INFINITY;
+    for (int i = 0; i < p->r->m->row_count; i++)
+        if (is_shown(p, i))
+            include(p, p->r->ms[i], row_error(p, i));
+    for (int i = 0; i < p->r->m->other_count; i++)
+        include(p, other_ms(p, i), other_error(p, i));
+}
+
+static double place_x(const plot *p, double ms)
+{
+    return LEFT + (log10(ms) - p->x0) / (p->x1 - p->x0) * (WIDTH - LEFT - RIGHT);
+}
+
+static double place_y(const plot *p, double error)
+{
+    return HEIGHT - BOTTOM - (log10(error) - p->y0) / (p->y1 - p->y0) * (HEIGHT - TOP - BOTTOM);
+}
+
+/* 1, 2 and 5 of each decade between the edges. */
+static void draw_ticks(const plot *p)
+{
+    static const double steps[] = { 1, 2, 5 };
+    for (int decade = -4; decade < 8; decade++)
+        for (int k = 0; k < 3; k++) {
+            double value = steps[k] * pow(10, decade), x = place_x(p, value), y = place_y(p, value);
+            if (log10(value) >= p->x0 && log10(value) <= p->x1)
+                fprintf(p->f,
+                        "<path class=grid d='M%.1f %d V%d'/><text x='%.1f' y='%d' "
+                        "text-anchor='middle'>%g</text>\n",
+                        x, TOP, HEIGHT - BOTTOM, x, HEIGHT - BOTTOM + 16, value);
+            if (log10(value) >= p->y0 && log10(value) <= p->y1)
+                fprintf(p->f,
+                        "<path class=grid d='M%d %.1f H%d'/><text x='%d' y='%.1f' "
+                        "text-anchor='end'>%g</text>\n",
+                        LEFT, y, WIDTH - RIGHT, LEFT - 6, y + 4, value);
+        }
+    fprintf(p->f,
+            "<text x='%d' y='%d' text-anchor='middle'>median ms a frame</text>\n"
+            "<text transform='translate(16 %d) rotate(-90)' text-anchor='middle'>%s</text>\n",
+            (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, (TOP + HEIGHT - BOTTOM) / 2,
+            p->mean ? "mean error, of 255" : "error, 99th percentile, of 255");
+}
+
+/* Its colour, which stands for the family of settings. */
+static const char *family(const char *name)
+{
+    static const struct {
+        const char *prefix, *family;
+    } families[] = { { "quality", "quality" }, { "gl", "gl" },     { "reference", "slow" },
+                     { "integral", "slow" },   { "post", "post" }, { "pre", "pre" } };
+    for (size_t i = 0; i < sizeof families / sizeof *families; i++)
+        if (!strncmp(name, families[i].prefix, strlen(families[i].prefix)))
+            return families[i].family;
+    return "pre";
+}
+
+static bool overlaps(const plot *p, box b)
+{
+    for (int i = 0; i < p->taken_count; i++) {
+        const box *t = &p->taken[i];
+        if (b.x0 < t->x1 && b.x1 > t->x0 && b.y0 < t->y1 && b.y1 > t->y0)
+            return true;
+    }
+    return b.x0 < LEFT || b.x1 > WIDTH || b.y0 < 0 || b.y1 > HEIGHT - BOTTOM;
+}
+
+static void take(plot *p, box b)
+{
+    if (p->taken_count < LABELS_MAX)
+        p->taken[p->taken_count++] = b;
+}
+
+/* A name beside a mark, where there is room; else none. */
+static void write_label(plot *p, double x, double y, const char *name)
+{
+    const double width = 6.4 * (double)strlen(name), height = 12;
+    const double places[][2] = { { 8, -2 },          { 8, 14 },           { -8 - width, -2 },
+                                 { -8 - width, 14 }, { -width / 2, -10 }, { -width / 2, 22 },
+                                 { 14, -16 },        { 14, 28 } };
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        box b = { x + places[i][0], y + places[i][1] - height + 2, x + places[i][0] + width,
+                  y + places[i][1] + 2 };
+        if (overlaps(p, b))
+            continue;
+        take(p, b);
+        fprintf(p->f, "<text x='%.1f' y='%.1f'>%s</text>\n", b.x0, b.y1 - 2, name);
+        return;
+    }
+}
+
+static void draw_front(const plot *p)
+{
+    const bool *front = p->mean ? p->r->front_of_mean : p->r->front;
+    bool begun = false;
+    double last = -INFINITY;
+    fputs("<path class=front d='", p->f);
+    for (;;) {
+        int next = -1;
+        for (int i = 0; i < p->r->m->row_count; i++)
+            if (front[i] && p->r->ms[i] > last && (next < 0 || p->r->ms[i] < p->r->ms[next]))
+                next = i;
+        if (next < 0)
+            break;
+        double x = place_x(p, p->r->ms[next]), y = place_y(p, row_error(p, next));
+        if (begun)
+            fprintf(p->f, " H%.1f V%.1f", x, y);
+        else
+            fprintf(p->f, "M%.1f %.1f", x, y);
+        begun = true;
+        last = p->r->ms[next];
+    }
+    fputs("'/>\n", p->f);
+}
+
+static void draw_rows(plot *p)
+{
+    const bool *front = p->mean ? p->r->front_of_mean : p->r->front;
+    for (int i = 0; i < p->r->m->row_count; i++) {
+        if (!is_shown(p, i))
+            continue;
+        const char *name = p->r->m->rows[i].setting.name;
+        double x = place_x(p, p->r->ms[i]), y = place_y(p, row_error(p, i));
+        fprintf(p->f,
+                "<circle class=%s cx='%.1f' cy='%.1f' r='%d'><title>%s: %.1f ms, %.2f"
+                "</title></circle>\n",
+                family(name), x, y, front[i] ? 6 : 4, name, p->r->ms[i], row_error(p, i));
+        take(p, (box){ x - 5, y - 5, x + 5, y + 5 });
+    }
+}
+
+static void draw_others(plot *p)
+{
+    for (int i = 0; i < p->r->m->other_count; i++) {
+        double x = place_x(p, other_ms(p, i)), y = place_y(p, other_error(p, i));
+        fprintf(p->f,
+                "<rect class=other x='%.1f' y='%.1f' width='9' height='9'><title>%s: %.1f ms, "
+                "%.2f</title></rect>\n",
+                x - 4.5, y - 4.5, p->r->m->others[i].name, other_ms(p, i), other_error(p, i));
+        take(p, (box){ x - 5, y - 5, x + 5, y + 5 });
+    }
+}
+
+/* Those that matter first, so that they find room. */
+static void write_labels(plot *p)
+{
+    const bool *front = p->mean ? p->r->front_of_mean : p->r->front;
+    for (int i = 0; i < p->r->m->other_count; i++)
+        write_label(p, place_x(p, other_ms(p, i)), place_y(p, other_error(p, i)),
+                    p->r->m->others[i].name);
+    for (int pass = 0; pass < 3; pass++)
+        for (int i = 0; i < p->r->m->row_count; i++) {
+            const char *name = p->r->m->rows[i].setting.name;
+            int rank = front[i] ? 0 : !strcmp(family(name), "quality") ? 1 : 2;
+            if (is_shown(p, i) && rank == pass)
+                write_label(p, place_x(p, p->r->ms[i]), place_y(p, row_error(p, i)), name);
+        }
+}
+
+void accuracy_report_plot(FILE *f, const accuracy_report *r, bool mean)
+{
+    plot *p = calloc(1, sizeof *p);
+    if (!p)
+        return;
+    *p = (plot){ .f = f, .r = r, .mean = mean };
+    find_edges(p);
+    fprintf(f, "<svg viewBox='0 0 %d %d' width='%d' height='%d' role='img'>\n", WIDTH, HEIGHT,
+            WIDTH, HEIGHT);
+    if (isfinite(p->x0)) {
+        draw_ticks(p);
+        draw_front(p);
+        draw_rows(p);
+        draw_others(p);
+        write_labels(p);
+    }
+    fputs("</svg>\n", f);
+    free(p);
+}

@@ -1,0 +1,204 @@
+#include "setting.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+typedef struct sweep {
+    accuracy_setting *out;
+    int count;
+    triptych_settings pre, post;
+} sweep;
+
+__attribute__((format(printf, 4, 5))) static void add(sweep *w, triptych_renderer renderer,
+                                                      triptych_settings s, const char *name, ...)
+{
+    va_list arguments;
+    accuracy_setting *one = &w->out[w->count++];
+    va_start(arguments, name);
+    vsnprintf(one->name, sizeof one->name, name, arguments);
+    va_end(arguments);
+    one->renderer = renderer;
+    one->settings = s;
+}
+
+static void add_qualities(sweep *w, const triptych_settings *usual)
+{
+    static const char *const names[] = { "draft", "normal", "high", "exact" };
+    for (int i = 0; i < 4; i++) {
+        triptych_settings s = *usual;
+        triptych_set_quality(&s, (triptych_quality)(TRIPTYCH_DRAFT + i));
+        add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", names[i]);
+    }
+}
+
+/* Post with each number of slices, the papers' parameter h, the other methods. */
+static void add_post(sweep *w)
+{
+    static const int slices[] = { 1, 2, 3, 4, 6, 8, 16 };
+    static const double h[] = { 0, 0.5, 0.7, 0.95, 0.99 };
+    triptych_settings s = w->post;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post");
+    for (size_t i = 0; i < sizeof slices / sizeof *slices; i++) {
+        s.slices = slices[i];
+        add(w, TRIPTYCH_RENDERER_CPU, s, "post-slices-%d", slices[i]);
+    }
+    s = w->post;
+    s.method = TRIPTYCH_CLIP;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip");
+    s.slices = 1;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip-slices-1");
+    s = w->post;
+    s.method = TRIPTYCH_AXIS;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post-axis");
+    s = w->post;
+    for (size_t i = 0; i < sizeof h / sizeof *h; i++) {
+        s.h = h[i];
+        add(w, TRIPTYCH_RENDERER_CPU, s, "post-h-%g", h[i]);
+    }
+}
+
+static void add_pre(sweep *w, triptych_compositing compositing)
+{
+    static const double h[] = { 0, 0.5, 0.95, 0.99 };
+    const char *name = compositing == TRIPTYCH_BY_SHEET ? "pre-sheet" : "pre";
+    triptych_settings s = w->pre;
+    s.compositing = compositing;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "%s", name);
+    for (size_t i = 0; i < sizeof h / sizeof *h; i++) {
+        s.h = h[i];
+        add(w, TRIPTYCH_RENDERER_CPU, s, "%s-h-%g", name, h[i]);
+    }
+    s.h = w->pre.h;
+    s.method = TRIPTYCH_CLIP;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "%s-clip", name);
+    s.method = TRIPTYCH_AXIS;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "%s-axis", name);
+}
+
+static void add_targets(sweep *w)
+{
+    triptych_settings s = w->pre;
+    s.target = TRIPTYCH_RGBA16F;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-rgba16f");
+    s.target = TRIPTYCH_RGBA8;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-rgba8");
+}
+
+static void add_kernels(sweep *w)
+{
+    static const double radii[] = { 1.5, 2.5, 3 };
+    triptych_settings s = w->pre;
+    for (size_t i = 0; i < sizeof radii / sizeof *radii; i++) {
+        s.kernel_radius = radii[i];
+        add(w, TRIPTYCH_RENDERER_CPU, s, "pre-radius-%g", radii[i]);
+    }
+}
+
+static void add_levels(sweep *w)
+{
+    static const double widths[] = { 1, 2, 4 };
+    for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
+        triptych_settings pre = w->pre, post = w->post;
+        pre.lod_px = post.lod_px = widths[i];
+        add(w, TRIPTYCH_RENDERER_CPU, post, "post-lod-%g", widths[i]);
+        add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-lod-%g", widths[i]);
+    }
+}
+
+static void add_renderers(sweep *w)
+{
+    triptych_settings s = w->post;
+    add(w, TRIPTYCH_RENDERER_GL, w->post, "gl-post");
+    add(w, TRIPTYCH_RENDERER_GL, w->pre, "gl-pre");
+    add(w, TRIPTYCH_RENDERER_REFERENCE, w->post, "reference-post");
+    add(w, TRIPTYCH_RENDERER_REFERENCE, w->pre, "reference-pre");
+    s.tolerance = 1e-2;
+    add(w, TRIPTYCH_RENDERER_INTEGRAL, s, "integral-0.01");
+}
+
+static void add_samples(sweep *w)
+{
+    static const int samples[] = { 2, 4 };
+    for (size_t i = 0; i < sizeof samples / sizeof *samples; i++) {
+        triptych_settings s = w->post;
+        s.samples = samples[i];
+        add(w, TRIPTYCH_RENDERER_CPU, s, "post-samples-%d", samples[i]);
+    }
+}
+
+int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptych_settings *usual)
+{
+    sweep w = { .out = out, .pre = *usual, .post = *usual };
+    w.pre.classify = TRIPTYCH_PRE;
+    w.post.classify = TRIPTYCH_POST;
+    add_qualities(&w, usual);
+    add_post(&w);
+    add_pre(&w, TRIPTYCH_BY_SPLAT);
+    add_targets(&w);
+    add_pre(&w, TRIPTYCH_BY_SHEET);
+    add_levels(&w);
+    add_kernels(&w);
+    add_renderers(&w);
+    add_samples(&w);
+    return w.count;
+}
+
+bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b)
+{
+    if (a->classify != b->classify || a->method != b->method || a->lod_px != b->lod_px ||
+        a->samples != b->samples || (a->method == TRIPTYCH_MERGE && a->h != b->h))
+        return false;
+    if (a->classify == TRIPTYCH_PRE)
+        return a->compositing == b->compositing && a->kernel_radius == b->kernel_radius;
+    return a->slices == b->slices;
+}
+
+__attribute__((format(printf, 4, 5))) static void put(accuracy_option *out, int *count,
+                                                      const char *name, const char *value, ...)
+{
+    va_list arguments;
+    va_start(arguments, value);
+    out[*count].name = name;
+    vsnprintf(out[*count].value, sizeof out->value, value, arguments);
+    va_end(arguments);
+    (*count)++;
+}
+
+static void put_pre(const triptych_settings *s, accuracy_option *out, int *count)
+{
+    static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8" };
+    put(out, count, "classify", "pre");
+    put(out, count, "compositing", "%s", s->compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
+    put(out, count, "kernel-radius", "%g", s->kernel_radius);
+    put(out, count, "target", "%s", targets[s->target]);
+}
+
+int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[ACCURACY_OPTIONS_MAX])
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral" };
+    static const char *const methods[] = { "merge", "clip", "axis" };
+    const triptych_settings *s = &one->settings;
+    int count = 0;
+    put(out, &count, "renderer", "%s", renderers[one->renderer]);
+    if (s->samples != 1)
+        put(out, &count, "samples", "%d", s->samples);
+    if (one->renderer == TRIPTYCH_RENDERER_INTEGRAL) {
+        put(out, &count, "tolerance", "%g", s->tolerance);
+        return count;
+    }
+    if (s->classify == TRIPTYCH_PRE)
+        put_pre(s, out, &count);
+    else {
+        put(out, &count, "classify", "%s", s->classify == TRIPTYCH_POST ? "post" : "auto");
+        if (s->slices)
+            put(out, &count, "slices", "%d", s->slices);
+    }
+    if (one->renderer == TRIPTYCH_RENDERER_REFERENCE && s->classify == TRIPTYCH_PRE)
+        count--; /* has no target */
+    put(out, &count, "method", "%s", methods[s->method]);
+    if (s->method == TRIPTYCH_MERGE)
+        put(out, &count, "h", "%g", s->h);
+    if (s->lod_px > 0)
+        put(out, &count, "lod", "%g", s->lod_px);
+    return count;
+}

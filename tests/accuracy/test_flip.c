@@ -1,0 +1,132 @@
+/* FLIP of pictures without detail, whose colours alone count, worked out step by step here;
+ * pictures with detail are compared with a plain computation by tests/cli/test_accuracy.py. */
+#include "flip.h"
+#include "test.h"
+
+enum { SIDE = 24 };
+
+static trip_budget *budget;
+
+static void fill(float *rgba, double red, double green, double blue)
+{
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        rgba[4 * i] = (float)red;
+        rgba[4 * i + 1] = (float)green;
+        rgba[4 * i + 2] = (float)blue;
+        rgba[4 * i + 3] = 1;
+    }
+}
+
+static float a[4 * SIDE * SIDE], b[4 * SIDE * SIDE];
+
+static double flip(void)
+{
+    double out = -1;
+    assert_int_equal(accuracy_flip(a, b, SIDE, SIDE, budget, &out), 0);
+    return out;
+}
+
+/* L*, a*, b* of green and blue of sRGB under D65, as colour tables have them. */
+static double most_apart(void)
+{
+    const double green[3] = { 87.7347, -86.1827, 83.1793 },
+                 blue[3] = { 32.2970, 79.1875, -107.8602 };
+    double da = 0.01 * (green[0] * green[1] - blue[0] * blue[1]);
+    double db = 0.01 * (green[0] * green[2] - blue[0] * blue[2]);
+    return pow(green[0] - blue[0] + sqrt(da * da + db * db), 0.7);
+}
+
+static double of_distance(double distance)
+{
+    double e = pow(distance, 0.7), most = most_apart(), knee = 0.4 * most;
+    return e < knee ? 0.95 * e / knee : 0.95 + 0.05 * (e - knee) / (most - knee);
+}
+
+static void a_picture_is_not_far_from_itself(void **state)
+{
+    (void)state;
+    fill(a, 0.3, 0.6, 0.9);
+    fill(b, 0.3, 0.6, 0.9);
+    assert_close(flip(), 0, 1e-9);
+}
+
+/* 100 of lightness. */
+static void black_is_far_from_white(void **state)
+{
+    (void)state;
+    fill(a, 0, 0, 0);
+    fill(b, 1, 1, 1);
+    assert_close(flip(), of_distance(100), 2e-4);
+}
+
+/* Greys differ by lightness alone: 116 times the cube root of the luminance, less 16. */
+static void greys_differ_by_lightness(void **state)
+{
+    (void)state;
+    double y = pow((0.5 + 0.055) / 1.055, 2.4), z = pow((0.52 + 0.055) / 1.055, 2.4);
+    fill(a, 0.5, 0.5, 0.5);
+    fill(b, 0.52, 0.52, 0.52);
+    assert_close(flip(), of_distance(116 * (cbrt(z) - cbrt(y))), 2e-4);
+}
+
+static void green_is_as_far_from_blue_as_can_be(void **state)
+{
+    (void)state;
+    fill(a, 0, 1, 0);
+    fill(b, 0, 0, 1);
+    /* Their luminances differ, but there are no edges in either. */
+    assert_close(flip(), 1, 2e-4);
+}
+
+/* What lies beyond what a display shows is not seen. */
+static void colours_are_clamped(void **state)
+{
+    (void)state;
+    fill(a, 1, 1, 1);
+    fill(b, 1.5, 2, 9);
+    assert_close(flip(), 0, 1e-9);
+}
+
+static void which_comes_first_does_not_matter(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4 * SIDE * SIDE; i++) {
+        a[i] = (float)test_random();
+        b[i] = (float)test_random();
+    }
+    double one, other;
+    assert_int_equal(accuracy_flip(a, b, SIDE, SIDE, budget, &one), 0);
+    assert_int_equal(accuracy_flip(b, a, SIDE, SIDE, budget, &other), 0);
+    assert_true(one > 0 && one <= 1);
+    assert_close(one, other, 1e-12);
+}
+
+static void too_little_memory_is_reported(void **state)
+{
+    (void)state;
+    trip_budget *small;
+    double out;
+    assert_int_equal(trip_budget_create(&small, 4096), 0);
+    test_catch_reports();
+    assert_int_equal(accuracy_flip(a, b, SIDE, SIDE, small, &out), TRIP_ERROR);
+    assert_one_report("--memory");
+    trip_budget_destroy(small);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_picture_is_not_far_from_itself),
+        cmocka_unit_test(black_is_far_from_white),
+        cmocka_unit_test(greys_differ_by_lightness),
+        cmocka_unit_test(green_is_as_far_from_blue_as_can_be),
+        cmocka_unit_test(colours_are_clamped),
+        cmocka_unit_test(which_comes_first_does_not_matter),
+        cmocka_unit_test(too_little_memory_is_reported),
+    };
+    if (trip_budget_create(&budget, 1 << 24))
+        return 1;
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    trip_budget_destroy(budget);
+    return failed;
+}

@@ -1,0 +1,115 @@
+/* SSIM of pictures whose means, variances and covariance are known. */
+#include "ssim.h"
+#include "test.h"
+
+enum { SIDE = 40 };
+
+static trip_budget *budget;
+
+static double ssim(const float *a, const float *b, int width, int height)
+{
+    double out = -2;
+    assert_int_equal(accuracy_ssim(a, b, width, height, budget, &out), 0);
+    return out;
+}
+
+static void fill(float *rgba, double (*at)(int x, int y))
+{
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        for (int c = 0; c < 3; c++)
+            rgba[4 * i + c] = (float)at(i % SIDE, i / SIDE);
+        rgba[4 * i + 3] = 1;
+    }
+}
+
+static double bright(int x, int y)
+{
+    (void)x;
+    (void)y;
+    return 0.8;
+}
+
+static double dark(int x, int y)
+{
+    (void)x;
+    (void)y;
+    return 0.2;
+}
+
+/* Neighbours differ by so much that any window's variance is that of the whole but for the weights'
+ * own sum of signs. */
+static double board(int x, int y)
+{
+    return (x + y) % 2 ? 0.9 : 0.1;
+}
+
+static double inverse_board(int x, int y)
+{
+    return 1 - board(x, y);
+}
+
+static float a[4 * SIDE * SIDE], b[4 * SIDE * SIDE];
+
+static void a_picture_is_like_itself(void **state)
+{
+    (void)state;
+    fill(a, board);
+    assert_close(ssim(a, a, SIDE, SIDE), 1, 1e-9);
+}
+
+/* Without variance only the means count. */
+static void even_pictures_differ_by_their_means(void **state)
+{
+    (void)state;
+    fill(a, bright);
+    fill(b, dark);
+    assert_close(ssim(a, b, SIDE, SIDE), (2 * 0.8 * 0.2 + 1e-4) / (0.64 + 0.04 + 1e-4), 1e-5);
+}
+
+/* Of a board and its inverse the means are 1/2 and the variances and covariance 0.16 and -0.16, but
+ * for 0.4 times the weights' sum with alternating signs squared, exp(-(pi sigma)^2/2) along each
+ * side, which is 1e-5. */
+static void inverse_pictures_are_unlike(void **state)
+{
+    (void)state;
+    fill(a, board);
+    fill(b, inverse_board);
+    assert_close(ssim(a, b, SIDE, SIDE), (-0.32 + 9e-4) / (0.32 + 9e-4), 1e-4);
+}
+
+/* Windows do not reach beyond the picture. */
+static void pictures_below_a_window_have_none(void **state)
+{
+    (void)state;
+    fill(a, board);
+    assert_true(isnan(ssim(a, a, 10, 40)));
+    assert_close(ssim(a, a, 11, 11), 1, 1e-9);
+}
+
+static void too_little_memory_is_reported(void **state)
+{
+    (void)state;
+    trip_budget *small;
+    double out;
+    assert_int_equal(trip_budget_create(&small, 4096), 0);
+    test_catch_reports();
+    assert_int_equal(accuracy_ssim(a, b, SIDE, SIDE, small, &out), TRIP_ERROR);
+    assert_one_report("--memory");
+    trip_budget_destroy(small);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_picture_is_like_itself),
+        cmocka_unit_test(even_pictures_differ_by_their_means),
+        cmocka_unit_test(inverse_pictures_are_unlike),
+        cmocka_unit_test(pictures_below_a_window_have_none),
+        cmocka_unit_test(too_little_memory_is_reported),
+    };
+    if (trip_budget_create(&budget, 1 << 24))
+        return 1;
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    trip_budget_destroy(budget);
+    return failed;
+}

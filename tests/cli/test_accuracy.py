@@ -1,0 +1,342 @@
+"""`triptych accuracy`: JSON, CSV and page agree with one another and with figures that are computed
+here, plainly, from the pictures it keeps. FLIP is written out from the paper a second time, by
+kernels of two dimensions, and SSIM by windows one by one."""
+import csv
+import html.parser
+import json
+import math
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+
+import numpy
+
+import program
+
+SMALL = ["--size", "40x32", "--views", "2", "--repeat", "1", "--tolerance", "1e-3", "--quiet"]
+STEPS = ("total", "storage", "model", "method", "level", "precision")
+
+
+def covered_errors(picture, truth):
+    """Of 255, of all channels of pixels that either picture covers."""
+    covered = numpy.maximum(picture[..., 3], truth[..., 3]) > numpy.float32(1 / 255)
+    return 255 * numpy.abs(picture - truth)[covered].ravel()
+
+
+def plain_ssim(a, b):
+    """The mean over windows of 11 x 11, of luminance over black."""
+    weights = numpy.exp(-((numpy.arange(11) - 5) ** 2) / (2 * 1.5**2))
+    weights = numpy.outer(weights, weights) / weights.sum() ** 2
+    x, y = (p[..., :3] @ (0.299, 0.587, 0.114) for p in (a, b))
+    values = []
+    for j in range(x.shape[0] - 10):
+        for i in range(x.shape[1] - 10):
+            u, v = x[j : j + 11, i : i + 11], y[j : j + 11, i : i + 11]
+            mu, mv = (weights * u).sum(), (weights * v).sum()
+            uu, vv = (weights * (u - mu) ** 2).sum(), (weights * (v - mv) ** 2).sum()
+            uv = (weights * (u - mu) * (v - mv)).sum()
+            values.append((2 * mu * mv + 1e-4) * (2 * uv + 9e-4)
+                          / ((mu**2 + mv**2 + 1e-4) * (uu + vv + 9e-4)))
+    return numpy.mean(values)
+
+
+def convolve(plane, kernel):
+    """With edges repeated."""
+    reach = kernel.shape[0] // 2
+    padded = numpy.pad(plane, reach, mode="edge")
+    out = numpy.zeros_like(plane)
+    for j in range(kernel.shape[0]):
+        for i in range(kernel.shape[1]):
+            out += kernel[j, i] * padded[j : j + plane.shape[0], i : i + plane.shape[1]]
+    return out
+
+
+def grid(reach):
+    return numpy.meshgrid(*2 * (numpy.arange(-reach, reach + 1),))
+
+
+XYZ = numpy.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
+                   [0.0193339, 0.1191920, 0.9503041]])
+WHITE = XYZ.sum(axis=1)
+PPD = 67
+
+
+def relative(rgb):
+    return rgb @ XYZ.T / WHITE
+
+
+def hunt_lab(rgb):
+    t, d = relative(rgb), 6 / 29
+    f = numpy.where(t > d**3, numpy.cbrt(t), t / (3 * d * d) + 4 / 29)
+    light = 116 * f[..., 1] - 16
+    return numpy.stack([light, 5 * light * (f[..., 0] - f[..., 1]),
+                        2 * light * (f[..., 1] - f[..., 2])], axis=-1)
+
+
+def distance(a, b):
+    d = numpy.abs(a - b)
+    return d[..., 0] + numpy.hypot(d[..., 1], d[..., 2])
+
+
+def seen(rgb):
+    """Colours after the eye's contrast sensitivity."""
+    t = relative(rgb)
+    opponent = [116 * t[..., 1] - 16, 500 * (t[..., 0] - t[..., 1]), 200 * (t[..., 1] - t[..., 2])]
+    curves = [(1, 0.0047, 0, 1e-5), (1, 0.0053, 0, 1e-5), (34.1, 0.04, 13.5, 0.025)]
+    x, y = grid(math.ceil(3 * math.sqrt(0.04 / (2 * math.pi**2)) * PPD))
+    squares = (x**2 + y**2) / PPD**2
+    for c, (a1, b1, a2, b2) in enumerate(curves):
+        kernel = sum(a * math.sqrt(math.pi / b) * numpy.exp(-math.pi**2 * squares / b)
+                     for a, b in ((a1, b1), (a2, b2)))
+        opponent[c] = convolve(opponent[c], kernel / kernel.sum())
+    y = (opponent[0] + 16) / 116
+    t = numpy.stack([opponent[1] / 500 + y, y, y - opponent[2] / 200], axis=-1)
+    return numpy.clip(t * WHITE @ numpy.linalg.inv(XYZ).T, 0, 1)
+
+
+def features(rgb, points):
+    sigma = 0.5 * 0.082 * PPD
+    x, y = grid(math.ceil(3 * sigma))
+    kernel = numpy.exp(-(x**2 + y**2) / (2 * sigma**2)) * (x**2 / sigma**2 - 1 if points else x)
+    kernel = numpy.where(kernel > 0, kernel / kernel[kernel > 0].sum(),
+                         kernel / -kernel[kernel < 0].sum())
+    light = relative(rgb)[..., 1]
+    return numpy.hypot(convolve(light, kernel), convolve(light, kernel.T))
+
+
+def plain_flip(a, b):
+    rgb = [numpy.clip(p[..., :3], 0, 1) for p in (a, b)]
+    rgb = [numpy.where(p <= 0.04045, p / 12.92, ((p + 0.055) / 1.055) ** 2.4) for p in rgb]
+    most = distance(hunt_lab(numpy.array([0.0, 1, 0])), hunt_lab(numpy.array([0.0, 0, 1]))) ** 0.7
+    e = distance(*(hunt_lab(seen(p)) for p in rgb)) ** 0.7
+    knee = 0.4 * most
+    colour = numpy.where(e < knee, 0.95 * e / knee, 0.95 + 0.05 * (e - knee) / (most - knee))
+    feature = numpy.max([numpy.abs(features(rgb[0], points) - features(rgb[1], points))
+                         for points in (False, True)], axis=0)
+    return numpy.mean(colour ** (1 - (feature / math.sqrt(2)) ** 0.5))
+
+
+class Page(html.parser.HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.sources, self.tags, self.text = [], [], ""
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.sources += [value for name, value in attributes if name in ("src", "href")]
+
+    def handle_data(self, data):
+        self.text += data
+
+
+class Accuracy(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        os.chmod(".", 0o755)
+        program.write_nrrd("a.nrrd", program.ball((24, 28, 40)))
+        program.write("a.tf", b"40 1 0.5 0.2 0\n200 0.2 0.6 1 0.4\n")
+        assert program.call("brick", "a.nrrd", "-q", "--tf", "a.tf", "--tile", "16").returncode == 0
+        run = program.call(
+            "accuracy", "a.trip", "-o", "report", *SMALL, "--pictures", "--source", "a.nrrd",
+            "--settings", "post,post-slices-1,pre,pre-rgba8,pre-lod-4,post-samples-2",
+            program=program.QUICK_PROGRAM)
+        assert run.returncode == 0, run.stderr
+        assert run.stderr == "", run.stderr
+        cls.out = run.stdout.decode()
+        with open("report/accuracy.json", encoding="utf-8") as f:
+            cls.report = json.load(f)
+        cls.rows = {row["name"]: row for row in cls.report["rows"]}
+
+    def pictures(self, name):
+        for view in range(2):
+            yield (program.read_exr(f"report/{name}-{view}.exr"),
+                   program.read_exr(f"report/truth-{view}.exr"))
+
+    def test_figures_are_those_of_the_pictures(self):
+        for name in "post", "post-slices-1", "pre", "pre-rgba8":
+            total, pairs = self.rows[name]["total"], list(self.pictures(name))
+            errors = [covered_errors(*pair) for pair in pairs]
+            every = numpy.concatenate(errors)
+            self.assertGreater(every.size, 1000)
+            self.assertAlmostEqual(total["max"], every.max(), 2)
+            self.assertAlmostEqual(total["mean"], every.mean(), 3)
+            self.assertAlmostEqual(total["median"], numpy.median(every), 1)
+            self.assertAlmostEqual(total["percentile_99"],
+                                   numpy.percentile(every, 99, method="higher"), delta=0.02)
+            self.assertAlmostEqual(total["worst_percentile_99"],
+                                   max(numpy.percentile(e, 99, method="higher") for e in errors),
+                                   delta=0.02)
+            self.assertAlmostEqual(total["psnr"],
+                                   -10 * math.log10((every**2).mean() / 255**2), 2)
+            self.assertAlmostEqual(total["ssim"], numpy.mean([plain_ssim(*p) for p in pairs]), 4)
+            self.assertAlmostEqual(total["flip"], numpy.mean([plain_flip(*p) for p in pairs]), 4)
+
+    def test_steps_stand_apart(self):
+        """Rounded layers change precision alone, slices the method, and values of a byte are stored
+        whole: without light nothing would be lost."""
+        rows = self.rows
+        for name, row in rows.items():
+            self.assertEqual("level" in row, name == "pre-lod-4", name)
+            for step in "total", "storage", "model", "method", "precision":
+                self.assertIn(step, row, name)
+        self.assertEqual(rows["post"]["model"]["max"], 0)
+        self.assertGreater(rows["pre"]["model"]["mean"], 0.5)
+        self.assertEqual(rows["pre"]["method"], rows["pre-rgba8"]["method"])
+        self.assertEqual(rows["pre"]["model"], rows["pre-rgba8"]["model"])
+        self.assertLess(rows["pre"]["precision"]["max"], 0.05)
+        self.assertGreater(rows["pre-rgba8"]["precision"]["mean"], 0.1)
+        self.assertGreater(rows["pre-lod-4"]["level"]["max"], 1)
+        self.assertLess(rows["post"]["total"]["mean"], rows["pre"]["total"]["mean"])
+        for row in rows.values():
+            self.assertGreater(row["ms"], 0)
+            self.assertGreater(row["splats"], 0)
+            self.assertGreater(row["bytes_read"], 0)
+        self.assertGreater(rows["pre"]["splats_drawn"], 0)
+        self.assertIsNone(rows["post"]["splats_drawn"])
+
+    def test_what_is_left_out_is_listed(self):
+        (left_out,) = self.report["left_out"]
+        self.assertEqual(left_out["name"], "post-samples-2")
+        self.assertIn("--samples 2", left_out["why"])
+        self.assertIn("post-samples-2", self.out)
+
+    def test_csv_has_the_same_figures(self):
+        with open("report/accuracy.csv", encoding="utf-8", newline="") as f:
+            lines = list(csv.DictReader(f))
+        self.assertEqual([line["name"] for line in lines], list(self.rows))
+        for line in lines:
+            row = self.rows[line["name"]]
+            self.assertAlmostEqual(float(line["ms"]), row["ms"], 4)
+            self.assertEqual(line["options"],
+                             " ".join(f"--{k} {v}" for k, v in row["options"].items()))
+            for step in STEPS:
+                if step in row:
+                    self.assertAlmostEqual(float(line[f"{step}_mean"]), row[step]["mean"], 5)
+                else:
+                    self.assertEqual(line[f"{step}_mean"], "")
+
+    def test_commands_draw_the_same(self):
+        view = self.report["views"][0]
+        camera = ["--size", "40x32", "--fov", repr(view["fov_degrees"]), "--tf", "a.tf"]
+        camera += [f"--{k}=" + ",".join(map(repr, view[k])) for k in ("eye", "look", "up")]
+        for name in "post", "pre-rgba8":
+            options = [x for k, v in self.rows[name]["options"].items() for x in ("--" + k, v)]
+            again = self.picture("a.trip", *camera, *options)
+            self.assertTrue((again == program.read_exr(f"report/{name}-0.exr")).all())
+
+    def test_page_holds_all_it_shows(self):
+        page = Page()
+        with open("report/index.html", encoding="utf-8") as f:
+            page.feed(f.read())
+        self.assertEqual(page.tags.count("svg"), 2)
+        self.assertEqual(page.tags.count("img"), 1 + 2 * len(self.rows))
+        for source in page.sources:
+            self.assertTrue(source.startswith("data:image/png;base64,"), source[:40])
+        for name in self.rows:
+            self.assertIn(name, page.text)
+        self.assertNotIn("nan", page.text)
+
+    def test_page_opens_in_chromium(self):
+        chromium = shutil.which("chromium")
+        if not chromium or program.SANITIZED:
+            self.skipTest("chromium is not installed")
+        with tempfile.TemporaryDirectory() as home:
+            run = subprocess.run(
+                [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+                 "--user-data-dir=" + home, "file://" + os.path.abspath("report/index.html")],
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=120, text=True, check=False)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual(run.stdout.count("<svg"), 2)
+        self.assertIn("</html>", run.stdout)
+
+    def test_seconds_bound_the_work(self):
+        self.works("accuracy", "a.trip", "-o", "short", *SMALL, "--budget", "0", "--no-ladder",
+                   "--settings", "post,pre*")
+        with open("short/accuracy.json", encoding="utf-8") as f:
+            report = json.load(f)
+        self.assertEqual([row["name"] for row in report["rows"]], ["post"])
+        self.assertNotIn("method", report["rows"][0])
+        self.assertEqual(report["views_left_out"], 1)
+        self.assertIn("pre", [one["name"] for one in report["left_out"]])
+
+    def test_progress_is_shown_but_not_when_quiet(self):
+        arguments = [a for a in SMALL if a != "--quiet"]
+        run = self.works("accuracy", "a.trip", "-o", "told", *arguments, "--no-ladder",
+                         "--settings", "post")
+        self.assertRegex(run.stderr, r"^accuracy  0:00")
+
+    def test_other_data_sets_stand_beside(self):
+        self.brick("a.nrrd", "bare.trip", "--tf", "a.tf", "--halo", "0")
+        self.works("accuracy", "a.trip", "-o", "beside", *SMALL, "--no-ladder", "--source", "a.nrrd",
+                   "--settings", "post,post-bare.trip", "--also", "bare.trip")
+        with open("beside/accuracy.json", encoding="utf-8") as f:
+            whole, bare = json.load(f)["rows"]
+        self.assertEqual(bare["data_set"], "bare.trip")
+        self.assertGreater(bare["total"]["mean"], whole["total"]["mean"])
+        self.assertGreater(bare["storage"]["mean"], whole["storage"]["mean"])
+
+    # Trouble
+
+    def test_what_is_there_stays_without_force(self):
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "report", *SMALL, says="--force")
+        os.mkdir("mine")
+        program.write("mine/letter.txt", b"dear")
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "mine", "--force", *SMALL,
+                            says="not a report")
+        self.assertEqual(os.listdir("mine"), ["letter.txt"])
+
+    def test_bad_input(self):
+        self.leaves_nothing(2, "accuracy", says="NAME.trip")
+        self.leaves_nothing(2, "accuracy", "a.trip", "--size", "8x8", says="32 to 4096")
+        self.leaves_nothing(2, "accuracy", "a.trip", "-o", "out", "--settings", "none",
+                            says="--list")
+        self.leaves_nothing(1, "accuracy", "missing.trip", "-o", "out", *SMALL)
+        self.leaves_nothing(1, "accuracy", "a.nrrd", "-o", "out", *SMALL)
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "out", "--tf", "missing.tf", *SMALL)
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "out", "--source", "missing.nrrd",
+                            *SMALL)
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "nowhere/out", *SMALL,
+                            says="cannot create")
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "out", "--memory", "64K", *SMALL)
+
+    def test_a_full_disk(self):
+        """A limit on the size of files stands for it."""
+        self.leaves_nothing(1, "accuracy", "a.trip", "-o", "out", *SMALL, "--no-ladder",
+                            "--settings", "post", preexec_fn=lambda: resource.setrlimit(
+                                resource.RLIMIT_FSIZE, (2048, 2048)))
+
+    def test_no_permission(self):
+        os.mkdir("closed", 0o555)
+        if os.getuid() == 0 and os.access("closed", os.W_OK):
+            identity = {"user": 65534, "group": 65534, "extra_groups": []}
+            try:
+                if program.call("--version", **identity).returncode:
+                    self.skipTest("another user cannot run the program where it lies")
+            except PermissionError:
+                self.skipTest("another user cannot run the program where it lies")
+        else:
+            identity = {}
+        self.fails(1, "accuracy", "a.trip", "-o", "closed/out", *SMALL, says="cannot create",
+                   **identity)
+
+    def test_an_interruption_leaves_nothing(self):
+        before = set(os.listdir("."))
+        process = program.start("accuracy", "a.trip", "-o", "out", "--views", "1000", "--quiet")
+        program.await_handler(process)
+        while process.poll() is None and set(os.listdir(".")) == before:
+            time.sleep(0.01)
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        err = process.communicate(timeout=60)[1].decode()
+        self.assertEqual(process.returncode, 1, err)
+        self.assertRegex(err, r"^triptych: .*interrupted\n$")
+        self.assertEqual(set(os.listdir(".")), before)
+
+
+if __name__ == "__main__":
+    program.main()
