@@ -57,7 +57,9 @@ typedef struct trip_volume_info {
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
-    TRIP_LEVEL_SET_FILLED, /* density 1 inside, 0 outside, a ramp one voxel wide at the surface */
+    /* Density 1 inside, 0 outside, and between them a ramp about the surface, 4 voxels wide where the
+     * band is: central differences, by which light comes, are exact within a voxel of the surface. */
+    TRIP_LEVEL_SET_FILLED,
     TRIP_LEVEL_SET_BAND,   /* density max(0, 1 - |distance| / half band width) */
 } trip_level_set_mode;
 

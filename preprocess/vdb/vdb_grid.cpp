@@ -29,7 +29,9 @@ class Converter
   public:
     Converter() = default;
     Converter(const trip_vdb_conversion &c, double background)
-        : mode_(c.mode), scale_(1 / (c.mode == TRIP_LEVEL_SET_BAND ? background : c.voxel_world))
+        : mode_(c.mode),
+          scale_(1 / (c.mode == TRIP_LEVEL_SET_BAND ? background
+                                                    : std::min(4 * c.voxel_world, 2 * background)))
     {
     }
     Sample operator()(double stored, bool active) const

@@ -472,8 +472,8 @@ void a_level_set_is_filled_by_default_and_says_so(void **)
     assert_string_equal(filled.info.note, "");
 }
 
-/* Inside 1, outside 0, a ramp of one voxel's width between; the interior has no active voxels in
- * the file. The densities' sum is the ball's volume. */
+/* Inside 1, outside 0, a ramp of four voxels' width between; the interior has no active voxels in
+ * the file. The densities' sum is the mean volume of balls of radius 20 - 2 to 20 + 2. */
 void a_filled_level_set_is_a_ball(void **)
 {
     openvdb::FloatGrid::Ptr grid = sphere();
@@ -487,7 +487,7 @@ void a_filled_level_set_is_a_ball(void **)
     Coord first = grid->evalActiveVoxelBoundingBox().min();
     check_voxels(v, first, [&](const Coord &at, float &value, bool &active) {
         double d = (double)grid->tree().getValue(at) / grid->voxelSize()[0];
-        value = (float)std::min(1.0, std::max(0.0, 0.5 - d));
+        value = (float)std::min(1.0, std::max(0.0, 0.5 - d / 4));
         active = value > 0;
     });
     for (const trip_volume_portion &portion : v.portions()) {
@@ -498,7 +498,8 @@ void a_filled_level_set_is_a_ball(void **)
         for (float value : values)
             sum += value;
     }
-    assert_true(std::fabs(sum / (4 / 3.0 * M_PI * 20 * 20 * 20) - 1) < 0.001);
+    const double mean_cube = 20.0 * 20 * 20 + 20 * 2 * 2; /* of r^3, r from 18 to 22 */
+    assert_true(std::fabs(sum / (4 / 3.0 * M_PI * mean_cube) - 1) < 0.001);
 }
 
 /* 1 at the surface, falling to 0 at the edges of the band, which is 3 voxels wide on each side. */
