@@ -79,9 +79,8 @@ static const struct argp_option option_table[] = {
     { "force", KEY_FORCE, NULL, 0, "Replace an existing data set", 3 },
     { "resume", KEY_RESUME, NULL, 0, "Go on from where the same command was killed", 3 },
     { "normals", KEY_NORMALS, "HOW", 0,
-      "What shading needs: compact (3 bytes), full (4), none or auto (default: auto, compact "
-      "unless "
-      "that takes a pass over the input of its own)",
+      "What shading needs: compact (3 bytes), full (4), none or auto (default: auto, compact where "
+      "that changes no colour by half of 1/255)",
       3 },
     { "halo", KEY_HALO, "0|1", 0,
       "Keep the transparent neighbours of what is kept, for interpolation (default: 1)", 3 },

@@ -183,12 +183,10 @@ static void add_world(cJSON *root, const triptych_info *info, const cJSON *text)
 
 static void add_normals(cJSON *root, const triptych_info *info)
 {
-    if (info->normal_bytes == 4)
-        cJSON_AddItemToObject(root, "gradient_scale", number(info->gradient_scale));
-    if (info->normal_bytes == 3) {
+    if (info->normal_bytes == 3)
         cJSON_AddItemToObject(root, "gradient_step", numbers(info->gradient_step, 3));
+    if (info->normal_bytes)
         cJSON_AddItemToObject(root, "gradient_full", number(info->gradient_full));
-    }
 }
 
 static cJSON *to_json(const data_set *d, bool verified)

@@ -306,7 +306,6 @@ static triptych_info info_of(const trip_dataset *d)
         .lists = d->list_count,
         .code_bytes = h->code_bytes,
         .normal_bytes = h->normal_bytes,
-        .gradient_scale = h->gradient_scale,
         .gradient_full = h->gradient_full,
         .tile_voxels = 1u << h->tile_log2,
         .slab_sheets = h->slab_sheets,

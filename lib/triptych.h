@@ -109,7 +109,7 @@ typedef struct triptych_info {
     uint64_t halo;               /* neighbours of those, for interpolation */
     uint64_t bytes, index_bytes; /* on disk: of everything, of the index */
     unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
-    double gradient_scale, gradient_step[3], gradient_full;   /* of normals of 4 bytes, 3 bytes */
+    double gradient_step[3], gradient_full;                   /* of normals of 3 bytes, of all */
     unsigned tile_voxels, slab_sheets, page_bytes;
     const char *notes; /* as its maker left them, JSON by `brick`; last until it is closed */
 } triptych_info;

@@ -25,7 +25,7 @@ typedef enum triptych_endian {
 } triptych_endian;
 
 typedef enum triptych_normals {
-    TRIPTYCH_NORMALS_AUTO,    /* compact, unless that takes a pass over the volume of its own */
+    TRIPTYCH_NORMALS_AUTO,    /* compact where they change no colour by half of 1/255 */
     TRIPTYCH_NORMALS_COMPACT, /* 3 bytes */
     TRIPTYCH_NORMALS_FULL,    /* 4 bytes */
     TRIPTYCH_NORMALS_NONE,

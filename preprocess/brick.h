@@ -12,7 +12,7 @@ typedef struct trip_value_range {
 } trip_value_range;
 
 typedef enum trip_brick_normals {
-    TRIP_NORMALS_AUTO,    /* compact, unless the volume would have to be scanned for that alone */
+    TRIP_NORMALS_AUTO,    /* compact where they keep gradients below full shading exactly */
     TRIP_NORMALS_COMPACT, /* in 3 bytes, see normal.h */
     TRIP_NORMALS_FULL,    /* in 4 bytes */
     TRIP_NORMALS_NONE,

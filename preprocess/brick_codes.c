@@ -5,17 +5,12 @@
 
 #include "gradient.h"
 
-/* The bound of gradients follows from the range of the values, or of the codes if that is unknown.
- */
 void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in, double lo,
                                 double hi)
 {
-    double least = in->scanned ? in->tally->value_min : lo;
-    double most = in->scanned ? in->tally->value_max : hi;
-    c->quantiser =
-        (trip_quantiser){ lo, hi > lo ? hi : lo + 1,
-                          trip_gradient_bound(in->info, least, most > least ? most : least + 1),
-                          trip_gradient_unit(&in->info->index_to_world) };
+    hi = hi > lo ? hi : lo + 1;
+    c->quantiser = (trip_quantiser){ lo, hi, trip_brick_gradient_full(in, lo, hi),
+                                     trip_gradient_unit(&in->info->index_to_world) };
 }
 
 static void choose_range(trip_brick_codes *c, const trip_brick_input *in)
@@ -30,22 +25,11 @@ static void choose_range(trip_brick_codes *c, const trip_brick_input *in)
     trip_brick_codes_set_range(c, in, lo, hi);
 }
 
-/* The magnitude from which on shading is full, for the range of the values or, where that is
- * unknown, of the codes. */
-static double full_gradient(const trip_brick_codes *c, const trip_brick_input *in)
-{
-    double range = in->scanned ? in->tally->value_max - in->tally->value_min : 0;
-    double voxel = cbrt(fabs(trip_affine_determinant(&in->info->index_to_world)));
-    return TRIP_GRADIENT_FULL * (range > 0 ? range : c->quantiser.hi - c->quantiser.lo) / voxel;
-}
-
 static void choose_compact_normals(trip_brick_codes *c, const trip_brick_input *in)
 {
-    const trip_volume_info *info = in->info;
-    double step[3], full = full_gradient(c, in);
-    double unit = info->type < TRIP_F16 ? fabs(info->slope) / 2 : 0;
-    trip_compact_normals_choose(&info->index_to_world, full, unit, step);
-    c->compact = trip_compact_normals_make(&info->index_to_world, full, step);
+    double step[3], full = c->quantiser.gradient_full;
+    trip_brick_choose_compact(in, full, step);
+    c->compact = trip_compact_normals_make(&in->info->index_to_world, full, step);
 }
 
 void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in)
@@ -60,11 +44,9 @@ void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in)
 trip_writer_codes trip_brick_codes_header(const trip_brick_codes *c)
 {
     trip_writer_codes codes = { .code_lo = c->quantiser.lo, .code_hi = c->quantiser.hi };
-    if (c->normal_bytes == 4)
-        codes.gradient_scale = c->quantiser.gradient_scale;
-    if (c->normal_bytes == 3) {
-        codes.gradient_full = c->compact.full;
+    if (c->normal_bytes)
+        codes.gradient_full = c->quantiser.gradient_full;
+    if (c->normal_bytes == 3)
         memcpy(codes.gradient_step, c->compact.step, sizeof codes.gradient_step);
-    }
     return codes;
 }

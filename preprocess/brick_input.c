@@ -5,6 +5,7 @@
 
 #include "brick_memory.h"
 #include "brick_text.h"
+#include "normal.h"
 #include "report.h"
 
 /* Saturates: the grid of a sparse volume may have more than 2^64 voxels. */
@@ -129,6 +130,30 @@ unsigned trip_brick_code_bytes(const trip_brick_input *in)
     return 1;
 }
 
+double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi)
+{
+    double range = in->scanned ? in->tally->value_max - in->tally->value_min : 0;
+    double voxel = cbrt(fabs(trip_affine_determinant(&in->info->index_to_world)));
+    return TRIP_GRADIENT_FULL * (range > 0 ? range : hi - lo) / voxel;
+}
+
+bool trip_brick_choose_compact(const trip_brick_input *in, double full, double step[3])
+{
+    double unit = in->info->type < TRIP_F16 ? fabs(in->info->slope) / 2 : 0;
+    return trip_compact_normals_choose(&in->info->index_to_world, full, unit, step);
+}
+
+/* Whether normals of 3 bytes are as good as those of 4: they keep differences of values exactly. */
+static bool are_compact_exact(const trip_brick_input *in)
+{
+    double lo = 0, hi = 0, step[3];
+    if (!in->scanned && !trip_brick_has_narrow_type(in))
+        return false;
+    if (trip_brick_has_narrow_type(in))
+        trip_brick_type_range(in->info, &lo, &hi);
+    return trip_brick_choose_compact(in, trip_brick_gradient_full(in, lo, hi), step);
+}
+
 unsigned trip_brick_normal_bytes(const trip_brick_input *in)
 {
     switch (in->params->normals) {
@@ -141,7 +166,15 @@ unsigned trip_brick_normal_bytes(const trip_brick_input *in)
     case TRIP_NORMALS_AUTO:
         break;
     }
-    return in->scanned || has_byte_type(in) ? 3 : 4;
+    return are_compact_exact(in) ? 3 : 4;
+}
+
+/* Normals of types of 8 or 16 bits are made before all values are seen, others once they are. */
+static bool depend_normals_on_range(const trip_brick_input *in)
+{
+    if (in->params->normals == TRIP_NORMALS_COMPACT)
+        return !has_byte_type(in);
+    return trip_brick_has_narrow_type(in) && trip_brick_normal_bytes(in) == 4;
 }
 
 static bool is_envelope_automatic(const trip_brick_params *p)
@@ -151,8 +184,7 @@ static bool is_envelope_automatic(const trip_brick_params *p)
 
 bool trip_brick_input_needs_scan(const trip_brick_input *in)
 {
-    bool needed = is_envelope_automatic(in->params) ||
-                  (in->params->normals == TRIP_NORMALS_COMPACT && !has_byte_type(in));
+    bool needed = is_envelope_automatic(in->params) || depend_normals_on_range(in);
     for (size_t i = 0; i < in->params->function_count; i++)
         needed = needed || trip_tf_needs_data(in->functions[i]);
     return needed;

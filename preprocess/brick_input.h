@@ -36,12 +36,17 @@ void trip_brick_input_close(trip_brick_input *in);
 bool trip_brick_has_narrow_type(const trip_brick_input *in);
 /* Bytes of a code: 1 where 8-bit codes represent all values of the type exactly, else 2. */
 unsigned trip_brick_code_bytes(const trip_brick_input *in);
-/* Bytes of a normal, 0 without normals; to be called after the scan, if there is one. */
+/* Bytes of a normal, 0 without normals; after the scan, if there is one. */
 unsigned trip_brick_normal_bytes(const trip_brick_input *in);
+/* The magnitude from which on shading is full, for the range of the values or, where that is
+ * unknown, of the codes, [lo, hi]. */
+double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi);
+/* Steps of normals of 3 bytes; whether all gradients below `full` are kept exactly. */
+bool trip_brick_choose_compact(const trip_brick_input *in, double full, double step[3]);
 /* The values of the lowest and the highest code, for types of 8 or 16 bits. */
 void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi);
 /* Whether the volume has to be scanned first: because the envelope is automatic, a function depends
- * on the values, or compact normals depend on their range. */
+ * on the values, or normals depend on their range. */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
 /* Whether the range of the codes is known before pieces are made, from the type or the scan. */
 bool trip_brick_will_be_quantised(const trip_brick_input *in);

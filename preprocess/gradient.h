@@ -35,9 +35,4 @@ static inline void trip_gradient_at(const float *value, const int64_t step[3],
  * the range of a float. */
 double trip_gradient_unit(const trip_affine *index_to_world);
 
-/* An upper bound of the magnitude of world-space gradients by central differences, in value units
- * per world unit, when all values are in [lo, hi]; the background is taken into account. One-sided
- * ones are at most twice as long. */
-double trip_gradient_bound(const trip_volume_info *info, double lo, double hi);
-
 #endif

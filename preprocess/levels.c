@@ -170,7 +170,7 @@ static void gradient_of(const making *m, uint32_t normal, double gradient[3])
     if (m->params->compact)
         trip_compact_normal_unpack(m->params->compact, normal, gradient);
     else
-        trip_normal_unpack(normal, m->params->quantiser.gradient_scale, gradient);
+        trip_normal_unpack(normal, m->params->quantiser.gradient_full, gradient);
 }
 
 /* Of a gradient in world space. */
@@ -179,7 +179,7 @@ static uint32_t normal_of(const making *m, const double gradient[3])
     const double(*j)[4] = m->params->index_to_world.m;
     double index[3];
     if (!m->params->compact)
-        return trip_normal_pack(gradient, m->params->quantiser.gradient_scale);
+        return trip_normal_pack(gradient, m->params->quantiser.gradient_full);
     for (int a = 0; a < 3; a++)
         index[a] = j[0][a] * gradient[0] + j[1][a] * gradient[1] + j[2][a] * gradient[2];
     return trip_compact_normal_pack(m->params->compact, index);

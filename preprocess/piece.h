@@ -35,8 +35,8 @@ enum {
 /* The meaning of codes, value(c) = lo + (hi - lo) * c / 65535, and of the magnitudes of normals. */
 typedef struct trip_quantiser {
     double lo, hi;
-    double gradient_scale; /* length of a gradient of magnitude 255 */
-    double gradient_unit;  /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
+    double gradient_full; /* of 4-byte normals (normal.h) */
+    double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
 } trip_quantiser;
 
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)

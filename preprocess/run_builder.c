@@ -134,10 +134,12 @@ static uint32_t normal_of(const trip_run_builder *b, const trip_quantiser *q, un
 {
     if (b->format.quantised)
         return b->normals[position];
-    double scale = q->gradient_scale * (q->gradient_unit > 0 ? q->gradient_unit : 1);
-    uint32_t magnitude =
-        trip_normal_pack((const double[3]){ b->magnitudes[position] }, scale) >> 24;
-    return magnitude ? b->normals[position] | magnitude << 24 : 0;
+    double gradient[3];
+    trip_direction_unpack(b->normals[position], gradient);
+    for (int a = 0; a < 3; a++)
+        gradient[a] *= (double)b->magnitudes[position];
+    return trip_normal_pack(gradient,
+                            q->gradient_full * (q->gradient_unit > 0 ? q->gradient_unit : 1));
 }
 
 static uint32_t take_first(trip_run_builder *b)

@@ -181,7 +181,7 @@ static void put_values(const work *k, const splat_row *r)
 }
 
 /* The world-space normal of an index-space gradient, in 4 bytes; where values are not quantised its
- * magnitude goes to *magnitude. */
+ * direction, and its magnitude goes to *magnitude. */
 static uint32_t full_normal(const trip_splatter *s, const double index[3], float *magnitude)
 {
     const double(*m)[3] = s->to_world;
@@ -189,10 +189,10 @@ static uint32_t full_normal(const trip_splatter *s, const double index[3], float
     for (int row = 0; row < 3; row++)
         g[row] = m[row][0] * index[0] + m[row][1] * index[1] + m[row][2] * index[2];
     if (s->params.format.quantised)
-        return trip_normal_pack(g, s->params.quantiser.gradient_scale);
+        return trip_normal_pack(g, s->params.quantiser.gradient_full);
     double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     *magnitude = (float)fmin(length * s->gradient_unit, FLT_MAX);
-    return trip_normal_pack(g, length) & 0xffffff;
+    return trip_direction_pack(g);
 }
 
 /* trip_gradient_share() of a voxel along an axis: beyond a sparse volume lies its background. */

@@ -21,8 +21,10 @@ static int scan(trip_brick_input *in)
 int trip_volume_function(const trip_brick_params *params, trip_tf **out)
 {
     trip_brick_input in = { 0 };
+    trip_brick_params alone = *params; /* without normals, for which a scan may be needed */
+    alone.normals = TRIP_NORMALS_NONE;
     *out = NULL;
-    int status = trip_brick_input_open(&in, params);
+    int status = trip_brick_input_open(&in, &alone);
     if (!status && trip_brick_input_needs_scan(&in))
         status = scan(&in);
     if (!status && params->function_count) {

@@ -13,7 +13,7 @@ static void unpack_gradient(const trip_field_fill *f, uint32_t normal, double gr
     if (f->header->normal_bytes == 3)
         trip_compact_normal_unpack(&f->compact, normal, gradient);
     else
-        trip_normal_unpack(normal, f->header->gradient_scale, gradient);
+        trip_normal_unpack(normal, f->header->gradient_full, gradient);
 }
 
 int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_run *run)

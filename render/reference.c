@@ -302,7 +302,7 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
     if (header->normal_bytes == 3)
         trip_compact_normal_unpack(&r->compact, *normal, gradient);
     else
-        trip_normal_unpack(*normal, header->gradient_scale, gradient);
+        trip_normal_unpack(*normal, header->gradient_full, gradient);
     trip_shade(frame->settings, &r->list->camera, r->gradient_full, voxel, gradient, rgb);
 }
 

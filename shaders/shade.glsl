@@ -22,12 +22,19 @@ vec4 unpack_normal(uint normal)
 #else
 vec4 unpack_normal(uint normal)
 {
+    float full = float(to_eye.w);
+    if ((normal & 0x80000000u) == 0u) {
+        ivec3 whole = ivec3(normal << 22, normal << 12, normal << 2) >> 22;
+        vec3 g = (vec3(whole) + 0.5 * float(normal >> 30)) * (full / 511.0);
+        float strength = length(g);
+        return vec4(g / max(strength, 1e-15), strength);
+    }
     vec2 p = vec2(normal & 4095u, normal >> 12 & 4095u) * (2.0 / 4095.0) - 1.0;
     vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
     if (n.z < 0.0)
         n.xy = (1.0 - abs(p.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(p, vec2(0.0)));
-    float m = float(normal >> 24) / 255.0;
-    return vec4(normalize(n), m * m * float(to_eye.w));
+    float root = 1.0 + float(normal >> 24 & 127u) / 32.0;
+    return vec4(normalize(n), root * root * full);
 }
 #endif
 

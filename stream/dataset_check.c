@@ -79,8 +79,12 @@ static int check_grid(const trip_file_header *h, const char *where)
         return FAIL_FIELD(code_lo, "no range of codes");
     if (!isfinite(h->value_min) || !isfinite(h->value_max) || h->value_min > h->value_max)
         return FAIL_FIELD(value_min, "no range of values");
-    if (!is_length(h->gradient_scale) || !is_length(h->gradient_full))
-        return FAIL_FIELD(gradient_scale, "no gradient scale");
+    if (h->earlier_scale)
+        return FAIL_FIELD(earlier_scale,
+                          "normals of an earlier form, which is not read any more; make "
+                          "the data set again with `triptych brick`");
+    if (!is_length(h->gradient_full))
+        return FAIL_FIELD(gradient_full, "no length of gradients");
     for (int a = 0; a < 3; a++)
         if (!is_length(h->gradient_step[a]))
             return FAIL_FIELD(gradient_step, "no gradient step");

@@ -51,10 +51,10 @@ typedef struct trip_file_header {
     double index_to_world[12];   /* row-major 3 x 4; voxel centres at integer indices */
     double code_lo, code_hi;     /* value of code 0 and of code 65535 */
     double value_min, value_max; /* range of the volume's finite values */
-    double gradient_scale;       /* of 4-byte normals: world-space gradient of magnitude code 255 */
+    uint64_t earlier_scale;      /* 0; had to do with 4-byte normals of a form that is refused */
     double gradient_step[3];     /* of 3-byte normals: index-space gradient of 1, along i, j, k */
-    double gradient_full;        /* of 3-byte normals: those of which the direction alone is kept
-                                    are at least this long in world space (normal.h) */
+    double gradient_full;        /* of normals: gradients at least this long in world space are kept
+                                    as a direction (normal.h) */
     uint64_t voxels;             /* voxels read (existing ones, for sparse grids) */
     uint64_t kept;               /* records of a list of voxels at level 0 */
     uint64_t halo;               /* records of a list of the halo at level 0; 0 without one */

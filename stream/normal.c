@@ -2,8 +2,9 @@
  * whose two coordinates are quantised. */
 #include "normal.h"
 
-enum { COORDINATE_MAX = 4095, MAGNITUDE_MAX = 255 };
-enum { STEPS_MAX = 127, P_MAX = 4095, Q_MAX = 2047, STRONG = 1 << 23 };
+enum { COORDINATE_MAX = 4095, PART_BITS = 10, PART_MAX = 511, LENGTH_MAX = 127 };
+enum { STEPS_MAX = 127, P_MAX = 4095, Q_MAX = 2047, COMPACT_STRONG = 1 << 23 };
+static const uint32_t STRONG = UINT32_C(1) << 31, CENTRE = UINT32_C(1) << 30;
 
 static double fold(double a, double b)
 {
@@ -16,60 +17,114 @@ static inline double clamp(double x)
     return x > 0 ? x < 1 ? x : 1 : 0; /* 0 for NaN */
 }
 
-static uint32_t quantise(double x)
+/* Octahedral coordinates in [0, most]. */
+static void pack_octahedral(const double g[3], double most, uint32_t to[2])
 {
-    return (uint32_t)(clamp(x * 0.5 + 0.5) * COORDINATE_MAX + 0.5);
+    double sum = fabs(g[0]) + fabs(g[1]) + fabs(g[2]), x = g[0] / sum, y = g[1] / sum;
+    double a = g[2] < 0 ? fold(x, y) : x, b = g[2] < 0 ? fold(y, x) : y;
+    to[0] = (uint32_t)(clamp(a * 0.5 + 0.5) * most + 0.5);
+    to[1] = (uint32_t)(clamp(b * 0.5 + 0.5) * most + 0.5);
 }
 
-static double dequantise(uint32_t q)
+/* To a vector of the given length. */
+static void unpack_octahedral(uint32_t first, uint32_t second, double most, double length,
+                              double g[3])
 {
-    return q * (2.0 / COORDINATE_MAX) - 1;
+    double a = first * (2 / most) - 1, b = second * (2 / most) - 1, z = 1 - fabs(a) - fabs(b);
+    double x = z < 0 ? fold(a, b) : a, y = z < 0 ? fold(b, a) : b;
+    double scale = length / sqrt(x * x + y * y + z * z);
+    g[0] = x * scale;
+    g[1] = y * scale;
+    g[2] = z * scale;
 }
 
-/* Square root coding: small gradients keep their relative accuracy. */
-static uint32_t quantise_magnitude(double magnitude, double gradient_scale)
+uint32_t trip_direction_pack(const double gradient[3])
 {
-    if (!(magnitude > 0) || !(gradient_scale > 0))
+    double sum = fabs(gradient[0]) + fabs(gradient[1]) + fabs(gradient[2]);
+    uint32_t c[2];
+    if (!(sum > 0) || !isfinite(sum))
         return 0;
-    return (uint32_t)(sqrt(clamp(magnitude / gradient_scale)) * MAGNITUDE_MAX + 0.5);
+    pack_octahedral(gradient, UINT16_MAX, c);
+    return c[0] | c[1] << 16;
 }
 
-uint32_t trip_normal_pack(const double gradient[3], double gradient_scale)
+void trip_direction_unpack(uint32_t direction, double unit[3])
 {
-    double x = gradient[0], y = gradient[1], z = gradient[2];
-    double sum = fabs(x) + fabs(y) + fabs(z);
-    uint32_t magnitude = quantise_magnitude(sqrt(x * x + y * y + z * z), gradient_scale);
-    if (magnitude == 0 || !isfinite(sum))
+    unpack_octahedral(direction & UINT16_MAX, direction >> 16, UINT16_MAX, 1, unit);
+}
+
+/* The nearest corner of the lattice's cubes, or the nearest of their centres, which are at 1/2 from
+ * the corners; its squared distance. No |part| is above PART_MAX. */
+static double round_parts(const double part[3], double centre, uint32_t *normal)
+{
+    double squared = 0;
+    *normal = centre > 0 ? CENTRE : 0;
+    for (int a = 0; a < 3; a++) {
+        double steps = part[a] - centre;
+        int32_t whole = (int32_t)(steps + copysign(0.5, steps));
+        *normal |= ((uint32_t)whole & ((1u << PART_BITS) - 1)) << PART_BITS * a;
+        squared += (steps - whole) * (steps - whole);
+    }
+    return squared;
+}
+
+static uint32_t pack_parts(const double gradient[3], double full)
+{
+    const double scale = PART_MAX / full;
+    const double part[3] = { gradient[0] * scale, gradient[1] * scale, gradient[2] * scale };
+    uint32_t corner, centre;
+    return round_parts(part, 0, &corner) <= round_parts(part, 0.5, &centre) ? corner : centre;
+}
+
+uint32_t trip_normal_pack(const double gradient[3], double full)
+{
+    double sum = fabs(gradient[0]) + fabs(gradient[1]) + fabs(gradient[2]);
+    if (!(sum > 0) || !isfinite(sum) || !(full > 0))
         return 0;
-    double p = x / sum, q = y / sum;
-    uint32_t a = quantise(z < 0 ? fold(p, q) : p);
-    uint32_t b = quantise(z < 0 ? fold(q, p) : q);
-    return a | b << 12 | magnitude << 24;
+    /* Squares of gradients need not be finite. */
+    double x = gradient[0] / sum, y = gradient[1] / sum, z = gradient[2] / sum;
+    double length = sqrt(x * x + y * y + z * z) * (sum / full);
+    uint32_t c[2];
+    if (length < 1)
+        return pack_parts(gradient, full);
+    pack_octahedral(gradient, COORDINATE_MAX, c);
+    double n = (sqrt(length) - 1) * 32 + 0.5;
+    return STRONG | c[0] | c[1] << 12 | (n < LENGTH_MAX ? (uint32_t)n : LENGTH_MAX) << 24;
 }
 
-void trip_normal_unpack(uint32_t normal, double gradient_scale, double gradient[3])
+void trip_normal_unpack(uint32_t normal, double full, double gradient[3])
 {
-    double a = dequantise(normal & COORDINATE_MAX);
-    double b = dequantise(normal >> 12 & COORDINATE_MAX);
-    double m = (normal >> 24) / (double)MAGNITUDE_MAX;
-    double z = 1 - fabs(a) - fabs(b);
-    double x = z < 0 ? fold(a, b) : a;
-    double y = z < 0 ? fold(b, a) : b;
-    double scale = m * m * gradient_scale / sqrt(x * x + y * y + z * z);
-    gradient[0] = x * scale;
-    gradient[1] = y * scale;
-    gradient[2] = z * scale;
+    if (normal & STRONG) {
+        double root = 1 + (normal >> 24 & LENGTH_MAX) / 32.0;
+        unpack_octahedral(normal & COORDINATE_MAX, normal >> 12 & COORDINATE_MAX, COORDINATE_MAX,
+                          full * root * root, gradient);
+        return;
+    }
+    for (int a = 0; a < 3; a++) {
+        int32_t whole = (int32_t)(normal << (32 - PART_BITS * (a + 1))) >> (32 - PART_BITS);
+        gradient[a] = full / PART_MAX * (whole + (normal & CENTRE ? 0.5 : 0));
+    }
 }
 
-void trip_compact_normals_choose(const trip_affine *index_to_world, double full, double unit,
+/* `unit` divided by the power of two with which the steps still reach `most`, or not at all. */
+static double finest_step(double unit, double most)
+{
+    int halvings = (int)fmax(0, ilogb(unit * STEPS_MAX / most));
+    return unit * STEPS_MAX >= most ? ldexp(unit, -halvings) : most / STEPS_MAX;
+}
+
+bool trip_compact_normals_choose(const trip_affine *index_to_world, double full, double unit,
                                  double step[3])
 {
     const double(*m)[4] = index_to_world->m;
+    bool exact = true;
     for (int a = 0; a < 3; a++) {
         /* The component along an axis of what is as long as `full` in world space, at most. */
         double most = full * trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
-        step[a] = unit * STEPS_MAX >= most ? unit : most / STEPS_MAX;
+        step[a] = finest_step(unit, most);
+        exact = exact && unit * STEPS_MAX >= most;
     }
+    return exact;
 }
 
 trip_compact_normals trip_compact_normals_make(const trip_affine *index_to_world, double full,
@@ -91,13 +146,13 @@ static void to_world(const trip_compact_normals *c, const double from[3], double
                   c->to_world[row][2] * from[2];
 }
 
-static uint32_t pack_direction(const double g[3])
+static uint32_t pack_compact_direction(const double g[3])
 {
     double sum = copysign(fabs(g[0]) + fabs(g[1]) + fabs(g[2]), g[2]);
     double x = g[0] / sum, y = g[1] / sum;
     uint32_t p = (uint32_t)(clamp((x + y) * 0.5 + 0.5) * P_MAX + 0.5);
     uint32_t q = (uint32_t)(clamp((x - y) * 0.5 + 0.5) * Q_MAX + 0.5);
-    return STRONG | q << 12 | p;
+    return COMPACT_STRONG | q << 12 | p;
 }
 
 /* The nearest multiple of the step; none is further than the steps reach. */
@@ -116,14 +171,14 @@ uint32_t trip_compact_normal_pack(const trip_compact_normals *c, const double gr
     if (!isfinite(squared))
         return 0;
     if (squared >= c->full * c->full)
-        return pack_direction(g);
+        return pack_compact_direction(g);
     int32_t x = steps_of(gradient[0], c->step[0]), y = steps_of(gradient[1], c->step[1]),
             z = steps_of(gradient[2], c->step[2]), sign = z < 0 ? -1 : 1;
     return (uint32_t)(sign * x & 255) | (uint32_t)(sign * y & 255) << 8 |
            (uint32_t)(sign * z) << 16;
 }
 
-static void unpack_direction(uint32_t normal, double g[3])
+static void unpack_compact_direction(uint32_t normal, double g[3])
 {
     double p = (normal & P_MAX) * (2.0 / P_MAX) - 1, q = (normal >> 12 & Q_MAX) * (2.0 / Q_MAX) - 1;
     double x = (p + q) / 2, y = (p - q) / 2, z = 1 - fmax(fabs(p), fabs(q));
@@ -135,8 +190,8 @@ static void unpack_direction(uint32_t normal, double g[3])
 
 void trip_compact_normal_unpack(const trip_compact_normals *c, uint32_t normal, double gradient[3])
 {
-    if (normal & STRONG) {
-        unpack_direction(normal, gradient);
+    if (normal & COMPACT_STRONG) {
+        unpack_compact_direction(normal, gradient);
         for (int a = 0; a < 3; a++)
             gradient[a] *= c->full;
         return;

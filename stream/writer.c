@@ -33,8 +33,8 @@ static int check_codes(const trip_writer_codes *c, const char *path)
 {
     if (!isfinite(c->code_lo) || !isfinite(c->code_hi) || c->code_lo > c->code_hi)
         return trip_fail(TRIP_ERROR, "write", path, "value range %g to %g", c->code_lo, c->code_hi);
-    const double gradients[] = { c->gradient_scale, c->gradient_step[0], c->gradient_step[1],
-                                 c->gradient_step[2], c->gradient_full };
+    const double gradients[] = { c->gradient_step[0], c->gradient_step[1], c->gradient_step[2],
+                                 c->gradient_full };
     for (size_t i = 0; i < sizeof gradients / sizeof *gradients; i++)
         if (!isfinite(gradients[i]) || gradients[i] < 0)
             return trip_fail(TRIP_ERROR, "write", path, "gradient scale %g", gradients[i]);
@@ -160,7 +160,6 @@ static void set_header_codes(trip_file_header *h, const trip_writer_codes *c)
 {
     h->code_lo = c->code_lo;
     h->code_hi = c->code_hi;
-    h->gradient_scale = c->gradient_scale;
     memcpy(h->gradient_step, c->gradient_step, sizeof h->gradient_step);
     h->gradient_full = c->gradient_full;
 }

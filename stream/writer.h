@@ -26,7 +26,6 @@ typedef struct trip_writer_list {
 /* What codes and normals stand for; the latter by normal_bytes. */
 typedef struct trip_writer_codes {
     double code_lo, code_hi;
-    double gradient_scale;
     double gradient_step[3], gradient_full;
 } trip_writer_codes;
 

@@ -117,7 +117,6 @@ static void set_compact_normals(trip_cpu_view *view, const trip_dataset *data, d
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             view->compact[i][j] = (float)(c.to_world[i][j] * c.step[j] / full);
-    view->compact_full = (float)(c.full / full);
 }
 
 static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_camera *camera,
@@ -137,7 +136,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         .v_axis = (axis + 2) % 3,
         .code_bytes = header->code_bytes,
         .normal_bytes = header->normal_bytes,
-        .gradient_most = (float)fmin(header->gradient_scale / full, 1e30),
+        .normal_full = (float)fmin(header->gradient_full / full, 1e30),
     };
     const int axes[3] = { view->u_axis, view->v_axis, axis };
     for (int i = 0; i < 3; i++) {

@@ -107,7 +107,7 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const tr
     double full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     f->light = as_it_is(frame->settings->light_direction, 0);
     f->to_eye =
-        as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_scale / full, 1e30));
+        as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_full / full, 1e30));
 }
 
 static void set_compact_normals(trip_gl_frame_double *f, const trip_frame *frame)

@@ -63,8 +63,8 @@
                       world space, over full shading; w of the first: length of                        \
                       those of which the direction alone is kept, likewise */                          \
     R4 light;      /* xyz: towards the light, world space */                                           \
-    R4 to_eye;     /* xyz: towards the eye in parallel views; w: the largest magnitude of a            \
-                      gradient over that at full shading */                                            \
+    R4 to_eye;     /* xyz: towards the eye in parallel views; w: gradient_full of the header        \
+                      over that at full shading */                                                     \
     R4 screen;     /* xy: the image's centre, pixels; zw: width, height */                             \
     R4 kernel;     /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */              \
     R4 edge;     /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code;     \

@@ -156,10 +156,8 @@ static building open_building(const given *g, trip_spill *spill, trip_journal *j
                              .tile_voxels = 1u << g->form.tile_log2,
                              .dims = { side, side, side },
                              .index_to_world = trip_affine_identity(),
-                             .codes = { .code_hi = 1,
-                                        .gradient_scale = 1,
-                                        .gradient_step = { 1, 1, 1 },
-                                        .gradient_full = 1 } };
+                             .codes = {
+                                 .code_hi = 1, .gradient_step = { 1, 1, 1 }, .gradient_full = 1 } };
     FUZZ_PROMISE(trip_writer_open(&b.writer, in_folder("b"), &w, budget) == 0);
     trip_list_builder_params l = { .format = g->format,
                                    .quantiser = { 0, 1, 1, 1 },

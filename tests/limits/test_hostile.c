@@ -294,7 +294,7 @@ static void the_scale_of_the_map_and_of_the_values(void **state)
         if (i % 2 == 1) {
             header->code_lo = header->value_min = -s;
             header->code_hi = header->value_max = s;
-            header->gradient_scale = s;
+            header->gradient_full = s;
         }
         snprintf(name, sizeof name, "%s times %g", i % 2 ? "values" : "space", s);
         judge_changed(name, &h, true);

@@ -174,12 +174,16 @@ static void gradients_of_floats_are_right(void **state)
                 double g[3],
                     e[3] = { ((double)f[1] - f[-1]) / 2 / 0.5, ((double)f[NX] - f[-NX]) / 2,
                              ((double)f[NX * NY] - f[-NX * NY]) / 2 / 2 };
-                trip_normal_unpack(l.normals[0][f - floats], l.header.gradient_scale, g);
+                double full = l.header.gradient_full;
+                trip_normal_unpack(l.normals[0][f - floats], full, g);
                 double length = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-                /* Half a step of the magnitude's root, and 0.06 degrees. */
-                double step = sqrt(length * l.header.gradient_scale) / 255 + 0.0012 * length;
+                /* Of a lattice with steps of full / 511; beyond, half a step of the length's root,
+                 * and 0.06 degrees. */
+                double error = length < full
+                                   ? full / 511
+                                   : sqrt(length * full) / 32 + full / 1024 + 0.0012 * length;
                 for (int a = 0; a < 3; a++)
-                    assert_true(fabs(g[a] - e[a]) <= 1.01 * step);
+                    assert_true(fabs(g[a] - e[a]) <= error);
             }
     test_free_lists(&l);
 }
@@ -277,7 +281,7 @@ static void normals_have_the_bytes_that_were_chosen(void **state)
         bool ranges;
         unsigned bytes;
     } ways[] = {
-        { TRIP_NORMALS_AUTO, false, 3 },    { TRIP_NORMALS_AUTO, true, 4 },
+        { TRIP_NORMALS_AUTO, false, 4 },    { TRIP_NORMALS_AUTO, true, 4 },
         { TRIP_NORMALS_COMPACT, true, 3 },  { TRIP_NORMALS_FULL, false, 4 },
         { TRIP_NORMALS_COMPACT, false, 3 }, { TRIP_NORMALS_NONE, true, 0 },
     };

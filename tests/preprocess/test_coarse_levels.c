@@ -253,7 +253,7 @@ static void normals_are_those_of_the_faces(void **state)
                      list->plane_bytes[1]);
     for (uint64_t i = 0; i < list->records; i++) {
         double g[3];
-        trip_normal_unpack(normals[i], d->header.gradient_scale, g);
+        trip_normal_unpack(normals[i], d->header.gradient_full, g);
         assert_true(fabs(fabs(g[2]) - 127.5 / 2) < 2); /* of the two voxels one is at the face */
         assert_true(fabs(g[0]) < 1 && fabs(g[1]) < 1);
     }

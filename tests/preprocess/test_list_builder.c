@@ -33,7 +33,7 @@ static void open_building(building *b, const char *name, const run_params *p)
                              .tile_voxels = 32,
                              .dims = { NX, NY, NZ },
                              .index_to_world = trip_affine_identity(),
-                             .codes = { .code_hi = 1, .gradient_scale = 1 } };
+                             .codes = { .code_hi = 1, .gradient_full = 1 } };
     trip_list_builder_params l = { .format = format,
                                    .dims = { NX, NY, NZ },
                                    .producers = p->producers,
@@ -150,7 +150,7 @@ static int run(const char *name, const run_params *p, uint64_t *spilled)
 {
     building b;
     trip_workers *producers;
-    trip_quantiser q = { .hi = 1, .gradient_scale = 1 };
+    trip_quantiser q = { .hi = 1, .gradient_full = 1 };
     open_building(&b, name, p);
     assert_int_equal(trip_workers_create(&producers, p->producers), 0);
     int status = 0;

@@ -1,6 +1,7 @@
 #include "brick_files.h"
 
 #include "format.h"
+#include "normal.h"
 #include "piece.h"
 #include "run_builder.h"
 
@@ -35,9 +36,9 @@ static void make_piece(sample *s, const trip_piece_format *f, const uint64_t *bi
         if (!(bitmap[p / 64] >> p % 64 & 1))
             continue;
         uint16_t code = (uint16_t)(p * 3 + 1);
-        float value = (float)p, magnitude = (float)(p % 256) / 255.0f;
-        uint32_t normal = p | (f->quantised ? 200u << 24 : 0);
-        magnitude *= magnitude;
+        float value = (float)p, magnitude = (float)(p % 256) / 512.0f;
+        uint32_t normal =
+            f->quantised ? p | 200u << 24 : trip_direction_pack((const double[3]){ 7, 0, 0 });
         if (f->quantised)
             memcpy(s->bytes + parts.values + n * 2, &code, 2);
         else
@@ -64,7 +65,7 @@ static void check_records(const trip_piece_format *f, const uint64_t *bitmap, ui
         if (f->normals && f->quantised)
             assert_int_equal(normals[n], p | 200u << 24);
         else if (f->normals)
-            assert_int_equal(normals[n], p % 256 ? p | p % 256 << 24 : 0);
+            assert_int_equal(normals[n], (uint32_t)(p % 256 / 512.0 * 511 + 0.5));
         else
             assert_null(normals);
         n++;
@@ -77,7 +78,7 @@ static void check_format(const trip_piece_format *f, trip_budget *budget)
 {
     static sample pieces[3];
     trip_run_builder *builder;
-    const trip_quantiser q = { .lo = 0, .hi = 65535, .gradient_scale = 1 };
+    const trip_quantiser q = { .lo = 0, .hi = 65535, .gradient_full = 1 };
     uint64_t random = f->tile_log2;
     assert_int_equal(trip_run_builder_create(&builder, f, budget), 0);
     for (unsigned share = 0; share <= 16; share++) {
@@ -118,7 +119,7 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
     (void)state;
     static sample good, bad;
     trip_budget *budget;
-    const trip_quantiser q = { .lo = 0, .hi = 65535, .gradient_scale = 1 };
+    const trip_quantiser q = { .lo = 0, .hi = 65535, .gradient_full = 1 };
     uint64_t random = 5;
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 26), 0);
     for (unsigned log2 = 4; log2 <= 7; log2++) {

@@ -72,7 +72,8 @@ static void set_params(writing *w, const scene_params *p)
     if (!given)
         params->index_to_world = trip_affine_identity();
     if (params->normal_bytes != 3) {
-        params->codes.gradient_scale = p->gradient_scale > 0 ? p->gradient_scale : 1;
+        params->codes.gradient_full =
+            TRIP_GRADIENT_FULL * (p->gradient_scale > 0 ? p->gradient_scale : 1);
         return;
     }
     double voxel = cbrt(fabs(trip_affine_determinant(&params->index_to_world)));
@@ -86,7 +87,7 @@ static void set_params(writing *w, const scene_params *p)
 static uint32_t pack_normal(const writing *w, const double gradient[3])
 {
     if (w->params.normal_bytes != 3)
-        return trip_normal_pack(gradient, 1);
+        return trip_normal_pack(gradient, TRIP_GRADIENT_FULL);
     trip_vec3 g = trip_affine_transpose_vector(&w->params.index_to_world,
                                                trip_v3(gradient[0], gradient[1], gradient[2]));
     return trip_compact_normal_pack(&w->compact, (double[3]){ g.x, g.y, g.z });

@@ -35,8 +35,8 @@ typedef struct scene_params {
     unsigned tile_voxels, slab_sheets;
     bool normals;
     unsigned code_bytes, normal_bytes; /* 0: 2, and 4 where there are normals */
-    double gradient_scale;             /* the header's, by which gradients are multiplied; 0: 1 */
-    scene_voxel voxel;                 /* NULL: every voxel is there with code 65535 */
+    double gradient_scale; /* of 4-byte normals, by which gradients are multiplied; 0: 1 */
+    scene_voxel voxel;     /* NULL: every voxel is there with code 65535 */
     void *user;
     const scene_part *parts; /* after the voxels of level 0, three lists each */
     unsigned part_count;     /* at most 3 */

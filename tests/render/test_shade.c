@@ -135,58 +135,136 @@ static trip_vec3 random_direction(uint64_t *state)
     return trip_normalize(v);
 }
 
-/* Of 3 bytes of a gradient in units of `full`, in 1/255: of a white and of a dark splat. */
-static double colour_error(const trip_compact_normals *c, const trip_settings *s, trip_vec3 g)
+/* ---- what normals are rounded for ---- */
+
+/* Shading as shade.h has it, of a grey, with gradients in units of the one at which it is full. */
+static double shaded(trip_vec3 g, trip_vec3 light, trip_vec3 eye, double grey)
 {
-    trip_camera view = camera(false);
-    double exact[3] = { g.x, g.y, g.z }, kept[3], worst = 0;
-    trip_compact_normal_unpack(c, trip_compact_normal_pack(c, exact), kept);
-    for (int dark = 0; dark < 2; dark++) {
-        double a[3] = { dark ? 0.1 : 1 }, b[3] = { a[0] };
-        trip_shade(s, &view, c->full, trip_v3(0, 0, 0), exact, a);
-        trip_shade(s, &view, c->full, trip_v3(0, 0, 0), kept, b);
-        worst = fmax(worst, 255 * fabs(a[0] - b[0]));
-    }
+    double length = trip_length(g), strength = fmin(1, length);
+    if (length == 0)
+        return grey;
+    trip_vec3 n = trip_scale(g, 1 / length), half = trip_normalize(trip_add(light, eye));
+    double facing = fmin(1, fmax(0, 4 * trip_dot(n, light) * trip_dot(n, eye)));
+    double matt = grey * (1 + strength * (0.3 + 0.7 * fabs(trip_dot(n, light)) - 1));
+    double shine = 0.2 * facing * pow(fabs(trip_dot(n, half)), 24);
+    return fmin(1, fmax(0, matt + strength * shine));
+}
+
+typedef struct rounding {
+    bool compact;
+    trip_compact_normals how;
+    double worst, sum; /* in 1/255: of the worst of some greys */
+    long count;
+} rounding;
+
+static trip_vec3 kept(const rounding *r, trip_vec3 g)
+{
+    const double gradient[3] = { g.x, g.y, g.z };
+    double back[3];
+    if (r->compact)
+        trip_compact_normal_unpack(&r->how, trip_compact_normal_pack(&r->how, gradient), back);
+    else
+        trip_normal_unpack(trip_normal_pack(gradient, 1), 1, back);
+    return trip_v3(back[0], back[1], back[2]);
+}
+
+static double error_of(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec3 eye)
+{
+    double worst = 0;
+    for (int grey = 0; grey <= 4; grey++)
+        worst = fmax(worst, 255 * fabs(shaded(g, light, eye, grey / 4.0) -
+                                       shaded(back, light, eye, grey / 4.0)));
     return worst;
+}
+
+/* Light and eye are moved to where the error is larger, as long as that seems worth it. */
+static double worst_about(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec3 eye,
+                          bool headlight, double most, uint64_t *random)
+{
+    double error = error_of(g, back, light, eye), reach = 0.2;
+    for (int step = 0; step < 60 && error > 0.6 * most; step++, reach *= 0.93) {
+        trip_vec3 e = trip_normalize(trip_add(eye, trip_scale(random_direction(random), reach)));
+        trip_vec3 l = trip_normalize(trip_add(light, trip_scale(random_direction(random), reach)));
+        l = headlight ? e : l;
+        double other = error_of(g, back, l, e);
+        if (other > error) {
+            error = other;
+            light = l;
+            eye = e;
+        }
+    }
+    return error;
+}
+
+/* Directions from all round; lengths up to `longest`, half of them near the end of that. */
+static void try_gradients(rounding *r, double shortest, double longest, int count)
+{
+    uint64_t random = 1;
+    for (int i = 0; i < count; i++) {
+        double part = 0.5 * (random_coordinate(&random) + 1);
+        double length = shortest + (longest - shortest) * (i & 2 ? part : cbrt(part));
+        trip_vec3 g = trip_scale(random_direction(&random), length),
+                  eye = random_direction(&random);
+        trip_vec3 light = i & 1 ? eye : random_direction(&random), back = kept(r, g);
+        r->sum += error_of(g, back, light, eye);
+        r->count++;
+        r->worst = fmax(r->worst, worst_about(g, back, light, eye, i & 1, r->worst, &random));
+    }
+    print_message("%s of %g to %g: worst %.3f/255, mean %.3f/255\n",
+                  r->compact ? "3 bytes" : "4 bytes", shortest, longest, r->worst,
+                  r->sum / (double)r->count);
+}
+
+static void four_bytes_change_no_colour_by_half_a_step(void **state)
+{
+    (void)state;
+    rounding weak = { 0 }, strong = { 0 };
+    try_gradients(&weak, 0, 1, 1000000);
+    try_gradients(&strong, 1, 4, 300000);
+    assert_true(weak.worst < 0.5 && weak.sum / (double)weak.count < 0.1);
+    assert_true(strong.worst < 0.5 && strong.sum / (double)strong.count < 0.1);
+}
+
+static rounding compact(double unit)
+{
+    const trip_affine m = trip_affine_identity();
+    double step[3];
+    trip_compact_normals_choose(&m, 1, unit, step);
+    return (rounding){ .compact = true, .how = trip_compact_normals_make(&m, 1, step) };
 }
 
 static void three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step(void **state)
 {
     (void)state;
-    trip_settings s = trip_settings_default();
-    trip_affine m = trip_affine_identity();
-    trip_compact_normals c = trip_compact_normals_make(&m, 1, (const double[]){ 1, 1, 1 });
-    uint64_t random = 1;
-    double worst = 0;
-    for (int i = 0; i < 1000000; i++) {
-        s.headlight = i % 2;
-        s.light_direction = random_direction(&random);
-        worst = fmax(worst, colour_error(&c, &s, trip_scale(random_direction(&random), 1.5)));
-    }
-    assert_true(worst < 0.5);
+    rounding r = compact(0);
+    try_gradients(&r, 1.0001, 4, 300000);
+    assert_true(r.worst < 0.5 && r.sum / (double)r.count < 0.1);
 }
 
-/* Where values have no smallest difference. */
+/* Where values have no smallest difference; what is made only where it is wanted. */
 static void three_bytes_of_any_gradient_change_a_colour_by_less_than_three_steps(void **state)
 {
     (void)state;
-    trip_settings s = trip_settings_default();
-    trip_affine m = trip_affine_identity();
-    double step[3];
-    trip_compact_normals_choose(&m, 1, 0, step);
-    trip_compact_normals c = trip_compact_normals_make(&m, 1, step);
-    uint64_t random = 2;
-    double worst = 0, sum = 0;
-    const int count = 1000000;
-    for (int i = 0; i < count; i++) {
-        s.headlight = i % 2;
-        s.light_direction = random_direction(&random);
-        double length = 0.5 * (random_coordinate(&random) + 1);
-        double error = colour_error(&c, &s, trip_scale(random_direction(&random), length));
-        worst = fmax(worst, error);
-        sum += error;
-    }
-    assert_true(worst < 3 && sum / count < 0.4);
+    rounding r = compact(0);
+    try_gradients(&r, 0, 1, 300000);
+    assert_true(r.worst < 3 && r.worst > 0.5 && r.sum / (double)r.count < 0.4);
+}
+
+/* Multiples of 1/2 where shading is full at 10.2, as of volumes of 8 bits. */
+static void three_bytes_of_bytes_change_no_colour(void **state)
+{
+    (void)state;
+    const double unit = 0.5 / 10.2;
+    rounding r = compact(unit);
+    double worst = 0;
+    for (int z = -20; z <= 20; z++)
+        for (int y = -20; y <= 20; y++)
+            for (int x = -20; x <= 20; x++) {
+                trip_vec3 g = trip_v3(x * unit, y * unit, z * unit), light = { 0.6, 0, 0.8 };
+                if (trip_length(g) < 1)
+                    worst = fmax(worst, error_of(g, kept(&r, g), light, trip_v3(0, 0.6, 0.8)));
+            }
+    assert_true(worst < 1e-9);
 }
 
 int main(void)
@@ -200,7 +278,9 @@ int main(void)
         cmocka_unit_test(a_sphere_shines_on_the_side_that_light_and_eye_share),
         cmocka_unit_test(the_result_stays_within_the_colours_range),
         cmocka_unit_test(a_parallel_view_is_lit_alike_everywhere),
+        cmocka_unit_test(four_bytes_change_no_colour_by_half_a_step),
         cmocka_unit_test(three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step),
+        cmocka_unit_test(three_bytes_of_bytes_change_no_colour),
         cmocka_unit_test(three_bytes_of_any_gradient_change_a_colour_by_less_than_three_steps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

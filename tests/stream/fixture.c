@@ -115,7 +115,6 @@ int fixture_write(fixture *f, const char *path)
                                   .index_to_world = trip_affine_identity(),
                                   .codes = { .code_lo = -1,
                                              .code_hi = 2,
-                                             .gradient_scale = 3,
                                              .gradient_step = { 0.5, 0.25, 1 },
                                              .gradient_full = 3 } };
     int status = trip_writer_open(&w, path, &params, f->budget);

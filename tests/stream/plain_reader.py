@@ -59,7 +59,7 @@ def read_header(index):
     header, at = unpack(
         "8x I:version I:header_bytes Q:header_checksum Q:index_bytes Q:checksums_offset "
         "Q:checksums_checksum 3Q:dims 12d:index_to_world d:code_lo d:code_hi d:value_min "
-        "d:value_max d:gradient_scale 3d:gradient_step d:gradient_full Q:voxels Q:kept Q:halo "
+        "d:value_max Q:reserved_scale 3d:gradient_step d:gradient_full Q:voxels Q:kept Q:halo "
         "I:tile_log2 I:slab_sheets I:page_log2 I:planes I:code_bytes I:normal_bytes I:list_count "
         "I:reserved Q:lists_offset Q:text_offset Q:text_bytes",
         index,
@@ -67,7 +67,7 @@ def read_header(index):
     )
     if at != 320 or header["version"] != 2 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
-    if header["reserved"] or any(index[320:1024]):
+    if header["reserved"] or header["reserved_scale"] or any(index[320:1024]):
         fail("index.trip", 320, "reserved bytes")
     if header["index_bytes"] != len(index):
         fail("index.trip", 24, "length of the file")
@@ -185,16 +185,20 @@ def decode_block(header, code_bytes, name, at, block, count):
     return [(u, v, factor * int(code)) for (u, v), code in zip(places, codes)]
 
 
-def wide_gradients(normals, scale):
+def wide_gradients(normals, full):
     """Rows (gx, gy, gz) of 4-byte normals."""
+    signed = lambda n: numpy.where(n > 511, n - 1024, n)
+    parts = [signed(normals >> 10 * n & 1023) + (normals >> 30 & 1) / 2 for n in range(3)]
+    small = numpy.stack(parts, 1) * (full / 511)
     x = (normals & 4095) * 2.0 / 4095 - 1
     y = (normals >> 12 & 4095) * 2.0 / 4095 - 1
     z = 1 - abs(x) - abs(y)
     fold_x = (1 - abs(y)) * numpy.where(x < 0, -1, 1)
     fold_y = (1 - abs(x)) * numpy.where(y < 0, -1, 1)
     direction = numpy.stack([numpy.where(z < 0, fold_x, x), numpy.where(z < 0, fold_y, y), z], 1)
-    length = ((normals >> 24) / 255.0) ** 2 * scale
-    return direction * (length / numpy.linalg.norm(direction, axis=1))[:, None]
+    length = (1 + (normals >> 24 & 127) / 32) ** 2 * full
+    large = direction * (length / numpy.linalg.norm(direction, axis=1))[:, None]
+    return numpy.where((normals >> 31)[:, None] == 1, large, small)
 
 
 def narrow_gradients(normals, header):
@@ -225,7 +229,7 @@ def read_normals(folder, index, header, a_list):
     parts = data.reshape(-1, size).astype("i8")
     normals = sum(parts[:, n] << 8 * n for n in range(size))
     if size == 4:
-        return normals, wide_gradients(normals, header["gradient_scale"])
+        return normals, wide_gradients(normals, header["gradient_full"])
     return normals, narrow_gradients(normals, header)
 
 

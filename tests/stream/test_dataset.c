@@ -292,13 +292,13 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->code_lo = INFINITY, "range of codes");
     REFUSE(c.header->code_hi = -2, "range of codes");
     REFUSE(c.header->value_max = NAN, "range of values");
-    REFUSE(c.header->gradient_scale = -1, "gradient scale");
+    REFUSE(c.header->earlier_scale = 1, "make the data set again");
     REFUSE(c.header->voxels = UINT64_MAX, "more voxels");
     REFUSE(c.header->voxels = 1, "more was kept");
     REFUSE(c.header->halo = UINT64_MAX, "more was kept");
     REFUSE(c.header->halo = 1, "no list of it");
     REFUSE(c.header->gradient_step[1] = NAN, "gradient step");
-    REFUSE(c.header->gradient_full = -1, "gradient scale");
+    REFUSE(c.header->gradient_full = -1, "no length of gradients");
     REFUSE(c.header->tile_log2 = 8, "tile size");
     REFUSE(c.header->slab_sheets = 0, "sheets per slab");
     REFUSE(c.header->page_log2 = 40, "page size");

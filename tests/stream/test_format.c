@@ -31,13 +31,13 @@ static void append_example(trip_writer *w, int axis)
         const example_voxel *x = &example[example_order[axis][n]];
         uint32_t u = x->p[(axis + 1) % 3], v = x->p[(axis + 2) % 3];
         uint32_t voxels[2] = { trip_voxel_pack(u % 16, v % 16, x->code) };
-        uint32_t normals[2] = { trip_normal_pack(x->gradient, 4) };
+        uint32_t normals[2] = { trip_normal_pack(x->gradient, 2) };
         uint32_t count = 1;
         /* Along z the first two voxels share a tile and a sheet, along x none do. */
         if (axis == 2 && n == 0) {
             x = &example[example_order[axis][++n]];
             voxels[1] = trip_voxel_pack(x->p[0], x->p[1], x->code);
-            normals[1] = trip_normal_pack(x->gradient, 4);
+            normals[1] = trip_normal_pack(x->gradient, 2);
             count = 2;
         }
         assert_int_equal(trip_writer_append(w, (unsigned)axis, x->p[axis], u / 16, v / 16, voxels,
@@ -72,7 +72,7 @@ static void write_example(const char *path, trip_budget *budget)
                                   .page_bytes = 4096,
                                   .dims = { 20, 3, 2 },
                                   .index_to_world = map,
-                                  .codes = { .code_lo = -10, .code_hi = 10, .gradient_scale = 4 } };
+                                  .codes = { .code_lo = -10, .code_hi = 10, .gradient_full = 2 } };
     assert_int_equal(trip_writer_open(&w, path, &params, budget), TRIP_OK);
     for (int axis = 0; axis < 3; axis++)
         append_example(w, axis);

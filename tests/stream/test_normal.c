@@ -22,31 +22,61 @@ static double random_coordinate(uint64_t *state)
     return (double)(fixture_random(state) >> 11) * 0x1p-52 - 1;
 }
 
+/* Any of all directions, those along axes and diagonals first. */
+static void direction_of(int i, uint64_t *random, double a[3])
+{
+    for (int k = 0; k < 3; k++)
+        a[k] = i < 27 ? (int[]){ i, i / 3, i / 9 }[k] % 3 - 1 : random_coordinate(random);
+}
+
 static void directions_come_back_within_six_hundredths_of_a_degree(void **state)
 {
     uint64_t random = 1;
+    double worst = 0, worst_alone = 0;
+    (void)state;
+    for (int i = 0; i < 1000000; i++) {
+        double a[3], b[3], alone[3];
+        direction_of(i, &random, a);
+        if (length(a) == 0)
+            continue;
+        trip_normal_unpack(trip_normal_pack(a, length(a) * 0.999), length(a), b);
+        worst = fmax(worst, angle_degrees(a, b));
+        trip_direction_unpack(trip_direction_pack(a), alone);
+        worst_alone = fmax(worst_alone, angle_degrees(a, alone));
+        assert_true(fabs(length(alone) - 1) < 1e-12);
+    }
+    assert_true(worst < 0.06 && worst_alone < 0.004);
+}
+
+/* No point is further from a body-centred cubic lattice than sqrt(5) / 4 of its cubes' edge; from
+ * one of corners alone some are half of sqrt(3) away. */
+static void weak_gradients_come_back_within_the_lattice_of_cubes_and_centres(void **state)
+{
+    uint64_t random = 5;
     double worst = 0;
     (void)state;
     for (int i = 0; i < 1000000; i++) {
         double a[3], b[3];
-        for (int k = 0; k < 3; k++)
-            a[k] = i < 27 ? (int[]){ i, i / 3, i / 9 }[k] % 3 - 1 : random_coordinate(&random);
-        if (length(a) == 0)
+        direction_of(i, &random, a);
+        if (length(a) >= 1)
             continue;
-        trip_normal_unpack(trip_normal_pack(a, length(a)), length(a), b);
-        worst = fmax(worst, angle_degrees(a, b));
+        double g[3] = { 3 * a[0], 3 * a[1], 3 * a[2] };
+        trip_normal_unpack(trip_normal_pack(g, 3), 3, b);
+        const double off[3] = { b[0] - g[0], b[1] - g[1], b[2] - g[2] };
+        worst = fmax(worst, length(off) / 3 * 511);
     }
-    assert_true(worst < 0.06);
+    assert_true(worst <= sqrt(5) / 4 + 1e-9 && worst > 0.54);
 }
 
-/* The root of the magnitude is rounded to 255 steps: off by half a step at most. */
-static void magnitudes_come_back_within_half_a_step_of_their_root(void **state)
+/* The root of the length is rounded to steps of 1/32: off by half a step at most. */
+static void long_gradients_come_back_within_half_a_step_of_their_root(void **state)
 {
     (void)state;
-    for (double m = 0; m <= 2; m += 0.0001) {
+    for (double m = 2; m <= 49; m += 0.001) {
         double a[3] = { 0, -m, 0 }, b[3];
         trip_normal_unpack(trip_normal_pack(a, 2), 2, b);
-        assert_true(fabs(sqrt(length(b) / 2) - sqrt(m / 2)) <= 0.5 / 255 + 1e-9);
+        assert_true(fabs(sqrt(length(b) / 2) - sqrt(m / 2)) <= 0.5 / 32 + 1e-9);
+        assert_true(length(b) >= 2 - 1e-9);
     }
 }
 
@@ -57,17 +87,19 @@ static void what_has_no_direction_is_zero(void **state)
     (void)state;
     for (int i = 0; i < 4; i++)
         assert_int_equal(trip_normal_pack(none[i], 1), 0);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(trip_direction_pack(none[i]), 0);
     assert_int_equal(trip_normal_pack((double[]){ 1, 2, 3 }, 0), 0);
     trip_normal_unpack(0, 5, b);
     assert_true(b[0] == 0 && b[1] == 0 && b[2] == 0);
 }
 
-static void magnitudes_beyond_the_scale_are_cut_to_it(void **state)
+static void the_longest_gradients_are_cut(void **state)
 {
-    double b[3];
+    double b[3], most = 3 * (1 + 127.0 / 32) * (1 + 127.0 / 32);
     (void)state;
     trip_normal_unpack(trip_normal_pack((double[]){ 0, 0, 1e300 }, 3), 3, b);
-    assert_true(fabs(b[2] - 3) < 1e-3);
+    assert_true(fabs(b[2] - most) < 1e-2 * most);
 }
 
 static trip_affine stretched(double x, double y, double z)
@@ -94,7 +126,10 @@ static void central_differences_of_bytes_are_exact_below_full(void **state)
     const double full = 0.04 * 255 / 2;
     double step[3];
     unsigned weak = 0;
-    trip_compact_normals_choose(&m, full, 0.5, step);
+    assert_true(trip_compact_normals_choose(&m, full, 0.5, step));
+    /* As fine as 127 of them reach. */
+    for (int a = 0; a < 3; a++)
+        assert_true(step[a] * 127 >= full * (1 << a) && step[a] / 2 * 127 < full * (1 << a));
     trip_compact_normals c = trip_compact_normals_make(&m, full, step);
     for (int z = -50; z <= 50; z++)
         for (int y = -30; y <= 30; y++)
@@ -118,7 +153,7 @@ static void other_weak_gradients_come_back_within_half_a_step(void **state)
     trip_affine inverse;
     double step[3];
     assert_true(trip_affine_invert(&m, &inverse));
-    trip_compact_normals_choose(&m, 2, 0, step);
+    assert_false(trip_compact_normals_choose(&m, 2, 0, step));
     trip_compact_normals c = trip_compact_normals_make(&m, 2, step);
     for (int i = 0; i < 100000; i++) {
         double w[3], back[3];
@@ -192,9 +227,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(directions_come_back_within_six_hundredths_of_a_degree),
-        cmocka_unit_test(magnitudes_come_back_within_half_a_step_of_their_root),
+        cmocka_unit_test(weak_gradients_come_back_within_the_lattice_of_cubes_and_centres),
+        cmocka_unit_test(long_gradients_come_back_within_half_a_step_of_their_root),
         cmocka_unit_test(what_has_no_direction_is_zero),
-        cmocka_unit_test(magnitudes_beyond_the_scale_are_cut_to_it),
+        cmocka_unit_test(the_longest_gradients_are_cut),
         cmocka_unit_test(central_differences_of_bytes_are_exact_below_full),
         cmocka_unit_test(other_weak_gradients_come_back_within_half_a_step),
         cmocka_unit_test(strong_gradients_keep_their_direction_within_a_tenth_of_a_degree),

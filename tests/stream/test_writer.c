@@ -413,7 +413,7 @@ static void parameters_out_of_range_are_refused(void **state)
     bad[5].page_bytes = 5000;
     bad[6].index_to_world.m[0][0] = 0;
     bad[7].codes.code_lo = 1;
-    bad[8].codes.gradient_scale = NAN;
+    bad[8].codes.gradient_full = NAN;
     bad[9].page_bytes = 1 << 24; /* six buffers of 16 MiB do not fit 16 MiB */
     fixture_catch_reports();
     for (int i = 0; i < 10; i++)

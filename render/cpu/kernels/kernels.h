@@ -93,9 +93,9 @@ typedef struct trip_cpu_view {
     bool stretch_varies;
     unsigned code_bytes, normal_bytes; /* of the list's codes, of the data set's normals */
     int axis, u_axis, v_axis;
-    float gradient_most; /* the largest magnitude of a normal, over gradient_full of shade.h */
     float compact[3][3]; /* of 3-byte normals: from steps to world space, over gradient_full */
-    float compact_full;  /* length of those of which the direction alone is kept, likewise */
+    float normal_full;   /* length of those of which the direction is kept, likewise; of 4-byte
+                            normals the least */
     double stretch;      /* world units per index length; the cube root of |J| where it varies */
     /* |r|^2 and |J r|^2 / stretch^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2
      * times these. */

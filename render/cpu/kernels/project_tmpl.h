@@ -346,19 +346,25 @@ INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
     return (v3){ w[0], w[1], w[2] };
 }
 
-/* As trip_normal_unpack(): the direction, and the magnitude over gradient_scale. */
-INLINE v3 unpack_normal(vi normal, vf *magnitude)
+/* As trip_normal_unpack(): the direction, and the length over gradient_full. */
+INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
 {
-    const vf step = v_set(2.0f / 4095);
+    const vf step = v_set(2.0f / 4095), part = v_set(view->normal_full / 511);
+    vf centre = v_from_int(v_shift_right(normal, 30) & 1) * v_set(0.5f);
+    v3 weak = { (v_from_int(normal << 22 >> 22) + centre) * part,
+                (v_from_int(normal << 12 >> 22) + centre) * part,
+                (v_from_int(normal << 2 >> 22) + centre) * part };
     vf a = v_fma(v_from_int(normal & 4095), step, v_set(-1));
     vf b = v_fma(v_from_int(v_shift_right(normal, 12) & 4095), step, v_set(-1));
-    vf m = v_from_int(v_shift_right(normal, 24)) * v_set(1.0f / 255);
-    *magnitude = m * m;
-    v3 n = { .z = v_set(1) - v_abs(a) - v_abs(b) };
-    vm below = v_gt(v_set(0), n.z);
-    n.x = v_select(below, v_copysign(v_set(1) - v_abs(b), a), a);
-    n.y = v_select(below, v_copysign(v_set(1) - v_abs(a), b), b);
-    return unit(n);
+    v3 strong = { .z = v_set(1) - v_abs(a) - v_abs(b) };
+    vm below = v_gt(v_set(0), strong.z);
+    strong.x = v_select(below, v_copysign(v_set(1) - v_abs(b), a), a);
+    strong.y = v_select(below, v_copysign(v_set(1) - v_abs(a), b), b);
+    vf root = v_fma(v_from_int(v_shift_right(normal, 24) & 127), v_set(1.0f / 32), v_set(1));
+    vm is_strong = v_gt(v_set(0), v_from_int(normal));
+    *length = v_select(is_strong, root * root * v_set(view->normal_full), v_sqrt(dot(weak, weak)));
+    return unit((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
+                      v_select(is_strong, strong.z, weak.z) });
 }
 
 /* As trip_compact_normal_unpack(): the direction, and the length over gradient_full. */
@@ -374,7 +380,7 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
     vf q = v_fma(v_from_int(v_shift_right(normal, 12) & 2047), v_set(1.0f / 2047), v_set(-0.5f));
     v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) };
     vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
-    *length = v_select(is_strong, v_set(view->compact_full), v_sqrt(dot(weak, weak)));
+    *length = v_select(is_strong, v_set(view->normal_full), v_sqrt(dot(weak, weak)));
     return unit((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
                       v_select(is_strong, strong.z, weak.z) });
 }
@@ -385,13 +391,8 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
 {
     const trip_settings *s = view->of->settings;
     vf magnitude;
-    v3 normal;
-    if (view->normal_bytes == 3) {
-        normal = unpack_compact_normal(view, packed, &magnitude);
-    } else {
-        normal = unpack_normal(packed, &magnitude);
-        magnitude = magnitude * v_set(view->gradient_most);
-    }
+    v3 normal = view->normal_bytes == 3 ? unpack_compact_normal(view, packed, &magnitude)
+                                        : unpack_normal(view, packed, &magnitude);
     eye = unit(eye);
     v3 half = eye;
     vf strength = v_min(v_set(1), magnitude), shining = strength;
