@@ -153,6 +153,17 @@ static int set_function(const sequence *s, triptych *t, int frame, bool quiet)
     return status;
 }
 
+/* ---- what is cut away ---- */
+
+/* The path's, where it has some, in place of the command line's. */
+static int set_clip(const sequence *s, triptych *t, int frame)
+{
+    triptych_settings settings = s->o->settings;
+    if (!trip_camera_path_clip(&s->path, trip_camera_path_seconds(&s->path, frame), &settings.clip))
+        return 0;
+    return triptych_set_settings(t, &settings);
+}
+
 /* ---- frames ---- */
 
 int sequence_prepare(sequence *s, triptych *t)
@@ -181,5 +192,7 @@ int sequence_set_frame(const sequence *s, triptych *t, int frame, bool quiet)
                                  .fov_degrees = c->fov_degrees,
                                  .ortho_height = c->ortho_height };
     int status = s->functions ? set_function(s, t, frame, quiet) : 0;
+    if (!status && s->path.count)
+        status = set_clip(s, t, frame);
     return status ? status : triptych_set_view(t, &view);
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clipping.h"
 #include "geometry.h"
 #include "report.h"
 
@@ -42,9 +43,15 @@ static double fps(const trip_camera_path *p)
     return p->frames_per_second > 0 ? p->frames_per_second : USUAL_FPS;
 }
 
+/* A loop takes two keys. */
+static double loop(const trip_camera_path *p)
+{
+    return p->count > 1 ? p->loop_seconds : 0;
+}
+
 static double duration(const trip_camera_path *p)
 {
-    return p->count ? p->keys[p->count - 1].seconds - p->keys[0].seconds : 0;
+    return p->count ? p->keys[p->count - 1].seconds - p->keys[0].seconds + loop(p) : 0;
 }
 
 int trip_camera_path_frames(const trip_camera_path *p)
@@ -52,17 +59,18 @@ int trip_camera_path_frames(const trip_camera_path *p)
     double steps = round(duration(p) * fps(p));
     if (p->count < 2)
         return (int)p->count;
-    return steps < 1                         ? 2
-           : steps < TRIP_CAMERA_PATH_FRAMES ? (int)steps + 1
+    const int last = loop(p) > 0 ? 0 : 1; /* the first frame is not seen twice */
+    return steps < 1                         ? 1 + last
+           : steps < TRIP_CAMERA_PATH_FRAMES ? (int)steps + last
                                              : TRIP_CAMERA_PATH_FRAMES;
 }
 
 double trip_camera_path_seconds(const trip_camera_path *p, int frame)
 {
-    int last = trip_camera_path_frames(p) - 1;
-    if (frame >= last)
-        return p->keys[p->count - 1].seconds;
-    return p->keys[0].seconds + duration(p) * frame / last;
+    int frames = trip_camera_path_frames(p), steps = loop(p) > 0 ? frames : frames - 1;
+    if (frame >= steps)
+        return p->keys[0].seconds + duration(p);
+    return p->keys[0].seconds + duration(p) * frame / steps;
 }
 
 /* The last key that is not after the time; the first where all are. */
@@ -216,17 +224,44 @@ static trip_navigation navigation_from(const double numbers[NUMBERS], const rota
     return n;
 }
 
+/* A key by its number, beyond the ends too: of a loop those of the rounds before and after, else
+ * the first and the last. */
+typedef struct numbered_key {
+    size_t at;
+    double seconds;
+} numbered_key;
+
+static numbered_key key_numbered(const trip_camera_path *p, long number)
+{
+    const long count = (long)p->count;
+    if (loop(p) > 0) {
+        long round = number < 0 ? -1 : number >= count ? 1 : 0;
+        size_t at = (size_t)(number - round * count);
+        return (numbered_key){ at, p->keys[at].seconds + (double)round * duration(p) };
+    }
+    size_t at = (size_t)(number < 0 ? 0 : number < count ? number : count - 1);
+    return (numbered_key){ at, p->keys[at].seconds };
+}
+
 trip_navigation trip_camera_path_view(const trip_camera_path *p, double seconds)
 {
-    size_t k = key_before(p, seconds);
+    const long k = (long)key_before(p, seconds);
     const trip_path_key *keys = p->keys;
-    if (k + 1 == p->count || seconds <= keys[k].seconds)
+    numbered_key near[4];
+    size_t four[4];
+    for (int i = 0; i < 4; i++) {
+        near[i] = key_numbered(p, k - 1 + i);
+        four[i] = near[i].at;
+    }
+    if (!(near[2].seconds > near[1].seconds) || seconds <= near[1].seconds)
         return keys[k].camera;
-    const size_t four[4] = { k ? k - 1 : k, k, k + 1, k + 2 < p->count ? k + 2 : k + 1 };
-    const place at = { .step = keys[k + 1].seconds - keys[k].seconds,
-                       .s = (seconds - keys[k].seconds) / (keys[k + 1].seconds - keys[k].seconds),
-                       .before = keys[k].seconds - keys[four[0]].seconds,
-                       .after = keys[four[3]].seconds - keys[k + 1].seconds };
+    if (seconds >= near[2].seconds)
+        return keys[four[2]].camera;
+    const double step = near[2].seconds - near[1].seconds;
+    const place at = { .step = step,
+                       .s = (seconds - near[1].seconds) / step,
+                       .before = near[1].seconds - near[0].seconds,
+                       .after = near[3].seconds - near[2].seconds };
     double numbers[4][NUMBERS], now[NUMBERS];
     rotation r[4];
     for (int i = 0; i < 4; i++) {
@@ -242,6 +277,17 @@ trip_navigation trip_camera_path_view(const trip_camera_path *p, double seconds)
     return navigation_from(now, &turned_to, &keys[k].camera);
 }
 
+/* The next key and the share of the way to it; the same key where there is none. */
+static size_t next_key(const trip_camera_path *p, size_t k, double seconds, double *t)
+{
+    const numbered_key from = key_numbered(p, (long)k), to = key_numbered(p, (long)k + 1);
+    *t = 0;
+    if (!(to.seconds > from.seconds) || seconds <= from.seconds)
+        return k;
+    *t = seconds < to.seconds ? (seconds - from.seconds) / (to.seconds - from.seconds) : 1;
+    return to.at;
+}
+
 /* The key whose function holds at a key; -1: the default. */
 static int function_at(const trip_camera_path *p, size_t key)
 {
@@ -253,11 +299,28 @@ static int function_at(const trip_camera_path *p, size_t key)
 
 trip_path_mix trip_camera_path_mix(const trip_camera_path *p, double seconds)
 {
-    size_t k = key_before(p, seconds);
-    bool between = k + 1 < p->count && seconds > p->keys[k].seconds;
-    trip_path_mix mix = { .from = function_at(p, k) };
-    mix.to = between ? function_at(p, k + 1) : mix.from;
-    if (mix.to != mix.from)
-        mix.t = (seconds - p->keys[k].seconds) / (p->keys[k + 1].seconds - p->keys[k].seconds);
+    double t;
+    const size_t k = key_before(p, seconds), next = next_key(p, k, seconds, &t);
+    trip_path_mix mix = { .from = function_at(p, k), .to = function_at(p, next) };
+    mix.t = mix.to != mix.from ? t : 0;
     return mix;
+}
+
+/* What is cut away at a key; NULL where none up to it says so. */
+static const triptych_clip *clip_at(const trip_camera_path *p, size_t key)
+{
+    for (const trip_path_key *k = p->keys + key; k >= p->keys; k--)
+        if (k->has_clip)
+            return &k->clip;
+    return NULL;
+}
+
+bool trip_camera_path_clip(const trip_camera_path *p, double seconds, triptych_clip *clip)
+{
+    double t;
+    const size_t k = key_before(p, seconds), next = next_key(p, k, seconds, &t);
+    const triptych_clip *from = clip_at(p, k), *to = clip_at(p, next);
+    if (from)
+        *clip = to ? trip_clipping_mix(from, to, t) : *from;
+    return from != NULL;
 }

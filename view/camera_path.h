@@ -8,8 +8,14 @@
  *
  * "ortho", the height of a parallel view, stands in the place of "fov"; all keys have the one or
  * all the other. "function" names a preset or a file, "function_text" has one as the text of a
- * `.tf`; a key without goes on with that of the key before it, the first with the default. One
- * thread. */
+ * `.tf`; a key without goes on with that of the key before it, the first with the default. So it is
+ * with "clip", what is cut away, whose parts may be left out:
+ *
+ *   "clip": { "box": [x, y, z, x, y, z], "voxels": true, "planes": [[a, b, c, d], ...] }
+ *
+ * "voxels" says that the box is of voxels. Between keys with parts of the same kinds these move;
+ * else the next key's come with it. "loop": SECONDS closes the path: it goes on from the last key
+ * to the first, in so many seconds, as smoothly as between others. One thread. */
 #ifndef TRIP_VIEW_CAMERA_PATH_H
 #define TRIP_VIEW_CAMERA_PATH_H
 
@@ -27,6 +33,8 @@ typedef struct trip_path_key {
     double seconds;         /* more than at the key before */
     trip_navigation camera; /* upright is not kept */
     char *function, *text;  /* the key's own; NULL: none, at most one of them is there */
+    bool has_clip;          /* of its own, */
+    triptych_clip clip;     /* that */
 } trip_path_key;
 
 /* Starts zeroed. */
@@ -34,6 +42,7 @@ typedef struct trip_camera_path {
     trip_path_key *keys;
     size_t count;
     double frames_per_second; /* 0: 30 */
+    double loop_seconds;      /* from the last key to the first again; 0: it ends */
 } trip_camera_path;
 
 void trip_camera_path_release(trip_camera_path *p);
@@ -49,7 +58,8 @@ int trip_camera_path_save(const trip_camera_path *p, const char *path);
 int trip_camera_path_parse(trip_camera_path *p, const char *name, const char *text);
 int trip_camera_path_load(trip_camera_path *p, const char *path);
 
-/* Frames from the first to the last key, both included. */
+/* Frames from the first to the last key, both included; of a loop up to the last before the first
+ * key comes again. */
 int trip_camera_path_frames(const trip_camera_path *p);
 /* When frame number `frame` is. */
 double trip_camera_path_seconds(const trip_camera_path *p, int frame);
@@ -67,6 +77,9 @@ typedef struct trip_path_mix {
     double t;
 } trip_path_mix;
 trip_path_mix trip_camera_path_mix(const trip_camera_path *p, double seconds);
+
+/* What is cut away then; false where no key up to there says so. */
+bool trip_camera_path_clip(const trip_camera_path *p, double seconds, triptych_clip *clip);
 
 #ifdef __cplusplus
 }

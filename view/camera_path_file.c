@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "camera_path.h"
+#include "clipping.h"
 #include "exact_json.h"
 #include "input_file.h"
 #include "json.h"
@@ -20,6 +21,21 @@ enum { MOST_BYTES = 64 << 20, VERSION = 1 };
 #define MOST_HEIGHT 1e100
 
 /* ---- to text ---- */
+
+static void add_clip(cJSON *key, const triptych_clip *c)
+{
+    cJSON *clip = cJSON_AddObjectToObject(key, "clip");
+    double box[6];
+    memcpy(box, c->box_lo, sizeof c->box_lo);
+    memcpy(box + 3, c->box_hi, sizeof c->box_hi);
+    if (c->box)
+        cJSON_AddItemToObject(clip, "box", trip_exact_numbers(box, 6));
+    if (c->box)
+        cJSON_AddBoolToObject(clip, "voxels", c->box_of_voxels);
+    cJSON *planes = c->planes ? cJSON_AddArrayToObject(clip, "planes") : NULL;
+    for (int i = 0; planes && i < c->planes; i++)
+        cJSON_AddItemToArray(planes, trip_exact_numbers(c->plane[i], 4));
+}
 
 static void add_key(cJSON *keys, const trip_path_key *k)
 {
@@ -37,6 +53,8 @@ static void add_key(cJSON *keys, const trip_path_key *k)
         cJSON_AddStringToObject(key, "function_text", k->text);
     else if (k->function)
         cJSON_AddStringToObject(key, "function", k->function);
+    if (k->has_clip)
+        add_clip(key, &k->clip);
 }
 
 char *trip_camera_path_print(const trip_camera_path *p)
@@ -45,6 +63,8 @@ char *trip_camera_path_print(const trip_camera_path *p)
     cJSON_AddItemToObject(root, "triptych_path", trip_exact_number(VERSION));
     if (p->frames_per_second > 0)
         cJSON_AddItemToObject(root, "frames_per_second", trip_exact_number(p->frames_per_second));
+    if (p->loop_seconds > 0)
+        cJSON_AddItemToObject(root, "loop", trip_exact_number(p->loop_seconds));
     cJSON *keys = cJSON_AddArrayToObject(root, "keys");
     for (size_t i = 0; keys && i < p->count; i++)
         add_key(keys, &p->keys[i]);
@@ -106,6 +126,34 @@ static const char *read_function(trip_path_key *k, const cJSON *key)
     return (function && !k->function) || (text && !k->text) ? "out of memory" : NULL;
 }
 
+static const char *read_clip(trip_path_key *k, const cJSON *key)
+{
+    const cJSON *clip = item_of(key, "clip"), *box = item_of(clip, "box"), *plane;
+    const cJSON *planes = item_of(clip, "planes"), *voxels = item_of(clip, "voxels");
+    triptych_clip *c = &k->clip;
+    double corners[6];
+    k->has_clip = clip != NULL;
+    if ((clip && !cJSON_IsObject(clip)) || (voxels && !cJSON_IsBool(voxels)) ||
+        (planes && (!cJSON_IsArray(planes) || cJSON_GetArraySize(planes) > TRIP_CLIPPING_PLANES)))
+        return "\"clip\" has a \"box\", whether it is of \"voxels\", and up to 6 \"planes\"";
+    c->box = box != NULL;
+    c->box_of_voxels = cJSON_IsTrue(voxels);
+    if (box && !trip_exact_read_numbers(box, 6, -FAR, FAR, corners))
+        return "the \"box\" of \"clip\" is six numbers";
+    for (int a = 0; a < 3 && box; a++) {
+        c->box_lo[a] = corners[a];
+        c->box_hi[a] = corners[3 + a];
+    }
+    cJSON_ArrayForEach(plane, planes)
+    {
+        if (!trip_exact_read_numbers(plane, 4, -FAR, FAR, c->plane[c->planes++]))
+            return "a plane of \"clip\" is four numbers";
+    }
+    return trip_clipping_is_sound(c) ? NULL
+                                     : "its \"clip\" leaves no box, or has a plane without "
+                                       "direction";
+}
+
 static const char *read_key(trip_camera_path *p, const cJSON *key)
 {
     trip_path_key *k = &p->keys[p->count];
@@ -122,6 +170,9 @@ static const char *read_key(trip_camera_path *p, const cJSON *key)
         return fault;
     if (before && (before->camera.ortho_height > 0) != (k->camera.ortho_height > 0))
         return "keys are all parallel (\"ortho\") or all in perspective (\"fov\")";
+    fault = read_clip(k, key);
+    if (fault)
+        return fault;
     fault = read_function(k, key);
     p->count++; /* its texts are the path's from here on */
     return fault;
@@ -149,7 +200,7 @@ static int read_keys(trip_camera_path *p, const cJSON *keys, const char *name)
 
 static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
 {
-    const cJSON *fps = item_of(root, "frames_per_second");
+    const cJSON *fps = item_of(root, "frames_per_second"), *loop = item_of(root, "loop");
     double version;
     if (!cJSON_IsObject(root) || !trip_exact_read(item_of(root, "triptych_path"), 0, FAR, &version))
         return trip_fail(TRIP_ERROR, "path", name, "is not a path: there is no \"triptych_path\"");
@@ -159,6 +210,8 @@ static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
     if (fps && !trip_exact_read(fps, 1e-3, MOST_FPS, &p->frames_per_second))
         return trip_fail(TRIP_ERROR, "path", name, "\"frames_per_second\" is not from 0.001 to %d",
                          MOST_FPS);
+    if (loop && !trip_exact_read(loop, 1e-3, MOST_SECONDS, &p->loop_seconds))
+        return trip_fail(TRIP_ERROR, "path", name, "\"loop\" is not a time above 0");
     int status = read_keys(p, item_of(root, "keys"), name);
     if (!status && trip_camera_path_frames(p) == TRIP_CAMERA_PATH_FRAMES)
         return trip_fail(TRIP_ERROR, "path", name, "is %d frames long, or longer",

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "annotation.h"
+#include "clipping.h"
 #include "report.h"
 
 namespace
@@ -460,10 +461,10 @@ bool draw_light(trip_panel *p, trip_document *d)
 bool draw_quality(trip_panel *p, trip_document *d)
 {
     triptych_settings *s = &d->settings;
-    static const char *const classes[] = { "Before splatting", "After interpolation" };
+    static const char *const classes[] = { "Before splatting", "After interpolation", "By itself" };
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
-    bool changed = choose(p, "Classify", &s->classify, classes, 2);
-    if (s->classify == TRIPTYCH_POST) {
+    bool changed = choose(p, "Classify", &s->classify, classes, 3);
+    if (s->classify != TRIPTYCH_PRE) {
         changed |= mark_beside(
             p, "Slices",
             ImGui::SliderInt("Slices", &s->slices, 0, 16, s->slices ? "%d" : "by the view"));
@@ -477,6 +478,78 @@ bool draw_quality(trip_panel *p, trip_document *d)
     if (s->method == TRIPTYCH_MERGE)
         changed |= slide(p, "h", &s->h, 0, 0.99, "%.2f");
     changed |= mark_beside(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
+    return changed;
+}
+
+// The papers' views.
+bool draw_shown(trip_panel *p, trip_document *d)
+{
+    static const char *const shown[] = { "The function", "Lists", "Merge map", "Levels" };
+    static const char *const legends[] = { "", "along x red, y green, z blue",
+                                           "weights of the lists, likewise",
+                                           "white the finest, then blue, green, yellow, ..." };
+    triptych_settings *s = &d->settings;
+    const bool changed = choose(p, "Colours by", &s->show, shown, 4);
+    if (s->show)
+        ImGui::TextDisabled("%s", legends[s->show]);
+    return changed;
+}
+
+bool draw_clip_box(trip_panel *p, trip_document *d)
+{
+    static const char *const labels[3][2] = { { "i from", "i to" },
+                                              { "j from", "j to" },
+                                              { "k from", "k to" } };
+    triptych_clip *c = &d->settings.clip;
+    bool changed = check(p, "Clip box", &c->box);
+    if (changed && c->box && !(c->box_lo[0] < c->box_hi[0]))
+        trip_clipping_box_of_all(c, &d->info);
+    for (int i = 0; i < 6 && c->box && c->box_of_voxels; i++) {
+        const int axis = i / 2, face = i % 2;
+        double place = face ? c->box_hi[axis] : c->box_lo[axis];
+        if (slide(p, labels[axis][face], &place, static_cast<double>(d->info.first[axis]) - 0.5,
+                  static_cast<double>(d->info.last[axis]) + 0.5, "%.1f")) {
+            trip_clipping_set_face(c, axis, face, place);
+            changed = true;
+        }
+    }
+    return changed;
+}
+
+bool draw_clip_plane(trip_panel *p, trip_document *d, int plane)
+{
+    triptych_clip *c = &d->settings.clip;
+    char label[32];
+    double depth = trip_clipping_depth(c, plane, &d->info);
+    std::snprintf(label, sizeof label, "Plane %d", plane + 1);
+    bool changed = slide(p, label, &depth, -1, 1, "%.3f");
+    if (changed)
+        trip_clipping_set_depth(c, plane, &d->info, depth);
+    std::snprintf(label, sizeof label, "Flip %d", plane + 1);
+    if (button(p, label)) {
+        trip_clipping_flip_plane(c, plane);
+        changed = true;
+    }
+    ImGui::SameLine();
+    std::snprintf(label, sizeof label, "Remove %d", plane + 1);
+    if (button(p, label)) {
+        trip_clipping_remove_plane(c, plane);
+        changed = true;
+    }
+    return changed;
+}
+
+bool draw_clipping(trip_panel *p, trip_document *d)
+{
+    triptych_clip *c = &d->settings.clip;
+    bool changed = check(p, "Clip the data", &d->clips);
+    if (!d->clips)
+        return changed;
+    changed |= draw_clip_box(p, d);
+    for (int i = 0; i < c->planes; i++)
+        changed |= draw_clip_plane(p, d, i);
+    if (c->planes < TRIP_CLIPPING_PLANES && d->has_navigation && button(p, "Add plane"))
+        changed |= trip_clipping_add_plane(c, &d->navigation);
     return changed;
 }
 
@@ -725,8 +798,12 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         v->changed |= draw_light(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);
-    if (section(p, "Show"))
+    if (section(p, "Clipping", false))
+        v->changed |= draw_clipping(p, d);
+    if (section(p, "Show")) {
+        v->changed |= draw_shown(p, d);
         draw_marks(p, v);
+    }
     if (section(p, "Gauges"))
         draw_gauges(p, v);
     if (section(p, "Plan", false))

@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "clipping.h"
 #include "exact_json.h"
 #include "input_file.h"
 #include "json.h"
@@ -58,10 +59,18 @@ static const entry setting_entries[] = {
     { "background", SETTING(background), NUMBERS, 4, 0, 1 },
     { "lod_px", SETTING(lod_px), NUMBERS, 1, 0, 1000 },
     { "samples", SETTING(samples), WHOLE, 1, 1, 64 },
+    { "show", SETTING(show), WHOLE, 1, TRIPTYCH_SHOW_PICTURE, TRIPTYCH_SHOW_LEVELS },
+    { "clip_box", SETTING(clip.box), WHOLE, 1, 0, 1 },
+    { "clip_box_of_voxels", SETTING(clip.box_of_voxels), WHOLE, 1, 0, 1 },
+    { "clip_box_lo", SETTING(clip.box_lo), NUMBERS, 3, -FAR, FAR },
+    { "clip_box_hi", SETTING(clip.box_hi), NUMBERS, 3, -FAR, FAR },
+    { "clip_planes", SETTING(clip.planes), WHOLE, 1, 0, TRIP_CLIPPING_PLANES },
+    { "clip_plane", SETTING(clip.plane), NUMBERS, 4 * TRIP_CLIPPING_PLANES, -FAR, FAR },
 };
 
 static const entry other_entries[] = {
     { "opacity_scale", offsetof(trip_view_state, opacity_scale), NUMBERS, 1, 1e-6, 1e6 },
+    { "clips", offsetof(trip_view_state, clips), YES_OR_NO, 1, 0, 1 },
     { "panel", offsetof(trip_view_state, panel), YES_OR_NO, 1, 0, 1 },
     { "box", offsetof(trip_view_state, box), YES_OR_NO, 1, 0, 1 },
     { "axes", offsetof(trip_view_state, axes), YES_OR_NO, 1, 0, 1 },
@@ -201,6 +210,8 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     const triptych_settings *t = &s->settings;
     if (!status && t->shading && !t->headlight && !(length_of(t->light) > 0))
         status = trip_fail(TRIP_ERROR, "read", path, "its light has no direction");
+    if (!status && !trip_clipping_is_sound(&t->clip))
+        status = trip_fail(TRIP_ERROR, "read", path, "its clipping box or planes are none");
     return status;
 }
 

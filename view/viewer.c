@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "camera_text.h"
+#include "clipping.h"
 #include "state_file.h"
 
 enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
@@ -53,6 +54,7 @@ static void keep(const trip_viewer *v, const trip_document *d)
                                              .text = text,
                                              .opacity_scale = d->opacity_scale,
                                              .settings = d->settings,
+                                             .clips = d->clips,
                                              .panel = v->panel,
                                              .box = v->box,
                                              .axes = v->axes,
@@ -69,8 +71,10 @@ static void take_state(trip_viewer *v, trip_document *d, trip_view_state *s)
         d->navigation = s->navigation;
         d->has_navigation = true;
     }
-    if (!v->settings_given)
+    if (!v->settings_given) {
         d->settings = s->settings;
+        d->clips = s->clips;
+    }
     if (!(v->opacity_scale > 0))
         d->opacity_scale = s->opacity_scale;
     if (!v->function && s->text && trip_function_editor_set_text(d->editor, d->input, s->text) == 0)
@@ -178,6 +182,15 @@ void trip_viewer_close(trip_viewer *v)
 
 /* ---- what is wanted ---- */
 
+/* What the library is to be set to. */
+static triptych_settings settings_of(const trip_document *d)
+{
+    triptych_settings s = d->settings;
+    if (!d->clips)
+        s.clip = (triptych_clip){ 0 };
+    return s;
+}
+
 /* The drawing thread has the text of the editor's function only where it was edited. */
 static void want(trip_viewer *v)
 {
@@ -195,7 +208,7 @@ static void want(trip_viewer *v)
                                                 .function = d->function,
                                                 .text = text,
                                                 .opacity_scale = d->opacity_scale,
-                                                .settings = d->settings });
+                                                .settings = settings_of(d) });
     d->revision = trip_function_editor_revision(d->editor);
     free(text);
     v->changed = false;
@@ -427,6 +440,10 @@ static int add_key(trip_document *d)
     if (!status && !text && d->function)
         p->keys[p->count - 1].function = strdup(d->function);
     free(text);
+    if (!status) {
+        p->keys[p->count - 1].has_clip = true;
+        p->keys[p->count - 1].clip = settings_of(d).clip;
+    }
     return status;
 }
 
@@ -462,7 +479,16 @@ void trip_viewer_mark(trip_viewer *v)
 char *trip_viewer_camera_options(trip_viewer *v)
 {
     const trip_document *d = navigable(v);
-    return d ? trip_camera_text(&d->navigation, v->picture_width, v->height) : NULL;
+    if (!d)
+        return NULL;
+    const triptych_settings s = settings_of(d);
+    char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
+    char *clip = trip_clipping_text(&s.clip);
+    if (camera && clip && asprintf(&text, "%s%s", camera, clip) < 0)
+        text = NULL;
+    free(camera);
+    free(clip);
+    return text;
 }
 
 void trip_viewer_copy_camera(trip_viewer *v)

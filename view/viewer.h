@@ -28,9 +28,10 @@ typedef struct trip_document {
     trip_function_editor *editor;
     uint64_t revision; /* of the editor, that is wanted */
     double opacity_scale;
-    triptych_settings settings;
-    trip_camera_path path; /* of the views that were marked, */
-    char *path_file;       /* in this file; NULL: none was */
+    triptych_settings settings; /* but for clipping: */
+    bool clips;                 /* by settings.clip, which stays as it is while it does not */
+    trip_camera_path path;      /* of the views that were marked, */
+    char *path_file;            /* in this file; NULL: none was */
 } trip_document;
 
 enum { TRIP_DOCUMENTS = 64 };

@@ -268,6 +268,113 @@ static void what_is_no_path_is_refused_by_its_key(void **state)
     assert_refused(PATH(KEY("0", "\"fov\": 3") "," KEY("100000", "\"fov\": 3")), "frames long");
 }
 
+static void a_loop_goes_on_from_the_last_key_to_the_first(void **state)
+{
+    (void)state;
+    trip_camera_path p = { .frames_per_second = 10, .loop_seconds = 1 };
+    for (int i = 0; i < 4; i++)
+        add(&p, 2 + i, around(90 * i), NULL);
+    assert_int_equal(trip_camera_path_frames(&p), 40);
+    for (int i = 0; i < 40; i++) {
+        double seconds = trip_camera_path_seconds(&p, i), turn = (seconds - 2) * PI / 2;
+        trip_navigation n = trip_camera_path_view(&p, seconds);
+        assert_close(seconds, 2 + 0.1 * i, 1e-12);
+        assert_eye(&n, 3 + 10 * cos(turn), 4 + 10 * sin(turn), 5);
+    }
+    trip_navigation end = trip_camera_path_view(&p, 6);
+    assert_memory_equal(&end, &p.keys[0].camera, sizeof end);
+    char *text = trip_camera_path_print(&p), *again;
+    trip_camera_path q = { 0 };
+    assert_int_equal(trip_camera_path_parse(&q, "q", text), 0);
+    assert_string_equal(text, again = trip_camera_path_print(&q));
+    assert_true(q.loop_seconds == 1);
+    free(text);
+    free(again);
+    trip_camera_path_release(&p);
+    trip_camera_path_release(&q);
+}
+
+static void functions_of_a_loop_go_over_into_the_first(void **state)
+{
+    (void)state;
+    trip_camera_path p = { .loop_seconds = 2 };
+    add(&p, 0, around(0), "first");
+    add(&p, 1, around(90), "second");
+    trip_path_mix mix = trip_camera_path_mix(&p, 1.5);
+    assert_int_equal(mix.from, 1);
+    assert_int_equal(mix.to, 0);
+    assert_close(mix.t, 0.25, 1e-12);
+    trip_camera_path_release(&p);
+}
+
+static const char cutting[] =
+    "{ \"triptych_path\": 1, \"keys\": ["
+    "{ \"seconds\": 0, \"eye\": [9,0,0], \"look\": [0,0,0], \"up\": [0,0,1], \"fov\": 30 },"
+    "{ \"seconds\": 1, \"eye\": [9,0,0], \"look\": [0,0,0], \"up\": [0,0,1], \"fov\": 30,"
+    "  \"clip\": { \"box\": [0,1,2,10,11,12], \"voxels\": true, \"planes\": [[1,0,0,-4]] } },"
+    "{ \"seconds\": 3, \"eye\": [9,0,0], \"look\": [0,0,0], \"up\": [0,0,1], \"fov\": 30,"
+    "  \"clip\": { \"box\": [4,1,2,8,11,13], \"voxels\": true, \"planes\": [[0,1,0,2]] } },"
+    "{ \"seconds\": 4, \"eye\": [9,0,0], \"look\": [0,0,0], \"up\": [0,0,1], \"fov\": 30 },"
+    "{ \"seconds\": 5, \"eye\": [9,0,0], \"look\": [0,0,0], \"up\": [0,0,1], \"fov\": 30,"
+    "  \"clip\": {} } ] }";
+
+static void boxes_and_planes_move_between_keys(void **state)
+{
+    (void)state;
+    trip_camera_path p = { 0 };
+    triptych_clip c;
+    assert_int_equal(trip_camera_path_parse(&p, "p", cutting), 0);
+    assert_false(trip_camera_path_clip(&p, 0.9, &c));
+    assert_true(trip_camera_path_clip(&p, 1.5, &c)); /* a quarter of the way */
+    assert_true(c.box && c.box_of_voxels && c.planes == 1);
+    assert_close(c.box_lo[0], 1, 1e-12);
+    assert_close(c.box_hi[0], 9.5, 1e-12);
+    assert_close(c.box_hi[2], 12.25, 1e-12);
+    assert_close(c.plane[0][0], 0.75, 1e-12);
+    assert_close(c.plane[0][1], 0.25, 1e-12);
+    assert_close(c.plane[0][3], -2.5, 1e-12);
+    assert_true(trip_camera_path_clip(&p, 4.9, &c)); /* that of 3 until nothing is cut */
+    assert_true(c.box && c.box_lo[0] == 4 && c.plane[0][1] == 1);
+    assert_true(trip_camera_path_clip(&p, 5, &c));
+    assert_true(!c.box && c.planes == 0);
+    char *text = trip_camera_path_print(&p), *again;
+    trip_camera_path q = { 0 };
+    assert_int_equal(trip_camera_path_parse(&q, "q", text), 0);
+    assert_string_equal(text, again = trip_camera_path_print(&q));
+    free(text);
+    free(again);
+    trip_camera_path_release(&p);
+    trip_camera_path_release(&q);
+}
+
+static void clips_that_are_none_are_refused(void **state)
+{
+    (void)state;
+    static const char *const clips[][2] = {
+        { "[0,1,2,10,11,12]", "[0,1,2,10,11,2]" },
+        { "[0,1,2,10,11,12]", "[0,1,2]" },
+        { "[[1,0,0,-4]]", "[[0,0,0,-4]]" },
+        { "[[1,0,0,-4]]", "[[1,0,0]]" },
+        { "[[1,0,0,-4]]", "[1]" },
+        { "\"clip\": {}", "\"clip\": 3" },
+        { "true", "1" },
+        { "[[1,0,0,-4]]",
+          "[[1,0,0,1],[1,0,0,1],[1,0,0,1],[1,0,0,1],[1,0,0,1],[1,0,0,1],[1,0,0,1]]" },
+    };
+    for (size_t i = 0; i < sizeof clips / sizeof *clips; i++) {
+        const char *at = strstr(cutting, clips[i][0]);
+        char *text;
+        trip_camera_path p = { 0 };
+        assert_non_null(at);
+        assert_true(asprintf(&text, "%.*s%s%s", (int)(at - cutting), cutting, clips[i][1],
+                             at + strlen(clips[i][0])) > 0);
+        test_catch_reports();
+        assert_int_equal(trip_camera_path_parse(&p, "p", text), TRIP_ERROR);
+        assert_one_report("clip");
+        free(text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -281,6 +388,10 @@ int main(void)
         cmocka_unit_test(functions_go_over_between_keys_that_have_others),
         cmocka_unit_test(a_path_is_read_as_it_was_written),
         cmocka_unit_test(what_is_no_path_is_refused_by_its_key),
+        cmocka_unit_test(a_loop_goes_on_from_the_last_key_to_the_first),
+        cmocka_unit_test(functions_of_a_loop_go_over_into_the_first),
+        cmocka_unit_test(boxes_and_planes_move_between_keys),
+        cmocka_unit_test(clips_that_are_none_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

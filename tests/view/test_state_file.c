@@ -29,6 +29,13 @@ static trip_view_state unusual(void)
     s.settings.headlight = 0;
     s.settings.light[1] = -1.0 / 7;
     s.settings.background[2] = 0.2;
+    s.settings.show = TRIPTYCH_SHOW_LEVELS;
+    s.settings.clip = (triptych_clip){ .box = 1,
+                                       .box_lo = { 0.1, -1.0 / 3, 2 },
+                                       .box_hi = { 1, 0, 1e9 },
+                                       .planes = 2,
+                                       .plane = { { 1.0 / 7, 0, 0, 5 }, { 0, 0, -1, 0.3 } } };
+    s.clips = true;
     s.panel = s.axes = true;
     return s;
 }
@@ -46,6 +53,9 @@ static void assert_same(const trip_view_state *a, const trip_view_state *b)
     assert_int_equal(a->settings.slices, b->settings.slices);
     assert_int_equal(a->settings.compositing, b->settings.compositing);
     assert_true(a->settings.lod_px == b->settings.lod_px);
+    assert_memory_equal(&a->settings.clip, &b->settings.clip, sizeof a->settings.clip);
+    assert_int_equal(a->settings.show, b->settings.show);
+    assert_int_equal(a->clips, b->clips);
 }
 
 static int use_folder(void **state)
