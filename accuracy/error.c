@@ -12,12 +12,19 @@ static void add_channel(accuracy_error *e, double error)
     e->most = fmax(e->most, error);
 }
 
-void accuracy_error_add(accuracy_error *e, const float *picture, const float *truth, size_t pixels)
+void accuracy_error_add_apart(accuracy_error *colour, accuracy_error *alpha, const float *picture,
+                              const float *truth, size_t pixels)
 {
     for (size_t i = 0; i < 4 * pixels; i += 4)
         if (picture[i + 3] > 1.0F / 255 || truth[i + 3] > 1.0F / 255)
-            for (size_t c = i; c < i + 4; c++)
-                add_channel(e, 255 * fabs((double)picture[c] - (double)truth[c]));
+            for (size_t c = 0; c < 4; c++)
+                add_channel(c == 3 ? alpha : colour,
+                            255 * fabs((double)picture[i + c] - (double)truth[i + c]));
+}
+
+void accuracy_error_add(accuracy_error *e, const float *picture, const float *truth, size_t pixels)
+{
+    accuracy_error_add_apart(e, e, picture, truth, pixels);
 }
 
 /* The least error that so many channels do not exceed. */

@@ -1,6 +1,5 @@
-/* How far pictures are from others of the same views: over the channels red, green, blue and alpha
- * of the pixels that the object covers, where alpha of either picture is above 1/255. One thread.
- */
+/* How far pictures are from others of the same views: over channels of the pixels that the object
+ * covers, where alpha of either picture is above 1/255. One thread. */
 #ifndef TRIP_ACCURACY_ERROR_H
 #define TRIP_ACCURACY_ERROR_H
 
@@ -25,8 +24,11 @@ typedef struct accuracy_error_figures {
     double median, mean, percentile_99, most, psnr;
 } accuracy_error_figures;
 
-/* Pictures of `pixels` times 4 floats, premultiplied, without background. */
+/* Pictures of `pixels` times 4 floats, premultiplied, without background; all four channels. */
 void accuracy_error_add(accuracy_error *e, const float *picture, const float *truth, size_t pixels);
+/* Red, green and blue alone to `colour`, alpha to `alpha`. */
+void accuracy_error_add_apart(accuracy_error *colour, accuracy_error *alpha, const float *picture,
+                              const float *truth, size_t pixels);
 /* All 0 where no pixel is covered. */
 accuracy_error_figures accuracy_error_measure(const accuracy_error *e);
 

@@ -11,9 +11,11 @@
 static const struct {
     const char *name;
     int (*run)(const session *s, const bench_options *o, bench_report *r);
+    bool makes_volumes; /* where no data set is named */
 } tables[] = {
-    { "orders", bench_orders },       { "submit", bench_submit },   { "stream", bench_stream },
-    { "renderers", bench_renderers }, { "popping", bench_popping },
+    { "orders", bench_orders, false },   { "submit", bench_submit, false },
+    { "stream", bench_stream, false },   { "renderers", bench_renderers, false },
+    { "popping", bench_popping, false }, { "levels", bench_levels, true },
 };
 
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)
@@ -44,22 +46,22 @@ static void join(int argc, char **argv, char *text, size_t bytes)
         used += (size_t)snprintf(text + used, bytes - used, " %s", argv[i]);
 }
 
-static int measure_table(const session *s, const bench_options *o, bench_report *r)
+/* Of the options; they are checked. */
+static size_t table_of(const bench_options *o)
 {
-    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
-        if (!strcmp(tables[i].name, o->table))
-            return tables[i].run(s, o, r);
-    return 0;
+    size_t i = 0;
+    while (i + 1 < sizeof tables / sizeof tables[0] && strcmp(tables[i].name, o->table) != 0)
+        i++;
+    return i;
 }
 
 /* Where no data set is named, of the included volume, which is made for it. */
-static int measure(bench_options *o, bench_report *r)
+static int measure_data(bench_options *o, size_t table, bench_report *r)
 {
     session s = { 0 };
     bench_sample sample = { 0 };
     bool included = !o->input;
     int status = 0;
-    o->progress = bench_progress_start(o->table);
     if (included) {
         status = bench_sample_make(&sample);
         o->input = sample.data;
@@ -68,10 +70,19 @@ static int measure(bench_options *o, bench_report *r)
         status = session_open(&s, o->input, &(session_look){ .tf = o->tf }, o->memory_bytes);
     if (!status) {
         describe(&s, o, included, r);
-        status = measure_table(&s, o, r);
+        status = tables[table].run(&s, o, r);
     }
     session_close(&s);
     bench_sample_remove(&sample);
+    return status;
+}
+
+static int measure(bench_options *o, bench_report *r)
+{
+    const size_t table = table_of(o);
+    o->progress = bench_progress_start(o->table);
+    int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
+                                                          : measure_data(o, table, r);
     bench_progress_end(o->progress);
     return status;
 }

@@ -22,26 +22,33 @@ enum {
     KEY_CLASSIFY,
     KEY_COMPOSITING,
     KEY_SLICES,
+    KEY_FIELD,
+    KEY_FINEST,
+    KEY_PLOT,
     KEY_JSON,
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
 #define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES))
+#define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST) | BIT(KEY_PLOT))
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
       "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
-      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping 256x256)",
+      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping, levels "
+      "256x256)",
       0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; popping cpu)",
+      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; popping, "
+      "levels cpu)",
       0 },
     { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
       0 },
     { "repeat", KEY_REPEAT, "N", 0,
       "Runs, in turns, to take the middle one of (default: 5; renderers 1)", 0 },
-    { "views", KEY_VIEWS, "N", 0, "Views round the object (default: 20); renderers only", 0 },
+    { "views", KEY_VIEWS, "N", 0,
+      "Views round the object (default: 20; levels 3); renderers and levels only", 0 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
     { "hidden", KEY_HIDDEN, "skip|draw", 0,
@@ -54,11 +61,18 @@ static const struct argp_option options[] = {
     { "no-counts", KEY_NO_COUNTS, NULL, 0,
       "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
     { "classify", KEY_CLASSIFY, "pre|post", 0,
-      "As of `triptych render` (default: pre); renderers and popping only", 0 },
+      "As of `triptych render` (default: pre); renderers, popping and levels only", 0 },
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
-      "Likewise, pre (default: splat); renderers and popping only", 0 },
+      "Likewise, pre (default: splat); renderers, popping and levels only", 0 },
     { "slices", KEY_SLICES, "N", 0,
-      "Slices of a sheet, post (default: by the view); renderers and popping only", 0 },
+      "Slices of a sheet, post (default: by the view); renderers, popping and levels only", 0 },
+    { "field", KEY_FIELD, "NAME", 0,
+      "What is sampled finer and finer: marschner-lobb, cloud, shells or filaments (default: "
+      "shells); levels without a data set only",
+      0 },
+    { "finest", KEY_FINEST, "N", 0,
+      "Up to so many voxels along each axis: 128, 256, 512 or 1024 (default: 512); likewise", 0 },
+    { "plot", KEY_PLOT, "FILE", 0, "Draws its table into an .svg; likewise", 0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -68,6 +82,7 @@ static const struct table {
     unsigned refused; /* options that have no meaning here */
     bool lists;       /* takes several sizes, renderers and thread counts */
     int repeat;
+    int views; /* 0: 20 */
     bool draw_hidden;
     int sizes[2], size_count;
     trip_renderer_kind renderers[3];
@@ -75,8 +90,8 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused =
-            OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
+        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
+                   BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 512 },
@@ -86,7 +101,7 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
+        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
                    BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
@@ -97,7 +112,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
         .sizes = { 1024 },
@@ -107,7 +122,7 @@ static const struct table {
     },
     {
         .name = "renderers",
-        .refused = BIT(KEY_ENGINE),
+        .refused = OF_LEVELS | BIT(KEY_ENGINE),
         .lists = true,
         .repeat = 1,
         .sizes = { 512, 1024 },
@@ -117,10 +132,20 @@ static const struct table {
     },
     {
         .name = "popping",
-        .refused = BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) | BIT(KEY_VIEWS) |
-                   BIT(KEY_REPEAT),
+        .refused = OF_LEVELS | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_VIEWS) | BIT(KEY_REPEAT),
         .draw_hidden = true,
         .repeat = 1,
+        .sizes = { 256 },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_CPU },
+        .renderer_count = 1,
+    },
+    {
+        .name = "levels",
+        .refused = BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS),
+        .repeat = 5,
+        .views = 3,
         .sizes = { 256 },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_CPU },
@@ -208,6 +233,22 @@ static int parse_compositing(const char *text, bench_options *o)
     return status;
 }
 
+static int parse_field(const char *text, bench_options *o)
+{
+    static const char *const names[] = { "marschner-lobb", "cloud", "shells", "filaments", NULL };
+    int which = 0, status = trip_option_choice("--field", text, names, &which);
+    o->field = names[which];
+    return status;
+}
+
+static int parse_finest(const char *text, bench_options *o)
+{
+    static const char *const names[] = { "128", "256", "512", "1024", NULL };
+    int which = 0, status = trip_option_choice("--finest", text, names, &which);
+    o->finest = 128 << which;
+    return status;
+}
+
 static int parse_option(int key, char *arg, bench_options *o)
 {
     switch (key) {
@@ -244,6 +285,13 @@ static int parse_option(int key, char *arg, bench_options *o)
         return parse_compositing(arg, o);
     case KEY_SLICES:
         return trip_option_integer("--slices", arg, 1, TRIP_SLICES_MAX, &o->settings.slices);
+    case KEY_FIELD:
+        return parse_field(arg, o);
+    case KEY_FINEST:
+        return parse_finest(arg, o);
+    case KEY_PLOT:
+        o->plot = arg;
+        return 0;
     case KEY_JSON:
         o->json = true;
         return 0;
@@ -255,7 +303,7 @@ static int parse_option(int key, char *arg, bench_options *o)
 static void fill_defaults(bench_options *o, const struct table *t)
 {
     if (!o->views)
-        o->views = 20;
+        o->views = t->views ? t->views : 20;
     if (!o->repeat)
         o->repeat = t->repeat;
     if (!o->size_count)
@@ -299,9 +347,8 @@ static void be_short(parse *p)
 
 static int check(parse *p)
 {
-    static const char *const names[] = {
-        "orders", "submit", "stream", "renderers", "popping", NULL
-    };
+    static const char *const names[] = { "orders",  "submit", "stream", "renderers",
+                                         "popping", "levels", NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)
@@ -356,7 +403,7 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                "than a minute, the renderers cpu and gl. What is compared takes turns, so that a "
                "machine busy for a while slows all of them.",
     };
-    *o = (bench_options){ .settings = trip_settings_default() };
+    *o = (bench_options){ .field = "shells", .finest = 512, .settings = trip_settings_default() };
     o->settings.slices = 0;
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);

@@ -19,6 +19,9 @@ typedef struct bench_options {
     int renderer_count;
     int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
     int repeat, views;
+    const char *field; /* what is sampled finer and finer, a name of trip_fields */
+    int finest;        /* up to so many voxels along each axis */
+    const char *plot;  /* an SVG of it is written here; NULL: none */
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
@@ -34,7 +37,8 @@ typedef struct bench_options {
     "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                \
     "  stream     reading and drawing against the disk's bandwidth\n"                              \
     "  renderers  the renderers there are, over views round the object\n"                          \
-    "  popping    how much pixels jump where the axis of most weight changes\n"
+    "  popping    how much pixels jump where the axis of most weight changes\n"                    \
+    "  levels     how far coarse levels are from the finest; what an object sampled finer takes\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

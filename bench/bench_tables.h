@@ -8,6 +8,8 @@ int bench_orders(const session *s, const bench_options *o, bench_report *r);
 int bench_submit(const session *s, const bench_options *o, bench_report *r);
 int bench_stream(const session *s, const bench_options *o, bench_report *r);
 int bench_popping(const session *s, const bench_options *o, bench_report *r);
+/* Without a session: of volumes that it makes. */
+int bench_levels(const session *s, const bench_options *o, bench_report *r);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 
 #endif

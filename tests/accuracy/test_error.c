@@ -44,6 +44,19 @@ static void errors_made_by_hand_have_the_figures_expected(void **state)
     assert_close(f.psnr, 10 * log10(255.0 * 255 * 400 / (238 * 9 + 2 * 51.0 * 51)), 1e-5);
 }
 
+static void colour_and_alpha_apart_are_three_channels_and_one(void **state)
+{
+    (void)state;
+    static accuracy_error colour, alpha;
+    const float truth[8] = { 0.2F, 0.2F, 0.2F, 1, 0, 0, 0, 0 };
+    const float picture[8] = { 0.2F + 6.0F / 255, 0.2F, 0.2F, 1 - 5.0F / 255, 1, 1, 1, 0 };
+    accuracy_error_add_apart(&colour, &alpha, picture, truth, 2);
+    assert_int_equal(colour.count, 3);
+    assert_int_equal(alpha.count, 1);
+    assert_close(accuracy_error_measure(&colour).mean, 2, 1e-5);
+    assert_close(accuracy_error_measure(&alpha).mean, 5, 1e-5);
+}
+
 static void pixels_count_where_either_picture_covers_them(void **state)
 {
     (void)state;
@@ -64,6 +77,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_picture_is_not_far_from_itself),
         cmocka_unit_test(errors_made_by_hand_have_the_figures_expected),
+        cmocka_unit_test(colour_and_alpha_apart_are_three_channels_and_one),
         cmocka_unit_test(pixels_count_where_either_picture_covers_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

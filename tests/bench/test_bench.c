@@ -282,6 +282,82 @@ static void popping_is_of_axis_alone(void **state)
     }
 }
 
+/* A block of one value without light: there is nothing for coarse levels to lose but its edges, and
+ * its pixels change as the finest level's do. */
+static void levels_of_a_plain_block_are_near_the_finest(void **state)
+{
+    (void)state;
+    program_run r;
+    char tf[] = "values data\nunit 1\n0 1 1 1 0.02\n255 1 1 1 0.02\n";
+    unsigned char values[32 * 32 * 32];
+    for (size_t i = 0; i < sizeof values; i++)
+        values[i] = (unsigned char)(100 + i % 2); /* of one look */
+    FILE *f = fopen("plain.raw", "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(values, 1, sizeof values, f), sizeof values);
+    assert_int_equal(fclose(f), 0);
+    f = fopen("plain.tf", "w");
+    assert_non_null(f);
+    assert_true(fputs(tf, f) >= 0);
+    assert_int_equal(fclose(f), 0);
+    program_call(&r,
+                 "brick plain.raw --size 32,32,32 --type uint8 --keep-all --tf plain.tf --levels 2 "
+                 "-o plain.trip -q");
+    assert_works(&r);
+    cJSON *root = bench("levels plain.trip --views 1 --no-shading");
+    const cJSON *rows = rows_of(root, "levels"), *row;
+    assert_int_equal(cJSON_GetArraySize(rows), 2);
+    for (int level = 1; level <= 2; level++) {
+        row = cJSON_GetArrayItem(rows, level - 1);
+        assert_true(number(row, "level") == level);
+        /* 32 voxels, turned and in a margin. */
+        assert_true(number(row, "width") >= 32 >> level && number(row, "width") <= 72 >> level);
+        assert_true(number(row, "ms") > 0 && number(row, "fine_ms") > 0);
+        assert_true(number(row, "colour_mean") > 0 && number(row, "colour_mean") < 8 * level);
+        /* It is white. */
+        assert_true(fabs(number(row, "colour_mean") - number(row, "alpha_mean")) < 0.01);
+    }
+    row = cJSON_GetArrayItem(rows_of(root, "dolly"), 1);
+    assert_true(number(row, "mean_of_finest") > 0.8 && number(row, "mean_of_finest") < 1.25);
+    assert_true(number(row, "most") >= number(row, "mean"));
+    cJSON_Delete(root);
+    program_call(
+        &r, "brick plain.raw --size 32,32,32 --type uint8 --keep-all --levels 0 -o without.trip "
+            "-q");
+    assert_works(&r);
+    program_call(&r, "bench levels without.trip");
+    assert_fails(&r, 1);
+}
+
+static void levels_without_a_data_set_samples_an_object_and_plots_it(void **state)
+{
+    (void)state;
+    program_run r;
+    assert_int_equal(mkdir("fields", 0700), 0);
+    assert_int_equal(setenv("TMPDIR", "fields", 1), 0);
+    cJSON *root = bench("levels --field filaments --finest 128 --size 32x24 --views 1 --repeat 1 "
+                        "--plot levels.svg");
+    assert_int_equal(rmdir("fields"), 0); /* nothing was left in it */
+    unsetenv("TMPDIR");
+    const cJSON *rows = rows_of(root, "finer"), *row = cJSON_GetArrayItem(rows, 0);
+    assert_int_equal(cJSON_GetArraySize(rows), 1);
+    assert_true(number(row, "voxels") == 128);
+    assert_true(number(row, "ms") > 0 && number(row, "fine_ms") > 0);
+    /* One volume has no coarser level that is wanted. */
+    assert_close(number(row, "colour"), number(row, "fine_colour"));
+    cJSON_Delete(root);
+    FILE *f = fopen("levels.svg", "r");
+    char text[4096] = "";
+    assert_non_null(f);
+    text[fread(text, 1, sizeof text - 1, f)] = 0;
+    fclose(f);
+    assert_true(!strncmp(text, "<svg ", 5) && strstr(text, "</svg>\n") && strstr(text, "128"));
+    program_call(&r, "bench levels --field spheres");
+    assert_fails(&r, 2);
+    program_call(&r, "bench levels --finest 100");
+    assert_fails(&r, 2);
+}
+
 static void tables_for_people_name_the_command_and_their_limits(void **state)
 {
     (void)state;
@@ -314,6 +390,7 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench stream block.trip --hidden skip --renderer gl",
         "bench stream block.trip --hidden skip --renderer reference",
         "bench renderers block.trip --hidden skip --renderer gl,reference",
+        "bench popping block.trip --finest 256",
         "bench orders block.trip --repeat 0",
         "bench orders block.trip --size 0x32",
         "bench orders block.trip --threads 1,2",
@@ -347,6 +424,8 @@ int main(void)
         cmocka_unit_test(
             without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
         cmocka_unit_test(popping_is_of_axis_alone),
+        cmocka_unit_test(levels_of_a_plain_block_are_near_the_finest),
+        cmocka_unit_test(levels_without_a_data_set_samples_an_object_and_plots_it),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
         cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),

@@ -1,0 +1,115 @@
+#include "bench_context.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "bench_frame.h"
+#include "report.h"
+
+/* Reports what a call of the library came to. */
+static int check(const bench_context *c, int status)
+{
+    if (status)
+        trip_report_line(triptych_error(c->t));
+    return status;
+}
+
+static triptych_renderer renderer_of(const bench_options *o)
+{
+    switch (o->renderers[0]) {
+    case TRIP_RENDERER_GL:
+        return TRIPTYCH_RENDERER_GL;
+    case TRIP_RENDERER_CPU:
+        return TRIPTYCH_RENDERER_CPU;
+    case TRIP_RENDERER_REFERENCE:
+        return TRIPTYCH_RENDERER_REFERENCE;
+    default:
+        return TRIPTYCH_RENDERER_AUTO;
+    }
+}
+
+static triptych_settings settings_of(const trip_settings *s)
+{
+    triptych_settings to = triptych_default_settings();
+    to.classify = s->classify == TRIP_CLASSIFY_POST ? TRIPTYCH_POST : TRIPTYCH_PRE;
+    to.compositing =
+        s->compositing == TRIP_COMPOSITING_SHEET ? TRIPTYCH_BY_SHEET : TRIPTYCH_BY_SPLAT;
+    to.slices = s->slices;
+    to.shading = s->shading;
+    to.kernel_radius = s->kernel_radius;
+    memset(to.background, 0, sizeof to.background);
+    return to;
+}
+
+int bench_context_open(bench_context *c, const char *path, const bench_options *o)
+{
+    const triptych_resources resources = { .memory_bytes = o->memory_bytes,
+                                           .threads = (unsigned)o->threads[0],
+                                           .renderer = renderer_of(o),
+                                           .keep_pages = 1 };
+    *c = (bench_context){ .settings = settings_of(&o->settings), .progress = o->progress };
+    if (triptych_create(&c->t))
+        return trip_fail(TRIP_ERROR, "bench", path, "out of memory");
+    int status = triptych_open(c->t, path, &resources);
+    if (!status)
+        status = triptych_set_function(c->t, &(triptych_function){ .name = o->tf });
+    return check(c, status);
+}
+
+void bench_context_close(bench_context *c)
+{
+    triptych_destroy(c->t);
+    c->t = NULL;
+}
+
+int bench_context_look(bench_context *c, const triptych_camera *camera)
+{
+    const triptych_view view = { .width = camera->width,
+                                 .height = camera->height,
+                                 .eye = camera->eye,
+                                 .look = camera->look,
+                                 .up = camera->up,
+                                 .fov_degrees = camera->fov_degrees,
+                                 .ortho_height = camera->ortho_height };
+    return check(c, triptych_set_view(c->t, &view));
+}
+
+int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba, double *ms)
+{
+    bench_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");
+    c->settings.lod_px = lod_px;
+    c->settings.samples = samples;
+    int status = triptych_set_settings(c->t, &c->settings);
+    const double start = bench_now_ms();
+    if (!status)
+        status = triptych_draw(c->t, rgba);
+    if (ms)
+        *ms = bench_now_ms() - start;
+    return check(c, status);
+}
+
+int bench_context_voxel(bench_context *c, double *width)
+{
+    triptych_info info;
+    int status = triptych_get_info(c->t, &info);
+    *width = 0;
+    for (int a = 0; a < 3 && !status; a++)
+        *width = fmax(*width, hypot(hypot(info.index_to_world[0][a], info.index_to_world[1][a]),
+                                    info.index_to_world[2][a]));
+    return check(c, status);
+}
+
+int bench_context_levels(bench_context *c, unsigned *levels)
+{
+    const char *kind = c->settings.classify == TRIPTYCH_POST ? "values" : "means";
+    triptych_info info;
+    int status = triptych_get_info(c->t, &info);
+    *levels = 0;
+    for (unsigned i = 0; !status && i < info.lists; i++) {
+        triptych_list list;
+        status = triptych_get_list(c->t, i, &list);
+        if (!status && !strcmp(list.kind, kind) && list.level > *levels)
+            *levels = list.level;
+    }
+    return check(c, status);
+}

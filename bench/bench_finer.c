@@ -1,0 +1,275 @@
+#include "bench_finer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "bench_context.h"
+#include "bench_sample.h"
+#include "error.h"
+#include "report.h"
+
+enum { MOST = BENCH_FINER_MOST, TRUTH_SAMPLES = 4, ENTRIES = 2 };
+
+/* One volume; it is drawn by two contexts, so that each keeps what it reads. */
+typedef struct volume {
+    bench_sample sample;
+    bench_context contexts[ENTRIES]; /* the finest level; coarse ones */
+    double *ms[ENTRIES];             /* of each run over all views */
+    accuracy_error colour[ENTRIES], alpha[ENTRIES];
+} volume;
+
+typedef struct measuring {
+    const bench_options *options;
+    volume *volumes; /* each twice as fine as the one before */
+    int count;
+    double lod_px;
+    size_t pixels;
+    float *rgba, *truth;
+} measuring;
+
+static int open_volume(measuring *m, int i)
+{
+    const bench_options *o = m->options;
+    volume *v = &m->volumes[i];
+    bench_progress_step(o->progress, "volume");
+    int status = bench_sample_make_field(&v->sample, o->field, BENCH_FINER_COARSEST << i, o->tf);
+    for (int e = 0; e < ENTRIES && !status; e++) {
+        v->ms[e] = calloc((size_t)o->repeat, sizeof *v->ms[e]);
+        if (!v->ms[e])
+            return trip_fail(TRIP_ERROR, "bench", "levels", "out of memory");
+        status = bench_context_open(&v->contexts[e], v->sample.data, o);
+    }
+    return status;
+}
+
+/* One of the views round the first volume, which all share. */
+static int find_view(measuring *m, int view, triptych_camera *camera)
+{
+    const bench_options *o = m->options;
+    const triptych_view wanted = { .width = o->sizes[0][0],
+                                   .height = o->sizes[0][1],
+                                   .azimuth_degrees = 360.0 * view / o->views,
+                                   .turntable = 1 };
+    triptych *t = m->volumes[0].contexts[0].t;
+    int status = triptych_set_view(t, &wanted);
+    if (!status)
+        status = triptych_get_camera(t, camera);
+    if (status)
+        trip_report_line(triptych_error(t));
+    return status;
+}
+
+/* The width of the first volume's voxels where they are nearest to the eye: by that, all are drawn
+ * about as coarse as it is. */
+static int find_lod(measuring *m)
+{
+    triptych_camera camera;
+    double voxel, distance = 0;
+    int status = find_view(m, 0, &camera);
+    if (!status)
+        status = bench_context_voxel(&m->volumes[0].contexts[0], &voxel);
+    if (status)
+        return status;
+    for (int a = 0; a < 3; a++)
+        distance = hypot(distance, camera.eye[a] - camera.look[a]);
+    const double near = distance - 0.5 * sqrt(3) * voxel * BENCH_FINER_COARSEST;
+    const double slope = 2 * tan(camera.fov_degrees * 3.14159265358979323846 / 360);
+    m->lod_px = voxel / (near * slope / camera.height);
+    return 0;
+}
+
+static int draw(measuring *m, volume *v, int e, const triptych_camera *camera, int samples,
+                float *rgba, double *ms)
+{
+    int status = bench_context_look(&v->contexts[e], camera);
+    return status ? status
+                  : bench_context_draw(&v->contexts[e], e ? m->lod_px : 0, samples, rgba, ms);
+}
+
+/* The truth of a view is the finest volume's; then all are drawn once untimed. */
+static int measure_errors(measuring *m, const triptych_camera *camera)
+{
+    int status = draw(m, &m->volumes[m->count - 1], 0, camera, TRUTH_SAMPLES, m->truth, NULL);
+    for (int i = 0; i < m->count; i++)
+        for (int e = 0; e < ENTRIES && !status; e++) {
+            volume *v = &m->volumes[i];
+            status = draw(m, v, e, camera, 1, m->rgba, NULL);
+            if (!status)
+                accuracy_error_add_apart(&v->colour[e], &v->alpha[e], m->rgba, m->truth, m->pixels);
+        }
+    return status;
+}
+
+/* All volumes in turns, run after run. */
+static int measure_times(measuring *m, const triptych_camera *camera)
+{
+    int status = 0;
+    for (int run = 0; run < m->options->repeat; run++)
+        for (int i = 0; i < m->count; i++)
+            for (int e = 0; e < ENTRIES && !status; e++) {
+                double ms = 0;
+                status = draw(m, &m->volumes[i], e, camera, 1, m->rgba, &ms);
+                m->volumes[i].ms[e][run] += ms / m->options->views;
+            }
+    return status;
+}
+
+static int measure(measuring *m)
+{
+    int status = find_lod(m);
+    for (int view = 0; view < m->options->views && !status; view++) {
+        triptych_camera camera;
+        status = find_view(m, view, &camera);
+        if (!status)
+            status = measure_errors(m, &camera);
+        if (!status)
+            status = measure_times(m, &camera);
+    }
+    return status;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double middle(double *ms, int count)
+{
+    qsort(ms, (size_t)count, sizeof *ms, ascending);
+    return ms[(count - 1) / 2];
+}
+
+static bench_finer_row row_of(const measuring *m, int i)
+{
+    volume *v = &m->volumes[i];
+    const int repeat = m->options->repeat;
+    return (bench_finer_row){ .voxels = BENCH_FINER_COARSEST << i,
+                              .fine_ms = middle(v->ms[0], repeat),
+                              .fine_colour = accuracy_error_measure(&v->colour[0]).mean,
+                              .fine_alpha = accuracy_error_measure(&v->alpha[0]).mean,
+                              .ms = middle(v->ms[1], repeat),
+                              .colour = accuracy_error_measure(&v->colour[1]).mean,
+                              .alpha = accuracy_error_measure(&v->alpha[1]).mean };
+}
+
+static const bench_column columns[] = {
+    { "voxels", "voxels a side", 0, 0 },
+    { "fine_ms", "finest: ms", 1, 0 },
+    { "fine_growth", "of the one before", 2, 0 },
+    { "fine_colour", "colour", 2, 0 },
+    { "fine_alpha", "alpha", 2, 0 },
+    { "ms", "by levels: ms", 1, 0 },
+    { "growth", "of the one before", 2, 0 },
+    { "colour", "colour", 2, 0 },
+    { "alpha", "alpha", 2, 0 },
+};
+
+static void add_rows(bench_report *r, const bench_finer_row *rows, int count)
+{
+    cJSON *table = bench_report_table(r, "finer", "Frames of one object sampled finer", columns,
+                                      sizeof columns / sizeof columns[0]);
+    for (int i = 0; i < count; i++) {
+        cJSON *row = cJSON_CreateObject();
+        cJSON_AddNumberToObject(row, "voxels", rows[i].voxels);
+        cJSON_AddNumberToObject(row, "fine_ms", rows[i].fine_ms);
+        cJSON_AddNumberToObject(row, "ms", rows[i].ms);
+        if (i > 0) {
+            cJSON_AddNumberToObject(row, "fine_growth", rows[i].fine_ms / rows[i - 1].fine_ms);
+            cJSON_AddNumberToObject(row, "growth", rows[i].ms / rows[i - 1].ms);
+        }
+        cJSON_AddNumberToObject(row, "fine_colour", rows[i].fine_colour);
+        cJSON_AddNumberToObject(row, "fine_alpha", rows[i].fine_alpha);
+        cJSON_AddNumberToObject(row, "colour", rows[i].colour);
+        cJSON_AddNumberToObject(row, "alpha", rows[i].alpha);
+        cJSON_AddItemToArray(table, row);
+    }
+}
+
+static void describe(const bench_options *o, bench_report *r)
+{
+    cJSON *settings = bench_report_settings(r);
+    char size[32];
+    snprintf(size, sizeof size, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
+    cJSON_AddStringToObject(settings, "size", size);
+    cJSON_AddStringToObject(settings, "field", o->field);
+    cJSON_AddStringToObject(settings, "classified",
+                            o->settings.classify == TRIP_CLASSIFY_POST          ? "post"
+                            : o->settings.compositing == TRIP_COMPOSITING_SHEET ? "pre, by sheets"
+                                                                                : "pre, by splats");
+    cJSON_AddNumberToObject(settings, "repeat", o->repeat);
+}
+
+static int report(const measuring *m, bench_report *r)
+{
+    bench_finer_row rows[MOST];
+    for (int i = 0; i < m->count; i++)
+        rows[i] = row_of(m, i);
+    add_rows(r, rows, m->count);
+    describe(m->options, r);
+    bench_report_limit(r,
+                       "Coarse levels are those of --lod %.3g, the most that voxels of the first "
+                       "volume are wide in pixels, so that all volumes are drawn about as coarse "
+                       "as that one.",
+                       m->lod_px);
+    bench_report_limit(r,
+                       "Errors are means of 255 over the pixels that the object covers, colour "
+                       "premultiplied, from the last volume drawn at its finest level with %d x %d "
+                       "pixels in place of each. Times are means over %d views round the object, "
+                       "from memory, the middle of %d runs in turns.",
+                       TRUTH_SAMPLES, TRUTH_SAMPLES, m->options->views, m->options->repeat);
+    if (m->options->settings.shading)
+        bench_report_limit(r, "Shading is full at a gradient that is given by the voxels, so that "
+                              "volumes sampled finer are shaded otherwise: --no-shading leaves "
+                              "that out of the errors of colour.");
+    return m->options->plot ? bench_finer_plot(m->options->plot, rows, m->count) : 0;
+}
+
+static int begin(measuring *m)
+{
+    const bench_options *o = m->options;
+    const size_t bytes = 4 * m->pixels * sizeof *m->rgba;
+    m->volumes = calloc((size_t)m->count, sizeof *m->volumes);
+    m->rgba = malloc(bytes);
+    m->truth = malloc(bytes);
+    if (!m->volumes || !m->rgba || !m->truth)
+        return trip_fail(TRIP_ERROR, "bench", "levels", "out of memory");
+    bench_progress_expect(o->progress,
+                          m->count + o->views * (1 + m->count * ENTRIES * (1 + o->repeat)));
+    int status = 0;
+    for (int i = 0; i < m->count && !status; i++)
+        status = open_volume(m, i);
+    return status;
+}
+
+static void end(measuring *m)
+{
+    for (int i = 0; m->volumes && i < m->count; i++) {
+        volume *v = &m->volumes[i];
+        for (int e = 0; e < ENTRIES; e++) {
+            bench_context_close(&v->contexts[e]);
+            free(v->ms[e]);
+        }
+        bench_sample_remove(&v->sample);
+    }
+    free(m->volumes);
+    free(m->rgba);
+    free(m->truth);
+}
+
+int bench_finer(const bench_options *o, bench_report *r)
+{
+    measuring m = { .options = o,
+                    .count = 1,
+                    .pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1] };
+    while (m.count < MOST && BENCH_FINER_COARSEST << m.count <= o->finest)
+        m.count++;
+    int status = begin(&m);
+    if (!status)
+        status = measure(&m);
+    if (!status)
+        status = report(&m, r);
+    end(&m);
+    return status;
+}

@@ -1,0 +1,317 @@
+/* bench levels: how far each coarse level is from the finest one where its voxels are a pixel wide,
+ * and how much pictures flicker while the eye moves away through all of them. Without a data set:
+ * what frames take of one object that is sampled finer and finer (bench_finer.c). */
+#include "bench_tables.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "bench_context.h"
+#include "bench_finer.h"
+#include "error.h"
+#include "report.h"
+
+enum {
+    /* Pixels of the truth along a side of a picture's, at least. */
+    LEAST_SAMPLES = 4,
+    /* Of that, pixels along a side, at most: levels whose truth would be larger are left out. */
+    MOST_TRUTH_PX = 4096,
+    DOLLY_STEPS = 128,
+    DOLLY_PX = 192,
+    TOO_LARGE = 1,
+};
+
+/* The eye moves from where voxels of level 0 are so wide to where they are so many times less. */
+static const double dolly_px = 0.8, dolly_times = 2;
+
+typedef struct measuring {
+    const bench_options *options;
+    bench_context context;
+    double voxel; /* width, world space */
+    unsigned levels;
+    bench_report *report;
+} measuring;
+
+/* ---- levels ---- */
+
+/* The pictures of a level. */
+typedef struct entry {
+    accuracy_error colour, alpha, fine_colour, fine_alpha; /* fine: the finest level at that size */
+    double ms, fine_ms;                                    /* over the views */
+    int width;
+} entry;
+
+/* The parallel view that shows all, with voxels of a level one pixel wide. */
+static int look_at(measuring *m, int view, unsigned level, triptych_camera *camera)
+{
+    const double pixel = ldexp(m->voxel, (int)level);
+    const triptych_view whole = { .width = 64,
+                                  .height = 64,
+                                  .azimuth_degrees = 360.0 * view / m->options->views,
+                                  .ortho_fit = 1,
+                                  .turntable = 1 };
+    int status = triptych_set_view(m->context.t, &whole);
+    if (!status)
+        status = triptych_get_camera(m->context.t, camera);
+    if (status) {
+        trip_report_line(triptych_error(m->context.t));
+        return status;
+    }
+    camera->width = camera->height = (int)ceil(camera->ortho_height / pixel);
+    camera->ortho_height = camera->height * pixel;
+    return bench_context_look(&m->context, camera);
+}
+
+static int samples_of(unsigned level)
+{
+    return (1 << level) > LEAST_SAMPLES ? 1 << level : LEAST_SAMPLES;
+}
+
+static int draw_and_compare(measuring *m, unsigned level, entry *e, float *truth, float *rgba)
+{
+    const size_t pixels = (size_t)e->width * (size_t)e->width;
+    double ms = 0, fine_ms = 0;
+    int status = bench_context_draw(&m->context, 0, samples_of(level), truth, NULL);
+    if (!status)
+        status = bench_context_draw(&m->context, 0, 1, rgba, NULL);
+    if (!status)
+        status = bench_context_draw(&m->context, 0, 1, rgba, &fine_ms);
+    if (status)
+        return status;
+    accuracy_error_add_apart(&e->fine_colour, &e->fine_alpha, rgba, truth, pixels);
+    status = bench_context_draw(&m->context, 1.0001, 1, rgba, NULL);
+    if (!status)
+        status = bench_context_draw(&m->context, 1.0001, 1, rgba, &ms);
+    if (status)
+        return status;
+    accuracy_error_add_apart(&e->colour, &e->alpha, rgba, truth, pixels);
+    e->ms += ms;
+    e->fine_ms += fine_ms;
+    return 0;
+}
+
+/* TOO_LARGE where the truth would be. */
+static int measure_view(measuring *m, int view, unsigned level, entry *e)
+{
+    triptych_camera camera;
+    float *truth = NULL, *rgba = NULL;
+    int status = look_at(m, view, level, &camera);
+    if (status)
+        return status;
+    e->width = camera.width;
+    if (camera.width > MOST_TRUTH_PX / samples_of(level))
+        return TOO_LARGE;
+    status = triptych_new_picture(m->context.t, e->width, e->width, 4, &truth);
+    if (!status)
+        status = triptych_new_picture(m->context.t, e->width, e->width, 4, &rgba);
+    if (status)
+        trip_report_line(triptych_error(m->context.t));
+    else
+        status = draw_and_compare(m, level, e, truth, rgba);
+    triptych_release_picture(m->context.t, truth);
+    triptych_release_picture(m->context.t, rgba);
+    return status;
+}
+
+static const bench_column level_columns[] = {
+    { "level", "level", 0, 0 },
+    { "width", "pixels", 0, 0 },
+    { "colour_mean", "colour: mean", 2, 0 },
+    { "colour_99", "99 %", 1, 0 },
+    { "alpha_mean", "alpha: mean", 2, 0 },
+    { "alpha_99", "99 %", 1, 0 },
+    { "ms", "ms", 1, 0 },
+    { "fine_colour_mean", "finest: colour", 2, 0 },
+    { "fine_alpha_mean", "alpha", 2, 0 },
+    { "fine_ms", "ms", 1, 0 },
+};
+
+static void add_level(const measuring *m, cJSON *table, unsigned level, const entry *e)
+{
+    const accuracy_error_figures colour = accuracy_error_measure(&e->colour);
+    const accuracy_error_figures alpha = accuracy_error_measure(&e->alpha);
+    cJSON *row = cJSON_CreateObject();
+    cJSON_AddNumberToObject(row, "level", level);
+    cJSON_AddNumberToObject(row, "width", e->width);
+    cJSON_AddNumberToObject(row, "colour_mean", colour.mean);
+    cJSON_AddNumberToObject(row, "colour_99", colour.percentile_99);
+    cJSON_AddNumberToObject(row, "alpha_mean", alpha.mean);
+    cJSON_AddNumberToObject(row, "alpha_99", alpha.percentile_99);
+    cJSON_AddNumberToObject(row, "ms", e->ms / m->options->views);
+    cJSON_AddNumberToObject(row, "fine_colour_mean", accuracy_error_measure(&e->fine_colour).mean);
+    cJSON_AddNumberToObject(row, "fine_alpha_mean", accuracy_error_measure(&e->fine_alpha).mean);
+    cJSON_AddNumberToObject(row, "fine_ms", e->fine_ms / m->options->views);
+    cJSON_AddItemToArray(table, row);
+}
+
+static int measure_levels(measuring *m)
+{
+    cJSON *table =
+        bench_report_table(m->report, "levels", "Each level, its voxels a pixel wide: error of 255",
+                           level_columns, sizeof level_columns / sizeof level_columns[0]);
+    int status = 0;
+    entry *e = malloc(sizeof *e);
+    if (!e)
+        return trip_fail(TRIP_ERROR, "bench", "levels", "out of memory");
+    for (unsigned level = 1; level <= m->levels && !status; level++) {
+        *e = (entry){ 0 };
+        for (int view = 0; view < m->options->views && !status; view++)
+            status = measure_view(m, view, level, e);
+        if (!status)
+            add_level(m, table, level, e);
+    }
+    free(e);
+    return status == TOO_LARGE ? 0 : status;
+}
+
+/* ---- dolly ---- */
+
+/* Mean changes from picture to picture, of 255, by step. */
+typedef struct flicker {
+    double changes[DOLLY_STEPS];
+} flicker;
+
+static double change(const float *a, const float *b, size_t pixels)
+{
+    double sum = 0;
+    for (size_t i = 0; i < 4 * pixels; i++)
+        sum += fabs((double)a[i] - (double)b[i]);
+    return 255 * sum / (4 * (double)pixels);
+}
+
+/* The eye of a step: at a distance that grows by the same factor from step to step. */
+static int look_from(measuring *m, const triptych_camera *from, int step)
+{
+    triptych_camera camera = *from;
+    const double times = pow(dolly_times, (double)step / DOLLY_STEPS);
+    for (int a = 0; a < 3; a++)
+        camera.eye[a] = from->look[a] + times * (from->eye[a] - from->look[a]);
+    return bench_context_look(&m->context, &camera);
+}
+
+/* So near that voxels are dolly_px wide in the middle. */
+static int find_start(measuring *m, triptych_camera *from)
+{
+    const triptych_view whole = { .width = DOLLY_PX, .height = DOLLY_PX, .fov_degrees = 30 };
+    int status = triptych_set_view(m->context.t, &whole);
+    if (!status)
+        status = triptych_get_camera(m->context.t, from);
+    if (status) {
+        trip_report_line(triptych_error(m->context.t));
+        return status;
+    }
+    const double wanted =
+        m->voxel * DOLLY_PX / dolly_px / 2 / tan(30 * 3.14159265358979323846 / 360);
+    double distance = 0;
+    for (int a = 0; a < 3; a++)
+        distance = hypot(distance, from->eye[a] - from->look[a]);
+    for (int a = 0; a < 3; a++)
+        from->eye[a] = from->look[a] + wanted / distance * (from->eye[a] - from->look[a]);
+    return 0;
+}
+
+static int dolly(measuring *m, const triptych_camera *from, double lod_px, float *pictures[2],
+                 flicker *f)
+{
+    const size_t pixels = (size_t)DOLLY_PX * DOLLY_PX;
+    int status = 0;
+    for (int step = 0; step <= DOLLY_STEPS && !status; step++) {
+        status = look_from(m, from, step);
+        if (!status)
+            status = bench_context_draw(&m->context, lod_px, 1, pictures[step % 2], NULL);
+        if (step > 0 && !status)
+            f->changes[step - 1] = change(pictures[0], pictures[1], pixels);
+    }
+    return status;
+}
+
+static const bench_column dolly_columns[] = {
+    { "drawn", "drawn", 0, 0 },
+    { "mean", "mean", 3, 0 },
+    { "most", "most", 3, 0 },
+    { "mean_of_finest", "of the finest's", 2, 0 },
+    { "most_of_finest", "most of that", 2, 0 },
+};
+
+static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const flicker *finest)
+{
+    double sum = 0, most = 0, sum_of_finest = 0, most_of_finest = 0;
+    cJSON *row = cJSON_CreateObject();
+    for (int i = 0; i < DOLLY_STEPS; i++) {
+        sum += f->changes[i];
+        most = fmax(most, f->changes[i]);
+        sum_of_finest += finest->changes[i];
+        most_of_finest = fmax(most_of_finest, f->changes[i] / finest->changes[i]);
+    }
+    cJSON_AddStringToObject(row, "drawn", drawn);
+    cJSON_AddNumberToObject(row, "mean", sum / DOLLY_STEPS);
+    cJSON_AddNumberToObject(row, "most", most);
+    cJSON_AddNumberToObject(row, "mean_of_finest", sum / sum_of_finest);
+    cJSON_AddNumberToObject(row, "most_of_finest", most_of_finest);
+    cJSON_AddItemToArray(table, row);
+}
+
+static int measure_dolly(measuring *m)
+{
+    cJSON *table =
+        bench_report_table(m->report, "dolly", "Change from picture to picture, of 255",
+                           dolly_columns, sizeof dolly_columns / sizeof dolly_columns[0]);
+    triptych_camera from;
+    flicker finest, coarse;
+    float *pictures[2] = { NULL, NULL };
+    int status = find_start(m, &from);
+    for (int i = 0; i < 2 && !status; i++)
+        status = triptych_new_picture(m->context.t, DOLLY_PX, DOLLY_PX, 4, &pictures[i]);
+    if (!status)
+        status = dolly(m, &from, 0, pictures, &finest);
+    if (!status)
+        status = dolly(m, &from, 1, pictures, &coarse);
+    for (int i = 0; i < 2; i++)
+        triptych_release_picture(m->context.t, pictures[i]);
+    if (status)
+        return status;
+    add_dolly(table, "finest", &finest, &finest);
+    add_dolly(table, "--lod 1", &coarse, &finest);
+    return 0;
+}
+
+static void add_limits(const measuring *m)
+{
+    bench_report_limit(
+        m->report,
+        "The truth of a level is the finest level drawn with at least %d x %d, and "
+        "at least as many pixels as voxels, in place of each, and averaged. From "
+        "the level on whose truth would be wider than %d pixels there is none. Views: %d round "
+        "the object, parallel. Colour is premultiplied; means and 99 %% are over "
+        "the pixels that the object covers.",
+        LEAST_SAMPLES, LEAST_SAMPLES, MOST_TRUTH_PX, m->options->views);
+    bench_report_limit(m->report,
+                       "The eye moves away from the object's middle in %d steps, from where voxels "
+                       "of the finest level are %g pixels wide to where they are %g; "
+                       "the last figure is of the step in which it is most.",
+                       DOLLY_STEPS, dolly_px, dolly_px / dolly_times);
+}
+
+int bench_levels(const session *s, const bench_options *o, bench_report *r)
+{
+    if (!s)
+        return bench_finer(o, r);
+    measuring m = { .options = o, .report = r };
+    int status = bench_context_open(&m.context, o->input, o);
+    if (!status)
+        status = bench_context_voxel(&m.context, &m.voxel);
+    if (!status)
+        status = bench_context_levels(&m.context, &m.levels);
+    if (!status && m.levels == 0)
+        status = trip_fail(TRIP_ERROR, "bench", o->input,
+                           "has no coarse levels; `triptych brick` without --levels 0 makes them");
+    bench_progress_expect(o->progress, (int)m.levels * o->views * 5 + 2 * (DOLLY_STEPS + 1));
+    if (!status)
+        status = measure_levels(&m);
+    if (!status)
+        status = measure_dolly(&m);
+    if (!status)
+        add_limits(&m);
+    bench_context_close(&m.context);
+    return status;
+}
