@@ -1,7 +1,9 @@
 /* triptych view: data sets and volumes -> a window. */
+#include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "cached_volume.h"
 #include "commands.h"
@@ -57,7 +59,8 @@ static const struct argp_option options[] = {
     { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, so many world units high", 2 },
     { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 2 },
     { "opacity-scale", KEY_OPACITY_SCALE, "X", 0, "Multiplies extinction", 2 },
-    { "classify", KEY_CLASSIFY, "pre|post", 0, "Before splatting, or after interpolation (default: pre)", 2 },
+    { "classify", KEY_CLASSIFY, "pre|post", 0,
+      "Before splatting, or after interpolation (default: pre)", 2 },
     { NULL, 0, NULL, 0, "Renderer:", 3 },
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },
@@ -256,21 +259,74 @@ static int parse(view_options *o, int argc, char **argv)
     return trip_options_parse(&argp, argc, argv, o);
 }
 
-/* As `triptych render` keeps volumes; by the drawing thread. */
-static int find(void *user, triptych *t, const char *input, const char **path)
+static triptych_brick_options brick_options(const view_options *o, bool keep_all)
 {
-    view_options *o = user;
     triptych_brick_options wanted = o->volume;
-    *path = input;
-    if (!cached_volume_wanted(input))
-        return 0;
     wanted.functions = &o->params.function;
-    wanted.function_count = o->params.function != NULL;
-    wanted.automatic = 1;
+    wanted.function_count = o->params.function != NULL && !keep_all;
+    wanted.automatic = !keep_all;
+    wanted.keep_all = keep_all;
     wanted.memory_bytes = o->params.memory_bytes;
     wanted.threads = o->params.threads;
-    const int status = cached_volume_open(&o->cached, t, input, &wanted);
+    return wanted;
+}
+
+/* What a data set was made of, where that lies beside it, for free(); `input` itself where it is a
+ * volume. NULL where it is reported to be missing. */
+static char *volume_of(triptych *t, const char *input)
+{
+    triptych_info info;
+    char *volume = NULL, *folder = strdup(input), *slash;
+    if (!folder || cached_volume_wanted(input))
+        return folder;
+    for (size_t n = strlen(folder); n > 1 && folder[n - 1] == '/'; n--)
+        folder[n - 1] = 0;
+    slash = strrchr(folder, '/');
+    if (slash)
+        slash[1] = 0;
+    int status = triptych_open(t, input, NULL);
+    if (!status)
+        status = triptych_get_info(t, &info);
+    cJSON *notes = status ? NULL : cJSON_Parse(info.notes);
+    const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(notes, "source"));
+    if (name && asprintf(&volume, "%s%s", slash ? folder : "", name) < 0)
+        volume = NULL;
+    if (!status && (!volume || access(volume, R_OK))) {
+        trip_fail(TRIP_ERROR, "brick", name ? name : input,
+                  "the volume it was made of is not beside it");
+        free(volume);
+        volume = NULL;
+    }
+    triptych_close(t);
+    cJSON_Delete(notes);
+    free(folder);
+    return volume;
+}
+
+/* As `triptych render` keeps volumes; by the drawing thread. */
+static int find(void *user, triptych *t, const char *input, bool keep_all, const char **path)
+{
+    view_options *o = user;
+    const triptych_brick_options wanted = brick_options(o, keep_all);
+    *path = input;
+    if (!keep_all && !cached_volume_wanted(input))
+        return 0;
+    char *volume = volume_of(t, input);
+    const int status = volume ? cached_volume_open(&o->cached, t, volume, &wanted) : TRIP_ERROR;
     *path = o->cached.path;
+    free(volume);
+    return status;
+}
+
+/* With all values; by a thread of its own. */
+static int make(void *user, triptych *t, const char *input)
+{
+    const triptych_brick_options wanted = brick_options(user, true);
+    cached_volume made = { .hold = -1 };
+    char *volume = volume_of(t, input);
+    const int status = volume ? cached_volume_open(&made, t, volume, &wanted) : TRIP_ERROR;
+    cached_volume_close(&made);
+    free(volume);
     return status;
 }
 
@@ -302,6 +358,7 @@ int trip_command_view(int argc, char **argv)
     o.params.inputs = o.inputs;
     o.params.user = &o;
     o.params.find = find;
+    o.params.make = make;
     o.params.release = release;
     if (!status)
         status = check_inputs(&o);

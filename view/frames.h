@@ -29,9 +29,10 @@ typedef struct trip_frames_params {
     void (*wake)(void *user);
     void *wake_user;
     /* The same: the data set to open for what the user named, which stays where it is until
-     * release(). NULL: names are data sets. A failure is reported in the context or the thread's
+     * release(); one with all values, which was made before, where keep_all. NULL: names are data
+     * sets. A failure is reported in the context or the thread's
      * scope. */
-    int (*find)(void *user, triptych *t, const char *input, const char **path);
+    int (*find)(void *user, triptych *t, const char *input, bool keep_all, const char **path);
     void (*release)(void *user);
     void *user;
 } trip_frames_params;
@@ -45,6 +46,7 @@ void trip_frames_stop(trip_frames *f);
 typedef struct trip_wanted {
     unsigned document; /* another number: another data set, or the same opened anew */
     const char *input;
+    bool keep_all; /* one that has all values: as find() */
     /* Where to look from; without it the view is found by `start`, whose pointers stay valid. */
     bool has_navigation;
     trip_navigation navigation;
@@ -80,6 +82,7 @@ typedef struct trip_frames_status {
     bool open;                  /* there is a data set */
     bool exact;                 /* the picture is the one that is wanted, whole */
     bool failed;                /* for the reason `message` */
+    bool left_out;              /* the function shows values that were not kept */
     bool rests;                 /* nothing more comes: the picture is exact, or has failed */
     char message[512];          /* of the last failure or warning; "" */
     uint64_t messages;          /* how many there were */

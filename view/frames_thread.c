@@ -176,7 +176,7 @@ static int open_data(trip_frames *f)
     pthread_mutex_unlock(&f->lock);
     show_stage(f, "open", 0);
     if (p->find)
-        status = p->find(p->user, f->t, w->input, &f->source);
+        status = p->find(p->user, f->t, w->input, w->keep_all, &f->source);
     if (!status)
         status = triptych_open(f->t, f->source,
                                &(triptych_resources){ .memory_bytes = p->memory_bytes,
@@ -202,10 +202,18 @@ static int use_function(trip_frames *f)
         free(key);
         return 0;
     }
-    int status =
-        triptych_set_function(f->t, &(triptych_function){ .name = w->text ? NULL : w->function,
-                                                          .text = w->text,
-                                                          .opacity_scale = w->opacity_scale });
+    int left_out = 0;
+    triptych_function wanted = { .name = w->text ? NULL : w->function,
+                                 .text = w->text,
+                                 .opacity_scale = w->opacity_scale,
+                                 .left_out = &left_out };
+    int status = triptych_set_function(f->t, &wanted);
+    wanted.left_out = NULL;
+    if (!status && left_out) /* with a warning that names the command */
+        status = triptych_set_function(f->t, &wanted);
+    pthread_mutex_lock(&f->lock);
+    f->status.left_out = !status && left_out;
+    pthread_mutex_unlock(&f->lock);
     f->other_function |= !status && !w->text;
     free(f->function);
     f->function = status ? NULL : key;

@@ -397,9 +397,28 @@ void draw_function_file(trip_panel *p, trip_viewer *v, trip_document *d)
     }
 }
 
+// Where the function shows values that were not kept.
+void draw_left_out(trip_panel *p, trip_viewer *v, trip_document *d)
+{
+    if (!v->maker)
+        return;
+    const trip_maker_status s = trip_maker_get_status(v->maker);
+    if (s.busy && s.document == d->number) {
+        char text[64];
+        std::snprintf(text, sizeof text, "bricking: %s %.0f %%", s.stage, 100 * s.done);
+        ImGui::ProgressBar(static_cast<float>(s.done), ImVec2(-1, 0), text);
+    } else if (v->status.left_out && v->status.document == d->number) {
+        ImGui::TextWrapped("This function shows values that were not kept when the data set was "
+                           "made.");
+        if (button(p, "Brick again with all values"))
+            trip_viewer_brick_again(v);
+    }
+}
+
 void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
 {
     draw_presets(p, v, d);
+    draw_left_out(p, v, d);
     draw_editor(p, d);
     draw_point(p, d);
     if (button(p, "Undo") && trip_function_editor_can_undo(d->editor)) {

@@ -28,7 +28,9 @@ typedef struct trip_view_params {
     bool fresh;         /* nothing is kept of how data sets were looked at */
     const char *script; /* a file of events, after which it ends */
     void *user;
-    int (*find)(void *user, triptych *t, const char *input, const char **path); /* as frames.h */
+    /* As frames.h and maker.h have them. */
+    int (*find)(void *user, triptych *t, const char *input, bool keep_all, const char **path);
+    int (*make)(void *user, triptych *t, const char *input); /* NULL: nothing is made */
     void (*release)(void *user);
 } trip_view_params;
 

@@ -200,6 +200,7 @@ static void want(trip_viewer *v)
     char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
     trip_frames_want(v->frames, &(trip_wanted){ .document = d->number,
                                                 .input = d->input,
+                                                .keep_all = d->keep_all,
                                                 .has_navigation = d->has_navigation,
                                                 .navigation = d->navigation,
                                                 .start = &d->start,
@@ -259,7 +260,8 @@ bool trip_viewer_rests(trip_viewer *v)
     const trip_frames_status s = trip_frames_get_status(v->frames);
     if (!d || v->changed || v->picture_width < 1 || v->height < 1)
         return !d || !v->changed;
-    return s.document == d->number && s.rests && !trip_frames_saving(v->frames);
+    return s.document == d->number && s.rests && !trip_frames_saving(v->frames) &&
+           !(v->maker && trip_maker_get_status(v->maker).busy);
 }
 
 static void lay_out(trip_viewer *v)
@@ -476,6 +478,33 @@ void trip_viewer_mark(trip_viewer *v)
     trip_viewer_say(v, text);
 }
 
+void trip_viewer_brick_again(trip_viewer *v)
+{
+    const trip_document *d = trip_viewer_document(v);
+    if (!d || !v->maker)
+        return;
+    if (!trip_maker_start(v->maker, d->number, d->input))
+        trip_viewer_say(v, "another data set is being bricked: try again when it is done");
+}
+
+/* What was bricked is opened in the place of what is shown. */
+static void take_made(trip_viewer *v)
+{
+    trip_made made;
+    trip_document *d = NULL;
+    if (!v->maker || !trip_maker_take(v->maker, &made))
+        return;
+    for (int i = 0; i < v->count; i++)
+        d = v->documents[i]->number == made.document ? v->documents[i] : d;
+    if (!made.made)
+        trip_viewer_say(v, made.message);
+    if (!d || !made.made)
+        return;
+    d->keep_all = true;
+    d->number = ++v->numbers;
+    v->changed |= d == trip_viewer_document(v);
+}
+
 char *trip_viewer_camera_options(trip_viewer *v)
 {
     const trip_document *d = navigable(v);
@@ -681,6 +710,7 @@ bool trip_viewer_tick(trip_viewer *v, double seconds)
     const trip_document *d = trip_viewer_document(v);
     take_opened(v);
     take_status(v);
+    take_made(v);
     v->message_seconds += seconds;
     const bool vanishes = v->message[0] && v->message_seconds > SECONDS_SAID && !v->status.failed;
     if (vanishes)

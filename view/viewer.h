@@ -7,6 +7,7 @@
 #include "event.h"
 #include "frames.h"
 #include "function_editor.h"
+#include "maker.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -16,6 +17,7 @@ extern "C" {
 typedef struct trip_document {
     unsigned number; /* no two have the same */
     char *input;     /* as the user named it */
+    bool keep_all;   /* it is bricked anew, with all values */
     bool opened;     /* what follows is known */
     triptych_info info;
     char *source; /* the path of the data set */
@@ -38,6 +40,7 @@ enum { TRIP_DOCUMENTS = 64 };
 
 typedef struct trip_viewer {
     trip_frames *frames;
+    trip_maker *maker; /* the caller's; NULL: nothing is bricked again */
     trip_document *documents[TRIP_DOCUMENTS];
     int count, shown;                              /* the one in the window; -1: none */
     unsigned numbers;                              /* given out */
@@ -91,7 +94,8 @@ void trip_viewer_let_go(trip_viewer *v);
 /* Takes what the drawing thread has, moves what flies, and says what is wanted. Returns whether
  * something goes on by itself. */
 bool trip_viewer_tick(trip_viewer *v, double seconds);
-/* Whether the picture of what is wanted is there and whole, or will not come. */
+/* Whether the picture of what is wanted is there and whole, or will not come; and nothing is being
+ * bricked again. */
 bool trip_viewer_rests(trip_viewer *v);
 
 /* ---- what keys and the panel do ---- */
@@ -109,6 +113,8 @@ void trip_viewer_copy_camera(trip_viewer *v);
 void trip_viewer_mark(trip_viewer *v);
 /* A preset or file; NULL: the data set's own. */
 void trip_viewer_set_function(trip_viewer *v, const char *function);
+/* Bricks the data set's volume again, with all values, while it is shown as it is. */
+void trip_viewer_brick_again(trip_viewer *v);
 /* The camera as options of `triptych render`, for free(); NULL: there is none. */
 char *trip_viewer_camera_options(trip_viewer *v);
 

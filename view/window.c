@@ -26,6 +26,7 @@ typedef struct window {
     GLFWwindow *glfw;
     trip_viewer viewer;
     trip_frames *frames;
+    trip_maker *maker; /* NULL: nothing is made */
     trip_panel *panel;
     trip_blit *blit;
     atomic_bool woken;
@@ -435,12 +436,23 @@ static int start_frames(window *w)
     return w->frames ? 0 : trip_fail(TRIP_ERROR, "view", "window", "out of memory");
 }
 
+static int start_maker(window *w)
+{
+    const trip_view_params *p = w->params;
+    if (!p->make)
+        return 0;
+    w->maker = trip_maker_create(
+        &(trip_maker_params){ .make = p->make, .user = p->user, .wake = wake, .wake_user = w });
+    return w->maker ? 0 : trip_fail(TRIP_ERROR, "view", "window", "out of memory");
+}
+
 static void open_documents(window *w)
 {
     const trip_view_params *p = w->params;
     trip_viewer *v = &w->viewer;
     int width, height;
     v->user = w;
+    v->maker = w->maker;
     v->copy = copy;
     v->start = p->start;
     v->settings = p->settings;
@@ -507,6 +519,7 @@ static int run(window *w)
 static void close_window(window *w)
 {
     trip_frames_stop(w->frames);
+    trip_maker_destroy(w->maker);
     trip_viewer_release(&w->viewer);
     trip_panel_destroy(w->panel);
     trip_blit_destroy(w->blit);
@@ -529,6 +542,8 @@ int trip_view_run(const trip_view_params *params)
     status = open_window(&w);
     if (!status)
         status = start_frames(&w);
+    if (!status)
+        status = start_maker(&w);
     if (!status) {
         trip_viewer_init(&w.viewer, w.frames);
         status = open_panel(&w);

@@ -239,6 +239,24 @@ class View(program.ProgramTest):
                    "--background=0,0,0")
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
+    def test_values_that_were_not_kept_are_bricked_again(self):
+        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
+        self.works("brick", "noise.nrrd", "-o", "part.trip", "--range=200:255")
+        self.view("wait\npicture before.exr\nclick 0.5 Brick again with all values\nwait\n"
+                  "picture after.exr\nstatus status.json\n", "part.trip", "--tf=grey")
+        camera = shlex.split(self.status()["camera"])
+        self.works("render", "noise.trip", *camera, "--tf=grey", "--background=0,0,0", "-o",
+                   "all.exr")
+        before, after, everything = (program.read_exr(f"{n}.exr") for n in ("before", "after", "all"))
+        self.assertTrue((before != after).any())
+        self.assertTrue((after == everything).all())
+        # Its volume is no longer beside it.
+        os.mkdir("elsewhere")
+        shutil.copytree("part.trip", "elsewhere/part.trip")
+        self.view("wait\nclick 0.5 Brick again with all values\nwait\nscreenshot alone.exr\n"
+                  "status status.json\n", "elsewhere/part.trip", "--tf=grey")
+        self.assertTrue(self.status()["exact"], self.status())
+
     def test_trouble_is_a_message_in_the_window(self):
         shutil.copytree("noise.trip", "damaged.trip")
         for name in os.listdir("damaged.trip"):
