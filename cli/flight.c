@@ -12,6 +12,7 @@ enum { MOST_CONTEXTS = 16, REPORT_BYTES = 4096 };
 
 typedef struct flying {
     const flight *f;
+    const volatile sig_atomic_t *signalled; /* of who called */
     pthread_mutex_t lock;
     pthread_cond_t turn; /* `then` has changed, or `status` */
     /* Under lock: the frames to draw and to go on with next; the first failure, and its line. */
@@ -124,6 +125,7 @@ static void *fly(void *argument)
     pilot *p = argument;
     trip_held_report held;
     int status, frame;
+    trip_scope_heed(p->all->signalled);
     trip_report_hold(&held);
     status = open_data(p);
     while (!status && (frame = take_frame(p->all)) >= 0) {
@@ -140,7 +142,7 @@ static void *fly(void *argument)
 
 int flight_draw(const flight *f, int *done)
 {
-    flying all = { .f = f, .next = 0 };
+    flying all = { .f = f, .signalled = trip_scope_signal() };
     pilot pilots[MOST_CONTEXTS] = { { 0 } };
     int count = 0;
     pthread_mutex_init(&all.lock, NULL);

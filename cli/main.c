@@ -1,5 +1,6 @@
 /* triptych COMMAND ...: picks the command; everything else is the command's. */
 #include "commands.h"
+#include "interrupt.h"
 
 #include <fcntl.h>
 #include <stdio.h>

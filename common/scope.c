@@ -1,10 +1,6 @@
 #include "scope.h"
 
-#include <signal.h>
 #include <stddef.h>
-
-/* The program's: only the handler sets it, and only a program installs that. */
-static volatile sig_atomic_t interrupted;
 
 static _Thread_local trip_scope own;
 static _Thread_local trip_scope *current; /* NULL: own */
@@ -36,9 +32,17 @@ void trip_scope_renew(trip_scope *s)
 int trip_interrupted(void)
 {
     for (const trip_scope *s = trip_scope_current(); s; s = s->around)
-        if (__atomic_load_n(&s->cancelled, __ATOMIC_RELAXED))
+        if (__atomic_load_n(&s->cancelled, __ATOMIC_RELAXED) || (s->signalled && *s->signalled))
             return 1;
-    return interrupted;
+    return 0;
+}
+
+const volatile sig_atomic_t *trip_scope_signal(void)
+{
+    for (const trip_scope *s = trip_scope_current(); s; s = s->around)
+        if (s->signalled)
+            return s->signalled;
+    return NULL;
 }
 
 /* The scope that was cancelled, or the outermost. */
@@ -56,21 +60,11 @@ bool trip_scope_report_once(void)
            !__atomic_exchange_n(&ended_scope()->reported, true, __ATOMIC_RELAXED);
 }
 
-static void on_signal(int number)
+void trip_scope_heed(const volatile sig_atomic_t *signalled)
 {
-    (void)number;
-    interrupted = 1;
-    signal(SIGINT, SIG_DFL);
-    signal(SIGTERM, SIG_DFL);
-}
-
-void trip_interrupt_install(void)
-{
-    struct sigaction action = { .sa_handler = on_signal, .sa_flags = SA_RESTART };
-    sigemptyset(&action.sa_mask);
-    interrupted = 0;
-    trip_scope_renew(ended_scope());
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    signal(SIGXFSZ, SIG_IGN);
+    trip_scope *s = trip_scope_current();
+    while (s->around)
+        s = s->around;
+    s->signalled = signalled;
+    trip_scope_renew(s);
 }

@@ -1,10 +1,11 @@
 /* The scope of a thread's work: where its messages go, and whether the work is cancelled. A thread
- * begins in a scope of its own, whose messages go to stderr and whose work ends with a signal to
- * the program; threads that work for another thread enter its scope. The only state of the process
- * is the flag that the handler of trip_interrupt_install() sets. */
+ * begins in a scope of its own, whose messages go to stderr; threads that work for another thread
+ * enter its scope. Nothing is kept for the whole process: that a signal came is told by a flag of
+ * the program's, if scopes point to one. */
 #ifndef TRIP_SCOPE_H
 #define TRIP_SCOPE_H
 
+#include <signal.h>
 #include <stdbool.h>
 
 #ifdef __cplusplus
@@ -24,6 +25,8 @@ typedef struct trip_scope {
     void *user;
     /* Atomic. Cancelled by trip_scope_cancel(); its interruption was reported. */
     bool cancelled, reported;
+    /* Not 0: cancelled, too. Of a program, which sets it for as long as it runs; or NULL. */
+    const volatile sig_atomic_t *signalled;
 } trip_scope;
 
 /* Moves the calling thread to scope `s`; returns the scope it leaves, to be entered again. */
@@ -36,14 +39,15 @@ void trip_scope_cancel(trip_scope *s);
 /* Ends the cancelling, so that the scope can be used again; no thread may be working in it. */
 void trip_scope_renew(trip_scope *s);
 
-/* Whether the calling thread's work is cancelled or the program is to end: long loops check this
+/* The outermost scope around the calling thread's has this flag, which is not set yet. */
+void trip_scope_heed(const volatile sig_atomic_t *signalled);
+/* The flag of the calling thread's scope or of one around it, for scopes that have none around them
+ * and for threads that begin in their own; or NULL. */
+const volatile sig_atomic_t *trip_scope_signal(void);
+
+/* Whether the calling thread's work is cancelled, or a signal came: long loops check this
  * and return trip_fail(TRIP_INTERRUPTED, ...), of which each scope reports one. */
 int trip_interrupted(void);
-
-/* For programs: installs handlers for SIGINT and SIGTERM, which interrupt all threads. A second
- * signal ends the process at once. Writing beyond a limit on file sizes becomes an error (EFBIG)
- * instead of the end of the process. */
-void trip_interrupt_install(void);
 
 /* Whether this thread is to report the interruption of its work: true once for each cancelled scope
  * and once for a signal. */

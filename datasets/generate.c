@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "fields.h"
+#include "interrupt.h"
 #include "new_file.h"
 #include "report.h"
 #include "write_vdb.h"

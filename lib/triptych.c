@@ -36,7 +36,9 @@ int triptych_create(triptych **out)
     *out = t;
     if (!t)
         return TRIPTYCH_ERROR;
-    t->scope = (trip_scope){ .failed = keep_failure, .sink = pass_line, .user = t };
+    t->scope = (trip_scope){
+        .failed = keep_failure, .sink = pass_line, .user = t, .signalled = trip_scope_signal()
+    };
     pthread_mutex_init(&t->lock, NULL);
     t->settings = trip_settings_default();
     t->settings.slices = 0;

@@ -628,7 +628,9 @@ static void serve(trip_frames *f)
 
 void trip_frames_prepare(trip_frames *f)
 {
-    f->scope = (trip_scope){ .failed = take_failure, .sink = take_report, .user = f };
+    f->scope = (trip_scope){
+        .failed = take_failure, .sink = take_report, .user = f, .signalled = trip_scope_signal()
+    };
 }
 
 void *trip_frames_run(void *user)

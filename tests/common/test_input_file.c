@@ -1,4 +1,5 @@
 #include "input_file.h"
+#include "interrupt.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,4 +1,5 @@
 #include "test.h"
+#include "interrupt.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -135,6 +136,23 @@ static void first_signal_sets_a_flag(void **state)
     assert_false(trip_interrupted());
     raise(SIGTERM);
     assert_true(trip_interrupted());
+}
+
+static void a_signal_interrupts_scopes_that_point_to_its_flag_alone(void **state)
+{
+    (void)state;
+    volatile sig_atomic_t flag = 0;
+    trip_scope heeding = { 0 }, inner = { .around = &heeding }, other = { 0 };
+    trip_scope *before = trip_scope_enter(&inner);
+    trip_scope_heed(&flag);
+    assert_ptr_equal(trip_scope_signal(), &flag);
+    assert_false(trip_interrupted());
+    flag = 1;
+    assert_true(trip_interrupted());
+    trip_scope_enter(&other);
+    assert_null(trip_scope_signal());
+    assert_false(trip_interrupted());
+    trip_scope_enter(before);
 }
 
 static void an_interruption_is_told_once(void **state)
@@ -327,6 +345,7 @@ int main(void)
         cmocka_unit_test(reporting_leaves_errno_alone),
         cmocka_unit_test(without_a_sink_lines_go_to_stderr),
         cmocka_unit_test(first_signal_sets_a_flag),
+        cmocka_unit_test(a_signal_interrupts_scopes_that_point_to_its_flag_alone),
         cmocka_unit_test(an_interruption_is_told_once),
         cmocka_unit_test(a_scope_takes_the_lines_of_its_threads_alone),
         cmocka_unit_test(failures_go_where_they_are_wanted_and_other_lines_further_out),

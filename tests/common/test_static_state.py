@@ -4,7 +4,6 @@ import subprocess
 import sys
 
 REASONS = {
-    "interrupted": "the program's: set by the handler that only a program installs",
     "c_locale": "made once, by pthread_once()",
     "c_locale_once": "pthread_once()'s own",
     "runnable": "filled before main(), then constant",
@@ -39,8 +38,8 @@ def main(libraries):
     found = [(library, *variable) for library in libraries for variable in variables(library)]
     bad = [f"{library}: {where}: {symbol}" for library, where, symbol in found
            if name_of(symbol) not in REASONS and not OTHERS.match(symbol)]
-    if not any(name_of(symbol) == "interrupted" for _, _, symbol in found):
-        sys.exit("not even the flag of signals is found: objdump's output is not understood")
+    if not any(name_of(symbol) == "c_locale" for _, _, symbol in found):
+        sys.exit("not even the C locale is found: objdump's output is not understood")
     if bad:
         sys.exit("kept for the whole process:\n" + "\n".join(bad))
 

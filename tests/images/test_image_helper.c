@@ -1,4 +1,5 @@
 #include "image_helper.h"
+#include "interrupt.h"
 
 #include <dirent.h>
 #include <errno.h>

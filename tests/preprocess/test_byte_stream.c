@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include "byte_stream.h"
+#include "interrupt.h"
 
 enum { COUNT = 10000 };
 

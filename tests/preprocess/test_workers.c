@@ -1,4 +1,5 @@
 #include "test.h"
+#include "interrupt.h"
 
 #include <pthread.h>
 #include <signal.h>

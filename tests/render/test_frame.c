@@ -1,4 +1,5 @@
 #include "scenes.h"
+#include "interrupt.h"
 #include "test.h"
 
 #include <errno.h>
