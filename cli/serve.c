@@ -1,11 +1,14 @@
 /* triptych serve: a data set -> a server for a browser on this machine. */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "commands.h"
 #include "library.h"
 #include "options.h"
 #include "report.h"
+#include "volume_options.h"
+#include "shown_volume.h"
 #include "serve.h"
 
 enum {
@@ -16,19 +19,37 @@ enum {
     KEY_RENDERER,
     KEY_MEMORY,
     KEY_ENGINE,
-    KEY_THREADS
+    KEY_THREADS,
+    KEY_GRID,
+    KEY_LEVEL_SET,
+    KEY_SPACING,
+    KEY_ALLOW_GAPS,
 };
+
+typedef struct serve_options {
+    trip_serve_params params;
+    shown_volume volume;
+} serve_options;
 
 static const struct argp_option options[] = {
     { "port", KEY_PORT, "N", 0, "Port to listen at, of 127.0.0.1 (default: one that is free)", 1 },
     { "fps", KEY_FPS, "N", 0, "Frames a second while the view moves (default: 30)", 1 },
     { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
-    { "classify", KEY_CLASSIFY, "pre|post", 0, "Before splatting, or after interpolation", 1 },
+    { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
+      "Before splatting, or after interpolation; auto: post where it can be had", 1 },
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
     { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
       1 },
     { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 1 },
     { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 1 },
+    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 2 },
+    { "grid", KEY_GRID, "NAME", 0,
+      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 2 },
+    { "level-set", KEY_LEVEL_SET, "HOW", 0,
+      "What to make of an OpenVDB level set: filled or band (default: filled)", 2 },
+    { "spacing", KEY_SPACING, "X,Y,Z", 0,
+      "Distance of voxels along each axis (default: the file's, else 1)", 2 },
+    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", 2 },
     { 0 },
 };
 
@@ -59,7 +80,7 @@ static int parse_renderer(int key, char *arg, trip_serve_params *p)
 
 static int parse_rest(int key, char *arg, trip_serve_params *p)
 {
-    static const char *const classifications[] = { "pre", "post", NULL };
+    static const char *const classifications[] = { "pre", "post", "auto", NULL };
     int which = 0, status;
     switch (key) {
     case KEY_PORT:
@@ -78,27 +99,50 @@ static int parse_rest(int key, char *arg, trip_serve_params *p)
     }
 }
 
-static error_t parse_key(int key, char *arg, struct argp_state *state)
+static int parse_volume(int key, char *arg, serve_options *o)
 {
-    trip_serve_params *p = state->input;
+    triptych_brick_options *v = &o->volume.options;
     switch (key) {
-    case ARGP_KEY_ARG:
-        if (p->input)
-            return trip_option_fail(arg, "one data set at a time");
-        p->input = arg;
+    case KEY_GRID:
+        return trip_option_grid(arg, &v->grid);
+    case KEY_LEVEL_SET:
+        return trip_option_level_set(arg, &v->level_set);
+    case KEY_SPACING:
+        return trip_option_spacing(arg, v->spacing);
+    case KEY_ALLOW_GAPS:
+        v->allow_gaps = 1;
         return 0;
-    case ARGP_KEY_END:
-        return p->input ? 0
-                        : trip_option_fail("NAME.trip", "none given: `triptych serve NAME.trip`");
     default:
-        return parse_rest(key, arg, p);
+        return parse_rest(key, arg, &o->params);
     }
 }
 
-/* A data set or function that cannot be taken is found here, before anybody looks. */
+static error_t parse_key(int key, char *arg, struct argp_state *state)
+{
+    serve_options *o = state->input;
+    trip_serve_params *p = &o->params;
+    switch (key) {
+    case ARGP_KEY_ARG:
+        if (p->input)
+            return trip_option_fail(arg, "one volume at a time");
+        p->input = arg;
+        return 0;
+    case ARGP_KEY_END:
+        return p->input ? 0 : trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+    default:
+        return parse_volume(key, arg, o);
+    }
+}
+
+/* A data set or function that cannot be taken is found here, before anybody looks; of a volume,
+ * which is bricked while its page is there, no more than that it is missing. */
 static int check_input(const trip_serve_params *p)
 {
     triptych *t = NULL;
+    if (cached_volume_wanted(p->input))
+        return access(p->input, R_OK) == 0 || strpbrk(p->input, "*?[%")
+                   ? 0
+                   : trip_fail_errno("read", p->input, "cannot open");
     int status = library_create(&t, NULL);
     if (!status)
         status =
@@ -121,17 +165,28 @@ int trip_command_serve(int argc, char **argv)
     static const struct argp argp = {
         .options = options,
         .parser = parse_key,
-        .args_doc = "NAME.trip",
+        .args_doc = "VOLUME|NAME.trip",
         .doc =
-            "Shows a data set in a browser on this machine, at the address that is printed, until "
+            "Shows a volume, or a data set made of one by `triptych brick`, in a browser on this "
+            "machine, at the address that is printed, until "
             "it is interrupted. A moving view is sent as JPEG, as large as its time allows; at "
             "rest the picture that `triptych render` draws is sent as PNG. It listens to 127.0.0.1 "
             "alone and answers addresses with its token alone; to look from another machine, "
-            "forward the port by ssh -L.",
+            "forward the port by ssh -L. A volume is bricked into a cache first, which `triptych "
+            "cache` lists and clears.",
     };
-    trip_serve_params p = { .settings = triptych_default_settings(), .ready = say };
-    int status = trip_options_parse(&argp, argc, argv, &p);
+    serve_options o = {
+        .params = { .settings = triptych_default_settings(),
+                    .ready = say,
+                    .find = shown_volume_find,
+                    .release = shown_volume_release,
+                    .find_user = &o.volume },
+    };
+    int status = trip_options_parse(&argp, argc, argv, &o);
+    o.volume.function = o.params.function;
+    o.volume.options.memory_bytes = o.params.memory_bytes;
+    o.volume.options.threads = o.params.threads;
     if (!status)
-        status = check_input(&p);
-    return trip_exit_status(status ? status : trip_serve_run(&p));
+        status = check_input(&o.params);
+    return trip_exit_status(status ? status : trip_serve_run(&o.params));
 }

@@ -1,16 +1,14 @@
 /* triptych view: data sets and volumes -> a window. */
-#include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-#include "cached_volume.h"
 #include "commands.h"
 #include "geometry.h"
 #include "library.h"
 #include "options.h"
 #include "report.h"
+#include "shown_volume.h"
 #include "view.h"
 #include "volume_options.h"
 
@@ -82,8 +80,7 @@ typedef struct view_options {
     const char **inputs;
     int argc;
     double eye[3], look[3], up[3];
-    triptych_brick_options volume;
-    cached_volume cached; /* of the volume that is shown */
+    shown_volume volume;
 } view_options;
 
 static int parse_size(const char *text, view_options *o)
@@ -190,13 +187,13 @@ static int parse_volume(int key, char *arg, view_options *o)
 {
     switch (key) {
     case KEY_GRID:
-        return trip_option_grid(arg, &o->volume.grid);
+        return trip_option_grid(arg, &o->volume.options.grid);
     case KEY_LEVEL_SET:
-        return trip_option_level_set(arg, &o->volume.level_set);
+        return trip_option_level_set(arg, &o->volume.options.level_set);
     case KEY_SPACING:
-        return trip_option_spacing(arg, o->volume.spacing);
+        return trip_option_spacing(arg, o->volume.options.spacing);
     case KEY_ALLOW_GAPS:
-        o->volume.allow_gaps = 1;
+        o->volume.options.allow_gaps = 1;
         return 0;
     default:
         return parse_renderer(key, arg, o);
@@ -259,83 +256,6 @@ static int parse(view_options *o, int argc, char **argv)
     return trip_options_parse(&argp, argc, argv, o);
 }
 
-static triptych_brick_options brick_options(const view_options *o, bool keep_all)
-{
-    triptych_brick_options wanted = o->volume;
-    wanted.functions = &o->params.function;
-    wanted.function_count = o->params.function != NULL && !keep_all;
-    wanted.automatic = !keep_all;
-    wanted.keep_all = keep_all;
-    wanted.memory_bytes = o->params.memory_bytes;
-    wanted.threads = o->params.threads;
-    return wanted;
-}
-
-/* What a data set was made of, where that lies beside it, for free(); `input` itself where it is a
- * volume. NULL where it is reported to be missing. */
-static char *volume_of(triptych *t, const char *input)
-{
-    triptych_info info;
-    char *volume = NULL, *folder = strdup(input), *slash;
-    if (!folder || cached_volume_wanted(input))
-        return folder;
-    for (size_t n = strlen(folder); n > 1 && folder[n - 1] == '/'; n--)
-        folder[n - 1] = 0;
-    slash = strrchr(folder, '/');
-    if (slash)
-        slash[1] = 0;
-    int status = triptych_open(t, input, NULL);
-    if (!status)
-        status = triptych_get_info(t, &info);
-    cJSON *notes = status ? NULL : cJSON_Parse(info.notes);
-    const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(notes, "source"));
-    if (name && asprintf(&volume, "%s%s", slash ? folder : "", name) < 0)
-        volume = NULL;
-    if (!status && (!volume || access(volume, R_OK))) {
-        trip_fail(TRIP_ERROR, "brick", name ? name : input,
-                  "the volume it was made of is not beside it");
-        free(volume);
-        volume = NULL;
-    }
-    triptych_close(t);
-    cJSON_Delete(notes);
-    free(folder);
-    return volume;
-}
-
-/* As `triptych render` keeps volumes; by the drawing thread. */
-static int find(void *user, triptych *t, const char *input, bool keep_all, const char **path)
-{
-    view_options *o = user;
-    const triptych_brick_options wanted = brick_options(o, keep_all);
-    *path = input;
-    if (!keep_all && !cached_volume_wanted(input))
-        return 0;
-    char *volume = volume_of(t, input);
-    const int status = volume ? cached_volume_open(&o->cached, t, volume, &wanted) : TRIP_ERROR;
-    *path = o->cached.path;
-    free(volume);
-    return status;
-}
-
-/* With all values; by a thread of its own. */
-static int make(void *user, triptych *t, const char *input)
-{
-    const triptych_brick_options wanted = brick_options(user, true);
-    cached_volume made = { .hold = -1 };
-    char *volume = volume_of(t, input);
-    const int status = volume ? cached_volume_open(&made, t, volume, &wanted) : TRIP_ERROR;
-    cached_volume_close(&made);
-    free(volume);
-    return status;
-}
-
-static void release(void *user)
-{
-    view_options *o = user;
-    cached_volume_close(&o->cached);
-}
-
 /* A data set that cannot be opened is found here, before there is a window. */
 static int check_inputs(const view_options *o)
 {
@@ -356,10 +276,13 @@ int trip_command_view(int argc, char **argv)
         return trip_exit_status(trip_fail(TRIP_ERROR, "usage", "view", "out of memory"));
     int status = parse(&o, argc, argv);
     o.params.inputs = o.inputs;
-    o.params.user = &o;
-    o.params.find = find;
-    o.params.make = make;
-    o.params.release = release;
+    o.volume.function = o.params.function;
+    o.volume.options.memory_bytes = o.params.memory_bytes;
+    o.volume.options.threads = o.params.threads;
+    o.params.user = &o.volume;
+    o.params.find = shown_volume_find;
+    o.params.make = shown_volume_make;
+    o.params.release = shown_volume_release;
     if (!status)
         status = check_inputs(&o);
     if (!status)

@@ -123,6 +123,12 @@ static enum MHD_Result give_status(server *s, struct MHD_Connection *c)
     return text ? answer(c, 200, "application/json", text, strlen(text), NULL) : MHD_NO;
 }
 
+static enum MHD_Result give_presets(struct MHD_Connection *c)
+{
+    char *text = trip_session_presets();
+    return text ? answer(c, 200, "application/json", text, strlen(text), NULL) : MHD_NO;
+}
+
 static enum MHD_Result get(server *s, struct MHD_Connection *c, const char *path)
 {
     if (!strcmp(path, "/"))
@@ -132,6 +138,8 @@ static enum MHD_Result get(server *s, struct MHD_Connection *c, const char *path
         return give_picture(s, c);
     if (!strcmp(path, "/status"))
         return give_status(s, c);
+    if (!strcmp(path, "/presets"))
+        return give_presets(c);
     return refuse(c, 404, "there is no such page");
 }
 
@@ -147,6 +155,10 @@ static enum MHD_Result post(server *s, struct MHD_Connection *c, const char *pat
         return trip_session_set_function(s->session, argument(c, "name"))
                    ? refuse(c, 204, "")
                    : refuse(c, 400, "there is no such function");
+    if (!strcmp(path, "/set"))
+        return trip_session_set(s->session, argument(c, "name"), argument(c, "value"))
+                   ? refuse(c, 204, "")
+                   : refuse(c, 400, "there is no such setting");
     return refuse(c, 404, "there is no such page");
 }
 

@@ -7,7 +7,7 @@
 
 /* Zero means the default. */
 typedef struct trip_serve_params {
-    const char *input; /* a data set */
+    const char *input; /* a data set, or what `find` makes one of */
     int port;          /* 0: one that is free */
     double frames_per_second;
     uint64_t memory_bytes; /* these as triptych_resources */
@@ -19,6 +19,10 @@ typedef struct trip_serve_params {
     /* Called once with the address to open, until the next interruption. */
     void (*ready)(void *user, const char *address);
     void *user;
+    /* As frames.h has them; NULL: the input is a data set. */
+    int (*find)(void *user, triptych *t, const char *input, bool keep_all, const char **path);
+    void (*release)(void *user);
+    void *find_user;
 } trip_serve_params;
 
 /* Until the program is interrupted, which is no failure: 0, or a reported failure. */

@@ -3,6 +3,7 @@
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -11,6 +12,7 @@
 #include "json.h"
 #include "report.h"
 #include "script.h"
+#include "text.h"
 #include "viewer.h"
 
 enum { WIDTH = 1024, HEIGHT = 768, MOST_SIDE = 4096, LEAST_SIDE = 16, MOST_EVENTS = 1000 };
@@ -92,6 +94,9 @@ trip_session *trip_session_start(const trip_serve_params *p)
                                                          .renderer = p->renderer,
                                                          .engine = p->engine,
                                                          .frames_per_second = p->frames_per_second,
+                                                         .find = p->find,
+                                                         .release = p->release,
+                                                         .user = p->find_user,
                                                          .wake = wake,
                                                          .wake_user = s });
     if (!s->frames) {
@@ -217,6 +222,110 @@ bool trip_session_set_function(trip_session *s, const char *name)
     return true;
 }
 
+static bool choose(const char *text, const char *const *names, int *out)
+{
+    for (int i = 0; names[i]; i++)
+        if (!strcmp(text, names[i])) {
+            *out = i;
+            return true;
+        }
+    return false;
+}
+
+static const char *const classes[] = { "pre", "post", "auto", NULL };
+static const char *const methods[] = { "merge", "clip", "axis", NULL };
+static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
+
+/* "head", or where the light comes from: degrees round from the x axis, and up. */
+static bool set_light(triptych_settings *s, const char *value)
+{
+    double degrees[2];
+    char *end;
+    if (!strcmp(value, "head")) {
+        s->headlight = 1;
+        return true;
+    }
+    char copy[64];
+    snprintf(copy, sizeof copy, "%s", value);
+    char *comma = strchr(copy, ',');
+    if (!comma || strlen(value) >= sizeof copy)
+        return false;
+    *comma = 0;
+    degrees[0] = strtod(copy, &end);
+    bool good = end != copy && !*end;
+    degrees[1] = strtod(comma + 1, &end);
+    good &= end != comma + 1 && !*end;
+    if (!good || !(fabs(degrees[0]) <= 360 && fabs(degrees[1]) <= 90))
+        return false;
+    const double unit = acos(-1) / 180, round = degrees[0] * unit, up = degrees[1] * unit;
+    s->headlight = 0;
+    s->light[0] = cos(up) * cos(round);
+    s->light[1] = cos(up) * sin(round);
+    s->light[2] = sin(up);
+    return true;
+}
+
+static bool set_number(double *out, const char *value, double lo, double hi)
+{
+    double number;
+    if (!trip_text_to_double(value, &number) || !(number >= lo && number <= hi))
+        return false;
+    *out = number;
+    return true;
+}
+
+/* What the page can set. */
+static bool set_setting(triptych_settings *s, const char *name, const char *value)
+{
+    static const char *const no_yes[] = { "0", "1", NULL };
+    int which = 0;
+    bool good = true;
+    if (!strcmp(name, "classify")) {
+        good = choose(value, classes, &which);
+        s->classify = good ? (triptych_classify)which : s->classify;
+    } else if (!strcmp(name, "method")) {
+        good = choose(value, methods, &which);
+        s->method = good ? (triptych_method)which : s->method;
+    } else if (!strcmp(name, "show")) {
+        good = choose(value, shows, &which);
+        s->show = good ? (triptych_show)which : s->show;
+    } else if (!strcmp(name, "shading")) {
+        good = choose(value, no_yes, &which);
+        s->shading = good ? which : s->shading;
+    } else if (!strcmp(name, "h")) {
+        good = set_number(&s->h, value, 0, 0.999);
+    } else {
+        good = !strcmp(name, "light") && set_light(s, value);
+    }
+    return good;
+}
+
+bool trip_session_set(trip_session *s, const char *name, const char *value)
+{
+    bool good = false;
+    pthread_mutex_lock(&s->lock);
+    trip_document *d = trip_viewer_document(&s->viewer);
+    if (d && !strcmp(name, "opacity"))
+        good = set_number(&d->opacity_scale, value, 1e-3, 1e3);
+    else if (d)
+        good = set_setting(&d->settings, name, value);
+    s->viewer.changed |= good;
+    trip_viewer_tick(&s->viewer, 0);
+    pthread_mutex_unlock(&s->lock);
+    return good;
+}
+
+char *trip_session_presets(void)
+{
+    cJSON *root = cJSON_CreateArray();
+    triptych_preset p;
+    for (unsigned i = 0; triptych_get_preset(i, &p); i++)
+        cJSON_AddItemToArray(root, cJSON_CreateString(p.name));
+    char *text = root ? trip_json_print(root, false) : NULL;
+    cJSON_Delete(root);
+    return text;
+}
+
 /* A copy of its pixels, so that encoding does not hold up drawing. */
 typedef struct copy {
     uint8_t *rgba;
@@ -264,12 +373,25 @@ bool trip_session_await(trip_session *s, uint64_t number, double seconds, trip_s
     return out->file != NULL;
 }
 
+/* As trip_session_set() takes them. */
+static void add_settings(cJSON *root, const triptych_settings *s)
+{
+    cJSON *settings = cJSON_AddObjectToObject(root, "settings");
+    cJSON_AddStringToObject(settings, "classify", classes[s->classify]);
+    cJSON_AddStringToObject(settings, "method", methods[s->method]);
+    cJSON_AddStringToObject(settings, "show", shows[s->show]);
+    cJSON_AddNumberToObject(settings, "shading", s->shading != 0);
+    cJSON_AddNumberToObject(settings, "h", s->h);
+}
+
 char *trip_session_status(trip_session *s)
 {
     cJSON *root = cJSON_CreateObject();
     pthread_mutex_lock(&s->lock);
     trip_frames_status status = trip_frames_get_status(s->frames);
     char *camera = trip_viewer_camera_options(&s->viewer);
+    const trip_document *d = trip_viewer_document(&s->viewer);
+    const triptych_settings settings = d ? d->settings : s->viewer.settings;
     pthread_mutex_unlock(&s->lock);
     cJSON_AddBoolToObject(root, "exact", status.exact);
     cJSON_AddBoolToObject(root, "failed", status.failed);
@@ -277,6 +399,7 @@ char *trip_session_status(trip_session *s)
     cJSON_AddStringToObject(root, "stage", status.stage);
     cJSON_AddNumberToObject(root, "done", status.done);
     cJSON_AddStringToObject(root, "camera", camera ? camera : "");
+    add_settings(root, &settings);
     char *text = root ? trip_json_print(root, false) : NULL;
     cJSON_Delete(root);
     free(camera);

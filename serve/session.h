@@ -24,6 +24,13 @@ bool trip_session_do(trip_session *s, const char *text, size_t bytes);
 /* A built-in function; false where there is none of the name. "": the data set's own. */
 bool trip_session_set_function(trip_session *s, const char *name);
 
+/* A setting by its name, as the page has them: classify, method, h, shading, light (head, or
+ * degrees "ROUND,UP"), opacity, show. False where there is no such name or value; nothing happens
+ * then. */
+bool trip_session_set(trip_session *s, const char *name, const char *value);
+/* The built-in functions' names as JSON, for free(); NULL without memory. */
+char *trip_session_presets(void);
+
 /* A picture as a file, for free(). */
 typedef struct trip_session_picture {
     unsigned char *file;

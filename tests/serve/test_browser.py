@@ -117,6 +117,23 @@ class InBrowser(program.ProgramTest):
             returnByValue=True,
         )["result"]["value"]
 
+    def test_each_control_brings_a_picture(self):
+        before = self.exact()
+        self.browser.value("document.getElementById('panel').open = true")
+        for query, value in (
+            ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=shading]", "checked = false"),
+            ("[data-set=shading]", "checked = true"), ("#head", "checked = false"),
+            ("#round", "value = '90'"), ("#up", "value = '-40'"), ("#head", "checked = true"),
+            ("[data-set=classify]", "value = 'post'"), ("[data-set=classify]", "value = 'pre'"),
+            ("[data-set=h]", "value = '0.1'"), ("[data-set=method]", "value = 'axis'"),
+            ("[data-set=show]", "value = 'lists'"), ("[data-set=show]", "value = 'merge'"),
+            ("[data-set=show]", "value = 'picture'"),
+        ):
+            self.browser.value(f"(c => {{ c.{value}; c.dispatchEvent(new Event('input')); }})"
+                               f"(document.querySelector('{query}'))")
+            before = self.exact(before)
+        self.browser.value("document.getElementById('panel').open = false")
+
     def test_drags_wheels_keys_and_functions_change_the_picture(self):
         before = self.exact()
         cameras = [self.status()["camera"]]

@@ -136,6 +136,59 @@ class Serve(program.ProgramTest):
         self.assert_rendered(bone, there, "--tf", "bone")
         self.assertTrue(self.status()["exact"])
 
+    def test_what_is_set_is_drawn(self):
+        self.do("resize 60 50")
+        picture, number, camera = self.whole_picture()
+        for name, value, options in (
+            ("classify", "post", ["--classify=post"]),
+            ("classify", "pre", []),
+            ("shading", "0", ["--no-shading"]),
+            ("show", "lists", ["--no-shading", "--show=lists"]),
+            ("show", "picture", ["--no-shading"]),
+            ("method", "axis", ["--no-shading", "--method=axis"]),
+            ("method", "merge", ["--no-shading"]),
+            ("h", "0.2", ["--no-shading", "--h=0.2"]),
+            ("opacity", "0.1", ["--no-shading", "--h=0.2", "--opacity-scale=0.1"]),
+        ):
+            status, _, data = self.ask("/set", "POST", name=name, value=value)
+            self.assertEqual(status, 204, data)
+            before = picture
+            picture, number, _ = self.whole_picture(number)
+            self.assert_rendered(picture, camera, *options)
+            if options:
+                self.assertTrue((picture != before).any(), (name, value))
+        for name, value in (
+            ("classify", "x"), ("classify", ""), ("shading", "2"), ("h", "1"), ("h", "nan"),
+            ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2,3"),
+            ("light", "nan,0"), ("light", "0,91"), ("light", "," * 500), ("samples", "64"), ("", ""),
+        ):
+            self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, (name, value))
+        self.assertEqual(self.ask("/set", "POST", name="light", value="30,45")[0], 204)
+        self.assertEqual(self.status()["settings"], {
+            "classify": "pre", "method": "merge", "show": "picture", "shading": 0, "h": 0.2})
+        self.assertIn("bone", json.loads(self.ask("/presets")[2]))
+
+    def test_a_volume_is_bricked_and_shown(self):
+        self.tearDown()
+        environment = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
+        self.server = program.start("serve", "v.nhdr", "--memory", "128M", "--threads", "2",
+                                    env=environment)
+        self.address = self.server.stdout.readline().decode().strip()
+        url = urllib.parse.urlsplit(self.address)
+        self.host, self.port = url.hostname, url.port
+        self.token = urllib.parse.parse_qs(url.query)["token"][0]
+        self.do("resize 40 30")
+        while not self.status()["exact"]:
+            self.assertFalse(self.status()["failed"], self.status())
+            time.sleep(0.02)
+        status, headers, data = self.ask("/picture", after=0)
+        self.assertEqual(headers["X-Whole"], "1")
+        run = program.call("render", "v.nhdr", "-o", "r.png",
+                           *shlex.split(self.status()["camera"]), env=environment)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        with open("r.png", "rb") as f:
+            numpy.testing.assert_array_equal(read_png(data)[..., :3], read_png(f.read())[..., :3])
+
     def test_nothing_new_is_waited_for(self):
         self.do("resize 40 30")
         while not self.status()["exact"]:
@@ -160,7 +213,7 @@ class Serve(program.ProgramTest):
         self.assertNotIn(b"http", page.replace(b"<!doctype html>", b""))
 
     def test_only_this_machine_with_the_token_is_answered(self):
-        for path in ("/", "/picture", "/status", "/nothing"):
+        for path in ("/", "/picture", "/status", "/presets", "/nothing"):
             for token in (None, "", "0" * 32, self.token[:-1], self.token.upper() + "x"):
                 self.assertEqual(self.ask(path, token=token)[0], 403, (path, token))
         for host in ("evil.example", f"evil.example:{self.port}", f"127.0.0.1:{self.port + 1}"):

@@ -1,0 +1,23 @@
+/* What `view` and `serve` show where the user names a volume: its data set in the cache, made there
+ * first. For the drawing thread, but for shown_volume_make(). */
+#ifndef TRIP_CLI_SHOWN_VOLUME_H
+#define TRIP_CLI_SHOWN_VOLUME_H
+
+#include <stdbool.h>
+
+#include "cached_volume.h"
+
+typedef struct shown_volume {
+    triptych_brick_options options; /* how a volume is read, memory and threads; nothing else */
+    const char *function;           /* that is to be shown, or NULL */
+    cached_volume cached;           /* zeroed at first */
+} shown_volume;
+
+/* As trip_frames_params.find and release have them; `user` is a shown_volume. */
+int shown_volume_find(void *user, triptych *t, const char *input, bool keep_all, const char **path);
+void shown_volume_release(void *user);
+/* What shown_volume_find() then finds with all values; by a thread of its own, as
+ * trip_maker_params.make has it. */
+int shown_volume_make(void *user, triptych *t, const char *input);
+
+#endif
