@@ -135,9 +135,9 @@ static const struct argp_option options[] = {
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
       "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
-      "pre with what only splats have: --kernel-radius, --compositing, --target, --submit, "
-      "--count, "
-      "--traversal ascending (default: pre)",
+      "pre with what only splats have (--lod, --kernel-radius, --compositing, --target, --submit, "
+      "--traversal ascending, --count) and for data without cells to interpolate in (default: "
+      "auto)",
       3 },
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
       "splat: each splat goes over those behind it, as in the papers; sheet: the splats of a sheet "
@@ -657,7 +657,7 @@ static int check_integral(parse *p)
     return 0;
 }
 
-/* What only splats have implies them. */
+/* What only splats have implies them, also where it is what it would be by default. */
 static int choose_classify(parse *p)
 {
     render_options *o = p->o;

@@ -36,7 +36,7 @@ static const struct argp_option options[] = {
     { "fps", KEY_FPS, "N", 0, "Frames a second while the view moves (default: 30)", 1 },
     { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
-      "Before splatting, or after interpolation; auto: post where it can be had", 1 },
+      "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
     { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
       1 },

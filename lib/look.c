@@ -49,7 +49,7 @@ triptych_settings triptych_default_settings(void)
 {
     const trip_settings s = trip_settings_default();
     return (triptych_settings){
-        .classify = (triptych_classify)s.classify,
+        .classify = TRIPTYCH_CLASSIFY_AUTO,
         .compositing = (triptych_compositing)s.compositing,
         .method = (triptych_method)s.method,
         .traversal = (triptych_traversal)s.traversal,

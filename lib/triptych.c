@@ -41,7 +41,9 @@ int triptych_create(triptych **out)
     };
     pthread_mutex_init(&t->lock, NULL);
     t->settings = trip_settings_default();
+    t->settings.classify = TRIP_CLASSIFY_POST;
     t->settings.slices = 0;
+    t->classify_auto = true;
     return TRIPTYCH_OK;
 }
 

@@ -219,7 +219,8 @@ typedef enum triptych_classify {
     /* Post, but pre where something is set that only splats have (ascending traversal, a rounded
      * target, indexed, triangles, coarse levels, by sheet, another kernel radius than 2, count), or
      * the data has no cells to interpolate in: one voxel thick, or culled without a halo.
-     * triptych_explain() says which. */
+     * triptych_explain() says which. Memory has no part in it: where post does not fit, the frame
+     * fails, and names what would do. */
     TRIPTYCH_CLASSIFY_AUTO,
 } triptych_classify;
 
@@ -277,8 +278,8 @@ typedef struct triptych_settings {
     triptych_show show; /* not of the integral, which has no lists or levels */
 } triptych_settings;
 
-/* Pre, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel radius 2, shading by
- * headlight, black; values, linear, 1e-4, one ray a pixel. */
+/* Classified by itself, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel
+ * radius 2, shading by headlight, black; values, linear, 1e-4, one ray a pixel. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 /* How close to the integral pictures are to be, for the time that takes; measured by `triptych
  * accuracy`, triptych-accuracy(1) has the figures. */

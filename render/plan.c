@@ -126,15 +126,28 @@ typedef struct selecting {
     trip_selection *selections[2]; /* of the layer's passes; NULL: in none of its sheets */
 } selecting;
 
-static void count_bytes(const selecting *of, uint64_t index)
+/* How many passes draw a sheet: those about the eye may be of both. */
+static unsigned passes_of(const selecting *of, int64_t sheet)
+{
+    unsigned count = 0;
+    for (int i = 0; i < 2; i++) {
+        const trip_selection *s = of->selections[i];
+        count += s && sheet >= s->sheet_first && sheet <= s->sheet_last;
+    }
+    return count;
+}
+
+static void count_runs(const selecting *of, uint64_t index, int64_t slab_sheet)
 {
     const trip_file_header *h = &of->p->data->header;
     const trip_file_run *runs = of->list->runs + index * h->slab_sheets;
     uint64_t *bytes = of->planned->bytes_selected;
     for (uint32_t s = 0; s < h->slab_sheets; s++) {
-        bytes[TRIP_PLANE_VOXELS] += 8 * (uint64_t)runs[s].words;
+        const uint64_t passes = passes_of(of, slab_sheet + s);
+        of->planned->splats_selected += passes * runs[s].records;
+        bytes[TRIP_PLANE_VOXELS] += passes * 8 * runs[s].words;
         if (of->list->planes >> TRIP_PLANE_NORMALS & 1)
-            bytes[TRIP_PLANE_NORMALS] += runs[s].records * (uint64_t)h->normal_bytes;
+            bytes[TRIP_PLANE_NORMALS] += passes * runs[s].records * h->normal_bytes;
     }
 }
 
@@ -148,8 +161,7 @@ static void select_brick(const selecting *of, uint64_t index, int64_t slab_sheet
             trip_selection_add(s, index);
     }
     of->planned->bricks_selected++;
-    of->planned->splats_selected += brick->records;
-    count_bytes(of, index);
+    count_runs(of, index, slab_sheet);
 }
 
 static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t index)
@@ -616,9 +628,11 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
     const char *light = s->headlight ? "from the eye" : "from the direction given";
     char bytes[32];
     bool differences = s->classify == TRIP_CLASSIFY_POST && !plan->gathers;
-    if (differences || (plan->gathers && plan->selection_count == 0))
-        fprintf(out, "shading     %s, by differences of the values\n",
-                s->shading ? "runs" : "does not run");
+    bool of_values = differences || (plan->gathers && plan->selection_count == 0);
+    if (of_values && s->shading)
+        fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
+    else if (of_values)
+        fprintf(out, "shading     does not run: not asked for\n");
     else if (plan->planes & 1u << TRIP_PLANE_NORMALS)
         fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))

@@ -13,13 +13,12 @@ void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
     *t = (trip_gl_sheet_textures){ .budget = t->budget };
 }
 
-static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height,
-                     uint64_t bytes)
+static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height, uint64_t bytes)
 {
     uint64_t taken = trip_budget_limit_bytes(t->budget) - trip_budget_left_bytes(t->budget);
     return trip_fail(TRIP_ERROR, "gl", "sheets",
                      "%d sheets of %lld x %lld voxels do not fit the memory given; raise --memory "
-                     "to more than %llu MiB, or use --renderer cpu",
+                     "to more than %llu MiB, or use --renderer cpu or --classify pre",
                      TRIP_GL_SHEETS_LEAST, (long long)width, (long long)height,
                      (unsigned long long)((taken + bytes) >> 20));
 }
@@ -32,7 +31,7 @@ static int check_size(int64_t width, int64_t height)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", "sheets",
                      "%lld x %lld voxels exceed the %d either way that this driver's textures "
-                     "hold; use another renderer",
+                     "hold; use another renderer, or --classify pre",
                      (long long)width, (long long)height, most);
 }
 

@@ -112,14 +112,17 @@ class Drawn(program.ProgramTest):
                         self.assertLessEqual(counts["splats_drawn"], counts["splats_projected"])
                         self.assertLessEqual(counts["splats_projected"], counts["splats_read"])
 
-    def test_the_halo_is_neither_read_nor_drawn(self):
+    def test_splats_neither_read_nor_draw_the_halo_and_only_with_it_values_are_interpolated(self):
         seen = []
         for halo in "0", "1":
             made = self.brick(os.path.join(program.DATASETS, "tooth.nhdr"), "h.trip", "--force",
                               "--halo", halo)
             self.assertEqual(made["halo"] > 0, halo == "1")
             for renderer in "cpu", "reference", "gl":
-                stats = self.stats("h.trip", "--renderer", renderer, "--size", "90x90")
+                view = ("h.trip", "--renderer", renderer, "--size", "90x90")
+                usual = self.stats(*view)["classify"]
+                self.assertEqual(usual, "post" if halo == "1" else "pre")
+                stats = self.stats(*view, "--classify", "pre")
                 lists = [(l["splats_read"], l["bytes_read"])
                          for l in stats["frames"][0]["lists"].values()]
                 with open("a.exr", "rb") as picture:

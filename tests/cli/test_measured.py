@@ -11,7 +11,7 @@ import program
 
 # One thread, so that what lies behind what is opaque is found in the same order in every run.
 VIEW = ["--tf", "solid.tf", "--renderer", "cpu", "--threads", "1", "--size", "256x256", "--fov",
-        "60", "--look", "64,64,64", "--eye", "64,-43,64"]
+        "60", "--look", "64,64,64", "--eye", "64,-43,64", "--classify", "pre"]
 COUNTS = ("splats_projected", "splats_drawn")
 
 
@@ -53,7 +53,7 @@ class Depth(program.ProgramTest):
 
     def test_distances_to_a_plate(self):
         for renderer in self.renderers():
-            straight = ["--look=7.5,7.5,6", "--up=0,1,0"]
+            straight = ["--look=7.5,7.5,6", "--up=0,1,0", "--classify=pre"]
             z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--ortho=8")
             self.assertLess(abs(z - 40).max(), 0.01)
             z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--fov=8")
@@ -62,6 +62,18 @@ class Depth(program.ProgramTest):
             self.assertLess(abs(z - 40 * slope).max(), 0.01)
             z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--ortho=64")
             self.assertTrue(numpy.isinf(z[0]).all() and numpy.isfinite(z[16, 16]))
+
+    def test_distances_to_where_interpolated_values_show(self):
+        """Between 0 and 200 values show from 100 on, half a voxel before the plate, and are opaque
+        from 150 on. What is seen of a slice is taken to be in its middle."""
+        for renderer in self.renderers():
+            for slices in 1, 4:
+                z = self.distances(
+                    renderer, "--eye=7.5,7.5,46", "--look=7.5,7.5,6", "--up=0,1,0", "--ortho=8",
+                    "--classify=post", f"--slices={slices}",
+                )
+                self.assertGreater(z.min(), 39.5 - 0.5 / slices, (renderer, slices))
+                self.assertLess(z.max(), 39.75 + 0.5 / slices, (renderer, slices))
 
     def test_an_orbit_s_distances_are_numbered_as_its_pictures(self):
         self.works("render", "plate.trip", "-o", "o.png", "--depth=oz.tif", "--orbit=2",
@@ -143,7 +155,8 @@ class Measured(program.ProgramTest):
     def test_counting_an_orbit_leaves_the_timed_frames_as_they_are(self):
         """The reader keeps bricks for the frames to come; the counting pass fills no such cache."""
         def frames(*more):
-            stats = self.stats("cube.trip", *VIEW[:8], "--orbit", "3", "--hidden", "draw", *more)
+            stats = self.stats("cube.trip", *VIEW[:8], "--classify", "pre", "--orbit", "3",
+                               "--hidden", "draw", *more)
             return stats["frames"]
         plain, counted = frames(), frames("--count")
         for a, b in zip(plain, counted):
@@ -154,6 +167,13 @@ class Measured(program.ProgramTest):
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", says="--stats or --explain")
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", "--explain",
                    "--classify", "post", says="counts splats")
+
+    def test_count_alone_draws_splats_and_says_so(self):
+        stats = self.stats("cube.trip", *VIEW[:-2], "--count")
+        self.assertEqual(stats["classify"], "pre")
+        said = self.works("render", "cube.trip", "-o", "a.exr", *VIEW[:-2], "--explain", "--count")
+        self.assertIn("classify    pre", said.stdout.decode())
+        self.assertEqual(self.stats("cube.trip", *VIEW[:-2])["classify"], "post")
 
     def test_compositing_is_in_the_plan_and_the_stats(self):
         stats = self.stats("cube.trip", *VIEW, "--compositing", "sheet")

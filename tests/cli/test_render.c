@@ -120,10 +120,15 @@ static void what_cannot_be_done_is_one_line_and_exit_status_1(void **state)
     fputs("0 1 1\n", f);
     fclose(f);
     const char *const failing[] = {
-        "missing.trip -o a.png",         "bad.tf -o a.png",
-        "fog.trip -o missing/a.png",     "fog.trip -o a.png --tf missing.tf",
-        "fog.trip -o a.png --tf bad.tf", "fog.trip -o a.png --stats missing/a.json",
-        "fog.trip -o a.png --memory 1M", "fog.trip -o a.png --memory 40M --renderer reference",
+        "missing.trip -o a.png",
+        "bad.tf -o a.png",
+        "fog.trip -o missing/a.png",
+        "fog.trip -o a.png --tf missing.tf",
+        "fog.trip -o a.png --tf bad.tf",
+        "fog.trip -o a.png --stats missing/a.json",
+        "fog.trip -o a.png --memory 1M",
+        "fog.trip -o a.png --memory 20M --renderer reference",
+        "fog.trip -o a.png --memory 40M --renderer reference --classify pre",
     };
     for (size_t i = 0; i < sizeof failing / sizeof *failing; i++) {
         program_call(&run, "render %s --size 1000x1000", failing[i]);
@@ -263,26 +268,35 @@ static void with_h_zero_thrice_the_kept_voxels_are_drawn_and_along_an_axis_once(
 static void skipping_what_is_hidden_does_not_change_the_picture(void **state)
 {
     (void)state;
-    program_call(&run, "render stent.trip --tf preset:bone -o a.exr --size 100x100 --hidden skip");
-    assert_works(&run);
-    program_call(&run, "render stent.trip --tf preset:bone -o b.exr --size 100x100 --hidden draw");
-    assert_works(&run);
-    picture a = load("a.exr"), b = load("b.exr");
-    assert_memory_equal(a.rgba, b.rgba, 100 * 100 * 4 * sizeof(float));
-    free(a.rgba);
-    free(b.rgba);
+    const char *const classify[] = { "pre", "post" };
+    const char *const look = "--tf preset:bone --size 100x100 --classify";
+    for (int i = 0; i < 2; i++) {
+        program_call(&run, "render stent.trip -o a.exr %s %s --hidden skip", look, classify[i]);
+        assert_works(&run);
+        program_call(&run, "render stent.trip -o b.exr %s %s --hidden draw", look, classify[i]);
+        assert_works(&run);
+        picture a = load("a.exr"), b = load("b.exr");
+        assert_memory_equal(a.rgba, b.rgba, 100 * 100 * 4 * sizeof(float));
+        free(a.rgba);
+        free(b.rgba);
+    }
 }
 
 static void explain_prints_the_plan_and_what_it_cost(void **state)
 {
     (void)state;
-    program_call(&run, "render stent.trip -o a.png --size 64x64 --explain --no-shading");
-    assert_works(&run);
-    assert_non_null(strstr(run.out, "method      merge"));
-    assert_non_null(strstr(run.out, "list y      read: "));
-    assert_non_null(strstr(run.out, "shading     does not run: not asked for"));
-    assert_non_null(strstr(run.out, "cost y      "));
-    assert_non_null(strstr(run.out, "time        "));
+    const char *const more[] = { "", "--classify pre" };
+    for (int i = 0; i < 2; i++) {
+        program_call(&run, "render stent.trip -o a.png --size 64x64 --explain --no-shading %s",
+                     more[i]);
+        assert_works(&run);
+        assert_non_null(strstr(run.out, i ? "classify    pre" : "classify    post"));
+        assert_non_null(strstr(run.out, "method      merge"));
+        assert_non_null(strstr(run.out, "list y      read: "));
+        assert_non_null(strstr(run.out, "shading     does not run: not asked for"));
+        assert_non_null(strstr(run.out, "cost y      "));
+        assert_non_null(strstr(run.out, "time        "));
+    }
 }
 
 static void a_function_that_shows_what_was_left_out_warns_with_a_count(void **state)

@@ -140,6 +140,8 @@ static void a_frame_has_statistics_by_list(void **state)
     triptych_frame_stats frame;
     triptych_list_stats list;
     triptych_info info;
+    settings.classify = TRIPTYCH_PRE;
+    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, timed), TRIPTYCH_OK);
@@ -257,9 +259,8 @@ static void what_only_splats_have_is_drawn_by_them(void **state)
 {
     (void)state;
     triptych *t = new_context();
-    triptych_settings usual = triptych_default_settings(), s;
-    usual.classify = TRIPTYCH_CLASSIFY_AUTO;
-    s = usual;
+    triptych_settings usual = triptych_default_settings(), s = usual;
+    assert_int_equal(usual.classify, TRIPTYCH_CLASSIFY_AUTO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     check_classified(t, &s, TRIPTYCH_POST, "by the view");
     s.slices = 4;

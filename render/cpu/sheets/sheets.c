@@ -122,7 +122,7 @@ static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all, uint64_t
 {
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                      "sheets of %lld x %lld voxels do not fit the memory given; raise --memory to "
-                     "%llu MiB",
+                     "%llu MiB, or draw splats: --classify pre",
                      (long long)(all->last[0] - all->first[0] + 1) * TRIP_CPU_BLOCK,
                      (long long)(all->last[1] - all->first[1] + 1) * TRIP_CPU_BLOCK,
                      trip_cpu_memory_mib(s->store.budget, needed / (LEFT_OVER_OF_WINDOWS - 1) *
