@@ -85,11 +85,12 @@ typedef struct trip_cpu {
     trip_cpu_job project_job, blend_job, pane_job;
 } trip_cpu;
 
-/* What --memory has to be, in MiB, for so many bytes besides what is taken. */
+/* What --memory has to be, in MiB, for so many bytes besides what is taken: a quarter of what is
+ * added goes to what is read ahead. */
 static inline unsigned long long trip_cpu_memory_mib(const trip_budget *budget, uint64_t bytes)
 {
-    uint64_t left = trip_budget_left_bytes(budget);
-    return ((trip_budget_limit_bytes(budget) - left + bytes) >> 20) + 1;
+    uint64_t left = trip_budget_left_bytes(budget), more = bytes > left ? bytes - left : 0;
+    return ((trip_budget_limit_bytes(budget) + more + more / 3) >> 20) + 1;
 }
 
 static inline uint32_t trip_cpu_pane_count(const trip_cpu *r)

@@ -154,7 +154,10 @@ class Formats(program.ProgramTest):
         grid.name = "density"
         grid.copyFromArray(numpy.ascontiguousarray(values.transpose(2, 1, 0).astype("f4")))
         pyopenvdb.write("bordered.vdb", grid)
-        difference = abs(self.draw("bordered.vdb") - self.draw("bordered.nrrd"))
+        # By splats, since what is not active is not of the grid: its cells are missing at the border.
+        view = *VIEW, "--classify", "pre"
+        drawn = [self.draw(f"bordered.{kind}", view=view) for kind in ("vdb", "nrrd")]
+        difference = abs(drawn[0] - drawn[1])
         self.assertLess(difference.max(), 0.02)
         self.assertLess(difference.mean(), 1 / 5000)
 

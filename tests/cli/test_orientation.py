@@ -250,18 +250,20 @@ class Orientation(program.ProgramTest):
             affine, values = acquisition(*ACQUISITIONS[name][:3])
             program.write_nifti("a.nii", values, TO_RAS @ affine)
             self.brick("a.nii")
-            options = Camera().options(TO_RAS[:3, :3])
-            expected = self.picture("a.trip", "--renderer=reference", *options)
-            for renderer in "cpu", "gl":
-                given = f"--renderer={renderer}", *options
-                run = program.call(
-                    "render", "a.trip", "-o", "b.exr", *given, program=program.QUICK_PROGRAM
-                )
-                if "no device here offers OpenGL" in run.stderr:
-                    self.skipTest("no OpenGL 4.5 here")
-                self.assertEqual(run.returncode, 0, run.stderr)
-                drawn = program.read_exr("b.exr")
-                self.alike(drawn, expected, (name, renderer), most=1 / 255, mean=0.05 / 255)
+            for classify, most, mean in ("pre", 1, 0.05), ("post", 5, 0.1):
+                options = f"--classify={classify}", *Camera().options(TO_RAS[:3, :3])
+                expected = self.picture("a.trip", "--renderer=reference", *options)
+                for renderer in "cpu", "gl":
+                    given = f"--renderer={renderer}", *options
+                    run = program.call(
+                        "render", "a.trip", "-o", "b.exr", *given, program=program.QUICK_PROGRAM
+                    )
+                    if "no device here offers OpenGL" in run.stderr:
+                        self.skipTest("no OpenGL 4.5 here")
+                    self.assertEqual(run.returncode, 0, run.stderr)
+                    drawn = program.read_exr("b.exr")
+                    about = name, renderer, classify
+                    self.alike(drawn, expected, about, most=most / 255, mean=mean / 255)
 
     def test_thick_slices_at_the_origin_are_not_taken_for_a_scan_without_orientation(self):
         """The map is diagonal then, as it is where a file says nothing."""
@@ -278,7 +280,8 @@ class Orientation(program.ProgramTest):
         program.write("red.tf", b"values data\n49 0 0 1 0\n50 0 0 1 1\n200 0 0 1 1\n200 1 0 0 1\n")
         source = os.path.join(program.DATASETS, "..", "tests", "regress", name)
         self.works("brick", source, "-o", "a.trip", "-q", "--force", "--tf", "red.tf")
-        picture = self.picture("a.trip", "--size=96x96", "--no-shading")
+        # By voxels: values between are blue, and hide what is red.
+        picture = self.picture("a.trip", "--size=96x96", "--no-shading", "--classify=pre")
         (whole,) = blobs(picture[..., 3])
         (bright,) = blobs(picture[..., 0])
         return numpy.subtract(bright, whole)

@@ -90,7 +90,7 @@ class View(program.ProgramTest):
             return json.load(f)
 
     def test_at_rest_it_is_the_picture_of_render(self):
-        for settings in [], ["--classify=post"]:
+        for settings in [], ["--classify=pre"]:
             self.view("wait\ndrag left 100 100 160 130 5\nwheel 2\nwait\npicture seen.exr\n"
                       "status status.json\n", "noise.trip", *settings)
             camera = shlex.split(self.status()["camera"])
@@ -139,6 +139,7 @@ class View(program.ProgramTest):
                     "click 0.3 Function editor", "click 0.5 Undo", "click 0.5 Redo",
                     "click 0.4 Opacity", "click 0.5 Shading", "click 0.5 Shading",
                     "click 0.5 Light from the eye\nclick 0.2 Light round", "click 0.9 Light up",
+                    "click 0.5 Classify\nclick 0.5 Before splatting",
                     "click 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Sheet by sheet",
                     "click 0.2 h",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",

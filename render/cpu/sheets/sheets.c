@@ -102,15 +102,18 @@ static trip_cpu_blocks blocks_of_layer(const trip_plan_layer *layer)
     return all.first[0] <= all.last[0] ? all : (trip_cpu_blocks){ .last = { 0, 0 } };
 }
 
+static uint64_t blocks_in(const trip_cpu_blocks *all)
+{
+    return (uint64_t)((all->last[0] - all->first[0] + 1) * (all->last[1] - all->first[1] + 1));
+}
+
 /* As many sheets at a time as fit beside twice the blocks that are needed. */
 static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_blocks *all, const trip_cpu_need *need,
                        uint64_t room)
 {
     s->slice_blocks = need->of_sheet * (uint64_t)s->of->frame->settings->slices;
     const uint64_t least = need->blocks + s->slice_blocks;
-    const uint64_t grid =
-        (uint64_t)((all->last[0] - all->first[0] + 1) * (all->last[1] - all->first[1] + 1));
-    const uint64_t most = grid * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
+    const uint64_t most = blocks_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
     while (sheets > TRIP_CPU_SHEETS_LEAST && trip_cpu_store_bytes(all, sheets, 2 * least) > room)
         sheets--;
@@ -118,8 +121,38 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_blocks *all, const tri
     return trip_cpu_store_fit(&s->store, all, sheets, least, most, room);
 }
 
-static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all, uint64_t needed)
+/* How far, in blocks, rays go along a sheet to the next. */
+static int64_t reach_of(const trip_settings *settings)
 {
+    return ((int64_t)trip_cpu_pass_steepest(settings) + 4) / TRIP_CPU_BLOCK + 1;
+}
+
+/* What the smallest windows of any layer of the frame take. */
+static int find_least(const trip_cpu_sheets *s, uint64_t *bytes)
+{
+    const trip_frame *frame = s->of->frame;
+    int status = 0;
+    *bytes = 0;
+    for (int axis = 0; axis < 3 && !status; axis++) {
+        const trip_plan_layer *layer = &frame->plan->layers[axis];
+        const trip_cpu_blocks all = blocks_of_layer(layer);
+        trip_cpu_need need;
+        status = trip_cpu_need_find(&need, layer, blocks_in(&all), s->store.budget);
+        if (status)
+            break;
+        uint64_t least = trip_cpu_windows_least_bytes(&all, reach_of(frame->settings), &need,
+                                                      frame->settings->slices);
+        *bytes = least > *bytes ? least : *bytes;
+    }
+    return status;
+}
+
+static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all)
+{
+    uint64_t needed;
+    int status = find_least(s, &needed);
+    if (status)
+        return status;
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                      "sheets of %lld x %lld voxels do not fit the memory given; raise --memory to "
                      "%llu MiB, or draw splats: --classify pre",
@@ -132,11 +165,9 @@ static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all, uint64_t
 /* Whole sheets where they fit for certain, else windows of them. */
 static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
 {
-    const trip_settings *settings = s->of->frame->settings;
     const trip_cpu_blocks all = blocks_of_layer(layer);
-    const uint64_t grid =
-        (uint64_t)((all.last[0] - all.first[0] + 1) * (all.last[1] - all.first[1] + 1));
-    const int64_t reach = ((int64_t)trip_cpu_pass_steepest(settings) + 4) / TRIP_CPU_BLOCK + 1;
+    const uint64_t grid = blocks_in(&all);
+    const int64_t reach = reach_of(s->of->frame->settings);
     trip_cpu_windows_release(&s->windows, s->store.budget);
     uint64_t left = trip_budget_left_bytes(s->store.budget) + trip_cpu_store_held_bytes(&s->store);
     uint64_t room = left / LEFT_OVER * (LEFT_OVER - 1);
@@ -151,7 +182,7 @@ static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
     room = left / LEFT_OVER_OF_WINDOWS * (LEFT_OVER_OF_WINDOWS - 1);
     if (trip_cpu_windows_fit(s, &all, reach, &need, room))
         return 0;
-    return refuse(s, &all, trip_cpu_windows_least_bytes(&all, reach, &need, settings->slices));
+    return refuse(s, &all);
 }
 
 int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis)
