@@ -3,12 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cached_volume.h"
 #include "commands.h"
 #include "geometry.h"
 #include "library.h"
 #include "options.h"
 #include "report.h"
+#include "shown_volume.h"
 #include "view.h"
 #include "volume_options.h"
 
@@ -80,8 +80,7 @@ typedef struct view_options {
     const char **inputs;
     int argc;
     double eye[3], look[3], up[3];
-    triptych_brick_options volume;
-    cached_volume cached; /* of the volume that is shown */
+    shown_volume volume;
 } view_options;
 
 static int parse_size(const char *text, view_options *o)
@@ -188,13 +187,13 @@ static int parse_volume(int key, char *arg, view_options *o)
 {
     switch (key) {
     case KEY_GRID:
-        return trip_option_grid(arg, &o->volume.grid);
+        return trip_option_grid(arg, &o->volume.options.grid);
     case KEY_LEVEL_SET:
-        return trip_option_level_set(arg, &o->volume.level_set);
+        return trip_option_level_set(arg, &o->volume.options.level_set);
     case KEY_SPACING:
-        return trip_option_spacing(arg, o->volume.spacing);
+        return trip_option_spacing(arg, o->volume.options.spacing);
     case KEY_ALLOW_GAPS:
-        o->volume.allow_gaps = 1;
+        o->volume.options.allow_gaps = 1;
         return 0;
     default:
         return parse_renderer(key, arg, o);
@@ -257,30 +256,6 @@ static int parse(view_options *o, int argc, char **argv)
     return trip_options_parse(&argp, argc, argv, o);
 }
 
-/* As `triptych render` keeps volumes; by the drawing thread. */
-static int find(void *user, triptych *t, const char *input, const char **path)
-{
-    view_options *o = user;
-    triptych_brick_options wanted = o->volume;
-    *path = input;
-    if (!cached_volume_wanted(input))
-        return 0;
-    wanted.functions = &o->params.function;
-    wanted.function_count = o->params.function != NULL;
-    wanted.automatic = 1;
-    wanted.memory_bytes = o->params.memory_bytes;
-    wanted.threads = o->params.threads;
-    const int status = cached_volume_open(&o->cached, t, input, &wanted);
-    *path = o->cached.path;
-    return status;
-}
-
-static void release(void *user)
-{
-    view_options *o = user;
-    cached_volume_close(&o->cached);
-}
-
 /* A data set that cannot be opened is found here, before there is a window. */
 static int check_inputs(const view_options *o)
 {
@@ -301,9 +276,13 @@ int trip_command_view(int argc, char **argv)
         return trip_exit_status(trip_fail(TRIP_ERROR, "usage", "view", "out of memory"));
     int status = parse(&o, argc, argv);
     o.params.inputs = o.inputs;
-    o.params.user = &o;
-    o.params.find = find;
-    o.params.release = release;
+    o.volume.function = o.params.function;
+    o.volume.options.memory_bytes = o.params.memory_bytes;
+    o.volume.options.threads = o.params.threads;
+    o.params.user = &o.volume;
+    o.params.find = shown_volume_find;
+    o.params.make = shown_volume_make;
+    o.params.release = shown_volume_release;
     if (!status)
         status = check_inputs(&o);
     if (!status)
