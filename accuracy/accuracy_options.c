@@ -60,7 +60,7 @@ static const struct argp_option options[] = {
       2 },
     { "budget", KEY_BUDGET, "SECONDS", 0,
       "Nothing is begun after so long; what was left out is listed (default: no end)", 2 },
-    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 2 },
+    TRIP_OPTION_THREADS(KEY_THREADS, 2),
     { "memory", KEY_MEMORY, "SIZE", 0,
       "Memory for all data (default: a quarter of what may be used)", 2 },
     { "pictures", KEY_PICTURES, NULL, 0, "Keep every picture too, as OpenEXR", 2 },
@@ -104,11 +104,11 @@ static int parse_number(int key, char *arg, accuracy_options *o)
     case KEY_BUDGET:
         return trip_option_number("--budget", arg, 0, 1e9, &o->budget_seconds);
     case KEY_THREADS:
-        status = trip_option_integer("--threads", arg, 1, 256, &threads);
+        status = trip_option_threads(arg, &threads);
         o->threads = (unsigned)threads;
         return status;
     case KEY_MEMORY:
-        return trip_option_bytes("--memory", arg, &o->memory_bytes);
+        return trip_option_memory(arg, &o->memory_bytes);
     default:
         return ARGP_ERR_UNKNOWN;
     }

@@ -56,8 +56,7 @@ static const struct argp_option options[] = {
       "by cpu only",
       0 },
     { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (default: auto); stream only", 0 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
-      0 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 0),
     { "no-counts", KEY_NO_COUNTS, NULL, 0,
       "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
     { "classify", KEY_CLASSIFY, "pre|post", 0,
@@ -190,21 +189,19 @@ static int parse_size(const char *text, bench_options *o, int i)
 
 static int parse_renderer(const char *text, bench_options *o, int i)
 {
-    static const char *const names[] = { "auto", "gl", "cpu", "reference", NULL };
-    int which = 0, status = trip_option_choice("--renderer", text, names, &which);
+    int which = 0, status = trip_option_renderer(text, 4, &which);
     o->renderers[i] = (trip_renderer_kind)which;
     return status;
 }
 
 static int parse_threads(const char *text, bench_options *o, int i)
 {
-    return trip_option_integer("--threads", text, 1, 1024, &o->threads[i]);
+    return trip_option_threads(text, &o->threads[i]);
 }
 
 static int parse_engine(const char *text, bench_options *o)
 {
-    static const char *const names[] = { "auto", "io_uring", "pread", NULL };
-    int which = 0, status = trip_option_choice("--engine", text, names, &which);
+    int which = 0, status = trip_option_engine(text, 3, &which);
     o->engine = (trip_engine)which;
     return status;
 }
@@ -219,8 +216,7 @@ static int parse_hidden(const char *text, bench_options *o)
 
 static int parse_classify(const char *text, bench_options *o)
 {
-    static const char *const names[] = { "pre", "post", NULL };
-    int which = 0, status = trip_option_choice("--classify", text, names, &which);
+    int which = 0, status = trip_option_classify(text, 2, &which);
     o->settings.classify = which ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
     return status;
 }
@@ -275,7 +271,7 @@ static int parse_option(int key, char *arg, bench_options *o)
     case KEY_ENGINE:
         return parse_engine(arg, o);
     case KEY_MEMORY:
-        return trip_option_bytes("--memory", arg, &o->memory_bytes);
+        return trip_option_memory(arg, &o->memory_bytes);
     case KEY_NO_COUNTS:
         o->no_counts = true;
         return 0;

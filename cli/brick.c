@@ -94,8 +94,7 @@ static const struct argp_option option_table[] = {
     { "quiet", 'q', NULL, 0, "Print no progress and no summary", 3 },
     { NULL, 0, NULL, 0, "Resources:", 4 },
     { "dry-run", KEY_DRY_RUN, NULL, 0, "Only estimate size and time, from parts of the input", 4 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
-      4 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 4),
     { "threads", KEY_THREADS, "N", 0, "Threads (default: one a processor)", 4 },
     { 0 },
 };
@@ -305,7 +304,7 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         o->dry_run = true;
         return 0;
     case KEY_MEMORY:
-        return trip_option_bytes("--memory", argument, &o->brick.memory_bytes);
+        return trip_option_memory(argument, &o->brick.memory_bytes);
     case KEY_THREADS:
         return parse_unsigned("--threads", argument, 256, &o->brick.threads);
     case ARGP_KEY_ARG:

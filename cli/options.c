@@ -122,3 +122,41 @@ int trip_option_choice(const char *option, const char *text, const char *const *
     }
     return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is none of %s", text, list);
 }
+
+/* Of the first `count` names. */
+static int choose_of_first(const char *option, const char *text, const char *const *names,
+                           int count, int *out)
+{
+    const char *taken[8] = { NULL };
+    for (int i = 0; i < count; i++)
+        taken[i] = names[i];
+    return trip_option_choice(option, text, taken, out);
+}
+
+int trip_option_memory(const char *text, uint64_t *out)
+{
+    return trip_option_bytes("--memory", text, out);
+}
+
+int trip_option_threads(const char *text, int *out)
+{
+    return trip_option_integer("--threads", text, 1, 256, out);
+}
+
+int trip_option_engine(const char *text, int names, int *out)
+{
+    static const char *const all[] = { "auto", "io_uring", "pread", "null" };
+    return choose_of_first("--engine", text, all, names, out);
+}
+
+int trip_option_renderer(const char *text, int names, int *out)
+{
+    static const char *const all[] = { "auto", "gl", "cpu", "reference", "integral" };
+    return choose_of_first("--renderer", text, all, names, out);
+}
+
+int trip_option_classify(const char *text, int names, int *out)
+{
+    static const char *const all[] = { "pre", "post", "auto" };
+    return choose_of_first("--classify", text, all, names, out);
+}

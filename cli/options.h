@@ -20,6 +20,28 @@ int trip_option_numbers(const char *option, const char *text, int least, int mos
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
 /* The position of `text` in a NULL-terminated list of names. */
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out);
+
+/* What several commands take, with the rows of their tables. The names come in the order of the
+ * library's values; `names` says how many of them the command takes. */
+#define TRIP_OPTION_MEMORY(key, group)                                                             \
+    {                                                                                              \
+        "memory", key, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",      \
+            group                                                                                  \
+    }
+#define TRIP_OPTION_ENGINE(key, group)                                                             \
+    {                                                                                              \
+        "engine", key, "NAME", 0, "auto, io_uring, pread or null (default: auto)", group           \
+    }
+#define TRIP_OPTION_THREADS(key, group)                                                            \
+    {                                                                                              \
+        "threads", key, "N", 0, "Threads that draw or read (default: one a processor)", group      \
+    }
+int trip_option_memory(const char *text, uint64_t *out);
+int trip_option_threads(const char *text, int *out);
+int trip_option_engine(const char *text, int names, int *out);   /* auto, io_uring, pread, null */
+int trip_option_renderer(const char *text, int names, int *out); /* auto, gl, cpu, reference, ... */
+int trip_option_classify(const char *text, int names, int *out); /* pre, post, auto */
+
 /* `why` completes "OPTION: ...". */
 int trip_option_fail(const char *option, const char *why);
 

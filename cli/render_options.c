@@ -169,10 +169,9 @@ static const struct argp_option options[] = {
       "Whether bricks behind what is opaque are read (default: skip); the picture is the same; "
       "cpu only",
       4 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
-      4 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 4 },
-    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 4 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 4),
+    TRIP_OPTION_ENGINE(KEY_ENGINE, 4),
+    TRIP_OPTION_THREADS(KEY_THREADS, 4),
     { "in-flight", KEY_IN_FLIGHT, "N", 0,
       "Images drawn at once, which divide the memory, 1 to 16 (default: 2; 1 with --stats, "
       "--explain); --orbit and --path only",
@@ -390,7 +389,6 @@ static int parse_view(int key, char *arg, parse *p)
 
 static int parse_method(int key, char *arg, parse *p)
 {
-    static const char *const classifications[] = { "pre", "post", "auto", NULL };
     static const char *const compositings[] = { "splat", "sheet", NULL };
     static const char *const methods[] = { "merge", "clip", "axis", NULL };
     static const char *const traversals[] = { "outward", "ascending", NULL };
@@ -398,7 +396,7 @@ static int parse_method(int key, char *arg, parse *p)
     int which = 0, status;
     switch (key) {
     case KEY_CLASSIFY:
-        status = trip_option_choice("--classify", arg, classifications, &which);
+        status = trip_option_classify(arg, 3, &which);
         s->classify = (triptych_classify)which;
         return status;
     case KEY_COMPOSITING:
@@ -542,15 +540,13 @@ static int parse_integral(int key, char *arg, parse *p)
 
 static int parse_renderer(int key, char *arg, parse *p)
 {
-    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral", NULL };
     static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
     static const char *const hidden[] = { "skip", "draw", NULL };
-    static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
     render_options *o = p->o;
     int which = 0, status;
     switch (key) {
     case KEY_RENDERER:
-        status = trip_option_choice("--renderer", arg, renderers, &which);
+        status = trip_option_renderer(arg, 5, &which);
         o->renderer = (triptych_renderer)which;
         return status;
     case KEY_TARGET:
@@ -565,13 +561,13 @@ static int parse_renderer(int key, char *arg, parse *p)
         o->hidden = (render_hidden)(which + 1);
         return status;
     case KEY_MEMORY:
-        return trip_option_bytes("--memory", arg, &o->memory_bytes);
+        return trip_option_memory(arg, &o->memory_bytes);
     case KEY_ENGINE:
-        status = trip_option_choice("--engine", arg, engines, &which);
+        status = trip_option_engine(arg, 4, &which);
         o->engine = (triptych_engine)which;
         return status;
     case KEY_THREADS:
-        return trip_option_integer("--threads", arg, 1, 1024, &o->threads);
+        return trip_option_threads(arg, &o->threads);
     case KEY_IN_FLIGHT:
         return trip_option_integer("--in-flight", arg, 1, 16, &o->in_flight);
     default:

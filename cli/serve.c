@@ -38,10 +38,9 @@ static const struct argp_option options[] = {
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
-      1 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 1 },
-    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 1 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 1),
+    TRIP_OPTION_ENGINE(KEY_ENGINE, 1),
+    TRIP_OPTION_THREADS(KEY_THREADS, 1),
     { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 2 },
     { "grid", KEY_GRID, "NAME", 0,
       "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 2 },
@@ -55,22 +54,20 @@ static const struct argp_option options[] = {
 
 static int parse_renderer(int key, char *arg, trip_serve_params *p)
 {
-    static const char *const renderers[] = { "auto", "gl", "cpu", NULL };
-    static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
     int which = 0, status;
     switch (key) {
     case KEY_RENDERER:
-        status = trip_option_choice("--renderer", arg, renderers, &which);
+        status = trip_option_renderer(arg, 3, &which);
         p->renderer = (triptych_renderer)which;
         return status;
     case KEY_MEMORY:
-        return trip_option_bytes("--memory", arg, &p->memory_bytes);
+        return trip_option_memory(arg, &p->memory_bytes);
     case KEY_ENGINE:
-        status = trip_option_choice("--engine", arg, engines, &which);
+        status = trip_option_engine(arg, 4, &which);
         p->engine = (triptych_engine)which;
         return status;
     case KEY_THREADS:
-        status = trip_option_integer("--threads", arg, 1, 256, &which);
+        status = trip_option_threads(arg, &which);
         p->threads = (unsigned)which;
         return status;
     default:
@@ -80,7 +77,6 @@ static int parse_renderer(int key, char *arg, trip_serve_params *p)
 
 static int parse_rest(int key, char *arg, trip_serve_params *p)
 {
-    static const char *const classifications[] = { "pre", "post", "auto", NULL };
     int which = 0, status;
     switch (key) {
     case KEY_PORT:
@@ -91,7 +87,7 @@ static int parse_rest(int key, char *arg, trip_serve_params *p)
         p->function = arg;
         return 0;
     case KEY_CLASSIFY:
-        status = trip_option_choice("--classify", arg, classifications, &which);
+        status = trip_option_classify(arg, 3, &which);
         p->settings.classify = (triptych_classify)which;
         return status;
     default:

@@ -62,10 +62,9 @@ static const struct argp_option options[] = {
     { NULL, 0, NULL, 0, "Renderer:", 3 },
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },
-    { "memory", KEY_MEMORY, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",
-      3 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring, pread or null (default: auto)", 3 },
-    { "threads", KEY_THREADS, "N", 0, "Threads that draw or read (default: one a processor)", 3 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 3),
+    TRIP_OPTION_ENGINE(KEY_ENGINE, 3),
+    TRIP_OPTION_THREADS(KEY_THREADS, 3),
     { NULL, 0, NULL, 0, "Volumes (not for data sets, which have it settled):", 4 },
     { "grid", KEY_GRID, "NAME", 0, "OpenVDB grid", 4 },
     { "level-set", KEY_LEVEL_SET, "HOW", 0,
@@ -140,7 +139,6 @@ static int parse_view(int key, char *arg, view_options *o)
 
 static int parse_look(int key, char *arg, view_options *o)
 {
-    static const char *const classifications[] = { "pre", "post", "auto", NULL };
     int which = 0, status;
     switch (key) {
     case KEY_TF:
@@ -149,7 +147,7 @@ static int parse_look(int key, char *arg, view_options *o)
     case KEY_OPACITY_SCALE:
         return trip_option_number("--opacity-scale", arg, 1e-6, 1e6, &o->params.opacity_scale);
     case KEY_CLASSIFY:
-        status = trip_option_choice("--classify", arg, classifications, &which);
+        status = trip_option_classify(arg, 3, &which);
         o->params.settings.classify = (triptych_classify)which;
         o->params.settings_given = true;
         return status;
@@ -160,22 +158,20 @@ static int parse_look(int key, char *arg, view_options *o)
 
 static int parse_renderer(int key, char *arg, view_options *o)
 {
-    static const char *const renderers[] = { "auto", "gl", "cpu", NULL };
-    static const char *const engines[] = { "auto", "io_uring", "pread", "null", NULL };
     int which = 0, status;
     switch (key) {
     case KEY_RENDERER:
-        status = trip_option_choice("--renderer", arg, renderers, &which);
+        status = trip_option_renderer(arg, 3, &which);
         o->params.renderer = (triptych_renderer)which;
         return status;
     case KEY_MEMORY:
-        return trip_option_bytes("--memory", arg, &o->params.memory_bytes);
+        return trip_option_memory(arg, &o->params.memory_bytes);
     case KEY_ENGINE:
-        status = trip_option_choice("--engine", arg, engines, &which);
+        status = trip_option_engine(arg, 4, &which);
         o->params.engine = (triptych_engine)which;
         return status;
     case KEY_THREADS:
-        status = trip_option_integer("--threads", arg, 1, 256, &which);
+        status = trip_option_threads(arg, &which);
         o->params.threads = (unsigned)which;
         return status;
     default:

@@ -1,9 +1,9 @@
 #include "tf_internal.h"
 
+#include "fail_line.h"
 #include "report.h"
 #include "text.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,16 +20,7 @@ typedef struct parser {
     bool normalised, unit_given, values_given;
 } parser;
 
-__attribute__((format(printf, 2, 3))) static int fail_at(const parser *p, const char *why, ...)
-{
-    char where[512], text[512];
-    va_list args;
-    va_start(args, why);
-    vsnprintf(text, sizeof text, why, args);
-    va_end(args);
-    snprintf(where, sizeof where, "%.400s: line %ld", p->name, p->line_number);
-    return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "%s", text);
-}
+#define fail_at(p, ...) trip_fail_line(TRIP_TF_STAGE, (p)->name, (p)->line_number, __VA_ARGS__)
 
 static int parse_unit(parser *p, const char *word)
 {

@@ -1,13 +1,13 @@
 #include "script.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "input_file.h"
+#include "fail_line.h"
 #include "report.h"
 #include "text.h"
 
@@ -29,16 +29,7 @@ typedef struct parser {
     unsigned modifiers; /* of its last words */
 } parser;
 
-__attribute__((format(printf, 2, 3))) static int fail_at(const parser *p, const char *why, ...)
-{
-    char where[512], text[512];
-    va_list args;
-    va_start(args, why);
-    vsnprintf(text, sizeof text, why, args);
-    va_end(args);
-    snprintf(where, sizeof where, "%.400s: line %ld", p->name, p->line);
-    return trip_fail(TRIP_ERROR, "script", where, "%s", text);
-}
+#define fail_at(p, ...) trip_fail_line("script", (p)->name, (p)->line, __VA_ARGS__)
 
 static int add(parser *p, trip_event event)
 {

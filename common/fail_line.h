@@ -1,0 +1,9 @@
+/* Faults in a line of a text, in the form of report.h. */
+#ifndef TRIP_FAIL_LINE_H
+#define TRIP_FAIL_LINE_H
+
+/* trip_fail(TRIP_ERROR, what, "NAME: line N", why, ...). */
+__attribute__((format(printf, 4, 5))) int trip_fail_line(const char *what, const char *name,
+                                                         long line, const char *why, ...);
+
+#endif
