@@ -4,24 +4,59 @@
 #include "report.h"
 #include "weight.h"
 
-/* The kernels leave out no single splat for its weight, so that they have no bound of their own to
- * count by: this is the definition's. What lies behind the eye is the same by both: wherever a
- * support is near it, trip_splat_project() decides for the kernels too. */
-static bool is_projected(const trip_cpu_view *view, int u, int v, int sheet)
+static const trip_list_grid *grid_of(const trip_cpu_view *view)
 {
-    const trip_camera *camera = &view->splat.camera;
-    const trip_list_grid *grid = &view->of->plan->lists[view->list->index].grid;
+    return &view->of->plan->lists[view->list->index].grid;
+}
+
+/* The bound by which splats of a list are culled, for the kernels. */
+static trip_cpu_reach reach_of(const trip_cpu_view *view)
+{
+    const trip_settings *s = view->of->settings;
+    const trip_list_grid *grid = grid_of(view);
+    const int axes[3] = { view->u_axis, view->v_axis, view->axis };
+    const double h = trip_weight_h(s);
+    trip_cpu_reach reach = { .bounded = !view->of->camera->ortho && s->method != TRIP_METHOD_AXIS,
+                             .inclusive = s->method == TRIP_METHOD_CLIP,
+                             .h = (float)h,
+                             .across = (float)(sqrt(1 + h * h) * trip_list_grid_growth(grid)) };
+    for (int i = 0; i < 3; i++)
+        reach.scale[i] = (float)grid->scale[axes[i]];
+    return reach;
+}
+
+/* Of a splat that the kernels leave to trip_splat_project(). */
+static bool is_reaching(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t i)
+{
     double p[3];
-    p[view->axis] = sheet;
-    p[view->u_axis] = u;
-    p[view->v_axis] = v;
+    p[view->axis] = staged->sheet[i];
+    p[view->u_axis] = staged->u[i];
+    p[view->v_axis] = staged->v[i];
     trip_vec3 position = trip_v3(p[0], p[1], p[2]);
+    trip_vec3 from_eye = trip_sub(position, view->splat.camera.eye);
     trip_splat s;
     return trip_splat_project(&view->splat, position, &s) &&
            trip_weight_may_reach(view->of->settings, view->of->camera, view->of->plan->axis_of_view,
-                                 view->axis,
-                                 trip_list_grid_vector(grid, trip_sub(position, camera->eye)),
-                                 s.radius * trip_list_grid_growth(grid));
+                                 view->axis, trip_list_grid_vector(grid_of(view), from_eye),
+                                 s.radius * trip_list_grid_growth(grid_of(view)));
+}
+
+/* Lists whose weight is 0 everywhere are not drawn, and so not counted. */
+static uint32_t count_reaching(const trip_cpu *r, const trip_cpu_view *view, trip_cpu_worker *w,
+                               uint32_t n)
+{
+    const trip_cpu_reach reach = reach_of(view);
+    const trip_cpu_staged *staged = &w->scratch.staged;
+    const trip_cpu_lanes *lanes = &w->scratch.lanes;
+    const uint32_t across = r->isa->lanes;
+    uint32_t count = 0;
+    r->isa->reaching(view, &reach, staged, n, &w->scratch.lanes);
+    for (uint32_t i = 0; i < n; i += across) {
+        count += (uint32_t)__builtin_popcount(lanes->kept[i / across]);
+        for (uint32_t bits = lanes->scalar[i / across]; bits; bits &= bits - 1)
+            count += is_reaching(view, staged, i + (uint32_t)__builtin_ctz(bits));
+    }
+    return count;
 }
 
 void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
@@ -35,11 +70,8 @@ void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
         trip_cpu_square square = trip_cpu_make_square(r, w, block, part->run, &at);
         if (square.mask == 0)
             continue;
-        const trip_cpu_staged *staged = &w->scratch.staged;
         uint32_t n = r->isa->stage(view, &square, false, &w->scratch.staged, 0);
-        for (uint32_t i = 0; i < n; i++)
-            chunk->counts.splats_projected +=
-                is_projected(view, staged->u[i], staged->v[i], staged->sheet[i]);
+        chunk->counts.splats_projected += count_reaching(r, view, w, n);
         n = r->isa->project(view, NULL, &w->scratch.staged, n, &w->scratch.lanes, w->counted, NULL);
         chunk->counts.splats_drawn += r->isa->drawn(view, &w->scratch, w->counted, n);
     }

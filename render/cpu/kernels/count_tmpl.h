@@ -1,12 +1,13 @@
-/* Which splats meet a pixel: by the numbers that project() gave them and the arithmetic that blends
- * and weighs, so that what is counted is what the kernels do. Included by table_tmpl.h after
- * merge_tmpl.h. */
+/* Which splats are in view, and which meet a pixel: by the footprints that project() finds and the
+ * arithmetic that blends and weighs, so that what is counted is what the kernels do. Included by
+ * table_tmpl.h after merge_tmpl.h. */
 #ifndef TRIP_CPU_COUNT_TMPL_H
 #define TRIP_CPU_COUNT_TMPL_H
 
 #include "cpu/kernels/blend_tmpl.h"
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/merge_tmpl.h"
+#include "cpu/kernels/project_tmpl.h"
 
 /* Whether some pixel of a stamp of the pane at hand lies in the image, in the support of `splat`,
  * which is local to the pane, and where the list has weight. */
@@ -67,6 +68,52 @@ static uint32_t drawn(const trip_cpu_view *view, trip_cpu_scratch *s, const trip
     for (uint32_t i = 0; i < count; i++)
         n += is_drawn(s, &splats[i]);
     return n;
+}
+
+/* The square of trip_splat.radius over that of the kernel: with u of footprint_of(), the largest
+ * eigenvalue of S^-1 is u times that of u S over |u S|. */
+INLINE vf growth2(const perspective *p, const trip_splat_frame *f, const trip_cpu_lanes *lanes,
+                  uint32_t at)
+{
+    vf x = ((v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at)) * p->step;
+    vf y = ((v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at)) * p->step;
+    vf rx = v_fma(x, p->XX, v_fma(y, p->XY, p->rX)), ry = v_fma(x, p->XY, v_fma(y, p->YY, p->rY));
+    vf rr = v_fma(x, p->rX + rx, v_fma(y, p->rY + ry, p->rr));
+    vf u = p->inverse_sigma * v_load(lanes->z + at), half = v_set(0.5f);
+    vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
+    vf sxy = v_fnma(rr, p->XY, rx * ry), apart = half * (sxx - syy);
+    vf largest = v_fma(half, sxx + syy, v_sqrt(v_fma(apart, apart, sxy * sxy)));
+    return v_fma(v_set((float)f->low_pass2) * u * u, largest / (p->det * rr), v_set(1));
+}
+
+/* As trip_weight_may_reach(). */
+INLINE vm may_reach(const trip_cpu_view *view, const trip_cpu_reach *reach, const perspective *p,
+                    const trip_cpu_staged *staged, const trip_cpu_lanes *lanes, uint32_t at)
+{
+    const float kernel = (float)(view->splat.sigma * sqrt(view->splat.cutoff2));
+    vf u = v_abs(offset(vi_load(staged->u + at), view->eye[0])) * v_set(reach->scale[0]);
+    vf v = v_abs(offset(vi_load(staged->v + at), view->eye[1])) * v_set(reach->scale[1]);
+    vf s = v_abs(offset(vi_load(staged->sheet + at), view->eye[2])) * v_set(reach->scale[2]);
+    vf radius = v_sqrt(growth2(p, &view->splat, lanes, at)) * v_set(kernel * reach->across);
+    vf bound = v_fnma(v_set(reach->h), v_max(s, v_max(u, v)), s) + radius;
+    return reach->inclusive ? v_ge(bound, v_set(0)) : v_gt(bound, v_set(0));
+}
+
+static void reaching(const trip_cpu_view *view, const trip_cpu_reach *reach,
+                     const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes)
+{
+    perspective persp = perspective_of(view);
+    for (uint32_t i = 0; i < count; i += V) {
+        place(view, staged, i, lanes);
+        vm usual = view->splat.camera.ortho ? v_ge(v_load(lanes->z + i), v_set(view->near))
+                                            : footprint_of(&persp, &view->splat, lanes, i).usual;
+        unsigned front = vm_bits(vm_first(count - i)) &
+                         ~vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
+        lanes->kept[i / V] = front & vm_bits(usual);
+        lanes->scalar[i / V] = front & ~vm_bits(usual);
+        if (reach->bounded)
+            lanes->kept[i / V] &= vm_bits(may_reach(view, reach, &persp, staged, lanes, i));
+    }
 }
 
 #endif

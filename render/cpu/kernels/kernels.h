@@ -151,6 +151,14 @@ typedef struct trip_cpu_lanes {
     bool broken; /* set for good when the numbers of some splat are not finite */
 } trip_cpu_lanes;
 
+/* The bound of trip_weight_may_reach() for splats of a list, in the grid of level 0. */
+typedef struct trip_cpu_reach {
+    bool bounded;    /* else a ray's weight does not depend on it, and all are reached */
+    bool inclusive;  /* the bound may be 0 */
+    float h, across; /* and what a radius is multiplied by */
+    float scale[3];  /* from the list's grid to that of level 0: u, v, sheet */
+} trip_cpu_reach;
+
 /* Splats that are sorted by stamps of a pane together, and bands of 64 stamps at most. */
 #define TRIP_CPU_LOCAL 256
 #define TRIP_CPU_BANDS 4
@@ -243,6 +251,10 @@ typedef struct trip_cpu_kernels {
     void (*pane_finish)(const trip_cpu_view *view, int x, int y, trip_cpu_content content,
                         const float *pixels, float *rgba, float *depth);
 
+    /* Which of the staged voxels are seen and have a support that rays with weight in the list may
+     * reach: lanes->kept; and which are for trip_cpu_project_scalar() to decide: lanes->scalar. */
+    void (*reaching)(const trip_cpu_view *view, const trip_cpu_reach *reach,
+                     const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes);
     /* How many of so many splats that project() made have a pixel centre of the image in their
      * support where the list has weight. Uses `s` for itself. */
     uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,

@@ -29,7 +29,7 @@
         .squares = squares, .stage = stage, .project = project, .pane_clear = pane_clear,          \
         .pane_begin = pane_begin, .pane_blend = pane_blend, .pane_end = pane_end,                  \
         .pane_merge = pane_merge, .pane_finish = pane_finish, .drawn = drawn,                      \
-        .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,                            \
+        .reaching = reaching, .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,      \
         .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
         .sheet_gradients = sheet_gradients, .sheet_between = sheet_between,                        \
         .sheet_pane = sheet_pane,                                                                  \
