@@ -7,6 +7,10 @@
 
 #include "report.h"
 
+/* Of volumes whose files are larger, at least, a version of so many voxels is made first. */
+#define LARGE_BYTES (UINT64_C(8) << 20)
+#define SMALL_VOXELS (UINT64_C(1) << 21)
+
 static triptych_brick_options options_of(const shown_volume *s, bool keep_all)
 {
     triptych_brick_options wanted = s->options;
@@ -60,13 +64,42 @@ static int open_volume(const shown_volume *s, cached_volume *cached, triptych *t
     return status;
 }
 
-int shown_volume_find(void *user, triptych *t, const char *input, bool keep_all, const char **path)
+/* 1: a small one is to be made first. */
+static int is_large(const shown_volume *s, triptych *t, const char *volume)
+{
+    const triptych_brick_options wanted = options_of(s, false);
+    cached_volume found = { .hold = -1 };
+    triptych_identity identity;
+    int there = cached_volume_find(&found, t, volume, &wanted);
+    if (there > 0)
+        cached_volume_close(&found);
+    if (there)
+        return there < 0 ? there : 0;
+    int status = triptych_identify(t, volume, &wanted, 0, &identity);
+    return status ? status : identity.bytes > LARGE_BYTES;
+}
+
+static int open_small(shown_volume *s, triptych *t, const char *volume)
+{
+    triptych_brick_options wanted = options_of(s, false);
+    wanted.most_voxels = SMALL_VOXELS;
+    wanted.levels = -1;
+    return cached_volume_open(&s->cached, t, volume, &wanted);
+}
+
+int shown_volume_find(void *user, triptych *t, const char *input, bool keep_all, bool *small,
+                      const char **path)
 {
     shown_volume *s = user;
     *path = input;
     if (!keep_all && !cached_volume_wanted(input))
         return 0;
-    const int status = open_volume(s, &s->cached, t, input, keep_all);
+    int status = s->samples && !keep_all ? is_large(s, t, input) : 0;
+    *small = status > 0;
+    if (*small)
+        status = open_small(s, t, input);
+    else if (!status)
+        status = open_volume(s, &s->cached, t, input, keep_all);
     *path = s->cached.path;
     return status;
 }
@@ -77,10 +110,10 @@ void shown_volume_release(void *user)
     cached_volume_close(&s->cached);
 }
 
-int shown_volume_make(void *user, triptych *t, const char *input)
+int shown_volume_make(void *user, triptych *t, const char *input, bool keep_all)
 {
     cached_volume made = { .hold = -1 };
-    const int status = open_volume(user, &made, t, input, true);
+    const int status = open_volume(user, &made, t, input, keep_all);
     cached_volume_close(&made);
     return status;
 }

@@ -10,14 +10,17 @@
 typedef struct shown_volume {
     triptych_brick_options options; /* how a volume is read, memory and threads; nothing else */
     const char *function;           /* that is to be shown, or NULL */
-    cached_volume cached;           /* zeroed at first */
+    bool samples;         /* of large volumes that are not in the cache a small one is found,
+                             of samples */
+    cached_volume cached; /* zeroed at first */
 } shown_volume;
 
 /* As trip_frames_params.find and release have them; `user` is a shown_volume. */
-int shown_volume_find(void *user, triptych *t, const char *input, bool keep_all, const char **path);
+int shown_volume_find(void *user, triptych *t, const char *input, bool keep_all, bool *small,
+                      const char **path);
 void shown_volume_release(void *user);
-/* What shown_volume_find() then finds with all values; by a thread of its own, as
- * trip_maker_params.make has it. */
-int shown_volume_make(void *user, triptych *t, const char *input);
+/* What shown_volume_find() then finds, with all values or those that are to be shown; by a thread
+ * of its own, as trip_maker_params.make has it. */
+int shown_volume_make(void *user, triptych *t, const char *input, bool keep_all);
 
 #endif

@@ -273,6 +273,7 @@ int trip_command_view(int argc, char **argv)
     int status = parse(&o, argc, argv);
     o.params.inputs = o.inputs;
     o.volume.function = o.params.function;
+    o.volume.samples = true;
     o.volume.options.memory_bytes = o.params.memory_bytes;
     o.volume.options.threads = o.params.threads;
     o.params.user = &o.volume;

@@ -23,6 +23,7 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .raw_endian = (int)o->raw_endian,
         .raw_offset_bytes = o->raw_offset_bytes,
         .allow_gaps = o->allow_gaps,
+        .most_voxels = o->most_voxels,
     };
 }
 

@@ -43,8 +43,10 @@ typedef struct triptych_brick_options {
     const char *raw_type;         /* "uint8", "int16", "float", ...; default: by the file's name */
     triptych_endian raw_endian;
     uint64_t raw_offset_bytes;
-    double spacing[3]; /* of voxels; default: the file's, else 1 */
-    int allow_gaps;    /* not 0: slices may be missing in a stack */
+    double spacing[3];    /* of voxels; default: the file's, else 1 */
+    int allow_gaps;       /* not 0: slices may be missing in a stack */
+    uint64_t most_voxels; /* not 0: of a volume of more voxels every second, third, ... along each
+                             axis is read, so that there are at most so many */
 
     /* What is kept: the union of these; with none of them, as with `automatic`. */
     const char *const *functions; /* presets or files, */

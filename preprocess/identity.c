@@ -27,6 +27,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
     fprintf(f, "%s %d %s %d %" PRIu64 " %d\n", v->grid ? v->grid : "", (int)v->level_set,
             v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes, v->allow_gaps);
+    if (v->most_voxels)
+        fprintf(f, "at most %" PRIu64 "\n", v->most_voxels);
     for (int a = 0; a < 3; a++)
         fprintf(f, "%" PRId64 " %a\n", v->raw_dims[a], v->spacing[a]);
 }

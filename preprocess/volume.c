@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "report.h"
+#include "sampled.h"
 #include "volume_reader.h"
 
 #define HEAD_BYTES 1024
@@ -176,6 +177,8 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
     if (params->spacing[0] > 0)
         override_spacing(&v->info.index_to_world, params->spacing);
     status = check_info(v);
+    if (!status && params->most_voxels)
+        status = trip_sampled_wrap(&v->reader, &v->state, &v->info, params->most_voxels, v->budget);
     if (status < 0 || !v->reader->read_slices)
         return status;
     v->slice_bytes = (size_t)(v->info.dims[0] * v->info.dims[1]) * trip_scalar_bytes(v->info.type);

@@ -74,6 +74,7 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks in which slices are missing */
+    uint64_t most_voxels;      /* of larger volumes every second, third, ... voxel along each axis */
 } trip_volume_params;
 
 typedef struct trip_volume trip_volume;

@@ -20,7 +20,8 @@ typedef struct trip_serve_params {
     void (*ready)(void *user, const char *address);
     void *user;
     /* As frames.h has them; NULL: the input is a data set. */
-    int (*find)(void *user, triptych *t, const char *input, bool keep_all, const char **path);
+    int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
+                const char **path);
     void (*release)(void *user);
     void *find_user;
 } trip_serve_params;

@@ -85,6 +85,21 @@ void trip_clipping_set_depth(triptych_clip *c, int plane, const triptych_info *i
     p[3] = -depth * length_of(p) * half_diagonal(info) - at_middle(p, info);
 }
 
+static double voxel_length(const triptych_info *info, int axis)
+{
+    const double(*m)[4] = info->index_to_world;
+    return hypot(hypot(m[0][axis], m[1][axis]), m[2][axis]);
+}
+
+void trip_clipping_rescale(triptych_clip *c, const triptych_info *from, const triptych_info *to)
+{
+    for (int a = 0; a < 3 && c->box_of_voxels; a++) {
+        const double scale = voxel_length(from, a) / voxel_length(to, a);
+        c->box_lo[a] *= scale;
+        c->box_hi[a] *= scale;
+    }
+}
+
 bool trip_clipping_is_sound(const triptych_clip *c)
 {
     for (int a = 0; a < 3 && c->box; a++)

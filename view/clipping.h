@@ -26,6 +26,8 @@ void trip_clipping_remove_plane(triptych_clip *c, int plane);
 double trip_clipping_depth(const triptych_clip *c, int plane, const triptych_info *info);
 void trip_clipping_set_depth(triptych_clip *c, int plane, const triptych_info *info, double depth);
 
+/* A box of voxels where the same data has voxels of another size. */
+void trip_clipping_rescale(triptych_clip *c, const triptych_info *from, const triptych_info *to);
 /* Whether a library would take it. */
 bool trip_clipping_is_sound(const triptych_clip *c);
 /* Between two that have the same kinds of parts, 0 is a and 1 is b; of others `a` below 1. */

@@ -29,10 +29,12 @@ typedef struct trip_frames_params {
     void (*wake)(void *user);
     void *wake_user;
     /* The same: the data set to open for what the user named, which stays where it is until
-     * release(); one with all values, which was made before, where keep_all. NULL: names are data
+     * release(); one with all values, which was made before, where keep_all. *small says whether it
+     * is of samples alone, in the place of a large one that is yet to be made. NULL: names are data
      * sets. A failure is reported in the context or the thread's
      * scope. */
-    int (*find)(void *user, triptych *t, const char *input, bool keep_all, const char **path);
+    int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
+                const char **path);
     void (*release)(void *user);
     void *user;
 } trip_frames_params;
@@ -66,6 +68,7 @@ void trip_frames_want(trip_frames *f, const trip_wanted *wanted);
 typedef struct trip_opened {
     unsigned document;
     bool first;         /* it has just been opened; else only navigation and function are set */
+    bool small;         /* as find() says */
     triptych_info info; /* without notes */
     triptych_histogram histogram;
     char *function; /* its text; NULL where it is as it was, or has none in data units */

@@ -41,6 +41,7 @@ struct trip_frames {
     trip_wanted now; /* what it works on */
     uint64_t taken;  /* asked when that was wanted; of what was worked on last: */
     uint64_t served;
+    bool small;                 /* as find() says */
     bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
     bool frugal;                /* no pages are kept between frames of it */
     unsigned document;

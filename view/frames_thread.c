@@ -167,6 +167,7 @@ static int open_data(trip_frames *f)
     const trip_wanted *w = &f->now;
     int status = 0;
     f->source = w->input;
+    f->small = false;
     f->document = w->document;
     pthread_mutex_lock(&f->lock);
     f->status = (trip_frames_status){ .document = w->document,
@@ -176,7 +177,7 @@ static int open_data(trip_frames *f)
     pthread_mutex_unlock(&f->lock);
     show_stage(f, "open", 0);
     if (p->find)
-        status = p->find(p->user, f->t, w->input, w->keep_all, &f->source);
+        status = p->find(p->user, f->t, w->input, w->keep_all, &f->small, &f->source);
     if (!status)
         status = triptych_open(f->t, f->source,
                                &(triptych_resources){ .memory_bytes = p->memory_bytes,
@@ -293,7 +294,7 @@ static void post(trip_frames *f, trip_opened *o)
 
 static int announce(trip_frames *f)
 {
-    trip_opened o = { .document = f->now.document, .first = !f->announced };
+    trip_opened o = { .document = f->now.document, .first = !f->announced, .small = f->small };
     int status = find_navigation(f, &o.navigation);
     if (!status && o.first)
         status = describe(f, &o);

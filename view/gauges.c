@@ -64,6 +64,9 @@ static void add_document(cJSON *root, trip_viewer *v)
     cJSON_AddNumberToObject(root, "documents", v->count);
     if (d)
         cJSON_AddStringToObject(root, "input", d->input);
+    cJSON *dims = d && d->opened ? cJSON_AddArrayToObject(root, "dims") : NULL;
+    for (int a = 0; a < 3 && dims; a++)
+        cJSON_AddItemToArray(dims, cJSON_CreateNumber((double)d->info.dims[a]));
     if (camera)
         cJSON_AddStringToObject(root, "camera", camera);
     cJSON_AddNumberToObject(root, "width", v->width);

@@ -14,7 +14,8 @@ struct trip_maker {
     bool started;     /* the thread is to be joined; the window's thread's */
     trip_scope scope; /* the thread's */
     triptych *t;      /* the thread's, but for triptych_cancel() */
-    char *input;      /* set before the thread begins */
+    char *input;      /* these are set before the thread begins */
+    bool keep_all;
 
     pthread_mutex_t lock;
     /* Under lock: */
@@ -62,7 +63,7 @@ static void *run(void *user)
 {
     trip_maker *m = user;
     trip_scope *before = trip_scope_enter(&m->scope);
-    int status = m->params.make(m->params.user, m->t, m->input);
+    int status = m->params.make(m->params.user, m->t, m->input, m->keep_all);
     if (status && *triptych_error(m->t))
         set_message(m, triptych_error(m->t));
     trip_scope_enter(before);
@@ -108,18 +109,19 @@ void trip_maker_destroy(trip_maker *m)
     free(m);
 }
 
-bool trip_maker_start(trip_maker *m, unsigned document, const char *input)
+bool trip_maker_start(trip_maker *m, unsigned document, const char *input, bool keep_all)
 {
     if (trip_maker_get_status(m).busy)
         return false;
     join(m);
     m->scope = (trip_scope){ .failed = take_failure, .sink = take_report, .user = m };
     m->input = strdup(input);
+    m->keep_all = keep_all;
     if (!m->input || triptych_create(&m->t))
         return false;
     triptych_set_messages(m->t, take_line, m);
     triptych_set_progress(m->t, show_progress, m);
-    m->made = (trip_made){ .document = document };
+    m->made = (trip_made){ .document = document, .keep_all = keep_all };
     m->ended = false;
     m->status = (trip_maker_status){ .busy = true, .document = document };
     m->started = pthread_create(&m->thread, NULL, run, m) == 0;

@@ -18,7 +18,7 @@ typedef struct trip_maker trip_maker;
 typedef struct trip_maker_params {
     /* By its thread: 0 once find() would have it at once, or a failure, reported in the context or
      * the thread's scope. */
-    int (*make)(void *user, triptych *t, const char *input);
+    int (*make)(void *user, triptych *t, const char *input, bool keep_all);
     void *user;
     void (*wake)(void *user); /* something has come; by its thread */
     void *wake_user;
@@ -30,7 +30,7 @@ trip_maker *trip_maker_create(const trip_maker_params *params);
 void trip_maker_destroy(trip_maker *m);
 
 /* For what the user named; false while something is made, or without a thread. */
-bool trip_maker_start(trip_maker *m, unsigned document, const char *input);
+bool trip_maker_start(trip_maker *m, unsigned document, const char *input, bool keep_all);
 
 typedef struct trip_maker_status {
     bool busy;         /* until what was made is taken */
@@ -44,6 +44,7 @@ trip_maker_status trip_maker_get_status(trip_maker *m);
 /* True once for each that has ended: whether it was made, else why not. */
 typedef struct trip_made {
     unsigned document;
+    bool keep_all;
     bool made;
     char message[512];
 } trip_made;

@@ -403,6 +403,8 @@ void draw_left_out(trip_panel *p, trip_viewer *v, trip_document *d)
     if (!v->maker)
         return;
     const trip_maker_status s = trip_maker_get_status(v->maker);
+    if (d->small)
+        return;
     if (s.busy && s.document == d->number) {
         char text[64];
         std::snprintf(text, sizeof text, "bricking: %s %.0f %%", s.stage, 100 * s.done);
@@ -722,6 +724,20 @@ void draw_progress(ImDrawList *list, trip_viewer *v, double scale)
     }
 }
 
+// While samples stand for the whole.
+void draw_making(ImDrawList *list, trip_viewer *v, const trip_document *d, double scale)
+{
+    char text[160];
+    const trip_maker_status s = trip_maker_get_status(v->maker);
+    std::snprintf(text, sizeof text,
+                  "a quick version of %lld x %lld x %lld voxels; the whole is being bricked: %s "
+                  "%.0f %%",
+                  static_cast<long long>(d->info.dims[0]), static_cast<long long>(d->info.dims[1]),
+                  static_cast<long long>(d->info.dims[2]), s.stage, 100 * s.done);
+    const double middle[2] = { v->picture_width / 2.0, v->height - 24 * scale };
+    put_text(list, middle, text);
+}
+
 void draw_message(ImDrawList *list, trip_viewer *v, double scale)
 {
     if (!v->message[0])
@@ -797,6 +813,8 @@ void draw_over(trip_panel *p, trip_viewer *v)
             draw_probe(list, v, d);
     }
     draw_progress(list, v, p->scale);
+    if (d && d->opened && d->small && v->maker)
+        draw_making(list, v, d, p->scale);
     list->PopClipRect();
     draw_message(ImGui::GetForegroundDrawList(), v, p->scale);
     if (v->keys)

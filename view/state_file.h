@@ -19,7 +19,7 @@ typedef struct trip_view_state {
     /* Of these what a viewer changes: classification, compositing, slices, method, shading, light,
      * h, kernel radius, background, level of detail, samples, clipping, what is shown. */
     triptych_settings settings;
-    bool clips; /* settings.clip counts */
+    bool clips;                       /* settings.clip counts */
     bool panel, box, axes, scale_bar; /* shown */
 } trip_view_state;
 

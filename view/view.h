@@ -29,8 +29,10 @@ typedef struct trip_view_params {
     const char *script; /* a file of events, after which it ends */
     void *user;
     /* As frames.h and maker.h have them. */
-    int (*find)(void *user, triptych *t, const char *input, bool keep_all, const char **path);
-    int (*make)(void *user, triptych *t, const char *input); /* NULL: nothing is made */
+    int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
+                const char **path);
+    int (*make)(void *user, triptych *t, const char *input,
+                bool keep_all); /* NULL: nothing is made */
     void (*release)(void *user);
 } trip_view_params;
 

@@ -217,7 +217,10 @@ static void want(trip_viewer *v)
 
 static void describe(trip_document *d, trip_opened *o)
 {
+    if (d->opened)
+        trip_clipping_rescale(&d->settings.clip, &d->info, &o->info);
     d->opened = true;
+    d->small = o->small;
     d->info = o->info;
     d->histogram = o->histogram;
     free(d->source);
@@ -261,7 +264,7 @@ bool trip_viewer_rests(trip_viewer *v)
     if (!d || v->changed || v->picture_width < 1 || v->height < 1)
         return !d || !v->changed;
     return s.document == d->number && s.rests && !trip_frames_saving(v->frames) &&
-           !(v->maker && trip_maker_get_status(v->maker).busy);
+           !(v->maker && (d->small || trip_maker_get_status(v->maker).busy));
 }
 
 static void lay_out(trip_viewer *v)
@@ -483,8 +486,16 @@ void trip_viewer_brick_again(trip_viewer *v)
     const trip_document *d = trip_viewer_document(v);
     if (!d || !v->maker)
         return;
-    if (!trip_maker_start(v->maker, d->number, d->input))
+    if (!trip_maker_start(v->maker, d->number, d->input, true))
         trip_viewer_say(v, "another data set is being bricked: try again when it is done");
+}
+
+/* The whole of what is shown by samples. */
+static void make_whole(trip_viewer *v)
+{
+    const trip_document *d = trip_viewer_document(v);
+    if (v->maker && d && d->opened && d->small && !trip_maker_get_status(v->maker).busy)
+        trip_maker_start(v->maker, d->number, d->input, false);
 }
 
 /* What was bricked is opened in the place of what is shown. */
@@ -496,11 +507,14 @@ static void take_made(trip_viewer *v)
         return;
     for (int i = 0; i < v->count; i++)
         d = v->documents[i]->number == made.document ? v->documents[i] : d;
-    if (!made.made)
+    if (d && !made.made) {
+        d->small = false; /* it stays as it is */
         trip_viewer_say(v, made.message);
+    }
     if (!d || !made.made)
         return;
-    d->keep_all = true;
+    d->keep_all |= made.keep_all;
+    d->small = false;
     d->number = ++v->numbers;
     v->changed |= d == trip_viewer_document(v);
 }
@@ -711,6 +725,7 @@ bool trip_viewer_tick(trip_viewer *v, double seconds)
     take_opened(v);
     take_status(v);
     take_made(v);
+    make_whole(v);
     v->message_seconds += seconds;
     const bool vanishes = v->message[0] && v->message_seconds > SECONDS_SAID && !v->status.failed;
     if (vanishes)

@@ -18,6 +18,7 @@ typedef struct trip_document {
     unsigned number; /* no two have the same */
     char *input;     /* as the user named it */
     bool keep_all;   /* it is bricked anew, with all values */
+    bool small;      /* of samples: the whole is to be bricked, or is being */
     bool opened;     /* what follows is known */
     triptych_info info;
     char *source; /* the path of the data set */

@@ -240,6 +240,18 @@ class View(program.ProgramTest):
                    "--background=0,0,0")
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
+    def test_a_large_volume_is_shown_by_samples_until_it_is_bricked(self):
+        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
+        program.write_nrrd("large.nrrd", program.ball((204, 204, 204), radius=0.5))
+        self.view("wait\npicture seen.exr\nwait\nstatus status.json\n", "large.nrrd")
+        self.works("render", "large.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
+                   "--background=0,0,0")
+        with open("seen.exr", "rb") as a, open("drawn.exr", "rb") as b:
+            self.assertEqual(a.read(), b.read())
+        self.assertEqual(self.status()["dims"], [204, 204, 204])
+        # The samples are in the cache, too.
+        self.assertEqual(self.works("cache", "list").stdout.count(b"large"), 2)
+
     def test_values_that_were_not_kept_are_bricked_again(self):
         os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "noise.nrrd", "-o", "part.trip", "--range=200:255")

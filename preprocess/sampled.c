@@ -1,0 +1,247 @@
+#include "sampled.h"
+
+#include <string.h>
+
+#include "report.h"
+
+typedef struct sampled {
+    const trip_volume_reader *of;
+    void *state; /* of that */
+    trip_budget *budget;
+    int64_t step;
+    /* Of slice readers: */
+    int64_t dims[2]; /* of the other's slices */
+    size_t value_bytes;
+    unsigned char *slice; /* one of them */
+    int64_t skip;         /* slices to get past before the next one is read */
+} sampled;
+
+static size_t slice_bytes(const sampled *s)
+{
+    return (size_t)s->dims[0] * (size_t)s->dims[1] * s->value_bytes;
+}
+
+static void close_sampled(void *opaque)
+{
+    sampled *s = opaque;
+    s->of->close(s->state);
+    if (s->slice)
+        trip_budget_release(s->budget, s->slice, slice_bytes(s));
+    trip_budget_release(s->budget, s, sizeof *s);
+}
+
+static int rewind_sampled(void *opaque)
+{
+    sampled *s = opaque;
+    s->skip = 0;
+    return s->of->rewind(s->state);
+}
+
+/* ---- slices ---- */
+
+static int get_past(sampled *s)
+{
+    int status = 0;
+    if (s->skip > 0 && s->of->skip_slices)
+        status = s->of->skip_slices(s->state, s->skip);
+    else
+        for (int64_t i = 0; i < s->skip && !status; i++)
+            status = s->of->read_slices(s->state, 1, s->slice);
+    s->skip = 0;
+    return status;
+}
+
+/* Every step-th value of every step-th row; returns where they end. */
+static unsigned char *pick(const sampled *s, unsigned char *to)
+{
+    const size_t row = (size_t)s->dims[0] * s->value_bytes;
+    for (int64_t j = 0; j < s->dims[1]; j += s->step)
+        for (int64_t i = 0; i < s->dims[0]; i += s->step, to += s->value_bytes)
+            memcpy(to, s->slice + (size_t)j * row + (size_t)i * s->value_bytes, s->value_bytes);
+    return to;
+}
+
+static int read_sampled(void *opaque, int64_t count, void *values)
+{
+    sampled *s = opaque;
+    unsigned char *to = values;
+    int status = 0;
+    for (int64_t i = 0; i < count && !status; i++) {
+        status = get_past(s);
+        if (!status)
+            status = s->of->read_slices(s->state, 1, s->slice);
+        to = pick(s, to);
+        s->skip = s->step - 1;
+    }
+    return status;
+}
+
+static int skip_sampled(void *opaque, int64_t count)
+{
+    sampled *s = opaque;
+    s->skip += count * s->step;
+    return 0;
+}
+
+static bool swap_sampled(const void *opaque)
+{
+    const sampled *s = opaque;
+    return s->of->swap(s->state);
+}
+
+/* ---- portions ---- */
+
+/* The other's, with what of it is sampled. */
+static int next_sampled(void *opaque, trip_volume_portion *portion)
+{
+    sampled *s = opaque;
+    trip_volume_portion *of = trip_budget_take(s->budget, sizeof *of);
+    if (!of)
+        return trip_fail(TRIP_ERROR, "read", "portion", "does not fit the memory given");
+    for (;;) {
+        bool some = true;
+        int status = s->of->next(s->state, of);
+        if (status <= 0) {
+            trip_budget_release(s->budget, of, sizeof *of);
+            return status;
+        }
+        for (int a = 0; a < 3; a++) {
+            int64_t end = of->origin[a] + of->size[a];
+            portion->origin[a] = (of->origin[a] + s->step - 1) / s->step;
+            portion->size[a] = (end + s->step - 1) / s->step - portion->origin[a];
+            some &= portion->size[a] > 0;
+        }
+        portion->data = of;
+        if (some)
+            return 1;
+        s->of->release(s->state, of);
+    }
+}
+
+static void release_sampled(void *opaque, trip_volume_portion *portion)
+{
+    sampled *s = opaque;
+    trip_volume_portion *of = portion->data;
+    s->of->release(s->state, of);
+    trip_budget_release(s->budget, of, sizeof *of);
+    portion->data = NULL;
+}
+
+/* The voxel that stands for one of the samples, in the portion or next to it. */
+static int64_t voxel_of(const sampled *s, const trip_volume_portion *of, int axis, int64_t sample)
+{
+    const int64_t at = sample * s->step, least = of->origin[axis] - 1;
+    const int64_t most = of->origin[axis] + of->size[axis];
+    return at < least ? least : at > most ? most : at;
+}
+
+typedef struct whole_box {
+    int64_t lo[3], size[3];
+    size_t voxels;
+    float *values;
+    uint8_t *active;
+} whole_box;
+
+static void pick_box(const sampled *s, const trip_volume_portion *of, const whole_box *box,
+                     const int64_t lo[3], const int64_t size[3], float *values, uint8_t *active)
+{
+    for (int64_t k = 0; k < size[2]; k++)
+        for (int64_t j = 0; j < size[1]; j++)
+            for (int64_t i = 0; i < size[0]; i++) {
+                const int64_t x = voxel_of(s, of, 0, lo[0] + i) - box->lo[0];
+                const int64_t y = voxel_of(s, of, 1, lo[1] + j) - box->lo[1];
+                const int64_t z = voxel_of(s, of, 2, lo[2] + k) - box->lo[2];
+                const size_t at = (size_t)((z * box->size[1] + y) * box->size[0] + x);
+                *values++ = box->values[at];
+                if (active)
+                    *active++ = box->active[at];
+            }
+}
+
+static int decode_sampled(const void *opaque, const trip_volume_portion *portion,
+                          const int64_t lo[3], const int64_t size[3], float *values,
+                          uint8_t *active)
+{
+    const sampled *s = opaque;
+    const trip_volume_portion *of = portion->data;
+    whole_box box = { .voxels = 1 };
+    for (int a = 0; a < 3; a++) {
+        box.lo[a] = voxel_of(s, of, a, lo[a]);
+        box.size[a] = voxel_of(s, of, a, lo[a] + size[a] - 1) - box.lo[a] + 1;
+        box.voxels *= (size_t)box.size[a];
+    }
+    box.values = trip_budget_take(s->budget, box.voxels * sizeof *box.values);
+    box.active = trip_budget_take(s->budget, box.voxels);
+    int status = box.values && box.active
+                     ? s->of->decode(s->state, of, box.lo, box.size, box.values, box.active)
+                     : trip_fail(TRIP_ERROR, "read", "portion", "does not fit the memory given");
+    if (!status)
+        pick_box(s, of, &box, lo, size, values, active);
+    if (box.values)
+        trip_budget_release(s->budget, box.values, box.voxels * sizeof *box.values);
+    if (box.active)
+        trip_budget_release(s->budget, box.active, box.voxels);
+    return status;
+}
+
+/* ---- opening ---- */
+
+static const trip_volume_reader sampled_slices = {
+    .close = close_sampled,
+    .rewind = rewind_sampled,
+    .read_slices = read_sampled,
+    .skip_slices = skip_sampled,
+    .swap = swap_sampled,
+};
+
+static const trip_volume_reader sampled_portions = {
+    .close = close_sampled,
+    .rewind = rewind_sampled,
+    .next = next_sampled,
+    .decode = decode_sampled,
+    .release = release_sampled,
+};
+
+static int64_t samples_along(int64_t voxels, int64_t step)
+{
+    return (voxels - 1) / step + 1;
+}
+
+static int64_t step_for(const int64_t dims[3], uint64_t most_voxels)
+{
+    int64_t step = 1;
+    while ((double)samples_along(dims[0], step) * (double)samples_along(dims[1], step) *
+               (double)samples_along(dims[2], step) >
+           (double)most_voxels)
+        step++;
+    return step;
+}
+
+int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volume_info *info,
+                      uint64_t most_voxels, trip_budget *budget)
+{
+    const int64_t step = step_for(info->dims, most_voxels);
+    if (step == 1)
+        return 0;
+    sampled *s = trip_budget_take(budget, sizeof *s);
+    if (!s)
+        return trip_fail(TRIP_ERROR, "read", "samples", "do not fit the memory given");
+    *s = (sampled){ .of = *reader,
+                    .state = *state,
+                    .budget = budget,
+                    .step = step,
+                    .dims = { info->dims[0], info->dims[1] },
+                    .value_bytes = trip_scalar_bytes(info->type) };
+    if ((*reader)->read_slices && !(s->slice = trip_budget_take(budget, slice_bytes(s)))) {
+        trip_budget_release(budget, s, sizeof *s);
+        return trip_fail(TRIP_ERROR, "read", "samples", "do not fit the memory given");
+    }
+    *reader = (*reader)->read_slices ? &sampled_slices : &sampled_portions;
+    *state = s;
+    for (int a = 0; a < 3; a++) {
+        info->dims[a] = samples_along(info->dims[a], step);
+        for (int i = 0; i < 3; i++)
+            info->index_to_world.m[i][a] *= (double)step;
+    }
+    return 0;
+}

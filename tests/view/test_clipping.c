@@ -1,0 +1,103 @@
+#include "test.h"
+
+#include "clipping.h"
+
+static const triptych_info info = {
+    .first = { 2, 0, 5 },
+    .last = { 9, 7, 20 },
+    .lo = { -10, -20, 0 },
+    .hi = { 10, 20, 40 },
+    .index_to_world = { { 2, 0, 0, 1 }, { 0, 3, 0, 0 }, { 0, 0, 1, 0 } },
+};
+
+static void the_box_begins_as_all_and_stays_a_box(void **state)
+{
+    (void)state;
+    triptych_clip c = { 0 };
+    trip_clipping_box_of_all(&c, &info);
+    assert_true(c.box && c.box_of_voxels && c.box_lo[0] == 1.5 && c.box_hi[2] == 20.5);
+    trip_clipping_set_face(&c, 1, 0, 100);
+    assert_true(c.box_lo[1] < c.box_hi[1] && c.box_hi[1] == 7.5);
+    trip_clipping_set_face(&c, 1, 1, -100);
+    assert_true(c.box_lo[1] < c.box_hi[1] && trip_clipping_is_sound(&c));
+}
+
+static void a_plane_cuts_what_lies_before_the_point_looked_at(void **state)
+{
+    (void)state;
+    const triptych_camera camera = {
+        .eye = { 1, -50, 2 }, .look = { 1, 5, 2 }, .up = { 0, 0, 1 }, .fov_degrees = 30
+    };
+    const trip_navigation n = trip_navigation_from_camera(&camera, NULL);
+    triptych_clip c = { 0 };
+    for (int i = 0; i < TRIP_CLIPPING_PLANES; i++)
+        assert_true(trip_clipping_add_plane(&c, &n));
+    assert_false(trip_clipping_add_plane(&c, &n));
+    const double *p = c.plane[0];
+    assert_close(p[0], 0, 1e-12);
+    assert_close(p[1], 1, 1e-12);
+    assert_close(p[3], -5, 1e-12);
+    /* Half of the diagonal is 30; the middle is at y = 0. */
+    assert_close(trip_clipping_depth(&c, 0, &info), 5.0 / 30, 1e-12);
+    trip_clipping_set_depth(&c, 0, &info, -0.5);
+    assert_close(c.plane[0][3], 15, 1e-12);
+    trip_clipping_flip_plane(&c, 0);
+    assert_close(trip_clipping_depth(&c, 0, &info), 0.5, 1e-12);
+    c.plane[1][3] = 7;
+    trip_clipping_remove_plane(&c, 0);
+    assert_int_equal(c.planes, TRIP_CLIPPING_PLANES - 1);
+    assert_true(c.plane[0][3] == 7);
+}
+
+static void a_box_of_voxels_stays_where_it_is_when_voxels_get_smaller(void **state)
+{
+    (void)state;
+    triptych_info fine = info;
+    triptych_clip c = {
+        .box = 1, .box_of_voxels = 1, .box_lo = { 1, 2, 3 }, .box_hi = { 4, 5, 6 }
+    };
+    for (int a = 0; a < 3; a++)
+        fine.index_to_world[a][a] /= 4;
+    trip_clipping_rescale(&c, &info, &fine);
+    assert_true(c.box_lo[0] == 4 && c.box_hi[1] == 20 && c.box_hi[2] == 24);
+    c.box_of_voxels = 0;
+    trip_clipping_rescale(&c, &info, &fine);
+    assert_true(c.box_lo[0] == 4);
+}
+
+static void opposite_planes_have_none_between_them(void **state)
+{
+    (void)state;
+    const triptych_clip a = { .planes = 1, .plane = { { 1, 0, 0, 2 } } };
+    const triptych_clip b = { .planes = 1, .plane = { { -1, 0, 0, -2 } } };
+    const triptych_clip mix = trip_clipping_mix(&a, &b, 0.5);
+    assert_true(mix.planes == 1 && mix.plane[0][0] == 1 && trip_clipping_is_sound(&mix));
+}
+
+static void the_text_is_what_render_takes(void **state)
+{
+    (void)state;
+    const triptych_clip c = { .box = 1,
+                              .box_of_voxels = 1,
+                              .box_lo = { 0.5, -1, 2 },
+                              .box_hi = { 3, 4, 5 },
+                              .planes = 1,
+                              .plane = { { 1, 0, 0, -0.25 } } };
+    char *text = trip_clipping_text(&c), *none = trip_clipping_text(&(triptych_clip){ 0 });
+    assert_string_equal(text, " --clip-box voxels:0.5,-1,2,3,4,5 --clip-plane 1,0,0,-0.25");
+    assert_string_equal(none, "");
+    free(text);
+    free(none);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_box_begins_as_all_and_stays_a_box),
+        cmocka_unit_test(a_plane_cuts_what_lies_before_the_point_looked_at),
+        cmocka_unit_test(a_box_of_voxels_stays_where_it_is_when_voxels_get_smaller),
+        cmocka_unit_test(opposite_planes_have_none_between_them),
+        cmocka_unit_test(the_text_is_what_render_takes),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
