@@ -250,7 +250,7 @@ class Orientation(program.ProgramTest):
             affine, values = acquisition(*ACQUISITIONS[name][:3])
             program.write_nifti("a.nii", values, TO_RAS @ affine)
             self.brick("a.nii")
-            for classify, most, mean in ("pre", 1, 0.05), ("post", 5, 0.1):
+            for classify, most, mean in ("pre", 1, 0.05), ("post", 2, 0.1):
                 options = f"--classify={classify}", *Camera().options(TO_RAS[:3, :3])
                 expected = self.picture("a.trip", "--renderer=reference", *options)
                 for renderer in "cpu", "gl":

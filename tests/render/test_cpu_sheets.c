@@ -460,6 +460,41 @@ static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
     }
 }
 
+enum { FEW_FIRST = 1000, FEW = 40 };
+
+static bool of_few_codes(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = FEW_FIRST + (unsigned)(FEW * wave(i, j, k));
+    return true;
+}
+
+/* Values between voxels are rounded to less than the voxels' own are. */
+static void what_has_few_codes_is_drawn_as_closely(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 24, 20, 22 },
+                                      .tile_voxels = 32,
+                                      .slab_sheets = 8,
+                                      .voxel = of_few_codes });
+    for (int i = 0; i <= FEW; i++)
+        scene_colour(&s, (unsigned)(FEW_FIRST + i), (unsigned)(FEW_FIRST + i), 0.2 + 0.02 * i, 0.5,
+                     1 - 0.02 * i, i < FEW / 2 ? 0 : 0.01 * (i - FEW / 2));
+    const trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.6), 70, 30, 48);
+    for (int slices = 1; slices <= 4; slices += 3) {
+        const trip_settings settings = post(slices);
+        scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+        scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+        assert_shows(&q);
+        assert_true(scene_difference(&p, &q) < 0.3 / 255);
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+    }
+    scene_destroy(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -470,6 +505,7 @@ int main(void)
         cmocka_unit_test(grids_too_wide_for_the_memory_are_drawn_in_windows),
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
+        cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,11 +5,13 @@
 
 #include "budget.h"
 #include "cpu/kernels/sheets.h"
+#include "cpu/sheets/codes.h"
 #include "transfer_function.h"
 
 typedef struct trip_cpu_function {
     trip_cpu_integrals integrals;
-    bool in_a_row; /* codes with extinction, first_visible to last_visible, biased */
+    trip_cpu_codes codes; /* whose integrals they are, and so below */
+    bool in_a_row;        /* codes with extinction, first_visible to last_visible, biased */
     int16_t first_visible, last_visible;
     uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
 } trip_cpu_function;
@@ -20,8 +22,9 @@ uint64_t trip_cpu_function_bytes(void);
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget);
 void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
 
-/* Of a table of 65536 entries, whose extinction is per world unit. */
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, double voxel_world);
+/* Of a table of 65536 entries of the data set's codes, whose extinction is per world unit. */
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
+                           double voxel_world);
 
 /* Whether some code of [least, most] has extinction; biased codes. */
 static inline bool trip_cpu_function_shows(const trip_cpu_function *f, int16_t least, int16_t most)

@@ -25,11 +25,11 @@ static float within_floats(double x)
 
 /* World-space gradients from those of index space: the inverse transpose of the map. Differences
  * are of codes, lengths over that of full shading; half of it, for what takes the sum of two. */
-static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame)
+static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, trip_cpu_codes codes)
 {
     const trip_file_header *h = &frame->data->header;
     double full = trip_shade_gradient_full(h, 1);
-    double unit = 0.5 * (h->code_hi - h->code_lo) / 65535 / full;
+    double unit = ldexp(0.5 * (h->code_hi - h->code_lo) / 65535 / full, -(int)codes.shift);
     const double(*m)[3] = (const double(*)[3])view->world;
     double adjugate[3][3];
     for (int i = 0; i < 3; i++)
@@ -77,13 +77,13 @@ double trip_cpu_pass_steepest(const trip_settings *s)
 }
 
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
-                             bool descending, const trip_cpu_integrals *integrals)
+                             bool descending, const trip_cpu_function *function)
 {
     const trip_camera *c = frame->camera;
     const trip_settings *s = frame->settings;
     *view = (trip_cpu_sheet_view){
         .of = frame,
-        .integrals = integrals,
+        .integrals = &function->integrals,
         .axis = axis,
         .ortho = c->ortho,
         .shading = s->shading,
@@ -103,7 +103,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         for (int k = 0; k < 3; k++)
             view->world[k][i] = trip_component(column, k) / c->voxel_world;
     }
-    set_gradient(view, frame);
+    set_gradient(view, frame, function->codes);
     set_light(view, frame);
     set_clip(view, &frame->plan->clip);
     set_tint(view, frame);

@@ -4,12 +4,13 @@
 #define TRIP_CPU_SHEETS_PASS_VIEW_H
 
 #include "cpu/kernels/sheets.h"
+#include "cpu/sheets/integrals.h"
 #include "renderer.h"
 
 /* How far along u or v rays that are drawn move at most from one sheet to the next. */
 double trip_cpu_pass_steepest(const trip_settings *settings);
 
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
-                             bool descending, const trip_cpu_integrals *integrals);
+                             bool descending, const trip_cpu_function *function);
 
 #endif

@@ -68,7 +68,9 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->pass = NULL;
     s->count = 0;
     s->run_count = 0;
-    trip_cpu_function_set(&s->function, r->frame->table, r->frame->camera->voxel_world);
+    s->store.codes = trip_cpu_codes_of(r->frame->data);
+    trip_cpu_function_set(&s->function, r->frame->table, s->store.codes,
+                          r->frame->camera->voxel_world);
     return 0;
 }
 
@@ -530,8 +532,7 @@ static int begin_pass(trip_cpu_sheets *s, const trip_pass *pass)
     int status = s->pass ? finish_row(s) : 0;
     s->pass = pass;
     s->way = pass->descending ? -1 : 1;
-    trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending,
-                            &s->function.integrals);
+    trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending, &s->function);
     return status;
 }
 

@@ -192,8 +192,10 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 static const uint16_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
-/* The codes of a square's records, biased; by copies, which compilers then know to be apart. */
-static void square_codes(const trip_cpu_walk *at, const trip_block *b, int16_t out[64])
+/* The codes of a square's records, stretched and biased; by copies, which compilers then know to be
+ * apart. */
+static void square_codes(const trip_cpu_walk *at, const trip_block *b, trip_cpu_codes stretch,
+                         int16_t out[64])
 {
     unsigned char narrow[64];
     uint16_t codes[64];
@@ -206,16 +208,20 @@ static void square_codes(const trip_cpu_walk *at, const trip_block *b, int16_t o
     } else {
         memcpy(codes, b->codes + 2 * (size_t)at->first, 2 * (size_t)count);
     }
+    if (stretch.shift > 0)
+        for (uint32_t i = 0; i < count; i++)
+            codes[i] = trip_cpu_code(stretch, codes[i]);
     for (uint32_t i = 0; i < count; i++)
         biased[i] = (int16_t)((codes[i] + (codes[i] == 0)) ^ TRIP_CPU_CODE_BIAS);
     memcpy(out, biased, sizeof *out * count);
 }
 
-static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block *b)
+static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block *b,
+                          trip_cpu_codes stretch)
 {
     int16_t codes[64];
     const int16_t *next = codes;
-    square_codes(at, b, codes);
+    square_codes(at, b, stretch, codes);
     if (at->mask == UINT64_MAX) { /* two voxels in a row follow one another */
         for (unsigned i = 0; i < 64; i += 2)
             memcpy(to + places[i], codes + i, 2 * sizeof *codes);
@@ -244,7 +250,8 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         u &= TRIP_CPU_BLOCK - 1;
         v &= TRIP_CPU_BLOCK - 1;
         if (in) /* what is occluded has none, nor has what lies beyond the grid */
-            decode_square(s->voxels[in].codes + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block);
+            decode_square(s->voxels[in].codes + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block,
+                          s->codes);
     }
 }
 

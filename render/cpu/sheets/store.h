@@ -35,6 +35,7 @@ typedef struct trip_cpu_store {
     trip_budget *budget;
     const trip_cpu_kernels *kernels;
     trip_cpu_pool *pool;
+    trip_cpu_codes codes; /* of the frame's data set */
 
     trip_cpu_voxels *voxels; /* blocks */
     size_t voxels_bytes;
