@@ -373,6 +373,23 @@ void scene_picture_free(scene_picture *p)
     p->rgba = p->depth = NULL;
 }
 
+scene_turn scene_turns(const scene_renderer *renderers, const scene *s,
+                       const trip_camera_params *view, const trip_settings *settings)
+{
+    return (scene_turn){ .next = renderers, .scene = s, .view = view, .settings = settings };
+}
+
+bool scene_take_turn(scene_turn *t)
+{
+    if (t->renderer)
+        scene_picture_free(&t->picture);
+    t->renderer = t->next;
+    if (!t->next->name)
+        return false;
+    t->picture = scene_draw(t->scene, t->next++, t->view, t->settings);
+    return true;
+}
+
 double scene_difference(const scene_picture *a, const scene_picture *b)
 {
     assert_int_equal(a->width, b->width);

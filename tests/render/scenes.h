@@ -100,6 +100,22 @@ scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
                               const trip_settings *settings, const scene_making *how);
 void scene_picture_free(scene_picture *p);
 
+/* A scene drawn by one renderer after the other. */
+typedef struct scene_turn {
+    const scene_renderer *next; /* an array that an entry without name ends */
+    const scene *scene;
+    const trip_camera_params *view;
+    const trip_settings *settings;
+    /* Of this turn, until the next. */
+    const scene_renderer *renderer;
+    scene_picture picture;
+} scene_turn;
+
+scene_turn scene_turns(const scene_renderer *renderers, const scene *s,
+                       const trip_camera_params *view, const trip_settings *settings);
+/* Frees the picture before and draws the next; false when all had their turn. */
+bool scene_take_turn(scene_turn *t);
+
 static inline const float *scene_pixel(const scene_picture *p, int x, int y)
 {
     return p->rgba + 4 * ((size_t)y * (size_t)p->width + (size_t)x);

@@ -100,8 +100,8 @@ static void splats_of_a_sheet_add_up_and_sheets_cover_one_another(void **state)
         trip_camera_params view = scene_view(&s, vector(d), 20, 10, 48);
         view.ortho_height = i / 6 ? 4 : 0;
         trip_settings settings = by(TRIP_COMPOSITING_SHEET);
-        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             double most = 0;
             for (int n = 0; n < 48 * 48; n++) {
                 trip_vec3 o, ray;
@@ -109,12 +109,11 @@ static void splats_of_a_sheet_add_up_and_sheets_cover_one_another(void **state)
                 scene_ray(&s, &view, n % 48, n / 48, &o, &ray);
                 expected_of_few(&s, axis, d[axis] > 0, o, ray, expected);
                 most = fmax(most, expected[2]);
-                assert_close(p.rgba[4 * n], expected[0], 2e-3);
-                assert_close(p.rgba[4 * n + 2], expected[1], 2e-3);
-                assert_close(p.rgba[4 * n + 3], expected[2], 2e-3);
+                assert_close(turn.picture.rgba[4 * n], expected[0], 2e-3);
+                assert_close(turn.picture.rgba[4 * n + 2], expected[1], 2e-3);
+                assert_close(turn.picture.rgba[4 * n + 3], expected[2], 2e-3);
             }
             assert_true(most > 0.9);
-            scene_picture_free(&p);
         }
         scene_destroy(&s);
     }
@@ -133,14 +132,13 @@ static void a_slab_has_the_opacity_of_its_voxels_together(void **state)
         scene_colour(&s, 65535, 65535, 1, 0.5, 0.25, opacity);
         trip_camera_params view = scene_view(&s, vector(d), 90, 4, 8);
         trip_settings settings = by(TRIP_COMPOSITING_SHEET);
-        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             for (int n = 0; n < 64; n++) {
                 double alpha = 1 - pow(1 - opacity, 9);
-                assert_close(p.rgba[4 * n + 3] / alpha, 1, 0.01);
-                assert_close(p.rgba[4 * n + 1] / alpha, 0.5, 0.01);
+                assert_close(turn.picture.rgba[4 * n + 3] / alpha, 1, 0.01);
+                assert_close(turn.picture.rgba[4 * n + 1] / alpha, 0.5, 0.01);
             }
-            scene_picture_free(&p);
         }
         scene_destroy(&s);
     }
@@ -166,10 +164,10 @@ static void from_within_the_splats_before_the_eye_count(void **state)
         double to = d[i % 3] > 0 ? 31.5 - trip_component(view.eye, i % 3)
                                  : trip_component(view.eye, i % 3) + 0.5;
         trip_settings settings = by(TRIP_COMPOSITING_SHEET);
-        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
-            assert_close(-log1p(-(double)scene_pixel(&p, 4, 4)[3]) / -log1p(-0.05) / to, 1, 0.02);
-            scene_picture_free(&p);
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            assert_close(-log1p(-(double)scene_pixel(&turn.picture, 4, 4)[3]) / -log1p(-0.05) / to,
+                         1, 0.02);
         }
     }
     scene_destroy(&s);
@@ -206,13 +204,12 @@ static void the_nearest_sheet_hides_those_behind_it(void **state)
         trip_settings settings = by(TRIP_COMPOSITING_SHEET);
         settings.h = 0.3;
         settings.traversal = i / 6 ? TRIP_TRAVERSAL_ASCENDING : TRIP_TRAVERSAL_OUTWARD;
-        for (const scene_renderer *r = scene_renderers(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
-            const float *c = scene_pixel(&p, 8, 8);
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            const float *c = scene_pixel(&turn.picture, 8, 8);
             assert_close(c[0], i / 3 % 2 ? 0 : 1, 0.01);
             assert_close(c[1], i / 3 % 2 ? 1 : 0, 0.01);
             assert_close(c[2], 0, 0.01);
-            scene_picture_free(&p);
         }
         scene_destroy(&s);
     }
@@ -232,18 +229,19 @@ static double mean_apart(const scene_picture *a, const scene_picture *b)
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
     scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings);
-    for (const scene_renderer *r = scene_renderers() + 1; r->name; r++) {
-        scene_picture p = scene_draw(s, r, view, settings);
-        double most = scene_difference(&p, &expected), mean = mean_apart(&p, &expected);
+    scene_turn turn = scene_turns(scene_renderers() + 1, s, view, settings);
+    while (scene_take_turn(&turn)) {
+        double most = scene_difference(&turn.picture, &expected),
+               mean = mean_apart(&turn.picture, &expected);
         if (!(most <= 1.0 / 255 && mean <= 0.1 / 255))
-            fail_msg("%s: %g of 255 apart, on average %g", r->name, 255 * most, 255 * mean);
+            fail_msg("%s: %g of 255 apart, on average %g", turn.renderer->name, 255 * most,
+                     255 * mean);
         for (unsigned i = 0; i < s->data->list_count; i++)
-            scene_compare_counts(&expected.lists[i], &p.lists[i], r->name);
-        for (int n = 0; n < p.width * p.height && settings->depth; n++)
+            scene_compare_counts(&expected.lists[i], &turn.picture.lists[i], turn.renderer->name);
+        for (int n = 0; n < turn.picture.width * turn.picture.height && settings->depth; n++)
             if (expected.rgba[4 * n + 3] > 0.05F)
-                assert_true(fabs(p.depth[n] - expected.depth[n]) <
+                assert_true(fabs(turn.picture.depth[n] - expected.depth[n]) <
                             0.005 * expected.depth[n] + 0.01);
-        scene_picture_free(&p);
     }
     scene_picture_free(&expected);
 }

@@ -56,8 +56,8 @@ static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
         trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 5, 5);
         view.ortho_height = i / 24 ? 3 : 0;
         trip_settings settings = post(diagonal ? 16 : 1 + i / 3 % 4);
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
                 trip_vec3 o, ray;
                 double from, to;
@@ -65,14 +65,13 @@ static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
                 assert_true(scene_ray_in_grid(&s, o, ray, &from, &to));
                 assert_true(is_at_face(&s, o, ray, from, axis) && is_at_face(&s, o, ray, to, axis));
                 double alpha = 1 - exp(-0.06F * (to - from) * scene_ray_stretch(&s, ray));
-                double tolerance = (diagonal ? 0.01 * alpha : 1e-6) + r->tolerance;
-                const float *c = scene_pixel(&p, n % 5, n / 5);
+                double tolerance = (diagonal ? 0.01 * alpha : 1e-6) + turn.renderer->tolerance;
+                const float *c = scene_pixel(&turn.picture, n % 5, n / 5);
                 assert_close(c[3], alpha, tolerance);
                 assert_close(c[0], alpha, tolerance);
                 assert_close(c[1], alpha / 2, tolerance);
                 assert_close(c[2], alpha / 4, tolerance);
             }
-            scene_picture_free(&p);
         }
         scene_destroy(&s);
     }
@@ -107,8 +106,8 @@ static void a_narrow_peak_is_seen_whole_at_any_slices(void **state)
             scene_view(&s, trip_v3(1, i / 3 % 2 ? 0.9 : -0.3, 0.4 - 0.1 * (i % 5)), 60, 10, 5);
         view.ortho_height = i / 6 % 2 ? 8 : 0;
         trip_settings settings = post(1 + i / 12);
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
                 trip_vec3 o, d;
                 double from, to;
@@ -120,11 +119,10 @@ static void a_narrow_peak_is_seen_whole_at_any_slices(void **state)
                     fabs(trip_component(d, axis)) < 0.2)
                     continue;
                 double alpha = 1 - exp(-0.7 / fabs(trip_component(d, axis)));
-                const float *c = scene_pixel(&p, n % 5, n / 5);
-                assert_close(c[3], alpha, 1e-5 + r->tolerance);
-                assert_close(c[0], alpha * peak / 65535, 4e-4 + r->tolerance);
+                const float *c = scene_pixel(&turn.picture, n % 5, n / 5);
+                assert_close(c[3], alpha, 1e-5 + turn.renderer->tolerance);
+                assert_close(c[0], alpha * peak / 65535, 4e-4 + turn.renderer->tolerance);
             }
-            scene_picture_free(&p);
         }
         scene_destroy(&s);
     }
@@ -168,10 +166,10 @@ static void values_fall_to_those_of_the_halo_and_end_without_it(void **state)
             trip_camera_params view = scene_view(&s, directions[i % 3], 60, 20, 1);
             view.ortho_height = 0.1;
             trip_settings settings = post(1 + i / 3);
-            for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-                scene_picture p = scene_draw(&s, r, &view, &settings);
-                assert_close(p.rgba[3], 1 - exp(-0.1 * (parts ? 8 : 7)), 1e-6 + r->tolerance);
-                scene_picture_free(&p);
+            scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+            while (scene_take_turn(&turn)) {
+                assert_close(turn.picture.rgba[3], 1 - exp(-0.1 * (parts ? 8 : 7)),
+                             1e-6 + turn.renderer->tolerance);
             }
         }
         scene_destroy(&s);
@@ -205,11 +203,11 @@ static void a_cell_without_a_corner_is_empty(void **state)
         view.look = trip_v3(at[0], at[1], at[2]);
         view.eye = trip_add(view.look, trip_v3(d[0], d[1], d[2]));
         trip_settings settings = post(1 + i / 9);
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             double length = beside < 2 ? EDGE - 3 : EDGE - 1;
-            assert_close(p.rgba[3], 1 - exp(-0.1F * length), 1e-6 + r->tolerance);
-            scene_picture_free(&p);
+            assert_close(turn.picture.rgba[3], 1 - exp(-0.1F * length),
+                         1e-6 + turn.renderer->tolerance);
         }
     }
     scene_destroy(&s);
@@ -232,17 +230,16 @@ static void from_within_what_lies_before_the_eye_is_seen(void **state)
                                     .height = 5 };
         view.look = trip_add(view.eye, trip_v3(d[0], d[1], d[2]));
         trip_settings settings = post(1 + i / 18 * 2);
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
                 trip_vec3 o, ray;
                 double from, to;
                 scene_ray(&s, &view, n % 5, n / 5, &o, &ray);
                 assert_true(scene_ray_in_grid(&s, o, ray, &from, &to) && from == 0);
-                assert_close(scene_pixel(&p, n % 5, n / 5)[3], 1 - exp(-0.1F * to),
-                             1e-6 + r->tolerance);
+                assert_close(scene_pixel(&turn.picture, n % 5, n / 5)[3], 1 - exp(-0.1F * to),
+                             1e-6 + turn.renderer->tolerance);
             }
-            scene_picture_free(&p);
         }
     }
     scene_destroy(&s);
@@ -283,10 +280,9 @@ static void the_nearest_wall_hides_those_behind_it(void **state)
             trip_settings settings = post(1 + i / 12);
             settings.method = (trip_method)(i / 2 % 3);
             settings.h = 0.5;
-            for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-                scene_picture p = scene_draw(&s, r, &view, &settings);
-                expect_colour(&p, i % 2 ? 2 : 0, r->name);
-                scene_picture_free(&p);
+            scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+            while (scene_take_turn(&turn)) {
+                expect_colour(&turn.picture, i % 2 ? 2 : 0, turn.renderer->name);
             }
         }
         scene_destroy(&s);
@@ -311,10 +307,9 @@ static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
                                     .height = 8 };
         view.look = trip_add(view.eye, trip_v3(d[0], d[1], d[2]));
         trip_settings settings = post(1 + i / 6);
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
-            expect_colour(&p, i / 3 % 2, r->name);
-            scene_picture_free(&p);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            expect_colour(&turn.picture, i / 3 % 2, turn.renderer->name);
         }
         scene_destroy(&s);
     }
@@ -332,14 +327,15 @@ static void a_saturated_pixel_is_opaque(void **state)
         trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 60, 20, 1);
         view.ortho_height = 0.1;
         trip_settings settings = post(2);
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             if (i)
-                assert_true(p.rgba[3] == 1);
+                assert_true(turn.picture.rgba[3] == 1);
             else
-                assert_close(p.rgba[3], 1 - through, 1e-6 + r->tolerance / 16);
-            assert_close(p.rgba[0], 0.75 * (i ? 1 : 1 - through), 1e-6 + r->tolerance);
-            scene_picture_free(&p);
+                assert_close(turn.picture.rgba[3], 1 - through,
+                             1e-6 + turn.renderer->tolerance / 16);
+            assert_close(turn.picture.rgba[0], 0.75 * (i ? 1 : 1 - through),
+                         1e-6 + turn.renderer->tolerance);
         }
         scene_destroy(&s);
     }
@@ -379,11 +375,11 @@ static void light_comes_by_differences_of_values(void **state)
                    trip_shade_gradient_full(&s.data->header, camera.voxel_world), trip_v3(0, 0, 0),
                    g, rgb);
         most = fmax(most, fabs(rgb[0] - unlit[0]));
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             for (int c = 0; c < 3; c++)
-                assert_close(p.rgba[c] / p.rgba[3], rgb[c], 1e-5 + 2 * r->tolerance);
-            scene_picture_free(&p);
+                assert_close(turn.picture.rgba[c] / turn.picture.rgba[3], rgb[c],
+                             1e-5 + 2 * turn.renderer->tolerance);
         }
         scene_destroy(&s);
     }
@@ -419,15 +415,15 @@ static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
     for (int lit = 0; lit < 2; lit++) {
         settings.shading = lit;
         scene_picture expected = { 0 };
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             if (!expected.rgba) {
-                expected = p;                                  /* the reference's */
-                assert_true(scene_pixel(&p, 6, 4)[3] > 0.01F); /* between the cells */
+                expected = turn.picture;                              /* the reference's */
+                assert_true(scene_pixel(&expected, 6, 4)[3] > 0.01F); /* between the cells */
+                turn.picture = (scene_picture){ 0 };
                 continue;
             }
-            assert_true(scene_difference(&expected, &p) <= r->tolerance);
-            scene_picture_free(&p);
+            assert_true(scene_difference(&expected, &turn.picture) <= turn.renderer->tolerance);
         }
         scene_picture_free(&expected);
     }
@@ -450,8 +446,8 @@ static void depth_is_the_mean_distance_of_what_is_seen(void **state)
         view.ortho_height = i % 3 == 0 ? 2 : 0;
         trip_settings settings = post(2);
         settings.depth = true;
-        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = scene_draw(&s, r, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
                 trip_vec3 o, ray;
                 double from, to;
@@ -460,9 +456,9 @@ static void depth_is_the_mean_distance_of_what_is_seen(void **state)
                 double unit = scene_ray_stretch(&s, ray), k = 0.1F, length = (to - from) * unit;
                 double expected = from * unit + 1 / k - length / expm1(k * length);
                 /* Segments count from their middles. */
-                assert_close(p.depth[n] - expected, 0, 0.01 + 40 * r->tolerance);
+                assert_close(turn.picture.depth[n] - expected, 0,
+                             0.01 + 40 * turn.renderer->tolerance);
             }
-            scene_picture_free(&p);
         }
         scene_destroy(&s);
     }
