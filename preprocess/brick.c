@@ -325,6 +325,8 @@ static int make_levels(brick *b)
                              .code_bytes = b->codes.code_bytes,
                              .index_to_world = b->in.info->index_to_world,
                              .levels = b->levels,
+                             .value_min = b->in.tally->value_min,
+                             .value_max = b->in.tally->value_max,
                              .folder = b->temporary.partial_path,
                              .writer = b->writer,
                              .spill = b->temporary.spill,

@@ -25,7 +25,8 @@ typedef struct making {
     trip_level_source sources[SOURCES];
     unsigned source_count;
     trip_list_builder *builder;
-    trip_output *file;              /* that the next level is made from; NULL: there is none */
+    trip_output *file; /* that the next level is made from; NULL: there is none */
+    trip_mean_scale scale;
     uint64_t sheets_before, sheets; /* of all levels: progress */
 
     trip_cell_tables tables;
@@ -258,9 +259,9 @@ static uint32_t value_code(const making *m, const trip_coarse_voxel *voxel)
     return m->params->code_bytes == 1 ? (voxel->value + 128u) / 257 * 257 : voxel->value;
 }
 
-static uint32_t mean_code(const trip_coarse_voxel *voxel, int axis)
+static uint32_t mean_code(const making *m, const trip_coarse_voxel *voxel, int axis)
 {
-    return trip_mean_pack(voxel->mean, voxel->cover[axis] / (double)TRIP_COARSE_ALL,
+    return trip_mean_pack(&m->scale, voxel->mean, voxel->cover[axis] / (double)TRIP_COARSE_ALL,
                           voxel->kept / (double)voxel->cover[axis]);
 }
 
@@ -275,7 +276,7 @@ static int emit(making *m, uint32_t count, unsigned list)
         if (list >= TRIP_HALO_LISTS)
             m->cell.values[at] = value_code(m, voxel);
         else if (voxel->kept)
-            m->cell.values[at] = mean_code(voxel, trip_list_axis(list));
+            m->cell.values[at] = mean_code(m, voxel, trip_list_axis(list));
         m->cell.normals[at] = voxel->normal;
     }
     return trip_splat_cell_emit(&m->cell, &f, list, &sink);
@@ -428,6 +429,8 @@ int trip_levels_make(const trip_levels_params *params, trip_budget *budget)
                        .budget = budget,
                        .level = level,
                        .first_list = level * lists,
+                       .scale = trip_mean_scale_make(params->value_min, params->value_max,
+                                                     params->quantiser.lo, params->quantiser.hi),
                        .sheets_before = before,
                        .sheets = sheets };
         level_dims(params->dims, level, m->dims);

@@ -19,9 +19,10 @@ typedef struct trip_levels_params {
     int64_t dims[3];                     /* of level 0 */
     trip_affine index_to_world;
     unsigned levels;
-    const char *folder;  /* for temporary files */
-    trip_writer *writer; /* with the lists of trip_levels_lists() */
-    trip_spill *spill;   /* whose segments are not needed any more */
+    double value_min, value_max; /* of the volume */
+    const char *folder;          /* for temporary files */
+    trip_writer *writer;         /* with the lists of trip_levels_lists() */
+    trip_spill *spill;           /* whose segments are not needed any more */
     trip_workers *workers;
     /* Called now and then with how much of the work is done. */
     void (*progress)(void *user, uint64_t done, uint64_t total);

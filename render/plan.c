@@ -258,8 +258,11 @@ static int make_table(const planning *p, const trip_list *list, trip_plan_list *
     if (!to)
         return trip_fail(TRIP_ERROR, "render", "plan",
                          "tables of coarse levels do not fit the memory given; raise --memory");
+    const trip_file_header *h = &p->data->header;
+    const trip_mean_scale scale =
+        trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
     for (unsigned code = 0; code < TABLE_ENTRIES; code++) {
-        to[code] = p->table[trip_mean_value(code)];
+        to[code] = p->table[trip_mean_value(&scale, code)];
         if (to[code].extinction > 0)
             to[code].extinction = (float)trip_mean_extinction(code % TRIP_MEAN_SHARES,
                                                               (double)to[code].extinction, length);

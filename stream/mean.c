@@ -2,10 +2,25 @@
 
 #include <math.h>
 
-enum { COVERS = 8, DEPTHS = 8 };
+enum { COVERS = 8, DEPTHS = 8, VALUES = 1024 };
 
 static const double covers[COVERS] = { 1.0 / 64, 1.0 / 32, 1.0 / 16, 1.0 / 8,
                                        1.0 / 4,  1.0 / 2,  3.0 / 4,  1 };
+
+trip_mean_scale trip_mean_scale_make(double value_min, double value_max, double code_lo,
+                                     double code_hi)
+{
+    const double per_value = code_hi > code_lo ? 65535 / (code_hi - code_lo) : 0;
+    const double lo = fmin(65535, fmax(0, (value_min - code_lo) * per_value));
+    const double hi = fmin(65535, fmax(lo, (value_max - code_lo) * per_value));
+    return (trip_mean_scale){ lo, hi - lo };
+}
+
+unsigned trip_mean_value(const trip_mean_scale *scale, unsigned code)
+{
+    const unsigned m = code >> TRIP_MEAN_AXIS_BITS;
+    return (unsigned)floor(scale->lo + scale->width * m / (VALUES - 1) + 0.5);
+}
 
 double trip_mean_cover(unsigned shares)
 {
@@ -17,9 +32,11 @@ double trip_mean_depth(unsigned shares)
     return (shares / COVERS % DEPTHS + 1) / (double)DEPTHS;
 }
 
-unsigned trip_mean_pack(unsigned value, double cover, double depth)
+unsigned trip_mean_pack(const trip_mean_scale *scale, double value, double cover, double depth)
 {
-    unsigned m = (value * 1023 + 32767) / 65535, c = 0;
+    const double part = scale->width > 0 ? (value - scale->lo) / scale->width : 0;
+    const unsigned m = (unsigned)rint(fmin(1, fmax(0, part)) * (VALUES - 1));
+    unsigned c = 0;
     double d = rint(depth * DEPTHS) - 1;
     while (c + 1 < COVERS && cover >= 0.5 * (covers[c] + covers[c + 1]))
         c++;

@@ -101,14 +101,14 @@ static cube sum_cube(const int64_t at[3], unsigned level, int axis)
 }
 
 /* Exact but for what a code has no room for. */
-static void expect_mean(const cube *c, unsigned code, unsigned level)
+static void expect_mean(const trip_mean_scale *scale, const cube *c, unsigned code, unsigned level)
 {
     const double edge = (double)(1u << level), cover = c->columns / (edge * edge);
     const double part = c->kept / (edge * edge * edge);
-    assert_true(fabs(trip_mean_value(code) - c->mean) < 65535.0 / 1023);
+    assert_true(fabs(trip_mean_value(scale, code) - c->mean) < 65535.0 / 1023);
     if (level == 1)
         assert_int_equal(code & (TRIP_MEAN_SHARES - 1),
-                         trip_mean_pack(0, cover, part / cover) & (TRIP_MEAN_SHARES - 1));
+                         trip_mean_pack(scale, 0, cover, part / cover) & (TRIP_MEAN_SHARES - 1));
     else if (part == 1)
         assert_int_equal(code & (TRIP_MEAN_SHARES - 1), TRIP_MEAN_SHARES - 1);
 }
@@ -119,6 +119,8 @@ static uint64_t check_list(const trip_dataset *d, const trip_list *list)
     static uint64_t words[TRIP_BLOCK_WORDS_MAX];
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
     const trip_block_form form = trip_block_form_of(&d->header, list->kind);
+    const trip_mean_scale scale = trip_mean_scale_make(d->header.value_min, d->header.value_max,
+                                                       d->header.code_lo, d->header.code_hi);
     trip_selection all;
     trip_run run;
     uint64_t records = 0;
@@ -136,7 +138,7 @@ static uint64_t check_list(const trip_dataset *d, const trip_list *list)
             cube c = sum_cube(at, list->level, list->axis);
             unsigned code = trip_voxel_code(voxels[i]);
             if (list->kind == TRIP_KIND_MEANS)
-                expect_mean(&c, code, list->level);
+                expect_mean(&scale, &c, code, list->level);
             else
                 assert_true(fabs(code - c.value) < 257);
             assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : c.known > 0);

@@ -285,7 +285,8 @@ static void tables_of_means_have_their_opacity(void **state)
         assert_int_equal(plan.lists[i].own_table != NULL, list->level > 0);
         if (list->level == 0)
             continue;
-        unsigned code = trip_mean_pack(65535, 0.5, 0.75);
+        const trip_mean_scale scale = { 0, 65535 };
+        unsigned code = trip_mean_pack(&scale, 65535, 0.5, 0.75);
         double depth = (double)plan.lists[i].table[code].extinction * length;
         assert_float_equal(1 - exp(-depth), 0.5 * (1 - exp(-k * 0.75 * length)), 1e-6);
         assert_float_equal(plan.lists[i].table[code].r, 1, 0);

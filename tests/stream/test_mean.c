@@ -4,12 +4,15 @@
 
 #include "mean.h"
 
+/* Values 0 to 65535, and as many codes. */
+static const trip_mean_scale whole = { 0, 65535 };
+
 static void a_cube_that_is_full_keeps_its_extinction(void **state)
 {
     (void)state;
-    unsigned code = trip_mean_pack(65535, 1, 1);
+    unsigned code = trip_mean_pack(&whole, 65535, 1, 1);
     assert_int_equal(code, 65535);
-    assert_int_equal(trip_mean_value(code), 65535);
+    assert_int_equal(trip_mean_value(&whole, code), 65535);
     assert_true(trip_mean_extinction(code % TRIP_MEAN_SHARES, 3.5, 0.25) == 3.5);
 }
 
@@ -19,7 +22,7 @@ static void shares_of_two_by_two_by_two_are_exact(void **state)
     for (int columns = 1; columns <= 4; columns++)
         for (int kept = columns; kept <= 2 * columns; kept++) {
             double cover = columns / 4.0, depth = kept / (2.0 * columns);
-            unsigned shares = trip_mean_pack(0, cover, depth) % TRIP_MEAN_SHARES;
+            unsigned shares = trip_mean_pack(&whole, 0, cover, depth) % TRIP_MEAN_SHARES;
             assert_true(trip_mean_cover(shares) == cover);
             /* Thirds alone have no eighths. */
             assert_true(fabs(trip_mean_depth(shares) - depth) <= (columns == 3 ? 1 / 23.9 : 0));
@@ -30,9 +33,29 @@ static void values_are_the_nearest_of_1024(void **state)
 {
     (void)state;
     for (unsigned value = 0; value < 65536; value++) {
-        unsigned back = trip_mean_value(trip_mean_pack(value, 0.5, 0.5));
+        unsigned back = trip_mean_value(&whole, trip_mean_pack(&whole, value, 0.5, 0.5));
         assert_true(fabs((double)back - value) <= 65535.0 / 1023 / 2 + 1);
     }
+}
+
+/* 1300 values of a type that has 65536 are all told apart, within the half of a step that rounding
+ * takes, and so that the ends are exact. */
+static void steps_are_of_the_range_of_values(void **state)
+{
+    (void)state;
+    const trip_mean_scale scale = trip_mean_scale_make(100, 1400, 0, 65535);
+    assert_true(scale.lo == 100 && scale.width == 1300);
+    for (unsigned value = 100; value <= 1400; value++) {
+        unsigned back = trip_mean_value(&scale, trip_mean_pack(&scale, value, 1, 1));
+        assert_true(fabs((double)back - value) <= 1300.0 / 1023 / 2 + 0.5);
+        if (value == 100 || value == 1400)
+            assert_int_equal(back, value);
+    }
+    /* Values beyond the codes are stored as the nearest code. */
+    const trip_mean_scale cut = trip_mean_scale_make(-10, 20, 0, 10);
+    assert_true(cut.lo == 0 && cut.width == 65535);
+    const trip_mean_scale one = trip_mean_scale_make(5, 5, 0, 10);
+    assert_int_equal(trip_mean_value(&one, trip_mean_pack(&one, 32768, 1, 1)), 32768);
 }
 
 /* Columns of the same depth side by side: what shows through is the mean of what each lets through.
@@ -55,6 +78,7 @@ int main(void)
         cmocka_unit_test(a_cube_that_is_full_keeps_its_extinction),
         cmocka_unit_test(shares_of_two_by_two_by_two_are_exact),
         cmocka_unit_test(values_are_the_nearest_of_1024),
+        cmocka_unit_test(steps_are_of_the_range_of_values),
         cmocka_unit_test(opacity_is_the_mean_over_the_columns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
