@@ -114,6 +114,22 @@ static void set_projection(trip_camera *c, const basis *b, double k, double scal
     c->to_y = trip_scale(trip_affine_transpose_vector(&c->index_to_world, y), across);
 }
 
+/* Extinctions are floats per world unit: voxels of these lengths have room there. */
+#define VOXEL_WORLD_LEAST 1e-32
+#define VOXEL_WORLD_MOST 1e32
+
+static int check_voxel(const trip_affine *m)
+{
+    for (int a = 0; a < 3; a++) {
+        double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
+        if (!(length >= VOXEL_WORLD_LEAST && length <= VOXEL_WORLD_MOST))
+            return trip_fail(TRIP_USAGE, "camera", "index to world",
+                             "voxels are %.3g world units long; %g to %g can be computed with",
+                             length, VOXEL_WORLD_LEAST, VOXEL_WORLD_MOST);
+    }
+    return 0;
+}
+
 /* What the renderers' numbers have room for; written so that what is not a number fails. */
 static int check_range(const trip_camera *c)
 {
@@ -138,6 +154,8 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
     int status = check_params(params);
     if (!status)
         status = make_basis(params, &b);
+    if (!status)
+        status = check_voxel(index_to_world);
     if (status)
         return status;
     if (!trip_affine_invert(index_to_world, &world_to_index))
