@@ -16,13 +16,19 @@ static void cover_column(uint8_t *open, unsigned cover)
                       TRIP_COARSE_ALL);
 }
 
+/* Gradients count by their length: of a solid the surface is seen, whose voxels have them, not the
+ * inside. */
 static void add_gradient(trip_coarse_sum *s, double part, const double gradient[3])
 {
-    double along = 0;
-    for (int a = 0; a < 3; a++)
+    double along = 0, length2 = 0;
+    for (int a = 0; a < 3; a++) {
         along += (double)s->gradient[a] * gradient[a];
+        length2 += gradient[a] * gradient[a];
+    }
+    const double weight = part * sqrt(length2);
+    s->steep += (float)weight;
     for (int a = 0; a < 3; a++)
-        s->gradient[a] += (float)(copysign(part, along) * gradient[a]);
+        s->gradient[a] += (float)(copysign(weight, along) * gradient[a]);
 }
 
 void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, unsigned odd,
@@ -73,5 +79,5 @@ bool trip_coarse_sum_get(const trip_coarse_sum *s, trip_coarse_voxel *out)
 void trip_coarse_sum_gradient(const trip_coarse_sum *s, double gradient[3])
 {
     for (int a = 0; a < 3; a++)
-        gradient[a] = s->kept > 0 ? (double)s->gradient[a] / (double)s->kept : 0;
+        gradient[a] = s->steep > 0 ? (double)s->gradient[a] / (double)s->steep : 0;
 }

@@ -15,13 +15,13 @@ typedef struct trip_coarse_voxel {
     uint16_t mean;     /* code of those kept */
     uint16_t value;    /* of those known */
     uint16_t cover[3]; /* of its columns along an axis, those with kept voxels */
-    uint32_t normal;   /* packed: the mean of those kept */
+    uint32_t normal;   /* packed: of those kept, see below */
 } trip_coarse_voxel;
 
 /* Sums over the voxels of one coarse voxel; all zero before the first but for `open`. */
 typedef struct trip_coarse_sum {
     float kept, known, mean, value;
-    float gradient[3];
+    float gradient[3], steep; /* each times its length; sum of the lengths */
     uint8_t open[3][4]; /* of the columns along an axis, in 255ths, the part without kept voxels */
 } trip_coarse_sum;
 
@@ -35,7 +35,7 @@ void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, uns
 /* Without u, v and normal; false where there was nothing to add up. */
 bool trip_coarse_sum_get(const trip_coarse_sum *s, trip_coarse_voxel *out);
 
-/* The mean gradient of what was kept. */
+/* The mean gradient of what was kept, each counted by its length. */
 void trip_coarse_sum_gradient(const trip_coarse_sum *s, double gradient[3]);
 
 #endif
