@@ -99,7 +99,20 @@ static scene_picture draw_flat(const scene *s, const scene_renderer *r, int axis
     return hard_draw(s, r, &v, form);
 }
 
-/* All voxels of opacity 0.3. Post, which has no cells there, refuses it (test_drawn). */
+static void expect_post_refused(const scene *s, int axis)
+{
+    const trip_vec3 along = { axis == 0, axis == 1, axis == 2 };
+    hard_view v = view_of(s, "flat", along, true);
+    trip_camera camera;
+    trip_plan plan;
+    v.settings.classify = TRIP_CLASSIFY_POST;
+    assert_int_equal(trip_camera_make(&camera, &v.camera, &s->data->index_to_world), 0);
+    test_catch_reports();
+    assert_true(trip_plan_make(&plan, s->data, &camera, &v.settings, s->table, s->budget) < 0);
+    assert_one_report("has one voxel along");
+}
+
+/* All voxels of opacity 0.3. Post has no cells there. */
 static void a_grid_may_be_one_voxel_thick(void **state)
 {
     (void)state;
@@ -117,6 +130,7 @@ static void a_grid_may_be_one_voxel_thick(void **state)
                     fail_msg("%s, thin along %d, form %u: %g", r->name, axis, form, alpha);
                 scene_picture_free(&p);
             }
+        expect_post_refused(&s, axis);
         scene_destroy(&s);
     }
 }
