@@ -194,11 +194,9 @@ int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
         .options = options,
         .parser = parse_key,
         .args_doc = "NAME.trip",
-        .doc =
-            "Measures what each setting that trades accuracy for time costs and errs on a data "
-            "set, against the emission-absorption integral, and writes a report: JSON, CSV and "
-            "a page.\vWith the report, `triptych render --error E` draws by the fastest settings "
-            "that stay below E.",
+        .doc = "Measures what each setting that trades accuracy for time costs and errs on a data "
+               "set, against the emission-absorption integral, and writes a report: JSON, CSV and "
+               "a page.",
     };
     *o = (accuracy_options){ .width = 256,
                              .height = 256,

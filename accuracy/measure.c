@@ -179,6 +179,7 @@ static int draw_integral(sweep *s, int data, int renderer, triptych_field field,
     triptych_settings settings = s->usual;
     double ms;
     settings.field = field;
+    settings.classify = field == TRIPTYCH_SPLATS ? TRIPTYCH_PRE : settings.classify;
     settings.kernel_radius = radius;
     settings.tolerance = s->o->tolerance;
     settings.samples = s->o->samples;
@@ -493,11 +494,6 @@ void accuracy_measured_free(accuracy_measured *m)
         free(m->rows[i].ms);
         free(m->rows[i].picture);
         free(m->rows[i].difference);
-    }
-    for (int i = 0; i < m->other_count; i++) {
-        free(m->others[i].ms);
-        free(m->others[i].picture);
-        free(m->others[i].difference);
     }
     free(m->rows);
     free(m->views);

@@ -43,18 +43,6 @@ typedef struct accuracy_row {
     char *picture, *difference; /* of the first view */
 } accuracy_row;
 
-/* What another program drew of the same views. */
-typedef struct accuracy_other {
-    char name[64], device[128];
-    accuracy_error error, view;
-    double ssim, flip;
-    int views, frames;
-    double *ms;
-    char *picture, *difference;
-} accuracy_other;
-
-enum { ACCURACY_OTHERS_MAX = 8 };
-
 typedef struct accuracy_measured {
     const accuracy_options *options;
     const char *folder; /* that is being written */
@@ -63,9 +51,6 @@ typedef struct accuracy_measured {
     accuracy_view *views;
     int view_count; /* done */
     char *truth;    /* picture of the first view */
-    accuracy_other others[ACCURACY_OTHERS_MAX];
-    int other_count;
-    char why_no_vtk[256];
     double seconds;
 } accuracy_measured;
 

@@ -20,7 +20,7 @@ static const char style[] =
     "svg{max-width:100%;height:auto;font:11px system-ui,sans-serif;background:#fff}"
     ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}circle,rect{stroke:#fff}"
     ".post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}.quality{fill:#c21f3a}"
-    ".other{fill:#7b3fb5}.key{display:inline-block;width:11px;height:11px;border-radius:6px;"
+    ".key{display:inline-block;width:11px;height:11px;border-radius:6px;"
     "margin:0 4px 0 14px}\n";
 
 static void write_escaped(FILE *f, const char *text)
@@ -83,17 +83,11 @@ static void write_plots(FILE *f, const accuracy_report *r)
           "post<span class=key style='background:#e07b1a'></span>pre"
           "<span class=key style='background:#2a9d4e'></span>gl"
           "<span class=key style='background:#888'></span>reference, integral"
-          "<span class=key style='background:#c21f3a'></span>--quality"
-          "<span class=key style='background:#7b3fb5;border-radius:0'></span>VTK. "
+          "<span class=key style='background:#c21f3a'></span>quality. "
           "The line is the front: no setting is both faster and closer.</p>\n",
           f);
     accuracy_report_plot(f, r, false);
     accuracy_report_plot(f, r, true);
-    if (r->m->why_no_vtk[0]) {
-        fputs("<p>VTK is left out: ", f);
-        write_escaped(f, r->m->why_no_vtk);
-        fputs("</p>\n", f);
-    }
 }
 
 static void write_row(FILE *f, const accuracy_report *r, int i)
@@ -124,28 +118,6 @@ static void write_row(FILE *f, const accuracy_report *r, int i)
     fputs("\n", f);
 }
 
-static void write_others(FILE *f, const accuracy_report *r)
-{
-    for (int i = 0; i < r->m->other_count; i++) {
-        const accuracy_other *one = &r->m->others[i];
-        const accuracy_error_figures e = accuracy_error_measure(&one->error);
-        fputs("<tr><td title=\"", f);
-        write_escaped(f, one->device);
-        fputs("\">", f);
-        write_escaped(f, one->name);
-        write_number(f, accuracy_median(one->ms, one->frames), 1);
-        fputs("<td>-<td>-", f);
-        write_number(f, e.most, 1);
-        write_number(f, e.mean, 2);
-        write_number(f, e.median, 2);
-        write_number(f, e.percentile_99, 2);
-        write_number(f, e.psnr, 1);
-        write_number(f, one->ssim / one->views, 4);
-        write_number(f, one->flip / one->views, 4);
-        fputs("<td>-<td>-<td>-<td>-<td>-\n", f);
-    }
-}
-
 static void write_table(FILE *f, const accuracy_report *r)
 {
     fputs("<h2>Settings</h2>\n<div class=wide><table><tr><th>settings<th>ms<th>million splats"
@@ -155,7 +127,6 @@ static void write_table(FILE *f, const accuracy_report *r)
     for (int i = 0; i < r->m->row_count; i++)
         if (r->m->rows[i].state == ACCURACY_MEASURED)
             write_row(f, r, i);
-    write_others(f, r);
     fputs("</table></div>\n<p>Bold: on the front of the 99th percentile. The last columns are the "
           "steps of the ladder, as mean / 99th percentile: <b>storage</b>, the integral of the "
           "values stored to that of the source; <b>model</b>, the integral of what is drawn (the "
@@ -194,11 +165,6 @@ static void write_pictures(FILE *f, const accuracy_report *r)
         const accuracy_row *row = &r->m->rows[i];
         write_figure(f, row->setting.name, row->picture, row->difference,
                      &r->figures[i][ACCURACY_TOTAL]);
-    }
-    for (int i = 0; i < r->m->other_count; i++) {
-        const accuracy_other *one = &r->m->others[i];
-        const accuracy_error_figures e = accuracy_error_measure(&one->error);
-        write_figure(f, one->name, one->picture, one->difference, &e);
     }
 }
 

@@ -1,4 +1,4 @@
-/* accuracy.json: what `render --error` reads, and all figures. */
+/* accuracy.json: all figures. */
 #include <cjson/cJSON.h>
 #include <math.h>
 

@@ -38,17 +38,6 @@ static double row_error(const plot *p, int i)
     return error_of(p, &p->r->figures[i][ACCURACY_TOTAL]);
 }
 
-static double other_error(const plot *p, int i)
-{
-    const accuracy_error_figures f = accuracy_error_measure(&p->r->m->others[i].error);
-    return error_of(p, &f);
-}
-
-static double other_ms(const plot *p, int i)
-{
-    return accuracy_median(p->r->m->others[i].ms, p->r->m->others[i].frames);
-}
-
 static void include(plot *p, double ms, double error)
 {
     p->x0 = fmin(p->x0, log10(ms) - 0.1);
@@ -64,8 +53,6 @@ static void find_edges(plot *p)
     for (int i = 0; i < p->r->m->row_count; i++)
         if (is_shown(p, i))
             include(p, p->r->ms[i], row_error(p, i));
-    for (int i = 0; i < p->r->m->other_count; i++)
-        include(p, other_ms(p, i), other_error(p, i));
 }
 
 static double place_x(const plot *p, double ms)
@@ -190,25 +177,10 @@ static void draw_rows(plot *p)
     }
 }
 
-static void draw_others(plot *p)
-{
-    for (int i = 0; i < p->r->m->other_count; i++) {
-        double x = place_x(p, other_ms(p, i)), y = place_y(p, other_error(p, i));
-        fprintf(p->f,
-                "<rect class=other x='%.1f' y='%.1f' width='9' height='9'><title>%s: %.1f ms, "
-                "%.2f</title></rect>\n",
-                x - 4.5, y - 4.5, p->r->m->others[i].name, other_ms(p, i), other_error(p, i));
-        take(p, (box){ x - 5, y - 5, x + 5, y + 5 });
-    }
-}
-
 /* Those that matter first, so that they find room. */
 static void write_labels(plot *p)
 {
     const bool *front = p->mean ? p->r->front_of_mean : p->r->front;
-    for (int i = 0; i < p->r->m->other_count; i++)
-        write_label(p, place_x(p, other_ms(p, i)), place_y(p, other_error(p, i)),
-                    p->r->m->others[i].name);
     for (int pass = 0; pass < 3; pass++)
         for (int i = 0; i < p->r->m->row_count; i++) {
             const char *name = p->r->m->rows[i].setting.name;
@@ -231,7 +203,6 @@ void accuracy_report_plot(FILE *f, const accuracy_report *r, bool mean)
         draw_ticks(p);
         draw_front(p);
         draw_rows(p);
-        draw_others(p);
         write_labels(p);
     }
     fputs("</svg>\n", f);

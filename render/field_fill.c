@@ -1,8 +1,10 @@
 #include "field_fill.h"
 
-void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data, trip_field *field)
+void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data, trip_field *field,
+                           unsigned planes)
 {
     f->field = field;
+    f->has_normals = planes >> TRIP_PLANE_NORMALS & 1;
     f->header = &data->header;
     f->compact = trip_compact_normals_make(&data->index_to_world, f->header->gradient_full,
                                            f->header->gradient_step);
@@ -20,8 +22,9 @@ int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_
 {
     const trip_block block = trip_block_of(batch, run);
     int axis = trip_batch_list(batch, run)->axis, status = 0;
+    const bool normals = f->has_normals && block.normals;
     trip_block_voxels(&block, 0, run->count, f->voxels);
-    if (block.normals)
+    if (normals)
         trip_block_normals(&block, 0, run->count, f->normals);
     for (uint32_t n = 0; n < run->count && !status; n++) {
         int64_t at[3];
@@ -29,10 +32,10 @@ int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_
         at[axis] = run->sheet;
         at[(axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(f->voxels[n]);
         at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(f->voxels[n]);
-        if (block.normals)
+        if (normals)
             unpack_gradient(f, f->normals[n], gradient);
-        status = trip_field_put(f->field, at, trip_voxel_code(f->voxels[n]),
-                                block.normals ? gradient : NULL);
+        status =
+            trip_field_put(f->field, at, trip_voxel_code(f->voxels[n]), normals ? gradient : NULL);
     }
     return status;
 }

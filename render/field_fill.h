@@ -1,5 +1,5 @@
 /* A field filled from the batches of a frame: voxels and halo alike, with normals where these are
- * read. A voxel that comes twice is put twice, the same. */
+ * read and wanted. A voxel that comes twice is put twice, the same. */
 #ifndef TRIP_FIELD_FILL_H
 #define TRIP_FIELD_FILL_H
 
@@ -9,12 +9,15 @@
 
 typedef struct trip_field_fill {
     trip_field *field;
+    bool has_normals;
     const trip_file_header *header;
     trip_compact_normals compact;                                         /* of 3 bytes */
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } trip_field_fill;
 
-void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data, trip_field *field);
+/* `planes`: those to use of what is read, a bit per trip_plane. */
+void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data, trip_field *field,
+                           unsigned planes);
 int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_run *run);
 
 #endif

@@ -421,13 +421,20 @@ static int gather_lists(const planning *p, unsigned kinds)
     return status;
 }
 
+/* Gradients of values are differences of values, so that the integral through them does not depend
+ * on what normals were rounded to; splats have their own. */
+static unsigned planes_gathered(const trip_dataset *data, const trip_settings *s)
+{
+    return s->field == TRIP_FIELD_SPLATS ? planes_of(data, s) : 1u << TRIP_PLANE_VOXELS;
+}
+
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                          const trip_settings *settings, unsigned kinds, trip_budget *budget)
 {
     const planning p = { plan, data, camera, settings, NULL, budget, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .gathers = true,
-                         .planes = planes_of(data, settings) };
+                         .planes = planes_gathered(data, settings) };
     place_whole_clip(plan, data, camera, settings);
     int status = take_lists(plan, data->list_count, budget);
     if (!status)
@@ -630,8 +637,8 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
 {
     const char *light = s->headlight ? "from the eye" : "from the direction given";
     char bytes[32];
-    bool differences = s->classify == TRIP_CLASSIFY_POST && !plan->gathers;
-    bool of_values = differences || (plan->gathers && plan->selection_count == 0);
+    bool of_values =
+        plan->gathers ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;
     if (of_values && s->shading)
         fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
     else if (of_values)

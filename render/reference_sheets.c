@@ -40,7 +40,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
         *out = NULL;
         return status;
     }
-    trip_field_fill_begin(&s->fill, data, s->field);
+    trip_field_fill_begin(&s->fill, data, s->field, 1u << TRIP_PLANE_VOXELS);
     trip_segments_make(&s->segments, frame->table);
     return 0;
 }

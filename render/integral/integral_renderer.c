@@ -87,7 +87,7 @@ static int begin_field(integral *r)
     r->planes = planes;
     int status = trip_field_create(&r->field, dims, r->budget);
     if (!status)
-        trip_field_fill_begin(&r->fill, data, r->field);
+        trip_field_fill_begin(&r->fill, data, r->field, planes);
     return status;
 }
 
