@@ -32,15 +32,22 @@ class Limits(program.ProgramTest):
         self.assertEqual(stages["read"]["bytes_read"], 1 << 20)
         self.assertIn("ratio", self.limits(source)[0]["limits"])
 
-    def test_only_an_envelope_that_depends_on_all_values_takes_a_second_pass(self):
+    def passes(self, type_name, *options):
+        size = "--size=32,32,64" if type_name == "uint8" else "--size=32,32,32"
+        stages = self.limits("ramp.raw", size, f"--type={type_name}", "--endian=little", *options)[1]
+        self.assertEqual(stages["read"]["bytes_read"], 1 << 16)
+        return 1 + stages["scan"]["bytes_read"] / (1 << 16)
+
+    def test_only_what_depends_on_all_values_takes_a_second_pass(self):
         with open("ramp.raw", "wb") as f:
             f.write(b"".join(i.to_bytes(2, "little") for i in range(1 << 15)))
-        options = "--size=32,32,32", "--type=uint16", "--endian=little"
-        for envelope, passes in (["--range=9:900"], 1), (["--keep-all"], 1), ([], 2), \
-                (["--tf=preset:grey"], 2):
-            stages = self.limits("ramp.raw", *options, *envelope)[1]
-            self.assertEqual(stages["scan"]["bytes_read"], (passes - 1) << 16, envelope)
-            self.assertEqual(stages["read"]["bytes_read"], 1 << 16)
+        for type_name in "uint8", "uint16":
+            for envelope, passes in ("--range=9:90", 1), ("--keep-all", 1), ("--tf=preset:grey", 2):
+                self.assertEqual(self.passes(type_name, envelope, "--normals=none"), passes, envelope)
+            self.assertEqual(self.passes(type_name), 2)
+        # What light is full at is a part of the range of the values, which 16 bits leave open.
+        self.assertEqual(self.passes("uint8", "--range=9:90"), 1)
+        self.assertEqual(self.passes("uint16", "--range=9:90"), 2)
 
     def test_a_header_beside_its_data_has_no_plain_read(self):
         summary, stages = self.limits(os.path.join(program.DATASETS, "tooth.nhdr"))
