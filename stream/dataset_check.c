@@ -37,11 +37,11 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
     copy.header_checksum = 0;
     if (memcmp(h->magic, TRIP_MAGIC, sizeof h->magic) != 0)
         return FAIL_FIELD(magic, "not the index of a data set (no " TRIP_MAGIC ")");
-    if (h->version == 1)
+    if (h->version > 0 && h->version < TRIP_FORMAT_VERSION)
         return trip_fail(TRIP_ERROR, "open", where,
-                         "byte %zu: format version 1, which is not read any more: make the data "
+                         "byte %zu: format version %u, which is not read any more: make the data "
                          "set again with `triptych brick`",
-                         offsetof(trip_file_header, version));
+                         offsetof(trip_file_header, version), h->version);
     if (h->version != TRIP_FORMAT_VERSION)
         return trip_fail(TRIP_ERROR, "open", where,
                          "byte %zu: format version %u, this program reads version %d",
@@ -79,10 +79,6 @@ static int check_grid(const trip_file_header *h, const char *where)
         return FAIL_FIELD(code_lo, "no range of codes");
     if (!isfinite(h->value_min) || !isfinite(h->value_max) || h->value_min > h->value_max)
         return FAIL_FIELD(value_min, "no range of values");
-    if (h->earlier_scale)
-        return FAIL_FIELD(earlier_scale,
-                          "normals of an earlier form, which is not read any more; make "
-                          "the data set again with `triptych brick`");
     if (!is_length(h->gradient_full))
         return FAIL_FIELD(gradient_full, "no length of gradients");
     for (int a = 0; a < 3; a++)

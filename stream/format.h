@@ -1,4 +1,4 @@
-/* The bytes of a data set on disk, `NAME.trip/`, format version 2; FORMAT.md describes the same for
+/* The bytes of a data set on disk, `NAME.trip/`, format version 3; FORMAT.md describes the same for
  * people. Fixed width, little-endian, no pointers; reserved bits are zero and refused otherwise.
  *
  *   index.trip               header, list descriptors, slabs, bricks, runs, page checksums, text
@@ -25,7 +25,7 @@
 #include <stdint.h>
 
 #define TRIP_MAGIC "TRIPTYCH"
-#define TRIP_FORMAT_VERSION 2
+#define TRIP_FORMAT_VERSION 3
 #define TRIP_HEADER_BYTES 1024
 #define TRIP_LISTS_MAX 4096
 #define TRIP_RECORD_BYTES 4 /* of a voxel, and of a normal, in memory */
@@ -51,20 +51,20 @@ typedef struct trip_file_header {
     double index_to_world[12];   /* row-major 3 x 4; voxel centres at integer indices */
     double code_lo, code_hi;     /* value of code 0 and of code 65535 */
     double value_min, value_max; /* range of the volume's finite values */
-    uint64_t earlier_scale;      /* 0; had to do with 4-byte normals of a form that is refused */
-    double gradient_step[3];     /* of 3-byte normals: index-space gradient of 1, along i, j, k */
-    double gradient_full;        /* of normals: gradients at least this long in world space are kept
-                                    as a direction (normal.h) */
-    uint64_t voxels;             /* voxels read (existing ones, for sparse grids) */
-    uint64_t kept;               /* records of a list of voxels at level 0 */
-    uint64_t halo;               /* records of a list of the halo at level 0; 0 without one */
-    uint32_t tile_log2;          /* 4 to 7: tile edge 16 to 128 voxels */
-    uint32_t slab_sheets;        /* sheets per slab, 1 to 64 */
-    uint32_t page_log2;          /* 12 to 24 */
-    uint32_t planes;             /* bit per trip_plane that some list has; voxels always */
-    uint32_t code_bytes;         /* 1 or 2 */
-    uint32_t normal_bytes;       /* 3 or 4; 0 without normals */
-    uint32_t list_count;         /* 3 (X, Y and Z of voxels at level 0) to TRIP_LISTS_MAX */
+    uint64_t reserved1;
+    double gradient_step[3]; /* of 3-byte normals: index-space gradient of 1, along i, j, k */
+    double gradient_full;    /* of normals: gradients at least this long in world space are kept
+                                as a direction (normal.h) */
+    uint64_t voxels;         /* voxels read (existing ones, for sparse grids) */
+    uint64_t kept;           /* records of a list of voxels at level 0 */
+    uint64_t halo;           /* records of a list of the halo at level 0; 0 without one */
+    uint32_t tile_log2;      /* 4 to 7: tile edge 16 to 128 voxels */
+    uint32_t slab_sheets;    /* sheets per slab, 1 to 64 */
+    uint32_t page_log2;      /* 12 to 24 */
+    uint32_t planes;         /* bit per trip_plane that some list has; voxels always */
+    uint32_t code_bytes;     /* 1 or 2 */
+    uint32_t normal_bytes;   /* 3 or 4; 0 without normals */
+    uint32_t list_count;     /* 3 (X, Y and Z of voxels at level 0) to TRIP_LISTS_MAX */
     uint32_t reserved0;
     uint64_t lists_offset; /* trip_file_list[list_count] */
     uint64_t text_offset;  /* UTF-8 JSON: source, envelope, transfer function */

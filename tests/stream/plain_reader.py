@@ -65,7 +65,7 @@ def read_header(index):
         index,
         0,
     )
-    if at != 320 or header["version"] != 2 or header["header_bytes"] != 1024:
+    if at != 320 or header["version"] != 3 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
     if header["reserved"] or header["reserved_scale"] or any(index[320:1024]):
         fail("index.trip", 320, "reserved bytes")

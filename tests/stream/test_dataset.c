@@ -281,7 +281,8 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     (void)state;
     REFUSE(c.header->magic[0] = 'X', "not the index of a data set");
     REFUSE(c.header->version = 1, "format version 1, which is not read any more");
-    REFUSE(c.header->version = 3, "format version 3");
+    REFUSE(c.header->version = 2, "format version 2, which is not read any more");
+    REFUSE(c.header->version = 4, "format version 4");
     REFUSE(c.header->header_bytes = 512, "header size");
     REFUSE(c.header->reserved[700] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");
@@ -292,7 +293,6 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->code_lo = INFINITY, "range of codes");
     REFUSE(c.header->code_hi = -2, "range of codes");
     REFUSE(c.header->value_max = NAN, "range of values");
-    REFUSE(c.header->earlier_scale = 1, "make the data set again");
     REFUSE(c.header->voxels = UINT64_MAX, "more voxels");
     REFUSE(c.header->voxels = 1, "more was kept");
     REFUSE(c.header->halo = UINT64_MAX, "more was kept");
