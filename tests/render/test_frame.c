@@ -289,7 +289,7 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
     scene s;
     make_scene(&s);
     trip_frame_stats stats;
-    float rgba[16 * 16 * 4];
+    float rgba[16 * 16 * 4] = { 0 }; /* the lazy renderer draws nothing */
     trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
     const unsigned slots[] = { 2, 3, 8, 64 }, held[] = { 1, 1, 4, 15 };
     for (int i = 0; i < 4; i++) {
