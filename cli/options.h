@@ -36,6 +36,30 @@ int trip_option_choice(const char *option, const char *text, const char *const *
     {                                                                                              \
         "threads", key, "N", 0, "Threads that draw or read (default: one a processor)", group      \
     }
+/* How volumes are read that are drawn without a data set; the keys are KEY_GRID, KEY_LEVEL_SET,
+ * KEY_SPACING and KEY_ALLOW_GAPS. */
+#define TRIP_OPTIONS_VOLUME(group)                                                                 \
+    { "grid",                                                                                      \
+      KEY_GRID,                                                                                    \
+      "NAME",                                                                                      \
+      0,                                                                                           \
+      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)",        \
+      group },                                                                                     \
+        { "level-set",                                                                             \
+          KEY_LEVEL_SET,                                                                           \
+          "HOW",                                                                                   \
+          0,                                                                                       \
+          "What to make of an OpenVDB level set: filled or band (default: filled)",                \
+          group },                                                                                 \
+        { "spacing",                                                                               \
+          KEY_SPACING,                                                                             \
+          "X,Y,Z",                                                                                 \
+          0,                                                                                       \
+          "Distance of voxels along each axis (default: the file's, else 1)",                      \
+          group },                                                                                 \
+    {                                                                                              \
+        "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", group  \
+    }
 int trip_option_memory(const char *text, uint64_t *out);
 int trip_option_threads(const char *text, int *out);
 int trip_option_engine(const char *text, int names, int *out);   /* auto, io_uring, pread, null */

@@ -148,8 +148,7 @@ static const struct argp_option options[] = {
       "Slices of a sheet, 1 to 16 (default: auto, by the view); post only", 3 },
     { "lod", KEY_LOD, "PX", 0,
       "Draw coarse levels where their voxels are at most so many pixels wide (default: 0, the "
-      "finest "
-      "alone)",
+      "finest alone)",
       3 },
     { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
     { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
@@ -197,13 +196,7 @@ static const struct argp_option options[] = {
       "the splats",
       5 },
     { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 6 },
-    { "grid", KEY_GRID, "NAME", 0,
-      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 6 },
-    { "level-set", KEY_LEVEL_SET, "HOW", 0,
-      "What to make of an OpenVDB level set: filled or band (default: filled)", 6 },
-    { "spacing", KEY_SPACING, "X,Y,Z", 0,
-      "Distance of voxels along each axis (default: the file's, else 1)", 6 },
-    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", 6 },
+    TRIP_OPTIONS_VOLUME(6),
     { 0 },
 };
 

@@ -42,13 +42,7 @@ static const struct argp_option options[] = {
     TRIP_OPTION_ENGINE(KEY_ENGINE, 1),
     TRIP_OPTION_THREADS(KEY_THREADS, 1),
     { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 2 },
-    { "grid", KEY_GRID, "NAME", 0,
-      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)", 2 },
-    { "level-set", KEY_LEVEL_SET, "HOW", 0,
-      "What to make of an OpenVDB level set: filled or band (default: filled)", 2 },
-    { "spacing", KEY_SPACING, "X,Y,Z", 0,
-      "Distance of voxels along each axis (default: the file's, else 1)", 2 },
-    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", 2 },
+    TRIP_OPTIONS_VOLUME(2),
     { 0 },
 };
 

@@ -66,11 +66,7 @@ static const struct argp_option options[] = {
     TRIP_OPTION_ENGINE(KEY_ENGINE, 3),
     TRIP_OPTION_THREADS(KEY_THREADS, 3),
     { NULL, 0, NULL, 0, "Volumes (not for data sets, which have it settled):", 4 },
-    { "grid", KEY_GRID, "NAME", 0, "OpenVDB grid", 4 },
-    { "level-set", KEY_LEVEL_SET, "HOW", 0,
-      "What to make of an OpenVDB level set: filled or band (default: filled)", 4 },
-    { "spacing", KEY_SPACING, "X,Y,Z", 0, "Distance of voxels along each axis", 4 },
-    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", 4 },
+    TRIP_OPTIONS_VOLUME(4),
     { 0 },
 };
 
