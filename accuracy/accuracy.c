@@ -4,9 +4,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "accuracy_options.h"
+#include "fastest.h"
 #include "measure.h"
 #include "report.h"
 #include "accuracy_report.h"
@@ -39,20 +39,6 @@ static char *join(int argc, char **argv)
     }
     fclose(f);
     return text;
-}
-
-/* NAME.accuracy beside NAME.trip. */
-static char *usual_output(const char *data)
-{
-    size_t length = strlen(data);
-    while (length > 1 && data[length - 1] == '/')
-        length--;
-    if (length > 5 && !strncmp(data + length - 5, ".trip", 5))
-        length -= 5;
-    char *path = malloc(length + sizeof ".accuracy");
-    if (path)
-        sprintf(path, "%.*s.accuracy", (int)length, data);
-    return path;
 }
 
 static int measure(const accuracy_options *o, accuracy_folder *folder, const char *command)
@@ -89,7 +75,7 @@ int trip_accuracy(int argc, char **argv)
         return print_settings();
     }
     if (!status && !o.output)
-        o.output = output = usual_output(o.data[0]);
+        o.output = output = accuracy_report_path(o.data[0]);
     if (!status && (!command || !o.output))
         status = trip_fail(TRIP_ERROR, "accuracy", "report", "out of memory");
     if (!status)

@@ -29,5 +29,7 @@ typedef struct accuracy_option {
 
 /* The options of `triptych render`; returns how many. */
 int accuracy_setting_options(const accuracy_setting *s, accuracy_option out[ACCURACY_OPTIONS_MAX]);
+/* Sets what one of them says, "classify" "post"; false: there is no such option or value. */
+bool accuracy_setting_read_option(accuracy_setting *s, const char *name, const char *value);
 
 #endif

@@ -10,6 +10,7 @@
 #include "geometry.h"
 #include "new_file.h"
 #include "options.h"
+#include "quality_options.h"
 #include "report.h"
 #include "text.h"
 #include "video.h"
@@ -49,6 +50,9 @@ enum {
     KEY_KERNEL_RADIUS,
     KEY_TARGET,
     KEY_RENDERER,
+    KEY_QUALITY,
+    KEY_ERROR,
+    KEY_REPORT,
     KEY_CLASSIFY,
     KEY_COMPOSITING,
     KEY_SLICES,
@@ -132,6 +136,7 @@ static const struct argp_option options[] = {
       "picture)",
       2 },
     { NULL, 0, NULL, 0, "Method:", 3 },
+    TRIP_OPTIONS_QUALITY(3),
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
       "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
@@ -203,10 +208,12 @@ static const struct argp_option options[] = {
 /* While parsing: what was given, for the checks of combinations. */
 typedef struct parse {
     render_options *o;
+    quality_options quality;
     bool h, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
     bool slices, compositing;
     bool kernel, integral; /* options of the integral renderer */
+    bool again;            /* over settings that --quality or --error has chosen */
 } parse;
 
 static int parse_size(const char *text, render_options *o)
@@ -388,6 +395,13 @@ static int parse_method(int key, char *arg, parse *p)
     triptych_settings *s = &p->o->settings;
     int which = 0, status;
     switch (key) {
+    case KEY_QUALITY:
+        return quality_option_quality(arg, &p->quality);
+    case KEY_ERROR:
+        return quality_option_error(arg, &p->quality);
+    case KEY_REPORT:
+        p->quality.report = arg;
+        return 0;
     case KEY_CLASSIFY:
         status = trip_option_classify(arg, 3, &which);
         s->classify = (triptych_classify)which;
@@ -707,6 +721,14 @@ static int check(parse *p)
         return status;
     if (p->light && !o->settings.shading)
         return trip_option_fail("--light", "does not apply with --no-shading");
+    if (quality_options_given(&p->quality) && o->renderer == TRIPTYCH_RENDERER_INTEGRAL &&
+        !p->again)
+        return trip_option_fail("--quality, --error",
+                                "do not apply to --renderer integral, which is what they come "
+                                "close to");
+    status = quality_options_check(&p->quality);
+    if (status)
+        return status;
     if (p->level != (o->function.window > 0))
         return trip_option_fail(p->level ? "--level" : "--window",
                                 "--window and --level are given together");
@@ -793,8 +815,26 @@ int render_options_parse(render_options *o, int argc, char **argv)
                "the next picture of it is drawn at once.\vPoints and lengths are in the data's "
                "world units.",
     };
-    *o = (render_options){ .width = 1024, .height = 1024, .settings = triptych_default_settings() };
+    const render_options usual = { .width = 1024,
+                                   .height = 1024,
+                                   .settings = triptych_default_settings() };
+    char *name = argv[0];
+    *o = usual;
     parse p = { .o = o };
+    int status = trip_options_parse(&argp, argc, argv, &p);
+    if (status || !quality_options_given(&p.quality))
+        return status;
+    /* Again, over what was chosen: other options go before, wherever they stand. */
+    render_options chosen = usual;
+    chosen.renderer = o->renderer;
+    chosen.settings.shading = o->settings.shading;
+    status = quality_options_use(&p.quality, &(quality_drawn){ o->input, o->function.name },
+                                 &chosen.settings, &chosen.renderer, true);
+    if (status)
+        return status;
+    *o = chosen;
+    p = (parse){ .o = o, .again = true };
+    argv[0] = name;
     return trip_options_parse(&argp, argc, argv, &p);
 }
 

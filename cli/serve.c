@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "library.h"
 #include "options.h"
+#include "quality_options.h"
 #include "report.h"
 #include "volume_options.h"
 #include "shown_volume.h"
@@ -15,6 +16,9 @@ enum {
     KEY_PORT = 256,
     KEY_FPS,
     KEY_TF,
+    KEY_QUALITY,
+    KEY_ERROR,
+    KEY_REPORT,
     KEY_CLASSIFY,
     KEY_RENDERER,
     KEY_MEMORY,
@@ -28,6 +32,9 @@ enum {
 
 typedef struct serve_options {
     trip_serve_params params;
+    quality_options quality;
+    bool classify_given;
+    triptych_classify classify;
     shown_volume volume;
 } serve_options;
 
@@ -35,6 +42,7 @@ static const struct argp_option options[] = {
     { "port", KEY_PORT, "N", 0, "Port to listen at, of 127.0.0.1 (default: one that is free)", 1 },
     { "fps", KEY_FPS, "N", 0, "Frames a second while the view moves (default: 30)", 1 },
     { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
+    TRIP_OPTIONS_QUALITY(1),
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
@@ -69,8 +77,9 @@ static int parse_renderer(int key, char *arg, trip_serve_params *p)
     }
 }
 
-static int parse_rest(int key, char *arg, trip_serve_params *p)
+static int parse_rest(int key, char *arg, serve_options *o)
 {
+    trip_serve_params *p = &o->params;
     int which = 0, status;
     switch (key) {
     case KEY_PORT:
@@ -82,8 +91,16 @@ static int parse_rest(int key, char *arg, trip_serve_params *p)
         return 0;
     case KEY_CLASSIFY:
         status = trip_option_classify(arg, 3, &which);
-        p->settings.classify = (triptych_classify)which;
+        o->classify = (triptych_classify)which;
+        o->classify_given = true;
         return status;
+    case KEY_QUALITY:
+        return quality_option_quality(arg, &o->quality);
+    case KEY_ERROR:
+        return quality_option_error(arg, &o->quality);
+    case KEY_REPORT:
+        o->quality.report = arg;
+        return 0;
     default:
         return parse_renderer(key, arg, p);
     }
@@ -103,7 +120,7 @@ static int parse_volume(int key, char *arg, serve_options *o)
         v->allow_gaps = 1;
         return 0;
     default:
-        return parse_rest(key, arg, &o->params);
+        return parse_rest(key, arg, o);
     }
 }
 
@@ -118,10 +135,21 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         p->input = arg;
         return 0;
     case ARGP_KEY_END:
-        return p->input ? 0 : trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+        return p->input ? quality_options_check(&o->quality)
+                        : trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
     default:
         return parse_volume(key, arg, o);
     }
+}
+
+static int choose_settings(serve_options *o)
+{
+    trip_serve_params *p = &o->params;
+    const quality_drawn drawn = { p->input, p->function };
+    int status = quality_options_use(&o->quality, &drawn, &p->settings, &p->renderer, false);
+    if (o->classify_given)
+        p->settings.classify = o->classify;
+    return status;
 }
 
 /* A data set or function that cannot be taken is found here, before anybody looks; of a volume,
@@ -176,6 +204,8 @@ int trip_command_serve(int argc, char **argv)
     o.volume.function = o.params.function;
     o.volume.options.memory_bytes = o.params.memory_bytes;
     o.volume.options.threads = o.params.threads;
+    if (!status)
+        status = choose_settings(&o);
     if (!status)
         status = check_input(&o.params);
     return trip_exit_status(status ? status : trip_serve_run(&o.params));

@@ -7,6 +7,7 @@
 #include "geometry.h"
 #include "library.h"
 #include "options.h"
+#include "quality_options.h"
 #include "report.h"
 #include "shown_volume.h"
 #include "view.h"
@@ -22,6 +23,9 @@ enum {
     KEY_VIEW,
     KEY_TF,
     KEY_OPACITY_SCALE,
+    KEY_QUALITY,
+    KEY_ERROR,
+    KEY_REPORT,
     KEY_CLASSIFY,
     KEY_FPS,
     KEY_SCALE,
@@ -57,6 +61,7 @@ static const struct argp_option options[] = {
     { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, so many world units high", 2 },
     { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 2 },
     { "opacity-scale", KEY_OPACITY_SCALE, "X", 0, "Multiplies extinction", 2 },
+    TRIP_OPTIONS_QUALITY(2),
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 2 },
     { NULL, 0, NULL, 0, "Renderer:", 3 },
@@ -75,6 +80,9 @@ typedef struct view_options {
     const char **inputs;
     int argc;
     double eye[3], look[3], up[3];
+    quality_options quality;
+    bool classify_given;
+    triptych_classify classify;
     shown_volume volume;
 } view_options;
 
@@ -144,9 +152,16 @@ static int parse_look(int key, char *arg, view_options *o)
         return trip_option_number("--opacity-scale", arg, 1e-6, 1e6, &o->params.opacity_scale);
     case KEY_CLASSIFY:
         status = trip_option_classify(arg, 3, &which);
-        o->params.settings.classify = (triptych_classify)which;
-        o->params.settings_given = true;
+        o->classify = (triptych_classify)which;
+        o->classify_given = true;
         return status;
+    case KEY_QUALITY:
+        return quality_option_quality(arg, &o->quality);
+    case KEY_ERROR:
+        return quality_option_error(arg, &o->quality);
+    case KEY_REPORT:
+        o->quality.report = arg;
+        return 0;
     default:
         return parse_view(key, arg, o);
     }
@@ -200,7 +215,20 @@ static int check(const view_options *o)
     if (v->eye && v->side)
         return trip_option_fail("--eye", "says where to look from, and so does --view: give one or "
                                          "the other");
-    return 0;
+    if (o->quality.error > 0 && o->params.count != 1)
+        return trip_option_fail("--error", "is of one data set: name it");
+    return quality_options_check(&o->quality);
+}
+
+static int choose_settings(view_options *o)
+{
+    trip_view_params *p = &o->params;
+    const quality_drawn drawn = { o->inputs[0], p->function };
+    int status = quality_options_use(&o->quality, &drawn, &p->settings, &p->renderer, false);
+    if (o->classify_given)
+        p->settings.classify = o->classify;
+    p->settings_given = o->classify_given || quality_options_given(&o->quality);
+    return status;
 }
 
 static error_t parse_key(int key, char *arg, struct argp_state *state)
@@ -267,6 +295,8 @@ int trip_command_view(int argc, char **argv)
     if (!o.inputs)
         return trip_exit_status(trip_fail(TRIP_ERROR, "usage", "view", "out of memory"));
     int status = parse(&o, argc, argv);
+    if (!status)
+        status = choose_settings(&o);
     o.params.inputs = o.inputs;
     o.volume.function = o.params.function;
     o.volume.samples = true;

@@ -230,6 +230,43 @@ class Accuracy(program.ProgramTest):
             again = self.picture("a.trip", *camera, *options)
             self.assertTrue((again == program.read_exr(f"report/{name}-0.exr")).all())
 
+    def test_an_error_is_turned_into_settings(self):
+        view = ["--size", "40x32", "--tf", "a.tf", "--report", "report"]
+        bound = 1.01 * self.rows["pre"]["total"]["worst_percentile_99"]
+        fits = [r for r in self.rows.values() if r["total"]["worst_percentile_99"] < bound]
+        fastest = min(fits, key=lambda r: r["ms"])
+        options = [x for k, v in fastest["options"].items() for x in ("--" + k, v)]
+        drawn = self.picture("a.trip", *view[:4], *options)
+        run = self.works("render", "a.trip", "-o", "e.exr", *view, "--error", repr(bound))
+        self.assertIn(f"note: --error: {fastest['name']}, ", run.stderr)
+        self.assertTrue((program.read_exr("e.exr") == drawn).all())
+        run = self.works("render", "a.trip", "-o", "e.exr", "--size", "40x32", "--report", "report",
+                         "--error", "255", "--no-shading")
+        self.assertIn("the data set's own: errors", run.stderr)
+        self.assertIn("measured with light", run.stderr)
+
+    def test_without_a_report_an_error_is_refused(self):
+        size = ["--size", "40x32", "-o", "e.exr"]
+        self.fails(1, "render", "a.trip", *size, "--error", "1", says="triptych accuracy")
+        self.fails(1, "render", "a.trip", *size, "--error", "1", "--report", "a.tf", says="accuracy.json")
+        self.fails(1, "render", "a.trip", *size, "--error", "1e-6", "--report", "report",
+                   says="comes closest")
+
+    def test_qualities_are_settings(self):
+        """Options beside a quality go before what it says, wherever they stand."""
+        draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
+        same = {("--quality", "draft"): ("--slices", "1"),
+                ("--quality", "normal"): (),
+                ("--quality", "high"): ("--slices", "4"),
+                ("--quality", "exact"): ("--slices", "16"),
+                ("--slices", "2", "--quality", "exact"): ("--slices", "2"),
+                ("--quality", "draft", "--classify", "pre"): ("--classify", "pre")}
+        pictures = [draw(*options) for options in same]
+        for options, picture in zip(same, pictures):
+            self.assertTrue((draw(*same[options]) == picture).all(), options)
+        for a, b in ((0, 1), (1, 2), (2, 3)):
+            self.assertTrue((pictures[a] != pictures[b]).any())
+
     def test_page_holds_all_it_shows(self):
         page = Page()
         with open("report/index.html", encoding="utf-8") as f:

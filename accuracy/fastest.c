@@ -1,0 +1,164 @@
+#include "fastest.h"
+
+#include <cjson/cJSON.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "input_file.h"
+#include "json.h"
+#include "report.h"
+
+enum { MOST_BYTES = 16 << 20, VERSION = 1 };
+
+char *accuracy_report_path(const char *data)
+{
+    size_t length = strlen(data);
+    while (length > 1 && data[length - 1] == '/')
+        length--;
+    size_t end = length;
+    while (end > 0 && data[end - 1] != '.' && data[end - 1] != '/')
+        end--;
+    if (end > 1 && data[end - 1] == '.' && data[end - 2] != '/')
+        length = end - 1;
+    char *path = malloc(length + sizeof ".accuracy");
+    if (path)
+        sprintf(path, "%.*s.accuracy", (int)length, data);
+    return path;
+}
+
+/* ---- one row ---- */
+
+static double number_of(const cJSON *object, const char *name)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+static const char *text_of(const cJSON *object, const char *name)
+{
+    return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, name));
+}
+
+static bool is_same(const char *a, const char *b)
+{
+    return a && b ? !strcmp(a, b) : a == b;
+}
+
+/* False where it is not of the data set that the report is of, has options that are not known, or
+ * lacks its figures. */
+static bool read_row(const cJSON *row, const char *data_set, accuracy_found *out)
+{
+    const cJSON *options = cJSON_GetObjectItemCaseSensitive(row, "options"), *option;
+    const char *name = text_of(row, "name");
+    if (!name || !cJSON_IsObject(options) || !is_same(text_of(row, "data_set"), data_set))
+        return false;
+    snprintf(out->setting.name, sizeof out->setting.name, "%s", name);
+    out->setting.renderer = TRIPTYCH_RENDERER_AUTO;
+    cJSON_ArrayForEach(
+        option, options) if (!cJSON_IsString(option) ||
+                             !accuracy_setting_read_option(&out->setting, option->string,
+                                                           option->valuestring)) return false;
+    const cJSON *total = cJSON_GetObjectItemCaseSensitive(row, "total");
+    out->error = number_of(total, "worst_percentile_99");
+    out->ms = number_of(row, "ms");
+    return out->error >= 0 && out->ms >= 0;
+}
+
+/* ---- the report ---- */
+
+static void warn_of_differences(const cJSON *root, const char *path, const accuracy_wanted *w,
+                                const triptych_settings *s)
+{
+    const char *function = text_of(root, "transfer_function");
+    if (!is_same(function, w->function))
+        trip_warn(path, "was measured with %s%s, not with %s%s: errors and times differ",
+                  function ? "--tf " : "the data set's own transfer function",
+                  function ? function : "", w->function ? "--tf " : "the data set's own",
+                  w->function ? w->function : "");
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(root, "shading")) != !!s->shading)
+        trip_warn(path, "was measured %s: errors and times differ",
+                  s->shading ? "without light" : "with light");
+}
+
+static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
+                  accuracy_found *out)
+{
+    const cJSON *row;
+    const triptych_settings usual = out->setting.settings;
+    const char *data_set = text_of(root, "data_set");
+    accuracy_found best = { .ms = INFINITY }, closest = { .error = INFINITY };
+    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "rows"))
+    {
+        accuracy_found one = { .setting.settings = usual };
+        if (!read_row(row, data_set, &one) ||
+            (w->renderers && !(w->renderers & 1u << one.setting.renderer)))
+            continue;
+        if (one.error < w->error && one.ms < best.ms)
+            best = one;
+        if (one.error < closest.error)
+            closest = one;
+    }
+    if (isinf(closest.error))
+        return trip_fail(TRIP_ERROR, "--error", path,
+                         "has no settings of the renderer that is to draw");
+    if (isinf(best.ms))
+        return trip_fail(TRIP_ERROR, "--error", path,
+                         "nothing stays below %g; %s comes closest, with %.2f", w->error,
+                         closest.setting.name, closest.error);
+    warn_of_differences(root, path, w, &usual);
+    *out = best;
+    return 0;
+}
+
+int accuracy_fastest_in(const char *text, const char *path, const accuracy_wanted *wanted,
+                        accuracy_found *out)
+{
+    trip_json json = { 0 };
+    int status = trip_json_parse(&json, text, path, NULL);
+    if (!status && number_of(json.root, "triptych_accuracy") != VERSION)
+        status =
+            trip_fail(TRIP_ERROR, "--error", path, "is no accuracy.json of `triptych accuracy`");
+    if (!status)
+        status = choose(json.root, path, wanted, out);
+    trip_json_free(&json);
+    return status;
+}
+
+static int read_text(const char *path, char *text)
+{
+    int fd = trip_input_open(path);
+    ssize_t bytes = fd >= 0 ? trip_input_read(fd, text, MOST_BYTES + 1) : -1;
+    int status =
+        bytes < 0
+            ? trip_fail_errno("--error", path, "`triptych accuracy` makes this report; cannot open")
+        : bytes > MOST_BYTES ? trip_fail(TRIP_ERROR, "--error", path, "is longer than a report is")
+                             : 0;
+    if (fd >= 0)
+        close(fd);
+    if (!status)
+        text[bytes] = 0;
+    return status;
+}
+
+int accuracy_fastest(const char *path, const accuracy_wanted *wanted, accuracy_found *out)
+{
+    char file[PATH_MAX];
+    struct stat st;
+    bool is_file = stat(path, &st) == 0 && !S_ISDIR(st.st_mode);
+    if (snprintf(file, sizeof file, "%s%s", path, is_file ? "" : "/accuracy.json") >=
+        (int)sizeof file)
+        return trip_fail(TRIP_USAGE, "--error", path, "the name is too long");
+    char *text = malloc(MOST_BYTES + 1);
+    if (!text)
+        return trip_fail(TRIP_ERROR, "--error", path, "out of memory");
+    int status = read_text(file, text);
+    if (!status)
+        status = accuracy_fastest_in(text, file, wanted, out);
+    free(text);
+    return status;
+}

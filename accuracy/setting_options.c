@@ -1,0 +1,109 @@
+/* A setting as options of `triptych render`, and back. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "setting.h"
+#include "text.h"
+
+static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral", NULL };
+static const char *const classifies[] = { "pre", "post", "auto", NULL };
+static const char *const compositings[] = { "splat", "sheet", NULL };
+static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
+static const char *const methods[] = { "merge", "clip", "axis", NULL };
+
+__attribute__((format(printf, 4, 5))) static void put(accuracy_option *out, int *count,
+                                                      const char *name, const char *value, ...)
+{
+    va_list arguments;
+    va_start(arguments, value);
+    out[*count].name = name;
+    vsnprintf(out[*count].value, sizeof out->value, value, arguments);
+    va_end(arguments);
+    (*count)++;
+}
+
+static void put_pre(const triptych_settings *s, accuracy_option *out, int *count)
+{
+    put(out, count, "classify", "pre");
+    put(out, count, "compositing", "%s", compositings[s->compositing]);
+    put(out, count, "kernel-radius", "%g", s->kernel_radius);
+    put(out, count, "target", "%s", targets[s->target]);
+}
+
+int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[ACCURACY_OPTIONS_MAX])
+{
+    const triptych_settings *s = &one->settings;
+    int count = 0;
+    put(out, &count, "renderer", "%s", renderers[one->renderer]);
+    if (s->samples != 1)
+        put(out, &count, "samples", "%d", s->samples);
+    if (one->renderer == TRIPTYCH_RENDERER_INTEGRAL) {
+        put(out, &count, "tolerance", "%g", s->tolerance);
+        return count;
+    }
+    if (s->classify == TRIPTYCH_PRE)
+        put_pre(s, out, &count);
+    else {
+        put(out, &count, "classify", "%s", classifies[s->classify]);
+        if (s->slices)
+            put(out, &count, "slices", "%d", s->slices);
+    }
+    if (one->renderer == TRIPTYCH_RENDERER_REFERENCE && s->classify == TRIPTYCH_PRE)
+        count--; /* has no target */
+    put(out, &count, "method", "%s", methods[s->method]);
+    if (s->method == TRIPTYCH_MERGE)
+        put(out, &count, "h", "%g", s->h);
+    if (s->lod_px > 0)
+        put(out, &count, "lod", "%g", s->lod_px);
+    return count;
+}
+
+static int find(const char *text, const char *const *names)
+{
+    for (int i = 0; names[i]; i++)
+        if (!strcmp(text, names[i]))
+            return i;
+    return -1;
+}
+
+static bool read_integer(const char *text, int *out)
+{
+    double number;
+    if (!trip_text_to_double(text, &number) || !(number >= 0 && number <= 1000) ||
+        number != (int)number)
+        return false;
+    *out = (int)number;
+    return true;
+}
+
+static bool read_number(const char *name, const char *text, triptych_settings *s)
+{
+    if (!strcmp(name, "samples"))
+        return read_integer(text, &s->samples);
+    if (!strcmp(name, "slices"))
+        return read_integer(text, &s->slices);
+    double *number = !strcmp(name, "h")               ? &s->h
+                     : !strcmp(name, "kernel-radius") ? &s->kernel_radius
+                     : !strcmp(name, "lod")           ? &s->lod_px
+                     : !strcmp(name, "tolerance")     ? &s->tolerance
+                                                      : NULL;
+    return number && trip_text_to_double(text, number);
+}
+
+bool accuracy_setting_read_option(accuracy_setting *one, const char *name, const char *value)
+{
+    triptych_settings *s = &one->settings;
+    int which;
+    if (!strcmp(name, "renderer") && (which = find(value, renderers)) >= 0)
+        return one->renderer = (triptych_renderer)which, true;
+    if (!strcmp(name, "classify") && (which = find(value, classifies)) >= 0)
+        return s->classify = (triptych_classify)which, true;
+    if (!strcmp(name, "compositing") && (which = find(value, compositings)) >= 0)
+        return s->compositing = (triptych_compositing)which, true;
+    if (!strcmp(name, "target") && (which = find(value, targets)) >= 0)
+        return s->target = (triptych_target)which, true;
+    if (!strcmp(name, "method") && (which = find(value, methods)) >= 0)
+        return s->method = (triptych_method)which, true;
+    return read_number(name, value, s);
+}

@@ -1,0 +1,57 @@
+/* --quality, --error and --report: what accuracy is traded for time by, in one word or one number,
+ * for all commands that draw. Main thread only. */
+#ifndef TRIP_QUALITY_OPTIONS_H
+#define TRIP_QUALITY_OPTIONS_H
+
+#include <stdbool.h>
+
+#include "triptych.h"
+
+typedef struct quality_options {
+    bool given; /* a quality */
+    triptych_quality quality;
+    double error;       /* 0: not given */
+    const char *report; /* NULL: NAME.accuracy beside the data */
+} quality_options;
+
+/* The keys are KEY_QUALITY, KEY_ERROR and KEY_REPORT. */
+#define TRIP_OPTIONS_QUALITY(group)                                                                \
+    { "quality",                                                                                   \
+      KEY_QUALITY,                                                                                 \
+      "NAME",                                                                                      \
+      0,                                                                                           \
+      "draft, normal, high or exact: settings that come closer to the integral and take longer, "  \
+      "of which triptych-accuracy(1) has the figures (default: normal)",                           \
+      group },                                                                                     \
+        { "error",                                                                                 \
+          KEY_ERROR,                                                                               \
+          "E",                                                                                     \
+          0,                                                                                       \
+          "The fastest settings that `triptych accuracy` measured to stay below E of 255 at the "  \
+          "99th percentile of pixels on this data",                                                \
+          group },                                                                                 \
+    {                                                                                              \
+        "report", KEY_REPORT, "REPORT/", 0,                                                        \
+            "The report that --error takes (default: NAME.accuracy beside the data)", group        \
+    }
+
+int quality_option_quality(const char *text, quality_options *q);
+int quality_option_error(const char *text, quality_options *q);
+/* What excludes one another; after parsing. */
+int quality_options_check(const quality_options *q);
+static inline bool quality_options_given(const quality_options *q)
+{
+    return q->given || q->error > 0;
+}
+
+/* What is drawn: a data set or volume, and the function as of --tf or NULL. */
+typedef struct quality_drawn {
+    const char *input, *function;
+} quality_drawn;
+
+/* Changes settings as the options say, and with --error the renderer where it is auto. Prints what
+ * --error has chosen. */
+int quality_options_use(const quality_options *q, const quality_drawn *drawn, triptych_settings *s,
+                        triptych_renderer *renderer, bool slow_too);
+
+#endif

@@ -1,0 +1,155 @@
+/* Settings as options and back, and which of a report's are taken. */
+#include "fastest.h"
+#include "test.h"
+
+static void options_say_all_of_a_setting(void **state)
+{
+    (void)state;
+    accuracy_setting all[ACCURACY_SETTINGS_MAX];
+    const triptych_settings usual = triptych_default_settings();
+    int count = accuracy_settings(all, &usual);
+    assert_true(count > 40 && count <= ACCURACY_SETTINGS_MAX);
+    for (int i = 0; i < count; i++) {
+        accuracy_option options[ACCURACY_OPTIONS_MAX];
+        accuracy_setting again = { .settings = usual };
+        int n = accuracy_setting_options(&all[i], options);
+        for (int k = 0; k < n; k++)
+            assert_true(accuracy_setting_read_option(&again, options[k].name, options[k].value));
+        if (all[i].renderer == TRIPTYCH_RENDERER_INTEGRAL) /* which has no layers */
+            again.settings.classify = all[i].settings.classify;
+        assert_int_equal(again.renderer, all[i].renderer);
+        assert_memory_equal(&again.settings, &all[i].settings, sizeof usual);
+    }
+}
+
+static void unknown_options_are_refused(void **state)
+{
+    (void)state;
+    static const char *const pairs[][2] = { { "h", "much" },       { "h", "" },
+                                            { "slices", "1.5" },   { "slices", "-1" },
+                                            { "samples", "1e9" },  { "classify", "late" },
+                                            { "sharpness", "1" },  { "method", "" },
+                                            { "renderer", "cpu " } };
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        accuracy_setting s = { .settings = triptych_default_settings() };
+        assert_false(accuracy_setting_read_option(&s, pairs[i][0], pairs[i][1]));
+    }
+}
+
+#define ROW(name, ms, error, options)                                                              \
+    "{\"name\":\"" name "\",\"data_set\":\"a.trip\",\"ms\":" ms                                    \
+    ",\"total\":{\"worst_percentile_99\":" error "},\"options\":{" options "}}"
+#define REPORT(rows)                                                                               \
+    "{\"triptych_accuracy\":1,\"data_set\":\"a.trip\",\"transfer_function\":null,"                 \
+    "\"shading\":true,\"rows\":[" rows "]}"
+
+static const char report[] =
+    REPORT(ROW("slow", "90", "0.1", "\"renderer\":\"reference\",\"classify\":\"post\"") "," ROW(
+        "fine", "40", "0.5",
+        "\"renderer\":\"cpu\",\"slices\":\"4\"") "," ROW("quick", "10", "2",
+                                                         "\"renderer\":\"gl\",\"slices\":"
+                                                         "\"1\"") "," ROW("odd", "1", "0",
+                                                                          "\"renderer\":"
+                                                                          "\"cpu\","
+                                                                          "\"sharpness\":"
+                                                                          "\"1\"") ","
+                                                                                   "{\"name"
+                                                                                   "\":"
+                                                                                   "\"other"
+                                                                                   "\","
+                                                                                   "\"data_"
+                                                                                   "set\":"
+                                                                                   "\"b."
+                                                                                   "trip\","
+                                                                                   "\"ms\":"
+                                                                                   "1,"
+                                                                                   "\"total"
+                                                                                   "\":{"
+                                                                                   "\"worst_"
+                                                                                   "percenti"
+                                                                                   "le_99\":"
+                                                                                   "0},"
+                                                                                   "\"option"
+                                                                                   "s\":{}"
+                                                                                   "}");
+
+static const struct {
+    double error;
+    unsigned renderers;
+    const char *name; /* NULL: none */
+} choices[] = {
+    { 3, 0, "quick" },
+    { 2, 0, "fine" }, /* below it, not at it */
+    { 0.5, 0, "slow" },
+    { 3, 1u << TRIPTYCH_RENDERER_CPU, "fine" },
+    { 0.5, 1u << TRIPTYCH_RENDERER_CPU, NULL },
+    { 0.05, 0, NULL },
+    { 3, 1u << TRIPTYCH_RENDERER_INTEGRAL, NULL },
+};
+
+static void the_fastest_below_the_error_is_taken(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof choices / sizeof *choices; i++) {
+        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        const accuracy_wanted wanted = { .error = choices[i].error,
+                                         .renderers = choices[i].renderers };
+        found.setting.settings.background[0] = 0.25;
+        test_catch_reports();
+        int status = accuracy_fastest_in(report, "a.json", &wanted, &found);
+        if (!choices[i].name) {
+            assert_int_equal(status, TRIP_ERROR);
+            assert_one_report("a.json");
+            continue;
+        }
+        assert_int_equal(status, 0);
+        assert_string_equal(found.setting.name, choices[i].name);
+        assert_true(found.setting.settings.background[0] == 0.25);
+    }
+}
+
+static void what_is_no_report_is_refused(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {
+        "",          "x",
+        "{}",        "[]",
+        REPORT("1"), "{\"triptych_accuracy\":2,\"rows\":[]}",
+        REPORT(""),  REPORT("{\"name\":\"a\",\"data_set\":\"a.trip\"}")
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        test_catch_reports();
+        assert_int_equal(
+            accuracy_fastest_in(texts[i], "a.json", &(accuracy_wanted){ .error = 9 }, &found),
+            TRIP_ERROR);
+        assert_one_report("a.json");
+    }
+}
+
+static void a_report_lies_beside_the_data(void **state)
+{
+    (void)state;
+    static const char *const pairs[][2] = { { "a.trip", "a.accuracy" },
+                                            { "b/a.trip//", "b/a.accuracy" },
+                                            { "../a.nii", "../a.accuracy" },
+                                            { "a.b/c", "a.b/c.accuracy" },
+                                            { ".trip", ".trip.accuracy" } };
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        char *path = accuracy_report_path(pairs[i][0]);
+        assert_string_equal(path, pairs[i][1]);
+        free(path);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(options_say_all_of_a_setting),
+        cmocka_unit_test(unknown_options_are_refused),
+        cmocka_unit_test(the_fastest_below_the_error_is_taken),
+        cmocka_unit_test(what_is_no_report_is_refused),
+        cmocka_unit_test(a_report_lies_beside_the_data),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
