@@ -12,10 +12,12 @@ static const struct {
     const char *name;
     int (*run)(const session *s, const bench_options *o, bench_report *r);
     bool makes_volumes; /* where no data set is named */
+    bool opens;         /* the data set by itself */
 } tables[] = {
-    { "orders", bench_orders, false },   { "submit", bench_submit, false },
-    { "stream", bench_stream, false },   { "renderers", bench_renderers, false },
-    { "popping", bench_popping, false }, { "levels", bench_levels, true },
+    { "orders", bench_orders, false, false },   { "submit", bench_submit, false, false },
+    { "stream", bench_stream, false, false },   { "renderers", bench_renderers, false, false },
+    { "popping", bench_popping, false, false }, { "levels", bench_levels, true, false },
+    { "flight", bench_flight, false, true },
 };
 
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)
@@ -66,12 +68,12 @@ static int measure_data(bench_options *o, size_t table, bench_report *r)
         status = bench_sample_make(&sample);
         o->input = sample.data;
     }
-    if (!status)
+    if (!status && !tables[table].opens)
         status = session_open(&s, o->input, &(session_look){ .tf = o->tf }, o->memory_bytes);
-    if (!status) {
+    if (!status && !tables[table].opens)
         describe(&s, o, included, r);
-        status = tables[table].run(&s, o, r);
-    }
+    if (!status)
+        status = tables[table].run(tables[table].opens ? NULL : &s, o, r);
     session_close(&s);
     bench_sample_remove(&sample);
     return status;

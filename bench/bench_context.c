@@ -14,7 +14,7 @@ static int check(const bench_context *c, int status)
     return status;
 }
 
-static triptych_renderer renderer_of(const bench_options *o)
+triptych_renderer bench_context_renderer(const bench_options *o)
 {
     switch (o->renderers[0]) {
     case TRIP_RENDERER_GL:
@@ -45,7 +45,7 @@ int bench_context_open(bench_context *c, const char *path, const bench_options *
 {
     const triptych_resources resources = { .memory_bytes = o->memory_bytes,
                                            .threads = (unsigned)o->threads[0],
-                                           .renderer = renderer_of(o),
+                                           .renderer = bench_context_renderer(o),
                                            .keep_pages = 1 };
     *c = (bench_context){ .settings = settings_of(&o->settings), .progress = o->progress };
     if (triptych_create(&c->t))

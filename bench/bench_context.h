@@ -13,6 +13,9 @@ typedef struct bench_context {
     bench_progress *progress;   /* a step of it is each picture */
 } bench_context;
 
+/* The one renderer of the options. */
+triptych_renderer bench_context_renderer(const bench_options *o);
+
 /* Failures are reported. Close it also after one. */
 int bench_context_open(bench_context *c, const char *path, const bench_options *o);
 void bench_context_close(bench_context *c);

@@ -25,11 +25,14 @@ enum {
     KEY_FIELD,
     KEY_FINEST,
     KEY_PLOT,
+    KEY_SECONDS,
+    KEY_FPS,
     KEY_JSON,
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
 #define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES))
+#define OF_FLIGHT (BIT(KEY_SECONDS) | BIT(KEY_FPS))
 #define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST) | BIT(KEY_PLOT))
 
 static const struct argp_option options[] = {
@@ -37,7 +40,7 @@ static const struct argp_option options[] = {
       "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
     { "size", KEY_SIZE, "WxH[,...]", 0,
       "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping, levels "
-      "256x256)",
+      "256x256; flight 800x600)",
       0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
       "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; popping, "
@@ -55,7 +58,8 @@ static const struct argp_option options[] = {
       "Whether bricks behind what is opaque are read (default: stream draw, renderers skip); skip "
       "by cpu only",
       0 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (default: auto); stream only", 0 },
+    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (default: auto); stream, flight",
+      0 },
     TRIP_OPTION_MEMORY(KEY_MEMORY, 0),
     { "no-counts", KEY_NO_COUNTS, NULL, 0,
       "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
@@ -72,6 +76,11 @@ static const struct argp_option options[] = {
     { "finest", KEY_FINEST, "N", 0,
       "Up to so many voxels along each axis: 128, 256, 512 or 1024 (default: 512); likewise", 0 },
     { "plot", KEY_PLOT, "FILE", 0, "Draws its table into an .svg; likewise", 0 },
+    { "seconds", KEY_SECONDS, "N", 0, "How long the eye moves (default: 12); flight only", 0 },
+    { "fps", KEY_FPS, "N", 0,
+      "Frames a second that moving views are drawn for, as of `triptych view` (default: 30); "
+      "likewise",
+      0 },
     { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
     { 0 },
 };
@@ -83,71 +92,81 @@ static const struct table {
     int repeat;
     int views; /* 0: 20 */
     bool draw_hidden;
-    int sizes[2], size_count;
+    int sizes[2][2], size_count;
     trip_renderer_kind renderers[3];
     int renderer_count;
 } tables[] = {
     {
         .name = "orders",
-        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
-                   BIT(KEY_HIDDEN),
+        .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
         .draw_hidden = true,
         .repeat = 5,
-        .sizes = { 512 },
+        .sizes = { { 512, 512 } },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_AUTO },
         .renderer_count = 1,
     },
     {
         .name = "submit",
-        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) |
-                   BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+        .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
         .draw_hidden = true,
         .repeat = 5,
-        .sizes = { 512 },
+        .sizes = { { 512, 512 } },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_GL },
         .renderer_count = 1,
     },
     {
         .name = "stream",
-        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_hidden = true,
         .repeat = 5,
-        .sizes = { 1024 },
+        .sizes = { { 1024, 1024 } },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_AUTO },
         .renderer_count = 1,
     },
     {
         .name = "renderers",
-        .refused = OF_LEVELS | BIT(KEY_ENGINE),
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_ENGINE),
         .lists = true,
         .repeat = 1,
-        .sizes = { 512, 1024 },
+        .sizes = { { 512, 512 }, { 1024, 1024 } },
         .size_count = 2,
         .renderers = { TRIP_RENDERER_CPU, TRIP_RENDERER_GL, TRIP_RENDERER_REFERENCE },
         .renderer_count = 3,
     },
     {
         .name = "popping",
-        .refused = OF_LEVELS | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
                    BIT(KEY_VIEWS) | BIT(KEY_REPEAT),
         .draw_hidden = true,
         .repeat = 1,
-        .sizes = { 256 },
+        .sizes = { { 256, 256 } },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_CPU },
         .renderer_count = 1,
     },
     {
         .name = "levels",
-        .refused = BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS),
+        .refused = OF_FLIGHT | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS),
         .repeat = 5,
         .views = 3,
-        .sizes = { 256 },
+        .sizes = { { 256, 256 } },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_CPU },
+        .renderer_count = 1,
+    },
+    {
+        .name = "flight",
+        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_REPEAT) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_HIDDEN) | BIT(KEY_NO_SHADING) | BIT(KEY_KERNEL_RADIUS),
+        .repeat = 1,
+        .sizes = { { 800, 600 } },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_AUTO },
         .renderer_count = 1,
     },
 };
@@ -288,6 +307,10 @@ static int parse_option(int key, char *arg, bench_options *o)
     case KEY_PLOT:
         o->plot = arg;
         return 0;
+    case KEY_SECONDS:
+        return trip_option_number("--seconds", arg, 0.1, 600, &o->seconds);
+    case KEY_FPS:
+        return trip_option_number("--fps", arg, 1, 1000, &o->frames_per_second);
     case KEY_JSON:
         o->json = true;
         return 0;
@@ -304,7 +327,7 @@ static void fill_defaults(bench_options *o, const struct table *t)
         o->repeat = t->repeat;
     if (!o->size_count)
         for (int i = 0; i < t->size_count; i++, o->size_count++)
-            o->sizes[i][0] = o->sizes[i][1] = t->sizes[i];
+            memcpy(o->sizes[i], t->sizes[i], sizeof o->sizes[i]);
     if (!o->renderer_count)
         for (int i = 0; i < t->renderer_count; i++, o->renderer_count++)
             o->renderers[i] = t->renderers[i];
@@ -344,7 +367,7 @@ static void be_short(parse *p)
 static int check(parse *p)
 {
     static const char *const names[] = { "orders",  "submit", "stream", "renderers",
-                                         "popping", "levels", NULL };
+                                         "popping", "levels", "flight", NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)
@@ -399,7 +422,11 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                "than a minute, the renderers cpu and gl. What is compared takes turns, so that a "
                "machine busy for a while slows all of them.",
     };
-    *o = (bench_options){ .field = "shells", .finest = 512, .settings = trip_settings_default() };
+    *o = (bench_options){ .field = "shells",
+                          .finest = 512,
+                          .seconds = 12,
+                          .frames_per_second = 30,
+                          .settings = trip_settings_default() };
     o->settings.slices = 0;
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);

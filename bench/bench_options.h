@@ -19,9 +19,11 @@ typedef struct bench_options {
     int renderer_count;
     int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
     int repeat, views;
-    const char *field; /* what is sampled finer and finer, a name of trip_fields */
-    int finest;        /* up to so many voxels along each axis */
-    const char *plot;  /* an SVG of it is written here; NULL: none */
+    const char *field;        /* what is sampled finer and finer, a name of trip_fields */
+    int finest;               /* up to so many voxels along each axis */
+    const char *plot;         /* an SVG of it is written here; NULL: none */
+    double seconds;           /* that a flight takes */
+    double frames_per_second; /* of it, wanted */
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
@@ -38,7 +40,8 @@ typedef struct bench_options {
     "  stream     reading and drawing against the disk's bandwidth\n"                              \
     "  renderers  the renderers there are, over views round the object\n"                          \
     "  popping    how much pixels jump where the axis of most weight changes\n"                    \
-    "  levels     how far coarse levels are from the finest; what an object sampled finer takes\n"
+    "  levels     how far coarse levels are from the finest; what an object sampled finer takes\n" \
+    "  flight     the viewer's drawing while the eye turns, approaches and flies through\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

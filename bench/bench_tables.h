@@ -10,6 +10,8 @@ int bench_stream(const session *s, const bench_options *o, bench_report *r);
 int bench_popping(const session *s, const bench_options *o, bench_report *r);
 /* Without a session: of volumes that it makes. */
 int bench_levels(const session *s, const bench_options *o, bench_report *r);
+/* Without a session: it opens the data set as the viewer does. */
+int bench_flight(const session *s, const bench_options *o, bench_report *r);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 
 #endif

@@ -329,6 +329,33 @@ static void levels_of_a_plain_block_are_near_the_finest(void **state)
     assert_fails(&r, 1);
 }
 
+/* However few pictures the machine is quick enough for. */
+static void flight_ends_with_the_picture_of_render_and_counts_each_picture_once(void **state)
+{
+    (void)state;
+    cJSON *root = bench("flight block.trip --renderer cpu --threads 2 --size 40x30 --seconds 0.4 "
+                        "--memory 64M");
+    const cJSON *rows = rows_of(root, "parts");
+    const cJSON *rest = cJSON_GetArrayItem(rows_of(root, "rest"), 0);
+    double pictures = 0;
+    assert_int_equal(cJSON_GetArraySize(rows), 5);
+    for (int i = 0; i < 5; i++) {
+        const cJSON *row = cJSON_GetArrayItem(rows, i);
+        assert_true(number(row, "ms") <= number(row, "ms_99"));
+        assert_true(number(row, "ms_99") <= number(row, "ms_most"));
+        assert_true(number(row, "stale") <= number(row, "pictures"));
+        if (i < 4)
+            pictures += number(row, "pictures");
+        else
+            assert_true(number(row, "pictures") == pictures);
+    }
+    assert_true(number(rest, "differ") == 0);
+    assert_true(number(rest, "first_ms") <= number(rest, "first_whole_ms"));
+    assert_true(number(rest, "limit_bytes") == 64.0 * (1 << 20));
+    assert_true(number(rest, "peak_bytes") <= number(rest, "limit_bytes"));
+    cJSON_Delete(root);
+}
+
 static void levels_without_a_data_set_samples_an_object_and_plots_it(void **state)
 {
     (void)state;
@@ -426,6 +453,7 @@ int main(void)
         cmocka_unit_test(popping_is_of_axis_alone),
         cmocka_unit_test(levels_of_a_plain_block_are_near_the_finest),
         cmocka_unit_test(levels_without_a_data_set_samples_an_object_and_plots_it),
+        cmocka_unit_test(flight_ends_with_the_picture_of_render_and_counts_each_picture_once),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
         cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),

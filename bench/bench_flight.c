@@ -1,0 +1,264 @@
+/* bench flight: what the viewer's drawing thread does while the eye turns about a data set, comes
+ * nearer and goes through it, as a table of the times between its pictures; and whether the picture
+ * at rest is the one that the library draws. */
+#include "bench_tables.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "bench_context.h"
+#include "budget.h"
+#include "flyer.h"
+#include "report.h"
+
+typedef struct flying {
+    const bench_options *options;
+    bench_report *report;
+    flyer flyer;
+    trip_frames_status status; /* at rest */
+} flying;
+
+static triptych_settings settings_of(const bench_options *o)
+{
+    (void)o;
+    return triptych_default_settings();
+}
+
+/* ---- frame times ---- */
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of sorted numbers: the least that so large a part of them does not exceed. */
+static double quantile(const double *sorted, int count, double part)
+{
+    const int i = (int)ceil(part * count) - 1;
+    return count ? sorted[i < 0 ? 0 : i] : 0;
+}
+
+/* What a part of the flight came to. */
+typedef struct part {
+    double *between, *age, *scale; /* of its pictures */
+    int count, stale;
+} part;
+
+/* Of pictures of steps `first` to before `past`. */
+static void gather(const flyer *f, int first, int past, part *p)
+{
+    for (int i = 1; i < f->picture_count; i++) {
+        const flyer_picture *at = &f->pictures[i];
+        if (at->step < first || at->step >= past)
+            continue;
+        p->between[p->count] = at->ms - at[-1].ms;
+        p->age[p->count] = at->age_ms;
+        p->scale[p->count] = at->scale;
+        p->stale += at->step < at->latest - 1;
+        p->count++;
+    }
+    qsort(p->between, (size_t)p->count, sizeof *p->between, ascending);
+    qsort(p->age, (size_t)p->count, sizeof *p->age, ascending);
+    qsort(p->scale, (size_t)p->count, sizeof *p->scale, ascending);
+}
+
+static void add_part(cJSON *table, const char *name, const part *p)
+{
+    double sum = 0;
+    cJSON *row = cJSON_CreateObject();
+    for (int i = 0; i < p->count; i++)
+        sum += p->between[i];
+    cJSON_AddStringToObject(row, "part", name);
+    cJSON_AddNumberToObject(row, "pictures", p->count);
+    cJSON_AddNumberToObject(row, "fps", sum > 0 ? 1e3 * p->count / sum : 0);
+    cJSON_AddNumberToObject(row, "ms", quantile(p->between, p->count, 0.5));
+    cJSON_AddNumberToObject(row, "ms_99", quantile(p->between, p->count, 0.99));
+    cJSON_AddNumberToObject(row, "ms_most", quantile(p->between, p->count, 1));
+    cJSON_AddNumberToObject(row, "age_ms", quantile(p->age, p->count, 0.5));
+    cJSON_AddNumberToObject(row, "age_ms_99", quantile(p->age, p->count, 0.99));
+    cJSON_AddNumberToObject(row, "stale", p->stale);
+    cJSON_AddNumberToObject(row, "scale", quantile(p->scale, p->count, 0.5));
+    cJSON_AddItemToArray(table, row);
+}
+
+static const bench_column part_columns[] = {
+    { "part", "part", 0, 0 },
+    { "pictures", "pictures", 0, 0 },
+    { "fps", "a second", 1, 0 },
+    { "ms", "ms between", 1, 0 },
+    { "ms_99", "99 %", 1, 0 },
+    { "ms_most", "most", 1, 0 },
+    { "age_ms", "ms from input", 1, 0 },
+    { "age_ms_99", "99 %", 1, 0 },
+    { "stale", "of older input", 0, 0 },
+    { "scale", "scale", 2, 0 },
+};
+
+static int add_parts(const flying *m)
+{
+    static const char *const names[FLYER_PARTS] = { "round", "nearer", "through", "back" };
+    const flyer *f = &m->flyer;
+    cJSON *table = bench_report_table(m->report, "parts", "Pictures while the eye moves",
+                                      part_columns, sizeof part_columns / sizeof part_columns[0]);
+    const size_t room = (size_t)f->picture_count + 1;
+    double *memory = calloc(3 * room, sizeof *memory);
+    if (!memory)
+        return trip_fail(TRIP_ERROR, "bench", "flight", "out of memory");
+    for (int i = 0; i <= FLYER_PARTS; i++) {
+        part p = { memory, memory + room, memory + 2 * room, 0, 0 };
+        const int steps = f->steps / FLYER_PARTS;
+        if (i < FLYER_PARTS)
+            gather(f, i * steps, (i + 1) * steps, &p);
+        else
+            gather(f, 0, f->steps, &p);
+        add_part(table, i < FLYER_PARTS ? names[i] : "all", &p);
+    }
+    free(memory);
+    return 0;
+}
+
+/* ---- at rest ---- */
+
+static int byte_of(float x)
+{
+    return x > 0 ? (x < 1 ? (int)(x * 255 + 0.5f) : 255) : 0;
+}
+
+static int draw_alone(const flying *m, triptych *t, int *differ)
+{
+    const bench_options *o = m->options;
+    const triptych_settings settings = settings_of(o);
+    const int width = o->sizes[0][0], height = o->sizes[0][1];
+    const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
+    float *rgba = NULL;
+    int status = triptych_open(t, o->input,
+                               &(triptych_resources){ .memory_bytes = o->memory_bytes,
+                                                      .threads = (unsigned)o->threads[0],
+                                                      .renderer = bench_context_renderer(o),
+                                                      .engine = (triptych_engine)o->engine });
+    if (!status)
+        status = triptych_set_function(t, &(triptych_function){ .name = o->tf });
+    if (!status)
+        status = triptych_set_settings(t, &settings);
+    if (!status)
+        status = triptych_set_view(t, &view);
+    if (!status)
+        status = triptych_new_picture(t, width, height, 4, &rgba);
+    if (!status)
+        status = triptych_draw(t, rgba);
+    for (size_t i = 0; !status && i < (size_t)width * (size_t)height; i++)
+        for (size_t c = 0; c < 3; c++)
+            *differ += byte_of(rgba[4 * i + c]) != m->flyer.last[4 * i + c];
+    return status;
+}
+
+/* Channels of the picture at rest that are not those of the picture the library draws. */
+static int compare_rest(const flying *m, int *differ)
+{
+    triptych *t = NULL;
+    *differ = 0;
+    if (triptych_create(&t))
+        return trip_fail(TRIP_ERROR, "bench", "flight", "out of memory");
+    int status = draw_alone(m, t, differ);
+    if (status)
+        trip_report_line(triptych_error(t));
+    triptych_destroy(t);
+    return status;
+}
+
+static const bench_column rest_columns[] = {
+    { "first_ms", "ms to first picture", 0, 0 },  { "first_whole_ms", "to whole picture", 0, 0 },
+    { "rest_ms", "to whole after flight", 0, 0 }, { "differ", "channels not render's", 0, 0 },
+    { "peak_bytes", "memory taken MB", 1, 1e6 },  { "limit_bytes", "promised MB", 1, 1e6 },
+    { "resident_bytes", "resident MB", 1, 1e6 },
+};
+
+static int add_rest(const flying *m)
+{
+    cJSON *table = bench_report_table(m->report, "rest", "Before and after", rest_columns,
+                                      sizeof rest_columns / sizeof rest_columns[0]);
+    cJSON *row = cJSON_CreateObject();
+    const double resident = (double)trip_memory_peak_rss_bytes();
+    int differ;
+    cJSON_AddItemToArray(table, row);
+    cJSON_AddNumberToObject(row, "first_ms", m->flyer.first_ms);
+    cJSON_AddNumberToObject(row, "first_whole_ms", m->flyer.first_whole_ms);
+    cJSON_AddNumberToObject(row, "rest_ms", m->flyer.rest_ms);
+    cJSON_AddNumberToObject(row, "peak_bytes", (double)m->status.stats.peak_memory_bytes);
+    cJSON_AddNumberToObject(row, "limit_bytes", (double)m->status.stats.memory_bytes);
+    cJSON_AddNumberToObject(row, "resident_bytes", resident);
+    int status = compare_rest(m, &differ);
+    cJSON_AddNumberToObject(row, "differ", differ);
+    return status;
+}
+
+static void describe(const flying *m)
+{
+    const bench_options *o = m->options;
+    const triptych_info *info = &m->flyer.opened.info;
+    cJSON *settings = bench_report_settings(m->report);
+    char text[64];
+    cJSON_AddStringToObject(settings, "data_set", o->input);
+    snprintf(text, sizeof text, "%lld x %lld x %lld", (long long)info->dims[0],
+             (long long)info->dims[1], (long long)info->dims[2]);
+    cJSON_AddStringToObject(settings, "grid", text);
+    cJSON_AddNumberToObject(settings, "data_set_bytes", (double)info->bytes);
+    cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
+    snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
+    cJSON_AddStringToObject(settings, "size", text);
+    cJSON_AddStringToObject(settings, "renderer", m->status.renderer);
+    cJSON_AddStringToObject(settings, "device", m->status.device);
+    cJSON_AddNumberToObject(settings, "wanted_fps", o->frames_per_second);
+}
+
+static void add_limits(const flying *m)
+{
+    bench_report_limit(m->report,
+                       "%d steps of input, %d a second, come whatever is drawn. Ms from input: "
+                       "from a step to the picture of it. Of older input: pictures of a step more "
+                       "than one before the latest there was when the picture before had come. "
+                       "Scale: the median part of the width and height wanted.",
+                       m->flyer.steps, FLYER_STEPS_PER_SECOND);
+    bench_report_limit(m->report, "Resident includes the program and its libraries; the data set "
+                                  "may be in the page cache: empty that for times from the disk.");
+}
+
+static int fly(flying *m)
+{
+    const bench_options *o = m->options;
+    const trip_frames_params params = { .memory_bytes = o->memory_bytes,
+                                        .threads = (unsigned)o->threads[0],
+                                        .renderer = bench_context_renderer(o),
+                                        .engine = (triptych_engine)o->engine,
+                                        .frames_per_second = o->frames_per_second };
+    const trip_wanted wanted = { .document = 1,
+                                 .input = o->input,
+                                 .width = o->sizes[0][0],
+                                 .height = o->sizes[0][1],
+                                 .function = o->tf,
+                                 .opacity_scale = 1,
+                                 .settings = settings_of(o) };
+    int status = flyer_fly(&m->flyer, &params, &wanted, o->seconds);
+    if (m->flyer.frames)
+        m->status = trip_frames_get_status(m->flyer.frames);
+    flyer_land(&m->flyer);
+    return status;
+}
+
+int bench_flight(const session *s, const bench_options *o, bench_report *r)
+{
+    flying m = { .options = o, .report = r };
+    (void)s;
+    int status = fly(&m);
+    if (!status) {
+        describe(&m);
+        status = add_parts(&m);
+    }
+    if (!status)
+        status = add_rest(&m);
+    if (!status)
+        add_limits(&m);
+    flyer_release(&m.flyer);
+    return status;
+}
