@@ -43,18 +43,25 @@ static double distance_to(const trip_camera *c, const uint64_t dims[3])
 }
 
 /* A pixel is as wide as directions of neighbouring rays are apart, at depth 1 in perspective. */
-static double voxel_px(const trip_camera *c, const uint64_t dims[3])
+static double voxel_px(const trip_camera *c, double distance)
 {
     double pixel = fmin(trip_length(c->rx), trip_length(c->ry));
-    return c->ortho ? 1 / pixel : 1 / (pixel * distance_to(c, dims));
+    return c->ortho ? 1 / pixel : 1 / (pixel * distance);
+}
+
+static int slices_of(double voxel_px)
+{
+    double more = floor(voxel_px / TRIP_SLICES_EACH_PX);
+    return 2 + (int)fmin(TRIP_SLICES_LARGE - 2, more);
 }
 
 trip_view_slices trip_slices_of_view(const trip_camera *camera, const trip_settings *settings,
                                      const uint64_t dims[3])
 {
+    const double distance = distance_to(camera, dims);
     trip_view_slices v = { .slope = steepest(camera, settings),
-                           .voxel_px = voxel_px(camera, dims) };
-    bool straight = v.slope <= TRIP_SLICES_STRAIGHT, large = v.voxel_px >= TRIP_SLICES_LARGE_PX;
-    v.slices = straight ? 1 : large ? 3 : 2;
+                           .voxel_px = voxel_px(camera, distance) };
+    const double counted = voxel_px(camera, fmax(distance, TRIP_SLICES_NEAR_VOXELS));
+    v.slices = v.slope <= TRIP_SLICES_STRAIGHT ? 1 : slices_of(counted);
     return v;
 }

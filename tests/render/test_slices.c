@@ -48,19 +48,20 @@ static void rays_along_an_axis_take_one_slice_and_oblique_ones_two(void **state)
         }
 }
 
-static void large_voxels_take_three_but_along_an_axis(void **state)
+static void large_voxels_take_more_but_along_an_axis(void **state)
 {
     (void)state;
     for (double px = 0.25; px < 40; px *= 2) {
         trip_view_slices v = parallel(0.5, 1 / px, 1);
         assert_close(v.voxel_px, px, 1e-9);
-        assert_int_equal(v.slices, px >= 4 ? 3 : 2);
+        assert_int_equal(v.slices, px < 4 ? 2 : px < 8 ? 3 : px < 16 ? 4 : 6);
         assert_int_equal(parallel(0, 1 / px, 1).slices, 1);
     }
 }
 
 /* The pixel at the middle is 2 tan(fov / 2) / WIDTH wide at distance 1, and the grid's nearest
- * voxel is so far off; within the grid voxels have no greatest size. Corners are the steepest. */
+ * voxel is so far off; within the grid voxels have no greatest size, and count as 16 voxels off.
+ * Corners are the steepest. */
 static void perspective_views_go_by_the_nearest_voxel_and_the_steepest_ray(void **state)
 {
     (void)state;
@@ -77,7 +78,12 @@ static void perspective_views_go_by_the_nearest_voxel_and_the_steepest_ray(void 
     inside.look.y = 40;
     v = slices_of(inside, 1, TRIP_METHOD_MERGE);
     assert_true(isinf(v.voxel_px));
-    assert_int_equal(v.slices, 3);
+    assert_int_equal(v.slices, 2 + (int)(WIDTH / (2 * half * 16) / 4));
+    assert_int_equal(v.slices, 4);
+    inside.fov_degrees = 60; /* 3.5 pixels at 16 voxels */
+    assert_int_equal(slices_of(inside, 1, TRIP_METHOD_MERGE).slices, 2);
+    inside.fov_degrees = 5; /* 46 */
+    assert_int_equal(slices_of(inside, 1, TRIP_METHOD_MERGE).slices, 6);
 }
 
 /* At 100 degrees, rays of slope 1 and more: by the list that they are most aligned with they are at
@@ -98,7 +104,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_along_an_axis_take_one_slice_and_oblique_ones_two),
-        cmocka_unit_test(large_voxels_take_three_but_along_an_axis),
+        cmocka_unit_test(large_voxels_take_more_but_along_an_axis),
         cmocka_unit_test(perspective_views_go_by_the_nearest_voxel_and_the_steepest_ray),
         cmocka_unit_test(the_steepest_ray_is_among_those_with_weight),
     };
