@@ -5,12 +5,27 @@
 
 #include "gradient.h"
 
+/* So that values keep 4096 codes at least, whatever lies around them. */
+#define BACKGROUND_SHARE 16
+
+/* The halo of a sparse volume holds its background. */
+static void include_background(trip_quantiser *q, const trip_brick_input *in)
+{
+    const double background = in->info->background;
+    const double lo = fmin(q->lo, background), hi = fmax(q->hi, background);
+    if (in->info->sparse && hi - lo <= BACKGROUND_SHARE * (q->hi - q->lo)) {
+        q->lo = lo;
+        q->hi = hi;
+    }
+}
+
 void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in, double lo,
                                 double hi)
 {
     hi = hi > lo ? hi : lo + 1;
     c->quantiser = (trip_quantiser){ lo, hi, trip_brick_gradient_full(in, lo, hi),
                                      trip_gradient_unit(&in->info->index_to_world) };
+    include_background(&c->quantiser, in);
 }
 
 static void choose_range(trip_brick_codes *c, const trip_brick_input *in)

@@ -16,7 +16,8 @@ typedef struct trip_brick_codes {
  * cover the range of types of 8 or 16 bits, else the range of the values, if that was scanned; else
  * it is to be set before values are quantised. */
 void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in);
-/* Codes cover [lo, hi]. */
+/* Codes cover [lo, hi], the values, and the background of a sparse volume where that is not much
+ * farther off than values are apart. */
 void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in, double lo,
                                 double hi);
 

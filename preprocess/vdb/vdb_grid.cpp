@@ -147,8 +147,8 @@ void BoxList::finish()
         return a.lo[0] < b.lo[0];
     });
     for (int a = 0; a < 3; a++) {
-        grid_.lo[a] = bounds_.min()[a];
-        grid_.hi[a] = bounds_.max()[a];
+        grid_.lo[a] = bounds_.min()[a] - 1;
+        grid_.hi[a] = bounds_.max()[a] + 1;
     }
 }
 

@@ -51,9 +51,11 @@ class trip_vdb_grid
     virtual void decode(const int64_t lo[3], const int64_t size[3], float *values,
                         uint8_t *active) const = 0;
 
-    trip_scalar type;                /* as stored */
-    double background = 0;           /* after conversion */
-    int32_t lo[3], hi[3];            /* of all existing voxels, inclusive */
+    trip_scalar type;      /* as stored */
+    double background = 0; /* after conversion */
+    /* Of all existing voxels and one of the background around them, so that values interpolated
+     * between voxels end there as they do in the library; inclusive. */
+    int32_t lo[3], hi[3];
     std::vector<trip_vdb_box> boxes; /* sorted by their corner's k, then j, then i */
 };
 

@@ -205,16 +205,18 @@ static void read_field(void)
             int64_t at[3] = { i % EDGE, i / EDGE % EDGE, i / EDGE / EDGE };
             lo[a] = at[a] < lo[a] ? at[a] : lo[a];
         }
-    memcpy(corner, lo, sizeof corner);
+    for (int a = 0; a < 3; a++)
+        corner[a] = lo[a] - 1;
 }
 
-/* Of the field's value, or the nearest that there are codes of: the background has none. */
+/* Of the field's value. */
 static int32_t code_of_field(const test_lists *l, size_t voxel)
 {
     int64_t x = (int64_t)(voxel % l->header.dims[0]) + corner[0];
     int64_t y = (int64_t)(voxel / l->header.dims[0] % l->header.dims[1]) + corner[1];
     int64_t z = (int64_t)(voxel / l->header.dims[0] / l->header.dims[1]) + corner[2];
-    double value = field[(z * EDGE + y) * EDGE + x];
+    bool within = x >= 0 && y >= 0 && z >= 0 && x < EDGE && y < EDGE && z < EDGE;
+    double value = within ? field[(z * EDGE + y) * EDGE + x] : 0;
     double code = (value - l->header.code_lo) / (l->header.code_hi - l->header.code_lo) * 65535;
     return (int32_t)fmin(65535, fmax(0, floor(code + 0.5)));
 }
