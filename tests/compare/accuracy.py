@@ -39,9 +39,9 @@ def load(path, name):
     return pictures.premultiply(image) if name.startswith(("triptych-", "integral")) else image
 
 
-def measure(options, prepared, field, views, log):
+def measure(options, prepared, field, views, size, log):
     """By program: figures of pictures.distance(), the mean over views; {} without an integral."""
-    size, apart = options.sizes[0], {one.name: [] for one in field}
+    apart = {one.name: [] for one in field}
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "picture.png")
         for view in views:
@@ -69,7 +69,7 @@ def table(result, size):
              "| program | median ms | error: median | mean | 99 % | most | of opacity: median | mean |",
              "|---|--:|--:|--:|--:|--:|--:|--:|"]
     times = {row["program"]: row["ms"] for row in result["rows"] if row["size"] == size}
-    for name, error in result["errors"].items():
+    for name, error in result["errors"].get(str(size), {}).items():
         lit = ("median", "mean", "percentile_99", "most")
         cells = ["-" if name == "vdb_render" else "%.2f" % error[key] for key in lit]
         cells += ["%.2f" % error[key] for key in ("opacity_median", "opacity_mean")]

@@ -13,6 +13,7 @@ import accuracy
 import check
 import contenders
 import pictures
+import plots
 import scenes
 from contenders import Unavailable
 from prepare import Prepared
@@ -34,15 +35,16 @@ NOTES = [
     "its ray tracing took. It has no transfer function: its grid holds the extinction of every "
     "voxel, so it shows the same opacity, in grey and unlit, without shadows (-shadowstep 1e9). It "
     "stops a ray at 4 % transmittance, VTK's ray caster at 0.8 %, Triptych at 0.012 %.",
-    "triptych-post: triptych-cpu with --classify post, 2 slices. vtk-cpu-half: vtk-cpu with a sample every half "
-    "voxel. VTK's ray caster is given a view wider by a pixel, which it needs to show the same.",
+    "triptych-post-1, -2, -4: triptych-cpu with --classify post and so many slices; triptych-cpu and "
+    "triptych-gl draw --classify pre. vtk-cpu-half: vtk-cpu with a sample every half voxel. VTK's ray caster is given a view wider by a pixel, which it needs to show the same.",
     "Errors: of 255, against the integral through the source volume (linear interpolation, tolerance "
     "%g, 8 bits a channel), over red, green, blue (premultiplied) and opacity of the pixels where "
     "either opacity is above 1/255, and of opacity alone, which no light changes; the mean of the views "
     "measured. VTK lights by gradients of its own, and lights flat regions: its error in colour holds "
     "that difference too." %
     accuracy.TOLERANCE,
-    "vdb_render's and Triptych's functions are applied to voxels, VTK's to interpolated values.",
+    "vdb_render's function, and those of triptych-cpu and triptych-gl, are applied to voxels, VTK's and "
+    "those of triptych-post to interpolated values.",
     "Triptych leaves flat regions unlit; VTK lights them like all others.",
     "Medians: of the rounds at each view, then over views.",
 ]
@@ -219,8 +221,9 @@ def run_scene(options, scene, volume):
         path = os.path.join(options.out, scene.name + ".png")
         views = views_of(prepared, options)
         view = views[1 % options.views]
-        result["errors"] = accuracy.measure(options, prepared, field,
-                                            views[:options.error_views], log)
+        result["errors"] = {
+            str(size): accuracy.measure(options, prepared, field, views[:options.error_views], size,
+                                        log) for size in options.sizes}
         result["pictures"] = path
         result["differences"] = draw_pictures(options, prepared, field, view, path)
     finally:
@@ -259,12 +262,58 @@ def _cell(row, is_base):
     return text
 
 
+def scene_text(result, whole):
+    """One scene's tables, with what they do not say."""
+    settings, out = whole["settings"], []
+    for size in settings["sizes"]:
+        out += [accuracy.table(result, size), ""]
+    out += ["%d views round the object, %d rounds, %d threads; errors of %d of the views. Load %.1f "
+            "before, %.1f after: times of programs in one table compare, those of tables do not." %
+            (settings["views"], settings["rounds"], settings["threads"], settings["error_views"],
+             result["load_before"], result["load_after"]), ""]
+    out += ["- " + note for note in NOTES]
+    out += ["- without %s: %s." % item for item in result["left_out"].items()]
+    return "\n".join(out) + "\n"
+
+
+def panels_of(result, size):
+    """For plots.svg(), of what was both timed and compared; vdb_render has opacity alone, and its
+    own time counts."""
+    errors, panels = result["errors"].get(str(size), {}), {"colour": [], "opacity": []}
+    for row in result["rows"]:
+        error = errors.get(row["program"])
+        if row["size"] != size or not error:
+            continue
+        ms = row.get("own_ms", row["ms"])
+        if row["program"] != "vdb_render":
+            panels["colour"].append((row["program"], ms, error["mean"]))
+        panels["opacity"].append((row["program"], ms, error["opacity_mean"]))
+    return {what: points for what, points in panels.items() if points}
+
+
+def write_scene(options, result, whole):
+    """SCENE.md, and SCENE-SIZE.svg for each size."""
+    with open(os.path.join(options.out, result["scene"] + ".md"), "w", encoding="utf-8") as file:
+        file.write(scene_text(result, whole))
+    for size in options.sizes:
+        panels = panels_of(result, size)
+        if not panels:
+            continue
+        path = os.path.join(options.out, "%s-%d.svg" % (result["scene"], size))
+        title = "%s, %d x %d px, %d views: time and error" % (result["scene"], size, size,
+                                                              options.views)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(plots.svg(title, panels))
+        result.setdefault("plots", []).append(path)
+
+
 def report(whole):
     out = ["Whole frames, median ms (times triptych-cpu's), %d views round the object, %d threads" %
            (whole["settings"]["views"], whole["settings"]["threads"]), "", table(whole["scenes"]), ""]
     for result in whole["scenes"]:
         if result["errors"]:
-            out += [accuracy.table(result, whole["settings"]["sizes"][0]), ""]
+            for size in whole["settings"]["sizes"]:
+                out += [accuracy.table(result, size), ""]
     out += ["- " + note for note in NOTES]
     for result in whole["scenes"]:
         out += ["- %s: without %s: %s." % (result["scene"], name, why)
@@ -274,7 +323,8 @@ def report(whole):
     out += ["", "Settings", ""]
     out += ["- %s: %s" % item for item in whole["settings"].items()]
     out += ["", "Pictures", ""]
-    out += ["- " + result["pictures"] for result in whole["scenes"]]
+    for result in whole["scenes"]:
+        out += ["- " + path for path in [result["pictures"], *result.get("plots", [])]]
     return "\n".join(out)
 
 
@@ -298,12 +348,12 @@ def parse_options():
                         "what the programs draw from")
     parser.add_argument("--triptych", required=True, metavar="PROGRAM",
                         help="default: built here, preset release")
-    parser.add_argument("--scenes", type=comma(str, names), metavar="NAME[,..]",
+    parser.add_argument("--scene", "--scenes", dest="scenes", type=comma(str, names), metavar="NAME[,..]",
                         help="default: all whose volume is there, of " + ", ".join(names))
     parser.add_argument("--programs", type=comma(str, contenders.NAMES), default=contenders.NAMES,
                         metavar="NAME[,..]", help="of " + ", ".join(contenders.NAMES) +
                         "; " + BASE + " always runs, it gives the views")
-    parser.add_argument("--sizes", type=comma(int), default=[512, 1024], metavar="N[,..]",
+    parser.add_argument("--size", "--sizes", dest="sizes", type=comma(int), default=[512, 1024], metavar="N[,..]",
                         help="pixels along an edge (default: 512,1024)")
     parser.add_argument("--views", type=int, default=20, help="round the object (default: 20)")
     parser.add_argument("--threads", type=int, default=min(4, len(os.sched_getaffinity(0))),
@@ -311,11 +361,13 @@ def parse_options():
     parser.add_argument("--rounds", type=int, default=3, help="turns of every program at all views; "
                         "0: only pictures (default: 3)")
     parser.add_argument("--error-views", type=int, default=3, metavar="N", help="of the views, whose "
-                        "errors are measured at the first size (default: 3)")
+                        "errors are measured, at every size (default: 3)")
     parser.add_argument("--patience", type=float, default=60, metavar="SECONDS",
                         help="who took longer for a round has no further one (default: 60)")
     parser.add_argument("--slow", type=float, default=3, metavar="SECONDS",
                         help="who takes longer for a frame draws every fourth view (default: 3)")
+    parser.add_argument("--no-alignment", action="store_true", help="leave out the check that all "
+                        "programs look the same way")
     parser.add_argument("--tidy", action="store_true", help="remove what a scene was drawn from")
     parser.add_argument("--json", action="store_true", help="print results.json, not tables")
     options = parser.parse_args()
@@ -330,7 +382,7 @@ def choose_scenes(options):
     for scene in scenes.SCENES:
         if options.scenes and scene.name not in options.scenes:
             continue
-        volume = scenes.find(scene, folders)
+        volume = scenes.find(scene, folders, os.path.join(options.out, "work"))
         if volume:
             yield scene, volume
         else:
@@ -343,13 +395,19 @@ def main():
     whole = {"machine": machine(options.triptych),
              "settings": {"views": options.views, "threads": options.threads,
                           "sizes": options.sizes, "rounds": options.rounds,
+                          "error_views": min(options.views, options.error_views),
                           "patience_s": options.patience, "slow_s": options.slow},
              "notes": NOTES, "scenes": []}
-    whole["alignment"] = check.cameras_agree(options, log)
+    if not options.no_alignment:
+        whole["alignment"] = check.cameras_agree(options, log)
     path = os.path.join(options.out, "results.json")
     for scene, volume in choose_scenes(options):
-        whole["scenes"].append(run_scene(options, scene, volume))
-        whole["machine"]["load_after"] = os.getloadavg()[0]
+        load = os.getloadavg()[0]
+        result = run_scene(options, scene, volume)
+        result["load_before"], result["load_after"] = load, os.getloadavg()[0]
+        write_scene(options, result, whole)
+        whole["scenes"].append(result)
+        whole["machine"]["load_after"] = result["load_after"]
         with open(path, "w", encoding="utf-8") as file:
             json.dump(whole, file, indent=1)
         log("so far\n" + table(whole["scenes"]))

@@ -145,13 +145,15 @@ class VdbRender:
         pass
 
 
-NAMES = ["triptych-cpu", "triptych-post", "triptych-gl", "vtk-cpu", "vtk-cpu-half", "vtk-gpu",
-         "vdb_render"]
+POST = "triptych-post-"  # and the slices
+NAMES = ["triptych-cpu", POST + "1", POST + "2", POST + "4", "triptych-gl", "vtk-cpu",
+         "vtk-cpu-half", "vtk-gpu", "vdb_render"]
 
 
 def make(name, prepared, threads):
-    if name == "triptych-post":
-        return Triptych(prepared, "cpu", threads, name, ["--classify", "post", "--slices", "2"])
+    if name.startswith(POST):
+        return Triptych(prepared, "cpu", threads, name,
+                        ["--classify", "post", "--slices", name[len(POST):]])
     if name == "vtk-cpu-half":
         return Vtk(prepared, "cpu", threads, name, 0.5)
     if name.startswith("triptych-"):

@@ -3,6 +3,8 @@ or beside the included volumes."""
 import os
 from collections import namedtuple
 
+import generated
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 INCLUDED = os.path.join(HERE, "..", "..", "datasets")
 
@@ -26,6 +28,10 @@ SCENES = [
     Scene("head", "cthead_256x256x99_uint16.nhdr", "cthead", True, "dense", "skin and bone"),
     Scene("chest", "lidc-idri-0314_512x512x275_int16.nhdr", "chest", True, "dense",
           "lungs, flesh and bone, translucent"),
+    Scene("brain-translucent", "ch2better.nii.gz", "brain-translucent", True, "dense",
+          "all of a brain, opacity 0 to 0.4 from value 60 to 255"),
+    Scene("marschner-lobb", generated.MARSCHNER_LOBB, "marschner-lobb", True, "dense",
+          "the signal of Marschner and Lobb"),
 ]
 
 
@@ -34,8 +40,12 @@ def function_path(scene):
     return own if os.path.exists(own) else os.path.join(INCLUDED, scene.function + ".tf")
 
 
-def find(scene, folders):
-    """The scene's file in the first of `folders`, or below it, that has one; else None."""
+def find(scene, folders, work):
+    """The scene's file, made in the folder `work` or in the first of `folders`, or below it, that has
+    one; else None."""
+    made = generated.make(scene.file, work)
+    if made:
+        return made
     for folder in folders:
         for root, below, files in os.walk(folder):
             below.sort()
