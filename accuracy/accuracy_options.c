@@ -37,7 +37,7 @@ static const struct argp_option options[] = {
     { "list", KEY_LIST, NULL, 0, "Print the names of the settings", 1 },
     { "source", KEY_SOURCE, "VOLUME", 0,
       "The volume that the data set was made of: the integral is of it, and what storing loses is "
-      "told apart",
+      "a step of its own",
       1 },
     { "also", KEY_ALSO, "OTHER.trip", 0,
       "A data set of the same volume kept otherwise (halo, bits, levels), drawn by the defaults; "

@@ -12,7 +12,7 @@ typedef unsigned bench_files;
 bench_files bench_files_of_plan(const trip_plan *plan);
 uint64_t bench_files_bytes(const session *s, bench_files files);
 
-/* Asks the system to forget what it holds of them; direct reads do not need that. */
+/* Advises the system to drop what it holds of them; direct reads do not need that. */
 void bench_files_forget(const session *s, bench_files files);
 
 typedef struct bench_disk_read {

@@ -34,22 +34,22 @@ unsigned bench_planes(const session *s, const trip_settings *settings)
     return planes;
 }
 
-static bool is_covered(void *user, const trip_selection *selection, uint32_t brick)
+static bool is_occluded(void *user, const trip_selection *selection, uint32_t brick)
 {
-    trip_renderer *covering = *(trip_renderer **)user;
-    return covering && trip_cpu_occluded(covering, selection, brick);
+    trip_renderer *occluder = *(trip_renderer **)user;
+    return occluder && trip_cpu_occluded(occluder, selection, brick);
 }
 
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
-                        trip_engine engine, trip_renderer *renderer, trip_renderer **covering)
+                        trip_engine engine, trip_renderer *renderer, trip_renderer **occluder)
 {
     return session_make_reader(s, out,
                                &(session_reader){ .engine = engine,
                                                   .planes = bench_planes(s, &o->settings),
                                                   .threads = o->threads[0],
                                                   .renderer = renderer,
-                                                  .skip = covering ? is_covered : NULL,
-                                                  .skip_user = covering });
+                                                  .skip = occluder ? is_occluded : NULL,
+                                                  .skip_user = occluder });
 }
 
 static int draw_planned(const bench_frame *f, const trip_camera *camera, bool count,
@@ -60,8 +60,8 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     if (!settings.slices)
         settings.slices =
             trip_slices_of_view(camera, &settings, f->session->data->header.dims).slices;
-    if (f->covering)
-        *f->covering = count ? NULL : f->renderer;
+    if (f->occluder)
+        *f->occluder = count ? NULL : f->renderer;
     double start = bench_now_ms();
     int status = trip_plan_make(&plan, f->session->data, camera, &settings, f->session->table,
                                 f->session->budget);

@@ -15,7 +15,7 @@ typedef struct bench_frame {
     trip_settings settings;
     float *rgba;
     /* The reader leaves out what lies behind what this one has drawn; NULL: reads everything. */
-    trip_renderer **covering;
+    trip_renderer **occluder;
     bench_progress *progress; /* a step of it is each frame; may be NULL */
 } bench_frame;
 
@@ -58,10 +58,10 @@ double bench_now_ms(void);
 /* Splats over the lists. */
 uint64_t bench_splats_drawn(const trip_frame_stats *s);
 uint64_t bench_splats_read(const trip_frame_stats *s);
-/* A reader of what the frames of the options read; `renderer` as in session_reader, `covering` as
+/* A reader of what the frames of the options read; `renderer` as in session_reader, `occluder` as
  * in bench_frame, either may be NULL. */
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
-                        trip_engine engine, trip_renderer *renderer, trip_renderer **covering);
+                        trip_engine engine, trip_renderer *renderer, trip_renderer **occluder);
 /* What the session's data and the settings have to be read: bit per trip_plane. */
 unsigned bench_planes(const session *s, const trip_settings *settings);
 

@@ -15,7 +15,7 @@ enum {
     KEY_VIEWS,
     KEY_NO_SHADING,
     KEY_KERNEL_RADIUS,
-    KEY_HIDDEN,
+    KEY_OCCLUDED,
     KEY_ENGINE,
     KEY_MEMORY,
     KEY_NO_COUNTS,
@@ -54,7 +54,7 @@ static const struct argp_option options[] = {
       "Views round the object (default: 20; levels 3); renderers and levels only", 0 },
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
-    { "hidden", KEY_HIDDEN, "skip|draw", 0,
+    { "occluded", KEY_OCCLUDED, "skip|draw", 0,
       "Whether bricks behind what is opaque are read (default: stream draw, renderers skip); skip "
       "by cpu only",
       0 },
@@ -91,7 +91,7 @@ static const struct table {
     bool lists;       /* takes several sizes, renderers and thread counts */
     int repeat;
     int views; /* 0: 20 */
-    bool draw_hidden;
+    bool draw_occluded;
     int sizes[2][2], size_count;
     trip_renderer_kind renderers[3];
     int renderer_count;
@@ -99,8 +99,8 @@ static const struct table {
     {
         .name = "orders",
         .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN),
-        .draw_hidden = true,
+                   BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED),
+        .draw_occluded = true,
         .repeat = 5,
         .sizes = { { 512, 512 } },
         .size_count = 1,
@@ -110,8 +110,8 @@ static const struct table {
     {
         .name = "submit",
         .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
-        .draw_hidden = true,
+                   BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+        .draw_occluded = true,
         .repeat = 5,
         .sizes = { { 512, 512 } },
         .size_count = 1,
@@ -121,7 +121,7 @@ static const struct table {
     {
         .name = "stream",
         .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
-        .draw_hidden = true,
+        .draw_occluded = true,
         .repeat = 5,
         .sizes = { { 1024, 1024 } },
         .size_count = 1,
@@ -140,9 +140,9 @@ static const struct table {
     },
     {
         .name = "popping",
-        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_VIEWS) | BIT(KEY_REPEAT),
-        .draw_hidden = true,
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) |
+                   BIT(KEY_NO_COUNTS) | BIT(KEY_VIEWS) | BIT(KEY_REPEAT),
+        .draw_occluded = true,
         .repeat = 1,
         .sizes = { { 256, 256 } },
         .size_count = 1,
@@ -151,7 +151,7 @@ static const struct table {
     },
     {
         .name = "levels",
-        .refused = OF_FLIGHT | BIT(KEY_ENGINE) | BIT(KEY_HIDDEN) | BIT(KEY_NO_COUNTS),
+        .refused = OF_FLIGHT | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_NO_COUNTS),
         .repeat = 5,
         .views = 3,
         .sizes = { { 256, 256 } },
@@ -162,7 +162,7 @@ static const struct table {
     {
         .name = "flight",
         .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_REPEAT) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_HIDDEN) | BIT(KEY_NO_SHADING) | BIT(KEY_KERNEL_RADIUS),
+                   BIT(KEY_OCCLUDED) | BIT(KEY_NO_SHADING) | BIT(KEY_KERNEL_RADIUS),
         .repeat = 1,
         .sizes = { { 800, 600 } },
         .size_count = 1,
@@ -225,11 +225,11 @@ static int parse_engine(const char *text, bench_options *o)
     return status;
 }
 
-static int parse_hidden(const char *text, bench_options *o)
+static int parse_occluded(const char *text, bench_options *o)
 {
     static const char *const names[] = { "skip", "draw", NULL };
-    int which = 0, status = trip_option_choice("--hidden", text, names, &which);
-    o->draw_hidden = which == 1;
+    int which = 0, status = trip_option_choice("--occluded", text, names, &which);
+    o->draw_occluded = which == 1;
     return status;
 }
 
@@ -285,8 +285,8 @@ static int parse_option(int key, char *arg, bench_options *o)
         return 0;
     case KEY_KERNEL_RADIUS:
         return trip_option_number("--kernel-radius", arg, 0.1, 100, &o->settings.kernel_radius);
-    case KEY_HIDDEN:
-        return parse_hidden(arg, o);
+    case KEY_OCCLUDED:
+        return parse_occluded(arg, o);
     case KEY_ENGINE:
         return parse_engine(arg, o);
     case KEY_MEMORY:
@@ -335,9 +335,10 @@ static void fill_defaults(bench_options *o, const struct table *t)
         o->thread_count = 1;
 }
 
-/* Bricks are left out where the processor's renderer finds them hidden; by the others, nothing is.
+/* Bricks are left out where the processor's renderer finds them occluded; by the others, nothing
+ * is.
  */
-static int check_hidden(bench_options *o, const struct table *t)
+static int check_occluded(bench_options *o, const struct table *t)
 {
     int able = 0;
     for (int i = 0; i < o->renderer_count; i++) {
@@ -345,7 +346,7 @@ static int check_hidden(bench_options *o, const struct table *t)
             o->renderers[i] = TRIP_RENDERER_CPU;
         able += o->renderers[i] == TRIP_RENDERER_CPU || o->renderers[i] == TRIP_RENDERER_AUTO;
     }
-    return able ? 0 : trip_option_fail("--hidden", "skip applies to --renderer cpu only");
+    return able ? 0 : trip_option_fail("--occluded", "skip applies to --renderer cpu only");
 }
 
 /* What is run where nothing is named: what is not given is chosen to take little time. */
@@ -380,13 +381,13 @@ static int check(parse *p)
         if (p->given & t->refused & BIT(options[i].key))
             return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
                              options[i].name);
-    if (!(p->given & BIT(KEY_HIDDEN)))
-        o->draw_hidden = t->draw_hidden;
+    if (!(p->given & BIT(KEY_OCCLUDED)))
+        o->draw_occluded = t->draw_occluded;
     fill_defaults(o, t);
     if (!t->lists && (o->size_count > 1 || o->renderer_count > 1 || o->thread_count > 1))
         return trip_fail(TRIP_USAGE, "usage", t->name,
                          "takes one size, one renderer and one number of threads");
-    return p->given & BIT(KEY_HIDDEN) && !o->draw_hidden ? check_hidden(o, t) : 0;
+    return p->given & BIT(KEY_OCCLUDED) && !o->draw_occluded ? check_occluded(o, t) : 0;
 }
 
 static error_t parse_key(int key, char *arg, struct argp_state *state)

@@ -27,7 +27,7 @@ typedef struct bench_options {
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0: the default */
-    bool draw_hidden;      /* bricks behind what is opaque */
+    bool draw_occluded;    /* bricks behind what is opaque */
     bool no_counts;        /* times only */
     bool json;
     bench_progress *progress; /* no option: where it is shown how far the table is; may be NULL */

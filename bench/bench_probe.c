@@ -25,7 +25,7 @@ static const char *device(const trip_renderer *r)
 static int begin_frame(trip_renderer *r, const trip_frame *frame)
 {
     bench_probe *p = probe_of(r);
-    *p = bench_probe_make(p->every);
+    *p = bench_probe_make(p->sample_stride);
     p->frame = frame;
     return 0;
 }
@@ -73,7 +73,7 @@ static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
     bench_probe *p = probe_of(r);
     uint32_t voxels[TRIP_RUN_RECORDS_MAX];
     (void)front_to_back;
-    if (!p->every)
+    if (!p->sample_stride)
         return 0;
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
@@ -82,8 +82,8 @@ static int draw(trip_renderer *r, const trip_batch *batch, bool front_to_back)
             trip_splat_frame_make(&p->frame->plan->lists[list->index].camera, p->frame->settings);
         const trip_block block = trip_block_of(batch, run);
         trip_block_voxels(&block, 0, run->count, voxels);
-        uint64_t next = (p->every - p->seen % p->every) % p->every;
-        for (uint64_t k = next; k < run->count; k += p->every)
+        uint64_t next = (p->sample_stride - p->seen % p->sample_stride) % p->sample_stride;
+        for (uint64_t k = next; k < run->count; k += p->sample_stride)
             look_at(p, &f, run, voxels[k]);
         p->seen += run->count;
     }
@@ -105,7 +105,7 @@ static trip_list_stats stats(const trip_renderer *r, unsigned list)
     return (trip_list_stats){ 0 };
 }
 
-bench_probe bench_probe_make(unsigned every)
+bench_probe bench_probe_make(unsigned sample_stride)
 {
     static const trip_renderer_ops ops = {
         .name = "probe",
@@ -117,5 +117,5 @@ bench_probe bench_probe_make(unsigned every)
         .picture = picture,
         .stats = stats,
     };
-    return (bench_probe){ .base = { &ops }, .every = every };
+    return (bench_probe){ .base = { &ops }, .sample_stride = sample_stride };
 }

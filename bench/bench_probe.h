@@ -8,7 +8,7 @@
 
 typedef struct bench_probe {
     trip_renderer base;
-    unsigned every; /* looks at every so manieth splat; 0: at none */
+    unsigned sample_stride; /* of every so many splats one is looked at; 0: none */
     const trip_frame *frame;
     int axis;
     uint64_t seen;           /* splats of the frame so far */
@@ -16,6 +16,6 @@ typedef struct bench_probe {
     uint64_t pixels;         /* those pixels */
 } bench_probe;
 
-bench_probe bench_probe_make(unsigned every);
+bench_probe bench_probe_make(unsigned sample_stride);
 
 #endif

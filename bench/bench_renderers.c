@@ -43,14 +43,14 @@ typedef struct race {
     trip_reader *reader;
     contender contenders[MAX_CONTENDERS];
     int count;
-    trip_renderer *covering; /* of the frame being drawn */
+    trip_renderer *occluder; /* of the frame being drawn */
     load *loads;             /* of the size being drawn: [view] */
     trip_camera_params *views;
 } race;
 
-static trip_renderer **covering(race *c)
+static trip_renderer **occluder_of(race *c)
 {
-    return c->options->draw_hidden ? NULL : &c->covering;
+    return c->options->draw_occluded ? NULL : &c->occluder;
 }
 
 static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_report *r)
@@ -104,8 +104,8 @@ static int measure_load(bench_frame frame, load *out)
 }
 
 /* A contender's turn begins with a frame that is not timed: shaders are compiled and buffers grown
- * in its first one, and threads that slept through the others' turns have yet to spread over the
- * processors. */
+ * in its first one, and threads that slept through the others' turns have yet to be distributed
+ * over the processors. */
 static int draw_view(race *c, bench_frame frame, int view)
 {
     int repeat = c->options->repeat, status = 0;
@@ -126,7 +126,7 @@ static int draw_views(race *c, const int size[2])
 {
     bench_frame frame = { .session = c->session,
                           .reader = c->reader,
-                          .covering = covering(c),
+                          .occluder = occluder_of(c),
                           .settings = c->options->settings,
                           .progress = c->options->progress };
     int status = session_take_image(c->session, size[0], size[1], &frame.rgba);
@@ -223,10 +223,10 @@ static int run(race *c, bench_report *r)
     return status;
 }
 
-static bool leaves_out_hidden(const race *c)
+static bool leaves_out_occluded(const race *c)
 {
     for (int i = 0; i < c->count; i++)
-        if (!c->options->draw_hidden && !strcmp(c->contenders[i].renderer->ops->name, "cpu"))
+        if (!c->options->draw_occluded && !strcmp(c->contenders[i].renderer->ops->name, "cpu"))
             return true;
     return false;
 }
@@ -241,7 +241,7 @@ static void add_limits(const race *c, bench_report *r)
                           "behind saturated pixels count too, though a renderer may skip them.");
     bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
                        SAMPLE_EVERY);
-    if (leaves_out_hidden(c))
+    if (leaves_out_occluded(c))
         bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
                               "same.");
     bench_report_limit(
@@ -263,7 +263,7 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
     bench_progress_expect(o->progress, 1 + frames * o->views * o->size_count);
     bench_progress_step(o->progress, "data set to memory");
     if (!status)
-        status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, covering(c));
+        status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, occluder_of(c));
     if (!status)
         status = run(c, r);
     if (c->reader)

@@ -61,7 +61,7 @@ typedef struct stream {
     bench_frame in_memory; /* no renderer: does not fit */
     bench_frame unread;    /* read and not drawn */
     bench_probe probe;
-    trip_renderer *covering; /* of the frame being drawn */
+    trip_renderer *occluder; /* of the frame being drawn */
     bench_files files;
     bool direct;
     uint64_t peak_rss_bytes, peak_bytes;
@@ -85,7 +85,7 @@ static int take_plain(stream *t, bench_plain how, sample *out)
 static int take_streamed(stream *t, sample *out)
 {
     bench_disk_read read;
-    t->covering = NULL;
+    t->occluder = NULL;
     int status = bench_files_stream(t->session, t->files, t->frame.reader, &read);
     *out = (sample){ read.ms, (double)read.bytes };
     return status;
@@ -139,13 +139,13 @@ static int open_frame(stream *t)
     bench_cost cost;
     bench_frame *f = &t->frame;
     *f = (bench_frame){ .session = s, .settings = o->settings };
-    f->covering = o->draw_hidden ? NULL : &t->covering;
+    f->occluder = o->draw_occluded ? NULL : &t->occluder;
     f->view = bench_view_oblique(s, size);
     int status = session_take_image(s, size[0], size[1], &f->rgba);
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
     if (!status)
-        status = bench_reader_create(s, &f->reader, o, o->engine, f->renderer, f->covering);
+        status = bench_reader_create(s, &f->reader, o, o->engine, f->renderer, f->occluder);
     if (!status)
         status = find_files(t);
     if (!status)
@@ -171,7 +171,7 @@ static int open_in_memory(stream *t, bench_report *r)
     other.budget = t->whole;
     bench_keep_report(why);
     status = bench_reader_create(&other, &t->in_memory.reader, t->options, TRIP_ENGINE_NULL, NULL,
-                                 t->frame.covering);
+                                 t->frame.occluder);
     bench_keep_report(NULL);
     if (!status || trip_interrupted())
         return status;
@@ -277,7 +277,7 @@ static void describe(const stream *t, bench_report *r)
     bench_report_limit(r, "Draw alone: the same frame with the data set in memory (null engine), "
                           "besides the promise; gl copies it to memory of its own, the others draw "
                           "it where it lies.");
-    if (t->frame.covering)
+    if (t->frame.occluder)
         bench_report_limit(r, "The frame leaves out bricks behind what is opaque, which reading "
                               "alone cannot.");
     bench_report_limit(r, "Memory: what was promised, what of it was taken and what was resident "

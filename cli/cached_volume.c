@@ -64,12 +64,12 @@ static int identify(search *s, uint64_t most_bytes)
     return triptych_identify(s->t, s->volume, &s->options, most_bytes, &s->identity);
 }
 
-/* Large files are told apart by their times alone, which must then differ after every later change.
- * A clock that is wrong is not waited for. */
-static int wait_until_settled(search *s)
+/* Large files are distinguished by their times alone, which must then differ after every later
+ * change. A clock that is wrong is not waited for. */
+static int wait_until_stable(search *s)
 {
     int status = 0;
-    for (int i = 0; i < 30 && !status && !s->identity.settled; i++) {
+    for (int i = 0; i < 30 && !status && !s->identity.stable; i++) {
         nanosleep(&(struct timespec){ .tv_nsec = 100000000 }, NULL);
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "read", s->volume, "interrupted");
@@ -89,7 +89,7 @@ static cache_key key_of(const char text[33])
 static int find_content_key(search *s, cache_key *key)
 {
     bool read = s->identity.bytes <= most_content_bytes;
-    int status = read ? identify(s, most_content_bytes) : wait_until_settled(s);
+    int status = read ? identify(s, most_content_bytes) : wait_until_stable(s);
     if (status == 0)
         *key = key_of(*s->identity.content ? s->identity.content : s->identity.state);
     return status;
@@ -100,10 +100,10 @@ static int find_key(search *s)
     int status = identify(s, 0);
     const cache_key state = key_of(s->identity.state);
     if (status < 0 ||
-        (s->identity.settled && cache_folder_recall(&s->v->folder, &state, &s->v->key)))
+        (s->identity.stable && cache_folder_recall(&s->v->folder, &state, &s->v->key)))
         return status;
     status = find_content_key(s, &s->v->key);
-    if (status == 0 && s->identity.settled) {
+    if (status == 0 && s->identity.stable) {
         const cache_key read = key_of(s->identity.state);
         cache_folder_remember(&s->v->folder, &read, &s->v->key);
     }
@@ -117,7 +117,7 @@ static int check_unchanged(search *s)
     cache_key key = s->v->key;
     int status = identify(s, 0);
     bool same = status == 0 && !strcmp(before.state, s->identity.state);
-    if (same && !before.settled)
+    if (same && !before.stable)
         status = find_content_key(s, &key);
     if (status == 0 && (!same || strcmp(key.text, s->v->key.text)))
         return trip_fail(TRIP_ERROR, "read", s->volume,

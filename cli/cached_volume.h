@@ -1,7 +1,7 @@
 /* A volume's data set in the cache: found there, or bricked into it first. What it is kept under is
  * the content of the volume's files and the options; so a changed file is another data set, and a
  * copy the same. The files' content is read once and remembered for as long as their times do not
- * change. Files of more than 1 GiB together are told apart by place, size and times alone. */
+ * change. Files of more than 1 GiB together are distinguished by place, size and times alone. */
 #ifndef TRIP_CLI_CACHED_VOLUME_H
 #define TRIP_CLI_CACHED_VOLUME_H
 

@@ -52,15 +52,15 @@ static int open_data(pilot *p)
     const render_options *o = f->o;
     int status = triptych_create(&p->t);
     if (!status)
-        status =
-            triptych_open(p->t, f->data,
-                          &(triptych_resources){ .memory_bytes = memory_of_each(f),
-                                                 .threads = (unsigned)o->threads,
-                                                 .renderer = o->renderer,
-                                                 .engine = o->engine,
-                                                 .keep_pages = 1,
-                                                 .read_hidden = o->hidden == RENDER_HIDDEN_DRAW,
-                                                 .name = o->input });
+        status = triptych_open(
+            p->t, f->data,
+            &(triptych_resources){ .memory_bytes = memory_of_each(f),
+                                   .threads = (unsigned)o->threads,
+                                   .renderer = o->renderer,
+                                   .engine = o->engine,
+                                   .keep_pages = 1,
+                                   .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
+                                   .name = o->input });
     if (!status)
         status = triptych_set_function(p->t, &o->function);
     if (!status)

@@ -23,7 +23,7 @@ int plain_disk_read(plain_disk *d, const char *path, void *memory);
 /* `bytes` of an unnamed file in `folder`, up to whole transfers, until the disk has them. */
 int plain_disk_write(plain_disk *d, const char *folder, uint64_t bytes, void *memory);
 
-/* Asks the system to forget what it holds of a file, if that is one. */
+/* Advises the system to drop what it holds of a file, if that is one. */
 void plain_disk_forget(const char *path);
 
 #endif

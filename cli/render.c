@@ -63,14 +63,15 @@ static int brick_volume(drawing *d)
 static int open_data(drawing *d, const char *path)
 {
     const render_options *o = &d->o;
-    return triptych_open(d->t, path,
-                         &(triptych_resources){ .memory_bytes = o->memory_bytes,
-                                                .threads = (unsigned)o->threads,
-                                                .renderer = o->renderer,
-                                                .engine = o->engine,
-                                                .keep_pages = d->sequence.frames > 1,
-                                                .read_hidden = o->hidden == RENDER_HIDDEN_DRAW,
-                                                .name = o->input });
+    return triptych_open(
+        d->t, path,
+        &(triptych_resources){ .memory_bytes = o->memory_bytes,
+                               .threads = (unsigned)o->threads,
+                               .renderer = o->renderer,
+                               .engine = o->engine,
+                               .keep_pages = d->sequence.frames > 1,
+                               .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
+                               .name = o->input });
 }
 
 /* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
@@ -268,7 +269,7 @@ static int draw_image(drawing *d, int index)
     return status ? status : finish_image(d, d->t, index, d->rgba);
 }
 
-/* How many frames are drawn at once: one where their times are to be told apart, or where a second
+/* How many frames are drawn at once: one where each is to be timed, or where a second
  * would take what the first needs. */
 static int contexts_of(const drawing *d)
 {

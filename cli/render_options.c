@@ -64,7 +64,7 @@ enum {
     KEY_STATS,
     KEY_EXPLAIN,
     KEY_COUNT,
-    KEY_HIDDEN,
+    KEY_OCCLUDED,
     KEY_MEMORY,
     KEY_ENGINE,
     KEY_THREADS,
@@ -169,7 +169,7 @@ static const struct argp_option options[] = {
     { "submit", KEY_SUBMIT, "FORM", 0,
       "replicated or indexed lists, sprites or triangles (default: replicated,sprites); gl only",
       4 },
-    { "hidden", KEY_HIDDEN, "skip|draw", 0,
+    { "occluded", KEY_OCCLUDED, "skip|draw", 0,
       "Whether bricks behind what is opaque are read (default: skip); the picture is the same; "
       "cpu only",
       4 },
@@ -197,7 +197,8 @@ static const struct argp_option options[] = {
     { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
     { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
     { "count", KEY_COUNT, NULL, 0,
-      "With --stats or --explain: draw everything once more, untimed, hidden bricks too, and count "
+      "With --stats or --explain: draw everything once more, untimed, occluded bricks too, and "
+      "count "
       "the splats",
       5 },
     { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 6 },
@@ -548,7 +549,7 @@ static int parse_integral(int key, char *arg, parse *p)
 static int parse_renderer(int key, char *arg, parse *p)
 {
     static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
-    static const char *const hidden[] = { "skip", "draw", NULL };
+    static const char *const occluded[] = { "skip", "draw", NULL };
     render_options *o = p->o;
     int which = 0, status;
     switch (key) {
@@ -563,9 +564,9 @@ static int parse_renderer(int key, char *arg, parse *p)
         return status;
     case KEY_SUBMIT:
         return parse_submit(arg, p);
-    case KEY_HIDDEN:
-        status = trip_option_choice("--hidden", arg, hidden, &which);
-        o->hidden = (render_hidden)(which + 1);
+    case KEY_OCCLUDED:
+        status = trip_option_choice("--occluded", arg, occluded, &which);
+        o->occluded = (render_occluded)(which + 1);
         return status;
     case KEY_MEMORY:
         return trip_option_memory(arg, &o->memory_bytes);
@@ -596,7 +597,7 @@ static int check_view(const parse *p)
     return 0;
 }
 
-/* What of the view a path has settled. */
+/* What of the view a path fixes. */
 static int check_path(const parse *p)
 {
     const render_options *o = p->o;
@@ -749,9 +750,10 @@ static int check(parse *p)
         return trip_option_fail("--submit", "applies to --renderer gl only");
     if (gl_only)
         o->renderer = TRIPTYCH_RENDERER_GL;
-    if (o->hidden && o->renderer != TRIPTYCH_RENDERER_AUTO && o->renderer != TRIPTYCH_RENDERER_CPU)
-        return trip_option_fail("--hidden", "applies to --renderer cpu only");
-    if (o->hidden)
+    if (o->occluded && o->renderer != TRIPTYCH_RENDERER_AUTO &&
+        o->renderer != TRIPTYCH_RENDERER_CPU)
+        return trip_option_fail("--occluded", "applies to --renderer cpu only");
+    if (o->occluded)
         o->renderer = TRIPTYCH_RENDERER_CPU;
     status = check_depth(o);
     if (status)

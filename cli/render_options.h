@@ -15,11 +15,11 @@ typedef enum render_field {
 } render_field;
 
 /* What becomes of bricks behind what is already opaque; skipped where nothing is said. */
-typedef enum render_hidden {
-    RENDER_HIDDEN_UNSET,
-    RENDER_HIDDEN_SKIP,
-    RENDER_HIDDEN_DRAW,
-} render_hidden;
+typedef enum render_occluded {
+    RENDER_OCCLUDED_UNSET,
+    RENDER_OCCLUDED_SKIP,
+    RENDER_OCCLUDED_DRAW,
+} render_occluded;
 
 typedef struct render_options {
     const char *input,
@@ -41,7 +41,7 @@ typedef struct render_options {
     int in_flight;                          /* frames drawn at once; 0: not given */
     triptych_settings settings;
     triptych_renderer renderer;
-    render_hidden hidden;
+    render_occluded occluded;
     render_field field;
     triptych_engine engine;
     uint64_t memory_bytes; /* 0: the default */

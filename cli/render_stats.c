@@ -141,8 +141,8 @@ int render_stats_add_frame(render_stats *s, triptych *t)
     cJSON_AddNumberToObject(f, "reads", (double)frame.reads);
     cJSON_AddNumberToObject(f, "bytes_cached", (double)frame.bytes_cached);
     cJSON_AddNumberToObject(f, "bytes_of_planes_left_out", (double)frame.bytes_unused);
-    cJSON_AddNumberToObject(f, "runs_skipped", (double)frame.runs_hidden);
-    cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame.bytes_hidden);
+    cJSON_AddNumberToObject(f, "runs_skipped", (double)frame.runs_occluded);
+    cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame.bytes_occluded);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
         cJSON_Delete(f);
@@ -274,9 +274,9 @@ int render_stats_explain_cost(triptych *t, FILE *out)
         return status;
     if (frame.bytes_cached)
         fprintf(out, "cache       %s from memory\n", trip_format_bytes(frame.bytes_cached, bytes));
-    if (frame.bytes_hidden)
-        fprintf(out, "hidden      %s in %" PRIu64 " runs not read: behind what is opaque\n",
-                trip_format_bytes(frame.bytes_hidden, bytes), frame.runs_hidden);
+    if (frame.bytes_occluded)
+        fprintf(out, "occluded    %s in %" PRIu64 " runs not read: behind what is opaque\n",
+                trip_format_bytes(frame.bytes_occluded, bytes), frame.runs_occluded);
     fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame.ms, frame.wait_ms, frame.draw_ms, frame.merge_ms);

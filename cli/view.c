@@ -70,7 +70,7 @@ static const struct argp_option options[] = {
     TRIP_OPTION_MEMORY(KEY_MEMORY, 3),
     TRIP_OPTION_ENGINE(KEY_ENGINE, 3),
     TRIP_OPTION_THREADS(KEY_THREADS, 3),
-    { NULL, 0, NULL, 0, "Volumes (not for data sets, which have it settled):", 4 },
+    { NULL, 0, NULL, 0, "Volumes (not data sets, of which it is part):", 4 },
     TRIP_OPTIONS_VOLUME(4),
     { 0 },
 };

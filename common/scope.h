@@ -1,6 +1,6 @@
 /* The scope of a thread's work: where its messages go, and whether the work is cancelled. A thread
  * begins in a scope of its own, whose messages go to stderr; threads that work for another thread
- * enter its scope. Nothing is kept for the whole process: that a signal came is told by a flag of
+ * enter its scope. Nothing is kept for the whole process: that a signal came is in a flag of
  * the program's, if scopes point to one. */
 #ifndef TRIP_SCOPE_H
 #define TRIP_SCOPE_H

@@ -1,5 +1,5 @@
 /* Writes a fog-volume VDB of any size in bounded memory: it holds one cube of 128^3 voxels, a node
- * of the tree above the leaves, and asks for each cube twice, once to write which voxels are there
+ * of the tree above the leaves, and reads each cube twice, once to write which voxels are there
  * and once for their values. What is zero is left out. Single-threaded; the source may use threads.
  */
 #ifndef TRIP_WRITE_VDB_H

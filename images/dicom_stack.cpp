@@ -22,7 +22,7 @@
 namespace
 {
 
-/* Elements longer than this stay in the file until they are asked for. */
+/* Elements longer than this stay in the file until they are read. */
 constexpr Uint32 lazy_bytes = 4096;
 
 /* What a slice's file says besides its pixels; what it does not say is empty or NAN. */

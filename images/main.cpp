@@ -231,7 +231,7 @@ void set_up_threads()
 
 int main()
 {
-    /* Ctrl-C goes to the whole group; who asked decides what becomes of the request. */
+    /* Ctrl-C goes to the whole group; the other end decides what becomes of a request. */
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN); /* a write that fails says so itself */
@@ -245,6 +245,6 @@ int main()
         for (;;)
             answer_one(session);
     } catch (const trip_connection_gone &) {
-        return 0; /* also of a parent that ended before this process could be told to end with it */
+        return 0; /* also of a parent that ended before this process could be set to end with it */
     }
 }

@@ -228,7 +228,7 @@ void encode(const trip_picture &p, const trip_picture_row &next_row, FileSink &s
 }
 
 /* `channels` values as RGBA, premultiplied. */
-void spread(const float *from, int channels, bool premultiplied, float rgba[4])
+void to_rgba(const float *from, int channels, bool premultiplied, float rgba[4])
 {
     bool grey = channels < 3;
     float alpha = channels % 2 == 0 ? from[channels - 1] : 1;
@@ -268,7 +268,7 @@ std::vector<float> trip_picture_read(const std::string &path, int &width, int &h
             throw trip_slice_error(path, trim(in->geterror()));
         for (int x = 0; x < spec.width; x++) {
             float *pixel = &rgba[((size_t)y * (size_t)spec.width + (size_t)x) * 4];
-            spread(&row[(size_t)x * (size_t)spec.nchannels], spec.nchannels, premultiplied, pixel);
+            to_rgba(&row[(size_t)x * (size_t)spec.nchannels], spec.nchannels, premultiplied, pixel);
             if (linear)
                 apply_curve(display_of_linear, pixel, true);
         }

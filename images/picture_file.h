@@ -20,8 +20,8 @@ struct trip_picture {
  * picture. */
 using trip_picture_row = std::function<bool(float *pixels)>;
 
-/* As trip_image_write(), for a path and params that are known to be right, to the descriptor; asks
- * for all rows from the top, and only for those that it has use for. */
+/* As trip_image_write(), for a path and params that are known to be right, to the descriptor; takes
+ * all rows from the top, and only for those that it has use for. */
 void trip_picture_write(const trip_picture &picture, const trip_picture_row &next_row);
 
 /* Premultiplied RGBA rows of a picture of one to four channels, display values in any format. */

@@ -1,4 +1,4 @@
-/* Slices that are missing among others, told by the numbers in their names or by their places. */
+/* Slices that are missing among others, found by the numbers in their names or by their places. */
 #ifndef TRIP_SLICE_GAPS_H
 #define TRIP_SLICE_GAPS_H
 

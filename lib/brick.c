@@ -209,7 +209,7 @@ static int identify(triptych *t, const trip_brick_params *params, uint64_t most_
         status = describe_options(params, &text);
     if (!status)
         status = trip_source_digest_state(&source, text, &state);
-    out->settled = !status && trip_source_is_stable(&source); /* before the content is read */
+    out->stable = !status && trip_source_is_stable(&source); /* before the content is read */
     if (!status && most_content_bytes > 0 && source.bytes <= most_content_bytes)
         status =
             trip_source_digest_content(&source, text, &content, t->show ? show_bytes : NULL, t);

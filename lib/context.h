@@ -46,7 +46,8 @@ struct triptych {
     trip_settings settings; /* slices 0: by the view */
     triptych_clip clip;     /* as given; frames have it in drawn_settings */
     bool classify_auto;     /* settings.classify is what that has come to for a frame */
-    bool counting; /* frames count exactly, and draw what is hidden too; the reader is for that: */
+    bool
+        counting; /* frames count exactly, and draw what is occluded too; the reader is for that: */
     bool reader_counts;
 
     bool has_view;

@@ -51,15 +51,15 @@ void trip_context_drop_renderer(triptych *t)
 static int make_reader(triptych *t, unsigned planes)
 {
     const triptych_resources *r = &t->resources;
-    bool finds_hidden = !strcmp(t->renderer->ops->name, "cpu");
-    bool draws_all = r->read_hidden || t->counting;
+    bool finds_occluded = !strcmp(t->renderer->ops->name, "cpu");
+    bool draws_all = r->read_occluded || t->counting;
     const session_reader wanted = {
         .engine = (trip_engine)r->engine,
         .planes = planes,
         .threads = (int)trip_context_threads(r->threads),
         .cache = r->keep_pages && !t->counting && !t->plan.gathers,
         .renderer = t->renderer,
-        .skip = finds_hidden && !draws_all ? trip_cpu_occluded : NULL,
+        .skip = finds_occluded && !draws_all ? trip_cpu_occluded : NULL,
         .skip_user = t->renderer,
     };
     if (t->reader && !(planes & ~t->planes) && t->counting == t->reader_counts)

@@ -88,9 +88,9 @@ typedef struct triptych_resources {
     unsigned threads;      /* that draw and read, up to 256; default: one a processor */
     triptych_renderer renderer;
     triptych_engine engine;
-    int keep_pages;  /* not 0: half of the memory left keeps what was read for the frames to come */
-    int read_hidden; /* not 0: bricks behind what is opaque are read too; the same picture */
-    const char *name; /* of the data in messages; default: its path */
+    int keep_pages; /* not 0: half of the memory left keeps what was read for the frames to come */
+    int read_occluded; /* not 0: bricks behind what is opaque are read too; the same picture */
+    const char *name;  /* of the data in messages; default: its path */
 } triptych_resources;
 
 /* Closes what is open, and opens a data set; resources NULL: the defaults. */
@@ -272,7 +272,7 @@ typedef struct triptych_settings {
     double tolerance;       /* of a component of a pixel, 1e-12 to 0.1 */
     int samples;            /* rays along each side of a pixel, 1 to 64; without depth. Renderers
                                but the integral draw a picture so many times as wide and high */
-    int count; /* not 0: triptych_list_stats has exact counts, which takes time, of hidden bricks
+    int count; /* not 0: triptych_list_stats has exact counts, which takes time, of occluded bricks
                   too */
     triptych_clip clip;
     triptych_show show; /* not of the integral, which has no lists or levels */
@@ -400,7 +400,7 @@ typedef struct triptych_frame_stats {
     double wait_ms, draw_ms, merge_ms;        /* waiting for the disk, drawing, merging layers */
     uint64_t splats, bytes_read, reads;       /* of all lists, from the disk */
     uint64_t bytes_cached;                    /* instead from memory */
-    uint64_t runs_hidden, bytes_hidden;       /* not read: behind what is opaque */
+    uint64_t runs_occluded, bytes_occluded;   /* not read: behind what is opaque */
     uint64_t bytes_unused;                    /* not read: of attributes that have no effect */
     uint64_t memory_bytes, peak_memory_bytes; /* that may be taken, and were since it was opened */
     const char *renderer, *device, *engine;   /* "cpu", "8 threads, AVX2", "io_uring+O_DIRECT" */

@@ -129,7 +129,7 @@ typedef struct triptych_identity {
     char state[33];   /* of the options and the files' places, sizes and times */
     char content[33]; /* of the options and all bytes of the files; "" where they were not read */
     uint64_t bytes;   /* of the files */
-    int settled; /* 0: a file changed so lately that changing again may leave `state` as it is */
+    int stable; /* 0: a file changed so lately that changing again may leave `state` as it is */
 } triptych_identity;
 
 /* Files of up to `most_content_bytes` together are read for `content`; 0: none are. What does not

@@ -49,7 +49,7 @@ typedef struct building {
     bool pending;
 } building;
 
-static int flush(building *a)
+static int append_pending(building *a)
 {
     trip_list_output *o = a->output;
     const uint32_t *voxels, *normals;
@@ -66,7 +66,7 @@ static int take_piece(void *user, const trip_piece *piece)
     building *a = user;
     int status = 0;
     if (a->pending && piece->key != a->key)
-        status = flush(a);
+        status = append_pending(a);
     trip_run_builder_add(a->output->builder, piece);
     a->key = piece->key;
     a->pending = true;
@@ -80,5 +80,5 @@ int trip_list_output_merge(trip_list_output *o, const trip_quantiser *quantiser,
 {
     building a = { .output = o, .quantiser = quantiser };
     int status = trip_merge(sources, count, take_piece, &a);
-    return status == 0 ? flush(&a) : status;
+    return status == 0 ? append_pending(&a) : status;
 }

@@ -419,7 +419,7 @@ int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion
     for (int a = 0; a < 3; a++)
         if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
             lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
-            return trip_fail(TRIP_ERROR, "read", v->path, "asked for voxels outside the portion");
+            return trip_fail(TRIP_ERROR, "read", v->path, "voxels outside the portion");
     decode_slices(v, portion->data, lo, size, values, active);
     return 0;
 }

@@ -47,10 +47,10 @@ bool trip_dataset_text_histogram(const trip_dataset_text *t, trip_histogram *out
 
 /* How many voxels hold values that `tf` shows but that were left out when the data set was made,
  * and the range of those values. An estimate from the histogram (bins count in proportion); 0 when
- * the text does not tell. */
+ * the text does not say. */
 double trip_dataset_text_culled(const trip_dataset_text *t, const trip_tf *tf, double range[2]);
 
-/* Adds what the data set says to what is asked of the default view: bounds of the splats, up,
+/* Adds what the data set says to what the default view is to have: bounds of the splats, up,
  * front. The bounds do not depend on how the data set is divided into tiles. */
 void trip_dataset_text_frame(const trip_dataset_text *t, const trip_dataset *d,
                              trip_camera_framing *framing);

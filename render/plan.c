@@ -642,13 +642,13 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
     if (of_values && s->shading)
         fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
     else if (of_values)
-        fprintf(out, "shading     does not run: not asked for\n");
+        fprintf(out, "shading     does not run: switched off\n");
     else if (plan->planes & 1u << TRIP_PLANE_NORMALS)
         fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))
         fprintf(out, "shading     does not run: the data set has no normals\n");
     else
-        fprintf(out, "shading     does not run: not asked for; normal planes are not read, %s\n",
+        fprintf(out, "shading     does not run: switched off; normal planes are not read, %s\n",
                 trip_format_bytes(trip_plan_bytes_left_out(plan, data), bytes));
 }
 

@@ -39,21 +39,21 @@ void trip_visible_start(trip_visible *v, const trip_tf_entry *table)
     double least = -log1p(-LEAST_OPACITY) / depth;
     for (unsigned code = 0; code < 65536; code++) {
         uint64_t bit = UINT64_C(1) << (code % 64);
-        v->shown[code / 64] =
-            (v->shown[code / 64] & ~bit) | (table[code].extinction >= least ? bit : 0);
+        v->codes[code / 64] =
+            (v->codes[code / 64] & ~bit) | (table[code].extinction >= least ? bit : 0);
     }
     v->splats = 0;
 }
 
-static inline bool is_shown(const trip_visible *v, unsigned code)
+static inline bool is_visible(const trip_visible *v, unsigned code)
 {
-    return v->shown[code / 64] >> (code % 64) & 1;
+    return v->codes[code / 64] >> (code % 64) & 1;
 }
 
-static bool some_shown(const trip_visible *v, unsigned first, unsigned last)
+static bool some_visible(const trip_visible *v, unsigned first, unsigned last)
 {
     for (unsigned code = first; code <= last;) {
-        uint64_t rest = v->shown[code / 64] >> (code % 64);
+        uint64_t rest = v->codes[code / 64] >> (code % 64);
         if (rest)
             return code + (unsigned)__builtin_ctzll(rest) <= last;
         code += 64 - code % 64;
@@ -131,7 +131,7 @@ static form make_form(const search *s, trip_vec3 normal, double offset, double a
 static bool bound_brick(const search *s, const trip_file_brick *b, const trip_file_slab *slab,
                         double *bounds)
 {
-    if (!some_shown(s->visible, b->code_min, b->code_max))
+    if (!some_visible(s->visible, b->code_min, b->code_max))
         return false;
     trip_brick_box place = trip_brick_box_of(&s->visible->data->header, slab, b);
     for (int i = 0; i < s->count; i++) {
@@ -204,7 +204,7 @@ static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
     trip_block_voxels(&block, 0, run->count, voxels);
     s->visible->splats += run->count;
     for (uint32_t n = 0; n < run->count; n++) {
-        if (!is_shown(s->visible, trip_voxel_code(voxels[n])))
+        if (!is_visible(s->visible, trip_voxel_code(voxels[n])))
             continue;
         double u = run->u + (double)trip_voxel_u(voxels[n]);
         double v = run->v + (double)trip_voxel_v(voxels[n]);

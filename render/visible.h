@@ -21,7 +21,7 @@ typedef struct trip_visible {
     double lo[3], hi[3];  /* bounds of all splats in index space */
 
     uint64_t splats;      /* looked at so far */
-    uint64_t shown[1024]; /* a bit a code: whether its voxels are visible */
+    uint64_t codes[1024]; /* a bit a code: whether its voxels are visible */
 } trip_visible;
 
 /* After the caller's part is set. `table` as filled for the data set. */

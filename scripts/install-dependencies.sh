@@ -1,6 +1,6 @@
 #!/bin/sh
 # Installs the Debian packages Triptych is built from, when any is missing. Works as root or with
-# sudo; asks for nothing and uses no network when everything is there already.
+# sudo; needs no input and uses no network when everything is there already.
 #
 #   scripts/install-dependencies.sh [--tests] [--compare] [--arm64]
 #   scripts/install-dependencies.sh --libraries

@@ -1,4 +1,4 @@
-/* The server: who may ask for what. */
+/* The server: which requests are answered, and from whom. */
 #include <arpa/inet.h>
 #include <microhttpd.h>
 #include <stdio.h>

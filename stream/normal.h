@@ -5,9 +5,9 @@
  *                  and z = bits 20-29 signed, h half of bit 30: a body-centred cubic lattice, of
  *                  whose points one is nearer than of any other lattice of as many
  *   bit 31 set     the gradient is at least `full` long: bits 0-11 and 12-23 are octahedral
- *                  coordinates of its direction (unorm12 over [-1, 1]), off by 0.06 degrees at
- * most, bits 24-30 are n: it is full * (1 + n / 32)^2 long, or longer for n = 127 No colour changes
- * by half of 1/255 for what is rounded (tests/render/test_shade.c).
+ *                  coordinates of its direction (unorm12 over [-1, 1]), 0.06 degrees off at most;
+ *                  bits 24-30 are n: it is full * (1 + n / 32)^2 long, or longer for n = 127
+ * No colour changes by half of 1/255 for what is rounded (tests/render/test_shade.c).
  *
  * 3 bytes, without the sign of the whole, since both sides of a surface are lit alike:
  *   bit 23 clear   the gradient in index space is (step[0] x, step[1] y, step[2] z), x = bits 0-7

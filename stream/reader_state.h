@@ -9,7 +9,7 @@
 #include "extent.h"
 #include "reader.h"
 
-/* Room to tell apart cached pages from others within a range. */
+/* Room to keep cached pages apart from others within a range. */
 #define TRIP_SLOT_REQUESTS_MAX (4 * TRIP_RANGES_MAX)
 
 typedef enum trip_slot_state {

@@ -92,7 +92,7 @@ void trip_frames_want(trip_frames *f, const trip_wanted *wanted)
     const bool ends = f->ends_early || f->wanted.document != copy.document;
     trip_wanted before = f->wanted;
     f->wanted = copy;
-    f->asked++;
+    f->wanted_count++;
     f->status.exact = f->status.rests = false;
     if (before.input && before.document != copy.document)
         trip_scope_cancel(&f->scope);

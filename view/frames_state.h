@@ -19,7 +19,7 @@ struct trip_frames {
     pthread_cond_t come;
     /* Under lock: */
     trip_wanted wanted;
-    uint64_t asked; /* how often something was wanted */
+    uint64_t wanted_count; /* how often something was wanted */
     bool quit;
     bool ends_early; /* what goes on is given up for what comes */
     char *save;      /* a file to write the whole picture to; NULL: none */
@@ -39,7 +39,7 @@ struct trip_frames {
 
     /* The drawing thread's own. */
     trip_wanted now; /* what it works on */
-    uint64_t taken;  /* asked when that was wanted; of what was worked on last: */
+    uint64_t taken;  /* wanted_count when that was wanted; of what was worked on last: */
     uint64_t served;
     bool small;                 /* as find() says */
     bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */

@@ -85,7 +85,7 @@ static void show_progress(void *user, const char *stage, uint64_t done, uint64_t
 static bool has_newer(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
-    const bool newer = f->quit || f->asked != f->taken;
+    const bool newer = f->quit || f->wanted_count != f->taken;
     pthread_mutex_unlock(&f->lock);
     return newer;
 }
@@ -112,16 +112,16 @@ static bool take_wanted(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
     f->status.stage[0] = 0; /* nothing goes on */
-    while (!f->quit && f->asked == f->taken && !f->save && !(f->looks && f->whole)) {
+    while (!f->quit && f->wanted_count == f->taken && !f->save && !(f->looks && f->whole)) {
         f->status.rests = true;
         pthread_cond_wait(&f->come, &f->lock);
     }
     const bool goes_on = !f->quit;
     if (goes_on)
         trip_scope_renew(&f->scope);
-    if (goes_on && f->asked != f->taken) {
+    if (goes_on && f->wanted_count != f->taken) {
         trip_wanted_release(&f->now);
-        f->taken = f->asked;
+        f->taken = f->wanted_count;
         f->whole = false;
         if (!trip_wanted_copy(&f->now, &f->wanted))
             trip_wanted_release(&f->now);
@@ -449,7 +449,7 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
         s->stats = stats;
         s->stats.renderer = s->stats.device = s->stats.engine = s->stats.ring = NULL;
     }
-    s->exact = d->whole && f->asked == f->taken;
+    s->exact = d->whole && f->wanted_count == f->taken;
     s->failed = false;
     pthread_mutex_unlock(&f->lock);
 }
@@ -567,7 +567,7 @@ static int write_picture(trip_frames *f, const char *path)
 static int save(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
-    char *path = f->save && f->asked == f->taken ? strdup(f->save) : NULL;
+    char *path = f->save && f->wanted_count == f->taken ? strdup(f->save) : NULL;
     pthread_mutex_unlock(&f->lock);
     if (!path)
         return 0;

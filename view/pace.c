@@ -16,14 +16,14 @@ void trip_pace_note(trip_pace *p, double pixels, double ms)
 }
 
 /* The line of least squares through the frames: ms = fixed + slope * megapixels, neither below 0.
- * Frames of one size do not tell the two apart: all is then taken to be of pixels. */
+ * From frames of one size the two do not follow: all is then taken to be of pixels. */
 static void fit(const trip_pace *p, double *fixed, double *slope)
 {
     const double mean_px = p->px / p->weight, mean_ms = p->ms / p->weight;
-    const double spread = p->px_px / p->weight - mean_px * mean_px;
+    const double variance = p->px_px / p->weight - mean_px * mean_px;
     const double both = p->px_ms / p->weight - mean_px * mean_ms;
     const double most = mean_ms / mean_px;
-    *slope = spread > 1e-4 * mean_px * mean_px ? both / spread : most;
+    *slope = variance > 1e-4 * mean_px * mean_px ? both / variance : most;
     *slope = fmin(fmax(*slope, 0), most);
     *fixed = fmax(mean_ms - *slope * mean_px, 0);
 }

@@ -18,8 +18,8 @@ enum { WIDTH = 1100, HEIGHT = 720 };
 
 /* While nothing goes on by itself the window sleeps; signals are looked for in between. */
 static const double sleep_seconds = 0.1, script_seconds = 0.002;
-/* Dear ImGui takes up to so many pictures to settle after input. */
-enum { SETTLES = 4 };
+/* Dear ImGui lays out what input changed within so many pictures. */
+enum { PICTURES_AFTER_INPUT = 4 };
 
 typedef struct window {
     const trip_view_params *params;
@@ -54,7 +54,7 @@ static int fail_of_glfw(const char *where)
 
 static void note_input(window *w)
 {
-    w->to_draw = SETTLES;
+    w->to_draw = PICTURES_AFTER_INPUT;
     if (w->input_at == 0)
         w->input_at = glfwGetTime();
 }
@@ -216,7 +216,7 @@ static void on_focus(GLFWwindow *glfw, int focused)
 static void on_refresh(GLFWwindow *glfw)
 {
     window *w = glfwGetWindowUserPointer(glfw);
-    w->to_draw = SETTLES;
+    w->to_draw = PICTURES_AFTER_INPUT;
 }
 
 static void listen(window *w)
@@ -271,7 +271,7 @@ static bool play_has_size(void *user, int width, int height)
 static bool play_find(void *user, const char *label, double box[4])
 {
     window *w = user;
-    w->to_draw = SETTLES;
+    w->to_draw = PICTURES_AFTER_INPUT;
     return trip_panel_find(w->panel, label, box);
 }
 
@@ -280,7 +280,7 @@ static void play_shoot(void *user, const char *path)
     window *w = user;
     free(w->shot);
     w->shot = strdup(path);
-    w->to_draw = SETTLES;
+    w->to_draw = PICTURES_AFTER_INPUT;
 }
 
 static void play_save(void *user, const char *path)

@@ -258,7 +258,7 @@ int decode_box(const void *opaque, const trip_volume_portion *portion, const int
         for (int a = 0; a < 3; a++) {
             if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
                 lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
-                throw trip_vdb_error("asked for voxels outside the portion");
+                throw trip_vdb_error("voxels outside the portion");
             at[a] = lo[a] + grid.lo[a];
         }
         grid.decode(at, size, values, active);

@@ -190,7 +190,7 @@ int trip_cpu_pool_create(trip_cpu_pool **out, unsigned threads)
         if (!pool->workers || start_worker(pool, i)) {
             trip_cpu_pool_destroy(pool);
             return trip_fail(TRIP_ERROR, "render", "threads",
-                             "cannot start %u threads; ask for fewer with --threads", threads);
+                             "cannot start %u threads; take fewer with --threads", threads);
         }
     }
     *out = pool;

@@ -10,7 +10,7 @@
 
 static const double kept = 20 * 18 * 16;
 
-/* A block of 20 x 18 x 16 voxels, all kept. */
+/* A body of 20 x 18 x 16 voxels, all kept. */
 static int enter(void **state)
 {
     program_run r;
@@ -175,7 +175,7 @@ static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void *
     {
         check_times(row);
         assert_true(number(row, "views") == 3);
-        /* A block in full view is drawn from one list at least, from three at most. */
+        /* A body in full view is drawn from one list at least, from three at most. */
         assert_true(number(row, "splats_drawn") >= kept);
         assert_true(number(row, "splats_drawn") <= 3 * kept);
         assert_close(number(row, "mpixels_per_s"),
@@ -282,7 +282,7 @@ static void popping_is_of_axis_alone(void **state)
     }
 }
 
-/* A block of one value without light: there is nothing for coarse levels to lose but its edges, and
+/* A body of one value without light: there is nothing for coarse levels to lose but its edges, and
  * its pixels change as the finest level's do. */
 static void levels_of_a_plain_block_are_near_the_finest(void **state)
 {
@@ -414,9 +414,9 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench stream block.trip --views 2",
         "bench stream block.trip --classify post",
         "bench renderers block.trip --classify never",
-        "bench stream block.trip --hidden skip --renderer gl",
-        "bench stream block.trip --hidden skip --renderer reference",
-        "bench renderers block.trip --hidden skip --renderer gl,reference",
+        "bench stream block.trip --occluded skip --renderer gl",
+        "bench stream block.trip --occluded skip --renderer reference",
+        "bench renderers block.trip --occluded skip --renderer gl,reference",
         "bench popping block.trip --finest 256",
         "bench orders block.trip --repeat 0",
         "bench orders block.trip --size 0x32",

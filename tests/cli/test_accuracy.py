@@ -304,7 +304,7 @@ class Accuracy(program.ProgramTest):
 
     def test_progress_is_shown_but_not_when_quiet(self):
         arguments = [a for a in SMALL if a != "--quiet"]
-        run = self.works("accuracy", "a.trip", "-o", "told", *arguments, "--no-ladder",
+        run = self.works("accuracy", "a.trip", "-o", "given", *arguments, "--no-ladder",
                          "--settings", "post")
         self.assertRegex(run.stderr, r"^accuracy  0:00")
 

@@ -164,7 +164,7 @@ class Drawn(program.ProgramTest):
                         method,
                     ]
                     view += ["--h", "0"] if method == "merge" else []
-                    stats = self.stats(*view, "--count", "--hidden", "draw")
+                    stats = self.stats(*view, "--count", "--occluded", "draw")
                     self.assertEqual(program.splats_drawn(stats), kept, view)
                     read = [c["splats_read"] for c in stats["frames"][0]["lists"].values()]
                     self.assertEqual([n for n in read if n], [kept], view)

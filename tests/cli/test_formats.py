@@ -281,7 +281,7 @@ class World(program.ProgramTest):
         self.assertAlmostEqual(slope, -1, delta=0.05)
 
     def test_pictures_are_neither_upside_down_nor_mirrored(self):
-        """A block at one corner of a large volume: high z is up, high x right when seen along y."""
+        """A body at one corner of a large volume: high z is up, high x right when seen along y."""
         values = numpy.full((40, 40, 40), 10, "u1")
         values[30:38, 4:12, 30:38] = 200
         program.write_nrrd("corner.nrrd", values)

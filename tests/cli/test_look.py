@@ -1,5 +1,5 @@
 """The look without a file: presets by name, windows, the scale of opacity, what is made of a volume
-without being told, and volumes in which there is nothing to see."""
+without options, and volumes in which there is nothing to see."""
 import json
 import os
 import re

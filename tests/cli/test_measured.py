@@ -89,7 +89,7 @@ class Depth(program.ProgramTest):
 
 
 class Measured(program.ProgramTest):
-    """A nearly opaque cube of 128 voxels a side, from close by: much of it is hidden."""
+    """A nearly opaque cube of 128 voxels a side, from close by: much of it is occluded."""
 
     @classmethod
     def setUpClass(cls):
@@ -118,13 +118,13 @@ class Measured(program.ProgramTest):
             _, summary, same = self.render(*measured)
             self.assertEqual(summary, plain, measured)
             self.assertTrue(same == picture, measured)
-        self.assertNotEqual(self.render("--hidden", "draw")[1], plain)
+        self.assertNotEqual(self.render("--occluded", "draw")[1], plain)
 
-    def test_hidden_bricks_are_left_out_of_what_is_measured(self):
+    def test_occluded_bricks_are_left_out_of_what_is_measured(self):
         frame = self.frame()
         self.assertGreater(frame["bytes_skipped"], 0)
-        self.assertEqual(bytes_read(frame), bytes_read(self.frame("--hidden", "skip")))
-        self.assertLess(bytes_read(frame), bytes_read(self.frame("--hidden", "draw")))
+        self.assertEqual(bytes_read(frame), bytes_read(self.frame("--occluded", "skip")))
+        self.assertLess(bytes_read(frame), bytes_read(self.frame("--occluded", "draw")))
 
     def test_what_was_not_counted_is_not_there(self):
         frame = self.frame()
@@ -137,7 +137,7 @@ class Measured(program.ProgramTest):
         self.assertNotRegex(said, "projected|[0-9] drawn|count ")
 
     def test_counts_are_of_everything_and_beside_the_frame_that_is_timed(self):
-        plain, counted, whole = self.frame(), self.frame("--count"), self.frame("--hidden", "draw")
+        plain, counted, whole = self.frame(), self.frame("--count"), self.frame("--occluded", "draw")
         for axis in counted["lists"].values():  # the timed frame did not count
             for key in COUNTS:
                 self.assertNotIn(key, axis)
@@ -156,7 +156,7 @@ class Measured(program.ProgramTest):
         """The reader keeps bricks for the frames to come; the counting pass fills no such cache."""
         def frames(*more):
             stats = self.stats("cube.trip", *VIEW[:8], "--classify", "pre", "--orbit", "3",
-                               "--hidden", "draw", *more)
+                               "--occluded", "draw", *more)
             return stats["frames"]
         plain, counted = frames(), frames("--count")
         for a, b in zip(plain, counted):

@@ -99,7 +99,7 @@ static void wrong_usage_is_one_line_and_exit_status_2(void **state)
         "fog.trip -o a.png --submit sprites,triangles",
         "fog.trip -o a.png --submit replicated --submit indexed",
         "fog.trip -o a.png --submit quads",
-        "fog.trip -o a.png --hidden skip --renderer reference",
+        "fog.trip -o a.png --occluded skip --renderer reference",
         "fog.trip -o a.png --memory 0",
         "fog.trip -o a.png --memory lots",
         "fog.trip -o a.png --engine aio",
@@ -265,15 +265,15 @@ static void with_h_zero_thrice_the_kept_voxels_are_drawn_and_along_an_axis_once(
     }
 }
 
-static void skipping_what_is_hidden_does_not_change_the_picture(void **state)
+static void skipping_what_is_occluded_does_not_change_the_picture(void **state)
 {
     (void)state;
     const char *const classify[] = { "pre", "post" };
     const char *const look = "--tf preset:bone --size 100x100 --classify";
     for (int i = 0; i < 2; i++) {
-        program_call(&run, "render stent.trip -o a.exr %s %s --hidden skip", look, classify[i]);
+        program_call(&run, "render stent.trip -o a.exr %s %s --occluded skip", look, classify[i]);
         assert_works(&run);
-        program_call(&run, "render stent.trip -o b.exr %s %s --hidden draw", look, classify[i]);
+        program_call(&run, "render stent.trip -o b.exr %s %s --occluded draw", look, classify[i]);
         assert_works(&run);
         picture a = load("a.exr"), b = load("b.exr");
         assert_memory_equal(a.rgba, b.rgba, 100 * 100 * 4 * sizeof(float));
@@ -293,7 +293,7 @@ static void explain_prints_the_plan_and_what_it_cost(void **state)
         assert_non_null(strstr(run.out, i ? "classify    pre" : "classify    post"));
         assert_non_null(strstr(run.out, "method      merge"));
         assert_non_null(strstr(run.out, "list y      read: "));
-        assert_non_null(strstr(run.out, "shading     does not run: not asked for"));
+        assert_non_null(strstr(run.out, "shading     does not run: switched off"));
         assert_non_null(strstr(run.out, "cost y      "));
         assert_non_null(strstr(run.out, "time        "));
     }
@@ -370,7 +370,7 @@ int main(void)
         cmocka_unit_test(an_orbit_writes_numbered_images_that_differ),
         cmocka_unit_test(stats_hold_the_fixed_keys),
         cmocka_unit_test(with_h_zero_thrice_the_kept_voxels_are_drawn_and_along_an_axis_once),
-        cmocka_unit_test(skipping_what_is_hidden_does_not_change_the_picture),
+        cmocka_unit_test(skipping_what_is_occluded_does_not_change_the_picture),
         cmocka_unit_test(explain_prints_the_plan_and_what_it_cost),
         cmocka_unit_test(a_function_that_shows_what_was_left_out_warns_with_a_count),
         cmocka_unit_test(what_cannot_be_written_fails_and_leaves_nothing_behind),

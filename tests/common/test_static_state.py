@@ -29,7 +29,7 @@ def variables(library):
 
 
 def name_of(symbol):
-    """Without its scope and the number that tells functions' statics apart."""
+    """Without its scope and the number by which functions' statics differ."""
     symbol = re.sub(r"\.\d+$", "", symbol)
     return re.sub(r"^(guard variable for )?.*::(\w+)$", r"\1\2", symbol)
 

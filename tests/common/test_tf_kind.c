@@ -118,7 +118,7 @@ static void dicom_says_what_it_is(void **state)
     assert_int_equal(trip_tf_recognise(&other, &h), TRIP_TF_SIMULATION);
 }
 
-/* Values between which nothing is told apart by their histogram. */
+/* Values whose histogram fits several kinds. */
 static void dicom_says_that_values_are_hounsfield_units(void **state)
 {
     (void)state;

@@ -98,7 +98,7 @@ class Frames:
     def __init__(self, options):
         self.options = options
         text = run([options.triptych, "bench", "renderers", options.dataset, "--renderer=cpu",
-                    "--threads=1", "--hidden=draw", "--json", "--size=" + options.size,
+                    "--threads=1", "--occluded=draw", "--json", "--size=" + options.size,
                     "--views=%d" % options.views] + options.look
                    + (["--no-counts"] if options.post else []))
         result = json.loads(text)
@@ -127,7 +127,7 @@ class Frames:
         run(["valgrind", "--tool=callgrind", "--callgrind-out-file=" + profile,
              self.options.triptych, "render", self.options.dataset, "--output",
              os.path.join(folder, "frame.tif"), "--classify=pre", "--renderer=cpu", "--threads=1",
-             "--hidden=draw",
+             "--occluded=draw",
              "--engine=pread", "--size=" + self.options.size] + view_options(view)
             + self.options.look, env=dict(os.environ, TRIPTYCH_ISA=isa))
         with open(profile, encoding="utf-8", errors="replace") as file:
@@ -150,8 +150,8 @@ def print_table(frames, counts):
         print("\nVoxels are those kept, pixels those of the picture. The rest is reading, checking, "
               "planning,\nthe function's integrals and writing the picture.")
         return
-    print("\nSplats and pixels are those of `triptych bench renderers`, hidden ones too. The rest is "
-          "reading,\nchecking, planning, leaving out what is hidden and writing the picture. valgrind has "
+    print("\nSplats and pixels are those of `triptych bench renderers`, occluded ones too. The rest is "
+          "reading,\nchecking, planning, leaving out what is occluded and writing the picture. valgrind has "
           "no AVX-512, so\nthat is not counted.")
 
 

@@ -1,4 +1,4 @@
-"""Draws one volume by one of VTK's mappers, as told by JSON lines on standard input:
+"""Draws one volume by one of VTK's mappers, as JSON lines say on standard input:
   {"mapper": "cpu" | "gpu", "volume": FILE.npy, "index_to_world": 3 x 4, "function": [[value, r, g, b,
    opacity], ...], "shading": bool, "threads": N,
    "step": voxels}
@@ -109,14 +109,14 @@ class Stage:
         self.display = job["mapper"] == "cpu"
 
     def device(self):
-        self.window.Render()  # before it, there is no context to ask
+        self.window.Render()  # before it, there is no context
         facts = dict(line.split(":", 1) for line in self.window.ReportCapabilities().splitlines()
                      if ":" in line and line.startswith("OpenGL"))
         return "%s, OpenGL %s" % (facts["OpenGL renderer string"].strip(),
                                   facts["OpenGL version string"].strip())
 
     def angle(self, view):
-        """The ray caster's picture is larger by a pixel than the view asks for: the first and the
+        """The ray caster's picture is larger by a pixel than that of the view: the first and the
         last of N rays along an edge are as far apart as N pixels are wide. The angle makes up for it."""
         if not self.display:
             return view["fov_degrees"]

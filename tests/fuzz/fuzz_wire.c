@@ -1,5 +1,5 @@
 /* A helper that answers anything: no crash, no hang and no leak, and what is accepted is a volume
- * or a picture of its own size. The first byte says what is asked. */
+ * or a picture of its own size. The first byte chooses the request. */
 #include "fuzz.h"
 
 #include "image_file.h"

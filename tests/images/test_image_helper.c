@@ -172,7 +172,7 @@ static void begin_answer(bool stays)
 }
 
 /* The status of a request that is answered so. */
-static int ask(uint64_t *data_bytes)
+static int request(uint64_t *data_bytes)
 {
     trip_image_helper *h;
     trip_image_helper_replace(answer_at_once, 150);
@@ -191,7 +191,7 @@ static int ask(uint64_t *data_bytes)
 static void expect_distrust(const char *text)
 {
     uint64_t bytes;
-    assert_int_equal(ask(&bytes), TRIP_ERROR);
+    assert_int_equal(request(&bytes), TRIP_ERROR);
     assert_one_report(text);
 }
 
@@ -222,7 +222,7 @@ static void warnings_have_an_end(void **state)
     for (int i = 0; i < 65; i++)
         add_reply(TRIP_IMAGE_WARNING, 0, 0, 0);
     uint64_t bytes;
-    assert_int_equal(ask(&bytes), TRIP_ERROR);
+    assert_int_equal(request(&bytes), TRIP_ERROR);
     assert_int_equal(reports, 65); /* 64 of them and the failure */
     assert_non_null(strstr(reported, "warnings without end"));
 }
@@ -235,7 +235,7 @@ static void signs_of_life_are_passed_over(void **state)
     for (int i = 0; i < 100; i++)
         add_reply(TRIP_IMAGE_WORKING, 0, 0, 0);
     add_reply(TRIP_IMAGE_DONE, 0, 0, 12345);
-    assert_int_equal(ask(&bytes), 0);
+    assert_int_equal(request(&bytes), 0);
     assert_int_equal(reports, 0);
     assert_int_equal(bytes, 12345);
 }

@@ -579,7 +579,7 @@ static void volumes_are_identified_by_content_and_by_state(void **state)
     write_volume(one, 64, 2);
     assert_int_equal(triptych_identify(t, one, NULL, 1000, &changed), TRIPTYCH_OK);
     assert_int_equal(a.bytes, 64);
-    assert_int_equal(a.settled, 0); /* it was written just now */
+    assert_int_equal(a.stable, 0); /* it was written just now */
     assert_int_equal(strlen(a.content), 32);
     assert_string_equal(a.content, copy.content);
     assert_string_not_equal(a.state, copy.state);
@@ -650,7 +650,7 @@ static void messages_go_to_whoever_takes_them(void **state)
     const triptych_function none = { .window = 1, .level = 1e9, .name = "grey" };
     int silent = triptych_set_function(t, &none);
     triptych_set_messages(t, count_message, &messages);
-    int told = triptych_set_function(t, &none);
+    int reported = triptych_set_function(t, &none);
     int failed = triptych_open(t, "none.trip", NULL);
     dup2(keep, STDERR_FILENO);
     close(keep);
@@ -658,7 +658,7 @@ static void messages_go_to_whoever_takes_them(void **state)
     assert_int_equal(read(ends[0], text, sizeof text), 0);
     close(ends[0]);
     assert_int_equal(silent, TRIPTYCH_OK);
-    assert_int_equal(told, TRIPTYCH_OK);
+    assert_int_equal(reported, TRIPTYCH_OK);
     assert_int_equal(failed, TRIPTYCH_ERROR);
     assert_int_equal(messages, 2);
     open_data(t, TRIPTYCH_RENDERER_CPU);

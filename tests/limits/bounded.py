@@ -37,10 +37,10 @@ class Stage:
 
 
 class Bounded:
-    """Gives each line of the report to `tell` and stops at the first stage that fails: AssertionError."""
+    """Gives each line of the report to `note` and stops at the first stage that fails: AssertionError."""
 
-    def __init__(self, folder, limit_bytes, memory_bytes, tell):
-        self.folder, self.tell = folder, tell
+    def __init__(self, folder, limit_bytes, memory_bytes, note):
+        self.folder, self.note = folder, note
         self.limit_bytes, self.memory_bytes = limit_bytes, memory_bytes
         self.data = os.path.join(folder, "bounded.trip")
 
@@ -52,7 +52,7 @@ class Bounded:
 
     def judge(self, stage, moved_bytes=0):
         if moved_bytes:
-            self.tell(stage.line(moved_bytes))
+            self.note(stage.line(moved_bytes))
         problem = stage.problem()
         assert problem is None, problem
 
@@ -65,7 +65,7 @@ class Bounded:
         if not os.path.exists(path):
             r = limits.run("triptych-generate", "shells", "--size", n, "--type", "float", "-o", path)
             assert r.status == 0, r.err
-            self.tell(f"{'generate':<24}{r.seconds:8.1f} s "
+            self.note(f"{'generate':<24}{r.seconds:8.1f} s "
                       f"{os.path.getsize(path) / 1e9 / r.seconds:6.2f} GB/s   resident "
                       f"{limits.text_bytes(r.peak_bytes):>10}")
         return path
@@ -76,7 +76,7 @@ class Bounded:
         made = json.loads(stage.outcome.out)
         self.judge(stage, made["input_bytes"] + made["bytes"])
         share = 100 * made["kept"] / made["voxels"]
-        self.tell(f"    {limits.text_bytes(made['input_bytes'])} read, {share:.1f} % of the voxels "
+        self.note(f"    {limits.text_bytes(made['input_bytes'])} read, {share:.1f} % of the voxels "
                   f"kept, {limits.text_bytes(made['temporary_bytes'])} spilled, "
                   f"{limits.text_bytes(made['bytes'])} written")
         assert made["kept"] >= 0.1 * made["voxels"], "less than a tenth of the voxels is kept"

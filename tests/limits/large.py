@@ -49,8 +49,8 @@ def remove_made(o, bounded, volume):
     shutil.rmtree(bounded.data, ignore_errors=True)
 
 
-def work(o, tell):
-    bounded = Bounded(o.work, o.limit, o.memory, tell)
+def work(o, note):
+    bounded = Bounded(o.work, o.limit, o.memory, note)
     shutil.rmtree(bounded.data, ignore_errors=True)  # of an earlier run
     volume = bounded.generate(o.volume)
     try:

@@ -106,7 +106,7 @@ class Test(unittest.TestCase):
     def path(cls, *names):
         return os.path.join(cls.folder, *names)
 
-    def tell(self, text):
+    def note(self, text):
         print(f"    {text}", flush=True)
 
     def works(self, name, *arguments, warns="", **popen):

@@ -78,7 +78,7 @@ class Faults(limits.Test):
             if name != "index.trip":  # the page that starts there
                 self.assertTrue(int(place[1]) <= at < int(place[1]) + 65536, (name, at, place[1]))
             self.restore(name)
-        self.tell(f"{count} bytes flipped: {found} errors, {count - found} same pictures")
+        self.note(f"{count} bytes flipped: {found} errors, {count - found} same pictures")
 
     def test_overwritten_and_moved_parts(self):
         for i in range(limits.rounds(FLIPS) // 5):

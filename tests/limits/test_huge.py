@@ -49,7 +49,7 @@ class Huge(limits.Test):
         self.assertEqual(json.loads(r.out)["kept"], 0)
 
     def test_slices_as_large_as_memory_allows(self):
-        """What the refusal asks for is enough, a first pass for the values' range included."""
+        """What the refusal names is enough, a first pass for the values' range included."""
         volume = self.holes("large.raw", 1024 * 1024 * 6 * 4)
         data = self.path("l.trip")
         arguments = ["brick", volume, "--size", "1024,1024,6", "--type", "float", "-o", data,
@@ -57,7 +57,7 @@ class Huge(limits.Test):
         for envelope in [], ["--keep-all"], ["--range", "0:0"]:
             r = self.fails("triptych", *arguments, *envelope, "--memory", "20M", says="--memory")
             enough = int(r.err.split("--memory ")[1].split("M")[0])
-            self.tell(f"slices of 4 MiB need {enough} MiB")
+            self.note(f"slices of 4 MiB need {enough} MiB")
             self.works("triptych", *arguments, *envelope, "--memory", f"{enough}M", "--dry-run")
             r = self.works("triptych", *arguments, *envelope, "--memory", f"{enough}M",
                            warns="there is nothing to see")

@@ -69,7 +69,7 @@ class Kill(limits.Test):
             if os.path.exists(self.name):
                 complete += 1
                 shutil.rmtree(self.name)
-        self.tell(f"killed {killed} times within {self.seconds:.2f} s, finished {complete} times, "
+        self.note(f"killed {killed} times within {self.seconds:.2f} s, finished {complete} times, "
                   f"{resumed} of them undisturbed")
 
     def test_killed_while_it_replaces_another(self):

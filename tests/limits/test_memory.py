@@ -25,7 +25,7 @@ class Memory(limits.Test):
             raise unittest.SkipTest(f"no memory cgroup can be made here: {e}")
 
     def test_a_volume_of_four_times_the_limit_and_more(self):
-        bounded = Bounded(self.folder, self.limit, self.memory, self.tell)
+        bounded = Bounded(self.folder, self.limit, self.memory, self.note)
         volume = bounded.generate(4 * self.limit)
         self.assertGreaterEqual(os.path.getsize(volume), 4 * self.limit)
         bounded.brick(volume)
@@ -51,7 +51,7 @@ class Memory(limits.Test):
             r = self.works("triptych-generate", "marschner-lobb", "--size", "64x64x6000", "--type",
                            "float", "-o", self.path(name))
             self.assertGreater(os.path.getsize(self.path(name)), 48 * MIB)  # the VDB is packed
-            self.tell(f"{name}: at most {limits.text_bytes(r.peak_bytes)} resident")
+            self.note(f"{name}: at most {limits.text_bytes(r.peak_bytes)} resident")
             self.assertLess(r.peak_bytes, limit)
             os.remove(self.path(name))
 

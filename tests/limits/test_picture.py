@@ -23,12 +23,12 @@ class Picture(limits.Test):
         yield from (["--memory", m] for m in memory)
         yield from (["--engine", e] for e in engines)
         yield from (["--threads", n] for n in threads)
-        hidden = ["skip", "draw"] if renderer == "cpu" else []
-        yield from (["--hidden", h] for h in hidden)
+        occluded = ["skip", "draw"] if renderer == "cpu" else []
+        yield from (["--occluded", h] for h in occluded)
         for _ in range(count):
             choice = ["--memory", self.random.choice(memory), "--engine",
                       self.random.choice(engines), "--threads", self.random.choice(threads)]
-            yield choice + (["--hidden", self.random.choice(hidden)] if hidden else [])
+            yield choice + (["--occluded", self.random.choice(occluded)] if occluded else [])
 
     def check(self, sets, renderer, view, count):
         size = "90x70"
@@ -83,7 +83,7 @@ class Picture(limits.Test):
             hashes.append(limits.picture_hash(picture))
             explained = self.works(*arguments, "--explain", env=env).out
             self.assertIn(f"ring        {rings[-1]}: ", explained)
-        self.tell(f"reads into GL memory: {rings[0]}")
+        self.note(f"reads into GL memory: {rings[0]}")
         self.assertIn(rings[0], ["mapped", "copied"])
         self.assertEqual(rings[1], "copied")
         self.assertEqual(hashes[0], hashes[1])

@@ -108,7 +108,7 @@ static trial make_trial(unsigned number, uint64_t *random)
     return t;
 }
 
-/* Blends and reads little at a time, so that bricks are found hidden before they are read. */
+/* Blends and reads little at a time, so that bricks are found occluded before they are read. */
 static trial skipping_trial(void)
 {
     return (trial){ .tile = 16,

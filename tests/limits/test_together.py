@@ -66,7 +66,7 @@ class Together(limits.Test):
         thread.join()
         self.assertEqual(said, [])
         self.assertLessEqual(seen, wanted)
-        self.tell(f"{failures} of {limits.rounds(30)} came upon the moment of change")
+        self.note(f"{failures} of {limits.rounds(30)} came upon the moment of change")
         self.works("triptych", "info", "--verify", data)
 
     def test_two_that_make_the_same_data_set(self):

@@ -9,7 +9,7 @@ enum { NX = 70, NY = 66, NZ = 50, N = NX * NY * NZ };
 /* What a walk met: how often each voxel, and that its value was right. */
 typedef struct seen {
     uint8_t times[N];
-    uint64_t done, batches, voxels; /* as last told */
+    uint64_t done, batches, voxels; /* as last reported */
     int64_t edge, height;
     bool wrong;
     int stop_after; /* slices; 0: never */
@@ -52,7 +52,7 @@ static int see_box(void *user, unsigned thread, const trip_box *box)
         for (int64_t j = 0; j < box->size[1]; j++)
             for (int64_t i = 0; i < box->size[0]; i++, n++) {
                 int64_t at = ((box->lo[2] + k) * NY + box->lo[1] + j) * NX + box->lo[0] + i;
-                s->times[at]++; /* boxes do not overlap, or the sanitizer would tell */
+                s->times[at]++; /* boxes do not overlap, or the sanitizer would find it */
                 s->wrong = s->wrong || values[n] != value_at((size_t)at);
             }
     return 0;

@@ -1,6 +1,6 @@
 /* Stands in for triptych-images where tests draw hundreds of small pictures only to read their
  * pixels: it starts in a hundredth of the time, since it loads none of the libraries. OpenEXR files
- * of float RGBA are written here, in blocks that are not packed; for any other request
+ * of float RGBA are written here, in chunks that are not packed; for any other request
  * triptych-images takes the place of this process before a byte of it is taken from the connection.
  * That triptych-images itself writes what it should is for the tests that read pictures of every
  * format and depth (test_image_file, test_formats). Pictures that hold what is no number are
@@ -20,9 +20,9 @@
 #include "image_file.h"
 #include "image_helper.h"
 
-enum { CONNECTION = TRIP_IMAGE_HELPER_FD, CHANNELS = 4, BLOCK_ROWS = 16, ZIP = 3 };
+enum { CONNECTION = TRIP_IMAGE_HELPER_FD, CHANNELS = 4, CHUNK_ROWS = 16, ZIP = 3 };
 
-/* Whoever asked is gone, or asks for what cannot be: nothing is left to do. */
+/* The other end is gone, or its request cannot be met: nothing is left to do. */
 static void give_up(void)
 {
     _exit(1);
@@ -108,7 +108,7 @@ static void put_attribute(output *o, const char *name, const char *type, const v
     put(o, value, (size_t)bytes);
 }
 
-/* The file's head, up to the table of where its blocks are. */
+/* The file's head, up to the table of where its chunks are. */
 static void put_head(output *o, int width, int height)
 {
     unsigned char channels[CHANNELS * 18 + 1] = { 0 };
@@ -180,19 +180,19 @@ static void write_all(int fd, const output *o)
 
 static void write_picture(int fd, int width, int height)
 {
-    int blocks = (height + BLOCK_ROWS - 1) / BLOCK_ROWS;
+    int chunks = (height + CHUNK_ROWS - 1) / CHUNK_ROWS;
     size_t row_bytes = (size_t)width * CHANNELS * sizeof(float);
-    output o = { .data = malloc(1024 + 16 * (size_t)blocks + (size_t)height * row_bytes) };
+    output o = { .data = malloc(1024 + 16 * (size_t)chunks + (size_t)height * row_bytes) };
     float *rgba = malloc(row_bytes);
     if (!o.data || !rgba)
         give_up();
     put_head(&o, width, height);
-    for (int i = 0; i < blocks; i++) {
-        uint64_t at = o.bytes + 8 * (size_t)(blocks - i) + (size_t)i * (8 + BLOCK_ROWS * row_bytes);
+    for (int i = 0; i < chunks; i++) {
+        uint64_t at = o.bytes + 8 * (size_t)(chunks - i) + (size_t)i * (8 + CHUNK_ROWS * row_bytes);
         put(&o, &at, sizeof at);
     }
-    for (int y = 0; y < height; y += BLOCK_ROWS)
-        put_block(&o, y, height - y < BLOCK_ROWS ? height - y : BLOCK_ROWS, width, rgba);
+    for (int y = 0; y < height; y += CHUNK_ROWS)
+        put_block(&o, y, height - y < CHUNK_ROWS ? height - y : CHUNK_ROWS, width, rgba);
     write_all(fd, &o);
     free(rgba);
     free(o.data);

@@ -237,10 +237,10 @@ const scene_renderer *scene_renderers(void)
         { "reference", trip_reference_create, 0 },
         { "cpu", create_cpu, 1.0 / 255 },
     };
-    static bool asked;
-    if (!asked && has_gl())
+    static bool looked;
+    if (!looked && has_gl())
         all[2] = (scene_renderer){ "gl", trip_gl_create, 1.0 / 255 };
-    asked = true;
+    looked = true;
     return all;
 }
 

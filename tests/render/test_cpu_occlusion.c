@@ -36,14 +36,14 @@ static void look(looks *l, const scene *s, const trip_camera_params *params, int
     l->mask = (trip_cpu_mask){ { ACROSS, ACROSS }, l->open };
 }
 
-static void open_only(looks *l, unsigned block_x, unsigned block_y)
+static void open_only(looks *l, unsigned cell_x, unsigned cell_y)
 {
     for (int i = 0; i < ACROSS * ACROSS; i++)
         l->open[i] = 0;
-    l->open[block_y / 8 * ACROSS + block_x / 8] = UINT64_C(1) << (8 * (block_y % 8) + block_x % 8);
+    l->open[cell_y / 8 * ACROSS + cell_x / 8] = UINT64_C(1) << (8 * (cell_y % 8) + cell_x % 8);
 }
 
-static bool reaches(const looks *l, const double at[3], unsigned block_x, unsigned block_y)
+static bool reaches(const looks *l, const double at[3], unsigned cell_x, unsigned cell_y)
 {
     double p[3];
     trip_splat s;
@@ -53,13 +53,13 @@ static bool reaches(const looks *l, const double at[3], unsigned block_x, unsign
     if (!trip_splat_project(&l->view.splat, trip_v3(p[0], p[1], p[2]), &s))
         return false;
     for (unsigned i = 0; i < 16; i++)
-        if (trip_splat_radius2(&l->view.splat, &s, 4 * block_x + i % 4 + 0.5,
-                               4 * block_y + i / 4 + 0.5) <= l->view.splat.cutoff2)
+        if (trip_splat_radius2(&l->view.splat, &s, 4 * cell_x + i % 4 + 0.5,
+                               4 * cell_y + i / 4 + 0.5) <= l->view.splat.cutoff2)
             return true;
     return false;
 }
 
-/* The box's voxels, each by itself; true when some reaches the block. */
+/* The box's voxels, each by itself; true when some reaches the cell. */
 static bool any_reaches(const looks *l, const trip_cpu_box *box, unsigned x, unsigned y)
 {
     for (double u = -box->half[0]; u <= box->half[0]; u++)
@@ -183,7 +183,7 @@ static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, 
     assert_int_equal(part.voxels, staying);
 }
 
-static void runs_show_all_that_reaches_an_open_block(void **state)
+static void runs_show_all_that_reaches_an_open_cell(void **state)
 {
     (void)state;
     scene s;
@@ -215,7 +215,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_occluded_reaches_no_open_cell),
         cmocka_unit_test(without_saturated_cells_all_is_visible),
-        cmocka_unit_test(runs_show_all_that_reaches_an_open_block),
+        cmocka_unit_test(runs_show_all_that_reaches_an_open_cell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -237,7 +237,7 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* A block of opaque voxels, filling the view: what lies behind its face is occluded. */
+/* A body of opaque voxels, filling the view: what lies behind its face is occluded. */
 static void check_occluded(trip_compositing compositing)
 {
     scene s;

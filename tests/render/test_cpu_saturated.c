@@ -116,7 +116,7 @@ static void check(fixture *f, const trip_cpu_kernels *k, int seed)
     assert_int_equal(next, some);
 }
 
-static void what_has_an_open_block_stays_and_nothing_else(void **state)
+static void what_has_an_open_cell_stays_and_nothing_else(void **state)
 {
     fixture *f = *state;
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++)
@@ -146,7 +146,7 @@ static void large_splats_stay_where_they_show(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(what_has_an_open_block_stays_and_nothing_else, set_up,
+        cmocka_unit_test_setup_teardown(what_has_an_open_cell_stays_and_nothing_else, set_up,
                                         tear_down),
         cmocka_unit_test_setup_teardown(large_splats_stay_where_they_show, set_up, tear_down),
     };

@@ -258,7 +258,7 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* A block that hides what lies behind its face, from the reader's side too. */
+/* A wall that hides what lies behind its face, from the reader's side too. */
 static void leaving_out_what_is_occluded_draws_the_same(void **state)
 {
     (void)state;
@@ -327,28 +327,28 @@ static void instruction_sets_agree(void **state)
 
 /* ---- kernels ---- */
 
-enum { BLOCKS = 5 }; /* here, to the left, above, the sheets before and behind */
+enum { RASTERS = 5 }; /* here, to the left, above, the sheets before and behind */
 
-static trip_cpu_voxels blocks[BLOCKS], out;
+static trip_cpu_voxels rasters[RASTERS], out;
 
-static int code_at(int block, int u, int v)
+static int code_at(int raster, int u, int v)
 {
-    return blocks[block].codes[v * TRIP_CPU_BLOCK_STRIDE + u];
+    return rasters[raster].codes[v * TRIP_CPU_RASTER_STRIDE + u];
 }
 
 /* Few different codes, the greatest and least among them, and missing ones. */
-static void fill_blocks(void)
+static void fill_rasters(void)
 {
     static const int16_t codes[] = { TRIP_CPU_CODE_LEAST,  -20000, -1, 0, 1, 2, 300, INT16_MAX,
                                      TRIP_CPU_CODE_MISSING };
-    memset(blocks, 0, sizeof blocks);
-    for (int b = 0; b < BLOCKS; b++)
-        for (int i = 0; i < TRIP_CPU_BLOCK_VOXELS; i++) {
+    memset(rasters, 0, sizeof rasters);
+    for (int b = 0; b < RASTERS; b++)
+        for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++) {
             uint32_t x = scene_hash(i, b, 7);
             bool smooth = i / 1000 % 2;
-            blocks[b].codes[i] = smooth ? (int16_t)(x % 900) : codes[x % 9];
+            rasters[b].codes[i] = smooth ? (int16_t)(x % 900) : codes[x % 9];
             for (int k = 0; k < 3; k++)
-                blocks[b].gradients[i].along[k] = (int16_t)(scene_hash(i, b, 8 + k) % 65536);
+                rasters[b].gradients[i].along[k] = (int16_t)(scene_hash(i, b, 8 + k) % 65536);
         }
 }
 
@@ -368,15 +368,15 @@ static int difference(int below, int here, int above)
 
 static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
 {
-    out = blocks[0];
-    k->sheet_gradients(&out, squares, &blocks[1], &blocks[2], &blocks[3], &blocks[4]);
-    assert_memory_equal(out.codes, blocks[0].codes, sizeof out.codes);
+    out = rasters[0];
+    k->sheet_gradients(&out, squares, &rasters[1], &rasters[2], &rasters[3], &rasters[4]);
+    assert_memory_equal(out.codes, rasters[0].codes, sizeof out.codes);
     for (int v = 0; v < 64; v++)
         for (int u = 0; u < 64; u++) {
-            int here = code_at(0, u, v), i = v * TRIP_CPU_BLOCK_STRIDE + u;
+            int here = code_at(0, u, v), i = v * TRIP_CPU_RASTER_STRIDE + u;
             const int16_t *along = out.gradients[i].along;
             if (!(squares >> (v / 8 * 8 + u / 8) & 1)) {
-                assert_memory_equal(along, blocks[0].gradients[i].along, sizeof out.gradients[i]);
+                assert_memory_equal(along, rasters[0].gradients[i].along, sizeof out.gradients[i]);
                 continue;
             }
             if (is_missing(here))
@@ -392,7 +392,7 @@ static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
 static void check_ranges(const trip_cpu_kernels *k)
 {
     trip_cpu_square_ranges ranges;
-    k->sheet_ranges(&blocks[0], &ranges);
+    k->sheet_ranges(&rasters[0], &ranges);
     for (int square = 0; square < 64; square++) {
         int least = INT16_MAX, most = INT16_MIN;
         for (int i = 0; i < 81; i++) {
@@ -408,7 +408,7 @@ static void check_ranges(const trip_cpu_kernels *k)
 static void check_cells(const trip_cpu_kernels *k, int16_t least, int16_t most)
 {
     trip_cpu_cells cells;
-    k->sheet_cells(&blocks[0], &blocks[4], UINT64_MAX, least, most, &cells);
+    k->sheet_cells(&rasters[0], &rasters[4], UINT64_MAX, least, most, &cells);
     for (int v = 0; v < 64; v++)
         for (int u = 0; u < 64; u++) {
             int low = INT16_MAX, high = INT16_MIN;
@@ -430,23 +430,23 @@ static int64_t between(int a, int b, int w)
 
 static void check_between(const trip_cpu_kernels *k, int w, bool gradients)
 {
-    k->sheet_between(&blocks[3], &blocks[4], UINT64_MAX, w << 16 | (16384 - w), gradients, &out);
+    k->sheet_between(&rasters[3], &rasters[4], UINT64_MAX, w << 16 | (16384 - w), gradients, &out);
     for (int v = 0; v <= 64; v++)
         for (int u = 0; u <= 64; u++) {
-            int a = code_at(3, u, v), b = code_at(4, u, v), i = v * TRIP_CPU_BLOCK_STRIDE + u;
+            int a = code_at(3, u, v), b = code_at(4, u, v), i = v * TRIP_CPU_RASTER_STRIDE + u;
             assert_int_equal(out.codes[i], is_missing(a) || is_missing(b) ? TRIP_CPU_CODE_MISSING
                                                                           : between(a, b, w));
             for (int n = 0; gradients && n < 3; n++)
                 assert_int_equal(
                     out.gradients[i].along[n],
-                    between(blocks[3].gradients[i].along[n], blocks[4].gradients[i].along[n], w));
+                    between(rasters[3].gradients[i].along[n], rasters[4].gradients[i].along[n], w));
         }
 }
 
 static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
 {
     (void)state;
-    fill_blocks();
+    fill_rasters();
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         check_ranges(*isa);
         check_gradients(*isa, UINT64_MAX);

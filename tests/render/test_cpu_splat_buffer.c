@@ -52,8 +52,7 @@ static uint32_t reserve(fixture *f, uint32_t count)
     return reserved;
 }
 
-/* Fills a chunk with `count` splats, the i-th in pane i mod PANES; `mark` tells them from others'.
- */
+/* Fills a chunk with `count` splats, the i-th in pane i mod PANES; `mark` is theirs alone. */
 static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
 {
     trip_cpu_chunk *chunk = &f->buffer.chunks[number];

@@ -1,6 +1,6 @@
 /* The gl renderer against the reference: forms of submission, methods, targets, the limits of a
  * driver, and what happens when something is missing. Pictures of real data: test_gl_views.c. The
- * order of layers and the opacity of blocks are tested with all renderers in test_reference.c. */
+ * order of layers and the opacity of bodies are tested with all renderers in test_reference.c. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>

@@ -179,7 +179,7 @@ static void nearly_opaque_black_and_white_agrees_with_the_reference(void **state
 }
 
 /* The stent is cut off at the border of the grid. In view 6 a ray is within a millionth of a voxel
- * of that at a slice, which single precision does not tell from being there. */
+ * of that at a slice, which single precision cannot distinguish from being there. */
 static void views_classified_after_interpolation_agree_with_the_reference(void **state)
 {
     (void)state;

@@ -5,7 +5,7 @@
 
 enum { SIZE = 4 };
 
-/* A block of fog seen along Z; the kernel is wide, so that many splats meet a ray. */
+/* A body of fog seen along Z; the kernel is wide, so that many splats meet a ray. */
 typedef struct fog {
     scene scene;
     trip_camera_params view;

@@ -28,7 +28,7 @@ static trip_settings exact(double tolerance)
 
 static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
 
-static void a_constant_block_has_the_opacity_of_the_path_in_it(void **state)
+static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
 {
     (void)state;
     const trip_vec3 directions[] = { { 1, 0, 0 }, { 0, 0, -1 }, { 0.3, 0.5, 0.2 }, { -1, 2, 0.7 } };
@@ -690,7 +690,7 @@ static void what_does_not_fit_the_memory_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_constant_block_has_the_opacity_of_the_path_in_it),
+        cmocka_unit_test(a_constant_body_has_the_opacity_of_the_path_in_it),
         cmocka_unit_test(a_ramp_is_integrated_in_extinction_and_in_colour),
         cmocka_unit_test(what_is_nearer_covers_what_is_behind),
         cmocka_unit_test(a_narrow_peak_of_the_function_is_not_missed),

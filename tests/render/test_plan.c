@@ -333,7 +333,7 @@ static void the_plan_explains_what_runs_and_why(void **state)
     assert_non_null(strstr(text, "list x      not read: no ray of the view has weight in it\n"));
     assert_non_null(strstr(text, "list z      read: "));
     assert_non_null(strstr(text, "sheets 0 to 59 descending, front to back\n"));
-    assert_non_null(strstr(text, "shading     does not run: not asked for"));
+    assert_non_null(strstr(text, "shading     does not run: switched off"));
     free(text);
     settings.shading = true;
     settings.method = TRIP_METHOD_AXIS;

@@ -64,7 +64,7 @@ static void the_nearest_sheet_is_in_front_for_every_axis_side_and_method(void **
     }
 }
 
-/* Through voxels and between them, of a block of one extinction; pixels so small that the low-pass
+/* Through voxels and between them, of a body of one extinction; pixels so small that the low-pass
  * does not count. */
 static void small_kernels_leave_the_ripple_that_the_formula_gives(void **state)
 {
@@ -317,7 +317,7 @@ static const trip_affine grids[] = {
     { { { -1, 0, 0, 0 }, { 0, 0, 1, 0 }, { 0, 1, 0, 0 } } },
 };
 
-/* World length of the part of a line (through the block's middle) inside the block of `dims`
+/* World length of the part of a line (through the body's middle) inside the body of `dims`
  * voxels. */
 static double length_inside(const trip_affine *grid, const int64_t dims[3], trip_vec3 direction)
 {
@@ -330,9 +330,9 @@ static double length_inside(const trip_affine *grid, const int64_t dims[3], trip
     return t;
 }
 
-/* Opacity 1 - (1 - o)^L of a constant block, L in voxel lengths. */
-static void check_block(const int64_t dims[3], const trip_affine *grid, trip_vec3 direction,
-                        double distance, bool ortho, trip_method method)
+/* Opacity 1 - (1 - o)^L of a constant body, L in voxel lengths. */
+static void check_body(const int64_t dims[3], const trip_affine *grid, trip_vec3 direction,
+                       double distance, bool ortho, trip_method method)
 {
     const double opacity = 0.06;
     scene s;
@@ -356,7 +356,7 @@ static void check_block(const int64_t dims[3], const trip_affine *grid, trip_vec
     scene_destroy(&s);
 }
 
-static void a_constant_block_has_its_opacity_from_any_side_at_any_zoom(void **state)
+static void a_constant_body_has_its_opacity_from_any_side_at_any_zoom(void **state)
 {
     (void)state;
     const int64_t flat[3] = { 30, 30, 9 }, cube[3] = { 26, 26, 26 };
@@ -368,9 +368,9 @@ static void a_constant_block_has_its_opacity_from_any_side_at_any_zoom(void **st
         const trip_affine *grid = &grids[i % 4];
         /* Only directions through opposite faces: edges and corners blur. */
         trip_vec3 d = trip_affine_vector(grid, directions[i % 3]);
-        check_block(flat, grid, d, distances[i / 2 % 4], i % 2, (trip_method)(i % 3));
+        check_body(flat, grid, d, distances[i / 2 % 4], i % 2, (trip_method)(i % 3));
         d = trip_affine_vector(grid, directions[i % 5]);
-        check_block(cube, grid, d, distances[i / 2 % 4], i % 2, (trip_method)(i % 3));
+        check_body(cube, grid, d, distances[i / 2 % 4], i % 2, (trip_method)(i % 3));
     }
 }
 
@@ -689,7 +689,7 @@ int main(void)
         cmocka_unit_test(inside_a_room_outward_order_is_right_and_ascending_order_fails),
         cmocka_unit_test(large_kernels_show_lines_when_clipped_and_none_when_merged),
         cmocka_unit_test(from_outside_ascending_order_gives_the_same_picture),
-        cmocka_unit_test(a_constant_block_has_its_opacity_from_any_side_at_any_zoom),
+        cmocka_unit_test(a_constant_body_has_its_opacity_from_any_side_at_any_zoom),
         cmocka_unit_test(a_larger_kernel_blurs_but_keeps_the_opacity),
         cmocka_unit_test(
             with_h_zero_all_lists_are_drawn_and_a_parallel_view_along_an_axis_draws_one),

@@ -133,7 +133,7 @@ static bool is_within(int i, int j, int k, int lo, int hi)
     return i >= lo && j >= lo && k >= lo && i <= hi && j <= hi && k <= hi;
 }
 
-static bool block(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+static bool body(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
     (void)gradient;
@@ -141,7 +141,7 @@ static bool block(void *user, int i, int j, int k, unsigned *code, double gradie
     return is_within(i, j, k, 6, 13);
 }
 
-static bool around_block(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+static bool around_body(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
     (void)gradient;
@@ -152,12 +152,12 @@ static bool around_block(void *user, int i, int j, int k, unsigned *code, double
 static void values_fall_to_those_of_the_halo_and_end_without_it(void **state)
 {
     (void)state;
-    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_block };
+    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_body };
     const trip_vec3 directions[] = { { 1, 0, 0 }, { 0, -1, 0 }, { 0, 0, 1 } };
     for (unsigned parts = 0; parts < 2; parts++) {
         scene s;
         scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                          .voxel = block,
+                                          .voxel = body,
                                           .parts = &halo,
                                           .part_count = parts });
         for (int code = 0; code < 65536; code++)
@@ -315,7 +315,7 @@ static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
     }
 }
 
-/* Of two blocks one is a little below the transmittance at which pixels are saturated. */
+/* Of two bodies one is a little below the transmittance at which pixels are saturated. */
 static void a_saturated_pixel_is_opaque(void **state)
 {
     (void)state;
@@ -430,7 +430,7 @@ static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
     scene_destroy(&s);
 }
 
-/* The mean distance of what a constant block shows. */
+/* The mean distance of what a constant body shows. */
 static void depth_is_the_mean_distance_of_what_is_seen(void **state)
 {
     (void)state;

@@ -38,8 +38,8 @@ static void values_are_the_nearest_of_1024(void **state)
     }
 }
 
-/* 1300 values of a type that has 65536 are all told apart, within the half of a step that rounding
- * takes, and so that the ends are exact. */
+/* 1300 values of a type that has 65536 all have means of their own, within the half of a step that
+ * rounding takes, and so that the ends are exact. */
 static void steps_are_of_the_range_of_values(void **state)
 {
     (void)state;

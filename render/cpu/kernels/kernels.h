@@ -260,19 +260,19 @@ typedef struct trip_cpu_kernels {
     uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                       uint32_t count);
 
-    /* Of a block's squares: what their cells lie between. */
-    void (*sheet_ranges)(const trip_cpu_voxels *block, trip_cpu_square_ranges *out);
+    /* Of a raster's squares: what their cells lie between. */
+    void (*sheet_ranges)(const trip_cpu_voxels *raster, trip_cpu_square_ranges *out);
     /* Which cells of the squares, a bit each, lie between two sheets on some code from `least` to
      * `most` (biased): none that lacks a corner. */
     void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                         int16_t least, int16_t most, trip_cpu_cells *out);
-    /* Gradients of the squares' voxels. Beside the block lie those to the left of it and above, of
+    /* Gradients of the squares' voxels. Beside the raster lie those to the left of it and above, of
      * the same sheet, and those of the sheets before and behind in index order. Codes alone are
      * read. */
-    void (*sheet_gradients)(trip_cpu_voxels *block, uint64_t squares, const trip_cpu_voxels *left,
+    void (*sheet_gradients)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                             const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
                             const trip_cpu_voxels *sheet_behind);
-    /* The voxels of the squares' cells between two blocks, with their gradients or without;
+    /* The voxels of the squares' cells between two rasters, with their gradients or without;
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);

@@ -1,8 +1,8 @@
-/* The kernel that draws a group of slices into the pixels of a tile (sheet.h): included by
+/* The kernel that draws a group of slices into the pixels of a pane (sheet.h): included by
  * table_tmpl.h after merge_tmpl.h. For each patch of 8 x 8 pixels it finds the segments in which
  * something may show; then each stamp takes those one after the other, its pixels all the while in
- * registers. Positions are worked out from the tile's own corner at each slice, so that they do not
- * depend on how slices are grouped or blocks laid out. */
+ * registers. Positions are worked out from the pane's own corner at each slice, so that they do not
+ * depend on how slices are grouped or rasters laid out. */
 #ifndef TRIP_CPU_SHEET_H
 #define TRIP_CPU_SHEET_H
 
@@ -29,16 +29,16 @@ INLINE vf exp_of_minus(vf x)
     return v_from_bits(v_bits(p) + (v_truncate(whole) << 23));
 }
 
-/* ---- where the tile lies in the slices ---- */
+/* ---- where the pane lies in the slices ---- */
 
-/* The rays' positions at the slices, in voxels from the first of the grid of blocks. */
-typedef struct tile_path {
+/* The rays' positions at the slices, in voxels from the first of the grid of rasters. */
+typedef struct pane_path {
     /* A lane is at base + first + along * its slope + its shift, `along` from the eye. */
     int32_t base[2][TRIP_CPU_SEGMENTS + 1];
     float first[2][TRIP_CPU_SEGMENTS + 1];
     float along[TRIP_CPU_SEGMENTS + 1];
-    double slope[2], start[2]; /* of the tile's corner */
-    /* Linear in the place within the tile: at its corner, and a pixel along x and y. */
+    double slope[2], start[2]; /* of the pane's corner */
+    /* Linear in the place within the pane: at its corner, and a pixel along x and y. */
     float toward[3];      /* the ray along the list's axis, of length 1 or so at the corner */
     float aside[2][3];    /* the ray along u and v, less the corner's slope times `toward` */
     float world[3][3];    /* the ray in world space, of length 1 or so at the corner */
@@ -49,7 +49,7 @@ typedef struct tile_path {
     /* How far inside each half-space a ray is at 0 along the sheets, and how much that grows by
      * along `toward`; in parallel views over a sheet. */
     float clip_at[TRIP_CLIP_MOST][3], clip_toward[TRIP_CLIP_MOST][3];
-} tile_path;
+} pane_path;
 
 /* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
  * over a sheet; false where it does not go the pass's way, or is too steep. */
@@ -123,8 +123,8 @@ static double greatest_of(const double v[3])
     return fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
 }
 
-/* What is linear in the place within the tile at (x, y). */
-static void find_forms(const trip_cpu_sheet_view *view, int x, int y, tile_path *path)
+/* What is linear in the place within the pane at (x, y). */
+static void find_forms(const trip_cpu_sheet_view *view, int x, int y, pane_path *path)
 {
     double corner[3], world[3][3], turns = view->ortho ? 0 : 1;
     for (int i = 0; i < 3; i++)
@@ -157,7 +157,7 @@ INLINE double dot_list(const double a[4], const double b[3])
 }
 
 /* Likewise of what is cut away. */
-static void find_clip(const trip_cpu_sheet_view *view, int x, int y, tile_path *path)
+static void find_clip(const trip_cpu_sheet_view *view, int x, int y, pane_path *path)
 {
     double turns = view->ortho ? 0 : 1, corner[3], start[3];
     for (int i = 0; i < 3; i++) {
@@ -183,7 +183,7 @@ static void find_clip(const trip_cpu_sheet_view *view, int x, int y, tile_path *
 }
 
 static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
-                      tile_path *path)
+                      pane_path *path)
 {
     const double origin[2] = { (double)g->first_u, (double)g->first_v };
     beam b = beam_of(view, x, y, TRIP_CPU_PANE);
@@ -216,13 +216,13 @@ typedef struct voxel_box {
     int32_t lo[2], hi[2];
 } voxel_box;
 
-/* A patch's beam, from the tile's corner's ray. */
+/* A patch's beam, from the pane's corner's ray. */
 typedef struct patch_beam {
     float4 slope[2], shift[2];
     bool whole;
 } patch_beam;
 
-static patch_beam patch_beam_of(const trip_cpu_sheet_view *view, const tile_path *path, int x,
+static patch_beam patch_beam_of(const trip_cpu_sheet_view *view, const pane_path *path, int x,
                                 int y)
 {
     beam b = beam_of(view, x, y, 8);
@@ -249,7 +249,7 @@ INLINE int32_t floor_within(float a)
 }
 
 /* What a beam passes at a slice: a little more for what single precision makes of it. */
-INLINE voxel_box beam_box(const tile_path *path, const patch_beam *b, unsigned n)
+INLINE voxel_box beam_box(const pane_path *path, const patch_beam *b, unsigned n)
 {
     voxel_box box;
     for (int a = 0; a < 2; a++) {
@@ -274,7 +274,7 @@ INLINE voxel_box both_boxes(voxel_box a, voxel_box b)
 /* Cut to the grid; false where nothing is left. */
 INLINE bool cut_box(const trip_cpu_group *g, voxel_box *box)
 {
-    const int32_t last[2] = { g->across * TRIP_CPU_BLOCK - 1, g->down * TRIP_CPU_BLOCK - 1 };
+    const int32_t last[2] = { g->across * TRIP_CPU_RASTER - 1, g->down * TRIP_CPU_RASTER - 1 };
     for (int i = 0; i < 2; i++) {
         box->lo[i] = box->lo[i] < 0 ? 0 : box->lo[i];
         box->hi[i] = box->hi[i] > last[i] ? last[i] : box->hi[i];
@@ -291,7 +291,7 @@ INLINE bool squares_show(const trip_cpu_group *g, const uint64_t *visible, voxel
     for (int32_t v = box.lo[1] >> 3; v <= v1; v++) {
         const uint64_t *row = visible + (size_t)(v >> 3) * (size_t)g->across;
         for (int32_t u = u0; u <= u1;) {
-            int32_t end = u | 7; /* of the block */
+            int32_t end = u | 7; /* of the raster */
             end = end > u1 ? u1 : end;
             uint64_t bits = row[u >> 3] >> (v & 7) * 8 & 255;
             if (bits >> (u & 7) & ((2u << (end - u)) - 1))
@@ -327,39 +327,39 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, voxel_box box)
     return false;
 }
 
-/* Numbers of 16 bits in a block, and where its gradients begin. */
-#define BLOCK_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
+/* Numbers of 16 bits in a raster, and where its gradients begin. */
+#define RASTER_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 #define GRADIENTS_FROM ((int32_t)(offsetof(trip_cpu_voxels, gradients) / sizeof(int16_t)))
 
 /* What a patch passes. */
 typedef struct patch_path {
     uint64_t segments; /* in which something may show */
-    /* At each slice of these the block that all of its rays lie in: from its start in the pool,
-     * where a ray is that is at 0 from tile_path.base; -1: several, or none. */
-    int32_t block[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
+    /* At each slice of these the raster that all of its rays lie in: from its start in the pool,
+     * where a ray is that is at 0 from pane_path.base; -1: several, or none. */
+    int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
 } patch_path;
 
-static void find_block(const trip_cpu_group *g, const tile_path *path, unsigned n, bool whole,
-                       voxel_box box, patch_path *area)
+static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned n, bool whole,
+                        voxel_box box, patch_path *area)
 {
     const voxel_box all = box;
-    area->block[n] = -1;
+    area->raster[n] = -1;
     if (!whole || !cut_box(g, &box))
         return;
     bool one = true;
     for (int a = 0; a < 2; a++)
         one &= box.lo[a] == all.lo[a] && box.hi[a] == all.hi[a] &&
-               box.lo[a] >> TRIP_CPU_BLOCK_LOG2 == box.hi[a] >> TRIP_CPU_BLOCK_LOG2;
+               box.lo[a] >> TRIP_CPU_RASTER_LOG2 == box.hi[a] >> TRIP_CPU_RASTER_LOG2;
     if (!one)
         return;
-    int32_t u = box.lo[0] >> TRIP_CPU_BLOCK_LOG2, v = box.lo[1] >> TRIP_CPU_BLOCK_LOG2;
-    area->block[n] = g->slices[n].blocks[v * g->across + u] * BLOCK_NUMBERS;
-    area->within[n] = (path->base[1][n] - (v << TRIP_CPU_BLOCK_LOG2)) * TRIP_CPU_BLOCK_STRIDE +
-                      path->base[0][n] - (u << TRIP_CPU_BLOCK_LOG2);
+    int32_t u = box.lo[0] >> TRIP_CPU_RASTER_LOG2, v = box.lo[1] >> TRIP_CPU_RASTER_LOG2;
+    area->raster[n] = g->slices[n].rasters[v * g->across + u] * RASTER_NUMBERS;
+    area->within[n] = (path->base[1][n] - (v << TRIP_CPU_RASTER_LOG2)) * TRIP_CPU_RASTER_STRIDE +
+                      path->base[0][n] - (u << TRIP_CPU_RASTER_LOG2);
 }
 
 static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const tile_path *path, int x, int y, patch_path *area)
+                       const pane_path *path, int x, int y, patch_path *area)
 {
     const patch_beam b = patch_beam_of(view, path, x, y);
     area->segments = 0;
@@ -372,8 +372,8 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (cells_show(g, n, both_boxes(last, next))) {
             area->segments |= UINT64_C(1) << n;
             if (placed != n)
-                find_block(g, path, n, b.whole, last, area);
-            find_block(g, path, n + 1, b.whole, next, area);
+                find_raster(g, path, n, b.whole, last, area);
+            find_raster(g, path, n + 1, b.whole, next, area);
             placed = n + 1;
         }
         last = next;
@@ -384,7 +384,7 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 
 /* The rays of a stamp. */
 typedef struct stamp_rays {
-    vf slope[2], shift[2]; /* from the tile's corner's */
+    vf slope[2], shift[2]; /* from the pane's corner's */
     vf length;             /* world units over a sheet */
     vf depth;              /* z over a sheet, and at the eye */
     vf depth_at_start;
@@ -425,13 +425,13 @@ INLINE vi vi_greater(vi a, vi b)
     return (a & m) | (b & ~m);
 }
 
-/* The cells that rays pass at a slice: from tile_path.base. */
+/* The cells that rays pass at a slice: from pane_path.base. */
 typedef struct corners {
     vi whole[2];
     vf part[2]; /* place in the cell */
 } corners;
 
-INLINE corners corners_at(const tile_path *path, const stamp_rays *l, unsigned n)
+INLINE corners corners_at(const pane_path *path, const stamp_rays *l, unsigned n)
 {
     corners c;
     for (int a = 0; a < 2; a++) {
@@ -476,33 +476,33 @@ INLINE void set_weights(const vf part[2], sample *s)
 }
 
 /* Cells of the grid; of those beyond it, the nearest. */
-INLINE void find_cells(const trip_cpu_group *g, const tile_path *path, unsigned n, const corners *c,
+INLINE void find_cells(const trip_cpu_group *g, const pane_path *path, unsigned n, const corners *c,
                        vi whole[2])
 {
     const int32_t size[2] = { g->across, g->down };
     for (int a = 0; a < 2; a++)
-        whole[a] = vi_within(c->whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_BLOCK - 1);
+        whole[a] = vi_within(c->whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_RASTER - 1);
 }
 
 /* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
  * their gradients. */
-INLINE vi find_places(const trip_cpu_group *g, const tile_path *path, const patch_path *area,
+INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
                       unsigned n, const corners *c, sample *s)
 {
-    if (area->block[n] >= 0) {
-        vi in = c->whole[1] * TRIP_CPU_BLOCK_STRIDE + c->whole[0] + area->within[n];
-        s->gradient_at = in * 3 + (area->block[n] + GRADIENTS_FROM);
-        return in + area->block[n];
+    if (area->raster[n] >= 0) {
+        vi in = c->whole[1] * TRIP_CPU_RASTER_STRIDE + c->whole[0] + area->within[n];
+        s->gradient_at = in * 3 + (area->raster[n] + GRADIENTS_FROM);
+        return in + area->raster[n];
     }
     vi whole[2];
     find_cells(g, path, n, c, whole);
-    vi block = (whole[1] >> TRIP_CPU_BLOCK_LOG2) * g->across + (whole[0] >> TRIP_CPU_BLOCK_LOG2);
-    vi in = (whole[1] & (TRIP_CPU_BLOCK - 1)) * TRIP_CPU_BLOCK_STRIDE +
-            (whole[0] & (TRIP_CPU_BLOCK - 1));
+    vi raster = (whole[1] >> TRIP_CPU_RASTER_LOG2) * g->across + (whole[0] >> TRIP_CPU_RASTER_LOG2);
+    vi in = (whole[1] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
+            (whole[0] & (TRIP_CPU_RASTER - 1));
     int32_t starts[V];
-    vi_store(starts, block);
+    vi_store(starts, raster);
     for (int i = 0; i < V; i++)
-        starts[i] = g->slices[n].blocks[starts[i]] * BLOCK_NUMBERS;
+        starts[i] = g->slices[n].rasters[starts[i]] * RASTER_NUMBERS;
     vi from = vi_load(starts);
     s->gradient_at = from + (in * 3 + GRADIENTS_FROM);
     return from + in;
@@ -530,7 +530,8 @@ INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
     const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
     int32_t places[V];
     vi_store(places, at);
-    __m256i top = two_codes(pool, places), bottom = two_codes(pool + TRIP_CPU_BLOCK_STRIDE, places);
+    __m256i top = two_codes(pool, places),
+            bottom = two_codes(pool + TRIP_CPU_RASTER_STRIDE, places);
     vi lack =
         (vi)_mm256_or_si256(_mm256_cmpeq_epi16(top, missing), _mm256_cmpeq_epi16(bottom, missing));
     vi sum = (vi)_mm256_madd_epi16(top, (__m256i)s->top) +
@@ -553,7 +554,7 @@ INLINE __m256i two_gradients(const int16_t *low, const int16_t *high)
 INLINE void find_gradients(const trip_cpu_group *g, sample *s)
 {
     const int16_t *pool = (const int16_t *)g->pool;
-    const int below = 3 * TRIP_CPU_BLOCK_STRIDE;
+    const int below = 3 * TRIP_CPU_RASTER_STRIDE;
     int32_t at[V];
     __m256i of[4];
     vi_store(at, s->gradient_at);
@@ -609,7 +610,7 @@ INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
     vi sum, lack;
     for (int i = 0; i < V; i++) {
         const int16_t *top = (const int16_t *)g->pool + at[i],
-                      *bottom = top + TRIP_CPU_BLOCK_STRIDE;
+                      *bottom = top + TRIP_CPU_RASTER_STRIDE;
         lack[i] = top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
                   bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
         sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
@@ -622,7 +623,7 @@ INLINE void find_gradients(const trip_cpu_group *g, sample *s)
 {
     for (int i = 0; i < V; i++) {
         const int16_t *top = (const int16_t *)g->pool + s->gradient_at[i];
-        const int16_t *bottom = top + 3 * TRIP_CPU_BLOCK_STRIDE;
+        const int16_t *bottom = top + 3 * TRIP_CPU_RASTER_STRIDE;
         for (int k = 0; k < 3; k++)
             s->gradient[k][i] = of_two(top[k], top[3 + k], s->top[i]) +
                                 of_two(bottom[k], bottom[3 + k], s->bottom[i]);
@@ -638,7 +639,7 @@ INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 
 #endif
 
-INLINE void sample_at(const trip_cpu_group *g, const tile_path *path, const patch_path *area,
+INLINE void sample_at(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
                       const stamp_rays *l, unsigned n, sample *s)
 {
     corners c = corners_at(path, l, n);
@@ -650,10 +651,10 @@ INLINE void sample_at(const trip_cpu_group *g, const tile_path *path, const patc
 /* ---- a segment ---- */
 
 /* What the transfer function makes of a segment. */
-typedef struct shown {
+typedef struct medium {
     vf extinction; /* 0: nothing */
     vf rgb[3];
-} shown;
+} medium;
 
 /* Where both ends have the same code, what the function is there. */
 INLINE void use_codes_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
@@ -686,7 +687,7 @@ INLINE void find_sums(const trip_cpu_integrals *in, sample *s)
     s->summed = true;
 }
 
-INLINE shown classified(const trip_cpu_integrals *in, sample *a, sample *b)
+INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
 {
     vi sums[4], codes = b->index - a->index;
     vm same = vi_is_0(codes);
@@ -701,7 +702,7 @@ INLINE shown classified(const trip_cpu_integrals *in, sample *a, sample *b)
     }
     vf extinction = v_from_int(sums[0]);
     vm some = v_gt(v_abs(extinction), v_set(0));
-    shown s = { .extinction = v_set(0) };
+    medium s = { .extinction = v_set(0) };
     if (!vm_any(some))
         return s;
     extinction = v_select(some, extinction, v_set(1));
@@ -721,8 +722,8 @@ INLINE vf dot3(const vf a[3], const vf b[3])
 }
 
 /* As trip_shade(), with the mean of the gradients of the ends. */
-INLINE void light_segment(const trip_cpu_sheet_view *view, const tile_path *path,
-                          const stamp_rays *l, const sample *a, const sample *b, shown *s)
+INLINE void light_segment(const trip_cpu_sheet_view *view, const pane_path *path,
+                          const stamp_rays *l, const sample *a, const sample *b, medium *s)
 {
     vf g[3], n[3];
     for (int k = 0; k < 3; k++) /* twice their mean */
@@ -772,7 +773,7 @@ typedef struct remnant {
 } remnant;
 
 INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
-                          const tile_path *path, unsigned n)
+                          const pane_path *path, unsigned n)
 {
     const float way = (float)view->direction, from = way * path->along[n];
     const float length = way * path->along[n + 1] - from;
@@ -792,7 +793,7 @@ INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
 
 /* Puts a segment behind what the pixels hold; false where it shows in none of them. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                              const stamp_rays *l, const tile_path *path, unsigned n, sample *a,
+                              const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
                               sample *b, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
@@ -813,7 +814,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     }
     if (!vm_any(open))
         return false;
-    shown s = classified(view->integrals, first, last);
+    medium s = classified(view->integrals, first, last);
     for (int k = 0; k < 3 && view->tinted; k++)
         s.rgb[k] = v_set(view->tint[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
@@ -837,7 +838,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
 }
 
 /* A pixel of which this is left is saturated: it takes no more, and its colour counts for all. */
-INLINE void close_saturated(vf pixel[CHANNELS])
+INLINE void finish_saturated(vf pixel[CHANNELS])
 {
     vm saturated =
         vm_and(v_gt(v_set((float)TRIP_SHEET_SATURATION), pixel[3]), v_gt(pixel[3], v_set(0)));
@@ -876,7 +877,7 @@ INLINE vf form_of(const float form[3], vf x, vf y)
 }
 
 /* Cuts the rays to the half-spaces; `inverse` takes what grows along `toward` to sheets. */
-INLINE void clip_rays(const trip_cpu_sheet_view *view, const tile_path *path, vf x, vf y,
+INLINE void clip_rays(const trip_cpu_sheet_view *view, const pane_path *path, vf x, vf y,
                       vf inverse, stamp_rays *l)
 {
     const vf zero = v_set(0), never = v_set(0x1p100f);
@@ -897,7 +898,7 @@ INLINE void clip_rays(const trip_cpu_sheet_view *view, const tile_path *path, vf
 }
 
 /* The rays through the pixel centres of a stamp. */
-static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, unsigned number,
+static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, unsigned number,
                       stamp_rays *l)
 {
     const vf x = stamp_x(number), y = stamp_y(number), none = v_set(0);
@@ -930,7 +931,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const tile_path *path, un
 }
 
 /* The rays whose cell at the first slice is in the group's window. */
-INLINE vm in_window(const trip_cpu_group *g, const tile_path *path, const stamp_rays *l)
+INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l)
 {
     corners c = corners_at(path, l, 0);
     vm in = l->along;
@@ -943,7 +944,7 @@ INLINE vm in_window(const trip_cpu_group *g, const tile_path *path, const stamp_
 }
 
 static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const tile_path *path, const patch_path *area, const stamp_rays *l,
+                       const pane_path *path, const patch_path *area, const stamp_rays *l,
                        float *stamp)
 {
     uint64_t segments = area->segments;
@@ -960,7 +961,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         sampled = next;
         if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
             continue;
-        close_saturated(pixel);
+        finish_saturated(pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
             break;
     }
@@ -968,9 +969,9 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         v_store(stamp + k * V, pixel[k]);
 }
 
-/* The stamps of a patch, of those of the tile. */
+/* The stamps of a patch, of those of the pane. */
 static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const tile_path *path, int x, int y, unsigned place, float *pixels)
+                       const pane_path *path, int x, int y, unsigned place, float *pixels)
 {
     unsigned column = place % 4 * 2, row = place / 4 * (8 / STAMP_ROWS);
     patch_path area;
@@ -994,7 +995,7 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
                            float *pixels)
 {
-    tile_path path;
+    pane_path path;
     uint64_t open = 0;
     find_path(view, g, x, y, &path);
     for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64; place++)

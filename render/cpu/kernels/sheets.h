@@ -1,4 +1,4 @@
-/* What the kernels of `post` (sheet.h) share: the values of sheets in blocks, the slices cut from
+/* What the kernels of `post` (sheet.h) share: the values of sheets in rasters, the slices cut from
  * them, the transfer function's integrals, and the constants of a pass. */
 #ifndef TRIP_CPU_SHEETS_H
 #define TRIP_CPU_SHEETS_H
@@ -21,25 +21,26 @@ typedef struct trip_cpu_gradient {
     int16_t along[3];
 } trip_cpu_gradient;
 
-/* A block is an aligned square of 64 x 64 voxels of a sheet or slice, and the first column and row
+/* A raster is an aligned square of 64 x 64 voxels of a sheet or slice, and the first column and row
  * of those to the right and below, so that it holds all corners of the cells that start in it.
- * Vectors of voxels are read and written up to TRIP_CPU_BLOCK_ROOM voxels beyond the last. */
-#define TRIP_CPU_BLOCK 64
-#define TRIP_CPU_BLOCK_LOG2 6
-#define TRIP_CPU_BLOCK_STRIDE (TRIP_CPU_BLOCK + 2)
-#define TRIP_CPU_BLOCK_ROOM 14
-#define TRIP_CPU_BLOCK_VOXELS ((TRIP_CPU_BLOCK + 1) * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK_ROOM)
+ * Vectors of voxels are read and written up to TRIP_CPU_RASTER_ROOM voxels beyond the last. */
+#define TRIP_CPU_RASTER 64
+#define TRIP_CPU_RASTER_LOG2 6
+#define TRIP_CPU_RASTER_STRIDE (TRIP_CPU_RASTER + 2)
+#define TRIP_CPU_RASTER_ROOM 14
+#define TRIP_CPU_RASTER_VOXELS                                                                     \
+    ((TRIP_CPU_RASTER + 1) * TRIP_CPU_RASTER_STRIDE + TRIP_CPU_RASTER_ROOM)
 
 typedef struct trip_cpu_voxels {
-    int16_t codes[TRIP_CPU_BLOCK_VOXELS];
-    trip_cpu_gradient gradients[TRIP_CPU_BLOCK_VOXELS]; /* of voxels that are there */
+    int16_t codes[TRIP_CPU_RASTER_VOXELS];
+    trip_cpu_gradient gradients[TRIP_CPU_RASTER_VOXELS]; /* of voxels that are there */
 } trip_cpu_voxels;
 
-/* Codes of a pool of blocks are counted in 32 bits. */
-#define TRIP_CPU_BLOCKS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
+/* Codes of a pool of rasters are counted in 32 bits. */
+#define TRIP_CPU_RASTERS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 
-/* A block is divided into 8 x 8 squares, a bit each, row by row. */
-#define TRIP_CPU_SQUARES_ACROSS (TRIP_CPU_BLOCK / 8)
+/* A raster is divided into 8 x 8 squares, a bit each, row by row. */
+#define TRIP_CPU_SQUARES_ACROSS (TRIP_CPU_RASTER / 8)
 
 /* What the cells that start in a square lie between at one sheet, as biased codes; least > most
  * where there are none. */
@@ -47,15 +48,15 @@ typedef struct trip_cpu_square_ranges {
     int16_t least[64], most[64];
 } trip_cpu_square_ranges;
 
-/* The cells of a block's squares, between a sheet and the next: a bit each, row by row. */
+/* The cells of a raster's squares, between a sheet and the next: a bit each, row by row. */
 typedef struct trip_cpu_cells {
     uint64_t squares[64];
 } trip_cpu_cells;
 
-/* The blocks of a sheet or slice in a grid of `across` x `down`, the outermost of which are absent:
- * the number of each in the pool; 0 is the block in which every voxel is missing. */
+/* The rasters of a sheet or slice in a grid of `across` x `down`, the outermost of which are
+ * absent: the number of each in the pool; 0 is the raster in which every voxel is missing. */
 typedef struct trip_cpu_slice {
-    const int32_t *blocks;
+    const int32_t *rasters;
     double coordinate; /* along the list's axis */
 } trip_cpu_slice;
 
@@ -74,11 +75,11 @@ typedef struct trip_cpu_integrals {
 
 typedef struct trip_cpu_group {
     const trip_cpu_voxels *pool;
-    int64_t first_u, first_v; /* voxels: of the grid of blocks */
+    int64_t first_u, first_v; /* voxels: of the grid of rasters */
     int32_t across, down;
     unsigned segments;
     trip_cpu_slice slices[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
-    /* For each segment and block of the grid: the squares in which some cell may show, and those
+    /* For each segment and raster of the grid: the squares in which some cell may show, and those
      * cells, of squares that have some. */
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
     const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];

@@ -1,4 +1,4 @@
-/* Kernels that prepare the blocks of sheets: ranges of codes, gradients, slices between sheets.
+/* Kernels that prepare the rasters of sheets: ranges of codes, gradients, slices between sheets.
  * Included by table_tmpl.h after simd_tmpl.h. A vector here is of eight numbers of 16 bits, a row
  * of a square; tests/render/test_cpu_sheets.c holds every instruction set to the same numbers. */
 #ifndef TRIP_CPU_SLICE_H
@@ -190,20 +190,20 @@ INLINE void vh_store_3(int16_t *p, vh a, vh b, vh c)
 
 static_assert(sizeof(trip_cpu_gradient) == 3 * sizeof(int16_t), "three numbers in a row");
 
-/* Where a square's first voxel lies in its block. */
+/* Where a square's first voxel lies in its raster. */
 INLINE int square_first(int square)
 {
-    return square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_BLOCK_STRIDE +
+    return square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_RASTER_STRIDE +
            square % TRIP_CPU_SQUARES_ACROSS * 8;
 }
 
-static void sheet_ranges(const trip_cpu_voxels *block, trip_cpu_square_ranges *out)
+static void sheet_ranges(const trip_cpu_voxels *raster, trip_cpu_square_ranges *out)
 {
     for (int square = 0; square < 64; square++) {
-        const int16_t *at = block->codes + square_first(square);
+        const int16_t *at = raster->codes + square_first(square);
         /* A missing code is the least, and less 1 it is the greatest. */
         vh least = vh_set(INT16_MAX), most = vh_set(INT16_MIN);
-        for (int row = 0; row < 9; row++, at += TRIP_CPU_BLOCK_STRIDE) {
+        for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE) {
             vh a = vh_load(at), b = vh_load(at + 1);
             most = vh_max(most, vh_max(a, b));
             least = vh_min(least, vh_min(vh_less_1(a), vh_less_1(b)));
@@ -234,7 +234,7 @@ static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, 
         uint64_t seen = 0;
         extremes above = extremes_at(from->codes + at, to->codes + at);
         for (int v = 0; v < 8; v++) {
-            at += TRIP_CPU_BLOCK_STRIDE;
+            at += TRIP_CPU_RASTER_STRIDE;
             extremes below = extremes_at(from->codes + at, to->codes + at);
             vh low = vh_min(above.least, below.least), high = vh_max(above.most, below.most);
             vh out_of = (vh)(low > highest) | (vh)(lowest > high) | vh_is_missing(low);
@@ -255,7 +255,7 @@ INLINE vh differences(vh codes, vh below, vh above)
     return vh_select(no_below | no_above, vh_half_difference(above, below), one_sided);
 }
 
-static void sheet_gradients(trip_cpu_voxels *block, uint64_t squares, const trip_cpu_voxels *left,
+static void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                             const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
                             const trip_cpu_voxels *sheet_behind)
 {
@@ -265,20 +265,20 @@ static void sheet_gradients(trip_cpu_voxels *block, uint64_t squares, const trip
         int square = __builtin_ctzll(rest);
         int u = square % TRIP_CPU_SQUARES_ACROSS * 8, v0 = square / TRIP_CPU_SQUARES_ACROSS * 8;
         for (int v = v0; v < v0 + 8; v++) {
-            int i = v * TRIP_CPU_BLOCK_STRIDE + u;
-            const int16_t *at = block->codes + i;
-            const int16_t *to_left = at - 1, *before = at - TRIP_CPU_BLOCK_STRIDE;
+            int i = v * TRIP_CPU_RASTER_STRIDE + u;
+            const int16_t *at = raster->codes + i;
+            const int16_t *to_left = at - 1, *before = at - TRIP_CPU_RASTER_STRIDE;
             if (v == 0)
-                before = above->codes + 63 * TRIP_CPU_BLOCK_STRIDE + u;
+                before = above->codes + 63 * TRIP_CPU_RASTER_STRIDE + u;
             if (u == 0) {
-                first[0] = left->codes[v * TRIP_CPU_BLOCK_STRIDE + 63];
+                first[0] = left->codes[v * TRIP_CPU_RASTER_STRIDE + 63];
                 memcpy(first + 1, at, 7 * sizeof *first);
                 to_left = first;
             }
             vh here = vh_load(at);
-            vh_store_3((int16_t *)&block->gradients[i],
+            vh_store_3((int16_t *)&raster->gradients[i],
                        differences(here, vh_load(to_left), vh_load(at + 1)),
-                       differences(here, vh_load(before), vh_load(at + TRIP_CPU_BLOCK_STRIDE)),
+                       differences(here, vh_load(before), vh_load(at + TRIP_CPU_RASTER_STRIDE)),
                        differences(here, vh_load(sheet_before->codes + i),
                                    vh_load(sheet_behind->codes + i)));
         }
@@ -313,7 +313,7 @@ INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *
 {
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         int at = square_first(__builtin_ctzll(rest));
-        for (int row = 0; row < 9; row++, at += TRIP_CPU_BLOCK_STRIDE) {
+        for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE) {
             for (int i = at; i < at + 2; i++)
                 codes_between(from->codes + i, to->codes + i, weights, out->codes + i);
             if (gradients)

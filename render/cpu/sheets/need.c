@@ -7,7 +7,7 @@
 enum { AT_HAND = 4 };
 
 typedef struct sheet {
-    uint64_t blocks, runs, words;
+    uint64_t rasters, runs, words;
 } sheet;
 
 static uint64_t greater(uint64_t a, uint64_t b)
@@ -18,28 +18,28 @@ static uint64_t greater(uint64_t a, uint64_t b)
 /* The sheet after those at hand, which it joins. */
 static void add_sheet(trip_cpu_need *need, sheet at_hand[AT_HAND], sheet next)
 {
-    uint64_t blocks = 0;
+    uint64_t rasters = 0;
     for (int i = 0; i < AT_HAND; i++) {
         at_hand[i] = i + 1 < AT_HAND ? at_hand[i + 1] : next;
-        blocks += at_hand[i].blocks;
+        rasters += at_hand[i].rasters;
     }
-    need->blocks = greater(need->blocks, blocks);
-    need->of_sheet = greater(need->of_sheet, next.blocks);
+    need->rasters = greater(need->rasters, rasters);
+    need->of_sheet = greater(need->of_sheet, next.rasters);
     need->runs = greater(need->runs, next.runs);
     need->words = greater(need->words, next.words);
 }
 
-static uint64_t blocks_of_tile(const trip_pass *pass)
+static uint64_t rasters_of_tile(const trip_pass *pass)
 {
     unsigned log2 = pass->selections->data->header.tile_log2;
-    return log2 > TRIP_CPU_BLOCK_LOG2 ? UINT64_C(1) << 2 * (log2 - TRIP_CPU_BLOCK_LOG2) : 1;
+    return log2 > TRIP_CPU_RASTER_LOG2 ? UINT64_C(1) << 2 * (log2 - TRIP_CPU_RASTER_LOG2) : 1;
 }
 
 static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_cursor *cursors,
-                     uint64_t blocks)
+                     uint64_t rasters)
 {
     sheet at_hand[AT_HAND] = { 0 }, now = { 0 };
-    const uint64_t of_tile = blocks_of_tile(pass);
+    const uint64_t of_tile = rasters_of_tile(pass);
     trip_pass_iterator it = trip_pass_begin(pass, cursors);
     int32_t number = 0;
     for (trip_run run; trip_pass_next(&it, &run);) {
@@ -50,13 +50,13 @@ static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_curso
         number = run.sheet;
         now.runs++;
         now.words += run.words;
-        now.blocks += now.blocks + of_tile <= blocks ? of_tile : blocks - now.blocks;
+        now.rasters += now.rasters + of_tile <= rasters ? of_tile : rasters - now.rasters;
     }
     for (int i = 0; i < AT_HAND; i++, now = (sheet){ 0 })
         add_sheet(need, at_hand, now);
 }
 
-int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t blocks,
+int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
                        trip_budget *budget)
 {
     *need = (trip_cpu_need){ 0 };
@@ -68,7 +68,7 @@ int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64
             return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                              "%u lists do not fit the memory given; raise --memory",
                              pass->selection_count);
-        add_pass(need, pass, cursors, blocks);
+        add_pass(need, pass, cursors, rasters);
         trip_budget_release(budget, cursors, bytes);
     }
     return 0;

@@ -7,12 +7,12 @@
 #include "plan.h"
 
 typedef struct trip_cpu_need {
-    uint64_t blocks;                /* of the sheets at hand when an interval is drawn */
-    uint64_t of_sheet, runs, words; /* blocks and so on of the sheet that has most */
+    uint64_t rasters;               /* of the sheets at hand when an interval is drawn */
+    uint64_t of_sheet, runs, words; /* rasters and so on of the sheet that has most */
 } trip_cpu_need;
 
-/* Of sheets of so many blocks each at most; TRIP_ERROR without the memory to find it. */
-int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t blocks,
+/* Of sheets of so many rasters each at most; TRIP_ERROR without the memory to find it. */
+int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
                        trip_budget *budget);
 
 #endif

@@ -77,7 +77,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
 /* ---- layers and passes ---- */
 
 /* Begins empty: first > last. */
-static void add_bricks(trip_cpu_blocks *b, const trip_selection *selection)
+static void add_bricks(trip_cpu_rasters *b, const trip_selection *selection)
 {
     unsigned tile_log2 = selection->data->header.tile_log2;
     for (uint64_t i = 0; i < selection->list->brick_count; i++) {
@@ -87,35 +87,35 @@ static void add_bricks(trip_cpu_blocks *b, const trip_selection *selection)
             continue;
         bool some = b->first[0] <= b->last[0];
         for (int a = 0; a < 2; a++) {
-            int64_t from = tile[a] << tile_log2 >> TRIP_CPU_BLOCK_LOG2;
-            int64_t to = (((tile[a] + 1) << tile_log2) - 1) >> TRIP_CPU_BLOCK_LOG2;
+            int64_t from = tile[a] << tile_log2 >> TRIP_CPU_RASTER_LOG2;
+            int64_t to = (((tile[a] + 1) << tile_log2) - 1) >> TRIP_CPU_RASTER_LOG2;
             b->first[a] = !some || from < b->first[a] ? from : b->first[a];
             b->last[a] = !some || to > b->last[a] ? to : b->last[a];
         }
     }
 }
 
-static trip_cpu_blocks blocks_of_layer(const trip_plan_layer *layer)
+static trip_cpu_rasters rasters_of_layer(const trip_plan_layer *layer)
 {
-    trip_cpu_blocks all = { .first = { 1, 1 } };
+    trip_cpu_rasters all = { .first = { 1, 1 } };
     for (int i = 0; i < layer->pass_count; i++)
         for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++)
             add_bricks(&all, &layer->passes[i].pass.selections[k]);
-    return all.first[0] <= all.last[0] ? all : (trip_cpu_blocks){ .last = { 0, 0 } };
+    return all.first[0] <= all.last[0] ? all : (trip_cpu_rasters){ .last = { 0, 0 } };
 }
 
-static uint64_t blocks_in(const trip_cpu_blocks *all)
+static uint64_t rasters_in(const trip_cpu_rasters *all)
 {
     return (uint64_t)((all->last[0] - all->first[0] + 1) * (all->last[1] - all->first[1] + 1));
 }
 
-/* As many sheets at a time as fit beside twice the blocks that are needed. */
-static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_blocks *all, const trip_cpu_need *need,
+/* As many sheets at a time as fit beside twice the rasters that are needed. */
+static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const trip_cpu_need *need,
                        uint64_t room)
 {
-    s->slice_blocks = need->of_sheet * (uint64_t)s->of->frame->settings->slices;
-    const uint64_t least = need->blocks + s->slice_blocks;
-    const uint64_t most = blocks_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
+    s->slice_rasters = need->of_sheet * (uint64_t)s->of->frame->settings->slices;
+    const uint64_t least = need->rasters + s->slice_rasters;
+    const uint64_t most = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
     while (sheets > TRIP_CPU_SHEETS_LEAST && trip_cpu_store_bytes(all, sheets, 2 * least) > room)
         sheets--;
@@ -123,10 +123,10 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_blocks *all, const tri
     return trip_cpu_store_fit(&s->store, all, sheets, least, most, room);
 }
 
-/* How far, in blocks, rays go along a sheet to the next. */
+/* How far, in rasters, rays go along a sheet to the next. */
 static int64_t reach_of(const trip_settings *settings)
 {
-    return ((int64_t)trip_cpu_pass_steepest(settings) + 4) / TRIP_CPU_BLOCK + 1;
+    return ((int64_t)trip_cpu_pass_steepest(settings) + 4) / TRIP_CPU_RASTER + 1;
 }
 
 /* What the smallest windows of any layer of the frame take. */
@@ -137,9 +137,9 @@ static int find_least(const trip_cpu_sheets *s, uint64_t *bytes)
     *bytes = 0;
     for (int axis = 0; axis < 3 && !status; axis++) {
         const trip_plan_layer *layer = &frame->plan->layers[axis];
-        const trip_cpu_blocks all = blocks_of_layer(layer);
+        const trip_cpu_rasters all = rasters_of_layer(layer);
         trip_cpu_need need;
-        status = trip_cpu_need_find(&need, layer, blocks_in(&all), s->store.budget);
+        status = trip_cpu_need_find(&need, layer, rasters_in(&all), s->store.budget);
         if (status)
             break;
         uint64_t least = trip_cpu_windows_least_bytes(&all, reach_of(frame->settings), &need,
@@ -149,7 +149,7 @@ static int find_least(const trip_cpu_sheets *s, uint64_t *bytes)
     return status;
 }
 
-static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all)
+static int refuse(const trip_cpu_sheets *s, const trip_cpu_rasters *all)
 {
     uint64_t needed;
     int status = find_least(s, &needed);
@@ -158,8 +158,8 @@ static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all)
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                      "sheets of %lld x %lld voxels do not fit the memory given; raise --memory to "
                      "%llu MiB, or draw splats: --classify pre",
-                     (long long)(all->last[0] - all->first[0] + 1) * TRIP_CPU_BLOCK,
-                     (long long)(all->last[1] - all->first[1] + 1) * TRIP_CPU_BLOCK,
+                     (long long)(all->last[0] - all->first[0] + 1) * TRIP_CPU_RASTER,
+                     (long long)(all->last[1] - all->first[1] + 1) * TRIP_CPU_RASTER,
                      trip_cpu_memory_mib(s->store.budget, needed / (LEFT_OVER_OF_WINDOWS - 1) *
                                                               LEFT_OVER_OF_WINDOWS));
 }
@@ -167,14 +167,14 @@ static int refuse(const trip_cpu_sheets *s, const trip_cpu_blocks *all)
 /* Whole sheets where they fit for certain, else windows of them. */
 static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
 {
-    const trip_cpu_blocks all = blocks_of_layer(layer);
-    const uint64_t grid = blocks_in(&all);
+    const trip_cpu_rasters all = rasters_of_layer(layer);
+    const uint64_t grid = rasters_in(&all);
     const int64_t reach = reach_of(s->of->frame->settings);
     trip_cpu_windows_release(&s->windows, s->store.budget);
     uint64_t left = trip_budget_left_bytes(s->store.budget) + trip_cpu_store_held_bytes(&s->store);
     uint64_t room = left / LEFT_OVER * (LEFT_OVER - 1);
     s->windows.used = false;
-    trip_cpu_need need = { .blocks = 4 * grid, .of_sheet = grid };
+    trip_cpu_need need = { .rasters = 4 * grid, .of_sheet = grid };
     if (fit_sheets(s, &all, &need, room))
         return 0;
     int status = trip_cpu_need_find(&need, layer, grid, s->store.budget);
@@ -263,10 +263,10 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coord
         g->visible[g->segments] = from->visible;
         g->cells[g->segments++] = from->cells;
     }
-    g->slices[g->segments] = (trip_cpu_slice){ at->blocks, coordinate };
+    g->slices[g->segments] = (trip_cpu_slice){ at->rasters, coordinate };
 }
 
-/* Slices of a group, which are cut once all of them have blocks. */
+/* Slices of a group, which are cut once all of them have rasters. */
 typedef struct cutting {
     trip_cpu_sheet_work work[TRIP_CPU_SLICES_MAX];
     unsigned count;
@@ -376,8 +376,8 @@ int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     const unsigned segments = (unsigned)s->of->frame->settings->slices;
     const trip_cpu_group given = s->group;
     s->group = (trip_cpu_group){ .pool = store->voxels,
-                                 .first_u = store->first_u * TRIP_CPU_BLOCK,
-                                 .first_v = store->first_v * TRIP_CPU_BLOCK,
+                                 .first_u = store->first_u * TRIP_CPU_RASTER,
+                                 .first_v = store->first_v * TRIP_CPU_RASTER,
                                  .across = store->across,
                                  .down = store->down,
                                  .windowed = s->windows.used,
@@ -474,22 +474,22 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
     return 0;
 }
 
-/* A block of the last sheet; false where none is left but for slices. */
-static bool take_block(trip_cpu_sheets *s, size_t at)
+/* A raster of the last sheet; false where none is left but for slices. */
+static bool take_raster(trip_cpu_sheets *s, size_t at)
 {
-    return s->store.free_count > s->slice_blocks &&
+    return s->store.free_count > s->slice_rasters &&
            trip_cpu_store_take(&s->store, sheet_of(s, s->count - 1), at);
 }
 
-/* Blocks of the last sheet for a run's voxels. */
-static int take_blocks(trip_cpu_sheets *s, const trip_run *run)
+/* Rasters of the last sheet for a run's voxels. */
+static int take_rasters(trip_cpu_sheets *s, const trip_run *run)
 {
     int edge = 1 << s->of->frame->data->header.tile_log2;
-    for (int v = run->v; v < run->v + edge; v += TRIP_CPU_BLOCK)
-        for (int u = run->u; u < run->u + edge; u += TRIP_CPU_BLOCK) {
+    for (int v = run->v; v < run->v + edge; v += TRIP_CPU_RASTER)
+        for (int u = run->u; u < run->u + edge; u += TRIP_CPU_RASTER) {
             size_t at =
-                trip_cpu_store_at(&s->store, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2);
-            while (!sheet_of(s, s->count - 1)->blocks[at] && !take_block(s, at)) {
+                trip_cpu_store_at(&s->store, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
+            while (!sheet_of(s, s->count - 1)->rasters[at] && !take_raster(s, at)) {
                 int before = s->count;
                 decode_runs(s);
                 int status = draw_complete(s, s->count - 1, false);
@@ -521,7 +521,7 @@ static int add_run(trip_cpu_sheets *s, const trip_run *run)
         return status;
     if (s->run_count == TRIP_CPU_SHEETS_RUNS)
         decode_runs(s);
-    status = take_blocks(s, run);
+    status = take_rasters(s, run);
     if (!status)
         s->runs[s->run_count++] = run;
     return status;

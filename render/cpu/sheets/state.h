@@ -23,8 +23,8 @@ struct trip_cpu_sheets {
     /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[0] all
      * is drawn. */
     int held[TRIP_CPU_SHEETS_MAX];
-    int count, most;       /* held; and drawn at a time, at most */
-    uint64_t slice_blocks; /* set aside for slices */
+    int count, most;        /* held; and drawn at a time, at most */
+    uint64_t slice_rasters; /* set aside for slices */
     const trip_batch *batch;
     const trip_run *runs[TRIP_CPU_SHEETS_RUNS]; /* to be decoded, of the last sheet */
     unsigned run_count;

@@ -9,44 +9,44 @@
 #define COLUMN_0 UINT64_C(0x0101010101010101)
 #define COLUMN_7 UINT64_C(0x8080808080808080)
 
-static const size_t block_bytes = sizeof(trip_cpu_voxels);
+static const size_t raster_bytes = sizeof(trip_cpu_voxels);
 
 /* ---- memory ---- */
 
-static void clear_block(const trip_cpu_store *s, int32_t at)
+static void clear_raster(const trip_cpu_store *s, int32_t at)
 {
     int16_t *codes = s->voxels[at].codes;
-    for (int i = 0; i < TRIP_CPU_BLOCK_VOXELS; i++)
+    for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++)
         codes[i] = TRIP_CPU_CODE_MISSING;
 }
 
 static void free_all(trip_cpu_store *s)
 {
     s->free_count = 0;
-    for (uint32_t i = s->blocks; i-- > 1;)
+    for (uint32_t i = s->rasters; i-- > 1;)
         s->free[s->free_count++] = (int32_t)i;
 }
 
 static void release_voxels(trip_cpu_store *s)
 {
     trip_budget_release(s->budget, s->voxels, s->voxels_bytes);
-    trip_budget_release(s->budget, s->free, s->blocks * sizeof *s->free);
+    trip_budget_release(s->budget, s->free, s->rasters * sizeof *s->free);
     s->voxels = NULL;
     s->free = NULL;
     s->voxels_bytes = 0;
-    s->blocks = 0;
+    s->rasters = 0;
 }
 
-/* Ends with so many blocks, or as many as there are where that is not far less. */
+/* Ends with so many rasters, or as many as there are where that is not far less. */
 static bool take_voxels(trip_cpu_store *s, uint64_t least, uint64_t wanted)
 {
-    if (s->blocks >= least && s->blocks >= wanted / 2)
+    if (s->rasters >= least && s->rasters >= wanted / 2)
         return true;
     release_voxels(s);
-    s->blocks = (uint32_t)wanted;
-    s->voxels_bytes = wanted * block_bytes;
+    s->rasters = (uint32_t)wanted;
+    s->voxels_bytes = wanted * raster_bytes;
     s->voxels = trip_budget_take(s->budget, s->voxels_bytes);
-    s->free = trip_budget_take(s->budget, s->blocks * sizeof *s->free);
+    s->free = trip_budget_take(s->budget, s->rasters * sizeof *s->free);
     if (!s->voxels || !s->free)
         release_voxels(s);
     return s->voxels != NULL;
@@ -64,13 +64,13 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
     size_t at = 0, grid = trip_cpu_store_grid(s);
     for (unsigned i = 0; i < s->sheet_room; i++) {
         trip_cpu_sheet *sheet = &s->sheets[i];
-        sheet->blocks = part(memory, &at, grid * sizeof *sheet->blocks);
+        sheet->rasters = part(memory, &at, grid * sizeof *sheet->rasters);
         sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
         sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
         sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
     }
     for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++)
-        s->slices[i].blocks = part(memory, &at, grid * sizeof *s->slices[i].blocks);
+        s->slices[i].rasters = part(memory, &at, grid * sizeof *s->slices[i].rasters);
     s->some = part(memory, &at, grid * sizeof *s->some);
     return at;
 }
@@ -99,13 +99,13 @@ static bool take_grids(trip_cpu_store *s)
     return s->grids != NULL;
 }
 
-static bool has_grid(const trip_cpu_blocks *all)
+static bool has_grid(const trip_cpu_rasters *all)
 {
     int64_t across = all->last[0] - all->first[0] + 3, down = all->last[1] - all->first[1] + 3;
     return across < (1 << 20) && down < (1 << 20) && across * down < (1 << 24);
 }
 
-static void set_grid(trip_cpu_store *s, const trip_cpu_blocks *all)
+static void set_grid(trip_cpu_store *s, const trip_cpu_rasters *all)
 {
     s->first_u = all->first[0] - 1;
     s->first_v = all->first[1] - 1;
@@ -113,45 +113,45 @@ static void set_grid(trip_cpu_store *s, const trip_cpu_blocks *all)
     s->down = (int32_t)(all->last[1] - all->first[1] + 3);
 }
 
-void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_blocks *to)
+void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to)
 {
     set_grid(s, to);
     memset(s->grids, 0, lay_out(s, s->grids));
     for (unsigned i = 0; i < s->sheet_room; i++)
         s->sheets[i].prepared = s->sheets[i].shaded = false;
     free_all(s);
-    clear_block(s, 0);
+    clear_raster(s, 0);
 }
 
-static uint64_t grid_bytes(const trip_cpu_blocks *all, unsigned sheets)
+static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets)
 {
     trip_cpu_store of = { .sheet_room = sheets };
     set_grid(&of, all);
     return lay_out(&of, NULL);
 }
 
-uint64_t trip_cpu_store_bytes(const trip_cpu_blocks *all, unsigned sheets, uint64_t blocks)
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters)
 {
     uint64_t grids = has_grid(all) ? grid_bytes(all, sheets) : UINT64_MAX / 2;
-    return grids + (blocks + 1) * (block_bytes + sizeof(int32_t));
+    return grids + (rasters + 1) * (raster_bytes + sizeof(int32_t));
 }
 
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
 {
-    return s->voxels_bytes + s->blocks * sizeof *s->free + s->grids_bytes;
+    return s->voxels_bytes + s->rasters * sizeof *s->free + s->grids_bytes;
 }
 
-bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_blocks *all, unsigned sheets,
+bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
                         uint64_t least, uint64_t most, uint64_t room)
 {
-    const uint64_t greatest = TRIP_CPU_BLOCKS_MAX - 1;
+    const uint64_t greatest = TRIP_CPU_RASTERS_MAX - 1;
     if (least > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, least) > room)
         return false;
     most = most < greatest ? most : greatest;
-    uint64_t fit = (room - grid_bytes(all, sheets)) / (block_bytes + sizeof *s->free) - 1;
+    uint64_t fit = (room - grid_bytes(all, sheets)) / (raster_bytes + sizeof *s->free) - 1;
     s->sheet_room = sheets;
     set_grid(s, all);
-    if (s->blocks > fit + 1)
+    if (s->rasters > fit + 1)
         release_voxels(s);
     if (!take_grids(s) || !take_voxels(s, 1 + least, 1 + (most < fit ? most : fit)))
         return false;
@@ -163,8 +163,8 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
 {
     if (s->free_count == 0)
         return false;
-    sheet->blocks[at] = s->free[--s->free_count];
-    clear_block(s, sheet->blocks[at]);
+    sheet->rasters[at] = s->free[--s->free_count];
+    clear_raster(s, sheet->rasters[at]);
     return true;
 }
 
@@ -172,9 +172,9 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 {
     size_t grid = trip_cpu_store_grid(s);
     for (size_t i = 0; i < grid; i++) {
-        if (sheet->blocks[i])
-            s->free[s->free_count++] = sheet->blocks[i];
-        sheet->blocks[i] = 0;
+        if (sheet->rasters[i])
+            s->free[s->free_count++] = sheet->rasters[i];
+        sheet->rasters[i] = 0;
         if (sheet->visible)
             sheet->visible[i] = 0;
     }
@@ -183,9 +183,9 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 /* ---- from a run to voxels ---- */
 
-/* Where a square's voxels lie in a block from its first, by Morton number. */
+/* Where a square's voxels lie in a raster from its first, by Morton number. */
 #define PLACE(n)                                                                                   \
-    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_BLOCK_STRIDE +                  \
+    ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_RASTER_STRIDE +                 \
      (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
 #define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
 #define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
@@ -231,12 +231,12 @@ static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block
         to[places[__builtin_ctzll(rest)]] = *next++;
 }
 
-/* The number of block (u, v) of a sheet; 0 beyond the grid. */
-static int32_t block_of(const trip_cpu_store *s, const trip_cpu_sheet *sheet, int64_t u, int64_t v)
+/* The number of raster (u, v) of a sheet; 0 beyond the grid. */
+static int32_t raster_of(const trip_cpu_store *s, const trip_cpu_sheet *sheet, int64_t u, int64_t v)
 {
     bool within = u >= s->first_u && v >= s->first_v && u < s->first_u + s->across &&
                   v < s->first_v + s->down;
-    return within ? sheet->blocks[trip_cpu_store_at(s, u, v)] : 0;
+    return within ? sheet->rasters[trip_cpu_store_at(s, u, v)] : 0;
 }
 
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
@@ -246,11 +246,11 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
     while (trip_cpu_walk_next(&at)) {
         int u = run->u + 8 * trip_cpu_square_u(at.number);
         int v = run->v + 8 * trip_cpu_square_v(at.number);
-        int32_t in = block_of(s, sheet, u >> TRIP_CPU_BLOCK_LOG2, v >> TRIP_CPU_BLOCK_LOG2);
-        u &= TRIP_CPU_BLOCK - 1;
-        v &= TRIP_CPU_BLOCK - 1;
+        int32_t in = raster_of(s, sheet, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
+        u &= TRIP_CPU_RASTER - 1;
+        v &= TRIP_CPU_RASTER - 1;
         if (in) /* what is occluded has none, nor has what lies beyond the grid */
-            decode_square(s->voxels[in].codes + v * TRIP_CPU_BLOCK_STRIDE + u, &at, block,
+            decode_square(s->voxels[in].codes + v * TRIP_CPU_RASTER_STRIDE + u, &at, block,
                           s->codes);
     }
 }
@@ -262,7 +262,7 @@ typedef struct work_job {
     trip_cpu_store *store;
     const trip_cpu_sheet_work *work;
     const trip_cpu_function *function;
-    /* Of the blocks that are there. */
+    /* Of the rasters that are there. */
     void (*each)(const struct work_job *job, const trip_cpu_sheet_work *w, size_t at);
 } work_job;
 
@@ -277,7 +277,7 @@ static void work_row(void *context, unsigned task, unsigned thread)
         return;
     for (int32_t u = 1; u < s->across - 1; u++) {
         size_t at = (size_t)(task % rows + 1) * (size_t)s->across + (size_t)u;
-        if (w->sheet->blocks[at])
+        if (w->sheet->rasters[at])
             job->each(job, w, at);
     }
 }
@@ -293,45 +293,46 @@ static void run_work(work_job *job, unsigned count)
     trip_cpu_pool_wait(job->store->pool, &rows);
 }
 
-static trip_cpu_voxels *block_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
+static trip_cpu_voxels *raster_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
 {
-    return s->voxels + (sheet ? sheet->blocks[at] : 0);
+    return s->voxels + (sheet ? sheet->rasters[at] : 0);
 }
 
-/* The first column of the block to the right, the first row of the one below, the voxel between. */
+/* The first column of the raster to the right, the first row of the one below, the voxel between.
+ */
 static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     size_t across = (size_t)s->across;
-    int16_t *to = block_at(s, w->sheet, at)->codes;
-    const int16_t *right = block_at(s, w->sheet, at + 1)->codes;
-    const int16_t *below = block_at(s, w->sheet, at + across)->codes;
-    for (int v = 0; v < TRIP_CPU_BLOCK; v++)
-        to[v * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK] = right[v * TRIP_CPU_BLOCK_STRIDE];
-    int16_t *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
-    memcpy(last, below, TRIP_CPU_BLOCK * sizeof *last);
-    last[TRIP_CPU_BLOCK] = block_at(s, w->sheet, at + across + 1)->codes[0];
+    int16_t *to = raster_at(s, w->sheet, at)->codes;
+    const int16_t *right = raster_at(s, w->sheet, at + 1)->codes;
+    const int16_t *below = raster_at(s, w->sheet, at + across)->codes;
+    for (int v = 0; v < TRIP_CPU_RASTER; v++)
+        to[v * TRIP_CPU_RASTER_STRIDE + TRIP_CPU_RASTER] = right[v * TRIP_CPU_RASTER_STRIDE];
+    int16_t *last = to + TRIP_CPU_RASTER * TRIP_CPU_RASTER_STRIDE;
+    memcpy(last, below, TRIP_CPU_RASTER * sizeof *last);
+    last[TRIP_CPU_RASTER] = raster_at(s, w->sheet, at + across + 1)->codes[0];
 }
 
 static void copy_gradients_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     size_t across = (size_t)s->across;
-    trip_cpu_gradient *to = block_at(s, w->sheet, at)->gradients;
-    const trip_cpu_gradient *right = block_at(s, w->sheet, at + 1)->gradients;
-    const trip_cpu_gradient *below = block_at(s, w->sheet, at + across)->gradients;
-    for (int v = 0; v < TRIP_CPU_BLOCK; v++)
-        to[v * TRIP_CPU_BLOCK_STRIDE + TRIP_CPU_BLOCK] = right[v * TRIP_CPU_BLOCK_STRIDE];
-    trip_cpu_gradient *last = to + TRIP_CPU_BLOCK * TRIP_CPU_BLOCK_STRIDE;
-    memcpy(last, below, TRIP_CPU_BLOCK * sizeof *last);
-    last[TRIP_CPU_BLOCK] = block_at(s, w->sheet, at + across + 1)->gradients[0];
+    trip_cpu_gradient *to = raster_at(s, w->sheet, at)->gradients;
+    const trip_cpu_gradient *right = raster_at(s, w->sheet, at + 1)->gradients;
+    const trip_cpu_gradient *below = raster_at(s, w->sheet, at + across)->gradients;
+    for (int v = 0; v < TRIP_CPU_RASTER; v++)
+        to[v * TRIP_CPU_RASTER_STRIDE + TRIP_CPU_RASTER] = right[v * TRIP_CPU_RASTER_STRIDE];
+    trip_cpu_gradient *last = to + TRIP_CPU_RASTER * TRIP_CPU_RASTER_STRIDE;
+    memcpy(last, below, TRIP_CPU_RASTER * sizeof *last);
+    last[TRIP_CPU_RASTER] = raster_at(s, w->sheet, at + across + 1)->gradients[0];
 }
 
 static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     copy_codes_beside(job, w, at);
-    s->kernels->sheet_ranges(block_at(s, w->sheet, at), &w->sheet->ranges[at]);
+    s->kernels->sheet_ranges(raster_at(s, w->sheet, at), &w->sheet->ranges[at]);
 }
 
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
@@ -346,14 +347,14 @@ static uint64_t square_cells(const work_job *job, const trip_cpu_sheet_work *w, 
                              int square)
 {
     const trip_cpu_store *s = job->store;
-    const int16_t *of[2] = { block_at(s, w->sheet, at)->codes, block_at(s, w->other, at)->codes };
-    int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_BLOCK_STRIDE +
+    const int16_t *of[2] = { raster_at(s, w->sheet, at)->codes, raster_at(s, w->other, at)->codes };
+    int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_RASTER_STRIDE +
                 square % TRIP_CPU_SQUARES_ACROSS * 8;
     uint64_t cells = 0;
     for (int i = 0; i < 64; i++) {
         int16_t least = INT16_MAX, most = INT16_MIN;
         for (int k = 0; k < 8; k++) {
-            int16_t code = of[k >> 2][first + (i / 8 + (k >> 1 & 1)) * TRIP_CPU_BLOCK_STRIDE +
+            int16_t code = of[k >> 2][first + (i / 8 + (k >> 1 & 1)) * TRIP_CPU_RASTER_STRIDE +
                                       i % 8 + (k & 1)];
             least = code < least ? code : least;
             most = code > most ? code : most;
@@ -372,7 +373,7 @@ static uint64_t cells_of(const work_job *job, const trip_cpu_sheet_work *w, size
     const trip_cpu_function *f = job->function;
     trip_cpu_cells *cells = &w->sheet->cells[at];
     if (f->in_a_row)
-        s->kernels->sheet_cells(block_at(s, w->sheet, at), block_at(s, w->other, at), squares,
+        s->kernels->sheet_cells(raster_at(s, w->sheet, at), raster_at(s, w->other, at), squares,
                                 f->first_visible, f->last_visible, cells);
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         int square = __builtin_ctzll(rest);
@@ -388,7 +389,7 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
 {
     const trip_cpu_square_ranges *a = &w->sheet->ranges[at], *b = &w->other->ranges[at];
     uint64_t visible = 0;
-    if (w->other->blocks[at])
+    if (w->other->rasters[at])
         for (int i = 0; i < 64; i++) {
             bool any = a->least[i] <= a->most[i] && b->least[i] <= b->most[i];
             int16_t least = a->least[i] < b->least[i] ? a->least[i] : b->least[i];
@@ -405,7 +406,7 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
     run_work(&(work_job){ .store = s, .work = work, .function = f, .each = find_visible }, count);
 }
 
-/* A block's squares and those beside them along u; `at` is of any block but the outermost. */
+/* A raster's squares and those beside them along u; `at` is of any raster but the outermost. */
 static uint64_t wider(const uint64_t *squares, size_t at)
 {
     uint64_t s = squares[at];
@@ -413,14 +414,14 @@ static uint64_t wider(const uint64_t *squares, size_t at)
            (squares[at + 1] << 7 & COLUMN_7);
 }
 
-/* A square of the outermost blocks is never visible: nor are those beyond. */
+/* A square of the outermost rasters is never visible: nor are those beyond. */
 static uint64_t row_wider(const trip_cpu_store *s, const uint64_t *squares, size_t at)
 {
     size_t row = at / (size_t)s->across;
     return row == 0 || row == (size_t)s->down - 1 ? 0 : wider(squares, at);
 }
 
-/* The squares of a block and those about them: both ends of a segment that meets a square lie in
+/* The squares of a raster and those about them: both ends of a segment that meets a square lie in
  * these, and all corners of their cells. */
 static uint64_t about(const trip_cpu_store *s, const uint64_t *squares, size_t at)
 {
@@ -438,10 +439,10 @@ static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, si
     uint64_t squares =
         w->everywhere ? UINT64_MAX : about(s, w->visible, at) | about(s, w->visible_before, at);
     if (squares)
-        s->kernels->sheet_gradients(block_at(s, w->sheet, at), squares,
-                                    block_at(s, w->sheet, at - 1),
-                                    block_at(s, w->sheet, at - (size_t)s->across),
-                                    block_at(s, w->other, at), block_at(s, w->third, at));
+        s->kernels->sheet_gradients(raster_at(s, w->sheet, at), squares,
+                                    raster_at(s, w->sheet, at - 1),
+                                    raster_at(s, w->sheet, at - (size_t)s->across),
+                                    raster_at(s, w->other, at), raster_at(s, w->third, at));
 }
 
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
@@ -458,7 +459,7 @@ bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
     for (int32_t v = 1; v < s->down - 1; v++)
         for (int32_t u = 1; u < s->across - 1; u++) {
             size_t at = (size_t)v * (size_t)s->across + (size_t)u;
-            if (!w->other->blocks[at] || !w->third->blocks[at] || !about(s, w->visible, at))
+            if (!w->other->rasters[at] || !w->third->rasters[at] || !about(s, w->visible, at))
                 continue;
             if (!trip_cpu_store_take(s, w->sheet, at)) {
                 trip_cpu_store_drop(s, w->sheet);
@@ -468,16 +469,16 @@ bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
     return true;
 }
 
-static void cut_block(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     int32_t to = (int32_t)lrint(w->part * 16384);
-    s->kernels->sheet_between(block_at(s, w->other, at), block_at(s, w->third, at),
+    s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at),
                               about(s, w->visible, at), to << 16 | (16384 - to), w->other->shaded,
-                              block_at(s, w->sheet, at));
+                              raster_at(s, w->sheet, at));
 }
 
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
 {
-    run_work(&(work_job){ .store = s, .work = work, .each = cut_block }, count);
+    run_work(&(work_job){ .store = s, .work = work, .each = cut_raster }, count);
 }

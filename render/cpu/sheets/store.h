@@ -1,4 +1,4 @@
-/* The sheets and slices at hand: blocks of voxels from a pool of fixed size, decoded from runs,
+/* The sheets and slices at hand: rasters of voxels from a pool of fixed size, decoded from runs,
  * completed with what lies beside them. Owned by the renderer's thread, which no job runs beside;
  * those that the functions here start end before they return. */
 #ifndef TRIP_CPU_SHEETS_STORE_H
@@ -13,8 +13,8 @@
 /* A sheet, or a slice between two. */
 typedef struct trip_cpu_sheet {
     int64_t number;                 /* of the sheet */
-    int32_t *blocks;                /* the number of each in the pool; 0: absent */
-    trip_cpu_square_ranges *ranges; /* of sheets; of blocks that are there */
+    int32_t *rasters;               /* the number of each in the pool; 0: absent */
+    trip_cpu_square_ranges *ranges; /* of sheets; of rasters that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
     trip_cpu_cells *cells;          /* those of squares that are visible */
     bool prepared, shaded;          /* ranges are there; gradients are */
@@ -26,10 +26,10 @@ enum {
     TRIP_CPU_SLICES_MAX = TRIP_CPU_SEGMENTS, /* between sheets */
 };
 
-/* A rectangle of blocks along u and v, inclusive. */
-typedef struct trip_cpu_blocks {
+/* A rectangle of rasters along u and v, inclusive. */
+typedef struct trip_cpu_rasters {
     int64_t first[2], last[2];
-} trip_cpu_blocks;
+} trip_cpu_rasters;
 
 typedef struct trip_cpu_store {
     trip_budget *budget;
@@ -37,12 +37,12 @@ typedef struct trip_cpu_store {
     trip_cpu_pool *pool;
     trip_cpu_codes codes; /* of the frame's data set */
 
-    trip_cpu_voxels *voxels; /* blocks */
+    trip_cpu_voxels *voxels; /* rasters */
     size_t voxels_bytes;
-    int32_t *free; /* numbers of free blocks */
-    uint32_t blocks, free_count;
+    int32_t *free; /* numbers of free rasters */
+    uint32_t rasters, free_count;
 
-    /* The grid of blocks, the outermost of which are absent; in blocks. */
+    /* The grid of rasters, the outermost of which are absent; in rasters. */
     int64_t first_u, first_v;
     int32_t across, down;
     char *grids; /* of the sheets and slices below */
@@ -52,24 +52,24 @@ typedef struct trip_cpu_store {
     uint64_t *some; /* squares visible in any of the segments drawn at a time */
 } trip_cpu_store;
 
-/* What so many sheets of a rectangle take, with a pool of so many blocks. */
-uint64_t trip_cpu_store_bytes(const trip_cpu_blocks *all, unsigned sheets, uint64_t blocks);
+/* What so many sheets of a rectangle take, with a pool of so many rasters. */
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters);
 /* What is taken of the budget. */
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
-/* Room for so many sheets of a rectangle, and for `least` to `most` blocks in at most `room` bytes;
- * every sheet is absent then. False where that is too little. */
-bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_blocks *all, unsigned sheets,
+/* Room for so many sheets of a rectangle, and for `least` to `most` rasters in at most `room`
+ * bytes; every sheet is absent then. False where that is too little. */
+bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
                         uint64_t least, uint64_t most, uint64_t room);
 /* Moves to a rectangle that is no larger than the one there is room for; every sheet is absent. */
-void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_blocks *to);
+void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to);
 void trip_cpu_store_release(trip_cpu_store *s);
 
-static inline bool trip_cpu_blocks_have(const trip_cpu_blocks *b, int64_t u, int64_t v)
+static inline bool trip_cpu_rasters_have(const trip_cpu_rasters *b, int64_t u, int64_t v)
 {
     return u >= b->first[0] && u <= b->last[0] && v >= b->first[1] && v <= b->last[1];
 }
 
-/* Where block (u, v), in blocks, is in the grid's tables. */
+/* Where raster (u, v), in rasters, is in the grid's tables. */
 static inline size_t trip_cpu_store_at(const trip_cpu_store *s, int64_t u, int64_t v)
 {
     return (size_t)((v - s->first_v) * s->across + (u - s->first_u));
@@ -80,16 +80,16 @@ static inline size_t trip_cpu_store_grid(const trip_cpu_store *s)
     return (size_t)s->across * (size_t)s->down;
 }
 
-/* A block in which all is missing; false when none is free. */
+/* A raster in which all is missing; false when none is free. */
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at);
-/* Every block of a sheet or slice is free again. */
+/* Every raster of a sheet or slice is free again. */
 void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 
-/* A run's voxels into blocks of a sheet that are there. May run beside those of other runs. */
+/* A run's voxels into rasters of a sheet that are there. May run beside those of other runs. */
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run);
 
-/* What is done with a sheet or slice: several of them at a time, block by block. */
+/* What is done with a sheet or slice: several of them at a time, raster by raster. */
 typedef struct trip_cpu_sheet_work {
     trip_cpu_sheet *sheet;
     /* Cells and slices: the sheets on both sides. Gradients: those before and after in index order,
@@ -102,7 +102,7 @@ typedef struct trip_cpu_sheet_work {
     double part;     /* of slices: the weight of `third` */
 } trip_cpu_sheet_work;
 
-/* Complete sheets' blocks get the first voxels of those beside them, and ranges. */
+/* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
 /* Which squares and cells may show from prepared sheets to the next, `other`. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
@@ -110,8 +110,8 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
 /* Gradients of prepared sheets' voxels, where cells may show or everywhere. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
-/* Blocks for a slice between two sheets, where cells may show. False when the pool is full; then it
- * is empty. */
+/* Rasters for a slice between two sheets, where cells may show. False when the pool is full; then
+ * it is empty. */
 bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
 /* The voxels of slices. */
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);

@@ -23,28 +23,28 @@ static size_t sheet_bytes(const trip_cpu_need *need)
 }
 
 /* What is at hand of windows of a size, as a rectangle at 0. */
-static trip_cpu_blocks at_hand(const trip_cpu_blocks *all, const int64_t size[2], int64_t reach)
+static trip_cpu_rasters at_hand(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach)
 {
-    trip_cpu_blocks b = { .first = { 0, 0 } };
+    trip_cpu_rasters b = { .first = { 0, 0 } };
     for (int a = 0; a < 2; a++)
         b.last[a] = lesser(size[a] + 2 * reach, all->last[a] - all->first[a] + 1) - 1;
     return b;
 }
 
-static uint64_t blocks_of(const trip_cpu_blocks *b, int slices)
+static uint64_t rasters_of(const trip_cpu_rasters *b, int slices)
 {
     return (uint64_t)((b->last[0] - b->first[0] + 1) * (b->last[1] - b->first[1] + 1)) *
            (uint64_t)(TRIP_CPU_WINDOW_SHEETS + slices);
 }
 
-static uint64_t bytes_of(const trip_cpu_blocks *all, const int64_t size[2], int64_t reach,
+static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,
                          int slices)
 {
-    trip_cpu_blocks b = at_hand(all, size, reach);
-    return trip_cpu_store_bytes(&b, TRIP_CPU_WINDOW_SHEETS, blocks_of(&b, slices));
+    trip_cpu_rasters b = at_hand(all, size, reach);
+    return trip_cpu_store_bytes(&b, TRIP_CPU_WINDOW_SHEETS, rasters_of(&b, slices));
 }
 
-uint64_t trip_cpu_windows_least_bytes(const trip_cpu_blocks *all, int64_t reach,
+uint64_t trip_cpu_windows_least_bytes(const trip_cpu_rasters *all, int64_t reach,
                                       const trip_cpu_need *need, int slices)
 {
     const int64_t one[2] = { 1, 1 };
@@ -74,7 +74,7 @@ void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget)
     w->bytes = 0;
 }
 
-bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_blocks *all, int64_t reach,
+bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room)
 {
     trip_cpu_windows *w = &s->windows;
@@ -91,11 +91,11 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_blocks *all, int64_
         int longer = w->size[0] > w->size[1] ? 0 : 1;
         w->size[longer] = (w->size[longer] + 1) / 2;
     }
-    trip_cpu_blocks hand = at_hand(all, w->size, reach);
-    uint64_t blocks = blocks_of(&hand, slices);
+    trip_cpu_rasters hand = at_hand(all, w->size, reach);
+    uint64_t rasters = rasters_of(&hand, slices);
     w->used =
         take_runs(w, need, s->store.budget) &&
-        trip_cpu_store_fit(&s->store, &hand, TRIP_CPU_WINDOW_SHEETS, blocks, blocks, room - kept);
+        trip_cpu_store_fit(&s->store, &hand, TRIP_CPU_WINDOW_SHEETS, rasters, rasters, room - kept);
     return w->used;
 }
 
@@ -108,9 +108,9 @@ typedef struct decoding {
     const trip_cpu_sheet *to;
 } decoding;
 
-static int64_t block_of(int64_t voxel)
+static int64_t raster_of(int64_t voxel)
 {
-    return voxel >> TRIP_CPU_BLOCK_LOG2;
+    return voxel >> TRIP_CPU_RASTER_LOG2;
 }
 
 static void decode_run(void *context, unsigned task, unsigned thread)
@@ -125,41 +125,41 @@ static void decode_run(void *context, unsigned task, unsigned thread)
     trip_cpu_store_decode(&d->s->store, d->to, &block, &(trip_run){ .u = kept->u, .v = kept->v });
 }
 
-/* Blocks for a run's voxels, where they are at hand. */
-static void take_blocks(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_cpu_kept_run *run,
-                        const trip_cpu_blocks *hand)
+/* Rasters for a run's voxels, where they are at hand. */
+static void take_rasters(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_cpu_kept_run *run,
+                         const trip_cpu_rasters *hand)
 {
     const int64_t last = (1 << s->of->frame->data->header.tile_log2) - 1;
-    for (int64_t v = block_of(run->v); v <= block_of(run->v + last); v++)
-        for (int64_t u = block_of(run->u); u <= block_of(run->u + last); u++)
-            if (trip_cpu_blocks_have(hand, u, v)) {
+    for (int64_t v = raster_of(run->v); v <= raster_of(run->v + last); v++)
+        for (int64_t u = raster_of(run->u); u <= raster_of(run->u + last); u++)
+            if (trip_cpu_rasters_have(hand, u, v)) {
                 size_t at = trip_cpu_store_at(&s->store, u, v);
-                if (!sheet->blocks[at])
+                if (!sheet->rasters[at])
                     trip_cpu_store_take(&s->store, sheet, at);
             }
 }
 
 /* Whether some run of a kept sheet has voxels at hand. */
 static bool is_at_hand(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *sheet,
-                       const trip_cpu_blocks *hand)
+                       const trip_cpu_rasters *hand)
 {
     const int64_t last = (1 << s->of->frame->data->header.tile_log2) - 1;
     for (size_t n = 0; n < sheet->run_count; n++) {
         const trip_cpu_kept_run *run = &sheet->runs[n];
-        if (block_of(run->u) <= hand->last[0] && block_of(run->u + last) >= hand->first[0] &&
-            block_of(run->v) <= hand->last[1] && block_of(run->v + last) >= hand->first[1])
+        if (raster_of(run->u) <= hand->last[0] && raster_of(run->u + last) >= hand->first[0] &&
+            raster_of(run->v) <= hand->last[1] && raster_of(run->v + last) >= hand->first[1])
             return true;
     }
     return false;
 }
 
-static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_blocks *hand)
+static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_rasters *hand)
 {
     const trip_cpu_kept_sheet *from = &s->windows.sheets[i];
     trip_cpu_sheet *to = &s->store.sheets[i];
     to->number = from->number;
     for (size_t n = 0; n < from->run_count; n++)
-        take_blocks(s, to, &from->runs[n], hand);
+        take_rasters(s, to, &from->runs[n], hand);
     decoding d = { s, from, to };
     trip_cpu_job job = { .run = decode_run, .context = &d, .tasks = (unsigned)from->run_count };
     trip_cpu_pool_start(s->of->pool, &job);
@@ -194,22 +194,22 @@ static void find_interval(trip_cpu_sheets *s)
 }
 
 /* Rays that start beside all windows are of the outermost. */
-static void set_window(trip_cpu_sheets *s, const trip_cpu_blocks *inner)
+static void set_window(trip_cpu_sheets *s, const trip_cpu_rasters *inner)
 {
-    const trip_cpu_blocks *all = &s->windows.all;
+    const trip_cpu_rasters *all = &s->windows.all;
     const int64_t origin[2] = { s->store.first_u, s->store.first_v };
     for (int a = 0; a < 2; a++) {
-        int64_t lo = (inner->first[a] - origin[a]) * TRIP_CPU_BLOCK;
-        int64_t hi = (inner->last[a] + 1 - origin[a]) * TRIP_CPU_BLOCK;
+        int64_t lo = (inner->first[a] - origin[a]) * TRIP_CPU_RASTER;
+        int64_t hi = (inner->last[a] + 1 - origin[a]) * TRIP_CPU_RASTER;
         s->group.lo[a] = inner->first[a] == all->first[a] ? INT32_MIN : (int32_t)lo;
         s->group.hi[a] = inner->last[a] == all->last[a] ? INT32_MAX : (int32_t)hi;
     }
 }
 
-static int draw_window(trip_cpu_sheets *s, const trip_cpu_blocks *inner)
+static int draw_window(trip_cpu_sheets *s, const trip_cpu_rasters *inner)
 {
     const trip_cpu_windows *w = &s->windows;
-    trip_cpu_blocks hand;
+    trip_cpu_rasters hand;
     for (int a = 0; a < 2; a++) {
         hand.first[a] = greater(inner->first[a] - w->reach, w->all.first[a]);
         hand.last[a] = lesser(inner->last[a] + w->reach, w->all.last[a]);
@@ -244,9 +244,9 @@ static int draw_interval(trip_cpu_sheets *s)
             for (int64_t u = w->all.first[0]; u <= w->all.last[0] && !status; u += w->size[0])
                 status = draw_window(
                     s,
-                    &(trip_cpu_blocks){ .first = { u, v },
-                                        .last = { lesser(u + w->size[0] - 1, w->all.last[0]),
-                                                  lesser(v + w->size[1] - 1, w->all.last[1]) } });
+                    &(trip_cpu_rasters){ .first = { u, v },
+                                         .last = { lesser(u + w->size[0] - 1, w->all.last[0]),
+                                                   lesser(v + w->size[1] - 1, w->all.last[1]) } });
     if (w->from == 1) {
         trip_cpu_kept_sheet first = w->sheets[0];
         w->count--;

@@ -1,6 +1,6 @@
 /* Sheets drawn window by window, where those of a list are too large to be at hand decoded: their
  * runs are kept as they are in the file, of the four sheets that one interval depends on, and for
- * each window, a rectangle of blocks, decoded with as much about it as rays can reach. Each ray is
+ * each window, a rectangle of rasters, decoded with as much about it as rays can reach. Each ray is
  * drawn in the window that it starts in, so that each segment is drawn once, and in order. Called
  * by the renderer's thread. */
 #ifndef TRIP_CPU_SHEETS_WINDOWS_H
@@ -31,9 +31,9 @@ typedef struct trip_cpu_kept_sheet {
 
 typedef struct trip_cpu_windows {
     bool used; /* in this layer */
-    trip_cpu_blocks all;
-    int64_t size[2]; /* blocks of a window along u and v */
-    int64_t reach;   /* blocks about it */
+    trip_cpu_rasters all;
+    int64_t size[2]; /* rasters of a window along u and v */
+    int64_t reach;   /* rasters about it */
     char *memory;
     size_t bytes;
     trip_cpu_kept_sheet sheets[TRIP_CPU_WINDOW_SHEETS]; /* in a row, the last may not be complete */
@@ -43,9 +43,9 @@ typedef struct trip_cpu_windows {
 
 /* What the smallest windows take; and readies the largest that do not take more than `room`: false
  * where that is too little. */
-uint64_t trip_cpu_windows_least_bytes(const trip_cpu_blocks *all, int64_t reach,
+uint64_t trip_cpu_windows_least_bytes(const trip_cpu_rasters *all, int64_t reach,
                                       const trip_cpu_need *need, int slices);
-bool trip_cpu_windows_fit(struct trip_cpu_sheets *s, const trip_cpu_blocks *all, int64_t reach,
+bool trip_cpu_windows_fit(struct trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room);
 void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget);
 

@@ -28,23 +28,23 @@ class Hidden(limits.Test):
         # Post draws several sheets at once, and has read more by then.
         for classify, most in ("pre", 0.5), ("post", 0.65):
             look = [*view, "--classify", classify]
-            drawn, wanted = self.stats(data, *look, "--hidden", "draw", size="512x512")
-            skipped, picture = self.stats(data, *look, "--hidden", "skip", size="512x512")
+            drawn, wanted = self.stats(data, *look, "--occluded", "draw", size="512x512")
+            skipped, picture = self.stats(data, *look, "--occluded", "skip", size="512x512")
             self.assertEqual(picture, wanted)
             share = bytes_read(skipped) / bytes_read(drawn)
-            self.tell(f"{classify}: {limits.text_bytes(bytes_read(drawn))} without, "
+            self.note(f"{classify}: {limits.text_bytes(bytes_read(drawn))} without, "
                       f"{limits.text_bytes(bytes_read(skipped))} with skipping: {100 * share:.0f} %")
             self.assertLessEqual(share, most)
             self.assertGreater(skipped["frames"][0]["bytes_skipped"], 0)
             self.assertGreater(skipped["frames"][0]["runs_skipped"], 0)
             self.assertEqual(drawn["frames"][0]["bytes_skipped"], 0)
         r = self.works("triptych", "render", data, "-o", self.path("p.png"), "--size", "512x512",
-                       "--explain", "--hidden", "skip", *look)
-        self.assertRegex(r.out, r"hidden +[\d.]+ [kMG]?B in \d+ runs not read")
+                       "--explain", "--occluded", "skip", *look)
+        self.assertRegex(r.out, r"occluded +[\d.]+ [kMG]?B in \d+ runs not read")
 
     def explained(self, data, *arguments):
         r = self.works("triptych", "render", data, "-o", self.path("p.png"), "--size", "160x120",
-                       "--explain", "--hidden", "draw", *arguments)
+                       "--explain", "--occluded", "draw", *arguments)
         left_out = [0, 0, 0]
         for found in re.finditer(r"left out: (\d+) transparent, (\d+) out of view, (\d+) without",
                                  r.out):
@@ -57,14 +57,14 @@ class Hidden(limits.Test):
         faint = self.path("faint.tf")
         with open(faint, "w") as f:
             f.write("0 0 0 0 0\n130 0 0 0 0\n131 1 1 1 0.5\n255 1 1 1 0.5\n")
-        everything = bytes_read(self.stats(data, "--tf", self.tf, "--h", "0.99", "--hidden",
+        everything = bytes_read(self.stats(data, "--tf", self.tf, "--h", "0.99", "--occluded",
                                            "draw")[0])
         for arguments, which in [(["--tf", faint, "--h", "0.99"], 0),
                                  (["--tf", self.tf, "--h", "0.99", "--fov", "60",
                                    "--eye", "48,60,48", "--look", "48,96,48"], 1)]:
             left_out = self.explained(data, *arguments)[1]
             self.assertGreater(left_out[which], 0)
-            stats = self.stats(data, *arguments, "--hidden", "draw")[0]
+            stats = self.stats(data, *arguments, "--occluded", "draw")[0]
             self.assertLess(bytes_read(stats), everything)
             counted = stats["frames"][0]["lists"].values()
             name = ["bricks_transparent", "bricks_outside"][which]
@@ -74,8 +74,8 @@ class Hidden(limits.Test):
         volume = self.generate("lobes.nrrd", "marschner-lobb", 64)
         data = self.brick(volume, "lobes.trip", "--keep-all")
         pre = "--classify", "pre"
-        shaded = self.stats(data, "--hidden", "draw", *pre)[0]
-        plain = self.stats(data, "--no-shading", "--hidden", "draw", *pre)[0]
+        shaded = self.stats(data, "--occluded", "draw", *pre)[0]
+        plain = self.stats(data, "--no-shading", "--occluded", "draw", *pre)[0]
         splats = sum(axis["splats_read"] for axis in plain["frames"][0]["lists"].values())
         normals = json.loads(self.works("triptych", "info", data, "--json").out)["normal_bytes"] * splats
         # Whole pages are read, some of them twice where slots meet.
@@ -88,7 +88,7 @@ class Hidden(limits.Test):
                          self.explained(data, "--no-shading", *pre)[0])
         self.assertAlmostEqual(float(said[1]), 1e-6 * normals, delta=0.01)
         # Post takes differences of values, and reads what it reads without light.
-        lit, flat = (self.stats(data, "--hidden", "draw", *more)[0]["frames"][0]
+        lit, flat = (self.stats(data, "--occluded", "draw", *more)[0]["frames"][0]
                      for more in ((), ("--no-shading",)))
         self.assertEqual(lit["lists"], flat["lists"])
         self.assertGreaterEqual(lit["bytes_of_planes_left_out"], normals)
@@ -100,12 +100,12 @@ class Hidden(limits.Test):
             frames = {}
             for memory in "24M", "1G":
                 r = self.works("triptych", "render", data, "-o", self.path("t.exr"), "--orbit", 4,
-                               "--size", "100x80", "--renderer", "cpu", "--hidden", "draw",
+                               "--size", "100x80", "--renderer", "cpu", "--occluded", "draw",
                                "--classify", classify, "--memory", memory, "--stats", "-")
                 frames[memory] = json.loads(r.out)["frames"]
             read = {memory: [sum(axis["bytes_read"] for axis in frame["lists"].values())
                              for frame in drawn] for memory, drawn in frames.items()}
-            self.tell(f"{classify}: bytes read by each frame: {read}")
+            self.note(f"{classify}: bytes read by each frame: {read}")
             # The same but for pages that two reads share, of which smaller slots make more.
             self.assertAlmostEqual(read["1G"][0], read["24M"][0], delta=0.01 * read["24M"][0])
             if classify == "pre":  # without normals, all finds room in either
