@@ -129,7 +129,7 @@ void BoxList::finish()
     auto clip = [&](trip_vdb_box &b) {
         for (int a = 0; a < 3; a++) {
             int32_t lo = std::max(b.lo[a], bounds_.min()[a]);
-            int32_t hi = std::min(b.lo[a] + b.size[a] - 1, bounds_.max()[a]);
+            int32_t hi = std::min(b.lo[a] + (b.size[a] - 1), bounds_.max()[a]);
             if (hi < lo)
                 return true;
             b.lo[a] = lo;
@@ -147,8 +147,8 @@ void BoxList::finish()
         return a.lo[0] < b.lo[0];
     });
     for (int a = 0; a < 3; a++) {
-        grid_.lo[a] = bounds_.min()[a] - 1;
-        grid_.hi[a] = bounds_.max()[a] + 1;
+        grid_.lo[a] = std::max(bounds_.min()[a], INT32_MIN + 1) - 1;
+        grid_.hi[a] = std::min(bounds_.max()[a], INT32_MAX - 1) + 1;
     }
 }
 
