@@ -1,0 +1,170 @@
+"""builds: what data sets and frames of a volume cost by each of several builds of triptych, in turns,
+and whether their pictures have the same bits. Started by ./builds."""
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+# Sides, and views from inside and of a wide angle, as every build has them.
+VIEWS = (["--view=front"], ["--view=left"], ["--view=top"], ["--view=iso"],
+         ["--view=iso", "--zoom=6"], ["--view=iso", "--fov=90"])
+
+
+def fail(text):
+    sys.exit("builds: " + text)
+
+
+def run(*command):
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        fail("%s: %s" % (" ".join(command[:2]), done.stderr.strip()[-400:]))
+    return done.stdout
+
+
+def middle(values):
+    return sorted(values)[(len(values) - 1) // 2]
+
+
+def load():
+    with open("/proc/loadavg", encoding="ascii") as file:
+        return float(file.read().split()[0])
+
+
+class Build:
+    """A program, which may lack options that later ones have."""
+
+    def __init__(self, path):
+        self.path = path
+        self.help = {c: run(path, c, "--help") for c in ("brick", "render", "bench")}
+
+    def given(self, command, *options):
+        """Those of the options that the command has."""
+        return [o for o in options if o.split("=")[0] in self.help[command]]
+
+    def brick(self, o, data, *options):
+        summary = run(self.path, "brick", o.volume, "-o", data, "--force", "--json",
+                      "--memory=" + o.memory, *self.given("brick", "--levels=0", *options), *o.brick)
+        return json.loads(summary)
+
+    def stream(self, o, data):
+        """Milliseconds of a frame from disk, of reading alone and of drawing from memory."""
+        report = json.loads(run(self.path, "bench", "stream", data, "--renderer=cpu", "--json",
+                                "--memory=" + o.memory, "--size=" + o.size, "--repeat=1"))
+        rows = report["tables"]["stages"]["rows"]
+        return {row["key"]: row["ms"] for row in rows if "ms" in row}
+
+    def pictures(self, o, data, folder):
+        """The SHA-256 of each view, as the pixels' bits in OpenEXR."""
+        name = os.path.join(folder, "view.exr")
+        hashes = []
+        for view in VIEWS:
+            run(self.path, "render", data, "-o", name, "--renderer=cpu", "--size=" + o.size, *view,
+                *self.given("render", "--classify=pre"), *o.render)
+            with open(name, "rb") as file:
+                hashes.append(hashlib.sha256(file.read()).hexdigest())
+        return hashes
+
+
+def seconds_of(summary):
+    total = summary["seconds"]
+    return total["total"] if isinstance(total, dict) else total
+
+
+def costs(builds, o, folder):
+    rows = [{"program": b.path, "brick": [], "frame": [], "read": [], "draw": []} for b in builds]
+    for _ in range(o.repeat):
+        for number, (build, row) in enumerate(zip(builds, rows)):
+            data = os.path.join(folder, "%d.trip" % number)  # forms that differ
+            made = build.brick(o, data)
+            splats = made["bytes"] - made.get("halo_bytes", 0)
+            row["bytes_a_splat"] = splats / made["kept"]
+            row["kept"] = made["kept"]
+            row["brick"].append(seconds_of(made))
+            for stage, ms in build.stream(o, data).items():
+                if stage in row:
+                    row[stage].append(ms)
+    for row in rows:
+        for stage in ("brick", "frame", "read", "draw"):
+            row[stage] = middle(row[stage]) if row[stage] else None
+    return rows
+
+
+def pictures(builds, o, folder):
+    """By each build with the halo and, where it has a choice, without."""
+    rows = []
+    for number, build in enumerate(builds):
+        halos = ["--halo=0", "--halo=1"] if "--halo" in build.help["brick"] else [None]
+        for halo in halos:
+            data = os.path.join(folder, "%d.trip" % number)
+            build.brick(o, data, "--normals=full", *([halo] if halo else []))
+            rows.append({"program": build.path, "halo": halo and halo[-1],
+                         "views": build.pictures(o, data, folder)})
+    return rows
+
+
+def print_costs(rows, o):
+    size = os.path.getsize(o.volume)
+    print("%s, %.1f MB, load %.1f\n" % (os.path.basename(o.volume), size / 1e6, load()))
+    print("%-32s %10s %8s %9s %9s %9s %9s" % ("program", "kept", "B/splat", "brick s", "frame ms",
+                                             "read ms", "draw ms"))
+    for row in rows:
+        print("%-32s %10d %8.2f %9.2f %9s %9s %9s" % (
+            row["program"][-32:], row["kept"], row["bytes_a_splat"], row["brick"],
+            *("-" if row[s] is None else "%.0f" % row[s] for s in ("frame", "read", "draw"))))
+    for row in rows[1:]:
+        print("%-32s %10s %8.2f %9.2f %9s %9s %9s" % (
+            "times the first", "", *(
+                row[s] / rows[0][s] for s in ("bytes_a_splat", "brick")), *(
+                    "-" if row[s] is None or rows[0][s] is None else "%.2f" % (row[s] / rows[0][s])
+                    for s in ("frame", "read", "draw"))))
+
+
+def print_pictures(rows):
+    for row in rows:
+        print("%-32s halo %-2s %s" % (row["program"][-32:], row["halo"] or "-",
+                                      " ".join(h[:8] for h in row["views"])))
+    same = all(row["views"] == rows[0]["views"] for row in rows)
+    print("the same bits" if same else "not the same bits")
+
+
+def parse():
+    parser = argparse.ArgumentParser(
+        prog="builds", description="What data sets of a volume, without coarse levels, and frames of "
+        "them cost by each of several builds of triptych, in turns; or whether six pictures of the "
+        "volume have the same bits, by splats with normals at full width, with the halo and without.")
+    parser.add_argument("--triptych", action="append", required=True,
+                        help="a build of the program; may be repeated, the first is compared with")
+    parser.add_argument("volume")
+    parser.add_argument("--brick", default="", help="options of `triptych brick`, as one word")
+    parser.add_argument("--render", default="", help="options of `triptych render`, with --pictures")
+    parser.add_argument("--memory", default="128M", help="as in triptych (default: 128M)")
+    parser.add_argument("--size", default="1024x1024", help="pixels (default: 1024x1024)")
+    parser.add_argument("--repeat", type=int, default=3, help="turns (default: 3)")
+    parser.add_argument("--pictures", action="store_true", help="compare pictures, not costs")
+    parser.add_argument("--work", help="a folder for the data sets (default: a temporary one)")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    options = parser.parse_args()
+    options.brick, options.render = options.brick.split(), options.render.split()
+    return options
+
+
+def main():
+    options = parse()
+    builds = [Build(path) for path in options.triptych]
+    with tempfile.TemporaryDirectory(dir=options.work) as folder:
+        rows = (pictures if options.pictures else costs)(builds, options, folder)
+    if options.json:
+        print(json.dumps(rows, indent=2))
+    elif options.pictures:
+        print_pictures(rows)
+    else:
+        print_costs(rows, options)
+    same = not options.pictures or all(row["views"] == rows[0]["views"] for row in rows)
+    return 0 if same else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
