@@ -1,5 +1,6 @@
 #include "view.h"
 
+#include "outline.h"
 #include "report.h"
 #include "visible.h"
 
@@ -113,23 +114,79 @@ static double kernel_that_counts(const trip_camera_framing *f, double radius)
     return fmax(radius / 2, radius - margin * voxels);
 }
 
-/* With a reader that is gone before the one of the frames is made. */
+/* What is fitted: voxels that are seen alone, and what shows together with others. */
+typedef struct fitted {
+    trip_visible *visible;
+    trip_outline *outline;
+} fitted;
+
+static int reach_of_fitted(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
+                           int count, double *values)
+{
+    const fitted *f = user;
+    double of_outline[TRIP_REACHES_MAX];
+    int status = trip_visible_reach(f->visible, origin, wanted, count, values);
+    trip_outline_reach(f->outline, origin, wanted, count, of_outline);
+    for (int i = 0; i < count; i++)
+        values[i] = fmax(values[i], of_outline[i]);
+    return status;
+}
+
+/* Of the view that has all of the box in it. */
+static int make_outline(trip_outline **out, const session *s, trip_reader *reader,
+                        const trip_camera_framing *f)
+{
+    trip_camera_params view;
+    trip_camera_framing of_box = *f;
+    of_box.ortho_height = 0;
+    int status = trip_camera_frame(&of_box, &s->data->index_to_world, &view);
+    return status ? status
+                  : trip_outline_make(out, &(trip_outline_params){
+                                               .data = s->data,
+                                               .reader = reader,
+                                               .budget = s->budget,
+                                               .table = s->table,
+                                               .lo = { f->lo[0], f->lo[1], f->lo[2] },
+                                               .hi = { f->hi[0], f->hi[1], f->hi[2] },
+                                               .view = &view,
+                                           });
+}
+
+static int make_outlined(trip_found_view *v, const triptych_view *o, const session *s,
+                         trip_visible *visible, trip_outline *outline, trip_camera_framing *f)
+{
+    fitted what = { visible, outline };
+    if (outline) {
+        v->splats += visible->splats + trip_outline_splats(outline);
+        trip_visible_start(visible, s->table, true);
+        f->reach = reach_of_fitted;
+        f->reach_user = &what;
+    }
+    return make_view(v, o, s, f);
+}
+
+/* With a reader that is gone before the one of the frames is made. What turns shows sides that the
+ * outline does not have. */
 static int make_fitted(trip_found_view *v, const triptych_view *o, const session *s,
                        double kernel_radius, const session_reader *wanted, trip_camera_framing *f)
 {
     trip_visible visible = { .data = s->data, .budget = s->budget };
+    trip_outline *outline = NULL;
     trip_dataset_kept_bounds(s->data, visible.lo, visible.hi);
     int status = session_make_reader(s, &visible.reader, wanted);
     if (status)
         return status;
-    trip_visible_start(&visible, s->table);
+    trip_visible_start(&visible, s->table, false);
     status = trip_visible_bounds(&visible, f->lo, f->hi);
     visible.kernel_radius = kernel_that_counts(f, kernel_radius);
+    if (!status && !o->eye && !f->turntable)
+        status = make_outline(&outline, s, visible.reader, f);
     f->reach = trip_visible_reach;
     f->reach_user = &visible;
     if (!status)
-        status = make_view(v, o, s, f);
-    v->splats = visible.splats;
+        status = make_outlined(v, o, s, &visible, outline, f);
+    v->splats += visible.splats;
+    trip_outline_destroy(outline);
     trip_reader_destroy(visible.reader);
     return status;
 }

@@ -7,6 +7,7 @@ enum { AXIS = 2 }; /* the list that is read; all hold the same voxels */
 
 #define LEAST_OPACITY (1.0 / 255.0)
 #define SHARE_OF_DEPTH (1.0 / 16.0)
+#define LEAST_ALONE 0.1
 
 /* Of a wanted function in index space:
  * normal . p + offset + around |(across[0] . p + from[0], across[1] . p + from[1])| */
@@ -30,19 +31,27 @@ typedef struct search {
     uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } search;
 
-void trip_visible_start(trip_visible *v, const trip_tf_entry *table)
+/* The extinction, per world unit, from which on voxels count. */
+static double least_extinction(const trip_visible *v)
 {
+    const trip_affine *m = &v->data->index_to_world;
+    if (v->alone)
+        return -log1p(-LEAST_ALONE) / cbrt(fabs(trip_affine_determinant(m)));
     trip_vec3 diagonal =
         trip_v3(v->hi[0] - v->lo[0] + 1, v->hi[1] - v->lo[1] + 1, v->hi[2] - v->lo[2] + 1);
-    double depth =
-        SHARE_OF_DEPTH * trip_length(trip_affine_vector(&v->data->index_to_world, diagonal));
-    double least = -log1p(-LEAST_OPACITY) / depth;
+    return -log1p(-LEAST_OPACITY) / (SHARE_OF_DEPTH * trip_length(trip_affine_vector(m, diagonal)));
+}
+
+void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone)
+{
+    v->alone = alone;
+    v->splats = 0;
+    double least = least_extinction(v);
     for (unsigned code = 0; code < 65536; code++) {
         uint64_t bit = UINT64_C(1) << (code % 64);
         v->codes[code / 64] =
             (v->codes[code / 64] & ~bit) | (table[code].extinction >= least ? bit : 0);
     }
-    v->splats = 0;
 }
 
 static inline bool is_visible(const trip_visible *v, unsigned code)
@@ -253,13 +262,13 @@ static int find(search *s)
     return status;
 }
 
-/* What was found, or the bounds of all splats. */
+/* What was found; for what is visible with others else the bounds of all splats. */
 static double result(const search *s, const form *f)
 {
     const trip_visible *v = s->visible;
     const trip_brick_box all = { { v->lo[0], v->lo[1], v->lo[2] },
                                  { v->hi[0], v->hi[1], v->hi[2] } };
-    return f->best > -INFINITY ? f->best : bound(s, f, &all);
+    return f->best > -INFINITY || v->alone ? f->best : bound(s, f, &all);
 }
 
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3])

@@ -2,9 +2,10 @@
  * of convex functions over all of them, exactly, whatever the tiles. Bricks that cannot reach
  * farther than what was found are not read: mostly a small part of one list is. One thread.
  *
- * A voxel counts as visible when a ray that met its like along a sixteenth of the data set's
- * diagonal would lose at least 1/255 of its light: fainter ones are seen where many lie behind one
- * another only, which they do not at the rim. */
+ * A voxel counts as visible together with others when a ray that met its like along a sixteenth of
+ * the data set's diagonal would lose at least 1/255 of its light: fainter ones are seen where many
+ * lie behind one another only, which they do not at the rim. It is visible alone when a ray through
+ * it loses a tenth. */
 #ifndef TRIP_VISIBLE_H
 #define TRIP_VISIBLE_H
 
@@ -20,18 +21,20 @@ typedef struct trip_visible {
     double kernel_radius; /* voxels: how far beyond their voxel splats count as reaching */
     double lo[3], hi[3];  /* bounds of all splats in index space */
 
+    bool alone;           /* which of them count: trip_visible_start() */
     uint64_t splats;      /* looked at so far */
     uint64_t codes[1024]; /* a bit a code: whether its voxels are visible */
 } trip_visible;
 
-/* After the caller's part is set. `table` as filled for the data set. */
-void trip_visible_start(trip_visible *v, const trip_tf_entry *table);
+/* After the caller's part is set. `table` as filled for the data set. Those visible alone count, or
+ * all that are visible together with others. */
+void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone);
 
 /* Bounds of the visible voxels in index space, without kernels. */
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);
 
 /* For trip_camera_framing, `user` being the trip_visible. Where nothing is visible, the bounds of
- * all splats take its place. */
+ * all splats take its place; where nothing is alone, values are -INFINITY. */
 int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 

@@ -203,6 +203,28 @@ class Views(program.ProgramTest):
             cameras.add(str(self.camera("--tf=f.tf", "--view=iso", *render)))
         self.assertEqual(len(cameras), 1)
 
+    def test_so_does_that_of_faint_things_framed_by_a_coarse_level(self):
+        k, j, i = numpy.indices((90, 90, 140))
+        r2 = ((i - 69.5) / 69) ** 2 + ((j - 44.5) / 44) ** 2 + ((k - 44.5) / 44) ** 2
+        volume = (200 * numpy.clip(1 - r2, 0, 1)).astype(numpy.uint8)
+        program.write("fog.tf", b"unit voxel\n0 1 1 1 0\n255 1 1 1 0.003\n")
+        cameras = set()
+        for brick, render in (
+            ([], []),
+            (["--tile=16", "--slab-sheets=1"], ["--memory=48M", "--engine=pread"]),
+            (["--tile=128", "--slab-sheets=64"], ["--threads=1"]),
+        ):
+            self.volume(volume, "--tf=fog.tf", *brick)
+            cameras.add(str(self.camera("--view=front", *render)))
+        self.assertEqual(len(cameras), 1)
+        # Wider than the voxels that a ray loses 1/255 by, and the picture is of what is seen.
+        alpha = self.draw("--view=front")[..., 3]
+        columns = numpy.nonzero((alpha >= 8 / 255).any(axis=0))[0]
+        self.assertAlmostEqual((columns.max() + 1 - columns.min()) / 160, 0.9, delta=0.03)
+        # Without coarse levels there is a view too.
+        self.volume(volume, "--tf=fog.tf", "--levels=0")
+        self.assertGreater(self.draw("--view=front")[..., 3].max(), 0.1)
+
     def test_zoom_magnifies_about_the_middle(self):
         self.volume(ball(40, 19))
         for options in [], ["--ortho=fit"]:

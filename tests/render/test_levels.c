@@ -347,7 +347,7 @@ static void expect_bounds_of_the_grid(const levels *l)
     trip_dataset_kept_bounds(l->drawn.data, visible.lo, visible.hi);
     assert_int_equal(trip_reader_create(&visible.reader, l->drawn.data, &params, l->drawn.budget),
                      0);
-    trip_visible_start(&visible, l->drawn.table);
+    trip_visible_start(&visible, l->drawn.table, false);
     assert_int_equal(trip_visible_bounds(&visible, lo, hi), 0);
     for (int a = 0; a < 3; a++) {
         assert_true(visible.lo[a] == 0 && visible.hi[a] == N - 1);

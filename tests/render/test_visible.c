@@ -58,7 +58,7 @@ static void find(const scene *s, const trip_reader_params *params, double kernel
                        .kernel_radius = kernel_radius,
                        .hi = { NX - 1, NY - 1, NZ - 1 } };
     assert_int_equal(trip_reader_create(&v.reader, s->data, params, s->budget), 0);
-    trip_visible_start(&v, s->table);
+    trip_visible_start(&v, s->table, false);
     assert_int_equal(trip_visible_reach(&v, origin, wanted, count, values), 0);
     *splats = v.splats;
     trip_reader_destroy(v.reader);
@@ -119,7 +119,7 @@ static void bounds_are_those_of_the_visible_voxels(void **state)
     }
     assert_int_equal(trip_reader_create(&v.reader, s.data, &(trip_reader_params){ 0 }, s.budget),
                      0);
-    trip_visible_start(&v, s.table);
+    trip_visible_start(&v, s.table, false);
     assert_int_equal(trip_visible_bounds(&v, lo, hi), 0);
     assert_memory_equal(lo, least, sizeof lo);
     assert_memory_equal(hi, most, sizeof hi);
