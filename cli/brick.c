@@ -309,8 +309,7 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return parse_unsigned("--threads", argument, 256, &o->brick.threads);
     case ARGP_KEY_ARG:
         if (o->volume)
-            return trip_option_fail(argument, "one volume at a time; slices are given by their "
-                                              "folder, or a pattern in quotes, like \"*.tif\"");
+            return trip_option_fail(argument, TRIP_ONE_VOLUME);
         o->volume = argument;
         return 0;
     case ARGP_KEY_END:

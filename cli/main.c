@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "report.h"
 
@@ -75,6 +76,12 @@ int main(int argc, char **argv)
     for (int i = 0; i < COMMANDS; i++)
         if (!strcmp(name, commands[i].name))
             return finish(commands[i].run(argc - 1, argv + 1));
+    if (access(name, F_OK) == 0)
+        return trip_exit_status(
+            trip_fail(TRIP_USAGE, "usage", name,
+                      "is no command: `triptych render %s -o PICTURE.png` draws "
+                      "it, `triptych view %s` shows it",
+                      name, name));
     return trip_exit_status(
         trip_fail(TRIP_USAGE, "usage", name, "no such command; `triptych --help` lists them"));
 }

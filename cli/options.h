@@ -68,5 +68,9 @@ int trip_option_classify(const char *text, int names, int *out); /* pre, post, a
 
 /* `why` completes "OPTION: ...". */
 int trip_option_fail(const char *option, const char *why);
+/* Why not, of a second volume: most often a shell has put the names of slices for a pattern. */
+#define TRIP_ONE_VOLUME                                                                            \
+    "one volume at a time; slices are given by their folder, or a pattern in quotes, like "        \
+    "\"*.tif\""
 
 #endif

@@ -788,7 +788,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (p->o->input)
-            return trip_option_fail(arg, "one volume at a time; -o names the picture");
+            return trip_option_fail(arg, TRIP_ONE_VOLUME "; -o names the picture");
         p->o->input = arg;
         return 0;
     case ARGP_KEY_END:

@@ -131,7 +131,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_ARG:
         if (p->input)
-            return trip_option_fail(arg, "one volume at a time");
+            return trip_option_fail(arg, TRIP_ONE_VOLUME);
         p->input = arg;
         return 0;
     case ARGP_KEY_END:

@@ -70,6 +70,16 @@ class Trouble(program.ProgramTest):
         self.as_nobody("render", "small.trip", "-o", "locked/out.png", "--size", "20x20")
         self.assertEqual(os.listdir("locked"), [])
 
+    def test_messages_name_what_to_do(self):
+        for command in ["brick", "-o", "out.trip"], ["render", "-o", "out.png"], ["serve"]:
+            says = "folder, or a pattern in quotes"
+            self.fails(2, *command, "small.nrrd", "cloud.nrrd", says=says)
+        self.fails(2, "small.nrrd", says="triptych render small.nrrd -o")
+        self.fails(1, "brick", "small.nrrd", "-o", "cloud.trip", says="--force")
+        says = "preset:bone?"
+        self.fails(1, "render", "small.trip", "-o", "out.png", "--tf", "bonee", says=says)
+        self.assertEqual(leftovers(), [])
+
     def test_outputs_that_cannot_be(self):
         for output in (
             "missing/out.trip",
