@@ -20,6 +20,13 @@ static const struct {
     { "flight", bench_flight, false, true },
 };
 
+/* Splats by their normals, values by their differences. */
+static bool is_lit(const session *s, const trip_settings *settings)
+{
+    bool post = settings->classify == TRIP_CLASSIFY_POST;
+    return post ? settings->shading : bench_planes(s, settings) >> TRIP_PLANE_NORMALS & 1;
+}
+
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)
 {
     cJSON *settings = bench_report_settings(r);
@@ -35,8 +42,7 @@ static void describe(const session *s, const bench_options *o, bool included, be
     if (o->size_count == 1)
         cJSON_AddStringToObject(settings, "size", text);
     cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
-    cJSON_AddBoolToObject(settings, "shading",
-                          bench_planes(s, &o->settings) >> TRIP_PLANE_NORMALS & 1);
+    cJSON_AddBoolToObject(settings, "shading", is_lit(s, &o->settings));
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }
 

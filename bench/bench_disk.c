@@ -1,5 +1,6 @@
 #include "bench_disk.h"
 
+#include <assert.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,15 +10,23 @@
 #include "plain_disk.h"
 #include "report.h"
 
-enum { FILES = 3 * TRIP_PLANES };
+enum { LISTS = 8, FILES = LISTS * TRIP_PLANES };
+static_assert((int)FILES <= 32, "bench_files has a bit for each");
 
-bench_files bench_files_of_plan(const trip_plan *plan)
+/* The first lists: level 0's come first. */
+static int lists_of(const trip_dataset *data)
+{
+    return data->list_count < LISTS ? (int)data->list_count : LISTS;
+}
+
+bench_files bench_files_of_plan(const trip_dataset *data, const trip_plan *plan)
 {
     bench_files files = 0;
-    for (int axis = 0; axis < 3; axis++)
+    for (int i = 0; i < lists_of(data); i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (plan->layers[axis].pass_count && plan->planes >> plane & 1)
-                files |= 1u << (axis * TRIP_PLANES + plane);
+            if (plan->lists[i].drawn && plan->layers[data->lists[i].axis].pass_count &&
+                plan->planes & data->lists[i].planes & 1u << plane)
+                files |= UINT32_C(1) << (i * TRIP_PLANES + plane);
     return files;
 }
 
@@ -38,11 +47,11 @@ void bench_files_forget(const session *s, bench_files files)
                           POSIX_FADV_DONTNEED);
 }
 
-static int read_plane(const session *s, int axis, int plane, plain_disk *d, void *memory)
+static int read_plane(const session *s, int list, int plane, plain_disk *d, void *memory)
 {
     char path[4096], name[32];
     if (snprintf(path, sizeof path, "%s/%s", s->data->path,
-                 trip_list_plane_name(&s->data->lists[axis], plane, name)) >= (int)sizeof path)
+                 trip_list_plane_name(&s->data->lists[list], plane, name)) >= (int)sizeof path)
         return trip_fail(TRIP_ERROR, "read", s->data->path, "the name is too long");
     return plain_disk_read(d, path, memory);
 }
@@ -91,18 +100,18 @@ int bench_files_read(const session *s, bench_files files, bench_plain how, bench
     return status;
 }
 
-static bool has_list(bench_files files, int axis)
+static bool has_list(bench_files files, int list)
 {
-    return files >> axis * TRIP_PLANES & ((1u << TRIP_PLANES) - 1);
+    return files >> list * TRIP_PLANES & ((1u << TRIP_PLANES) - 1);
 }
 
-static int stream_lists(trip_reader *reader, const trip_pass lists[3], bench_files files)
+static int stream_lists(trip_reader *reader, const trip_pass passes[LISTS], bench_files files)
 {
     trip_batch batch;
     int status = trip_reader_begin(reader, NULL);
-    for (int axis = 0; axis < 3 && !status; axis++)
-        if (has_list(files, axis))
-            status = trip_reader_then(reader, &lists[axis]);
+    for (int i = 0; i < LISTS && !status; i++)
+        if (has_list(files, i))
+            status = trip_reader_then(reader, &passes[i]);
     while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
         trip_reader_release(reader, &batch);
         status =
@@ -114,22 +123,22 @@ static int stream_lists(trip_reader *reader, const trip_pass lists[3], bench_fil
 int bench_files_stream(const session *s, bench_files files, trip_reader *reader,
                        bench_disk_read *out)
 {
-    trip_selection lists[3] = { 0 };
-    trip_pass passes[3];
+    trip_selection lists[LISTS] = { 0 };
+    trip_pass passes[LISTS];
     int status = 0;
-    for (int axis = 0; axis < 3 && !status; axis++)
-        if (has_list(files, axis))
-            status = trip_selection_create_whole(&lists[axis], s->data, &s->data->lists[axis],
-                                                 false, s->budget);
-    for (int axis = 0; axis < 3; axis++)
-        passes[axis] = trip_pass_of(&lists[axis]);
+    for (int i = 0; i < LISTS && !status; i++)
+        if (has_list(files, i))
+            status = trip_selection_create_whole(&lists[i], s->data, &s->data->lists[i], false,
+                                                 s->budget);
+    for (int i = 0; i < LISTS; i++)
+        passes[i] = trip_pass_of(&lists[i]);
     double start = bench_now_ms();
     if (!status)
         status = stream_lists(reader, passes, files);
     out->ms = bench_now_ms() - start;
     out->bytes = trip_reader_get_stats(reader).bytes_read;
     out->direct = strstr(trip_reader_engine_name(reader), "O_DIRECT");
-    for (int axis = 0; axis < 3; axis++)
-        trip_selection_destroy(&lists[axis], s->budget);
+    for (int i = 0; i < LISTS; i++)
+        trip_selection_destroy(&lists[i], s->budget);
     return status;
 }

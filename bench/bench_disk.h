@@ -5,11 +5,11 @@
 
 #include "session.h"
 
-/* Plane files, as bits: axis * TRIP_PLANES + plane. */
-typedef unsigned bench_files;
+/* Plane files of the first eight lists, as bits: list * TRIP_PLANES + plane. */
+typedef uint32_t bench_files;
 
 /* The files that a plan's passes read from. */
-bench_files bench_files_of_plan(const trip_plan *plan);
+bench_files bench_files_of_plan(const trip_dataset *data, const trip_plan *plan);
 uint64_t bench_files_bytes(const session *s, bench_files files);
 
 /* Advises the system to drop what it holds of them; direct reads do not need that. */

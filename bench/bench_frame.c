@@ -29,7 +29,7 @@ uint64_t bench_splats_read(const trip_frame_stats *s)
 unsigned bench_planes(const session *s, const trip_settings *settings)
 {
     unsigned planes = 1u << TRIP_PLANE_VOXELS;
-    if (settings->shading)
+    if (settings->shading && settings->classify == TRIP_CLASSIFY_PRE)
         planes |= s->data->header.planes & 1u << TRIP_PLANE_NORMALS;
     return planes;
 }

@@ -109,6 +109,7 @@ bench_probe bench_probe_make(unsigned sample_stride)
 {
     static const trip_renderer_ops ops = {
         .name = "probe",
+        .classifies_post = true,
         .destroy = destroy,
         .device = device,
         .begin_frame = begin_frame,

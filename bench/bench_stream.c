@@ -123,7 +123,7 @@ static int find_files(stream *t)
                                 t->session->table, t->session->budget);
     if (status)
         return status;
-    t->files = bench_files_of_plan(&plan);
+    t->files = bench_files_of_plan(t->session->data, &plan);
     trip_plan_release(&plan, t->session->budget);
     return 0;
 }

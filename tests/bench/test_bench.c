@@ -164,6 +164,30 @@ static void stream_reads_the_files_of_all_lists(void **state)
     cJSON_Delete(root);
 }
 
+/* Values and their halo, and no normals. */
+static void stream_of_post_reads_what_it_interpolates(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r,
+                 "brick block.raw --size 20,18,16 --type uint8 --range 100:255 -o upper.trip -q");
+    assert_int_equal(r.exit_status, 0);
+    cJSON *root = bench("stream upper.trip --renderer cpu --classify post --slices 2 --size 64x64 "
+                        "--repeat 2 --memory 64M");
+    const cJSON *rows = rows_of(root, "stages");
+    const cJSON *summary = cJSON_GetArrayItem(rows_of(root, "summary"), 0);
+    double planes = file_bytes("upper.trip/x0.voxels") + file_bytes("upper.trip/y0.voxels") +
+                    file_bytes("upper.trip/z0.voxels") + file_bytes("upper.trip/x0.halo") +
+                    file_bytes("upper.trip/y0.halo") + file_bytes("upper.trip/z0.halo");
+    assert_true(number(stage(rows, "plain"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "streamed"), "bytes_read") == planes);
+    assert_true(number(stage(rows, "frame"), "bytes_read") == planes);
+    assert_close(number(summary, "frame_of_bound"),
+                 number(stage(rows, "frame"), "ms") /
+                     fmax(number(stage(rows, "read"), "ms"), number(stage(rows, "draw"), "ms")));
+    cJSON_Delete(root);
+}
+
 static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void **state)
 {
     (void)state;
@@ -412,7 +436,7 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench renderers block.trip --engine pread",
         "bench renderers block.trip --renderer none",
         "bench stream block.trip --views 2",
-        "bench stream block.trip --classify post",
+        "bench stream block.trip --classify never",
         "bench renderers block.trip --classify never",
         "bench stream block.trip --occluded skip --renderer gl",
         "bench stream block.trip --occluded skip --renderer reference",
@@ -445,6 +469,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(orders_draws_thrice_at_h_0_and_once_from_the_side),
         cmocka_unit_test(stream_reads_the_files_of_all_lists),
+        cmocka_unit_test(stream_of_post_reads_what_it_interpolates),
         cmocka_unit_test(renderers_gives_a_row_for_each_renderer_size_and_thread_count),
         cmocka_unit_test(renderers_says_what_each_view_was_and_took_counted_or_not),
         cmocka_unit_test(submit_compares_forms_where_there_is_gl),

@@ -130,7 +130,13 @@ static void print_trial(const trial *t)
                   r->gap_bytes, r->threads, r->buffered, r->cache_bytes, r->fault != NULL);
 }
 
-static void draw(const scene *s, trip_renderer_kind kind, const trial *t, int view, float *rgba,
+/* What draws, and in which way. */
+typedef struct drawing {
+    trip_renderer_kind kind;
+    trip_classify classify;
+} drawing;
+
+static void draw(const scene *s, drawing by, const trial *t, int view, float *rgba,
                  trip_frame_stats *stats)
 {
     trip_camera camera;
@@ -143,10 +149,11 @@ static void draw(const scene *s, trip_renderer_kind kind, const trial *t, int vi
     trip_settings settings = trip_settings_default();
     trip_camera_params looking = view_of(s, view);
     settings.h = 0.4;
+    settings.classify = by.classify;
     assert_int_equal(trip_camera_make(&camera, &looking, &s->data->index_to_world), 0);
     assert_int_equal(trip_plan_make(&plan, s->data, &camera, &settings, s->table, s->budget), 0);
     assert_int_equal(trip_budget_create(&budget, t->memory_bytes), 0);
-    assert_int_equal(trip_renderer_create(&renderer, kind, t->threads, budget), 0);
+    assert_int_equal(trip_renderer_create(&renderer, by.kind, t->threads, budget), 0);
     params.planes = plan.planes;
     params.skip = t->skip ? trip_cpu_occluded : NULL;
     params.skip_user = renderer;
@@ -163,22 +170,22 @@ static void draw(const scene *s, trip_renderer_kind kind, const trial *t, int vi
     trip_plan_release(&plan, s->budget);
 }
 
-static void check_renderer(trip_renderer_kind kind, int trials)
+static void check_renderer(drawing by, int trials)
 {
     static float wanted[VIEWS][SIZE * SIZE * 4], rgba[SIZE * SIZE * 4];
     trip_frame_stats stats;
-    uint64_t skipped = 0, random = (uint64_t)kind;
+    uint64_t skipped = 0, random = (uint64_t)by.kind;
     scene s;
     create_scene(&s, 64, 8);
     for (int view = 0; view < VIEWS; view++)
-        draw(&s, kind, &(trial){ .threads = 1, .frames = 1, .memory_bytes = 1 << 30 }, view,
+        draw(&s, by, &(trial){ .threads = 1, .frames = 1, .memory_bytes = 1 << 30 }, view,
              wanted[view], &stats);
     scene_destroy(&s);
     for (int i = 0; i < limits_rounds(trials); i++) {
         trial t = i ? make_trial((unsigned)i, &random) : skipping_trial();
         create_scene(&s, t.tile, t.slab);
         for (int view = 0; view < VIEWS; view++) {
-            draw(&s, kind, &t, view, rgba, &stats);
+            draw(&s, by, &t, view, rgba, &stats);
             skipped += stats.reader.bytes_skipped;
             if (memcmp(rgba, wanted[view], picture_bytes) != 0)
                 print_trial(&t);
@@ -186,20 +193,22 @@ static void check_renderer(trip_renderer_kind kind, int trials)
         }
         scene_destroy(&s);
     }
-    assert_int_equal(skipped > 0, kind == TRIP_RENDERER_CPU);
+    assert_int_equal(skipped > 0, by.kind == TRIP_RENDERER_CPU);
 }
 
+/* It has neither threads nor memory to set. */
 static void the_reference_picture_does_not_depend_on_how_it_is_read(void **state)
 {
     (void)state;
-    check_renderer(TRIP_RENDERER_REFERENCE,
-                   FEW_TRIALS); /* it has neither threads nor memory to set */
+    check_renderer((drawing){ TRIP_RENDERER_REFERENCE, TRIP_CLASSIFY_PRE }, FEW_TRIALS);
+    check_renderer((drawing){ TRIP_RENDERER_REFERENCE, TRIP_CLASSIFY_POST }, FEW_TRIALS);
 }
 
 static void the_cpu_picture_does_not_depend_on_how_it_is_read(void **state)
 {
     (void)state;
-    check_renderer(TRIP_RENDERER_CPU, TRIALS);
+    check_renderer((drawing){ TRIP_RENDERER_CPU, TRIP_CLASSIFY_PRE }, TRIALS);
+    check_renderer((drawing){ TRIP_RENDERER_CPU, TRIP_CLASSIFY_POST }, TRIALS);
 }
 
 int main(void)
