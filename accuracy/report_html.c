@@ -18,7 +18,8 @@ static const char style[] =
     "figure{display:inline-block;margin:0 12px 14px 0;font-size:12px;vertical-align:top}"
     "figcaption{max-width:262px}img{background:#000;image-rendering:pixelated;margin-right:4px}\n"
     "svg{max-width:100%;height:auto;font:11px system-ui,sans-serif;background:#fff}"
-    ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}circle,rect{stroke:#fff}"
+    ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}.leader{stroke:#bbb;fill:none}"
+    "circle,rect{stroke:#fff}"
     ".post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}.quality{fill:#c21f3a}"
     ".key{display:inline-block;width:11px;height:11px;border-radius:6px;"
     "margin:0 4px 0 14px}\n";

@@ -119,29 +119,17 @@ static void take(plot *p, box b)
         p->taken[p->taken_count++] = b;
 }
 
-/* A name beside a mark, where there is room; else none. */
-static void write_label(plot *p, double x, double y, const char *name)
+/* A line of it, which names keep away from. */
+static void take_line(plot *p, double x0, double y0, double x1, double y1)
 {
-    const double width = 6.4 * (double)strlen(name), height = 12;
-    const double places[][2] = { { 8, -2 },          { 8, 14 },           { -8 - width, -2 },
-                                 { -8 - width, 14 }, { -width / 2, -10 }, { -width / 2, 22 },
-                                 { 14, -16 },        { 14, 28 } };
-    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-        box b = { x + places[i][0], y + places[i][1] - height + 2, x + places[i][0] + width,
-                  y + places[i][1] + 2 };
-        if (overlaps(p, b))
-            continue;
-        take(p, b);
-        fprintf(p->f, "<text x='%.1f' y='%.1f'>%s</text>\n", b.x0, b.y1 - 2, name);
-        return;
-    }
+    take(p, (box){ fmin(x0, x1) - 1, fmin(y0, y1) - 1, fmax(x0, x1) + 1, fmax(y0, y1) + 1 });
 }
 
-static void draw_front(const plot *p)
+static void draw_front(plot *p)
 {
     const bool *front = p->mean ? p->r->front_of_mean : p->r->front;
     bool begun = false;
-    double last = -INFINITY;
+    double last = -INFINITY, before_x = 0, before_y = 0;
     fputs("<path class=front d='", p->f);
     for (;;) {
         int next = -1;
@@ -151,14 +139,51 @@ static void draw_front(const plot *p)
         if (next < 0)
             break;
         double x = place_x(p, p->r->ms[next]), y = place_y(p, row_error(p, next));
-        if (begun)
-            fprintf(p->f, " H%.1f V%.1f", x, y);
-        else
-            fprintf(p->f, "M%.1f %.1f", x, y);
+        fprintf(p->f, begun ? " H%.1f V%.1f" : "M%.1f %.1f", x, y);
+        if (begun) {
+            take_line(p, before_x, before_y, x, before_y);
+            take_line(p, x, before_y, x, y);
+        }
         begun = true;
+        before_x = x;
+        before_y = y;
         last = p->r->ms[next];
     }
     fputs("'/>\n", p->f);
+}
+
+/* From a mark to its name, where that is not beside it. */
+static void draw_leader(const plot *p, double x, double y, box b)
+{
+    double to_x = fmin(fmax(x, b.x0), b.x1), to_y = y < b.y0 ? b.y0 : b.y1;
+    if (hypot(to_x - x, to_y - y) > 14)
+        fprintf(p->f, "<path class=leader d='M%.1f %.1f L%.1f %.1f'/>\n", x, y, to_x, to_y);
+}
+
+/* A name as near to its mark as there is room; where there is none, it is left to the mark's title.
+ */
+static void write_label(plot *p, double x, double y, const char *name)
+{
+    const double width = 6.4 * (double)strlen(name), height = 12;
+    for (int ring = 0; ring < 5; ring++) {
+        const double up = -4 - 14 * ring, down = 14 + 14 * ring;
+        const double places[][2] = { { 8, up },
+                                     { 8, down },
+                                     { -8 - width, up },
+                                     { -8 - width, down },
+                                     { -width / 2, up - 6 },
+                                     { -width / 2, down + 6 } };
+        for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+            box b = { x + places[i][0], y + places[i][1] - height + 2, x + places[i][0] + width,
+                      y + places[i][1] + 2 };
+            if (overlaps(p, b))
+                continue;
+            take(p, b);
+            draw_leader(p, x, y, b);
+            fprintf(p->f, "<text x='%.1f' y='%.1f'>%s</text>\n", b.x0, b.y1 - 2, name);
+            return;
+        }
+    }
 }
 
 static void draw_rows(plot *p)

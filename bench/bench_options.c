@@ -33,7 +33,7 @@ enum {
 #define BIT(key) (1u << ((key)-KEY_TF))
 #define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES))
 #define OF_FLIGHT (BIT(KEY_SECONDS) | BIT(KEY_FPS))
-#define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST) | BIT(KEY_PLOT))
+#define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST))
 
 static const struct argp_option options[] = {
     { "tf", KEY_TF, "FILE", 0,
@@ -76,7 +76,8 @@ static const struct argp_option options[] = {
       0 },
     { "finest", KEY_FINEST, "N", 0,
       "Up to so many voxels along each axis: 128, 256, 512 or 1024 (default: 512); likewise", 0 },
-    { "plot", KEY_PLOT, "FILE", 0, "Draws its table into an .svg; likewise", 0 },
+    { "plot", KEY_PLOT, "FILE", 0,
+      "Draws its table into an .svg; popping, or levels without a data set", 0 },
     { "seconds", KEY_SECONDS, "N", 0, "How long the eye moves (default: 12); flight only", 0 },
     { "fps", KEY_FPS, "N", 0,
       "Frames a second that moving views are drawn for, as of `triptych view` (default: 30); "
@@ -99,8 +100,8 @@ static const struct table {
 } tables[] = {
     {
         .name = "orders",
-        .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED),
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_PLOT) | OF_MODEL | BIT(KEY_VIEWS) |
+                   BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED),
         .draw_occluded = true,
         .repeat = 5,
         .sizes = { { 512, 512 } },
@@ -110,8 +111,9 @@ static const struct table {
     },
     {
         .name = "submit",
-        .refused = OF_FLIGHT | OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_RENDERER) | BIT(KEY_THREADS),
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_PLOT) | OF_MODEL | BIT(KEY_VIEWS) |
+                   BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_RENDERER) |
+                   BIT(KEY_THREADS),
         .draw_occluded = true,
         .repeat = 5,
         .sizes = { { 512, 512 } },
@@ -121,7 +123,7 @@ static const struct table {
     },
     {
         .name = "stream",
-        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_PLOT) | BIT(KEY_VIEWS) | BIT(KEY_NO_COUNTS),
         .draw_occluded = true,
         .repeat = 5,
         .sizes = { { 1024, 1024 } },
@@ -131,7 +133,7 @@ static const struct table {
     },
     {
         .name = "renderers",
-        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_ENGINE),
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_PLOT) | BIT(KEY_ENGINE),
         .lists = true,
         .repeat = 1,
         .sizes = { { 512, 512 }, { 1024, 1024 } },
@@ -162,8 +164,9 @@ static const struct table {
     },
     {
         .name = "flight",
-        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_REPEAT) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_OCCLUDED) | BIT(KEY_NO_SHADING) | BIT(KEY_KERNEL_RADIUS),
+        .refused = OF_LEVELS | BIT(KEY_PLOT) | OF_MODEL | BIT(KEY_VIEWS) | BIT(KEY_REPEAT) |
+                   BIT(KEY_NO_COUNTS) | BIT(KEY_OCCLUDED) | BIT(KEY_NO_SHADING) |
+                   BIT(KEY_KERNEL_RADIUS),
         .repeat = 1,
         .sizes = { { 800, 600 } },
         .size_count = 1,

@@ -6,25 +6,26 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bench_popping.h"
 #include "bench_view.h"
 #include "report.h"
 
-/* The settings, a line each. */
-static const struct row {
-    const char *name;
+/* The settings, a line each, in the plot's order. */
+static const struct setting {
+    const char *name, *label;
     trip_method method;
     double h;
-} rows[] = {
-    { "axis", TRIP_METHOD_AXIS, 0 },
-    { "clip", TRIP_METHOD_CLIP, 0 },
-    { "merge, h 0.99", TRIP_METHOD_MERGE, 0.99 },
-    { "merge, h 0.95", TRIP_METHOD_MERGE, 0.95 },
-    { "merge, h 0.85", TRIP_METHOD_MERGE, 0.85 },
-    { "merge, h 0.5", TRIP_METHOD_MERGE, 0.5 },
-    { "merge, h 0", TRIP_METHOD_MERGE, 0 },
+} settings[] = {
+    { "merge, h 0", "0", TRIP_METHOD_MERGE, 0 },
+    { "merge, h 0.5", "0.5", TRIP_METHOD_MERGE, 0.5 },
+    { "merge, h 0.85", "0.85", TRIP_METHOD_MERGE, 0.85 },
+    { "merge, h 0.95", "0.95", TRIP_METHOD_MERGE, 0.95 },
+    { "merge, h 0.99", "0.99", TRIP_METHOD_MERGE, 0.99 },
+    { "clip", "clip", TRIP_METHOD_CLIP, 0 },
+    { "axis", "axis", TRIP_METHOD_AXIS, 0 },
 };
 
-enum { ROWS = sizeof rows / sizeof rows[0], STEPS = 40 };
+enum { ROWS = sizeof settings / sizeof settings[0], STEPS = 40 };
 
 static const double step_degrees = 0.05;
 
@@ -38,12 +39,6 @@ typedef struct measuring {
     float (*changes)[STEPS]; /* by pixel */
     float *sorted;           /* room for the changes of a step */
 } measuring;
-
-/* Of 255, over the pixels that change at all. */
-typedef struct figures {
-    double mean, percentile_99, most; /* changes beyond the motion, in the step where most */
-    double motion;                    /* its mean */
-} figures;
 
 static int ascending(const void *a, const void *b)
 {
@@ -60,12 +55,12 @@ static float change_of(const float a[4], const float b[4])
 }
 
 /* Draws all steps; the changes from one to the next stay. */
-static int draw_steps(measuring *m, const trip_settings *settings)
+static int draw_steps(measuring *m, const trip_settings *drawn)
 {
     bench_frame frame = m->scene.frame;
     bench_cost cost;
     int status = 0;
-    frame.settings = *settings;
+    frame.settings = *drawn;
     for (int i = 0; i <= STEPS && !status; i++) {
         frame.view =
             bench_view_between(m->session, m->scene.size, 45 + step_degrees * (i - 0.5 * STEPS));
@@ -99,21 +94,19 @@ static size_t take_motion(measuring *m, double *mean)
     return kept;
 }
 
-static figures find_figures(measuring *m)
+static void find_figures(measuring *m, bench_popping_row *f)
 {
-    figures f = { 0 };
-    size_t count = take_motion(m, &f.motion);
-    f.motion *= 255;
+    size_t count = take_motion(m, &f->motion);
+    f->motion *= 255;
     for (int i = 0; i < STEPS && count > 0; i++) {
         double sum = 0;
         for (size_t p = 0; p < count; p++)
             sum += (double)(m->sorted[p] = m->changes[p][i]);
         qsort(m->sorted, count, sizeof *m->sorted, ascending);
-        f.mean = fmax(f.mean, 255 * sum / (double)count);
-        f.most = fmax(f.most, 255 * (double)m->sorted[count - 1]);
-        f.percentile_99 = fmax(f.percentile_99, 255 * (double)m->sorted[(count - 1) * 99 / 100]);
+        f->mean = fmax(f->mean, 255 * sum / (double)count);
+        f->most = fmax(f->most, 255 * (double)m->sorted[count - 1]);
+        f->percentile_99 = fmax(f->percentile_99, 255 * (double)m->sorted[(count - 1) * 99 / 100]);
     }
-    return f;
 }
 
 static const bench_column columns[] = {
@@ -122,7 +115,7 @@ static const bench_column columns[] = {
     { "motion", "motion", 3, 0 },
 };
 
-static void add_row(cJSON *table, const char *name, const figures *f)
+static void add_row(cJSON *table, const char *name, const bench_popping_row *f)
 {
     cJSON *row = cJSON_CreateObject();
     cJSON_AddStringToObject(row, "settings", name);
@@ -137,19 +130,22 @@ static int measure(measuring *m, const bench_options *o, bench_report *r)
 {
     cJSON *table = bench_report_table(r, "popping", "Changes of pixels beyond the motion, of 255",
                                       columns, sizeof columns / sizeof columns[0]);
+    bench_popping_row rows[ROWS] = { 0 };
     int status = 0;
     for (int i = 0; i < ROWS && !status; i++) {
-        trip_settings settings = o->settings;
-        settings.background[3] = 0;
-        settings.method = rows[i].method;
-        settings.h = rows[i].h;
-        status = draw_steps(m, &settings);
+        trip_settings drawn = o->settings;
+        drawn.background[3] = 0;
+        drawn.method = settings[i].method;
+        drawn.h = settings[i].h;
+        status = draw_steps(m, &drawn);
         if (status)
             break;
-        const figures f = find_figures(m);
-        add_row(table, rows[i].name, &f);
+        rows[i].label = settings[i].label;
+        rows[i].has_h = settings[i].method == TRIP_METHOD_MERGE;
+        find_figures(m, &rows[i]);
+        add_row(table, settings[i].name, &rows[i]);
     }
-    return status;
+    return status || !o->plot ? status : bench_popping_plot(o->plot, rows, ROWS);
 }
 
 static void add_limits(const bench_options *o, bench_report *r)

@@ -280,6 +280,13 @@ static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_
     assert_fails(&r, 2);
 }
 
+static void assert_a_plot(const char *path, const char *label)
+{
+    static char text[16384];
+    program_read(path, text, sizeof text);
+    assert_true(!strncmp(text, "<svg ", 5) && strstr(text, "</svg>\n") && strstr(text, label));
+}
+
 /* Of noise, which the three lists show as differently as can be. With axis all pixels jump at once;
  * with clip those on the line between two lists, and with merge none. */
 static void popping_is_of_axis_alone(void **state)
@@ -288,11 +295,11 @@ static void popping_is_of_axis_alone(void **state)
     const char *const models[] = { "", "--compositing sheet", "--classify post --slices 1" };
     for (int i = 0; i < 3; i++) {
         char arguments[128];
-        snprintf(arguments, sizeof arguments, "popping block.trip --size 32x32 --no-shading %s",
-                 models[i]);
+        snprintf(arguments, sizeof arguments,
+                 "popping block.trip --size 32x32 --no-shading --plot popping.svg %s", models[i]);
         cJSON *root = bench(arguments);
-        const cJSON *rows = rows_of(root, "popping"), *axis = cJSON_GetArrayItem(rows, 0);
-        const cJSON *clip = cJSON_GetArrayItem(rows, 1), *row;
+        const cJSON *rows = rows_of(root, "popping"), *axis = cJSON_GetArrayItem(rows, 6);
+        const cJSON *clip = cJSON_GetArrayItem(rows, 5), *row;
         assert_true(number(axis, "mean") > 3 * number(axis, "motion"));
         assert_true(number(clip, "mean") < number(axis, "mean") / 6);
         cJSON_ArrayForEach(row, rows)
@@ -303,6 +310,7 @@ static void popping_is_of_axis_alone(void **state)
                 assert_true(number(row, "percentile_99") < number(axis, "percentile_99") / 4);
         }
         cJSON_Delete(root);
+        assert_a_plot("popping.svg", "0.95");
     }
 }
 
@@ -397,12 +405,7 @@ static void levels_without_a_data_set_samples_an_object_and_plots_it(void **stat
     /* One volume has no coarser level that is wanted. */
     assert_close(number(row, "colour"), number(row, "fine_colour"));
     cJSON_Delete(root);
-    FILE *f = fopen("levels.svg", "r");
-    char text[4096] = "";
-    assert_non_null(f);
-    text[fread(text, 1, sizeof text - 1, f)] = 0;
-    fclose(f);
-    assert_true(!strncmp(text, "<svg ", 5) && strstr(text, "</svg>\n") && strstr(text, "128"));
+    assert_a_plot("levels.svg", "128");
     program_call(&r, "bench levels --field spheres");
     assert_fails(&r, 2);
     program_call(&r, "bench levels --finest 100");

@@ -1,0 +1,155 @@
+/* What jumps over h, as a picture: h from 0 towards 1, then the methods that have none. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "bench_popping.h"
+#include "new_file.h"
+#include "report.h"
+
+enum { WIDTH = 620, HEIGHT = 380, LEFT = 70, RIGHT = 130, TOP = 44, BOTTOM = 56 };
+
+static const double least = 0.01; /* of 255; what is less is drawn there */
+
+typedef struct curve {
+    const char *name, *colour;
+    double (*of)(const bench_popping_row *row);
+} curve;
+
+static double most_of(const bench_popping_row *r)
+{
+    return r->most;
+}
+
+static double percentile_99_of(const bench_popping_row *r)
+{
+    return r->percentile_99;
+}
+
+static double mean_of(const bench_popping_row *r)
+{
+    return r->mean;
+}
+
+static double motion_of(const bench_popping_row *r)
+{
+    return r->motion;
+}
+
+static const curve curves[] = {
+    { "most", "#b03020", most_of },
+    { "99 %", "#c08010", percentile_99_of },
+    { "mean", "#2050b0", mean_of },
+    { "motion", "#777", motion_of },
+};
+
+enum { CURVES = sizeof curves / sizeof *curves };
+
+typedef struct plot {
+    const bench_popping_row *rows;
+    int count;
+    int lo, hi; /* of 255: powers of ten */
+    FILE *file;
+} plot;
+
+static double x_of(const plot *p, int i)
+{
+    return LEFT + (WIDTH - LEFT - RIGHT) * (p->count > 1 ? (double)i / (p->count - 1) : 0.5);
+}
+
+static double y_of(const plot *p, double change)
+{
+    double share = (log10(fmax(least, change)) - p->lo) / (p->hi - p->lo);
+    return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share;
+}
+
+static void text(const plot *p, double x, double y, const char *anchor, const char *colour,
+                 const char *what)
+{
+    fprintf(p->file, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\">%s</text>\n", x, y,
+            anchor, colour, what);
+}
+
+static void draw_axes(const plot *p)
+{
+    char label[32];
+    for (int power = p->lo; power <= p->hi; power++) {
+        const double y = y_of(p, pow(10, power));
+        fprintf(p->file, "<line x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\" stroke=\"#ddd\"/>\n",
+                LEFT, y, WIDTH - RIGHT, y);
+        snprintf(label, sizeof label, power == p->lo ? "\342\211\244 %g" : "%g", pow(10, power));
+        text(p, LEFT - 8, y + 4, "end", "#333", label);
+    }
+    for (int i = 0; i < p->count; i++)
+        text(p, x_of(p, i), HEIGHT - BOTTOM + 20, "middle", "#333", p->rows[i].label);
+    text(p, 8, TOP - 20, "start", "#333", "change of a pixel beyond the motion, of 255");
+    text(p, 0.5 * (LEFT + WIDTH - RIGHT), HEIGHT - 10, "middle", "#333",
+         "merge by h, and the other methods");
+}
+
+/* A line through those with an h, and marks. */
+static void draw_curve(const plot *p, const curve *c)
+{
+    fprintf(p->file, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"2\" points=\"",
+            c->colour);
+    for (int i = 0; i < p->count; i++)
+        if (p->rows[i].has_h)
+            fprintf(p->file, "%.1f,%.1f ", x_of(p, i), y_of(p, c->of(&p->rows[i])));
+    fprintf(p->file, "\"/>\n");
+    for (int i = 0; i < p->count; i++)
+        fprintf(p->file, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"4\" fill=\"%s\"/>\n", x_of(p, i),
+                y_of(p, c->of(&p->rows[i])), c->colour);
+}
+
+/* Names beside the last marks, one below the other where these are near. */
+static void draw_names(const plot *p)
+{
+    double last = -INFINITY;
+    bool done[CURVES] = { false };
+    for (int n = 0; n < CURVES; n++) {
+        int next = -1;
+        for (int c = 0; c < CURVES; c++)
+            if (!done[c] && (next < 0 || curves[c].of(&p->rows[p->count - 1]) >
+                                             curves[next].of(&p->rows[p->count - 1])))
+                next = c;
+        double y = fmax(y_of(p, curves[next].of(&p->rows[p->count - 1])) + 4, last + 15);
+        text(p, WIDTH - RIGHT + 12, y, "start", curves[next].colour, curves[next].name);
+        done[next] = true;
+        last = y;
+    }
+}
+
+static void draw(const plot *p)
+{
+    fprintf(p->file,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
+            "font-family=\"sans-serif\" font-size=\"13\">\n"
+            "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
+            WIDTH, HEIGHT);
+    draw_axes(p);
+    for (int c = CURVES - 1; c >= 0; c--)
+        draw_curve(p, &curves[c]);
+    draw_names(p);
+    fprintf(p->file, "</svg>\n");
+}
+
+int bench_popping_plot(const char *path, const bench_popping_row *rows, int count)
+{
+    char *svg = NULL;
+    size_t bytes = 0;
+    double most = 10 * least;
+    for (int i = 0; i < count; i++)
+        most = fmax(most, fmax(rows[i].most, rows[i].motion));
+    plot p = { .rows = rows,
+               .count = count,
+               .lo = (int)floor(log10(least)),
+               .hi = (int)ceil(log10(most)),
+               .file = open_memstream(&svg, &bytes) };
+    if (!p.file)
+        return trip_fail(TRIP_ERROR, "bench", path, "out of memory");
+    draw(&p);
+    int status = fclose(p.file) ? trip_fail(TRIP_ERROR, "bench", path, "out of memory")
+                                : trip_new_file_of_text("bench", path, svg);
+    free(svg);
+    return status;
+}
