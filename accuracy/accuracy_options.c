@@ -43,8 +43,8 @@ static const struct argp_option options[] = {
       "A data set of the same volume kept otherwise (halo, bits, levels), drawn by the defaults; "
       "up to 7",
       1 },
-    { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
-    { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 1 },
+    TRIP_OPTION_TF(KEY_TF, 1),
+    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 1),
     { NULL, 0, NULL, 0, "How:", 2 },
     { "views", KEY_VIEWS, "N", 0,
       "Views round the object, in turns perspective, parallel, from inside, wide (default: 4)", 2 },
@@ -70,13 +70,10 @@ static const struct argp_option options[] = {
 
 static int parse_size(const char *text, accuracy_options *o)
 {
-    int used = 0;
-    if (sscanf(text, "%4dx%4d%n", &o->width, &o->height, &used) != 2 || text[used] ||
-        strspn(text, "0123456789x") != strlen(text))
-        return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 256x256", text);
-    if (o->width < 32 || o->width > 4096 || o->height < 32 || o->height > 4096)
+    int status = trip_option_size("--size", text, &o->width, &o->height);
+    if (!status && (o->width < 32 || o->width > 4096 || o->height < 32 || o->height > 4096))
         return trip_option_fail("--size", "sides have 32 to 4096 pixels");
-    return 0;
+    return status;
 }
 
 static int add_data(const char *path, accuracy_options *o)
@@ -92,13 +89,13 @@ static int parse_number(int key, char *arg, accuracy_options *o)
     int threads = 0, status;
     switch (key) {
     case KEY_VIEWS:
-        return trip_option_integer("--views", arg, 1, 1000, &o->views);
+        return trip_option_views(arg, &o->views);
     case KEY_SIZE:
         return parse_size(arg, o);
     case KEY_SAMPLES:
         return trip_option_integer("--samples", arg, 1, 16, &o->samples);
     case KEY_REPEAT:
-        return trip_option_integer("--repeat", arg, 1, 100, &o->repeat);
+        return trip_option_repeat(arg, &o->repeat);
     case KEY_TOLERANCE:
         return trip_option_number("--tolerance", arg, 1e-8, 0.01, &o->tolerance);
     case KEY_BUDGET:

@@ -36,8 +36,7 @@ enum {
 #define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST))
 
 static const struct argp_option options[] = {
-    { "tf", KEY_TF, "FILE", 0,
-      "Transfer function, a preset's name or a file (default: kept in the data set)", 0 },
+    TRIP_OPTION_TF(KEY_TF, 0),
     { "size", KEY_SIZE, "WxH[,...]", 0,
       "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping, levels "
       "256x256; flight 800x600)",
@@ -52,7 +51,7 @@ static const struct argp_option options[] = {
       "Runs, in turns, to take the middle one of (default: 5; renderers 1)", 0 },
     { "views", KEY_VIEWS, "N", 0,
       "Views round the object (default: 20; levels 3); renderers and levels only", 0 },
-    { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 0 },
+    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 0),
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
     { "occluded", KEY_OCCLUDED, "skip|draw", 0,
       "Whether bricks behind what is opaque are read (default: stream draw, renderers skip); skip "
@@ -203,11 +202,7 @@ static int parse_list(const char *option, const char *text, bench_options *o, in
 
 static int parse_size(const char *text, bench_options *o, int i)
 {
-    int used = 0, *size = o->sizes[i];
-    if (sscanf(text, "%5dx%5d%n", &size[0], &size[1], &used) == 2 && !text[used] && size[0] > 0 &&
-        size[1] > 0 && strspn(text, "0123456789x") == strlen(text))
-        return 0;
-    return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
+    return trip_option_size("--size", text, &o->sizes[i][0], &o->sizes[i][1]);
 }
 
 static int parse_renderer(const char *text, bench_options *o, int i)
@@ -281,9 +276,9 @@ static int parse_option(int key, char *arg, bench_options *o)
     case KEY_THREADS:
         return parse_list("--threads", arg, o, &o->thread_count, parse_threads);
     case KEY_REPEAT:
-        return trip_option_integer("--repeat", arg, 1, 1000, &o->repeat);
+        return trip_option_repeat(arg, &o->repeat);
     case KEY_VIEWS:
-        return trip_option_integer("--views", arg, 1, 1000, &o->views);
+        return trip_option_views(arg, &o->views);
     case KEY_NO_SHADING:
         o->settings.shading = false;
         return 0;

@@ -109,6 +109,15 @@ int trip_option_bytes(const char *option, const char *text, uint64_t *out)
     return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a size like 512M or 2G", text);
 }
 
+int trip_option_size(const char *option, const char *text, int *width, int *height)
+{
+    int used = 0;
+    if (sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && !text[used] && *width > 0 &&
+        *height > 0 && strspn(text, "0123456789x") == strlen(text))
+        return 0;
+    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a size like 1024x768", text);
+}
+
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out)
 {
     char list[256] = "";
@@ -141,6 +150,16 @@ int trip_option_memory(const char *text, uint64_t *out)
 int trip_option_threads(const char *text, int *out)
 {
     return trip_option_integer("--threads", text, 1, 256, out);
+}
+
+int trip_option_repeat(const char *text, int *out)
+{
+    return trip_option_integer("--repeat", text, 1, 1000, out);
+}
+
+int trip_option_views(const char *text, int *out)
+{
+    return trip_option_integer("--views", text, 1, 1000, out);
 }
 
 int trip_option_engine(const char *text, int names, int *out)

@@ -18,6 +18,8 @@ int trip_option_numbers(const char *option, const char *text, int least, int mos
                         int *count);
 /* Sizes with binary suffixes: "256M". */
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
+/* A picture of 1 to 99999 pixels a side: "1024x768". */
+int trip_option_size(const char *option, const char *text, int *width, int *height);
 /* The position of `text` in a NULL-terminated list of names. */
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out);
 
@@ -35,6 +37,16 @@ int trip_option_choice(const char *option, const char *text, const char *const *
 #define TRIP_OPTION_THREADS(key, group)                                                            \
     {                                                                                              \
         "threads", key, "N", 0, "Threads that draw or read (default: one a processor)", group      \
+    }
+/* Of `bench` and `accuracy`, which measure. */
+#define TRIP_OPTION_TF(key, group)                                                                 \
+    {                                                                                              \
+        "tf", key, "NAME|FILE", 0,                                                                 \
+            "Transfer function, a preset's name or a file (default: kept in the data set)", group  \
+    }
+#define TRIP_OPTION_NO_SHADING(key, group)                                                         \
+    {                                                                                              \
+        "no-shading", key, NULL, 0, "Colours as they are; normals are not read", group             \
     }
 /* How volumes are read that are drawn without a data set; the keys are KEY_GRID, KEY_LEVEL_SET,
  * KEY_SPACING and KEY_ALLOW_GAPS. */
@@ -62,6 +74,8 @@ int trip_option_choice(const char *option, const char *text, const char *const *
     }
 int trip_option_memory(const char *text, uint64_t *out);
 int trip_option_threads(const char *text, int *out);
+int trip_option_repeat(const char *text, int *out);              /* timed runs, 1 to 1000 */
+int trip_option_views(const char *text, int *out);               /* round the object, 1 to 1000 */
 int trip_option_engine(const char *text, int names, int *out);   /* auto, io_uring, pread, null */
 int trip_option_renderer(const char *text, int names, int *out); /* auto, gl, cpu, reference, ... */
 int trip_option_classify(const char *text, int names, int *out); /* pre, post, auto */

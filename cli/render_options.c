@@ -217,15 +217,6 @@ typedef struct parse {
     bool again;            /* over settings that --quality or --error has chosen */
 } parse;
 
-static int parse_size(const char *text, render_options *o)
-{
-    int used = 0;
-    if (sscanf(text, "%5dx%5d%n", &o->width, &o->height, &used) == 2 && !text[used] &&
-        o->width > 0 && o->height > 0 && strspn(text, "0123456789x") == strlen(text))
-        return 0;
-    return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
-}
-
 static int parse_point(const char *option, const char *text, double point[3], bool *given)
 {
     int count;
@@ -360,7 +351,7 @@ static int parse_view(int key, char *arg, parse *p)
     render_options *o = p->o;
     switch (key) {
     case KEY_SIZE:
-        return parse_size(arg, o);
+        return trip_option_size("--size", arg, &o->width, &o->height);
     case KEY_EYE:
         return parse_point("--eye", arg, o->eye, &o->eye_given);
     case KEY_LOOK:

@@ -86,17 +86,6 @@ typedef struct view_options {
     shown_volume volume;
 } view_options;
 
-static int parse_size(const char *text, view_options *o)
-{
-    int used = 0, width = 0, height = 0;
-    if (sscanf(text, "%5dx%5d%n", &width, &height, &used) != 2 || text[used] || width < 1 ||
-        height < 1)
-        return trip_fail(TRIP_USAGE, "usage", "--size", "\"%s\" is not a size like 1024x768", text);
-    o->params.width = width;
-    o->params.height = height;
-    return 0;
-}
-
 static int parse_point(const char *option, const char *text, double point[3], const double **place)
 {
     int count;
@@ -236,7 +225,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     view_options *o = state->input;
     switch (key) {
     case KEY_SIZE:
-        return parse_size(arg, o);
+        return trip_option_size("--size", arg, &o->params.width, &o->params.height);
     case KEY_SCALE:
         return trip_option_number("--scale", arg, 0.5, 8, &o->params.scale);
     case KEY_NO_PANEL:

@@ -184,6 +184,27 @@ bool trip_tf_visible_span(const trip_tf *tf, double lo, double hi, double span[2
     return trip_tf_visible_in(tf, lo, hi);
 }
 
+/* What a picture does not show by half of 1/255 need not be known. */
+static const double faint = 0.5 / 255;
+
+bool trip_tf_lost_peak(const trip_tf *tf, double lo, double hi, trip_tf_point *out)
+{
+    double step = (hi - lo) / 65535;
+    for (size_t i = 0; i < tf->count && step > 0; i++) {
+        const trip_tf_point *p = &tf->points[i];
+        double code = (p->value - lo) / step;
+        if (!(p->value > lo && p->value < hi) || p->colour.opacity <= faint)
+            continue;
+        double below = trip_tf_evaluate(tf, lo + step * floor(code)).opacity;
+        double above = trip_tf_evaluate(tf, lo + step * ceil(code)).opacity;
+        if (fmax(below, above) < p->colour.opacity / 2) {
+            *out = *p;
+            return true;
+        }
+    }
+    return false;
+}
+
 static void write_number(FILE *f, double number, char end)
 {
     char text[32];

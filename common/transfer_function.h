@@ -121,6 +121,11 @@ int trip_tf_window(trip_tf *tf, double width, double level);
  * used on values that are not. */
 void trip_tf_check_range(const trip_tf *tf, double value_min, double value_max, const char *where);
 
+/* The first point that shows between two codes of a data set and less than half as much at both, so
+ * that a table of the codes (below) does not show it: a peak narrower than a code. False where
+ * there is none. */
+bool trip_tf_lost_peak(const trip_tf *tf, double lo, double hi, trip_tf_point *out);
+
 /* Unit of length in world units; 0 means one voxel. */
 double trip_tf_unit_world(const trip_tf *tf);
 

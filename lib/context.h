@@ -65,6 +65,7 @@ struct triptych {
     trip_frame frame;
     trip_drawing drawing;
 
+    bool rounding_checked; /* of the function and the settings that are set */
     bool has_stats;
     triptych_frame_stats stats;
     triptych_list_stats *list_stats; /* by the data set's lists, of the budget; NULL: not yet */

@@ -7,6 +7,7 @@
 #include "dataset_level.h"
 #include "lod.h"
 #include "report.h"
+#include "rounding.h"
 #include "tint.h"
 
 static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
@@ -202,10 +203,21 @@ static int plan_frame(triptych *t)
     return status;
 }
 
+/* Once for a function and settings. The reference and the integral round nothing. */
+static void check_rounding(triptych *t)
+{
+    const trip_settings *s = &t->drawn_settings;
+    bool rounds = !strcmp(t->renderer->ops->name, "cpu") || !strcmp(t->renderer->ops->name, "gl");
+    if (!t->rounding_checked && rounds && s->classify == TRIP_CLASSIFY_PRE && !s->show)
+        trip_rounding_check(&t->session, s);
+    t->rounding_checked = true;
+}
+
 static int plan(triptych *t)
 {
     uint64_t start = trip_frame_now_ns();
     choose_settings(t);
+    check_rounding(t);
     int status = plan_frame(t);
     t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
     t->begun = status == 0;

@@ -18,6 +18,7 @@ int trip_context_use_function(triptych *t, const triptych_function *f)
     int status = session_use_function(&t->session, &look);
     if (f->left_out)
         *f->left_out = missing;
+    t->rounding_checked = false;
     t->has_function |= !status && !missing;
     return status;
 }
@@ -75,7 +76,7 @@ int triptych_set_quality(triptych_settings *s, triptych_quality quality)
         return TRIPTYCH_USAGE;
     s->classify = quality == TRIPTYCH_NORMAL ? usual.classify : TRIPTYCH_POST;
     s->compositing = usual.compositing;
-    s->slices = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 4 : 0;
+    s->slices = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 8 : 0;
     s->slices = quality == TRIPTYCH_EXACT ? 16 : s->slices;
     s->method = usual.method;
     s->h = usual.h;
@@ -195,6 +196,8 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         return trip_context_leave(before, status);
     if (s->kernel_radius < SMOOTH_KERNEL_VOXELS && s->kernel_radius != t->settings.kernel_radius)
         warn_of_ripple(s->kernel_radius);
+    t->rounding_checked &= (trip_target)s->target == t->settings.target &&
+                           (trip_compositing)s->compositing == t->settings.compositing;
     t->classify_auto = s->classify == TRIPTYCH_CLASSIFY_AUTO;
     t->settings = (trip_settings){
         .classify = s->classify == TRIPTYCH_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST,

@@ -34,6 +34,17 @@ static void warn_of_culled_values(const session *s, const trip_tf *tf, const ses
 }
 
 /* An opacity o becomes 1 - (1 - o)^scale. */
+static void warn_of_lost_peak(const session *s, const trip_tf *tf)
+{
+    const trip_file_header *h = &s->data->header;
+    trip_tf_point peak;
+    if (trip_tf_lost_peak(tf, h->code_lo, h->code_hi, &peak))
+        trip_warn(s->input,
+                  "the transfer function has a peak at %.9g that is narrower than the %.3g between "
+                  "two codes of the data: it is not shown; make it wider",
+                  peak.value, (h->code_hi - h->code_lo) / 65535);
+}
+
 static void scale_extinction(trip_tf_entry *table, double scale)
 {
     if (scale > 0 && scale != 1)
@@ -79,6 +90,7 @@ int session_use_function(session *s, const session_look *look)
     if (!status && !find_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
         warn_of_culled_values(s, tf, look);
+        warn_of_lost_peak(s, tf);
         double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
         trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
         scale_extinction(s->table, look->opacity_scale);

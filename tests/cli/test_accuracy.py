@@ -257,7 +257,7 @@ class Accuracy(program.ProgramTest):
         draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
         same = {("--quality", "draft"): ("--slices", "1"),
                 ("--quality", "normal"): (),
-                ("--quality", "high"): ("--slices", "4"),
+                ("--quality", "high"): ("--slices", "8"),
                 ("--quality", "exact"): ("--slices", "16"),
                 ("--slices", "2", "--quality", "exact"): ("--slices", "2"),
                 ("--quality", "draft", "--classify", "pre"): ("--classify", "pre")}

@@ -46,6 +46,25 @@ class Look(program.ProgramTest):
             self.works("brick", path, "--json", "--force", "-o", "k.trip", *options).stdout
         )["function_kind"]
 
+    def test_what_is_lost_is_said(self):
+        """Fog too thin for the format of the layers, and peaks narrower than a code."""
+        program.write("thin.tf", b"0 1 1 1 0.0001\n")
+        program.write("thick.tf", b"0 1 1 1 0.1\n")
+        program.write("peak.tf", b"0 1 1 1 0\n100.001 1 1 1 0\n100.0015 1 1 1 1\n100.002 1 1 1 0\n")
+        for tf, options, says in (
+                ("thin", ["--target", "rgba16f"], "--compositing sheet rounds once a sheet"),
+                ("thin", ["--target", "rgba8"], "--compositing sheet"),
+                ("thin", ["--target", "rgba8", "--compositing", "sheet"], "--target rgba32f"),
+                ("thin", ["--target", "rgba32f"], ""),
+                ("thin", ["--classify", "pre", "--opacity-scale", "1e-4"], "layers of rgba32f"),
+                ("thin", ["--opacity-scale", "1e-4"], ""), # post
+                ("thick", ["--target", "rgba16f"], ""),
+                ("peak", [], "a peak at 100.0015 that is narrower than")):
+            run = self.works("render", "ball.trip", "-o", "lost.exr", "--size", "16x16", "--renderer", "cpu",
+                             "--tf", tf + ".tf", "--orbit", "2", *options)
+            self.assertEqual(run.stderr.count("warning: ball.trip: "), says != "", run.stderr)
+            self.assertIn(says, run.stderr)
+
     def test_opacity_scale_multiplies_extinction(self):
         view = ["--eye=9.5,-60,9.5", "--look=9.5,9.5,9.5", "--ortho=24", "--size=32x32"]
         view += ["--renderer", "reference", "--method", "axis", "--tf", "viridis"]

@@ -265,6 +265,32 @@ static void table_holds_the_function_at_every_code(void **state)
     trip_tf_destroy(tf);
 }
 
+/* Codes are 1/16 apart. */
+static void peaks_narrower_than_a_code_are_found(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *points;
+        double value; /* 0: none */
+    } functions[] = {
+        { "0 1 1 1 0\n99.99 1 1 1 0\n100.02 1 1 1 0.9\n100.05 1 1 1 0\n", 100.02 },
+        { "0 1 1 1 0\n99.9 1 1 1 0\n100.02 1 1 1 0.9\n100.1 1 1 1 0\n", 0 },
+        { "0 1 1 1 0.8\n100.01 1 1 1 0.8\n100.02 1 1 1 0.9\n100.03 1 1 1 0.8\n", 0 },
+        { "0 1 1 1 0\n100.01 1 1 1 0\n100.02 1 1 1 0.9\n", 0 },             /* a step */
+        { "0 1 1 1 0\n99.99 1 1 1 0\n100 1 1 1 0.9\n100.01 1 1 1 0\n", 0 }, /* at a code */
+        { "0 1 1 1 0\n100.02 1 1 1 0\n100.03 1 1 1 0.001\n100.04 1 1 1 0\n", 0 },
+        { "5000 1 1 1 0\n5000.02 1 1 1 1\n5000.04 1 1 1 0\n", 0 }, /* beyond the data */
+    };
+    for (size_t i = 0; i < sizeof functions / sizeof *functions; i++) {
+        trip_tf *tf = from_text(functions[i].points);
+        trip_tf_point peak = { 0 };
+        assert_int_equal(trip_tf_lost_peak(tf, 0, 65535.0 / 16, &peak), functions[i].value > 0);
+        assert_true(peak.value == functions[i].value);
+        assert_false(trip_tf_lost_peak(tf, 100, 100, &peak));
+        trip_tf_destroy(tf);
+    }
+}
+
 static void unit_in_world_length_replaces_the_voxel(void **state)
 {
     (void)state;
@@ -378,6 +404,7 @@ int main(void)
         cmocka_unit_test(visibility_equals_sampling_for_random_functions),
         cmocka_unit_test(extinction_gives_back_the_opacity_of_any_thickness),
         cmocka_unit_test(table_holds_the_function_at_every_code),
+        cmocka_unit_test(peaks_narrower_than_a_code_are_found),
         cmocka_unit_test(unit_in_world_length_replaces_the_voxel),
         cmocka_unit_test(text_form_keeps_every_bit),
         cmocka_unit_test(load_tells_text_and_json_apart_by_content),

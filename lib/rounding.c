@@ -1,0 +1,52 @@
+#include "rounding.h"
+
+#include <math.h>
+
+#include "report.h"
+
+static int code_of(const trip_file_header *h, double value)
+{
+    double range = h->code_hi - h->code_lo;
+    double code = range > 0 ? 65535 * (value - h->code_lo) / range : 0;
+    return (int)fmin(65535, fmax(0, code));
+}
+
+double trip_rounding_opacity(const session *s, const trip_settings *settings)
+{
+    const trip_file_header *h = &s->data->header;
+    const double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    const double sigma = settings->kernel_radius / TRIP_CUTOFF;
+    const double share =
+        trip_settings_sum_sheets(settings) ? 1 : 1 / (2 * 3.14159265358979323846 * sigma * sigma);
+    double most = 0;
+    for (int code = code_of(h, h->value_min); code <= code_of(h, h->value_max); code++)
+        most = fmax(most, (double)s->table[code].extinction);
+    return -expm1(-most * voxel * share);
+}
+
+/* A splat of opacity a changes one of 3/4 by a / 4. Rounded to steps of that size u, a constant
+ * splat's change is off by up to u / 2. By floats transmittance is what is kept, near 1 at first,
+ * where steps are 2^-24. */
+double trip_rounding_least(trip_target target)
+{
+    static const double steps[] = { [TRIP_TARGET_RGBA32F] = 0x1p-24,
+                                    [TRIP_TARGET_RGBA16F] = 0x1p-11 * 4,
+                                    [TRIP_TARGET_RGBA8] = 4.0 / 255 };
+    return steps[target] / 2 / 0.1;
+}
+
+void trip_rounding_check(const session *s, const trip_settings *settings)
+{
+    static const char *const names[] = { "rgba32f", "rgba16f", "rgba8" };
+    const double opacity = trip_rounding_opacity(s, settings);
+    const bool by_sheets = trip_settings_sum_sheets(settings);
+    if (!(opacity > 0) || opacity >= trip_rounding_least(settings->target))
+        return;
+    trip_warn(s->input,
+              "%s have an opacity of %.2g at most, and layers of %s, rounded at each, lose much of "
+              "what is less than %.2g: %s",
+              by_sheets ? "sheets" : "splats", opacity, names[settings->target],
+              trip_rounding_least(settings->target),
+              !by_sheets ? "--compositing sheet rounds once a sheet"
+                         : "--target rgba32f loses less");
+}
