@@ -77,11 +77,15 @@ static void add_pre(sweep *w, triptych_compositing compositing)
 
 static void add_targets(sweep *w)
 {
-    triptych_settings s = w->pre;
-    s.target = TRIPTYCH_RGBA16F;
-    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-rgba16f");
-    s.target = TRIPTYCH_RGBA8;
-    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-rgba8");
+    for (int sheets = 0; sheets < 2; sheets++) {
+        triptych_settings s = w->pre;
+        const char *name = sheets ? "pre-sheet" : "pre";
+        s.compositing = sheets ? TRIPTYCH_BY_SHEET : TRIPTYCH_BY_SPLAT;
+        s.target = TRIPTYCH_RGBA16F;
+        add(w, TRIPTYCH_RENDERER_CPU, s, "%s-rgba16f", name);
+        s.target = TRIPTYCH_RGBA8;
+        add(w, TRIPTYCH_RENDERER_CPU, s, "%s-rgba8", name);
+    }
 }
 
 static void add_kernels(sweep *w)

@@ -83,9 +83,19 @@ static int draw(pilot *p)
     return status;
 }
 
+static void pass_warning(void *user, const char *line)
+{
+    static const char warning[] = "triptych: warning: ";
+    (void)user;
+    if (!strncmp(line, warning, strlen(warning)))
+        trip_report_line(line);
+}
+
+/* What the first is warned of, all are. */
 static int draw_frame(pilot *p, int frame)
 {
     const flight *f = p->all->f;
+    triptych_set_messages(p->t, frame ? NULL : pass_warning, NULL);
     int status = sequence_set_frame(f->sequence, p->t, frame, true);
     if (!status)
         status = draw(p);
