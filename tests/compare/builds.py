@@ -12,6 +12,8 @@ import tempfile
 VIEWS = (["--view=front"], ["--view=left"], ["--view=top"], ["--view=iso"],
          ["--view=iso", "--zoom=6"], ["--view=iso", "--fov=90"])
 
+STAGES = ("frame", "read", "draw")
+
 
 def fail(text):
     sys.exit("builds: " + text)
@@ -68,11 +70,6 @@ class Build:
         return hashes
 
 
-def seconds_of(summary):
-    total = summary["seconds"]
-    return total["total"] if isinstance(total, dict) else total
-
-
 def costs(builds, o, folder):
     rows = [{"program": b.path, "brick": [], "frame": [], "read": [], "draw": []} for b in builds]
     for _ in range(o.repeat):
@@ -81,13 +78,13 @@ def costs(builds, o, folder):
             made = build.brick(o, data)
             splats = made["bytes"] - made.get("halo_bytes", 0)
             row["bytes_a_splat"] = splats / made["kept"]
-            row["kept"] = made["kept"]
-            row["brick"].append(seconds_of(made))
+            row["kept"], row["input_bytes"] = made["kept"], made["input_bytes"]
+            row["brick"].append(made["seconds"])
             for stage, ms in build.stream(o, data).items():
-                if stage in row:
+                if stage in STAGES:
                     row[stage].append(ms)
     for row in rows:
-        for stage in ("brick", "frame", "read", "draw"):
+        for stage in ("brick", *STAGES):
             row[stage] = middle(row[stage]) if row[stage] else None
     return rows
 
@@ -105,21 +102,25 @@ def pictures(builds, o, folder):
     return rows
 
 
+def text(number, form):
+    return "-" if number is None else form % number
+
+
+def ratio(a, b):
+    return "-" if a is None or b is None else "%.2f" % (a / b)
+
+
 def print_costs(rows, o):
-    size = os.path.getsize(o.volume)
-    print("%s, %.1f MB, load %.1f\n" % (os.path.basename(o.volume), size / 1e6, load()))
-    print("%-32s %10s %8s %9s %9s %9s %9s" % ("program", "kept", "B/splat", "brick s", "frame ms",
-                                             "read ms", "draw ms"))
+    print("%s, %.1f MB of input, load %.1f\n" % (os.path.basename(o.volume),
+                                                 rows[0]["input_bytes"] / 1e6, load()))
+    line = "%-32s %10s %8s %9s %9s %9s %9s"
+    print(line % ("program", "kept", "B/splat", "brick s", "frame ms", "read ms", "draw ms"))
     for row in rows:
-        print("%-32s %10d %8.2f %9.2f %9s %9s %9s" % (
-            row["program"][-32:], row["kept"], row["bytes_a_splat"], row["brick"],
-            *("-" if row[s] is None else "%.0f" % row[s] for s in ("frame", "read", "draw"))))
+        print(line % (row["program"][-32:], row["kept"], "%.2f" % row["bytes_a_splat"],
+                      "%.2f" % row["brick"], *(text(row[s], "%.0f") for s in STAGES)))
     for row in rows[1:]:
-        print("%-32s %10s %8.2f %9.2f %9s %9s %9s" % (
-            "times the first", "", *(
-                row[s] / rows[0][s] for s in ("bytes_a_splat", "brick")), *(
-                    "-" if row[s] is None or rows[0][s] is None else "%.2f" % (row[s] / rows[0][s])
-                    for s in ("frame", "read", "draw"))))
+        print(line % ("times the first", "", *(ratio(row[s], rows[0][s]) for s in (
+            "bytes_a_splat", "brick", *STAGES))))
 
 
 def print_pictures(rows):
