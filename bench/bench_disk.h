@@ -1,5 +1,5 @@
 /* What the disk gives a program that only reads: files from end to end, past the page cache, in
- * large blocks, several at once. */
+ * large transfers, several at once. */
 #ifndef TRIP_BENCH_DISK_H
 #define TRIP_BENCH_DISK_H
 
