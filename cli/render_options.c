@@ -9,6 +9,7 @@
 #include "cached_volume.h"
 #include "geometry.h"
 #include "new_file.h"
+#include "effects_options.h"
 #include "options.h"
 #include "quality_options.h"
 #include "report.h"
@@ -45,6 +46,10 @@ enum {
     KEY_WINDOW,
     KEY_LEVEL,
     KEY_LIGHT,
+    KEY_EFFECTS,
+    KEY_ANISOTROPY,
+    KEY_CUEING,
+    KEY_LIGHT_CELLS,
     KEY_NO_SHADING,
     KEY_H,
     KEY_KERNEL_RADIUS,
@@ -118,8 +123,8 @@ static const struct argp_option options[] = {
     { "window", KEY_WINDOW, "W", 0,
       "With --level: stretch the function over the values from L-W/2 to L+W/2", 2 },
     { "level", KEY_LEVEL, "L", 0, "The middle of --window", 2 },
-    { "light", KEY_LIGHT, "X,Y,Z|head", 0,
-      "Direction to the light, or from the eye (default: head); not with --no-shading", 2 },
+    TRIP_OPTION_LIGHT(2),
+    TRIP_OPTIONS_EFFECTS(2),
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
@@ -227,18 +232,6 @@ static int parse_point(const char *option, const char *text, double point[3], bo
 static bool is_zero(const double v[3])
 {
     return !(trip_length(trip_v3(v[0], v[1], v[2])) > 0);
-}
-
-static int parse_light(const char *text, triptych_settings *s)
-{
-    bool given;
-    s->headlight = !strcmp(text, "head");
-    if (s->headlight)
-        return 0;
-    int status = parse_point("--light", text, s->light, &given);
-    if (!status && is_zero(s->light))
-        return trip_option_fail("--light", "the direction is zero");
-    return status;
 }
 
 static int parse_background(const char *text, triptych_settings *s)
@@ -497,7 +490,15 @@ static int parse_look(int key, char *arg, parse *p)
         return trip_option_number("--level", arg, -DBL_MAX, DBL_MAX, &o->function.level);
     case KEY_LIGHT:
         p->light = true;
-        return parse_light(arg, &o->settings);
+        return trip_option_light(arg, &o->settings);
+    case KEY_EFFECTS:
+        return trip_option_effects(arg, &o->settings);
+    case KEY_ANISOTROPY:
+        return trip_option_anisotropy(arg, &o->settings);
+    case KEY_CUEING:
+        return trip_option_cueing(arg, &o->settings);
+    case KEY_LIGHT_CELLS:
+        return trip_option_light_cells(arg, &o->settings);
     case KEY_NO_SHADING:
         o->settings.shading = false;
         return 0;
@@ -711,7 +712,7 @@ static int check(parse *p)
         status = check_sequence(p);
     if (status)
         return status;
-    if (p->light && !o->settings.shading)
+    if (p->light && !o->settings.shading && !o->settings.effects)
         return trip_option_fail("--light", "does not apply with --no-shading");
     if (quality_options_given(&p->quality) && o->renderer == TRIPTYCH_RENDERER_INTEGRAL &&
         !p->again)
@@ -719,6 +720,8 @@ static int check(parse *p)
                                 "do not apply to --renderer integral, which is what they come "
                                 "close to");
     status = quality_options_check(&p->quality);
+    if (!status)
+        status = trip_option_check_effects(&o->settings);
     if (status)
         return status;
     if (p->level != (o->function.window > 0))

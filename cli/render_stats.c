@@ -207,6 +207,13 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
                                 o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
     if (o->settings.lod_px > 0)
         cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
+    if (frame.effects) {
+        cJSON *effects = cJSON_AddArrayToObject(root, "effects");
+        static const char *const names[] = { "shadows", "occlusion", "cueing" };
+        for (int i = 0; i < 3; i++)
+            if (frame.effects >> i & 1)
+                cJSON_AddItemToArray(effects, cJSON_CreateString(names[i]));
+    }
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);
@@ -265,7 +272,7 @@ static void explain_list(void *user, const char *name, const triptych_list_stats
 
 int render_stats_explain_cost(triptych *t, FILE *out)
 {
-    char bytes[32];
+    char bytes[32], memory[32];
     triptych_frame_stats frame;
     int status = triptych_get_frame_stats(t, &frame);
     if (!status)
@@ -277,6 +284,10 @@ int render_stats_explain_cost(triptych *t, FILE *out)
     if (frame.bytes_occluded)
         fprintf(out, "occluded    %s in %" PRIu64 " runs not read: behind what is opaque\n",
                 trip_format_bytes(frame.bytes_occluded, bytes), frame.runs_occluded);
+    if (frame.light_memory_bytes)
+        fprintf(out, "light       %s read in %.1f ms, worked out in %.1f ms; %s of memory\n",
+                trip_format_bytes(frame.light_bytes_read, bytes), frame.light_gather_ms,
+                frame.light_sweep_ms, trip_format_bytes(frame.light_memory_bytes, memory));
     fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame.ms, frame.wait_ms, frame.draw_ms, frame.merge_ms);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "commands.h"
+#include "effects_options.h"
 #include "library.h"
 #include "options.h"
 #include "quality_options.h"
@@ -20,6 +21,11 @@ enum {
     KEY_ERROR,
     KEY_REPORT,
     KEY_CLASSIFY,
+    KEY_LIGHT,
+    KEY_EFFECTS,
+    KEY_ANISOTROPY,
+    KEY_CUEING,
+    KEY_LIGHT_CELLS,
     KEY_RENDERER,
     KEY_MEMORY,
     KEY_ENGINE,
@@ -45,6 +51,8 @@ static const struct argp_option options[] = {
     TRIP_OPTIONS_QUALITY(1),
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
+    TRIP_OPTION_LIGHT(1),
+    TRIP_OPTIONS_EFFECTS(1),
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
     TRIP_OPTION_MEMORY(KEY_MEMORY, 1),
     TRIP_OPTION_ENGINE(KEY_ENGINE, 1),
@@ -77,6 +85,25 @@ static int parse_renderer(int key, char *arg, trip_serve_params *p)
     }
 }
 
+/* Light and effects. */
+static int parse_effects(int key, char *arg, trip_serve_params *p)
+{
+    switch (key) {
+    case KEY_LIGHT:
+        return trip_option_light(arg, &p->settings);
+    case KEY_EFFECTS:
+        return trip_option_effects(arg, &p->settings);
+    case KEY_ANISOTROPY:
+        return trip_option_anisotropy(arg, &p->settings);
+    case KEY_CUEING:
+        return trip_option_cueing(arg, &p->settings);
+    case KEY_LIGHT_CELLS:
+        return trip_option_light_cells(arg, &p->settings);
+    default:
+        return parse_renderer(key, arg, p);
+    }
+}
+
 static int parse_rest(int key, char *arg, serve_options *o)
 {
     trip_serve_params *p = &o->params;
@@ -102,7 +129,7 @@ static int parse_rest(int key, char *arg, serve_options *o)
         o->quality.report = arg;
         return 0;
     default:
-        return parse_renderer(key, arg, p);
+        return parse_effects(key, arg, p);
     }
 }
 
@@ -206,6 +233,8 @@ int trip_command_serve(int argc, char **argv)
     o.volume.options.threads = o.params.threads;
     if (!status)
         status = choose_settings(&o);
+    if (!status)
+        status = trip_option_check_effects(&o.params.settings);
     if (!status)
         status = check_input(&o.params);
     return trip_exit_status(status ? status : trip_serve_run(&o.params));

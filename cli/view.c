@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "effects_options.h"
 #include "geometry.h"
 #include "library.h"
 #include "options.h"
@@ -27,6 +28,11 @@ enum {
     KEY_ERROR,
     KEY_REPORT,
     KEY_CLASSIFY,
+    KEY_LIGHT,
+    KEY_EFFECTS,
+    KEY_ANISOTROPY,
+    KEY_CUEING,
+    KEY_LIGHT_CELLS,
     KEY_FPS,
     KEY_SCALE,
     KEY_NO_PANEL,
@@ -64,6 +70,8 @@ static const struct argp_option options[] = {
     TRIP_OPTIONS_QUALITY(2),
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 2 },
+    TRIP_OPTION_LIGHT(2),
+    TRIP_OPTIONS_EFFECTS(2),
     { NULL, 0, NULL, 0, "Renderer:", 3 },
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },
@@ -130,6 +138,27 @@ static int parse_view(int key, char *arg, view_options *o)
     }
 }
 
+/* Light and effects. */
+static int parse_effects(int key, char *arg, view_options *o)
+{
+    triptych_settings *s = &o->params.settings;
+    o->params.settings_given |= key >= KEY_LIGHT && key <= KEY_LIGHT_CELLS;
+    switch (key) {
+    case KEY_LIGHT:
+        return trip_option_light(arg, s);
+    case KEY_EFFECTS:
+        return trip_option_effects(arg, s);
+    case KEY_ANISOTROPY:
+        return trip_option_anisotropy(arg, s);
+    case KEY_CUEING:
+        return trip_option_cueing(arg, s);
+    case KEY_LIGHT_CELLS:
+        return trip_option_light_cells(arg, s);
+    default:
+        return parse_view(key, arg, o);
+    }
+}
+
 static int parse_look(int key, char *arg, view_options *o)
 {
     int which = 0, status;
@@ -152,7 +181,7 @@ static int parse_look(int key, char *arg, view_options *o)
         o->quality.report = arg;
         return 0;
     default:
-        return parse_view(key, arg, o);
+        return parse_effects(key, arg, o);
     }
 }
 
@@ -262,7 +291,8 @@ static int parse(view_options *o, int argc, char **argv)
                "\vF1 lists the keys. Files can be dropped on the window.",
     };
     o->params.settings = triptych_default_settings();
-    return trip_options_parse(&argp, argc, argv, o);
+    int status = trip_options_parse(&argp, argc, argv, o);
+    return status ? status : trip_option_check_effects(&o->params.settings);
 }
 
 /* A data set that cannot be opened is found here, before there is a window. */

@@ -4,10 +4,12 @@
 #define TRIP_CONTEXT_H
 
 #include <pthread.h>
+#include <stdio.h>
 
 #include "frame.h"
 #include "field.h"
 #include "image_file.h"
+#include "light_map.h"
 #include "renderer_choice.h"
 #include "session.h"
 #include "slices.h"
@@ -43,9 +45,12 @@ struct triptych {
     trip_dataset
         *at_level;  /* what frames are drawn from that have a coarse level alone; else NULL */
     unsigned level; /* that */
-    trip_settings settings; /* slices 0: by the view */
-    triptych_clip clip;     /* as given; frames have it in drawn_settings */
-    bool classify_auto;     /* settings.classify is what that has come to for a frame */
+    trip_settings settings;  /* slices 0: by the view */
+    triptych_clip clip;      /* as given; frames have it in drawn_settings */
+    bool classify_auto;      /* settings.classify is what that has come to for a frame */
+    int effects;             /* as set; frames have what they come to in drawn_settings */
+    const char *why_effects; /* of those that auto chose or left; NULL: nothing was left to it */
+    trip_light_map *light;   /* of frames with shadows or occlusion; NULL: none was drawn of late */
     bool
         counting; /* frames count exactly, and draw what is occluded too; the reader is for that: */
     bool reader_counts;
@@ -97,6 +102,14 @@ void trip_context_drop_level(triptych *t);
 trip_clip trip_context_clip(const triptych *t);
 /* And the reader, which may be in its memory. */
 void trip_context_drop_renderer(triptych *t);
+/* The effects of a frame that is planned: sets them in drawn_settings. */
+int trip_context_choose_effects(triptych *t);
+/* Begins what light reaches, for the frame that is planned; drops it where nothing depends on it.
+ */
+int trip_context_begin_light(triptych *t);
+void trip_context_drop_light(triptych *t);
+/* An effect a line: whether it runs and why. */
+void trip_context_explain_effects(const triptych *t, FILE *out);
 /* What the frame has come to, once its picture is complete. */
 int trip_context_note_stats(triptych *t);
 void trip_context_drop_stats(triptych *t);

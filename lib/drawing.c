@@ -26,6 +26,7 @@ void trip_context_drop_level(triptych *t)
 {
     if (t->at_level)
         trip_context_drop_reader(t);
+    trip_context_drop_light(t);
     trip_dataset_level_close(t->at_level);
     t->at_level = NULL;
     t->level = 0;
@@ -42,6 +43,7 @@ static session drawn_session(const triptych *t)
 void trip_context_drop_renderer(triptych *t)
 {
     trip_context_drop_reader(t);
+    trip_context_drop_light(t);
     if (t->renderer)
         t->renderer->ops->destroy(t->renderer);
     t->renderer = NULL;
@@ -218,7 +220,9 @@ static int plan(triptych *t)
     uint64_t start = trip_frame_now_ns();
     choose_settings(t);
     check_rounding(t);
-    int status = plan_frame(t);
+    int status = trip_context_choose_effects(t);
+    if (!status)
+        status = plan_frame(t);
     t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
     t->begun = status == 0;
     return status;
@@ -226,7 +230,9 @@ static int plan(triptych *t)
 
 static int start(triptych *t)
 {
-    int status = make_reader(t, t->plan.planes);
+    int status = trip_context_begin_light(t);
+    if (!status)
+        status = make_reader(t, t->plan.planes);
     t->frame = (trip_frame){
         .data = drawn_session(t).data,
         .camera = &t->camera,
@@ -234,6 +240,7 @@ static int start(triptych *t)
         .plan = &t->plan,
         .table = t->session.table,
         .field = t->source,
+        .light = t->light,
         .count = t->counting,
         .progress = t->show ? show_progress : NULL,
         .progress_user = t,

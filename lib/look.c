@@ -66,6 +66,9 @@ triptych_settings triptych_default_settings(void)
         .kernel = (triptych_kernel)s.kernel,
         .tolerance = s.tolerance,
         .samples = s.samples,
+        .anisotropy = s.effects.anisotropy,
+        .cueing = 0.6,
+        .light_cells = s.effects.cells,
     };
 }
 
@@ -122,6 +125,22 @@ static const char *fault_of_clip(const triptych_clip *c)
     return NULL;
 }
 
+static const char *fault_of_effects(const triptych_settings *s)
+{
+    const int all = TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING | TRIPTYCH_EFFECTS_AUTO;
+    if (s->effects & ~all)
+        return "there is no such effect";
+    if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
+        return "light from the eye casts no shadows that are seen; give its direction";
+    if (!(s->anisotropy >= -0.95 && s->anisotropy <= 0.95))
+        return "the anisotropy of scattering lies between -0.95 and 0.95";
+    if (s->effects & TRIPTYCH_CUEING && !(s->cueing > 0 && s->cueing <= 1))
+        return "depth cueing lies above 0 and up to 1";
+    if (s->effects && !(s->light_cells >= 8 && s->light_cells <= TRIP_LIGHT_CELLS_MAX))
+        return "the light's lattice has 8 to 1024 cells";
+    return NULL;
+}
+
 static const char *fault_of_settings(const triptych_settings *s)
 {
     trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
@@ -142,7 +161,7 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "h lies between 0 and below 1";
     if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
         return "the kernel radius lies between 0.1 and 100 voxels";
-    if (s->shading && !s->headlight && !(length > 0 && isfinite(length)))
+    if ((s->shading || s->effects) && !s->headlight && !(length > 0 && isfinite(length)))
         return "the direction to the light is zero or not finite";
     for (int i = 0; i < 4; i++)
         if (!(s->background[i] >= 0 && s->background[i] <= 1))
@@ -152,6 +171,7 @@ static const char *fault_of_settings(const triptych_settings *s)
     if (s->show < TRIPTYCH_SHOW_PICTURE || s->show > TRIPTYCH_SHOW_LEVELS)
         return "there is nothing such to be shown";
     const char *fault = fault_of_clip(&s->clip);
+    fault = fault ? fault : fault_of_effects(s);
     return fault ? fault : fault_of_integral(s);
 }
 
@@ -198,6 +218,10 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         warn_of_ripple(s->kernel_radius);
     t->rounding_checked &= (trip_target)s->target == t->settings.target &&
                            (trip_compositing)s->compositing == t->settings.compositing;
+    /* What was taken for frames before may be in the way of the light's lattice. */
+    if (s->effects != t->effects || s->light_cells != t->settings.effects.cells)
+        trip_context_drop_renderer(t);
+    t->effects = s->effects;
     t->classify_auto = s->classify == TRIPTYCH_CLASSIFY_AUTO;
     t->settings = (trip_settings){
         .classify = s->classify == TRIPTYCH_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST,
@@ -220,6 +244,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .tolerance = s->tolerance,
         .samples = s->samples,
         .show = (trip_show)s->show,
+        .effects = { .cueing = s->cueing, .anisotropy = s->anisotropy, .cells = s->light_cells },
     };
     t->clip = s->clip;
     t->counting = s->count;

@@ -30,6 +30,8 @@ int triptych_explain(triptych *t, char **text)
         explain_choices(t, f);
     if (f)
         trip_plan_explain(&t->plan, t->session.data, &t->drawn_settings, f);
+    if (f)
+        trip_context_explain_effects(t, f);
     if (!status && (!f || fclose(f) != 0)) {
         free(*text);
         *text = NULL;
@@ -62,9 +64,17 @@ void trip_context_drop_stats(triptych *t)
     t->has_stats = false;
 }
 
+static int effects_of(const trip_effects *e)
+{
+    return (e->shadows ? TRIPTYCH_SHADOWS : 0) | (e->occlusion ? TRIPTYCH_OCCLUSION : 0) |
+           (e->cueing > 0 ? TRIPTYCH_CUEING : 0);
+}
+
 static triptych_frame_stats frame_stats(const triptych *t)
 {
     const trip_frame_stats *s = &t->drawing.stats;
+    const trip_light_stats light =
+        t->light ? trip_light_map_stats(t->light) : (trip_light_stats){ 0 };
     return (triptych_frame_stats){
         .ms = s->ms,
         .plan_ms = t->plan_ms,
@@ -86,6 +96,11 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .classify = (triptych_classify)t->drawn_settings.classify,
         .slices = t->drawn_settings.classify == TRIP_CLASSIFY_POST ? t->drawn_settings.slices : 0,
         .ring = ring_text(t->renderer, t->reader),
+        .effects = effects_of(&t->drawn_settings.effects),
+        .light_bytes_read = light.bytes_read,
+        .light_memory_bytes = light.memory_bytes,
+        .light_gather_ms = light.gather_ms,
+        .light_sweep_ms = light.sweep_ms,
     };
 }
 

@@ -248,6 +248,15 @@ typedef enum triptych_show {
     TRIPTYCH_SHOW_LEVELS, /* which level: white the finest, then blue, green, yellow, orange, red */
 } triptych_show;
 
+/* Effects besides shading. What is not among them costs nothing. */
+enum {
+    TRIPTYCH_SHADOWS = 1,   /* what lies towards light[] attenuates its light, which fog scatters;
+                               not with the headlight */
+    TRIPTYCH_OCCLUSION = 2, /* what lies around attenuates the light from everywhere */
+    TRIPTYCH_CUEING = 4,    /* what is farther fades into the background */
+    TRIPTYCH_EFFECTS_AUTO = 8, /* and those that the kind of data and the function call for */
+};
+
 typedef struct triptych_settings {
     triptych_classify classify;
     triptych_compositing compositing; /* pre */
@@ -276,10 +285,16 @@ typedef struct triptych_settings {
                   too */
     triptych_clip clip;
     triptych_show show; /* not of the integral, which has no lists or levels */
+    int effects;        /* the sum of TRIPTYCH_SHADOWS, ...; not of GL */
+    double anisotropy;  /* of fog that scatters: -0.95 backwards to 0.95 forwards, 0 alike */
+    double cueing;      /* share of the background in what is farthest, above 0 to 1 */
+    int light_cells;    /* of shadows and occlusion: a lattice of at most so many cells along the
+                           longest side of the volume, 8 to 1024, at least a voxel each */
 } triptych_settings;
 
 /* Classified by itself, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel
- * radius 2, shading by headlight, black; values, linear, 1e-4, one ray a pixel. */
+ * radius 2, shading by headlight, black; values, linear, 1e-4, one ray a pixel; no effects, and
+ * where they are set scattering alike, cueing 0.6, 128 cells. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 /* How close to the integral pictures are to be, for the time that takes; measured by `triptych
  * accuracy`, triptych-accuracy(1) has the figures. */
@@ -407,6 +422,10 @@ typedef struct triptych_frame_stats {
     const char *ring;                         /* where reads land, in words */
     triptych_classify classify;               /* pre or post, what was drawn */
     int slices;                               /* of a sheet, post; else 0 */
+    int effects;                              /* that ran; of shadows and occlusion: */
+    uint64_t light_bytes_read;                /* not in bytes_read; 0 where it was kept */
+    uint64_t light_memory_bytes;
+    double light_gather_ms, light_sweep_ms; /* in ms: reading and gathering; working out */
 } triptych_frame_stats;
 
 TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);

@@ -102,8 +102,7 @@ static const char *string_at(const trip_dataset_text *t, const char *key)
     return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(t->root, key));
 }
 
-/* TRIP_TF_SIMULATION where the text has none. */
-static trip_tf_kind kind_of(const trip_dataset_text *t)
+trip_tf_kind trip_dataset_text_kind(const trip_dataset_text *t)
 {
     trip_tf_kind kind = trip_tf_kind_from_name(string_at(t, "function_kind"));
     return kind == TRIP_TF_AUTOMATIC ? TRIP_TF_SIMULATION : kind;
@@ -139,7 +138,7 @@ int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, t
     trip_histogram histogram;
     bool given = trip_tf_needs_data(tf) && trip_dataset_text_histogram(t, &histogram);
     const trip_tf_data data = { d->header.value_min, d->header.value_max, given ? &histogram : NULL,
-                                kind_of(t) };
+                                trip_dataset_text_kind(t) };
     return trip_tf_adapt(tf, &data, t->path);
 }
 

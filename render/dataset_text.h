@@ -36,6 +36,9 @@ const char *trip_dataset_text_source_option(const trip_dataset_text *t, int i);
 /* What was chosen for the user where the file left a choice; NULL: nothing. */
 const char *trip_dataset_text_note(const trip_dataset_text *t);
 
+/* What the volume is; TRIP_TF_SIMULATION where the text does not say. */
+trip_tf_kind trip_dataset_text_kind(const trip_dataset_text *t);
+
 /* Turns a function that is relative to the data, or made from its histogram, into data units. */
 int trip_dataset_text_adapt(const trip_dataset_text *t, const trip_dataset *d, trip_tf *tf);
 

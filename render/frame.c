@@ -4,6 +4,7 @@
 #include <math.h>
 #include <time.h>
 
+#include "light_map.h"
 #include "report.h"
 #include "splat.h"
 
@@ -169,10 +170,22 @@ static int load(trip_drawing *d)
     return status;
 }
 
+/* Light reaches places before anything is drawn. */
+static int make_light(trip_drawing *d)
+{
+    trip_light_map *light = d->frame->light;
+    return light ? trip_light_map_step(light) : TRIP_FRAME_DONE;
+}
+
 /* One piece of what is ready. */
 static int draw_next(trip_drawing *d, bool whole)
 {
-    int status = load(d);
+    int status = make_light(d);
+    if (status == TRIP_FRAME_MORE && trip_frame_poll())
+        status = TRIP_INTERRUPTED;
+    if (status != TRIP_FRAME_DONE)
+        return status;
+    status = load(d);
     if (status != TRIP_FRAME_DONE)
         return status;
     status = d->in_batch ? TRIP_FRAME_MORE : next_batch(d);
@@ -217,6 +230,20 @@ static int check_camera(const trip_camera *c)
     return isfinite(sum) ? 0 : trip_splat_fail();
 }
 
+/* What the renderer cannot draw. */
+static int check_renderer(const trip_frame *frame, const trip_renderer *renderer)
+{
+    const trip_settings *s = frame->settings;
+    if (s->classify == TRIP_CLASSIFY_POST && !frame->plan->gathers &&
+        !renderer->ops->classifies_post)
+        return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
+                         "does not classify after interpolation");
+    if (trip_effects_some(&s->effects) && !(renderer->ops->effects >> s->classify & 1))
+        return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
+                         "draws no effects; choose another renderer, or none: --effects none");
+    return 0;
+}
+
 int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *reader,
                      const trip_frame *frame)
 {
@@ -229,10 +256,8 @@ int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *read
                          .begun_ms = now_ms() };
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = check_camera(frame->camera);
-    if (!status && frame->settings->classify == TRIP_CLASSIFY_POST && !frame->plan->gathers &&
-        !renderer->ops->classifies_post)
-        status = trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                           "does not classify after interpolation");
+    if (!status)
+        status = check_renderer(frame, renderer);
     if (!status) {
         d->begun = true;
         status = renderer->ops->begin_frame(renderer, frame);
@@ -259,7 +284,9 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
 
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 {
-    if (!d->loaded)
+    if (d->frame->light && !trip_light_map_is_complete(d->frame->light))
+        trip_light_map_await(d->frame->light, timeout_ns);
+    else if (!d->loaded)
         d->renderer->ops->await_load(d->renderer, timeout_ns);
     else if (!d->done && !d->in_batch)
         trip_reader_await(d->reader, timeout_ns);

@@ -19,6 +19,13 @@ static inline trip_vec3 trip_list_grid_vector(const trip_list_grid *g, trip_vec3
     return trip_v3(v.x * g->scale[0], v.y * g->scale[1], v.z * g->scale[2]);
 }
 
+/* A position in the list's grid, in that of level 0. */
+static inline trip_vec3 trip_list_grid_point(const trip_list_grid *g, trip_vec3 p)
+{
+    return trip_v3(p.x * g->scale[0] + g->offset[0], p.y * g->scale[1] + g->offset[1],
+                   p.z * g->scale[2] + g->offset[2]);
+}
+
 /* The most that a length grows by from the list's grid to that of level 0. */
 static inline double trip_list_grid_growth(const trip_list_grid *g)
 {

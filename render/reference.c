@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "layer.h"
+#include "light_map.h"
 #include "normal.h"
 #include "pixels.h"
 #include "reference_sheets.h"
@@ -36,6 +37,7 @@ typedef struct reference {
     trip_splat_frame constants; /* of it */
     unsigned channels;          /* of a layer */
     double gradient_full;
+    trip_effects_view effects;
     trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
     size_t pixels_bytes;
@@ -130,6 +132,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
     r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
                                            header->gradient_step);
+    r->effects = trip_effects_view_make(frame->settings, frame->camera, header->dims);
+    trip_light_map_view(frame->light, &r->effects);
     r->axis = -1;
     r->broken = false;
     r->sums = trip_settings_sum_sheets(frame->settings);
@@ -295,15 +299,19 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
     rgb[1] = entry->g;
     rgb[2] = entry->b;
     trip_tint_of(frame->settings, r->axis, frame->data->lists[r->number].level, rgb);
-    if (!frame->settings->shading || !normal)
+    const bool shaded = frame->settings->shading && normal;
+    if (!shaded && !trip_effects_some(&frame->settings->effects))
         return;
     const trip_file_header *header = &frame->data->header;
     double gradient[3];
-    if (header->normal_bytes == 3)
+    if (shaded && header->normal_bytes == 3)
         trip_compact_normal_unpack(&r->compact, *normal, gradient);
-    else
+    else if (shaded)
         trip_normal_unpack(*normal, header->gradient_full, gradient);
-    trip_shade(frame->settings, &r->list->camera, r->gradient_full, voxel, gradient, rgb);
+    const trip_light light =
+        trip_light_at(frame->settings, &r->list->camera, r->gradient_full, voxel);
+    trip_effects_colour(&r->effects, &light, trip_list_grid_point(&r->list->grid, voxel),
+                        shaded ? gradient : NULL, rgb);
 }
 
 /* By the rays in the grid of level 0. */
@@ -479,6 +487,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops reference_ops = {
     .name = "reference",
     .classifies_post = true,
+    .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "field_fill.h"
+#include "light_map.h"
 #include "segments.h"
 #include "shade.h"
 #include "tint.h"
@@ -17,6 +18,7 @@ struct trip_reference_sheets {
     bool has_gradients;
     trip_field_fill fill;
     trip_segments segments;
+    trip_effects_view effects;
 };
 
 int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *frame,
@@ -42,6 +44,8 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     }
     trip_field_fill_begin(&s->fill, data, s->field, 1u << TRIP_PLANE_VOXELS);
     trip_segments_make(&s->segments, frame->table);
+    s->effects = trip_effects_view_make(frame->settings, frame->camera, h->dims);
+    trip_light_map_view(frame->light, &s->effects);
     return 0;
 }
 
@@ -181,10 +185,15 @@ static void light(const passage *p, const place ends[2], trip_vec3 middle, doubl
 {
     const trip_reference_sheets *s = p->s;
     const trip_frame *frame = s->frame;
+    const trip_settings *settings = frame->settings;
+    const trip_light at = trip_light_at(settings, frame->camera, s->gradient_full, middle);
+    if (!settings->shading) {
+        trip_effects_colour(&s->effects, &at, middle, NULL, rgb);
+        return;
+    }
     trip_vec3 codes = trip_scale(trip_add(gradient_at(&ends[0]), gradient_at(&ends[1])), 0.5);
     trip_vec3 g = trip_affine_transpose_vector(&s->to_index, trip_scale(codes, s->value_per_code));
-    trip_shade(frame->settings, frame->camera, s->gradient_full, middle,
-               (double[3]){ g.x, g.y, g.z }, rgb);
+    trip_effects_colour(&s->effects, &at, middle, (double[3]){ g.x, g.y, g.z }, rgb);
 }
 
 /* False once the pixel is saturated. */
@@ -226,7 +235,7 @@ static bool add_segment(passage *p, double t0, double t1, int64_t cells)
     double t = 0.5 * (from + to);
     if (trip_tint_of(p->s->frame->settings, p->axis, p->s->frame->plan->level, own))
         memcpy(segment.rgb, own, sizeof own);
-    if (p->s->frame->settings->shading)
+    if (p->s->frame->settings->shading || trip_effects_some(&p->s->frame->settings->effects))
         light(p, ends, point_at(p, t), segment.rgb);
     const double fragment[TRIP_CHANNELS_MAX] = {
         [TRIP_CHANNEL_RED] = segment.rgb[0],       [TRIP_CHANNEL_GREEN] = segment.rgb[1],

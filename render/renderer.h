@@ -13,6 +13,7 @@
 #include "transfer_function.h"
 
 struct trip_field;
+struct trip_light_map;
 
 /* Of a list in one frame. Where frames classify after interpolation nothing is projected: 0. */
 typedef struct trip_list_stats {
@@ -32,6 +33,8 @@ typedef struct trip_frame {
     const trip_tf_entry *table; /* 65536 entries */
     /* For the integral renderer: integrate this instead of what batches hold; NULL: those. */
     const struct trip_field *field;
+    /* Of frames with shadows or occlusion, but for the integral renderer: begun; else NULL. */
+    struct trip_light_map *light;
     bool count; /* splats projected and drawn, too: counting costs time */
     /* Called between batches with how many splats were drawn, of how many: "draw"; and by the
      * integral renderer with how many pixels: "integrate". May be NULL. */
@@ -63,6 +66,7 @@ enum {
 typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
     bool classifies_post; /* draws frames whose settings say so (sheet.h) */
+    unsigned effects;     /* draws frames with effects: a bit per trip_classify */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);

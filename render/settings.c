@@ -18,6 +18,7 @@ trip_settings trip_settings_default(void)
         .background = { 0, 0, 0, 1 },
         .tolerance = 1e-4,
         .samples = 1,
+        .effects = { .cells = TRIP_LIGHT_CELLS },
     };
 }
 
@@ -32,6 +33,9 @@ int trip_settings_check(const trip_settings *s)
     if (s->indexed && s->clip.count > 0)
         return trip_fail(TRIP_USAGE, "render", "clipping",
                          "one array of vertices is drawn whole; use three lists");
+    if (s->effects.shadows && s->headlight)
+        return trip_fail(TRIP_USAGE, "render", "shadows",
+                         "light from the eye casts none that is seen; give its direction");
     if (s->classify == TRIP_CLASSIFY_PRE)
         return 0;
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)

@@ -68,6 +68,18 @@ typedef enum trip_show {
     TRIP_SHOW_LEVELS,  /* which level of detail */
 } trip_show;
 
+/* What is simulated besides colour and shading (effects.h). What is off costs nothing. */
+typedef struct trip_effects {
+    bool shadows;      /* what lies towards light_direction attenuates its light */
+    bool occlusion;    /* what lies around attenuates the light that comes from everywhere */
+    double cueing;     /* share of the background in the colour of what is farthest: 0 (off) to 1 */
+    double anisotropy; /* of scattering, where shadows are: -1 < g < 1 */
+    int cells; /* of the light's grid along its longest axis, TRIP_LIGHT_CELLS_MAX or less */
+} trip_effects;
+
+#define TRIP_LIGHT_CELLS 128
+#define TRIP_LIGHT_CELLS_MAX 1024
+
 /* Slices of a sheet: the most that settings may have. */
 #define TRIP_SLICES_MAX 16
 
@@ -97,6 +109,7 @@ typedef struct trip_settings {
                            of other renderers are that much larger instead */
     trip_clip clip;     /* what is drawn lies inside; world space */
     trip_show show;
+    trip_effects effects;
 } trip_settings;
 
 /* The defaults: pre, splat by splat, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by

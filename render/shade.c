@@ -31,22 +31,31 @@ static double clamp(double x)
     return x > 0 ? x < 1 ? x : 1 : 0;
 }
 
-unsigned trip_light_colour(const trip_light *l, const double gradient[3], double rgb[3])
+trip_lit trip_light_on(const trip_light *l, const double gradient[3])
 {
     trip_vec3 g = { gradient[0], gradient[1], gradient[2] };
     double magnitude = trip_length(g), scale = 1 / magnitude;
     if (!(magnitude > 0))
-        return 0;
+        return (trip_lit){ 0 };
     double light = scale * trip_dot(g, l->light), eye = scale * trip_dot(g, l->eye);
     double half = scale * trip_dot(g, l->half);
-    double strength = clamp(magnitude / l->gradient_full);
-    double specular = clamp(TRIP_FACING * light * eye) * shininess_power(half);
-    double matt = 1 + strength * (TRIP_AMBIENT + TRIP_DIFFUSE * fabs(light) - 1);
-    unsigned form = 1 + (light < 0) + 2 * (strength < 1);
+    return (trip_lit){ .strength = clamp(magnitude / l->gradient_full),
+                       .diffuse = fabs(light),
+                       .specular = clamp(TRIP_FACING * light * eye) * shininess_power(half),
+                       .behind = light < 0 };
+}
+
+unsigned trip_light_colour(const trip_light *l, const double gradient[3], double rgb[3])
+{
+    const trip_lit lit = trip_light_on(l, gradient);
+    if (!(lit.strength > 0))
+        return 0;
+    double matt = 1 + lit.strength * (TRIP_AMBIENT + TRIP_DIFFUSE * lit.diffuse - 1);
+    unsigned form = 1 + lit.behind + 2 * (lit.strength < 1);
     for (int i = 0; i < 3; i++) {
-        double lit = rgb[i] * matt + strength * TRIP_SPECULAR * specular;
-        rgb[i] = clamp(lit);
-        form += 4u * (lit < 1) << i;
+        double colour = rgb[i] * matt + lit.strength * TRIP_SPECULAR * lit.specular;
+        rgb[i] = clamp(colour);
+        form += 4u * (colour < 1) << i;
     }
     return form;
 }

@@ -42,6 +42,13 @@ typedef struct trip_light {
 /* At a point in index space. */
 trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gradient_full,
                          trip_vec3 voxel);
+/* How a surface with a world-space gradient is lit: the terms above, all 0 where it is flat. */
+typedef struct trip_lit {
+    double strength, diffuse, specular; /* specular: with `facing` */
+    bool behind;                        /* light falls on the side of falling values */
+} trip_lit;
+trip_lit trip_light_on(const trip_light *l, const double gradient[3]);
+
 /* Lights the colour `rgb` (not premultiplied) of what has a world-space gradient. Returns a number
  * that stays the same while the gradient, the colour or both change and what comes of them is a
  * smooth function: it has kinks where a surface turns from the light and at the bounds. */

@@ -54,6 +54,10 @@ static const entry setting_entries[] = {
     { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
     { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },
     { "light", SETTING(light), NUMBERS, 3, -FAR, FAR },
+    { "effects", SETTING(effects), WHOLE, 1, 0, 15 },
+    { "anisotropy", SETTING(anisotropy), NUMBERS, 1, -0.95, 0.95 },
+    { "cueing", SETTING(cueing), NUMBERS, 1, 1e-6, 1 },
+    { "light_cells", SETTING(light_cells), WHOLE, 1, 8, 1024 },
     { "h", SETTING(h), NUMBERS, 1, 0, 0.999999 },
     { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
     { "background", SETTING(background), NUMBERS, 4, 0, 1 },
@@ -208,7 +212,7 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     if (!status)
         status = read_entries(s, root, ENTRIES(other_entries), false, path);
     const triptych_settings *t = &s->settings;
-    if (!status && t->shading && !t->headlight && !(length_of(t->light) > 0))
+    if (!status && (t->shading || t->effects) && !t->headlight && !(length_of(t->light) > 0))
         status = trip_fail(TRIP_ERROR, "read", path, "its light has no direction");
     if (!status && !trip_clipping_is_sound(&t->clip))
         status = trip_fail(TRIP_ERROR, "read", path, "its clipping box or planes are none");

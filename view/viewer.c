@@ -188,6 +188,8 @@ static triptych_settings settings_of(const trip_document *d)
     triptych_settings s = d->settings;
     if (!d->clips)
         s.clip = (triptych_clip){ 0 };
+    if (s.headlight) /* which casts no shadows that are seen */
+        s.effects &= ~TRIPTYCH_SHADOWS;
     return s;
 }
 

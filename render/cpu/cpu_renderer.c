@@ -249,6 +249,7 @@ static void destroy(trip_renderer *base)
 static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
+    .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -2,6 +2,7 @@
 
 #include "block.h"
 #include "normal.h"
+#include "cpu/effects.h"
 #include "shade.h"
 #include "tint.h"
 
@@ -161,6 +162,7 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip
 {
     make_view(view, frame, &frame->plan->lists[list->index].camera, list->axis, front_to_back);
     view->list = list;
+    trip_cpu_effects_make(&view->effects, frame, list->axis, &frame->plan->lists[list->index].grid);
     view->code_bytes = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
     double tint[3] = { 0 };
     view->tinted = trip_tint_of(frame->settings, list->axis, list->level, tint);

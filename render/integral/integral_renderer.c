@@ -95,6 +95,9 @@ static int check_frame(const trip_frame *frame)
 {
     if (frame->settings->depth)
         return trip_fail(TRIP_USAGE, "render", "depth", "the integral gives no distances");
+    if (frame->settings->field == TRIP_FIELD_SPLATS && trip_effects_some(&frame->settings->effects))
+        return trip_fail(TRIP_USAGE, "render", "effects",
+                         "the integral has them of values, not of splats");
     if (frame->settings->field == TRIP_FIELD_VALUES)
         return trip_plan_check_cells(frame->data, "--field splats");
     return 0;
@@ -119,6 +122,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .clip = &frame->plan->clip,
         .shaded = frame->settings->shading && header->planes >> TRIP_PLANE_NORMALS & 1,
         .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world),
+        .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };
     return status;
 }
@@ -271,6 +275,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 
 static const trip_renderer_ops integral_ops = {
     .name = "integral",
+    .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -4,6 +4,7 @@
 #define TRIP_INTEGRAND_H
 
 #include "classes.h"
+#include "effects.h"
 #include "field.h"
 #include "quadrature.h"
 #include "ray.h"
@@ -17,6 +18,7 @@ typedef struct trip_integrand {
     const trip_clip *clip;     /* of the rays, or of the voxels; index space */
     bool shaded;
     double gradient_full; /* as of trip_shade() */
+    trip_effects_view effects;
 } trip_integrand;
 
 /* Through the values: those of a cell are classified where the ray is, and lit by the gradient
@@ -24,6 +26,8 @@ typedef struct trip_integrand {
  * knot of the transfer function, so that a piece is smooth but for kinks of the light. Along a ray
  * a linear cell is a polynomial of degree 3, a cubic one of degree 9, of code and gradient alike.
  * Stored normals of 3 bytes are no longer than gradient_full, and are interpolated as they are. */
+/* Where effects depend on what light passes, each place has integrals of its own, to the same
+ * tolerance. */
 trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray);
 
 /* Splats that a ray meets: a thread's memory, from the budget, kept from ray to ray. */

@@ -15,6 +15,15 @@ trip_ray trip_ray_make(const trip_camera *c, double x, double y)
     return r;
 }
 
+trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t)
+{
+    return (trip_ray){ .origin = origin,
+                       .direction = direction,
+                       .inverse = trip_v3(inverse(direction.x), inverse(direction.y),
+                                          inverse(direction.z)),
+                       .world_per_t = world_per_t };
+}
+
 bool trip_ray_clip(const trip_ray *r, const int64_t lo[3], const int64_t hi[3], double *from,
                    double *to)
 {

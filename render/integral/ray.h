@@ -13,6 +13,8 @@ typedef struct trip_ray {
 
 /* Of a pixel position. */
 trip_ray trip_ray_make(const trip_camera *c, double x, double y);
+/* From a place in a direction, index space; world_per_t is the direction's length in the world. */
+trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t);
 
 static inline trip_vec3 trip_ray_at(const trip_ray *r, double t)
 {

@@ -5,7 +5,8 @@
 typedef struct passage {
     const trip_integrand *in;
     const trip_ray *ray;
-    trip_light light;    /* the same all along the ray */
+    trip_light light; /* the same all along the ray */
+    trip_effects_view effects;
     trip_cell_line line; /* of the cell where it is */
     trip_ray_sum sum;
 } passage;
@@ -18,8 +19,13 @@ static void sample(void *user, double t, trip_ray_sample *out)
     double extinction = trip_classes_at(p->in->classes, here[0], out->rgb);
     out->extinction = extinction * p->ray->world_per_t;
     out->form = 1;
-    if (p->in->shaded && extinction > 0)
+    if (extinction > 0 && trip_effects_some(&p->effects.effects)) {
+        trip_effects_colour(&p->effects, &p->light, trip_ray_at(p->ray, t),
+                            p->in->shaded ? here + 1 : NULL, out->rgb);
+        out->form = 0;
+    } else if (p->in->shaded && extinction > 0) {
         out->form = trip_light_colour(&p->light, here + 1, out->rgb);
+    }
 }
 
 /* A place in a cell: 0 to 1 of its line, and the code there. */
@@ -103,6 +109,41 @@ static bool visit_cube(void *user, const int64_t at[3], double from, double to)
     return trip_ray_walk(p->ray, &cells, from, to, visit_cell, p);
 }
 
+/* Transmittance from a place on, in a world direction given in index space. */
+static double through(const trip_integrand *in, trip_vec3 from, trip_vec3 direction)
+{
+    trip_integrand bare = *in;
+    bare.shaded = false;
+    bare.effects.effects = (trip_effects){ 0 };
+    const trip_ray ray = trip_ray_from(from, direction, 1);
+    return trip_integrate_values(&bare, &ray).transmittance;
+}
+
+static double reached_at(const void *user, trip_vec3 voxel)
+{
+    const trip_integrand *in = user;
+    return through(in, voxel, in->effects.to_light);
+}
+
+static double open_at(const void *user, trip_vec3 voxel)
+{
+    const trip_integrand *in = user;
+    double sum = 0;
+    for (int n = 0; n < TRIP_OPEN_DIRECTIONS; n++)
+        sum += through(in, voxel,
+                       trip_affine_vector(&in->effects.to_index, trip_effects_direction(n)));
+    return sum / TRIP_OPEN_DIRECTIONS;
+}
+
+static trip_effects_view effects_of(const trip_integrand *in)
+{
+    trip_effects_view effects = in->effects;
+    effects.user = in;
+    effects.reached = reached_at;
+    effects.open = open_at;
+    return effects;
+}
+
 trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray)
 {
     const int64_t *dims = trip_field_dims(in->field);
@@ -113,6 +154,8 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
     if (trip_ray_clip(ray, cubes.lo, cubes.hi, &from, &to) &&
         trip_clip_ray(in->clip, ray->origin, ray->direction, &from, &to)) {
         p.light = trip_light_at(in->settings, in->camera, in->gradient_full, trip_ray_at(ray, 1));
+        if (trip_effects_some(&in->effects.effects))
+            p.effects = effects_of(in);
         p.sum.length = to - from;
         trip_ray_walk(ray, &cubes, from, to, visit_cube, &p);
     }

@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -887,6 +888,99 @@ static void two_contexts_draw_in_two_threads_and_one_is_cancelled(void **state)
     }
 }
 
+static triptych_frame_stats draw(triptych *t, float *rgba)
+{
+    triptych_frame_stats stats;
+    assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_OK);
+    return stats;
+}
+
+static bool are_same(const float *a, const float *b)
+{
+    return memcmp(a, b, FLOATS * sizeof *a) == 0;
+}
+
+static triptych_settings with_effects(int effects)
+{
+    triptych_settings s = triptych_default_settings();
+    const double light[3] = { 1, -1, 1 };
+    s.headlight = 0;
+    memcpy(s.light, light, sizeof light);
+    s.effects = effects;
+    s.light_cells = 32;
+    return s;
+}
+
+static void effects_cost_what_is_asked_for_and_are_kept_from_view_to_view(void **state)
+{
+    (void)state;
+    static float plain[FLOATS], lit[FLOATS], turned[FLOATS], again[FLOATS];
+    const triptych_settings none = with_effects(0);
+    const triptych_settings some = with_effects(TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION);
+    triptych *t = new_context(), *other = new_context();
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_set_settings(t, &none), TRIPTYCH_OK);
+    const triptych_frame_stats before = draw(t, plain);
+    assert_int_equal(before.effects, 0);
+    assert_int_equal(before.light_bytes_read + before.light_memory_bytes, 0);
+
+    assert_int_equal(triptych_set_settings(t, &some), TRIPTYCH_OK);
+    triptych_frame_stats with = draw(t, lit);
+    assert_int_equal(with.effects, TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION);
+    assert_int_equal(with.bytes_read, before.bytes_read);
+    assert_true(with.light_bytes_read > 0 && with.light_memory_bytes > 0);
+    assert_false(are_same(plain, lit));
+
+    assert_int_equal(triptych_turn(t, 40), TRIPTYCH_OK);
+    assert_int_equal(draw(t, turned).light_bytes_read, 0);
+    open_data(other, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(triptych_set_settings(other, &some), TRIPTYCH_OK);
+    assert_int_equal(triptych_turn(other, 40), TRIPTYCH_OK);
+    assert_true(draw(other, again).light_bytes_read > 0);
+    assert_true(are_same(turned, again));
+
+    assert_int_equal(triptych_set_function(t, &(triptych_function){ .opacity_scale = 0.5 }),
+                     TRIPTYCH_OK);
+    assert_true(draw(t, turned).light_bytes_read > 0);
+    assert_int_equal(triptych_set_function(t, NULL), TRIPTYCH_OK);
+    assert_int_equal(triptych_turn(t, 0), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_settings(t, &none), TRIPTYCH_OK);
+    with = draw(t, again);
+    assert_int_equal(with.light_bytes_read + with.light_memory_bytes, 0);
+    assert_int_equal(with.bytes_read, before.bytes_read);
+    assert_true(are_same(plain, again));
+    triptych_destroy(other);
+    triptych_destroy(t);
+}
+
+static void measurements_keep_their_colours_unless_effects_are_asked_for(void **state)
+{
+    (void)state;
+    static float rgba[FLOATS];
+    triptych *t = new_context();
+    char *text;
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    triptych_settings s = with_effects(TRIPTYCH_EFFECTS_AUTO);
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(draw(t, rgba).effects, 0);
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
+    assert_non_null(strstr(text, "shadowing   does not run: "));
+    assert_null(strstr(text, "light  "));
+    free(text);
+    triptych_end(t);
+    s.effects |= TRIPTYCH_CUEING;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(draw(t, rgba).effects, TRIPTYCH_CUEING);
+    s.effects = TRIPTYCH_SHADOWS;
+    s.headlight = 1;
+    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "give its direction");
+    s.effects = 16;
+    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "no such effect");
+    triptych_destroy(t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -913,6 +1007,8 @@ int main(void)
         cmocka_unit_test(the_integral_of_what_is_kept_is_that_of_the_volume),
         cmocka_unit_test(what_only_splats_have_is_drawn_by_them),
         cmocka_unit_test(more_samples_are_the_mean_of_a_larger_picture),
+        cmocka_unit_test(effects_cost_what_is_asked_for_and_are_kept_from_view_to_view),
+        cmocka_unit_test(measurements_keep_their_colours_unless_effects_are_asked_for),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);

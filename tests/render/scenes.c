@@ -1,5 +1,7 @@
 #include "scenes.h"
 
+#include "light_map.h"
+
 #include "test.h"
 
 #include <stdlib.h>
@@ -297,12 +299,24 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     params.planes = plan.planes;
     assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
     assert_int_equal(renderer->create(&r, s->budget), 0);
+    trip_light_map *light = NULL;
+    const trip_light_source source = { .data = s->data,
+                                       .settings = settings,
+                                       .clip = &plan.clip,
+                                       .table = s->table,
+                                       .engine = params.engine,
+                                       .threads = 1 };
+    if (trip_effects_light(&settings->effects)) {
+        assert_int_equal(trip_light_map_create(&light, s->budget), 0);
+        assert_int_equal(trip_light_map_begin(light, &source), 0);
+    }
 
     trip_frame frame = { .data = s->data,
                          .camera = &camera,
                          .settings = settings,
                          .plan = &plan,
                          .table = s->table,
+                         .light = light,
                          .count = true };
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
     assert_non_null(p.rgba);
@@ -318,6 +332,7 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     for (unsigned i = 0; i < s->data->list_count; i++)
         p.lists[i] = trip_frame_list_stats(r, reader, i);
     r->ops->destroy(r);
+    trip_light_map_destroy(light);
     trip_reader_destroy(reader);
     trip_plan_release(&plan, s->budget);
     return p;

@@ -111,6 +111,7 @@ typedef struct trip_cpu_view {
     trip_splat parallel; /* the footprint of all, in parallel views */
     float behind;        /* splats at this depth or less do not show */
     float near;          /* in parallel views: splats of less depth are near */
+    trip_cpu_effects effects;
 } trip_cpu_view;
 
 /* A square of 8 x 8 voxels of a run, as its block (block.h) has it. */

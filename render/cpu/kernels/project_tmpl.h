@@ -11,6 +11,7 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/scalar.h"
 #include "cpu/kernels/simd_tmpl.h"
+#include "cpu/kernels/effects_tmpl.h"
 #include "shade.h"
 
 /* Splats whose largest optical depth is below 2^-60 are left out: 10^18 of them would not show. */
@@ -385,15 +386,14 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
                       v_select(is_strong, strong.z, weak.z) });
 }
 
-/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
- * With light from the eye `facing` changes nothing that a float keeps. */
-INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
+/* As trip_light_on(), `eye` of unit length. With light from the eye `facing` changes nothing that a
+ * float keeps. */
+INLINE surface surface_of(const trip_cpu_view *view, v3 eye, vi packed)
 {
     const trip_settings *s = view->of->settings;
     vf magnitude;
     v3 normal = view->normal_bytes == 3 ? unpack_compact_normal(view, packed, &magnitude)
                                         : unpack_normal(view, packed, &magnitude);
-    eye = unit(eye);
     v3 half = eye;
     vf strength = v_min(v_set(1), magnitude), shining = strength;
     vf to_light = dot(normal, eye);
@@ -409,12 +409,35 @@ INLINE colour shaded(const trip_cpu_view *view, colour c, v3 eye, vi packed)
     vf h2 = v_max(dot(normal, half) * dot(normal, half), v_set(0x1p-8f));
     vf h8 = (h2 * h2) * (h2 * h2);
     static_assert((int)TRIP_SHININESS == 24, "the power below");
-    vf gloss = shining * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8);
-    vf matt = v_fma(diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
-    matt = v_fma(strength, matt, v_set(1));
-    return (colour){ v_min(v_set(1), v_fma(c.r, matt, gloss)),
-                     v_min(v_set(1), v_fma(c.g, matt, gloss)),
-                     v_min(v_set(1), v_fma(c.b, matt, gloss)) };
+    return (surface){ .strength = strength,
+                      .diffuse = diffuse,
+                      .gloss = shining * v_set((float)TRIP_SPECULAR) * ((h8 * h8) * h8),
+                      .normal = { normal.x, normal.y, normal.z } };
+}
+
+/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
+ */
+INLINE colour shaded(const surface *s, colour c)
+{
+    vf matt = v_fma(s->diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
+    matt = v_fma(s->strength, matt, v_set(1));
+    return (colour){ v_min(v_set(1), v_fma(c.r, matt, s->gloss)),
+                     v_min(v_set(1), v_fma(c.g, matt, s->gloss)),
+                     v_min(v_set(1), v_fma(c.b, matt, s->gloss)) };
+}
+
+/* With effects; `s` of strength 0 where nothing is shaded. */
+INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, const surface *s,
+                           const trip_cpu_staged *staged, uint32_t at)
+{
+    const trip_settings *settings = view->of->settings;
+    const vf place[3] = { v_from_int(vi_load(staged->u + at)), v_from_int(vi_load(staged->v + at)),
+                          v_from_int(vi_load(staged->sheet + at)) };
+    const v3 light = settings->headlight ? eye : v3_of(settings->light_direction);
+    const vf to_light[3] = { light.x, light.y, light.z }, to_eye[3] = { eye.x, eye.y, eye.z };
+    vf rgb[3] = { c.r, c.g, c.b };
+    effects_on(&view->effects, place, s, to_light, to_eye, rgb);
+    return (colour){ rgb[0], rgb[1], rgb[2] };
 }
 
 /* ---- putting it together ---- */
@@ -558,11 +581,14 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
                  v_gather(table + 2, code * 4) };
     if (view->tinted)
         c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
-    if (!view->shading)
+    if (!view->shading && !view->effects.some)
         return c;
-    v3 eye = towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),
-                         vi_load(staged->sheet + at));
-    return shaded(view, c, eye, vi_load(staged->normal + at));
+    v3 eye = unit(towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),
+                              vi_load(staged->sheet + at)));
+    surface s = { .strength = v_set(0), .gloss = v_set(0) };
+    if (view->shading)
+        s = surface_of(view, eye, vi_load(staged->normal + at));
+    return view->effects.some ? with_effects(view, c, eye, &s, staged, at) : shaded(&s, c);
 }
 
 /* trip_cpu_splat.c[] of thin splats. */

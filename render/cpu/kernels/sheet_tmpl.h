@@ -7,6 +7,7 @@
 #define TRIP_CPU_SHEET_H
 
 #include "cpu/kernels/blend_tmpl.h"
+#include "cpu/kernels/effects_tmpl.h"
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 #include "shade.h"
@@ -721,9 +722,9 @@ INLINE vf dot3(const vf a[3], const vf b[3])
     return v_fma(a[0], b[0], v_fma(a[1], b[1], a[2] * b[2]));
 }
 
-/* As trip_shade(), with the mean of the gradients of the ends. */
-INLINE void light_segment(const trip_cpu_sheet_view *view, const pane_path *path,
-                          const stamp_rays *l, const sample *a, const sample *b, medium *s)
+/* As trip_light_on(), with the mean of the gradients of the ends. */
+INLINE surface surface_between(const trip_cpu_sheet_view *view, const pane_path *path,
+                               const stamp_rays *l, const sample *a, const sample *b)
 {
     vf g[3], n[3];
     for (int k = 0; k < 3; k++) /* twice their mean */
@@ -745,12 +746,22 @@ INLINE void light_segment(const trip_cpu_sheet_view *view, const pane_path *path
     facing = v_min(v_set(1), v_max(v_set(0), facing * v_set((float)TRIP_FACING)));
     static_assert((int)TRIP_SHININESS == 24, "the powers below");
     vf p2 = to_half * to_half, p4 = p2 * p2, p8 = p4 * p4;
-    vf highlight = strength * v_set((float)TRIP_SPECULAR) * p8 * p8 * p8 * facing;
+    return (surface){
+        .strength = strength,
+        .diffuse = v_abs(to_light),
+        .gloss = strength * v_set((float)TRIP_SPECULAR) * p8 * p8 * p8 * facing,
+        .normal = { n[0] * inverse, n[1] * inverse, n[2] * inverse },
+    };
+}
+
+/* As trip_shade(). */
+INLINE void light_segment(const surface *lit, medium *s)
+{
     vf matt =
-        v_fma(v_fma(v_abs(to_light), v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1))),
-              strength, v_set(1));
+        v_fma(v_fma(lit->diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1))),
+              lit->strength, v_set(1));
     for (int k = 0; k < 3; k++)
-        s->rgb[k] = v_min(v_set(1), v_max(v_set(0), v_fma(s->rgb[k], matt, highlight)));
+        s->rgb[k] = v_min(v_set(1), v_max(v_set(0), v_fma(s->rgb[k], matt, lit->gloss)));
 }
 
 /* z where the rays are so far along. */
@@ -791,6 +802,20 @@ INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
     out->summed = false;
 }
 
+/* Where the rays of slice n are `further` along: voxels of the list. */
+INLINE void places_at(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
+                      unsigned n, vf further, vf at[3])
+{
+    const int64_t origin[2] = { g->first_u, g->first_v };
+    for (int a = 0; a < 2; a++) {
+        float first = (float)(path->base[a][n] + origin[a]) + path->first[a][n];
+        vf slope = l->slope[a] + v_set((float)path->slope[a]);
+        at[a] = v_fma(l->slope[a], v_set(path->along[n]), v_set(first) + l->shift[a]);
+        at[a] = v_fma(slope, further, at[a]);
+    }
+    at[2] = v_set((float)g->slices[n].coordinate) + further;
+}
+
 /* Puts a segment behind what the pixels hold; false where it shows in none of them. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                               const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
@@ -820,10 +845,18 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
     if (!vm_any(open))
         return false;
+    surface lit = { .strength = v_set(0), .gloss = v_set(0) };
     if (view->shading) {
         find_light(g, a);
         find_light(g, b);
-        light_segment(view, path, l, a, b, &s);
+        lit = surface_between(view, path, l, a, b);
+    }
+    if (view->effects.some) {
+        vf at[3];
+        places_at(g, path, l, n, middle - v_set(path->along[n]), at);
+        effects_on(&view->effects, at, &lit, l->light, l->to_eye, s.rgb);
+    } else if (view->shading) {
+        light_segment(&lit, &s);
     }
     vf opacity = v_set(1) - exp_of_minus(s.extinction * l->length * sheets);
     vf add = v_select(open, opacity * pixel[3], v_set(0));

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "camera.h"
+#include "cpu/kernels/effects.h"
 #include "settings.h"
 
 struct trip_frame;
@@ -108,6 +109,7 @@ typedef struct trip_cpu_sheet_view {
     double clip[TRIP_CLIP_MOST][4];
     bool tinted; /* all has one colour before it is lit: */
     float tint[3];
+    trip_cpu_effects effects;
 } trip_cpu_sheet_view;
 
 #endif

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "cpu/effects.h"
 #include "shade.h"
 #include "tint.h"
 #include "weight.h"
@@ -107,4 +108,5 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
     set_light(view, frame);
     set_clip(view, &frame->plan->clip);
     set_tint(view, frame);
+    trip_cpu_effects_make(&view->effects, frame, axis, NULL);
 }

@@ -1,0 +1,72 @@
+#include "effects_options.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "options.h"
+#include "report.h"
+
+int trip_option_light(const char *text, triptych_settings *s)
+{
+    int count;
+    s->headlight = !strcmp(text, "head");
+    if (s->headlight)
+        return 0;
+    int status = trip_option_numbers("--light", text, 3, 3, s->light, &count);
+    if (!status && !(s->light[0] != 0 || s->light[1] != 0 || s->light[2] != 0))
+        return trip_option_fail("--light", "the direction is zero");
+    return status;
+}
+
+int trip_option_effects(const char *text, triptych_settings *s)
+{
+    static const char *const names[] = { "shadows", "occlusion", "cueing", "auto", "none", NULL };
+    static const int bits[] = { TRIPTYCH_SHADOWS, TRIPTYCH_OCCLUSION, TRIPTYCH_CUEING,
+                                TRIPTYCH_EFFECTS_AUTO, 0 };
+    int effects = 0, count = 0;
+    bool none = false;
+    for (const char *rest = text; rest; count++) {
+        char name[16];
+        const char *comma = strchr(rest, ',');
+        size_t length = comma ? (size_t)(comma - rest) : strlen(rest);
+        int which;
+        snprintf(name, sizeof name, "%.*s", (int)(length < sizeof name ? length : sizeof name - 1),
+                 rest);
+        int status = trip_option_choice("--effects", name, names, &which);
+        if (status)
+            return status;
+        effects |= bits[which];
+        none |= bits[which] == 0;
+        rest = comma ? comma + 1 : NULL;
+    }
+    if (none && count > 1)
+        return trip_option_fail("--effects", "none goes with nothing else");
+    s->effects = effects;
+    return 0;
+}
+
+int trip_option_anisotropy(const char *text, triptych_settings *s)
+{
+    return trip_option_number("--anisotropy", text, -0.95, 0.95, &s->anisotropy);
+}
+
+int trip_option_cueing(const char *text, triptych_settings *s)
+{
+    int status = trip_option_number("--cueing", text, 0, 1, &s->cueing);
+    if (!status && !(s->cueing > 0))
+        return trip_option_fail("--cueing", "is above 0");
+    return status;
+}
+
+int trip_option_light_cells(const char *text, triptych_settings *s)
+{
+    return trip_option_integer("--light-cells", text, 8, 1024, &s->light_cells);
+}
+
+int trip_option_check_effects(const triptych_settings *s)
+{
+    if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
+        return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "
+                                             "its direction: --light X,Y,Z");
+    return 0;
+}

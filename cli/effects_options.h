@@ -1,0 +1,53 @@
+/* Options of light and effects, as triptych_settings has them, alike in the commands that draw.
+ * Each function reports a bad value, and returns TRIP_USAGE. */
+#ifndef TRIP_EFFECTS_OPTIONS_H
+#define TRIP_EFFECTS_OPTIONS_H
+
+#include "triptych.h"
+
+/* Rows of a command's table; the keys are KEY_EFFECTS, KEY_ANISOTROPY, KEY_CUEING and
+ * KEY_LIGHT_CELLS, and KEY_LIGHT where a command has that. */
+#define TRIP_OPTION_LIGHT(group)                                                                   \
+    {                                                                                              \
+        "light", KEY_LIGHT, "X,Y,Z|head", 0,                                                       \
+            "Direction to the light, or from the eye (default: head); not with --no-shading, but " \
+            "for --effects",                                                                       \
+            group                                                                                  \
+    }
+#define TRIP_OPTIONS_EFFECTS(group)                                                                \
+    { "effects",                                                                                   \
+      KEY_EFFECTS,                                                                                 \
+      "auto|none|LIST",                                                                            \
+      0,                                                                                           \
+      "shadows (with scattering in fog, and a --light), occlusion (of light from everywhere), "    \
+      "cueing (of depth), joined by commas; auto: those that the kind of data calls for, which "   \
+      "for measurements are none; cpu, reference and integral only (default: none)",               \
+      group },                                                                                     \
+        { "anisotropy",                                                                            \
+          KEY_ANISOTROPY,                                                                          \
+          "G",                                                                                     \
+          0,                                                                                       \
+          "How fog scatters light: -0.95 backwards to 0.95 forwards (default: 0, alike)",          \
+          group },                                                                                 \
+        { "cueing",                                                                                \
+          KEY_CUEING,                                                                              \
+          "SHARE",                                                                                 \
+          0,                                                                                       \
+          "Of the background in what is farthest, above 0 to 1 (default: 0.6)",                    \
+          group },                                                                                 \
+    {                                                                                              \
+        "light-cells", KEY_LIGHT_CELLS, "N", 0,                                                    \
+            "Cells of the lattice of shadows and occlusion along the volume's longest side, 8 to " \
+            "1024 (default: 128)",                                                                 \
+            group                                                                                  \
+    }
+
+int trip_option_light(const char *text, triptych_settings *s);
+int trip_option_effects(const char *text, triptych_settings *s);
+int trip_option_anisotropy(const char *text, triptych_settings *s);
+int trip_option_cueing(const char *text, triptych_settings *s);
+int trip_option_light_cells(const char *text, triptych_settings *s);
+/* What does not go together, once all is parsed. */
+int trip_option_check_effects(const triptych_settings *s);
+
+#endif

@@ -1,0 +1,29 @@
+/* What the kernels need of a frame's effects (effects.h), by the axes of a list: u, v and sheet.
+ * Plain values. */
+#ifndef TRIP_CPU_EFFECTS_H
+#define TRIP_CPU_EFFECTS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* A lattice of what light reaches (light_grid.h). */
+typedef struct trip_cpu_light {
+    const float *at; /* NULL: it is not looked up */
+    int32_t step[3]; /* from a node to the next */
+    float last[3];   /* of nodes */
+    float per_voxel; /* nodes */
+} trip_cpu_light;
+
+typedef struct trip_cpu_effects {
+    bool some, lit, cued; /* any; shadows or occlusion; depth cueing */
+    /* From places of the list to those of level 0, in which what follows is. */
+    float scale[3], offset[3];
+    trip_cpu_light reached, open;
+    float towards[3];         /* the bias towards the light */
+    float aside[3][3];        /* and along a unit vector of the world: [u, v, sheet][world] */
+    float phase[3];           /* 1 - g^2, 1 + g^2, 2 g */
+    float cue[4], cue_rgb[3]; /* as of trip_effects_view */
+    float cueing;
+} trip_cpu_effects;
+
+#endif

@@ -1,0 +1,115 @@
+/* Effects on the colours of a vector of places, as effects.h of the renderers has them: included
+ * before the kernels that shade. */
+#ifndef TRIP_CPU_EFFECTS_TMPL_H
+#define TRIP_CPU_EFFECTS_TMPL_H
+
+#include "cpu/kernels/effects.h"
+#include "cpu/kernels/simd_tmpl.h"
+#include "shade.h"
+
+/* How a surface is lit: as trip_lit, and `gloss` what its highlight adds. */
+typedef struct surface {
+    vf strength, diffuse, gloss;
+    vf normal[3]; /* world space, unit length; anything where strength is 0 */
+} surface;
+
+INLINE vf within_01(vf a)
+{
+    return v_min(v_max(a, v_set(0)), v_set(1));
+}
+
+/* At places of level 0. */
+INLINE vf light_at(const trip_cpu_light *g, const vf place[3])
+{
+    vf part[3];
+    vi cell = vi_set(0);
+    for (int a = 0; a < 3; a++) {
+        const vf last = v_set(g->last[a]);
+        vf node = v_max(place[a] * v_set(g->per_voxel), v_set(0)); /* 0 for what is no number */
+        node = v_min(node, last);
+        vi whole = v_truncate(v_min(node, last - v_set(0.5f)));
+        part[a] = node - v_from_int(whole);
+        cell = cell + whole * g->step[a];
+    }
+    vf sum = v_set(0);
+    for (int n = 0; n < 8; n++) {
+        vf weight = n & 1 ? part[0] : v_set(1) - part[0];
+        weight = weight * (n & 2 ? part[1] : v_set(1) - part[1]);
+        weight = weight * (n & 4 ? part[2] : v_set(1) - part[2]);
+        const float *corner = g->at + (ptrdiff_t)(n & 1) * g->step[0] +
+                              (ptrdiff_t)(n >> 1 & 1) * g->step[1] +
+                              (ptrdiff_t)(n >> 2) * g->step[2];
+        sum = v_fma(weight, v_gather(corner, cell), sum);
+    }
+    return sum;
+}
+
+INLINE vf phase_of(const trip_cpu_effects *e, const vf light[3], const vf to_eye[3])
+{
+    vf turned = v_fma(light[0], to_eye[0], v_fma(light[1], to_eye[1], light[2] * to_eye[2]));
+    vf d = v_fma(v_set(e->phase[2]), turned, v_set(e->phase[1]));
+    return v_set(e->phase[0]) / (d * v_sqrt(d));
+}
+
+INLINE vf open_of(const trip_cpu_effects *e, const vf place[3], const surface *s)
+{
+    vf one[3], other[3];
+    for (int a = 0; a < 3; a++) {
+        vf aside = v_fma(s->normal[0], v_set(e->aside[a][0]),
+                         v_fma(s->normal[1], v_set(e->aside[a][1]),
+                               s->normal[2] * v_set(e->aside[a][2]))) *
+                   s->strength;
+        one[a] = place[a] + aside;
+        other[a] = place[a] - aside;
+    }
+    vf open = v_max(light_at(&e->open, one), light_at(&e->open, other));
+    return v_min(v_set(1), (v_set(1) + s->strength) * open);
+}
+
+INLINE void light_places(const trip_cpu_effects *e, const vf place[3], const surface *s,
+                         const vf light[3], const vf to_eye[3], vf rgb[3])
+{
+    vf reached = v_set(1), open = v_set(1), phase = v_set(1);
+    if (e->reached.at) {
+        vf nearer[3];
+        for (int a = 0; a < 3; a++)
+            nearer[a] = v_fma(s->strength, v_set(e->towards[a]), place[a]);
+        reached = light_at(&e->reached, nearer);
+        phase = phase_of(e, light, to_eye);
+    }
+    if (e->open.at)
+        open = open_of(e, place, s);
+    vf direct = v_fma(s->strength, s->diffuse - phase, phase) * reached;
+    vf matt = v_fma(v_set((float)TRIP_DIFFUSE), direct, v_set((float)TRIP_AMBIENT) * open);
+    for (int k = 0; k < 3; k++)
+        rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss * reached));
+}
+
+/* `at` is a place of the list, `light` and `to_eye` are unit vectors of the world. Not inlined:
+ * frames without effects are not to pay for it. */
+static __attribute__((noinline)) void effects_on(const trip_cpu_effects *e, const vf at[3],
+                                                 const surface *s, const vf light[3],
+                                                 const vf to_eye[3], vf rgb[3])
+{
+    vf place[3];
+    for (int a = 0; a < 3; a++)
+        place[a] = v_fma(at[a], v_set(e->scale[a]), v_set(e->offset[a]));
+    if (e->lit) {
+        light_places(e, place, s, light, to_eye, rgb);
+    } else {
+        const vf back = v_set((float)(TRIP_AMBIENT - 1));
+        vf matt = v_fma(s->strength, v_fma(s->diffuse, v_set((float)TRIP_DIFFUSE), back), v_set(1));
+        for (int k = 0; k < 3; k++)
+            rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss));
+    }
+    if (!e->cued)
+        return;
+    vf f = v_set(e->cue[3]);
+    for (int a = 0; a < 3; a++)
+        f = v_fma(place[a], v_set(e->cue[a]), f);
+    f = within_01(f) * v_set(e->cueing);
+    for (int k = 0; k < 3; k++)
+        rgb[k] = v_fma(v_set(e->cue_rgb[k]) - rgb[k], f, rgb[k]);
+}
+
+#endif

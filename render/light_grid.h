@@ -1,0 +1,45 @@
+/* Numbers at the nodes of a coarse lattice over a volume: node i along an axis lies at the voxel
+ * index i * spacing, from the first voxel to the last or just beyond it. Between nodes they are
+ * interpolated linearly, beyond them as at the nearest. Plain values; read-only once filled, for
+ * any number of threads. */
+#ifndef TRIP_LIGHT_GRID_H
+#define TRIP_LIGHT_GRID_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "geometry.h"
+
+typedef struct trip_light_grid {
+    double spacing; /* voxels, whole */
+    int nodes[3];   /* along i, j, k: 2 or more */
+    float *at;      /* i fastest */
+} trip_light_grid;
+
+/* The lattice over a volume of `dims` voxels that has at most `cells` cells along the longest axis,
+ * `stride` of which then become one; without numbers. */
+static inline trip_light_grid trip_light_grid_over(const uint64_t dims[3], int cells, int stride)
+{
+    uint64_t longest = 1;
+    for (int a = 0; a < 3; a++)
+        longest = dims[a] - 1 > longest ? dims[a] - 1 : longest;
+    uint64_t spacing = (longest + (uint64_t)cells - 1) / (uint64_t)cells * (uint64_t)stride;
+    trip_light_grid g = { .spacing = (double)spacing };
+    for (int a = 0; a < 3; a++) {
+        g.nodes[a] = (int)((dims[a] - 1 + spacing - 1) / spacing) + 1;
+        g.nodes[a] = g.nodes[a] < 2 ? 2 : g.nodes[a];
+    }
+    return g;
+}
+
+static inline size_t trip_light_grid_count(const trip_light_grid *g)
+{
+    return (size_t)g->nodes[0] * (size_t)g->nodes[1] * (size_t)g->nodes[2];
+}
+
+/* At a place in units of nodes. */
+double trip_light_grid_at_node(const trip_light_grid *g, const double node[3]);
+/* At a place in index space. */
+double trip_light_grid_at(const trip_light_grid *g, trip_vec3 voxel);
+
+#endif

@@ -1,0 +1,499 @@
+#include "light_map.h"
+
+#include <string.h>
+
+#include "frame.h"
+#include "report.h"
+
+enum { CODES = 65536, SLOTS = 4, SLOT_BYTES = 256 << 10 };
+
+/* What is to be done next. */
+typedef enum stage { GATHER, SWEEP_REACHED, SWEEP_OPEN, COMPLETE } stage;
+
+struct trip_light_map {
+    trip_budget *budget;
+    trip_light_source source; /* of the frame */
+
+    /* What the extinction was gathered for. */
+    bool has_key, pre;
+    const trip_dataset *data;
+    unsigned level;
+    trip_clip clip;
+    float extinctions[CODES];   /* per world unit, by code */
+    uint32_t shown[CODES + 1];  /* how many codes below have some */
+    trip_vec3 light_direction;  /* that `reached` is made for */
+    bool has_reached, has_open; /* they are complete */
+
+    /* Sums of extinctions while they are gathered; then floats, and behind them those of `reached`.
+     */
+    double *memory;
+    trip_light_grid extinction, reached, open;
+    size_t nodes, open_nodes;
+
+    stage stage;
+    trip_reader *reader; /* while it gathers; else NULL */
+    trip_selection selections[TRIP_KINDS];
+    trip_pass pass;
+    trip_light_sweep sweep;
+    bool sweeping;
+    int direction; /* of `open`, being swept */
+    trip_light_stats stats;
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
+};
+
+int trip_light_map_create(trip_light_map **out, trip_budget *budget)
+{
+    trip_light_map *m = *out = trip_budget_take(budget, sizeof *m);
+    if (!m)
+        return trip_fail(TRIP_ERROR, "render", "light", "out of memory; raise --memory");
+    m->budget = budget;
+    m->stage = COMPLETE;
+    return 0;
+}
+
+static void stop_gathering(trip_light_map *m)
+{
+    trip_reader_destroy(m->reader);
+    m->reader = NULL;
+    for (unsigned i = 0; i < m->pass.selection_count; i++)
+        trip_selection_destroy(&m->selections[i], m->budget);
+    m->pass = (trip_pass){ 0 };
+}
+
+static void stop_sweeping(trip_light_map *m)
+{
+    trip_light_sweep_end(&m->sweep);
+    m->sweeping = false;
+    m->direction = 0;
+}
+
+static void drop_open(trip_light_map *m)
+{
+    if (m->open.at)
+        trip_budget_release(m->budget, m->open.at, m->open_nodes * sizeof *m->open.at);
+    m->open.at = NULL;
+    m->has_open = false;
+}
+
+static void drop_all(trip_light_map *m)
+{
+    stop_gathering(m);
+    stop_sweeping(m);
+    drop_open(m);
+    if (m->memory)
+        trip_budget_release(m->budget, m->memory, m->nodes * sizeof *m->memory);
+    m->memory = NULL;
+    m->has_key = m->has_reached = false;
+}
+
+void trip_light_map_destroy(trip_light_map *m)
+{
+    if (!m)
+        return;
+    drop_all(m);
+    trip_budget_release(m->budget, m, sizeof *m);
+}
+
+/* ---- what is the same as before ---- */
+
+static bool same_clip(const trip_clip *a, const trip_clip *b)
+{
+    bool same = a->count == b->count;
+    for (int i = 0; i < a->count && same; i++) {
+        const trip_half_space *p = &a->planes[i], *q = &b->planes[i];
+        same = p->offset == q->offset && p->normal.x == q->normal.x && p->normal.y == q->normal.y &&
+               p->normal.z == q->normal.z;
+    }
+    return same;
+}
+
+static bool same_function(const trip_light_map *m, const trip_tf_entry *table)
+{
+    for (int code = 0; code < CODES; code++)
+        if (m->extinctions[code] != table[code].extinction)
+            return false;
+    return true;
+}
+
+static bool is_gathered_for(const trip_light_map *m, const trip_light_source *s)
+{
+    const trip_light_grid grid =
+        trip_light_grid_over(s->data->header.dims, s->settings->effects.cells, 1);
+    return m->has_key && m->data == s->data && m->level == s->level &&
+           m->pre == (s->settings->classify == TRIP_CLASSIFY_PRE) &&
+           m->extinction.spacing == grid.spacing && same_clip(&m->clip, s->clip) &&
+           same_function(m, s->table);
+}
+
+static bool same_light(const trip_light_map *m, trip_vec3 light)
+{
+    return m->light_direction.x == light.x && m->light_direction.y == light.y &&
+           m->light_direction.z == light.z;
+}
+
+/* ---- beginning ---- */
+
+static int no_memory(const trip_light_grid *g, size_t bytes)
+{
+    char text[32];
+    return trip_fail(TRIP_ERROR, "render", "light",
+                     "a grid of %d x %d x %d nodes takes %s, which the memory given does not have; "
+                     "raise --memory or lower --light-cells",
+                     g->nodes[0], g->nodes[1], g->nodes[2], trip_format_bytes(bytes, text));
+}
+
+static void note_key(trip_light_map *m, const trip_light_source *s)
+{
+    m->data = s->data;
+    m->level = s->level;
+    m->pre = s->settings->classify == TRIP_CLASSIFY_PRE;
+    m->clip = *s->clip;
+    for (int code = 0; code < CODES; code++) {
+        m->extinctions[code] = s->table[code].extinction;
+        m->shown[code + 1] = m->shown[code] + (m->extinctions[code] > 0);
+    }
+    m->has_key = true;
+}
+
+static int take_grids(trip_light_map *m, const trip_light_source *s)
+{
+    const int cells = s->settings->effects.cells;
+    m->extinction = m->reached = trip_light_grid_over(s->data->header.dims, cells, 1);
+    m->open = trip_light_grid_over(s->data->header.dims, cells, TRIP_OPEN_STRIDE);
+    m->nodes = trip_light_grid_count(&m->extinction);
+    m->open_nodes = trip_light_grid_count(&m->open);
+    size_t columns = trip_light_sweep_most_bytes(&m->reached);
+    bool fits = trip_budget_left_bytes(m->budget) > m->nodes * sizeof *m->memory + columns;
+    m->memory = fits ? trip_budget_take(m->budget, m->nodes * sizeof *m->memory) : NULL;
+    if (!m->memory)
+        return no_memory(&m->extinction, m->nodes * sizeof *m->memory + columns);
+    m->extinction.at = (float *)m->memory;
+    m->reached.at = m->extinction.at + m->nodes;
+    return 0;
+}
+
+/* The axis of the list that is read. */
+static int axis_of(const trip_light_source *s)
+{
+    trip_affine to_index;
+    trip_affine_invert(&s->data->index_to_world, &to_index); /* it was checked on opening */
+    trip_vec3 light = trip_affine_vector(&to_index, s->settings->light_direction);
+    int axis = 2;
+    for (int a = 0; a < 2 && s->settings->effects.shadows; a++)
+        if (fabs(trip_component(light, a)) > fabs(trip_component(light, axis)))
+            axis = a;
+    return axis;
+}
+
+static bool is_read(const trip_light_source *s, const trip_list *list, int axis)
+{
+    const trip_kind_info *kind = trip_kind_of(list->kind);
+    bool pre = s->settings->classify == TRIP_CLASSIFY_PRE;
+    return list->axis == axis && list->level == 0 && list->records > 0 &&
+           (pre ? kind->splatted && !kind->coarse : kind->lattice);
+}
+
+/* All bricks in which the function shows something. */
+static int select_list(trip_light_map *m, const trip_list *list)
+{
+    trip_selection *s = &m->selections[m->pass.selection_count];
+    int status =
+        trip_selection_create(s, m->data, list, false, 0, list->dims[list->axis] - 1, m->budget);
+    bool some = false;
+    for (uint64_t i = 0; i < list->brick_count && !status; i++) {
+        const trip_file_brick *brick = &list->bricks[i];
+        if (m->shown[brick->code_max + 1] > m->shown[brick->code_min]) {
+            trip_selection_add(s, i);
+            some = true;
+        }
+    }
+    if (some)
+        m->pass.selection_count++;
+    else if (!status)
+        trip_selection_destroy(s, m->budget);
+    return status;
+}
+
+static int start_gathering(trip_light_map *m, const trip_light_source *s)
+{
+    const int axis = axis_of(s);
+    int status = 0;
+    m->pass = (trip_pass){ .selections = m->selections };
+    for (unsigned i = 0; i < s->data->list_count && !status; i++)
+        if (is_read(s, &s->data->lists[i], axis) && m->pass.selection_count < TRIP_KINDS)
+            status = select_list(m, &s->data->lists[i]);
+    if (status || m->pass.selection_count == 0)
+        return status;
+    const trip_reader_params params = {
+        .engine = s->engine == TRIP_ENGINE_NULL ? TRIP_ENGINE_AUTO : s->engine,
+        .planes = 1u << TRIP_PLANE_VOXELS,
+        .slots = SLOTS,
+        .slot_bytes = trip_reader_slot_bytes(s->data, 1u << TRIP_PLANE_VOXELS, SLOT_BYTES),
+        .threads = s->threads,
+    };
+    status = trip_reader_create(&m->reader, s->data, &params, m->budget);
+    return status ? status : trip_reader_begin(m->reader, &m->pass);
+}
+
+static int gather_anew(trip_light_map *m, const trip_light_source *s)
+{
+    drop_all(m);
+    note_key(m, s);
+    int status = take_grids(m, s);
+    if (!status)
+        status = start_gathering(m, s);
+    if (status)
+        drop_all(m);
+    m->stage = GATHER;
+    return status;
+}
+
+static int take_open(trip_light_map *m)
+{
+    const size_t bytes = m->open_nodes * sizeof *m->open.at;
+    m->open.at = trip_budget_take(m->budget, bytes);
+    return m->open.at ? 0 : no_memory(&m->open, bytes);
+}
+
+/* What is left to do once the extinction is there. */
+static stage next_stage(const trip_light_map *m)
+{
+    const trip_effects *e = &m->source.settings->effects;
+    return e->shadows && !m->has_reached  ? SWEEP_REACHED
+           : e->occlusion && !m->has_open ? SWEEP_OPEN
+                                          : COMPLETE;
+}
+
+int trip_light_map_begin(trip_light_map *m, const trip_light_source *s)
+{
+    const trip_effects *e = &s->settings->effects;
+    int status = 0;
+    m->source = *s;
+    m->stats = (trip_light_stats){ 0 };
+    if (!is_gathered_for(m, s))
+        status = gather_anew(m, s);
+    if (!status && e->occlusion && !m->open.at)
+        status = take_open(m);
+    if (!e->occlusion)
+        drop_open(m);
+    if (status)
+        return status;
+    const bool same = same_light(m, s->settings->light_direction);
+    m->has_reached &= same;
+    m->light_direction = s->settings->light_direction;
+    if (m->stage != GATHER && !(same && m->stage == next_stage(m))) {
+        stop_sweeping(m);
+        m->stage = next_stage(m);
+    }
+    return 0;
+}
+
+/* ---- gathering ---- */
+
+/* Adds to the nodes around a voxel in proportion to how near they are: all shares make 1. */
+static void add_voxel(trip_light_map *m, const int64_t at[3], double extinction)
+{
+    const trip_light_grid *g = &m->extinction;
+    const size_t step[3] = { 1, (size_t)g->nodes[0], (size_t)g->nodes[0] * (size_t)g->nodes[1] };
+    const int64_t spacing = (int64_t)g->spacing;
+    double *first = m->memory, part[3];
+    for (int a = 0; a < 3; a++) {
+        first += (size_t)(at[a] / spacing) * step[a];
+        part[a] = (double)(at[a] % spacing) / g->spacing;
+    }
+    for (int n = 0; n < 8; n++) {
+        double share = extinction;
+        size_t corner = 0;
+        for (int a = 0; a < 3; a++) {
+            share *= n >> a & 1 ? part[a] : 1 - part[a];
+            corner += (size_t)(n >> a & 1) * step[a];
+        }
+        if (share > 0)
+            first[corner] += share;
+    }
+}
+
+static void gather_run(trip_light_map *m, const trip_batch *batch, const trip_run *run)
+{
+    const trip_block block = trip_block_of(batch, run);
+    const int axis = trip_batch_list(batch, run)->axis;
+    trip_block_voxels(&block, 0, run->count, m->voxels);
+    for (uint32_t n = 0; n < run->count; n++) {
+        const double extinction = (double)m->extinctions[trip_voxel_code(m->voxels[n])];
+        if (!(extinction > 0))
+            continue;
+        int64_t at[3];
+        at[axis] = run->sheet;
+        at[(axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(m->voxels[n]);
+        at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(m->voxels[n]);
+        if (trip_clip_has(&m->clip, trip_v3((double)at[0], (double)at[1], (double)at[2])))
+            add_voxel(m, at, extinction);
+    }
+}
+
+/* What the shares of all voxels of the grid along an axis make at a node. */
+static double shares_at(const trip_light_map *m, int axis, int node)
+{
+    const int64_t spacing = (int64_t)m->extinction.spacing, middle = node * spacing;
+    const int64_t last = (int64_t)m->data->header.dims[axis] - 1;
+    double sum = 0;
+    for (int64_t i = middle - spacing + 1; i < middle + spacing; i++)
+        if (i >= 0 && i <= last)
+            sum +=
+                (double)(spacing - (i < middle ? middle - i : i - middle)) / m->extinction.spacing;
+    return sum;
+}
+
+/* Sums into means, as floats, each before what is still to be read. */
+static void finish_gathering(trip_light_map *m)
+{
+    const trip_light_grid *g = &m->extinction;
+    size_t n = 0;
+    for (int k = 0; k < g->nodes[2]; k++)
+        for (int j = 0; j < g->nodes[1]; j++) {
+            double row = shares_at(m, 2, k) * shares_at(m, 1, j);
+            for (int i = 0; i < g->nodes[0]; i++, n++) {
+                double sum;
+                memcpy(&sum, &m->memory[n], sizeof sum);
+                float mean = sum > 0 ? (float)(sum / (row * shares_at(m, 0, i))) : 0;
+                memcpy(&g->at[n], &mean, sizeof mean);
+            }
+        }
+    stop_gathering(m);
+}
+
+static int gather(trip_light_map *m)
+{
+    trip_batch batch;
+    int status = 0;
+    if (m->reader && !trip_reader_await(m->reader, 0))
+        return TRIP_FRAME_WAITS;
+    if (m->reader)
+        status = trip_reader_next(m->reader, &batch);
+    if (status < 0) {
+        drop_all(m);
+        return status;
+    }
+    if (status > 0) {
+        for (size_t i = 0; i < batch.run_count; i++)
+            gather_run(m, &batch, &batch.runs[i]);
+        m->stats.splats += batch.splats;
+        trip_reader_release(m->reader, &batch);
+        return TRIP_FRAME_MORE;
+    }
+    if (m->reader) {
+        const trip_reader_stats read = trip_reader_get_stats(m->reader);
+        m->stats.bytes_read = read.bytes_read;
+        m->stats.reads = read.reads;
+    }
+    finish_gathering(m);
+    m->stage = next_stage(m);
+    return TRIP_FRAME_MORE;
+}
+
+/* ---- sweeps ---- */
+
+/* A world direction of unit length. */
+static bool begin_sweep(trip_light_map *m, trip_light_grid *out, double weight, trip_vec3 direction)
+{
+    trip_affine to_index;
+    trip_affine_invert(&m->data->index_to_world, &to_index);
+    m->sweep = (trip_light_sweep){ .extinction = &m->extinction, .out = out, .weight = weight };
+    for (int a = 0; a < 3; a++)
+        m->sweep.last[a] = (double)m->data->header.dims[a] - 1;
+    m->sweeping =
+        trip_light_sweep_begin(&m->sweep, trip_affine_vector(&to_index, direction), 1, m->budget);
+    return m->sweeping;
+}
+
+/* The first time, the grid starts from 0. */
+static int start_sweep(trip_light_map *m)
+{
+    bool open = m->stage == SWEEP_OPEN;
+    trip_light_grid *out = open ? &m->open : &m->reached;
+    if (m->direction == 0)
+        memset(out->at, 0, (open ? m->open_nodes : m->nodes) * sizeof *out->at);
+    if (begin_sweep(m, out, open ? 1.0 / TRIP_OPEN_DIRECTIONS : 1,
+                    open ? trip_effects_direction(m->direction) : m->light_direction))
+        return 0;
+    return no_memory(out, trip_light_sweep_most_bytes(out));
+}
+
+/* A layer. */
+static int sweep(trip_light_map *m)
+{
+    int status = m->sweeping ? 0 : start_sweep(m);
+    if (status)
+        return status;
+    if (trip_light_sweep_step(&m->sweep))
+        return TRIP_FRAME_MORE;
+    trip_light_sweep_end(&m->sweep);
+    m->sweeping = false;
+    if (m->stage == SWEEP_OPEN && ++m->direction < TRIP_OPEN_DIRECTIONS)
+        return TRIP_FRAME_MORE;
+    m->direction = 0;
+    m->has_reached |= m->stage == SWEEP_REACHED;
+    m->has_open |= m->stage == SWEEP_OPEN;
+    m->stage = next_stage(m);
+    return TRIP_FRAME_MORE;
+}
+
+int trip_light_map_step(trip_light_map *m)
+{
+    const uint64_t start = trip_frame_now_ns();
+    if (m->stage == COMPLETE)
+        return TRIP_FRAME_DONE;
+    bool gathers = m->stage == GATHER;
+    int status = gathers ? gather(m) : sweep(m);
+    double ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    m->stats.gather_ms += gathers ? ms : 0;
+    m->stats.sweep_ms += gathers ? 0 : ms;
+    return status;
+}
+
+void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns)
+{
+    if (m->stage == GATHER && m->reader)
+        trip_reader_await(m->reader, timeout_ns);
+}
+
+bool trip_light_map_is_complete(const trip_light_map *m)
+{
+    return m->stage == COMPLETE;
+}
+
+const trip_light_grid *trip_light_map_reached(const trip_light_map *m)
+{
+    return m->source.settings->effects.shadows ? &m->reached : NULL;
+}
+
+const trip_light_grid *trip_light_map_open(const trip_light_map *m)
+{
+    return m->source.settings->effects.occlusion ? &m->open : NULL;
+}
+
+static double reached_at(const void *user, trip_vec3 voxel)
+{
+    return trip_light_grid_at(&((const trip_light_map *)user)->reached, voxel);
+}
+
+static double open_at(const void *user, trip_vec3 voxel)
+{
+    return trip_light_grid_at(&((const trip_light_map *)user)->open, voxel);
+}
+
+void trip_light_map_view(const trip_light_map *m, trip_effects_view *view)
+{
+    view->user = m;
+    view->reached = reached_at;
+    view->open = open_at;
+}
+
+trip_light_stats trip_light_map_stats(const trip_light_map *m)
+{
+    trip_light_stats stats = m->stats;
+    stats.memory_bytes = m->nodes * sizeof *m->memory;
+    if (m->open.at)
+        stats.memory_bytes += m->open_nodes * sizeof *m->open.at;
+    return stats;
+}

@@ -1,0 +1,493 @@
+/* Shadows, scattering, ambient occlusion and depth cueing: the integral against closed forms, the
+ * others against it and one another. */
+#include "effects.h"
+#include "light_map.h"
+#include "scenes.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { EDGE = 20, SIZE = 9 };
+#define FOG 0.05
+
+static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
+
+static trip_settings with_shadows(trip_vec3 to_light)
+{
+    trip_settings s = trip_settings_default();
+    s.classify = TRIP_CLASSIFY_POST;
+    s.slices = 4;
+    s.shading = s.headlight = false;
+    s.light_direction = trip_normalize(to_light);
+    s.background[3] = 0;
+    s.tolerance = 1e-5;
+    s.effects.shadows = true;
+    return s;
+}
+
+/* Constant fog, white. */
+static void create_fog(scene *s, float extinction)
+{
+    scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
+    for (int code = 0; code < 65536; code++)
+        s->table[code] = (trip_tf_entry){ 1, 1, 1, extinction };
+}
+
+static trip_camera_params along_z(const scene *s)
+{
+    trip_camera_params view = scene_view(s, trip_v3(0, 0, 1), 60, 30, SIZE);
+    view.ortho_height = 18;
+    return view;
+}
+
+/* Where the ray of a pixel is along x. */
+static double place_x(const scene *s, const trip_camera_params *view, int x, int y)
+{
+    trip_vec3 o, d;
+    scene_ray(s, view, x, y, &o, &d);
+    return o.x;
+}
+
+static scene_picture integrate(const scene *s, const trip_camera_params *view,
+                               const trip_settings *settings)
+{
+    return scene_integrate(s, view, settings, &(scene_making){ 0 });
+}
+
+/* The light of a slab that is lit from the side is attenuated by what lies beside. */
+static double lit_from_the_side(double x, double g)
+{
+    const double depth = EDGE - 1, phase = (1 - g * g) / pow(1 + g * g, 1.5);
+    return (1 - exp(-FOG * depth)) * (0.3 + 0.7 * phase * exp(-FOG * (depth - x)));
+}
+
+static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
+{
+    (void)state;
+    scene s;
+    create_fog(&s, (float)FOG);
+    const trip_camera_params view = along_z(&s);
+    for (int n = 0; n < 2; n++) {
+        trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+        settings.effects.anisotropy = 0.4 * n;
+        scene_picture exact = integrate(&s, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        for (int x = 0; x < SIZE; x++) {
+            double expected =
+                lit_from_the_side(place_x(&s, &view, x, 4), settings.effects.anisotropy);
+            assert_close(scene_pixel(&exact, x, 4)[0], expected, 2e-5);
+        }
+        while (strcmp(turn.next->name ? turn.next->name : "gl", "gl") && scene_take_turn(&turn))
+            assert_true(scene_difference(&turn.picture, &exact) < 5e-4);
+        if (turn.renderer)
+            scene_picture_free(&turn.picture);
+        scene_picture_free(&exact);
+    }
+    scene_destroy(&s);
+}
+
+/* From the eye's side: light and view pass the same, turned back by 180 degrees. */
+static void fog_lit_from_the_front_scatters_backwards(void **state)
+{
+    (void)state;
+    scene s;
+    create_fog(&s, (float)FOG);
+    const trip_camera_params view = along_z(&s);
+    trip_settings settings = with_shadows(trip_v3(0, 0, 1));
+    settings.effects.anisotropy = 0.3;
+    const double g = 0.3, depth = FOG * (EDGE - 1), phase = (1 - g * g) / pow(1 + g, 3);
+    scene_picture exact = integrate(&s, &view, &settings);
+    scene_picture coarse = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+    double expected = 0.3 * (1 - exp(-depth)) + 0.7 * phase * (1 - exp(-2 * depth)) / 2;
+    assert_close(scene_pixel(&exact, 4, 4)[0], expected, 2e-5);
+    assert_close(scene_pixel(&coarse, 4, 4)[0], expected, 1e-3);
+    scene_picture_free(&coarse);
+    scene_picture_free(&exact);
+    scene_destroy(&s);
+}
+
+/* Two slabs across x, empty between: voxels 4 to 7 and 13 to 16. */
+static bool two_slabs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = (i >= 4 && i <= 7) || (i >= 13 && i <= 16) ? 65535 : 0;
+    return true;
+}
+
+/* Extinction over its maximum at x, and its integral from x on: linear between voxels. */
+static double slabs_at(double x, double *beyond)
+{
+    double here = 0;
+    *beyond = 0;
+    for (int i = 0; i < EDGE; i++) {
+        unsigned code;
+        two_slabs(NULL, i, 0, 0, &code, NULL);
+        double d = x - i, weight = fmax(0, 1 - fabs(d)), half = 0.5 * weight * weight;
+        if (!code)
+            continue;
+        here += weight;
+        *beyond += d >= 1 ? 0 : d >= 0 ? half : d > -1 ? 1 - half : 1;
+    }
+    return here;
+}
+
+static void a_box_casts_its_shadow_on_the_next(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = two_slabs });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)(0.4 * code / 65535) };
+    const trip_camera_params view = along_z(&s);
+    const trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+    scene_picture exact = integrate(&s, &view, &settings);
+    scene_picture coarse = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+    int seen = 0;
+    for (int x = 0; x < SIZE; x++) {
+        double beyond, here = slabs_at(place_x(&s, &view, x, 4), &beyond);
+        double expected = (1 - exp(-0.4 * here * (EDGE - 1))) * (0.3 + 0.7 * exp(-0.4 * beyond));
+        assert_close(scene_pixel(&exact, x, 4)[0], expected, 1e-4);
+        assert_close(scene_pixel(&coarse, x, 4)[0], expected, 0.01);
+        seen += here > 0;
+    }
+    assert_true(seen >= 4);
+    scene_picture_free(&coarse);
+    scene_picture_free(&exact);
+    scene_destroy(&s);
+}
+
+enum { BALL = 33 };
+
+/* A ball of fog with a soft rim, and gradients away from its middle. */
+static bool ball(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const double c = 0.5 * (BALL - 1), d[3] = { i - c, j - c, k - c };
+    double r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    double value = fmin(1, fmax(0, (13 - r) / 4));
+    (void)user;
+    *code = (unsigned)(65535 * value);
+    for (int a = 0; a < 3 && value > 0 && value < 1; a++)
+        gradient[a] = -d[a] / r / 4;
+    return true;
+}
+
+static void create_ball(scene *s, double extinction, const trip_affine *map)
+{
+    scene_create(s, &(scene_params){ .dims = { BALL, BALL, BALL },
+                                     .index_to_world = *map,
+                                     .normals = true,
+                                     .voxel = ball });
+    for (int code = 0; code < 65536; code++)
+        s->table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, (float)(extinction * code / 65535) };
+}
+
+static double off(const scene_picture *a, const scene_picture *b)
+{
+    double sum = 0;
+    size_t count = 4 * (size_t)a->width * (size_t)a->height;
+    for (size_t i = 0; i < count; i++)
+        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
+    return sum / (double)count;
+}
+
+/* Against the double integral: from a place of the ray, on towards the light. */
+static void the_error_falls_as_the_lattice_becomes_finer(void **state)
+{
+    (void)state;
+    const trip_affine maps[2] = { trip_affine_identity(), sheared };
+    for (int n = 0; n < 2; n++) {
+        scene s;
+        create_ball(&s, 0.15, &maps[n]);
+        const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, SIZE);
+        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        settings.tolerance = 1e-4;
+        settings.effects.anisotropy = 0.3;
+        scene_picture exact = integrate(&s, &view, &settings);
+        double before = 1;
+        for (int cells = 8; cells <= 32; cells *= 2) {
+            settings.effects.cells = cells;
+            scene_picture p = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+            double error = off(&p, &exact);
+            if (!(error < before / 1.8))
+                fail_msg("%d cells: %g, before %g", cells, error, before);
+            before = error;
+            scene_picture_free(&p);
+        }
+        assert_true(before < 1e-3);
+        scene_picture_free(&exact);
+        scene_destroy(&s);
+    }
+}
+
+static void openness_is_the_mean_over_directions(void **state)
+{
+    (void)state;
+    scene s;
+    const trip_affine map = trip_affine_identity();
+    create_ball(&s, 0.15, &map);
+    const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, 5);
+    trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+    settings.effects.shadows = false;
+    settings.effects.occlusion = true;
+    settings.tolerance = 1e-2;
+    scene_picture exact = integrate(&s, &view, &settings);
+    scene_picture p = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+    assert_true(scene_difference(&p, &exact) < 0.015);
+    settings.effects.occlusion = false;
+    scene_picture plain = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+    assert_true(scene_difference(&p, &plain) > 0.05);
+    scene_picture_free(&plain);
+    scene_picture_free(&p);
+    scene_picture_free(&exact);
+    scene_destroy(&s);
+}
+
+static void every_renderer_draws_them_alike(void **state)
+{
+    (void)state;
+    scene s;
+    create_ball(&s, 0.6, &sheared);
+    trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 24);
+    for (int n = 0; n < 8; n++) {
+        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+        settings.shading = n & 2;
+        settings.effects.occlusion = n & 4;
+        settings.effects.cueing = n & 4 ? 0.5 : 0;
+        settings.effects.anisotropy = -0.3;
+        view.ortho_height = n & 2 ? 50 : 0;
+        scene_picture reference = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+        scene_picture cpu = scene_draw(&s, &scene_renderers()[1], &view, &settings);
+        double apart = scene_difference(&reference, &cpu);
+        if (!(apart < scene_renderers()[1].tolerance))
+            fail_msg("%d: %g apart", n, apart);
+        scene_picture_free(&cpu);
+        scene_picture_free(&reference);
+    }
+    scene_destroy(&s);
+}
+
+static int create_single(trip_renderer **out, trip_budget *budget)
+{
+    return trip_cpu_create(out, budget, 1);
+}
+
+static void threads_and_slots_change_no_bit(void **state)
+{
+    (void)state;
+    scene s;
+    const trip_affine map = trip_affine_identity();
+    create_ball(&s, 0.6, &map);
+    const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 40);
+    const scene_renderer single = { "cpu", create_single, 0 };
+    for (int n = 0; n < 2; n++) {
+        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        settings.classify = n ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+        settings.effects.occlusion = settings.shading = true;
+        scene_picture a = scene_draw(&s, &scene_renderers()[1], &view, &settings);
+        scene_picture b = scene_draw_with(
+            &s, &single, &view, &settings,
+            &(trip_reader_params){ .engine = TRIP_ENGINE_PREAD, .slots = 2, .buffered = true });
+        assert_memory_equal(a.rgba, b.rgba, 4 * 40 * 40 * sizeof *a.rgba);
+        scene_picture_free(&a);
+        scene_picture_free(&b);
+    }
+    scene_destroy(&s);
+}
+
+/* What is all but clear neither shades nor hides. */
+static void in_a_clear_volume_effects_change_nothing(void **state)
+{
+    (void)state;
+    scene s;
+    const trip_affine map = trip_affine_identity();
+    create_ball(&s, 1e-4, &map);
+    const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 16);
+    for (int n = 0; n < 4; n++) {
+        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+        settings.shading = n & 2;
+        settings.effects.occlusion = true;
+        scene_picture with = scene_draw(&s, &scene_renderers()[1], &view, &settings);
+        settings.effects = (trip_effects){ .cells = TRIP_LIGHT_CELLS };
+        scene_picture without = scene_draw(&s, &scene_renderers()[1], &view, &settings);
+        assert_true(scene_difference(&with, &without) < 1e-5);
+        scene_picture_free(&with);
+        scene_picture_free(&without);
+    }
+    scene_destroy(&s);
+}
+
+/* A wall across the view, opaque, at voxel *user along z. */
+static bool wall(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)i;
+    (void)j;
+    (void)gradient;
+    *code = k <= *(int *)user ? 65535 : 0;
+    return true;
+}
+
+static void what_is_farther_fades_into_the_background(void **state)
+{
+    (void)state;
+    for (int at = 3; at < EDGE; at += 6) {
+        scene s;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = wall, .user = &at });
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ 1, 0.5F, 0, code > 65000 ? 50 : 0 };
+        const trip_camera_params view = along_z(&s);
+        trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+        settings.effects.shadows = false;
+        settings.effects.cueing = 0.8;
+        settings.background[2] = 1;
+        const double far = (double)(EDGE - 1 - at) / (EDGE - 1), f = 0.8 * far;
+        for (int n = 0; n < 3; n++) {
+            scene_picture p = n < 2 ? scene_draw(&s, &scene_renderers()[n], &view, &settings)
+                                    : integrate(&s, &view, &settings);
+            const float *c = scene_pixel(&p, 4, 4);
+            assert_close(c[0], 1 - f, 0.8 * 0.3 / (EDGE - 1));
+            assert_close(c[1], 0.5 * (1 - f), 0.8 * 0.3 / (EDGE - 1));
+            assert_close(c[2], f, 0.8 * 0.3 / (EDGE - 1));
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+static void scattering_keeps_light(void **state)
+{
+    (void)state;
+    enum { STEPS = 20000 };
+    for (double g = -0.9; g < 0.95; g += 0.3) {
+        double sum = 0;
+        for (int n = 0; n < STEPS; n++)
+            sum += trip_effects_phase(g, (2 * n + 1.0) / STEPS - 1) / STEPS;
+        assert_close(sum, 1, 1e-4);
+    }
+}
+
+static void directions_are_spread_evenly(void **state)
+{
+    (void)state;
+    trip_vec3 sum = { 0, 0, 0 };
+    for (int n = 0; n < TRIP_OPEN_DIRECTIONS; n++) {
+        trip_vec3 d = trip_effects_direction(n);
+        assert_close(trip_length(d), 1, 1e-12);
+        sum = trip_add(sum, d);
+        for (int m = 0; m < n; m++)
+            assert_true(trip_dot(d, trip_effects_direction(m)) < 0.95);
+    }
+    assert_true(trip_length(sum) / TRIP_OPEN_DIRECTIONS < 0.02);
+}
+
+/* The second frame reads nothing where the view alone has changed; the light takes a sweep; the
+ * function takes all. */
+static void the_lattice_is_kept_until_something_changes(void **state)
+{
+    (void)state;
+    scene s;
+    trip_light_map *m;
+    const trip_affine map = trip_affine_identity();
+    const trip_clip none = { 0 };
+    create_ball(&s, 0.6, &map);
+    trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    const trip_light_source source = {
+        .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
+    };
+    assert_int_equal(trip_light_map_create(&m, s.budget), 0);
+    for (int n = 0; n < 4; n++) {
+        if (n == 2)
+            settings.light_direction = trip_v3(0, 1, 0);
+        if (n == 3)
+            s.table[40000].extinction *= 2;
+        assert_int_equal(trip_light_map_begin(m, &source), 0);
+        int status;
+        assert_true(trip_light_map_is_complete(m) == (n == 1));
+        while ((status = trip_light_map_step(m)) > 0)
+            trip_light_map_await(m, UINT64_MAX);
+        assert_int_equal(status, TRIP_FRAME_DONE);
+        assert_true((trip_light_map_stats(m).bytes_read > 0) == (n == 0 || n == 3));
+    }
+    trip_light_map_destroy(m);
+    scene_destroy(&s);
+}
+
+static void a_lattice_that_does_not_fit_is_refused(void **state)
+{
+    (void)state;
+    scene s;
+    trip_light_map *m;
+    const trip_affine map = trip_affine_identity();
+    const trip_clip none = { 0 };
+    create_ball(&s, 0.6, &map);
+    const trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    const trip_light_source source = {
+        .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
+    };
+    assert_int_equal(trip_light_map_create(&m, s.budget), 0);
+    uint64_t most = trip_budget_left_bytes(s.budget) - 100000;
+    assert_true(trip_budget_charge(s.budget, most));
+    test_catch_reports();
+    assert_true(trip_light_map_begin(m, &source) < 0);
+    assert_one_report("33 x 33 x 33 nodes");
+    trip_budget_discharge(s.budget, most);
+    trip_light_map_destroy(m);
+    scene_destroy(&s);
+}
+
+static void a_renderer_without_effects_refuses_them(void **state)
+{
+    (void)state;
+    const trip_renderer_ops ops = { .name = "plain", .classifies_post = true };
+    trip_renderer plain = { .ops = &ops };
+    trip_drawing drawing;
+    trip_camera camera;
+    trip_plan plan;
+    trip_reader *reader;
+    scene s;
+    create_fog(&s, (float)FOG);
+    const trip_camera_params view = along_z(&s);
+    trip_settings settings = with_shadows(trip_v3(0, 0, 1));
+    settings.effects = (trip_effects){ .cueing = 0.5, .cells = TRIP_LIGHT_CELLS };
+    assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, s.data, &camera, &settings, s.table, s.budget), 0);
+    assert_int_equal(trip_reader_create(&reader, s.data,
+                                        &(trip_reader_params){ .planes = plan.planes }, s.budget),
+                     0);
+    const trip_frame frame = {
+        .data = s.data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s.table
+    };
+    test_catch_reports();
+    assert_true(trip_frame_begin(&drawing, &plain, reader, &frame) < 0);
+    assert_one_report("draws no effects");
+    trip_frame_end(&drawing);
+    trip_reader_destroy(reader);
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fog_lit_from_the_side_is_darker_away_from_the_light),
+        cmocka_unit_test(fog_lit_from_the_front_scatters_backwards),
+        cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
+        cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
+        cmocka_unit_test(openness_is_the_mean_over_directions),
+        cmocka_unit_test(every_renderer_draws_them_alike),
+        cmocka_unit_test(threads_and_slots_change_no_bit),
+        cmocka_unit_test(in_a_clear_volume_effects_change_nothing),
+        cmocka_unit_test(what_is_farther_fades_into_the_background),
+        cmocka_unit_test(scattering_keeps_light),
+        cmocka_unit_test(directions_are_spread_evenly),
+        cmocka_unit_test(the_lattice_is_kept_until_something_changes),
+        cmocka_unit_test(a_renderer_without_effects_refuses_them),
+        cmocka_unit_test(a_lattice_that_does_not_fit_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
