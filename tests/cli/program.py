@@ -32,6 +32,7 @@ GENERATE = os.environ["TRIP_GENERATE"]
 DATASETS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "datasets")
 SANITIZED = bool(os.environ.get("TRIP_SANITIZE"))
 SWITCHED_OFF = os.environ.get("TRIP_SWITCHED_OFF", "").split()  # "GL", "OPENVDB"
+GL = () if "GL" in SWITCHED_OFF else ("gl",)  # for lists of renderers
 if "OPENVDB" in SWITCHED_OFF:
     sys.modules["pyopenvdb"] = None  # tests take it for missing
 

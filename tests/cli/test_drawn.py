@@ -113,12 +113,12 @@ class Drawn(program.ProgramTest):
                         self.assertLessEqual(counts["splats_projected"], counts["splats_read"])
 
     def test_splats_neither_read_nor_draw_the_halo_and_only_with_it_values_are_interpolated(self):
-        seen = []
+        seen, renderers = [], ("cpu", "reference", *program.GL)
         for halo in "0", "1":
             made = self.brick(os.path.join(program.DATASETS, "tooth.nhdr"), "h.trip", "--force",
                               "--halo", halo)
             self.assertEqual(made["halo"] > 0, halo == "1")
-            for renderer in "cpu", "reference", "gl":
+            for renderer in renderers:
                 view = ("h.trip", "--renderer", renderer, "--size", "90x90")
                 usual = self.stats(*view)["classify"]
                 self.assertEqual(usual, "post" if halo == "1" else "pre")
@@ -127,7 +127,7 @@ class Drawn(program.ProgramTest):
                          for l in stats["frames"][0]["lists"].values()]
                 with open("a.exr", "rb") as picture:
                     seen.append((halo, renderer, lists, picture.read()))
-        for without, with_halo in zip(seen[:3], seen[3:]):
+        for without, with_halo in zip(seen[: len(renderers)], seen[len(renderers) :]):
             self.assertEqual(without[1:], with_halo[1:])
 
     def test_an_orbit_has_a_frame_of_stats_for_each_image(self):

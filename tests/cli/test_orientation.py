@@ -253,7 +253,7 @@ class Orientation(program.ProgramTest):
             for classify, most, mean in ("pre", 1, 0.05), ("post", 2, 0.1):
                 options = f"--classify={classify}", *Camera().options(TO_RAS[:3, :3])
                 expected = self.picture("a.trip", "--renderer=reference", *options)
-                for renderer in "cpu", "gl":
+                for renderer in "cpu", *program.GL:
                     given = f"--renderer={renderer}", *options
                     run = program.call(
                         "render", "a.trip", "-o", "b.exr", *given, program=program.QUICK_PROGRAM
