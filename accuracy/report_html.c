@@ -10,7 +10,7 @@ static const char style[] =
     "body{font:15px/1.45 system-ui,sans-serif;max-width:1180px;margin:24px auto;padding:0 16px;"
     "color:#222}\n"
     "h1{font-size:24px}h2{font-size:19px;margin-top:32px}\n"
-    "table{border-collapse:collapse;font-size:13px}td,th{padding:2px 7px;text-align:right;"
+    "table{border-collapse:collapse;font-size:12px}td,th{padding:2px 5px;text-align:right;"
     "border-bottom:1px solid #ddd;white-space:nowrap}td:first-child,th:first-child{text-align:left}"
     "\n"
     "tr.front td:first-child{font-weight:bold}.wide{overflow-x:auto}\n"
