@@ -226,8 +226,9 @@ static void find_visible(trip_cpu_sheets *s, int complete)
     count = 0;
     for (int i = 0; i + 1 < complete; i++)
         if (trip_cpu_sheets_are_ahead(s, sheet_of(s, i + 1)->number))
-            work[count++] =
-                (trip_cpu_sheet_work){ .sheet = sheet_of(s, i), .other = sheet_of(s, i + 1) };
+            work[count++] = (trip_cpu_sheet_work){ .sheet = sheet_of(s, i),
+                                                   .other = sheet_of(s, i + 1),
+                                                   .everywhere = trip_cpu_sheets_leap(s) };
     trip_cpu_store_find_visible(&s->store, work, count, &s->function);
 }
 
@@ -245,8 +246,8 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
                 .sheet = sheet,
                 .other = s->way > 0 ? before : after,
                 .third = s->way > 0 ? after : before,
-                .visible = sheet->visible,
-                .visible_before = before ? before->visible : NULL,
+                .needed = sheet->needed,
+                .needed_before = before ? before->needed : NULL,
                 .everywhere = trip_cpu_sheets_leap(s),
             };
     }
@@ -278,7 +279,7 @@ static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutti
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
     trip_cpu_sheet *slice = &s->store.slices[cut->count];
     const trip_cpu_sheet_work w = {
-        .sheet = slice, .other = from, .third = to, .visible = from->visible, .part = part
+        .sheet = slice, .other = from, .third = to, .needed = from->needed, .part = part
     };
     if (!trip_cpu_store_take_slice(&s->store, &w))
         return false;

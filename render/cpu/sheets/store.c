@@ -8,6 +8,7 @@
 
 #define COLUMN_0 UINT64_C(0x0101010101010101)
 #define COLUMN_7 UINT64_C(0x8080808080808080)
+#define ROW_0 UINT64_C(0xff)
 
 static const size_t raster_bytes = sizeof(trip_cpu_voxels);
 
@@ -68,6 +69,8 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
         sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
         sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
+        sheet->edges = part(memory, &at, grid * sizeof *sheet->edges);
+        sheet->needed = part(memory, &at, grid * sizeof *sheet->needed);
     }
     for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++)
         s->slices[i].rasters = part(memory, &at, grid * sizeof *s->slices[i].rasters);
@@ -175,8 +178,11 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
         if (sheet->rasters[i])
             s->free[s->free_count++] = sheet->rasters[i];
         sheet->rasters[i] = 0;
-        if (sheet->visible)
-            sheet->visible[i] = 0;
+    }
+    if (sheet->visible) {
+        memset(sheet->visible, 0, grid * sizeof *sheet->visible);
+        memset(sheet->edges, 0, grid * sizeof *sheet->edges);
+        memset(sheet->needed, 0, grid * sizeof *sheet->needed);
     }
     sheet->prepared = sheet->shaded = false;
 }
@@ -385,10 +391,23 @@ static uint64_t cells_of(const work_job *job, const trip_cpu_sheet_work *w, size
     return squares;
 }
 
+/* A segment moves less than a voxel along u and v: both of its ends lie in cells that touch the one
+ * that it meets, or in that, and their corners from one voxel before it to two behind. */
+static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells, uint64_t squares)
+{
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        const uint64_t bit = rest & -rest, seen = cells->squares[__builtin_ctzll(rest)];
+        edges[TRIP_CPU_LEFT] |= seen & COLUMN_0 ? bit : 0;
+        edges[TRIP_CPU_RIGHT] |= seen & (COLUMN_7 | COLUMN_7 >> 1) ? bit : 0;
+        edges[TRIP_CPU_ABOVE] |= seen & ROW_0 ? bit : 0;
+        edges[TRIP_CPU_BELOW] |= seen & (ROW_0 << 56 | ROW_0 << 48) ? bit : 0;
+    }
+}
+
 static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_square_ranges *a = &w->sheet->ranges[at], *b = &w->other->ranges[at];
-    uint64_t visible = 0;
+    uint64_t visible = 0, *edges = w->sheet->edges[at];
     if (w->other->rasters[at])
         for (int i = 0; i < 64; i++) {
             bool any = a->least[i] <= a->most[i] && b->least[i] <= b->most[i];
@@ -397,47 +416,45 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
             if (any && trip_cpu_function_shows(job->function, least, most))
                 visible |= UINT64_C(1) << i;
         }
-    w->sheet->visible[at] = visible ? cells_of(job, w, at, visible) : 0;
+    w->sheet->visible[at] = visible = visible ? cells_of(job, w, at, visible) : 0;
+    for (int k = 0; k < TRIP_CPU_EDGES; k++)
+        edges[k] = k == TRIP_CPU_ALL || w->everywhere ? visible : 0;
+    find_edges(edges, &w->sheet->cells[at], w->everywhere ? 0 : visible);
+}
+
+/* Some squares of a raster, by an edge, and those beside them along u. */
+static uint64_t beside(const trip_cpu_edges *e, int edge)
+{
+    const uint64_t *here = e[0], *before = e[-1], *behind = e[1];
+    return here[edge] | ((here[edge] & here[TRIP_CPU_LEFT]) >> 1 & ~COLUMN_7) |
+           ((here[edge] & here[TRIP_CPU_RIGHT]) << 1 & ~COLUMN_0) |
+           ((before[edge] & before[TRIP_CPU_RIGHT]) >> 7 & COLUMN_0) |
+           ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & COLUMN_7);
+}
+
+/* Outermost rasters have no squares that may show. */
+static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+{
+    const trip_cpu_edges *e = &w->sheet->edges[at];
+    const int32_t across = job->store->across;
+    w->sheet->needed[at] =
+        beside(e, TRIP_CPU_ALL) | beside(e, TRIP_CPU_ABOVE) >> 8 | beside(e, TRIP_CPU_BELOW) << 8 |
+        beside(e - across, TRIP_CPU_BELOW) >> 56 | beside(e + across, TRIP_CPU_ABOVE) << 56;
 }
 
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f)
 {
     run_work(&(work_job){ .store = s, .work = work, .function = f, .each = find_visible }, count);
-}
-
-/* A raster's squares and those beside them along u; `at` is of any raster but the outermost. */
-static uint64_t wider(const uint64_t *squares, size_t at)
-{
-    uint64_t s = squares[at];
-    return s | (s << 1 & ~COLUMN_0) | (s >> 1 & ~COLUMN_7) | (squares[at - 1] >> 7 & COLUMN_0) |
-           (squares[at + 1] << 7 & COLUMN_7);
-}
-
-/* A square of the outermost rasters is never visible: nor are those beyond. */
-static uint64_t row_wider(const trip_cpu_store *s, const uint64_t *squares, size_t at)
-{
-    size_t row = at / (size_t)s->across;
-    return row == 0 || row == (size_t)s->down - 1 ? 0 : wider(squares, at);
-}
-
-/* The squares of a raster and those about them: both ends of a segment that meets a square lie in
- * these, and all corners of their cells. */
-static uint64_t about(const trip_cpu_store *s, const uint64_t *squares, size_t at)
-{
-    size_t across = (size_t)s->across;
-    if (!squares)
-        return 0;
-    uint64_t here = wider(squares, at);
-    return here | here << 8 | here >> 8 | row_wider(s, squares, at - across) >> 56 |
-           row_wider(s, squares, at + across) << 56;
+    run_work(&(work_job){ .store = s, .work = work, .each = find_needed }, count);
 }
 
 static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    uint64_t squares =
-        w->everywhere ? UINT64_MAX : about(s, w->visible, at) | about(s, w->visible_before, at);
+    const uint64_t before = w->needed_before ? w->needed_before[at] : 0;
+    const uint64_t behind = w->needed ? w->needed[at] : 0;
+    const uint64_t squares = w->everywhere ? UINT64_MAX : before | behind;
     if (squares)
         s->kernels->sheet_gradients(raster_at(s, w->sheet, at), squares,
                                     raster_at(s, w->sheet, at - 1),
@@ -459,7 +476,7 @@ bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
     for (int32_t v = 1; v < s->down - 1; v++)
         for (int32_t u = 1; u < s->across - 1; u++) {
             size_t at = (size_t)v * (size_t)s->across + (size_t)u;
-            if (!w->other->rasters[at] || !w->third->rasters[at] || !about(s, w->visible, at))
+            if (!w->other->rasters[at] || !w->third->rasters[at] || !w->needed[at])
                 continue;
             if (!trip_cpu_store_take(s, w->sheet, at)) {
                 trip_cpu_store_drop(s, w->sheet);
@@ -473,8 +490,8 @@ static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t
 {
     const trip_cpu_store *s = job->store;
     int32_t to = (int32_t)lrint(w->part * 16384);
-    s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at),
-                              about(s, w->visible, at), to << 16 | (16384 - to), w->other->shaded,
+    s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), w->needed[at],
+                              to << 16 | (16384 - to), w->other->shaded,
                               raster_at(s, w->sheet, at));
 }
 

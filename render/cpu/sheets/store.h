@@ -10,6 +10,18 @@
 #include "cpu/sheets/integrals.h"
 #include "reader.h"
 
+/* Squares of a raster in which cells may show: all, and those with such cells so near to an edge
+ * that both ends of a segment that meets these depend on voxels of the square beyond it. */
+enum {
+    TRIP_CPU_ALL,
+    TRIP_CPU_LEFT,
+    TRIP_CPU_RIGHT,
+    TRIP_CPU_ABOVE,
+    TRIP_CPU_BELOW,
+    TRIP_CPU_EDGES
+};
+typedef uint64_t trip_cpu_edges[TRIP_CPU_EDGES];
+
 /* A sheet, or a slice between two. */
 typedef struct trip_cpu_sheet {
     int64_t number;                 /* of the sheet */
@@ -17,6 +29,8 @@ typedef struct trip_cpu_sheet {
     trip_cpu_square_ranges *ranges; /* of sheets; of rasters that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
     trip_cpu_cells *cells;          /* those of squares that are visible */
+    trip_cpu_edges *edges;          /* these squares by edges */
+    uint64_t *needed;               /* squares of which segments that may show take voxels */
     bool prepared, shaded;          /* ranges are there; gradients are */
 } trip_cpu_sheet;
 
@@ -95,22 +109,23 @@ typedef struct trip_cpu_sheet_work {
     /* Cells and slices: the sheets on both sides. Gradients: those before and after in index order,
      * NULL where there is none. */
     const trip_cpu_sheet *other, *third;
-    /* Squares in which cells may show: of gradients on both sides of the sheet, NULL where there is
+    /* Squares that are needed: of gradients on both sides of the sheet, NULL where there is
      * nothing; of slices between the sheets. */
-    const uint64_t *visible, *visible_before;
-    bool everywhere; /* gradients: of all squares */
+    const uint64_t *needed, *needed_before;
+    bool everywhere; /* gradients: of all squares; cells: all about those that may show */
     double part;     /* of slices: the weight of `third` */
 } trip_cpu_sheet_work;
 
 /* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
-/* Which squares and cells may show from prepared sheets to the next, `other`. */
+/* Which squares and cells may show from prepared sheets to the next, `other`, and which squares are
+ * needed then. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
-/* Gradients of prepared sheets' voxels, where cells may show or everywhere. */
+/* Gradients of prepared sheets' voxels, where they are needed or everywhere. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
-/* Rasters for a slice between two sheets, where cells may show. False when the pool is full; then
+/* Rasters for a slice between two sheets, where they are needed. False when the pool is full; then
  * it is empty. */
 bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
 /* The voxels of slices. */

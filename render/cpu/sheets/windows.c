@@ -178,17 +178,18 @@ static void find_interval(trip_cpu_sheets *s)
         { .sheet = a,
           .other = up ? before : b,
           .third = up ? b : before,
-          .visible = a->visible,
+          .needed = a->needed,
           .everywhere = leap },
         { .sheet = b,
           .other = up ? a : behind,
           .third = up ? behind : a,
-          .visible_before = a->visible,
+          .needed_before = a->needed,
           .everywhere = leap },
     };
     trip_cpu_store_prepare(&s->store, both, 2);
-    trip_cpu_store_find_visible(&s->store, &(trip_cpu_sheet_work){ .sheet = a, .other = b }, 1,
-                                &s->function);
+    trip_cpu_store_find_visible(
+        &s->store, &(trip_cpu_sheet_work){ .sheet = a, .other = b, .everywhere = leap }, 1,
+        &s->function);
     if (s->view.shading)
         trip_cpu_store_find_gradients(&s->store, both, 2);
 }
