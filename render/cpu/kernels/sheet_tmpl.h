@@ -217,16 +217,16 @@ typedef struct voxel_box {
     int32_t lo[2], hi[2];
 } voxel_box;
 
-/* A patch's beam, from the pane's corner's ray. */
+/* The beam of a patch or pane, from the pane's corner's ray. */
 typedef struct patch_beam {
     float4 slope[2], shift[2];
     bool whole;
 } patch_beam;
 
 static patch_beam patch_beam_of(const trip_cpu_sheet_view *view, const pane_path *path, int x,
-                                int y)
+                                int y, int size)
 {
-    beam b = beam_of(view, x, y, 8);
+    beam b = beam_of(view, x, y, size);
     patch_beam p = { .whole = b.whole };
     for (int a = 0; a < 2; a++)
         for (int i = 0; i < 4; i++) {
@@ -359,25 +359,44 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
                       path->base[0][n] - (u << TRIP_CPU_RASTER_LOG2);
 }
 
-static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, int x, int y, patch_path *area)
+/* The segments in which a square that the pane meets may show. */
+static uint64_t pane_segments(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                              const pane_path *path, int x, int y)
 {
-    const patch_beam b = patch_beam_of(view, path, x, y);
-    area->segments = 0;
+    const patch_beam b = patch_beam_of(view, path, x, y, TRIP_CPU_PANE);
+    uint64_t segments = 0;
     voxel_box last = beam_box(path, &b, 0), end = beam_box(path, &b, g->segments);
     if (!squares_show(g, g->some, both_boxes(last, end)))
-        return;
-    unsigned placed = UINT32_MAX;
+        return 0;
     for (unsigned n = 0; n < g->segments; n++) {
         voxel_box next = beam_box(path, &b, n + 1);
-        if (cells_show(g, n, both_boxes(last, next))) {
-            area->segments |= UINT64_C(1) << n;
-            if (placed != n)
-                find_raster(g, path, n, b.whole, last, area);
-            find_raster(g, path, n + 1, b.whole, next, area);
-            placed = n + 1;
-        }
+        if (squares_show(g, g->visible[n], both_boxes(last, next)))
+            segments |= UINT64_C(1) << n;
         last = next;
+    }
+    return segments;
+}
+
+/* Of the pane's segments. */
+static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const pane_path *path, uint64_t segments, int x, int y, patch_path *area)
+{
+    const patch_beam b = patch_beam_of(view, path, x, y, 8);
+    area->segments = 0;
+    unsigned passed = UINT32_MAX, placed = UINT32_MAX;
+    voxel_box last, next = { 0 };
+    for (; segments; segments &= segments - 1) {
+        unsigned n = (unsigned)__builtin_ctzll(segments);
+        last = passed == n ? next : beam_box(path, &b, n);
+        next = beam_box(path, &b, n + 1);
+        passed = n + 1;
+        if (!cells_show(g, n, both_boxes(last, next)))
+            continue;
+        area->segments |= UINT64_C(1) << n;
+        if (placed != n)
+            find_raster(g, path, n, b.whole, last, area);
+        find_raster(g, path, n + 1, b.whole, next, area);
+        placed = n + 1;
     }
 }
 
@@ -444,15 +463,15 @@ INLINE corners corners_at(const pane_path *path, const stamp_rays *l, unsigned n
     return c;
 }
 
-/* What rays meet at a slice: the nearest code, and what the rest is worked out from where it is
- * needed. */
+/* What rays meet at a slice: the entry of the function's integrals nearest to the code, and what
+ * the rest is worked out from where it is needed. */
 typedef struct sample {
     vi index;
     vm there;         /* all corners are */
     vi top, bottom;   /* weights of two corners, the right one's in the higher 16 bits */
     vi gradient_at;   /* of the first corner, as 16-bit numbers from the pool's first */
     vi gradient[3];   /* times 2^WEIGHT_LOG2 */
-    vi sums[4];       /* of the integrals, at the code */
+    vi sums[4];       /* of the integrals, at the entry */
     bool lit, summed; /* gradient is there; sums are */
 } sample;
 
@@ -509,6 +528,13 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
     return from + in;
 }
 
+/* The entry of the function's integrals that is nearest to a code, biased, times 2^WEIGHT_LOG2. */
+INLINE vi nearest_entry(vi code)
+{
+    const int log2 = WEIGHT_LOG2 + TRIP_CPU_ENTRY_LOG2;
+    return ((code + (1 << (log2 - 1))) >> log2) + TRIP_CPU_CODE_BIAS / TRIP_CPU_ENTRY_CODES;
+}
+
 #if TRIP_SIMD == TRIP_SIMD_AVX2
 
 /* Two corners beside each other of each lane: faster than the instruction that gathers them. */
@@ -524,7 +550,7 @@ INLINE __m256i two_codes(const int16_t *pool, const int32_t at[V])
     return _mm256_inserti128_si256(_mm256_castsi128_si256(of[0]), of[1], 1);
 }
 
-/* The nearest code, and which rays lack a corner. */
+/* The nearest entry, and which rays lack a corner. */
 INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
 {
     const int16_t *pool = (const int16_t *)g->pool;
@@ -538,7 +564,7 @@ INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
     vi sum = (vi)_mm256_madd_epi16(top, (__m256i)s->top) +
              (vi)_mm256_madd_epi16(bottom, (__m256i)s->bottom);
     s->there = vi_is_0(lack);
-    s->index = ((sum + (1 << (WEIGHT_LOG2 - 1))) >> WEIGHT_LOG2) + TRIP_CPU_CODE_BIAS;
+    s->index = nearest_entry(sum);
 }
 
 /* Gradients of two corners beside each other, of lanes i and i + 4: along u twice, along v, ... */
@@ -617,7 +643,7 @@ INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
         sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
     }
     s->there = vi_is_0(lack);
-    s->index = ((sum + (1 << (WEIGHT_LOG2 - 1))) >> WEIGHT_LOG2) + TRIP_CPU_CODE_BIAS;
+    s->index = nearest_entry(sum);
 }
 
 INLINE void find_gradients(const trip_cpu_group *g, sample *s)
@@ -633,9 +659,13 @@ INLINE void find_gradients(const trip_cpu_group *g, sample *s)
 
 INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 {
+    int32_t at[V], of[4][V];
+    vi_store(at, numbers);
     for (int i = 0; i < V; i++)
         for (int k = 0; k < 4; k++)
-            out[k][i] = rows[numbers[i]][k];
+            of[k][i] = rows[at[i]][k];
+    for (int k = 0; k < 4; k++)
+        out[k] = vi_load(of[k]);
 }
 
 #endif
@@ -657,24 +687,16 @@ typedef struct medium {
     vf rgb[3];
 } medium;
 
-/* Where both ends have the same code, what the function is there. */
-INLINE void use_codes_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
+/* Where both ends have the same entry, what the function is about it. */
+INLINE void use_entries_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
 {
-    int32_t at[V], of[4][V];
-    vi_store(at, index);
+    vi at[4];
+    find_rows(in->at, index, at);
     for (int k = 0; k < 4; k++)
-        vi_store(of[k], sums[k]);
-    unsigned bits = vm_bits(same);
-    for (; bits; bits &= bits - 1) {
-        int i = __builtin_ctz(bits);
-        for (int k = 0; k < 4; k++)
-            of[k][i] = in->at[at[i]][k];
-    }
-    for (int k = 0; k < 4; k++)
-        sums[k] = vi_load(of[k]);
+        sums[k] = (vi)v_select(same, (vf)at[k], (vf)sums[k]);
 }
 
-/* Whether a segment between two codes may show. */
+/* Whether a segment between two entries may show. */
 INLINE vm may_show(const trip_cpu_integrals *in, vi a, vi b)
 {
     vi beyond = (vi)(vi_greater(a, b) < in->first) | (vi)(vi_lesser(a, b) > in->last);
@@ -690,15 +712,15 @@ INLINE void find_sums(const trip_cpu_integrals *in, sample *s)
 
 INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
 {
-    vi sums[4], codes = b->index - a->index;
-    vm same = vi_is_0(codes);
+    vi sums[4], entries = b->index - a->index;
+    vm same = vi_is_0(entries);
     find_sums(in, a);
     find_sums(in, b);
     for (int k = 0; k < 4; k++)
         sums[k] = b->sums[k] - a->sums[k];
-    vf over = v_from_int(codes);
+    vf over = v_from_int(entries);
     if (vm_any(same)) {
-        use_codes_alone(in, a->index, same, sums);
+        use_entries_alone(in, a->index, same, sums);
         over = v_select(same, v_set(1), over);
     }
     vf extinction = v_from_int(sums[0]);
@@ -1002,19 +1024,37 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         v_store(stamp + k * V, pixel[k]);
 }
 
-/* The stamps of a patch, of those of the pane. */
-static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, int x, int y, unsigned place, float *pixels)
+/* A stamp's pixels take more. */
+INLINE bool stamp_is_open(const float *stamp)
 {
-    unsigned column = place % 4 * 2, row = place / 4 * (8 / STAMP_ROWS);
+    return vm_any(v_gt(v_load(stamp + 3 * V), v_set(0)));
+}
+
+enum { PATCH_STAMPS = 2 * 8 / STAMP_ROWS };
+
+/* Of the pane's stamps, one of a patch. */
+INLINE unsigned patch_stamp(unsigned place, unsigned i)
+{
+    return (place / 4 * (8 / STAMP_ROWS) + i / 2) * STAMPS_ACROSS + place % 4 * 2 + i % 2;
+}
+
+static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const pane_path *path, uint64_t segments, int x, int y, unsigned place,
+                       float *pixels)
+{
+    bool open = false;
+    for (unsigned i = 0; i < PATCH_STAMPS; i++)
+        open |= stamp_is_open(pixels + STAMP_FLOATS * patch_stamp(place, i));
+    if (!open)
+        return;
     patch_path area;
-    find_patch(view, g, path, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8, &area);
+    find_patch(view, g, path, segments, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8, &area);
     if (!area.segments)
         return;
-    for (unsigned i = 0; i < 2 * 8 / STAMP_ROWS; i++) {
-        unsigned number = (row + i / 2) * STAMPS_ACROSS + column + i % 2;
+    for (unsigned i = 0; i < PATCH_STAMPS; i++) {
+        unsigned number = patch_stamp(place, i);
         float *stamp = pixels + STAMP_FLOATS * number;
-        if (!vm_any(v_gt(v_load(stamp + 3 * V), v_set(0))))
+        if (!stamp_is_open(stamp))
             continue;
         stamp_rays l;
         find_rays(view, path, number, &l);
@@ -1031,10 +1071,11 @@ static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group
     pane_path path;
     uint64_t open = 0;
     find_path(view, g, x, y, &path);
-    for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64; place++)
-        draw_patch(view, g, &path, x, y, place, pixels);
+    const uint64_t segments = pane_segments(view, g, &path, x, y);
+    for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64 && segments; place++)
+        draw_patch(view, g, &path, segments, x, y, place, pixels);
     for (unsigned i = 0; i < STAMPS; i++)
-        if (vm_any(v_gt(v_load(pixels + STAMP_FLOATS * i + 3 * V), v_set(0))))
+        if (stamp_is_open(pixels + STAMP_FLOATS * i))
             open |= UINT64_C(1) << (i / STAMPS_ACROSS * STAMP_ROWS / 4 * 8 + i % STAMPS_ACROSS);
     return open;
 }

@@ -61,14 +61,19 @@ typedef struct trip_cpu_slice {
     double coordinate; /* along the list's axis */
 } trip_cpu_slice;
 
-/* Integrals of the transfer function from code 0 to each code, times a factor that makes the
- * greatest 2^30: of extinction, and of extinction times each colour component. Differences of them
- * are exact but for the rounding of each. */
+/* Integrals of the transfer function from code 0 to each multiple of TRIP_CPU_ENTRY_CODES, times a
+ * factor that makes the greatest 2^30: of extinction, and of extinction times each colour
+ * component. Differences of them are exact but for the rounding of each. So few entries stay in a
+ * processor's cache. */
+#define TRIP_CPU_ENTRY_LOG2 2
+#define TRIP_CPU_ENTRY_CODES (1 << TRIP_CPU_ENTRY_LOG2)
+#define TRIP_CPU_ENTRIES (65536 / TRIP_CPU_ENTRY_CODES + 1)
+
 typedef struct trip_cpu_integrals {
-    int32_t (*sums)[4];  /* 65536: extinction, red, green, blue */
-    int32_t (*at)[4];    /* what they grow by from one code to the next, at a code */
-    float extinction;    /* 1 of sums[0], per voxel_world */
-    int32_t first, last; /* codes with extinction are among these; first > last: none */
+    int32_t (*sums)[4]; /* TRIP_CPU_ENTRIES: extinction, red, green, blue */
+    int32_t (*at)[4]; /* what they grow by about an entry, from half a one before to half behind */
+    float extinction; /* 1 of sums[0], per voxel_world */
+    int32_t first, last; /* entries with extinction are among these; first > last: none */
 } trip_cpu_integrals;
 
 /* Segments of a group: at most so many, and one slice more. */

@@ -2,22 +2,22 @@
 
 #include <math.h>
 
-enum { CODES = 65536 };
+enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES, ENTRY_CODES = TRIP_CPU_ENTRY_CODES };
 
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
 
 uint64_t trip_cpu_function_bytes(void)
 {
-    return CODES * (sizeof(int32_t[4]) * 2 + sizeof(uint32_t));
+    return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t);
 }
 
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
 {
     trip_cpu_integrals *in = &f->integrals;
     *f = (trip_cpu_function){ 0 };
-    in->sums = trip_budget_take(budget, CODES * sizeof *in->sums);
-    in->at = trip_budget_take(budget, CODES * sizeof *in->at);
+    in->sums = trip_budget_take(budget, ENTRIES * sizeof *in->sums);
+    in->at = trip_budget_take(budget, ENTRIES * sizeof *in->at);
     f->next_visible = trip_budget_take(budget, CODES * sizeof *f->next_visible);
     if (in->sums && in->at && f->next_visible)
         return true;
@@ -28,8 +28,8 @@ bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
 void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget)
 {
     trip_cpu_integrals *in = &f->integrals;
-    trip_budget_release(budget, in->sums, CODES * sizeof *in->sums);
-    trip_budget_release(budget, in->at, CODES * sizeof *in->at);
+    trip_budget_release(budget, in->sums, ENTRIES * sizeof *in->sums);
+    trip_budget_release(budget, in->at, ENTRIES * sizeof *in->at);
     trip_budget_release(budget, f->next_visible, CODES * sizeof *f->next_visible);
     *f = (trip_cpu_function){ 0 };
 }
@@ -74,32 +74,36 @@ static int32_t rounded(double x)
     return (int32_t)(x + 0.5);
 }
 
-static void set_at(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cpu_codes codes,
-                   double factor)
+/* What an entry stands for reaches no farther from a code that is nearest to it. */
+static void widen_visible(uint32_t *next)
 {
-    for (int code = 0; code < CODES; code++) {
-        const trip_tf_entry e = entry_at(table, codes, code);
-        in->at[code][0] = rounded(factor * e.extinction);
-        for (int i = 0; i < 3; i++)
-            in->at[code][1 + i] = rounded(factor * e.extinction * component(&e, i));
+    for (uint32_t code = CODES; code-- > 0;) {
+        const uint32_t from = code < ENTRY_CODES ? 0 : code - ENTRY_CODES;
+        if (next[from] <= code + ENTRY_CODES)
+            next[code] = code;
+        else if (next[code] < CODES)
+            next[code] -= ENTRY_CODES;
     }
 }
 
 static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
 {
     uint32_t next = CODES;
-    f->integrals.last = -1;
+    int32_t most = -1;
     for (int code = CODES - 1; code >= 0; code--) {
         if (entry_at(table, f->codes, code).extinction > 0) {
             next = (uint32_t)code;
-            f->integrals.last = f->integrals.last < 0 ? code : f->integrals.last;
+            most = most < 0 ? code : most;
         }
         f->next_visible[code] = next;
     }
-    uint32_t first = f->next_visible[0], last = first;
+    f->integrals.first = (int32_t)(next / ENTRY_CODES);
+    f->integrals.last = most < 0 ? -1 : (most + ENTRY_CODES - 1) / ENTRY_CODES;
+    widen_visible(f->next_visible);
+    const uint32_t first = f->next_visible[0];
+    uint32_t last = first;
     while (last + 1 < CODES && f->next_visible[last + 1] == last + 1)
         last++;
-    f->integrals.first = (int32_t)first;
     f->in_a_row = first < CODES && (last + 1 >= CODES || f->next_visible[last + 1] == CODES);
     f->first_visible = (int16_t)((int)first - TRIP_CPU_CODE_BIAS);
     f->last_visible = (int16_t)((int)last - TRIP_CPU_CODE_BIAS);
@@ -117,15 +121,45 @@ static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes)
     return all;
 }
 
+/* The integrals up to half an entry: an entry of sums[], or where one of at[] ends and the next
+ * begins. */
+static void set_half(trip_cpu_integrals *in, int half, const double sum[4], double factor)
+{
+    const int entry = half / 2;
+    for (int i = 0; i < 4; i++) {
+        const int32_t to_here = rounded(factor * sum[i]);
+        if (half % 2 == 0) {
+            in->sums[entry][i] = to_here;
+        } else {
+            in->at[entry][i] = to_here - in->at[entry][i];
+            in->at[entry + 1][i] = to_here;
+        }
+    }
+}
+
+/* The first and the last of at[], of which half an entry each lies among the codes. */
+static void set_ends(trip_cpu_integrals *in, double factor, const trip_tf_entry *first,
+                     const trip_tf_entry *last)
+{
+    const trip_tf_entry *ends[2] = { first, last };
+    int32_t *rows[2] = { in->at[0], in->at[ENTRIES - 1] };
+    for (int k = 0; k < 2; k++) {
+        double sum[4], most = INT32_MAX;
+        step(ends[k], ends[k], sum);
+        for (int i = 0; i < 4; i++)
+            rows[k][i] = (int32_t)fmin(most, ENTRY_CODES * factor * sum[i]);
+    }
+}
+
 static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cpu_codes codes,
                      double factor)
 {
     double sum[4] = { 0 }, add[4];
     trip_tf_entry here = entry_at(table, codes, 0);
-    for (int code = 0; code < CODES; code++) {
-        for (int i = 0; i < 4; i++)
-            in->sums[code][i] = rounded(factor * sum[i]);
-        if (code == CODES - 1)
+    for (int code = 0;; code++) {
+        if (code % (ENTRY_CODES / 2) == 0)
+            set_half(in, code / (ENTRY_CODES / 2), sum, factor);
+        if (code == CODES)
             break;
         const trip_tf_entry before = here;
         here = entry_at(table, codes, code + 1);
@@ -135,6 +169,8 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
         for (int i = 0; i < 4; i++)
             sum[i] += add[i];
     }
+    const trip_tf_entry first = entry_at(table, codes, 0);
+    set_ends(in, factor, &first, &here);
 }
 
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
@@ -145,7 +181,7 @@ void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, tri
     const double factor = all > 0 ? GREATEST / all : 1;
     f->codes = codes;
     set_sums(&f->integrals, table, codes, factor);
-    set_at(&f->integrals, table, codes, factor);
     set_next_visible(f, table);
-    f->integrals.extinction = (float)fmin(1e25, voxel_world / factor); /* opaque anyway */
+    f->integrals.extinction =
+        (float)fmin(1e25, voxel_world / (factor * ENTRY_CODES)); /* opaque anyway */
 }

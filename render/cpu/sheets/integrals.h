@@ -11,9 +11,10 @@
 typedef struct trip_cpu_function {
     trip_cpu_integrals integrals;
     trip_cpu_codes codes; /* whose integrals they are, and so below */
-    bool in_a_row;        /* codes with extinction, first_visible to last_visible, biased */
+    /* Codes that may show: those with extinction, and as many beside as an entry reaches. */
+    bool in_a_row; /* they are first_visible to last_visible, biased */
     int16_t first_visible, last_visible;
-    uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
+    uint32_t *next_visible; /* 65536: the first such code from here on, or 65536 */
 } trip_cpu_function;
 
 /* What it takes. */
@@ -26,7 +27,7 @@ void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
                            double voxel_world);
 
-/* Whether some code of [least, most] has extinction; biased codes. */
+/* Whether some code of [least, most] may show; biased codes. */
 static inline bool trip_cpu_function_shows(const trip_cpu_function *f, int16_t least, int16_t most)
 {
     return least <= most &&
