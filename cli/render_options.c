@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "cached_volume.h"
+#include "clip_options.h"
 #include "geometry.h"
 #include "new_file.h"
 #include "effects_options.h"
@@ -62,6 +63,8 @@ enum {
     KEY_COMPOSITING,
     KEY_SLICES,
     KEY_LOD,
+    KEY_MAX_BYTES,
+    KEY_MAX_MS,
     KEY_METHOD,
     KEY_SUBMIT,
     KEY_TRAVERSAL,
@@ -128,13 +131,7 @@ static const struct argp_option options[] = {
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
-    { "clip-box", KEY_CLIP_BOX, "X,Y,Z,X,Y,Z", 0,
-      "Cut away what lies outside of the box from the first point to the second, in world units; "
-      "of "
-      "voxels:I,J,K,I,J,K in voxels",
-      2 },
-    { "clip-plane", KEY_CLIP_PLANE, "A,B,C,D", 0,
-      "Cut away what has A x + B y + C z + D < 0, in world units; up to 6 times", 2 },
+    TRIP_OPTIONS_CLIP(2),
     { "show", KEY_SHOW, "WHAT", 0,
       "What colours stand for: picture (the function), lists (along x red, y green, z blue), merge "
       "(their weights at each pixel, nothing of the volume) or levels (of detail) (default: "
@@ -159,6 +156,14 @@ static const struct argp_option options[] = {
     { "lod", KEY_LOD, "PX", 0,
       "Draw coarse levels where their voxels are at most so many pixels wide (default: 0, the "
       "finest alone)",
+      3 },
+    { "max-bytes", KEY_MAX_BYTES, "SIZE", 0,
+      "Draw levels so coarse that no more than this, as 64M, of codes and normals is in view, what "
+      "is widest in the picture finest",
+      3 },
+    { "max-ms", KEY_MAX_MS, "MS", 0,
+      "The same for about so long a frame, by what others took: the picture then depends on the "
+      "machine",
       3 },
     { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
     { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
@@ -232,6 +237,14 @@ static int parse_point(const char *option, const char *text, double point[3], bo
 static bool is_zero(const double v[3])
 {
     return !(trip_length(trip_v3(v[0], v[1], v[2])) > 0);
+}
+
+static int parse_max_bytes(const char *text, triptych_settings *s)
+{
+    uint64_t bytes = 0;
+    int status = trip_option_bytes("--max-bytes", text, &bytes);
+    s->max_bytes = (double)bytes;
+    return status;
 }
 
 static int parse_background(const char *text, triptych_settings *s)
@@ -398,6 +411,10 @@ static int parse_method(int key, char *arg, parse *p)
         return status;
     case KEY_LOD:
         return trip_option_number("--lod", arg, 0, 1000, &s->lod_px);
+    case KEY_MAX_BYTES:
+        return parse_max_bytes(arg, s);
+    case KEY_MAX_MS:
+        return trip_option_number("--max-ms", arg, 1e-3, 1e9, &s->max_ms);
     case KEY_SLICES:
         p->slices = true;
         s->slices = 0;
@@ -424,37 +441,6 @@ static int parse_method(int key, char *arg, parse *p)
     }
 }
 
-static int parse_clip_box(const char *text, triptych_clip *clip)
-{
-    static const char voxels[] = "voxels:";
-    double corners[6];
-    int count;
-    clip->box = true;
-    clip->box_of_voxels = !strncmp(text, voxels, strlen(voxels));
-    int status = trip_option_numbers(
-        "--clip-box", clip->box_of_voxels ? text + strlen(voxels) : text, 6, 6, corners, &count);
-    for (int a = 0; a < 3 && !status; a++) {
-        if (!(corners[a] < corners[3 + a]))
-            return trip_option_fail("--clip-box", "the second point is not beyond the first");
-        clip->box_lo[a] = corners[a];
-        clip->box_hi[a] = corners[3 + a];
-    }
-    return status;
-}
-
-static int parse_clip_plane(const char *text, triptych_clip *clip)
-{
-    const int most = (int)(sizeof clip->plane / sizeof *clip->plane);
-    int count;
-    if (clip->planes == most)
-        return trip_option_fail("--clip-plane", "there are at most 6");
-    double *plane = clip->plane[clip->planes++];
-    int status = trip_option_numbers("--clip-plane", text, 4, 4, plane, &count);
-    if (!status && is_zero(plane))
-        return trip_option_fail("--clip-plane", "the direction A,B,C is zero");
-    return status;
-}
-
 static int parse_cut(int key, char *arg, parse *p)
 {
     static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
@@ -462,9 +448,9 @@ static int parse_cut(int key, char *arg, parse *p)
     int which = 0, status;
     switch (key) {
     case KEY_CLIP_BOX:
-        return parse_clip_box(arg, &s->clip);
+        return trip_option_clip_box(arg, &s->clip);
     case KEY_CLIP_PLANE:
-        return parse_clip_plane(arg, &s->clip);
+        return trip_option_clip_plane(arg, &s->clip);
     case KEY_SHOW:
         status = trip_option_choice("--show", arg, shows, &which);
         s->show = (triptych_show)which;

@@ -3,6 +3,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "clip_options.h"
 #include "commands.h"
 #include "effects_options.h"
 #include "library.h"
@@ -26,6 +27,8 @@ enum {
     KEY_ANISOTROPY,
     KEY_CUEING,
     KEY_LIGHT_CELLS,
+    KEY_CLIP_BOX,
+    KEY_CLIP_PLANE,
     KEY_RENDERER,
     KEY_MEMORY,
     KEY_ENGINE,
@@ -53,6 +56,7 @@ static const struct argp_option options[] = {
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
     TRIP_OPTION_LIGHT(1),
     TRIP_OPTIONS_EFFECTS(1),
+    TRIP_OPTIONS_CLIP(1),
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
     TRIP_OPTION_MEMORY(KEY_MEMORY, 1),
     TRIP_OPTION_ENGINE(KEY_ENGINE, 1),
@@ -121,6 +125,10 @@ static int parse_rest(int key, char *arg, serve_options *o)
         o->classify = (triptych_classify)which;
         o->classify_given = true;
         return status;
+    case KEY_CLIP_BOX:
+        return trip_option_clip_box(arg, &p->settings.clip);
+    case KEY_CLIP_PLANE:
+        return trip_option_clip_plane(arg, &p->settings.clip);
     case KEY_QUALITY:
         return quality_option_quality(arg, &o->quality);
     case KEY_ERROR:

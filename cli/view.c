@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clip_options.h"
 #include "commands.h"
 #include "effects_options.h"
 #include "geometry.h"
@@ -33,6 +34,8 @@ enum {
     KEY_ANISOTROPY,
     KEY_CUEING,
     KEY_LIGHT_CELLS,
+    KEY_CLIP_BOX,
+    KEY_CLIP_PLANE,
     KEY_FPS,
     KEY_SCALE,
     KEY_NO_PANEL,
@@ -72,6 +75,7 @@ static const struct argp_option options[] = {
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 2 },
     TRIP_OPTION_LIGHT(2),
     TRIP_OPTIONS_EFFECTS(2),
+    TRIP_OPTIONS_CLIP(2),
     { NULL, 0, NULL, 0, "Renderer:", 3 },
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },
@@ -173,6 +177,12 @@ static int parse_look(int key, char *arg, view_options *o)
         o->classify = (triptych_classify)which;
         o->classify_given = true;
         return status;
+    case KEY_CLIP_BOX:
+        o->params.settings_given = true;
+        return trip_option_clip_box(arg, &o->params.settings.clip);
+    case KEY_CLIP_PLANE:
+        o->params.settings_given = true;
+        return trip_option_clip_plane(arg, &o->params.settings.clip);
     case KEY_QUALITY:
         return quality_option_quality(arg, &o->quality);
     case KEY_ERROR:
@@ -245,7 +255,7 @@ static int choose_settings(view_options *o)
     int status = quality_options_use(&o->quality, &drawn, &p->settings, &p->renderer, false);
     if (o->classify_given)
         p->settings.classify = o->classify;
-    p->settings_given = o->classify_given || quality_options_given(&o->quality);
+    p->settings_given |= o->classify_given || quality_options_given(&o->quality);
     return status;
 }
 

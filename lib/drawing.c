@@ -89,6 +89,20 @@ static int make_camera(triptych *t)
     return trip_camera_make(&t->camera, &view, &drawn_session(t).data->index_to_world);
 }
 
+/* Bytes that a processor draws in a millisecond, where nothing was measured yet. */
+#define USUAL_BYTES_PER_MS 20e3
+
+/* A bound of time as one of bytes. */
+static trip_settings bounded_settings(const triptych *t)
+{
+    trip_settings s = t->settings;
+    const double rate = t->bytes_per_ms > 0 ? t->bytes_per_ms : USUAL_BYTES_PER_MS;
+    const double bytes = fmax(t->max_ms * rate, 1);
+    if (t->max_ms > 0)
+        s.max_bytes = s.max_bytes > 0 ? fmin(s.max_bytes, bytes) : bytes;
+    return s;
+}
+
 /* The coarse level of a frame that has one alone. */
 static unsigned choose_level(const triptych *t, const trip_camera *camera)
 {
@@ -96,7 +110,8 @@ static unsigned choose_level(const triptych *t, const trip_camera *camera)
     if (t->settings.classify != TRIP_CLASSIFY_POST || t->classify_auto ||
         t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return 0;
-    return trip_lod_of_all(data, camera, &t->settings, trip_dataset_value_levels(data));
+    const trip_settings settings = bounded_settings(t);
+    return trip_lod_of_all(data, camera, &settings, trip_dataset_value_levels(data));
 }
 
 /* Takes up the level of the frame, by the view of level 0, and makes its camera. */
@@ -139,7 +154,7 @@ static int prepare(triptych *t)
 /* What of the frame only splats have; NULL: nothing. */
 static const char *needs_splats(const triptych *t)
 {
-    const trip_settings *s = &t->settings;
+    const trip_settings *s = &t->drawn_settings;
     const trip_file_header *h = &t->session.data->header;
     if (t->counting)
         return "splats are counted";
@@ -149,7 +164,7 @@ static const char *needs_splats(const triptych *t)
         return "the target is rounded";
     if (s->indexed || s->triangles)
         return "a form of submission is set";
-    if (s->lod_px > 0)
+    if (trip_settings_has_levels(s))
         return "coarse levels are to be drawn";
     if (s->compositing != TRIP_COMPOSITING_SPLAT)
         return "splats are to be composited by sheets";
@@ -166,7 +181,7 @@ static const char *needs_splats(const triptych *t)
 static void choose_settings(triptych *t)
 {
     bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
-    t->drawn_settings = t->settings;
+    t->drawn_settings = bounded_settings(t);
     t->why_pre = t->classify_auto && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || (t->classify_auto && integral))
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;

@@ -86,6 +86,7 @@ int triptych_set_quality(triptych_settings *s, triptych_quality quality)
     s->target = usual.target;
     s->kernel_radius = usual.kernel_radius;
     s->lod_px = usual.lod_px;
+    s->max_bytes = s->max_ms = 0;
     s->samples = usual.samples;
     return TRIPTYCH_OK;
 }
@@ -168,6 +169,8 @@ static const char *fault_of_settings(const triptych_settings *s)
             return "components of the background lie between 0 and 1";
     if (!(s->lod_px >= 0 && s->lod_px <= 1000))
         return "levels are chosen by 0 to 1000 pixels a voxel";
+    if (!(s->max_bytes >= 0 && s->max_bytes <= 1e18 && s->max_ms >= 0 && s->max_ms <= 1e9))
+        return "bounds of bytes and milliseconds lie between 0 (none) and 1e18 and 1e9";
     if (s->show < TRIPTYCH_SHOW_PICTURE || s->show > TRIPTYCH_SHOW_LEVELS)
         return "there is nothing such to be shown";
     const char *fault = fault_of_clip(&s->clip);
@@ -239,6 +242,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .kernel_radius = s->kernel_radius,
         .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
         .lod_px = s->lod_px,
+        .max_bytes = s->max_bytes,
         .field = (trip_field_kind)s->field,
         .kernel = (trip_kernel)s->kernel,
         .tolerance = s->tolerance,
@@ -246,6 +250,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .show = (trip_show)s->show,
         .effects = { .cueing = s->cueing, .anisotropy = s->anisotropy, .cells = s->light_cells },
     };
+    t->max_ms = s->max_ms;
     t->clip = s->clip;
     t->counting = s->count;
     if (!s->headlight)

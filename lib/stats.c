@@ -124,6 +124,16 @@ static triptych_list_stats list_stats(const triptych *t, unsigned i)
     };
 }
 
+/* Of frames whose levels are bounded: what bounds of time are made of. */
+static void note_rate(triptych *t)
+{
+    const trip_frame_stats *s = &t->drawing.stats;
+    const double bytes = t->plan.lod.limit.bytes, ms = s->ms - s->merge_ms;
+    if (!(bytes > 0 && ms > 0))
+        return;
+    t->bytes_per_ms = t->bytes_per_ms > 0 ? 0.5 * (t->bytes_per_ms + bytes / ms) : bytes / ms;
+}
+
 int trip_context_note_stats(triptych *t)
 {
     unsigned count = t->session.data->list_count;
@@ -136,6 +146,7 @@ int trip_context_note_stats(triptych *t)
     for (unsigned i = 0; i < count; i++)
         t->list_stats[i] = list_stats(t, i);
     t->has_stats = true;
+    note_rate(t);
     return 0;
 }
 

@@ -274,6 +274,11 @@ typedef struct triptych_settings {
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
                       0 to 1000; 0, the default: the finest alone. Post has one level for all of a
                       frame. Not with indexed */
+    double max_bytes; /* > 0: what is widest in the picture first is drawn by the finest levels with
+                         which codes and normals of so many bytes at most are in view; not counted
+                         are positions, some 10 to 30 % more. Not beyond what lod_px calls for */
+    double max_ms; /* > 0: the same by about how long the frame takes, from how long others of the
+                      context took: depends on the machine, and so does the picture then */
     int depth;     /* not 0: frames have distances too; not with rounded targets or the integral */
     /* Of the integral renderer alone, but for samples. */
     triptych_field field;   /* what it integrates */
@@ -306,7 +311,8 @@ typedef enum triptych_quality {
 } triptych_quality;
 
 /* Changes what accuracy is traded for time by: classify, compositing, slices, method, h, target,
- * kernel_radius, lod_px and samples; the rest stays. TRIPTYCH_USAGE: there is no such quality. */
+ * kernel_radius, lod_px, max_bytes, max_ms and samples; the rest stays. TRIPTYCH_USAGE: there is no
+ * such quality. */
 TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 

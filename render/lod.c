@@ -1,9 +1,12 @@
 #include "lod.h"
 
+#include "lod_limit.h"
+
 #include "report.h"
 
-/* Cells as small as bricks of level 0 usually are, larger where there would be too many. */
-enum { CELL_LOG2 = 6, MOST_CELLS = 1 << 22 };
+/* Cells as small as bricks of level 0 usually are, larger where there would be too many, or where
+ * what is in them counts: then the largest tiles do not reach over them. */
+enum { CELL_LOG2 = 6, LIMITED_CELL_LOG2 = 7, MOST_CELLS = 1 << 22 };
 
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
 {
@@ -22,10 +25,10 @@ static unsigned count_levels(const trip_dataset *data)
     return level;
 }
 
-static void choose_cells(trip_lod *lod, const trip_dataset *data)
+static void choose_cells(trip_lod *lod, const trip_dataset *data, int least_log2)
 {
     double cells;
-    lod->cell_log2 = lod->levels > CELL_LOG2 ? (int)lod->levels : CELL_LOG2;
+    lod->cell_log2 = (int)lod->levels > least_log2 ? (int)lod->levels : least_log2;
     lod->cell_log2--;
     do {
         lod->cell_log2++;
@@ -68,8 +71,8 @@ static double width_in(const trip_camera *camera, const int64_t first[3], const 
     return camera->ortho || depth > 0 ? trip_lod_width_px(camera, depth) : HUGE_VAL;
 }
 
-static double width_in_cell(const trip_lod *lod, const trip_dataset *data,
-                            const trip_camera *camera, const int64_t cell[3])
+double trip_lod_cell_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                           const int64_t cell[3])
 {
     int64_t first[3], past[3];
     for (int a = 0; a < 3; a++) {
@@ -88,7 +91,7 @@ static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_came
     for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
         for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
             for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++) {
-                double width = width_in_cell(lod, data, camera, cell);
+                double width = trip_lod_cell_width(lod, data, camera, cell);
                 *to++ = (uint8_t)trip_lod_level(width, px, lod->levels);
             }
 }
@@ -96,17 +99,20 @@ static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_came
 int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
                   const trip_settings *settings, trip_budget *budget)
 {
-    *lod = (trip_lod){ .levels = settings->lod_px > 0 ? count_levels(data) : 0 };
+    *lod = (trip_lod){ .levels = trip_settings_has_levels(settings) ? count_levels(data) : 0 };
     if (lod->levels == 0)
         return 0;
-    choose_cells(lod, data);
+    choose_cells(lod, data, settings->max_bytes > 0 ? LIMITED_CELL_LOG2 : CELL_LOG2);
     lod->bytes = (size_t)(lod->cells[0] * lod->cells[1] * lod->cells[2]);
     lod->level = trip_budget_take(budget, lod->bytes);
     if (!lod->level)
         return trip_fail(TRIP_ERROR, "render", "levels",
                          "%zu cells do not fit the memory given; raise --memory", lod->bytes);
     fill_levels(lod, data, camera, settings->lod_px * settings->samples);
-    return 0;
+    int status = settings->max_bytes > 0 ? trip_lod_bound(lod, data, camera, settings, budget) : 0;
+    if (status)
+        trip_lod_release(lod, budget);
+    return status;
 }
 
 void trip_lod_release(trip_lod *lod, trip_budget *budget)
@@ -163,6 +169,11 @@ unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
     const int64_t past[3] = { (int64_t)data->header.dims[0], (int64_t)data->header.dims[1],
                               (int64_t)data->header.dims[2] };
     double width = width_in(camera, first, past);
-    return settings->lod_px > 0 ? trip_lod_level(width, settings->lod_px * settings->samples, most)
-                                : 0;
+    unsigned level = settings->lod_px > 0
+                         ? trip_lod_level(width, settings->lod_px * settings->samples, most)
+                         : 0;
+    while (settings->max_bytes > 0 && level < most &&
+           trip_lod_values_bytes(data, camera, settings, level) > settings->max_bytes)
+        level++;
+    return level;
 }

@@ -3,9 +3,9 @@
  * the settings, so never from bricks, tiles or memory. A voxel of a level covers voxels of one
  * cell, and is drawn where that cell has its level: so each place is drawn at one level, once.
  *
- * A cell has the coarsest level whose voxels are at most lod_px pixels wide where the cell comes
- * nearest to the eye, all along the grid's longest step; cells about the eye have level 0.
- * Read-only once made. */
+ * Without a bound on bytes (lod_limit.h) a cell has the coarsest level whose voxels are at most
+ * lod_px pixels wide where the cell comes nearest to the eye, all along the grid's longest step;
+ * cells about the eye have level 0. Read-only once made. */
 #ifndef TRIP_LOD_H
 #define TRIP_LOD_H
 
@@ -14,12 +14,21 @@
 #include "dataset.h"
 #include "settings.h"
 
+/* What a bound on bytes came to; zero: there was none. */
+typedef struct trip_lod_limit {
+    double bytes;      /* that the levels chosen have in view */
+    double full_bytes; /* without the bound */
+    double px;         /* voxels are at most so many pixels wide, but at the coarsest level; 0: the
+                          bound has changed nothing */
+} trip_lod_limit;
+
 typedef struct trip_lod {
     unsigned levels;  /* that may be chosen: the data set has them all */
     int cell_log2;    /* voxels of level 0 along a cell's edge */
     int64_t cells[3]; /* along i, j, k */
     uint8_t *level;   /* of a cell, i fastest; NULL: level 0 everywhere */
     size_t bytes;     /* of those, from the budget */
+    trip_lod_limit limit;
 } trip_lod;
 
 /* `camera` is made with level 0's map. Where the settings call for the finest level, nothing is
@@ -27,6 +36,11 @@ typedef struct trip_lod {
 int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
                   const trip_settings *settings, trip_budget *budget);
 void trip_lod_release(trip_lod *lod, trip_budget *budget);
+
+/* How wide voxels of level 0 are where a cell comes nearest to the eye; cells about the eye:
+ * HUGE_VAL. */
+double trip_lod_cell_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                           const int64_t cell[3]);
 
 /* The level of all of the grid where a frame has one alone, as those that classify after
  * interpolation do: the finest of its places' levels, at most `most`. */

@@ -492,13 +492,14 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
 
 static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
-    if (!(s->lod_px > 0) || plan->gathers)
+    if (!trip_settings_has_levels(s) || plan->gathers)
         return;
     if (s->classify == TRIP_CLASSIFY_POST)
         fprintf(out,
                 "levels      %s: level %u for all of the grid, whose voxels are at most %g pixels "
-                "wide\n",
-                plan->level ? "run" : "do not run", plan->level, s->lod_px);
+                "wide%s\n",
+                plan->level ? "run" : "do not run", plan->level, s->lod_px,
+                s->max_bytes > 0 ? ", or which the bound on bytes calls for" : "");
     else if (plan->lod.level)
         fprintf(
             out,
@@ -507,6 +508,24 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
             1 << plan->lod.cell_log2, plan->lod.levels + 1, s->lod_px);
     else
         fprintf(out, "levels      do not run: the data set has none\n");
+}
+
+static void explain_limit(const trip_plan *plan, const trip_settings *s, FILE *out)
+{
+    const trip_lod_limit *l = &plan->lod.limit;
+    char most[32], full[32], bytes[32];
+    if (!plan->lod.level || !(s->max_bytes > 0) || plan->gathers)
+        return;
+    trip_format_bytes((uint64_t)fmin(s->max_bytes, 1e18), most);
+    trip_format_bytes((uint64_t)l->full_bytes, full);
+    trip_format_bytes((uint64_t)l->bytes, bytes);
+    if (l->px > 0)
+        fprintf(out,
+                "bound       of %s of codes and normals in view: levels are chosen as if voxels "
+                "could be %.3g pixels wide, which leaves %s of %s\n",
+                most, l->px, bytes, full);
+    else
+        fprintf(out, "bound       of %s of codes and normals in view: %s suffice\n", most, full);
 }
 
 static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *out)
@@ -658,6 +677,7 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
     int used = 0;
     explain_method(plan, settings, out);
     explain_levels(plan, settings, out);
+    explain_limit(plan, settings, out);
     explain_clip(plan, settings, out);
     for (unsigned i = 0; i < data->list_count; i++)
         explain_list(plan, &data->lists[i], out);

@@ -172,6 +172,24 @@ static bool is_clipped(const trip_cull *cull, const box *b)
            trip_clip_misses(cull->clip, cull->camera->eye, b->lo, b->hi, reach_over_clip(cull));
 }
 
+/* The radius of splats that lie as deep as the farthest of the box. */
+static double radius_in(const trip_cull *cull, double depth)
+{
+    double low_pass2 = cull->low_pass2 * (cull->camera->ortho ? 1 : depth * depth);
+    return sqrt(cull->radius2 + low_pass2) * (1 + 1e-9);
+}
+
+bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double hi[3])
+{
+    box b;
+    for (int a = 0; a < 3; a++) {
+        b.lo[a] = lo[a] - trip_component(cull->camera->eye, a);
+        b.hi[a] = hi[a] - trip_component(cull->camera->eye, a);
+    }
+    double depth = farthest_along(&b, cull->camera->forward);
+    return depth > -cull->behind && !outside(cull, &b, radius_in(cull, larger(depth, 0)));
+}
+
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  const trip_file_slab *slab)
 {

@@ -45,6 +45,9 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
                          int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about);
 
+/* Whether splats of voxels in a box of the list's grid may be seen, by the view alone. */
+bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double hi[3]);
+
 /* `slab` is the one that the brick is in. */
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  const trip_file_slab *slab);

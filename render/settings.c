@@ -27,7 +27,7 @@ int trip_settings_check(const trip_settings *s)
     if (s->depth && s->target != TRIP_TARGET_RGBA32F)
         return trip_fail(TRIP_USAGE, "render", "depth",
                          "rounded layers have no depth; leave the target at rgba32f");
-    if (s->indexed && s->lod_px > 0)
+    if (s->indexed && trip_settings_has_levels(s))
         return trip_fail(TRIP_USAGE, "render", "levels",
                          "one array of vertices has the finest level alone; use three lists");
     if (s->indexed && s->clip.count > 0)

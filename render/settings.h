@@ -101,6 +101,8 @@ typedef struct trip_settings {
     double background[4];      /* r, g, b, a; not premultiplied */
     double lod_px;             /* cells are drawn at the coarsest level whose voxels are at most so
                                   many pixels of the picture wide (lod.h); 0: all at the finest */
+    double max_bytes;          /* and at coarser ones still, so that no more is read (lod_limit.h);
+                                  0: no bound */
     /* Of the integral renderer alone. */
     trip_field_kind field;
     trip_kernel kernel; /* of values */
@@ -120,6 +122,12 @@ trip_settings trip_settings_default(void);
 static inline bool trip_settings_sum_sheets(const trip_settings *s)
 {
     return s->classify == TRIP_CLASSIFY_PRE && s->compositing == TRIP_COMPOSITING_SHEET;
+}
+
+/* Whether coarse levels may be drawn. */
+static inline bool trip_settings_has_levels(const trip_settings *s)
+{
+    return s->lod_px > 0 || s->max_bytes > 0;
 }
 
 /* Fails (usage) for settings that exclude one another. */

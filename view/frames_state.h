@@ -54,7 +54,6 @@ struct trip_frames {
     int width, height;
     uint8_t *shown;             /* the picture's pixels */
     trip_pace pace, whole_pace; /* of frames of moving views; of whole pictures */
-    double lod_px;              /* of moving views */
     bool whole;                 /* rgba is the whole picture of what is wanted */
     double shown_ms;            /* when a picture was last shown */
 };

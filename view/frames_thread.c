@@ -7,6 +7,7 @@
 
 #include "frames_state.h"
 #include "report.h"
+#include "same_settings.h"
 
 static double now_ms(void)
 {
@@ -21,8 +22,9 @@ static void wake(trip_frames *f)
 }
 
 /* Of moving views, in pixels of their frames: voxels no wider are drawn by coarse levels. */
-#define LOD_LEAST_PX 1.0
-#define LOD_MOST_PX 3.0
+#define MOVING_LOD_PX 1.0
+/* Of the time that such a frame has, what is for data: the rest is for pixels. */
+#define DATA_SHARE 0.6
 
 /* ---- what there is to say ---- */
 
@@ -154,7 +156,6 @@ static void close_data(trip_frames *f)
     f->function = NULL;
     f->has_settings = f->open = f->announced = f->warm = f->other_function = false;
     f->pace = f->whole_pace = (trip_pace){ 0 };
-    f->lod_px = LOD_LEAST_PX;
     pthread_mutex_lock(&f->lock);
     f->status.open = false;
     pthread_mutex_unlock(&f->lock);
@@ -223,14 +224,21 @@ static int use_function(trip_frames *f)
     return status;
 }
 
-static int use_settings(trip_frames *f, double lod_px)
+/* Those that are wanted, but for levels. */
+static triptych_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
-    triptych_settings wanted = f->now.settings;
+    triptych_settings s = f->now.settings;
+    s.lod_px = lod_px;
+    s.max_ms = max_ms;
+    return s;
+}
+
+static int use_settings(trip_frames *f, const triptych_settings *wanted)
+{
     int status = 0;
-    wanted.lod_px = lod_px;
-    if (!f->has_settings || memcmp(&f->settings, &wanted, sizeof wanted))
-        status = triptych_set_settings(f->t, &wanted);
-    f->settings = wanted;
+    if (!f->has_settings || !trip_same_settings(&f->settings, wanted))
+        status = triptych_set_settings(f->t, wanted);
+    f->settings = *wanted;
     f->has_settings = status == 0;
     return status;
 }
@@ -370,7 +378,7 @@ static void show(trip_frames *f, int width, int height, bool whole)
 typedef struct frame {
     int width, height;
     bool whole; /* of the size and detail that are wanted */
-    double lod_px;
+    triptych_settings settings;
     bool first; /* there is no picture of this view: parts of it are shown, and it is finished */
     double begun_ms;
 } frame;
@@ -437,7 +445,7 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
         f->times[s->moving++ % TRIP_FRAMES_TIMES] = (float)ms;
         s->moving_ms = ms;
         s->scale = (double)d->width / f->now.width;
-        s->lod_px = d->lod_px;
+        s->lod_px = d->settings.lod_px;
     }
     if (d->whole)
         s->whole_ms = ms;
@@ -454,19 +462,19 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
     pthread_mutex_unlock(&f->lock);
 }
 
-static int draw(trip_frames *f, double scale, double lod_px, bool first)
+static int draw(trip_frames *f, double scale, const triptych_settings *settings, bool first)
 {
     const trip_wanted *w = &f->now;
     frame d = { .width = (int)ceil(w->width * scale),
                 .height = (int)ceil(w->height * scale),
-                .whole = scale == 1 && lod_px == w->settings.lod_px,
-                .lod_px = lod_px,
+                .whole = scale == 1 && trip_same_settings(settings, &w->settings),
+                .settings = *settings,
                 .first = first,
                 .begun_ms = now_ms() };
     const triptych_view view = trip_navigation_view(&w->navigation, d.width, d.height);
     f->shown_ms = first ? d.begun_ms : f->shown_ms;
     set_ends_early(f, !first);
-    int status = use_settings(f, lod_px);
+    int status = use_settings(f, settings);
     if (!status)
         status = triptych_set_view(f->t, &view);
     if (!status)
@@ -486,17 +494,20 @@ static int draw(trip_frames *f, double scale, double lod_px, bool first)
     return 0;
 }
 
-/* A frame of a moving view: smaller first, then coarser, to keep to the time. */
+/* A frame of a moving view: coarse and small, to keep to the time. */
 static int draw_moving(trip_frames *f, double pixels, double target_ms)
 {
-    const double scale = trip_pace_scale(&f->pace, pixels, target_ms), begun_ms = now_ms();
-    const int status = draw(f, scale, fmax(f->lod_px, f->now.settings.lod_px), true);
-    const double ms = now_ms() - begun_ms;
-    if (ms > 1.3 * target_ms && scale < 0.6)
-        f->lod_px = fmin(f->lod_px * 1.4, LOD_MOST_PX);
-    else if (ms < 0.7 * target_ms)
-        f->lod_px = fmax(f->lod_px / 1.4, LOD_LEAST_PX);
-    return status;
+    const triptych_settings settings =
+        with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px), DATA_SHARE * target_ms);
+    return draw(f, trip_pace_scale(&f->pace, pixels, target_ms), &settings, true);
+}
+
+/* One of the picture's size, before the whole one. */
+static int draw_coarse(trip_frames *f)
+{
+    const triptych_settings settings =
+        with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px), f->now.settings.max_ms);
+    return draw(f, 1, &settings, false);
 }
 
 /* A picture at once, then the whole one; between them one of its size but coarser where that is
@@ -504,16 +515,17 @@ static int draw_moving(trip_frames *f, double pixels, double target_ms)
 static int draw_wanted(trip_frames *f)
 {
     enum { LONG_MS = 1500 };
-    const double lod_px = f->now.settings.lod_px, target_ms = 1000 / f->params.frames_per_second;
+    const triptych_settings *whole = &f->now.settings;
+    const double target_ms = 1000 / f->params.frames_per_second;
     const double pixels = (double)f->now.width * f->now.height;
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, pixels);
     if (whole_ms > 0 && whole_ms < target_ms)
-        return draw(f, 1, lod_px, true);
+        return draw(f, 1, whole, true);
     int status = draw_moving(f, pixels, target_ms);
     if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))
-        status = draw(f, 1, fmax(LOD_LEAST_PX, lod_px), false);
+        status = draw_coarse(f);
     if (!status && !f->whole && !has_newer(f))
-        status = draw(f, 1, lod_px, false);
+        status = draw(f, 1, whole, false);
     return status;
 }
 
@@ -527,7 +539,7 @@ static int prepare(trip_frames *f)
     if (!status)
         status = take_pictures(f);
     if (!status)
-        status = use_settings(f, f->now.settings.lod_px);
+        status = use_settings(f, &f->now.settings);
     if (!status)
         status = use_function(f);
     if (!status && (!f->announced || !f->now.has_navigation || f->other_function))

@@ -507,7 +507,7 @@ bool draw_shown(trip_panel *p, trip_document *d)
 {
     static const char *const shown[] = { "The function", "Lists", "Merge map", "Levels" };
     static const char *const legends[] = { "", "along x red, y green, z blue",
-                                           "weights of the lists, likewise",
+                                           "their weights: x red, y green, z blue",
                                            "white the finest, then blue, green, yellow, ..." };
     triptych_settings *s = &d->settings;
     const bool changed = choose(p, "Colours by", &s->show, shown, 4);

@@ -133,6 +133,7 @@ static trip_document *make_document(trip_viewer *v, const char *input)
                           .editor = trip_function_editor_create(),
                           .start = v->start,
                           .settings = v->settings,
+                          .clips = v->settings.clip.box || v->settings.clip.planes > 0,
                           .opacity_scale = v->opacity_scale > 0 ? v->opacity_scale : 1 };
     if (d->input && d->editor && (d->function || !v->function)) {
         recall(v, d);

@@ -295,6 +295,113 @@ static void tables_of_means_have_their_opacity(void **state)
     scene_destroy(&s);
 }
 
+/* ---- bounds ---- */
+
+/* Codes of 2 bytes in the three lists or fewer, of dense fog: an eighth as many at each level. */
+static double bytes_of(const trip_lod *lod, const scene *s, int lists)
+{
+    double bytes = 0;
+    int64_t cell[3];
+    for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
+        for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
+            for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++) {
+                double voxels = 1;
+                for (int a = 0; a < 3; a++)
+                    voxels *=
+                        fmin(ldexp(1, lod->cell_log2), (double)s->data->header.dims[a] -
+                                                           ldexp((double)cell[a], lod->cell_log2));
+                bytes += lists * 2 * ldexp(voxels, -3 * (int)trip_lod_at(lod, cell));
+            }
+    return bytes;
+}
+
+static trip_lod bounded(scene *s, double max_bytes)
+{
+    trip_lod lod;
+    trip_camera c;
+    trip_settings settings = settings_at(0);
+    const trip_camera_params view = view_along(s);
+    settings.method = TRIP_METHOD_AXIS;
+    settings.max_bytes = max_bytes;
+    assert_int_equal(trip_camera_make(&c, &view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_lod_make(&lod, s->data, &c, &settings, s->budget), 0);
+    return lod;
+}
+
+static void bounds_are_kept_and_what_is_nearest_is_finest(void **state)
+{
+    (void)state;
+    scene s;
+    const double full = 2.0 * NX * NY * NZ;
+    bool mixed = false;
+    create(&s, 64, 0.01);
+    assert_int_equal(s.data->header.code_bytes, 2);
+    for (double part = 2; part > 1.0 / 512; part /= 1.5) {
+        trip_lod lod = bounded(&s, part * full);
+        const int64_t far_cell[3] = { 0, 0, 0 }, near_cell[3] = { 1, 0, 0 };
+        const unsigned farther = trip_lod_at(&lod, far_cell), nearer = trip_lod_at(&lod, near_cell);
+        const double bytes = bytes_of(&lod, &s, 1);
+        assert_float_equal(lod.limit.bytes, bytes, 1e-6 * full);
+        assert_float_equal(lod.limit.full_bytes, full, 1e-6 * full);
+        assert_true(bytes <= part * full);
+        assert_true(nearer <= farther && farther - nearer <= 1);
+        assert_true((lod.limit.px > 0) == (part < 1));
+        mixed |= nearer < farther;
+        trip_lod_release(&lod, s.budget);
+    }
+    assert_true(mixed);
+    trip_lod all_coarse = bounded(&s, 1);
+    assert_float_equal(bytes_of(&all_coarse, &s, 1), ldexp(full, -9), 1);
+    trip_lod_release(&all_coarse, s.budget);
+    scene_destroy(&s);
+}
+
+/* However the data set is cut up: tiles of 16 or 128 voxels. */
+static void tiles_make_no_difference_to_bounds(void **state)
+{
+    (void)state;
+    scene_picture p[2];
+    for (int i = 0; i < 2; i++) {
+        scene s;
+        create(&s, i ? 16 : 128, 0.03);
+        const trip_camera_params view = view_along(&s);
+        trip_settings settings = settings_at(0);
+        settings.max_bytes = 1.0 * NX * NY * NZ;
+        p[i] = scene_draw(&s, renderer_named("cpu"), &view, &settings);
+        assert_true(p[i].stats.all.splats_read < (uint64_t)NX * NY * NZ);
+        scene_destroy(&s);
+    }
+    assert_true(scene_difference(&p[0], &p[1]) == 0);
+    scene_picture_free(&p[0]);
+    scene_picture_free(&p[1]);
+}
+
+static void values_of_a_level_are_an_eighth(void **state)
+{
+    (void)state;
+    scene s;
+    trip_camera c;
+    const scene_part part = {
+        .level = 1, .kind = TRIP_KIND_VALUES, .by = { 2, 2, 2 }, .voxel = all
+    };
+    scene_create(&s, &(scene_params){ .dims = { 64, 64, NZ },
+                                      .tile_voxels = 64,
+                                      .slab_sheets = 8,
+                                      .voxel = all,
+                                      .parts = &part,
+                                      .part_count = 1 });
+    trip_settings settings = settings_at(0);
+    settings.classify = TRIP_CLASSIFY_POST;
+    settings.method = TRIP_METHOD_AXIS;
+    const trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 300, 40, SIZE_PX);
+    assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    settings.max_bytes = 2.0 * 64 * 64 * NZ;
+    assert_int_equal(trip_lod_of_all(s.data, &c, &settings, 1), 0);
+    settings.max_bytes -= 1;
+    assert_int_equal(trip_lod_of_all(s.data, &c, &settings, 1), 1);
+    scene_destroy(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -307,6 +414,9 @@ int main(void)
         cmocka_unit_test(tiles_make_no_difference),
         cmocka_unit_test(interpolated_fog_is_as_thick_at_a_coarse_level),
         cmocka_unit_test(tables_of_means_have_their_opacity),
+        cmocka_unit_test(bounds_are_kept_and_what_is_nearest_is_finest),
+        cmocka_unit_test(tiles_make_no_difference_to_bounds),
+        cmocka_unit_test(values_of_a_level_are_an_eighth),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

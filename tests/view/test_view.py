@@ -187,6 +187,20 @@ class View(program.ProgramTest):
             changes = before.shape != after.shape or (before != after).any()
             self.assertEqual(changes, name not in unchanged, name)
 
+    def test_what_the_command_line_cuts_is_cut(self):
+        cut = ["--clip-box=voxels:4,4,4,20,15,20", "--clip-plane=1,0.5,0,-6"]
+        self.view("wait\npicture whole.exr\nwait\n", "noise.trip")
+        self.view("wait\npicture cut.exr\nstatus status.json\n", "noise.trip", *cut)
+        camera = shlex.split(self.status()["camera"])
+        self.works("render", "noise.trip", *camera, "--background=0,0,0", "-o", "cut_drawn.exr")
+        self.assertIn("--clip-plane", camera)
+        pictures = []
+        for name in "cut", "cut_drawn", "whole":
+            with open(f"{name}.exr", "rb") as f:
+                pictures.append(f.read())
+        self.assertEqual(pictures[0], pictures[1])
+        self.assertNotEqual(pictures[0], pictures[2])
+
     def test_marks_change_the_window_and_not_the_picture(self):
         marks = ["Box", "Axes", "Scale bar", "Keys"]
         script = "wait\nclick 0.5 Fit\nmove 10 10\nwait\npicture p.exr\nscreenshot 0.exr\n" + "".join(

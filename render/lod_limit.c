@@ -1,0 +1,196 @@
+#include "lod_limit.h"
+
+#include "brick_box.h"
+#include "plan_cull.h"
+#include "report.h"
+#include "weight.h"
+
+/* Cells about the eye count as if they began so far from it, so that they too can be coarser. */
+#define NEAREST_CELLS 0.25
+
+/* What the levels are chosen from; a cell's numbers are in the order of trip_lod.level. */
+typedef struct limiting {
+    trip_lod *lod;
+    const trip_dataset *data;
+    uint32_t *voxels; /* of level 0 in the cell; 0 where it is out of view */
+    float *width;     /* px, of those voxels */
+    double bytes[32]; /* of a voxel of level 0, drawn at a level, in all lists that are read */
+} limiting;
+
+static int lists_read(const trip_camera *camera, const trip_settings *settings)
+{
+    const int axis_of_view = trip_weight_axis_of_view(camera);
+    int lists = 0;
+    for (int axis = 0; axis < 3; axis++)
+        lists += trip_weight_is_somewhere(settings, camera, axis_of_view, axis);
+    return lists;
+}
+
+static double code_bytes(const trip_dataset *data, const trip_list *list)
+{
+    const unsigned own = trip_kind_of(list->kind)->code_bytes;
+    return own ? own : data->header.code_bytes;
+}
+
+static void weigh_levels(limiting *l, const trip_camera *camera, const trip_settings *settings)
+{
+    const double normals = settings->shading ? l->data->header.normal_bytes : 0;
+    const double kept = (double)l->data->header.kept;
+    for (unsigned level = 0; level <= l->lod->levels; level++) {
+        const trip_list *list =
+            trip_dataset_find(l->data, 2, level, level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
+        const double share = kept > 0 ? (double)list->records / kept : 0;
+        l->bytes[level] =
+            lists_read(camera, settings) * share * (code_bytes(l->data, list) + normals);
+    }
+}
+
+static uint32_t *cell_at(const limiting *l, const double place[3])
+{
+    const trip_lod *lod = l->lod;
+    int64_t cell[3];
+    for (int a = 0; a < 3; a++)
+        cell[a] = (int64_t)place[a] >> lod->cell_log2;
+    return &l->voxels[(cell[2] * lod->cells[1] + cell[1]) * lod->cells[0] + cell[0]];
+}
+
+/* Tiles lie in cells; slabs need not, sheets do. */
+static void count_voxels(limiting *l)
+{
+    const trip_list *list = trip_dataset_find(l->data, 2, 0, TRIP_KIND_VOXELS);
+    const trip_file_header *h = &l->data->header;
+    for (uint64_t s = 0; s < list->slab_count; s++) {
+        const trip_file_slab *slab = &list->slabs[s];
+        for (uint64_t b = slab->first_brick; b < slab->first_brick + slab->brick_count; b++) {
+            const trip_file_brick *brick = &list->bricks[b];
+            for (unsigned i = brick->sheet_min; i <= brick->sheet_max; i++) {
+                const double place[3] = { (double)brick->tile_u * (1u << h->tile_log2),
+                                          (double)brick->tile_v * (1u << h->tile_log2),
+                                          (double)slab->slab * h->slab_sheets + i };
+                *cell_at(l, place) += list->runs[b * h->slab_sheets + i].records;
+            }
+        }
+    }
+}
+
+/* Widths of the voxels of a cell in view; cells out of view have no voxels. */
+static void place_cell(limiting *l, const trip_cull *cull, const int64_t cell[3], size_t at)
+{
+    const trip_lod *lod = l->lod;
+    const double edge = ldexp(1, lod->cell_log2);
+    double lo[3], hi[3];
+    for (int a = 0; a < 3; a++) {
+        lo[a] = (double)cell[a] * edge - 0.5;
+        hi[a] = fmin((double)(cell[a] + 1) * edge, (double)l->data->header.dims[a]) - 0.5;
+    }
+    if (!trip_cull_may_see(cull, lo, hi))
+        l->voxels[at] = 0;
+    const double nearest = trip_lod_width_px(cull->camera, NEAREST_CELLS * edge);
+    const double width = trip_lod_cell_width(lod, l->data, cull->camera, cell);
+    l->width[at] = (float)(width < nearest || cull->camera->ortho ? width : nearest);
+}
+
+static int place_cells(limiting *l, const trip_camera *camera, const trip_settings *settings)
+{
+    const trip_lod *lod = l->lod;
+    const trip_list *list = trip_dataset_find(l->data, 2, 0, TRIP_KIND_VOXELS);
+    trip_list_grid grid;
+    int64_t cell[3];
+    size_t at = 0;
+    int status = trip_list_grid_make(&grid, l->data, list);
+    if (status)
+        return status;
+    const trip_cull cull = trip_cull_make(l->data, camera, &grid, settings,
+                                          trip_weight_axis_of_view(camera), NULL, NULL);
+    for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
+        for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
+            for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++)
+                place_cell(l, &cull, cell, at++);
+    return 0;
+}
+
+/* The level of a cell where voxels may be so wide. */
+static unsigned level_at(const limiting *l, size_t cell, double px)
+{
+    const unsigned level = trip_lod_level((double)l->width[cell], px, l->lod->levels);
+    return level > l->lod->level[cell] ? level : l->lod->level[cell];
+}
+
+static double bytes_at(const limiting *l, double px)
+{
+    double bytes = 0;
+    for (size_t i = 0; i < l->lod->bytes; i++)
+        if (l->voxels[i])
+            bytes += l->voxels[i] * l->bytes[level_at(l, i, px)];
+    return bytes;
+}
+
+/* The least width, to one part in 64, with which so many bytes suffice; `most` where none does. */
+static double least_px(const limiting *l, double bytes, double most)
+{
+    enum { PARTS = 64, DOUBLINGS = 40 };
+    int enough = PARTS * DOUBLINGS, too_little = 0;
+    while (enough - too_little > 1) {
+        const int middle = (enough + too_little) / 2;
+        if (bytes_at(l, most * exp2((double)middle / PARTS - DOUBLINGS)) <= bytes)
+            enough = middle;
+        else
+            too_little = middle;
+    }
+    return most * exp2((double)enough / PARTS - DOUBLINGS);
+}
+
+static void choose(limiting *l, double most_bytes)
+{
+    trip_lod *lod = l->lod;
+    double widest = 0;
+    for (size_t i = 0; i < lod->bytes; i++)
+        widest = fmax(widest, l->voxels[i] ? (double)l->width[i] : 0);
+    lod->limit.full_bytes = lod->limit.bytes = bytes_at(l, 0);
+    if (lod->limit.full_bytes <= most_bytes || !(widest > 0))
+        return;
+    const double px = least_px(l, most_bytes, ldexp(widest, (int)lod->levels));
+    lod->limit.px = px;
+    lod->limit.bytes = bytes_at(l, px);
+    for (size_t i = 0; i < lod->bytes; i++)
+        lod->level[i] = (uint8_t)level_at(l, i, px);
+}
+
+int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                   const trip_settings *settings, trip_budget *budget)
+{
+    const size_t cells = lod->bytes;
+    limiting l = { .lod = lod, .data = data };
+    l.voxels = trip_budget_take(budget, cells * sizeof *l.voxels);
+    l.width = trip_budget_take(budget, cells * sizeof *l.width);
+    int status = l.voxels && l.width
+                     ? 0
+                     : trip_fail(TRIP_ERROR, "render", "levels",
+                                 "%zu cells do not fit the memory given; raise --memory", cells);
+    if (!status) {
+        count_voxels(&l);
+        weigh_levels(&l, camera, settings);
+        status = place_cells(&l, camera, settings);
+    }
+    if (!status)
+        choose(&l, settings->max_bytes);
+    if (l.voxels)
+        trip_budget_release(budget, l.voxels, cells * sizeof *l.voxels);
+    if (l.width)
+        trip_budget_release(budget, l.width, cells * sizeof *l.width);
+    return status;
+}
+
+double trip_lod_values_bytes(const trip_dataset *data, const trip_camera *camera,
+                             const trip_settings *settings, unsigned level)
+{
+    double bytes = 0;
+    for (unsigned i = 0; i < data->list_count; i++) {
+        const trip_list *list = &data->lists[i];
+        const bool read = level ? list->kind == TRIP_KIND_VALUES
+                                : list->kind == TRIP_KIND_VOXELS || list->kind == TRIP_KIND_HALO;
+        if (read && list->axis == 2 && list->level == level)
+            bytes += (double)list->records * code_bytes(data, list);
+    }
+    return bytes * lists_read(camera, settings);
+}
