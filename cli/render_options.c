@@ -54,6 +54,8 @@ enum {
     KEY_NO_SHADING,
     KEY_H,
     KEY_KERNEL_RADIUS,
+    KEY_LOW_PASS,
+    KEY_FLATTEN,
     KEY_TARGET,
     KEY_RENDERER,
     KEY_QUALITY,
@@ -142,7 +144,8 @@ static const struct argp_option options[] = {
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
       "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
-      "pre with what only splats have (--lod, --kernel-radius, --compositing, --target, --submit, "
+      "pre with what only splats have (--lod, --kernel-radius, --kernel exact or ewa, --low-pass, "
+      "--flatten, --compositing, --target, --submit, "
       "--traversal ascending, --count) and for data without cells to interpolate in (default: "
       "auto)",
       3 },
@@ -170,6 +173,15 @@ static const struct argp_option options[] = {
       3 },
     { "traversal", KEY_TRAVERSAL, "NAME", 0, "outward or ascending (default: outward)", 3 },
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 3 },
+    { "low-pass", KEY_LOW_PASS, "NAME", 0,
+      "What keeps splats from falling between pixels: ewa (a convolution), uniform (Swan's "
+      "scaling; "
+      "--renderer reference and --kernel ewa only) or none (default: ewa); pre only",
+      3 },
+    { "flatten", KEY_FLATTEN, "S", 0,
+      "Flatten kernels along the gradient by 1 to 100, for surfaces (default: 1, round); --kernel "
+      "ewa only",
+      3 },
     { NULL, 0, NULL, 0, "Renderer:", 4 },
     { "renderer", KEY_RENDERER, "NAME", 0,
       "gl, cpu, reference, integral or auto (default: auto: gl on graphics hardware, else cpu)",
@@ -195,7 +207,9 @@ static const struct argp_option options[] = {
       "integral only",
       4 },
     { "kernel", KEY_KERNEL, "NAME", 0,
-      "Interpolation of values, linear or cubic (default: linear); integral only", 4 },
+      "Footprints of splats, exact or ewa (by the affine map at the centre; default: exact); "
+      "interpolation of values, linear or cubic (default: linear), with the integral only",
+      4 },
     { "tolerance", KEY_TOLERANCE, "E", 0,
       "Error of a pixel's components, 1e-12 to 0.1 (default: 1e-4); integral only", 4 },
     { "samples", KEY_SAMPLES, "N", 0, "N x N rays a pixel, for antialiasing (default: 1)", 4 },
@@ -225,7 +239,21 @@ typedef struct parse {
     bool slices, compositing;
     bool kernel, integral; /* options of the integral renderer */
     bool again;            /* over settings that --quality or --error has chosen */
+    bool footprint;        /* --kernel of splats, --low-pass or --flatten */
 } parse;
+
+static int parse_footprint(int key, const char *arg, parse *p)
+{
+    static const char *const filters[] = { "ewa", "uniform", "none", NULL };
+    triptych_settings *s = &p->o->settings;
+    int which = 0, status;
+    p->footprint = true;
+    if (key == KEY_FLATTEN)
+        return trip_option_number("--flatten", arg, 1, 100, &s->flatten);
+    status = trip_option_choice("--low-pass", arg, filters, &which);
+    s->low_pass = (triptych_low_pass)which;
+    return status;
+}
 
 static int parse_point(const char *option, const char *text, double point[3], bool *given)
 {
@@ -409,6 +437,9 @@ static int parse_method(int key, char *arg, parse *p)
         status = trip_option_choice("--compositing", arg, compositings, &which);
         s->compositing = (triptych_compositing)which;
         return status;
+    case KEY_LOW_PASS:
+    case KEY_FLATTEN:
+        return parse_footprint(key, arg, p);
     case KEY_LOD:
         return trip_option_number("--lod", arg, 0, 1000, &s->lod_px);
     case KEY_MAX_BYTES:
@@ -496,10 +527,26 @@ static int parse_look(int key, char *arg, parse *p)
     }
 }
 
+/* Of values, or of splats. */
+static int parse_kernel(const char *arg, parse *p)
+{
+    static const char *const kernels[] = { "linear", "cubic", "exact", "ewa", NULL };
+    triptych_settings *s = &p->o->settings;
+    int which = 0, status = trip_option_choice("--kernel", arg, kernels, &which);
+    bool of_values = which <= TRIPTYCH_CUBIC;
+    if (of_values)
+        s->kernel = (triptych_kernel)which;
+    else
+        s->footprint = (triptych_footprint)(which - (TRIPTYCH_CUBIC + 1));
+    p->kernel |= of_values;
+    p->integral |= of_values;
+    p->footprint |= !of_values;
+    return status;
+}
+
 static int parse_integral(int key, char *arg, parse *p)
 {
     static const char *const fields[] = { "stored", "source", "splats", NULL };
-    static const char *const kernels[] = { "linear", "cubic", NULL };
     render_options *o = p->o;
     int which = 0, status;
     switch (key) {
@@ -508,10 +555,7 @@ static int parse_integral(int key, char *arg, parse *p)
         o->field = (render_field)(which + 1);
         break;
     case KEY_KERNEL:
-        p->kernel = true;
-        status = trip_option_choice("--kernel", arg, kernels, &which);
-        o->settings.kernel = (triptych_kernel)which;
-        break;
+        return parse_kernel(arg, p);
     case KEY_TOLERANCE:
         status = trip_option_number("--tolerance", arg, 1e-12, 0.1, &o->settings.tolerance);
         break;
@@ -639,18 +683,38 @@ static int check_integral(parse *p)
     return 0;
 }
 
+static int check_footprint(const parse *p)
+{
+    const render_options *o = p->o;
+    const triptych_settings *s = &o->settings;
+    bool ewa = s->footprint == TRIPTYCH_FOOTPRINT_EWA;
+    bool reference = o->renderer == TRIPTYCH_RENDERER_REFERENCE;
+    if (p->footprint && o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_option_fail("--kernel, --low-pass, --flatten",
+                                "of footprints do not apply to --renderer integral");
+    if (s->low_pass == TRIPTYCH_LOW_PASS_UNIFORM && !(reference && ewa))
+        return trip_option_fail("--low-pass",
+                                "uniform goes with --renderer reference and --kernel ewa");
+    if (s->flatten > 1 && !ewa)
+        return trip_option_fail("--flatten", "applies to --kernel ewa only");
+    if (s->flatten > 1 && o->count)
+        return trip_option_fail("--flatten", "does not go with --count");
+    return 0;
+}
+
 /* What only splats have implies them, also where it is what it would be by default. */
 static int choose_classify(parse *p)
 {
     render_options *o = p->o;
     bool splats = o->settings.traversal != TRIPTYCH_OUTWARD || p->kernel_radius || o->count ||
-                  p->compositing || p->target || p->lists || p->forms;
+                  p->compositing || p->footprint || p->target || p->lists || p->forms;
     if (o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
         return 0;
     if (splats && p->slices)
-        return trip_option_fail(
-            "--slices", "does not go with --kernel-radius, --compositing, --target, --submit, "
-                        "--count or --traversal ascending, which are of splats");
+        return trip_option_fail("--slices",
+                                "does not go with --kernel exact or ewa, --low-pass, --flatten, "
+                                "--kernel-radius, --compositing, --target, --submit, --count or "
+                                "--traversal ascending, which are of splats");
     if (splats)
         o->settings.classify = TRIPTYCH_PRE;
     else if (p->slices)
@@ -669,8 +733,8 @@ static int check_classify(const parse *p)
         return trip_option_fail("--classify", "does not apply to --renderer integral");
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
         return trip_option_fail("--traversal", "is outward with --classify post");
-    if (p->kernel_radius || p->compositing)
-        return trip_option_fail("--kernel-radius, --compositing",
+    if (p->kernel_radius || p->compositing || p->footprint)
+        return trip_option_fail("--kernel, --low-pass, --flatten, --kernel-radius, --compositing",
                                 "apply to splats: give --classify pre");
     if (o->count)
         return trip_option_fail("--count", "counts splats: give --classify pre");
@@ -716,6 +780,8 @@ static int check(parse *p)
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     status = check_integral(p);
+    if (!status)
+        status = check_footprint(p);
     if (!status)
         status = choose_classify(p);
     if (!status)

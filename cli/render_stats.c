@@ -205,6 +205,9 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     else
         cJSON_AddStringToObject(root, "compositing",
                                 o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
+    if (frame.classify == TRIPTYCH_PRE)
+        cJSON_AddStringToObject(root, "kernel",
+                                o->settings.footprint == TRIPTYCH_FOOTPRINT_EWA ? "ewa" : "exact");
     if (o->settings.lod_px > 0)
         cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
     if (frame.effects) {

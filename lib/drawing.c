@@ -168,6 +168,8 @@ static const char *needs_splats(const triptych *t)
         return "coarse levels are to be drawn";
     if (s->compositing != TRIP_COMPOSITING_SPLAT)
         return "splats are to be composited by sheets";
+    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
+        return "a kernel or low-pass of splats is set";
     if (s->kernel_radius != TRIP_KERNEL_RADIUS_VOXELS)
         return "a kernel radius is set";
     if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
@@ -205,17 +207,38 @@ static int plan_field(triptych *t)
                                 s->budget);
 }
 
+/* What of the splats' settings the renderer or the data set cannot do. */
+static int check_splats(const triptych *t)
+{
+    const trip_settings *s = &t->settings;
+    triptych_renderer renderer = t->resources.renderer;
+    bool splats = s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA;
+    if (splats && renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_fail(TRIP_USAGE, "render", "kernel",
+                         "the integral has no footprints and no low-pass");
+    if (s->low_pass == TRIP_LOW_PASS_UNIFORM && renderer != TRIPTYCH_RENDERER_REFERENCE)
+        return trip_fail(TRIP_USAGE, "render", "low-pass",
+                         "uniform scaling is drawn by the reference alone");
+    if (s->flatten > 1 && !(t->session.data->header.planes >> TRIP_PLANE_NORMALS & 1))
+        return trip_fail(TRIP_USAGE, "render", t->name,
+                         "has no gradients to flatten kernels along");
+    return 0;
+}
+
 static int plan_frame(triptych *t)
 {
     session *s = &t->session;
+    int status = check_splats(t);
+    if (status)
+        return status;
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL && t->settings.show)
         return trip_fail(TRIP_USAGE, "render", "show", "the integral has no lists and no levels");
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
         return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
-    int status = trip_plan_make(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
-                                s->table, s->budget);
+    status = trip_plan_make(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
+                            s->table, s->budget);
     t->plan.level = t->level;
     return status;
 }

@@ -52,6 +52,9 @@ triptych_settings triptych_default_settings(void)
     return (triptych_settings){
         .classify = TRIPTYCH_CLASSIFY_AUTO,
         .compositing = (triptych_compositing)s.compositing,
+        .footprint = (triptych_footprint)s.footprint,
+        .low_pass = (triptych_low_pass)s.low_pass,
+        .flatten = s.flatten,
         .method = (triptych_method)s.method,
         .traversal = (triptych_traversal)s.traversal,
         .target = (triptych_target)s.target,
@@ -79,6 +82,9 @@ int triptych_set_quality(triptych_settings *s, triptych_quality quality)
         return TRIPTYCH_USAGE;
     s->classify = quality == TRIPTYCH_NORMAL ? usual.classify : TRIPTYCH_POST;
     s->compositing = usual.compositing;
+    s->footprint = usual.footprint;
+    s->low_pass = usual.low_pass;
+    s->flatten = usual.flatten;
     s->slices = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 8 : 0;
     s->slices = quality == TRIPTYCH_EXACT ? 16 : s->slices;
     s->method = usual.method;
@@ -101,6 +107,20 @@ static const char *fault_of_integral(const triptych_settings *s)
     if (!(s->samples >= 1 && s->samples <= 64))
         return "a pixel has 1 to 64 samples along each side";
     return NULL;
+}
+
+static const char *fault_of_splats(const triptych_settings *s)
+{
+    if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
+        return "there is no such compositing";
+    if (s->footprint < TRIPTYCH_FOOTPRINT_EXACT || s->footprint > TRIPTYCH_FOOTPRINT_EWA ||
+        s->low_pass < TRIPTYCH_LOW_PASS_EWA || s->low_pass > TRIPTYCH_LOW_PASS_NONE)
+        return "there is no such footprint or low-pass";
+    if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
+        return "the kernel radius lies between 0.1 and 100 voxels";
+    if (!(s->flatten >= 1 && s->flatten <= 100))
+        return "kernels are 1 to 100 times as flat as round ones";
+    return s->flatten > 1 && s->count ? "flat kernels are not counted" : NULL;
 }
 
 static bool is_a_box(const double lo[3], const double hi[3])
@@ -152,16 +172,12 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "there is no such method, traversal or target";
     if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_CLASSIFY_AUTO)
         return "there is no such classification";
-    if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
-        return "there is no such compositing";
     if (!(s->slices >= 0 && s->slices <= TRIP_SLICES_MAX))
         return "a sheet has 1 to 16 slices, or as many as the view calls for (0)";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
         return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1))
         return "h lies between 0 and below 1";
-    if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
-        return "the kernel radius lies between 0.1 and 100 voxels";
     if ((s->shading || s->effects) && !s->headlight && !(length > 0 && isfinite(length)))
         return "the direction to the light is zero or not finite";
     for (int i = 0; i < 4; i++)
@@ -173,7 +189,8 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "bounds of bytes and milliseconds lie between 0 (none) and 1e18 and 1e9";
     if (s->show < TRIPTYCH_SHOW_PICTURE || s->show > TRIPTYCH_SHOW_LEVELS)
         return "there is nothing such to be shown";
-    const char *fault = fault_of_clip(&s->clip);
+    const char *fault = fault_of_splats(s);
+    fault = fault ? fault : fault_of_clip(&s->clip);
     fault = fault ? fault : fault_of_effects(s);
     return fault ? fault : fault_of_integral(s);
 }
@@ -229,6 +246,9 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
     t->settings = (trip_settings){
         .classify = s->classify == TRIPTYCH_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST,
         .compositing = (trip_compositing)s->compositing,
+        .footprint = (trip_footprint)s->footprint,
+        .low_pass = (trip_low_pass)s->low_pass,
+        .flatten = s->flatten,
         .slices = s->slices,
         .method = (trip_method)s->method,
         .traversal = (trip_traversal)s->traversal,

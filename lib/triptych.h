@@ -217,10 +217,10 @@ typedef enum triptych_classify {
     TRIPTYCH_PRE,  /* voxels are classified, and their splats drawn */
     TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
     /* Post, but pre where something is set that only splats have (ascending traversal, a rounded
-     * target, indexed, triangles, coarse levels, by sheet, another kernel radius than 2, count), or
-     * the data has no cells to interpolate in: one voxel thick, or culled without a halo.
-     * triptych_explain() says which. Memory has no part in it: where post does not fit, the frame
-     * fails, and names what would do. */
+     * target, indexed, triangles, coarse levels, by sheet, EWA footprints, another low-pass or
+     * kernel radius than 2, count), or the data has no cells to interpolate in: one voxel thick, or
+     * culled without a halo. triptych_explain() says which. Memory has no part in it: where post
+     * does not fit, the frame fails, and names what would do. */
     TRIPTYCH_CLASSIFY_AUTO,
 } triptych_classify;
 
@@ -229,6 +229,19 @@ typedef enum triptych_compositing {
     TRIPTYCH_BY_SPLAT, /* each, in list order */
     TRIPTYCH_BY_SHEET, /* the sum of those of each sheet, whose order does not matter then */
 } triptych_compositing;
+
+/* How the footprint of a splat is worked out (pre). */
+typedef enum triptych_footprint {
+    TRIPTYCH_FOOTPRINT_EXACT, /* from the distance of every pixel's ray */
+    TRIPTYCH_FOOTPRINT_EWA,   /* by the affine map at its centre, as EWA volume splatting does */
+} triptych_footprint;
+
+/* What keeps splats from falling between pixels (pre). */
+typedef enum triptych_low_pass {
+    TRIPTYCH_LOW_PASS_EWA,     /* convolution with a Gaussian */
+    TRIPTYCH_LOW_PASS_UNIFORM, /* Swan's scaling; of EWA footprints, by the reference alone */
+    TRIPTYCH_LOW_PASS_NONE,
+} triptych_low_pass;
 
 /* What is cut away. Of splats (pre) those are drawn whose voxels are inside: they reach over the
  * cut by their radius. Where values are interpolated (post, the integral) rays are cut. */
@@ -260,6 +273,10 @@ enum {
 typedef struct triptych_settings {
     triptych_classify classify;
     triptych_compositing compositing; /* pre */
+    triptych_footprint footprint;     /* pre */
+    triptych_low_pass low_pass;       /* pre */
+    double flatten; /* of EWA footprints: how many times flatter kernels are along full gradients, 1
+                       (round) to 100; without count */
     int slices; /* of a sheet, post: 1 to 16, more come closer to the integral; 0: by the view */
     triptych_method method;
     triptych_traversal traversal;
@@ -297,9 +314,9 @@ typedef struct triptych_settings {
                            longest side of the volume, 8 to 1024, at least a voxel each */
 } triptych_settings;
 
-/* Classified by itself, by splat, slices by the view, merge, outward, rgba32f, h 0.85, kernel
- * radius 2, shading by headlight, black; values, linear, 1e-4, one ray a pixel; no effects, and
- * where they are set scattering alike, cueing 0.6, 128 cells. */
+/* Classified by itself, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
+ * outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black; values, linear, 1e-4, one
+ * ray a pixel; no effects, and where they are set scattering alike, cueing 0.6, 128 cells. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 /* How close to the integral pictures are to be, for the time that takes; measured by `triptych
  * accuracy`, triptych-accuracy(1) has the figures. */
@@ -310,8 +327,9 @@ typedef enum triptych_quality {
     TRIPTYCH_EXACT,
 } triptych_quality;
 
-/* Changes what accuracy is traded for time by: classify, compositing, slices, method, h, target,
- * kernel_radius, lod_px, max_bytes, max_ms and samples; the rest stays. TRIPTYCH_USAGE: there is no
+/* Changes what accuracy is traded for time by: classify, compositing, footprint, low_pass, flatten,
+ * slices, method, h, target, kernel_radius, lod_px, max_bytes, max_ms and samples; the rest stays.
+ * TRIPTYCH_USAGE: there is no
  * such quality. */
 TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);

@@ -332,7 +332,8 @@ static int take_lists(trip_plan *plan, unsigned count, trip_budget *budget)
 /* Sheets that are classified after interpolation are lit by differences of values. */
 static unsigned planes_of(const trip_dataset *data, const trip_settings *settings)
 {
-    bool read = settings->shading && settings->classify == TRIP_CLASSIFY_PRE;
+    bool wanted = settings->shading || settings->flatten > 1;
+    bool read = wanted && settings->classify == TRIP_CLASSIFY_PRE;
     unsigned normals = read ? 1u << TRIP_PLANE_NORMALS : 0;
     return 1u << TRIP_PLANE_VOXELS | (data->header.planes & normals);
 }
@@ -662,6 +663,9 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
         fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
     else if (of_values)
         fprintf(out, "shading     does not run: switched off\n");
+    else if (!s->shading && s->flatten > 1)
+        fprintf(out,
+                "shading     does not run: switched off; normal planes are read to flatten by\n");
     else if (plan->planes & 1u << TRIP_PLANE_NORMALS)
         fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))

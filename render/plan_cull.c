@@ -44,7 +44,9 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
                          int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about)
 {
-    double radius = about ? TRIP_SHEET_RADIUS : settings->kernel_radius;
+    double radius = about ? TRIP_SHEET_RADIUS : settings->kernel_radius, room = 1;
+    if (settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
+        room = TRIP_SPLAT_AFFINE_REACH * TRIP_SPLAT_AFFINE_REACH;
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
     return (trip_cull){
         .camera = camera,
@@ -55,10 +57,11 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
                    side(camera, camera->to_x, camera->width - 0.5, -1),
                    side(camera, camera->to_y, camera->height - 0.5, -1) },
-        .radius2 = radius * radius,
+        .radius2 = room * radius * radius,
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
-        .low_pass2 = TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
+        .low_pass2 =
+            room * TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
         .behind = about ? 0 : behind_eye(camera, settings),
         .table = table,
         .about = about,

@@ -285,10 +285,21 @@ static bool draw_footprint(reference *r, const trip_splat *s, double fragment[TR
             double front = trip_splat_front(&r->constants, s, x + 0.5, y + 0.5);
             double footprint = front * s->amplitude * (exp(-m / 2) - r->constants.edge);
             fragment[TRIP_CHANNEL_DEPTH] = fmax(0, s->z) * p->ray_length;
-            put_fragment(r, p, fragment, extinction * p->stretch * footprint);
+            double stretch = s->affine ? 1 : p->stretch;
+            put_fragment(r, p, fragment, extinction * stretch * footprint);
         }
     }
     return touched;
+}
+
+/* The world-space gradient of a voxel. */
+static void unpack(const reference *r, uint32_t normal, double gradient[3])
+{
+    const trip_file_header *header = &r->frame->data->header;
+    if (header->normal_bytes == 3)
+        trip_compact_normal_unpack(&r->compact, normal, gradient);
+    else
+        trip_normal_unpack(normal, header->gradient_full, gradient);
 }
 
 static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *entry,
@@ -302,12 +313,9 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
     const bool shaded = frame->settings->shading && normal;
     if (!shaded && !trip_effects_some(&frame->settings->effects))
         return;
-    const trip_file_header *header = &frame->data->header;
     double gradient[3];
-    if (shaded && header->normal_bytes == 3)
-        trip_compact_normal_unpack(&r->compact, *normal, gradient);
-    else if (shaded)
-        trip_normal_unpack(*normal, header->gradient_full, gradient);
+    if (shaded)
+        unpack(r, *normal, gradient);
     const trip_light light =
         trip_light_at(frame->settings, &r->list->camera, r->gradient_full, voxel);
     trip_effects_colour(&r->effects, &light, trip_list_grid_point(&r->list->grid, voxel),
@@ -324,12 +332,22 @@ static bool may_reach(const reference *r, trip_vec3 voxel, double radius)
                                  from_eye, radius * trip_list_grid_growth(grid));
 }
 
+static trip_flattening flattening(const reference *r, const uint32_t *normal)
+{
+    double gradient[3];
+    if (!normal || !(r->constants.flatten > 0))
+        return (trip_flattening){ 0 };
+    unpack(r, *normal, gradient);
+    return trip_splat_flattening(&r->constants, gradient, r->gradient_full);
+}
+
 static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal)
 {
     trip_list_stats *stats = &r->stats[r->number];
     trip_splat s;
     stats->splats_read++;
-    bool seen = trip_splat_project(&r->constants, voxel, &s);
+    trip_flattening flat = flattening(r, normal);
+    bool seen = trip_splat_project_flat(&r->constants, voxel, &flat, &s);
     r->broken |= trip_splat_is_broken(&s);
     if (!seen || !may_reach(r, voxel, s.radius))
         return;

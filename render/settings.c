@@ -15,6 +15,7 @@ trip_settings trip_settings_default(void)
         .light_direction = { 0, 0, 1 },
         .h = 0.85,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
+        .flatten = 1,
         .background = { 0, 0, 0, 1 },
         .tolerance = 1e-4,
         .samples = 1,
@@ -36,8 +37,17 @@ int trip_settings_check(const trip_settings *s)
     if (s->effects.shadows && s->headlight)
         return trip_fail(TRIP_USAGE, "render", "shadows",
                          "light from the eye casts none that is seen; give its direction");
+    if (s->low_pass == TRIP_LOW_PASS_UNIFORM && s->footprint != TRIP_FOOTPRINT_EWA)
+        return trip_fail(TRIP_USAGE, "render", "low-pass",
+                         "uniform scaling is of the kernel ewa; give that too");
+    if (s->flatten > 1 && s->footprint != TRIP_FOOTPRINT_EWA)
+        return trip_fail(TRIP_USAGE, "render", "flatten",
+                         "flat kernels are of the kernel ewa; give that too");
     if (s->classify == TRIP_CLASSIFY_PRE)
         return 0;
+    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
+        return trip_fail(TRIP_USAGE, "render", "kernel",
+                         "footprints and their low-pass are of splats; classify pre");
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)
         return trip_fail(TRIP_USAGE, "render", "traversal",
                          "sheets that are classified after interpolation are composited outward");

@@ -43,6 +43,19 @@ typedef enum trip_field_kind {
     TRIP_FIELD_SPLATS, /* the sum of the splats */
 } trip_field_kind;
 
+/* What of a splat's footprint is worked out how (pre; splat.h). */
+typedef enum trip_footprint {
+    TRIP_FOOTPRINT_EXACT, /* from the distance of every pixel's ray */
+    TRIP_FOOTPRINT_EWA,   /* by the affine map at the centre (Zwicker et al. 2001) */
+} trip_footprint;
+
+/* What keeps footprints from falling between pixel centres (ewa.h). */
+typedef enum trip_low_pass {
+    TRIP_LOW_PASS_EWA,     /* the footprint's convolution with a Gaussian */
+    TRIP_LOW_PASS_UNIFORM, /* Swan's scaling; of EWA footprints, by the reference alone */
+    TRIP_LOW_PASS_NONE,
+} trip_low_pass;
+
 typedef enum trip_kernel {
     TRIP_KERNEL_LINEAR, /* between the 8 voxels around */
     TRIP_KERNEL_CUBIC,  /* Catmull and Rom's, between 64 */
@@ -86,7 +99,11 @@ typedef struct trip_effects {
 typedef struct trip_settings {
     trip_classify classify;
     trip_compositing compositing; /* of splats */
-    int slices;                   /* of a sheet, post: 1 to TRIP_SLICES_MAX */
+    trip_footprint footprint;     /* likewise */
+    trip_low_pass low_pass;       /* likewise */
+    double
+        flatten; /* of EWA footprints: how much flatter kernels are along the gradient, 1: round */
+    int slices;  /* of a sheet, post: 1 to TRIP_SLICES_MAX */
     trip_method method;
     trip_traversal traversal;
     trip_target target;
@@ -114,8 +131,9 @@ typedef struct trip_settings {
     trip_effects effects;
 } trip_settings;
 
-/* The defaults: pre, splat by splat, 2 slices, merge, outward, h 0.85, kernel radius 2, shading by
- * headlight, rgba32f, no depth, black; values, linear, to 1e-4, one ray a pixel. */
+/* The defaults: pre, splat by splat, exact footprints, EWA's low-pass, 2 slices, merge, outward, h
+ * 0.85, kernel radius 2, shading by headlight, rgba32f, no depth, black; values, linear, to 1e-4,
+ * one ray a pixel. */
 trip_settings trip_settings_default(void);
 
 /* Whether splats are summed sheet by sheet. */

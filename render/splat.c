@@ -1,5 +1,6 @@
 #include "splat.h"
 
+#include "ewa.h"
 #include "report.h"
 
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings)
@@ -12,7 +13,11 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
         .camera = *camera,
         .sigma = sigma,
         .cutoff2 = cutoff2,
-        .low_pass2 = TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX,
+        .affine = settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho,
+        .low_pass = settings->low_pass,
+        .flatten = settings->flatten > 1 ? 1 - 1 / (settings->flatten * settings->flatten) : 0,
+        .low_pass2 =
+            settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX,
         .amplitude = 1 / (two_pi * sigma * sigma) / (1 - edge * (1 + cutoff2 / 2)),
         .edge = edge,
         .rxrx = trip_dot(camera->rx, camera->rx),
@@ -90,6 +95,56 @@ static bool set_bounds(const trip_splat_frame *f, trip_vec3 ray, trip_splat *s)
     s->x1 = s->x + cx + half_x;
     s->y0 = s->y + cy - half_y;
     s->y1 = s->y + cy + half_y;
+    return true;
+}
+
+static trip_covariance2 low_passed(const trip_splat_frame *f, const trip_covariance2 *s)
+{
+    return f->low_pass == TRIP_LOW_PASS_UNIFORM ? trip_covariance2_scaled(s, f->low_pass2)
+                                                : trip_covariance2_low_passed(s, f->low_pass2);
+}
+
+/* Whether the rays of the round kernel's support differ so little from r_c. */
+static bool is_affine(const trip_splat_frame *f, trip_vec3 ray, const trip_ray_space *j)
+{
+    trip_covariance kernel = trip_covariance_round(f->sigma);
+    trip_covariance2 s = trip_covariance_integrated(&kernel, j), wide = low_passed(f, &s);
+    double apart2 = f->cutoff2 * (wide.xx * f->rxrx + 2 * wide.xy * f->rxry + wide.yy * f->ryry);
+    return TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE * trip_dot(ray, ray) >= apart2;
+}
+
+/* Conic, amplitude and bounds by the affine map at the centre, which is known. */
+static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
+                       const trip_flattening *flat, trip_splat *s)
+{
+    trip_covariance kernel = trip_covariance_flattened(f->sigma, flat->normal, flat->share);
+    trip_covariance2 exact = trip_covariance_integrated(&kernel, j);
+    trip_covariance2 wide = low_passed(f, &exact), conic = trip_covariance2_inverse(&wide);
+    double half_x = sqrt(f->cutoff2 * wide.xx), half_y = sqrt(f->cutoff2 * wide.yy);
+    s->affine = true;
+    s->ray2 = 1;
+    s->conic_xx = conic.xx;
+    s->conic_xy = conic.xy;
+    s->conic_yy = conic.yy;
+    s->amplitude = f->amplitude * f->sigma * f->sigma * trip_ray_space_volume(j) / sqrt(wide.det);
+    s->x0 = s->x - half_x;
+    s->x1 = s->x + half_x;
+    s->y0 = s->y - half_y;
+    s->y1 = s->y + half_y;
+}
+
+/* A splat in perspective by the affine map at its centre; false where that is not used. */
+static bool project_affine(const trip_splat_frame *f, trip_vec3 v, const trip_flattening *flat,
+                           trip_splat *s)
+{
+    trip_vec3 ray, c;
+    place(f, v, s, &ray, &c);
+    trip_ray_space j = trip_ray_space_at(&f->camera, v);
+    if (!is_affine(f, ray, &j))
+        return false;
+    set_footprint(f, ray, c, s); /* of which the radius is kept */
+    s->radius *= TRIP_SPLAT_AFFINE_REACH;
+    set_affine(f, &j, flat, s);
     return true;
 }
 
@@ -205,7 +260,8 @@ double trip_splat_parallel_near(const trip_splat_frame *f)
     return (sqrt(f->cutoff2) + slant(f, &s)) * f->sigma / trip_length(f->camera.r0);
 }
 
-static bool project_parallel(const trip_splat_frame *f, trip_vec3 v, trip_splat *s)
+static bool project_parallel(const trip_splat_frame *f, trip_vec3 v, const trip_flattening *flat,
+                             trip_splat *s)
 {
     trip_vec3 ray, c;
     place(f, v, s, &ray, &c);
@@ -216,15 +272,36 @@ static bool project_parallel(const trip_splat_frame *f, trip_vec3 v, trip_splat 
     s->near = !(s->z >= reach);
     set_form(s->along, f->camera.r0, v, trip_scale(f->camera.rx, -1), trip_scale(f->camera.ry, -1),
              1 / (trip_length(f->camera.r0) * f->sigma));
+    if (flat->share > 0 || f->low_pass == TRIP_LOW_PASS_UNIFORM) {
+        trip_ray_space j = trip_ray_space_at(&f->camera, v);
+        set_affine(f, &j, flat, s);
+    }
     return !(s->z <= -reach);
+}
+
+trip_flattening trip_splat_flattening(const trip_splat_frame *f, const double gradient[3],
+                                      double gradient_full)
+{
+    trip_vec3 g = { gradient[0], gradient[1], gradient[2] };
+    trip_vec3 normal = trip_affine_transpose_vector(&f->camera.index_to_world, g);
+    return (trip_flattening){ trip_normalize(normal),
+                              f->flatten * fmin(1, trip_length(g) / gradient_full) };
 }
 
 bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out)
 {
+    return trip_splat_project_flat(f, voxel, &(trip_flattening){ 0 }, out);
+}
+
+bool trip_splat_project_flat(const trip_splat_frame *f, trip_vec3 voxel,
+                             const trip_flattening *flat, trip_splat *out)
+{
     trip_vec3 ray, c, v = trip_sub(voxel, f->camera.eye);
     *out = (trip_splat){ .z = trip_dot(f->camera.forward, v) };
     if (f->camera.ortho)
-        return project_parallel(f, v, out);
+        return project_parallel(f, v, flat, out);
+    if (f->affine)
+        return (out->z > 0 && project_affine(f, v, flat, out)) || set_near(f, v, out);
     if (out->z > 0) {
         place(f, v, out, &ray, &c);
         set_footprint(f, ray, c, out);
@@ -278,7 +355,7 @@ static double radius2(const trip_splat_frame *f, const trip_splat *s, double x, 
 {
     double dx = x - s->x, dy = y - s->y;
     double q = s->conic_xx * dx * dx + 2 * s->conic_xy * dx * dy + s->conic_yy * dy * dy;
-    if (f->camera.ortho)
+    if (f->camera.ortho || s->affine)
         return q;
     trip_vec3 ray = trip_camera_ray(&f->camera, x, y);
     double a = form_at(s->a, x, y), b = form_at(s->b, x, y);

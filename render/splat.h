@@ -54,7 +54,28 @@
  *     s(p) = c.r(p) / (sigma |r(p)|)
  * so that behind the eye there is no low-pass. In parallel views all of this holds with e1 and e2
  * at right angles to r0, the vector from where the ray of p begins to v in place of |c| r(p) / |r|,
- * and 1 in place of z. */
+ * and 1 in place of z.
+ *
+ * With settings.footprint EWA (Zwicker et al. 2001) a footprint is what the local affine
+ * approximation at the splat's centre makes of it: S is the covariance of ray space without its
+ * third row and column (ewa.h), the same S as above, and g(p) and stretch(p) are those of the
+ * centre all over it,
+ *     m(p) = q^T S'^-1 q,  footprint' stretch = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) stretch(x, y)
+ *                                               (exp(-m(p) / 2) - edge) / (1 - edge (1 + k^2 / 2))
+ * so that no pixel needs its ray, and the support is an ellipse about (x, y). Parallel views are
+ * affine as they are. In perspective the approximation is used where the rays of the support
+ * differ from r_c by at most TRIP_SPLAT_AFFINE |r_c|, taken for granted where
+ *     k^2 (S'_xx rx.rx + 2 S'_xy rx.ry + S'_yy ry.ry) <= (TRIP_SPLAT_AFFINE |r_c|)^2:
+ * of cubes on the axis of view that is from 2.8 kernel radii off the eye on. Other splats have
+ * the numbers of near ones. With settings.low_pass none S' is S; uniform, see ewa.h.
+ *
+ * With settings.flatten s > 1 the kernel of a voxel with gradient is flattened along it (section 5
+ * of the same paper): its covariance in index space is that of trip_covariance_flattened() with the
+ * unit vector along the gradient there and the share  (1 - 1 / s^2) min(1, |gradient| /
+ * gradient_full) (shade.h), so that where there is no surface it stays round. It keeps its
+ * integral: footprint' stretch = stretch(x, y) / (2 pi sigma^2) sqrt(|S of the round kernel| /
+ * |S'|) ... Near splats in perspective stay round; bounds on what a splat reaches are those of
+ * round ones. */
 #ifndef TRIP_SPLAT_H
 #define TRIP_SPLAT_H
 
@@ -63,9 +84,17 @@
 #include "camera.h"
 #include "settings.h"
 
+/* See above; and every ray of an affine support passes within so many times the radius that the
+ * exact one would have. */
+#define TRIP_SPLAT_AFFINE 0.5
+#define TRIP_SPLAT_AFFINE_REACH 2.0
+
 /* Constants of one frame. */
 typedef struct trip_splat_frame {
     trip_camera camera;
+    bool affine; /* footprints by the affine map, in perspective */
+    trip_low_pass low_pass;
+    double flatten;   /* 1 - 1 / s^2; 0: kernels are round */
     double sigma;     /* index space */
     double cutoff2;   /* TRIP_CUTOFF^2 */
     double low_pass2; /* px^2 */
@@ -86,14 +115,30 @@ typedef struct trip_splat {
     /* Of near splats in perspective the numbers above, but for z, amplitude, bounds and radius, are
      * not set, and m = (a^2 + b^2) / |r|^2 and s = along / |r|; in parallel views s = along. */
     bool near;
+    bool affine; /* m and stretch by the centre's ray: ray2 is 1, and the amplitude has the stretch
+                  */
     double a[3], b[3], along[3]; /* of a pixel position (x, y): the dot products with (1, x, y) */
 } trip_splat;
 
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings);
 
+/* How a kernel is flattened: along a unit vector in index space, by a share (ewa.h). */
+typedef struct trip_flattening {
+    trip_vec3 normal;
+    double share;
+} trip_flattening;
+
+/* Of a voxel with this world-space gradient. */
+trip_flattening trip_splat_flattening(const trip_splat_frame *f, const double gradient[3],
+                                      double gradient_full);
+
 /* False when the splat is not drawn (behind the eye, or out of the picture beside it). The bounds
  * of near splats may be wider than their support. */
 bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out);
+
+/* The same of a flattened kernel. */
+bool trip_splat_project_flat(const trip_splat_frame *f, trip_vec3 voxel,
+                             const trip_flattening *flat, trip_splat *out);
 
 /* Whether numbers of a splat just projected are not finite, so that it can neither be drawn nor be
  * known not to show: the frame is to end with trip_splat_fail(). No view that trip_camera_make()
@@ -114,7 +159,8 @@ double trip_splat_behind(const trip_splat_frame *f);
  * are not drawn. */
 double trip_splat_parallel_near(const trip_splat_frame *f);
 
-/* World units per index length along the ray of a pixel position. */
+/* World units per index length along the ray of a pixel position; of affine splats the amplitude
+ * has it. */
 double trip_splat_stretch(const trip_splat_frame *f, double x, double y);
 
 /* What voxels of one extinction add up to, over that extinction, along rays parallel to an axis of

@@ -27,7 +27,11 @@ bool touches(splat s, ivec2 pixel)
     real3 at = real3(1.0, p);
     if (s.near)
         m = dot(s.a, at) * dot(s.a, at) + dot(s.b, at) * dot(s.b, at);
+#ifdef AFFINE
+    m *= s.near ? s.ray2 / ray2 : 1.0;
+#else
     m *= s.ray2 / ray2;
+#endif
     bool front = !s.near || dot(s.along, at) > -sqrt(kernel.y * ray2);
 #else
     bool front = !s.near || dot(s.along, real3(1.0, p)) > -sqrt(kernel.y);

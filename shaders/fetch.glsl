@@ -69,7 +69,8 @@ real3 offset_of(trip_gl_square square, uint k, out uint code)
 }
 #endif
 
-#ifdef SHADED
+#if defined(SHADED) || defined(FLATTENED)
+#define HAS_NORMALS
 uint normal_at(uint at)
 {
 #ifdef COMPACT
@@ -108,11 +109,11 @@ record fetch_record(uint position)
     r.place = run.place + vec3(dot(to_x.xyz, offset), dot(to_y.xyz, offset),
                                dot(forward.xyz, offset));
 #endif
-#if defined(SHADED) && defined(INDEXED)
+#if defined(HAS_NORMALS) && defined(INDEXED)
     r.normal = normals[at];
-#elif defined(SHADED) && defined(COMPACT)
+#elif defined(HAS_NORMALS) && defined(COMPACT)
     r.normal = normal_at(square.normals + 3u * k);
-#elif defined(SHADED)
+#elif defined(HAS_NORMALS)
     r.normal = normal_at(square.normals + 4u * k);
 #else
     r.normal = 0u;

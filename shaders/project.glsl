@@ -2,7 +2,8 @@
 // A, B taken per unit of depth and of `step`, and all covariances times u, which alone carries the
 // size of a splat in pixels: no number leaves a float's range. See render/splat.h for the formulas.
 // `c` and `place` are a record's (fetch.glsl). With NEAR, and wherever splats are counted, some may be
-// near: then all have the numbers of near ones.
+// near: then all have the numbers of near ones. With AFFINE those that are not near are affine
+// (render/splat.h), and have none of these.
 #include "real.glsl"
 
 #if defined(TRIP_DOUBLE) && !defined(NEAR)
@@ -21,6 +22,20 @@ struct splat {
     real3 a, b, along; // dot products with (1, x, y), (x, y) pixels from the image's centre
 #endif
 };
+
+#ifdef FLATTENED
+// Of the splat at hand: trip_flattening of render/splat.h, list axes.
+vec4 flattening;
+
+// xx, xy, yy of S and its determinant, from those of the round kernel: for the gradients gx, gy of x
+// and y the part of `share` at right angles to the normal. `along` is normal . ray, of unit length.
+real4 flattened(real4 s, real3 gx, real3 gy, real along)
+{
+    real3 x = cross(gx, flattening.xyz), y = cross(gy, flattening.xyz);
+    return real4(mix(s.xyz, real3(dot(x, x), dot(x, y), dot(y, y)), flattening.w),
+                 s.w * mix(1.0, along * along, flattening.w));
+}
+#endif
 
 #ifdef NEAR
 #ifdef PARALLEL
@@ -112,6 +127,20 @@ bool project(real3 c, real3 place, out splat s)
     s.amplitude = parallel.w;
     s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
     s.radius = parallel_size.z;
+#ifdef FLATTENED
+    // S, S' and the low-pass over sigma^2 `most`.
+    real most = max(dot(to_x.xyz, to_x.xyz), dot(to_y.xyz, to_y.xyz));
+    real3 gx = to_x.xyz * inversesqrt(most), gy = to_y.xyz * inversesqrt(most);
+    real3 area = cross(gx, gy);
+    real low = kernel.z / (kernel.x * most), det_s = dot(area, area);
+    real4 shape = flattened(real4(dot(gx, gx), dot(gx, gy), dot(gy, gy), det_s), gx, gy,
+                            dot(normalize(ray_0.xyz), flattening.xyz));
+    real det = shape.w + low * (shape.x + shape.z) + low * low;
+    s.conic = real3(shape.z + low, -shape.y, shape.x + low) / (det * kernel.x * most);
+    s.amplitude = parallel_size.w * sqrt(det_s / det);
+    real2 half_size = sqrt(real2(shape.x + low, shape.z + low) * (kernel.x * kernel.y * most));
+    s.bounds = real4(s.centre - half_size, s.centre + half_size);
+#endif
 #ifdef NEAR
     return project_near(place, s);
 #else
@@ -133,17 +162,42 @@ bool project_far(real3 c, real3 place, out splat s)
     real u = min(forward.w * forward.w * (place.z * place.z), real(1e17));
     real low = kernel.z * u;
     real sxx = dot(b, b), sxy = -dot(a, b), syy = dot(a, a);
-    real det_s = ray_y.w * s.ray2;
-    real inverse_det = 1.0 / (det_s + low * (sxx + syy) + low * low);
+    real det_s = ray_y.w * s.ray2, det_shape = det_s;
+#ifdef AFFINE
+    real spread = dot(real3(sxx + low, 2.0 * sxy, syy + low),
+                      real3(dot(ray_x.xyz, ray_x.xyz), dot(ray_x.xyz, ray_y.xyz),
+                            dot(ray_y.xyz, ray_y.xyz)));
+#endif
+    real half_difference = 0.5 * (sxx - syy);
+    real largest = 0.5 * (sxx + syy) + sqrt(half_difference * half_difference + sxy * sxy);
+#ifdef FLATTENED
+    real4 shape = flattened(real4(sxx, sxy, syy, det_s), b, -a, dot(ray, flattening.xyz) * inversesqrt(s.ray2));
+    sxx = shape.x;
+    sxy = shape.y;
+    syy = shape.z;
+    det_shape = shape.w;
+#endif
+    real inverse_det = 1.0 / (det_shape + low * (sxx + syy) + low * low);
     real3 conic = real3(syy + low, -sxy, sxx + low) * inverse_det;
     s.conic = conic * u;
     s.amplitude = kernel.w * sqrt(det_s * inverse_det);
 
-    // The largest eigenvalue of S^-1 is that of S over |S|.
-    real half_difference = 0.5 * (sxx - syy);
-    real largest = 0.5 * (sxx + syy) + sqrt(half_difference * half_difference + sxy * sxy);
+    // The largest eigenvalue of S^-1 is that of S over |S|; of the round kernel.
     s.radius = sqrt(kernel.x * kernel.y * (1.0 + low * largest / det_s));
 
+#ifdef AFFINE
+    if (!(s.ray2 * u * (AFFINE_MOST * AFFINE_MOST) >= kernel.y * ray_x.w * ray_x.w * spread))
+        return false;
+    real2 half_size = sqrt(real2(sxx + low, syy + low) * (kernel.y / u));
+    s.bounds = real4(s.centre - half_size, s.centre + half_size);
+    s.radius *= AFFINE_REACH;
+#ifdef ANISOTROPIC
+    s.amplitude *= sqrt((dot(world2_a, real4(1.0, s.centre, s.centre.x * s.centre.x)) +
+                         dot(world2_b.xy, s.centre.y * s.centre)) / s.ray2);
+#endif
+    s.ray2 = 1.0;
+    return true;
+#else
     // E and l over u.
     real k = kernel.y * ray_x.w / (s.ray2 * u), k_step = k * ray_x.w;
     real exx = conic.x - k_step * dot(ray_x.xyz, ray_x.xyz);
@@ -159,12 +213,17 @@ bool project_far(real3 c, real3 place, out splat s)
     real2 half_size = real2(sqrt(size * eyy), sqrt(size * exx));
     s.bounds = real4(s.centre + middle - half_size, s.centre + middle + half_size);
     return true;
+#endif
 }
 
 bool project(real3 c, real3 place, out splat s)
 {
     bool far = project_far(c, place, s);
-#ifdef NEAR
+#if defined(NEAR) && defined(AFFINE)
+    s.near = !far;
+    s.a = s.b = s.along = real3(0.0);
+    return far || project_near(c, place, s);
+#elif defined(NEAR)
     s.near = !(far && dot(c, c) >= kernel.x * kernel.y + s.radius * s.radius);
     return project_near(c, place, s);
 #else

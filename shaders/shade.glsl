@@ -3,8 +3,7 @@
 // FACING come from render/shade.h.
 #include "real.glsl"
 
-#ifdef SHADED
-
+#if defined(SHADED) || defined(FLATTENED)
 // World-space gradient direction and, in w, its magnitude over that at full shading.
 #ifdef COMPACT
 vec4 unpack_normal(uint normal)
@@ -37,7 +36,9 @@ vec4 unpack_normal(uint normal)
     return vec4(normalize(n), root * root * full);
 }
 #endif
+#endif
 
+#ifdef SHADED
 // World space, of what lies in a direction from the eye in list axes.
 vec3 towards_eye(vec3 from_eye)
 {

@@ -35,7 +35,9 @@ void main()
     vec2 p = gl_FragCoord.xy + vec2(0.0, row) - screen.xy, q = p - footprint.xy;
     float m = q.x * (footprint.z * q.x + shear * q.y) + footprint.w * q.y * q.y;
     float stretch = 1.0;
-#if defined(ANISOTROPIC)
+#ifdef AFFINE
+    // Near splats alone have the stretch of the pixel's ray, below.
+#elif defined(ANISOTROPIC)
     vec4 terms = vec4(1.0, p, p.x * p.x);
     vec2 more = p.y * p;
     float inverse_ray2 = 1.0 / (dot(ray2_a, terms) + dot(ray2_b.xy, more));
@@ -50,9 +52,18 @@ void main()
 #ifdef PARALLEL
     front = front_of(at.z);
 #else
-    float inverse = 1.0 / (dot(ray2_a, vec4(1.0, p, p.x * p.x)) + dot(ray2_b.xy, p.y * p));
-    m = dot(at.xy, at.xy) * inverse;
-    front = front_of(at.z * sqrt(inverse));
+    vec4 terms_near = vec4(1.0, p, p.x * p.x);
+    float inverse = 1.0 / (dot(ray2_a, terms_near) + dot(ray2_b.xy, p.y * p));
+#ifdef AFFINE
+    if (footprint.z <= 0.0) // not affine
+#endif
+    {
+        m = dot(at.xy, at.xy) * inverse;
+        front = front_of(at.z * sqrt(inverse));
+#if defined(AFFINE) && defined(ANISOTROPIC)
+        stretch = sqrt((dot(world2_a, terms_near) + dot(world2_b.xy, p.y * p)) * inverse);
+#endif
+    }
 #endif
 #endif
     float falloff = max(exp(-0.5 * m) - edge.x, 0.0);

@@ -80,6 +80,11 @@ void main()
 #endif
     splat s;
     vec4 entry = look_up(r.code);
+#ifdef FLATTENED
+    vec4 g = unpack_normal(r.normal);
+    vec3 n = vec3(dot(world_0.xyz, g.xyz), dot(world_1.xyz, g.xyz), dot(world_2.xyz, g.xyz));
+    flattening = vec4(n / max(length(n), 1e-15), min(1.0, g.w) * to_x.w);
+#endif
     if (entry.a <= 0.0 || !project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius)) {
         drop();
         return;

@@ -28,19 +28,21 @@ static bool classifies_post(const trip_cpu *r)
 }
 
 /* The views of the layer's lists. */
-static void make_views(trip_cpu *r, bool front_to_back, bool shading)
+static void make_views(trip_cpu *r, bool front_to_back, bool normals)
 {
     const trip_dataset *data = r->frame->data;
     int axis = r->view.axis;
     trip_cpu_layer_view_make(&r->view, r->frame, axis, front_to_back);
-    r->view.shading = shading;
+    r->view.shading = normals && r->frame->settings->shading;
+    r->view.flattens = normals && r->view.splat.flatten > 0;
     for (unsigned i = 0; i < data->list_count; i++) {
         const trip_list *list = &data->lists[i];
         if (list->axis != axis || !r->frame->plan->lists[i].drawn)
             continue;
         trip_cpu_view_make(&r->views[i], classifies_post(r) ? &r->sheet_frame : r->frame, list,
                            front_to_back);
-        r->views[i].shading = shading;
+        r->views[i].shading = r->view.shading;
+        r->views[i].flattens = r->view.flattens;
         if (!classifies_post(r))
             r->views[i].table = r->frame->plan->lists[i].table;
         if (r->frame->count)
@@ -53,10 +55,13 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     trip_cpu *r = (trip_cpu *)base;
     if (classifies_post(r))
         return trip_cpu_sheets_draw(r->sheets, batch);
-    bool shading = r->frame->settings->shading && batch->planes[TRIP_PLANE_NORMALS];
-    if (front_to_back != r->view.front_to_back || shading != r->view.shading) {
+    bool normals = batch->planes[TRIP_PLANE_NORMALS];
+    bool shading = r->frame->settings->shading && normals;
+    bool flattens = r->view.splat.flatten > 0 && normals;
+    if (front_to_back != r->view.front_to_back || shading != r->view.shading ||
+        flattens != r->view.flattens) {
         trip_cpu_finish_blending(r);
-        make_views(r, front_to_back, shading);
+        make_views(r, front_to_back, normals);
     }
     return trip_cpu_draw_batch(r, batch);
 }

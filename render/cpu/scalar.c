@@ -102,25 +102,38 @@ static void set_opacity(const trip_cpu_view *view, double depth, int sheet, trip
     }
 }
 
+/* By X, Y and Z. */
+static trip_vec3 in_data_axes(const trip_cpu_view *view, double u, double v, double sheet)
+{
+    double p[3];
+    p[view->u_axis] = u;
+    p[view->v_axis] = v;
+    p[view->axis] = sheet;
+    return trip_v3(p[0], p[1], p[2]);
+}
+
 bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
-                             trip_cpu_splat *out, bool *broken)
+                             const float flat[4], trip_cpu_splat *out, bool *broken)
 {
     const trip_camera *camera = &view->splat.camera;
-    double position[3];
-    position[view->u_axis] = u;
-    position[view->v_axis] = v;
-    position[view->axis] = sheet;
+    trip_flattening flattening = { 0 };
+    if (flat)
+        flattening = (trip_flattening){
+            trip_normalize(in_data_axes(view, (double)flat[0], (double)flat[1], (double)flat[2])),
+            (double)flat[3]
+        };
     trip_splat s;
     memset(out, 0, sizeof *out);
     bool drawn =
-        trip_splat_project(&view->splat, trip_v3(position[0], position[1], position[2]), &s);
+        trip_splat_project_flat(&view->splat, in_data_axes(view, u, v, sheet), &flattening, &s);
     if (trip_splat_is_broken(&s))
         *broken = true;
     if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
     /* What is opaque anyway stays within what exponents of floats hold. */
-    double depth = fmin(0x1p90, extinction * s.amplitude * view->stretch);
+    double stretch = s.affine ? 1 : view->stretch;
+    double depth = fmin(0x1p90, extinction * s.amplitude * stretch);
     out->panes = trip_cpu_panes(out, view->panes_across);
     if (s.near) {
         out->panes |= TRIP_CPU_PANES_NEAR;

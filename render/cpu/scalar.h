@@ -5,10 +5,11 @@
 
 #include "cpu/kernels/kernels.h"
 
-/* A splat by trip_splat_project(); colours are left unset. False when nothing of it is drawn; sets
+/* A splat by trip_splat_project(); colours are left unset. `flat`: u, v and the list's component of
+ * trip_flattening.normal, and its share; NULL: round. False when nothing of it is drawn; sets
  * `broken` when its numbers are not finite, so that it is neither drawn nor left out. */
 bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
-                             trip_cpu_splat *out, bool *broken);
+                             const float flat[4], trip_cpu_splat *out, bool *broken);
 
 /* l11, l21 and l22 of a projected splat. */
 void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out);

@@ -76,10 +76,11 @@ static void set_rays(trip_cpu_view *view)
     bool usual = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
     usual |= view->sums;
     view->stretch_varies = !(camera->ortho || alike);
+    view->affine = view->splat.affine;
     view->stretch =
         view->stretch_varies ? camera->voxel_world : trip_splat_stretch(&view->splat, 0, 0);
     view->rays = TRIP_CPU_STRETCHED;
-    if (usual && camera->ortho)
+    if (usual && (camera->ortho || view->affine))
         view->rays = TRIP_CPU_PARALLEL;
     else if (usual && alike)
         view->rays = TRIP_CPU_PERSPECTIVE;
@@ -89,7 +90,7 @@ static void set_limits(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
     double most = 1;
-    if (view->stretch_varies)
+    if (view->stretch_varies && !view->affine)
         most = most_stretch(&camera->index_to_world) / view->stretch;
     view->thin = (float)((double)TRIP_CPU_THIN / most);
     view->behind = (float)(-trip_splat_behind(&view->splat) * (1 + 1e-6));

@@ -53,7 +53,8 @@ static double centre_length(const trip_camera *c)
 
 /* Rays from the image's centre, scaled so that the one there has length 1: projected numbers do not
  * depend on the scale, and floats keep far from their limits whatever the world's unit. */
-static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis, double sigma)
+static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis, double sigma,
+                           double flatten)
 {
     double px = 0.5 * c->width, py = 0.5 * c->height;
     f->screen = (trip_gl_double4){ { px, py, c->width, c->height } };
@@ -69,7 +70,7 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
     }
     set_steps(f, axis, forward, r0, rx, ry, sigma);
     f->ray_0 = in_list_axes(r0, axis, 0);
-    f->to_x = in_list_axes(to_x, axis, 0);
+    f->to_x = in_list_axes(to_x, axis, flatten);
     f->to_y = in_list_axes(to_y, axis, 0);
     if (c->ortho)
         rx = ry = trip_v3(0, 0, 0); /* all rays are alike */
@@ -89,8 +90,8 @@ static void set_parallel(trip_gl_frame_double *f, const trip_splat_frame *consta
         return;
     double world = trip_splat_stretch(constants, 0, 0);
     f->parallel = (trip_gl_double4){ { s.conic_xx, s.conic_xy, s.conic_yy, s.amplitude * world } };
-    f->parallel_size =
-        (trip_gl_double4){ { 0.5 * (s.x1 - s.x0), 0.5 * (s.y1 - s.y0), s.radius, 0 } };
+    f->parallel_size = (trip_gl_double4){ { 0.5 * (s.x1 - s.x0), 0.5 * (s.y1 - s.y0), s.radius,
+                                            constants->amplitude * world } };
 }
 
 static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const trip_camera *c,
@@ -133,7 +134,7 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
     trip_splat_frame constants = trip_splat_frame_make(c, s);
     trip_vec3 none = { 0, 0, 0 };
     *out = (trip_gl_frame_double){ 0 };
-    set_projection(out, c, axis, constants.sigma);
+    set_projection(out, c, axis, constants.sigma, constants.flatten);
     set_parallel(out, &constants);
     set_world(out, frame, c, axis);
     set_compact_normals(out, frame);
@@ -220,15 +221,21 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_PARALLEL;
     else if (!is_isotropic(camera))
         effects |= TRIP_GL_ANISOTROPIC;
-    if (s->shading && frame->plan->planes & 1u << TRIP_PLANE_NORMALS)
-        effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0) |
-                   (frame->data->header.normal_bytes == 3 ? TRIP_GL_COMPACT : 0);
+    bool normals = frame->plan->planes & 1u << TRIP_PLANE_NORMALS;
+    if (normals && s->shading)
+        effects |= TRIP_GL_SHADED | (s->headlight ? TRIP_GL_HEADLIGHT : 0);
+    if (normals && s->flatten > 1)
+        effects |= TRIP_GL_FLATTENED;
+    if (effects & (TRIP_GL_SHADED | TRIP_GL_FLATTENED) && frame->data->header.normal_bytes == 3)
+        effects |= TRIP_GL_COMPACT;
     if (s->indexed)
         effects |= TRIP_GL_INDEXED;
     if (s->depth)
         effects |= TRIP_GL_DEPTH;
     if (trip_settings_sum_sheets(s))
         effects |= TRIP_GL_SUMMED;
+    if (s->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
+        effects |= TRIP_GL_AFFINE;
     if (trip_weight_is_everywhere(s, frame->camera, frame->plan->axis_of_view, axis))
         effects |= TRIP_GL_UNCULLED;
     return effects;
@@ -237,7 +244,7 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
 /* With r_max and r_min the largest and smallest |ray| of the image and of its plane, any support
  * reaches at most  k sigma |ry| r_max / (K depth) + k low-pass r_max / r_min  pixels from its
  * centre along x within the image (from S'_xx and g >= (r_min / r_max)^2 in splat.h), and alike
- * along y. */
+ * along y. Of affine supports the centre's ray is at most 1 / (1 - TRIP_SPLAT_AFFINE) as long. */
 double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *c,
                                   double point_size_px)
 {
@@ -257,6 +264,8 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
                      trip_length(trip_camera_ray(c, i & 1 ? c->width : 0, i & 2 ? c->height : 0)));
     trip_vec3 normal = trip_cross(c->rx, c->ry);
     double k = fabs(trip_dot(c->r0, normal)), r_min = k / trip_length(normal);
+    if (settings->footprint == TRIP_FOOTPRINT_EWA)
+        r_max /= 1 - TRIP_SPLAT_AFFINE;
     double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
     double wide = fmax(trip_length(c->rx), trip_length(c->ry));
     return room > 0 ? settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
@@ -264,7 +273,8 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
 
 /* With r = |r_c|, r_min the least |ray| of the image's plane, the splat of a depth z is not near
  * where  (z r)^2 >= 2 R^2 (r^2 / r_min^2 + 1) + 2 k^2 low-pass^2 z^2 (rx.rx + ry.ry):  that is the
- * condition of render/cpu/kernels/project_tmpl.h. */
+ * condition of render/cpu/kernels/project_tmpl.h. With 1 / TRIP_SPLAT_AFFINE^2 in place of 2 it is
+ * that of affine splats. */
 double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *c)
 {
     const trip_splat_frame f = trip_splat_frame_make(c, settings);
@@ -272,6 +282,7 @@ double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera
         return trip_splat_parallel_near(&f);
     trip_vec3 normal = trip_cross(c->rx, c->ry);
     double r_min2 = pow(trip_dot(c->r0, normal), 2) / trip_dot(normal, normal);
-    double room = 1 - 2 * f.cutoff2 * f.low_pass2 * (f.rxrx + f.ryry) / r_min2;
-    return room > 0 ? 2 * settings->kernel_radius / sqrt(r_min2 * room) : HUGE_VAL;
+    double times = f.affine ? 1 / (TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE) : 2;
+    double room = 1 - times * f.cutoff2 * f.low_pass2 * (f.rxrx + f.ryry) / r_min2;
+    return room > 0 ? settings->kernel_radius * sqrt(2 * times / (r_min2 * room)) : HUGE_VAL;
 }

@@ -15,13 +15,15 @@ enum trip_gl_effect {
     TRIP_GL_SHADED = 4,
     TRIP_GL_HEADLIGHT = 8,
     TRIP_GL_INDEXED = 16,
-    TRIP_GL_QUADS = 32,    /* two triangles a splat instead of a sprite */
-    TRIP_GL_UNCULLED = 64, /* every pixel has weight in the list */
-    TRIP_GL_COMPACT = 128, /* normals of 3 bytes; only with TRIP_GL_SHADED */
-    TRIP_GL_DEPTH = 256,   /* layers have depths (layer.h) */
-    TRIP_GL_NEAR = 512,    /* some splats may be near (render/splat.h) */
-    TRIP_GL_SUMMED = 1024, /* splats are summed sheet by sheet */
-    TRIP_GL_EFFECT_SETS = 2048,
+    TRIP_GL_QUADS = 32,       /* two triangles a splat instead of a sprite */
+    TRIP_GL_UNCULLED = 64,    /* every pixel has weight in the list */
+    TRIP_GL_COMPACT = 128,    /* normals of 3 bytes; only where they are read */
+    TRIP_GL_DEPTH = 256,      /* layers have depths (layer.h) */
+    TRIP_GL_NEAR = 512,       /* some splats may be near (render/splat.h) */
+    TRIP_GL_SUMMED = 1024,    /* splats are summed sheet by sheet */
+    TRIP_GL_AFFINE = 2048,    /* footprints by the affine map at the centre (render/splat.h) */
+    TRIP_GL_FLATTENED = 4096, /* kernels, along their gradients */
+    TRIP_GL_EFFECT_SETS = 8192,
 };
 
 /* Of a list that the plan draws. */

@@ -50,7 +50,8 @@
  * for counting and weights. */
 #define TRIP_GL_FRAME_FIELDS(R4)                                                                       \
     R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */       \
-    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective) */                              \
+    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective); w of the first: how much       \
+                          kernels are flattened, trip_splat_frame.flatten */                           \
     R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's           \
                           centre; w: step, and (r . ray_x x ray_y)^2 */                                \
     R4 ray_0;          /* xyz: the ray at the image's centre */                                        \
@@ -63,7 +64,7 @@
                       world space, over full shading; w of the first: length of                        \
                       those of which the direction alone is kept, likewise */                          \
     R4 light;      /* xyz: towards the light, world space */                                           \
-    R4 to_eye;     /* xyz: towards the eye in parallel views; w: gradient_full of the header        \
+    R4 to_eye;     /* xyz: towards the eye in parallel views; w: gradient_full of the header           \
                       over that at full shading */                                                     \
     R4 screen;     /* xy: the image's centre, pixels; zw: width, height */                             \
     R4 kernel;     /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */              \
@@ -71,7 +72,8 @@
                     z: 1 / (2 erf(cutoff / sqrt 2)); w: of lists of means, the length of a voxel along \
                     the axis, else 0 */                                                                \
     R4 parallel; /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */               \
-    R4 parallel_size; /* its half extents in x and y, its radius in index space */                     \
+    R4 parallel_size; /* its half extents in x and y, its radius in index space, its amplitude         \
+                         without low-pass */                                                           \
     R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;        \
                          w: the largest of them */                                                     \
     R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along     \

@@ -9,6 +9,7 @@
 #include "report.h"
 #include "shade.h"
 #include "sheet.h"
+#include "splat.h"
 
 static const struct {
     const char *vertex, *fragment, *compute;
@@ -17,7 +18,8 @@ static const struct {
 } passes[] = {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
     [TRIP_GL_PASS_SUM] = { "screen.vert", "sum.frag", NULL, TRIP_GL_DEPTH, false },
-    [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp", TRIP_GL_PARALLEL | TRIP_GL_INDEXED, true },
+    [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp",
+                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_AFFINE, true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
     [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", 0, false },
@@ -34,12 +36,13 @@ static void write_effects(FILE *out, unsigned effects)
         unsigned effect;
         const char *name;
     } names[] = {
-        { TRIP_GL_PARALLEL, "PARALLEL" }, { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
-        { TRIP_GL_SHADED, "SHADED" },     { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
-        { TRIP_GL_INDEXED, "INDEXED" },   { TRIP_GL_QUADS, "QUADS" },
-        { TRIP_GL_UNCULLED, "UNCULLED" }, { TRIP_GL_COMPACT, "COMPACT" },
-        { TRIP_GL_DEPTH, "DEPTH" },       { TRIP_GL_NEAR, "NEAR" },
-        { TRIP_GL_SUMMED, "SUMS" },
+        { TRIP_GL_PARALLEL, "PARALLEL" },   { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
+        { TRIP_GL_SHADED, "SHADED" },       { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
+        { TRIP_GL_INDEXED, "INDEXED" },     { TRIP_GL_QUADS, "QUADS" },
+        { TRIP_GL_UNCULLED, "UNCULLED" },   { TRIP_GL_COMPACT, "COMPACT" },
+        { TRIP_GL_DEPTH, "DEPTH" },         { TRIP_GL_NEAR, "NEAR" },
+        { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
+        { TRIP_GL_FLATTENED, "FLATTENED" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -55,6 +58,8 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
         fprintf(out, "#define TRIP_DOUBLE\n");
     fprintf(out, "#define METHOD %d\n#define LAYERS %u\n", (int)variant->method, variant->layers);
     fprintf(out, "#define SHEET_SATURATION %.9f\n", TRIP_SHEET_SATURATION);
+    fprintf(out, "#define AFFINE_MOST %f\n#define AFFINE_REACH %f\n", TRIP_SPLAT_AFFINE,
+            TRIP_SPLAT_AFFINE_REACH);
     write_effects(out, variant->effects);
     if (variant->effects & TRIP_GL_SHADED)
         fprintf(out,
@@ -67,7 +72,7 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
 
 static int build(const trip_gl_variant *variant, GLuint *program)
 {
-    char defines[1024] = "";
+    char defines[1280] = "";
     int status = write_defines(variant, defines, sizeof defines);
     if (status)
         return status;

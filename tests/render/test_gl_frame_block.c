@@ -44,6 +44,7 @@ static void from_the_sprite_depth_on_every_support_fits_a_sprite(void **state)
     trip_settings settings = trip_settings_default();
     for (int i = 0; i < 300; i++) {
         trip_camera c = random_camera();
+        settings.footprint = (trip_footprint)(i % 2);
         trip_splat_frame constants = trip_splat_frame_make(&c, &settings);
         double size = between(16, 300), depth = trip_gl_frame_sprite_depth(&settings, &c, size);
         for (int k = 0; k < 1000 && isfinite(depth); k++) {

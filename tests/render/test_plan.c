@@ -219,6 +219,7 @@ static void no_splat_that_touches_a_pixel_is_left_out(void **state)
         trip_camera c = random_camera(&s, i);
         trip_settings settings = unlit((trip_method)(i % 3), i % 4 ? test_random() : 0.85);
         settings.kernel_radius = i % 7 == 0 ? 4 : 2;
+        settings.footprint = (trip_footprint)(i / 2 % 2);
         scene_picture p = scene_draw(&s, scene_renderers(), &c.params, &settings);
         int axis_of_view = trip_weight_axis_of_view(&c);
         for (int axis = 0; axis < 3; axis++) {

@@ -9,6 +9,7 @@
 
 #include "cpu/kernels/exp_tmpl.h"
 #include "cpu/kernels/kernels.h"
+#include "cpu/kernels/rays_tmpl.h"
 #include "cpu/kernels/simd_tmpl.h"
 
 #define STAMP_ROWS (V / 4)
@@ -90,7 +91,15 @@ typedef struct patch {
     unsigned number;
 } patch;
 
-/* u of trip_cpu_splat. */
+/* The same of G as given. */
+INLINE vf nearness_by(const patch *p, const trip_cpu_splat *splat, vf g)
+{
+    vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
+    vf b = v_fma(p->y, v_set(splat->l22), v_set(splat->l2));
+    return v_max(v_fnma(g, v_fma(b, b, a * a), v_set(1)), v_set(0));
+}
+
+/* u of trip_cpu_splat; of near splats see rays_of_near(). */
 INLINE vf nearness(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
     vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
@@ -124,15 +133,27 @@ INLINE bool is_near(const trip_cpu_splat *splat)
     return __builtin_expect((splat->panes & TRIP_CPU_PANES_NEAR) != 0, 0);
 }
 
+/* What near splats are blended with: their own G and stretch where others are affine. */
+INLINE ray_lengths rays_of_near(const patch *p, trip_cpu_rays rays)
+{
+    const trip_cpu_scratch *s = p->pane;
+    const trip_camera *camera = &s->view->splat.camera;
+    if (s->view->affine)
+        return ray_lengths_at(s->view, v_set((float)(s->x - 0.5 * camera->width)) + p->x,
+                              v_set((float)(s->y - 0.5 * camera->height)) + p->y);
+    return (ray_lengths){ .g = rays == TRIP_CPU_PARALLEL ? v_set(1) : p->ray,
+                          .stretch = rays == TRIP_CPU_STRETCHED ? p->stretch : v_set(1) };
+}
+
 /* front(p) of splat.h of a near splat. The error function is 1 - (a polynomial) exp(-t^2), within
  * 2e-5 (Abramowitz and Stegun 1964, 7.1.25), exp_minus() aside. */
-INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
+INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, vf g)
 {
     vf x = p->x + v_set((float)p->pane->x), y = p->y + v_set((float)p->pane->y);
     vf along = v_fma(x, v_set(splat->c[TRIP_CPU_ALONG_X]), v_set(splat->c[TRIP_CPU_ALONG]));
     along = v_fma(y, v_set(splat->c[TRIP_CPU_ALONG_Y]), along);
-    if (rays != TRIP_CPU_PARALLEL)
-        along = along * v_sqrt(p->ray);
+    if (!p->pane->view->splat.camera.ortho)
+        along = along * v_sqrt(g);
     vf end = v_set((float)TRIP_CUTOFF), s = v_min(v_abs(along), end);
     vf t = v_set(1) / v_fma(s, v_set((float)(0.47047 * 0.70710678118654752)), v_set(1));
     vf sum = v_fma(t, v_set(0.7478556f), v_set(-0.0958798f));
@@ -144,24 +165,33 @@ INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays ra
     return v_select(v_gt(along, -end), front, v_set(0));
 }
 
-/* Optical depth of other splats, likewise. */
-INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, vf u, trip_cpu_rays rays)
+/* Optical depth of other splats, likewise, but for the stretch. */
+INLINE vf long_depth(const patch *p, const trip_cpu_splat *splat, vf u)
 {
     vf y = v_fma(u, p->cutoff, v_set(splat->c[TRIP_CPU_LEAST]));
-    vf depth = exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
-    if (rays == TRIP_CPU_STRETCHED)
-        depth = depth * p->stretch;
+    return exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
+}
+
+INLINE vf near_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
+{
+    ray_lengths of = rays_of_near(p, rays);
+    vf depth = long_depth(p, splat, nearness_by(p, splat, of.g));
+    return depth * of.stretch * front_of(p, splat, of.g);
+}
+
+INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
+{
     if (is_near(splat))
-        depth = depth * front_of(p, splat, rays);
-    return depth;
+        return near_depth(p, splat, rays);
+    vf depth = long_depth(p, splat, nearness(p, splat, rays));
+    return rays == TRIP_CPU_STRETCHED ? depth * p->stretch : depth;
 }
 
 INLINE vf opacity(const patch *p, const trip_cpu_splat *splat, bool thick, trip_cpu_rays rays)
 {
-    vf u = nearness(p, splat, rays);
     if (rays != TRIP_CPU_STRETCHED && !thick)
-        return thin_opacity(splat, u);
-    vf depth = optical_depth(p, splat, u, rays);
+        return thin_opacity(splat, nearness(p, splat, rays));
+    vf depth = optical_depth(p, splat, rays);
     if (is_near(splat))
         return v_select(v_gt(v_set(TRIP_CPU_THIN), depth), depth * thin_ratio(depth),
                         v_set(1) - exp_minus(depth));
@@ -327,7 +357,7 @@ INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_c
     if (front_to_back)
         put_behind(p, splat, depth, opacity(p, splat, thick, rays), target);
     else
-        put_over(p, splat, depth, optical_depth(p, splat, nearness(p, splat, rays), rays), target);
+        put_over(p, splat, depth, optical_depth(p, splat, rays), target);
 }
 
 /* The splats where none is thick; false, with nothing done, when a pixel is saturated or would be.
@@ -638,13 +668,6 @@ static uint64_t pane_end(trip_cpu_scratch *s)
 
 /* ---- taking up a pane ---- */
 
-INLINE vf form_at(const float form[6], vf x, vf y)
-{
-    vf fx = v_fma(x, v_set(form[3]), v_fma(y, v_set(form[4]), v_set(form[1])));
-    vf fy = v_fma(y, v_set(form[5]), v_set(form[2]));
-    return v_fma(x, fx, v_fma(y, fy, v_set(form[0])));
-}
-
 /* G and the stretch at a stamp's pixels. */
 static void set_rays(trip_cpu_scratch *s, unsigned number)
 {
@@ -652,11 +675,11 @@ static void set_rays(trip_cpu_scratch *s, unsigned number)
     float *of = s->rays + 2 * V * number;
     vf x = v_set((float)(s->x - 0.5 * view->splat.camera.width)) + stamp_x(number);
     vf y = v_set((float)(s->y - 0.5 * view->splat.camera.height)) + stamp_y(number);
-    vf inverse = v_set(1) / form_at(view->ray2, x, y), stretch = v_set(1);
-    if (view->stretch_varies)
-        stretch = v_sqrt(form_at(view->world2, x, y) * inverse);
-    v_store(of, view->splat.camera.ortho ? v_set(1) : inverse);
-    v_store(of + V, stretch);
+    ray_lengths of_rays = { v_set(1), v_set(1) };
+    if (!view->splat.camera.ortho && !view->affine)
+        of_rays = ray_lengths_at(view, x, y);
+    v_store(of, of_rays.g);
+    v_store(of + V, of_rays.stretch);
     s->rays_known[number / 64] |= UINT64_C(1) << number % 64;
 }
 

@@ -21,10 +21,14 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
                 .y = stamp_y(number),
                 .ray = v_load(s->rays + 2 * V * number),
                 .pane = s };
-    vm in = vm_and(v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)),
-                   in_image(&view->splat.camera, s->x, s->y, column, row));
-    if (splat->panes & TRIP_CPU_PANES_NEAR)
-        in = vm_and(in, v_gt(front_of(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)));
+    vm in = in_image(&view->splat.camera, s->x, s->y, column, row);
+    if (is_near(splat)) {
+        ray_lengths of = rays_of_near(&p, TRIP_CPU_PERSPECTIVE);
+        in = vm_and(in, v_gt(nearness_by(&p, splat, of.g), v_set(0)));
+        in = vm_and(in, v_gt(front_of(&p, splat, of.g), v_set(0)));
+    } else {
+        in = vm_and(in, v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)));
+    }
     return vm_any(in) &&
            vm_any(vm_and(in, v_gt(weight(view, view->axis, s->x, s->y, column, row), v_set(0))));
 }
@@ -90,7 +94,8 @@ INLINE vf growth2(const perspective *p, const trip_splat_frame *f, const trip_cp
 INLINE vm may_reach(const trip_cpu_view *view, const trip_cpu_reach *reach, const perspective *p,
                     const trip_cpu_staged *staged, const trip_cpu_lanes *lanes, uint32_t at)
 {
-    const float kernel = (float)(view->splat.sigma * sqrt(view->splat.cutoff2));
+    const double room = view->affine ? TRIP_SPLAT_AFFINE_REACH : 1;
+    const float kernel = (float)(room * view->splat.sigma * sqrt(view->splat.cutoff2));
     vf u = v_abs(offset(vi_load(staged->u + at), view->eye[0])) * v_set(reach->scale[0]);
     vf v = v_abs(offset(vi_load(staged->v + at), view->eye[1])) * v_set(reach->scale[1]);
     vf s = v_abs(offset(vi_load(staged->sheet + at), view->eye[2])) * v_set(reach->scale[2]);
@@ -106,7 +111,7 @@ static void reaching(const trip_cpu_view *view, const trip_cpu_reach *reach,
     for (uint32_t i = 0; i < count; i += V) {
         place(view, staged, i, lanes);
         vm usual = view->splat.camera.ortho ? v_ge(v_load(lanes->z + i), v_set(view->near))
-                                            : footprint_of(&persp, &view->splat, lanes, i).usual;
+                                            : footprint_of(&persp, view, lanes, NULL, i).usual;
         unsigned front = vm_bits(vm_first(count - i)) &
                          ~vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
         lanes->kept[i / V] = front & vm_bits(usual);

@@ -74,7 +74,7 @@ static_assert(sizeof(trip_cpu_splat) == 64, "one cache line");
 
 /* Where the rays of a view are alike, their tables are not needed. */
 typedef enum trip_cpu_rays {
-    TRIP_CPU_PARALLEL,    /* G = 1, stretch constant */
+    TRIP_CPU_PARALLEL,    /* G = 1, stretch constant; of affine views, near splats aside */
     TRIP_CPU_PERSPECTIVE, /* G(p) = 1 / |r(p)|^2, stretch constant: cubic voxels */
     TRIP_CPU_STRETCHED,   /* G(p) and stretch(p) */
 } trip_cpu_rays;
@@ -87,10 +87,13 @@ typedef struct trip_cpu_view {
     trip_splat_frame splat;     /* by the camera of the list */
     trip_cpu_rays rays;
     bool front_to_back, shading;
-    bool sums;   /* splats are summed sheet by sheet */
-    bool tinted; /* all have one colour before they are lit: */
+    bool flattens; /* kernels, along their gradients */
+    bool sums;     /* splats are summed sheet by sheet */
+    bool tinted;   /* all have one colour before they are lit: */
     float tint[3];
     bool stretch_varies;
+    bool affine; /* by the affine map at the centre (splat.h): G and stretch are 1 but of near ones
+                  */
     unsigned code_bytes, normal_bytes; /* of the list's codes, of the data set's normals */
     int axis, u_axis, v_axis;
     float compact[3][3]; /* of 3-byte normals: from steps to world space, over gradient_full */

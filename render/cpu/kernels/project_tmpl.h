@@ -9,6 +9,7 @@
 #include "cpu/kernels/saturated_tmpl.h"
 #include "cpu/kernels/exp_tmpl.h"
 #include "cpu/kernels/kernels.h"
+#include "cpu/kernels/rays_tmpl.h"
 #include "cpu/scalar.h"
 #include "cpu/kernels/simd_tmpl.h"
 #include "cpu/kernels/effects_tmpl.h"
@@ -77,7 +78,7 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
         int32_t at = reversed ? count - V - i : i;
         vi place = load_bytes(places + V + at), code = load_codes(square->codes, code_bytes, at);
         vi normal = vi_set(0);
-        if (view->shading)
+        if (view->shading || view->flattens)
             normal = load_normals(square->normals, view->normal_bytes, at);
         if (reversed) {
             place = vi_reverse(place);
@@ -91,7 +92,7 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
         vi_store_packed(staged->v + filled, seen, v + v_shift_right(place, 3));
         vi_store_packed(staged->sheet + filled, seen, sheet);
         vi_store_packed(staged->code + filled, seen, code);
-        if (view->shading)
+        if (view->shading || view->flattens)
             vi_store_packed(staged->normal + filled, seen, normal);
         filled += (uint32_t)__builtin_popcount(vm_bits(seen));
     }
@@ -160,151 +161,7 @@ INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint
     v_store(lanes->y + at, part);
 }
 
-/* ---- the footprint ---- */
-
-typedef struct footprint {
-    vf l11, l21, l22;                    /* as in trip_cpu_splat */
-    vf det_ratio;                        /* |S| / |S'| */
-    vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
-    vm usual;                            /* the numbers are good */
-} footprint;
-
-/* Constants of a perspective view as floats; rays relative to the image's middle, pixel steps X =
- * rx / step and Y = ry / step of a length about 1, so that no square of theirs leaves a float's
- * range however narrow the view. */
-typedef struct perspective {
-    vf middle_x, middle_y, step;
-    vf rr, rX, rY, XX, XY, YY; /* of r at the middle, X and Y */
-    vf det;                    /* (r . X x Y)^2 */
-    vf inverse_sigma;          /* of a splat at depth 1, in pixels: step (r . X x Y) / sigma */
-    vf reach, inverse_step;    /* cutoff^2 step; 1 / step */
-    vf near;                   /* 2 cutoff^2 step^2 */
-    bool uneven;               /* not cubes, whose footprints may be any number of times as long as
-                                  wide */
-} perspective;
-
-/* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
- */
-#define FARTHEST 1e12f
-
-INLINE perspective perspective_of(const trip_cpu_view *view)
-{
-    const trip_splat_frame *f = &view->splat;
-    const trip_camera *c = &f->camera;
-    trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
-    double step = sqrt(fmax(f->rxrx, f->ryry));
-    trip_vec3 x = trip_scale(c->rx, 1 / step), y = trip_scale(c->ry, 1 / step);
-    double volume = trip_dot(r, trip_cross(x, y));
-    return (perspective){
-        .middle_x = v_set((float)(0.5 * c->width)),
-        .middle_y = v_set((float)(0.5 * c->height)),
-        .step = v_set((float)step),
-        .rr = v_set((float)trip_dot(r, r)),
-        .rX = v_set((float)trip_dot(r, x)),
-        .rY = v_set((float)trip_dot(r, y)),
-        .XX = v_set((float)trip_dot(x, x)),
-        .XY = v_set((float)trip_dot(x, y)),
-        .YY = v_set((float)trip_dot(y, y)),
-        .det = v_set((float)(volume * volume)),
-        .inverse_sigma = v_set((float)(step * volume / f->sigma)),
-        .reach = v_set((float)(f->cutoff2 * step)),
-        .inverse_step = v_set((float)(1 / step)),
-        .near = v_set((float)(2 * f->cutoff2 * step * step)),
-        .uneven = view->stretch_varies,
-    };
-}
-
-/* Bounds of the support, the ellipse of E and l in splat.h over u of footprint_of(), to be widened
- * by the caller; k2 is cutoff^2 / u. */
-INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
-{
-    vf inverse = v_set(1) / v_fnma(exy, exy, exx * eyy);
-    f->shift_x = v_fnma(exy, ly, eyy * lx) * inverse;
-    f->shift_y = v_fnma(exy, lx, exx * ly) * inverse;
-    vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
-    f->half_x = v_sqrt(size * eyy);
-    f->half_y = v_sqrt(size * exx);
-}
-
-/* Whether a difference from `whole` has kept most of its digits. */
-INLINE vm is_exact(vf difference, vf whole)
-{
-    return v_ge(difference, whole * v_set(1e-2f));
-}
-
-/* With D = r_c . X x Y, constant over the image, and u = (step D z / sigma)^2,
- * u S = adj [X x r_c, Y x r_c] and |u S| = D^2 |r_c|^2: u alone carries the size of a splat in
- * pixels, and all else is about 1. */
-INLINE footprint footprint_of(const perspective *p, const trip_splat_frame *f,
-                              const trip_cpu_lanes *lanes, uint32_t at)
-{
-    footprint out;
-    vf x = ((v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at)) * p->step;
-    vf y = ((v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at)) * p->step;
-    vf rx = v_fma(x, p->XX, v_fma(y, p->XY, p->rX)); /* r_c . X */
-    vf ry = v_fma(x, p->XY, v_fma(y, p->YY, p->rY));
-    vf rr = v_fma(x, p->rX + rx, v_fma(y, p->rY + ry, p->rr)); /* |r_c|^2 */
-    vf u = p->inverse_sigma * v_load(lanes->z + at);
-    u = u * u;
-    /* From here on S, S' and the low-pass times u. */
-    vf low_pass = v_set((float)f->low_pass2) * u;
-    vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
-    vf sxy = v_fnma(rr, p->XY, rx * ry);
-    vm exact = vm_first(V);
-    if (p->uneven)
-        exact = vm_and(is_exact(sxx, rr * p->YY), is_exact(syy, rr * p->XX));
-    vf det_s = p->det * rr;
-    vf det = v_fma(low_pass, sxx + syy + low_pass, det_s);
-    sxx = sxx + low_pass;
-    syy = syy + low_pass;
-
-    /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
-    vf inverse = v_set(1) / (det * syy);
-    vf inverse_det = syy * inverse, inverse_syy = det * inverse;
-    vf rr_u = rr * u, unit = rr_u * v_set((float)(1 / f->cutoff2));
-    out.l11 = v_sqrt(unit * (syy * inverse_det));
-    out.l21 = -(sxy * inverse_syy) * out.l11;
-    out.l22 = v_sqrt(unit * inverse_syy);
-    out.det_ratio = det_s * inverse_det;
-
-    /* E is S'^-1 less a matrix whose product with S' has this trace times k^2 / |r_c|^2. Where E is
-     * positive definite by twice that, |v - eye|^2 also exceeds 4 R^2 and R^2 + radius^2 of
-     * splat.h, so that no near splat is usual. What is not a number is not usual. */
-    vf trace = v_fma(p->XX, sxx, v_fma(p->YY, syy, (p->XY + p->XY) * sxy));
-    out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
-    vf t = p->reach / rr_u, t_step = t * p->step;
-    vf exx = v_fnma(t_step, p->XX, syy * inverse_det),
-       eyy = v_fnma(t_step, p->YY, sxx * inverse_det);
-    vf exy = v_fnma(t_step, p->XY, -sxy * inverse_det);
-    if (p->uneven)
-        out.usual =
-            vm_and(vm_and(out.usual, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
-    bound(&out, exx, exy, eyy, t * rx, t * ry, t * rr * p->inverse_step);
-    return out;
-}
-
-INLINE footprint footprint_parallel(const trip_cpu_view *view)
-{
-    const trip_splat *s = &view->parallel;
-    trip_cpu_splat one;
-    trip_cpu_set_conic(s, &one);
-    return (footprint){
-        .l11 = v_set(one.l11),
-        .l21 = v_set(one.l21),
-        .l22 = v_set(one.l22),
-        .det_ratio = v_set((float)pow(s->amplitude / view->splat.amplitude, 2)),
-        .shift_x = v_set((float)(0.5 * (s->x0 + s->x1) - s->x)),
-        .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
-        .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
-        .half_y = v_set((float)(0.5 * (s->y1 - s->y0))),
-    };
-}
-
-/* ---- colour and light ---- */
-
-typedef struct colour {
-    vf r, g, b;
-} colour;
+/* ---- normals ---- */
 
 typedef struct v3 {
     vf x, y, z;
@@ -324,27 +181,6 @@ INLINE v3 unit(v3 a)
 INLINE v3 v3_of(trip_vec3 a)
 {
     return (v3){ v_set((float)a.x), v_set((float)a.y), v_set((float)a.z) };
-}
-
-INLINE vf offset(vi index, double eye)
-{
-    vd_pair a = widen_int(index);
-    return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
-}
-
-/* From the voxel to the eye, world space, not normalised. */
-INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
-{
-    const trip_camera *camera = &view->splat.camera;
-    if (camera->ortho)
-        return v3_of(trip_scale(camera->world_forward, -1));
-    vf c[3] = { offset(u, view->eye[0]), offset(v, view->eye[1]), offset(sheet, view->eye[2]) };
-    vf w[3];
-    for (int i = 0; i < 3; i++)
-        w[i] = -v_fma(
-            v_set((float)view->world[i][0]), c[0],
-            v_fma(v_set((float)view->world[i][1]), c[1], v_set((float)view->world[i][2]) * c[2]));
-    return (v3){ w[0], w[1], w[2] };
 }
 
 /* As trip_normal_unpack(): the direction, and the length over gradient_full. */
@@ -384,6 +220,312 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
     *length = v_select(is_strong, v_set(view->normal_full), v_sqrt(dot(weak, weak)));
     return unit((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
                       v_select(is_strong, strong.z, weak.z) });
+}
+
+/* How kernels are flattened: trip_flattening, along the list's own axes. */
+typedef struct flattening {
+    v3 normal;
+    vf share;
+} flattening;
+
+/* As trip_splat_flattening(). */
+INLINE flattening flattening_of(const trip_cpu_view *view, const trip_cpu_staged *staged,
+                                uint32_t at)
+{
+    vi packed = vi_load(staged->normal + at);
+    vf strength;
+    v3 g = view->normal_bytes == 3 ? unpack_compact_normal(view, packed, &strength)
+                                   : unpack_normal(view, packed, &strength);
+    v3 columns[3];
+    for (int i = 0; i < 3; i++)
+        columns[i] = (v3){ v_set((float)view->world[0][i]), v_set((float)view->world[1][i]),
+                           v_set((float)view->world[2][i]) };
+    return (flattening){
+        .normal = unit((v3){ dot(columns[0], g), dot(columns[1], g), dot(columns[2], g) }),
+        .share = v_min(v_set(1), strength) * v_set((float)view->splat.flatten),
+    };
+}
+
+/* ---- the footprint ---- */
+
+typedef struct footprint {
+    vf l11, l21, l22; /* as in trip_cpu_splat */
+    vf det_ratio;     /* |S| / |S'|; of affine splats times the stretch squared */
+    vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
+    vm usual;                            /* the numbers are good */
+} footprint;
+
+/* Constants of a perspective view as floats; rays relative to the image's middle, pixel steps X =
+ * rx / step and Y = ry / step of a length about 1, so that no square of theirs leaves a float's
+ * range however narrow the view. */
+typedef struct perspective {
+    vf middle_x, middle_y, step;
+    vf rr, rX, rY, XX, XY, YY; /* of r at the middle, X and Y */
+    vf det;                    /* (r . X x Y)^2 */
+    vf inverse_sigma;          /* of a splat at depth 1, in pixels: step (r . X x Y) / sigma */
+    vf reach, inverse_step;    /* cutoff^2 step; 1 / step */
+    vf near;                   /* 2 cutoff^2 step^2; of affine views as splat.h says */
+    v3 middle, X, Y, XxY;      /* r at the middle and so on, along the list's own axes */
+    v3 YxR, RxX;               /* and cross products */
+    bool uneven;               /* not cubes, whose footprints may be any number of times as long as
+                                  wide */
+} perspective;
+
+/* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
+ */
+#define FARTHEST 1e12f
+
+/* Components along u, v and the list, which is an even permutation: cross products keep their sign.
+ */
+INLINE v3 in_list_axes(const trip_cpu_view *view, trip_vec3 a)
+{
+    return v3_of(trip_v3(trip_component(a, view->u_axis), trip_component(a, view->v_axis),
+                         trip_component(a, view->axis)));
+}
+
+/* Floats leave to doubles what lies between affine and near splats. */
+#define AFFINE_ROOM 1.001
+
+INLINE perspective perspective_of(const trip_cpu_view *view)
+{
+    const trip_splat_frame *f = &view->splat;
+    const trip_camera *c = &f->camera;
+    trip_vec3 r = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    double step = sqrt(fmax(f->rxrx, f->ryry));
+    trip_vec3 x = trip_scale(c->rx, 1 / step), y = trip_scale(c->ry, 1 / step);
+    double volume = trip_dot(r, trip_cross(x, y));
+    double nearest = f->affine ? AFFINE_ROOM / (TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE) : 2;
+    return (perspective){
+        .middle_x = v_set((float)(0.5 * c->width)),
+        .middle_y = v_set((float)(0.5 * c->height)),
+        .step = v_set((float)step),
+        .rr = v_set((float)trip_dot(r, r)),
+        .rX = v_set((float)trip_dot(r, x)),
+        .rY = v_set((float)trip_dot(r, y)),
+        .XX = v_set((float)trip_dot(x, x)),
+        .XY = v_set((float)trip_dot(x, y)),
+        .YY = v_set((float)trip_dot(y, y)),
+        .det = v_set((float)(volume * volume)),
+        .inverse_sigma = v_set((float)(step * volume / f->sigma)),
+        .reach = v_set((float)(f->cutoff2 * step)),
+        .inverse_step = v_set((float)(1 / step)),
+        .near = v_set((float)(nearest * f->cutoff2 * step * step)),
+        .middle = in_list_axes(view, r),
+        .X = in_list_axes(view, x),
+        .Y = in_list_axes(view, y),
+        .XxY = in_list_axes(view, trip_cross(x, y)),
+        .YxR = in_list_axes(view, trip_cross(y, r)),
+        .RxX = in_list_axes(view, trip_cross(r, x)),
+        .uneven = view->stretch_varies,
+    };
+}
+
+/* Bounds of the support, the ellipse of E and l in splat.h over u of footprint_of(), to be widened
+ * by the caller; k2 is cutoff^2 / u. */
+INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
+{
+    vf inverse = v_set(1) / v_fnma(exy, exy, exx * eyy);
+    f->shift_x = v_fnma(exy, ly, eyy * lx) * inverse;
+    f->shift_y = v_fnma(exy, lx, exx * ly) * inverse;
+    vf size = v_fma(lx, f->shift_x, v_fma(ly, f->shift_y, k2)) * inverse;
+    f->half_x = v_sqrt(size * eyy);
+    f->half_y = v_sqrt(size * exx);
+}
+
+/* Bounds of the support of an affine splat: an ellipse about the centre. */
+INLINE void bound_affine(footprint *f, vf sxx, vf syy, vf k2)
+{
+    f->shift_x = f->shift_y = v_set(0);
+    f->half_x = v_sqrt(k2 * sxx);
+    f->half_y = v_sqrt(k2 * syy);
+}
+
+/* The square of the stretch over view->stretch, (x, y) pixels from the image's middle. */
+INLINE vf stretch2_at(const trip_cpu_view *view, vf x, vf y)
+{
+    vf stretch = ray_lengths_at(view, x, y).stretch;
+    return stretch * stretch;
+}
+
+/* Whether a difference from `whole` has kept most of its digits. */
+INLINE vm is_exact(vf difference, vf whole)
+{
+    return v_ge(difference, whole * v_set(1e-2f));
+}
+
+/* S of a kernel and its determinant. */
+typedef struct spread {
+    vf xx, xy, yy, det;
+} spread;
+
+INLINE v3 cross(v3 a, v3 b)
+{
+    return (v3){ v_fnma(a.z, b.y, a.y * b.z), v_fnma(a.x, b.z, a.z * b.x),
+                 v_fnma(a.y, b.x, a.x * b.y) };
+}
+
+INLINE vf mixed(vf a, vf b, vf share)
+{
+    return v_fma(share, b - a, a);
+}
+
+/* S of a flattened kernel from that of the round one: for the gradients gx and gy of x and y, and n
+ * the normal, it is the round one's less `share` and that share of (g x n).(g x n), the part at
+ * right angles to n. `along2` and `all2` are (n . r)^2 and r . r of the ray. */
+INLINE spread flattened(spread s, const flattening *f, v3 gx, v3 gy, vf along2, vf all2)
+{
+    v3 x = cross(gx, f->normal), y = cross(gy, f->normal);
+    return (spread){ mixed(s.xx, dot(x, x), f->share), mixed(s.xy, dot(x, y), f->share),
+                     mixed(s.yy, dot(y, y), f->share),
+                     s.det * mixed(v_set(1), along2 / all2, f->share) };
+}
+
+/* Of a splat through (x, y) steps from the image's middle. */
+INLINE spread flattened_at(const perspective *p, spread s, const flattening *f, vf x, vf y, vf rr)
+{
+    vf along =
+        v_fma(x, dot(p->X, f->normal), v_fma(y, dot(p->Y, f->normal), dot(p->middle, f->normal)));
+    v3 gx = { v_fnma(x, p->XxY.x, p->YxR.x), v_fnma(x, p->XxY.y, p->YxR.y),
+              v_fnma(x, p->XxY.z, p->YxR.z) };
+    v3 gy = { v_fnma(y, p->XxY.x, p->RxX.x), v_fnma(y, p->XxY.y, p->RxX.y),
+              v_fnma(y, p->XxY.z, p->RxX.z) };
+    return flattened(s, f, gx, gy, along * along, rr);
+}
+
+/* With D = r_c . X x Y, constant over the image, and u = (step D z / sigma)^2,
+ * u S = adj [X x r_c, Y x r_c] and |u S| = D^2 |r_c|^2: u alone carries the size of a splat in
+ * pixels, and all else is about 1. */
+INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
+                              const trip_cpu_lanes *lanes, const flattening *flat, uint32_t at)
+{
+    const trip_splat_frame *f = &view->splat;
+    footprint out;
+    vf x = ((v_load(lanes->whole_x + at) - p->middle_x) + v_load(lanes->x + at)) * p->step;
+    vf y = ((v_load(lanes->whole_y + at) - p->middle_y) + v_load(lanes->y + at)) * p->step;
+    vf rx = v_fma(x, p->XX, v_fma(y, p->XY, p->rX)); /* r_c . X */
+    vf ry = v_fma(x, p->XY, v_fma(y, p->YY, p->rY));
+    vf rr = v_fma(x, p->rX + rx, v_fma(y, p->rY + ry, p->rr)); /* |r_c|^2 */
+    vf u = p->inverse_sigma * v_load(lanes->z + at);
+    u = u * u;
+    /* From here on S, S' and the low-pass times u. */
+    vf low_pass = v_set((float)f->low_pass2) * u;
+    vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
+    vf sxy = v_fnma(rr, p->XY, rx * ry);
+    vm exact = vm_first(V);
+    if (p->uneven)
+        exact = vm_and(is_exact(sxx, rr * p->YY), is_exact(syy, rr * p->XX));
+    vf det_s = p->det * rr;
+    vf trace = v_fma(p->XX, sxx + low_pass, v_fma(p->YY, syy + low_pass, (p->XY + p->XY) * sxy));
+    spread shape = { sxx, sxy, syy, det_s };
+    if (flat) {
+        shape = flattened_at(p, shape, flat, x, y, rr);
+        sxx = shape.xx, sxy = shape.xy, syy = shape.yy;
+    }
+    vf det = v_fma(low_pass, sxx + syy + low_pass, shape.det);
+    sxx = sxx + low_pass;
+    syy = syy + low_pass;
+
+    /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
+    vf inverse = v_set(1) / (det * syy);
+    vf inverse_det = syy * inverse, inverse_syy = det * inverse;
+    vf rr_u = rr * u, unit = (f->affine ? u : rr_u) * v_set((float)(1 / f->cutoff2));
+    out.l11 = v_sqrt(unit * (syy * inverse_det));
+    out.l21 = -(sxy * inverse_syy) * out.l11;
+    out.l22 = v_sqrt(unit * inverse_syy);
+    out.det_ratio = det_s * inverse_det;
+
+    /* The trace is of round kernels. E is S'^-1 less a matrix whose product with S' has this trace
+     * times k^2 / |r_c|^2. Where E is positive definite by twice that, |v - eye|^2 also exceeds 4
+     * R^2 and R^2 + radius^2 of splat.h, so that no near splat is usual. What is not a number is
+     * not usual. */
+    out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
+    if (f->affine) {
+        out.usual = vm_and(out.usual, exact);
+        bound_affine(&out, sxx, syy, v_set((float)f->cutoff2) / u);
+        if (p->uneven)
+            out.det_ratio =
+                out.det_ratio * stretch2_at(view, x * p->inverse_step, y * p->inverse_step);
+        return out;
+    }
+    vf t = p->reach / rr_u, t_step = t * p->step;
+    vf exx = v_fnma(t_step, p->XX, syy * inverse_det),
+       eyy = v_fnma(t_step, p->YY, sxx * inverse_det);
+    vf exy = v_fnma(t_step, p->XY, -sxy * inverse_det);
+    if (p->uneven)
+        out.usual =
+            vm_and(vm_and(out.usual, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
+    bound(&out, exx, exy, eyy, t * rx, t * ry, t * rr * p->inverse_step);
+    return out;
+}
+
+/* Of a flattened kernel in a parallel view. */
+INLINE footprint footprint_flat_parallel(const trip_cpu_view *view, const flattening *flat)
+{
+    const trip_splat_frame *f = &view->splat;
+    const trip_camera *c = &f->camera;
+    double xx = trip_dot(c->to_x, c->to_x), yy = trip_dot(c->to_y, c->to_y), most = fmax(xx, yy);
+    double area = trip_length(trip_cross(c->to_x, c->to_y)) / most, root = 1 / sqrt(most);
+    v3 gx = in_list_axes(view, trip_scale(c->to_x, root));
+    v3 gy = in_list_axes(view, trip_scale(c->to_y, root));
+    vf along = dot(in_list_axes(view, trip_normalize(c->r0)), flat->normal);
+    /* S, S' and the low-pass over sigma^2 `most`. */
+    spread s = { v_set((float)(xx / most)), v_set((float)(trip_dot(c->to_x, c->to_y) / most)),
+                 v_set((float)(yy / most)), v_set((float)(area * area)) };
+    vf det_s = s.det, low_pass = v_set((float)(f->low_pass2 / (f->sigma * f->sigma * most)));
+    s = flattened(s, flat, gx, gy, along * along, v_set(1));
+    vf det = v_fma(low_pass, s.xx + s.yy + low_pass, s.det);
+    vf sxx = s.xx + low_pass, syy = s.yy + low_pass;
+    vf unit = v_set((float)(1 / (f->cutoff2 * f->sigma * f->sigma * most)));
+    footprint out = { .det_ratio = det_s / det };
+    out.l11 = v_sqrt(unit * (syy / det));
+    out.l21 = -(s.xy / syy) * out.l11;
+    out.l22 = v_sqrt(unit / syy);
+    bound_affine(&out, sxx, syy, v_set((float)(f->cutoff2 * f->sigma * f->sigma * most)));
+    return out;
+}
+
+INLINE footprint footprint_parallel(const trip_cpu_view *view)
+{
+    const trip_splat *s = &view->parallel;
+    trip_cpu_splat one;
+    trip_cpu_set_conic(s, &one);
+    return (footprint){
+        .l11 = v_set(one.l11),
+        .l21 = v_set(one.l21),
+        .l22 = v_set(one.l22),
+        .det_ratio = v_set((float)pow(s->amplitude / view->splat.amplitude, 2)),
+        .shift_x = v_set((float)(0.5 * (s->x0 + s->x1) - s->x)),
+        .shift_y = v_set((float)(0.5 * (s->y0 + s->y1) - s->y)),
+        .half_x = v_set((float)(0.5 * (s->x1 - s->x0))),
+        .half_y = v_set((float)(0.5 * (s->y1 - s->y0))),
+    };
+}
+
+/* ---- colour and light ---- */
+
+typedef struct colour {
+    vf r, g, b;
+} colour;
+
+INLINE vf offset(vi index, double eye)
+{
+    vd_pair a = widen_int(index);
+    return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
+}
+
+/* From the voxel to the eye, world space, not normalised. */
+INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
+{
+    const trip_camera *camera = &view->splat.camera;
+    if (camera->ortho)
+        return v3_of(trip_scale(camera->world_forward, -1));
+    vf c[3] = { offset(u, view->eye[0]), offset(v, view->eye[1]), offset(sheet, view->eye[2]) };
+    vf w[3];
+    for (int i = 0; i < 3; i++)
+        w[i] = -v_fma(
+            v_set((float)view->world[i][0]), c[0],
+            v_fma(v_set((float)view->world[i][1]), c[1], v_set((float)view->world[i][2]) * c[2]));
+    return (v3){ w[0], w[1], w[2] };
 }
 
 /* As trip_light_on(), `eye` of unit length. With light from the eye `facing` changes nothing that a
@@ -545,12 +687,17 @@ static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged 
                                bool *broken)
 {
     unsigned drawn = 0;
+    flattening along = { .share = v_set(0) };
+    if (view->flattens)
+        along = flattening_of(view, staged, at);
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
         uint32_t k = at + i;
         double extinction = (double)view->table[staged->code[k]].extinction;
+        const float flat[4] = { along.normal.x[i], along.normal.y[i], along.normal.z[i],
+                                along.share[i] };
         if (trip_cpu_project_scalar(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
-                                    &splats[i], broken))
+                                    view->flattens ? flat : NULL, &splats[i], broken))
             drawn |= 1u << i;
         if (view->sums)
             depths[i] = splats[i].peak;
@@ -698,8 +845,15 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
         place(view, staged, i, lanes);
     for (uint32_t i = 0; i < count; i += V) {
         footprint f = parallel;
+        flattening flat, *flattens = NULL;
+        if (view->flattens) {
+            flat = flattening_of(view, staged, i);
+            flattens = &flat;
+        }
+        if (view->flattens && view->splat.camera.ortho)
+            f = footprint_flat_parallel(view, &flat);
         if (!view->splat.camera.ortho)
-            f = footprint_of(&persp, &view->splat, lanes, i);
+            f = footprint_of(&persp, view, lanes, flattens, i);
         else
             f.usual = v_ge(v_load(lanes->z + i), v_set(view->near));
         unsigned valid = vm_bits(vm_first(count - i));

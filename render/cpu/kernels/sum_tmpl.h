@@ -115,6 +115,17 @@ INLINE vf falloff(vf u)
     return u * sum * sum;
 }
 
+/* Of a splat's peak at the pixels. */
+INLINE vf share_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays kind)
+{
+    if (is_near(splat)) {
+        ray_lengths of = rays_of_near(p, kind);
+        return falloff(nearness_by(p, splat, of.g)) * of.stretch * front_of(p, splat, of.g);
+    }
+    vf share = falloff(nearness(p, splat, kind));
+    return kind == TRIP_CPU_STRETCHED ? share * p->stretch : share;
+}
+
 /* A blend_one: the patch holds the sums of its stamp's open sheet. */
 INLINE void add_to_sheet(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays kind,
                          bool front_to_back, trip_target target)
@@ -125,11 +136,7 @@ INLINE void add_to_sheet(patch *p, const trip_cpu_splat *splat, float depth, tri
         end_sheet(p);
         p->sheet = splat->sheet;
     }
-    vf share = falloff(nearness(p, splat, kind));
-    if (kind == TRIP_CPU_STRETCHED)
-        share = share * p->stretch;
-    if (is_near(splat))
-        share = share * front_of(p, splat, kind);
+    vf share = share_of(p, splat, kind);
     p->r = v_fma(share, v_set(splat->r), p->r);
     p->g = v_fma(share, v_set(splat->g), p->g);
     p->b = v_fma(share, v_set(splat->b), p->b);
