@@ -17,7 +17,7 @@ static const struct {
     { "orders", bench_orders, false, false },   { "submit", bench_submit, false, false },
     { "stream", bench_stream, false, false },   { "renderers", bench_renderers, false, false },
     { "popping", bench_popping, false, false }, { "levels", bench_levels, true, false },
-    { "flight", bench_flight, false, true },
+    { "flight", bench_flight, false, true },    { "ewa", bench_ewa, false, false },
 };
 
 /* Splats by their normals, values by their differences. */

@@ -172,6 +172,16 @@ static const struct table {
         .renderers = { TRIP_RENDERER_AUTO },
         .renderer_count = 1,
     },
+    {
+        .name = "ewa",
+        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_NO_COUNTS) |
+                   BIT(KEY_VIEWS),
+        .repeat = 5,
+        .sizes = { { 512, 512 } },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_CPU },
+        .renderer_count = 1,
+    },
 };
 
 /* While parsing: what was given, for the check against the table. */
@@ -366,8 +376,8 @@ static void be_short(parse *p)
 
 static int check(parse *p)
 {
-    static const char *const names[] = { "orders",  "submit", "stream", "renderers",
-                                         "popping", "levels", "flight", NULL };
+    static const char *const names[] = { "orders", "submit", "stream", "renderers", "popping",
+                                         "levels", "flight", "ewa",    NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)

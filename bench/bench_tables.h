@@ -12,6 +12,7 @@ int bench_popping(const session *s, const bench_options *o, bench_report *r);
 int bench_levels(const session *s, const bench_options *o, bench_report *r);
 /* Without a session: it opens the data set as the viewer does. */
 int bench_flight(const session *s, const bench_options *o, bench_report *r);
+int bench_ewa(const session *s, const bench_options *o, bench_report *r);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 
 #endif
