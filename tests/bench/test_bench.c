@@ -412,6 +412,48 @@ static void levels_without_a_data_set_samples_an_object_and_plots_it(void **stat
     assert_fails(&r, 2);
 }
 
+/* On the axis of view, by the formulas of render/splat.h: with t the distance from the centre in
+ * standard deviations, the exact form divides t^2 by 1 + (t sigma / distance)^2. */
+static double most_on_axis(double radii)
+{
+    const double k = 10.0 / 3, edge = exp(-k * k / 2);
+    double most = 0;
+    for (double t = 0; t < 1.2 * k; t += 1e-3) {
+        double exact = t * t / (1 + pow(t / (k * radii), 2));
+        double is = t < k ? exp(-t * t / 2) - edge : 0;
+        most = fmax(most, fabs(is - fmax(0, exp(-exact / 2) - edge)));
+    }
+    return 100 * most / (1 - edge);
+}
+
+static void ewa_compares_splats_and_pictures(void **state)
+{
+    (void)state;
+    cJSON *root = bench("ewa block.trip --size 24x20 --repeat 2");
+    const cJSON *rows = rows_of(root, "splats"), *row;
+    int checked = 0;
+    cJSON_ArrayForEach(row, rows)
+    {
+        if (number(row, "angle") > 0)
+            continue;
+        double expected = most_on_axis(number(row, "distance"));
+        assert_true(fabs(number(row, "most") - expected) < 0.01 * expected + 1e-4);
+        assert_true(number(row, "sum") <= 0 && -number(row, "sum") <= number(row, "mean") + 1e-9);
+        checked++;
+    }
+    assert_true(checked >= 5);
+    rows = rows_of(root, "pictures");
+    assert_true(cJSON_GetArraySize(rows) >= 3);
+    cJSON_ArrayForEach(row, rows)
+    {
+        assert_close(number(row, "ratio"), number(row, "ewa_ms") / number(row, "exact_ms"));
+        assert_true(number(row, "mean") <= number(row, "most"));
+    }
+    assert_true(number(cJSON_GetArrayItem(rows, 0), "most") <
+                number(cJSON_GetArrayItem(rows, cJSON_GetArraySize(rows) - 1), "most"));
+    cJSON_Delete(root);
+}
+
 static void tables_for_people_name_the_command_and_their_limits(void **state)
 {
     (void)state;
@@ -482,6 +524,7 @@ int main(void)
         cmocka_unit_test(levels_of_a_plain_block_are_near_the_finest),
         cmocka_unit_test(levels_without_a_data_set_samples_an_object_and_plots_it),
         cmocka_unit_test(flight_ends_with_the_picture_of_render_and_counts_each_picture_once),
+        cmocka_unit_test(ewa_compares_splats_and_pictures),
         cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
         cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),
