@@ -19,6 +19,15 @@ static void assert_same(const scene_picture *a, const scene_picture *b)
     assert_memory_equal(a->rgba, b->rgba, 16 * (size_t)a->width * (size_t)a->height);
 }
 
+static trip_settings settings_with(trip_compositing compositing, trip_footprint footprint)
+{
+    trip_settings s = trip_settings_default();
+    s.compositing = compositing;
+    s.footprint = footprint;
+    s.flatten = footprint == TRIP_FOOTPRINT_EWA ? 3 : 1;
+    return s;
+}
+
 /* With every instruction set and target, and by sheets, the picture of `a` by one thread and that
  * of `b` by another number of threads, from batches as `reader` says. */
 static void check_view(const scene *a, const scene *b, trip_camera_params view, unsigned threads,
@@ -26,7 +35,8 @@ static void check_view(const scene *a, const scene *b, trip_camera_params view, 
 {
     enum { TARGETS = TRIP_TARGET_RGBA8 + 1, FORMS }; /* the last is by sheets */
     static int turn;                                 /* the form, where they are taken by turns */
-    trip_settings settings = trip_settings_default();
+    trip_settings settings = settings_with(
+        TRIP_COMPOSITING_SPLAT, turn % 3 == 1 ? TRIP_FOOTPRINT_EWA : TRIP_FOOTPRINT_EXACT);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
         for (int form = 0; form < FORMS; form++) {
@@ -130,10 +140,9 @@ typedef struct frame_by_hand {
 } frame_by_hand;
 
 static void begin_by_hand(frame_by_hand *f, const scene *s, const trip_camera_params *view,
-                          unsigned threads, trip_compositing compositing)
+                          unsigned threads, const trip_settings *settings)
 {
-    f->settings = trip_settings_default();
-    f->settings.compositing = compositing;
+    f->settings = *settings;
     f->splats = f->occluded = 0;
     assert_int_equal(trip_camera_make(&f->camera, view, &s->data->index_to_world), 0);
     assert_int_equal(
@@ -199,18 +208,16 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, size_t piece, bool sk
     trip_reader_destroy(reader);
 }
 
-static void check_pieces(trip_compositing compositing)
+static void check_pieces(trip_settings settings)
 {
     scene s;
     cpu_scenes_blobs(&s, 32, NULL);
-    trip_settings settings = trip_settings_default();
-    settings.compositing = compositing;
     trip_camera_params view = side_view(&s);
     scene_picture whole = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
     const size_t pieces[3] = { 1, 3, 17 };
     for (int i = 0; i < 3; i++) {
         frame_by_hand f;
-        begin_by_hand(&f, &s, &view, 3, compositing);
+        begin_by_hand(&f, &s, &view, 3, &settings);
         draw_by_hand(&f, &s, pieces[i], false);
         assert_memory_equal(f.rgba, whole.rgba, 16 * (size_t)view.width * (size_t)view.height);
         end_by_hand(&f, &s);
@@ -222,8 +229,9 @@ static void check_pieces(trip_compositing compositing)
 static void batches_cut_anywhere_draw_the_same(void **state)
 {
     (void)state;
-    check_pieces(TRIP_COMPOSITING_SPLAT);
-    check_pieces(TRIP_COMPOSITING_SHEET);
+    check_pieces(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EXACT));
+    check_pieces(settings_with(TRIP_COMPOSITING_SHEET, TRIP_FOOTPRINT_EXACT));
+    check_pieces(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EWA));
 }
 
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -238,7 +246,7 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
 }
 
 /* A body of opaque voxels, filling the view: what lies behind its face is occluded. */
-static void check_occluded(trip_compositing compositing)
+static void check_occluded(trip_settings settings)
 {
     scene s;
     frame_by_hand all, some;
@@ -248,13 +256,13 @@ static void check_occluded(trip_compositing compositing)
     scene_colour(&s, 0, 65535, 0.4, 0.7, 0.2, 0.95);
     scene_colour(&s, 0, 20000, 0.9, 0.3, 0.2, 0.9);
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
-    begin_by_hand(&all, &s, &view, 1, compositing);
+    begin_by_hand(&all, &s, &view, 1, &settings);
     draw_by_hand(&all, &s, UINT32_MAX / 2, false);
     /* Small buffers let panes close early. */
     for (unsigned threads = 1; threads <= 4; threads++) {
         trip_budget *budget = s.budget;
         assert_int_equal(trip_budget_create(&s.budget, UINT64_C(64) << 20), 0);
-        begin_by_hand(&some, &s, &view, threads, compositing);
+        begin_by_hand(&some, &s, &view, threads, &settings);
         draw_by_hand(&some, &s, 1, true);
         assert_memory_equal(all.rgba, some.rgba, 16 * (size_t)view.width * (size_t)view.height);
         if (threads == 1)
@@ -272,8 +280,9 @@ static void check_occluded(trip_compositing compositing)
 static void leaving_out_what_is_occluded_draws_the_same(void **state)
 {
     (void)state;
-    check_occluded(TRIP_COMPOSITING_SPLAT);
-    check_occluded(TRIP_COMPOSITING_SHEET);
+    check_occluded(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EXACT));
+    check_occluded(settings_with(TRIP_COMPOSITING_SHEET, TRIP_FOOTPRINT_EXACT));
+    check_occluded(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EWA));
 }
 
 static void frames_follow_one_another_on_one_renderer(void **state)
@@ -285,7 +294,7 @@ static void frames_follow_one_another_on_one_renderer(void **state)
     trip_settings settings = trip_settings_default();
     trip_camera_params view = side_view(&s);
     scene_picture alone = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
-    begin_by_hand(&f, &s, &view, 3, TRIP_COMPOSITING_SPLAT);
+    begin_by_hand(&f, &s, &view, 3, &settings);
     draw_by_hand(&f, &s, 5000, false);
     /* A frame given up half-way, with splats still on their way, leaves nothing behind. */
     assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);
