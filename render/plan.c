@@ -460,6 +460,20 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
     *plan = (trip_plan){ 0 };
 }
 
+/* What of footprints is not as usual. */
+static void explain_footprints(const trip_settings *s, FILE *out)
+{
+    if (s->footprint == TRIP_FOOTPRINT_EWA)
+        fprintf(out, "kernel      ewa: footprints by the affine map at each splat's centre\n");
+    if (s->low_pass == TRIP_LOW_PASS_NONE)
+        fprintf(out, "low-pass    does not run: switched off\n");
+    else if (s->low_pass == TRIP_LOW_PASS_UNIFORM)
+        fprintf(out, "low-pass    uniform: kernels are scaled until no axis is shorter\n");
+    if (s->flatten > 1)
+        fprintf(out, "flattening  runs, %g times along full gradients: normal planes are read\n",
+                s->flatten);
+}
+
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     if (plan->gathers) {
@@ -476,6 +490,7 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     if (trip_settings_sum_sheets(s))
         fprintf(out,
                 "compositing sheet: the splats of a sheet are summed, and composited as one\n");
+    explain_footprints(s, out);
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out, "method      merge: layers of up to three lists, blended by w^2 with h = %g\n",
@@ -664,8 +679,7 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
     else if (of_values)
         fprintf(out, "shading     does not run: switched off\n");
     else if (!s->shading && s->flatten > 1)
-        fprintf(out,
-                "shading     does not run: switched off; normal planes are read to flatten by\n");
+        fprintf(out, "shading     does not run: switched off\n");
     else if (plan->planes & 1u << TRIP_PLANE_NORMALS)
         fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))

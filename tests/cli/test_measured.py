@@ -184,6 +184,13 @@ class Measured(program.ProgramTest):
             self.fails(2, "render", "cube.trip", "-o", "b.png", "--compositing", "sheet", *more,
                        says="--compositing")
 
+    def test_the_kernel_is_in_the_plan_and_the_stats(self):
+        self.assertEqual(self.stats("cube.trip", *VIEW, "--kernel", "ewa")["kernel"], "ewa")
+        said = self.render("--explain", "--kernel", "ewa", "--low-pass", "none")[0]
+        self.assertRegex(said, "(?m)^kernel      ewa: ")
+        self.assertRegex(said, "(?m)^low-pass    does not run")
+        self.assertNotIn("flattening", said)
+
 
 if __name__ == "__main__":
     program.main()
