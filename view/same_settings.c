@@ -25,6 +25,11 @@ static bool same_form(const triptych_settings *a, const triptych_settings *b)
            a->kernel == b->kernel && a->tolerance == b->tolerance && a->samples == b->samples;
 }
 
+static bool same_footprints(const triptych_settings *a, const triptych_settings *b)
+{
+    return a->footprint == b->footprint && a->low_pass == b->low_pass && a->flatten == b->flatten;
+}
+
 static bool same_effects(const triptych_settings *a, const triptych_settings *b)
 {
     return a->effects == b->effects && a->anisotropy == b->anisotropy && a->cueing == b->cueing &&
@@ -33,8 +38,9 @@ static bool same_effects(const triptych_settings *a, const triptych_settings *b)
 
 bool trip_same_settings(const triptych_settings *a, const triptych_settings *b)
 {
-    return same_form(a, b) && same_effects(a, b) && a->shading == b->shading &&
-           a->headlight == b->headlight && same_numbers(a->light, b->light, 3) &&
-           same_numbers(a->background, b->background, 4) && a->depth == b->depth &&
-           a->count == b->count && a->show == b->show && same_clip(&a->clip, &b->clip);
+    return same_form(a, b) && same_footprints(a, b) && same_effects(a, b) &&
+           a->shading == b->shading && a->headlight == b->headlight &&
+           same_numbers(a->light, b->light, 3) && same_numbers(a->background, b->background, 4) &&
+           a->depth == b->depth && a->count == b->count && a->show == b->show &&
+           same_clip(&a->clip, &b->clip);
 }

@@ -16,6 +16,9 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
 #define MEMBER(name) memcpy(&to->name, &s->name, sizeof to->name)
     MEMBER(classify);
     MEMBER(compositing);
+    MEMBER(footprint);
+    MEMBER(low_pass);
+    MEMBER(flatten);
     MEMBER(slices);
     MEMBER(method);
     MEMBER(traversal);
@@ -74,6 +77,9 @@ static void every_member_counts(void **state)
     } while (0)
     COUNTS(classify);
     COUNTS(compositing);
+    COUNTS(footprint);
+    COUNTS(low_pass);
+    COUNTS(flatten);
     COUNTS(slices);
     COUNTS(method);
     COUNTS(traversal);
