@@ -495,6 +495,40 @@ static void what_has_few_codes_is_drawn_as_closely(void **state)
     scene_destroy(&s);
 }
 
+static bool not_kept(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    return !crest(user, i, j, k, code, gradient);
+}
+
+/* From where sheets lie closer together than floats tell distances from the eye apart. */
+static void the_narrowest_views_look_as_in_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = not_kept };
+    scene_create(&s, &(scene_params){ .dims = { SIDE_I, SIDE_J, SIDE_K },
+                                      .tile_voxels = 32,
+                                      .slab_sheets = 8,
+                                      .voxel = crest,
+                                      .parts = &halo,
+                                      .part_count = 1 });
+    scene_colour(&s, 33000, 65535, 0.9, 0.5, 0.1, 0.4);
+    const double degrees[] = { 1e-6, 1e-4 };
+    for (int i = 0; i < 4; i++) {
+        trip_settings settings = post(i < 2 ? 1 : 3);
+        double slope = tan(degrees[i % 2] * 3.14159265358979323846 / 360);
+        trip_camera_params view =
+            scene_view(&s, trip_v3(1, 0.8, 0.6), 30 / slope, degrees[i % 2], PIXELS);
+        scene_picture expected = scene_draw(&s, scene_renderers_post(), &view, &settings);
+        scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+        assert_shows(&expected);
+        assert_true(scene_difference(&expected, &p) <= 1.0 / 255);
+        scene_picture_free(&p);
+        scene_picture_free(&expected);
+    }
+    scene_destroy(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -506,6 +540,7 @@ int main(void)
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
         cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
+        cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

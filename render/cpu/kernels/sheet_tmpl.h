@@ -38,7 +38,10 @@ typedef struct pane_path {
     int32_t base[2][TRIP_CPU_SEGMENTS + 1];
     float first[2][TRIP_CPU_SEGMENTS + 1];
     float along[TRIP_CPU_SEGMENTS + 1];
-    double slope[2], start[2]; /* of the pane's corner */
+    float
+        near[TRIP_CPU_SEGMENTS + 1]; /* the same from the first slice: exact however far the eye */
+    float sheets[TRIP_CPU_SEGMENTS]; /* of a segment, how long it is */
+    double slope[2], start[2];       /* of the pane's corner */
     /* Linear in the place within the pane: at its corner, and a pixel along x and y. */
     float toward[3];      /* the ray along the list's axis, of length 1 or so at the corner */
     float aside[2][3];    /* the ray along u and v, less the corner's slope times `toward` */
@@ -47,8 +50,8 @@ typedef struct pane_path {
     float world_length;   /* world units over a sheet, where `world` and `toward` are 1 */
     float depth;          /* z over a sheet where `toward` is 1 */
     float gradient[3][3]; /* as the view's, of sums of weights 2^WEIGHT_LOG2 */
-    /* How far inside each half-space a ray is at 0 along the sheets, and how much that grows by
-     * along `toward`; in parallel views over a sheet. */
+    /* How far inside each half-space a ray is at the first slice, in perspective times the length
+     * of `toward`, and by how much that grows over a sheet the pass's way, likewise. */
     float clip_at[TRIP_CLIP_MOST][3], clip_toward[TRIP_CLIP_MOST][3];
 } pane_path;
 
@@ -157,8 +160,8 @@ INLINE double dot_list(const double a[4], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Likewise of what is cut away. */
-static void find_clip(const trip_cpu_sheet_view *view, int x, int y, pane_path *path)
+/* Likewise of what is cut away; `along` is the first slice's. */
+static void find_clip(const trip_cpu_sheet_view *view, int x, int y, double along, pane_path *path)
 {
     double turns = view->ortho ? 0 : 1, corner[3], start[3];
     for (int i = 0; i < 3; i++) {
@@ -168,17 +171,21 @@ static void find_clip(const trip_cpu_sheet_view *view, int x, int y, pane_path *
     }
     const double *linear[3] = { corner, view->rx, view->ry };
     const double *starts[3] = { start, view->rx, view->ry };
+    const double way = view->direction;
     double unit = view->ortho ? (corner[2] != 0 ? 1 / corner[2] : 0) : 1 / greatest_of(corner);
     for (int n = 0; n < view->clips; n++) {
         const double *plane = view->clip[n];
-        double by = unit * dot_list(plane, corner);
+        const double by = unit * dot_list(plane, corner), at = dot_list(plane, start) + plane[3];
         for (int i = 0; i < 3; i++) {
-            double toward = i == 0 || !view->ortho ? unit * dot_list(plane, linear[i]) : 0;
-            double at = i == 0 || view->ortho ? dot_list(plane, starts[i]) : 0;
-            if (view->ortho)
-                at -= by * starts[i][2];
+            double toward = unit * dot_list(plane, linear[i]);
+            double inside = way * (at * unit * linear[i][2] + along * toward);
+            if (view->ortho) {
+                toward = i == 0 ? way * by : 0;
+                inside = i == 0 ? at + by * (along - start[2])
+                                : dot_list(plane, starts[i]) - by * starts[i][2];
+            }
             path->clip_toward[n][i] = (float)toward;
-            path->clip_at[n][i] = (float)(at + (i == 0 ? plane[3] : 0));
+            path->clip_at[n][i] = (float)inside;
         }
     }
 }
@@ -195,6 +202,10 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
     for (unsigned n = 0; n <= g->segments; n++) {
         double along = from_start(view, g->slices[n].coordinate);
         path->along[n] = (float)along;
+        path->near[n] = (float)(g->slices[n].coordinate - g->slices[0].coordinate);
+        if (n > 0)
+            path->sheets[n - 1] =
+                (float)fabs(g->slices[n].coordinate - g->slices[n - 1].coordinate);
         for (int a = 0; a < 2; a++) {
             double bounds[2];
             beam_bounds(&b, a, along, bounds);
@@ -207,7 +218,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
         for (int i = 0; i < 3; i++)
             path->gradient[k][i] = view->gradient[k][i] * (1.0f / (1 << WEIGHT_LOG2));
     find_forms(view, x, y, path);
-    find_clip(view, x, y, path);
+    find_clip(view, x, y, from_start(view, g->slices[0].coordinate), path);
 }
 
 /* ---- which segments may show ---- */
@@ -409,7 +420,7 @@ typedef struct stamp_rays {
     vf depth;              /* z over a sheet, and at the eye */
     vf depth_at_start;
     vm along;    /* they go the pass's way */
-    vf from, to; /* what of them is not cut away: along the sheets, times the direction */
+    vf from, to; /* what of them is not cut away: sheets from the first slice, the pass's way */
     vf light[3], to_eye[3], half[3];
 } stamp_rays;
 
@@ -808,9 +819,8 @@ typedef struct remnant {
 INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
                           const pane_path *path, unsigned n)
 {
-    const float way = (float)view->direction, from = way * path->along[n];
-    const float length = way * path->along[n + 1] - from;
-    const vf inverse = v_set(1 / length), zero = v_set(0), one = v_set(1);
+    const float from = (float)view->direction * path->near[n];
+    const vf inverse = v_set(1 / path->sheets[n]), zero = v_set(0), one = v_set(1);
     const vf first = v_min(one, v_max(zero, (l->from - v_set(from)) * inverse));
     const vf last = v_min(one, v_max(zero, (l->to - v_set(from)) * inverse));
     return (remnant){ first, last, v_gt(last, first) };
@@ -847,7 +857,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     open = vm_and(open, vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* what begins behind the eye's plane is left out */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
-    vf sheets = v_set(fabsf(path->along[n + 1] - path->along[n]));
+    vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
     if (view->clips > 0) {
@@ -931,18 +941,15 @@ INLINE vf form_of(const float form[3], vf x, vf y)
     return v_fma(x, v_set(form[1]), v_fma(y, v_set(form[2]), v_set(form[0])));
 }
 
-/* Cuts the rays to the half-spaces; `inverse` takes what grows along `toward` to sheets. */
+/* Cuts the rays to the half-spaces. */
 INLINE void clip_rays(const trip_cpu_sheet_view *view, const pane_path *path, vf x, vf y,
-                      vf inverse, stamp_rays *l)
+                      stamp_rays *l)
 {
     const vf zero = v_set(0), never = v_set(0x1p100f);
     l->from = zero - never;
     l->to = never;
     for (int n = 0; n < view->clips; n++) {
         vf at = form_of(path->clip_at[n], x, y), by = form_of(path->clip_toward[n], x, y);
-        by = by * v_set((float)view->direction);
-        if (!view->ortho)
-            by = by * inverse;
         vm in = v_gt(by, zero), out = v_gt(zero, by);
         vf where = (zero - at) / v_select(in, by, v_select(out, by, v_set(1)));
         l->from = v_select(in, v_max(l->from, where), l->from);
@@ -982,7 +989,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
     }
     set_unit(l->to_eye);
     set_light(view, l);
-    clip_rays(view, path, x, y, inverse, l);
+    clip_rays(view, path, x, y, l);
 }
 
 /* The rays whose cell at the first slice is in the group's window. */
