@@ -61,15 +61,18 @@ def _axes(plot, what):
 
 
 def _labels(points, plot):
-    """Where names are written: beside their points, each moved down to where no other one is."""
+    """Where names are written: beside their points, each moved down to where no other one is, nor a
+    point of another."""
+    dots = {name: plot.place(ms, error) for name, ms, error in points}
     taken, places = [], {}
     for name, ms, error in sorted(points, key=lambda p: plot.place(p[1], p[2])[1]):
         x, y = plot.place(ms, error)
         width = 7 * len(name)
         left = x + 9 if x + 9 + width < WIDTH - 4 else x - 9 - width
         row = y + 4
+        others = taken + [(u - 6, v + 4, 12) for other, (u, v) in dots.items() if other != name]
         while any(abs(row - r) < LABEL_PX and left < l + w and l < left + width
-                  for l, r, w in taken):
+                  for l, r, w in others):
             row += 3
         taken.append((left, row, width))
         places[name] = left, row
