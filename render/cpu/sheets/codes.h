@@ -1,6 +1,6 @@
-/* Codes as sheets hold them. Sheets and slices hold whole codes, and so do samples of them; where a
- * data set uses few of the 65536 there are, they are stretched by a power of two, so that rounding
- * them takes no more than 1/32768 of the values there are. */
+/* Codes as sheets hold them. Sheets and slices hold whole codes; where a data set uses few of the
+ * 65536 there are, they are stretched by a power of two, so that rounding them takes no more than
+ * 1/32768 of the values there are; samples, every fourth code (TRIP_CPU_ENTRIES), 1/16384. */
 #ifndef TRIP_CPU_SHEETS_CODES_H
 #define TRIP_CPU_SHEETS_CODES_H
 
