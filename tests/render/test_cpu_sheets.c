@@ -495,6 +495,51 @@ static void what_has_few_codes_is_drawn_as_closely(void **state)
     scene_destroy(&s);
 }
 
+enum { LABEL = 30001, LABELS = 3, LABEL_VOXELS = 20 };
+
+/* Two voxels make the codes of all 16 bits needed. */
+static bool labelled(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = LABEL + (unsigned)(i / LABEL_VOXELS);
+    if (i == 0 && k == 0 && j % 19 == 0)
+        *code = j ? 65535 : 0;
+    return true;
+}
+
+static double mean_difference(const scene_picture *a, const scene_picture *b)
+{
+    const int floats = 4 * a->width * a->height;
+    double sum = 0;
+    for (int i = 0; i < floats; i++)
+        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
+    return sum / floats;
+}
+
+/* Neighbouring codes may mean what has nothing in common. Only where one label goes over into the
+ * next is a value rounded to one of them. */
+static void labels_keep_their_colours(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { LABEL_VOXELS * LABELS, 20, 22 },
+                                      .tile_voxels = 32,
+                                      .slab_sheets = 8,
+                                      .voxel = labelled });
+    for (unsigned i = 0; i < LABELS; i++)
+        scene_colour(&s, LABEL + i, LABEL + i, i % 3 == 0, i % 3 == 1, i % 3 == 2, 0.9);
+    trip_camera_params view = scene_view(&s, trip_v3(0.2, 1, 0.1), 70, 30, 48);
+    const trip_settings settings = post(2);
+    scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+    assert_shows(&q);
+    assert_true(mean_difference(&p, &q) < 2.0 / 255);
+    scene_picture_free(&p);
+    scene_picture_free(&q);
+    scene_destroy(&s);
+}
+
 static bool not_kept(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     return !crest(user, i, j, k, code, gradient);
@@ -540,6 +585,7 @@ int main(void)
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
         cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
+        cmocka_unit_test(labels_keep_their_colours),
         cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

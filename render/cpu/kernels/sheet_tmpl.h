@@ -540,10 +540,10 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
 }
 
 /* The entry of the function's integrals that is nearest to a code, biased, times 2^WEIGHT_LOG2. */
-INLINE vi nearest_entry(vi code)
+INLINE vi nearest_entry(const trip_cpu_integrals *in, vi code)
 {
-    const int log2 = WEIGHT_LOG2 + TRIP_CPU_ENTRY_LOG2;
-    return ((code + (1 << (log2 - 1))) >> log2) + TRIP_CPU_CODE_BIAS / TRIP_CPU_ENTRY_CODES;
+    const int log2 = WEIGHT_LOG2 + in->entry_log2;
+    return ((code + (1 << (log2 - 1))) >> log2) + (TRIP_CPU_CODE_BIAS >> in->entry_log2);
 }
 
 #if TRIP_SIMD == TRIP_SIMD_AVX2
@@ -562,7 +562,7 @@ INLINE __m256i two_codes(const int16_t *pool, const int32_t at[V])
 }
 
 /* The nearest entry, and which rays lack a corner. */
-INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
+INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
     const int16_t *pool = (const int16_t *)g->pool;
     const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
@@ -575,7 +575,7 @@ INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
     vi sum = (vi)_mm256_madd_epi16(top, (__m256i)s->top) +
              (vi)_mm256_madd_epi16(bottom, (__m256i)s->bottom);
     s->there = vi_is_0(lack);
-    s->index = nearest_entry(sum);
+    s->index = nearest_entry(in, sum);
 }
 
 /* Gradients of two corners beside each other, of lanes i and i + 4: along u twice, along v, ... */
@@ -643,7 +643,7 @@ INLINE int32_t of_two(int16_t left, int16_t right, int32_t weights)
     return left * (weights & 0xffff) + right * (weights >> 16);
 }
 
-INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
+INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
     vi sum, lack;
     for (int i = 0; i < V; i++) {
@@ -654,7 +654,7 @@ INLINE void find_codes(const trip_cpu_group *g, vi at, sample *s)
         sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
     }
     s->there = vi_is_0(lack);
-    s->index = nearest_entry(sum);
+    s->index = nearest_entry(in, sum);
 }
 
 INLINE void find_gradients(const trip_cpu_group *g, sample *s)
@@ -681,12 +681,12 @@ INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 
 #endif
 
-INLINE void sample_at(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
-                      const stamp_rays *l, unsigned n, sample *s)
+INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, const pane_path *path,
+                      const patch_path *area, const stamp_rays *l, unsigned n, sample *s)
 {
     corners c = corners_at(path, l, n);
     set_weights(c.part, s);
-    find_codes(g, find_places(g, path, area, n, &c, s), s);
+    find_codes(g, in, find_places(g, path, area, n, &c, s), s);
     s->lit = s->summed = false;
 }
 
@@ -698,7 +698,7 @@ typedef struct medium {
     vf rgb[3];
 } medium;
 
-/* Where both ends have the same entry, what the function is about it. */
+/* Where both ends have the same entry, what the function is there. */
 INLINE void use_entries_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
 {
     vi at[4];
@@ -1018,8 +1018,8 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
         if (sampled != n)
-            sample_at(g, path, area, l, n, &ends[n % 2]);
-        sample_at(g, path, area, l, next, &ends[next % 2]);
+            sample_at(g, view->integrals, path, area, l, n, &ends[n % 2]);
+        sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
         sampled = next;
         if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
             continue;

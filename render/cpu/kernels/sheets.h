@@ -61,18 +61,17 @@ typedef struct trip_cpu_slice {
     double coordinate; /* along the list's axis */
 } trip_cpu_slice;
 
-/* Integrals of the transfer function from code 0 to each multiple of TRIP_CPU_ENTRY_CODES, times a
- * factor that makes the greatest 2^30: of extinction, and of extinction times each colour
- * component. Differences of them are exact but for the rounding of each. So few entries stay in a
- * processor's cache. */
-#define TRIP_CPU_ENTRY_LOG2 2
-#define TRIP_CPU_ENTRY_CODES (1 << TRIP_CPU_ENTRY_LOG2)
-#define TRIP_CPU_ENTRIES (65536 / TRIP_CPU_ENTRY_CODES + 1)
+/* Integrals of the transfer function from code 0 to each entry, times a factor that makes the
+ * greatest 2^30: of extinction, and of extinction times each colour component. Differences of them
+ * are exact but for the rounding of each. Entries are 1, 2 or 4 codes apart, as far as the function
+ * is linear between them: fewer stay in a processor's cache. */
+#define TRIP_CPU_ENTRIES_MOST 65537
 
 typedef struct trip_cpu_integrals {
-    int32_t (*sums)[4]; /* TRIP_CPU_ENTRIES: extinction, red, green, blue */
-    int32_t (*at)[4]; /* what they grow by about an entry, from half a one before to half behind */
-    float extinction; /* 1 of sums[0], per voxel_world */
+    int32_t (*sums)[4];  /* TRIP_CPU_ENTRIES_MOST: extinction, red, green, blue */
+    int32_t (*at)[4];    /* what they would grow by to the next entry if all was as at this one */
+    int entry_log2;      /* codes from one entry to the next */
+    float extinction;    /* 1 of sums[0], per voxel_world */
     int32_t first, last; /* entries with extinction are among these; first > last: none */
 } trip_cpu_integrals;
 

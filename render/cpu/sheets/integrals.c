@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES, ENTRY_CODES = TRIP_CPU_ENTRY_CODES };
+enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MOST, LOG2_MOST = 2 };
 
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
@@ -34,6 +34,14 @@ void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget)
     *f = (trip_cpu_function){ 0 };
 }
 
+static trip_tf_entry between(const trip_tf_entry *a, const trip_tf_entry *b, float part)
+{
+    return (trip_tf_entry){ .r = a->r + part * (b->r - a->r),
+                            .g = a->g + part * (b->g - a->g),
+                            .b = a->b + part * (b->b - a->b),
+                            .extinction = a->extinction + part * (b->extinction - a->extinction) };
+}
+
 /* The function is linear between the codes of the data set. */
 static trip_tf_entry entry_at(const trip_tf_entry *table, trip_cpu_codes codes, int code)
 {
@@ -42,11 +50,7 @@ static trip_tf_entry entry_at(const trip_tf_entry *table, trip_cpu_codes codes, 
     const int rest = code & ((1 << codes.shift) - 1);
     if (rest == 0 || whole >= CODES - 1)
         return *a;
-    const float part = (float)rest / (float)(1 << codes.shift);
-    return (trip_tf_entry){ .r = a->r + part * (b->r - a->r),
-                            .g = a->g + part * (b->g - a->g),
-                            .b = a->b + part * (b->b - a->b),
-                            .extinction = a->extinction + part * (b->extinction - a->extinction) };
+    return between(a, b, (float)rest / (float)(1 << codes.shift));
 }
 
 static double component(const trip_tf_entry *e, int i)
@@ -74,20 +78,22 @@ static int32_t rounded(double x)
     return (int32_t)(x + 0.5);
 }
 
-/* What an entry stands for reaches no farther from a code that is nearest to it. */
-static void widen_visible(uint32_t *next)
+/* An entry stands for codes as far as half of one to the next away, and the function's line between
+ * two for all of them. */
+static void widen_visible(uint32_t *next, uint32_t entry_codes)
 {
     for (uint32_t code = CODES; code-- > 0;) {
-        const uint32_t from = code < ENTRY_CODES ? 0 : code - ENTRY_CODES;
-        if (next[from] <= code + ENTRY_CODES)
+        const uint32_t from = code < entry_codes ? 0 : code - entry_codes;
+        if (next[from] <= code + entry_codes)
             next[code] = code;
         else if (next[code] < CODES)
-            next[code] -= ENTRY_CODES;
+            next[code] -= entry_codes;
     }
 }
 
 static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
 {
+    const int log2 = f->integrals.entry_log2;
     uint32_t next = CODES;
     int32_t most = -1;
     for (int code = CODES - 1; code >= 0; code--) {
@@ -97,9 +103,9 @@ static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
         }
         f->next_visible[code] = next;
     }
-    f->integrals.first = (int32_t)(next / ENTRY_CODES);
-    f->integrals.last = most < 0 ? -1 : (most + ENTRY_CODES - 1) / ENTRY_CODES;
-    widen_visible(f->next_visible);
+    f->integrals.first = (int32_t)(next >> log2);
+    f->integrals.last = most < 0 ? -1 : (most + (1 << log2) - 1) >> log2;
+    widen_visible(f->next_visible, 1u << log2);
     const uint32_t first = f->next_visible[0];
     uint32_t last = first;
     while (last + 1 < CODES && f->next_visible[last + 1] == last + 1)
@@ -121,33 +127,51 @@ static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes)
     return all;
 }
 
-/* The integrals up to half an entry: an entry of sums[], or where one of at[] ends and the next
- * begins. */
-static void set_half(trip_cpu_integrals *in, int half, const double sum[4], double factor)
+/* Of opacity or colour through a voxel's length. Between the values of a source of 8 bits there are
+ * 256 codes, so that whatever its function does, it changes by less from an entry to the codes that
+ * are nearest to it. */
+#define ENTRY_TOLERANCE (1.0 / 127)
+
+/* Whether two media are much alike, in what a voxel's length of them adds to a picture. */
+static bool are_alike(const trip_tf_entry *a, const trip_tf_entry *b, double voxel_world)
 {
-    const int entry = half / 2;
-    for (int i = 0; i < 4; i++) {
-        const int32_t to_here = rounded(factor * sum[i]);
-        if (half % 2 == 0) {
-            in->sums[entry][i] = to_here;
-        } else {
-            in->at[entry][i] = to_here - in->at[entry][i];
-            in->at[entry + 1][i] = to_here;
-        }
-    }
+    double colour = 0, most = 0;
+    for (int i = 0; i < 3; i++)
+        colour = fmax(colour, fabs(component(a, i) - component(b, i)));
+    if (voxel_world * fabs((double)a->extinction - b->extinction) + colour <= ENTRY_TOLERANCE)
+        return true;
+    const double of_a = -expm1(-voxel_world * a->extinction);
+    const double of_b = -expm1(-voxel_world * b->extinction);
+    for (int i = 0; i < 3; i++)
+        most = fmax(most, fabs(of_a * component(a, i) - of_b * component(b, i)));
+    return fmax(most, fabs(of_a - of_b)) <= ENTRY_TOLERANCE;
 }
 
-/* The first and the last of at[], of which half an entry each lies among the codes. */
-static void set_ends(trip_cpu_integrals *in, double factor, const trip_tf_entry *first,
-                     const trip_tf_entry *last)
+/* Whether entries so far apart stand for the codes that are nearest to them. */
+static bool suffices(const trip_tf_entry *table, trip_cpu_codes codes, int log2, double voxel_world)
 {
-    const trip_tf_entry *ends[2] = { first, last };
-    int32_t *rows[2] = { in->at[0], in->at[ENTRIES - 1] };
-    for (int k = 0; k < 2; k++) {
-        double sum[4], most = INT32_MAX;
-        step(ends[k], ends[k], sum);
-        for (int i = 0; i < 4; i++)
-            rows[k][i] = (int32_t)fmin(most, ENTRY_CODES * factor * sum[i]);
+    const int step = 1 << log2, most = CODES - 1;
+    if (log2 == 0 || codes.shift >= 8)
+        return true;
+    for (int code = 0; code < CODES; code++) {
+        const int nearest = (code + step / 2) >> log2 << log2;
+        const trip_tf_entry is = entry_at(table, codes, code);
+        const trip_tf_entry taken = entry_at(table, codes, nearest < most ? nearest : most);
+        if (!are_alike(&is, &taken, voxel_world))
+            return false;
+    }
+    return true;
+}
+
+static void set_entry(trip_cpu_integrals *in, int entry, const double sum[4],
+                      const trip_tf_entry *here, double factor)
+{
+    const double codes = 1 << in->entry_log2;
+    double at[4];
+    step(here, here, at);
+    for (int i = 0; i < 4; i++) {
+        in->sums[entry][i] = rounded(factor * sum[i]);
+        in->at[entry][i] = rounded(fmin(INT32_MAX - 1, codes * factor * at[i]));
     }
 }
 
@@ -157,8 +181,8 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
     double sum[4] = { 0 }, add[4];
     trip_tf_entry here = entry_at(table, codes, 0);
     for (int code = 0;; code++) {
-        if (code % (ENTRY_CODES / 2) == 0)
-            set_half(in, code / (ENTRY_CODES / 2), sum, factor);
+        if (code % (1 << in->entry_log2) == 0)
+            set_entry(in, code >> in->entry_log2, sum, &here, factor);
         if (code == CODES)
             break;
         const trip_tf_entry before = here;
@@ -169,8 +193,6 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
         for (int i = 0; i < 4; i++)
             sum[i] += add[i];
     }
-    const trip_tf_entry first = entry_at(table, codes, 0);
-    set_ends(in, factor, &first, &here);
 }
 
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
@@ -180,8 +202,11 @@ void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, tri
     /* A function of one code alone still has what at[] is in units of. */
     const double factor = all > 0 ? GREATEST / all : 1;
     f->codes = codes;
+    f->integrals.entry_log2 = LOG2_MOST;
+    while (!suffices(table, codes, f->integrals.entry_log2, voxel_world))
+        f->integrals.entry_log2--;
     set_sums(&f->integrals, table, codes, factor);
     set_next_visible(f, table);
     f->integrals.extinction =
-        (float)fmin(1e25, voxel_world / (factor * ENTRY_CODES)); /* opaque anyway */
+        (float)fmin(1e25, voxel_world / ldexp(factor, f->integrals.entry_log2)); /* opaque anyway */
 }
