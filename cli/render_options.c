@@ -208,7 +208,9 @@ static const struct argp_option options[] = {
       4 },
     { "kernel", KEY_KERNEL, "NAME", 0,
       "Footprints of splats, exact or ewa (by the affine map at the centre; default: exact); "
-      "interpolation of values, linear or cubic (default: linear), with the integral only",
+      "interpolation of values, linear (the default), cubic (Catmull and Rom's, from 64 voxels) or "
+      "gaussian (which smooths; not by integral); of --classify post, gl and reference draw cubic "
+      "and gaussian, cpu does not",
       4 },
     { "tolerance", KEY_TOLERANCE, "E", 0,
       "Error of a pixel's components, 1e-12 to 0.1 (default: 1e-4); integral only", 4 },
@@ -530,16 +532,15 @@ static int parse_look(int key, char *arg, parse *p)
 /* Of values, or of splats. */
 static int parse_kernel(const char *arg, parse *p)
 {
-    static const char *const kernels[] = { "linear", "cubic", "exact", "ewa", NULL };
+    static const char *const kernels[] = { "linear", "cubic", "gaussian", "exact", "ewa", NULL };
     triptych_settings *s = &p->o->settings;
     int which = 0, status = trip_option_choice("--kernel", arg, kernels, &which);
-    bool of_values = which <= TRIPTYCH_CUBIC;
+    bool of_values = which <= TRIPTYCH_GAUSSIAN;
     if (of_values)
         s->kernel = (triptych_kernel)which;
     else
-        s->footprint = (triptych_footprint)(which - (TRIPTYCH_CUBIC + 1));
+        s->footprint = (triptych_footprint)(which - (TRIPTYCH_GAUSSIAN + 1));
     p->kernel |= of_values;
-    p->integral |= of_values;
     p->footprint |= !of_values;
     return status;
 }
@@ -665,10 +666,14 @@ static int check_integral(parse *p)
     bool integral = o->renderer == TRIPTYCH_RENDERER_INTEGRAL;
     o->settings.field = o->field == RENDER_FIELD_SPLATS ? TRIPTYCH_SPLATS : TRIPTYCH_VALUES;
     if (p->integral && !integral)
-        return trip_option_fail("--field, --kernel, --tolerance",
-                                "apply to --renderer integral only");
+        return trip_option_fail("--field, --tolerance", "apply to --renderer integral only");
     if (p->kernel && o->field == RENDER_FIELD_SPLATS)
         return trip_option_fail("--kernel", "does not apply to --field splats");
+    if (integral && o->settings.kernel == TRIPTYCH_GAUSSIAN)
+        return trip_option_fail("--kernel", "is linear or cubic with --renderer integral");
+    if (o->renderer == TRIPTYCH_RENDERER_CPU && o->settings.kernel != TRIPTYCH_LINEAR)
+        return trip_option_fail("--kernel", "is linear with --renderer cpu: gl and reference draw "
+                                            "cubic and gaussian, integral cubic");
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");
@@ -710,14 +715,15 @@ static int choose_classify(parse *p)
                   p->compositing || p->footprint || p->target || p->lists || p->forms;
     if (o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
         return 0;
-    if (splats && p->slices)
-        return trip_option_fail("--slices",
+    const bool of_values = p->kernel && o->renderer != TRIPTYCH_RENDERER_INTEGRAL;
+    if (splats && (p->slices || of_values))
+        return trip_option_fail(p->slices ? "--slices" : "--kernel linear, cubic or gaussian",
                                 "does not go with --kernel exact or ewa, --low-pass, --flatten, "
                                 "--kernel-radius, --compositing, --target, --submit, --count or "
                                 "--traversal ascending, which are of splats");
     if (splats)
         o->settings.classify = TRIPTYCH_PRE;
-    else if (p->slices)
+    else if (p->slices || of_values)
         o->settings.classify = TRIPTYCH_POST;
     return 0;
 }
@@ -727,6 +733,9 @@ static int check_classify(const parse *p)
     const render_options *o = p->o;
     if (o->settings.classify == TRIPTYCH_CLASSIFY_AUTO)
         return 0;
+    if (o->settings.classify == TRIPTYCH_PRE && p->kernel &&
+        o->renderer != TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_option_fail("--kernel", "applies to --classify post and --renderer integral");
     if (o->settings.classify == TRIPTYCH_PRE)
         return p->slices ? trip_option_fail("--slices", "applies to --classify post only") : 0;
     if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)

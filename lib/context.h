@@ -49,6 +49,7 @@ struct triptych {
     triptych_clip clip;      /* as given; frames have it in drawn_settings */
     double max_ms;           /* 0: no bound of time */
     double bytes_per_ms;     /* that bounded frames took; 0: none was drawn */
+    bool kernel_warned;      /* that the halo is short for it */
     bool classify_auto;      /* settings.classify is what that has come to for a frame */
     int effects;             /* as set; frames have what they come to in drawn_settings */
     const char *why_effects; /* of those that auto chose or left; NULL: nothing was left to it */

@@ -5,6 +5,7 @@
 #include "context.h"
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
+#include "kernel.h"
 #include "lod.h"
 #include "report.h"
 #include "rounding.h"
@@ -197,6 +198,9 @@ static void choose_settings(triptych *t)
 static int plan_field(triptych *t)
 {
     session *s = &t->session;
+    if (t->settings.kernel == TRIP_KERNEL_GAUSSIAN)
+        return trip_fail(TRIP_USAGE, "render", "kernel",
+                         "the integral goes through polynomials: linear or cubic");
     unsigned kinds = 1u << TRIP_KIND_VOXELS;
     if (t->settings.field == TRIP_FIELD_VALUES)
         kinds = t->source ? 0 : kinds | 1u << TRIP_KIND_HALO;
@@ -266,6 +270,20 @@ static int plan(triptych *t)
     return status;
 }
 
+/* Once for a kernel, of frames that are drawn. */
+static void warn_of_halo(triptych *t)
+{
+    const session *s = &t->session;
+    if (t->kernel_warned || !trip_plan_halo_is_short(t->frame.data, &t->drawn_settings))
+        return;
+    t->kernel_warned = true;
+    trip_warn(
+        s->input,
+        "has one voxel about what it keeps, and the %s kernel reaches two: those beyond count "
+        "as the ones next to them; brick --keep-all leaves nothing out",
+        trip_kernel_name(t->settings.kernel));
+}
+
 static int start(triptych *t)
 {
     int status = trip_context_begin_light(t);
@@ -286,6 +304,8 @@ static int start(triptych *t)
     t->drawn = status == 0;
     if (!status)
         status = trip_frame_begin(&t->drawing, t->renderer, t->reader, &t->frame);
+    if (!status)
+        warn_of_halo(t);
     return status;
 }
 

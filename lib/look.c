@@ -100,7 +100,7 @@ int triptych_set_quality(triptych_settings *s, triptych_quality quality)
 static const char *fault_of_integral(const triptych_settings *s)
 {
     if (s->field < TRIPTYCH_VALUES || s->field > TRIPTYCH_SPLATS || s->kernel < TRIPTYCH_LINEAR ||
-        s->kernel > TRIPTYCH_CUBIC)
+        s->kernel > TRIPTYCH_GAUSSIAN)
         return "there is no such field or kernel";
     if (!(s->tolerance >= 1e-12 && s->tolerance <= 0.1))
         return "the tolerance lies between 1e-12 and 0.1";
@@ -238,6 +238,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         warn_of_ripple(s->kernel_radius);
     t->rounding_checked &= (trip_target)s->target == t->settings.target &&
                            (trip_compositing)s->compositing == t->settings.compositing;
+    t->kernel_warned &= (trip_kernel)s->kernel == t->settings.kernel;
     /* What was taken for frames before may be in the way of the light's lattice. */
     if (s->effects != t->effects || s->light_cells != t->settings.effects.cells)
         trip_context_drop_renderer(t);

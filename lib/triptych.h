@@ -208,8 +208,9 @@ typedef enum triptych_field {
 } triptych_field;
 
 typedef enum triptych_kernel {
-    TRIPTYCH_LINEAR, /* between the 8 voxels around */
-    TRIPTYCH_CUBIC,  /* Catmull and Rom's, between 64 */
+    TRIPTYCH_LINEAR,   /* between the 8 voxels around */
+    TRIPTYCH_CUBIC,    /* Catmull and Rom's, between 64; not of the CPU renderer */
+    TRIPTYCH_GAUSSIAN, /* a splat's, of 64, which smooths; not of the CPU renderer or the integral */
 } triptych_kernel;
 
 /* What comes first. */
@@ -299,7 +300,7 @@ typedef struct triptych_settings {
     int depth;     /* not 0: frames have distances too; not with rounded targets or the integral */
     /* Of the integral renderer alone, but for samples. */
     triptych_field field;   /* what it integrates */
-    triptych_kernel kernel; /* of values */
+    triptych_kernel kernel; /* of values; of post, too */
     double tolerance;       /* of a component of a pixel, 1e-12 to 0.1 */
     int samples;            /* rays along each side of a pixel, 1 to 64; without depth. Renderers
                                but the integral draw a picture so many times as wide and high */

@@ -1,6 +1,9 @@
 #include "brick_ranges.h"
 
+#include <math.h>
 #include <string.h>
+
+#include "field.h"
 
 /* Of 4 bytes each, a few slabs of them. */
 #define TILES_MAX (INT64_C(1) << 24)
@@ -41,12 +44,13 @@ static void find_tiles(trip_brick_ranges *r)
 }
 
 void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data, int axis,
-                              trip_budget *budget)
+                              trip_kernel kernel, trip_budget *budget)
 {
     int sheets = (int)data->header.slab_sheets;
     *r = (trip_brick_ranges){ .data = data,
                               .axis = axis,
-                              .reach = (TRIP_SHEET_REACH + sheets - 1) / sheets,
+                              .kernel = kernel,
+                              .reach = (trip_sheet_reach(kernel) + sheets - 1) / sheets,
                               .middle = INT64_MIN / 2,
                               .budget = budget };
     r->slabs = 2 * r->reach + 1;
@@ -120,6 +124,17 @@ static void move_to(trip_brick_ranges *r, int64_t slab)
     r->middle = slab;
 }
 
+/* By how far interpolated values go beyond those they come from. */
+static trip_code_range widened(trip_kernel kernel, trip_code_range range)
+{
+    double bounds[2];
+    if (range.least > range.most)
+        return range;
+    trip_field_code_bounds(kernel, range.least, range.most, bounds);
+    return (trip_code_range){ (uint16_t)fmax(0, floor(bounds[0])),
+                              (uint16_t)fmin(65535, ceil(bounds[1])) };
+}
+
 trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
                                         const trip_file_brick *brick)
 {
@@ -132,5 +147,5 @@ trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
             for (int du = -1; du <= 1; du++)
                 range = both(range, *tile_at(r, layer, (int64_t)brick->tile_u + du,
                                              (int64_t)brick->tile_v + dv));
-    return range;
+    return widened(r->kernel, range);
 }

@@ -222,8 +222,8 @@ int trip_field_finish(trip_field *f, const trip_field_map *map)
     return 0;
 }
 
-/* The weights of linear are a mean, the absolute ones of cubic add up to at most 1.25 along each
- * axis. */
+/* The weights of linear and gaussian are a mean, the absolute ones of cubic add up to at most 1.25
+ * along each axis. */
 void trip_field_code_bounds(trip_kernel kernel, double least, double most, double bounds[2])
 {
     double sum = kernel == TRIP_KERNEL_CUBIC ? 1.25 * 1.25 * 1.25 : 1;
@@ -310,7 +310,7 @@ bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t
     if (!take_corners(f, at, corners))
         return false;
     memcpy(out->at, at, sizeof out->at);
-    out->edge = kernel == TRIP_KERNEL_CUBIC ? 4 : 2;
+    out->edge = kernel == TRIP_KERNEL_LINEAR ? 2 : 4;
     if (out->edge == 2)
         memcpy(out->voxels, corners, sizeof corners);
     else

@@ -7,9 +7,9 @@
  * interpolated in cells: cell (i, j, k) is the cube from voxel (i, j, k) to (i + 1, j + 1, k + 1),
  * and is empty unless all its eight corners are there. Linear weighs those; cubic the 4 x 4 x 4
  * voxels around by Catmull and Rom's spline, which goes through the values and has central
- * differences as derivatives; beyond the grid its edge repeats, and another voxel that is missing
- * there counts as the corner next to it. The
- * gradient is interpolated alike, from those at the voxels. */
+ * differences as derivatives; gaussian the same voxels (kernel.h). Beyond the grid its edge
+ * repeats, and another voxel that is missing there counts as the corner next to it. The gradient is
+ * interpolated alike, from those at the voxels. */
 #ifndef TRIP_FIELD_H
 #define TRIP_FIELD_H
 

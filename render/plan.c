@@ -49,7 +49,7 @@ static int add_selection(const planning *p, trip_plan_pass *pass, const trip_lis
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
     double eye = trip_component(plan->lists[list->index].camera.eye, list->axis);
     /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round. */
-    int64_t over = p->about ? TRIP_SHEET_REACH : 0;
+    int64_t over = p->about ? trip_sheet_reach(p->settings->kernel) : 0;
     if (side == BEYOND)
         first = first_sheet_beyond(eye, sheets) - over;
     else if (side == BELOW)
@@ -311,7 +311,7 @@ static int plan_sheets(const planning *p, int axis)
 {
     planning with = *p;
     trip_brick_ranges about;
-    trip_brick_ranges_create(&about, p->data, axis, p->budget);
+    trip_brick_ranges_create(&about, p->data, axis, p->settings->kernel, p->budget);
     with.about = &about;
     int status = plan_layer(&with, axis);
     trip_brick_ranges_destroy(&about);
@@ -472,6 +472,23 @@ static void explain_footprints(const trip_settings *s, FILE *out)
     if (s->flatten > 1)
         fprintf(out, "flattening  runs, %g times along full gradients: normal planes are read\n",
                 s->flatten);
+}
+
+bool trip_plan_halo_is_short(const trip_dataset *data, const trip_settings *s)
+{
+    const trip_file_header *h = &data->header;
+    return s->classify == TRIP_CLASSIFY_POST && s->kernel != TRIP_KERNEL_LINEAR &&
+           h->kept < h->dims[0] * h->dims[1] * h->dims[2];
+}
+
+static void explain_kernel(const trip_dataset *data, const trip_settings *s, FILE *out)
+{
+    if (s->classify != TRIP_CLASSIFY_POST || s->kernel == TRIP_KERNEL_LINEAR)
+        return;
+    fprintf(out, "kernel      %s: from 64 voxels%s\n", trip_kernel_name(s->kernel),
+            trip_plan_halo_is_short(data, s)
+                ? "; those beyond the halo of one voxel count as the ones next to them"
+                : "");
 }
 
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
@@ -694,6 +711,8 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
 {
     int used = 0;
     explain_method(plan, settings, out);
+    if (!plan->gathers)
+        explain_kernel(data, settings, out);
     explain_levels(plan, settings, out);
     explain_limit(plan, settings, out);
     explain_clip(plan, settings, out);

@@ -70,6 +70,10 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget);
  * the option that draws them. */
 int trip_plan_check_cells(const trip_dataset *data, const char *instead);
 
+/* Whether interpolation needs voxels that a data set with a halo of one may lack: two about what is
+ * visible. They count as the corners of cells next to them (sheet.h). */
+bool trip_plan_halo_is_short(const trip_dataset *data, const trip_settings *settings);
+
 /* Of the 8 x 8 square of a list's sheet with its corner at u and v, which voxels are splatted: not
  * those of cells that another level is drawn in, nor those that are cut away. A bit each by Morton
  * number, as in a block. */

@@ -44,7 +44,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
                          int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about)
 {
-    double radius = about ? TRIP_SHEET_RADIUS : settings->kernel_radius, room = 1;
+    double radius = about ? trip_sheet_radius(settings->kernel) : settings->kernel_radius, room = 1;
     if (settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
         room = TRIP_SPLAT_AFFINE_REACH * TRIP_SPLAT_AFFINE_REACH;
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
@@ -166,7 +166,7 @@ static double reach_over_clip(const trip_cull *cull)
     double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
     if (!cull->about)
         return 0;
-    return TRIP_SHEET_REACH + (h * TRIP_CULL_STEEPEST > 1 ? 1 / h : TRIP_CULL_STEEPEST);
+    return trip_sheet_reach(s->kernel) + (h * TRIP_CULL_STEEPEST > 1 ? 1 / h : TRIP_CULL_STEEPEST);
 }
 
 static bool is_clipped(const trip_cull *cull, const box *b)

@@ -116,11 +116,10 @@ typedef struct passage {
     double layer[TRIP_CHANNELS_MAX];
 } passage;
 
-/* Where the ray is at t, in a cell: the eight corners, i fastest, and their weights. */
+/* Where the ray is at t, in a cell: its voxels, and their weights. */
 typedef struct place {
-    int64_t cell[3];
-    const trip_field_voxel *corners[8];
-    double weights[8];
+    trip_field_cell cell;
+    double weights[64];
     double code;
 } place;
 
@@ -129,28 +128,28 @@ static trip_vec3 point_at(const passage *p, double t)
     return trip_add(p->origin, trip_scale(p->direction, t));
 }
 
-static void set_weights(place *at, trip_vec3 point)
+/* Of the cell's voxels, i fastest. */
+static void set_weights(trip_kernel kernel, place *at, trip_vec3 point)
 {
-    for (int n = 0; n < 8; n++) {
-        at->weights[n] = 1;
-        for (int a = 0; a < 3; a++) {
-            double f = trip_component(point, a) - (double)at->cell[a];
-            at->weights[n] *= n >> a & 1 ? f : 1 - f;
-        }
-    }
+    const int edge = at->cell.edge, first = edge == 2;
+    double w[3][TRIP_KERNEL_TAPS];
+    for (int a = 0; a < 3; a++)
+        trip_kernel_weights(kernel, trip_component(point, a) - (double)at->cell.at[a], w[a]);
+    for (int n = 0; n < edge * edge * edge; n++)
+        at->weights[n] = w[0][first + n % edge] * w[1][first + n / edge % edge] *
+                         w[2][first + n / (edge * edge)];
 }
 
 /* False where the cell is empty. */
-static bool interpolate(const trip_field *field, place *at)
+static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point, place *at)
 {
+    const trip_kernel kernel = p->s->frame->settings->kernel;
+    if (!trip_field_take_cell(p->s->field, kernel, cell, &at->cell))
+        return false;
+    set_weights(kernel, at, point);
     at->code = 0;
-    for (int n = 0; n < 8; n++) {
-        at->corners[n] = trip_field_at(field, at->cell[0] + (n & 1), at->cell[1] + (n >> 1 & 1),
-                                       at->cell[2] + (n >> 2));
-        if (!at->corners[n])
-            return false;
-        at->code += at->weights[n] * at->corners[n]->code;
-    }
+    for (int n = 0; n < at->cell.edge * at->cell.edge * at->cell.edge; n++)
+        at->code += at->weights[n] * at->cell.voxels[n]->code;
     return true;
 }
 
@@ -158,25 +157,24 @@ static bool interpolate(const trip_field *field, place *at)
  * and beyond the grid. */
 static bool find_place(const passage *p, double t, int64_t cells, place *at)
 {
-    const trip_field *field = p->s->field;
-    const int64_t *dims = trip_field_dims(field);
+    const int64_t *dims = trip_field_dims(p->s->field);
     trip_vec3 point = point_at(p, t);
+    int64_t cell[3];
     for (int a = 0; a < 3; a++) {
         double x = trip_component(point, a), last = (double)dims[a] - 1;
         if (a != p->axis && !(x >= 0 && x <= last))
             return false;
-        at->cell[a] = a == p->axis ? cells : (int64_t)fmin(floor(x), last - 1);
+        cell[a] = a == p->axis ? cells : (int64_t)fmin(floor(x), last - 1);
     }
-    set_weights(at, point);
-    return interpolate(field, at);
+    return interpolate(p, cell, point, at);
 }
 
 static trip_vec3 gradient_at(const place *at)
 {
     double g[3] = { 0 };
-    for (int n = 0; n < 8; n++)
+    for (int n = 0; n < at->cell.edge * at->cell.edge * at->cell.edge; n++)
         for (int a = 0; a < 3; a++)
-            g[a] += at->weights[n] * at->corners[n]->gradient[a];
+            g[a] += at->weights[n] * at->cell.voxels[n]->gradient[a];
     return trip_v3(g[0], g[1], g[2]);
 }
 

@@ -57,8 +57,9 @@ typedef enum trip_low_pass {
 } trip_low_pass;
 
 typedef enum trip_kernel {
-    TRIP_KERNEL_LINEAR, /* between the 8 voxels around */
-    TRIP_KERNEL_CUBIC,  /* Catmull and Rom's, between 64 */
+    TRIP_KERNEL_LINEAR,   /* between the 8 voxels around */
+    TRIP_KERNEL_CUBIC,    /* Catmull and Rom's, between 64 */
+    TRIP_KERNEL_GAUSSIAN, /* a splat's, of 64, which smooths (kernel.h); not of the integral */
 } trip_kernel;
 
 /* What comes first: the transfer function, or the reconstruction from voxels. */
@@ -120,13 +121,13 @@ typedef struct trip_settings {
                                   many pixels of the picture wide (lod.h); 0: all at the finest */
     double max_bytes;          /* and at coarser ones still, so that no more is read (lod_limit.h);
                                   0: no bound */
+    trip_kernel kernel;        /* of values, post and the integral */
     /* Of the integral renderer alone. */
     trip_field_kind field;
-    trip_kernel kernel; /* of values */
-    double tolerance;   /* of a component of a pixel, 0 to 1 */
-    int samples;        /* rays of a pixel, along x and along y; their mean is its colour. Frames
-                           of other renderers are that much larger instead */
-    trip_clip clip;     /* what is drawn lies inside; world space */
+    double tolerance; /* of a component of a pixel, 0 to 1 */
+    int samples;      /* rays of a pixel, along x and along y; their mean is its colour. Frames
+                         of other renderers are that much larger instead */
+    trip_clip clip;   /* what is drawn lies inside; world space */
     trip_show show;
     trip_effects effects;
 } trip_settings;

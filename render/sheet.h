@@ -6,7 +6,10 @@
  * space, codes per index): along each axis the central difference where both neighbours are there,
  * the difference to the one that is there otherwise, 0 without neighbours. A cell is the cube
  * between eight voxels, and is empty unless all of them are there. Within it codes and gradients
- * are interpolated linearly between its corners.
+ * are interpolated by settings.kernel (kernel.h) along each axis: linearly between its corners, or
+ * from the 4 x 4 x 4 voxels around, as in field.h: beyond the grid its edge repeats, and another
+ * voxel that is missing counts as the corner next to it. A halo of one voxel has all corners of
+ * cells with a voxel that was kept; what it lacks of those around counts so.
  *
  * Slices. Along the axis of a list slices lie at the coordinates n / S, S = settings.slices; in
  * perspective the eye's own coordinate is one more. A layer's ray is cut by them into segments, and
@@ -33,16 +36,23 @@
 #ifndef TRIP_SHEET_H
 #define TRIP_SHEET_H
 
-#include "settings.h"
+#include "kernel.h"
 
 /* Half of 1/255. */
 #define TRIP_SHEET_SATURATION (1.0 / 512.0)
 
-/* How far in indices, along each axis, a voxel changes what is drawn: it is a corner of the cells
- * about it, and the gradients of its neighbours depend on it. */
-#define TRIP_SHEET_REACH 2
+/* How far in indices, along each axis, a voxel changes what is drawn: cells about it are
+ * interpolated from it, and the gradients of its neighbours depend on it. */
+static inline int trip_sheet_reach(trip_kernel kernel)
+{
+    return trip_kernel_reach(kernel) + 1;
+}
+enum { TRIP_SHEET_REACH_MOST = 3 };
 
 /* The distance in indices of the farthest ray that a voxel changes. */
-#define TRIP_SHEET_RADIUS (TRIP_SHEET_REACH * 1.7320508075688772)
+static inline double trip_sheet_radius(trip_kernel kernel)
+{
+    return trip_sheet_reach(kernel) * 1.7320508075688772;
+}
 
 #endif

@@ -103,6 +103,52 @@ vec4 corner_weights(vec2 part)
     return vec4(rest.x * part.y, part.x * part.y, part.x * rest.y, rest.x * rest.y);
 }
 
+#ifdef WIDE
+// Mirrors render/kernel.c.
+vec4 kernel_weights(float x)
+{
+    if (clips.w == CUBIC)
+        return 0.5 * vec4(x * (x * (2.0 - x) - 1.0), x * x * (3.0 * x - 5.0) + 2.0,
+                          x * (x * (4.0 - 3.0 * x) + 1.0), x * x * (x - 1.0));
+    vec4 d = (x + vec4(1.0, 0.0, -1.0, -2.0)) * (0.5 * CUTOFF);
+    vec4 w = max(exp(-0.5 * d * d) - exp(-0.5 * CUTOFF * CUTOFF), 0.0);
+    return w / dot(w, vec4(1.0));
+}
+
+// Of the 4 x 4 x 4 voxels around a cell: its place and layer, and its weight.
+struct tap {
+    ivec3 at;
+    float weight;
+};
+
+// Number n of a place between the sheets of an end. Beyond the grid its edge repeats; another voxel
+// that is missing is the corner next to it.
+tap tap_of(place at, trip_gl_sheet_end end, vec4 weights[3], int n)
+{
+    ivec3 i = ivec3(n & 3, n >> 2 & 3, n >> 4);
+    int layer = i.z == 0 ? end.outer_before : i.z == 1 ? end.before : i.z == 2 ? end.behind : end.outer_behind;
+    ivec2 voxel = clamp(at.cell + i.xy - 1, clips.yz, extent.zw);
+    tap t;
+    t.at = ivec3(voxel, layer);
+    t.weight = weights[0][i.x] * weights[1][i.y] * weights[2][i.z];
+    bool there = layer >= 0 && all(greaterThanEqual(voxel, ivec2(0))) && all(lessThan(voxel, extent.xy));
+    if (!there || texelFetch(codes, t.at, 0).r < 0.0)
+        t.at = ivec3(at.cell + ivec2(greaterThan(i.xy, ivec2(1))), i.z > 1 ? end.behind : end.before);
+    return t;
+}
+
+float wide_code(place at, trip_gl_sheet_end end)
+{
+    vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
+    float sum = 0.0;
+    for (int n = 0; n < 64; n++) {
+        tap t = tap_of(at, end, weights, n);
+        sum += t.weight * texelFetch(codes, t.at, 0).r;
+    }
+    return sum;
+}
+#endif
+
 place place_at(ray r, trip_gl_sheet_end end)
 {
     place at;
@@ -129,10 +175,26 @@ place place_at(ray r, trip_gl_sheet_end end)
     at.there = all(greaterThanEqual(min(before, behind), vec4(0.0)));
     vec4 weights = corner_weights(at.part);
     at.code = mix(dot(weights, before), dot(weights, behind), end.part);
+#ifdef WIDE
+    if (at.there)
+        at.code = wide_code(at, end);
+#endif
     return at;
 }
 
 #ifdef SHADED
+#ifdef WIDE
+vec3 gradient_at(place at, trip_gl_sheet_end end)
+{
+    vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
+    vec3 g = vec3(0.0);
+    for (int n = 0; n < 64; n++) {
+        tap t = tap_of(at, end, weights, n);
+        g += t.weight * texelFetch(gradients, t.at, 0).xyz;
+    }
+    return g;
+}
+#else
 vec3 sheet_gradient(place at, int sheet)
 {
     vec4 w = corner_weights(at.part);
@@ -151,6 +213,7 @@ vec3 gradient_at(place at, trip_gl_sheet_end end)
         g += end.part * sheet_gradient(at, end.behind);
     return g;
 }
+#endif
 
 // Of a segment, by the mean of the gradients of its ends.
 vec3 lit_between(vec3 colour, ray r, vec3 gradient_sum)

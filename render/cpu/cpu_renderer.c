@@ -179,9 +179,16 @@ static int fit_buffers(trip_cpu *r)
 
 static int begin_sheets(trip_cpu *r)
 {
+    const trip_kernel kernel = r->frame->settings->kernel;
+    if (kernel != TRIP_KERNEL_LINEAR)
+        return trip_fail(TRIP_USAGE, "render", "CPU renderer",
+                         "does not draw --kernel %s with --classify post; --renderer gl%s",
+                         trip_kernel_name(kernel),
+                         kernel == TRIP_KERNEL_CUBIC ? ", reference and integral do"
+                                                     : " and reference do");
     int status = r->sheets ? 0 : trip_cpu_sheets_create(&r->sheets, r);
     r->sheet_settings = *r->frame->settings;
-    r->sheet_settings.kernel_radius = TRIP_SHEET_RADIUS;
+    r->sheet_settings.kernel_radius = trip_sheet_radius(kernel);
     r->sheet_frame = *r->frame;
     r->sheet_frame.settings = &r->sheet_settings;
     return status ? status : trip_cpu_sheets_begin_frame(r->sheets, r);

@@ -94,16 +94,18 @@
                                               list axes, to world space, over full shading */      \
     I4 extent; /* voxels of u and v from the first on; the grid's last, from that */               \
     I4 clips;  /* x: half-spaces that rays are cut to: how far inside they begin, and how much     \
-                  that grows by as far as `along` and `across` say */                              \
+                  that grows by as far as `along` and `across` say; y, z: the grid's first voxels  \
+                  from the sheets' first; w: the kernel */                                         \
     R4 clip_start[12], clip_along[12];
 
 /* The end of a segment: where rays pass a slice. `step` is how far along the list it is from the
  * end before; 0: no segment lies between them. A ray's u is base + first + what it moves along
- * `along`; the sheets before and behind the slice lie in two layers, and `part` is the weight of
- * the latter. */
+ * `along`; the sheets before and behind the slice lie in two layers, and `part` is the place
+ * between them; those beyond the two lie in the outer layers (-1: there is none). */
 #define TRIP_GL_SHEET_END_FIELDS(INT, FLOAT)                                                       \
     INT base_u, base_v, before, behind;                                                            \
-    FLOAT first_u, first_v, along, step, part, unused_0, unused_1, unused_2;
+    FLOAT first_u, first_v, along, step, part;                                                     \
+    INT outer_before, outer_behind, unused;
 
 #ifdef TRIP_GLSL
 #define TRIP_GL_VEC3 vec3

@@ -118,9 +118,11 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
                          : linear(r.r0[1 + a] - s * r.r0[0], r.rx[1 + a] - s * r.rx[0],
                                   r.ry[1 + a] - s * r.ry[0], 0);
         v.constants.extent.v[a] = (int32_t)size[a];
+        v.constants.clips.v[1 + a] = (int32_t)-first[a];
         v.constants.extent.v[2 + a] = (int32_t)((int64_t)dims[(axis + 1 + a) % 3] - 1 - first[a]);
     }
     v.constants.across_u.v[3] = (float)unit;
+    v.constants.clips.v[3] = (int32_t)frame->settings->kernel;
     v.constants.along = linear(r.r0[0], r.rx[0], r.ry[0], way);
     v.constants.start = linear(0, r.x_start[0], r.y_start[0], 0);
     set_gradient(&v, frame);
@@ -137,11 +139,13 @@ static int32_t split(double place, int64_t first, float *rest)
 }
 
 trip_gl_sheet_end trip_gl_sheet_end_at(const trip_gl_sheet_view *v, double coordinate, double step,
-                                       const int layers[2], double part)
+                                       const int layers[4], double part)
 {
     double along = coordinate - v->eye[0];
-    trip_gl_sheet_end e = { .before = layers[0],
-                            .behind = layers[1],
+    trip_gl_sheet_end e = { .outer_before = layers[0],
+                            .before = layers[1],
+                            .behind = layers[2],
+                            .outer_behind = layers[3],
                             .along = (float)along,
                             .step = (float)step,
                             .part = (float)part };

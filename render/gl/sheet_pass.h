@@ -22,8 +22,8 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
                                            double unit);
 
 /* The end at a coordinate, `step` (with the sign of the way) behind the one before; `layers` are of
- * the sheets before and behind it, `part` the weight of the latter. */
+ * the two sheets before and the two behind it, `part` its place between the middle ones. */
 trip_gl_sheet_end trip_gl_sheet_end_at(const trip_gl_sheet_view *v, double coordinate, double step,
-                                       const int layers[2], double part);
+                                       const int layers[4], double part);
 
 #endif

@@ -13,13 +13,14 @@ void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
     *t = (trip_gl_sheet_textures){ .budget = t->budget };
 }
 
-static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height, uint64_t bytes)
+static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned least,
+                     uint64_t bytes)
 {
     uint64_t taken = trip_budget_limit_bytes(t->budget) - trip_budget_left_bytes(t->budget);
     return trip_fail(TRIP_ERROR, "gl", "sheets",
-                     "%d sheets of %lld x %lld voxels do not fit the memory given; raise --memory "
+                     "%u sheets of %lld x %lld voxels do not fit the memory given; raise --memory "
                      "to more than %llu MiB, or use --renderer cpu or --classify pre",
-                     TRIP_GL_SHEETS_LEAST, (long long)width, (long long)height,
+                     least, (long long)width, (long long)height,
                      (unsigned long long)((taken + bytes) >> 20));
 }
 
@@ -47,15 +48,16 @@ static GLuint make_texture(const trip_gl_sheet_textures *t, GLenum format)
     return texture;
 }
 
-static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, bool gradients)
+static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned least,
+                bool gradients)
 {
     uint64_t sheet = (uint64_t)width * (uint64_t)height;
     sheet *= gradients ? CODE_BYTES + GRADIENT_BYTES : CODE_BYTES;
     uint64_t layers = trip_budget_left_bytes(t->budget) / SHARE / sheet;
-    layers = layers < TRIP_GL_SHEETS_LEAST ? TRIP_GL_SHEETS_LEAST : layers;
+    layers = layers < least ? least : layers;
     layers = layers > TRIP_GL_SHEETS_MAX ? TRIP_GL_SHEETS_MAX : layers;
     if (!trip_budget_charge(t->budget, layers * sheet))
-        return no_memory(t, width, height, layers * sheet);
+        return no_memory(t, width, height, least, layers * sheet);
     t->bytes = layers * sheet;
     t->width = (int)width;
     t->height = (int)height;
@@ -71,13 +73,14 @@ static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, bool g
 }
 
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
-                               bool gradients)
+                               unsigned least, bool gradients)
 {
-    if (t->codes && width <= t->width && height <= t->height && gradients == (t->gradients != 0))
+    if (t->codes && width <= t->width && height <= t->height && t->layers >= (int)least &&
+        gradients == (t->gradients != 0))
         return TRIP_OK;
     trip_gl_sheet_textures_release(t);
     int status = check_size(width, height);
-    return status ? status : make(t, width, height, gradients);
+    return status ? status : make(t, width, height, least, gradients);
 }
 
 void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height)

@@ -10,8 +10,7 @@
 
 #include "budget.h"
 
-/* Three are the least that can be drawn: gradients at a sheet depend on those on both sides. */
-enum { TRIP_GL_SHEETS_LEAST = 3, TRIP_GL_SHEETS_MAX = 10 };
+enum { TRIP_GL_SHEETS_MAX = 10 };
 
 typedef struct trip_gl_sheet_textures {
     trip_budget *budget;
@@ -21,9 +20,9 @@ typedef struct trip_gl_sheet_textures {
     uint64_t bytes; /* of the budget */
 } trip_gl_sheet_textures;
 
-/* Room for at least TRIP_GL_SHEETS_LEAST sheets of width x height voxels. */
+/* Room for at least so many sheets of width x height voxels. */
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
-                               bool gradients);
+                               unsigned least, bool gradients);
 /* No voxel is in the first width x height of a layer. */
 void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width,
                                   int height);

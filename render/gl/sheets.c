@@ -3,25 +3,35 @@
 #include <math.h>
 #include <string.h>
 
+#include "field.h"
 #include "gl/frame_block.h"
 #include "report.h"
+#include "sheet.h"
 
 /* Of a part of the work: pixels times ends, squares that are decoded, voxels that get gradients. */
 enum { PART_ENDS = 1 << 20, PART_SQUARES = 1 << 14, PART_VOXELS = 1 << 20 };
 
 /* ---- frames, layers, passes ---- */
 
+/* Sheets about an interval that what is seen in it depends on: by the kernel, and by gradients, at
+ * one sheet more. */
+static int sheets_about(const trip_settings *s)
+{
+    return trip_sheet_reach(s->kernel) - 1;
+}
+
 static unsigned effects_of(const trip_frame *frame)
 {
     const trip_settings *s = frame->settings;
-    return (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
+    return (s->kernel != TRIP_KERNEL_LINEAR ? TRIP_GL_WIDE : 0) |
+           (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
            (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0);
 }
 
 static void forget(trip_gl_sheets *s)
 {
     s->pass = NULL;
-    s->count = 0;
+    s->count = s->front = 0;
     s->batch = (trip_gl_sheet_batch){ 0 };
     s->drawing = (trip_gl_sheet_drawing){ 0 };
 }
@@ -92,7 +102,9 @@ int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis)
     s->axis = axis;
     forget(s);
     find_extent(s);
-    return trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1],
+    /* Those of an interval, those behind it, and one before it where that is kept. */
+    const unsigned least = 2 * (unsigned)sheets_about(s->frame->settings) + 1;
+    return trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], least,
                                       s->frame->settings->shading);
 }
 
@@ -256,15 +268,23 @@ static double eye_behind(const trip_gl_sheets *s, int i)
     return (s->view.eye[0] - (double)s->held[i].number) * (double)s->way;
 }
 
-/* Whether something between held[i] and the next may show. */
+/* Whether something between held[i] and the next may show; false where there is no next. */
 static bool shows(const trip_gl_sheets *s, int i)
 {
-    const trip_gl_sheet *a = &s->held[i], *b = &s->held[i + 1];
-    if (a->least > a->most || b->least > b->most || eye_behind(s, i) >= 1)
+    const int about = sheets_about(s->frame->settings) - 1;
+    unsigned least = UINT16_MAX, most = 0;
+    double bounds[2];
+    if (i < 0 || i + 1 >= s->count || s->held[i].least > s->held[i].most ||
+        s->held[i + 1].least > s->held[i + 1].most || eye_behind(s, i) >= 1)
         return false;
-    unsigned least = a->least < b->least ? a->least : b->least;
-    unsigned most = a->most > b->most ? a->most : b->most;
-    return trip_gl_sheet_function_shows(&s->function, least, most);
+    for (int k = i - about; k <= i + 1 + about; k++)
+        if (k >= 0 && k < s->count) {
+            least = s->held[k].least < least ? s->held[k].least : least;
+            most = s->held[k].most > most ? s->held[k].most : most;
+        }
+    trip_field_code_bounds(s->frame->settings->kernel, least, most, bounds);
+    return trip_gl_sheet_function_shows(&s->function, (unsigned)fmax(0, floor(bounds[0])),
+                                        (unsigned)fmin(65535, ceil(bounds[1])));
 }
 
 static int make_gradients(trip_gl_sheets *s, int i)
@@ -293,23 +313,37 @@ static int make_gradients(trip_gl_sheets *s, int i)
     return status;
 }
 
-/* Of the sheets up to the last one to be drawn, the first that something shows beside and that has
- * no gradients: from the next group on, those before it are not at hand. -1: there is none. All
- * held are complete. */
+/* Of the sheets that what is to be drawn is interpolated from, the first that something shows about
+ * and that has no gradients: from the next group on, those before it are not at hand. -1: there is
+ * none. All held are complete. */
 static int without_gradients(const trip_gl_sheets *s)
 {
-    for (int i = 0; i <= s->drawing.to && s->textures.gradients; i++)
-        if (!s->held[i].has_gradients &&
-            ((i > 0 && shows(s, i - 1)) || (i + 1 < s->count && shows(s, i))))
-            return i;
+    const int about = sheets_about(s->frame->settings);
+    for (int i = 0; i < s->count && i < s->drawing.to + about && s->textures.gradients; i++)
+        for (int k = i - about; k < i + about && !s->held[i].has_gradients; k++)
+            if (shows(s, k))
+                return i;
     return -1;
+}
+
+/* The layer of held[i]; beyond the grid that of the last one there, and -1 where another sheet is
+ * not at hand: then it has no voxels. */
+static int layer_of(const trip_gl_sheets *s, int i)
+{
+    const int64_t number = s->held[0].number + i * s->way;
+    const int64_t sheets = (int64_t)s->frame->data->header.dims[s->axis];
+    if (i >= 0 && i < s->count)
+        return s->held[i].layer;
+    return number >= 0 && number < sheets ? -1 : s->held[i < 0 ? 0 : s->count - 1].layer;
 }
 
 /* The ends of the slices from held[i] to the next; returns how many there are then. */
 static int add_ends(const trip_gl_sheets *s, int i, trip_gl_sheet_end *ends, int count)
 {
-    const trip_gl_sheet *from = &s->held[i], *to = &s->held[i + 1];
-    const int slices = s->frame->settings->slices, layers[2] = { from->layer, to->layer };
+    const trip_gl_sheet *from = &s->held[i];
+    const int slices = s->frame->settings->slices;
+    const int layers[4] = { layer_of(s, i - 1), layer_of(s, i), layer_of(s, i + 1),
+                            layer_of(s, i + 2) };
     const double eye = fmax(0, eye_behind(s, i)), way = (double)s->way;
     double last = eye;
     ends[count++] =
@@ -332,7 +366,8 @@ static void begin_group(trip_gl_sheets *s)
     trip_gl_sheet_drawing *d = &s->drawing;
     const int most = s->frame->settings->slices + 1;
     d->in_group = true;
-    d->band = d->row = d->ends = d->done = 0;
+    d->band = d->row = d->ends = 0;
+    d->done = s->front;
     for (; d->done < d->to && d->ends + most <= TRIP_GL_ENDS_MAX; d->done++)
         if (shows(s, d->done))
             d->ends = add_ends(s, d->done, ends, d->ends);
@@ -379,16 +414,21 @@ static int draw_rows(trip_gl_sheets *s)
     return trip_gl_queue_end_part(s->queue);
 }
 
-/* Lets go of what is drawn. */
+/* Lets go of what is drawn, but for what the kernel still reaches. */
 static void end_group(trip_gl_sheets *s)
 {
     trip_gl_sheet_drawing *d = &s->drawing;
-    s->count -= d->done;
-    memmove(s->held, s->held + d->done, (size_t)s->count * sizeof *s->held);
-    d->to -= d->done;
+    const int kept = s->frame->settings->kernel == TRIP_KERNEL_LINEAR ? 0 : 1;
+    const int drop = d->done > kept ? d->done - kept : 0;
+    s->count -= drop;
+    memmove(s->held, s->held + drop, (size_t)s->count * sizeof *s->held);
+    d->to -= drop;
+    s->front = d->done - drop;
     d->in_group = false;
-    if (d->to == 0 && d->all)
-        s->count = 0;
+    if (d->to <= s->front && d->all)
+        s->count = s->front = 0;
+    if (d->to <= s->front || s->count == 0)
+        d->to = 0;
 }
 
 /* A part of what is to be drawn. */
@@ -407,14 +447,14 @@ static int draw_part(trip_gl_sheets *s)
     return status;
 }
 
-/* Has the complete sheets drawn: up to the last one when `all`, after which none is held; else up
- * to the last but one, whose gradients depend on the last. */
+/* Has the complete sheets drawn: up to the last one when `all`, after which none is held; else as
+ * far as none is missing behind them that they depend on. */
 static void begin_drawing(trip_gl_sheets *s, bool all)
 {
-    const int to = all ? s->count - 1 : s->count - 2;
-    s->drawing = (trip_gl_sheet_drawing){ .to = to > 0 ? to : 0, .all = all };
-    if (to <= 0 && all)
-        s->count = 0;
+    const int to = s->count - 1 - (all ? 0 : sheets_about(s->frame->settings));
+    s->drawing = (trip_gl_sheet_drawing){ .to = to > s->front ? to : 0, .all = all };
+    if (to <= s->front && all)
+        s->count = s->front = 0;
 }
 
 /* ---- batches ---- */

@@ -31,9 +31,9 @@ typedef struct trip_gl_sheet_batch {
     bool begun;
 } trip_gl_sheet_batch;
 
-/* What is being drawn: from the first sheet to number `to`. */
+/* What is being drawn: from the front to sheet `to`. */
 typedef struct trip_gl_sheet_drawing {
-    int to;        /* 0: nothing */
+    int to;        /* the front or less: nothing */
     bool all;      /* then no sheet is held */
     bool in_group; /* up to `done` are being drawn */
     int done;
@@ -62,6 +62,7 @@ typedef struct trip_gl_sheets {
     trip_gl_sheet_view view;
     trip_gl_sheet held[TRIP_GL_SHEETS_MAX]; /* in a row; the last may not be complete */
     int count;
+    int front; /* the first that is not drawn from: 1 where what lies before it reaches over it */
     trip_gl_sheet_batch batch;
     trip_gl_sheet_drawing drawing;
 } trip_gl_sheets;

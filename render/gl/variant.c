@@ -26,7 +26,7 @@ static const struct {
     [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", 0, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
-                                      TRIP_GL_DEPTH,
+                                      TRIP_GL_DEPTH | TRIP_GL_WIDE,
                                   false },
 };
 
@@ -42,7 +42,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_UNCULLED, "UNCULLED" },   { TRIP_GL_COMPACT, "COMPACT" },
         { TRIP_GL_DEPTH, "DEPTH" },         { TRIP_GL_NEAR, "NEAR" },
         { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
-        { TRIP_GL_FLATTENED, "FLATTENED" },
+        { TRIP_GL_FLATTENED, "FLATTENED" }, { TRIP_GL_WIDE, "WIDE" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -61,6 +61,9 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
     fprintf(out, "#define AFFINE_MOST %f\n#define AFFINE_REACH %f\n", TRIP_SPLAT_AFFINE,
             TRIP_SPLAT_AFFINE_REACH);
     write_effects(out, variant->effects);
+    if (variant->effects & TRIP_GL_WIDE)
+        fprintf(out, "#define CUBIC %d\n#define CUTOFF %.9f\n", (int)TRIP_KERNEL_CUBIC,
+                TRIP_CUTOFF);
     if (variant->effects & TRIP_GL_SHADED)
         fprintf(out,
                 "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"

@@ -161,6 +161,23 @@ static void from_within_and_far_away_it_agrees_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
+/* The grid's border, holes, and sheets that are not there. */
+static void every_kernel_agrees_with_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &sheared, 2);
+    for (int i = 0; i < 4; i++) {
+        trip_camera_params view = scene_view(&s, trip_v3(1, i % 2 ? 0.9 : -0.3, 0.8), 60, 40, 40);
+        view.ortho_height = i == 3 ? 45 : 0;
+        trip_settings settings = post();
+        settings.kernel = i / 2 ? TRIP_KERNEL_GAUSSIAN : TRIP_KERNEL_CUBIC;
+        settings.slices = 1 + i % 2;
+        compare("kernels", &s, &view, &settings);
+    }
+    scene_destroy(&s);
+}
+
 static void depths_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -367,6 +384,7 @@ int main(void)
         cmocka_unit_test(codes_of_one_byte_agree_with_the_reference),
         cmocka_unit_test(every_method_and_number_of_slices_agrees_with_the_reference),
         cmocka_unit_test(from_within_and_far_away_it_agrees_with_the_reference),
+        cmocka_unit_test(every_kernel_agrees_with_the_reference),
         cmocka_unit_test(depths_agree_with_the_reference),
         cmocka_unit_test(layers_of_two_bands_are_whole),
         cmocka_unit_test(frames_given_up_anywhere_leave_the_next_as_it_is),

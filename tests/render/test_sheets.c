@@ -3,6 +3,8 @@
 #include "scenes.h"
 #include "test.h"
 
+#include <string.h>
+
 #include "shade.h"
 #include "sheet.h"
 
@@ -620,9 +622,15 @@ static void put_blobs(trip_field **field, const scene *s)
     assert_int_equal(trip_field_finish(*field, &map), 0);
 }
 
+/* The CPU renderer interpolates linearly. */
+static bool draws(const scene_renderer *r, trip_kernel kernel)
+{
+    return kernel == TRIP_KERNEL_LINEAR || strcmp(r->name, "cpu") != 0;
+}
+
 /* Of 1, 4 and 16 slices: the integral is of the same field, by the same light. Translucent, so that
  * nothing is saturated. */
-static void compare_with_integral(bool lit, bool parallel, trip_vec3 direction)
+static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, trip_vec3 direction)
 {
     trip_field *field;
     scene s;
@@ -632,6 +640,7 @@ static void compare_with_integral(bool lit, bool parallel, trip_vec3 direction)
         s.table[code] = (trip_tf_entry){ (float)code / 65535, 0.5F, 1 - (float)code / 65535,
                                          0.25F * (float)fmax(0, code - 10000) / 30000 };
     trip_settings settings = post(1);
+    settings.kernel = kernel;
     settings.tolerance = 1e-6;
     settings.shading = lit;
     trip_camera_params view = scene_view(&s, direction, 60, 18, 20);
@@ -640,7 +649,7 @@ static void compare_with_integral(bool lit, bool parallel, trip_vec3 direction)
         scene_integrate(&s, &view, &settings, &(scene_making){ .threads = 1, .field = field });
     double errors[3] = { 0 };
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-        for (int n = 0; n < 3; n++) {
+        for (int n = 0; n < 3 && draws(r, kernel); n++) {
             settings.slices = 1 << 2 * n;
             scene_picture p = scene_draw(&s, r, &view, &settings);
             double error = mean_apart(&p, &truth);
@@ -661,10 +670,146 @@ static void compare_with_integral(bool lit, bool parallel, trip_vec3 direction)
 static void the_error_falls_with_the_square_of_the_slices(void **state)
 {
     (void)state;
-    compare_with_integral(false, false, trip_v3(1, 0.2, -0.3));
-    compare_with_integral(false, true, trip_v3(-1, 0.9, 0.8));
-    compare_with_integral(true, false, trip_v3(0.3, 1, -0.9));
-    compare_with_integral(true, true, trip_v3(0.2, 0.1, -1));
+    const trip_kernel linear = TRIP_KERNEL_LINEAR;
+    compare_with_integral(linear, false, false, trip_v3(1, 0.2, -0.3));
+    compare_with_integral(linear, false, true, trip_v3(-1, 0.9, 0.8));
+    compare_with_integral(linear, true, false, trip_v3(0.3, 1, -0.9));
+    compare_with_integral(linear, true, true, trip_v3(0.2, 0.1, -1));
+}
+
+static void by_the_cubic_kernel_it_is_the_cubic_integral(void **state)
+{
+    (void)state;
+    compare_with_integral(TRIP_KERNEL_CUBIC, false, true, trip_v3(-1, 0.9, 0.8));
+    compare_with_integral(TRIP_KERNEL_CUBIC, true, false, trip_v3(0.3, 1, -0.9));
+}
+
+/* Any values, sheet by sheet along an axis. */
+typedef struct layers {
+    int axis;
+    unsigned codes[EDGE];
+} layers;
+
+static bool layer_code(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const layers *l = user;
+    (void)gradient;
+    *code = l->codes[(const int[3]){ i, j, k }[l->axis]];
+    return true;
+}
+
+/* A spline by Hermite's form, the profile of a splat by its formula; beyond the ends they repeat.
+ */
+static double value_at(const layers *l, trip_kernel kernel, double z)
+{
+    int cell = (int)fmin(floor(z), EDGE - 2);
+    double v[4], x = z - cell, sum = 0, weights = 0;
+    for (int i = 0; i < 4; i++)
+        v[i] = l->codes[(int)fmin(EDGE - 1, fmax(0, cell + i - 1))];
+    if (kernel == TRIP_KERNEL_CUBIC)
+        return v[1] * (1 + 2 * x) * (1 - x) * (1 - x) + v[2] * x * x * (3 - 2 * x) +
+               (v[2] - v[0]) / 2 * x * (1 - x) * (1 - x) - (v[3] - v[1]) / 2 * x * x * (1 - x);
+    for (int i = 0; i < 4; i++) {
+        double d = x - (i - 1), w = exp(-d * d / 0.72) - exp(-50.0 / 9);
+        sum += fmax(0, w) * v[i];
+        weights += fmax(0, w);
+    }
+    return sum / weights;
+}
+
+/* Rays along the axis; extinction that is linear in the code has the depth of the trapezoids
+ * between slices. */
+static void along_the_sheets_slices_have_the_values_of_the_kernel(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        const trip_kernel kernel = i / 3 % 2 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_GAUSSIAN;
+        const int slices = 2 + i / 6 * 3;
+        layers l = { .axis = i % 3 };
+        double sum = 0;
+        for (int n = 0; n < EDGE; n++)
+            l.codes[n] = 20000 + scene_hash(n, i, 7) % 20000;
+        for (int n = 0; n <= (EDGE - 1) * slices; n++)
+            sum += value_at(&l, kernel, (double)n / slices) / slices /
+                   (n % ((EDGE - 1) * slices) ? 1 : 2);
+        scene s;
+        scene_create(
+            &s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = layer_code, .user = &l });
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ 1, 1, 1, 0.05F * (float)code / 30000 };
+        trip_vec3 direction = { l.axis == 0, l.axis == 1, l.axis == 2 };
+        trip_camera_params view = scene_view(&s, direction, 60, 20, 1);
+        view.ortho_height = 0.1;
+        trip_settings settings = post(slices);
+        settings.kernel = kernel;
+        for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+            if (!draws(r, kernel))
+                continue;
+            scene_picture p = scene_draw(&s, r, &view, &settings);
+            assert_close(p.rgba[3], 1 - exp(-0.05 * sum / 30000), 1e-6 + 0.01 * r->tolerance);
+            scene_picture_free(&p);
+        }
+        scene_destroy(&s);
+    }
+}
+
+static bool is_inside(double x, double y, double z)
+{
+    return x * x + y * y + z * z < 50;
+}
+
+/* A ball of rising values, and the voxels next to it. */
+static bool ball(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const double x = i - 10.2, y = j - 9.7, z = k - 9.9;
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)fmax(0, 52000 - 800 * (x * x + y * y + z * z));
+    return is_inside(x, y, z);
+}
+
+static bool around_ball(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    bool some = false;
+    for (int n = 0; n < 27; n++)
+        some |= ball(user, i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1, code, gradient);
+    return !ball(user, i, j, k, code, gradient) && some;
+}
+
+/* Of voxels that a halo of one lacks the integral of the data set has the same rule. */
+static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
+{
+    (void)state;
+    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_ball };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .normals = true,
+                                      .voxel = ball,
+                                      .parts = &halo,
+                                      .part_count = 1 });
+    for (int code = 8000; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, 0.5F * (float)(code - 8000) / 30000 };
+    trip_settings settings = post(16);
+    settings.kernel = TRIP_KERNEL_CUBIC;
+    settings.tolerance = 1e-6;
+    settings.shading = true;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.7, -0.4), 60, 18, 20);
+    scene_picture truth = scene_integrate(&s, &view, &settings, &(scene_making){ .threads = 1 });
+    settings.kernel = TRIP_KERNEL_LINEAR;
+    scene_picture linear = scene_integrate(&s, &view, &settings, &(scene_making){ .threads = 1 });
+    settings.kernel = TRIP_KERNEL_CUBIC;
+    for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+        if (!draws(r, settings.kernel))
+            continue;
+        scene_picture p = scene_draw(&s, r, &view, &settings);
+
+        assert_true(mean_apart(&p, &truth) < 0.05 / 255);
+        assert_true(mean_apart(&p, &truth) < 0.2 * mean_apart(&p, &linear));
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&truth);
+    scene_picture_free(&linear);
+    scene_destroy(&s);
 }
 
 /* The largest change of a pixel from one picture to the next while the camera is turned in steps of
@@ -775,6 +920,9 @@ int main(void)
         cmocka_unit_test(depth_is_the_mean_distance_of_what_is_seen),
         cmocka_unit_test(mirrored_turned_and_moved_it_is_the_same_picture),
         cmocka_unit_test(the_error_falls_with_the_square_of_the_slices),
+        cmocka_unit_test(by_the_cubic_kernel_it_is_the_cubic_integral),
+        cmocka_unit_test(along_the_sheets_slices_have_the_values_of_the_kernel),
+        cmocka_unit_test(beyond_the_halo_voxels_count_as_those_next_to_them),
         cmocka_unit_test(turning_across_45_degrees_nothing_pops),
         cmocka_unit_test(bricks_and_coarser_levels_change_no_bit),
     };
