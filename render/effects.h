@@ -4,13 +4,14 @@
  * clamped to [0, 1], in the place of what shade.h makes of it, with its strength s (0 where nothing
  * is shaded, as in fog), n and l. It is the same where all of these are 1:
  *     reached(x) = T(x + s b l),  T(y) = exp(-integral of extinction from y towards the light)
- *     open(x)    = min(1, (1 + s) max(m(x + s b n), m(x - s b n))),  m(y) = mean of T over
- * directions phase      = (1 - g^2) / (1 + g^2 - 2 g cos)^(3/2) phase is that of Henyey &
- * Greenstein 1941, times 4 pi, cos that of the angle by which light turns towards the eye. So fog
- * has single scattering after Max 1995 (Optical models for direct volume rendering, section 5) with
- * a share of light from everywhere, and surfaces have cast shadows. A surface is lit where light
- * reaches it, a little outside: b is TRIP_LIGHT_BIAS cells of the grid below long. Half of what is
- * around a surface is the body itself, hence 1 + s.
+ *     open(x)    = min(1, (1 + s) max(m(x + s b n), m(x - s b n)))
+ *     phase      = (1 - g^2) / (1 + g^2 - 2 g cos)^(3/2)
+ * m is the mean of T over directions. phase is that of Henyey & Greenstein 1941, times 4 pi, cos
+ * that of the angle by which light turns towards the eye. So fog has single scattering after Max
+ * 1995 (Optical models for direct volume rendering, section 5) with a share of light from
+ * everywhere, and surfaces have cast shadows. A surface is lit where light reaches it, a little
+ * outside: b is TRIP_LIGHT_BIAS cells of the grid below long. Half of what is around a surface is
+ * the body itself, hence 1 + s.
  *
  * T and m are looked up in a lattice over the volume (light_grid.h), that of m with cells twice as
  * long; the integral renderer works them out, m by the same directions. What is cut away does not
