@@ -6,7 +6,7 @@
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
 #include "kernel.h"
-#include "lod.h"
+#include "lod_limit.h"
 #include "report.h"
 #include "rounding.h"
 #include "tint.h"
@@ -257,6 +257,24 @@ static void check_rounding(triptych *t)
     t->rounding_checked = true;
 }
 
+/* The coarsest levels may have more than the bound allows, and a data set may have none. */
+static void check_bound(const triptych *t)
+{
+    const double most = t->settings.max_bytes;
+    const double bytes = t->plan.lod.level ? t->plan.lod.limit.bytes
+                                           : trip_lod_values_bytes(t->session.data, &t->camera,
+                                                                   &t->drawn_settings, t->level);
+    char is[32], allowed[32];
+    if (!(most > 0) || bytes <= most)
+        return;
+    trip_format_bytes((uint64_t)bytes, is);
+    trip_format_bytes((uint64_t)most, allowed);
+    trip_warn(
+        t->session.input,
+        "up to %s are read by the coarsest level that the data set has, more than the %s allowed",
+        is, allowed);
+}
+
 static int plan(triptych *t)
 {
     uint64_t start = trip_frame_now_ns();
@@ -265,6 +283,8 @@ static int plan(triptych *t)
     int status = trip_context_choose_effects(t);
     if (!status)
         status = plan_frame(t);
+    if (!status)
+        check_bound(t);
     t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
     t->begun = status == 0;
     return status;

@@ -527,18 +527,17 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
 {
     if (!trip_settings_has_levels(s) || plan->gathers)
         return;
+    char chosen[64] = "the finest";
+    const char *bound = s->max_bytes > 0 ? ", or what the bound on bytes calls for" : "";
+    if (s->lod_px > 0)
+        snprintf(chosen, sizeof chosen, "the coarsest whose voxels are at most %g pixels wide",
+                 s->lod_px);
     if (s->classify == TRIP_CLASSIFY_POST)
-        fprintf(out,
-                "levels      %s: level %u for all of the grid, whose voxels are at most %g pixels "
-                "wide%s\n",
-                plan->level ? "run" : "do not run", plan->level, s->lod_px,
-                s->max_bytes > 0 ? ", or which the bound on bytes calls for" : "");
+        fprintf(out, "levels      %s: level %u for all of the grid: %s%s\n",
+                plan->level ? "run" : "do not run", plan->level, chosen, bound);
     else if (plan->lod.level)
-        fprintf(
-            out,
-            "levels      run: cells of %d voxels a side, each at the coarsest of %u levels whose "
-            "voxels are at most %g pixels wide\n",
-            1 << plan->lod.cell_log2, plan->lod.levels + 1, s->lod_px);
+        fprintf(out, "levels      run: cells of %d voxels a side, each at one of %u levels: %s%s\n",
+                1 << plan->lod.cell_log2, plan->lod.levels + 1, chosen, bound);
     else
         fprintf(out, "levels      do not run: the data set has none\n");
 }

@@ -221,6 +221,14 @@ class Drawn(program.ProgramTest):
         self.assertLess(lists["z"]["splats_read"], 0.7 * self.kept["tooth"])
         self.assertEqual(lists["x"]["splats_read"] + lists["y"]["splats_read"], 0)
 
+    def test_a_bound_that_no_level_keeps_is_named(self):
+        for classify in "pre", "post":
+            draw = ["render", "tooth.trip", "-o", "x.png", "--size=20x20", f"--classify={classify}"]
+            held = self.works(*draw, "--max-bytes=1G")
+            self.assertEqual("", held.stderr)
+            beyond = self.works(*draw, "--max-bytes=1")
+            self.assertRegex(beyond.stderr, "^triptych: warning: tooth.trip: up to .* are read")
+
 
 if __name__ == "__main__":
     program.main()
