@@ -10,8 +10,8 @@
 #define TRIP_OPTION_LIGHT(group)                                                                   \
     {                                                                                              \
         "light", KEY_LIGHT, "X,Y,Z|head", 0,                                                       \
-            "Direction to the light, or from the eye (default: head); not with --no-shading, but " \
-            "for --effects",                                                                       \
+            "Direction to the light, or from the eye (default: head); what is not shaded has it "  \
+            "for --effects alone",                                                                 \
             group                                                                                  \
     }
 #define TRIP_OPTIONS_EFFECTS(group)                                                                \
