@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "errno_text.h"
 #include "text.h"
 
 enum { LINE_BYTES = 4096, WHERE_BYTES = 2560 };
@@ -173,10 +174,7 @@ int trip_fail(int status, const char *what, const char *where, const char *why, 
 int trip_fail_errno(const char *what, const char *where, const char *action)
 {
     char buffer[256];
-    const char *reason = errno == EFBIG
-                             ? "larger than files may be here: see the limit on file sizes "
-                               "(ulimit -f) and the file system's own"
-                             : strerror_r(errno, buffer, sizeof buffer);
+    const char *reason = trip_errno_text(errno, buffer, sizeof buffer);
     if (action && *action)
         return trip_fail(TRIP_ERROR, what, where, "%s: %s", action, reason);
     return trip_fail(TRIP_ERROR, what, where, "%s", reason);

@@ -12,6 +12,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include "errno_text.h"
 #include "slice_files.h"
 
 namespace
@@ -196,12 +197,18 @@ std::string trim(std::string text)
     return text;
 }
 
+void check_written(const trip_picture &p, const FileSink &sink)
+{
+    char room[256];
+    if (sink.error_number())
+        throw trip_slice_error(p.path, std::string("cannot write: ") +
+                                           trip_errno_text(sink.error_number(), room, sizeof room));
+}
+
 [[noreturn]] void fail_encoding(const trip_picture &p, const FileSink &sink, OIIO::ImageOutput &out)
 {
     std::string why = trim(out.geterror());
-    if (sink.error_number())
-        throw trip_slice_error(p.path,
-                               std::string("cannot write: ") + std::strerror(sink.error_number()));
+    check_written(p, sink);
     throw trip_slice_error(p.path, "cannot encode: " + why);
 }
 
@@ -244,9 +251,7 @@ void trip_picture_write(const trip_picture &p, const trip_picture_row &next_row)
 {
     FileSink sink(p.path, p.fd);
     encode(p, next_row, sink);
-    if (sink.error_number())
-        throw trip_slice_error(p.path,
-                               std::string("cannot write: ") + std::strerror(sink.error_number()));
+    check_written(p, sink);
 }
 
 std::vector<float> trip_picture_read(const std::string &path, int &width, int &height)

@@ -150,7 +150,7 @@ class Trouble(program.ProgramTest):
         ):
             self.fails(1, *arguments, preexec_fn=limited, says="ulimit -f")
         picture = ("render", "small.trip", "-o", "out.exr", "--size", "600x600")
-        self.fails(1, *picture, "--background", "0.3,0.5,0.7", preexec_fn=limited)
+        self.fails(1, *picture, "--background", "0.3,0.5,0.7", preexec_fn=limited, says="ulimit -f")
         self.assertEqual(leftovers(), [])
 
     def test_links_and_modes_where_stats_go(self):

@@ -1,6 +1,6 @@
 /* What an interrupted run of `brick` left: the journal from the input, with right checksums. What
  * is accepted must be safe to go on with, and be in bounds. The first byte says what kind of run
- * reads it; then records: a byte of kind, two of length, the bytes. */
+ * reads it; then records, as journal_file.h says. */
 #include "fuzz.h"
 
 #include <fcntl.h>
@@ -8,9 +8,9 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include "journal.h"
+#include "journal_file.h"
 
 enum {
     SLICE_VOXELS = 64 * 64,
@@ -36,41 +36,10 @@ static FILE *create(const char *name)
     return f;
 }
 
-enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEQUENCES, KINDS };
-
-/* Records are long and mostly zero: the input gives how they begin, and after a byte of how many,
- * the sequences of a checkpoint before that. */
-static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t size)
-{
-    size_t sequences = kind == CHECKPOINT_WITH_SEQUENCES && size ? data[0] % 8 : 0;
-    size_t body = kind == RAW     ? size
-                  : kind == START ? sizeof(trip_journal_start)
-                                  : sizeof(trip_checkpoint);
-    size_t bytes = body + sequences * sizeof(trip_sequence);
-    unsigned char *record = calloc(1, bytes + 1);
-    if (sequences && size > 1 + sequences * sizeof(trip_sequence)) {
-        memcpy(record + body, data + 1, sequences * sizeof(trip_sequence));
-        data += 1 + sequences * sizeof(trip_sequence);
-        size -= 1 + sequences * sizeof(trip_sequence);
-    }
-    memcpy(record, data, size < body ? size : body);
-    const uint64_t number = kind == CHECKPOINT_WITH_SEQUENCES ? CHECKPOINT : kind;
-    const uint64_t head[3] = { number, bytes, XXH64(record, bytes, number) };
-    fwrite(head, sizeof head, 1, f);
-    fwrite(record, bytes, 1, f);
-    free(record);
-}
-
 static void write_files(const uint8_t *data, size_t size)
 {
     FILE *journal = create("journal"), *runs = create("runs"), *pieces = create("pieces");
-    while (size >= 3) {
-        size_t bytes = data[1] | (size_t)data[2] << 8;
-        bytes = bytes < size - 3 ? bytes : size - 3;
-        write_record(journal, data[0] % KINDS, data + 3, bytes);
-        data += 3 + bytes;
-        size -= 3 + bytes;
-    }
+    write_journal(journal, data, size);
     fclose(journal);
     FUZZ_PROMISE(ftruncate(fileno(runs), 1000 * sizeof(trip_run_record)) == 0);
     fclose(runs);

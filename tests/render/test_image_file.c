@@ -324,7 +324,7 @@ static void a_full_disk_is_reported_and_leaves_nothing(void **state)
         setrlimit(RLIMIT_FSIZE, &tight);
         int status = trip_image_write(&files, path_of(names[i]), SIDE, SIDE, rgba, NULL);
         setrlimit(RLIMIT_FSIZE, &old);
-        assert_one_report("File too large");
+        assert_one_report("ulimit -f");
         assert_int_equal(status, TRIP_ERROR);
         assert_int_equal(count_files(), before);
     }

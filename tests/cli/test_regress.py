@@ -1,0 +1,78 @@
+"""What the program did wrong with once, with the small files of tests/regress, or what is made of
+them here: scales, temporaries, Ctrl-C."""
+import bz2
+import os
+import signal
+import time
+
+import numpy
+import program
+
+REGRESS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "regress")
+LIMIT_S = 2 * (4 if program.SANITIZED else 1)  # of processors
+VIEW = ("--size=40x40", "--h=0", "--classify=pre")
+
+
+class Regress(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.source = os.path.join(REGRESS, "block.nrrd")
+        brick = program.call("brick", cls.source, "-o", "block.trip", "-q")
+        assert brick.returncode == 0, brick.stderr
+
+    def draw(self, *arguments, **options):
+        process = program.start("render", "block.trip", "-o", "p.png", "--renderer=cpu",
+                                "--size=16x16", *arguments, **options)
+        err = process.communicate()[1]
+        self.assertEqual((process.returncode, err), (0, b""))
+        return process.pid
+
+    def test_voxels_of_any_size_are_drawn(self):
+        """Squares of areas overflowed floats, and the picture was empty."""
+        for spacing, view in (
+            *((scale, ()) for scale in (1e-12, 1e-8, 1e4, 1e12)),
+            (100, ("--fov=0.1",)),
+        ):
+            self.brick(self.source, "scaled.trip", f"--spacing={spacing},{spacing},{spacing}")
+            expected = self.picture("scaled.trip", "--renderer=reference", *VIEW, *view)
+            drawn = self.picture("scaled.trip", "--renderer=cpu", *VIEW, *view)
+            self.assertGreater(expected[..., 3].max(), 0.5, (spacing, view))
+            self.assertLessEqual(numpy.abs(drawn - expected).max(), 2 / 255, (spacing, view))
+
+    def test_what_a_killed_process_left_is_in_nobodys_way(self):
+        """Of the number that the process itself has."""
+
+        def leave():
+            program.write(f".triptych-{os.getpid()}.tmp", b"")
+
+        os.remove(f".triptych-{self.draw(preexec_fn=leave)}.tmp")
+
+    def test_ctrl_c_ends_a_skip_through_what_is_compressed(self):
+        """90 GB of zeros in 90 kB; the skip was gone through to its end first."""
+        program.write("zeros.bz2", bz2.compress(bytes(45 << 20)) * 2000)
+        program.write(
+            "zeros.nhdr",
+            b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: bzip2\n"
+            b"byte skip: 90000000000\ndata file: zeros.bz2\n",
+        )
+        before = set(os.listdir("."))
+        process = program.start("brick", "zeros.nhdr", "-o", "zeros.trip", "-q")
+        program.await_handler(process)
+        while process.poll() is None and program.processor_seconds(process) < 0.2:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        limit = program.processor_seconds(process) + LIMIT_S
+        while process.poll() is None and program.processor_seconds(process) < limit:
+            time.sleep(0.01)
+        ended = process.poll() is not None
+        process.kill()
+        err = process.communicate()[1].decode()
+        self.assertTrue(ended)
+        self.assertTrue(program.LINE.fullmatch(err), err)
+        self.assertIn("interrupted", err)
+        self.assertEqual(set(os.listdir(".")), before)
+
+
+if __name__ == "__main__":
+    program.main()

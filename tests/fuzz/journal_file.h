@@ -1,0 +1,49 @@
+/* Journals of `brick` with right checksums, made of few bytes: each record is a byte of kind, two
+ * of length, and as many bytes. */
+#ifndef TRIP_JOURNAL_FILE_H
+#define TRIP_JOURNAL_FILE_H
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+#include "journal.h"
+
+enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEQUENCES, KINDS };
+
+/* Records are long and mostly zero: the input gives how they begin, and after a byte of how many,
+ * the sequences of a checkpoint before that. */
+static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t size)
+{
+    size_t sequences = kind == CHECKPOINT_WITH_SEQUENCES && size ? data[0] % 8 : 0;
+    size_t body = kind == RAW     ? size
+                  : kind == START ? sizeof(trip_journal_start)
+                                  : sizeof(trip_checkpoint);
+    size_t bytes = body + sequences * sizeof(trip_sequence);
+    unsigned char *record = calloc(1, bytes + 1);
+    if (sequences && size > 1 + sequences * sizeof(trip_sequence)) {
+        memcpy(record + body, data + 1, sequences * sizeof(trip_sequence));
+        data += 1 + sequences * sizeof(trip_sequence);
+        size -= 1 + sequences * sizeof(trip_sequence);
+    }
+    memcpy(record, data, size < body ? size : body);
+    const uint64_t number = kind == CHECKPOINT_WITH_SEQUENCES ? CHECKPOINT : kind;
+    const uint64_t head[3] = { number, bytes, XXH64(record, bytes, number) };
+    fwrite(head, sizeof head, 1, f);
+    fwrite(record, bytes, 1, f);
+    free(record);
+}
+
+static void write_journal(FILE *journal, const uint8_t *data, size_t size)
+{
+    while (size >= 3) {
+        size_t bytes = data[1] | (size_t)data[2] << 8;
+        bytes = bytes < size - 3 ? bytes : size - 3;
+        write_record(journal, data[0] % KINDS, data + 3, bytes);
+        data += 3 + bytes;
+        size -= 3 + bytes;
+    }
+}
+
+#endif
