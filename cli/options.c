@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,12 +39,32 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     }
 }
 
+/* The first that begins like an option's name but has other bytes in it than ASCII's visible ones,
+ * which getopt would send to the terminal as they are; NULL without such. */
+static const char *find_hidden_name(int argc, char **argv)
+{
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
+        const char *p = argv[i];
+        bool is_long = strncmp(p, "--", 2) == 0;
+        if (*p++ != '-' || !*p)
+            continue;
+        do
+            if (*p <= ' ' || *p > '~')
+                return argv[i];
+        while (is_long && *++p && *p != '=');
+    }
+    return NULL;
+}
+
 int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input)
 {
     const struct argp_child children[] = { { argp, 0, NULL, 0 }, { 0 } };
     const struct argp outer = { .options = common_options,
                                 .parser = parse_key,
                                 .children = children };
+    const char *hidden = find_hidden_name(argc, argv);
+    if (hidden)
+        return trip_option_fail(hidden, "no such option");
     snprintf(help_name, sizeof help_name, "triptych %s", argv[0]);
     snprintf(error_prefix, sizeof error_prefix, "triptych: usage: %s", argv[0]);
     argv[0] = error_prefix;

@@ -180,6 +180,11 @@ class Options(program.ProgramTest):
             self.assertIn(run.returncode, (1, 2))
             self.assertEqual(run.stderr.count("\n"), 1)
 
+    def test_names_that_a_terminal_would_obey(self):
+        for name in ("--fr\x1b[31mob", "--size\x7f=3x3", "-\x1b", "--fr\udcffob"):
+            run = self.fails(2, "render", name, says="no such option")
+            self.assertTrue(run.stderr.rstrip("\n").isprintable(), run.stderr)
+
     def test_wrong_combinations(self):
         brick, render = ["brick", self.source, "-o", "b.trip"], ["render", "a.trip", "-o", "a.png"]
         self.all_fail(
