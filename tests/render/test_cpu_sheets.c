@@ -395,13 +395,16 @@ static void check_ranges(const trip_cpu_kernels *k)
     k->sheet_ranges(&rasters[0], &ranges);
     for (int square = 0; square < 64; square++) {
         int least = INT16_MAX, most = INT16_MIN;
+        bool whole = true;
         for (int i = 0; i < 81; i++) {
             int code = code_at(0, square % 8 * 8 + i % 9, square / 8 * 8 + i / 9);
+            whole &= !is_missing(code);
             least = !is_missing(code) && code < least ? code : least;
             most = code > most ? code : most;
         }
         assert_int_equal(ranges.least[square], least);
         assert_int_equal(ranges.most[square], most);
+        assert_int_equal(ranges.whole >> square & 1, whole);
     }
 }
 
@@ -574,6 +577,70 @@ static void the_narrowest_views_look_as_in_the_reference(void **state)
     scene_destroy(&s);
 }
 
+enum { HOLED = 20 };
+
+/* One voxel in so many is missing; codes are smooth. */
+static bool holed(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const unsigned *one_in = user;
+    (void)gradient;
+    *code = (unsigned)(65535 * wave(2 * i, 2 * j, 2 * k));
+    return scene_hash(i, j, k) % *one_in != 0;
+}
+
+/* With every instruction set. */
+static void expect_as_in_the_reference(const scene *s, const trip_camera_params *view,
+                                       const trip_settings *settings)
+{
+    scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings);
+    assert_shows(&expected);
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+        scene_picture p = scene_draw(s, &cpu_scenes_cpu, view, settings);
+        const double apart = 255 * scene_difference(&expected, &p);
+        print_message("%s: %.3f of 1/255\n", (*isa)->isa, apart);
+        assert_true(apart <= 0.5);
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&expected);
+    unsetenv("TRIPTYCH_ISA");
+}
+
+/* Cells beside a hole are empty, whichever of their corners it is: without slices between sheets
+ * and with them, along both ways of each list, and from within. */
+static void cells_that_lack_a_corner_are_empty_as_in_the_reference(void **state)
+{
+    (void)state;
+    unsigned seldom = 40, often = 15, *const one_in[] = { &seldom, &often };
+    const struct {
+        trip_vec3 from;
+        double distance, fov_degrees, ortho_height;
+        int slices;
+    } views[] = {
+        { { 1, 0.83, 0.61 }, 50, 35, 0, 1 },    { { -0.57, -1, 0.71 }, 50, 35, 0, 2 },
+        { { 0.37, 0.53, -1 }, 50, 35, 0, 1 },   { { -0.53, 0.41, 0.97 }, 6.3, 100, 0, 1 },
+        { { 1, 0.83, -0.61 }, 6.3, 100, 0, 3 }, { { -1, 0.23, 0.31 }, 50, 35, 25, 1 },
+    };
+    for (int n = 0; n < 2; n++) {
+        scene s;
+        scene_create(&s, &(scene_params){ .dims = { HOLED, HOLED, HOLED },
+                                          .tile_voxels = 16,
+                                          .slab_sheets = 8,
+                                          .voxel = holed,
+                                          .user = one_in[n] });
+        scene_colour(&s, 20000, 65535, 0.2, 0.5, 1, 0.05);
+        for (size_t i = 0; i < sizeof views / sizeof views[0]; i++) {
+            trip_settings settings = post(views[i].slices);
+            trip_camera_params view =
+                scene_view(&s, views[i].from, views[i].distance, views[i].fov_degrees, 48);
+            view.ortho_height = views[i].ortho_height;
+            settings.shading = n == 0;
+            expect_as_in_the_reference(&s, &view, &settings);
+        }
+        scene_destroy(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -587,6 +654,7 @@ int main(void)
         cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
         cmocka_unit_test(labels_keep_their_colours),
         cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),
+        cmocka_unit_test(cells_that_lack_a_corner_are_empty_as_in_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

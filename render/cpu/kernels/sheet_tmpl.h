@@ -294,24 +294,31 @@ INLINE bool cut_box(const trip_cpu_group *g, voxel_box *box)
     return box->lo[0] <= box->hi[0] && box->lo[1] <= box->hi[1];
 }
 
-/* Whether some square of the box may show. */
-INLINE bool squares_show(const trip_cpu_group *g, const uint64_t *visible, voxel_box box)
+/* Whether some square of the box is in a set, or not in it where `flip` is UINT64_MAX and not 0. */
+INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uint64_t flip,
+                           voxel_box box)
 {
     if (!cut_box(g, &box))
         return false;
     int32_t u0 = box.lo[0] >> 3, u1 = box.hi[0] >> 3, v1 = box.hi[1] >> 3;
     for (int32_t v = box.lo[1] >> 3; v <= v1; v++) {
-        const uint64_t *row = visible + (size_t)(v >> 3) * (size_t)g->across;
+        const uint64_t *row = squares + (size_t)(v >> 3) * (size_t)g->across;
         for (int32_t u = u0; u <= u1;) {
             int32_t end = u | 7; /* of the raster */
             end = end > u1 ? u1 : end;
-            uint64_t bits = row[u >> 3] >> (v & 7) * 8 & 255;
+            uint64_t bits = (row[u >> 3] ^ flip) >> (v & 7) * 8 & 255;
             if (bits >> (u & 7) & ((2u << (end - u)) - 1))
                 return true;
             u = end + 1;
         }
     }
     return false;
+}
+
+/* Whether some square of the box may show. */
+INLINE bool squares_show(const trip_cpu_group *g, const uint64_t *visible, voxel_box box)
+{
+    return some_square_of(g, visible, 0, box);
 }
 
 /* Whether some cell of the box may show. */
@@ -346,6 +353,7 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, voxel_box box)
 /* What a patch passes. */
 typedef struct patch_path {
     uint64_t segments; /* in which something may show */
+    uint64_t gaps;     /* of these, where cells that rays meet may lack corners */
     /* At each slice of these the raster that all of its rays lie in: from its start in the pool,
      * where a ray is that is at 0 from pane_path.base; -1: several, or none. */
     int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
@@ -393,7 +401,7 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const pane_path *path, uint64_t segments, int x, int y, patch_path *area)
 {
     const patch_beam b = patch_beam_of(view, path, x, y, 8);
-    area->segments = 0;
+    area->segments = area->gaps = 0;
     unsigned passed = UINT32_MAX, placed = UINT32_MAX;
     voxel_box last, next = { 0 };
     for (; segments; segments &= segments - 1) {
@@ -401,9 +409,12 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         last = passed == n ? next : beam_box(path, &b, n);
         next = beam_box(path, &b, n + 1);
         passed = n + 1;
-        if (!cells_show(g, n, both_boxes(last, next)))
+        const voxel_box both = both_boxes(last, next);
+        if (!cells_show(g, n, both))
             continue;
         area->segments |= UINT64_C(1) << n;
+        if (g->without_halo && some_square_of(g, g->whole[n], UINT64_MAX, both))
+            area->gaps |= UINT64_C(1) << n;
         if (placed != n)
             find_raster(g, path, n, b.whole, last, area);
         find_raster(g, path, n + 1, b.whole, next, area);
@@ -690,6 +701,33 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
     s->lit = s->summed = false;
 }
 
+/* Which rays at slice n are in cells of a segment that have all of their corners: a slice at a
+ * sheet has those at that sheet only. */
+static vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
+                         unsigned n, unsigned segment)
+{
+    corners c = corners_at(path, l, n);
+    vi whole[2], lack;
+    int32_t u[V], v[V];
+    find_cells(g, path, n, &c, whole);
+    vi_store(u, whole[0]);
+    vi_store(v, whole[1]);
+    for (int i = 0; i < V; i++) {
+        int32_t at = (v[i] >> TRIP_CPU_RASTER_LOG2) * g->across + (u[i] >> TRIP_CPU_RASTER_LOG2);
+        int32_t in = (v[i] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
+                     (u[i] & (TRIP_CPU_RASTER - 1));
+        bool missing = false;
+        for (int k = 0; k < 2; k++) {
+            const int16_t *top = g->pool[g->sheets[segment][k][at]].codes + in;
+            const int16_t *bottom = top + TRIP_CPU_RASTER_STRIDE;
+            missing |= top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
+                       bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
+        }
+        lack[i] = missing;
+    }
+    return vi_is_0(lack);
+}
+
 /* ---- a segment ---- */
 
 /* What the transfer function makes of a segment. */
@@ -850,13 +888,16 @@ INLINE void places_at(const trip_cpu_group *g, const pane_path *path, const stam
 
 /* Puts a segment behind what the pixels hold; false where it shows in none of them. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                              const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
-                              sample *b, vf pixel[CHANNELS])
+                              const stamp_rays *l, const pane_path *path, unsigned n, bool gaps,
+                              sample *a, sample *b, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* what begins behind the eye's plane is left out */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
+    if (gaps && vm_any(open))
+        open = vm_and(
+            open, vm_and(in_whole_cells(g, path, l, n, n), in_whole_cells(g, path, l, n + 1, n)));
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
@@ -1021,7 +1062,8 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             sample_at(g, view->integrals, path, area, l, n, &ends[n % 2]);
         sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
         sampled = next;
-        if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
+        if (!composite_segment(view, g, l, path, n, area->gaps >> n & 1, &ends[n % 2],
+                               &ends[next % 2], pixel))
             continue;
         finish_saturated(pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))

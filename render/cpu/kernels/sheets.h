@@ -47,6 +47,7 @@ typedef struct trip_cpu_voxels {
  * where there are none. */
 typedef struct trip_cpu_square_ranges {
     int16_t least[64], most[64];
+    uint64_t whole; /* squares whose cells have all of their corners at the sheet */
 } trip_cpu_square_ranges;
 
 /* The cells of a raster's squares, between a sheet and the next: a bit each, row by row. */
@@ -88,6 +89,11 @@ typedef struct trip_cpu_group {
      * cells, of squares that have some. */
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
     const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];
+    /* The squares whose cells all have their eight corners, and the rasters of the sheets that
+     * these are of; for data without a halo, where cells that show may lack some. */
+    bool without_halo;
+    const uint64_t *whole[TRIP_CPU_SEGMENTS];
+    const int32_t *sheets[TRIP_CPU_SEGMENTS][2];
     const uint64_t *some; /* squares visible in any segment */
     /* Only rays whose cell at the first slice is in [lo, hi) are drawn; voxels, as positions are.
      */

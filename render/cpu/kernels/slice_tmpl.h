@@ -197,20 +197,34 @@ INLINE int square_first(int square)
            square % TRIP_CPU_SQUARES_ACROSS * 8;
 }
 
+/* The least code that is there of a square some of which is missing; INT16_MAX: none is. */
+static int16_t least_there(const int16_t *at)
+{
+    /* A missing code is the least, and less 1 it is the greatest. */
+    vh least = vh_set(INT16_MAX);
+    for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE)
+        least = vh_min(least, vh_min(vh_less_1(vh_load(at)), vh_less_1(vh_load(at + 1))));
+    int low = vh_least(least);
+    return (int16_t)(low == INT16_MAX ? low : low + 1);
+}
+
 static void sheet_ranges(const trip_cpu_voxels *raster, trip_cpu_square_ranges *out)
 {
+    out->whole = 0;
     for (int square = 0; square < 64; square++) {
-        const int16_t *at = raster->codes + square_first(square);
-        /* A missing code is the least, and less 1 it is the greatest. */
+        const int16_t *first = raster->codes + square_first(square), *at = first;
         vh least = vh_set(INT16_MAX), most = vh_set(INT16_MIN);
         for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE) {
             vh a = vh_load(at), b = vh_load(at + 1);
             most = vh_max(most, vh_max(a, b));
-            least = vh_min(least, vh_min(vh_less_1(a), vh_less_1(b)));
+            least = vh_min(least, vh_min(a, b));
         }
-        int low = vh_least(least);
-        out->least[square] = (int16_t)(low == INT16_MAX ? low : low + 1);
+        out->least[square] = vh_least(least);
         out->most[square] = (int16_t)~vh_least(~most);
+        if (out->least[square] == TRIP_CPU_CODE_MISSING)
+            out->least[square] = least_there(first);
+        else
+            out->whole |= UINT64_C(1) << square;
     }
 }
 

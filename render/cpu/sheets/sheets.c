@@ -254,15 +254,19 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
     trip_cpu_store_find_gradients(&s->store, work, count);
 }
 
-/* `from` is where the interval starts that the segment before the slice lies in; NULL: the slice
- * is the group's first. */
-static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coordinate,
-                      const trip_cpu_sheet *from)
+/* The segment before the slice lies between held[i] and held[i + 1]; `first`: the slice is the
+ * group's first, before which there is none. */
+static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coordinate, int i,
+                      bool first)
 {
     trip_cpu_group *g = &s->group;
-    if (from) {
+    if (!first) {
+        const trip_cpu_sheet *from = sheet_of(s, i);
         g->visible[g->segments] = from->visible;
-        g->cells[g->segments++] = from->cells;
+        g->cells[g->segments] = from->cells;
+        g->whole[g->segments] = from->whole;
+        g->sheets[g->segments][0] = from->rasters;
+        g->sheets[g->segments++][1] = sheet_of(s, i + 1)->rasters;
     }
     g->slices[g->segments] = (trip_cpu_slice){ at->rasters, coordinate };
 }
@@ -284,7 +288,7 @@ static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutti
     if (!trip_cpu_store_take_slice(&s->store, &w))
         return false;
     cut->work[cut->count++] = w;
-    add_slice(s, slice, (double)from->number + part * (double)s->way, first ? NULL : from);
+    add_slice(s, slice, (double)from->number + part * (double)s->way, i, first);
     return true;
 }
 
@@ -300,14 +304,14 @@ static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
     double eye = s->view.ortho ? 0 : (s->view.eye[2] - (double)from->number) * (double)s->way;
     bool fits = true;
     if (first && eye <= 0)
-        add_slice(s, from, (double)from->number, NULL);
+        add_slice(s, from, (double)from->number, i, true);
     else if (first)
         fits = take_slice(s, i, eye, true, cut);
     for (int n = 1; n < slices && fits; n++)
         if (n > eye * slices)
             fits = take_slice(s, i, (double)n / slices, false, cut);
     if (fits) {
-        add_slice(s, to, (double)to->number, from);
+        add_slice(s, to, (double)to->number, i, false);
         return true;
     }
     while (cut->count > count_before)
@@ -381,6 +385,7 @@ int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
                                  .first_v = store->first_v * TRIP_CPU_RASTER,
                                  .across = store->across,
                                  .down = store->down,
+                                 .without_halo = s->of->frame->data->header.halo == 0,
                                  .windowed = s->windows.used,
                                  .lo = { given.lo[0], given.lo[1] },
                                  .hi = { given.hi[0], given.hi[1] } };

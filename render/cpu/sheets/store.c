@@ -68,6 +68,7 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->rasters = part(memory, &at, grid * sizeof *sheet->rasters);
         sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
         sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
+        sheet->whole = part(memory, &at, grid * sizeof *sheet->whole);
         sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
         sheet->edges = part(memory, &at, grid * sizeof *sheet->edges);
         sheet->needed = part(memory, &at, grid * sizeof *sheet->needed);
@@ -181,6 +182,7 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
     }
     if (sheet->visible) {
         memset(sheet->visible, 0, grid * sizeof *sheet->visible);
+        memset(sheet->whole, 0, grid * sizeof *sheet->whole);
         memset(sheet->edges, 0, grid * sizeof *sheet->edges);
         memset(sheet->needed, 0, grid * sizeof *sheet->needed);
     }
@@ -416,6 +418,7 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
             if (any && trip_cpu_function_shows(job->function, least, most))
                 visible |= UINT64_C(1) << i;
         }
+    w->sheet->whole[at] = w->other->rasters[at] ? a->whole & b->whole : 0;
     w->sheet->visible[at] = visible = visible ? cells_of(job, w, at, visible) : 0;
     for (int k = 0; k < TRIP_CPU_EDGES; k++)
         edges[k] = k == TRIP_CPU_ALL || w->everywhere ? visible : 0;

@@ -29,6 +29,7 @@ typedef struct trip_cpu_sheet {
     trip_cpu_square_ranges *ranges; /* of sheets; of rasters that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
     trip_cpu_cells *cells;          /* those of squares that are visible */
+    uint64_t *whole;                /* squares whose cells all have eight corners */
     trip_cpu_edges *edges;          /* these squares by edges */
     uint64_t *needed;               /* squares of which segments that may show take voxels */
     bool prepared, shaded;          /* ranges are there; gradients are */
@@ -118,8 +119,8 @@ typedef struct trip_cpu_sheet_work {
 
 /* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
-/* Which squares and cells may show from prepared sheets to the next, `other`, and which squares are
- * needed then. */
+/* Which squares and cells may show from prepared sheets to the next, `other`, which squares are
+ * needed then, and which are whole. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
 /* Gradients of prepared sheets' voxels, where they are needed or everywhere. */
