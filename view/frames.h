@@ -24,7 +24,7 @@ typedef struct trip_frames_params {
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
-    double frames_per_second; /* while the view moves */
+    double frames_per_second; /* while the view moves; 0: 30 */
     /* By the drawing thread: something has come. */
     void (*wake)(void *user);
     void *wake_user;

@@ -23,6 +23,7 @@ static void wake(trip_frames *f)
 
 /* Of moving views, in pixels of their frames: voxels no wider are drawn by coarse levels. */
 #define MOVING_LOD_PX 1.0
+#define USUAL_FPS 30.0
 /* Of the time that such a frame has, what is for data: the rest is for pixels. */
 #define DATA_SHARE 0.6
 
@@ -516,7 +517,8 @@ static int draw_wanted(trip_frames *f)
 {
     enum { LONG_MS = 1500 };
     const triptych_settings *whole = &f->now.settings;
-    const double target_ms = 1000 / f->params.frames_per_second;
+    const double wanted = f->params.frames_per_second;
+    const double target_ms = 1000 / (wanted > 0 ? wanted : USUAL_FPS);
     const double pixels = (double)f->now.width * f->now.height;
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, pixels);
     if (whole_ms > 0 && whole_ms < target_ms)

@@ -425,7 +425,7 @@ static int start_frames(window *w)
         .threads = p->threads,
         .renderer = p->renderer,
         .engine = p->engine,
-        .frames_per_second = p->frames_per_second > 0 ? p->frames_per_second : 30,
+        .frames_per_second = p->frames_per_second,
         .wake = wake,
         .wake_user = w,
         .find = p->find,
