@@ -468,14 +468,14 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
     s->usual = usual_settings(o);
     s->begin = now_seconds();
     int status = add_rows(m, &s->usual);
-    if (!status && !o->quiet)
-        s->progress = bench_progress_start_lines("accuracy");
     if (!status)
         status = accuracy_contexts_create(&s->contexts, o);
     if (!status)
         status = take_pictures(s);
     if (!status)
         status = leave_out_idle(s);
+    if (!status && !o->quiet)
+        s->progress = bench_progress_start_lines("accuracy");
     if (!status)
         status = measure_views(s);
     m->seconds = now_seconds() - s->begin;

@@ -89,17 +89,16 @@ trip_session *trip_session_start(const trip_serve_params *p)
     if (!s)
         return NULL;
     make_locks(s);
-    s->frames = trip_frames_start(&(trip_frames_params){
-        .memory_bytes = p->memory_bytes,
-        .threads = p->threads,
-        .renderer = p->renderer,
-        .engine = p->engine,
-        .frames_per_second = p->frames_per_second > 0 ? p->frames_per_second : 30,
-        .find = p->find,
-        .release = p->release,
-        .user = p->find_user,
-        .wake = wake,
-        .wake_user = s });
+    s->frames = trip_frames_start(&(trip_frames_params){ .memory_bytes = p->memory_bytes,
+                                                         .threads = p->threads,
+                                                         .renderer = p->renderer,
+                                                         .engine = p->engine,
+                                                         .frames_per_second = p->frames_per_second,
+                                                         .find = p->find,
+                                                         .release = p->release,
+                                                         .user = p->find_user,
+                                                         .wake = wake,
+                                                         .wake_user = s });
     if (!s->frames) {
         free(s);
         return NULL;

@@ -329,6 +329,7 @@ class Accuracy(program.ProgramTest):
         self.assertEqual(os.listdir("mine"), ["letter.txt"])
 
     def test_bad_input(self):
+        self.fails(1, "accuracy", "none.trip", "-o", "x", says="cannot open")
         self.leaves_nothing(2, "accuracy", says="NAME.trip")
         self.leaves_nothing(2, "accuracy", "a.trip", "--size", "8x8", says="32 to 4096")
         self.leaves_nothing(2, "accuracy", "a.trip", "-o", "out", "--settings", "none",
