@@ -210,7 +210,7 @@ typedef enum triptych_field {
 typedef enum triptych_kernel {
     TRIPTYCH_LINEAR,   /* between the 8 voxels around */
     TRIPTYCH_CUBIC,    /* Catmull and Rom's, between 64; not of the CPU renderer */
-    TRIPTYCH_GAUSSIAN, /* a splat's, of 64, which smooths; not of the CPU renderer or the integral */
+    TRIPTYCH_GAUSSIAN, /* a splat's, of 64, which smooths; of the reference and gl */
 } triptych_kernel;
 
 /* What comes first. */

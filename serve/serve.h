@@ -7,10 +7,10 @@
 
 /* Zero means the default. */
 typedef struct trip_serve_params {
-    const char *input; /* a data set, or what `find` makes one of */
-    int port;          /* 0: one that is free */
+    const char *input;        /* a data set, or what `find` makes one of */
+    int port;                 /* 0: one that is free */
     double frames_per_second; /* while the view moves; 0: 30 */
-    uint64_t memory_bytes; /* these as triptych_resources */
+    uint64_t memory_bytes;    /* these as triptych_resources */
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
