@@ -66,8 +66,8 @@ static int resume(const char *name, trip_budget *budget)
     if (status == 0) {
         assert_non_null(trip_journal_get_checkpoint(journal));
         assert_int_equal(trip_journal_get_checkpoint(journal)->done, 1);
-        trip_journal_close(journal);
     }
+    trip_journal_close(journal);
     trip_spill_keep(spill, false);
     trip_spill_close(spill);
     return status;
