@@ -59,10 +59,12 @@ static bool read_row(const cJSON *row, const char *data_set, accuracy_found *out
         return false;
     snprintf(out->setting.name, sizeof out->setting.name, "%s", name);
     out->setting.renderer = TRIPTYCH_RENDERER_AUTO;
-    cJSON_ArrayForEach(
-        option, options) if (!cJSON_IsString(option) ||
-                             !accuracy_setting_read_option(&out->setting, option->string,
-                                                           option->valuestring)) return false;
+    cJSON_ArrayForEach(option, options)
+    {
+        const char *value = cJSON_GetStringValue(option);
+        if (!value || !accuracy_setting_read_option(&out->setting, option->string, value))
+            return false;
+    }
     const cJSON *total = cJSON_GetObjectItemCaseSensitive(row, "total");
     out->error = number_of(total, "worst_percentile_99");
     out->ms = number_of(row, "ms");

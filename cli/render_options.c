@@ -683,6 +683,10 @@ static int check_integral(parse *p)
     if (integral && o->settings.show != TRIPTYCH_SHOW_PICTURE)
         return trip_option_fail("--show", "does not apply to --renderer integral, which has no "
                                           "lists and no levels");
+    if (integral && (o->settings.lod_px > 0 || o->settings.max_bytes > 0 || o->settings.max_ms > 0))
+        return trip_option_fail(
+            "--lod, --max-bytes, --max-ms",
+            "do not apply to --renderer integral, which draws the finest level");
     if (integral && p->kernel_radius && o->field != RENDER_FIELD_SPLATS)
         return trip_option_fail("--kernel-radius", "applies to splats: give --field splats");
     return 0;

@@ -261,11 +261,13 @@ static void check_rounding(triptych *t)
 static void check_bound(const triptych *t)
 {
     const double most = t->settings.max_bytes;
+    char is[32], allowed[32];
+    if (!(most > 0))
+        return;
     const double bytes = t->plan.lod.level ? t->plan.lod.limit.bytes
                                            : trip_lod_values_bytes(t->session.data, &t->camera,
                                                                    &t->drawn_settings, t->level);
-    char is[32], allowed[32];
-    if (!(most > 0) || bytes <= most)
+    if (bytes <= most)
         return;
     trip_format_bytes((uint64_t)bytes, is);
     trip_format_bytes((uint64_t)most, allowed);
