@@ -65,6 +65,14 @@ int trip_option_light_cells(const char *text, triptych_settings *s)
 
 int trip_option_check_effects(const triptych_settings *s)
 {
+    const triptych_settings usual = triptych_default_settings();
+    const int some = s->effects | (s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : 0);
+    if (s->anisotropy != usual.anisotropy && !(some & TRIPTYCH_SHADOWS))
+        return trip_option_fail("--anisotropy", "applies to --effects shadows");
+    if (s->cueing != usual.cueing && !(some & TRIPTYCH_CUEING))
+        return trip_option_fail("--cueing", "applies to --effects cueing");
+    if (s->light_cells != usual.light_cells && !(some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION)))
+        return trip_option_fail("--light-cells", "applies to --effects shadows and occlusion");
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
         return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "
                                              "its direction: --light X,Y,Z");
