@@ -4,12 +4,13 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <poll.h>
+#include <pthread.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -47,25 +48,66 @@ void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms)
     stand_in_patience_ms = patience_ms;
 }
 
-/* The connection as descriptor 3, nothing to read or to print to, signals as they come. */
-static int spawn(const char *program, int fd, pid_t *pid)
+/* What the new process needs of this one, and what it leaves for it. */
+typedef struct launch {
+    char *program;
+    int fd;
+    pid_t parent;
+    volatile int error; /* why the program did not start */
+} launch;
+
+/* The process shares its parent's memory here, so that no handler of a signal may run in it before
+ * the program does: all signals are blocked. */
+static void reset_signals(void)
+{
+    struct sigaction handler;
+    sigset_t none;
+    for (int s = 1; s < NSIG; s++)
+        if (sigaction(s, NULL, &handler) == 0 && handler.sa_handler != SIG_IGN &&
+            handler.sa_handler != SIG_DFL)
+            signal(s, SIG_DFL);
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, NULL);
+}
+
+/* The connection as descriptor 3, nothing to read or to print to, signals as they come. The kernel
+ * ends the process with the thread that started it from its first instruction on; a parent that
+ * ended before that was set is not its parent any more. */
+static _Noreturn void become_helper(launch *l)
 {
     char *argv[] = { (char[]){ PROGRAM }, NULL };
-    sigset_t none;
-    posix_spawn_file_actions_t files;
-    posix_spawnattr_t attributes;
-    sigemptyset(&none);
-    posix_spawn_file_actions_init(&files);
-    posix_spawnattr_init(&attributes);
-    posix_spawn_file_actions_adddup2(&files, fd, TRIP_IMAGE_HELPER_FD);
-    for (int i = 0; i < TRIP_IMAGE_HELPER_FD; i++)
-        posix_spawn_file_actions_addopen(&files, i, "/dev/null", O_RDWR, 0);
-    posix_spawn_file_actions_addclosefrom_np(&files, TRIP_IMAGE_HELPER_FD + 1);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-    int error = posix_spawn(pid, program, &files, &attributes, argv, environ);
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&files);
+    bool ready = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == l->parent &&
+                 (l->fd == TRIP_IMAGE_HELPER_FD ? fcntl(l->fd, F_SETFD, 0)
+                                                : dup2(l->fd, TRIP_IMAGE_HELPER_FD)) >= 0;
+    for (int i = 0; i < TRIP_IMAGE_HELPER_FD && ready; i++) {
+        int null = open("/dev/null", O_RDWR | O_CLOEXEC);
+        ready = null >= 0 && (null == i ? fcntl(i, F_SETFD, 0) : dup2(null, i)) >= 0;
+    }
+    if (ready) {
+        closefrom(TRIP_IMAGE_HELPER_FD + 1);
+        reset_signals();
+        execve(l->program, argv, environ);
+    }
+    l->error = errno ? errno : ECHILD;
+    _exit(127);
+}
+
+/* 0, or the errno of what failed. */
+static int spawn(char *program, int fd, pid_t *pid)
+{
+    launch l = { .program = program, .fd = fd, .parent = getpid() };
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    *pid = vfork();
+    if (*pid == 0)
+        become_helper(&l);
+    int error = *pid < 0 ? errno : l.error;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (*pid > 0 && error)
+        waitpid(*pid, NULL, 0);
+    if (error)
+        *pid = 0;
     return error;
 }
 

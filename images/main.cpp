@@ -235,7 +235,6 @@ int main()
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN); /* a write that fails says so itself */
-    trip_sandbox_end_with_parent();
     (void)trip_sandbox_enter(); /* where the kernel can */
     set_up_threads();
     std::set_new_handler(on_memory_refused);
@@ -245,6 +244,6 @@ int main()
         for (;;)
             answer_one(session);
     } catch (const trip_connection_gone &) {
-        return 0; /* also of a parent that ended before this process could be set to end with it */
+        return 0;
     }
 }

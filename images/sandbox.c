@@ -6,7 +6,6 @@
 #include <seccomp.h>
 #include <signal.h>
 #include <stddef.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -176,11 +175,6 @@ bool trip_sandbox_enter(void)
     if (filter)
         seccomp_release(filter);
     return good;
-}
-
-void trip_sandbox_end_with_parent(void)
-{
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
 }
 
 void trip_sandbox_limit_memory(uint64_t bytes)

@@ -16,9 +16,6 @@ extern "C" {
  * EPERM. False, with nothing given up, where the kernel cannot do it. */
 bool trip_sandbox_enter(void);
 
-/* The kernel ends this process when the thread that started it ends. */
-void trip_sandbox_end_with_parent(void);
-
 /* From here on memory that is more than `bytes` beyond what is held
  * already, with some room for the libraries' own needs, is refused. */
 void trip_sandbox_limit_memory(uint64_t bytes);

@@ -14,6 +14,7 @@
 #include <sys/socket.h>
 #include <sys/types.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -278,12 +279,11 @@ static void a_wait_for_a_silent_helper_ends_with_a_signal(void **state)
     assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-/* Stopped, it cannot see that its connection has ended. */
-static void a_helper_ends_with_its_killed_parent(void **state)
+/* A process that starts a helper, which answers a request if it is to, and stops it. Returns the
+ * process. */
+static pid_t stop_a_helper(bool answered, pid_t *helper)
 {
-    (void)state;
-    int pipes[2], status = 0;
-    pid_t helper = 0;
+    int pipes[2];
     assert_int_equal(prctl(PR_SET_CHILD_SUBREAPER, 1), 0);
     assert_int_equal(pipe(pipes), 0);
     pid_t parent = fork();
@@ -291,23 +291,41 @@ static void a_helper_ends_with_its_killed_parent(void **state)
         trip_image_helper *h;
         uint64_t bytes;
         trip_report_redirect(keep_report, NULL);
-        if (trip_image_helper_start(&h, "read") == 0 &&
+        int status = trip_image_helper_start(&h, "read");
+        if (status == 0 && answered &&
             trip_image_helper_request(h, TRIP_IMAGE_READ, "none.png", NULL, -1) == 0)
             (void)trip_image_helper_outcome(h, &bytes);
-        helper = only_child();
-        kill(helper, SIGSTOP);
-        (void)!write(pipes[1], &helper, sizeof helper);
+        *helper = only_child();
+        kill(*helper, SIGSTOP);
+        (void)!write(pipes[1], helper, sizeof *helper);
         for (;;)
             pause();
     }
-    assert_int_equal(read(pipes[0], &helper, sizeof helper), sizeof helper);
+    assert_int_equal(read(pipes[0], helper, sizeof *helper), sizeof *helper);
     close(pipes[0]);
     close(pipes[1]);
-    assert_true(helper > 0);
-    kill(parent, SIGKILL);
-    assert_int_equal(waitpid(parent, &status, 0), parent);
-    assert_int_equal(waitpid(helper, &status, 0), helper);
-    assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
+    assert_true(*helper > 0);
+    return parent;
+}
+
+/* Stopped, it cannot see that its connection has ended: while it loads its libraries, and later. */
+static void a_helper_ends_with_its_killed_parent(void **state)
+{
+    (void)state;
+    for (int answered = 0; answered < 2; answered++) {
+        int status = 0;
+        pid_t helper = 0, parent = stop_a_helper(answered, &helper), ended = 0;
+        kill(parent, SIGKILL);
+        assert_int_equal(waitpid(parent, &status, 0), parent);
+        for (int ms = 0; ms < 20000 && ended == 0; ms++) {
+            ended = waitpid(helper, &status, WNOHANG);
+            nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+        }
+        if (ended == 0)
+            kill(helper, SIGKILL);
+        assert_int_equal(ended, helper);
+        assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
+    }
 }
 
 int main(void)
