@@ -26,6 +26,7 @@ enum key {
     KEY_SIZE,
     KEY_TYPE,
     KEY_SPACING,
+    KEY_AXES,
     KEY_ENDIAN,
     KEY_OFFSET,
     KEY_ALLOW_GAPS,
@@ -67,6 +68,10 @@ static const struct argp_option option_table[] = {
     { "offset", KEY_OFFSET, "BYTES", 0, "Raw data: where it starts in the file (default: 0)", 1 },
     { "spacing", KEY_SPACING, "X,Y,Z", 0,
       "Distance of voxels along each axis (default: the file's, else 1)", 1 },
+    { "axes", KEY_AXES, "PIR", 0,
+      "Where in the patient x, y and z point to, where the file does not say: posterior, inferior, "
+      "right",
+      1 },
     { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0,
       "Stacks of slices: go on where some are missing, as if their neighbours touched", 1 },
     { NULL, 0, NULL, 0, "What is kept (default: what an automatic transfer function shows):", 2 },
@@ -225,6 +230,8 @@ static error_t parse_input_option(int key, char *argument, triptych_brick_option
                    : trip_option_fail("--type", "no such type; for example uint8, int16 or float");
     case KEY_SPACING:
         return trip_option_spacing(argument, v->spacing);
+    case KEY_AXES:
+        return trip_option_axes(argument, &v->axes);
     case KEY_ENDIAN:
         return parse_endian(argument, &v->raw_endian);
     case KEY_OFFSET:

@@ -297,7 +297,7 @@ static void print_anatomy(const triptych_info *info, const char *space)
 static void print_notes(const cJSON *root)
 {
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
-        if (cJSON_IsString(item) && strlen(item->valuestring) < 200 && strlen(item->string) < 200 &&
+        if (cJSON_IsString(item) && strlen(item->valuestring) < 1024 && strlen(item->string) < 200 &&
             !strchr(item->valuestring, '\n') && strcmp(item->string, "space") != 0) {
             trip_text_write(stdout, item->string);
             for (size_t i = strlen(item->string); i < 12; i++)

@@ -49,7 +49,7 @@ int trip_option_choice(const char *option, const char *text, const char *const *
         "no-shading", key, NULL, 0, "Colours as they are; normals are not read", group             \
     }
 /* How volumes are read that are drawn without a data set; the keys are KEY_GRID, KEY_LEVEL_SET,
- * KEY_SPACING and KEY_ALLOW_GAPS. */
+ * KEY_SPACING, KEY_AXES and KEY_ALLOW_GAPS. */
 #define TRIP_OPTIONS_VOLUME(group)                                                                 \
     { "grid",                                                                                      \
       KEY_GRID,                                                                                    \
@@ -68,6 +68,13 @@ int trip_option_choice(const char *option, const char *text, const char *const *
           "X,Y,Z",                                                                                 \
           0,                                                                                       \
           "Distance of voxels along each axis (default: the file's, else 1)",                      \
+          group },                                                                                 \
+        { "axes",                                                                                  \
+          KEY_AXES,                                                                                \
+          "PIR",                                                                                   \
+          0,                                                                                       \
+          "Where in the patient x, y and z point to, where the file does not say: posterior, "     \
+          "inferior, right",                                                                       \
           group },                                                                                 \
     {                                                                                              \
         "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", group  \

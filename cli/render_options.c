@@ -22,6 +22,7 @@ enum {
     KEY_GRID = 256,
     KEY_LEVEL_SET,
     KEY_SPACING,
+    KEY_AXES,
     KEY_ALLOW_GAPS,
     KEY_SIZE,
     KEY_EYE,
@@ -101,8 +102,9 @@ static const struct argp_option options[] = {
     { "roll", KEY_ROLL, "DEGREES", 0, "Turn the picture clockwise", 1 },
     { "zoom", KEY_ZOOM, "FACTOR", 0, "Magnify, as another lens would (default: 1)", 1 },
     { "up", KEY_UP, "X,Y,Z", 0,
-      "What is up; the sides follow it (default: 0,0,1; OpenVDB 0,1,0; scans of thick slices "
-      "0,0,-1)",
+      "What is up; the sides follow it (default: 0,0,1; OpenVDB 0,1,0; where the file says "
+      "nothing, "
+      "0,0,-1 for thick slices, 0,-1,0 for what is mirror-symmetric across z)",
       1 },
     { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
     { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (default: the middle of what is visible)", 1 },
@@ -328,6 +330,8 @@ static int parse_volume(int key, char *arg, triptych_brick_options *v)
         return trip_option_level_set(arg, &v->level_set);
     case KEY_SPACING:
         return trip_option_spacing(arg, v->spacing);
+    case KEY_AXES:
+        return trip_option_axes(arg, &v->axes);
     case KEY_ALLOW_GAPS:
         v->allow_gaps = true;
         return 0;
@@ -765,11 +769,10 @@ static int check(parse *p)
     if (!o->output)
         return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
     const triptych_brick_options *v = &o->volume;
-    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->allow_gaps) &&
+    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->axes || v->allow_gaps) &&
         !cached_volume_wanted(o->input))
-        return trip_option_fail(
-            o->input,
-            "is a data set: --grid, --level-set, --spacing and --allow-gaps are for volumes");
+        return trip_option_fail(o->input, "is a data set: --grid, --level-set, --spacing, --axes "
+                                          "and --allow-gaps are for volumes");
     int status = check_view(p);
     if (!status)
         status = check_sequence(p);

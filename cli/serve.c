@@ -36,6 +36,7 @@ enum {
     KEY_GRID,
     KEY_LEVEL_SET,
     KEY_SPACING,
+    KEY_AXES,
     KEY_ALLOW_GAPS,
 };
 
@@ -151,6 +152,8 @@ static int parse_volume(int key, char *arg, serve_options *o)
         return trip_option_level_set(arg, &v->level_set);
     case KEY_SPACING:
         return trip_option_spacing(arg, v->spacing);
+    case KEY_AXES:
+        return trip_option_axes(arg, &v->axes);
     case KEY_ALLOW_GAPS:
         v->allow_gaps = 1;
         return 0;

@@ -48,6 +48,7 @@ enum {
     KEY_GRID,
     KEY_LEVEL_SET,
     KEY_SPACING,
+    KEY_AXES,
     KEY_ALLOW_GAPS,
 };
 
@@ -227,6 +228,8 @@ static int parse_volume(int key, char *arg, view_options *o)
         return trip_option_level_set(arg, &o->volume.options.level_set);
     case KEY_SPACING:
         return trip_option_spacing(arg, o->volume.options.spacing);
+    case KEY_AXES:
+        return trip_option_axes(arg, &o->volume.options.axes);
     case KEY_ALLOW_GAPS:
         o->volume.options.allow_gaps = 1;
         return 0;

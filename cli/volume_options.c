@@ -1,5 +1,6 @@
 #include "volume_options.h"
 
+#include "anatomy.h"
 #include "options.h"
 
 int trip_option_grid(const char *name, const char **grid)
@@ -27,4 +28,11 @@ int trip_option_spacing(const char *text, double spacing[3])
         if (!(spacing[a] > 0))
             return trip_option_fail("--spacing", "takes three positive lengths");
     return status;
+}
+
+int trip_option_axes(const char *text, const char **axes)
+{
+    *axes = text;
+    return trip_anatomy_axes_valid(text) ? 0
+                                         : trip_option_fail("--axes", "takes " TRIP_ANATOMY_AXES);
 }

@@ -11,5 +11,7 @@ int trip_option_grid(const char *name, const char **grid);
 int trip_option_level_set(const char *text, triptych_level_set *mode);
 /* "X,Y,Z", each above 0. */
 int trip_option_spacing(const char *text, double spacing[3]);
+/* "PIR". */
+int trip_option_axes(const char *text, const char **axes);
 
 #endif

@@ -17,6 +17,17 @@ static char opposite(char end)
     return at ? pairs[(at - pairs) ^ 1] : '\0';
 }
 
+bool trip_anatomy_axes_valid(const char *axes)
+{
+    unsigned pairs = 0;
+    for (int a = 0; a < 3; a++) {
+        if (!opposite(axes[a]))
+            return false;
+        pairs |= axes[a] == 'R' || axes[a] == 'L' ? 1 : axes[a] == 'A' || axes[a] == 'P' ? 2 : 4;
+    }
+    return pairs == 7 && axes[3] == '\0';
+}
+
 trip_vec3 trip_anatomy_direction(const char *space, char end)
 {
     double v[3] = { 0, 0, 0 };

@@ -20,6 +20,11 @@ bool trip_anatomy_known(const char *space);
  * space or end. */
 trip_vec3 trip_anatomy_direction(const char *space, char end);
 
+/* Whether these are the ends that three axes of a grid point to, one of each pair: "PIR". */
+#define TRIP_ANATOMY_AXES                                                                          \
+    "three letters, where x, y and z point to: one of R and L, one of A and P, one of S and I"
+bool trip_anatomy_axes_valid(const char *axes);
+
 /* "right", "left", "anterior", "posterior", "superior", "inferior"; "" for other letters. */
 const char *trip_anatomy_end_name(char end);
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "anatomy.h"
 #include "brick.h"
 #include "context.h"
 #include "identity.h"
@@ -22,6 +23,7 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .spacing = { o->spacing[0], o->spacing[1], o->spacing[2] },
         .raw_endian = (int)o->raw_endian,
         .raw_offset_bytes = o->raw_offset_bytes,
+        .axes = o->axes,
         .allow_gaps = o->allow_gaps,
         .most_voxels = o->most_voxels,
     };
@@ -64,6 +66,8 @@ static const char *fault_of_volume(const triptych_brick_options *o)
         if (o->raw_dims[a] < 0 || o->raw_dims[a] > INT32_MAX)
             return "raw data has 1 to 2147483647 voxels along each axis";
     }
+    if (o->axes && !trip_anatomy_axes_valid(o->axes))
+        return "the axes are three letters: one of R and L, of A and P and of S and I each";
     if (o->raw_type && !triptych_is_raw_type(o->raw_type))
         return "there is no such type of raw data";
     if (o->raw_offset_bytes > UINT64_C(1) << 62)

@@ -43,7 +43,10 @@ typedef struct triptych_brick_options {
     const char *raw_type;         /* "uint8", "int16", "float", ...; default: by the file's name */
     triptych_endian raw_endian;
     uint64_t raw_offset_bytes;
-    double spacing[3];    /* of voxels; default: the file's, else 1 */
+    double spacing[3]; /* of voxels; default: the file's, else 1 */
+    /* Where in the patient x, y and z of a volume point to whose file does not say: three letters,
+     * one of R and L, of A and P and of S and I each, as "PIR". */
+    const char *axes;
     int allow_gaps;       /* not 0: slices may be missing in a stack */
     uint64_t most_voxels; /* not 0: of a volume of more voxels every second, third, ... along each
                              axis is read, so that there are at most so many */
@@ -96,7 +99,7 @@ typedef struct triptych_brick_summary {
     unsigned levels;                   /* so many */
     uint64_t temporary_bytes;          /* written and removed again */
     int resumed;
-    char note[512]; /* what was chosen where the file leaves a choice, or "" */
+    char note[1024]; /* what was chosen where the file leaves a choice, or "" */
     triptych_brick_stage stages[TRIPTYCH_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* that could be taken, and were */
 } triptych_brick_summary;

@@ -16,6 +16,7 @@
 #include "folder.h"
 #include "levels.h"
 #include "list_builder.h"
+#include "mirror.h"
 #include "report.h"
 #include "splats.h"
 
@@ -32,6 +33,7 @@ typedef struct brick {
     trip_list_builder *builder;
     trip_splatter *splatter;
     unsigned levels;         /* coarse ones */
+    int mirror;              /* axis across which what was kept is symmetric; -1: none */
     uint64_t written_before; /* up to the end of the last stage */
 } brick;
 
@@ -373,6 +375,26 @@ static int check_records(brick *b)
     return 0;
 }
 
+/* What is up is guessed where neither the file nor its format's custom says it. */
+static bool is_up_unknown(const trip_volume_info *info)
+{
+    return !info->oriented && !info->space[0] && strcmp(info->format, "openvdb") &&
+           strcmp(info->format, "nifti");
+}
+
+static int find_mirror(brick *b)
+{
+    const trip_quantiser *q = &b->codes.quantiser;
+    trip_mirror_params p = { .levels = b->levels,
+                             .level_lists = trip_piece_list_count(&b->format),
+                             .tile_log2 = b->format.tile_log2,
+                             .scale = trip_mean_scale_make(b->in.tally->value_min,
+                                                           b->in.tally->value_max, q->lo, q->hi) };
+    memcpy(p.dims, b->in.info->dims, sizeof p.dims);
+    return is_up_unknown(b->in.info) ? trip_mirror_find(&b->mirror, b->writer, &p, b->in.budget)
+                                     : 0;
+}
+
 static int finish_output(brick *b)
 {
     double begin = now_seconds();
@@ -380,7 +402,8 @@ static int finish_output(brick *b)
                                                           .info = b->in.info,
                                                           .envelope = &b->in.envelope,
                                                           .functions = b->in.functions,
-                                                          .histogram = &b->in.histogram });
+                                                          .histogram = &b->in.histogram,
+                                                          .mirror = b->mirror });
     if (!text)
         return TRIP_ERROR;
     trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
@@ -400,7 +423,7 @@ static void fill_summary(brick *b)
     trip_brick_summary *s = b->summary;
     const double(*m)[4] = b->in.info->index_to_world.m;
     memcpy(s->dims, b->in.info->dims, sizeof s->dims);
-    memcpy(s->note, b->in.info->note, sizeof s->note);
+    trip_brick_text_note(b->in.info, b->mirror, s->note);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
     s->voxels = b->in.tally->voxels;
@@ -451,6 +474,8 @@ static int make(brick *b)
         status = merge_lists(b);
     if (status == 0)
         status = make_levels(b);
+    if (status == 0)
+        status = find_mirror(b);
     return status == 0 ? finish_output(b) : status;
 }
 
@@ -477,7 +502,7 @@ static void close_all(brick *b, int status)
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
 {
-    brick b = { .params = params, .summary = summary };
+    brick b = { .params = params, .summary = summary, .mirror = -1 };
     b.temporary = trip_brick_temporary_none();
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);

@@ -83,7 +83,7 @@ typedef struct trip_brick_summary {
     uint64_t level_bytes;     /* of these, of their lists */
     uint64_t temporary_bytes; /* spilled */
     bool resumed;             /* an interrupted run was resumed */
-    char note[512];           /* that of trip_volume_info */
+    char note[1024];          /* what was chosen where the file leaves a choice, or "" */
     trip_brick_cost stages[TRIP_BRICK_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* limit and peak of the budget */
 } trip_brick_summary;

@@ -149,6 +149,8 @@ static void add_volume_options(cJSON *options, const trip_volume_params *v)
         add_option(options, "--spacing=%s,%s,%s", trip_text_from_double(v->spacing[0], number[0]),
                    trip_text_from_double(v->spacing[1], number[1]),
                    trip_text_from_double(v->spacing[2], number[2]));
+    if (v->axes)
+        add_option(options, "--axes=%s", v->axes);
     if (v->allow_gaps)
         add_option(options, "--allow-gaps");
 }
@@ -175,20 +177,37 @@ static const char *base_name(const char *path)
     return slash && slash[1] ? slash + 1 : path;
 }
 
+void trip_brick_text_note(const trip_volume_info *info, int mirror,
+                          char note[TRIP_BRICK_NOTE_BYTES])
+{
+    static const char guess[] =
+        "its file does not say what is up: being mirror-symmetric across z, its slices are taken "
+        "for views from the side, with up at -y and the front at -x; --up, --view and --axes say "
+        "otherwise";
+    bool guessed = mirror == 2;
+    snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s%s", info->note,
+             guessed && info->note[0] ? "; " : "", guessed ? guess : "");
+}
+
 char *trip_brick_text_make(const trip_brick_text *t)
 {
+    static const char *const axes[] = { "x", "y", "z" };
+    char note[TRIP_BRICK_NOTE_BYTES];
+    trip_brick_text_note(t->info, t->mirror, note);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "source", base_name(t->params->input));
     add_source_options(root, t->params);
     cJSON_AddStringToObject(root, "format", t->info->format);
     if (t->info->name[0])
         cJSON_AddStringToObject(root, "grid", t->info->name);
-    if (t->info->note[0])
-        cJSON_AddStringToObject(root, "note", t->info->note);
+    if (note[0])
+        cJSON_AddStringToObject(root, "note", note);
     if (t->info->space[0])
         cJSON_AddStringToObject(root, "space", t->info->space);
     if (t->info->oriented)
         cJSON_AddTrueToObject(root, "oriented");
+    if (t->mirror >= 0)
+        cJSON_AddStringToObject(root, "mirror", axes[t->mirror]);
     cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
     cJSON_AddStringToObject(root, "function_kind",
                             trip_tf_kind_name(trip_brick_kind(t->info, t->histogram)));

@@ -11,7 +11,7 @@
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 9 };
+enum { BRICKER_VERSION = 10 };
 
 /* A file is identified by its name, length and time of change, a pattern by its text. */
 static void write_input(FILE *f, const trip_brick_params *p)
@@ -27,6 +27,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
     fprintf(f, "%s %d %s %d %" PRIu64 " %d\n", v->grid ? v->grid : "", (int)v->level_set,
             v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes, v->allow_gaps);
+    if (v->axes)
+        fprintf(f, "axes %s\n", v->axes);
     if (v->most_voxels)
         fprintf(f, "at most %" PRIu64 "\n", v->most_voxels);
     for (int a = 0; a < 3; a++)

@@ -4,11 +4,13 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "anatomy.h"
 #include "report.h"
 #include "sampled.h"
 #include "volume_reader.h"
@@ -72,6 +74,8 @@ static int check_options(const char *path, const char *format, const trip_volume
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))
             return trip_fail(TRIP_USAGE, "read", path, "--spacing takes three positive lengths");
+    if (p->axes && !trip_anatomy_axes_valid(p->axes))
+        return trip_fail(TRIP_USAGE, "read", path, "--axes takes " TRIP_ANATOMY_AXES);
     return 0;
 }
 
@@ -131,6 +135,41 @@ static void override_spacing(trip_affine *m, const double spacing[3])
     }
 }
 
+/* Whether world space is the grid's own but for the lengths of its axes and its origin. */
+static bool is_upright(const trip_affine *m)
+{
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            if (row == column ? !(m->m[row][column] > 0) : m->m[row][column] != 0)
+                return false;
+    return true;
+}
+
+/* World space becomes that of the patient, as if the file had said how it lies. */
+static int set_axes(trip_volume *v, const char *axes)
+{
+    trip_volume_info *info = &v->info;
+    trip_affine turn = trip_affine_identity();
+    if (info->space[0])
+        return trip_fail(TRIP_USAGE, "read", v->path,
+                         "says itself how it lies in the patient, in %s: --axes is for files that "
+                         "do not",
+                         info->space);
+    if (!is_upright(&info->index_to_world))
+        return trip_fail(TRIP_USAGE, "read", v->path,
+                         "gives its axes directions of their own: --axes is for files that do not");
+    snprintf(info->space, sizeof info->space, "%s",
+             strcmp(info->format, "nifti") == 0 ? "RAS" : "LPS");
+    info->oriented = true;
+    for (int a = 0; a < 3; a++) {
+        trip_vec3 to = trip_anatomy_direction(info->space, axes[a]);
+        for (int row = 0; row < 3; row++)
+            turn.m[row][a] = trip_component(to, row);
+    }
+    info->index_to_world = trip_affine_multiply(&turn, &info->index_to_world);
+    return 0;
+}
+
 int trip_volume_check_dims(const char *path, const trip_volume_info *info)
 {
     int64_t bytes = trip_scalar_bytes(info->type);
@@ -176,7 +215,9 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
         return status;
     if (params->spacing[0] > 0)
         override_spacing(&v->info.index_to_world, params->spacing);
-    status = check_info(v);
+    status = params->axes ? set_axes(v, params->axes) : 0;
+    if (!status)
+        status = check_info(v);
     if (!status && params->most_voxels)
         status = trip_sampled_wrap(&v->reader, &v->state, &v->info, params->most_voxels, v->budget);
     if (status < 0 || !v->reader->read_slices)

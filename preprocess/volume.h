@@ -57,10 +57,11 @@ typedef struct trip_volume_info {
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
-    /* Density 1 inside, 0 outside, and between them a ramp about the surface, 4 voxels wide where the
-     * band is: central differences, by which light comes, are exact within a voxel of the surface. */
+    /* Density 1 inside, 0 outside, and between them a ramp about the surface, 4 voxels wide where
+     * the band is: central differences, by which light comes, are exact within a voxel of the
+     * surface. */
     TRIP_LEVEL_SET_FILLED,
-    TRIP_LEVEL_SET_BAND,   /* density max(0, 1 - |distance| / half band width) */
+    TRIP_LEVEL_SET_BAND, /* density max(0, 1 - |distance| / half band width) */
 } trip_level_set_mode;
 
 /* Zero means the default everywhere. */
@@ -68,13 +69,16 @@ typedef struct trip_volume_params {
     const char *grid; /* OpenVDB grid name; default: "density", else the first fog volume,
                        * else the first scalar grid */
     trip_level_set_mode level_set;
-    int64_t raw_dims[3];       /* headerless raw only: --size */
-    const char *raw_type;      /* --type; default: from the file's name, else uint8 */
-    double spacing[3];         /* --spacing: raw and image stacks; elsewhere overrides the file's */
+    int64_t raw_dims[3];  /* headerless raw only: --size */
+    const char *raw_type; /* --type; default: from the file's name, else uint8 */
+    double spacing[3];    /* --spacing: raw and image stacks; elsewhere overrides the file's */
+    /* --axes: three letters as trip_anatomy_axes_valid() takes them, where in the patient x, y and
+     * z of a file point to that does not say. */
+    const char *axes;
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks in which slices are missing */
-    uint64_t most_voxels;      /* of larger volumes every second, third, ... voxel along each axis */
+    uint64_t most_voxels; /* of larger volumes every second, third, ... voxel along each axis */
 } trip_volume_params;
 
 typedef struct trip_volume trip_volume;

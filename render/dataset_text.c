@@ -254,6 +254,14 @@ static bool is_scan_from_above(const trip_affine *m)
     return least > 0 && most >= 1.5 * least;
 }
 
+/* Of what has a left and a right along z, the slices are views from the side. Such pictures run
+ * from the top down and, by custom, from the front to the back. Which side is left is not known. */
+static bool is_mirrored_across_z(const trip_dataset_text *t)
+{
+    const char *mirror = string_at(t, "mirror");
+    return mirror && !strcmp(mirror, "z");
+}
+
 /* Which way is up and where the front is: as the text has it, else as the patient stands, else by
  * the format's custom, else by a guess. */
 static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 *up,
@@ -273,7 +281,13 @@ static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 
         *front = trip_anatomy_direction(space, 'A');
         return;
     }
-    bool scan = !oriented && !y_up && !patient && is_scan_from_above(&d->index_to_world);
+    bool unknown = !oriented && !y_up && !patient;
+    if (unknown && is_mirrored_across_z(t)) {
+        *up = trip_v3(0, -1, 0);
+        *front = trip_length(*front) > 0 ? *front : trip_v3(-1, 0, 0);
+        return;
+    }
+    bool scan = unknown && is_scan_from_above(&d->index_to_world);
     *up = y_up ? trip_v3(0, 1, 0) : trip_v3(0, 0, scan ? -1 : 1);
     if (!(trip_length(*front) > 0) && (patient || scan))
         *front = trip_v3(0, patient ? 1 : -1, 0);

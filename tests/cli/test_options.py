@@ -15,6 +15,7 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 # Option: wrong values; None where it takes none.
 BRICK = {
     "--allow-gaps": None,
+    "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
     "--endian": NAMES,
     "--level-set": NAMES + ["refuse"],
     "--offset": ["", "-1", "x", "1.5", "9" * 30],
@@ -41,6 +42,7 @@ BRICK = {
     "--output": [],
 }
 RENDER = {
+    "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
     "--clip-box": ["", "1", "1,2,3", "0,0,0,1,1,x", "0,0,0,1,1,0", "voxels:", "voxel:0,0,0,1,1,1"],
     "--clip-plane": ["", "1,2,3", "0,0,0,1", "1,2,3,x", "1,2,3,4,5"],
     "--show": NAMES,
@@ -195,6 +197,7 @@ class Options(program.ProgramTest):
                 render + ["--grid=density", "--grid=heat"],
                 render + ["--grid=density"],
                 render + ["--spacing=1,1,1"],
+                render + ["--axes=PIR"],
                 render + ["--ortho=5", "--fov=30"],
                 render + ["--eye=1,2,3", "--view=front"],
                 render + ["--light=head", "--no-shading"],

@@ -275,6 +275,79 @@ class Orientation(program.ProgramTest):
             self.brick(source)
             self.check_default_view(source)
 
+    def test_axes_that_are_given_are_as_if_the_file_had_said_so(self):
+        for name, letters in ("axial", "LPS"), ("coronal", "LIP"), ("sagittal", "PIR"), ("mirrored", "RPS"):
+            affine, values = acquisition(*ACQUISITIONS[name][:3])
+            affine[:3, 3] = 0  # as of a file that says nothing
+            program.write_nrrd("said.nrrd", values, geometry=nrrd_geometry("LPS", affine))
+            program.write_nrrd("silent.nrrd", values, (2, 2, 2))
+            program.write_nifti("said.nii", values, TO_RAS @ affine)
+            said = self.brick("said.nrrd")
+            expected = self.picture("a.trip", "--size=96x96")
+            silent = self.brick("silent.nrrd", "--axes", letters)
+            for key in "space", "axes", "index_to_world":
+                self.assertEqual(silent[key], said[key], name)
+            self.assertIn(f"--axes={letters}", silent["source"]["source_options"])
+            self.check_default_view(name)
+            picture = self.picture("a.trip", "--size=96x96")
+            self.assertTrue(numpy.array_equal(picture, expected), name)
+            self.brick("said.nii")
+            self.alike(picture, self.picture("a.trip", "--size=96x96"), name, most=0.01, mean=5e-4)
+        slices = program.noise((9, 10, 11)).astype("u2")
+        os.makedirs("slices", exist_ok=True)
+        for z, image in enumerate(slices):
+            program.write_dicom(f"slices/{z}.dcm", image, z)
+        for axes, source in ("PIR", "said.nrrd"), ("LIP", "said.nii"), ("LPS", "slices"):
+            command = "brick", source, "-o", "b.trip", "-q", "--axes", axes
+            self.fails(2, *command, says="says itself how it lies in the patient")
+        program.write_nrrd("turned.nrrd", slices, geometry="space dimension: 3\n"
+                           "space directions: (0,1,0) (1,0,0) (0,0,1)")
+        self.fails(2, "brick", "turned.nrrd", "-o", "b.trip", "--axes", "PIR", says="directions of their own")
+
+    def test_axes_are_part_of_what_is_drawn_at_once(self):
+        """And of what the cache knows a data set by."""
+        affine, values = acquisition(*ACQUISITIONS["sagittal"][:3])
+        affine[:3, 3] = 0
+        program.write_nrrd("silent.nrrd", values, (2, 2, 2))
+        program.write_nrrd("said.nrrd", values, geometry=nrrd_geometry("LPS", affine))
+        size = "--size=64x64"
+        other = self.picture("silent.nrrd", size)
+        own = self.picture("silent.nrrd", size, "--axes=PIR")
+        self.assertTrue(numpy.array_equal(own, self.picture("said.nrrd", size)))
+        self.assertGreater(abs(own - other).mean(), 0.02)
+
+    def test_what_is_symmetric_is_shown_upright_and_its_sides_are_not_named(self):
+        """What has a left and a right that are alike, as slices from ear to ear of a file that says
+        nothing; the same file with directions is shown alike by what it says."""
+        steps = (0, 2, 0), (0, 0, -2), (-2, 0, 0)
+        affine, _ = acquisition(*steps)
+        index = numpy.stack(numpy.meshgrid(*[numpy.arange(45)] * 3, indexing="ij"), axis=-1)
+        side, back, up = numpy.moveaxis(index @ affine[:3, :3].T + affine[:3, 3], -1, 0)
+        wedge = (abs(side) < 15) & (back < 24) & (up > -24) & (up - back < 8)
+        values = numpy.where(wedge, 200, 10).astype("u2").transpose(2, 1, 0)
+        affine[:3, 3] = 0
+        program.write_nrrd("said.nrrd", values, geometry=nrrd_geometry("LPS", affine))
+        program.write_nrrd("silent.nrrd", values, (2, 2, 2))
+        self.brick("said.nrrd")
+        expected = self.picture("a.trip", "--size=96x96")
+        self.works("brick", "silent.nrrd", "-o", "a.trip", "-q", "--force", "--tf", "all.tf")
+        info = self.info("a.trip")
+        self.assertEqual(info["source"]["mirror"], "z")
+        self.assertNotIn("axes", info)
+        self.assertNotIn("space", info["source"])
+        text = self.works("info", "a.trip").stdout.decode()
+        self.assertIn("mirror-symmetric across z", text)
+        for end in "left", "right", "anterior", "superior":
+            self.assertNotIn(f"to {end}", text)
+        self.alike(self.picture("a.trip", "--size=96x96"), expected, "wedge", most=0.01, mean=5e-4)
+        # What is said is not overruled, not even by 0, 0, 1.
+        upright = self.picture("a.trip", "--size=96x96", "--up=0,0,1")
+        self.assertGreater(abs(upright - expected).mean(), 0.02)
+        run = self.works("render", "silent.nrrd", "-o", "b.png", "--size=32x32", "--tf", "all.tf")
+        self.assertIn("--up, --view and --axes say otherwise", run.stderr)
+        run = self.works("render", "said.nrrd", "-o", "b.png", "--size=32x32", "--tf", "all.tf")
+        self.assertNotIn("symmetric", run.stderr)
+
     def bright_from_middle(self, name):
         """From the middle of what tests/regress/NAME holds to that of its bright part, in pixels."""
         program.write("red.tf", b"values data\n49 0 0 1 0\n50 0 0 1 1\n200 0 0 1 1\n200 1 0 0 1\n")

@@ -71,6 +71,18 @@ static void vectors_are_named_by_the_ends_they_point_to_most_first(void **state)
     assert_string_equal(trip_anatomy_words("LPS", trip_v3(NAN, 0, 0), words), "");
 }
 
+static void axes_are_one_end_of_each_pair(void **state)
+{
+    (void)state;
+    static const char *const good[] = { "PIR", "LPS", "RAS", "SAL", "IRA" };
+    static const char *const bad[] = { "",    "P",   "PI",  "PIRR", "PAR", "LRS", "SIA",
+                                       "pir", "XYZ", "PI ", "PIR ", "LL",  "AAA" };
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+        assert_true(trip_anatomy_axes_valid(good[i]));
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_false(trip_anatomy_axes_valid(bad[i]));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -78,6 +90,7 @@ int main(void)
         cmocka_unit_test(each_end_of_the_body_is_where_its_convention_has_it),
         cmocka_unit_test(both_conventions_are_right_handed),
         cmocka_unit_test(vectors_are_named_by_the_ends_they_point_to_most_first),
+        cmocka_unit_test(axes_are_one_end_of_each_pair),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

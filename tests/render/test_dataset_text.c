@@ -157,6 +157,33 @@ static void thick_slices_without_an_orientation_are_a_scan_from_above(void **sta
     trip_dataset_text_destroy(t);
 }
 
+static void slices_of_what_is_mirrored_across_them_are_views_from_the_side(void **state)
+{
+    (void)state;
+    trip_vec3 up, d = view_from("{\"mirror\": \"z\"}", &up);
+    assert_true(up.y == -1 && -d.x > fabs(d.z) && d.y < 0);
+    d = view_from("{\"mirror\": \"z\", \"format\": \"nrrd\", \"front\": \"+z\"}", &up);
+    assert_true(up.y == -1 && d.z > fabs(d.x));
+    char *const others[][2] = {
+        { "{\"mirror\": \"z\", \"space\": \"LPS\"}", "{\"space\": \"LPS\"}" },
+        { "{\"mirror\": \"z\", \"oriented\": true}", "{\"oriented\": true}" },
+        { "{\"mirror\": \"z\", \"format\": \"openvdb\"}", "{\"format\": \"openvdb\"}" },
+        { "{\"mirror\": \"z\", \"format\": \"nifti\"}", "{\"format\": \"nifti\"}" },
+        { "{\"mirror\": \"z\", \"up\": \"+x\"}", "{\"up\": \"+x\"}" },
+        { "{\"mirror\": \"x\"}", "{}" },
+        { "{\"mirror\": \"y\"}", "{}" },
+        { "{\"mirror\": \"zz\"}", "{}" },
+        { "{\"mirror\": 2}", "{}" },
+    };
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        trip_vec3 own_up, other_up;
+        trip_vec3 own = view_from(others[i][0], &own_up),
+                  other = view_from(others[i][1], &other_up);
+        assert_true(trip_length(trip_sub(own, other)) == 0);
+        assert_true(trip_length(trip_sub(own_up, other_up)) == 0);
+    }
+}
+
 static void voxels_shown_but_left_out_are_counted_from_the_histogram(void **state)
 {
     (void)state;
@@ -194,6 +221,7 @@ int main(void)
         cmocka_unit_test(a_space_that_is_none_counts_as_not_given),
         cmocka_unit_test(thick_slices_of_a_known_orientation_are_not_turned_over),
         cmocka_unit_test(thick_slices_without_an_orientation_are_a_scan_from_above),
+        cmocka_unit_test(slices_of_what_is_mirrored_across_them_are_views_from_the_side),
         cmocka_unit_test(voxels_shown_but_left_out_are_counted_from_the_histogram),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
