@@ -57,6 +57,8 @@ enum {
     KEY_KERNEL_RADIUS,
     KEY_LOW_PASS,
     KEY_FLATTEN,
+    KEY_WEIGHTS,
+    KEY_NORMALISE,
     KEY_TARGET,
     KEY_RENDERER,
     KEY_QUALITY,
@@ -146,8 +148,9 @@ static const struct argp_option options[] = {
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
       "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
-      "pre with what only splats have (--lod, --kernel-radius, --kernel exact or ewa, --low-pass, "
-      "--flatten, --compositing, --target, --submit, "
+      "pre with what only splats have (--lod, --kernel-radius, --kernel exact, ewa or fixed, "
+      "--low-pass, "
+      "--flatten, --compositing, --method image, --weights, --target, --submit, "
       "--traversal ascending, --count) and for data without cells to interpolate in (default: "
       "auto)",
       3 },
@@ -170,9 +173,19 @@ static const struct argp_option options[] = {
       "The same for about so long a frame, by what others took: the picture then depends on the "
       "machine",
       3 },
-    { "method", KEY_METHOD, "NAME", 0, "merge, clip or axis (default: merge)", 3 },
+    { "method", KEY_METHOD, "NAME", 0,
+      "merge, clip, axis or image (sheets parallel to the image plane; by reference only) "
+      "(default: "
+      "merge)",
+      3 },
     { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
       3 },
+    { "weights", KEY_WEIGHTS, "pixel|vertex", 0,
+      "What merge blends by: the weights of each pixel, or of the corners of splats, interpolated "
+      "over them (by reference only) (default: pixel); pre only",
+      3 },
+    { "normalise", KEY_NORMALISE, NULL, 0,
+      "Divide colours by the opacity that has accumulated: what is covered at all is opaque", 3 },
     { "traversal", KEY_TRAVERSAL, "NAME", 0, "outward or ascending (default: outward)", 3 },
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 3 },
     { "low-pass", KEY_LOW_PASS, "NAME", 0,
@@ -209,7 +222,9 @@ static const struct argp_option options[] = {
       "integral only",
       4 },
     { "kernel", KEY_KERNEL, "NAME", 0,
-      "Footprints of splats, exact or ewa (by the affine map at the centre; default: exact); "
+      "Footprints of splats, exact, ewa (by the affine map at the centre) or fixed (all as large "
+      "as "
+      "one in the middle; by reference and gl) (default: exact); "
       "interpolation of values, linear (the default), cubic (Catmull and Rom's, from 64 voxels) or "
       "gaussian (which smooths; not by integral); of --classify post, gl and reference draw cubic "
       "and gaussian, cpu does not",
@@ -244,13 +259,19 @@ typedef struct parse {
     bool kernel, integral; /* options of the integral renderer */
     bool again;            /* over settings that --quality or --error has chosen */
     bool footprint;        /* --kernel of splats, --low-pass or --flatten */
+    bool weights;
 } parse;
 
 static int parse_footprint(int key, const char *arg, parse *p)
 {
     static const char *const filters[] = { "ewa", "uniform", "none", NULL };
+    static const char *const weights[] = { "pixel", "vertex", NULL };
     triptych_settings *s = &p->o->settings;
     int which = 0, status;
+    if (key == KEY_WEIGHTS) {
+        p->weights = true;
+        return trip_option_choice("--weights", arg, weights, &s->vertex_weights);
+    }
     p->footprint = true;
     if (key == KEY_FLATTEN)
         return trip_option_number("--flatten", arg, 1, 100, &s->flatten);
@@ -422,7 +443,7 @@ static int parse_view(int key, char *arg, parse *p)
 static int parse_method(int key, char *arg, parse *p)
 {
     static const char *const compositings[] = { "splat", "sheet", NULL };
-    static const char *const methods[] = { "merge", "clip", "axis", NULL };
+    static const char *const methods[] = { "merge", "clip", "axis", "image", NULL };
     static const char *const traversals[] = { "outward", "ascending", NULL };
     triptych_settings *s = &p->o->settings;
     int which = 0, status;
@@ -443,6 +464,7 @@ static int parse_method(int key, char *arg, parse *p)
         status = trip_option_choice("--compositing", arg, compositings, &which);
         s->compositing = (triptych_compositing)which;
         return status;
+    case KEY_WEIGHTS:
     case KEY_LOW_PASS:
     case KEY_FLATTEN:
         return parse_footprint(key, arg, p);
@@ -525,6 +547,9 @@ static int parse_look(int key, char *arg, parse *p)
     case KEY_NO_SHADING:
         o->settings.shading = false;
         return 0;
+    case KEY_NORMALISE:
+        o->settings.normalise = true;
+        return 0;
     case KEY_BACKGROUND:
         p->background = true;
         return parse_background(arg, &o->settings);
@@ -536,7 +561,8 @@ static int parse_look(int key, char *arg, parse *p)
 /* Of values, or of splats. */
 static int parse_kernel(const char *arg, parse *p)
 {
-    static const char *const kernels[] = { "linear", "cubic", "gaussian", "exact", "ewa", NULL };
+    static const char *const kernels[] = { "linear", "cubic", "gaussian", "exact",
+                                           "ewa",    "fixed", NULL };
     triptych_settings *s = &p->o->settings;
     int which = 0, status = trip_option_choice("--kernel", arg, kernels, &which);
     bool of_values = which <= TRIPTYCH_GAUSSIAN;
@@ -681,8 +707,8 @@ static int check_integral(parse *p)
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");
-    if (integral && (p->h || p->order || p->compositing))
-        return trip_option_fail("--method, --h, --traversal, --compositing",
+    if (integral && (p->h || p->order || p->compositing || p->weights))
+        return trip_option_fail("--method, --h, --weights, --traversal, --compositing",
                                 "do not apply to --renderer integral, which has no layers");
     if (integral && o->settings.show != TRIPTYCH_SHOW_PICTURE)
         return trip_option_fail("--show", "does not apply to --renderer integral, which has no "
@@ -715,20 +741,50 @@ static int check_footprint(const parse *p)
     return 0;
 }
 
+/* What not every renderer draws implies one that does. */
+static int choose_renderer(parse *p)
+{
+    render_options *o = p->o;
+    const triptych_settings *s = &o->settings;
+    const bool image = s->method == TRIPTYCH_IMAGE, reference = image || s->vertex_weights;
+    const bool fixed = s->footprint == TRIPTYCH_FOOTPRINT_FIXED;
+    if (s->vertex_weights && s->method != TRIPTYCH_MERGE)
+        return trip_option_fail("--weights", "vertex goes with --method merge");
+    if (s->vertex_weights && s->compositing == TRIPTYCH_BY_SHEET)
+        return trip_option_fail("--weights", "vertex goes with --compositing splat");
+    if (image && (p->compositing || s->traversal != TRIPTYCH_OUTWARD))
+        return trip_option_fail("--method", "image goes without --compositing and --traversal");
+    if ((image || fixed) && (s->lod_px > 0 || s->max_bytes > 0 || s->max_ms > 0))
+        return trip_option_fail(image ? "--method image" : "--kernel fixed",
+                                "goes without --lod, --max-bytes and --max-ms");
+    if (reference && o->renderer != TRIPTYCH_RENDERER_AUTO &&
+        o->renderer != TRIPTYCH_RENDERER_REFERENCE)
+        return trip_option_fail(image ? "--method image" : "--weights vertex",
+                                "goes with --renderer reference only");
+    if (fixed && o->renderer == TRIPTYCH_RENDERER_CPU)
+        return trip_option_fail("--kernel fixed", "goes with --renderer reference and gl only");
+    if (o->renderer == TRIPTYCH_RENDERER_AUTO && (reference || fixed))
+        o->renderer = reference ? TRIPTYCH_RENDERER_REFERENCE : TRIPTYCH_RENDERER_GL;
+    return 0;
+}
+
 /* What only splats have implies them, also where it is what it would be by default. */
 static int choose_classify(parse *p)
 {
     render_options *o = p->o;
     bool splats = o->settings.traversal != TRIPTYCH_OUTWARD || p->kernel_radius || o->count ||
-                  p->compositing || p->footprint || p->target || p->lists || p->forms;
+                  p->compositing || p->footprint || p->weights || p->target || p->lists ||
+                  p->forms || o->settings.method == TRIPTYCH_IMAGE;
     if (o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
         return 0;
     const bool of_values = p->kernel && o->renderer != TRIPTYCH_RENDERER_INTEGRAL;
     if (splats && (p->slices || of_values))
-        return trip_option_fail(p->slices ? "--slices" : "--kernel linear, cubic or gaussian",
-                                "does not go with --kernel exact or ewa, --low-pass, --flatten, "
-                                "--kernel-radius, --compositing, --target, --submit, --count or "
-                                "--traversal ascending, which are of splats");
+        return trip_option_fail(
+            p->slices ? "--slices" : "--kernel linear, cubic or gaussian",
+            "does not go with --kernel exact, ewa or fixed, --low-pass, --flatten, "
+            "--kernel-radius, --method image, --weights, --compositing, --target, --submit, "
+            "--count or "
+            "--traversal ascending, which are of splats");
     if (splats)
         o->settings.classify = TRIPTYCH_PRE;
     else if (p->slices || of_values)
@@ -750,8 +806,11 @@ static int check_classify(const parse *p)
         return trip_option_fail("--classify", "does not apply to --renderer integral");
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
         return trip_option_fail("--traversal", "is outward with --classify post");
-    if (p->kernel_radius || p->compositing || p->footprint)
-        return trip_option_fail("--kernel, --low-pass, --flatten, --kernel-radius, --compositing",
+    if (o->settings.method == TRIPTYCH_IMAGE)
+        return trip_option_fail("--method", "image is of splats: give --classify pre");
+    if (p->kernel_radius || p->compositing || p->footprint || p->weights)
+        return trip_option_fail("--kernel, --low-pass, --flatten, --weights, --kernel-radius, "
+                                "--compositing",
                                 "apply to splats: give --classify pre");
     if (o->count)
         return trip_option_fail("--count", "counts splats: give --classify pre");
@@ -798,6 +857,8 @@ static int check(parse *p)
     status = check_integral(p);
     if (!status)
         status = check_footprint(p);
+    if (!status)
+        status = choose_renderer(p);
     if (!status)
         status = choose_classify(p);
     if (!status)

@@ -20,7 +20,8 @@ struct render_stats {
     cJSON *root, *frames;
 };
 
-static const char *const method_names[] = { "merge", "clip", "axis" };
+static const char *const footprint_names[] = { "exact", "ewa", "fixed" };
+static const char *const method_names[] = { "merge", "clip", "axis", "image" };
 
 static int out_of_memory(void)
 {
@@ -206,8 +207,7 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         cJSON_AddStringToObject(root, "compositing",
                                 o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
     if (frame.classify == TRIPTYCH_PRE)
-        cJSON_AddStringToObject(root, "kernel",
-                                o->settings.footprint == TRIPTYCH_FOOTPRINT_EWA ? "ewa" : "exact");
+        cJSON_AddStringToObject(root, "kernel", footprint_names[o->settings.footprint]);
     if (o->settings.lod_px > 0)
         cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
     if (frame.effects) {

@@ -54,6 +54,7 @@ struct triptych {
     int effects;             /* as set; frames have what they come to in drawn_settings */
     const char *why_effects; /* of those that auto chose or left; NULL: nothing was left to it */
     trip_light_map *light;   /* of frames with shadows or occlusion; NULL: none was drawn of late */
+    bool normalise;          /* colours by opacity, as set */
     bool
         counting; /* frames count exactly, and draw what is occluded too; the reader is for that: */
     bool reader_counts;

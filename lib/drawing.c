@@ -7,8 +7,10 @@
 #include "dataset_level.h"
 #include "kernel.h"
 #include "lod_limit.h"
+#include "normalise.h"
 #include "report.h"
 #include "rounding.h"
+#include "splat.h"
 #include "tint.h"
 
 static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
@@ -171,6 +173,8 @@ static const char *needs_splats(const triptych *t)
         return "splats are to be composited by sheets";
     if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
         return "a kernel or low-pass of splats is set";
+    if (s->method == TRIP_METHOD_IMAGE || s->vertex_weights)
+        return "image-aligned sheets or weights of vertices are of splats";
     if (s->kernel_radius != TRIP_KERNEL_RADIUS_VOXELS)
         return "a kernel radius is set";
     if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
@@ -192,6 +196,8 @@ static void choose_settings(triptych *t)
     if (!t->settings.slices)
         t->drawn_settings.slices = t->slices.slices;
     t->drawn_settings.clip = trip_context_clip(t);
+    if (t->normalise) /* what is behind comes after that */
+        memset(t->drawn_settings.background, 0, sizeof t->drawn_settings.background);
 }
 
 /* The plan of a frame by the integral renderer: what its field is made of. */
@@ -229,10 +235,29 @@ static int check_splats(const triptych *t)
     return 0;
 }
 
+/* The size of sprites that all have one. */
+static int choose_sprites(triptych *t)
+{
+    trip_settings *s = &t->drawn_settings;
+    const uint64_t *dims = t->session.data->header.dims;
+    if (s->footprint != TRIP_FOOTPRINT_FIXED)
+        return 0;
+    const trip_vec3 middle = trip_v3(0.5 * ((double)dims[0] - 1), 0.5 * ((double)dims[1] - 1),
+                                     0.5 * ((double)dims[2] - 1));
+    s->sprite_px = trip_splat_sprite_px(&t->camera, s, middle);
+    if (s->sprite_px > 0)
+        return 0;
+    return trip_fail(TRIP_USAGE, "render", "kernel",
+                     "footprints of a fixed size have that of one in the middle of the volume, "
+                     "which lies behind the eye");
+}
+
 static int plan_frame(triptych *t)
 {
     session *s = &t->session;
     int status = check_splats(t);
+    if (!status)
+        status = choose_sprites(t);
     if (status)
         return status;
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL && t->settings.show)
@@ -391,11 +416,20 @@ static void take_means(const float *fine, int side, int width, int height, float
         }
 }
 
+static int take_drawn(triptych *t, float *rgba, float *depth)
+{
+    int status = trip_frame_picture(&t->drawing, rgba, depth);
+    if (!status && t->normalise)
+        trip_normalise(rgba, (size_t)t->camera.width * (size_t)t->camera.height,
+                       t->settings.background);
+    return status;
+}
+
 static int take_colours(triptych *t, float *rgba, float *depth)
 {
     const int side = pixels_a_side(t);
     if (side == 1)
-        return trip_frame_picture(&t->drawing, rgba, depth);
+        return take_drawn(t, rgba, depth);
     trip_budget *budget = t->session.budget;
     size_t bytes = (size_t)t->camera.width * (size_t)t->camera.height * 4 * sizeof *rgba;
     float *fine = trip_budget_take(budget, bytes);
@@ -404,7 +438,7 @@ static int take_colours(triptych *t, float *rgba, float *depth)
                          "a picture %d times as wide and high does not fit the memory given; raise "
                          "--memory or take fewer",
                          side);
-    int status = trip_frame_picture(&t->drawing, fine, NULL);
+    int status = take_drawn(t, fine, NULL);
     if (!status)
         take_means(fine, side, t->turned.width, t->turned.height, rgba);
     trip_budget_release(budget, fine, bytes);

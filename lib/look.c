@@ -85,6 +85,7 @@ int triptych_set_quality(triptych_settings *s, triptych_quality quality)
     s->footprint = usual.footprint;
     s->low_pass = usual.low_pass;
     s->flatten = usual.flatten;
+    s->vertex_weights = usual.vertex_weights;
     s->slices = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 8 : 0;
     s->slices = quality == TRIPTYCH_EXACT ? 16 : s->slices;
     s->method = usual.method;
@@ -113,7 +114,7 @@ static const char *fault_of_splats(const triptych_settings *s)
 {
     if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
         return "there is no such compositing";
-    if (s->footprint < TRIPTYCH_FOOTPRINT_EXACT || s->footprint > TRIPTYCH_FOOTPRINT_EWA ||
+    if (s->footprint < TRIPTYCH_FOOTPRINT_EXACT || s->footprint > TRIPTYCH_FOOTPRINT_FIXED ||
         s->low_pass < TRIPTYCH_LOW_PASS_EWA || s->low_pass > TRIPTYCH_LOW_PASS_NONE)
         return "there is no such footprint or low-pass";
     if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
@@ -166,7 +167,7 @@ static const char *fault_of_settings(const triptych_settings *s)
 {
     trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
     double length = trip_length(light);
-    if (s->method < TRIPTYCH_MERGE || s->method > TRIPTYCH_AXIS ||
+    if (s->method < TRIPTYCH_MERGE || s->method > TRIPTYCH_IMAGE ||
         s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
         s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
         return "there is no such method, traversal or target";
@@ -250,6 +251,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .footprint = (trip_footprint)s->footprint,
         .low_pass = (trip_low_pass)s->low_pass,
         .flatten = s->flatten,
+        .vertex_weights = s->vertex_weights,
         .slices = s->slices,
         .method = (trip_method)s->method,
         .traversal = (trip_traversal)s->traversal,
@@ -274,6 +276,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
     t->max_ms = s->max_ms;
     t->clip = s->clip;
     t->counting = s->count;
+    t->normalise = s->normalise;
     if (!s->headlight)
         t->settings.light_direction =
             trip_normalize(trip_v3(s->light[0], s->light[1], s->light[2]));

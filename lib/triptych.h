@@ -189,6 +189,8 @@ typedef enum triptych_method {
     TRIPTYCH_MERGE, /* three layers, blended */
     TRIPTYCH_CLIP,  /* each pixel from one layer */
     TRIPTYCH_AXIS,  /* one layer for the picture */
+    TRIPTYCH_IMAGE, /* sheets parallel to the image plane (Mueller & Crawfis 1998), which have no
+                       order of lists; pre, by the reference alone */
 } triptych_method;
 
 typedef enum triptych_traversal {
@@ -217,11 +219,12 @@ typedef enum triptych_kernel {
 typedef enum triptych_classify {
     TRIPTYCH_PRE,  /* voxels are classified, and their splats drawn */
     TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
-    /* Post, but pre where something is set that only splats have (ascending traversal, a rounded
-     * target, indexed, triangles, coarse levels, by sheet, EWA footprints, another low-pass or
-     * kernel radius than 2, count), or the data has no cells to interpolate in: one voxel thick, or
-     * culled without a halo. triptych_explain() says which. Memory has no part in it: where post
-     * does not fit, the frame fails, and names what would do. */
+    /* Post, but pre where something is set that only splats have (ascending traversal, the
+     * method image, weights of vertices, a rounded target, indexed, triangles, coarse levels, by
+     * sheet, EWA footprints, another low-pass or kernel radius than 2, count), or the data has no
+     * cells to interpolate in: one voxel thick, or culled without a halo. triptych_explain() says
+     * which. Memory has no part in it: where post does not fit, the frame fails, and names what
+     * would do. */
     TRIPTYCH_CLASSIFY_AUTO,
 } triptych_classify;
 
@@ -235,6 +238,8 @@ typedef enum triptych_compositing {
 typedef enum triptych_footprint {
     TRIPTYCH_FOOTPRINT_EXACT, /* from the distance of every pixel's ray */
     TRIPTYCH_FOOTPRINT_EWA,   /* by the affine map at its centre, as EWA volume splatting does */
+    TRIPTYCH_FOOTPRINT_FIXED, /* a circle of one size in pixels, that of one in the middle of the
+                                 volume; by the reference and gl */
 } triptych_footprint;
 
 /* What keeps splats from falling between pixels (pre). */
@@ -276,6 +281,10 @@ typedef struct triptych_settings {
     triptych_compositing compositing; /* pre */
     triptych_footprint footprint;     /* pre */
     triptych_low_pass low_pass;       /* pre */
+    int vertex_weights; /* not 0: merge takes weights from the corners of splats (pre, by splat; by
+                           the reference alone) */
+    int normalise;      /* not 0: colours are divided by the opacity that has accumulated, and what
+                           is covered at all is opaque */
     double flatten; /* of EWA footprints: how many times flatter kernels are along full gradients, 1
                        (round) to 100; without count */
     int slices; /* of a sheet, post: 1 to 16, more come closer to the integral; 0: by the view */
@@ -329,9 +338,8 @@ typedef enum triptych_quality {
 } triptych_quality;
 
 /* Changes what accuracy is traded for time by: classify, compositing, footprint, low_pass, flatten,
- * slices, method, h, target, kernel_radius, lod_px, max_bytes, max_ms and samples; the rest stays.
- * TRIPTYCH_USAGE: there is no
- * such quality. */
+ * vertex_weights, slices, method, h, target, kernel_radius, lod_px, max_bytes, max_ms and samples;
+ * the rest stays. TRIPTYCH_USAGE: there is no such quality. */
 TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 

@@ -230,6 +230,26 @@ static int check_camera(const trip_camera *c)
     return isfinite(sum) ? 0 : trip_splat_fail();
 }
 
+static int check_forms(const trip_settings *s, const trip_renderer *renderer)
+{
+    const struct {
+        bool wanted;
+        unsigned form;
+        const char *why;
+    } forms[] = {
+        { s->footprint == TRIP_FOOTPRINT_FIXED, TRIP_DRAWS_FIXED,
+          "draws no footprints of a fixed size: reference and gl do" },
+        { s->vertex_weights, TRIP_DRAWS_VERTEX_WEIGHTS,
+          "weighs pixels, not vertices: the reference does that" },
+        { s->method == TRIP_METHOD_IMAGE, TRIP_DRAWS_IMAGE_SHEETS,
+          "draws no image-aligned sheets: the reference does" },
+    };
+    for (size_t i = 0; i < sizeof forms / sizeof *forms; i++)
+        if (forms[i].wanted && !(renderer->ops->forms & forms[i].form))
+            return trip_fail(TRIP_USAGE, "render", renderer->ops->name, "%s", forms[i].why);
+    return 0;
+}
+
 /* What the renderer cannot draw. */
 static int check_renderer(const trip_frame *frame, const trip_renderer *renderer)
 {
@@ -241,7 +261,7 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
     if (trip_effects_some(&s->effects) && !(renderer->ops->effects >> s->classify & 1))
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects; choose another renderer, or none: --effects none");
-    return 0;
+    return frame->plan->gathers ? 0 : check_forms(s, renderer);
 }
 
 int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *reader,

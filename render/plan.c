@@ -465,6 +465,8 @@ static void explain_footprints(const trip_settings *s, FILE *out)
 {
     if (s->footprint == TRIP_FOOTPRINT_EWA)
         fprintf(out, "kernel      ewa: footprints by the affine map at each splat's centre\n");
+    if (s->footprint == TRIP_FOOTPRINT_FIXED)
+        fprintf(out, "kernel      fixed: every footprint %.4g pixels wide\n", s->sprite_px);
     if (s->low_pass == TRIP_LOW_PASS_NONE)
         fprintf(out, "low-pass    does not run: switched off\n");
     else if (s->low_pass == TRIP_LOW_PASS_UNIFORM)
@@ -510,11 +512,16 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     explain_footprints(s, out);
     switch (s->method) {
     case TRIP_METHOD_MERGE:
-        fprintf(out, "method      merge: layers of up to three lists, blended by w^2 with h = %g\n",
-                s->h);
+        fprintf(out,
+                "method      merge: layers of up to three lists, blended by w^2 with h = %g%s\n",
+                s->h, s->vertex_weights ? ", w from the corners of splats" : "");
         break;
     case TRIP_METHOD_CLIP:
         fprintf(out, "method      clip: every pixel from the list its ray is most aligned with\n");
+        break;
+    case TRIP_METHOD_IMAGE:
+        fprintf(out, "method      image: sheets parallel to the image plane, from list %c\n",
+                axis_names[plan->axis_of_view]);
         break;
     case TRIP_METHOD_AXIS:
         fprintf(out, "method      axis: list %c alone, by the ray at the image centre\n",

@@ -48,6 +48,8 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
     if (settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
         room = TRIP_SPLAT_AFFINE_REACH * TRIP_SPLAT_AFFINE_REACH;
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
+    const bool fixed = settings->footprint == TRIP_FOOTPRINT_FIXED;
+    double widest = fixed ? trip_splat_fixed_radius_px(settings) : TRIP_CUTOFF * TRIP_LOW_PASS_PX;
     return (trip_cull){
         .camera = camera,
         .settings = settings,
@@ -57,11 +59,11 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
                    side(camera, camera->to_x, camera->width - 0.5, -1),
                    side(camera, camera->to_y, camera->height - 0.5, -1) },
-        .radius2 = room * radius * radius,
+        .radius2 = fixed ? 0 : room * radius * radius,
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
-         * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. */
-        .low_pass2 =
-            room * TRIP_CUTOFF * TRIP_CUTOFF * TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX * pixel2,
+         * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. Of fixed footprints all there
+         * is. */
+        .low_pass2 = room * widest * widest * pixel2,
         .behind = about ? 0 : behind_eye(camera, settings),
         .table = table,
         .about = about,
@@ -136,7 +138,7 @@ static bool outside(const trip_cull *cull, const box *b, double radius)
 static bool may_weigh(const trip_cull *cull, const box *b, double radius, int axis)
 {
     double lo[3], hi[3];
-    if (cull->settings->method == TRIP_METHOD_AXIS || cull->camera->ortho)
+    if (trip_settings_has_one_list(cull->settings) || cull->camera->ortho)
         return true; /* decided for the list as a whole */
     for (int a = 0; a < 3; a++) {
         lo[a] = (b->lo[a] - radius) * cull->grid->scale[a];
@@ -163,7 +165,7 @@ static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
 static double reach_over_clip(const trip_cull *cull)
 {
     const trip_settings *s = cull->settings;
-    double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
+    double h = trip_settings_has_one_list(s) ? 0 : trip_weight_h(s);
     if (!cull->about)
         return 0;
     return trip_sheet_reach(s->kernel) + (h * TRIP_CULL_STEEPEST > 1 ? 1 / h : TRIP_CULL_STEEPEST);

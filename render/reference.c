@@ -6,6 +6,7 @@
 #include <limits.h>
 #include <string.h>
 
+#include "image_sheets.h"
 #include "layer.h"
 #include "light_map.h"
 #include "normal.h"
@@ -26,6 +27,7 @@ typedef struct pixel {
     double stretch;    /* world units per index length of the list at hand, along the ray */
     double ray_length; /* |J r(p)| of it */
     double merged[TRIP_CHANNELS_MAX]; /* sum of w^2 layer over the layers that are done */
+    double merged_weight;             /* sum of w^2 likewise */
 } pixel;
 
 typedef struct reference {
@@ -42,6 +44,7 @@ typedef struct reference {
     pixel *pixels;
     size_t pixels_bytes;
     trip_reference_sheets *sheets; /* of frames that classify after interpolation; else NULL */
+    trip_image_sheets *slabs;      /* of frames that are composited by them; else NULL */
     int axis;                      /* of the layer being drawn; -1 before the first */
     bool sums;                     /* splats, sheet by sheet */
     int64_t sheet;                 /* that is open, of `list` */
@@ -58,6 +61,7 @@ static void destroy(trip_renderer *base)
     reference *r = (reference *)base;
     trip_budget *budget = r->budget;
     trip_reference_sheets_destroy(r->sheets);
+    trip_image_sheets_destroy(r->slabs);
     trip_budget_release(budget, r->pixels, r->pixels_bytes);
     trip_budget_release(budget, r->stats, r->stats_room * sizeof *r->stats);
     trip_budget_release(budget, r, sizeof *r);
@@ -126,7 +130,9 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     reference *r = (reference *)base;
     const trip_file_header *header = &frame->data->header;
     trip_reference_sheets_destroy(r->sheets);
+    trip_image_sheets_destroy(r->slabs);
     r->sheets = NULL;
+    r->slabs = NULL;
     r->frame = frame;
     r->channels = trip_layer_channels(frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world);
@@ -143,7 +149,10 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         return status;
     if (frame->settings->classify == TRIP_CLASSIFY_POST)
         return trip_reference_sheets_create(&r->sheets, frame, r->budget);
-    return clear_pixels(r);
+    if (frame->settings->method == TRIP_METHOD_IMAGE)
+        status = trip_image_sheets_create(&r->slabs, frame->camera, frame->settings, header->dims,
+                                          r->budget);
+    return status ? status : clear_pixels(r);
 }
 
 /* Puts a fragment behind what is there (front to back) or over it. */
@@ -205,8 +214,10 @@ static int fold_layer(reference *r)
     end_sheet(r);
     for (int y = 0; y < camera->height && !status; y++) {
         pixel *row = row_of(r, y);
-        for (int x = 0; x < camera->width; x++)
+        for (int x = 0; x < camera->width; x++) {
             add_layer(r, row[x].layer, row[x].weight, row[x].merged);
+            row[x].merged_weight += row[x].weight * row[x].weight;
+        }
         status = trip_frame_poll();
     }
     return status;
@@ -226,7 +237,10 @@ static int begin_layer(trip_renderer *base, int axis)
             pixel *p = &row_of(r, y)[x];
             trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
             memset(p->layer, 0, sizeof p->layer);
-            p->weight = trip_weight(r->frame->settings, r->frame->plan->axis_of_view, ray, axis);
+            p->weight = 0; /* of vertices: until a splat is drawn there */
+            if (!r->frame->settings->vertex_weights)
+                p->weight =
+                    trip_weight(r->frame->settings, r->frame->plan->axis_of_view, ray, axis);
         }
         status = trip_frame_poll();
     }
@@ -265,28 +279,69 @@ static void put_fragment(const reference *r, pixel *p, const double fragment[TRI
         p->sheet[c] += depth * fragment[c];
 }
 
+/* The weights of the corners of a splat's bounds, left and right above, then below: below 0 where
+ * the list has none. False where no corner has any. */
+static bool weigh_corners(const reference *r, const trip_splat *s, double weights[4])
+{
+    bool some = false;
+    for (int i = 0; i < 4; i++) {
+        trip_vec3 ray =
+            trip_camera_ray(r->frame->camera, i & 1 ? s->x1 : s->x0, i & 2 ? s->y1 : s->y0);
+        weights[i] = trip_weight_signed(r->frame->settings, ray, r->axis);
+        some |= weights[i] > 0;
+    }
+    return some;
+}
+
+/* Linear over each of two triangles, which meet from the right above to the left below; as a depth
+ * buffer holds it, not below 0. */
+static double weight_within(const trip_splat *s, const double w[4], double x, double y)
+{
+    double u = (x - s->x0) / (s->x1 - s->x0), v = (y - s->y0) / (s->y1 - s->y0);
+    if (u + v <= 1)
+        return fmax(0, w[0] + u * (w[1] - w[0]) + v * (w[2] - w[0]));
+    return fmax(0, w[3] + (1 - u) * (w[2] - w[3]) + (1 - v) * (w[1] - w[3]));
+}
+
+/* Of a pixel in the support. */
+static void draw_pixel(reference *r, const trip_splat *s, trip_vec3 voxel, int x, int y,
+                       double fragment[TRIP_CHANNELS_MAX], double extinction)
+{
+    pixel *p = &row_of(r, y)[x];
+    double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
+    double footprint = s->amplitude * (exp(-m / 2) - r->constants.edge);
+    double depth = extinction * (s->affine ? 1 : p->stretch) * footprint;
+    fragment[TRIP_CHANNEL_DEPTH] = fmax(0, s->z) * p->ray_length;
+    if (r->slabs)
+        trip_image_sheets_add(r->slabs, &r->constants, voxel, x, y, fragment, depth);
+    else
+        put_fragment(r, p, fragment, depth * trip_splat_front(&r->constants, s, x + 0.5, y + 0.5));
+}
+
 /* True when some pixel centre is in the support where the layer has weight. */
-static bool draw_footprint(reference *r, const trip_splat *s, double fragment[TRIP_CHANNELS_MAX],
-                           double extinction)
+static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
+                           double fragment[TRIP_CHANNELS_MAX], double extinction)
 {
     const trip_camera *camera = r->frame->camera;
+    const bool by_vertices = r->frame->settings->vertex_weights;
     trip_pixels columns = trip_pixels_within(s->x0, s->x1, camera->width);
     trip_pixels rows = trip_pixels_within(s->y0, s->y1, camera->height);
+    double weights[4];
     bool touched = false;
+    if (by_vertices && !weigh_corners(r, s, weights))
+        return false;
     r->rows.first = rows.first < r->rows.first ? rows.first : r->rows.first;
     r->rows.last = rows.last > r->rows.last ? rows.last : r->rows.last;
     for (int y = rows.first; y <= rows.last && !trip_interrupted(); y++) {
         for (int x = columns.first; x <= columns.last; x++) {
             pixel *p = &row_of(r, y)[x];
             double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
-            if (!(p->weight > 0 && m <= r->constants.cutoff2))
+            if (!((p->weight > 0 || by_vertices) && m <= r->constants.cutoff2))
                 continue;
             touched = true;
-            double front = trip_splat_front(&r->constants, s, x + 0.5, y + 0.5);
-            double footprint = front * s->amplitude * (exp(-m / 2) - r->constants.edge);
-            fragment[TRIP_CHANNEL_DEPTH] = fmax(0, s->z) * p->ray_length;
-            double stretch = s->affine ? 1 : p->stretch;
-            put_fragment(r, p, fragment, extinction * stretch * footprint);
+            if (by_vertices)
+                p->weight = weight_within(s, weights, x + 0.5, y + 0.5);
+            draw_pixel(r, s, voxel, x, y, fragment, extinction);
         }
     }
     return touched;
@@ -356,7 +411,7 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     const trip_tf_entry *entry = &r->list->table[trip_voxel_code(record)];
     double fragment[TRIP_CHANNELS_MAX] = { [TRIP_CHANNEL_ALPHA] = 1 };
     colour(r, voxel, entry, normal, fragment);
-    stats->splats_drawn += draw_footprint(r, &s, fragment, entry->extinction);
+    stats->splats_drawn += draw_footprint(r, &s, voxel, fragment, entry->extinction);
 }
 
 /* Index position of a record: sheet along the list's axis, u and v along the next two. */
@@ -424,6 +479,11 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
 static double weight_sum(const reference *r, int x, int y)
 {
     const trip_frame *frame = r->frame;
+    if (frame->settings->vertex_weights) {
+        const pixel *p = &row_of(r, y)[x];
+        double all = p->merged_weight + p->weight * p->weight;
+        return all > 0 ? all : 1; /* nothing is there */
+    }
     trip_vec3 ray = trip_camera_ray(frame->camera, x + 0.5, y + 0.5);
     double sum = 0;
     for (int axis = 0; axis < 3; axis++) {
@@ -471,6 +531,8 @@ static void merge_splats(const reference *r, int x, int y, double merged[TRIP_CH
     double layer[TRIP_CHANNELS_MAX];
     memcpy(layer, p->layer, sizeof layer);
     composite_sheet(r, p->sheet, layer);
+    for (int n = 0; r->slabs && n < trip_image_sheets_count(r->slabs); n++)
+        composite_sheet(r, trip_image_sheets_at(r->slabs, x, y, n), layer);
     memcpy(merged, p->merged, sizeof p->merged);
     add_layer(r, layer, p->weight, merged);
 }
@@ -506,6 +568,7 @@ static const trip_renderer_ops reference_ops = {
     .name = "reference",
     .classifies_post = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
+    .forms = TRIP_DRAWS_FIXED | TRIP_DRAWS_VERTEX_WEIGHTS | TRIP_DRAWS_IMAGE_SHEETS,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

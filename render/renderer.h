@@ -63,10 +63,18 @@ enum {
     TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk is at work */
 };
 
+/* Forms that the papers compare with, which not every renderer draws. */
+enum {
+    TRIP_DRAWS_FIXED = 1,          /* footprints of a fixed size */
+    TRIP_DRAWS_VERTEX_WEIGHTS = 2, /* weights interpolated between vertices */
+    TRIP_DRAWS_IMAGE_SHEETS = 4,   /* sheets parallel to the image plane */
+};
+
 typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
     bool classifies_post; /* draws frames whose settings say so (sheet.h) */
     unsigned effects;     /* draws frames with effects: a bit per trip_classify */
+    unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);

@@ -23,8 +23,31 @@ trip_settings trip_settings_default(void)
     };
 }
 
+/* What the forms of splats that the papers compare with exclude. */
+static int check_forms(const trip_settings *s)
+{
+    const bool image = s->method == TRIP_METHOD_IMAGE;
+    if ((image || s->footprint == TRIP_FOOTPRINT_FIXED) && trip_settings_has_levels(s))
+        return trip_fail(TRIP_USAGE, "render", "levels",
+                         "sprites of a fixed size and image-aligned sheets are of the finest");
+    if (image && (s->traversal != TRIP_TRAVERSAL_OUTWARD || trip_settings_sum_sheets(s)))
+        return trip_fail(TRIP_USAGE, "render", "method",
+                         "image-aligned sheets have no traversal, and are sums already");
+    if (s->vertex_weights && (s->method != TRIP_METHOD_MERGE || trip_settings_sum_sheets(s)))
+        return trip_fail(TRIP_USAGE, "render", "weights",
+                         "those of vertices are of splats that are merged one by one");
+    if (s->classify == TRIP_CLASSIFY_POST && (image || s->vertex_weights))
+        return trip_fail(TRIP_USAGE, "render", "method",
+                         "image-aligned sheets and weights of vertices are of splats; classify "
+                         "pre");
+    return 0;
+}
+
 int trip_settings_check(const trip_settings *s)
 {
+    int status = check_forms(s);
+    if (status)
+        return status;
     if (s->depth && s->target != TRIP_TARGET_RGBA32F)
         return trip_fail(TRIP_USAGE, "render", "depth",
                          "rounded layers have no depth; leave the target at rgba32f");

@@ -24,6 +24,8 @@ typedef enum trip_method {
     TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005, 5.2; 2008, 4.2) */
     TRIP_METHOD_CLIP,  /* every pixel from the list its ray is most aligned with (2005, 5.1) */
     TRIP_METHOD_AXIS,  /* one list per frame, by the ray at the image centre (Westover 1989) */
+    TRIP_METHOD_IMAGE, /* sheets parallel to the image plane, which splats are cut into (Mueller &
+                          Crawfis 1998, image_sheets.h); any one list will do */
 } trip_method;
 
 typedef enum trip_traversal {
@@ -47,6 +49,7 @@ typedef enum trip_field_kind {
 typedef enum trip_footprint {
     TRIP_FOOTPRINT_EXACT, /* from the distance of every pixel's ray */
     TRIP_FOOTPRINT_EWA,   /* by the affine map at the centre (Zwicker et al. 2001) */
+    TRIP_FOOTPRINT_FIXED, /* of one size in pixels, sprite_px (2008, 5.2) */
 } trip_footprint;
 
 /* What keeps footprints from falling between pixel centres (ewa.h). */
@@ -104,7 +107,9 @@ typedef struct trip_settings {
     trip_low_pass low_pass;       /* likewise */
     double
         flatten; /* of EWA footprints: how much flatter kernels are along the gradient, 1: round */
-    int slices;  /* of a sheet, post: 1 to TRIP_SLICES_MAX */
+    double sprite_px;    /* of fixed footprints: their width, trip_splat_sprite_px() */
+    bool vertex_weights; /* merge: weights of a splat's corners, interpolated over it (2008, 4.2) */
+    int slices;          /* of a sheet, post: 1 to TRIP_SLICES_MAX */
     trip_method method;
     trip_traversal traversal;
     trip_target target;
@@ -141,6 +146,12 @@ trip_settings trip_settings_default(void);
 static inline bool trip_settings_sum_sheets(const trip_settings *s)
 {
     return s->classify == TRIP_CLASSIFY_PRE && s->compositing == TRIP_COMPOSITING_SHEET;
+}
+
+/* Whether a frame has one list, that of the axis of view. */
+static inline bool trip_settings_has_one_list(const trip_settings *s)
+{
+    return s->method == TRIP_METHOD_AXIS || s->method == TRIP_METHOD_IMAGE;
 }
 
 /* Whether coarse levels may be drawn. */

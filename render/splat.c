@@ -15,6 +15,9 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
         .cutoff2 = cutoff2,
         .affine = settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho,
         .low_pass = settings->low_pass,
+        .fixed = settings->footprint == TRIP_FOOTPRINT_FIXED
+                     ? settings->sprite_px / (2 * TRIP_CUTOFF)
+                     : 0,
         .flatten = settings->flatten > 1 ? 1 - 1 / (settings->flatten * settings->flatten) : 0,
         .low_pass2 =
             settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX,
@@ -102,6 +105,57 @@ static trip_covariance2 low_passed(const trip_splat_frame *f, const trip_covaria
 {
     return f->low_pass == TRIP_LOW_PASS_UNIFORM ? trip_covariance2_scaled(s, f->low_pass2)
                                                 : trip_covariance2_low_passed(s, f->low_pass2);
+}
+
+/* Conic, amplitude (without stretch), bounds and radius of a footprint of fixed size; z is 1 in
+ * parallel views. */
+static void set_fixed(const trip_splat_frame *f, double z, trip_splat *s)
+{
+    double exact2 = f->fixed * f->fixed, wide2 = exact2 + f->low_pass2;
+    double reach = sqrt(f->cutoff2 * wide2);
+    s->conic_xx = s->conic_yy = 1 / wide2;
+    s->conic_xy = 0;
+    s->amplitude = f->amplitude * (exact2 / wide2);
+    s->x0 = s->x - reach;
+    s->x1 = s->x + reach;
+    s->y0 = s->y - reach;
+    s->y1 = s->y + reach;
+    s->radius = z * reach * sqrt(f->rxrx + f->ryry);
+}
+
+double trip_splat_fixed_radius_px(const trip_settings *settings)
+{
+    return hypot(settings->sprite_px / 2,
+                 settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_CUTOFF * TRIP_LOW_PASS_PX);
+}
+
+double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *settings,
+                            trip_vec3 middle)
+{
+    trip_covariance kernel = trip_covariance_round(settings->kernel_radius / TRIP_CUTOFF);
+    trip_vec3 from_eye = trip_sub(middle, camera->eye);
+    if (!camera->ortho && !(trip_dot(camera->forward, from_eye) > 0))
+        return 0;
+    trip_ray_space j = trip_ray_space_at(camera, from_eye);
+    return 2 * TRIP_CUTOFF * sqrt(sqrt(trip_covariance_integrated(&kernel, &j).det));
+}
+
+/* A splat in perspective of fixed size; false behind the eye, and where it is so near that its
+ * place in the picture is no number. */
+static bool project_fixed(const trip_splat_frame *f, trip_vec3 v, trip_splat *s)
+{
+    const double farthest_px = 1e9;
+    trip_vec3 ray, c;
+    if (!(s->z > 0))
+        return false;
+    place(f, v, s, &ray, &c);
+    if (!(fabs(s->x) < farthest_px && fabs(s->y) < farthest_px))
+        return *s = (trip_splat){ .z = s->z }, false;
+    set_fixed(f, s->z, s);
+    s->affine = true;
+    s->ray2 = 1;
+    s->amplitude *= trip_splat_stretch(f, s->x, s->y);
+    return true;
 }
 
 /* Whether the rays of the round kernel's support differ so little from r_c. */
@@ -250,13 +304,22 @@ static double slant(const trip_splat_frame *f, const trip_splat *s)
             fabs(trip_dot(f->camera.r0, f->camera.ry)) * (s->y1 - s->y0));
 }
 
+static void set_parallel_footprint(const trip_splat_frame *f, trip_vec3 ray, trip_vec3 c,
+                                   trip_splat *s)
+{
+    set_footprint(f, ray, c, s);
+    if (f->fixed > 0)
+        set_fixed(f, 1, s);
+    else
+        set_bounds(f, ray, s);
+}
+
 double trip_splat_parallel_near(const trip_splat_frame *f)
 {
     trip_splat s = { .z = 1 };
     trip_vec3 ray, c;
     place(f, f->camera.r0, &s, &ray, &c);
-    set_footprint(f, ray, c, &s);
-    set_bounds(f, ray, &s);
+    set_parallel_footprint(f, ray, c, &s);
     return (sqrt(f->cutoff2) + slant(f, &s)) * f->sigma / trip_length(f->camera.r0);
 }
 
@@ -265,8 +328,7 @@ static bool project_parallel(const trip_splat_frame *f, trip_vec3 v, const trip_
 {
     trip_vec3 ray, c;
     place(f, v, s, &ray, &c);
-    set_footprint(f, ray, c, s);
-    set_bounds(f, ray, s);
+    set_parallel_footprint(f, ray, c, s);
     double unit = f->sigma / trip_length(f->camera.r0);
     double reach = (sqrt(f->cutoff2) + slant(f, s)) * unit;
     s->near = !(s->z >= reach);
@@ -300,6 +362,8 @@ bool trip_splat_project_flat(const trip_splat_frame *f, trip_vec3 voxel,
     *out = (trip_splat){ .z = trip_dot(f->camera.forward, v) };
     if (f->camera.ortho)
         return project_parallel(f, v, flat, out);
+    if (f->fixed > 0)
+        return project_fixed(f, v, out);
     if (f->affine)
         return (out->z > 0 && project_affine(f, v, flat, out)) || set_near(f, v, out);
     if (out->z > 0) {

@@ -69,6 +69,12 @@
  * of cubes on the axis of view that is from 2.8 kernel radii off the eye on. Other splats have
  * the numbers of near ones. With settings.low_pass none S' is S; uniform, see ewa.h.
  *
+ * With settings.footprint FIXED (Hofsetz, Max & Bastos 2008, section 5.2) every footprint is a
+ * circle of settings.sprite_px P pixels, as point sprites are: S = (P / (2 k))^2 I, in the formulas
+ * of EWA, wherever the splat lies in front of the eye. Its optical depth at the centre, before the
+ * low-pass, is that of the exact footprint; what it covers is not. In parallel views only S is
+ * replaced.
+ *
  * With settings.flatten s > 1 the kernel of a voxel with gradient is flattened along it (section 5
  * of the same paper): its covariance in index space is that of trip_covariance_flattened() with the
  * unit vector along the gradient there and the share  (1 - 1 / s^2) min(1, |gradient| /
@@ -92,7 +98,8 @@
 /* Constants of one frame. */
 typedef struct trip_splat_frame {
     trip_camera camera;
-    bool affine; /* footprints by the affine map, in perspective */
+    bool affine;  /* footprints by the affine map, in perspective */
+    double fixed; /* sigma of fixed footprints, pixels; 0: they are not */
     trip_low_pass low_pass;
     double flatten;   /* 1 - 1 / s^2; 0: kernels are round */
     double sigma;     /* index space */
@@ -131,6 +138,14 @@ typedef struct trip_flattening {
 /* Of a voxel with this world-space gradient. */
 trip_flattening trip_splat_flattening(const trip_splat_frame *f, const double gradient[3],
                                       double gradient_full);
+
+/* What settings.sprite_px is by the paper: twice the radius of the footprint of a splat at
+ * `middle`, a point of index space (of the circle as large where that is an ellipse). 0: it lies
+ * behind the eye. */
+double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *settings,
+                            trip_vec3 middle);
+/* How far fixed footprints reach, low-pass included. */
+double trip_splat_fixed_radius_px(const trip_settings *settings);
 
 /* False when the splat is not drawn (behind the eye, or out of the picture beside it). The bounds
  * of near splats may be wider than their support. */

@@ -19,17 +19,23 @@ static int largest_axis(trip_vec3 r)
     return y >= z ? 1 : 2;
 }
 
+double trip_weight_signed(const trip_settings *s, trip_vec3 ray, int axis)
+{
+    return (fabs(trip_component(ray, axis)) / largest(ray) - s->h) / (1 - s->h);
+}
+
 double trip_weight(const trip_settings *s, int axis_of_view, trip_vec3 ray, int axis)
 {
     switch (s->method) {
     case TRIP_METHOD_AXIS:
+    case TRIP_METHOD_IMAGE:
         return axis == axis_of_view;
     case TRIP_METHOD_CLIP:
         return axis == largest_axis(ray);
     case TRIP_METHOD_MERGE:
         break;
     }
-    return fmax(0, (fabs(trip_component(ray, axis)) / largest(ray) - s->h) / (1 - s->h));
+    return fmax(0, trip_weight_signed(s, ray, axis));
 }
 
 int trip_weight_axis_of_view(const trip_camera *c)
@@ -40,7 +46,7 @@ int trip_weight_axis_of_view(const trip_camera *c)
 bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axis_of_view, int axis,
                            trip_vec3 centre_from_eye, double radius)
 {
-    if (s->method == TRIP_METHOD_AXIS)
+    if (trip_settings_has_one_list(s))
         return axis == axis_of_view;
     if (c->ortho)
         return trip_weight(s, axis_of_view, c->r0, axis) > 0;
@@ -77,7 +83,7 @@ trip_ray_bounds trip_ray_bounds_over(const trip_camera *c, const double from[2],
 bool trip_weight_may_lie(const trip_settings *s, int axis_of_view, const trip_ray_bounds *bounds,
                          int axis)
 {
-    if (s->method == TRIP_METHOD_AXIS)
+    if (trip_settings_has_one_list(s))
         return axis == axis_of_view;
     double least = larger(bounds->least[0], larger(bounds->least[1], bounds->least[2]));
     return !(bounds->most[axis] * (1 + 1e-9) < trip_weight_h(s) * least); /* room for rounding */
@@ -114,7 +120,7 @@ static bool some_pixel_weighs(const trip_settings *s, const trip_camera *c, int 
 bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
                               int axis)
 {
-    if (c->ortho || s->method == TRIP_METHOD_AXIS)
+    if (c->ortho || trip_settings_has_one_list(s))
         return trip_weight(s, axis_of_view, c->r0, axis) > 0;
     const rectangle image = { { 0, 0 }, { c->width - 1, c->height - 1 } };
     return some_pixel_weighs(s, c, axis_of_view, axis, &image);
@@ -125,7 +131,7 @@ bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int 
 bool trip_weight_is_everywhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
                                int axis)
 {
-    if (c->ortho || s->method == TRIP_METHOD_AXIS)
+    if (c->ortho || trip_settings_has_one_list(s))
         return true;
     double sign = trip_component(trip_camera_ray(c, 0.5, 0.5), axis);
     for (int i = 0; i < 4; i++) {

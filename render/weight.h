@@ -8,9 +8,12 @@
 
 /* merge:  w_a = max(0, (|r_a| / max |r| - h) / (1 - h))
  * clip:   1 for the largest |r_a| (the first of equals), else 0
- * axis:   1 for `axis_of_view`, else 0
+ * axis, image:  1 for `axis_of_view`, else 0
  * At every ray at least one weight is 1. */
 double trip_weight(const trip_settings *s, int axis_of_view, trip_vec3 ray, int axis);
+
+/* merge: (|r_a| / max |r| - h) / (1 - h), which is below 0 where the list has no weight. */
+double trip_weight_signed(const trip_settings *s, trip_vec3 ray, int axis);
 
 /* argmax |r_a| of the ray at the image centre: the one list of Westover's method. */
 int trip_weight_axis_of_view(const trip_camera *c);

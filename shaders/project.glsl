@@ -148,6 +148,26 @@ bool project(real3 c, real3 place, out splat s)
 #endif
 }
 #else
+#ifdef FIXED
+bool project_far(real3 c, real3 place, out splat s)
+{
+    if (!(place.z > 0.0))
+        return false;
+    s.centre = place.xy / place.z;
+    s.conic = parallel.xyz;
+    s.ray2 = 1.0;
+    s.amplitude = parallel.w;
+#ifdef ANISOTROPIC
+    real4 terms = real4(1.0, s.centre, s.centre.x * s.centre.x);
+    real2 more = s.centre.y * s.centre;
+    s.amplitude *= sqrt((dot(world2_a, terms) + dot(world2_b.xy, more)) /
+                        (dot(ray2_a, terms) + dot(ray2_b.xy, more)));
+#endif
+    s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
+    s.radius = parallel_size.z * place.z;
+    return max(abs(s.centre.x), abs(s.centre.y)) < 1e9;
+}
+#else
 bool project_far(real3 c, real3 place, out splat s)
 {
     if (!(place.z > 0.0))
@@ -215,11 +235,16 @@ bool project_far(real3 c, real3 place, out splat s)
     return true;
 #endif
 }
+#endif
 
 bool project(real3 c, real3 place, out splat s)
 {
     bool far = project_far(c, place, s);
-#if defined(NEAR) && defined(AFFINE)
+#if defined(NEAR) && defined(FIXED)
+    s.near = false;
+    s.a = s.b = s.along = real3(0.0);
+    return far;
+#elif defined(NEAR) && defined(AFFINE)
     s.near = !far;
     s.a = s.b = s.along = real3(0.0);
     return far || project_near(c, place, s);

@@ -27,7 +27,8 @@ static bool same_form(const triptych_settings *a, const triptych_settings *b)
 
 static bool same_footprints(const triptych_settings *a, const triptych_settings *b)
 {
-    return a->footprint == b->footprint && a->low_pass == b->low_pass && a->flatten == b->flatten;
+    return a->footprint == b->footprint && a->low_pass == b->low_pass && a->flatten == b->flatten &&
+           a->vertex_weights == b->vertex_weights;
 }
 
 static bool same_effects(const triptych_settings *a, const triptych_settings *b)
@@ -39,8 +40,8 @@ static bool same_effects(const triptych_settings *a, const triptych_settings *b)
 bool trip_same_settings(const triptych_settings *a, const triptych_settings *b)
 {
     return same_form(a, b) && same_footprints(a, b) && same_effects(a, b) &&
-           a->shading == b->shading && a->headlight == b->headlight &&
-           same_numbers(a->light, b->light, 3) && same_numbers(a->background, b->background, 4) &&
-           a->depth == b->depth && a->count == b->count && a->show == b->show &&
-           same_clip(&a->clip, &b->clip);
+           a->normalise == b->normalise && a->shading == b->shading &&
+           a->headlight == b->headlight && same_numbers(a->light, b->light, 3) &&
+           same_numbers(a->background, b->background, 4) && a->depth == b->depth &&
+           a->count == b->count && a->show == b->show && same_clip(&a->clip, &b->clip);
 }

@@ -81,11 +81,28 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
            trip_affine_vector(j, ry), 1 / (c->voxel_world * c->voxel_world));
 }
 
+/* Footprints of one size in perspective. */
+static void set_fixed(trip_gl_frame_double *f, const trip_splat_frame *constants)
+{
+    const trip_camera *c = &constants->camera;
+    double exact2 = constants->fixed * constants->fixed, wide2 = exact2 + constants->low_pass2;
+    double reach = sqrt(constants->cutoff2 * wide2);
+    double amplitude = constants->amplitude * c->voxel_world;
+    f->parallel = (trip_gl_double4){ { 1 / wide2, 0, 1 / wide2, amplitude * (exact2 / wide2) } };
+    f->parallel_size = (trip_gl_double4){
+        { reach, reach, reach * sqrt(constants->rxrx + constants->ryry) / centre_length(c), 0 }
+    };
+}
+
 /* All splats of a parallel view have the same footprint and the same world length along the ray. */
 static void set_parallel(trip_gl_frame_double *f, const trip_splat_frame *constants)
 {
     trip_splat s;
     const trip_camera *c = &constants->camera;
+    if (constants->fixed > 0 && !c->ortho) {
+        set_fixed(f, constants);
+        return;
+    }
     if (!c->ortho || !trip_splat_project(constants, trip_add(c->eye, c->r0), &s))
         return;
     double world = trip_splat_stretch(constants, 0, 0);
@@ -236,6 +253,8 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_SUMMED;
     if (s->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
         effects |= TRIP_GL_AFFINE;
+    if (s->footprint == TRIP_FOOTPRINT_FIXED && !camera->ortho)
+        effects |= TRIP_GL_AFFINE | TRIP_GL_FIXED;
     if (trip_weight_is_everywhere(s, frame->camera, frame->plan->axis_of_view, axis))
         effects |= TRIP_GL_UNCULLED;
     return effects;
@@ -251,6 +270,8 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
     double half = 0.5 * (point_size_px - 2);
     if (fmax(c->width, c->height) <= point_size_px)
         return 0;
+    if (settings->footprint == TRIP_FOOTPRINT_FIXED)
+        return trip_splat_fixed_radius_px(settings) <= half ? 0 : HUGE_VAL;
     if (c->ortho) {
         trip_splat s;
         trip_splat_frame constants = trip_splat_frame_make(c, settings);
@@ -280,6 +301,8 @@ double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera
     const trip_splat_frame f = trip_splat_frame_make(c, settings);
     if (c->ortho)
         return trip_splat_parallel_near(&f);
+    if (settings->footprint == TRIP_FOOTPRINT_FIXED)
+        return -HUGE_VAL; /* none is near, wherever it is */
     trip_vec3 normal = trip_cross(c->rx, c->ry);
     double r_min2 = pow(trip_dot(c->r0, normal), 2) / trip_dot(normal, normal);
     double times = f.affine ? 1 / (TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE) : 2;

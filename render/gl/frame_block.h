@@ -24,7 +24,8 @@ enum trip_gl_effect {
     TRIP_GL_AFFINE = 2048,    /* footprints by the affine map at the centre (render/splat.h) */
     TRIP_GL_FLATTENED = 4096, /* kernels, along their gradients */
     TRIP_GL_WIDE = 8192,      /* values are interpolated from 64 voxels (render/kernel.h) */
-    TRIP_GL_EFFECT_SETS = 16384,
+    TRIP_GL_FIXED = 16384,    /* footprints of one size; AFFINE, too, in perspective */
+    TRIP_GL_EFFECT_SETS = 32768,
 };
 
 /* Of a list that the plan draws. */

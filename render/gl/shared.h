@@ -71,9 +71,10 @@
     R4 edge;     /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code;     \
                     z: 1 / (2 erf(cutoff / sqrt 2)); w: of lists of means, the length of a voxel along \
                     the axis, else 0 */                                                                \
-    R4 parallel; /* the one footprint of a parallel view: conic xx, xy, yy, amplitude */               \
-    R4 parallel_size; /* its half extents in x and y, its radius in index space, its amplitude         \
-                         without low-pass */                                                           \
+    R4 parallel; /* the one footprint of a parallel view, or of FIXED: conic xx, xy, yy, amplitude     \
+                  */                                                                                   \
+    R4 parallel_size; /* its half extents in x and y, its radius in index space (FIXED: at depth       \
+                         1), its amplitude without low-pass */                                                                                   \
     R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;        \
                          w: the largest of them */                                                     \
     R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along     \

@@ -19,7 +19,8 @@ static const struct {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
     [TRIP_GL_PASS_SUM] = { "screen.vert", "sum.frag", NULL, TRIP_GL_DEPTH, false },
     [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp",
-                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_AFFINE, true },
+                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_AFFINE | TRIP_GL_FIXED,
+                             true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
     [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", 0, false },
@@ -43,6 +44,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_DEPTH, "DEPTH" },         { TRIP_GL_NEAR, "NEAR" },
         { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
         { TRIP_GL_FLATTENED, "FLATTENED" }, { TRIP_GL_WIDE, "WIDE" },
+        { TRIP_GL_FIXED, "FIXED" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

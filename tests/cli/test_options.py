@@ -96,6 +96,8 @@ RENDER = {
     "--report": [],
     "--kernel-radius": NUMBERS + ["0", "-1", "1e9"],
     "--low-pass": NAMES + ["gaussian"],
+    "--weights": NAMES,
+    "--normalise": None,
     "--flatten": NUMBERS + ["0", "0.5", "1e9"],
     "--target": NAMES,
     "--renderer": NAMES,
@@ -217,6 +219,15 @@ class Options(program.ProgramTest):
                 render + ["--low-pass=uniform", "--kernel=ewa"],
                 render + ["--low-pass=uniform", "--renderer=reference"],
                 render + ["--flatten=3"],
+                render + ["--kernel=fixed", "--renderer=cpu"],
+                render + ["--kernel=fixed", "--lod=1"],
+                render + ["--method=image", "--renderer=cpu"],
+                render + ["--method=image", "--traversal=ascending"],
+                render + ["--method=image", "--classify=post"],
+                render + ["--weights=vertex", "--renderer=gl"],
+                render + ["--weights=vertex", "--method=clip"],
+                render + ["--weights=vertex", "--compositing=sheet"],
+                render + ["--weights=vertex", "--renderer=integral"],
                 render + ["--flatten=3", "--kernel=ewa", "--count"],
                 render + ["--kernel=cubic", "--classify=pre"],
                 render + ["--kernel=cubic", "--kernel-radius=3"],
@@ -252,12 +263,13 @@ class Options(program.ProgramTest):
     def test_every_value_works(self):
         render = ["--size=24x20"]
         values = {
-            "--method": ["merge", "clip", "axis"],
+            "--method": ["merge", "clip", "axis", "image"],
+            "--weights": ["pixel", "vertex"],
+            "--renderer=reference --kernel": ["linear", "cubic", "gaussian", "fixed"],
             "--traversal": ["outward", "ascending"],
             "--renderer": ["cpu", "reference", "integral", "auto"],
             "--renderer=integral --field": ["stored", "splats"],
             "--renderer=integral --kernel": ["linear", "cubic"],
-            "--renderer=reference --kernel": ["linear", "cubic", "gaussian"],
             "--renderer=integral --tolerance": ["1e-8", "0.1"],
             "--renderer=integral --samples": ["1", "3"],
             "--renderer=integral --field=splats --kernel-radius": ["1", "2.5"],
@@ -307,6 +319,7 @@ class Options(program.ProgramTest):
         runs = [f"{option}={value}".split() for option, all_of in values.items() for value in all_of]
         runs += [
             ["--no-shading"],
+            ["--normalise"],
             ["--explain"],
             ["--explain", "--count"],
             ["--depth=z.tif"],
