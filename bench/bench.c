@@ -18,6 +18,7 @@ static const struct {
     { "stream", bench_stream, false, false },   { "renderers", bench_renderers, false, false },
     { "popping", bench_popping, false, false }, { "levels", bench_levels, true, false },
     { "flight", bench_flight, false, true },    { "ewa", bench_ewa, false, false },
+    { "forms", bench_forms, false, false },
 };
 
 /* Splats by their normals, values by their differences. */

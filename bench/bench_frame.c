@@ -8,6 +8,7 @@
 #include "cpu/cpu_renderer.h"
 #include "report.h"
 #include "slices.h"
+#include "splat.h"
 
 double bench_now_ms(void)
 {
@@ -52,6 +53,16 @@ int bench_reader_create(const session *s, trip_reader **out, const bench_options
                                                   .skip_user = occluder });
 }
 
+/* That of a splat in the middle of the volume, which the views of tables look at. */
+static double sprite_px(const trip_dataset *data, const trip_camera *camera,
+                        const trip_settings *settings)
+{
+    const uint64_t *dims = data->header.dims;
+    return trip_splat_sprite_px(camera, settings,
+                                trip_v3(0.5 * ((double)dims[0] - 1), 0.5 * ((double)dims[1] - 1),
+                                        0.5 * ((double)dims[2] - 1)));
+}
+
 static int draw_planned(const bench_frame *f, const trip_camera *camera, bool count,
                         bench_cost *cost)
 {
@@ -60,6 +71,8 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     if (!settings.slices)
         settings.slices =
             trip_slices_of_view(camera, &settings, f->session->data->header.dims).slices;
+    if (settings.footprint == TRIP_FOOTPRINT_FIXED)
+        settings.sprite_px = sprite_px(f->session->data, camera, &settings);
     if (f->occluder)
         *f->occluder = count ? NULL : f->renderer;
     double start = bench_now_ms();

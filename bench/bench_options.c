@@ -39,10 +39,11 @@ static const struct argp_option options[] = {
     TRIP_OPTION_TF(KEY_TF, 0),
     { "size", KEY_SIZE, "WxH[,...]", 0,
       "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping, levels "
-      "256x256; flight 800x600)",
+      "256x256; forms 128x128; flight 800x600)",
       0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl; renderers all there are; popping, "
+      "gl, cpu, reference or auto (default: auto; submit gl, forms reference; renderers all there "
+      "are; popping, "
       "levels cpu)",
       0 },
     { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
@@ -170,6 +171,18 @@ static const struct table {
         .sizes = { { 800, 600 } },
         .size_count = 1,
         .renderers = { TRIP_RENDERER_AUTO },
+        .renderer_count = 1,
+    },
+    {
+        .name = "forms",
+        .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_PLOT) | OF_MODEL | BIT(KEY_VIEWS) |
+                   BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_RENDERER) |
+                   BIT(KEY_THREADS) | BIT(KEY_REPEAT),
+        .draw_occluded = true,
+        .repeat = 1,
+        .sizes = { { 128, 128 } },
+        .size_count = 1,
+        .renderers = { TRIP_RENDERER_REFERENCE },
         .renderer_count = 1,
     },
     {
@@ -377,7 +390,7 @@ static void be_short(parse *p)
 static int check(parse *p)
 {
     static const char *const names[] = { "orders", "submit", "stream", "renderers", "popping",
-                                         "levels", "flight", "ewa",    NULL };
+                                         "levels", "flight", "forms",  "ewa",       NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)

@@ -4,7 +4,7 @@
 
 #include "bench_view.h"
 
-enum { METHODS = 5, VIEWS = 2 };
+enum { METHODS = 6, AXIS = 4, IN_PAPER = 5, VIEWS = 2 };
 
 static const struct {
     const char *name;
@@ -16,6 +16,7 @@ static const struct {
     { "merge, h = 0.95", TRIP_METHOD_MERGE, 0.95 },
     { "clip", TRIP_METHOD_CLIP, 0 },
     { "axis", TRIP_METHOD_AXIS, 0 },
+    { "image", TRIP_METHOD_IMAGE, 0 }, /* by renderers that have it */
 };
 
 /* The Foot in Hofsetz & Max 2005, by view and method: splats, and frames per second with a list of
@@ -23,7 +24,7 @@ static const struct {
 #define PAPER_VALID_VOXELS 897229.0
 static const struct {
     double splats, fps;
-} paper[VIEWS][METHODS] = {
+} paper[VIEWS][IN_PAPER] = {
     /* Table 1: all three lists. */
     { { 2691697, 0.889 },
       { 1559188, 1.307 },
@@ -62,7 +63,7 @@ static const bench_column columns[] = {
 static void add_row(cJSON *rows, bench_runs *runs, const bench_cost counted[METHODS], int view,
                     int method, double kept)
 {
-    const bench_cost *axis = &bench_runs_sorted(runs, METHODS - 1)[(runs->repeat - 1) / 2];
+    const bench_cost *axis = &bench_runs_sorted(runs, AXIS)[(runs->repeat - 1) / 2];
     const bench_cost *own = &bench_runs_sorted(runs, method)[(runs->repeat - 1) / 2];
     double drawn = (double)bench_splats_drawn(&counted[method].stats);
     cJSON *row = cJSON_CreateObject();
@@ -75,12 +76,19 @@ static void add_row(cJSON *rows, bench_runs *runs, const bench_cost counted[METH
         cJSON_AddNumberToObject(row, "multiple", drawn / kept);
     bench_runs_describe(runs, method, row);
     cJSON_AddNumberToObject(row, "speed", axis->ms / own->ms);
+    cJSON_AddItemToArray(rows, row);
+    if (method >= IN_PAPER)
+        return;
     cJSON_AddNumberToObject(row, "paper_splats", paper[view][method].splats);
     cJSON_AddNumberToObject(row, "paper_multiple", paper[view][method].splats / PAPER_VALID_VOXELS);
     cJSON_AddNumberToObject(row, "paper_fps", paper[view][method].fps);
-    cJSON_AddNumberToObject(row, "paper_speed",
-                            paper[view][method].fps / paper[view][METHODS - 1].fps);
-    cJSON_AddItemToArray(rows, row);
+    cJSON_AddNumberToObject(row, "paper_speed", paper[view][method].fps / paper[view][AXIS].fps);
+}
+
+/* Image-aligned sheets are the last of the methods. */
+static int methods_of(const trip_renderer *renderer)
+{
+    return renderer->ops->forms & TRIP_DRAWS_IMAGE_SHEETS ? METHODS : METHODS - 1;
 }
 
 /* Each method once with exact counts, which also warms up, then the timed runs. */
@@ -89,8 +97,9 @@ static int measure_view(const bench_frame *base, const bench_options *o, bench_r
     bench_frame frames[METHODS];
     bench_cost counted[METHODS];
     bench_runs runs = { 0 };
+    const int count = methods_of(base->renderer);
     int status = 0;
-    for (int i = 0; i < METHODS && !status; i++) {
+    for (int i = 0; i < count && !status; i++) {
         frames[i] = *base;
         frames[i].view = views[view].view(base->session, o->sizes[0]);
         frames[i].settings.method = methods[i].method;
@@ -98,11 +107,11 @@ static int measure_view(const bench_frame *base, const bench_options *o, bench_r
         status = bench_frame_draw(&frames[i], true, &counted[i]);
     }
     if (!status)
-        status = bench_runs_take(&runs, frames, METHODS, o->repeat);
+        status = bench_runs_take(&runs, frames, count, o->repeat);
     if (!status) {
         cJSON *rows = bench_report_table(r, views[view].key, views[view].title, columns,
                                          sizeof columns / sizeof columns[0]);
-        for (int i = 0; i < METHODS; i++)
+        for (int i = 0; i < count; i++)
             add_row(rows, &runs, counted, view, i, (double)base->session->data->header.kept);
     }
     bench_runs_free(&runs);
@@ -118,6 +127,8 @@ static void add_limits(bench_report *r)
                           "ones. Kept: voxels in each list of the data set. Bricks that the "
                           "transfer function makes invisible are left out, so a function narrower "
                           "than the data set's own lowers all multiples.");
+    bench_report_limit(r, "Image: sheets parallel to the image plane (Mueller & Crawfis 1998), "
+                          "which each splat is cut into; by the reference alone.");
     bench_report_limit(r, "Speed: against axis in the same view; the median is the middle run of "
                           "runs that take turns.");
     bench_report_limit(r, "Bound by: the largest part of the middle run, as the calling thread saw "

@@ -23,6 +23,7 @@ static const struct setting {
     { "merge, h 0.99", "0.99", TRIP_METHOD_MERGE, 0.99 },
     { "clip", "clip", TRIP_METHOD_CLIP, 0 },
     { "axis", "axis", TRIP_METHOD_AXIS, 0 },
+    { "image", "image", TRIP_METHOD_IMAGE, 0 }, /* splats, by renderers that have it */
 };
 
 enum { ROWS = sizeof settings / sizeof settings[0], STEPS = 40 };
@@ -131,8 +132,13 @@ static int measure(measuring *m, const bench_options *o, bench_report *r)
     cJSON *table = bench_report_table(r, "popping", "Changes of pixels beyond the motion, of 255",
                                       columns, sizeof columns / sizeof columns[0]);
     bench_popping_row rows[ROWS] = { 0 };
+    const trip_renderer_ops *ops = m->scene.frame.renderer->ops;
+    const bool image = ops->forms & TRIP_DRAWS_IMAGE_SHEETS &&
+                       o->settings.classify == TRIP_CLASSIFY_PRE &&
+                       o->settings.compositing == TRIP_COMPOSITING_SPLAT;
+    const int count = image ? ROWS : ROWS - 1;
     int status = 0;
-    for (int i = 0; i < ROWS && !status; i++) {
+    for (int i = 0; i < count && !status; i++) {
         trip_settings drawn = o->settings;
         drawn.background[3] = 0;
         drawn.method = settings[i].method;
@@ -145,7 +151,7 @@ static int measure(measuring *m, const bench_options *o, bench_report *r)
         find_figures(m, &rows[i]);
         add_row(table, settings[i].name, &rows[i]);
     }
-    return status || !o->plot ? status : bench_popping_plot(o->plot, rows, ROWS);
+    return status || !o->plot ? status : bench_popping_plot(o->plot, rows, count);
 }
 
 static void add_limits(const bench_options *o, bench_report *r)

@@ -72,11 +72,12 @@ static void check_times(const cJSON *row)
     assert_close(number(row, "fps"), 1000 / ms);
 }
 
-static void check_orders(const cJSON *rows, const double multiples[5])
+/* After the papers' rows, image-aligned sheets where the renderer has them. */
+static void check_orders(const cJSON *rows, const double multiples[5], bool image)
 {
     static const char *const names[] = { "merge, h = 0.00", "merge, h = 0.85", "merge, h = 0.95",
                                          "clip", "axis" };
-    assert_int_equal(cJSON_GetArraySize(rows), 5);
+    assert_int_equal(cJSON_GetArraySize(rows), image ? 6 : 5);
     for (int i = 0; i < 5; i++) {
         const cJSON *row = cJSON_GetArrayItem(rows, i), *axis = cJSON_GetArrayItem(rows, 4);
         assert_string_equal(cJSON_GetObjectItem(row, "method")->valuestring, names[i]);
@@ -102,8 +103,8 @@ static void orders_draws_thrice_at_h_0_and_once_from_the_side(void **state)
                  "orders block.trip --renderer %s --size 96x80 --repeat 3", renderers[i]);
         cJSON *root = bench(arguments);
         const cJSON *rows = rows_of(root, "oblique");
-        check_orders(rows, oblique);
-        check_orders(rows_of(root, "lateral"), lateral);
+        check_orders(rows, oblique, i == 0);
+        check_orders(rows_of(root, "lateral"), lateral, i == 0);
         for (int k = 0; k < 4; k++)
             assert_true(number(cJSON_GetArrayItem(rows, k), "splats_drawn") >=
                         number(cJSON_GetArrayItem(rows, k + 1), "splats_drawn"));
@@ -240,7 +241,7 @@ static void submit_compares_forms_where_there_is_gl(void **state)
     assert_works(&r);
     cJSON *root = cJSON_Parse(r.out);
     const cJSON *rows = rows_of(root, "submit"), *row;
-    assert_int_equal(cJSON_GetArraySize(rows), 8);
+    assert_int_equal(cJSON_GetArraySize(rows), 10);
     cJSON_ArrayForEach(row, rows)
     {
         bool axis = !strcmp(cJSON_GetObjectItem(row, "orders")->valuestring, "axis");
@@ -285,6 +286,22 @@ static void assert_a_plot(const char *path, const char *label)
     static char text[16384];
     program_read(path, text, sizeof text);
     assert_true(!strncmp(text, "<svg ", 5) && strstr(text, "</svg>\n") && strstr(text, label));
+}
+
+/* The first row is what the others are compared with. */
+static void forms_compares_what_the_papers_do_with_the_usual_picture(void **state)
+{
+    (void)state;
+    cJSON *root = bench("forms block.trip --size 24x24");
+    const cJSON *rows = rows_of(root, "forms"), *row;
+    assert_int_equal(cJSON_GetArraySize(rows), 7);
+    cJSON_ArrayForEach(row, rows)
+    {
+        bool first = row == cJSON_GetArrayItem(rows, 0);
+        assert_true(first ? number(row, "most") == 0 : number(row, "most") > 0);
+        assert_true(number(row, "percentile_99") <= number(row, "most"));
+    }
+    cJSON_Delete(root);
 }
 
 /* Of noise, which the three lists show as differently as can be. With axis all pixels jump at once;
@@ -520,6 +537,7 @@ int main(void)
         cmocka_unit_test(submit_compares_forms_where_there_is_gl),
         cmocka_unit_test(
             without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
+        cmocka_unit_test(forms_compares_what_the_papers_do_with_the_usual_picture),
         cmocka_unit_test(popping_is_of_axis_alone),
         cmocka_unit_test(levels_of_a_plain_block_are_near_the_finest),
         cmocka_unit_test(levels_without_a_data_set_samples_an_object_and_plots_it),
