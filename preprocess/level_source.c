@@ -1,5 +1,6 @@
 #include "level_source.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 #include "format.h"
@@ -11,6 +12,7 @@ typedef struct square_header {
     uint64_t key;
     uint32_t count, reserved;
 } square_header;
+static_assert(sizeof(square_header) == TRIP_LEVEL_SQUARE_BYTES, "what precedes voxels");
 
 /* Every second bit of a Morton code, from bit 0. */
 static int64_t even_bits(uint64_t m)
@@ -94,14 +96,24 @@ static void take_run(trip_level_source *s, const trip_list_run *run)
     place(s, run->sheet, trip_morton(run->tile_u, run->tile_v));
 }
 
+int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_log2, uint64_t *key,
+                           uint32_t *count)
+{
+    square_header h = { 0 };
+    int status = trip_output_read(file, at, &h, sizeof h);
+    *key = h.key;
+    *count = h.count;
+    if (status == 0 && h.count > UINT32_C(1) << 2 * edge_log2)
+        status = trip_fail(TRIP_ERROR, "brick", file->path, "is not what was written");
+    return status;
+}
+
 /* Over the sheets that are not wanted. */
 static int next_of_file(trip_level_source *s)
 {
     square_header h;
     while (s->at < s->file->bytes) {
-        int status = trip_output_read(s->file, s->at, &h, sizeof h);
-        if (status == 0 && h.count > s->room)
-            status = trip_fail(TRIP_ERROR, "brick", s->file->path, "is not what was written");
+        int status = trip_level_file_square(s->file, s->at, s->tile_log2, &h.key, &h.count);
         if (status < 0)
             return status;
         uint64_t sheet = h.key >> TRIP_TILE_MORTON_BITS, bytes = h.count * sizeof *s->memory;

@@ -48,4 +48,9 @@ int trip_level_source_next(trip_level_source *s);
 int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_voxel *voxels,
                            uint32_t count);
 
+/* Reads back what stands before a square's voxels, which follow TRIP_LEVEL_SQUARE_BYTES behind. */
+enum { TRIP_LEVEL_SQUARE_BYTES = 16 };
+int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_log2, uint64_t *key,
+                           uint32_t *count);
+
 #endif

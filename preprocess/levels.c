@@ -7,6 +7,7 @@
 #include "level_source.h"
 #include "mean.h"
 #include "report.h"
+#include "sharpen.h"
 #include "splat_cell.h"
 
 enum { SOURCES = 4, FILE_BUFFER_BYTES = 1 << 16 };
@@ -25,8 +26,9 @@ typedef struct making {
     trip_level_source sources[SOURCES];
     unsigned source_count;
     trip_list_builder *builder;
-    trip_output *file; /* that the next level is made from; NULL: there is none */
+    trip_output *file; /* of its voxels, for its values and the next level; NULL: there is none */
     trip_mean_scale scale;
+    trip_sharpen sharpen;
     uint64_t sheets_before, sheets; /* of all levels: progress */
 
     trip_cell_tables tables;
@@ -150,7 +152,10 @@ static int open_builder(making *m)
     for (unsigned list = 0; list < m->first_list; list++)
         records += trip_writer_records(p->writer, list);
     uint64_t wanted = least + records * PIECE_BYTES;
-    left = left > BUILDER_BYTES + least ? left - BUILDER_BYTES : least;
+    uint64_t beside = BUILDER_BYTES;
+    if (p->format.halo)
+        beside += trip_sharpen_later_bytes(m->dims, m->edge_log2, records);
+    left = left > beside + least ? left - beside : least;
     for (size_t i = 0; i < trip_spill_count(p->spill); i++)
         trip_spill_retire(p->spill, i);
     trip_list_builder_params b = { .format = format,
@@ -239,16 +244,15 @@ static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
     return trip_list_builder_reserve(user, thread, list, bytes);
 }
 
-/* Marks the voxels of the square that were kept, or all, in the cell; false where there are none.
- */
-static bool mark(making *m, uint32_t count, bool kept)
+/* Marks the voxels of a square in the cell: all, or of lists of means those that were kept. False
+ * where there are none. */
+static bool mark(making *m, const trip_coarse_voxel *voxels, uint32_t count, bool kept)
 {
     bool some = false;
     for (uint32_t i = 0; i < count; i++) {
-        const trip_coarse_voxel *voxel = &m->voxels[i];
-        if (kept && !voxel->kept)
+        if (kept && !voxels[i].kept)
             continue;
-        trip_splat_cell_mark(&m->cell, voxel->v, 0, &voxel->u, 1);
+        trip_splat_cell_mark(&m->cell, voxels[i].v, 0, &voxels[i].u, 1);
         some = true;
     }
     return some;
@@ -266,12 +270,12 @@ static uint32_t mean_code(const making *m, const trip_coarse_voxel *voxel, int a
 }
 
 /* The pieces of a list. */
-static int emit(making *m, uint32_t count, unsigned list)
+static int emit(making *m, const trip_coarse_voxel *voxels, uint32_t count, unsigned list)
 {
     const trip_piece_format whole = format_of(m), f = trip_piece_format_of(&whole, list);
     const trip_piece_sink sink = { reserve, m->builder, 0 };
     for (uint32_t i = 0; i < count; i++) {
-        const trip_coarse_voxel *voxel = &m->voxels[i];
+        const trip_coarse_voxel *voxel = &voxels[i];
         size_t at = trip_splat_cell_row(&m->cell, voxel->v, 0) + voxel->u;
         if (list >= TRIP_HALO_LISTS)
             m->cell.values[at] = value_code(m, voxel);
@@ -282,7 +286,9 @@ static int emit(making *m, uint32_t count, unsigned list)
     return trip_splat_cell_emit(&m->cell, &f, list, &sink);
 }
 
-static int make_pieces(making *m, uint64_t key, uint32_t count)
+/* Of a square, in the three lists from `first` on: those of means, or of values. */
+static int make_pieces(making *m, uint64_t key, const trip_coarse_voxel *voxels, uint32_t count,
+                       unsigned first)
 {
     const uint64_t morton = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
     const int64_t edge = (int64_t)1 << m->edge_log2;
@@ -293,14 +299,11 @@ static int make_pieces(making *m, uint64_t key, uint32_t count)
         lo[bit % 2] |= (int64_t)(morton >> bit & 1) << bit / 2;
     lo[0] <<= m->edge_log2;
     lo[1] <<= m->edge_log2;
-    for (unsigned first = 0; first < trip_piece_list_count(&m->params->format);
-         first += TRIP_HALO_LISTS) {
-        trip_splat_cell_begin(&m->cell, lo, size);
-        if (!mark(m, count, first == 0))
-            continue;
-        for (unsigned list = first; list < first + 3 && status == 0; list++)
-            status = emit(m, count, list);
-    }
+    trip_splat_cell_begin(&m->cell, lo, size);
+    if (!mark(m, voxels, count, first == 0))
+        return 0;
+    for (unsigned list = first; list < first + 3 && status == 0; list++)
+        status = emit(m, voxels, count, list);
     return status;
 }
 
@@ -315,6 +318,11 @@ static uint64_t first_key(const making *m)
     return first;
 }
 
+static int poll(void)
+{
+    return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted") : 0;
+}
+
 static int make_square(making *m, uint64_t key)
 {
     int status = 0;
@@ -327,18 +335,30 @@ static int make_square(making *m, uint64_t key)
     }
     uint32_t count = status == 0 ? take_voxels(m) : 0;
     if (count > 0)
-        status = make_pieces(m, key, count);
+        status = make_pieces(m, key, m->voxels, count, 0);
     if (count > 0 && status == 0 && m->file)
         status = trip_level_file_append(m->file, key, m->voxels, count);
-    if (status == 0 && trip_interrupted())
-        status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
-    return status;
+    return status == 0 ? poll() : status;
 }
 
 static void show(const making *m, uint64_t sheet)
 {
     if (m->params->progress)
         m->params->progress(m->params->progress_user, m->sheets_before + sheet, m->sheets);
+}
+
+/* The lists of values, once the file is complete. */
+static int make_values(making *m)
+{
+    trip_coarse_voxel *voxels;
+    uint64_t key;
+    uint32_t count;
+    int status = 0;
+    while (status == 0 && (status = trip_sharpen_next(&m->sharpen, &key, &voxels, &count)) == 1) {
+        status = make_pieces(m, key, voxels, count, TRIP_HALO_LISTS);
+        status = status == 0 ? poll() : status;
+    }
+    return status;
 }
 
 static int make_level(making *m)
@@ -350,11 +370,13 @@ static int make_level(making *m)
             show(m, sheet = key >> TRIP_TILE_MORTON_BITS);
         status = make_square(m, key);
     }
+    if (status == 0 && m->file)
+        status = trip_output_flush(m->file);
+    if (status == 0 && m->params->format.halo)
+        status = make_values(m);
     if (status == 0)
         status = trip_list_builder_finish(m->builder, &m->params->quantiser, m->params->workers,
                                           NULL, NULL);
-    if (status == 0 && m->file)
-        status = trip_output_flush(m->file);
     return status;
 }
 
@@ -394,9 +416,17 @@ static int create_file(making *m, trip_output *file)
                               m->budget);
 }
 
+static int open_sharpen(making *m)
+{
+    const double least = m->scale.lo, most = m->scale.lo + m->scale.width;
+    return trip_sharpen_open(&m->sharpen, m->file, m->edge_log2, (uint16_t)ceil(least),
+                             (uint16_t)floor(most), m->budget);
+}
+
 static void close_making(making *m)
 {
     trip_list_builder_destroy(m->builder);
+    trip_sharpen_close(&m->sharpen);
     for (unsigned i = 0; i < m->source_count; i++)
         trip_level_source_close(&m->sources[i]);
     if (m->memory)
@@ -408,8 +438,10 @@ static int make(making *m, const trip_output *below, trip_output *file)
     int status = take_memory(m);
     if (status == 0)
         status = m->level == 1 ? open_lists(m) : open_file(m, below);
-    if (status == 0 && m->level < m->params->levels)
+    if (status == 0 && (m->level < m->params->levels || m->params->format.halo))
         status = create_file(m, file);
+    if (status == 0 && m->params->format.halo)
+        status = open_sharpen(m);
     if (status == 0)
         status = open_builder(m);
     return status == 0 ? make_level(m) : status;
