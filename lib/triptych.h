@@ -412,16 +412,17 @@ TRIPTYCH_API int triptych_draw(triptych *t, float *rgba);
 enum {
     TRIPTYCH_DONE = 0,
     TRIPTYCH_MORE = 1,  /* there is more to draw: the deadline has passed */
-    TRIPTYCH_WAITS = 2, /* nothing to draw: the disk is at work */
+    TRIPTYCH_WAITS = 2, /* nothing to draw: the disk or a graphics device is at work */
 };
 
 /* The same in steps, for programs with other things to do: begin, steps until TRIPTYCH_DONE,
  * picture, end. Until the end nothing can be set. */
 TRIPTYCH_API int triptych_begin(triptych *t);
 /* Draws what has been read, until the deadline by CLOCK_MONOTONIC in nanoseconds; something of it
- * in any case. Never waits for the disk. UINT64_MAX: no deadline. */
+ * in any case. Never waits for the disk, and for a graphics device no longer than for a picture or
+ * a piece. UINT64_MAX: no deadline. */
 TRIPTYCH_API int triptych_step(triptych *t, uint64_t deadline_ns);
-/* Waits until there is something to draw, at most so long. */
+/* Waits until there is something to draw, or room for it, at most so long. */
 TRIPTYCH_API int triptych_await(triptych *t, uint64_t timeout_ns);
 /* The picture so far; after TRIPTYCH_DONE the picture. rgba as above. */
 TRIPTYCH_API int triptych_picture(triptych *t, float *rgba);

@@ -49,14 +49,17 @@ static int begin_reading(trip_drawing *d)
     return status;
 }
 
-/* The layers up to `last` that have passes, in order. */
+/* The layers up to `last` that have passes, in order, until TRIP_FRAME_DONE. */
 static int begin_layers(trip_drawing *d, int last)
 {
     int status = 0;
-    for (; d->next_axis <= last && !status; d->next_axis++)
+    for (; d->next_axis <= last; d->next_axis++) {
         if (d->frame->plan->layers[d->next_axis].pass_count)
             status = d->renderer->ops->begin_layer(d->renderer, d->next_axis);
-    return status;
+        if (status)
+            return status;
+    }
+    return TRIP_FRAME_DONE;
 }
 
 static bool is_front_to_back(const trip_drawing *d, const trip_batch *batch)
@@ -66,14 +69,17 @@ static bool is_front_to_back(const trip_drawing *d, const trip_batch *batch)
     return passes[batch->pass != &passes[0].pass].front_to_back;
 }
 
-static int begin_batch(trip_drawing *d, const trip_batch *batch)
+static void begin_batch(trip_drawing *d, const trip_batch *batch)
 {
-    int axis = batch->pass->selections->list->axis;
     assert(batch->run_count > 0);
     d->held[(d->held_first + d->held_count++) % HELD_MAX] = *batch;
     d->in_batch = true;
     d->next_run = 0;
-    return begin_layers(d, axis);
+}
+
+static const trip_batch *newest_held(const trip_drawing *d)
+{
+    return &d->held[(d->held_first + d->held_count - 1) % HELD_MAX];
 }
 
 /* Runs of the batch from the next one on: whole ones of `most` splats in all, or one. */
@@ -91,11 +97,15 @@ static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t 
     return piece;
 }
 
+/* Of the batch, whose layer is begun before. */
 static int draw_piece(trip_drawing *d, bool whole)
 {
     const trip_renderer_ops *ops = d->renderer->ops;
-    const trip_batch *batch = &d->held[(d->held_first + d->held_count - 1) % HELD_MAX];
+    const trip_batch *batch = newest_held(d);
     double start = now_ms();
+    int begun = begin_layers(d, batch->pass->selections->list->axis);
+    if (begun)
+        return begun;
     size_t first = d->next_run;
     trip_batch piece = next_piece(d, batch, whole || ops->in_parts ? UINT64_MAX : TRIP_FRAME_PIECE);
     int status = ops->draw(d->renderer, &piece, is_front_to_back(d, batch));
@@ -105,12 +115,12 @@ static int draw_piece(trip_drawing *d, bool whole)
         report_progress(d, &piece);
     d->in_batch = d->next_run < batch->run_count;
     d->stats.draw_ms += now_ms() - start;
-    return status < 0 ? status : TRIP_OK;
+    return status;
 }
 
-static int is_done(const trip_drawing *d, const trip_batch *batch, bool wait)
+static int is_done(const trip_drawing *d, const trip_batch *batch)
 {
-    return d->renderer->ops->is_done ? d->renderer->ops->is_done(d->renderer, batch, wait) : 1;
+    return d->renderer->ops->is_done ? d->renderer->ops->is_done(d->renderer, batch) : 1;
 }
 
 static void release_oldest(trip_drawing *d)
@@ -119,22 +129,21 @@ static void release_oldest(trip_drawing *d)
     d->held_count--;
 }
 
-/* Gives back the slots of batches that the renderer is done with, oldest first; where more than
- * `most` are held it is waited for. */
-static int release_drawn(trip_drawing *d, unsigned most)
+/* Gives back the slots of batches that the renderer is done with, oldest first. */
+static int release_drawn(trip_drawing *d)
 {
     int done = 1;
-    while (d->held_count > 0 &&
-           (done = is_done(d, &d->held[d->held_first % HELD_MAX], d->held_count > most)) > 0)
+    while (d->held_count > d->in_batch &&
+           (done = is_done(d, &d->held[d->held_first % HELD_MAX])) > 0)
         release_oldest(d);
     return done < 0 ? done : 0;
 }
 
 /* A renderer may hold up to half of the ring, so that the disk is busy with the other half. */
-static unsigned may_hold(const trip_drawing *d)
+static bool holds_many(const trip_drawing *d)
 {
     unsigned half = trip_reader_slots(d->reader) / 2;
-    return half < HELD_MAX ? half : HELD_MAX - 1;
+    return d->held_count - d->in_batch > (half < HELD_MAX ? half : HELD_MAX - 1);
 }
 
 static int end_passes(trip_drawing *d)
@@ -144,29 +153,29 @@ static int end_passes(trip_drawing *d)
                                                    : d->renderer->ops->end_passes(d->renderer);
 }
 
-/* The next batch, once the last one is drawn; TRIP_FRAME_DONE when there is none. */
+/* The next batch, once the last one is drawn: 0 and in_batch, or where there is none all_read. */
 static int next_batch(trip_drawing *d)
 {
     trip_batch batch;
     if (!trip_reader_await(d->reader, 0))
         return TRIP_FRAME_WAITS;
     int status = trip_reader_next(d->reader, &batch);
-    if (status < 0)
-        return status;
     if (status > 0)
-        status = begin_batch(d, &batch);
-    else
-        status = end_passes(d);
-    return status < 0 ? status : d->in_batch ? TRIP_FRAME_MORE : TRIP_FRAME_DONE;
+        begin_batch(d, &batch);
+    d->all_read = status == 0;
+    return status < 0 ? status : 0;
 }
 
-/* A piece of what the renderer keeps; TRIP_FRAME_DONE when all of it is there. */
+/* A piece of what the renderer keeps; TRIP_FRAME_DONE when all of it is there, and reads are on
+ * their way. */
 static int load(trip_drawing *d)
 {
-    int status = d->loaded ? TRIP_FRAME_DONE : d->renderer->ops->load(d->renderer);
+    if (d->loaded)
+        return TRIP_FRAME_DONE;
+    int status = d->renderer->ops->load(d->renderer);
     d->loaded = status == TRIP_FRAME_DONE;
-    if (status == TRIP_FRAME_MORE && trip_frame_poll())
-        status = TRIP_INTERRUPTED;
+    if (d->loaded)
+        status = begin_reading(d);
     return status;
 }
 
@@ -181,22 +190,21 @@ static int make_light(trip_drawing *d)
 static int draw_next(trip_drawing *d, bool whole)
 {
     int status = make_light(d);
-    if (status == TRIP_FRAME_MORE && trip_frame_poll())
-        status = TRIP_INTERRUPTED;
+    if (status == TRIP_FRAME_DONE)
+        status = load(d);
     if (status != TRIP_FRAME_DONE)
         return status;
-    status = load(d);
-    if (status != TRIP_FRAME_DONE)
+    status = release_drawn(d);
+    if (!status && !d->in_batch && !d->all_read)
+        status = holds_many(d) ? TRIP_FRAME_WAITS : next_batch(d);
+    if (status)
         return status;
-    status = d->in_batch ? TRIP_FRAME_MORE : next_batch(d);
-    if (status != TRIP_FRAME_MORE)
-        return status;
+    if (d->all_read)
+        return end_passes(d);
     status = draw_piece(d, whole);
     if (!status && !d->in_batch)
-        status = release_drawn(d, may_hold(d));
-    if (!status)
-        status = trip_frame_poll();
-    return status < 0 ? status : TRIP_FRAME_MORE;
+        status = release_drawn(d);
+    return status ? status : TRIP_FRAME_MORE;
 }
 
 trip_list_stats trip_frame_list_stats(const trip_renderer *renderer, const trip_reader *reader,
@@ -282,7 +290,7 @@ int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *read
         d->begun = true;
         status = renderer->ops->begin_frame(renderer, frame);
     }
-    if (!status)
+    if (!status && d->loaded)
         status = begin_reading(d);
     trip_scope_enter(before);
     return status;
@@ -294,21 +302,30 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = trip_frame_poll();
     if (!status)
-        do
+        do {
             status = d->done ? TRIP_FRAME_DONE : draw_next(d, whole);
-        while (status == TRIP_FRAME_MORE && (whole || trip_frame_now_ns() < deadline_ns));
+            if (status == TRIP_FRAME_MORE && trip_frame_poll())
+                status = TRIP_INTERRUPTED;
+        } while (status == TRIP_FRAME_MORE && (whole || trip_frame_now_ns() < deadline_ns));
     d->done = status == TRIP_FRAME_DONE;
     trip_scope_enter(before);
     return status;
+}
+
+static void await_renderer(trip_drawing *d, uint64_t timeout_ns)
+{
+    const trip_renderer_ops *ops = d->renderer->ops;
+    if (ops->await && !d->done)
+        ops->await(d->renderer, timeout_ns);
 }
 
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 {
     if (d->frame->light && !trip_light_map_is_complete(d->frame->light))
         trip_light_map_await(d->frame->light, timeout_ns);
-    else if (!d->loaded)
-        d->renderer->ops->await_load(d->renderer, timeout_ns);
-    else if (!d->done && !d->in_batch)
+    else if (!d->loaded || d->in_batch || d->all_read || holds_many(d))
+        await_renderer(d, timeout_ns);
+    else
         trip_reader_await(d->reader, timeout_ns);
 }
 

@@ -37,7 +37,8 @@ typedef struct trip_drawing {
     trip_scope scope; /* cancelled: the frame is given up */
     double begun_ms;
     bool begun, done; /* the renderer has begun the frame; every batch is drawn */
-    bool loaded;      /* by the renderer, what it keeps */
+    bool loaded;      /* by the renderer, what it keeps; the reads are begun */
+    bool all_read;    /* and drawn */
     int next_axis;    /* layers before this one were begun */
     uint64_t splats;  /* drawn so far */
     /* Being drawn: held[(held_first + held_count - 1) % TRIP_FRAME_HELD_MAX] from this run on. */
@@ -48,15 +49,16 @@ typedef struct trip_drawing {
     unsigned held_first, held_count;
 } trip_drawing;
 
-/* Starts the reads. The reader must read at least the plan's planes. After a failure too,
- * trip_frame_end() follows. */
+/* Starts the reads, where the renderer has nothing to load. The reader must read at least the
+ * plan's planes. After a failure too, trip_frame_end() follows. */
 int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *reader,
                      const trip_frame *frame);
 /* Loads and draws what is ready, until the deadline by CLOCK_MONOTONIC, which it passes by the time
  * of one piece of at most TRIP_FRAME_PIECE splats or one run; something of what is ready in any
  * case. UINT64_MAX: no deadline. */
 int trip_frame_step(trip_drawing *d, uint64_t deadline_ns);
-/* Waits until there is something to draw, at most for the timeout; UINT64_MAX: without end. */
+/* Waits until there is something to draw, or room for it, at most for the timeout; UINT64_MAX:
+ * without end. */
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns);
 /* The picture of what is drawn so far: width * height * 4 floats, premultiplied, row 0 at the top,
  * and with settings.depth as many distances (layer.h); otherwise `depth` is NULL. After
@@ -66,7 +68,8 @@ int trip_frame_picture(trip_drawing *d, float *rgba, float *depth);
  * within milliseconds, and like those that follow with TRIP_INTERRUPTED. */
 void trip_frame_cancel(trip_drawing *d);
 /* The renderer and the reader are free for another frame. One that is not done is given up: what
- * the renderer has under way is dropped, and reads under way are not waited for. */
+ * the renderer has under way is dropped, or left to end on a graphics device before the next frame
+ * is drawn there, and reads under way are not waited for. */
 void trip_frame_end(trip_drawing *d);
 
 /* Begins, steps to the end, takes the picture; rgba and depth as in trip_frame_picture(). */

@@ -60,7 +60,7 @@ typedef struct trip_renderer trip_renderer;
 enum {
     TRIP_FRAME_DONE = 0,
     TRIP_FRAME_MORE = 1,  /* more is ready to be done */
-    TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk is at work */
+    TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk or a graphics device is at work */
 };
 
 /* Forms that the papers compare with, which not every renderer draws. */
@@ -78,21 +78,22 @@ typedef struct trip_renderer_ops {
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);
-    /* Loads a piece of what the renderer keeps of the data set from frame to frame; called between
-     * begin_frame and begin_layer until TRIP_FRAME_DONE. NULL: it keeps nothing. */
+    /* Loads a piece of what the renderer keeps of the data set from frame to frame, once what an
+     * earlier frame left under way has ended; called between begin_frame and begin_layer until
+     * TRIP_FRAME_DONE, and before anything is read. NULL: it keeps and leaves nothing. */
     int (*load)(trip_renderer *r);
-    /* Where load() has come to TRIP_FRAME_WAITS: waits until it is to be called again, at most so
-     * long. */
-    void (*await_load)(trip_renderer *r, uint64_t timeout_ns);
-    /* The layer of `axis` starts empty. */
+    /* Where a call has come to TRIP_FRAME_WAITS, or is_done() to 0: waits until it is to be called
+     * again, at most so long. NULL: neither happens. */
+    void (*await)(trip_renderer *r, uint64_t timeout_ns);
+    /* The layer of `axis` starts empty. Called again until TRIP_FRAME_DONE. */
     int (*begin_layer)(trip_renderer *r, int axis);
     /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
     int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
-    /* Every batch of the frame was drawn, and every layer begun. NULL: nothing is left to do then.
-     */
+    /* Every batch of the frame was drawn, and every layer begun. Called again until
+     * TRIP_FRAME_DONE. NULL: nothing is left to do then. */
     int (*end_passes)(trip_renderer *r);
-    /* Whether draw() is given whole batches and draws them in parts: it returns 1 until the batch
-     * is drawn, and is called again with the same batch. Else it is given pieces of batches. */
+    /* Whether draw() is given whole batches and draws them in parts: it is called again with the
+     * same batch until TRIP_FRAME_DONE. Else it is given pieces of batches. */
     bool in_parts;
     /* Memory of the renderer's own for a reader's ring: `count` slots of `bytes`, aligned to 4096;
      * batches that lie there are drawn in place. NULL where it has none to give. It stays the
@@ -101,16 +102,17 @@ typedef struct trip_renderer_ops {
     void *const *(*take_slots)(trip_renderer *r, unsigned count, size_t bytes);
     /* Takes that memory back. */
     void (*drop_slots)(trip_renderer *r);
-    /* 1: the batch is done with, and its slot may be read into; 0: not yet, only where it is not to
-     * wait; negative: failed. NULL where take_slots is. */
-    int (*is_done)(trip_renderer *r, const trip_batch *batch, bool wait);
+    /* 1: the batch is done with, and its slot may be read into; 0: not yet; negative: failed. NULL
+     * where take_slots is. */
+    int (*is_done)(trip_renderer *r, const trip_batch *batch);
     /* Merges what the layers hold so far, puts the background behind, and gives width * height * 4
      * floats, premultiplied, row 0 at the top; with settings.depth also width * height distances as
      * layer.h has them, otherwise `depth` is NULL. The frame goes on as if it had not been called;
      * after its last batch it gives the picture. */
     int (*picture)(trip_renderer *r, float *rgba, float *depth);
-    /* The frame is over or given up: returns when nothing that it is drawn from is in use. NULL:
-     * nothing is between the other calls. */
+    /* The frame is over or given up, and waited for is no more than takes a moment: when it
+     * returns, nothing that the frame is drawn from is in use but the renderer's own memory, which
+     * load() sees to. NULL: nothing is between the other calls. */
     void (*end_frame)(trip_renderer *r);
     /* Of a list in the frame, by its number in the data set, once the picture was taken
      * (bytes_read is the caller's). */

@@ -45,6 +45,7 @@ typedef struct gl_renderer {
     trip_gl_batch batch;
     trip_gl_cursor at;         /* in the batch */
     bool in_batch;             /* which is not all drawn */
+    bool prepared;             /* for the frame, what its commands use */
     const trip_gl_band *band;  /* being drawn into */
     trip_gl_resident resident; /* submission form "indexed" only */
     GLuint vertex_array, quad_indices;
@@ -72,6 +73,7 @@ static void destroy(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
     if (r->context && trip_gl_context_use(r->context) == TRIP_OK) {
+        trip_gl_queue_drain(&r->queue);
         trip_gl_variants_release(&r->variants);
         trip_gl_target_release(&r->target);
         trip_gl_ring_release(&r->ring);
@@ -124,15 +126,12 @@ static bool sums_sheets(const gl_renderer *r)
     return trip_settings_sum_sheets(r->frame->settings);
 }
 
-static int begin_frame(trip_renderer *base, const trip_frame *frame)
+/* Where nothing of an earlier frame is under way: what is freed here is in no use. */
+static int prepare(gl_renderer *r)
 {
-    gl_renderer *r = (gl_renderer *)base;
+    const trip_frame *frame = r->frame;
     const trip_camera *camera = frame->camera;
-    int status = check_size(r, camera);
-    if (!status)
-        status = trip_gl_context_use(r->context);
-    if (!status)
-        status = trip_gl_target_resize(&r->target, camera->width, camera->height,
+    int status = trip_gl_target_resize(&r->target, camera->width, camera->height,
                                        frame->settings->target, frame->settings->depth);
     if (!status)
         status = trip_gl_constants_fill(&r->constants, r->context, frame);
@@ -143,13 +142,6 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                         trip_gl_context_limits(r->context)->storage_block_bytes);
     if (status)
         return status;
-    r->base.resident = frame->settings->indexed;
-    r->frame = frame;
-    r->layers = 0;
-    r->quads = 0;
-    r->in_batch = false;
-    r->in_layer = false;
-    r->sums.method = frame->settings->method;
     memset(r->stats, 0, frame->data->list_count * sizeof *r->stats);
     if (frame->count) {
         static const GLuint zero = 0;
@@ -159,21 +151,62 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         status = trip_gl_sheets_begin_frame(&r->sheets, frame);
     if (status)
         return status;
+    r->prepared = true;
     return trip_gl_check(r->context, "frame");
+}
+
+/* Once all that was begun is done: 0, prepared; TRIP_FRAME_WAITS: not yet. */
+static int prepare_when_done(gl_renderer *r)
+{
+    int done = trip_gl_queue_is_done(&r->queue, r->queue.ended, false);
+    return done < 0 ? done : done ? prepare(r) : TRIP_FRAME_WAITS;
+}
+
+static int begin_frame(trip_renderer *base, const trip_frame *frame)
+{
+    gl_renderer *r = (gl_renderer *)base;
+    int status = check_size(r, frame->camera);
+    if (!status)
+        status = trip_gl_context_use(r->context);
+    if (status)
+        return status;
+    r->base.resident = frame->settings->indexed;
+    r->frame = frame;
+    r->layers = 0;
+    r->quads = 0;
+    r->prepared = false;
+    r->in_batch = false;
+    r->in_layer = false;
+    r->sums.method = frame->settings->method;
+    status = prepare_when_done(r);
+    return status < 0 ? status : TRIP_OK;
 }
 
 static int load(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
+    if (!status && !r->prepared)
+        status = prepare_when_done(r);
     if (status || !r->frame->settings->indexed)
         return status;
     return trip_gl_resident_load(&r->resident);
 }
 
-static void await_load(trip_renderer *base, uint64_t timeout_ns)
+static void await(trip_renderer *base, uint64_t timeout_ns)
 {
-    trip_gl_resident_await(&((gl_renderer *)base)->resident, timeout_ns);
+    gl_renderer *r = (gl_renderer *)base;
+    if (r->prepared && r->frame->settings->indexed && r->resident.loading)
+        trip_gl_resident_await(&r->resident, timeout_ns);
+    else if (trip_gl_context_use(r->context) == TRIP_OK)
+        trip_gl_queue_await(&r->queue, timeout_ns);
+}
+
+/* 0: a part may be begun; else TRIP_FRAME_WAITS, or negative. */
+static int await_room(gl_renderer *r)
+{
+    int room = trip_gl_queue_has_room(&r->queue);
+    return room < 0 ? room : room ? TRIP_OK : TRIP_FRAME_WAITS;
 }
 
 static int use_program(gl_renderer *r, trip_gl_pass pass, unsigned effects)
@@ -224,16 +257,18 @@ static int mask_region(gl_renderer *r, int axis)
     return status;
 }
 
-/* The last sheets of the layer begun, if any are open. */
+/* The last sheets of the layer begun, if any are open: a part of them. */
 static int end_passes(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
+    if (!status)
+        status = await_room(r);
     if (!status && r->in_layer && classifies_post(r))
         status = trip_gl_sheets_end_layer(&r->sheets);
     else if (!status && r->in_layer && sums_sheets(r))
         status = trip_gl_sums_end_layer(&r->sums);
-    r->in_layer = false;
+    r->in_layer = r->in_layer && status > 0;
     return status;
 }
 
@@ -416,10 +451,23 @@ static int draw_sheets(gl_renderer *r, const trip_batch *batch)
     return status;
 }
 
+/* 0: there is a slot of the ring where the batch calls for one; else TRIP_FRAME_WAITS, or negative.
+ */
+static int await_slot(const gl_renderer *r)
+{
+    bool taken = classifies_post(r) ? r->sheets.batch.begun : r->in_batch;
+    int is_free = taken ? 1 : trip_gl_ring_is_free(&r->ring);
+    return is_free < 0 ? is_free : is_free ? TRIP_OK : TRIP_FRAME_WAITS;
+}
+
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
+    if (!status)
+        status = await_room(r);
+    if (!status)
+        status = await_slot(r);
     if (!status && classifies_post(r))
         return draw_sheets(r, batch);
     if (!status && !r->in_batch)
@@ -444,18 +492,20 @@ static void *const *take_slots(trip_renderer *base, unsigned count, size_t bytes
 static void drop_slots(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
-    if (trip_gl_context_use(r->context) == TRIP_OK)
-        trip_gl_slots_release(&r->slots);
+    if (trip_gl_context_use(r->context))
+        return;
+    trip_gl_queue_drain(&r->queue);
+    trip_gl_slots_release(&r->slots);
 }
 
-static int is_done(trip_renderer *base, const trip_batch *batch, bool wait)
+static int is_done(trip_renderer *base, const trip_batch *batch)
 {
     gl_renderer *r = (gl_renderer *)base;
     trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
     if (!slot)
         return 1;
     int status = trip_gl_context_use(r->context);
-    return status ? status : trip_gl_queue_is_done(&r->queue, slot->part, wait);
+    return status ? status : trip_gl_queue_is_done(&r->queue, slot->part, false);
 }
 
 /* A strip of the band's rows from `y` on, merged and read. */
@@ -517,10 +567,18 @@ static void describe(gl_renderer *r)
         snprintf(r->device, sizeof r->device, "%s", name);
 }
 
+static int wait_and_prepare(gl_renderer *r)
+{
+    int status = trip_gl_queue_is_done(&r->queue, r->queue.ended, true);
+    return status < 0 ? status : prepare(r);
+}
+
 static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = trip_gl_context_use(r->context);
+    if (!status && !r->prepared)
+        status = wait_and_prepare(r);
     if (!status)
         status = merge(r, rgba, depth);
     if (status)
@@ -535,8 +593,10 @@ static void end_frame(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
     trip_gl_resident_pause(&r->resident);
-    if (trip_gl_context_use(r->context) == TRIP_OK)
-        trip_gl_queue_drain(&r->queue);
+    if (trip_gl_context_use(r->context))
+        return;
+    trip_gl_queue_leave(&r->queue);
+    trip_gl_ring_leave(&r->ring);
 }
 
 static trip_list_stats stats(const trip_renderer *base, unsigned list)
@@ -552,7 +612,7 @@ static const trip_renderer_ops gl_ops = {
     .device = device,
     .begin_frame = begin_frame,
     .load = load,
-    .await_load = await_load,
+    .await = await,
     .begin_layer = begin_layer,
     .draw = draw,
     .end_passes = end_passes,

@@ -4,7 +4,7 @@
 #include "report.h"
 
 /* How long a wait does not notice that the frame is cancelled. */
-static const GLuint64 look_ns = 10000000;
+static const GLuint64 look_ns = 1000000;
 
 static int wait_failed(void)
 {
@@ -40,15 +40,42 @@ int trip_gl_queue_is_done(trip_gl_queue *q, uint64_t part, bool wait)
     return 1;
 }
 
+/* The part that must be done before there is room for one more; 0: none. */
+static uint64_t before_next(const trip_gl_queue *q)
+{
+    return q->ended < TRIP_GL_QUEUE_PARTS ? 0 : q->ended - (TRIP_GL_QUEUE_PARTS - 1);
+}
+
+int trip_gl_queue_has_room(trip_gl_queue *q)
+{
+    return trip_gl_queue_is_done(q, before_next(q), false);
+}
+
 int trip_gl_queue_end_part(trip_gl_queue *q)
 {
+    int status = trip_gl_queue_is_done(q, before_next(q), true);
+    if (status < 0)
+        return status;
     q->fences[++q->ended % TRIP_GL_QUEUE_PARTS] = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     glFlush();
-    int status = trip_frame_poll();
-    if (status || q->ended < TRIP_GL_QUEUE_PARTS)
-        return status;
-    status = trip_gl_queue_is_done(q, q->ended - (TRIP_GL_QUEUE_PARTS - 1), true);
-    return status < 0 ? status : TRIP_OK;
+    return trip_frame_poll();
+}
+
+void trip_gl_queue_await(trip_gl_queue *q, uint64_t timeout_ns)
+{
+    if (q->done < q->ended)
+        look_at_oldest(q, timeout_ns);
+}
+
+void trip_gl_queue_leave(trip_gl_queue *q)
+{
+    GLsync *fence = &q->fences[q->ended % TRIP_GL_QUEUE_PARTS];
+    if (q->done == q->ended)
+        fence = &q->fences[++q->ended % TRIP_GL_QUEUE_PARTS];
+    else
+        glDeleteSync(*fence);
+    *fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    glFlush();
 }
 
 void trip_gl_queue_drain(trip_gl_queue *q)

@@ -37,6 +37,17 @@ static int no_room(const trip_gl_ring *r, size_t bytes)
     return trip_fail(TRIP_ERROR, "gl", "buffer", "the driver has no %zu bytes left", bytes);
 }
 
+int trip_gl_ring_is_free(const trip_gl_ring *r)
+{
+    return trip_gl_queue_is_done(r->queue, r->slots[r->next].part, false);
+}
+
+void trip_gl_ring_leave(trip_gl_ring *r)
+{
+    for (int i = 0; i < TRIP_GL_RING_SLOTS; i++)
+        r->slots[i].part = r->queue->ended;
+}
+
 int trip_gl_ring_take(trip_gl_ring *r, size_t bytes, trip_gl_slot **slot)
 {
     trip_gl_slot *s = &r->slots[r->next];

@@ -32,6 +32,11 @@ typedef struct trip_gl_ring {
 bool trip_gl_slot_make(trip_gl_slot *slot, size_t bytes, bool readable, trip_budget *budget);
 void trip_gl_slot_release(trip_gl_slot *slot, trip_budget *budget);
 
+/* Whether the GPU has read what the next slot held: 1, or 0: not yet; negative: failed (reported).
+ */
+int trip_gl_ring_is_free(const trip_gl_ring *r);
+/* Every slot is read by the queue's last part. */
+void trip_gl_ring_leave(trip_gl_ring *r);
 /* The next slot with room for `bytes`, waiting until the GPU has read what it held. */
 int trip_gl_ring_take(trip_gl_ring *r, size_t bytes, trip_gl_slot **slot);
 void trip_gl_ring_release(trip_gl_ring *r);

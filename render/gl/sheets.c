@@ -507,10 +507,10 @@ int trip_gl_sheets_end_layer(trip_gl_sheets *s)
     int status = TRIP_OK;
     if (s->pass && s->drawing.to == 0)
         begin_drawing(s, true);
-    while (!status && s->drawing.to > 0) {
+    if (s->drawing.to > 0)
         status = draw_part(s);
-        status = status ? status : trip_frame_poll();
-    }
+    if (!status && s->drawing.to > 0)
+        return 1;
     forget(s);
     return status ? status : trip_gl_check(s->context, "sheets");
 }

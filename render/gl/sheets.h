@@ -71,7 +71,7 @@ int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame);
 int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis);
 /* A part of the work that the batch calls for; 1: there is more. */
 int trip_gl_sheets_draw(trip_gl_sheets *s, const trip_batch *batch);
-/* Every batch of the layer was drawn: so are its last sheets. */
+/* Every batch of the layer was drawn: a part of its last sheets is; 1: there is more. */
 int trip_gl_sheets_end_layer(trip_gl_sheets *s);
 void trip_gl_sheets_release(trip_gl_sheets *s);
 
