@@ -1,6 +1,5 @@
 #include "bench_disk.h"
 
-#include <assert.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,44 +9,30 @@
 #include "plain_disk.h"
 #include "report.h"
 
-enum { LISTS = 8, FILES = LISTS * TRIP_PLANES };
-static_assert((int)FILES <= 32, "bench_files has a bit for each");
+enum { AXES = 3 };
 
-/* The first lists: level 0's come first. */
-static int lists_of(const trip_dataset *data)
+static bool has_file(const bench_files *files, unsigned list, int plane)
 {
-    return data->list_count < LISTS ? (int)data->list_count : LISTS;
+    return files->planes[list] >> plane & 1;
 }
 
-bench_files bench_files_of_plan(const trip_dataset *data, const trip_plan *plan)
+void bench_files_of_plan(const trip_dataset *data, const trip_plan *plan, bench_files *out)
 {
-    bench_files files = 0;
-    for (int i = 0; i < lists_of(data); i++)
+    *out = (bench_files){ 0 };
+    for (unsigned i = 0; i < data->list_count; i++)
+        if (plan->lists[i].drawn && plan->layers[data->lists[i].axis].pass_count)
+            out->planes[i] = (uint8_t)(plan->planes & data->lists[i].planes);
+}
+
+void bench_files_forget(const session *s, const bench_files *files)
+{
+    for (unsigned i = 0; i < s->data->list_count; i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (plan->lists[i].drawn && plan->layers[data->lists[i].axis].pass_count &&
-                plan->planes & data->lists[i].planes & 1u << plane)
-                files |= UINT32_C(1) << (i * TRIP_PLANES + plane);
-    return files;
+            if (has_file(files, i, plane))
+                posix_fadvise(s->data->lists[i].plane_fd[plane], 0, 0, POSIX_FADV_DONTNEED);
 }
 
-uint64_t bench_files_bytes(const session *s, bench_files files)
-{
-    uint64_t bytes = 0;
-    for (int i = 0; i < FILES; i++)
-        if (files >> i & 1)
-            bytes += s->data->lists[i / TRIP_PLANES].plane_bytes[i % TRIP_PLANES];
-    return bytes;
-}
-
-void bench_files_forget(const session *s, bench_files files)
-{
-    for (int i = 0; i < FILES; i++)
-        if (files >> i & 1)
-            posix_fadvise(s->data->lists[i / TRIP_PLANES].plane_fd[i % TRIP_PLANES], 0, 0,
-                          POSIX_FADV_DONTNEED);
-}
-
-static int read_plane(const session *s, int list, int plane, plain_disk *d, void *memory)
+static int read_plane(const session *s, unsigned list, int plane, plain_disk *d, void *memory)
 {
     char path[4096], name[32];
     if (snprintf(path, sizeof path, "%s/%s", s->data->path,
@@ -82,36 +67,40 @@ static void release_memory(const session *s, void *memory, size_t bytes, bool la
     trip_budget_discharge(s->budget, bytes);
 }
 
-int bench_files_read(const session *s, bench_files files, bench_plain how, bench_disk_read *out)
+/* Every file, one behind the other. */
+static int read_files(const session *s, const bench_files *files, plain_disk *d, void *memory)
+{
+    int status = 0;
+    for (unsigned i = 0; i < s->data->list_count; i++)
+        for (int plane = 0; plane < TRIP_PLANES && !status; plane++)
+            if (has_file(files, i, plane))
+                status = read_plane(s, i, plane, d, memory);
+    return status;
+}
+
+int bench_files_read(const session *s, const bench_files *files, bench_plain how,
+                     bench_disk_read *out)
 {
     plain_disk d = { .direct = true, .look = how == BENCH_PLAIN };
     bool large_pages = how != BENCH_PLAIN_SMALL;
     void *memory = take_memory(s, PLAIN_DISK_MEMORY_BYTES, large_pages);
-    int status = 0;
     if (!memory)
         return trip_fail(TRIP_ERROR, "bench", s->input,
                          "%zu bytes to read into do not fit the memory given; raise --memory",
                          PLAIN_DISK_MEMORY_BYTES);
-    for (int i = 0; i < FILES && !status; i++)
-        if (files >> i & 1)
-            status = read_plane(s, i / TRIP_PLANES, i % TRIP_PLANES, &d, memory);
+    int status = read_files(s, files, &d, memory);
     *out = (bench_disk_read){ d.seconds * 1e3, d.bytes, d.direct };
     release_memory(s, memory, PLAIN_DISK_MEMORY_BYTES, large_pages);
     return status;
 }
 
-static bool has_list(bench_files files, int list)
-{
-    return files >> list * TRIP_PLANES & ((1u << TRIP_PLANES) - 1);
-}
-
-static int stream_lists(trip_reader *reader, const trip_pass passes[LISTS], bench_files files)
+static int stream_passes(trip_reader *reader, const trip_pass passes[AXES])
 {
     trip_batch batch;
     int status = trip_reader_begin(reader, NULL);
-    for (int i = 0; i < LISTS && !status; i++)
-        if (has_list(files, i))
-            status = trip_reader_then(reader, &passes[i]);
+    for (int axis = 0; axis < AXES && !status; axis++)
+        if (passes[axis].selection_count)
+            status = trip_reader_then(reader, &passes[axis]);
     while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
         trip_reader_release(reader, &batch);
         status =
@@ -120,25 +109,41 @@ static int stream_lists(trip_reader *reader, const trip_pass passes[LISTS], benc
     return status;
 }
 
-int bench_files_stream(const session *s, bench_files files, trip_reader *reader,
+/* All of the files' lists along an axis, from `selections` on. */
+static int select_axis(const session *s, const bench_files *files, int axis,
+                       trip_selection *selections, trip_pass *pass)
+{
+    int status = 0;
+    *pass = (trip_pass){ .selections = selections };
+    for (unsigned i = 0; i < s->data->list_count && !status; i++)
+        if (files->planes[i] && s->data->lists[i].axis == axis)
+            status = trip_selection_create_whole(&selections[pass->selection_count++], s->data,
+                                                 &s->data->lists[i], false, s->budget);
+    return status;
+}
+
+int bench_files_stream(const session *s, const bench_files *files, trip_reader *reader,
                        bench_disk_read *out)
 {
-    trip_selection lists[LISTS] = { 0 };
-    trip_pass passes[LISTS];
+    const unsigned lists = s->data->list_count;
+    trip_pass passes[AXES];
+    trip_selection *selections = calloc(lists, sizeof *selections);
+    if (!selections)
+        return trip_fail(TRIP_ERROR, "bench", s->input, "out of memory");
+    unsigned count = 0;
     int status = 0;
-    for (int i = 0; i < LISTS && !status; i++)
-        if (has_list(files, i))
-            status = trip_selection_create_whole(&lists[i], s->data, &s->data->lists[i], false,
-                                                 s->budget);
-    for (int i = 0; i < LISTS; i++)
-        passes[i] = trip_pass_of(&lists[i]);
+    for (int axis = 0; axis < AXES && !status; axis++) {
+        status = select_axis(s, files, axis, selections + count, &passes[axis]);
+        count += passes[axis].selection_count;
+    }
     double start = bench_now_ms();
     if (!status)
-        status = stream_lists(reader, passes, files);
+        status = stream_passes(reader, passes);
     out->ms = bench_now_ms() - start;
     out->bytes = trip_reader_get_stats(reader).bytes_read;
     out->direct = strstr(trip_reader_engine_name(reader), "O_DIRECT");
-    for (int i = 0; i < LISTS; i++)
-        trip_selection_destroy(&lists[i], s->budget);
+    for (unsigned i = 0; i < lists; i++)
+        trip_selection_destroy(&selections[i], s->budget);
+    free(selections);
     return status;
 }

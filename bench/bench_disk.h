@@ -5,15 +5,16 @@
 
 #include "session.h"
 
-/* Plane files of the first eight lists, as bits: list * TRIP_PLANES + plane. */
-typedef uint32_t bench_files;
+/* Plane files of a data set's lists. */
+typedef struct bench_files {
+    uint8_t planes[TRIP_LISTS_MAX]; /* of a list, by its number: a bit per trip_plane */
+} bench_files;
 
 /* The files that a plan's passes read from. */
-bench_files bench_files_of_plan(const trip_dataset *data, const trip_plan *plan);
-uint64_t bench_files_bytes(const session *s, bench_files files);
+void bench_files_of_plan(const trip_dataset *data, const trip_plan *plan, bench_files *out);
 
 /* Advises the system to drop what it holds of them; direct reads do not need that. */
-void bench_files_forget(const session *s, bench_files files);
+void bench_files_forget(const session *s, const bench_files *files);
 
 typedef struct bench_disk_read {
     double ms;
@@ -29,11 +30,13 @@ typedef enum bench_plain {
     BENCH_PLAIN_SMALL, /* nothing loaded, into memory as the system gives it to any program */
 } bench_plain;
 
-int bench_files_read(const session *s, bench_files files, bench_plain how, bench_disk_read *out);
+int bench_files_read(const session *s, const bench_files *files, bench_plain how,
+                     bench_disk_read *out);
 
-/* The same bytes as the reader streams them: every splat of the files' lists, checked against its
- * checksum and handed out, and not drawn. The reader reads the files' planes and skips nothing. */
-int bench_files_stream(const session *s, bench_files files, trip_reader *reader,
+/* The same bytes as the reader streams them: every splat of the files' lists, those of an axis
+ * merged by list coordinate, checked against its checksum and handed out, and not drawn. The reader
+ * reads the files' planes and skips nothing. */
+int bench_files_stream(const session *s, const bench_files *files, trip_reader *reader,
                        bench_disk_read *out);
 
 #endif

@@ -76,7 +76,7 @@ static sample of_cost(const bench_cost *c)
 static int take_plain(stream *t, bench_plain how, sample *out)
 {
     bench_disk_read read;
-    int status = bench_files_read(t->session, t->files, how, &read);
+    int status = bench_files_read(t->session, &t->files, how, &read);
     *out = (sample){ read.ms, (double)read.bytes };
     t->direct = read.direct;
     return status;
@@ -86,7 +86,7 @@ static int take_streamed(stream *t, sample *out)
 {
     bench_disk_read read;
     t->occluder = NULL;
-    int status = bench_files_stream(t->session, t->files, t->frame.reader, &read);
+    int status = bench_files_stream(t->session, &t->files, t->frame.reader, &read);
     *out = (sample){ read.ms, (double)read.bytes };
     return status;
 }
@@ -103,7 +103,7 @@ static int take(stream *t, int stage, sample *out)
     bench_progress_step(t->options->progress, names[stage]);
     if (stage == DRAW && !t->in_memory.renderer)
         return 0;
-    bench_files_forget(t->session, t->files);
+    bench_files_forget(t->session, &t->files);
     if (stage <= SMALL)
         return take_plain(t, plain[stage], out);
     if (stage == STREAMED)
@@ -123,7 +123,7 @@ static int find_files(stream *t)
                                 t->session->table, t->session->budget);
     if (status)
         return status;
-    t->files = bench_files_of_plan(t->session->data, &plan);
+    bench_files_of_plan(t->session->data, &plan, &t->files);
     trip_plan_release(&plan, t->session->budget);
     return 0;
 }
