@@ -172,10 +172,19 @@ INLINE vf dot(v3 a, v3 b)
     return v_fma(a.x, b.x, v_fma(a.y, b.y, a.z * b.z));
 }
 
+/* Lengths below 1e-15 count as 0. */
+INLINE v3 unit_of(v3 a, vf *length)
+{
+    const vf least = v_set(1e-30f);
+    vf squared = dot(a, a), root = v_sqrt(v_max(squared, least)), inverse = v_set(1) / root;
+    *length = v_select(v_ge(squared, least), root, v_set(0));
+    return (v3){ a.x * inverse, a.y * inverse, a.z * inverse };
+}
+
 INLINE v3 unit(v3 a)
 {
-    vf inverse = v_set(1) / v_sqrt(v_max(dot(a, a), v_set(1e-30f)));
-    return (v3){ a.x * inverse, a.y * inverse, a.z * inverse };
+    vf length;
+    return unit_of(a, &length);
 }
 
 INLINE v3 v3_of(trip_vec3 a)
@@ -199,9 +208,13 @@ INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
     strong.y = v_select(below, v_copysign(v_set(1) - v_abs(a), b), b);
     vf root = v_fma(v_from_int(v_shift_right(normal, 24) & 127), v_set(1.0f / 32), v_set(1));
     vm is_strong = v_gt(v_set(0), v_from_int(normal));
-    *length = v_select(is_strong, root * root * v_set(view->normal_full), v_sqrt(dot(weak, weak)));
-    return unit((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
-                      v_select(is_strong, strong.z, weak.z) });
+    vf weak_length;
+    v3 direction =
+        unit_of((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
+                      v_select(is_strong, strong.z, weak.z) },
+                &weak_length);
+    *length = v_select(is_strong, root * root * v_set(view->normal_full), weak_length);
+    return direction;
 }
 
 /* As trip_compact_normal_unpack(): the direction, and the length over gradient_full. */
@@ -217,9 +230,13 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
     vf q = v_fma(v_from_int(v_shift_right(normal, 12) & 2047), v_set(1.0f / 2047), v_set(-0.5f));
     v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) };
     vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
-    *length = v_select(is_strong, v_set(view->normal_full), v_sqrt(dot(weak, weak)));
-    return unit((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
-                      v_select(is_strong, strong.z, weak.z) });
+    vf weak_length;
+    v3 direction =
+        unit_of((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
+                      v_select(is_strong, strong.z, weak.z) },
+                &weak_length);
+    *length = v_select(is_strong, v_set(view->normal_full), weak_length);
+    return direction;
 }
 
 /* How kernels are flattened: trip_flattening, along the list's own axes. */
@@ -269,6 +286,7 @@ typedef struct perspective {
     v3 YxR, RxX;               /* and cross products */
     bool uneven;               /* not cubes, whose footprints may be any number of times as long as
                                   wide */
+    bool affine;               /* footprints are, as view->splat has it */
 } perspective;
 
 /* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
@@ -317,6 +335,7 @@ INLINE perspective perspective_of(const trip_cpu_view *view)
         .YxR = in_list_axes(view, trip_cross(y, r)),
         .RxX = in_list_axes(view, trip_cross(r, x)),
         .uneven = view->stretch_varies,
+        .affine = f->affine,
     };
 }
 
@@ -428,7 +447,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
     /* q^T S'^-1 q = (syy / det) (x - sxy / syy y)^2 + y^2 / syy */
     vf inverse = v_set(1) / (det * syy);
     vf inverse_det = syy * inverse, inverse_syy = det * inverse;
-    vf rr_u = rr * u, unit = (f->affine ? u : rr_u) * v_set((float)(1 / f->cutoff2));
+    vf rr_u = rr * u, unit = (p->affine ? u : rr_u) * v_set((float)(1 / f->cutoff2));
     out.l11 = v_sqrt(unit * (syy * inverse_det));
     out.l21 = -(sxy * inverse_syy) * out.l11;
     out.l22 = v_sqrt(unit * inverse_syy);
@@ -439,7 +458,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
      * R^2 and R^2 + radius^2 of splat.h, so that no near splat is usual. What is not a number is
      * not usual. */
     out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
-    if (f->affine) {
+    if (p->affine) {
         out.usual = vm_and(out.usual, exact);
         bound_affine(&out, sxx, syy, v_set((float)f->cutoff2) / u);
         if (p->uneven)
@@ -833,27 +852,28 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
 /* In three loops, each short enough that the processor works on several vectors at a time: one
  * loop's chain of divisions and roots would leave it waiting. What lies over saturated cells is
  * left out before it is coloured, stored, sorted and gathered. */
-static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
-                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
-                        trip_cpu_splat *out, float *depths)
+INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic uint64_t *open,
+                           const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
+                           trip_cpu_splat *out, float *depths)
 {
     uint32_t n = 0;
     const float *extinction = &view->table[0].extinction;
+    const bool ortho = !common && view->splat.camera.ortho, flattens = !common && view->flattens;
     footprint parallel = footprint_parallel(view);
     perspective persp = perspective_of(view);
+    if (common)
+        persp.uneven = persp.affine = false;
     for (uint32_t i = 0; i < count; i += V)
         place(view, staged, i, lanes);
     for (uint32_t i = 0; i < count; i += V) {
         footprint f = parallel;
-        flattening flat, *flattens = NULL;
-        if (view->flattens) {
+        flattening flat;
+        if (flattens)
             flat = flattening_of(view, staged, i);
-            flattens = &flat;
-        }
-        if (view->flattens && view->splat.camera.ortho)
+        if (flattens && ortho)
             f = footprint_flat_parallel(view, &flat);
-        if (!view->splat.camera.ortho)
-            f = footprint_of(&persp, view, lanes, flattens, i);
+        if (!ortho)
+            f = footprint_of(&persp, view, lanes, flattens ? &flat : NULL, i);
         else
             f.usual = v_ge(v_load(lanes->z + i), v_set(view->near));
         unsigned valid = vm_bits(vm_first(count - i));
@@ -869,6 +889,17 @@ static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
     for (uint32_t i = 0; i < count; i += V)
         n += store_splats(view, staged, i, lanes, out + n, TRIP_CPU_DEPTH ? depths + n : NULL);
     return n;
+}
+
+/* Perspective views of cubes by round kernels are compiled by themselves, without what they do not
+ * need. */
+static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
+                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
+                        trip_cpu_splat *out, float *depths)
+{
+    if (view->splat.camera.ortho || view->splat.affine || view->stretch_varies || view->flattens)
+        return project_as(false, view, open, staged, count, lanes, out, depths);
+    return project_as(true, view, open, staged, count, lanes, out, depths);
 }
 
 #endif
