@@ -1,6 +1,7 @@
 #include "fastest.h"
 
 #include <cjson/cJSON.h>
+#include <inttypes.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -29,6 +30,11 @@ char *accuracy_report_path(const char *data)
     if (path)
         sprintf(path, "%.*s.accuracy", (int)length, data);
     return path;
+}
+
+void accuracy_checksum_text(uint64_t checksum, char text[ACCURACY_CHECKSUM_BYTES])
+{
+    snprintf(text, ACCURACY_CHECKSUM_BYTES, "%016" PRIx64, checksum);
 }
 
 /* ---- one row ---- */
@@ -87,6 +93,21 @@ static void warn_of_differences(const cJSON *root, const char *path, const accur
                   s->shading ? "without light" : "with light");
 }
 
+/* Reports of before they had a checksum may be of anything. */
+static int check_data(const cJSON *root, const char *path, const accuracy_wanted *w)
+{
+    const char *checksum = text_of(root, "checksum");
+    if (!w->checksum)
+        return 0;
+    if (!checksum)
+        trip_warn(path, "does not say which data set it was made of; measure it anew");
+    return !checksum || !strcmp(checksum, w->checksum)
+               ? 0
+               : trip_fail(TRIP_ERROR, "--error", path,
+                           "was made of another data set, or before this one was bricked anew: "
+                           "`triptych accuracy` measures it");
+}
+
 static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
                   accuracy_found *out)
 {
@@ -125,6 +146,8 @@ int accuracy_fastest_in(const char *text, const char *path, const accuracy_wante
     if (!status && number_of(json.root, "triptych_accuracy") != VERSION)
         status =
             trip_fail(TRIP_ERROR, "--error", path, "is no accuracy.json of `triptych accuracy`");
+    if (!status)
+        status = check_data(json.root, path, wanted);
     if (!status)
         status = choose(json.root, path, wanted, out);
     trip_json_free(&json);

@@ -157,6 +157,7 @@ static int leave_out_idle(sweep *s)
                          s->contexts.why[0][TRIPTYCH_RENDERER_CPU]);
     if (status || triptych_get_info(t, &info))
         return status ? status : TRIP_ERROR;
+    s->m->checksum = info.checksum;
     for (unsigned i = 0; i < info.lists; i++)
         if (triptych_get_list(t, i, &list) == 0 && list.level > levels)
             levels = list.level;

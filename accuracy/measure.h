@@ -52,6 +52,7 @@ typedef struct accuracy_measured {
     int view_count; /* done */
     char *truth;    /* picture of the first view */
     double seconds;
+    uint64_t checksum; /* of the first data set, triptych_info */
 } accuracy_measured;
 
 int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder);

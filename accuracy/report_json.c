@@ -5,6 +5,7 @@
 #include "bench_report.h"
 #include "json.h"
 #include "accuracy_report.h"
+#include "fastest.h"
 
 static void add_number(cJSON *to, const char *name, double value)
 {
@@ -92,10 +93,13 @@ static void add_left_out(cJSON *list, const accuracy_row *row)
 static void add_facts(cJSON *root, const accuracy_report *r)
 {
     const accuracy_options *o = r->m->options;
+    char checksum[ACCURACY_CHECKSUM_BYTES];
+    accuracy_checksum_text(r->m->checksum, checksum);
     cJSON_AddNumberToObject(root, "triptych_accuracy", 1);
     cJSON_AddStringToObject(root, "version", triptych_version());
     cJSON_AddStringToObject(root, "command", r->command);
     cJSON_AddStringToObject(root, "data_set", o->data[0]);
+    cJSON_AddStringToObject(root, "checksum", checksum);
     cJSON_AddItemToObject(root, "source",
                           o->source ? cJSON_CreateString(o->source) : cJSON_CreateNull());
     cJSON_AddItemToObject(root, "transfer_function",

@@ -2,7 +2,9 @@
 
 #include <stdlib.h>
 
+#include "cached_volume.h"
 #include "fastest.h"
+#include "library.h"
 #include "options.h"
 #include "report.h"
 
@@ -30,9 +32,32 @@ int quality_options_check(const quality_options *q)
     return 0;
 }
 
+/* That of a data set; of a volume, which is bricked later, "". */
+static int find_checksum(const char *input, char text[ACCURACY_CHECKSUM_BYTES])
+{
+    triptych *t = NULL;
+    triptych_info info;
+    text[0] = 0;
+    if (cached_volume_wanted(input))
+        return 0;
+    int status = library_create(&t, NULL);
+    if (!status)
+        status = triptych_open(t, input, NULL);
+    if (!status)
+        status = triptych_get_info(t, &info);
+    if (!status)
+        accuracy_checksum_text(info.checksum, text);
+    triptych_destroy(t);
+    return status;
+}
+
 static int use_report(const quality_options *q, const quality_drawn *drawn, triptych_settings *s,
                       triptych_renderer *renderer, bool slow_too)
 {
+    char checksum[ACCURACY_CHECKSUM_BYTES];
+    int status = find_checksum(drawn->input, checksum);
+    if (status)
+        return status;
     const unsigned fast = 1u << TRIPTYCH_RENDERER_CPU | 1u << TRIPTYCH_RENDERER_GL;
     const accuracy_wanted wanted = {
         .error = q->error,
@@ -40,12 +65,13 @@ static int use_report(const quality_options *q, const quality_drawn *drawn, trip
                      : slow_too ? 0
                                 : fast,
         .function = drawn->function,
+        .checksum = checksum[0] ? checksum : NULL,
     };
     accuracy_found found = { .setting.settings = *s };
     char *beside = q->report ? NULL : accuracy_report_path(drawn->input);
     const char *path = q->report ? q->report : beside;
-    int status = path ? accuracy_fastest(path, &wanted, &found)
-                      : trip_fail(TRIP_ERROR, "--error", drawn->input, "out of memory");
+    status = path ? accuracy_fastest(path, &wanted, &found)
+                  : trip_fail(TRIP_ERROR, "--error", drawn->input, "out of memory");
     if (!status) {
         *s = found.setting.settings;
         *renderer = found.setting.renderer;

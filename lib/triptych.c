@@ -306,6 +306,7 @@ static triptych_info info_of(const trip_dataset *d)
         .halo = h->halo,
         .bytes = d->bytes,
         .index_bytes = h->index_bytes,
+        .checksum = h->header_checksum,
         .format_version = h->version,
         .lists = d->list_count,
         .code_bytes = h->code_bytes,

@@ -108,6 +108,7 @@ typedef struct triptych_info {
     uint64_t kept;               /* of those: not what no function given to `brick` shows */
     uint64_t halo;               /* neighbours of those, for interpolation */
     uint64_t bytes, index_bytes; /* on disk: of everything, of the index */
+    uint64_t checksum; /* of the index, which has those of all else: the same data, the same number */
     unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
     double gradient_step[3], gradient_full;                   /* of normals of 3 bytes, of all */
     unsigned tile_voxels, slab_sheets, page_bytes;

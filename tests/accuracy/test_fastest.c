@@ -127,6 +127,35 @@ static void what_is_no_report_is_refused(void **state)
     }
 }
 
+static void a_report_of_another_data_set_is_refused(void **state)
+{
+    (void)state;
+    static const char row[] = "\"rows\":[{\"name\":\"a\",\"data_set\":\"a.trip\",\"ms\":1,"
+                              "\"total\":{\"worst_percentile_99\":1},\"options\":{}}]}";
+    const struct {
+        const char *checksum, *wanted;
+        int status, reports;
+    } cases[] = { { "\"checksum\":\"00000000000000ff\",", "00000000000000ff", 0, 0 },
+                  { "\"checksum\":\"00000000000000fe\",", "00000000000000ff", TRIP_ERROR, 1 },
+                  { "\"checksum\":\"00000000000000fe\",", NULL, 0, 0 },
+                  { "", "00000000000000ff", 0, 1 } };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[512];
+        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        snprintf(text, sizeof text,
+                 "{\"triptych_accuracy\":1,\"data_set\":\"a.trip\",\"shading\":true,%s%s",
+                 cases[i].checksum, row);
+        test_catch_reports();
+        int status = accuracy_fastest_in(
+            text, "a.json", &(accuracy_wanted){ .error = 9, .checksum = cases[i].wanted }, &found);
+        assert_int_equal(status, cases[i].status);
+        assert_int_equal(test_report_count, cases[i].reports);
+    }
+    char own[ACCURACY_CHECKSUM_BYTES];
+    accuracy_checksum_text(255, own);
+    assert_string_equal(own, cases[0].wanted);
+}
+
 static void a_report_lies_beside_the_data(void **state)
 {
     (void)state;
@@ -149,6 +178,7 @@ int main(void)
         cmocka_unit_test(unknown_options_are_refused),
         cmocka_unit_test(the_fastest_below_the_error_is_taken),
         cmocka_unit_test(what_is_no_report_is_refused),
+        cmocka_unit_test(a_report_of_another_data_set_is_refused),
         cmocka_unit_test(a_report_lies_beside_the_data),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

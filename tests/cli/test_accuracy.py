@@ -252,6 +252,14 @@ class Accuracy(program.ProgramTest):
         self.fails(1, "render", "a.trip", *size, "--error", "1e-6", "--report", "report",
                    says="comes closest")
 
+    def test_a_report_is_of_its_data_set(self):
+        """Bricked again alike it is the same, otherwise not."""
+        size = ["--size", "40x32", "-o", "e.exr", "--tf", "a.tf", "--error", "255"]
+        for name, options in ("again", ["--keep-all"]), ("other", ["--range", "60:255"]):
+            self.works("brick", "a.nrrd", "-q", "--tile", "16", "-o", name + ".trip", *options)
+        self.works("render", "again.trip", *size, "--report", "report")
+        self.fails(1, "render", "other.trip", *size, "--report", "report", says="another data set")
+
     def test_qualities_are_settings(self):
         """Options beside a quality go before what it says, wherever they stand."""
         draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
