@@ -27,6 +27,7 @@ enum key {
     KEY_TYPE,
     KEY_SPACING,
     KEY_AXES,
+    KEY_COORDINATES,
     KEY_ENDIAN,
     KEY_OFFSET,
     KEY_ALLOW_GAPS,
@@ -72,6 +73,8 @@ static const struct argp_option option_table[] = {
       "Where in the patient x, y and z point to, where the file does not say: posterior, inferior, "
       "right",
       1 },
+    { "coordinates", KEY_COORDINATES, "X.txt,Y.txt,Z.txt", 0,
+      "Where voxels lie along each axis, by files of numbers; empty: evenly", 1 },
     { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0,
       "Stacks of slices: go on where some are missing, as if their neighbours touched", 1 },
     { NULL, 0, NULL, 0, "What is kept (default: what an automatic transfer function shows):", 2 },
@@ -236,6 +239,9 @@ static error_t parse_input_option(int key, char *argument, triptych_brick_option
         return parse_endian(argument, &v->raw_endian);
     case KEY_OFFSET:
         return parse_offset(argument, &v->raw_offset_bytes);
+    case KEY_COORDINATES:
+        v->coordinates = argument;
+        return 0;
     case KEY_ALLOW_GAPS:
         v->allow_gaps = true;
         return 0;

@@ -189,6 +189,14 @@ static void add_normals(cJSON *root, const triptych_info *info)
         cJSON_AddItemToObject(root, "gradient_full", number(info->gradient_full));
 }
 
+static bool is_uneven(const triptych_info *info)
+{
+    for (int a = 0; a < 3; a++)
+        if (info->spacing_least[a] < info->spacing_most[a])
+            return true;
+    return false;
+}
+
 static cJSON *to_json(const data_set *d, bool verified)
 {
     const triptych_info *info = &d->info;
@@ -201,6 +209,10 @@ static cJSON *to_json(const data_set *d, bool verified)
     cJSON_AddItemToObject(root, "format_version", number(info->format_version));
     cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
     cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
+    if (is_uneven(info)) {
+        cJSON_AddItemToObject(root, "spacing_least", numbers(info->spacing_least, 3));
+        cJSON_AddItemToObject(root, "spacing_most", numbers(info->spacing_most, 3));
+    }
     add_world(root, info, d->source.root);
     cJSON_AddItemToObject(root, "value_min", number(info->value_min));
     cJSON_AddItemToObject(root, "value_max", number(info->value_max));
@@ -271,6 +283,10 @@ static void print_world(const triptych_info *info)
            shortest(trip_length(direction(info->index_to_world, 0)), a),
            shortest(trip_length(direction(info->index_to_world, 1)), b),
            shortest(trip_length(direction(info->index_to_world, 2)), c));
+    for (int axis = 0; axis < 3; axis++)
+        if (info->spacing_least[axis] < info->spacing_most[axis])
+            printf("%c %-10s %s to %s apart\n", 'i' + axis, "voxels",
+                   shortest(info->spacing_least[axis], a), shortest(info->spacing_most[axis], b));
     for (int row = 0; row < 3; row++) {
         const double *m = info->index_to_world[row];
         printf("%-12s %12s %12s %12s %12s\n", row ? "" : "to world", shortest(m[0], a),

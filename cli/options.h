@@ -49,7 +49,7 @@ int trip_option_choice(const char *option, const char *text, const char *const *
         "no-shading", key, NULL, 0, "Colours as they are; normals are not read", group             \
     }
 /* How volumes are read that are drawn without a data set; the keys are KEY_GRID, KEY_LEVEL_SET,
- * KEY_SPACING, KEY_AXES and KEY_ALLOW_GAPS. */
+ * KEY_SPACING, KEY_COORDINATES, KEY_AXES and KEY_ALLOW_GAPS. */
 #define TRIP_OPTIONS_VOLUME(group)                                                                 \
     { "grid",                                                                                      \
       KEY_GRID,                                                                                    \
@@ -68,6 +68,12 @@ int trip_option_choice(const char *option, const char *text, const char *const *
           "X,Y,Z",                                                                                 \
           0,                                                                                       \
           "Distance of voxels along each axis (default: the file's, else 1)",                      \
+          group },                                                                                 \
+        { "coordinates",                                                                           \
+          KEY_COORDINATES,                                                                         \
+          "X.txt,Y.txt,Z.txt",                                                                     \
+          0,                                                                                       \
+          "Where voxels lie along each axis, by files of numbers; empty: evenly",                  \
           group },                                                                                 \
         { "axes",                                                                                  \
           KEY_AXES,                                                                                \

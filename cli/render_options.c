@@ -23,6 +23,7 @@ enum {
     KEY_LEVEL_SET,
     KEY_SPACING,
     KEY_AXES,
+    KEY_COORDINATES,
     KEY_ALLOW_GAPS,
     KEY_SIZE,
     KEY_EYE,
@@ -353,6 +354,9 @@ static int parse_volume(int key, char *arg, triptych_brick_options *v)
         return trip_option_spacing(arg, v->spacing);
     case KEY_AXES:
         return trip_option_axes(arg, &v->axes);
+    case KEY_COORDINATES:
+        v->coordinates = arg;
+        return 0;
     case KEY_ALLOW_GAPS:
         v->allow_gaps = true;
         return 0;
@@ -828,10 +832,11 @@ static int check(parse *p)
     if (!o->output)
         return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
     const triptych_brick_options *v = &o->volume;
-    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->axes || v->allow_gaps) &&
+    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->coordinates || v->axes ||
+         v->allow_gaps) &&
         !cached_volume_wanted(o->input))
-        return trip_option_fail(o->input, "is a data set: --grid, --level-set, --spacing, --axes "
-                                          "and --allow-gaps are for volumes");
+        return trip_option_fail(o->input, "is a data set: --grid, --level-set, --spacing, "
+                                          "--coordinates, --axes and --allow-gaps are for volumes");
     int status = check_view(p);
     if (!status)
         status = check_sequence(p);

@@ -37,6 +37,7 @@ enum {
     KEY_LEVEL_SET,
     KEY_SPACING,
     KEY_AXES,
+    KEY_COORDINATES,
     KEY_ALLOW_GAPS,
 };
 
@@ -154,6 +155,9 @@ static int parse_volume(int key, char *arg, serve_options *o)
         return trip_option_spacing(arg, v->spacing);
     case KEY_AXES:
         return trip_option_axes(arg, &v->axes);
+    case KEY_COORDINATES:
+        v->coordinates = arg;
+        return 0;
     case KEY_ALLOW_GAPS:
         v->allow_gaps = 1;
         return 0;

@@ -49,6 +49,7 @@ enum {
     KEY_LEVEL_SET,
     KEY_SPACING,
     KEY_AXES,
+    KEY_COORDINATES,
     KEY_ALLOW_GAPS,
 };
 
@@ -230,6 +231,9 @@ static int parse_volume(int key, char *arg, view_options *o)
         return trip_option_spacing(arg, o->volume.options.spacing);
     case KEY_AXES:
         return trip_option_axes(arg, &o->volume.options.axes);
+    case KEY_COORDINATES:
+        o->volume.options.coordinates = arg;
+        return 0;
     case KEY_ALLOW_GAPS:
         o->volume.options.allow_gaps = 1;
         return 0;

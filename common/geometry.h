@@ -44,6 +44,17 @@ static inline double trip_dot(trip_vec3 a, trip_vec3 b)
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
+/* Component by component. */
+static inline trip_vec3 trip_vec3_times(trip_vec3 a, trip_vec3 b)
+{
+    return trip_v3(a.x * b.x, a.y * b.y, a.z * b.z);
+}
+
+static inline trip_vec3 trip_vec3_over(trip_vec3 a, trip_vec3 b)
+{
+    return trip_v3(a.x / b.x, a.y / b.y, a.z / b.z);
+}
+
 static inline trip_vec3 trip_cross(trip_vec3 a, trip_vec3 b)
 {
     return trip_v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);

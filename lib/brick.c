@@ -20,6 +20,7 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .level_set = (trip_level_set_mode)o->level_set,
         .raw_dims = { o->raw_dims[0], o->raw_dims[1], o->raw_dims[2] },
         .raw_type = o->raw_type,
+        .coordinates = o->coordinates,
         .spacing = { o->spacing[0], o->spacing[1], o->spacing[2] },
         .raw_endian = (int)o->raw_endian,
         .raw_offset_bytes = o->raw_offset_bytes,

@@ -135,6 +135,14 @@ static int place_camera(triptych *t)
     return !status && t->at_level ? make_camera(t) : status;
 }
 
+/* Of its own choice one that draws the data set. */
+static trip_renderer_kind renderer_wanted(const triptych *t)
+{
+    const bool uneven = trip_coordinates_uneven(&t->session.data->coordinates);
+    const bool any = t->resources.renderer == TRIPTYCH_RENDERER_AUTO;
+    return any && uneven ? TRIP_RENDERER_CPU : (trip_renderer_kind)t->resources.renderer;
+}
+
 static int prepare(triptych *t)
 {
     session *s = &t->session;
@@ -147,8 +155,7 @@ static int prepare(triptych *t)
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer)
-        status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
-                                      s->budget);
+        status = trip_renderer_create(&t->renderer, renderer_wanted(t), r->threads, s->budget);
     if (!status)
         status = place_camera(t);
     return status;
@@ -181,6 +188,9 @@ static const char *needs_splats(const triptych *t)
         return "the grid is one voxel thick";
     if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
         return "voxels were left out, and their halo is not in the data set";
+    if (trip_coordinates_uneven(&t->session.data->coordinates) &&
+        !(t->renderer->ops->uneven >> TRIP_CLASSIFY_POST & 1))
+        return "the spacing is uneven, and this renderer has no sheets of such grids";
     return NULL;
 }
 
@@ -192,6 +202,10 @@ static void choose_settings(triptych *t)
     t->why_pre = t->classify_auto && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || (t->classify_auto && integral))
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
+    if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
+        t->drawn_settings.classify == TRIP_CLASSIFY_PRE &&
+        t->drawn_settings.footprint == TRIP_FOOTPRINT_EXACT)
+        t->drawn_settings.footprint = TRIP_FOOTPRINT_EWA;
     t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
     if (!t->settings.slices)
         t->drawn_settings.slices = t->slices.slices;

@@ -196,6 +196,21 @@ static const char *fault_of_settings(const triptych_settings *s)
     return fault ? fault : fault_of_integral(s);
 }
 
+typedef struct places {
+    double at[3];
+} places;
+
+/* Of voxels; no bounds stay none. */
+static places places_of(const triptych *t, const double voxels[3])
+{
+    places out;
+    for (int a = 0; a < 3; a++)
+        out.at[a] = isfinite(voxels[a])
+                        ? trip_coordinates_place(&t->session.data->coordinates, a, voxels[a])
+                        : voxels[a];
+    return out;
+}
+
 trip_clip trip_context_clip(const triptych *t)
 {
     const triptych_clip *c = &t->clip;
@@ -203,7 +218,9 @@ trip_clip trip_context_clip(const triptych *t)
     trip_clip clip = { 0 };
     if (c->box && c->box_of_voxels) /* the map was checked on opening */
         trip_affine_invert(&t->session.data->index_to_world, &to_box);
-    if (c->box)
+    if (c->box && c->box_of_voxels)
+        trip_clip_add_box(&clip, places_of(t, c->box_lo).at, places_of(t, c->box_hi).at, &to_box);
+    else if (c->box)
         trip_clip_add_box(&clip, c->box_lo, c->box_hi, &to_box);
     for (int i = 0; i < c->planes; i++)
         trip_clip_add(&clip, trip_v3(c->plane[i][0], c->plane[i][1], c->plane[i][2]),

@@ -55,6 +55,9 @@ static int prepare(triptych *t, double x, double y, trip_camera *camera)
     int status = trip_context_check_idle(t, true);
     if (!status && !(isfinite(x) && isfinite(y)))
         status = trip_fail(TRIP_USAGE, "render", "probe", "the place is not finite");
+    if (!status && trip_coordinates_uneven(&t->session.data->coordinates))
+        status = trip_fail(TRIP_USAGE, "render", "probe",
+                           "places are found in grids with even spacing alone");
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status)

@@ -87,6 +87,11 @@ static int put_volume(reading *r)
     return status;
 }
 
+static bool same_coordinates(const double *a, const double *b, int64_t count)
+{
+    return a && b ? memcmp(a, b, (size_t)count * sizeof *a) == 0 : a == b;
+}
+
 static int check_grid(const reading *r, const char *path)
 {
     const trip_volume_info *info = trip_volume_get_info(r->volume);
@@ -94,6 +99,8 @@ static int check_grid(const reading *r, const char *path)
     bool same = memcmp(&info->index_to_world, map, sizeof *map) == 0;
     for (int a = 0; a < 3; a++)
         same &= info->dims[a] == (int64_t)r->data->header.dims[a];
+    for (int a = 0; a < 3 && same; a++)
+        same = same_coordinates(info->coordinates[a], r->data->coordinates.along[a], info->dims[a]);
     return same ? 0
                 : trip_fail(TRIP_ERROR, "read", path,
                             "is not the volume that %s was made of: its grid is another",
@@ -113,6 +120,7 @@ static int read_volume(reading *r, const char *path)
                   : trip_field_finish(
                         r->field,
                         &(trip_field_map){ .index_to_world = r->data->index_to_world,
+                                           .coordinates = &r->data->coordinates,
                                            .value_per_code = (h->code_hi - h->code_lo) / 65535 });
 }
 

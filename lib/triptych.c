@@ -267,12 +267,15 @@ int triptych_open(triptych *t, const char *path, const triptych_resources *resou
 }
 
 /* The box of world space about voxels `first` to `last`, from edge to edge. */
-static void find_box(const trip_affine *m, triptych_info *out)
+static void find_box(const trip_dataset *d, triptych_info *out)
 {
+    const trip_affine *m = &d->index_to_world;
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++)
-            p[a] = corner >> a & 1 ? (double)out->last[a] + 0.5 : (double)out->first[a] - 0.5;
+            p[a] = trip_coordinates_place(&d->coordinates, a,
+                                          corner >> a & 1 ? (double)out->last[a] + 0.5
+                                                          : (double)out->first[a] - 0.5);
         trip_vec3 world = trip_affine_point(m, trip_v3(p[0], p[1], p[2]));
         for (int a = 0; a < 3; a++) {
             double x = trip_component(world, a);
@@ -290,7 +293,23 @@ static void describe_kept(const trip_dataset *d, triptych_info *out)
         out->first[a] = (int64_t)ends[0][a];
         out->last[a] = (int64_t)ends[1][a];
     }
-    find_box(&d->index_to_world, out);
+    find_box(d, out);
+}
+
+static void describe_spacing(const trip_dataset *d, triptych_info *out)
+{
+    const double(*m)[4] = d->index_to_world.m;
+    for (int a = 0; a < 3; a++) {
+        const double length = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
+        const double *x = d->coordinates.along[a];
+        double least = 1, most = 1;
+        for (int64_t i = 1; x && i < d->coordinates.voxels[a]; i++) {
+            least = fmin(least, x[i] - x[i - 1]);
+            most = fmax(most, x[i] - x[i - 1]);
+        }
+        out->spacing_least[a] = least * length;
+        out->spacing_most[a] = most * length;
+    }
 }
 
 static triptych_info info_of(const trip_dataset *d)
@@ -323,6 +342,7 @@ static triptych_info info_of(const trip_dataset *d)
     }
     memcpy(info.index_to_world, d->index_to_world.m, sizeof info.index_to_world);
     describe_kept(d, &info);
+    describe_spacing(d, &info);
     return info;
 }
 

@@ -99,7 +99,10 @@ TRIPTYCH_API void triptych_close(triptych *t);
 
 typedef struct triptych_info {
     int64_t dims[3];             /* voxels of the volume along i, j, k */
-    double index_to_world[3][4]; /* world = matrix . (i, j, k, 1) */
+    double index_to_world[3][4]; /* world = matrix . (i, j, k, 1), where spacing is even */
+    /* Least and most distance of neighbours along i, j, k in the world. They differ where spacing
+     * is uneven; the matrix then takes places to the world, which are indices on the average. */
+    double spacing_least[3], spacing_most[3];
     int64_t first[3], last[3];   /* voxels kept along i, j, k */
     double lo[3], hi[3];         /* box of those in world space, from edge to edge */
     double value_min, value_max; /* of the volume */

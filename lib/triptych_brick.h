@@ -43,7 +43,10 @@ typedef struct triptych_brick_options {
     const char *raw_type;         /* "uint8", "int16", "float", ...; default: by the file's name */
     triptych_endian raw_endian;
     uint64_t raw_offset_bytes;
-    double spacing[3]; /* of voxels; default: the file's, else 1 */
+    const char *coordinates; /* of voxels along the axes, "X.txt,Y.txt,Z.txt": files of as many
+                                numbers, ascending or descending; an axis whose name is empty has
+                                even spacing; NULL: the file's, else even */
+    double spacing[3];       /* of voxels; default: the file's, else 1 */
     /* Where in the patient x, y and z of a volume point to whose file does not say: three letters,
      * one of R and L, of A and P and of S and I each, as "PIR". */
     const char *axes;

@@ -227,6 +227,7 @@ int trip_view_find(trip_found_view *found, const triptych_view *view, const sess
     if (status)
         return status;
     trip_camera_framing f = framing_of(view, s);
-    return is_fitted(view) ? make_fitted(found, view, s, kernel_radius, wanted, &f)
-                           : make_view(found, view, s, &f);
+    const bool fits = is_fitted(view) && !trip_coordinates_uneven(&s->data->coordinates);
+    return fits ? make_fitted(found, view, s, kernel_radius, wanted, &f)
+                : make_view(found, view, s, &f);
 }

@@ -105,6 +105,8 @@ static int update_memory_plan(brick *b)
 static int open_writer(brick *b)
 {
     trip_writer_list lists[6 * (TRIP_LEVELS_MOST + 1)];
+    const trip_coordinates coordinates = trip_brick_coordinates(&b->in);
+    const int levels = trip_coordinates_uneven(&coordinates) ? -1 : b->params->levels;
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
                              .code_bytes = b->codes.code_bytes,
@@ -112,9 +114,10 @@ static int open_writer(brick *b)
                              .tile_voxels = b->params->tile_voxels,
                              .slab_sheets = b->params->slab_sheets,
                              .index_to_world = b->in.info->index_to_world,
+                             .coordinates = &coordinates,
                              .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
-    b->levels = trip_levels_count(p.dims, b->params->levels, 1u << b->format.tile_log2);
+    b->levels = trip_levels_count(p.dims, levels, 1u << b->format.tile_log2);
     p.lists = lists;
     p.list_count = trip_levels_lists(p.dims, &p.index_to_world, b->format.halo, b->levels, lists);
     return trip_writer_open(&b->writer, b->params->output, &p, b->in.budget);

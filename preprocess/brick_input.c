@@ -27,6 +27,13 @@ static int check_dims(const trip_brick_input *in)
     return 0;
 }
 
+trip_coordinates trip_brick_coordinates(const trip_brick_input *in)
+{
+    double *const *along = in->info->coordinates;
+    return trip_coordinates_make(
+        along[0] ? (const double *const[3]){ along[0], along[1], along[2] } : NULL, in->info->dims);
+}
+
 trip_piece_format trip_brick_format(const trip_brick_params *p)
 {
     return (trip_piece_format){ .tile_log2 =
@@ -147,7 +154,7 @@ bool trip_brick_choose_compact(const trip_brick_input *in, double full, double s
 static bool are_compact_exact(const trip_brick_input *in)
 {
     double lo = 0, hi = 0, step[3];
-    if (!in->scanned && !trip_brick_has_narrow_type(in))
+    if ((!in->scanned && !trip_brick_has_narrow_type(in)) || in->info->coordinates[0])
         return false;
     if (trip_brick_has_narrow_type(in))
         trip_brick_type_range(in->info, &lo, &hi);

@@ -3,6 +3,7 @@
 #ifndef TRIP_BRICK_INPUT_H
 #define TRIP_BRICK_INPUT_H
 
+#include "coordinates.h"
 #include "brick.h"
 #include "envelope.h"
 #include "piece.h"
@@ -25,6 +26,8 @@ typedef struct trip_brick_input {
 } trip_brick_input;
 
 /* The format of pieces for these parameters, with `quantised` not set yet. */
+trip_coordinates trip_brick_coordinates(const trip_brick_input *in);
+
 trip_piece_format trip_brick_format(const trip_brick_params *p);
 
 /* Opens the volume and loads the transfer functions. */

@@ -151,6 +151,8 @@ static void add_volume_options(cJSON *options, const trip_volume_params *v)
                    trip_text_from_double(v->spacing[2], number[2]));
     if (v->axes)
         add_option(options, "--axes=%s", v->axes);
+    if (v->coordinates)
+        add_option(options, "--coordinates=%s", v->coordinates);
     if (v->allow_gaps)
         add_option(options, "--allow-gaps");
 }

@@ -4,7 +4,7 @@ static double careful_difference(const float *value, int64_t step, double share)
 {
     bool after = isfinite(value[step]), before = isfinite(value[-step]);
     double rise = (double)value[after ? step : 0] - (double)value[before ? -step : 0];
-    return after && before ? share * rise : rise;
+    return (after && before ? share : 2 * share) * rise;
 }
 
 void trip_gradient_careful(const float *value, const int64_t step[3], const double share[3],

@@ -31,6 +31,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
         fprintf(f, "axes %s\n", v->axes);
     if (v->most_voxels)
         fprintf(f, "at most %" PRIu64 "\n", v->most_voxels);
+    if (v->coordinates)
+        fprintf(f, "%s\n", v->coordinates);
     for (int a = 0; a < 3; a++)
         fprintf(f, "%" PRId64 " %a\n", v->raw_dims[a], v->spacing[a]);
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "report.h"
+#include "volume_coordinates.h"
 
 typedef struct sampled {
     const trip_volume_reader *of;
@@ -240,8 +241,7 @@ int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volu
     *state = s;
     for (int a = 0; a < 3; a++) {
         info->dims[a] = samples_along(info->dims[a], step);
-        for (int i = 0; i < 3; i++)
-            info->index_to_world.m[i][a] *= (double)step;
+        trip_volume_sample_coordinates(info, a, step, info->dims[a]);
     }
     return 0;
 }

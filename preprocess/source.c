@@ -12,6 +12,7 @@
 
 #include "byte_stream.h"
 #include "report.h"
+#include "volume_coordinates.h"
 #include "volume_reader.h"
 
 #define PIECE_BYTES ((size_t)1 << 20)
@@ -59,6 +60,8 @@ int trip_source_find(trip_source *s, const char *path, const trip_volume_params 
         s->format = reader->format;
         status = reader->list ? reader->list(path, add_file, s) : add_file(s, path);
     }
+    if (status == 0 && params->coordinates)
+        status = trip_volume_list_coordinates(params->coordinates, add_file, s);
     if (status < 0)
         trip_source_free(s);
     return status;

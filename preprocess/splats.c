@@ -195,10 +195,16 @@ static uint32_t full_normal(const trip_splatter *s, const double index[3], float
     return trip_direction_pack(g);
 }
 
-/* trip_gradient_share() of a voxel along an axis: beyond a sparse volume lies its background. */
+/* trip_gradient_share() of a voxel along an axis: beyond a sparse volume lies its background. With
+ * uneven spacing the same of places, for gradients a place. */
 static double share_of(const work *k, int axis, int64_t at)
 {
     const trip_volume_info *info = k->s->params.info;
+    const double *x = info->coordinates[axis];
+    if (x) {
+        int64_t after = at < info->dims[axis] - 1 ? at + 1 : at, before = at > 0 ? at - 1 : at;
+        return after > before ? 1 / (x[after] - x[before]) : 0;
+    }
     return trip_gradient_share(!info->sparse && (at == 0 || at == info->dims[axis] - 1));
 }
 

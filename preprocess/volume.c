@@ -13,6 +13,7 @@
 #include "anatomy.h"
 #include "report.h"
 #include "sampled.h"
+#include "volume_coordinates.h"
 #include "volume_reader.h"
 
 #define HEAD_BYTES 1024
@@ -67,6 +68,10 @@ static int check_options(const char *path, const char *format, const trip_volume
     if (strcmp(format, "openvdb") != 0 && (p->grid || p->level_set))
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s: --grid and --level-set are for OpenVDB", format);
+    if (strcmp(format, "openvdb") == 0 && p->coordinates)
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "its format is openvdb, whose voxels lie evenly: --coordinates is for "
+                         "others");
     if (strcmp(format, "images") != 0 && p->allow_gaps)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s: --allow-gaps is for stacks of slices", format);
@@ -215,11 +220,16 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
         return status;
     if (params->spacing[0] > 0)
         override_spacing(&v->info.index_to_world, params->spacing);
-    status = params->axes ? set_axes(v, params->axes) : 0;
+    if (params->coordinates && !(status = trip_volume_check_dims(v->path, &v->info)))
+        status = trip_volume_read_coordinates(&v->info, params->coordinates, v->path);
+    if (!status && params->axes)
+        status = set_axes(v, params->axes);
     if (!status)
         status = check_info(v);
     if (!status && params->most_voxels)
         status = trip_sampled_wrap(&v->reader, &v->state, &v->info, params->most_voxels, v->budget);
+    if (!status)
+        status = trip_volume_complete_coordinates(&v->info, v->path);
     if (status < 0 || !v->reader->read_slices)
         return status;
     v->slice_bytes = (size_t)(v->info.dims[0] * v->info.dims[1]) * trip_scalar_bytes(v->info.type);
@@ -316,6 +326,7 @@ void trip_volume_close(trip_volume *v)
     drop_memory(v);
     if (v->state)
         v->reader->close(v->state);
+    trip_volume_free_coordinates(&v->info);
     free(v->path);
     free(v);
 }

@@ -43,6 +43,8 @@ const char *trip_scalar_name(trip_scalar type);
 typedef struct trip_volume_info {
     int64_t dims[3]; /* voxels along i, j, k; each >= 1 */
     trip_affine index_to_world;
+    /* Tables of trip_coordinates; all NULL where spacing is even. The volume's. */
+    double *coordinates[3];
     trip_scalar type;    /* as stored in the file */
     double slope, inter; /* value = slope * stored + inter */
     bool sparse;         /* only active voxels exist; the others hold `background` */
@@ -69,9 +71,10 @@ typedef struct trip_volume_params {
     const char *grid; /* OpenVDB grid name; default: "density", else the first fog volume,
                        * else the first scalar grid */
     trip_level_set_mode level_set;
-    int64_t raw_dims[3];  /* headerless raw only: --size */
-    const char *raw_type; /* --type; default: from the file's name, else uint8 */
-    double spacing[3];    /* --spacing: raw and image stacks; elsewhere overrides the file's */
+    int64_t raw_dims[3];     /* headerless raw only: --size */
+    const char *raw_type;    /* --type; default: from the file's name, else uint8 */
+    const char *coordinates; /* --coordinates: files, as volume_coordinates.h has them */
+    double spacing[3];       /* --spacing: raw and image stacks; elsewhere overrides the file's */
     /* --axes: three letters as trip_anatomy_axes_valid() takes them, where in the patient x, y and
      * z of a file point to that does not say. */
     const char *axes;

@@ -63,6 +63,32 @@ uint64_t trip_clip_square(const trip_clip *clip, int axis, int64_t sheet, int64_
     return mask;
 }
 
+/* Voxels beyond the grid's last are in no block. */
+static bool has_voxel(const trip_clip *clip, const trip_coordinates *coordinates,
+                      const int64_t voxel[3])
+{
+    for (int a = 0; a < 3; a++)
+        if (voxel[a] >= coordinates->voxels[a])
+            return false;
+    return trip_clip_has(clip,
+                         trip_v3(coordinates->along[0][voxel[0]], coordinates->along[1][voxel[1]],
+                                 coordinates->along[2][voxel[2]]));
+}
+
+uint64_t trip_clip_uneven_square(const trip_clip *clip, const trip_coordinates *coordinates,
+                                 int axis, const int64_t corner[3])
+{
+    uint64_t mask = 0;
+    for (unsigned n = 0; n < 64; n++) {
+        int64_t voxel[3];
+        voxel[(axis + 1) % 3] = corner[0] + ((n & 1) | (n >> 1 & 2) | (n >> 2 & 4));
+        voxel[(axis + 2) % 3] = corner[1] + ((n >> 1 & 1) | (n >> 2 & 2) | (n >> 3 & 4));
+        voxel[axis] = corner[2];
+        mask |= (uint64_t)has_voxel(clip, coordinates, voxel) << n;
+    }
+    return mask;
+}
+
 bool trip_clip_ray(const trip_clip *clip, trip_vec3 origin, trip_vec3 direction, double *from,
                    double *to)
 {

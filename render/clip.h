@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "coordinates.h"
 #include "geometry.h"
 
 /* Six of a box, and six more. */
@@ -56,6 +57,9 @@ static inline bool trip_clip_has(const trip_clip *clip, trip_vec3 voxel)
 /* Of the 8 x 8 square of a list's sheet with its corner at u and v, which voxels are: a bit each by
  * Morton number, as in a block. */
 uint64_t trip_clip_square(const trip_clip *clip, int axis, int64_t sheet, int64_t u, int64_t v);
+/* The same with uneven spacing; `corner`: u, v and sheet. */
+uint64_t trip_clip_uneven_square(const trip_clip *clip, const trip_coordinates *coordinates,
+                                 int axis, const int64_t corner[3]);
 
 /* Narrows [*from, *to] to where origin + t direction is inside; false where nothing is left. */
 bool trip_clip_ray(const trip_clip *clip, trip_vec3 origin, trip_vec3 direction, double *from,

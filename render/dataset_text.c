@@ -298,6 +298,8 @@ void trip_dataset_text_frame(const trip_dataset_text *t, const trip_dataset *d,
 {
     trip_dataset_kept_bounds(d, framing->lo, framing->hi);
     for (int a = 0; a < 3; a++) {
+        framing->lo[a] = trip_coordinates_place(&d->coordinates, a, framing->lo[a]);
+        framing->hi[a] = trip_coordinates_place(&d->coordinates, a, framing->hi[a]);
         framing->lo[a] -= TRIP_KERNEL_RADIUS_VOXELS;
         framing->hi[a] += TRIP_KERNEL_RADIUS_VOXELS;
     }

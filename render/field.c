@@ -157,8 +157,18 @@ int trip_field_put(trip_field *f, const int64_t at[3], double code, const double
     return 0;
 }
 
-/* Along an axis, codes per index. */
-static double difference(const trip_field *f, const int64_t at[3], double here, int axis)
+/* Of neighbours: what they are apart, for a difference. */
+static double apart(const trip_field_map *map, int axis, int64_t before, int64_t after)
+{
+    if (!map->coordinates)
+        return (double)(after - before);
+    return trip_coordinates_at(map->coordinates, axis, after) -
+           trip_coordinates_at(map->coordinates, axis, before);
+}
+
+/* Along an axis, codes per index, or per unit of place. */
+static double difference(const trip_field *f, const trip_field_map *map, const int64_t at[3],
+                         double here, int axis)
 {
     int64_t after[3] = { at[0], at[1], at[2] }, before[3] = { at[0], at[1], at[2] };
     after[axis]++;
@@ -166,7 +176,9 @@ static double difference(const trip_field *f, const int64_t at[3], double here, 
     const trip_field_voxel *a = trip_field_at(f, after[0], after[1], after[2]);
     const trip_field_voxel *b = trip_field_at(f, before[0], before[1], before[2]);
     double rise = (a ? (double)a->code : here) - (b ? (double)b->code : here);
-    return a && b ? rise / 2 : rise;
+    if (!a && !b)
+        return 0;
+    return rise / apart(map, axis, b ? before[axis] : at[axis], a ? after[axis] : at[axis]);
 }
 
 static void set_gradient(const trip_field *f, const trip_field_map *map,
@@ -175,8 +187,9 @@ static void set_gradient(const trip_field *f, const trip_field_map *map,
     bool given = !isnan(voxel->gradient[0]);
     if (given && !map->signless)
         return;
-    trip_vec3 rise = trip_v3(difference(f, at, voxel->code, 0), difference(f, at, voxel->code, 1),
-                             difference(f, at, voxel->code, 2));
+    trip_vec3 rise =
+        trip_v3(difference(f, map, at, voxel->code, 0), difference(f, map, at, voxel->code, 1),
+                difference(f, map, at, voxel->code, 2));
     trip_vec3 g = trip_affine_transpose_vector(to_index, trip_scale(rise, map->value_per_code));
     float *stored = voxel->gradient;
     if (!given) {

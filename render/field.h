@@ -16,6 +16,7 @@
 #include <stdint.h>
 
 #include "budget.h"
+#include "coordinates.h"
 #include "geometry.h"
 #include "settings.h"
 
@@ -47,6 +48,7 @@ int trip_field_put(trip_field *f, const int64_t at[3], double code, const double
 /* What the gradients that were not given are worked out with. */
 typedef struct trip_field_map {
     trip_affine index_to_world;
+    const trip_coordinates *coordinates; /* NULL: spacing is even */
     double value_per_code;
     bool signless; /* gradients given may point either way: they are turned to where values rise */
 } trip_field_map;

@@ -53,6 +53,8 @@ typedef struct summing {
 static const trip_list *coarse_list(const trip_dataset *data)
 {
     unsigned level = 0;
+    if (trip_coordinates_uneven(&data->coordinates))
+        return NULL;
     for (int a = 0; a < 3; a++)
         while ((data->header.dims[a] - 1) >> level >= MOST_VOXELS)
             level++;

@@ -47,7 +47,9 @@ static int add_selection(const planning *p, trip_plan_pass *pass, const trip_lis
 {
     trip_plan *plan = p->plan;
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
-    double eye = trip_component(plan->lists[list->index].camera.eye, list->axis);
+    double eye =
+        trip_coordinates_index(&p->data->coordinates, list->axis,
+                               trip_component(plan->lists[list->index].camera.eye, list->axis));
     /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round. */
     int64_t over = p->about ? trip_sheet_reach(p->settings->kernel) : 0;
     if (side == BEYOND)
@@ -348,6 +350,21 @@ int trip_plan_check_cells(const trip_dataset *data, const char *instead)
     return 0;
 }
 
+int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s)
+{
+    const char *why = NULL;
+    if (!trip_coordinates_uneven(&data->coordinates))
+        return 0;
+    if (s->field == TRIP_FIELD_SPLATS)
+        why = "the sum of its splats has no integral here; --field values has";
+    else if (s->kernel != TRIP_KERNEL_LINEAR)
+        why = "it is interpolated linearly alone";
+    else if (s->footprint == TRIP_FOOTPRINT_FIXED || s->vertex_weights ||
+             s->method == TRIP_METHOD_IMAGE)
+        why = "neither fixed sprites, weights of vertices nor image-aligned sheets draw it";
+    return why ? trip_fail(TRIP_USAGE, "render", data->path, "has uneven spacing: %s", why) : 0;
+}
+
 static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                              const trip_settings *settings)
 {
@@ -360,9 +377,12 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
 {
     const planning p = { plan, data, camera, settings, table, budget, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
+                         .coordinates = &data->coordinates,
                          .planes = planes_of(data, settings) };
     place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
+    if (!status)
+        status = trip_plan_check_coordinates(data, settings);
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         status = trip_plan_check_cells(data, "--classify pre");
     if (!status && settings->classify == TRIP_CLASSIFY_PRE)
@@ -434,10 +454,13 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
 {
     const planning p = { plan, data, camera, settings, NULL, budget, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
+                         .coordinates = &data->coordinates,
                          .gathers = true,
                          .planes = planes_gathered(data, settings) };
     place_whole_clip(plan, data, camera, settings);
-    int status = take_lists(plan, data->list_count, budget);
+    int status = trip_plan_check_coordinates(data, settings);
+    if (!status)
+        status = take_lists(plan, data->list_count, budget);
     if (!status)
         status = gather_lists(&p, kinds);
     if (status)
@@ -668,7 +691,10 @@ uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t 
     if (planned->by_level)
         drawn = trip_lod_square(&plan->lod, list, sheet, u, v);
     if (drawn && planned->clip.count > 0)
-        drawn &= trip_clip_square(&planned->clip, list->axis, sheet, u, v);
+        drawn &= trip_coordinates_uneven(plan->coordinates)
+                     ? trip_clip_uneven_square(&planned->clip, plan->coordinates, list->axis,
+                                               (const int64_t[3]){ u, v, sheet })
+                     : trip_clip_square(&planned->clip, list->axis, sheet, u, v);
     return drawn;
 }
 

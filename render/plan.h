@@ -44,11 +44,12 @@ typedef struct trip_plan_layer {
 
 typedef struct trip_plan {
     int axis_of_view;
-    bool gathers;    /* trip_plan_make_field()'s */
-    trip_lod lod;    /* which level is drawn where */
-    unsigned level;  /* post: of all of the frame; the data set it was made for is of that level */
-    trip_clip clip;  /* in index space: what of the grid is inside */
-    unsigned planes; /* bit per trip_plane to read */
+    bool gathers;   /* trip_plan_make_field()'s */
+    trip_lod lod;   /* which level is drawn where */
+    unsigned level; /* post: of all of the frame; the data set it was made for is of that level */
+    trip_clip clip; /* in index space: what of the grid is inside */
+    const trip_coordinates *coordinates; /* of the data set */
+    unsigned planes;                     /* bit per trip_plane to read */
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */
     trip_plan_layer layers[3];
@@ -69,6 +70,9 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget);
 /* Fails (reported) for grids one voxel thick, in which no value lies between voxels; `instead` is
  * the option that draws them. */
 int trip_plan_check_cells(const trip_dataset *data, const char *instead);
+
+/* Fails (reported) for what grids with uneven spacing are not drawn with. */
+int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *settings);
 
 /* Whether interpolation needs voxels that a data set with a halo of one may lack: two about what is
  * visible. They count as the corners of cells next to them (sheet.h). */

@@ -47,6 +47,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
     double radius = about ? trip_sheet_radius(settings->kernel) : settings->kernel_radius, room = 1;
     if (settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
         room = TRIP_SPLAT_AFFINE_REACH * TRIP_SPLAT_AFFINE_REACH;
+    radius *= data->coordinates.widest;
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
     const bool fixed = settings->footprint == TRIP_FOOTPRINT_FIXED;
     double widest = fixed ? trip_splat_fixed_radius_px(settings) : TRIP_CUTOFF * TRIP_LOW_PASS_PX;
@@ -55,6 +56,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .settings = settings,
         .grid = grid,
         .header = &data->header,
+        .coordinates = &data->coordinates,
         .axis_of_view = axis_of_view,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
                    side(camera, camera->to_x, camera->width - 0.5, -1),
@@ -64,7 +66,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. Of fixed footprints all there
          * is. */
         .low_pass2 = room * widest * widest * pixel2,
-        .behind = about ? 0 : behind_eye(camera, settings),
+        .behind = about ? 0 : data->coordinates.widest * behind_eye(camera, settings),
         .table = table,
         .about = about,
     };
@@ -101,8 +103,8 @@ static box place_box(const trip_cull *cull, int axis, const trip_brick_box *b)
     for (int i = 0; i < 3; i++) {
         int a = (axis + 1 + i) % 3;
         double eye = trip_component(cull->camera->eye, a);
-        r.lo[a] = b->lo[i] - eye;
-        r.hi[a] = b->hi[i] - eye;
+        r.lo[a] = trip_coordinates_place(cull->coordinates, a, b->lo[i]) - eye;
+        r.hi[a] = trip_coordinates_place(cull->coordinates, a, b->hi[i]) - eye;
     }
     return r;
 }
@@ -168,7 +170,8 @@ static double reach_over_clip(const trip_cull *cull)
     double h = trip_settings_has_one_list(s) ? 0 : trip_weight_h(s);
     if (!cull->about)
         return 0;
-    return trip_sheet_reach(s->kernel) + (h * TRIP_CULL_STEEPEST > 1 ? 1 / h : TRIP_CULL_STEEPEST);
+    return cull->coordinates->widest * (trip_sheet_reach(s->kernel) +
+                                        (h * TRIP_CULL_STEEPEST > 1 ? 1 / h : TRIP_CULL_STEEPEST));
 }
 
 static bool is_clipped(const trip_cull *cull, const box *b)

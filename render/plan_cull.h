@@ -29,6 +29,7 @@ typedef struct trip_cull {
     const trip_settings *settings;
     const trip_list_grid *grid;
     const trip_file_header *header;
+    const trip_coordinates *coordinates;
     int axis_of_view;
     trip_cull_plane sides[4];  /* through the outermost pixel centres */
     double radius2, low_pass2; /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */

@@ -34,10 +34,12 @@ typedef struct reference {
     trip_renderer base;
     trip_budget *budget;
     const trip_frame *frame;
-    const trip_plan_list *list; /* at hand; NULL: none since the layer began */
-    unsigned number;            /* of it, in the data set */
-    trip_splat_frame constants; /* of it */
-    unsigned channels;          /* of a layer */
+    const trip_plan_list *list;    /* at hand; NULL: none since the layer began */
+    unsigned number;               /* of it, in the data set */
+    trip_splat_frame constants;    /* of it */
+    const trip_splat_frame *splat; /* of the splat at hand: the same, or `local` */
+    trip_splat_frame local;        /* where spacing is uneven */
+    unsigned channels;             /* of a layer */
     double gradient_full;
     trip_effects_view effects;
     trip_compact_normals compact; /* where normals have 3 bytes */
@@ -308,14 +310,16 @@ static void draw_pixel(reference *r, const trip_splat *s, trip_vec3 voxel, int x
                        double fragment[TRIP_CHANNELS_MAX], double extinction)
 {
     pixel *p = &row_of(r, y)[x];
-    double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
+    double m = trip_splat_radius2(r->splat, s, x + 0.5, y + 0.5);
     double footprint = s->amplitude * (exp(-m / 2) - r->constants.edge);
-    double depth = extinction * (s->affine ? 1 : p->stretch) * footprint;
+    double stretch =
+        r->splat == &r->local ? trip_splat_stretch(r->splat, x + 0.5, y + 0.5) : p->stretch;
+    double depth = extinction * (s->affine ? 1 : stretch) * footprint;
     fragment[TRIP_CHANNEL_DEPTH] = fmax(0, s->z) * p->ray_length;
     if (r->slabs)
         trip_image_sheets_add(r->slabs, &r->constants, voxel, x, y, fragment, depth);
     else
-        put_fragment(r, p, fragment, depth * trip_splat_front(&r->constants, s, x + 0.5, y + 0.5));
+        put_fragment(r, p, fragment, depth * trip_splat_front(r->splat, s, x + 0.5, y + 0.5));
 }
 
 /* True when some pixel centre is in the support where the layer has weight. */
@@ -335,7 +339,7 @@ static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
     for (int y = rows.first; y <= rows.last && !trip_interrupted(); y++) {
         for (int x = columns.first; x <= columns.last; x++) {
             pixel *p = &row_of(r, y)[x];
-            double m = trip_splat_radius2(&r->constants, s, x + 0.5, y + 0.5);
+            double m = trip_splat_radius2(r->splat, s, x + 0.5, y + 0.5);
             if (!((p->weight > 0 || by_vertices) && m <= r->constants.cutoff2))
                 continue;
             touched = true;
@@ -393,7 +397,7 @@ static trip_flattening flattening(const reference *r, const uint32_t *normal)
     if (!normal || !(r->constants.flatten > 0))
         return (trip_flattening){ 0 };
     unpack(r, *normal, gradient);
-    return trip_splat_flattening(&r->constants, gradient, r->gradient_full);
+    return trip_splat_flattening(r->splat, gradient, r->gradient_full);
 }
 
 static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uint32_t *normal)
@@ -401,10 +405,19 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     trip_list_stats *stats = &r->stats[r->number];
     trip_splat s;
     stats->splats_read++;
+    const trip_coordinates *coordinates = &r->frame->data->coordinates;
+    trip_vec3 centre = voxel;
+    double growth = 1;
+    r->splat = &r->constants;
+    if (trip_coordinates_uneven(coordinates)) {
+        centre = trip_splat_place(&r->constants, coordinates, voxel, &r->local, &growth);
+        voxel = trip_coordinates_point(coordinates, voxel);
+        r->splat = &r->local;
+    }
     trip_flattening flat = flattening(r, normal);
-    bool seen = trip_splat_project_flat(&r->constants, voxel, &flat, &s);
+    bool seen = trip_splat_project_flat(r->splat, centre, &flat, &s);
     r->broken |= trip_splat_is_broken(&s);
-    if (!seen || !may_reach(r, voxel, s.radius))
+    if (!seen || !may_reach(r, voxel, growth * s.radius))
         return;
     stats->splats_projected++;
 
@@ -441,7 +454,8 @@ static void draw_run(reference *r, const trip_batch *batch, const trip_run *run)
                                                run->v + (int64_t)trip_voxel_v(r->voxels[at])))
             continue;
         trip_vec3 position = voxel_position(r->axis, run, r->voxels[at]);
-        if (trip_clip_has(&r->list->clip, position))
+        if (trip_clip_has(&r->list->clip,
+                          trip_coordinates_point(&r->frame->data->coordinates, position)))
             draw_splat(r, position, r->voxels[at], block.normals ? &r->normals[at] : NULL);
     }
 }
@@ -569,6 +583,7 @@ static const trip_renderer_ops reference_ops = {
     .classifies_post = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .forms = TRIP_DRAWS_FIXED | TRIP_DRAWS_VERTEX_WEIGHTS | TRIP_DRAWS_IMAGE_SHEETS,
+    .uneven = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -13,6 +13,7 @@ struct trip_reference_sheets {
     trip_budget *budget;
     const trip_frame *frame;
     trip_affine to_index;
+    const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
     trip_field *field; /* gradients are in index space, codes per index */
     bool has_gradients;
@@ -34,6 +35,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     s->budget = budget;
     s->frame = frame;
     trip_affine_invert(&data->index_to_world, &s->to_index); /* it was checked on opening */
+    s->coordinates = &data->coordinates;
     s->value_per_code = (h->code_hi - h->code_lo) / 65535;
     s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world);
     int status = trip_field_create(&s->field, dims, budget);
@@ -64,26 +66,30 @@ int trip_reference_sheets_put(trip_reference_sheets *s, const trip_batch *batch,
     return trip_field_fill_run(&s->fill, batch, run);
 }
 
-/* Codes per index along an axis; of a voxel that is there. */
-static double difference(const trip_field *field, const int64_t at[3], int axis)
+/* Codes per index along an axis, or per unit of place; of a voxel that is there. */
+static double difference(const trip_reference_sheets *s, const int64_t at[3], int axis)
 {
+    const trip_field *field = s->field;
     const int64_t d[3] = { axis == 0, axis == 1, axis == 2 };
     double here = trip_field_at(field, at[0], at[1], at[2])->code;
     const trip_field_voxel *after = trip_field_at(field, at[0] + d[0], at[1] + d[1], at[2] + d[2]);
     const trip_field_voxel *before = trip_field_at(field, at[0] - d[0], at[1] - d[1], at[2] - d[2]);
-    if (after && before)
-        return ((double)after->code - before->code) / 2;
-    return after ? after->code - here : before ? here - before->code : 0;
+    const double rise =
+        (after ? (double)after->code : here) - (before ? (double)before->code : here);
+    const int64_t first = before ? at[axis] - 1 : at[axis], last = after ? at[axis] + 1 : at[axis];
+    return last > first ? rise / (trip_coordinates_at(s->coordinates, axis, last) -
+                                  trip_coordinates_at(s->coordinates, axis, first))
+                        : 0;
 }
 
 /* Differences of codes are exact in the field's single precision. */
-static int set_gradient(trip_field *field, const int64_t at[3])
+static int set_gradient(const trip_reference_sheets *s, const int64_t at[3])
 {
+    trip_field *field = s->field;
     const trip_field_voxel *v = trip_field_at(field, at[0], at[1], at[2]);
     if (!v)
         return 0;
-    const double g[3] = { difference(field, at, 0), difference(field, at, 1),
-                          difference(field, at, 2) };
+    const double g[3] = { difference(s, at, 0), difference(s, at, 1), difference(s, at, 2) };
     return trip_field_put(field, at, v->code, g);
 }
 
@@ -98,7 +104,7 @@ int trip_reference_sheets_prepare(trip_reference_sheets *s)
         for (int n = 0; n < EDGE * EDGE * EDGE && !status; n++) {
             const int64_t at[3] = { first[0] + n % EDGE, first[1] + n / EDGE % EDGE,
                                     first[2] + n / (EDGE * EDGE) };
-            status = set_gradient(s->field, at);
+            status = set_gradient(s, at);
         }
         status = status ? status : trip_frame_poll();
     }
@@ -126,6 +132,14 @@ typedef struct place {
 static trip_vec3 point_at(const passage *p, double t)
 {
     return trip_add(p->origin, trip_scale(p->direction, t));
+}
+
+/* The index of a point, whose coordinates are places. */
+static trip_vec3 index_at(const passage *p, trip_vec3 point)
+{
+    const trip_coordinates *c = p->s->coordinates;
+    return trip_v3(trip_coordinates_index(c, 0, point.x), trip_coordinates_index(c, 1, point.y),
+                   trip_coordinates_index(c, 2, point.z));
 }
 
 /* Of the cell's voxels, i fastest. */
@@ -158,7 +172,7 @@ static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point
 static bool find_place(const passage *p, double t, int64_t cells, place *at)
 {
     const int64_t *dims = trip_field_dims(p->s->field);
-    trip_vec3 point = point_at(p, t);
+    trip_vec3 point = index_at(p, point_at(p, t));
     int64_t cell[3];
     for (int a = 0; a < 3; a++) {
         double x = trip_component(point, a), last = (double)dims[a] - 1;
@@ -244,13 +258,23 @@ static bool add_segment(passage *p, double t0, double t1, int64_t cells)
                      -expm1(-segment.extinction * (to - from) * p->world_per_t));
 }
 
+/* Where the ray is at a coordinate of the axis, in indices. */
+static double reached_at(const passage *p, double coordinate)
+{
+    return (trip_coordinates_place(p->s->coordinates, p->axis, coordinate) -
+            trip_component(p->origin, p->axis)) /
+           trip_component(p->direction, p->axis);
+}
+
 /* Between the slices at coordinates n / slices that lie before the eye, and from the eye itself to
- * the first of them. Coordinate c is reached at t = (c - o) / d. */
+ * the first of them. */
 static void add_segments(passage *p)
 {
     const double slices = p->s->frame->settings->slices;
     const double top = (double)trip_field_dims(p->s->field)[p->axis] - 1;
-    const double o = trip_component(p->origin, p->axis), d = trip_component(p->direction, p->axis);
+    const double o =
+        trip_coordinates_index(p->s->coordinates, p->axis, trip_component(p->origin, p->axis));
+    const double d = trip_component(p->direction, p->axis);
     const double step = d > 0 ? 1 : -1, last = d > 0 ? top * slices : 0;
     double n = d > 0 ? fmax(0, ceil(o * slices)) : fmin(top * slices, floor(o * slices));
     bool eye_within = !p->s->frame->camera->ortho && o > 0 && o < top;
@@ -258,7 +282,7 @@ static void add_segments(passage *p)
     for (; (last - n) * step >= 0; n += step) {
         double to = n / slices;
         int64_t cells = (int64_t)fmin(floor(0.5 * (from + to)), top - 1);
-        if (from != to && !add_segment(p, (from - o) / d, (to - o) / d, cells))
+        if (from != to && !add_segment(p, reached_at(p, from), reached_at(p, to), cells))
             return;
         from = to;
     }

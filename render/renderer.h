@@ -75,6 +75,7 @@ typedef struct trip_renderer_ops {
     bool classifies_post; /* draws frames whose settings say so (sheet.h) */
     unsigned effects;     /* draws frames with effects: a bit per trip_classify */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
+    unsigned uneven;      /* draws grids with uneven spacing: a bit per trip_classify */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);

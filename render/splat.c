@@ -30,6 +30,42 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
     };
 }
 
+trip_splat_frame trip_splat_frame_scaled(const trip_splat_frame *f, trip_vec3 unit)
+{
+    trip_splat_frame out = *f;
+    trip_camera *c = &out.camera;
+    c->eye = trip_vec3_over(c->eye, unit);
+    c->r0 = trip_vec3_over(c->r0, unit);
+    c->rx = trip_vec3_over(c->rx, unit);
+    c->ry = trip_vec3_over(c->ry, unit);
+    c->forward = trip_vec3_times(c->forward, unit);
+    c->to_x = trip_vec3_times(c->to_x, unit);
+    c->to_y = trip_vec3_times(c->to_y, unit);
+    for (int row = 0; row < 3; row++)
+        for (int a = 0; a < 3; a++)
+            c->index_to_world.m[row][a] *= trip_component(unit, a);
+    out.rxrx = trip_dot(c->rx, c->rx);
+    out.rxry = trip_dot(c->rx, c->ry);
+    out.ryry = trip_dot(c->ry, c->ry);
+    return out;
+}
+
+trip_vec3 trip_splat_place(const trip_splat_frame *f, const trip_coordinates *coordinates,
+                           trip_vec3 voxel, trip_splat_frame *frame, double *growth)
+{
+    *growth = 1;
+    if (!trip_coordinates_uneven(coordinates)) {
+        *frame = *f;
+        return voxel;
+    }
+    const trip_vec3 width = trip_v3(trip_coordinates_width(coordinates, 0, (int64_t)voxel.x),
+                                    trip_coordinates_width(coordinates, 1, (int64_t)voxel.y),
+                                    trip_coordinates_width(coordinates, 2, (int64_t)voxel.z));
+    *frame = trip_splat_frame_scaled(f, width);
+    *growth = fmax(width.x, fmax(width.y, width.z));
+    return trip_vec3_over(trip_coordinates_point(coordinates, voxel), width);
+}
+
 /* Centre and ray2 for a depth; the ray through the centre and `c`, the vector whose cross products
  * with rx and ry are A and B. */
 static void place(const trip_splat_frame *f, trip_vec3 v, trip_splat *s, trip_vec3 *ray,

@@ -81,13 +81,18 @@
  * gradient_full) (shade.h), so that where there is no surface it stays round. It keeps its
  * integral: footprint' stretch = stretch(x, y) / (2 pi sigma^2) sqrt(|S of the round kernel| /
  * |S'|) ... Near splats in perspective stay round; bounds on what a splat reaches are those of
- * round ones. */
+ * round ones.
+ *
+ * With uneven spacing (coordinates.h) a voxel's kernel is as wide along each axis as the voxel is,
+ * trip_coordinates_width(): all of the above is in an index space of its own, in which that is 1
+ * and the kernel round. Weights and the order of sheets stay those of places. */
 #ifndef TRIP_SPLAT_H
 #define TRIP_SPLAT_H
 
 #include <stdbool.h>
 
 #include "camera.h"
+#include "coordinates.h"
 #include "settings.h"
 
 /* See above; and every ray of an affine support passes within so many times the radius that the
@@ -126,6 +131,16 @@ typedef struct trip_splat {
                   */
     double a[3], b[3], along[3]; /* of a pixel position (x, y): the dot products with (1, x, y) */
 } trip_splat;
+
+/* The same of a view whose index space has other units, each axis's `unit` as long as those of
+ * `f`: in which a kernel is round that is so much wider along each axis there. Depths keep theirs.
+ */
+trip_splat_frame trip_splat_frame_scaled(const trip_splat_frame *f, trip_vec3 unit);
+
+/* Of a voxel of a grid: the frame in which its kernel is round, `f` itself where spacing is even,
+ * and where the voxel lies there; lengths are up to `growth` times as long in that of `f`. */
+trip_vec3 trip_splat_place(const trip_splat_frame *f, const trip_coordinates *coordinates,
+                           trip_vec3 voxel, trip_splat_frame *frame, double *growth);
 
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings);
 

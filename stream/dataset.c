@@ -150,6 +150,18 @@ static void set_list(trip_dataset *d, trip_list *l, const trip_file_list *f)
         }
 }
 
+static void set_coordinates(trip_dataset *d)
+{
+    const uint64_t *dims = d->header.dims;
+    const int64_t voxels[3] = { (int64_t)dims[0], (int64_t)dims[1], (int64_t)dims[2] };
+    const bool uneven = d->header.coordinates_offset != 0;
+    const double *first = uneven ? table(d, d->header.coordinates_offset) : NULL;
+    d->coordinates = trip_coordinates_make(
+        uneven ? (const double *const[3]){ first, first + dims[0], first + dims[0] + dims[1] }
+               : NULL,
+        voxels);
+}
+
 static int set_lists(trip_dataset *d)
 {
     const trip_file_list *files = table(d, d->header.lists_offset);
@@ -159,6 +171,7 @@ static int set_lists(trip_dataset *d)
         return trip_fail(TRIP_ERROR, "open", d->path,
                          "no memory for its %u lists: give more with --memory", count);
     memcpy(d->index_to_world.m, d->header.index_to_world, sizeof d->index_to_world.m);
+    set_coordinates(d);
     for (; d->list_count < count; d->list_count++) {
         trip_list *l = &d->lists[d->list_count];
         l->index = d->list_count;

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 
 #include "budget.h"
+#include "coordinates.h"
 #include "format.h"
 #include "geometry.h"
 #include "kind.h"
@@ -36,8 +37,9 @@ typedef struct trip_list {
 typedef struct trip_dataset {
     char *path;
     trip_file_header header;
-    trip_affine index_to_world; /* of level 0 */
-    trip_list *lists;           /* from the budget */
+    trip_affine index_to_world; /* of level 0; with uneven spacing of the places there */
+    trip_coordinates coordinates;
+    trip_list *lists; /* from the budget */
     unsigned list_count;
     char *text;     /* JSON, terminated */
     uint64_t bytes; /* of all files */

@@ -1,6 +1,7 @@
 #include "dataset_check.h"
 
 #include "block.h"
+#include "coordinates.h"
 #include "geometry.h"
 #include "kind.h"
 #include "report.h"
@@ -419,6 +420,24 @@ static int check_text(const unsigned char *index, const trip_file_header *h, con
     return TRIP_OK;
 }
 
+/* The tables of a grid with uneven spacing, which has no coarse levels. */
+static int check_coordinates(const unsigned char *index, const trip_file_header *h,
+                             const trip_file_list *lists, const char *where)
+{
+    const double *table = (const void *)(index + h->coordinates_offset);
+    for (int a = 0; a < 3; a++) {
+        const char *fault = trip_coordinates_fault(table, (int64_t)h->dims[a]);
+        if (fault)
+            return fail_at(where, (uint64_t)((const unsigned char *)table - index), fault);
+        table += h->dims[a];
+    }
+    for (uint32_t i = 0; i < h->list_count; i++)
+        if (lists[i].level > 0)
+            return fail_at(where, h->lists_offset + i * sizeof *lists,
+                           "a coarse level of a grid with uneven spacing");
+    return TRIP_OK;
+}
+
 static int check_places(const unsigned char *index, const trip_file_header *h, const char *where,
                         sections *s)
 {
@@ -426,19 +445,24 @@ static int check_places(const unsigned char *index, const trip_file_header *h, c
         return FAIL_FIELD(lists_offset, "the lists lie outside the file");
     if (!add_section(s, h, h->text_offset, h->text_bytes, 1, 1))
         return FAIL_FIELD(text_offset, "the text lies outside the file");
+    if (h->coordinates_offset &&
+        !add_section(s, h, h->coordinates_offset, h->dims[0] + h->dims[1] + h->dims[2], 8, 8))
+        return FAIL_FIELD(coordinates_offset, "the coordinates lie outside the file");
     const trip_file_list *lists = (const void *)(index + h->lists_offset);
     int status = check_text(index, h, where);
     for (uint32_t i = 0; i < h->list_count && status == TRIP_OK; i++)
         status = check_list_head(s, h, &lists[i], where, h->lists_offset + i * sizeof *lists);
     if (status == TRIP_OK)
         status = check_set(h, lists, where);
+    if (status == TRIP_OK && h->coordinates_offset)
+        status = check_coordinates(index, h, lists, where);
     return status == TRIP_OK ? check_overlap(s, where) : status;
 }
 
 int trip_dataset_check_tables(const unsigned char *index, const trip_file_header *h,
                               const char *where)
 {
-    sections s = { calloc(TABLES_PER_LIST * (size_t)h->list_count + 2, sizeof *s.items), 0 };
+    sections s = { calloc(TABLES_PER_LIST * (size_t)h->list_count + 3, sizeof *s.items), 0 };
     if (!s.items)
         return trip_fail(TRIP_ERROR, "open", where, "out of memory");
     int status = check_places(index, h, where, &s);

@@ -69,7 +69,9 @@ typedef struct trip_file_header {
     uint64_t lists_offset; /* trip_file_list[list_count] */
     uint64_t text_offset;  /* UTF-8 JSON: source, envelope, transfer function */
     uint64_t text_bytes;
-    uint8_t reserved[TRIP_HEADER_BYTES - 320];
+    uint64_t coordinates_offset; /* where voxels lie along i, j and k (coordinates.h): doubles,
+                                    dims[0] + dims[1] + dims[2] of them; 0: spacing is even */
+    uint8_t reserved[TRIP_HEADER_BYTES - 328];
 } trip_file_header;
 
 typedef struct trip_file_list {
@@ -117,6 +119,7 @@ static_assert(sizeof(trip_file_header) == TRIP_HEADER_BYTES, "header size");
 static_assert(offsetof(trip_file_header, dims) == 48, "header layout");
 static_assert(offsetof(trip_file_header, voxels) == 240, "header layout");
 static_assert(offsetof(trip_file_header, text_bytes) == 312, "header layout");
+static_assert(offsetof(trip_file_header, coordinates_offset) == 320, "header layout");
 static_assert(sizeof(trip_file_list) == 320, "list size");
 static_assert(offsetof(trip_file_list, records) == 152, "list layout");
 static_assert(sizeof(trip_file_slab) == 32, "slab size");

@@ -550,9 +550,23 @@ static int append_lists(trip_writer *w, trip_output *index)
     return status;
 }
 
+static int append_coordinates(trip_writer *w, trip_output *index)
+{
+    const trip_coordinates *c = w->params.coordinates;
+    if (!c || !trip_coordinates_uneven(c))
+        return TRIP_OK;
+    int status = trip_output_align(index, 8);
+    w->header.coordinates_offset = index->bytes;
+    for (int a = 0; a < 3 && status == TRIP_OK; a++)
+        status = trip_output_append(index, c->along[a], (size_t)c->voxels[a] * sizeof(double));
+    return status;
+}
+
 static int append_tables(trip_writer *w, trip_output *index, const char *text)
 {
     int status = append_lists(w, index);
+    if (status == TRIP_OK)
+        status = append_coordinates(w, index);
     w->header.text_offset = index->bytes;
     w->header.text_bytes = strlen(text);
     if (status == TRIP_OK)

@@ -32,13 +32,18 @@ static bool is_reaching(const trip_cpu_view *view, const trip_cpu_staged *staged
     p[view->axis] = staged->sheet[i];
     p[view->u_axis] = staged->u[i];
     p[view->v_axis] = staged->v[i];
-    trip_vec3 position = trip_v3(p[0], p[1], p[2]);
-    trip_vec3 from_eye = trip_sub(position, view->splat.camera.eye);
+    trip_vec3 voxel = trip_v3(p[0], p[1], p[2]);
+    trip_vec3 from_eye = trip_sub(trip_coordinates_point(&view->of->data->coordinates, voxel),
+                                  view->splat.camera.eye);
+    trip_splat_frame local;
+    double growth;
+    trip_vec3 position =
+        trip_splat_place(&view->splat, &view->of->data->coordinates, voxel, &local, &growth);
     trip_splat s;
-    return trip_splat_project(&view->splat, position, &s) &&
+    return trip_splat_project(&local, position, &s) &&
            trip_weight_may_reach(view->of->settings, view->of->camera, view->of->plan->axis_of_view,
                                  view->axis, trip_list_grid_vector(grid_of(view), from_eye),
-                                 s.radius * trip_list_grid_growth(grid_of(view)));
+                                 growth * s.radius * trip_list_grid_growth(grid_of(view)));
 }
 
 /* Lists whose weight is 0 everywhere are not drawn, and so not counted. */

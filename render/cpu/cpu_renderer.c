@@ -194,6 +194,19 @@ static int begin_sheets(trip_cpu *r)
     return status ? status : trip_cpu_sheets_begin_frame(r->sheets, r);
 }
 
+/* With uneven spacing rays are as long in no two kernels' index spaces, but affine ones need none.
+ */
+static int check_kernels(const trip_frame *frame)
+{
+    const trip_settings *s = frame->settings;
+    if (s->footprint == TRIP_FOOTPRINT_EWA || frame->camera->ortho ||
+        !trip_coordinates_uneven(&frame->data->coordinates))
+        return 0;
+    return trip_fail(TRIP_USAGE, "render", "cpu",
+                     "grids with uneven spacing are drawn by --kernel ewa alone; reference has the "
+                     "exact kernel too");
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     trip_cpu *r = (trip_cpu *)base;
@@ -204,7 +217,9 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         r->workers[i].scratch.lanes.broken = false;
     if (classifies_post(r))
         release_buffers(r);
-    int status = trip_cpu_fit_panes(r, frame->camera->width, frame->camera->height);
+    int status = check_kernels(frame);
+    if (!status)
+        status = trip_cpu_fit_panes(r, frame->camera->width, frame->camera->height);
     if (!status)
         status = fit_buffers(r);
     if (!status)
@@ -262,6 +277,7 @@ static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
+    .uneven = 1u << TRIP_CLASSIFY_PRE,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,
@@ -277,7 +293,7 @@ bool trip_cpu_occluded(void *renderer, const trip_selection *selection, uint32_t
 {
     trip_cpu *r = renderer;
     if (r->base.ops != &cpu_ops || !r->in_layer || selection->list->axis != r->view.axis ||
-        !r->view.front_to_back)
+        !r->view.front_to_back || r->view.coordinates)
         return false;
     const trip_cpu_view *view = &r->views[selection->list->index];
     trip_cpu_box box =

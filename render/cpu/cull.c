@@ -31,7 +31,7 @@ static uint32_t count_voxels(const trip_block *block, const trip_cpu_part *part)
 void trip_cpu_cull(const trip_cpu_culling *c, const trip_block *block, trip_cpu_part *part)
 {
     const trip_run *run = part->run;
-    if (!c->view->front_to_back)
+    if (!c->view->front_to_back || c->view->coordinates)
         return;
     trip_cpu_box box = trip_cpu_brick_box(c->view, run->brick, run->sheet, run->sheet);
     trip_cpu_occlusion occlusion = trip_cpu_box_occlusion(c->view, c->mask, &box);

@@ -112,27 +112,68 @@ static trip_vec3 in_data_axes(const trip_cpu_view *view, double u, double v, dou
     return trip_v3(p[0], p[1], p[2]);
 }
 
+/* The index space in which a voxel's kernel is round: the view's where spacing is even. */
+typedef struct splat_space {
+    trip_splat_frame frame;
+    trip_vec3 centre, width;
+    double ray; /* how many times as long the ray through the voxel is in it */
+} splat_space;
+
+static splat_space space_of(const trip_cpu_view *view, trip_vec3 voxel)
+{
+    const trip_coordinates *c = &view->of->data->coordinates;
+    const trip_camera *camera = &view->splat.camera;
+    splat_space s = { .width = { 1, 1, 1 }, .ray = 1 };
+    double growth;
+    s.centre = trip_splat_place(&view->splat, c, voxel, &s.frame, &growth);
+    if (!view->coordinates)
+        return s;
+    s.width = trip_v3(trip_coordinates_width(c, 0, (int64_t)voxel.x),
+                      trip_coordinates_width(c, 1, (int64_t)voxel.y),
+                      trip_coordinates_width(c, 2, (int64_t)voxel.z));
+    trip_vec3 ray =
+        camera->ortho ? camera->r0 : trip_sub(trip_coordinates_point(c, voxel), camera->eye);
+    double length = trip_length(ray);
+    s.ray = length > 0 ? trip_length(trip_vec3_over(ray, s.width)) / length : 1;
+    return s;
+}
+
+/* Of a near splat, blended by rays in the view's index space: their lengths in its own are taken to
+ * be as much longer as that through its centre is. */
+static void divide_forms(trip_splat *s, double by)
+{
+    for (int i = 0; i < 3; i++) {
+        s->a[i] /= by;
+        s->b[i] /= by;
+        s->along[i] /= by;
+    }
+}
+
 bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
                              const float flat[4], trip_cpu_splat *out, bool *broken)
 {
     const trip_camera *camera = &view->splat.camera;
+    const splat_space space = space_of(view, in_data_axes(view, u, v, sheet));
     trip_flattening flattening = { 0 };
     if (flat)
         flattening = (trip_flattening){
-            trip_normalize(in_data_axes(view, (double)flat[0], (double)flat[1], (double)flat[2])),
+            trip_normalize(trip_vec3_times(
+                in_data_axes(view, (double)flat[0], (double)flat[1], (double)flat[2]),
+                space.width)),
             (double)flat[3]
         };
     trip_splat s;
     memset(out, 0, sizeof *out);
-    bool drawn =
-        trip_splat_project_flat(&view->splat, in_data_axes(view, u, v, sheet), &flattening, &s);
+    bool drawn = trip_splat_project_flat(&space.frame, space.centre, &flattening, &s);
+    if (s.near && !camera->ortho)
+        divide_forms(&s, space.ray);
     if (trip_splat_is_broken(&s))
         *broken = true;
     if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
     /* What is opaque anyway stays within what exponents of floats hold. */
-    double stretch = s.affine ? 1 : view->stretch;
+    double stretch = s.affine ? 1 : view->stretch / space.ray;
     double depth = fmin(0x1p90, extinction * s.amplitude * stretch);
     out->panes = trip_cpu_panes(out, view->panes_across);
     if (s.near) {

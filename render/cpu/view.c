@@ -86,6 +86,12 @@ static void set_rays(trip_cpu_view *view)
         view->rays = TRIP_CPU_PERSPECTIVE;
 }
 
+/* How much longer than one of mean size a voxel may be. */
+static double widest(const trip_cpu_view *view)
+{
+    return view->coordinates ? view->coordinates->widest : 1;
+}
+
 static void set_limits(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
@@ -93,7 +99,7 @@ static void set_limits(trip_cpu_view *view)
     if (view->stretch_varies && !view->affine)
         most = most_stretch(&camera->index_to_world) / view->stretch;
     view->thin = (float)((double)TRIP_CPU_THIN / most);
-    view->behind = (float)(-trip_splat_behind(&view->splat) * (1 + 1e-6));
+    view->behind = (float)(-widest(view) * trip_splat_behind(&view->splat) * (1 + 1e-6));
     view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
     view->panes_across = (camera->width + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE;
 }
@@ -105,7 +111,7 @@ static void set_parallel(trip_cpu_view *view)
     if (!camera->ortho)
         return;
     trip_splat_project(&view->splat, trip_add(camera->eye, camera->r0), &view->parallel);
-    view->near = (float)(trip_splat_parallel_near(&view->splat) * (1 + 1e-6));
+    view->near = (float)(widest(view) * trip_splat_parallel_near(&view->splat) * (1 + 1e-6));
     view->behind = -view->near;
 }
 
@@ -130,6 +136,8 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
     *view = (trip_cpu_view){
         .of = frame,
         .table = frame->table,
+        .coordinates =
+            trip_coordinates_uneven(&frame->data->coordinates) ? &frame->data->coordinates : NULL,
         .splat = trip_splat_frame_make(camera, frame->settings),
         .front_to_back = front_to_back,
         .sums = trip_settings_sum_sheets(frame->settings),

@@ -64,14 +64,21 @@ static inline void weigh(const trip_field_voxel *const *voxels, int edge, double
     }
 }
 
-trip_cell_line trip_cell_along(const trip_field_cell *cell, const trip_ray *ray, double from,
-                               double to)
+trip_cell_line trip_cell_along(const trip_field_cell *cell, const trip_coordinates *coordinates,
+                               const trip_ray *ray, double from, double to)
 {
     trip_cell_line l = { .from = from, .length = to - from, .inverse = 1 / (to - from) };
     double w[3][4][4];
     for (int a = 0; a < 3; a++) {
         double d = trip_component(ray->direction, a), rise = d * l.length;
-        double start = trip_component(ray->origin, a) + d * from - (double)cell->at[a];
+        double start = trip_component(ray->origin, a) + d * from;
+        if (coordinates && trip_coordinates_uneven(coordinates)) {
+            const double *corner = coordinates->along[a] + cell->at[a];
+            start = (start - corner[0]) / (corner[1] - corner[0]);
+            rise /= corner[1] - corner[0];
+        } else {
+            start -= (double)cell->at[a];
+        }
         (cell->edge == 2 ? linear_weights : cubic_weights)(start, rise, w[a]);
     }
     if (cell->edge == 2)

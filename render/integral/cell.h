@@ -15,8 +15,10 @@ typedef struct trip_cell_line {
     double all[TRIP_POLYNOMIAL_DEGREE + 1][4]; /* the same, and the gradient's three components */
 } trip_cell_line;
 
-trip_cell_line trip_cell_along(const trip_field_cell *cell, const trip_ray *ray, double from,
-                               double to);
+/* `coordinates`: of the grid, linear cells alone having uneven ones; NULL: voxels lie at integers.
+ */
+trip_cell_line trip_cell_along(const trip_field_cell *cell, const trip_coordinates *coordinates,
+                               const trip_ray *ray, double from, double to);
 
 /* At t: the code, and the gradient as of trip_field_voxel. */
 static inline void trip_cell_line_at(const trip_cell_line *l, double t, double out[4])

@@ -116,6 +116,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_classes_make(r->classes, frame->table, frame->camera->voxel_world,
                       frame->settings->tolerance);
     r->in = (trip_integrand){
+        .coordinates = &frame->data->coordinates,
         .classes = r->classes,
         .settings = frame->settings,
         .camera = frame->camera,
@@ -158,6 +159,7 @@ static int complete_field(integral *r)
         return 0;
     int status = trip_field_finish(
         r->field, &(trip_field_map){ .index_to_world = r->frame->data->index_to_world,
+                                     .coordinates = &r->frame->data->coordinates,
                                      .value_per_code = (header->code_hi - header->code_lo) / 65535,
                                      .signless = header->normal_bytes == 3 });
     r->complete = status == 0;
@@ -276,6 +278,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops integral_ops = {
     .name = "integral",
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
+    .uneven = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -11,7 +11,8 @@
 #include "shade.h"
 
 typedef struct trip_integrand {
-    const trip_field *field; /* finished */
+    const trip_field *field;             /* finished */
+    const trip_coordinates *coordinates; /* of its grid; NULL: spacing is even */
     const trip_classes *classes;
     const trip_settings *settings;
     const trip_camera *camera; /* of the grid of the field */

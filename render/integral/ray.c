@@ -24,12 +24,17 @@ trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t
                        .world_per_t = world_per_t };
 }
 
-bool trip_ray_clip(const trip_ray *r, const int64_t lo[3], const int64_t hi[3], double *from,
-                   double *to)
+static double face_at(const trip_ray_boxes *b, int axis, int64_t face)
+{
+    return b->coordinates ? trip_coordinates_at(b->coordinates, axis, face) : (double)face;
+}
+
+bool trip_ray_clip(const trip_ray *r, const trip_ray_boxes *b, double *from, double *to)
 {
     for (int a = 0; a < 3; a++) {
         double o = trip_component(r->origin, a), d = trip_component(r->direction, a);
-        double near = (double)(d < 0 ? hi[a] : lo[a]), far = (double)(d < 0 ? lo[a] : hi[a]);
+        double lo = face_at(b, a, b->lo[a]), hi = face_at(b, a, b->hi[a]);
+        double near = d < 0 ? hi : lo, far = d < 0 ? lo : hi;
         if (d == 0 && (o < near || o > far))
             return false;
         if (d == 0)
@@ -46,7 +51,9 @@ bool trip_ray_clip(const trip_ray *r, const int64_t lo[3], const int64_t hi[3], 
 static void find_box(const trip_ray_boxes *b, trip_vec3 p, int64_t at[3])
 {
     for (int a = 0; a < 3; a++) {
-        double x = fmin((double)b->hi[a], fmax((double)b->lo[a], trip_component(p, a)));
+        double x = trip_component(p, a);
+        x = b->coordinates ? trip_coordinates_index(b->coordinates, a, x) : x;
+        x = fmin((double)b->hi[a], fmax((double)b->lo[a], x));
         int64_t steps = ((int64_t)floor(x) - b->lo[a]) / b->edge;
         int64_t last = (b->hi[a] - 1 - b->lo[a]) / b->edge;
         at[a] = b->lo[a] + (steps < last ? steps : last) * b->edge;
@@ -69,12 +76,12 @@ static pace make_pace(const trip_ray *r, int axis, int64_t edge)
 }
 
 /* Where the ray leaves a box, at most `to`; the axis of that face, or -1. */
-static int find_exit(const pace paces[3], const int64_t hi[3], const int64_t at[3], double *to)
+static int find_exit(const pace paces[3], const trip_ray_boxes *b, const int64_t at[3], double *to)
 {
     int axis = -1;
     for (int a = 0; a < 3; a++) {
         int64_t face = at[a] + paces[a].to_face;
-        double away = (double)(face < hi[a] ? face : hi[a]) - paces[a].origin;
+        double away = face_at(b, a, face < b->hi[a] ? face : b->hi[a]) - paces[a].origin;
         double t = away * paces[a].inverse;
         if (t < *to) { /* not where it is not a number */
             *to = t;
@@ -89,14 +96,14 @@ bool trip_ray_walk(const trip_ray *r, const trip_ray_boxes *boxes, double from, 
 {
     int64_t at[3];
     pace paces[3];
-    if (!trip_ray_clip(r, boxes->lo, boxes->hi, &from, &to))
+    if (!trip_ray_clip(r, boxes, &from, &to))
         return true;
     find_box(boxes, trip_ray_at(r, from), at);
     for (int a = 0; a < 3; a++)
         paces[a] = make_pace(r, a, boxes->edge);
     while (from < to) {
         double exit = to;
-        int axis = find_exit(paces, boxes->hi, at, &exit);
+        int axis = find_exit(paces, boxes, at, &exit);
         exit = exit > from ? exit : from; /* rounding */
         if (!visit(user, at, from, exit))
             return false;

@@ -3,6 +3,7 @@
 #define TRIP_RAY_H
 
 #include "camera.h"
+#include "coordinates.h"
 
 /* The points origin + t direction, t >= 0. */
 typedef struct trip_ray {
@@ -26,13 +27,13 @@ static inline trip_vec3 trip_ray_at(const trip_ray *r, double t)
  * until false is returned; then false is returned here. */
 typedef struct trip_ray_boxes {
     int64_t lo[3], hi[3], edge;
+    const trip_coordinates *coordinates; /* where their faces lie; NULL: at integers */
 } trip_ray_boxes;
 typedef bool (*trip_ray_visit)(void *user, const int64_t at[3], double from, double to);
 bool trip_ray_walk(const trip_ray *r, const trip_ray_boxes *boxes, double from, double to,
                    trip_ray_visit visit, void *user);
 
-/* Cuts [*from, *to] to the box [lo, hi]; false where nothing is left. */
-bool trip_ray_clip(const trip_ray *r, const int64_t lo[3], const int64_t hi[3], double *from,
-                   double *to);
+/* Cuts [*from, *to] to the box [lo, hi] of all; false where nothing is left. */
+bool trip_ray_clip(const trip_ray *r, const trip_ray_boxes *boxes, double *from, double *to);
 
 #endif

@@ -77,7 +77,7 @@ static bool visit_cell(void *user, const int64_t at[3], double from, double to)
     if (!(from < to) || !trip_field_take_cell(in->field, in->settings->kernel, at, &cell) ||
         !trip_classes_visible(in->classes, cell.least, cell.most))
         return true;
-    p->line = trip_cell_along(&cell, p->ray, from, to);
+    p->line = trip_cell_along(&cell, in->coordinates, p->ray, from, to);
     int count = trip_polynomial_turns(&p->line.code, turns);
     place here = place_at(p, 0);
     for (int i = 0; i <= count; i++) {
@@ -100,7 +100,7 @@ static bool visit_cube(void *user, const int64_t at[3], double from, double to)
     trip_field_code_bounds(in->settings->kernel, cube->range[0], cube->range[1], bounds);
     if (!trip_classes_visible(in->classes, bounds[0], bounds[1]))
         return true;
-    trip_ray_boxes cells = { .edge = 1 };
+    trip_ray_boxes cells = { .edge = 1, .coordinates = in->coordinates };
     for (int a = 0; a < 3; a++) {
         int64_t past = at[a] + TRIP_FIELD_EDGE;
         cells.lo[a] = at[a];
@@ -148,10 +148,11 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
 {
     const int64_t *dims = trip_field_dims(in->field);
     const trip_ray_boxes cubes = { .hi = { dims[0] - 1, dims[1] - 1, dims[2] - 1 },
-                                   .edge = TRIP_FIELD_EDGE };
+                                   .edge = TRIP_FIELD_EDGE,
+                                   .coordinates = in->coordinates };
     double from = 0, to = INFINITY;
     passage p = { .in = in, .ray = ray, .sum = trip_ray_sum_begin(in->settings->tolerance, 1) };
-    if (trip_ray_clip(ray, cubes.lo, cubes.hi, &from, &to) &&
+    if (trip_ray_clip(ray, &cubes, &from, &to) &&
         trip_clip_ray(in->clip, ray->origin, ray->direction, &from, &to)) {
         p.light = trip_light_at(in->settings, in->camera, in->gradient_full, trip_ray_at(ray, 1));
         if (trip_effects_some(&in->effects.effects))

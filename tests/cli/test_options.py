@@ -21,6 +21,7 @@ BRICK = {
     "--offset": ["", "-1", "x", "1.5", "9" * 30],
     "--size": ["", "1", "1,2", "0,1,1", "-1,1,1", "a,b,c", "1,2,3,4", "nan,1,1"],
     "--spacing": POINTS + ["0,1,1", "-1,1,1"],
+    "--coordinates": ["", "x.txt", "x.txt,y.txt", "x.txt,y.txt,z.txt", "a,b,c,d"],
     "--type": ["", "nonsense", "uint7", "block"],
     "--range": ["", "1", "2:1", "a:b", "nan:1", "1:2:3", ":x"],
     "--tf": ["preset:nonsense", "preset:"],
@@ -53,6 +54,7 @@ RENDER = {
     "--grid": [],
     "--level-set": NAMES + ["refuse"],
     "--spacing": POINTS + ["0,1,1", "-1,1,1"],
+    "--coordinates": ["", "x.txt", "x.txt,y.txt", "x.txt,y.txt,z.txt", "a,b,c,d"],
     "--size": [
         "",
         "10",

@@ -65,6 +65,7 @@ static void set_params(writing *w, const scene_params *p)
         .page_bytes = 4096,
         .dims = { p->dims[0], p->dims[1], p->dims[2] },
         .index_to_world = p->index_to_world,
+        .coordinates = p->coordinates,
         .codes = { .code_hi = 1 },
     };
     trip_writer_params *params = &w->params;

@@ -31,7 +31,8 @@ typedef struct scene_part {
 
 typedef struct scene_params {
     int64_t dims[3];
-    trip_affine index_to_world; /* all zero: the identity */
+    trip_affine index_to_world;          /* all zero: the identity */
+    const trip_coordinates *coordinates; /* NULL: even spacing */
     unsigned tile_voxels, slab_sheets;
     bool normals;
     unsigned code_bytes, normal_bytes; /* 0: 2, and 4 where there are normals */

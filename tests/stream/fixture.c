@@ -113,6 +113,7 @@ int fixture_write(fixture *f, const char *path)
                                   .page_bytes = p->page_bytes,
                                   .dims = { p->dims[0], p->dims[1], p->dims[2] },
                                   .index_to_world = trip_affine_identity(),
+                                  .coordinates = p->coordinates,
                                   .codes = { .code_lo = -1,
                                              .code_hi = 2,
                                              .gradient_step = { 0.5, 0.25, 1 },

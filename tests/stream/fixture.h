@@ -32,6 +32,7 @@ typedef struct fixture_params {
     unsigned tile_voxels, slab_sheets, page_bytes;
     unsigned code_bytes, normal_bytes; /* of the latter, 4 where there are normals */
     bool normals, empty, replace;
+    const trip_coordinates *coordinates; /* NULL: even spacing */
     bool in_memory; /* in /dev/shm where there is one: no waiting for the disk to sync */
 } fixture_params;
 

@@ -61,14 +61,14 @@ def read_header(index):
         "Q:checksums_checksum 3Q:dims 12d:index_to_world d:code_lo d:code_hi d:value_min "
         "d:value_max Q:reserved_scale 3d:gradient_step d:gradient_full Q:voxels Q:kept Q:halo "
         "I:tile_log2 I:slab_sheets I:page_log2 I:planes I:code_bytes I:normal_bytes I:list_count "
-        "I:reserved Q:lists_offset Q:text_offset Q:text_bytes",
+        "I:reserved Q:lists_offset Q:text_offset Q:text_bytes Q:coordinates_offset",
         index,
         0,
     )
-    if at != 320 or header["version"] != 3 or header["header_bytes"] != 1024:
+    if at != 328 or header["version"] != 3 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
-    if header["reserved"] or header["reserved_scale"] or any(index[320:1024]):
-        fail("index.trip", 320, "reserved bytes")
+    if header["reserved"] or header["reserved_scale"] or any(index[328:1024]):
+        fail("index.trip", 328, "reserved bytes")
     if header["index_bytes"] != len(index):
         fail("index.trip", 24, "length of the file")
     if xxh64(index[:16] + bytes(8) + index[24:1024]) != header["header_checksum"]:
@@ -82,6 +82,16 @@ def check_index(index, header):
         fail("index.trip", table, "checksum of the page checksums")
     checksums = numpy.frombuffer(index, "<u8", offset=table)
     check_pages("index.trip", index[1024:table], 1 << header["page_log2"], checksums, 1024)
+
+
+def check_coordinates(index, header):
+    at = header["coordinates_offset"]
+    for voxels in header["dims"] if at else ():
+        places = struct.unpack_from(f"<{voxels}d", index, at)
+        steps = [b - a for a, b in zip(places, places[1:])]
+        if places[0] != 0 or places[-1] != voxels - 1 or not all(1e-6 <= s for s in steps):
+            fail("index.trip", at, "coordinates")
+        at += 8 * voxels
 
 
 def read_list(index, header, number):
@@ -260,6 +270,7 @@ def main():
         index = file.read()
     header = read_header(index)
     check_index(index, header)
+    check_coordinates(index, header)
     for number in range(header["list_count"]):
         print_list(folder, index, header, number, sys.stdout)
 

@@ -284,8 +284,12 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->version = 2, "format version 2, which is not read any more");
     REFUSE(c.header->version = 4, "format version 4");
     REFUSE(c.header->header_bytes = 512, "header size");
-    REFUSE(c.header->reserved[700] = 1, "reserved");
+    REFUSE(c.header->reserved[690] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");
+    REFUSE(c.header->coordinates_offset = 3, "the coordinates lie outside");
+    REFUSE(c.header->coordinates_offset = UINT64_MAX - 7, "the coordinates lie outside");
+    REFUSE(c.header->coordinates_offset = c.header->checksums_offset,
+           "the coordinates lie outside");
     REFUSE(c.header->dims[1] = 0, "grid size");
     REFUSE(c.header->dims[2] = UINT64_C(1) << 32, "grid size");
     REFUSE(c.header->index_to_world[0] = NAN, "index-to-world");
@@ -427,6 +431,43 @@ static void a_data_set_being_replaced_can_be_opened_at_every_moment(void **state
     shared.params.replace = false;
 }
 
+/* Of a data set with tables, each number of which is checked. */
+static void coordinates_are_read_as_written_and_bad_ones_refused(void **state)
+{
+    (void)state;
+    static double tables[34 + 20 + 18];
+    const double *along[3] = { tables, tables + 34, tables + 54 };
+    const int64_t dims[3] = { 34, 20, 18 };
+    const fixture usual = shared;
+    trip_dataset *d;
+    static crafted c;
+    for (int a = 0, n = 0; a < 3; a++)
+        for (int i = 0; i < dims[a]; i++, n++)
+            tables[n] = (double)i * i / (double)(dims[a] - 1);
+    const trip_coordinates coordinates = trip_coordinates_make(along, dims);
+    fixture_make(&shared, &(fixture_params){ .dims = { 34, 20, 18 },
+                                             .normals = true,
+                                             .tile_voxels = 16,
+                                             .page_bytes = 4096,
+                                             .coordinates = &coordinates,
+                                             .in_memory = true });
+    assert_int_equal(trip_dataset_open(&d, shared.path, shared.budget), TRIP_OK);
+    for (int a = 0; a < 3; a++)
+        assert_memory_equal(d->coordinates.along[a], along[a], (size_t)dims[a] * sizeof(double));
+    assert_true(d->coordinates.widest == coordinates.widest);
+    trip_dataset_close(d);
+#define PLACES ((double *)(void *)(c.bytes + c.header->coordinates_offset))
+    REFUSE(PLACES[7] = NAN, "not finite");
+    REFUSE(PLACES[7] = PLACES[6], "do not ascend");
+    REFUSE(PLACES[40] = -1, "do not ascend");
+    REFUSE(PLACES[0] = -1, "do not run from 0");
+    REFUSE(PLACES[33] = 34, "do not run from 0");
+    REFUSE(PLACES[71] = 17.5, "do not run from 0");
+    REFUSE(c.header->coordinates_offset = c.header->lists_offset, "");
+    fixture_free(&shared);
+    shared = usual;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -435,6 +476,7 @@ int main(void)
         cmocka_unit_test(a_missing_file_or_folder_is_an_error),
         cmocka_unit_test(a_file_without_permission_is_an_error),
         cmocka_unit_test(a_header_that_makes_no_sense_is_refused_although_its_checksum_is_right),
+        cmocka_unit_test(coordinates_are_read_as_written_and_bad_ones_refused),
         cmocka_unit_test(tables_that_make_no_sense_are_refused_although_their_checksums_are_right),
         cmocka_unit_test(verify_finds_records_that_do_not_agree_with_the_index),
         cmocka_unit_test(files_of_another_data_set_are_noticed),

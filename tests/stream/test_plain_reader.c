@@ -64,16 +64,20 @@ static bool check_output(const fixture *f)
 
 static void the_plain_reader_sees_what_was_written(void **state)
 {
+    const double x[3] = { 0, 0.5, 2 }, y[2] = { 0, 1 }, z[9] = { 0, 1.5, 2, 2.25, 3, 4, 5, 6, 8 };
+    const trip_coordinates uneven =
+        trip_coordinates_make((const double *const[3]){ x, y, z }, (const int64_t[3]){ 3, 2, 9 });
     fixture_params params[] = {
         { .dims = { 40, 37, 30 }, .normals = true, .tile_voxels = 16, .page_bytes = 4096 },
         { .dims = { 70, 130, 5 }, .slab_sheets = 3, .density = 0.1 },
         { .dims = { 9, 9, 9 }, .empty = true, .normals = true },
         { .dims = { 40, 37, 30 }, .normals = true, .normal_bytes = 3, .code_bytes = 1 },
         { .dims = { 140, 9, 150 }, .tile_voxels = 128, .code_bytes = 1 },
+        { .dims = { 3, 2, 9 }, .coordinates = &uneven },
     };
     bool ran = true;
     (void)state;
-    for (int i = 0; i < 5 && ran; i++) {
+    for (int i = 0; i < 6 && ran; i++) {
         fixture f;
         fixture_make(&f, &params[i]);
         ran = check_output(&f);

@@ -96,9 +96,10 @@ INLINE vm may_reach(const trip_cpu_view *view, const trip_cpu_reach *reach, cons
 {
     const double room = view->affine ? TRIP_SPLAT_AFFINE_REACH : 1;
     const float kernel = (float)(room * view->splat.sigma * sqrt(view->splat.cutoff2));
-    vf u = v_abs(offset(vi_load(staged->u + at), view->eye[0])) * v_set(reach->scale[0]);
-    vf v = v_abs(offset(vi_load(staged->v + at), view->eye[1])) * v_set(reach->scale[1]);
-    vf s = v_abs(offset(vi_load(staged->sheet + at), view->eye[2])) * v_set(reach->scale[2]);
+    vf u = v_abs(offset(widen_int(vi_load(staged->u + at)), view->eye[0])) * v_set(reach->scale[0]);
+    vf v = v_abs(offset(widen_int(vi_load(staged->v + at)), view->eye[1])) * v_set(reach->scale[1]);
+    vf s = v_abs(offset(widen_int(vi_load(staged->sheet + at)), view->eye[2])) *
+           v_set(reach->scale[2]);
     vf radius = v_sqrt(growth2(p, &view->splat, lanes, at)) * v_set(kernel * reach->across);
     vf bound = v_fnma(v_set(reach->h), v_max(s, v_max(u, v)), s) + radius;
     return reach->inclusive ? v_ge(bound, v_set(0)) : v_gt(bound, v_set(0));
@@ -114,8 +115,9 @@ static void reaching(const trip_cpu_view *view, const trip_cpu_reach *reach,
                                             : footprint_of(&persp, view, lanes, NULL, i).usual;
         unsigned front = vm_bits(vm_first(count - i)) &
                          ~vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
-        lanes->kept[i / V] = front & vm_bits(usual);
-        lanes->scalar[i / V] = front & ~vm_bits(usual);
+        unsigned by_lanes = view->coordinates ? 0 : vm_bits(usual);
+        lanes->kept[i / V] = front & by_lanes;
+        lanes->scalar[i / V] = front & ~by_lanes;
         if (reach->bounded)
             lanes->kept[i / V] &= vm_bits(may_reach(view, reach, &persp, staged, lanes, i));
     }

@@ -91,6 +91,8 @@ typedef struct trip_cpu_view {
     bool sums;     /* splats are summed sheet by sheet */
     bool tinted;   /* all have one colour before they are lit: */
     float tint[3];
+    const trip_coordinates *coordinates; /* of uneven spacing: splats are projected one by one; else
+                                            NULL */
     bool stretch_varies;
     bool affine; /* by the affine map at the centre (splat.h): G and stretch are 1 but of near ones
                   */

@@ -138,11 +138,30 @@ INLINE void split(vd_pair p, vf *whole, vf *part)
     *part = v_narrow(p.lo - vd_low(*whole), p.hi - vd_high(*whole));
 }
 
+/* Positions of voxels along an axis of the grid. Lanes beyond the last voxel may hold any number. */
+INLINE vd_pair positions(const trip_cpu_view *view, int axis, const int32_t *voxels)
+{
+    if (!view->coordinates)
+        return widen_int(vi_load(voxels));
+    const double *along = view->coordinates->along[axis];
+    const int64_t last = view->coordinates->voxels[axis] - 1;
+    double low[V / 2], high[V / 2];
+    for (int i = 0; i < V; i++) {
+        int64_t n = voxels[i] < 0 ? 0 : voxels[i] > last ? last : voxels[i];
+        (i < V / 2 ? low : high)[i % (V / 2)] = along[n];
+    }
+    vd_pair out;
+    memcpy(&out.lo, low, sizeof low);
+    memcpy(&out.hi, high, sizeof high);
+    return out;
+}
+
 INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
                   trip_cpu_lanes *lanes)
 {
-    vd_pair u = widen_int(vi_load(staged->u + at)), v = widen_int(vi_load(staged->v + at));
-    vd_pair s = widen_int(vi_load(staged->sheet + at));
+    vd_pair u = positions(view, view->u_axis, staged->u + at);
+    vd_pair v = positions(view, view->v_axis, staged->v + at);
+    vd_pair s = positions(view, view->axis, staged->sheet + at);
     vd_pair x = along(view->along_x, u, v, s), y = along(view->along_y, u, v, s);
     vd_pair zs = along(view->along_z, u, v, s);
     vf z = v_narrow(zs.lo, zs.hi), whole, part;
@@ -526,19 +545,20 @@ typedef struct colour {
     vf r, g, b;
 } colour;
 
-INLINE vf offset(vi index, double eye)
+INLINE vf offset(vd_pair a, double eye)
 {
-    vd_pair a = widen_int(index);
     return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
 }
 
 /* From the voxel to the eye, world space, not normalised. */
-INLINE v3 towards_eye(const trip_cpu_view *view, vi u, vi v, vi sheet)
+INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
     const trip_camera *camera = &view->splat.camera;
     if (camera->ortho)
         return v3_of(trip_scale(camera->world_forward, -1));
-    vf c[3] = { offset(u, view->eye[0]), offset(v, view->eye[1]), offset(sheet, view->eye[2]) };
+    vf c[3] = { offset(positions(view, view->u_axis, staged->u + at), view->eye[0]),
+                offset(positions(view, view->v_axis, staged->v + at), view->eye[1]),
+                offset(positions(view, view->axis, staged->sheet + at), view->eye[2]) };
     vf w[3];
     for (int i = 0; i < 3; i++)
         w[i] = -v_fma(
@@ -749,8 +769,7 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
         c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
     if (!view->shading && !view->effects.some)
         return c;
-    v3 eye = unit(towards_eye(view, vi_load(staged->u + at), vi_load(staged->v + at),
-                              vi_load(staged->sheet + at)));
+    v3 eye = unit(towards_eye(view, staged, at));
     surface s = { .strength = v_set(0), .gloss = v_set(0) };
     if (view->shading)
         s = surface_of(view, eye, vi_load(staged->normal + at));
@@ -878,7 +897,8 @@ INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic
             f.usual = v_ge(v_load(lanes->z + i), v_set(view->near));
         unsigned valid = vm_bits(vm_first(count - i));
         unsigned behind = vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
-        unsigned scalar = valid & ~behind & ~vm_bits(f.usual);
+        unsigned usual = view->coordinates ? 0 : vm_bits(f.usual);
+        unsigned scalar = valid & ~behind & ~usual;
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
         unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~scalar;
         if (open && kept)

@@ -1,0 +1,243 @@
+#include "volume_coordinates.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "coordinates.h"
+#include "report.h"
+
+enum { LETTERS = 3 };
+static const char letters[LETTERS] = { 'x', 'y', 'z' };
+
+static int fail_axis(const char *path, int axis, const char *why)
+{
+    return trip_fail(TRIP_ERROR, "read", path, "coordinates along %c: %s", letters[axis], why);
+}
+
+static bool lies_along_axis(const trip_affine *m, int axis)
+{
+    for (int a = 0; a < 3; a++)
+        if (a != axis && (m->m[a][axis] != 0 || m->m[axis][a] != 0))
+            return false;
+    return true;
+}
+
+static bool are_even(const double *table, int64_t count)
+{
+    for (int64_t i = 0; i < count; i++)
+        if (!(fabs(table[i] - (double)i) <= TRIP_VOLUME_EVEN))
+            return false;
+    return true;
+}
+
+static const char *fault_of_values(const double *values, int64_t count)
+{
+    for (int64_t i = 0; i < count; i++) {
+        if (!isfinite(values[i]))
+            return "some are not finite";
+        if (i > 1 && !((values[i] - values[i - 1]) * (values[1] - values[0]) > 0))
+            return "they neither ascend nor descend throughout";
+    }
+    if (count > 1 && !(isfinite(values[count - 1] - values[0]) && values[1] != values[0]))
+        return "they neither ascend nor descend throughout";
+    return NULL;
+}
+
+int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *values,
+                                const char *path)
+{
+    const int64_t count = info->dims[axis];
+    const char *fault = fault_of_values(values, count);
+    double *column = info->index_to_world.m[axis], *table = NULL;
+    if (!fault && !lies_along_axis(&info->index_to_world, axis))
+        fault = "the axis of the volume does not lie along that of the world";
+    if (fault)
+        return fail_axis(path, axis, fault);
+    column[3] = values[0];
+    if (count == 1)
+        return 0;
+    column[axis] = (values[count - 1] - values[0]) / (double)(count - 1);
+    table = calloc((size_t)count, sizeof *table);
+    if (!table)
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    for (int64_t i = 1; i < count; i++)
+        table[i] = (values[i] - values[0]) / column[axis];
+    table[count - 1] = (double)(count - 1);
+    fault = trip_coordinates_fault(table, count);
+    if (fault || are_even(table, count)) {
+        free(table);
+        return fault ? fail_axis(path, axis, fault) : 0;
+    }
+    free(info->coordinates[axis]);
+    info->coordinates[axis] = table;
+    return 0;
+}
+
+/* ---- text files ---- */
+
+/* The name between two commas of the option; false when there are more or less than three. */
+static bool split_names(const char *files, const char *begin[3], size_t length[3])
+{
+    for (int a = 0; a < 3; a++) {
+        begin[a] = files;
+        length[a] = strcspn(files, ",");
+        files += length[a];
+        if (a < 2 && *files++ != ',')
+            return false;
+    }
+    return *files == 0;
+}
+
+static bool is_between(int c)
+{
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == ',' || c == ';';
+}
+
+/* The next number of a file; 0: there is none, -1: what is there is none. */
+static int next_number(FILE *f, double *value)
+{
+    char word[64];
+    size_t n = 0;
+    int c;
+    while (is_between(c = fgetc(f)))
+        continue;
+    for (; c != EOF && !is_between(c); c = fgetc(f))
+        if (n < sizeof word - 1)
+            word[n++] = (char)c;
+        else
+            return -1;
+    word[n] = 0;
+    char *end = word;
+    *value = n ? strtod(word, &end) : 0;
+    return n == 0 ? 0 : *end ? -1 : 1;
+}
+
+static int read_numbers(FILE *f, const char *file, double *values, int64_t count)
+{
+    double beyond;
+    for (int64_t i = 0; i <= count; i++) {
+        int got = next_number(f, i < count ? &values[i] : &beyond);
+        if (got < 0)
+            return trip_fail(TRIP_ERROR, "read", file, "number %" PRId64 " is none", i + 1);
+        if (ferror(f))
+            return trip_fail_errno("read", file, "cannot read");
+        if (got != (i < count))
+            return trip_fail(TRIP_ERROR, "read", file,
+                             "has %s than the %" PRId64 " coordinates of its axis",
+                             got ? "more" : "fewer", count);
+    }
+    return 0;
+}
+
+static int read_axis(trip_volume_info *info, int axis, const char *file, const char *path)
+{
+    const int64_t count = info->dims[axis];
+    double *values = calloc((size_t)count, sizeof *values);
+    if (!values)
+        return trip_fail(TRIP_ERROR, "read", file, "out of memory");
+    FILE *f = fopen(file, "re");
+    int status =
+        f ? read_numbers(f, file, values, count) : trip_fail_errno("read", file, "cannot open");
+    if (f)
+        fclose(f);
+    if (!status)
+        status = trip_volume_set_coordinates(info, axis, values, path);
+    free(values);
+    return status;
+}
+
+typedef int (*visit_axis)(void *user, int axis, const char *file);
+
+static int each_file(const char *files, visit_axis visit, void *user)
+{
+    const char *begin[3];
+    size_t length[3];
+    int status = 0;
+    if (!split_names(files, begin, length))
+        return trip_fail(TRIP_USAGE, "read", files, "--coordinates takes three files: X,Y,Z");
+    for (int a = 0; a < 3 && !status; a++) {
+        char *file = length[a] ? strndup(begin[a], length[a]) : NULL;
+        if (length[a] && !file)
+            return trip_fail(TRIP_ERROR, "read", files, "out of memory");
+        status = file ? visit(user, a, file) : 0;
+        free(file);
+    }
+    return status;
+}
+
+typedef struct reading {
+    trip_volume_info *info;
+    const char *path;
+} reading;
+
+static int read_one(void *user, int axis, const char *file)
+{
+    const reading *r = user;
+    return read_axis(r->info, axis, file, r->path);
+}
+
+int trip_volume_read_coordinates(trip_volume_info *info, const char *files, const char *path)
+{
+    return each_file(files, read_one, &(reading){ info, path });
+}
+
+typedef struct listing {
+    int (*visit)(void *user, const char *file);
+    void *user;
+} listing;
+
+static int list_one(void *user, int axis, const char *file)
+{
+    const listing *l = user;
+    (void)axis;
+    return l->visit(l->user, file);
+}
+
+int trip_volume_list_coordinates(const char *files, int (*visit)(void *user, const char *file),
+                                 void *user)
+{
+    return each_file(files, list_one, &(listing){ visit, user });
+}
+
+/* ---- tables ---- */
+
+void trip_volume_sample_coordinates(trip_volume_info *info, int axis, int64_t step, int64_t count)
+{
+    double *table = info->coordinates[axis];
+    const bool uneven = table && count > 1;
+    const double mean = uneven ? table[(count - 1) * step] / (double)(count - 1) : (double)step;
+    for (int row = 0; row < 3; row++)
+        info->index_to_world.m[row][axis] *= mean;
+    if (!uneven)
+        return;
+    for (int64_t i = 1; i < count; i++)
+        table[i] = table[i * step] / mean;
+    table[count - 1] = (double)(count - 1);
+}
+
+int trip_volume_complete_coordinates(trip_volume_info *info, const char *path)
+{
+    if (!info->coordinates[0] && !info->coordinates[1] && !info->coordinates[2])
+        return 0;
+    for (int a = 0; a < 3; a++) {
+        const size_t count = (size_t)info->dims[a];
+        if (info->coordinates[a])
+            continue;
+        if (!(info->coordinates[a] = calloc(count, sizeof(double))))
+            return trip_fail(TRIP_ERROR, "read", path, "out of memory");
+        for (size_t i = 0; i < count; i++)
+            info->coordinates[a][i] = (double)i;
+    }
+    return 0;
+}
+
+void trip_volume_free_coordinates(trip_volume_info *info)
+{
+    for (int a = 0; a < 3; a++) {
+        free(info->coordinates[a]);
+        info->coordinates[a] = NULL;
+    }
+}

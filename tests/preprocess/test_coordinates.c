@@ -1,0 +1,180 @@
+/* Where voxels lie, from text files, and what is made of it. */
+#include "volume_files.h"
+
+#include "coordinates.h"
+#include "volume_coordinates.h"
+
+static trip_budget *budget;
+
+/* A file of an axis; its path lasts until the next of that axis. */
+static const char *write_text(char axis, const char *text)
+{
+    static char paths[3][256];
+    char *path = paths[axis - 'x'];
+    snprintf(path, sizeof *paths, "%s", write_bytes((const char[]){ axis, 0 }, text, strlen(text)));
+    return path;
+}
+
+static trip_volume_params raw_params(const char *coordinates)
+{
+    return (trip_volume_params){ .raw_dims = { NX, NY, NZ },
+                                 .raw_type = "uint8",
+                                 .coordinates = coordinates };
+}
+
+static const char *sample_file(void)
+{
+    bytes b = { .count = 0 };
+    append_volume(&b, TRIP_U8, false);
+    return write_file("sample.raw", &b);
+}
+
+/* "X,Y,Z" of files in the test's folder. */
+static char *option(const char *x, const char *y, const char *z)
+{
+    char *text;
+    assert_true(asprintf(&text, "%s,%s,%s", x, y, z) > 0);
+    return text;
+}
+
+static void coordinates_are_places_and_a_map(void **state)
+{
+    (void)state;
+    trip_volume *v;
+    const char *x = write_text('x', "-1 0 0.5\n2,3\n");
+    const char *z = write_text('z', "10\t9;7 6 4 2 -2\n\n");
+    char *files = option(x, "", z);
+    const trip_volume_params p = raw_params(files);
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, sample_file(), &p, budget), 0);
+    const trip_volume_info *info = trip_volume_get_info(v);
+    assert_map(&info->index_to_world,
+               (const double[3][4]){ { 1, 0, 0, -1 }, { 0, 1, 0, 0 }, { 0, 0, -2, 10 } });
+    const double places[3][NZ] = { { 0, 1, 1.5, 3, 4 },
+                                   { 0, 1, 2, 3 },
+                                   { 0, 0.5, 1.5, 2, 3, 4, 6 } };
+    const int64_t dims[3] = { NX, NY, NZ };
+    for (int a = 0; a < 3; a++) {
+        assert_null(trip_coordinates_fault(info->coordinates[a], dims[a]));
+        for (int i = 0; i < dims[a]; i++)
+            assert_true(fabs(info->coordinates[a][i] - places[a][i]) < 1e-12);
+    }
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+    free(files);
+}
+
+static void coordinates_that_are_even_are_a_spacing(void **state)
+{
+    (void)state;
+    trip_volume *v;
+    const char *x = write_text('x', "5 7 9.0005 11 13");
+    char *files = option(x, "", "");
+    const trip_volume_params p = raw_params(files);
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, sample_file(), &p, budget), 0);
+    const trip_volume_info *info = trip_volume_get_info(v);
+    assert_map(&info->index_to_world,
+               (const double[3][4]){ { 2, 0, 0, 5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+    for (int a = 0; a < 3; a++)
+        assert_null(info->coordinates[a]);
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+    free(files);
+}
+
+/* Every second voxel keeps its place in the world. */
+static void what_is_left_out_leaves_the_others_where_they_are(void **state)
+{
+    (void)state;
+    trip_volume *v;
+    const double world[NZ] = { 0, 1, 3, 4, 9, 10, 16 };
+    const char *z = write_text('z', "0 1 3 4 9 10 16");
+    char *files = option("", "", z);
+    trip_volume_params p = raw_params(files);
+    p.most_voxels = VOXELS / 4;
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, sample_file(), &p, budget), 0);
+    const trip_volume_info *info = trip_volume_get_info(v);
+    assert_int_equal(info->dims[2], 4);
+    assert_null(trip_coordinates_fault(info->coordinates[2], 4));
+    for (int k = 0; k < 4; k++) {
+        const trip_vec3 at =
+            trip_affine_point(&info->index_to_world, trip_v3(0, 0, info->coordinates[2][k]));
+        assert_true(fabs(at.z - world[2 * k]) < 1e-12);
+    }
+    assert_true(fabs(info->index_to_world.m[0][0] - 2) < 1e-12);
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+    free(files);
+}
+
+static void refuse(int status, const char *x, const char *y, const char *z, const char *why)
+{
+    char *files = option(x, y, z);
+    const trip_volume_params p = raw_params(files);
+    assert_refused_as(status, sample_file(), &p, why);
+    free(files);
+}
+
+static void bad_coordinates_are_refused(void **state)
+{
+    (void)state;
+    const struct {
+        const char *text, *why;
+    } bad[] = {
+        { "0 1 2 3", "fewer" },
+        { "", "fewer" },
+        { "0 1 2 3 5 6", "more" },
+        { "0 1 2 3 3", "neither ascend nor descend" },
+        { "0 1 3 2 5", "neither ascend nor descend" },
+        { "1 1 1 1 1", "neither ascend nor descend" },
+        { "0 1 nan 3 5", "not finite" },
+        { "0 1 inf 3 5", "not finite" },
+        { "-1e308 1 2 3 1.7e308", "neither ascend nor descend" },
+        { "0 1e-9 2 3 5", "millionth" },
+        { "0 1 two 3 5", "number 3 is none" },
+        { "0 1 2x 3 5", "number 3 is none" },
+        { "0 1 2 3 "
+          "5000000000000000000000000000000000000000000000000000000000000000000000000",
+          "number 5 is none" },
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        refuse(TRIP_ERROR, write_text('x', bad[i].text), "", "", bad[i].why);
+    refuse(TRIP_ERROR, "/nowhere/x.txt", "", "", "cannot open");
+    const trip_volume_params two = raw_params("a,b"), four = raw_params("a,b,c,d");
+    assert_refused_as(TRIP_USAGE, sample_file(), &two, "three files");
+    assert_refused_as(TRIP_USAGE, sample_file(), &four, "three files");
+}
+
+/* Place and index are one another's inverse, beyond the ends too. */
+static void places_and_indices_are_inverse(void **state)
+{
+    (void)state;
+    const double x[] = { 0, 0.25, 2.5, 3 }, one[] = { 0 };
+    const trip_coordinates c =
+        trip_coordinates_make((const double *const[3]){ x, one, x }, (const int64_t[3]){ 4, 1, 4 });
+    const double pairs[][2] = { { -1, -0.25 }, { 0, 0 },      { 0.5, 0.125 },
+                                { 1, 0.25 },   { 2.5, 2.75 }, { 4, 3.5 } };
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        assert_true(fabs(trip_coordinates_place(&c, 0, pairs[i][0]) - pairs[i][1]) < 1e-12);
+        assert_true(fabs(trip_coordinates_index(&c, 0, pairs[i][1]) - pairs[i][0]) < 1e-12);
+        assert_true(trip_coordinates_place(&c, 1, pairs[i][0]) == pairs[i][0]);
+    }
+    assert_true(fabs(trip_coordinates_width(&c, 0, 0) - 0.25) < 1e-12);
+    assert_true(fabs(trip_coordinates_width(&c, 0, 1) - 1.25) < 1e-12);
+    assert_true(fabs(trip_coordinates_width(&c, 0, 3) - 0.5) < 1e-12);
+    assert_true(fabs(c.widest - 1.375) < 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(coordinates_are_places_and_a_map),
+        cmocka_unit_test(coordinates_that_are_even_are_a_spacing),
+        cmocka_unit_test(what_is_left_out_leaves_the_others_where_they_are),
+        cmocka_unit_test(bad_coordinates_are_refused),
+        cmocka_unit_test(places_and_indices_are_inverse),
+    };
+    return cmocka_run_group_tests_name("coordinates", tests, make_folder, remove_folder);
+}

@@ -1,0 +1,430 @@
+/* Grids with uneven spacing (coordinates.h): the integral against closed forms, the reference
+ * against the integral, and the CPU renderer against the reference. */
+#include "cpu_scenes.h"
+#include "test.h"
+
+enum { EDGE = 20 };
+
+/* Steps that differ by up to `most` times, along each axis others. */
+typedef struct uneven {
+    double tables[3][EDGE];
+    trip_coordinates coordinates;
+} uneven;
+
+static void make_uneven(uneven *u, double most)
+{
+    const double *along[3];
+    const int64_t voxels[3] = { EDGE, EDGE, EDGE };
+    for (int a = 0; a < 3; a++) {
+        double *x = u->tables[a];
+        x[0] = 0;
+        for (int i = 1; i < EDGE; i++)
+            x[i] = x[i - 1] + pow(most, (scene_hash(a, i, 7) % 1000) / 999.0);
+        const double last = x[EDGE - 1];
+        for (int i = 1; i < EDGE; i++)
+            x[i] *= (EDGE - 1) / last;
+        x[EDGE - 1] = EDGE - 1;
+        along[a] = x;
+    }
+    u->coordinates = trip_coordinates_make(along, voxels);
+}
+
+static trip_settings plain(double tolerance)
+{
+    trip_settings s = trip_settings_default();
+    s.shading = false;
+    s.tolerance = tolerance;
+    s.background[3] = 0;
+    return s;
+}
+
+static trip_settings post(int slices)
+{
+    trip_settings s = plain(1e-5);
+    s.classify = TRIP_CLASSIFY_POST;
+    s.slices = slices;
+    return s;
+}
+
+static trip_settings splats(void)
+{
+    trip_settings s = plain(1e-5);
+    s.classify = TRIP_CLASSIFY_PRE;
+    s.footprint = TRIP_FOOTPRINT_EWA;
+    return s;
+}
+
+static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
+
+static scene_picture integrate(const scene *s, const trip_camera_params *view,
+                               const trip_settings *settings)
+{
+    return scene_integrate(s, view, settings, &(scene_making){ 0 });
+}
+
+static trip_camera_params view_of(const scene *s, int number, int size)
+{
+    static const trip_vec3 directions[] = {
+        { 1, 0, 0 }, { 0.3, 0.5, 0.2 }, { -1, 2, 0.7 }, { 0.1, -0.2, -1 }
+    };
+    trip_camera_params view = scene_view(s, directions[number % 4], 60, 30, size);
+    view.ortho_height = number / 4 % 2 ? 25 : 0;
+    return view;
+}
+
+/* The grid fills the same box whatever the spacing within. */
+static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
+{
+    (void)state;
+    uneven u;
+    make_uneven(&u, 20);
+    for (int i = 0; i < 16; i++) {
+        scene s;
+        int crossed = 0;
+        scene_create(&s,
+                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .coordinates = &u.coordinates,
+                                      .index_to_world = i / 8 ? sheared : trip_affine_identity() });
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ 1, 0.5F, 0.25F, 0.05F };
+        const trip_camera_params view = view_of(&s, i, 9);
+        const trip_settings exact = plain(1e-6);
+        scene_picture p = integrate(&s, &view, &exact);
+        for (int n = 0; n < 81; n++) {
+            trip_vec3 o, d;
+            double from, to, alpha = 0;
+            scene_ray(&s, &view, n % 9, n / 9, &o, &d);
+            if (scene_ray_in_grid(&s, o, d, &from, &to))
+                alpha = 1 - exp(-0.05F * (to - from) * scene_ray_stretch(&s, d));
+            crossed += alpha > 0;
+            assert_close(scene_pixel(&p, n % 9, n / 9)[3], alpha, 1e-6);
+            assert_close(scene_pixel(&p, n % 9, n / 9)[1], alpha / 2, 1e-6);
+        }
+        assert_in_range(crossed, 5, 81);
+        scene_picture_free(&p);
+        scene_destroy(&s);
+    }
+}
+
+/* Proportional to the place along i. */
+static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const uneven *u = user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = (unsigned)lround(3000 * u->tables[0][i]);
+    return true;
+}
+
+/* What is linear among places stays so between voxels, at whatever places these lie; but for the
+ * rounding of codes. */
+static void a_ramp_is_as_steep_wherever_it_was_sampled(void **state)
+{
+    (void)state;
+    uneven u;
+    scene s;
+    make_uneven(&u, 20);
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .coordinates = &u.coordinates,
+                                      .voxel = ramp,
+                                      .user = &u });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ (float)code / 65535, 0, 0, 0.4F * (float)code / 65535 };
+    for (int i = 0; i < 8; i++) {
+        const trip_camera_params view = view_of(&s, i, 7);
+        const trip_settings exact = plain(1e-6);
+        scene_picture p = integrate(&s, &view, &exact);
+        for (int n = 0; n < 49; n++) {
+            trip_vec3 o, d;
+            double from, to;
+            scene_ray(&s, &view, n % 7, n / 7, &o, &d);
+            if (!scene_ray_in_grid(&s, o, d, &from, &to))
+                continue;
+            double length = to - from, value = 3000 * (o.x + from * d.x) / 65535,
+                   rise = 3000 * d.x / 65535;
+            double through = exp(-0.4 * (value + rise * length / 2) * length);
+            assert_close(scene_pixel(&p, n % 7, n / 7)[3], 1 - through, 5e-5);
+        }
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+/* Light falls on a ramp as on a plane, at every voxel: differences are divided by how far the
+ * voxels are apart. */
+static void a_ramp_has_one_gradient(void **state)
+{
+    (void)state;
+    uneven u;
+    scene s;
+    make_uneven(&u, 20);
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .coordinates = &u.coordinates,
+                                      .normals = true,
+                                      .voxel = ramp,
+                                      .user = &u });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 0.5F, 0, 0, 0.4F };
+    trip_camera_params view = scene_view(&s, trip_v3(0.6, 0.5, 0.2), 60, 20, 5);
+    view.ortho_height = 8; /* every ray has the same light */
+    trip_settings lit = plain(1e-6), sheets = post(2);
+    lit.shading = sheets.shading = true;
+    scene_picture p = integrate(&s, &view, &lit);
+    scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &sheets);
+    double first = (double)p.rgba[0] / (double)p.rgba[3];
+    assert_in_range(lround(1000 * fabs(first - 0.5)), 10, 500); /* it is lit */
+    for (int n = 0; n < 25; n++) {
+        assert_close(p.rgba[4 * n] / p.rgba[4 * n + 3], first, 2e-4);
+        assert_close(q.rgba[4 * n] / q.rgba[4 * n + 3], first, 2e-4);
+    }
+    scene_picture_free(&p);
+    scene_picture_free(&q);
+    scene_destroy(&s);
+}
+
+/* A blob about the grid's middle with a standard deviation of WIDTH. */
+#define WIDTH 3.0
+static bool blob(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const uneven *u = user;
+    const double middle = 0.5 * (EDGE - 1);
+    const double x = u->tables[0][i] - middle, y = u->tables[1][j] - middle,
+                 z = u->tables[2][k] - middle;
+    const double value = 60000 * exp(-(x * x + y * y + z * z) / (2 * WIDTH * WIDTH));
+    *code = (unsigned)lround(value);
+    gradient[0] = -x * value * 1e-5;
+    gradient[1] = -y * value * 1e-5;
+    gradient[2] = -z * value * 1e-5;
+    return true;
+}
+
+static void create_blob(scene *s, uneven *u, const trip_affine *map)
+{
+    scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                     .index_to_world = map ? *map : trip_affine_identity(),
+                                     .coordinates = &u->coordinates,
+                                     .tile_voxels = 16,
+                                     .normals = true,
+                                     .voxel = blob,
+                                     .user = u });
+    for (int code = 0; code < 65536; code++)
+        s->table[code] = (trip_tf_entry){ 1, (float)code / 65535, 0.25F, (float)code / 65535 };
+}
+
+/* The integral of a Gaussian along a line, but for the interpolation between voxels: linear over a
+ * step h it is off by h^2 / 8 times the second derivative, which is at most 1 / WIDTH^2. */
+static void a_gaussian_has_its_line_integral(void **state)
+{
+    (void)state;
+    uneven u;
+    scene s;
+    make_uneven(&u, 3);
+    create_blob(&s, &u, NULL);
+    const double middle = 0.5 * (EDGE - 1), h = u.coordinates.widest;
+    for (int i = 0; i < 8; i++) {
+        const trip_camera_params view = view_of(&s, i, 7);
+        const trip_settings exact = plain(1e-6);
+        scene_picture p = integrate(&s, &view, &exact);
+        for (int n = 0; n < 49; n++) {
+            trip_vec3 o, d;
+            scene_ray(&s, &view, n % 7, n / 7, &o, &d);
+            trip_vec3 to = trip_sub(trip_v3(middle, middle, middle), o), across = trip_cross(to, d);
+            double r2 = trip_dot(across, across), along = sqrt(2 * 3.14159265358979) * WIDTH;
+            double depth = 60000.0 / 65535 * along * exp(-r2 / (2 * WIDTH * WIDTH));
+            double slack = 3 * h * h / (8 * WIDTH * WIDTH) * along + 0.01; /* and the box's end */
+            double alpha = (double)scene_pixel(&p, n % 7, n / 7)[3];
+            assert_true(alpha >= -expm1(-depth + slack) && alpha <= -expm1(-depth - slack));
+        }
+        assert_true((double)scene_pixel(&p, 3, 3)[3] > 0.99);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+static void slices_come_to_the_integral(void **state)
+{
+    (void)state;
+    uneven u;
+    make_uneven(&u, 6);
+    for (int i = 0; i < 10; i++) {
+        scene s;
+        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        trip_camera_params view = view_of(&s, i, 12);
+        if (i >= 8) /* from within */
+            view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
+        trip_settings fine = post(8), coarse = post(1), exact = plain(1e-6);
+        fine.shading = coarse.shading = exact.shading = i / 2 % 2;
+        scene_picture p = integrate(&s, &view, &exact);
+        scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &fine);
+        scene_picture r = scene_draw(&s, &cpu_scenes_reference, &view, &coarse);
+        double near = scene_difference(&p, &q), far = scene_difference(&p, &r);
+        assert_true(near < 0.004);
+        assert_true(far < 0.12);
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+        scene_picture_free(&r);
+        scene_destroy(&s);
+    }
+}
+
+/* Where no ray is cut off the optical depths of all splats add up to their masses, of which each is
+ * the extinction times the voxel's own volume. */
+static void splats_have_the_mass_of_their_voxels(void **state)
+{
+    (void)state;
+    enum { SIZE = 64 };
+    uneven u;
+    scene s;
+    make_uneven(&u, 6);
+    create_blob(&s, &u, NULL);
+    for (int code = 0; code < 65536; code++)
+        s.table[code].extinction = 1e-3F * (float)code / 65535;
+    trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 30, SIZE);
+    view.ortho_height = 60;
+    const trip_settings settings = splats();
+    double mass = 0;
+    for (int n = 0; n < EDGE * EDGE * EDGE; n++) {
+        const int at[3] = { n % EDGE, n / EDGE % EDGE, n / EDGE / EDGE };
+        unsigned code;
+        double gradient[3], volume = 1;
+        blob(&u, at[0], at[1], at[2], &code, gradient);
+        for (int a = 0; a < 3; a++)
+            volume *= (u.tables[a][at[a] < EDGE - 1 ? at[a] + 1 : at[a]] -
+                       u.tables[a][at[a] > 0 ? at[a] - 1 : at[a]]) /
+                      (at[a] > 0 && at[a] < EDGE - 1 ? 2 : 1);
+        mass += volume * (double)s.table[code].extinction;
+    }
+    const scene_renderer *const renderers[] = { &cpu_scenes_reference, &cpu_scenes_cpu };
+    for (int i = 0; i < 2; i++) {
+        scene_picture p = scene_draw(&s, renderers[i], &view, &settings);
+        double sum = 0, pixel = 60.0 / SIZE;
+        for (int n = 0; n < SIZE * SIZE; n++)
+            sum -= log1p(-(double)p.rgba[4 * n + 3]) * pixel * pixel;
+        assert_close(sum / mass, 1, 2e-3);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings,
+                    double most)
+{
+    scene_picture p = scene_draw(s, &cpu_scenes_reference, view, settings);
+    for (unsigned threads = 1; threads <= 3; threads += 2) {
+        cpu_scenes_threads = threads;
+        scene_picture q = scene_draw(s, &cpu_scenes_cpu, view, settings);
+        assert_true(scene_difference(&p, &q) <= most);
+        scene_picture_free(&q);
+    }
+    cpu_scenes_threads = 3;
+    scene_picture_free(&p);
+}
+
+static void the_cpu_renderer_draws_the_splats_of_the_reference(void **state)
+{
+    (void)state;
+    uneven u;
+    make_uneven(&u, 6);
+    for (int i = 0; i < 16; i++) {
+        scene s;
+        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        const trip_camera_params view = view_of(&s, i / 2, 40);
+        trip_settings settings = splats();
+        settings.shading = i % 3 == 0;
+        settings.flatten = i % 4 == 1 ? 3 : 1;
+        settings.compositing = i % 5 == 0 ? TRIP_COMPOSITING_SHEET : TRIP_COMPOSITING_SPLAT;
+        settings.depth = i == 6;
+        compare(&s, &view, &settings, 2e-3);
+        scene_destroy(&s);
+    }
+}
+
+/* Where the eye is among the splats, those about it have rays whose lengths in their own index
+ * space the CPU renderer takes from the one through the centre. */
+static void from_within_it_is_close(void **state)
+{
+    (void)state;
+    uneven u;
+    make_uneven(&u, 3);
+    scene s;
+    create_blob(&s, &u, NULL);
+    trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 60, 40);
+    view.eye = trip_v3(4.2, 5.1, 14.7);
+    const trip_settings settings = splats();
+    compare(&s, &view, &settings, 0.06);
+    scene_destroy(&s);
+}
+
+/* Tables of even steps draw what no tables draw. */
+static void even_coordinates_change_nothing(void **state)
+{
+    (void)state;
+    uneven u;
+    make_uneven(&u, 1);
+    for (int i = 0; i < 8; i++) {
+        scene with, without;
+        uneven none = u;
+        none.coordinates = (trip_coordinates){ .along = { NULL }, .widest = 1 };
+        create_blob(&with, &u, i / 4 ? &sheared : NULL);
+        create_blob(&without, &none, i / 4 ? &sheared : NULL);
+        assert_true(trip_coordinates_uneven(&with.data->coordinates));
+        assert_false(trip_coordinates_uneven(&without.data->coordinates));
+        const trip_camera_params view = view_of(&with, i, 20);
+        const trip_settings settings[] = { post(2), splats() };
+        for (int n = 0; n < 3; n++) {
+            const scene_renderer *r = n < 2 ? &cpu_scenes_reference : &cpu_scenes_cpu;
+            scene_picture p = scene_draw(&with, r, &view, &settings[n > 0]);
+            scene_picture q = scene_draw(&without, r, &view, &settings[n > 0]);
+            assert_true(scene_difference(&p, &q) <= (n < 2 ? 1e-6 : 1e-3));
+            scene_picture_free(&p);
+            scene_picture_free(&q);
+        }
+        scene_picture p = integrate(&with, &view, &settings[0]);
+        scene_picture q = integrate(&without, &view, &settings[0]);
+        assert_true(scene_difference(&p, &q) <= 1e-6);
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+        scene_destroy(&with);
+        scene_destroy(&without);
+    }
+}
+
+/* A voxel is cut away by its place. */
+static void voxels_are_clipped_where_they_lie(void **state)
+{
+    (void)state;
+    uneven u;
+    make_uneven(&u, 6);
+    scene s;
+    create_blob(&s, &u, NULL);
+    const trip_camera_params view = view_of(&s, 1, 32);
+    trip_settings settings = splats(), sheets = post(8), exact = plain(1e-6);
+    const trip_vec3 normal = { 0.8, 0.6, 0 };
+    trip_clip_add(&settings.clip, normal, -13);
+    sheets.clip = exact.clip = settings.clip;
+    compare(&s, &view, &settings, 2e-3);
+    scene_picture p = integrate(&s, &view, &exact);
+    scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &sheets);
+    assert_true(scene_difference(&p, &q) < 0.006);
+    scene_picture_free(&p);
+    scene_picture_free(&q);
+    scene_destroy(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_constant_body_has_the_opacity_of_the_path_in_it),
+        cmocka_unit_test(a_ramp_is_as_steep_wherever_it_was_sampled),
+        cmocka_unit_test(a_ramp_has_one_gradient),
+        cmocka_unit_test(a_gaussian_has_its_line_integral),
+        cmocka_unit_test(slices_come_to_the_integral),
+        cmocka_unit_test(splats_have_the_mass_of_their_voxels),
+        cmocka_unit_test(the_cpu_renderer_draws_the_splats_of_the_reference),
+        cmocka_unit_test(from_within_it_is_close),
+        cmocka_unit_test(even_coordinates_change_nothing),
+        cmocka_unit_test(voxels_are_clipped_where_they_lie),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
