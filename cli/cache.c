@@ -55,12 +55,18 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     }
 }
 
-/* The volume's name, as the data set has it; for free(), NULL where it is damaged. */
+/* The volume's name, as the data set has it; for free(), NULL where it cannot be opened: the next
+ * use makes it anew, so that nobody has to be told why. */
 static char *source_name(const char *path)
 {
     triptych *t = NULL;
     char *name = NULL;
-    if (library_create(&t, NULL) == 0 && triptych_open(t, path, NULL) == 0) {
+    int status = library_create(&t, NULL);
+    if (status == 0) {
+        triptych_set_messages(t, NULL, NULL);
+        status = triptych_open(t, path, NULL);
+    }
+    if (status == 0) {
         name = library_note(t, "source");
         name = name ? name : strdup("");
     }
@@ -96,7 +102,7 @@ static void print_text(const cache_folder *c, const cache_entry *entries, size_t
         char *path = cache_folder_path(c, &entries[i].key), *name = path ? source_name(path) : NULL;
         printf("%9s  %s  ", trip_format_bytes(entries[i].bytes, bytes),
                format_time(entries[i].used_ns, true, used));
-        trip_text_write(stdout, name ? name : "(damaged)");
+        trip_text_write(stdout, name ? name : "(damaged, or of another version)");
         printf("  %s\n", path ? path : "");
         free(name);
         free(path);

@@ -493,6 +493,12 @@ class Cache(program.ProgramTest):
         for d in found["data_sets"]:
             self.assertEqual(d["bytes"], self.size_of(os.path.basename(d["path"])))
             self.works("info", "--verify", d["path"])
+        with open(os.path.join(found["data_sets"][0]["path"], "index.trip"), "r+b") as f:
+            f.seek(8)  # as of an earlier version
+            f.write(b"\2")
+        run = self.works("cache", "list")
+        self.assertIn(b"(damaged, or of another version)", run.stdout)
+        self.assertEqual(run.stderr, "")
         self.assertIn(b"removed 2 data sets", self.works("cache", "clear").stdout)
         self.assertEqual(os.listdir(self.cache), [])
         for wrong in [], ["nonsense"], ["list", "clear"], ["clear", "--json"], ["list", "--x"]:

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Seconds from a file to its picture: `triptych render VOLUME -o x.png` for every kind of file, as a
-table. "first" bricks into an empty cache, "again" finds it there; the middle one of ROUNDS runs,
+table. "first" bricks into an empty cache, "again" finds it there, each with the seconds of processors
+that the whole takes, which other work on the machine hardly changes; the middle one of ROUNDS runs,
 with the files in the page cache. One volume in each form, written beside the others, and what there
 is of others:
 
@@ -12,8 +13,10 @@ import bz2
 import gzip
 import os
 import re
+import resource
 import shutil
 import statistics
+import struct
 import subprocess
 import sys
 import tempfile
@@ -48,6 +51,44 @@ def tooth():
     return values.astype("<u2").reshape(161, 94, 103)
 
 
+def write_pages(path, values):
+    """Of a TIFF, a strip each: image width and length, bits, no compression, black is 0, and where
+    the strip is."""
+    depth, height, width = values.shape
+    size, place = height * width * values.dtype.itemsize, 8
+    with open(path, "wb") as f:
+        f.write(struct.pack("<2sHI", b"II", 42, place))
+        for k, image in enumerate(values):
+            tags = [(256, width), (257, height), (258, 8 * values.dtype.itemsize), (259, 1)]
+            tags += [(262, 1), (273, place + 110), (278, height), (279, size)]
+            place += 110 + size
+            f.write(struct.pack("<H", len(tags)))
+            for tag, value in tags:
+                f.write(struct.pack("<HHII", tag, 4, 1, value))
+            f.write(struct.pack("<I8x", place if k + 1 < depth else 0))
+            f.write(image.tobytes())
+
+
+def write_detached(values, raw):
+    """Headers beside their data: a file, packed or not, a file a slice, and NIfTI's pair."""
+    z, y, x = values.shape
+    header = (
+        f"NRRD0004\ntype: {program.NRRD_TYPES[values.dtype.str[1:]]}\ndimension: 3\n"
+        f"sizes: {x} {y} {z}\nspacings: 1 1 1\nendian: little\n"
+    )
+    program.write("beside.nhdr", f"{header}encoding: raw\ndata file: {raw}\n".encode())
+    program.write("packed.nhdr", f"{header}encoding: bzip2\ndata file: {raw}.bz2\n".encode())
+    many = f"encoding: raw\ndata file: slice%04d.raw 0 {z - 1} 1 2\n"
+    program.write("slices.nhdr", (header + many).encode())
+    for k, image in enumerate(values):
+        program.write_raw(f"slice{k:04d}.raw", image)
+    with open("plain.nii", "rb") as f:
+        pair = bytearray(f.read(348))
+    struct.pack_into("<f", pair, 108, 0)
+    program.write("pair.hdr", bytes(pair[:344]) + b"ni1\0")
+    program.write_raw("pair.img", values)
+
+
 def write_forms(values):
     """The same values in every form that can be written here."""
     z, y, x = values.shape
@@ -60,14 +101,19 @@ def write_forms(values):
     program.write_nifti("packed.nii.gz", values, packed=True)
     for pack, ending in (gzip.compress, ".gz"), (bz2.compress, ".bz2"):
         program.write(raw + ending, pack(values.tobytes()))
+    write_detached(values, raw)
     forms = [
         ("raw", raw),
         ("raw, gzip", raw + ".gz"),
         ("raw, bzip2", raw + ".bz2"),
         ("NRRD", "attached.nrrd"),
         ("NRRD, gzip", "packed.nrrd"),
+        ("NRRD, a header beside its data", "beside.nhdr"),
+        ("NRRD, bzip2 beside it", "packed.nhdr"),
+        ("NRRD, a file a slice beside it", "slices.nhdr"),
         ("NIfTI", "plain.nii"),
         ("NIfTI, gzip", "packed.nii.gz"),
+        ("NIfTI, .hdr and .img", "pair.hdr"),
     ]
     if values.dtype == numpy.uint8:
         program.write_vol("packed.vol", values)
@@ -79,21 +125,37 @@ def write_forms(values):
     for k, image in enumerate(values):
         program.write_dicom(f"dicom/{k:04d}.dcm", image.astype(numpy.uint16), k)
     stacks = [(name, name.split()[0].lower()) for name in ("TIFF stack", "PNG stack", "EXR stack")]
-    return forms + stacks + [("DICOM series", "dicom")]
+    write_pages("pages.tif", values)
+    places = [(0, 0, k) for k in range(z)]
+    program.write_dicom("frames.dcm", values.astype(numpy.uint16), 0, (1, 1, 1), places[0], frames=places)
+    pages = ("TIFF of pages", "pages.tif")
+    return forms + stacks + [pages, ("DICOM series", "dicom"), ("DICOM of frames", "frames.dcm")]
+
+
+def beside(path):
+    """Files that hold the values of a header."""
+    endings = {"beside.nhdr": ".raw", "packed.nhdr": ".raw.bz2", "pair.hdr": ".img"}
+    if path == "slices.nhdr":
+        return [n for n in os.listdir() if n.startswith("slice") and n.endswith(".raw")]
+    start = "pair" if path == "pair.hdr" else "raw_"
+    ending = endings.get(path)
+    return [n for n in os.listdir() if ending and n.startswith(start) and n.endswith(ending)]
 
 
 def size_of(path):
     if os.path.isdir(path):
         return sum(os.path.getsize(os.path.join(path, n)) for n in os.listdir(path))
-    return os.path.getsize(path)
+    return sum(os.path.getsize(n) for n in [path, *beside(path)])
 
 
 def seconds(triptych, path):
-    begin = time.monotonic()
+    """Of the clock, and of processors, those of triptych-images too."""
+    begin, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     run = subprocess.run([triptych, "render", path, "-o", "x.png"], capture_output=True)
     if run.returncode:
         sys.exit(run.stderr.decode())
-    return time.monotonic() - begin
+    clock, after = time.monotonic() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return clock, after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def measure(triptych, path):
@@ -102,7 +164,14 @@ def measure(triptych, path):
         shutil.rmtree("cache", ignore_errors=True)
         first.append(seconds(triptych, path))
         again.append(seconds(triptych, path))
-    return statistics.median(first), statistics.median(again)
+    return [statistics.median(run[i] for run in runs) for runs in (first, again) for i in (0, 1)]
+
+
+def measure_data_set(triptych, path):
+    """Of one that was bricked before."""
+    subprocess.run([triptych, "brick", path, "-o", "x.trip", "-q"], check=True)
+    runs = [seconds(triptych, "x.trip") for _ in range(ROUNDS)]
+    return [statistics.median(run[i] for run in runs) for i in (0, 1)]
 
 
 def main():
@@ -119,10 +188,13 @@ def main():
         forms = write_forms(values) + [(os.path.basename(f), f) for f in [cloud] + files]
         z, y, x = values.shape
         print(f"{x} x {y} x {z}, {values.dtype}\n")
-        print("| file | MB | first, s | again, s |\n|---|---:|---:|---:|")
+        print("| file | MB | first, s | of processors | again, s | of processors |")
+        print("|---|---:|---:|---:|---:|---:|")
         for name, path in forms:
-            first, again = measure(triptych, path)
-            print(f"| {name} | {size_of(path) / 1e6:.1f} | {first:.2f} | {again:.2f} |", flush=True)
+            times = " | ".join(f"{t:.2f}" for t in measure(triptych, path))
+            print(f"| {name} | {size_of(path) / 1e6:.1f} | {times} |", flush=True)
+        again = " | ".join(f"{t:.2f}" for t in measure_data_set(triptych, forms[0][1]))
+        print(f"| data set of the first | {size_of('x.trip') / 1e6:.1f} | | | {again} |")
     finally:
         shutil.rmtree(folder)
 
