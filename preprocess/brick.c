@@ -378,9 +378,13 @@ static int check_records(brick *b)
     return 0;
 }
 
-/* What is up is guessed where neither the file nor its format's custom says it. */
+/* What is up is guessed where neither the file nor its format's custom says it. The mirror image of
+ * voxels is not that of the object where their spacing is uneven. */
 static bool is_up_unknown(const trip_volume_info *info)
 {
+    for (int a = 0; a < 3; a++)
+        if (info->coordinates[a])
+            return false;
     return !info->oriented && !info->space[0] && strcmp(info->format, "openvdb") &&
            strcmp(info->format, "nifti");
 }
