@@ -273,9 +273,8 @@ static void find_box(const trip_dataset *d, triptych_info *out)
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++)
-            p[a] = trip_coordinates_place(&d->coordinates, a,
-                                          corner >> a & 1 ? (double)out->last[a] + 0.5
-                                                          : (double)out->first[a] - 0.5);
+            p[a] = corner >> a & 1 ? trip_coordinates_at(&d->coordinates, a, out->last[a]) + 0.5
+                                   : trip_coordinates_at(&d->coordinates, a, out->first[a]) - 0.5;
         trip_vec3 world = trip_affine_point(m, trip_v3(p[0], p[1], p[2]));
         for (int a = 0; a < 3; a++) {
             double x = trip_component(world, a);

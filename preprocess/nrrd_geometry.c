@@ -154,12 +154,37 @@ static int parse_spacings(const trip_nrrd_parser *p, trip_nrrd_header *h)
     return 0;
 }
 
+/* As many numbers as the axis has samples. */
+static int parse_coordinates(const trip_nrrd_parser *p, trip_nrrd_header *h, int a)
+{
+    const int axis = p->kept[a];
+    char *text = p->coordinates[axis];
+    /* Each has a digit and a blank at least. */
+    if (text && (uint64_t)h->dims[a] <= strlen(text))
+        h->coordinates[a] = calloc((size_t)h->dims[a], sizeof(double));
+    for (int64_t i = 0; h->coordinates[a] && i < h->dims[a]; i++) {
+        char *end, *word = trip_nrrd_next_word(&text);
+        h->coordinates[a][i] = strtod(word, &end);
+        if (end == word || *end) {
+            free(h->coordinates[a]);
+            h->coordinates[a] = NULL;
+        }
+    }
+    if (p->coordinates[axis] && (!h->coordinates[a] || *trip_nrrd_trim(text)))
+        return trip_nrrd_fail(p, p->coordinate_lines[axis],
+                              "\"coordinates %d\" must be %lld numbers", axis,
+                              (long long)h->dims[a]);
+    return 0;
+}
+
 /* World space is right-handed: x of a left-handed one is counted the other way. */
 static void set_space(trip_nrrd_header *h, const space *s)
 {
     snprintf(h->space, sizeof h->space, "%s", s->name ? s->convention : "");
     for (int column = 0; column < 4 && s->left_handed; column++)
         h->index_to_world.m[0][column] = 0 - h->index_to_world.m[0][column];
+    for (int64_t i = 0; h->coordinates[0] && s->left_handed && i < h->dims[0]; i++)
+        h->coordinates[0][i] = 0 - h->coordinates[0][i];
 }
 
 int trip_nrrd_parse_geometry(const trip_nrrd_parser *p, trip_nrrd_header *h)
@@ -178,6 +203,9 @@ int trip_nrrd_parse_geometry(const trip_nrrd_parser *p, trip_nrrd_header *h)
                               "\"space origin\" must be \"(x,y,z%s)\"", s.has_time ? ",t" : "");
     for (int row = 0; row < 3 && p->values[TRIP_NRRD_ORIGIN]; row++)
         h->index_to_world.m[row][3] = origin[row];
+    for (int a = 0; a < 3; a++)
+        if ((status = parse_coordinates(p, h, a)) < 0)
+            return status;
     set_space(h, &s);
     return 0;
 }

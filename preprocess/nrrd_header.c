@@ -101,6 +101,26 @@ char *trip_nrrd_trim(char *text)
     return text;
 }
 
+/* Of the keys and values of the user's, "coordinates N:=x0 x1 ..." says where the samples of axis N
+ * lie, for which there is no field. */
+static int keep_key(trip_nrrd_parser *p, char *line, char *colon)
+{
+    static const char key[] = "coordinates ";
+    char *number = line + sizeof key - 1;
+    *colon = '\0';
+    if (strncmp(line, key, sizeof key - 1) != 0)
+        return 0;
+    int64_t axis;
+    if (!trip_nrrd_parse_integer(&number, &axis) || *number || axis < 0 ||
+        axis >= TRIP_NRRD_AXES_MAX)
+        return trip_nrrd_fail(p, p->line, "\"%.40s\" names no axis", line);
+    if (p->coordinates[axis])
+        return trip_nrrd_fail(p, p->line, "\"%s\" is given twice", line);
+    p->coordinates[axis] = trip_nrrd_trim(colon + 2);
+    p->coordinate_lines[axis] = p->line;
+    return 0;
+}
+
 /* Keeps the value of one "field: value" line. */
 static int keep_field(trip_nrrd_parser *p, char *line)
 {
@@ -108,8 +128,8 @@ static int keep_field(trip_nrrd_parser *p, char *line)
     if (!colon)
         return trip_nrrd_fail(p, p->line, "\"%.40s\" is neither \"field: value\" nor a comment",
                               line);
-    if (colon[1] == '=') /* a key and value of the user's */
-        return 0;
+    if (colon[1] == '=')
+        return keep_key(p, line, colon);
     *colon = '\0';
     char *name = trip_nrrd_trim(line);
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
@@ -342,5 +362,7 @@ void trip_nrrd_header_free(trip_nrrd_header *h)
     for (size_t i = 0; i < h->file_count; i++)
         free(h->files[i]);
     free(h->files);
+    for (int a = 0; a < 3; a++)
+        free(h->coordinates[a]);
     *h = (trip_nrrd_header){ 0 };
 }

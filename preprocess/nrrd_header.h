@@ -16,7 +16,8 @@ typedef struct trip_nrrd_header {
     int64_t dims[3]; /* of the three axes kept; axes of size 1 beyond them are dropped */
     trip_affine index_to_world;
     char space[8]; /* anatomical, as in anatomy.h; "" where the header names no such space */
-    bool oriented; /* the header gives the directions of the axes in space */
+    double *coordinates[3]; /* of the axes in the world; NULL: even */
+    bool oriented;          /* the header gives the directions of the axes in space */
     trip_scalar type;
     bool big_endian; /* not meaningful for types of one byte */
     trip_byte_encoding encoding;

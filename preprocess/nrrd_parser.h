@@ -35,6 +35,9 @@ typedef struct trip_nrrd_parser {
     int line;                       /* number of the last line that was taken */
     char *values[TRIP_NRRD_FIELDS]; /* text after "field:", NULL where absent */
     int lines[TRIP_NRRD_FIELDS];
+    /* Of "coordinates N:=" and its line. */
+    char *coordinates[TRIP_NRRD_AXES_MAX];
+    int coordinate_lines[TRIP_NRRD_AXES_MAX];
     int axes;
     int kept[3]; /* axes that are the volume's i, j, k */
 } trip_nrrd_parser;

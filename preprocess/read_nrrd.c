@@ -9,6 +9,7 @@
 #include "dense_file.h"
 #include "nrrd_header.h"
 #include "report.h"
+#include "volume_coordinates.h"
 #include "volume_reader.h"
 
 static bool nrrd_probe(const char *path, const unsigned char *head, size_t bytes,
@@ -142,6 +143,9 @@ static int nrrd_open(const char *path, const trip_volume_params *params, trip_bu
     memcpy(info->space, h.space, sizeof info->space);
     info->type = h.type;
     status = open_data(path, &h, info, state);
+    for (int a = 0; a < 3 && status == 0; a++)
+        if (h.coordinates[a])
+            status = trip_volume_set_coordinates(info, a, h.coordinates[a], path);
     trip_nrrd_header_free(&h);
     return status;
 }

@@ -22,7 +22,7 @@
 
 /* In the order of their probing: formats with a magic number first. */
 static const trip_volume_reader *const readers[] = {
-    &trip_read_vdb, &trip_read_nrrd,   &trip_read_nifti,
+    &trip_read_vdb, &trip_read_nrrd,   &trip_read_nifti, &trip_read_netcdf,
     &trip_read_vol, &trip_read_images, &trip_read_raw,
 };
 
@@ -65,9 +65,12 @@ static int check_options(const char *path, const char *format, const trip_volume
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s: --size, --type, --endian and --offset are for raw data",
                          format);
-    if (strcmp(format, "openvdb") != 0 && (p->grid || p->level_set))
+    if (strcmp(format, "openvdb") != 0 &&
+        ((p->grid && strcmp(format, "netcdf") != 0) || p->level_set))
         return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is %s: --grid and --level-set are for OpenVDB", format);
+                         "its format is %s: --grid and --level-set are for OpenVDB, --grid for "
+                         "netCDF too",
+                         format);
     if (strcmp(format, "openvdb") == 0 && p->coordinates)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is openvdb, whose voxels lie evenly: --coordinates is for "

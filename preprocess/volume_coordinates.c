@@ -66,14 +66,14 @@ int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *
     for (int64_t i = 1; i < count; i++)
         table[i] = (values[i] - values[0]) / column[axis];
     table[count - 1] = (double)(count - 1);
-    fault = trip_coordinates_fault(table, count);
-    if (fault || are_even(table, count)) {
-        free(table);
-        return fault ? fail_axis(path, axis, fault) : 0;
-    }
     free(info->coordinates[axis]);
-    info->coordinates[axis] = table;
-    return 0;
+    info->coordinates[axis] = NULL;
+    fault = trip_coordinates_fault(table, count);
+    if (fault || are_even(table, count))
+        free(table);
+    else
+        info->coordinates[axis] = table;
+    return fault ? fail_axis(path, axis, fault) : 0;
 }
 
 /* ---- text files ---- */

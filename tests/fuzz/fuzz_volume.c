@@ -2,7 +2,7 @@
  * within the volume. The first byte says which name the file gets. */
 #include "volume_file.h"
 
-static const char *const extensions[] = { "nii", "vol", "vdb", "nrrd", "nii.gz" };
+static const char *const extensions[] = { "nii", "vol", "vdb", "nrrd", "nii.gz", "nc" };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

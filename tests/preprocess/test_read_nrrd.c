@@ -512,6 +512,33 @@ static void vectors_with_time_give_their_place_in_space(void **state)
 }
 
 /* It is about vectors and tensors. */
+static void coordinates_of_axes_are_a_key_and_value(void **state)
+{
+    (void)state;
+    trip_budget *budget;
+    trip_volume *v;
+    const char *path = write_with_lines("uneven.nrrd", "coordinates 0:=1 2 3 4 9\n"
+                                                       "coordinates 2:= 6 5 4 3 2 1 0 \n"
+                                                       "other key:=1 2\n");
+    const double x[NX] = { 0, 0.5, 1, 1.5, 4 };
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, path, NULL, budget), 0);
+    const trip_volume_info *info = trip_volume_get_info(v);
+    assert_map(&info->index_to_world,
+               (const double[3][4]){ { 2, 0, 0, 1 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
+    for (int i = 0; i < NX; i++)
+        assert_true(fabs(info->coordinates[0][i] - x[i]) < 1e-12);
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+    assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 4\n"), "must be 5 numbers");
+    assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 4 5 6\n"),
+                   "must be 5 numbers");
+    assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 x 5\n"), "must be 5 numbers");
+    assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 4 2\n"),
+                   "neither ascend nor descend");
+    assert_refused(write_with_lines("bad.nrrd", "coordinates z:=1\n"), "names no axis");
+}
+
 static void the_measurement_frame_changes_nothing(void **state)
 {
     (void)state;
@@ -541,6 +568,7 @@ int main(void)
         cmocka_unit_test(an_unknown_space_is_warned_of),
         cmocka_unit_test(left_handed_spaces_are_turned_right_handed),
         cmocka_unit_test(vectors_with_time_give_their_place_in_space),
+        cmocka_unit_test(coordinates_of_axes_are_a_key_and_value),
         cmocka_unit_test(the_measurement_frame_changes_nothing),
         cmocka_unit_test(axes_of_size_one_are_dropped),
         cmocka_unit_test(what_is_no_scalar_volume_is_refused),

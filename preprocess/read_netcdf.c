@@ -1,0 +1,587 @@
+/* NetCDF in its classic forms (CDF-1, CDF-2 and CDF-5): a variable of three dimensions or more, the
+ * last of which are k, j and i; of those before, the first place. A dimension with a variable of
+ * its own name has that for coordinates. What an attribute names as fill or missing is no value.
+ * Files of netCDF-4 are HDF5, and refused. */
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "dense_file.h"
+#include "report.h"
+#include "volume_coordinates.h"
+#include "volume_reader.h"
+
+enum {
+    HEADER_MOST = 1 << 24,
+    DIMS_MOST = 32, /* of a variable */
+    TAG_DIMENSION = 10,
+    TAG_VARIABLE = 11,
+    TAG_ATTRIBUTE = 12,
+    TYPE_CHAR = 2,
+    TYPES = 12,
+    PIECE_BYTES = 1 << 16,
+};
+
+/* By the number of a type; of 0 and of characters there are no volumes. */
+static const int scalar_of[TYPES] = { -1,       TRIP_I8, -1,       TRIP_I16, TRIP_I32, TRIP_F32,
+                                      TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64 };
+
+typedef struct text {
+    const char *at; /* in the header, not terminated */
+    size_t length;
+} text;
+
+typedef struct dimension {
+    text name;
+    uint64_t size; /* 0: as many as there are records */
+} dimension;
+
+typedef struct variable {
+    text name;
+    unsigned dims;
+    uint64_t dim[DIMS_MOST];
+    unsigned type;
+    uint64_t begin;
+    double slope, inter, missing[2]; /* NaN: none */
+} variable;
+
+typedef struct header {
+    const char *path;
+    unsigned char *bytes;
+    size_t count, at;
+    bool broken;    /* what was taken was not there */
+    bool wide, far; /* numbers, places in the file have 8 bytes */
+    uint64_t file_bytes, records, record_bytes;
+    dimension *dims;
+    uint64_t dim_count;
+    variable *variables;
+    uint64_t variable_count;
+} header;
+
+/* ---- the header ---- */
+
+static uint64_t take_number(header *h, unsigned bytes)
+{
+    uint64_t x = 0;
+    if (h->count - h->at < bytes) {
+        h->broken = true;
+        return 0;
+    }
+    for (unsigned i = 0; i < bytes; i++)
+        x = x << 8 | h->bytes[h->at++];
+    return x;
+}
+
+static uint64_t take_count(header *h)
+{
+    return take_number(h, h->wide ? 8 : 4);
+}
+
+/* So many bytes, and what pads them to a multiple of 4. */
+static const unsigned char *take_bytes(header *h, uint64_t bytes)
+{
+    uint64_t left = h->count - h->at, padded = (bytes + 3) & ~UINT64_C(3);
+    const unsigned char *from = h->bytes + h->at;
+    if (bytes > left || padded > left) {
+        h->broken = true;
+        return NULL;
+    }
+    h->at += (size_t)padded;
+    return from;
+}
+
+static text take_text(header *h)
+{
+    text t = { NULL, 0 };
+    uint64_t length = take_count(h);
+    t.at = (const char *)take_bytes(h, length);
+    t.length = t.at ? (size_t)length : 0;
+    return t;
+}
+
+/* How many items a list announced by a tag has, of at least `least` bytes each. */
+static uint64_t take_list(header *h, unsigned tag, unsigned least)
+{
+    uint64_t is = take_number(h, 4), count = take_count(h);
+    if ((is != tag && !(is == 0 && count == 0)) || count > (h->count - h->at) / least)
+        h->broken = true;
+    return h->broken ? 0 : count;
+}
+
+static bool is_named(text t, const char *name)
+{
+    return t.length == strlen(name) && memcmp(t.at, name, t.length) == 0;
+}
+
+static bool same_text(text a, text b)
+{
+    return a.length == b.length && memcmp(a.at, b.at, a.length) == 0;
+}
+
+/* A stored number. */
+static double number_at(const unsigned char *at, unsigned type)
+{
+    const unsigned bytes = trip_scalar_bytes((trip_scalar)scalar_of[type]);
+    uint64_t bits = 0;
+    for (unsigned i = 0; i < bytes; i++)
+        bits = bits << 8 | at[i];
+    float single;
+    double both;
+    uint32_t half = (uint32_t)bits;
+    const unsigned up = 64 - 8 * bytes;
+    switch (scalar_of[type]) {
+    case TRIP_F32:
+        memcpy(&single, &half, sizeof single);
+        return (double)single;
+    case TRIP_F64:
+        memcpy(&both, &bits, sizeof both);
+        return both;
+    case TRIP_I8:
+    case TRIP_I16:
+    case TRIP_I32:
+    case TRIP_I64:
+        return (double)((int64_t)(bits << up) >> up);
+    default:
+        return (double)bits;
+    }
+}
+
+static void take_attribute(header *h, variable *v)
+{
+    text name = take_text(h);
+    unsigned type = (unsigned)take_number(h, 4);
+    uint64_t count = take_count(h), bytes;
+    const bool known = type > 0 && type < TYPES;
+    const unsigned each = !known              ? 1
+                          : type == TYPE_CHAR ? 1
+                                              : trip_scalar_bytes((trip_scalar)scalar_of[type]);
+    if (!known || __builtin_mul_overflow(count, each, &bytes)) {
+        h->broken = true;
+        return;
+    }
+    const unsigned char *values = take_bytes(h, bytes);
+    if (!v || !values || count == 0 || type == TYPE_CHAR)
+        return;
+    if (is_named(name, "scale_factor"))
+        v->slope = number_at(values, type);
+    else if (is_named(name, "add_offset"))
+        v->inter = number_at(values, type);
+    else if (is_named(name, "_FillValue"))
+        v->missing[0] = number_at(values, type);
+    else if (is_named(name, "missing_value"))
+        v->missing[1] = number_at(values, type);
+}
+
+static void take_attributes(header *h, variable *v)
+{
+    uint64_t count = take_list(h, TAG_ATTRIBUTE, 12);
+    for (uint64_t i = 0; i < count && !h->broken; i++)
+        take_attribute(h, v);
+}
+
+static void take_dimension(header *h, dimension *d)
+{
+    d->name = take_text(h);
+    d->size = take_count(h);
+}
+
+/* What unwritten numbers of floats are filled with, where no attribute says another. */
+#define FILL_FLOAT 9.9692099683868690e+36
+
+static void take_variable(header *h, variable *v)
+{
+    v->name = take_text(h);
+    uint64_t dims = take_count(h);
+    if (dims > DIMS_MOST) {
+        h->broken = true;
+        return;
+    }
+    v->dims = (unsigned)dims;
+    for (unsigned i = 0; i < v->dims; i++) {
+        v->dim[i] = take_count(h);
+        h->broken |= v->dim[i] >= h->dim_count;
+    }
+    v->slope = 1;
+    v->missing[0] = v->missing[1] = NAN;
+    take_attributes(h, v);
+    v->type = (unsigned)take_number(h, 4);
+    take_count(h); /* of bytes, which follow from the rest */
+    v->begin = take_number(h, h->far ? 8 : 4);
+    h->broken |= v->type == 0 || v->type >= TYPES;
+    if ((v->type == 5 || v->type == 6) && isnan(v->missing[0]))
+        v->missing[0] = FILL_FLOAT;
+}
+
+static uint64_t size_of(const header *h, uint64_t dim)
+{
+    return h->dims[dim].size ? h->dims[dim].size : h->records;
+}
+
+static bool has_records(const header *h, const variable *v)
+{
+    return v->dims > 0 && h->dims[v->dim[0]].size == 0;
+}
+
+static unsigned bytes_of(const variable *v)
+{
+    return v->type == TYPE_CHAR ? 1 : trip_scalar_bytes((trip_scalar)scalar_of[v->type]);
+}
+
+/* Of a record of a variable. */
+static uint64_t record_bytes_of(header *h, const variable *v)
+{
+    uint64_t bytes = bytes_of(v);
+    for (unsigned i = 1; i < v->dims; i++)
+        h->broken |= __builtin_mul_overflow(bytes, h->dims[v->dim[i]].size, &bytes);
+    return bytes;
+}
+
+/* Records of all variables lie one after the other; each padded, but where there is one alone. */
+static void measure_records(header *h)
+{
+    uint64_t alone = 0, sum = 0;
+    unsigned count = 0;
+    for (uint64_t i = 0; i < h->variable_count; i++)
+        if (has_records(h, &h->variables[i])) {
+            alone = record_bytes_of(h, &h->variables[i]);
+            h->broken |= alone > INT64_MAX / 4 ||
+                         __builtin_add_overflow(sum, (alone + 3) & ~UINT64_C(3), &sum);
+            count++;
+        }
+    h->record_bytes = count == 1 ? alone : sum;
+    h->broken |= h->record_bytes > INT64_MAX;
+}
+
+static void parse(header *h)
+{
+    const unsigned form = h->bytes[3];
+    h->at = 4;
+    h->far = form != 1;
+    h->wide = form == 5;
+    h->records = take_count(h);
+    h->dim_count = take_list(h, TAG_DIMENSION, 8);
+    if (h->broken || !(h->dims = calloc((size_t)h->dim_count + 1, sizeof *h->dims)))
+        return;
+    for (uint64_t i = 0; i < h->dim_count && !h->broken; i++)
+        take_dimension(h, &h->dims[i]);
+    take_attributes(h, NULL);
+    h->variable_count = take_list(h, TAG_VARIABLE, 28);
+    if (h->broken || !(h->variables = calloc((size_t)h->variable_count + 1, sizeof *h->variables)))
+        return;
+    for (uint64_t i = 0; i < h->variable_count && !h->broken; i++)
+        take_variable(h, &h->variables[i]);
+    for (uint64_t i = 0; i < h->variable_count && !h->broken; i++)
+        for (unsigned d = 1; d < h->variables[i].dims; d++)
+            h->broken |= h->dims[h->variables[i].dim[d]].size == 0;
+    if (!h->broken)
+        measure_records(h);
+}
+
+static int read_at(int fd, const char *path, uint64_t offset, void *to, size_t bytes)
+{
+    unsigned char *p = to;
+    while (bytes > 0) {
+        ssize_t n = pread(fd, p, bytes, (off_t)offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n < 0)
+            return trip_fail_errno("read", path, "cannot read");
+        if (n == 0)
+            return trip_fail(TRIP_ERROR, "read", path, "ends early, at byte %" PRIu64, offset);
+        p += n;
+        offset += (uint64_t)n;
+        bytes -= (size_t)n;
+    }
+    return 0;
+}
+
+static void free_header(header *h)
+{
+    free(h->bytes);
+    free(h->dims);
+    free(h->variables);
+}
+
+static int read_header(header *h, int fd, const char *path)
+{
+    struct stat st;
+    if (fstat(fd, &st) < 0)
+        return trip_fail_errno("read", path, "cannot open");
+    h->path = path;
+    h->file_bytes = (uint64_t)st.st_size;
+    h->count = h->file_bytes < HEADER_MOST ? (size_t)h->file_bytes : HEADER_MOST;
+    h->bytes = malloc(h->count + 1);
+    if (!h->bytes)
+        return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
+    int status = read_at(fd, path, 0, h->bytes, h->count);
+    if (status)
+        return status;
+    if (h->count >= 4 && memcmp(h->bytes, "CDF", 3) != 0)
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "is netCDF-4 or another HDF5 file, which is not read: `nccopy -k cdf5` "
+                         "makes a classic one of it");
+    if (h->count >= 4)
+        parse(h);
+    if (!h->broken && (!h->dims || !h->variables))
+        return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
+    return h->broken
+               ? trip_fail(TRIP_ERROR, "read", path, "byte %zu: its header makes no sense", h->at)
+               : 0;
+}
+
+/* ---- the volume ---- */
+
+typedef struct netcdf {
+    int fd;
+    char *path;
+    uint64_t begin, stride; /* of slices in the file */
+    uint64_t values;        /* of one */
+    int64_t next;
+    trip_scalar stored;
+    bool decoded; /* slices are given as floats, in which what is missing is not a number */
+    float missing[2];
+} netcdf;
+
+static bool netcdf_probe(const char *path, const unsigned char *head, size_t bytes,
+                         const trip_volume_params *params)
+{
+    (void)path;
+    (void)params;
+    bool classic =
+        bytes >= 4 && memcmp(head, "CDF", 3) == 0 && (head[3] == 1 || head[3] == 2 || head[3] == 5);
+    return classic || (bytes >= 8 && memcmp(head, "\x89HDF\r\n\x1a\n", 8) == 0);
+}
+
+/* Values of the last three dimensions; 0: it is no volume. */
+static double volume_of(const header *h, const variable *v)
+{
+    double values = 1;
+    if (v->dims < 3 || scalar_of[v->type] < 0)
+        return 0;
+    for (unsigned i = v->dims - 3; i < v->dims; i++)
+        values *= (double)size_of(h, v->dim[i]);
+    return values;
+}
+
+/* The one named, else that with the most values. */
+static int choose_variable(const header *h, const char *name, const variable **out)
+{
+    *out = NULL;
+    for (uint64_t i = 0; i < h->variable_count; i++) {
+        const variable *v = &h->variables[i];
+        bool wanted =
+            name ? is_named(v->name, name) : volume_of(h, v) > (*out ? volume_of(h, *out) : 0);
+        *out = wanted ? v : *out;
+    }
+    if (!*out)
+        return trip_fail(TRIP_ERROR, "read", h->path, name ? "has no variable \"%s\"" : "%s",
+                         name ? name : "has no variable of numbers with three dimensions");
+    return volume_of(h, *out) > 0
+               ? 0
+               : trip_fail(TRIP_ERROR, "read", h->path,
+                           "its variable \"%.*s\" has not three dimensions of numbers",
+                           (int)((*out)->name.length < 99 ? (*out)->name.length : 99),
+                           (*out)->name.at);
+}
+
+static const variable *coordinates_of(const header *h, uint64_t dim)
+{
+    for (uint64_t i = 0; i < h->variable_count; i++) {
+        const variable *v = &h->variables[i];
+        if (v->dims == 1 && v->dim[0] == dim && scalar_of[v->type] >= 0 &&
+            same_text(v->name, h->dims[dim].name))
+            return v;
+    }
+    return NULL;
+}
+
+static int read_coordinates(const header *h, int fd, const variable *v, double *values,
+                            uint64_t count)
+{
+    const unsigned bytes = bytes_of(v);
+    const uint64_t stride = has_records(h, v) ? h->record_bytes : bytes;
+    int status = 0;
+    for (uint64_t i = 0; i < count && !status; i++) {
+        unsigned char number[8];
+        uint64_t at;
+        if (__builtin_mul_overflow(i, stride, &at) || __builtin_add_overflow(at, v->begin, &at) ||
+            at > h->file_bytes)
+            at = h->file_bytes;
+        status = read_at(fd, h->path, at, number, bytes);
+        values[i] = status ? 0 : v->slope * number_at(number, v->type) + v->inter;
+    }
+    return status;
+}
+
+static int place_axis(const header *h, int fd, uint64_t dim, int axis, trip_volume_info *info)
+{
+    const variable *v = coordinates_of(h, dim);
+    const uint64_t count = (uint64_t)info->dims[axis];
+    if (!v || count > h->file_bytes)
+        return 0;
+    double *values = calloc((size_t)count, sizeof *values);
+    int status = values ? read_coordinates(h, fd, v, values, count)
+                        : trip_fail(TRIP_ERROR, "read", h->path, "no memory for coordinates");
+    if (!status)
+        status = trip_volume_set_coordinates(info, axis, values, h->path);
+    free(values);
+    return status;
+}
+
+static void describe(const header *h, const variable *v, trip_volume_info *info)
+{
+    int length = (int)(v->name.length < 60 ? v->name.length : 60);
+    snprintf(info->name, sizeof info->name, "%.*s", length, v->name.at);
+    unsigned others = 0;
+    for (uint64_t i = 0; i < h->variable_count; i++)
+        others += &h->variables[i] != v && volume_of(h, &h->variables[i]) > 0;
+    if (others || v->dims > 3)
+        snprintf(info->note, sizeof info->note, "variable \"%.*s\"%s%s", length, v->name.at,
+                 others ? ", one of several (--grid NAME takes another)" : "",
+                 v->dims > 3 ? ", at the first place of its other dimensions" : "");
+}
+
+static int lay_out(const header *h, const variable *v, trip_volume_info *info, netcdf *n)
+{
+    uint64_t bytes = bytes_of(v), end;
+    for (int a = 0; a < 3; a++) {
+        uint64_t size = size_of(h, v->dim[v->dims - 1 - (unsigned)a]);
+        info->dims[a] = size > INT64_MAX ? 0 : (int64_t)size;
+    }
+    info->type = n->stored = (trip_scalar)scalar_of[v->type];
+    info->slope = v->slope;
+    info->inter = v->inter;
+    int status = trip_volume_check_dims(h->path, info);
+    if (status)
+        return status;
+    n->begin = v->begin;
+    n->values = (uint64_t)info->dims[0] * (uint64_t)info->dims[1];
+    n->stride = has_records(h, v) && v->dims == 3 ? h->record_bytes : n->values * bytes;
+    if (__builtin_mul_overflow(n->stride, (uint64_t)info->dims[2] - 1, &end) ||
+        __builtin_add_overflow(end, n->values * bytes, &end) ||
+        __builtin_add_overflow(end, v->begin, &end) || end > h->file_bytes)
+        return trip_fail(TRIP_ERROR, "read", h->path,
+                         "ends early, at byte %" PRIu64 ", within its variable", h->file_bytes);
+    n->decoded = !isnan(v->missing[0]) || !isnan(v->missing[1]);
+    for (int i = 0; i < 2; i++)
+        n->missing[i] = (float)v->missing[i];
+    info->type = n->decoded ? TRIP_F32 : info->type;
+    return 0;
+}
+
+static void netcdf_close(void *state)
+{
+    netcdf *n = state;
+    if (n->fd >= 0)
+        close(n->fd);
+    free(n->path);
+    free(n);
+}
+
+static int open_variable(netcdf *n, const trip_volume_params *params, trip_volume_info *info)
+{
+    header h = { 0 };
+    const variable *v;
+    int status = read_header(&h, n->fd, n->path);
+    if (!status)
+        status = choose_variable(&h, params->grid, &v);
+    if (!status)
+        status = lay_out(&h, v, info, n);
+    for (int a = 0; a < 3 && !status; a++)
+        status = place_axis(&h, n->fd, v->dim[v->dims - 1 - (unsigned)a], a, info);
+    if (!status)
+        describe(&h, v, info);
+    free_header(&h);
+    return status;
+}
+
+static int netcdf_open(const char *path, const trip_volume_params *params, trip_budget *budget,
+                       trip_volume_info *info, void **state)
+{
+    (void)budget;
+    netcdf *n = calloc(1, sizeof *n);
+    if (!n || !(n->path = strdup(path))) {
+        free(n);
+        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    }
+    n->fd = open(path, O_RDONLY | O_CLOEXEC);
+    int status =
+        n->fd < 0 ? trip_fail_errno("read", path, "cannot open") : open_variable(n, params, info);
+    if (status)
+        netcdf_close(n);
+    else
+        *state = n;
+    return status;
+}
+
+static int netcdf_rewind(void *state)
+{
+    ((netcdf *)state)->next = 0;
+    return 0;
+}
+
+/* So many values as floats. */
+static int decode_values(const netcdf *n, uint64_t at, uint64_t count, float *to)
+{
+    unsigned char piece[PIECE_BYTES];
+    const unsigned bytes = trip_scalar_bytes(n->stored);
+    int status = 0;
+    while (count > 0 && !status) {
+        uint64_t some = count < PIECE_BYTES / bytes ? count : PIECE_BYTES / bytes;
+        status = read_at(n->fd, n->path, at, piece, (size_t)(some * bytes));
+        if (!status)
+            trip_scalar_decode(n->stored, !trip_machine_is_big_endian(), 1, 0, piece, (size_t)some,
+                               to);
+        for (uint64_t i = 0; i < some && !status; i++)
+            if (to[i] == n->missing[0] || to[i] == n->missing[1])
+                to[i] = NAN;
+        at += some * bytes;
+        to += some;
+        count -= some;
+    }
+    return status;
+}
+
+static int netcdf_read_slices(void *state, int64_t count, void *values)
+{
+    netcdf *n = state;
+    const uint64_t bytes = trip_scalar_bytes(n->stored);
+    int status = 0;
+    for (int64_t i = 0; i < count && !status; i++, n->next++) {
+        const uint64_t at = n->begin + (uint64_t)n->next * n->stride;
+        const uint64_t to = (uint64_t)i * n->values;
+        if (trip_interrupted())
+            return trip_fail(TRIP_INTERRUPTED, "read", n->path, "interrupted");
+        status = n->decoded ? decode_values(n, at, n->values, (float *)values + to)
+                            : read_at(n->fd, n->path, at, (unsigned char *)values + to * bytes,
+                                      (size_t)(n->values * bytes));
+    }
+    return status;
+}
+
+static int netcdf_skip_slices(void *state, int64_t count)
+{
+    ((netcdf *)state)->next += count;
+    return 0;
+}
+
+static bool netcdf_swap(const void *state)
+{
+    return !((const netcdf *)state)->decoded && !trip_machine_is_big_endian();
+}
+
+const trip_volume_reader trip_read_netcdf = {
+    .format = "netcdf",
+    .probe = netcdf_probe,
+    .open = netcdf_open,
+    .close = netcdf_close,
+    .rewind = netcdf_rewind,
+    .read_slices = netcdf_read_slices,
+    .skip_slices = netcdf_skip_slices,
+    .swap = netcdf_swap,
+};

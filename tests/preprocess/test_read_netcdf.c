@@ -1,0 +1,265 @@
+/* Files of netCDF's classic forms, put together by hand. */
+#include "volume_files.h"
+
+static void put(bytes *b, uint64_t x, unsigned width)
+{
+    append_word(b, x, width, true);
+}
+
+typedef struct file {
+    bytes b;
+    int form;        /* 1, 2 or 5 */
+    size_t begin[4]; /* where the places of the variables' values stand */
+} file;
+
+static void put_count(file *f, uint64_t x)
+{
+    put(&f->b, x, f->form == 5 ? 8 : 4);
+}
+
+static void put_text(file *f, const char *text)
+{
+    put_count(f, strlen(text));
+    append(&f->b, text, strlen(text));
+    append(&f->b, "\0\0\0", (4 - strlen(text) % 4) % 4);
+}
+
+static void put_list(file *f, unsigned tag, uint64_t count)
+{
+    put(&f->b, count ? tag : 0, 4);
+    put_count(f, count);
+}
+
+static void put_float_attribute(file *f, const char *name, int value)
+{
+    put_text(f, name);
+    put(&f->b, 5, 4);
+    put_count(f, 1);
+    append_value(&f->b, TRIP_F32, value, true);
+}
+
+/* What a file has besides the sample volume as variable "t" of (z, y, x). */
+typedef struct contents {
+    int form;
+    bool records;     /* z has as many as there are records */
+    bool coordinates; /* of x, 1, 2, 4, 8, 16, and of z, 6, 5, 4 ... 0 */
+    bool scaled;      /* t stands for twice as much, and 3 */
+    bool missing;     /* where t is 5 it has no value */
+    int type;         /* of t: 3 int16, 5 float */
+} contents;
+
+static trip_scalar scalar_of(const contents *c)
+{
+    return c->type == 5 ? TRIP_F32 : TRIP_I16;
+}
+
+static void put_variable(file *f, const char *name, const int *dims, unsigned count)
+{
+    put_text(f, name);
+    put_count(f, count);
+    for (unsigned i = 0; i < count; i++)
+        put_count(f, (uint64_t)dims[i]);
+}
+
+static void end_variable(file *f, int number, int type, uint64_t vsize)
+{
+    put(&f->b, (uint64_t)type, 4);
+    put_count(f, vsize);
+    f->begin[number] = f->b.count;
+    put(&f->b, 0, f->form == 1 ? 4 : 8);
+}
+
+/* Writes where a variable's values begin, which is here. */
+static void begin_values(file *f, int number)
+{
+    bytes place = { .count = 0 };
+    append_word(&place, f->b.count, f->form == 1 ? 4 : 8, true);
+    memcpy(f->b.data + f->begin[number], place.data, place.count);
+}
+
+static void pad(file *f)
+{
+    append(&f->b, "\0\0\0", (4 - f->b.count % 4) % 4);
+}
+
+static void put_header(file *f, const contents *c)
+{
+    const int volume[3] = { 0, 1, 2 }, x = 2, z = 0;
+    const unsigned each = trip_scalar_bytes(scalar_of(c));
+    f->form = c->form;
+    append(&f->b, "CDF", 3);
+    put(&f->b, (uint64_t)c->form, 1);
+    put_count(f, c->records ? NZ : 0);
+    put_list(f, 10, 3);
+    put_text(f, "z");
+    put_count(f, c->records ? 0 : NZ);
+    put_text(f, "lat");
+    put_count(f, NY);
+    put_text(f, "x");
+    put_count(f, NX);
+    put_list(f, 12, 1);
+    put_text(f, "title");
+    put(&f->b, 2, 4);
+    put_text(f, "a test");
+    put_list(f, 11, c->coordinates ? 3 : 1);
+    put_variable(f, "t", volume, 3);
+    put_list(f, 12, (c->scaled ? 2 : 0) + (c->missing ? 1 : 0));
+    if (c->scaled) {
+        put_float_attribute(f, "scale_factor", 2);
+        put_float_attribute(f, "add_offset", 3);
+    }
+    if (c->missing)
+        put_float_attribute(f, "missing_value", 5);
+    end_variable(f, 0, c->type, VOXELS * each);
+    if (!c->coordinates)
+        return;
+    put_variable(f, "x", &x, 1);
+    put_list(f, 12, 0);
+    end_variable(f, 1, 6, NX * 8);
+    put_variable(f, "z", &z, 1);
+    put_list(f, 12, 0);
+    end_variable(f, 2, 4, NZ * 4);
+}
+
+static void put_slices(file *f, const contents *c, int first, int count)
+{
+    append_slices(&f->b, scalar_of(c), true, first, count);
+    if (c->coordinates || !c->records)
+        pad(f);
+}
+
+static const char *write_contents(const char *name, const contents *c)
+{
+    static file f;
+    f = (file){ .form = c->form };
+    put_header(&f, c);
+    if (c->coordinates) {
+        begin_values(&f, 1);
+        for (int i = 0; i < NX; i++)
+            append_value(&f.b, TRIP_F64, 1 << i, true);
+    }
+    begin_values(&f, 0);
+    if (!c->records) {
+        put_slices(&f, c, 0, NZ);
+        if (c->coordinates)
+            begin_values(&f, 2);
+        for (int k = 0; k < NZ && c->coordinates; k++)
+            append_value(&f.b, TRIP_I32, NZ - 1 - k, true);
+        return write_file(name, &f.b);
+    }
+    for (int k = 0; k < NZ; k++) {
+        put_slices(&f, c, k, 1);
+        if (k == 0 && c->coordinates)
+            begin_values(&f, 2);
+        if (c->coordinates)
+            append_value(&f.b, TRIP_I32, NZ - 1 - k, true);
+    }
+    return write_file(name, &f.b);
+}
+
+static void every_form_holds_the_sample(void **state)
+{
+    (void)state;
+    static const int forms[] = { 1, 2, 5 };
+    for (int n = 0; n < 24; n++) {
+        const contents c = { .form = forms[n % 3],
+                             .records = n / 3 % 2,
+                             .coordinates = n / 6 % 2,
+                             .type = n / 12 ? 5 : 3 };
+        assert_holds_sample(write_contents("a.nc", &c), NULL, scalar_of(&c));
+    }
+}
+
+static void coordinates_become_places(void **state)
+{
+    (void)state;
+    static const double x[NX] = { 0, 4.0 / 15, 12.0 / 15, 28.0 / 15, 4 };
+    for (int records = 0; records < 2; records++) {
+        const contents c = { .form = 2, .records = records, .coordinates = true, .type = 5 };
+        trip_budget *budget;
+        trip_volume *v;
+        assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+        assert_int_equal(trip_volume_open(&v, write_contents("b.nc", &c), NULL, budget), 0);
+        const trip_volume_info *info = trip_volume_get_info(v);
+        assert_map(&info->index_to_world,
+                   (const double[3][4]){ { 3.75, 0, 0, 1 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
+        for (int i = 0; i < NX; i++)
+            assert_true(fabs(info->coordinates[0][i] - x[i]) < 1e-12);
+        for (int k = 0; k < NZ; k++)
+            assert_true(info->coordinates[2][k] == k);
+        assert_string_equal(info->name, "t");
+        trip_volume_close(v);
+        trip_budget_destroy(budget);
+    }
+}
+
+static void numbers_are_scaled_and_missing_ones_are_none(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 4; n++) {
+        const contents c = {
+            .form = 1, .records = n % 2, .scaled = true, .missing = true, .type = n / 2 ? 5 : 3
+        };
+        float values[VOXELS];
+        trip_volume_info info;
+        int missing = 0;
+        assert_int_equal(read_volume(write_contents("c.nc", &c), NULL, 2, values, VOXELS, &info),
+                         0);
+        for (int v = 0; v < VOXELS; v++) {
+            int stored = sample(scalar_of(&c), v % NX, v / NX % NY, v / NX / NY);
+            missing += stored == 5;
+            assert_true(stored == 5 ? isnan(values[v]) : values[v] == 2.0F * (float)stored + 3);
+        }
+        assert_in_range(missing, 1, VOXELS / 10);
+    }
+}
+
+static void a_variable_is_chosen_by_name(void **state)
+{
+    (void)state;
+    const contents c = { .form = 1, .coordinates = true, .type = 3 };
+    const char *path = write_contents("d.nc", &c);
+    assert_holds_sample(path, &(trip_volume_params){ .grid = "t" }, TRIP_I16);
+    assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "u" }, "no variable \"u\"");
+    assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "x" },
+                      "not three dimensions");
+}
+
+static void files_of_hdf5_are_refused(void **state)
+{
+    (void)state;
+    assert_refused(write_bytes("e.nc", "\x89HDF\r\n\x1a\n\0\0\0\0", 12), "nccopy");
+}
+
+static void any_damage_is_read_or_refused(void **state)
+{
+    (void)state;
+    const contents c = { .form = 5, .records = true, .coordinates = true, .type = 3 };
+    static unsigned char whole[1 << 16], damaged[1 << 16];
+    FILE *f = fopen(write_contents("f.nc", &c), "rb");
+    size_t count = fread(whole, 1, sizeof whole, f);
+    int refused = 0;
+    fclose(f);
+    for (size_t length = 0; length < count; length += length < 700 ? 7 : 31)
+        refused += survives(write_bytes("g.nc", whole, length), NULL);
+    assert_true(refused > 80); /* but for what pads the end */
+    for (size_t at = 4; at < 600; at++)
+        for (int n = 0; n < 2; n++) {
+            memcpy(damaged, whole, count);
+            damaged[at] = n ? 255 : (unsigned char)(damaged[at] + 1);
+            survives(write_bytes("g.nc", damaged, count), NULL);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_form_holds_the_sample),
+        cmocka_unit_test(coordinates_become_places),
+        cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
+        cmocka_unit_test(a_variable_is_chosen_by_name),
+        cmocka_unit_test(files_of_hdf5_are_refused),
+        cmocka_unit_test(any_damage_is_read_or_refused),
+    };
+    return cmocka_run_group_tests_name("netcdf", tests, make_folder, remove_folder);
+}
