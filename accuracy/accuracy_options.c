@@ -9,6 +9,7 @@
 enum {
     KEY_SOURCE = 256,
     KEY_ALSO,
+    KEY_BESIDE,
     KEY_TF,
     KEY_NO_SHADING,
     KEY_SETTINGS,
@@ -42,6 +43,10 @@ static const struct argp_option options[] = {
     { "also", KEY_ALSO, "OTHER.trip", 0,
       "A data set of the same volume kept otherwise (halo, bits, levels), drawn by the defaults; "
       "up to 7",
+      1 },
+    { "beside", KEY_BESIDE, "COMMAND", 0,
+      "Another program that draws the same views of the source, as VTK's ray caster by "
+      "vtk_worker.py, up to 4: see triptych-accuracy(1)",
       1 },
     TRIP_OPTION_TF(KEY_TF, 1),
     TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 1),
@@ -119,6 +124,11 @@ static int parse_word(int key, char *arg, accuracy_options *o)
         return 0;
     case KEY_SOURCE:
         o->source = arg;
+        return 0;
+    case KEY_BESIDE:
+        if (o->beside_count == ACCURACY_BESIDE_MAX)
+            return trip_option_fail("--beside", "4 other programs at most");
+        o->beside[o->beside_count++] = arg;
         return 0;
     case KEY_TF:
         o->tf = arg;

@@ -15,6 +15,12 @@ static bool is_measured(const accuracy_report *r, int i)
     return r->m->rows[i].state == ACCURACY_MEASURED;
 }
 
+/* And no program beside. */
+static bool is_setting(const accuracy_report *r, int i)
+{
+    return is_measured(r, i) && !r->m->rows[i].beside;
+}
+
 static double error_of(const accuracy_report *r, int i, bool mean)
 {
     const accuracy_error_figures *f = &r->figures[i][ACCURACY_TOTAL];
@@ -25,10 +31,10 @@ static double error_of(const accuracy_report *r, int i, bool mean)
 static void find_front(const accuracy_report *r, bool mean, bool *front)
 {
     for (int i = 0; i < r->m->row_count; i++) {
-        front[i] = is_measured(r, i);
+        front[i] = is_setting(r, i);
         for (int j = 0; j < r->m->row_count && front[i]; j++) {
             double e = error_of(r, i, mean), other = error_of(r, j, mean);
-            if (is_measured(r, j) && r->ms[j] <= r->ms[i] && other <= e &&
+            if (is_setting(r, j) && r->ms[j] <= r->ms[i] && other <= e &&
                 (r->ms[j] < r->ms[i] || other < e))
                 front[i] = false;
         }

@@ -116,6 +116,23 @@ static int add_others(accuracy_measured *m, const triptych_settings *usual)
     return status;
 }
 
+/* Other programs, each of which starts with the first view. */
+static int add_programs(accuracy_measured *m)
+{
+    int status = 0;
+    for (int i = 0; i < m->options->beside_count && !status; i++) {
+        accuracy_setting one = { 0 };
+        snprintf(one.name, sizeof one.name, "beside-%d", i + 1);
+        status = add_row(m, 0, &one);
+        accuracy_row *row = &m->rows[m->row_count - 1];
+        if (!status && !(row->beside = calloc(1, sizeof *row->beside)))
+            status = trip_fail(TRIP_ERROR, "accuracy", one.name, "out of memory");
+        if (!status)
+            row->beside->socket = -1;
+    }
+    return status;
+}
+
 static int add_rows(accuracy_measured *m, const triptych_settings *usual)
 {
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
@@ -128,6 +145,8 @@ static int add_rows(accuracy_measured *m, const triptych_settings *usual)
             status = add_row(m, 0, &all[i]);
     if (!status)
         status = add_others(m, usual);
+    if (!status)
+        status = add_programs(m);
     if (!status && !m->row_count)
         return trip_fail(TRIP_USAGE, "usage", "--settings",
                          "\"%s\" names none; `triptych accuracy --list` prints the names",
@@ -163,6 +182,8 @@ static int leave_out_idle(sweep *s)
             levels = list.level;
     for (int i = 0; i < s->m->row_count; i++) {
         accuracy_row *row = &s->m->rows[i];
+        if (row->beside)
+            continue;
         if (row->setting.settings.lod_px > 0 && !levels)
             leave_out(row, "the data set has no coarse levels");
         else if (row->setting.settings.samples > s->o->samples)
@@ -344,6 +365,44 @@ static int time_row(sweep *s, accuracy_row *row)
     return status;
 }
 
+static int draw_beside(sweep *s, accuracy_row *row, int view)
+{
+    accuracy_beside *b = row->beside;
+    const accuracy_view *seen = &s->m->views[view];
+    double ms;
+    int status = accuracy_beside_picture(b, seen, s->m->folder, s->pictures[RAN], &ms, row->why);
+    for (int i = 0; i < s->o->repeat && !status; i++)
+        status = accuracy_beside_draw(b, seen, &row->ms[row->frames++], row->why);
+    return status;
+}
+
+/* Another program, as measure_row() does settings. */
+static int measure_beside(sweep *s, accuracy_row *row, int view, int number)
+{
+    triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
+    int status = 0;
+    bench_progress_step(s->progress, row->setting.name);
+    if (view == 0) {
+        status = accuracy_beside_start(row->beside, s->o->beside[number], s->o, t, row->why);
+        if (!status)
+            snprintf(row->setting.name, sizeof row->setting.name, "%.*s",
+                     (int)sizeof row->setting.name - 1, row->beside->name);
+    }
+    if (!status)
+        status = draw_beside(s, row, view);
+    if (status == TRIP_ERROR) {
+        row->state = ACCURACY_LEFT_OUT;
+        return 0;
+    }
+    if (!status)
+        status = compare_with_truth(s, row);
+    if (!status)
+        status = keep_exr(s, t, RAN, view, row->setting.name);
+    row->views++;
+    row->state = ACCURACY_MEASURED;
+    return status;
+}
+
 /* Untimed first, which also warms what a frame needs. */
 static int measure_row(sweep *s, accuracy_row *row, int view)
 {
@@ -411,10 +470,12 @@ static int measure_view(sweep *s, int view)
     if (status)
         return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "no view: %s", triptych_error(t));
     status = find_truth(s, view);
+    const int settings = m->row_count - s->o->beside_count;
     for (int i = 0; i < m->row_count && !status; i++)
         if (m->rows[i].state == (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED) &&
             (view || i == 0 || !is_over(s)))
-            status = measure_row(s, &m->rows[i], view);
+            status = i < settings ? measure_row(s, &m->rows[i], view)
+                                  : measure_beside(s, &m->rows[i], view, i - settings);
     if (!status)
         m->view_count++;
     return status;
@@ -492,6 +553,9 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
 void accuracy_measured_free(accuracy_measured *m)
 {
     for (int i = 0; i < m->row_count; i++) {
+        if (m->rows[i].beside)
+            accuracy_beside_end(m->rows[i].beside);
+        free(m->rows[i].beside);
         free(m->rows[i].ms);
         free(m->rows[i].picture);
         free(m->rows[i].difference);

@@ -5,11 +5,12 @@
 #define TRIP_ACCURACY_MEASURE_H
 
 #include "accuracy_options.h"
+#include "beside.h"
 #include "error.h"
 #include "setting.h"
 #include "views.h"
 
-enum { ACCURACY_ROWS_MAX = ACCURACY_SETTINGS_MAX + 2 * ACCURACY_DATA_MAX };
+enum { ACCURACY_ROWS_MAX = ACCURACY_SETTINGS_MAX + 2 * ACCURACY_DATA_MAX + ACCURACY_BESIDE_MAX };
 
 typedef enum accuracy_step {
     ACCURACY_TOTAL,   /* what ran to the integral that is true */
@@ -29,7 +30,8 @@ typedef enum accuracy_state {
 
 typedef struct accuracy_row {
     accuracy_setting setting;
-    int data; /* of accuracy_options.data */
+    int data;                /* of accuracy_options.data */
+    accuracy_beside *beside; /* another program, whose name is the setting's; NULL: a setting */
     accuracy_state state;
     char why[256]; /* it was left out */
     accuracy_error error[ACCURACY_STEPS];

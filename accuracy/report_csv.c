@@ -84,7 +84,7 @@ char *accuracy_report_csv(const accuracy_report *r)
         return NULL;
     write_head(f);
     for (int i = 0; i < r->m->row_count; i++)
-        if (r->m->rows[i].state == ACCURACY_MEASURED)
+        if (r->m->rows[i].state == ACCURACY_MEASURED && !r->m->rows[i].beside)
             write_row(f, r, i);
     if (fclose(f) == 0)
         return text;

@@ -20,7 +20,8 @@ static const char style[] =
     "svg{max-width:100%;height:auto;font:11px system-ui,sans-serif;background:#fff}"
     ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}.leader{stroke:#bbb;fill:none}"
     "circle,rect{stroke:#fff}"
-    ".post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}.quality{fill:#c21f3a}"
+    ".beside{fill:#7b3fa0}.post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}."
+    "quality{fill:#c21f3a}"
     ".key{display:inline-block;width:11px;height:11px;border-radius:6px;"
     "margin:0 4px 0 14px}\n";
 
@@ -80,13 +81,18 @@ static void write_head(FILE *f, const accuracy_report *r)
 
 static void write_plots(FILE *f, const accuracy_report *r)
 {
-    fputs("<h2>Time and error</h2>\n<p><span class='key post' style='background:#1f6fc4'></span>"
-          "post<span class=key style='background:#e07b1a'></span>pre"
-          "<span class=key style='background:#2a9d4e'></span>gl"
-          "<span class=key style='background:#888'></span>reference, integral"
-          "<span class=key style='background:#c21f3a'></span>quality. "
-          "The line is the front: no setting is both faster and closer.</p>\n",
-          f);
+    fprintf(f,
+            "<h2>Time and error</h2>\n<p><span class='key post' style='background:#1f6fc4'></span>"
+            "post<span class=key style='background:#e07b1a'></span>pre"
+            "<span class=key style='background:#2a9d4e'></span>gl"
+            "<span class=key style='background:#888'></span>reference, integral"
+            "<span class=key style='background:#c21f3a'></span>quality"
+            "%s. "
+            "The line is the front: no setting is both faster and closer.</p>\n",
+            r->m->options->beside_count
+                ? "<span class=key style='background:#7b3fa0;border-radius:0'></span>"
+                  "another program, with its own light"
+                : "");
     accuracy_report_plot(f, r, false);
     accuracy_report_plot(f, r, true);
 }
@@ -96,7 +102,10 @@ static void write_row(FILE *f, const accuracy_report *r, int i)
     const accuracy_row *row = &r->m->rows[i];
     const accuracy_error_figures *e = &r->figures[i][ACCURACY_TOTAL];
     fprintf(f, "<tr%s><td title=\"", r->front[i] ? " class=front" : "");
-    accuracy_write_options(f, &row->setting);
+    if (row->beside)
+        write_escaped(f, row->beside->about);
+    else
+        accuracy_write_options(f, &row->setting);
     fputs("\">", f);
     write_escaped(f, row->setting.name);
     write_number(f, r->ms[i], 1);
@@ -209,7 +218,7 @@ static void write_commands(FILE *f, const accuracy_report *r)
     }
     for (int i = 0; i < r->m->row_count; i++) {
         const accuracy_row *row = &r->m->rows[i];
-        if (row->state != ACCURACY_MEASURED)
+        if (row->state != ACCURACY_MEASURED || row->beside)
             continue;
         fputs("triptych render ", memory);
         accuracy_write_word(memory, o->data[row->data]);

@@ -50,12 +50,17 @@ static void add_row(cJSON *rows, const accuracy_report *r, int i)
     cJSON_AddItemToArray(rows, o);
     cJSON_AddStringToObject(o, "name", row->setting.name);
     cJSON_AddStringToObject(o, "data_set", r->m->options->data[row->data]);
-    add_options(o, &row->setting);
+    if (row->beside)
+        cJSON_AddStringToObject(o, "version", row->beside->about);
+    else
+        add_options(o, &row->setting);
     add_number(o, "views", row->views);
     add_times(o, r->ms[i], row->ms, row->frames);
-    add_number(o, "splats", row->splats / row->views);
-    add_number(o, "splats_drawn", row->splats_drawn >= 0 ? row->splats_drawn : NAN);
-    add_number(o, "bytes_read", row->bytes_read / row->views);
+    if (!row->beside) {
+        add_number(o, "splats", row->splats / row->views);
+        add_number(o, "splats_drawn", row->splats_drawn >= 0 ? row->splats_drawn : NAN);
+        add_number(o, "bytes_read", row->bytes_read / row->views);
+    }
     cJSON *total = add_figures(o, "total", &r->figures[i][ACCURACY_TOTAL]);
     add_number(total, "worst_percentile_99", row->worst_percentile_99);
     add_number(total, "ssim", row->ssim / row->views);
@@ -63,7 +68,8 @@ static void add_row(cJSON *rows, const accuracy_report *r, int i)
     for (int s = ACCURACY_TOTAL + 1; s < ACCURACY_STEPS; s++)
         if (row->has[s])
             add_figures(o, accuracy_step_names[s], &r->figures[i][s]);
-    cJSON_AddBoolToObject(o, "front", r->front[i]);
+    if (!row->beside)
+        cJSON_AddBoolToObject(o, "front", r->front[i]);
 }
 
 static void add_view(cJSON *views, const accuracy_view *view)
@@ -122,12 +128,13 @@ char *accuracy_report_json(const accuracy_report *r)
     add_facts(root, r);
     cJSON *views = cJSON_AddArrayToObject(root, "views");
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
+    cJSON *beside = cJSON_AddArrayToObject(root, "beside");
     cJSON *left_out = cJSON_AddArrayToObject(root, "left_out");
     for (int i = 0; i < r->m->view_count; i++)
         add_view(views, &r->m->views[i]);
     for (int i = 0; i < r->m->row_count; i++)
         if (r->m->rows[i].state == ACCURACY_MEASURED)
-            add_row(rows, r, i);
+            add_row(r->m->rows[i].beside ? beside : rows, r, i);
         else
             add_left_out(left_out, &r->m->rows[i]);
     cJSON_AddNumberToObject(root, "views_left_out", r->m->options->views - r->m->view_count);

@@ -194,10 +194,16 @@ static void draw_rows(plot *p)
             continue;
         const char *name = p->r->m->rows[i].setting.name;
         double x = place_x(p, p->r->ms[i]), y = place_y(p, row_error(p, i));
-        fprintf(p->f,
-                "<circle class=%s cx='%.1f' cy='%.1f' r='%d'><title>%s: %.1f ms, %.2f"
-                "</title></circle>\n",
-                family(name), x, y, front[i] ? 6 : 4, name, p->r->ms[i], row_error(p, i));
+        if (p->r->m->rows[i].beside)
+            fprintf(p->f,
+                    "<rect class=beside x='%.1f' y='%.1f' width='9' height='9'><title>%s: %.1f ms, "
+                    "%.2f</title></rect>\n",
+                    x - 4.5, y - 4.5, name, p->r->ms[i], row_error(p, i));
+        else
+            fprintf(p->f,
+                    "<circle class=%s cx='%.1f' cy='%.1f' r='%d'><title>%s: %.1f ms, %.2f"
+                    "</title></circle>\n",
+                    family(name), x, y, front[i] ? 6 : 4, name, p->r->ms[i], row_error(p, i));
         take(p, (box){ x - 5, y - 5, x + 5, y + 5 });
     }
 }
@@ -209,7 +215,9 @@ static void write_labels(plot *p)
     for (int pass = 0; pass < 3; pass++)
         for (int i = 0; i < p->r->m->row_count; i++) {
             const char *name = p->r->m->rows[i].setting.name;
-            int rank = front[i] ? 0 : !strcmp(family(name), "quality") ? 1 : 2;
+            int rank = front[i] || p->r->m->rows[i].beside ? 0
+                       : !strcmp(family(name), "quality")  ? 1
+                                                           : 2;
             if (is_shown(p, i) && rank == pass)
                 write_label(p, place_x(p, p->r->ms[i]), place_y(p, row_error(p, i)), name);
         }

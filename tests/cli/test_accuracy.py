@@ -10,6 +10,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -325,6 +326,52 @@ class Accuracy(program.ProgramTest):
         self.assertEqual(bare["data_set"], "bare.trip")
         self.assertGreater(bare["total"]["mean"], whole["total"]["mean"])
         self.assertGreater(bare["storage"]["mean"], whole["storage"]["mean"])
+
+    def test_other_programs_stand_beside(self):
+        """One that draws nothing is off by all there is, and takes what it says."""
+        program.write("beside.py", b"""
+import json, sys
+job = json.loads(sys.stdin.readline())
+assert job["dims"] == [40, 28, 24] and "values data" in job["tf"] and job["volume"].endswith("a.nrrd")
+print(json.dumps({"name": "nothing", "version": "1.5"}), flush=True)
+for line in sys.stdin:
+    view = json.loads(line)
+    print(json.dumps({"ms": 12.5}), flush=True)
+    if view.get("picture"):
+        open(view["picture"], "wb").write(bytes(4 * view["size"][0] * view["size"][1]))
+        print("{}", flush=True)
+""")
+        self.works("accuracy", "a.trip", "-o", "others", *SMALL, "--no-ladder", "--source", "a.nrrd",
+                   "--tf", "a.tf", "--settings", "post", "--pictures", "--beside",
+                   f"{sys.executable} beside.py", "--beside", "exit 3")
+        with open("others/accuracy.json", encoding="utf-8") as f:
+            report = json.load(f)
+        [row] = report["beside"]
+        self.assertEqual([row["name"], row["version"], row["ms"]], ["nothing", "1.5", 12.5])
+        errors = [covered_errors(numpy.zeros_like(truth), truth)
+                  for truth in (program.read_exr(f"others/truth-{view}.exr") for view in range(2))]
+        self.assertAlmostEqual(row["total"]["mean"], numpy.concatenate(errors).mean(), delta=0.01)
+        self.assertEqual([r["name"] for r in report["rows"]], ["post"])
+        [left_out] = report["left_out"]
+        self.assertIn("the program has ended", left_out["why"])
+        with open("others/index.html", encoding="utf-8") as f:
+            page = f.read()
+        self.assertEqual(page.count("<rect class=beside"), 2)
+        self.assertFalse(os.path.exists("others/beside.raw"))
+
+    def test_vtk_stands_beside_where_it_is_installed(self):
+        worker = os.path.join(os.path.dirname(program.DATASETS), "accuracy", "vtk_worker.py")
+        if not shutil.which("xvfb-run") or subprocess.run(
+                [sys.executable, "-c", "import vtkmodules.vtkRenderingVolume"],
+                capture_output=True).returncode:
+            self.skipTest("VTK for Python or xvfb-run is not installed")
+        self.works("accuracy", "a.trip", "-o", "vtk", *SMALL, "--no-ladder", "--source", "a.nrrd", "--tf",
+                   "a.tf", "--no-shading", "--settings", "post", "--beside",
+                   f"xvfb-run -a {sys.executable} {worker} --step 0.5")
+        with open("vtk/accuracy.json", encoding="utf-8") as f:
+            [row] = json.load(f)["beside"]
+        self.assertEqual(row["name"], "vtk-cpu-step-0.5")
+        self.assertLess(row["total"]["mean"], 8)
 
     # Trouble
 

@@ -76,7 +76,7 @@ class Vtk:
                "index_to_world": prepared.info["index_to_world"],
                "function": prepared.function, "shading": prepared.scene.shading}
         self.process = subprocess.Popen(
-            [sys.executable, os.path.join(HERE, "vtk_worker.py")], stdin=subprocess.PIPE,
+            [sys.executable, os.path.join(HERE, "..", "..", "accuracy", "vtk_worker.py")], stdin=subprocess.PIPE,
             stdout=subprocess.PIPE, text=True, env=_environment(threads))
         about = self._ask(job)
         self.version = about["version"]

@@ -1,10 +1,17 @@
-"""Draws one volume by one of VTK's mappers, as JSON lines say on standard input:
-  {"mapper": "cpu" | "gpu", "volume": FILE.npy, "index_to_world": 3 x 4, "function": [[value, r, g, b,
-   opacity], ...], "shading": bool, "threads": N,
-   "step": voxels}
+#!/usr/bin/env python3
+"""Draws one volume by one of VTK's mappers, for tests/compare and `triptych accuracy --beside`.
+Options: --step VOXELS, --mapper cpu|gpu, in place of what the first line says. JSON lines on
+standard input say what is drawn:
+  {"volume": FILE, "dims": [i, j, k], "index_to_world": 3 x 4, "tf": TEXT, "shading": bool,
+   "threads": N, "mapper": "cpu" | "gpu", "step": voxels}
 then any number of
-  {"eye": .., "look": .., "up": .., "fov_degrees": .., "size": N, "picture": FILE.png | null}
-and answers each by a line: {"version", "device"}, then {"ms", "display_ms"}."""
+  {"eye": .., "look": .., "up": .., "fov_degrees" or "ortho_height": .., "size": N or [W, H],
+   "picture": FILE or null}
+and each is answered by a line: {"name", "version", "device"}, then {"ms", "display_ms"}, and {}
+once the picture is written: .png, or .raw, whose bytes are rows of RGBA, the top row first.
+FILE is a .npy, a NRRD or a NIfTI; TEXT a transfer function as of `triptych tf show`, or "function"
+its points, [[value, r, g, b, opacity a voxel], ...]."""
+import argparse
 import json
 import math
 import os
@@ -14,11 +21,11 @@ import time
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, the windows and mappers behind the names below
 import vtkmodules.vtkRenderingVolumeOpenGL2
-from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
-from vtkmodules.vtkIOImage import vtkPNGWriter
+from vtkmodules.vtkIOImage import vtkNIFTIImageReader, vtkNrrdReader, vtkPNGWriter
 from vtkmodules.vtkRenderingCore import (vtkColorTransferFunction, vtkLight, vtkRenderer,
                                          vtkRenderWindow,
                                          vtkVolume, vtkVolumeProperty, vtkWindowToImageFilter)
@@ -28,9 +35,29 @@ from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 AMBIENT, DIFFUSE, SPECULAR, SHININESS = 0.3, 0.7, 0.2, 24
 
 
+def read_by_vtk(path, dims):
+    """By VTK's own reader; where the voxels are is known already."""
+    lower = path.lower()
+    if lower.endswith((".nrrd", ".nhdr")):
+        reader = vtkNrrdReader()
+    elif lower.endswith((".nii", ".nii.gz")):
+        reader = vtkNIFTIImageReader()
+    else:
+        raise SystemExit("VTK is given NRRD and NIfTI here, not " + path)
+    reader.SetFileName(path)
+    reader.Update()
+    scalars = reader.GetOutput().GetPointData().GetScalars()
+    if scalars is None or list(reader.GetOutput().GetDimensions()) != list(dims):
+        raise SystemExit("VTK does not read " + path)
+    return vtk_to_numpy(scalars).reshape(dims[::-1])
+
+
 def make_image(job):
     """The volume with its spacing, and the rest of its placement as a matrix."""
-    values = np.load(job["volume"], mmap_mode=None)
+    if job["volume"].endswith(".npy"):
+        values = np.load(job["volume"], mmap_mode=None)
+    else:
+        values = np.ascontiguousarray(read_by_vtk(job["volume"], job["dims"]))
     affine = np.array(job["index_to_world"])
     spacing = np.linalg.norm(affine[:, :3], axis=0)
     image = vtkImageData()
@@ -46,9 +73,24 @@ def make_image(job):
     return image, matrix, voxel, values  # VTK does not own the values
 
 
+def read_function(text, voxel):
+    """Points of a `.tf` text in data units, with opacity per voxel."""
+    points, unit = [], voxel
+    for line in text.splitlines():
+        words = line.split("#")[0].split()
+        if words[:1] == ["unit"]:
+            unit = voxel if words[1] == "voxel" else float(words[1])
+        elif len(words) == 5:
+            points.append([float(word) for word in words])
+    for point in points:
+        point[4] = 1 - (1 - min(point[4], 0.9999)) ** (voxel / unit)
+    return points
+
+
 def make_property(job, voxel):
     colour, opacity = vtkColorTransferFunction(), vtkPiecewiseFunction()
-    for value, red, green, blue, alpha in job["function"]:
+    points = job["function"] if "function" in job else read_function(job["tf"], voxel)
+    for value, red, green, blue, alpha in points:
         colour.AddRGBPoint(value, red, green, blue)
         opacity.AddPoint(value, alpha)
     look = vtkVolumeProperty()
@@ -89,6 +131,11 @@ def make_headlight():
     return light
 
 
+def size_of(view):
+    size = view["size"]
+    return tuple(size) if isinstance(size, list) else (size, size)
+
+
 class Stage:
     def __init__(self, job):
         image, matrix, voxel, self.values = make_image(job)
@@ -118,19 +165,26 @@ class Stage:
     def angle(self, view):
         """The ray caster's picture is larger by a pixel than that of the view: the first and the
         last of N rays along an edge are as far apart as N pixels are wide. The angle makes up for it."""
-        if not self.display:
-            return view["fov_degrees"]
-        slope = math.tan(math.radians(view["fov_degrees"]) / 2)
-        return math.degrees(2 * math.atan(slope * view["size"] / (view["size"] - 1)))
+        slope = math.tan(math.radians(view["fov_degrees"]) / 2) * self.growth(view)
+        return math.degrees(2 * math.atan(slope))
+
+    def growth(self, view):
+        height = size_of(view)[1]
+        return height / (height - 1) if self.display else 1
 
     def look_from(self, view):
         camera = self.renderer.GetActiveCamera()
         camera.SetPosition(view["eye"])
         camera.SetFocalPoint(view["look"])
         camera.SetViewUp(view["up"])
-        camera.SetViewAngle(self.angle(view))
-        if self.window.GetSize() != (view["size"], view["size"]):
-            self.window.SetSize(view["size"], view["size"])
+        if view.get("ortho_height"):
+            camera.ParallelProjectionOn()
+            camera.SetParallelScale(view["ortho_height"] / 2 * self.growth(view))
+        else:
+            camera.ParallelProjectionOff()
+            camera.SetViewAngle(self.angle(view))
+        if self.window.GetSize() != size_of(view):
+            self.window.SetSize(*size_of(view))
         self.renderer.ResetCameraClippingRange()
 
     def draw(self, view):
@@ -153,6 +207,13 @@ class Stage:
         grab.SetInput(self.window)
         grab.SetInputBufferTypeToRGBA()
         grab.ReadFrontBufferOff()
+        if path.endswith(".raw"):
+            grab.Update()
+            image = grab.GetOutput()
+            width, height, _ = image.GetDimensions()
+            pixels = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 4)
+            np.ascontiguousarray(pixels[::-1]).tofile(path)
+            return
         writer = vtkPNGWriter()
         writer.SetFileName(path)
         writer.SetInputConnection(grab.GetOutputPort())
@@ -167,8 +228,14 @@ def main():
     def answer(what):
         print(json.dumps(what), file=answers, flush=True)
 
-    stage = Stage(json.loads(sys.stdin.readline()))
-    answer({"version": vtkVersion.GetVTKVersion(), "device": stage.device()})
+    options = argparse.ArgumentParser()
+    options.add_argument("--step", type=float)
+    options.add_argument("--mapper", choices=["cpu", "gpu"])
+    given = options.parse_args()
+    job = {"mapper": "cpu", "step": 1, **json.loads(sys.stdin.readline())}
+    job.update({key: value for key, value in vars(given).items() if value is not None})
+    stage = Stage(job)
+    answer({"name": "vtk-%s-step-%g" % (job["mapper"], job["step"]), "version": vtkVersion.GetVTKVersion(), "device": stage.device()})
     for line in sys.stdin:
         view = json.loads(line)
         answer(stage.draw(view))
