@@ -179,11 +179,20 @@ static int load(trip_drawing *d)
     return status;
 }
 
+static void run_tasks(void *renderer, void (*task)(void *context, unsigned number), void *context,
+                      unsigned count)
+{
+    trip_renderer *r = renderer;
+    r->ops->run_tasks(r, task, context, count);
+}
+
 /* Light reaches places before anything is drawn. */
 static int make_light(trip_drawing *d)
 {
     trip_light_map *light = d->frame->light;
-    return light ? trip_light_map_step(light) : TRIP_FRAME_DONE;
+    const trip_task_runner runner = { run_tasks, d->renderer };
+    return light ? trip_light_map_step(light, d->renderer->ops->run_tasks ? &runner : NULL)
+                 : TRIP_FRAME_DONE;
 }
 
 /* One piece of what is ready. */

@@ -420,12 +420,12 @@ static int start_sweep(trip_light_map *m)
 }
 
 /* A layer. */
-static int sweep(trip_light_map *m)
+static int sweep(trip_light_map *m, const trip_task_runner *runner)
 {
     int status = m->sweeping ? 0 : start_sweep(m);
     if (status)
         return status;
-    if (trip_light_sweep_step(&m->sweep))
+    if (trip_light_sweep_step(&m->sweep, runner))
         return TRIP_FRAME_MORE;
     trip_light_sweep_end(&m->sweep);
     m->sweeping = false;
@@ -438,13 +438,13 @@ static int sweep(trip_light_map *m)
     return TRIP_FRAME_MORE;
 }
 
-int trip_light_map_step(trip_light_map *m)
+int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner)
 {
     const uint64_t start = trip_frame_now_ns();
     if (m->stage == COMPLETE)
         return TRIP_FRAME_DONE;
     bool gathers = m->stage == GATHER;
-    int status = gathers ? gather(m) : sweep(m);
+    int status = gathers ? gather(m) : sweep(m, runner);
     double ms = (double)(trip_frame_now_ns() - start) * 1e-6;
     m->stats.gather_ms += gathers ? ms : 0;
     m->stats.sweep_ms += gathers ? 0 : ms;

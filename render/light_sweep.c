@@ -5,6 +5,8 @@
 /* Less is taken for nothing. */
 #define DARK 1e-7
 
+enum { BAND_ROWS = 4 }; /* of a task */
+
 static size_t column_bytes(const trip_light_sweep *s)
 {
     return (size_t)s->columns[0] * (size_t)s->columns[1] * sizeof *s->through;
@@ -92,17 +94,26 @@ static double layer_coordinate(const trip_light_sweep *s, int layer)
     return s->out->spacing * (s->descending ? s->out->nodes[s->axis] - 1 - layer : layer);
 }
 
-/* From the layer before to this one. */
-static void attenuate(trip_light_sweep *s)
+/* Of rows before `end`. */
+static int end_of_band(unsigned band, int end)
 {
+    const int last = (int)(band + 1) * BAND_ROWS;
+    return last < end ? last : end;
+}
+
+/* Some rows of columns from the layer before to this one. */
+static void attenuate(void *sweep, unsigned band)
+{
+    const trip_light_sweep *s = sweep;
+    const int first = (int)band * BAND_ROWS, end = end_of_band(band, s->columns[1]);
     const double spacing = s->out->spacing;
     double from[3], step[3];
     from[s->axis] = layer_coordinate(s, s->layer - 1);
     step[s->axis] = layer_coordinate(s, s->layer) - from[s->axis];
     step[s->across] = s->slope[0] * spacing;
     step[s->down] = s->slope[1] * spacing;
-    double *through = s->through;
-    for (int row = 0; row < s->columns[1]; row++) {
+    double *through = s->through + (ptrdiff_t)first * s->columns[0];
+    for (int row = first; row < end; row++) {
         from[s->down] = (s->first[1] + row + (s->layer - 1) * s->slope[1]) * spacing;
         for (int column = 0; column < s->columns[0]; column++, through++) {
             from[s->across] = (s->first[0] + column + (s->layer - 1) * s->slope[0]) * spacing;
@@ -114,9 +125,11 @@ static void attenuate(trip_light_sweep *s)
     }
 }
 
-/* The layer's nodes from the columns around them: all nodes lie alike between columns. */
-static void give(trip_light_sweep *s)
+/* Some rows of the layer's nodes from the columns around them: all nodes lie alike between columns.
+ */
+static void give(void *sweep, unsigned band)
 {
+    const trip_light_sweep *s = sweep;
     const size_t strides[3] = { 1, (size_t)s->out->nodes[0],
                                 (size_t)s->out->nodes[0] * (size_t)s->out->nodes[1] };
     const int layer = s->descending ? s->out->nodes[s->axis] - 1 - s->layer : s->layer;
@@ -127,7 +140,8 @@ static void give(trip_light_sweep *s)
         begin[i] = (int)floor(at);
         part[i] = at - begin[i];
     }
-    for (int v = 0; v < s->out->nodes[s->down]; v++) {
+    const int end = end_of_band(band, s->out->nodes[s->down]);
+    for (int v = (int)band * BAND_ROWS; v < end; v++) {
         const int row = begin[1] + v, below = row + (part[1] > 0);
         const double *upper = s->through + (ptrdiff_t)row * s->columns[0] + begin[0];
         const double *lower = s->through + (ptrdiff_t)below * s->columns[0] + begin[0];
@@ -141,10 +155,20 @@ static void give(trip_light_sweep *s)
     }
 }
 
-bool trip_light_sweep_step(trip_light_sweep *s)
+static void run(const trip_task_runner *runner, void (*task)(void *context, unsigned number),
+                trip_light_sweep *s, int rows)
+{
+    const unsigned bands = (unsigned)((rows + BAND_ROWS - 1) / BAND_ROWS);
+    if (runner)
+        runner->run(runner->user, task, s, bands);
+    for (unsigned band = 0; band < bands && !runner; band++)
+        task(s, band);
+}
+
+bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner)
 {
     if (s->layer > 0)
-        attenuate(s);
-    give(s);
+        run(runner, attenuate, s, s->columns[1]);
+    run(runner, give, s, s->out->nodes[s->down]);
     return ++s->layer < s->out->nodes[s->axis];
 }

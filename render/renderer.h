@@ -115,6 +115,10 @@ typedef struct trip_renderer_ops {
      * returns, nothing that the frame is drawn from is in use but the renderer's own memory, which
      * load() sees to. NULL: nothing is between the other calls. */
     void (*end_frame)(trip_renderer *r);
+    /* Does independent tasks on the renderer's threads, and returns when all are done; before
+     * begin_layer. NULL: it has one thread, the caller's. */
+    void (*run_tasks)(trip_renderer *r, void (*task)(void *context, unsigned number), void *context,
+                      unsigned count);
     /* Of a list in the frame, by its number in the data set, once the picture was taken
      * (bytes_read is the caller's). */
     trip_list_stats (*stats)(const trip_renderer *r, unsigned list);

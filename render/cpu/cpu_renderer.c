@@ -273,6 +273,28 @@ static void destroy(trip_renderer *base)
     trip_budget_release(budget, r, sizeof *r);
 }
 
+typedef struct tasks {
+    void (*task)(void *context, unsigned number);
+    void *context;
+} tasks;
+
+static void run_task(void *context, unsigned number, unsigned thread)
+{
+    const tasks *t = context;
+    (void)thread;
+    t->task(t->context, number);
+}
+
+static void run_tasks(trip_renderer *base, void (*task)(void *context, unsigned number),
+                      void *context, unsigned count)
+{
+    trip_cpu *r = (trip_cpu *)base;
+    tasks all = { task, context };
+    trip_cpu_job job = { .run = run_task, .context = &all, .tasks = count };
+    trip_cpu_pool_start(r->pool, &job);
+    trip_cpu_pool_wait(r->pool, &job);
+}
+
 static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
@@ -286,6 +308,7 @@ static const trip_renderer_ops cpu_ops = {
     .end_passes = end_passes,
     .picture = picture,
     .end_frame = end_frame,
+    .run_tasks = run_tasks,
     .stats = stats,
 };
 

@@ -310,6 +310,32 @@ static void frames_follow_one_another_on_one_renderer(void **state)
     scene_destroy(&s);
 }
 
+/* Sweeps of light are tasks of the frame's threads, too. */
+static void light_has_the_same_bits_by_any_threads(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 32, NULL);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.7, 0.5), 48, 50, 32);
+    trip_settings settings = trip_settings_default();
+    settings.headlight = false;
+    settings.light_direction = trip_normalize(trip_v3(0.2, -0.5, 1));
+    settings.effects.shadows = settings.effects.occlusion = true;
+    settings.effects.cells = 24;
+    cpu_scenes_threads = 1;
+    scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    cpu_scenes_threads = 4;
+    scene_picture q = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    settings.effects.occlusion = false;
+    scene_picture without = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+    assert_same(&p, &q);
+    assert_true(scene_difference(&p, &without) > 0.01);
+    scene_picture_free(&p);
+    scene_picture_free(&q);
+    scene_picture_free(&without);
+    scene_destroy(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -321,6 +347,7 @@ int main(void)
         cmocka_unit_test(batches_cut_anywhere_draw_the_same),
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(frames_follow_one_another_on_one_renderer),
+        cmocka_unit_test(light_has_the_same_bits_by_any_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -408,12 +408,55 @@ static void the_lattice_is_kept_until_something_changes(void **state)
         assert_int_equal(trip_light_map_begin(m, &source), 0);
         int status;
         assert_true(trip_light_map_is_complete(m) == (n == 1));
-        while ((status = trip_light_map_step(m)) > 0)
+        while ((status = trip_light_map_step(m, NULL)) > 0)
             trip_light_map_await(m, UINT64_MAX);
         assert_int_equal(status, TRIP_FRAME_DONE);
         assert_true((trip_light_map_stats(m).bytes_read > 0) == (n == 0 || n == 3));
     }
     trip_light_map_destroy(m);
+    scene_destroy(&s);
+}
+
+/* The last task first. */
+static void run_backwards(void *user, void (*task)(void *context, unsigned number), void *context,
+                          unsigned count)
+{
+    *(unsigned *)user += count;
+    while (count-- > 0)
+        task(context, count);
+}
+
+static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
+{
+    (void)state;
+    scene s;
+    trip_light_map *maps[2];
+    const trip_affine map = trip_affine_identity();
+    const trip_clip none = { 0 };
+    create_ball(&s, 0.6, &map);
+    trip_settings settings = with_shadows(trip_v3(0.3, -0.8, 0.5));
+    settings.effects.occlusion = true;
+    const trip_light_source source = {
+        .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
+    };
+    unsigned tasks = 0;
+    const trip_task_runner runner = { run_backwards, &tasks };
+    for (int n = 0; n < 2; n++) {
+        assert_int_equal(trip_light_map_create(&maps[n], s.budget), 0);
+        assert_int_equal(trip_light_map_begin(maps[n], &source), 0);
+        while (trip_light_map_step(maps[n], n ? &runner : NULL) > 0)
+            trip_light_map_await(maps[n], UINT64_MAX);
+        assert_true(trip_light_map_is_complete(maps[n]));
+    }
+    const trip_light_grid *open[2] = { trip_light_map_open(maps[0]), trip_light_map_open(maps[1]) };
+    const trip_light_grid *lit[2] = { trip_light_map_reached(maps[0]),
+                                      trip_light_map_reached(maps[1]) };
+    assert_memory_equal(open[0]->at, open[1]->at,
+                        trip_light_grid_count(open[0]) * sizeof *open[0]->at);
+    assert_memory_equal(lit[0]->at, lit[1]->at, trip_light_grid_count(lit[0]) * sizeof *lit[0]->at);
+    assert_true(tasks > 1000);
+    trip_light_map_destroy(maps[0]);
+    trip_light_map_destroy(maps[1]);
     scene_destroy(&s);
 }
 
@@ -487,6 +530,7 @@ int main(void)
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),
         cmocka_unit_test(a_renderer_without_effects_refuses_them),
+        cmocka_unit_test(whoever_does_the_tasks_the_lattice_has_the_same_bits),
         cmocka_unit_test(a_lattice_that_does_not_fit_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
