@@ -45,6 +45,10 @@ struct triptych {
     trip_dataset
         *at_level;  /* what frames are drawn from that have a coarse level alone; else NULL */
     unsigned level; /* that */
+    double
+        share_above; /* of a frame of two levels, that of the next coarser one's picture; else 0 */
+    float *finer;    /* and the picture of the finer one, once it is complete, of the budget */
+    bool finer_done;
     trip_settings settings;  /* slices 0: by the view */
     triptych_clip clip;      /* as given; frames have it in drawn_settings */
     double max_ms;           /* 0: no bound of time */
@@ -77,7 +81,8 @@ struct triptych {
     bool rounding_checked; /* of the function and the settings that are set */
     bool has_stats;
     triptych_frame_stats stats;
-    triptych_list_stats *list_stats; /* by the data set's lists, of the budget; NULL: not yet */
+    triptych_frame_stats finer_stats; /* of the first of two levels */
+    triptych_list_stats *list_stats;  /* by the data set's lists, of the budget; NULL: not yet */
 
     trip_image_files files;
 };

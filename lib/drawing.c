@@ -27,8 +27,6 @@ void trip_context_drop_reader(triptych *t)
 
 void trip_context_drop_level(triptych *t)
 {
-    if (t->at_level)
-        trip_context_drop_reader(t);
     trip_context_drop_light(t);
     trip_dataset_level_close(t->at_level);
     t->at_level = NULL;
@@ -52,8 +50,9 @@ void trip_context_drop_renderer(triptych *t)
     t->renderer = NULL;
 }
 
-/* One that reads all the planes wanted. Counting is by a reader of its own, so that nothing that
- * was read then is in the cache of the frames that are timed. */
+/* One that reads all the planes wanted, of any level: its lists keep their numbers. Counting is by
+ * a reader of its own, so that nothing that was read then is in the cache of the frames that are
+ * timed. */
 static int make_reader(triptych *t, unsigned planes)
 {
     const triptych_resources *r = &t->resources;
@@ -73,8 +72,7 @@ static int make_reader(triptych *t, unsigned planes)
     trip_context_drop_reader(t);
     t->planes = planes;
     t->reader_counts = t->counting;
-    const session s = drawn_session(t);
-    return session_make_reader(&s, &t->reader, &wanted);
+    return session_make_reader(&t->session, &t->reader, &wanted);
 }
 
 /* Pixels of the frame along each side of one of the picture: where more than one ray a pixel is
@@ -117,6 +115,31 @@ static unsigned choose_level(const triptych *t, const trip_camera *camera)
     return trip_lod_of_all(data, camera, &settings, trip_dataset_value_levels(data));
 }
 
+/* From here on frames are drawn from that level. */
+static int use_level(triptych *t, unsigned level)
+{
+    int status = 0;
+    if (level == t->level)
+        return 0;
+    trip_context_drop_level(t);
+    if (level > 0)
+        status = trip_dataset_level_open(&t->at_level, t->session.data, level);
+    t->level = t->at_level ? level : 0;
+    return status;
+}
+
+/* That of the next coarser level. Distances are of one surface, and light that reaches places is
+ * worked out for one level. */
+static double choose_share_above(const triptych *t, unsigned level)
+{
+    const trip_settings settings = bounded_settings(t);
+    if (t->settings.classify != TRIP_CLASSIFY_POST || t->classify_auto || t->counting ||
+        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL || t->settings.depth)
+        return 0;
+    return trip_lod_share_above(t->session.data, &t->camera, &settings, level,
+                                trip_dataset_value_levels(t->session.data));
+}
+
 /* Takes up the level of the frame, by the view of level 0, and makes its camera. */
 static int place_camera(triptych *t)
 {
@@ -124,14 +147,11 @@ static int place_camera(triptych *t)
     t->at_level = NULL;
     int status = make_camera(t);
     t->at_level = before;
-    unsigned level = status ? t->level : choose_level(t, &t->camera);
-    if (level != t->level) {
-        trip_context_drop_reader(t);
-        trip_context_drop_level(t);
-        if (level > 0)
-            status = trip_dataset_level_open(&t->at_level, t->session.data, level);
-        t->level = t->at_level ? level : 0;
-    }
+    if (status)
+        return status;
+    const unsigned level = choose_level(t, &t->camera);
+    t->share_above = choose_share_above(t, level);
+    status = use_level(t, level);
     return !status && t->at_level ? make_camera(t) : status;
 }
 
@@ -141,6 +161,25 @@ static trip_renderer_kind renderer_wanted(const triptych *t)
     const bool uneven = trip_coordinates_uneven(&t->session.data->coordinates);
     const bool any = t->resources.renderer == TRIPTYCH_RENDERER_AUTO;
     return any && uneven ? TRIP_RENDERER_CPU : (trip_renderer_kind)t->resources.renderer;
+}
+
+static size_t finer_bytes(const triptych *t)
+{
+    return (size_t)t->turned.width * (size_t)t->turned.height * 4 * sizeof *t->finer;
+}
+
+/* Of a frame that is planned, before the reader takes its part of what is left. */
+static int take_finer(triptych *t)
+{
+    if (trip_effects_light(&t->drawn_settings.effects))
+        t->share_above = 0;
+    if (t->share_above > 0)
+        t->finer = trip_budget_take(t->session.budget, finer_bytes(t));
+    if (t->share_above > 0 && !t->finer)
+        return trip_fail(TRIP_ERROR, "render", "levels",
+                         "two pictures, of two levels, do not fit the memory given; raise "
+                         "--memory");
+    return 0;
 }
 
 static int prepare(triptych *t)
@@ -379,6 +418,14 @@ static void end(triptych *t)
     t->begun = t->drawn = false;
 }
 
+static void end_levels(triptych *t)
+{
+    if (t->finer)
+        trip_budget_release(t->session.budget, t->finer, finer_bytes(t));
+    t->finer = NULL;
+    t->finer_done = false;
+}
+
 int triptych_begin(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
@@ -387,22 +434,19 @@ int triptych_begin(triptych *t)
         return trip_context_leave(before, status);
     status = plan(t);
     if (!status)
+        status = take_finer(t);
+    if (!status)
         status = start(t);
-    if (status)
+    if (status) {
         end(t);
+        end_levels(t);
+    }
     return trip_context_leave(before, status);
 }
 
 static int check_drawing(const triptych *t)
 {
     return t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "none is begun");
-}
-
-int triptych_step(triptych *t, uint64_t deadline_ns)
-{
-    trip_scope *before = trip_context_enter(t);
-    int status = check_drawing(t);
-    return trip_context_leave(before, status ? status : trip_frame_step(&t->drawing, deadline_ns));
 }
 
 int triptych_await(triptych *t, uint64_t timeout_ns)
@@ -459,6 +503,49 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     return status;
 }
 
+/* The first of two levels is drawn: keeps its picture, and begins the other. */
+static int begin_coarser(triptych *t)
+{
+    int status = take_colours(t, t->finer, NULL);
+    if (!status)
+        status = trip_context_note_stats(t);
+    if (status)
+        return status;
+    t->finer_stats = t->stats;
+    end(t);
+    t->finer_done = true;
+    status = use_level(t, t->level + 1);
+    if (!status)
+        status = make_camera(t);
+    if (!status)
+        status = plan(t);
+    if (!status)
+        status = start(t);
+    return status;
+}
+
+int triptych_step(triptych *t, uint64_t deadline_ns)
+{
+    trip_scope *before = trip_context_enter(t);
+    int status = check_drawing(t);
+    if (!status)
+        status = trip_frame_step(&t->drawing, deadline_ns);
+    if (status == TRIP_FRAME_DONE && t->finer && !t->finer_done) {
+        status = begin_coarser(t);
+        status = status ? status : trip_frame_step(&t->drawing, deadline_ns);
+    }
+    return trip_context_leave(before, status);
+}
+
+/* Of the first level until the other is complete. */
+static void mix_levels(const triptych *t, float *rgba)
+{
+    const size_t count = finer_bytes(t) / sizeof *t->finer;
+    const double share = t->drawing.done ? t->share_above : 0;
+    for (size_t i = 0; i < count; i++)
+        rgba[i] = (float)(t->finer[i] + share * ((double)rgba[i] - t->finer[i]));
+}
+
 /* Of the picture's own pixels, whatever was drawn. */
 static void draw_merge_map(const triptych *t, float *rgba)
 {
@@ -484,6 +571,8 @@ static int take_picture(triptych *t, float *rgba, float *depth)
                       depth ? "the frame was begun without" : "is to be taken with the picture");
     if (!status)
         status = take_colours(t, rgba, depth);
+    if (!status && t->finer_done)
+        mix_levels(t, rgba);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
         draw_merge_map(t, rgba);
     if (!status && t->drawing.done)
@@ -507,6 +596,7 @@ void triptych_end(triptych *t)
 {
     trip_scope *before = trip_scope_enter(&t->scope); /* the error of the last call stays */
     end(t);
+    end_levels(t);
     trip_context_leave(before, 0);
 }
 

@@ -12,6 +12,10 @@ static void explain_choices(const triptych *t, FILE *out)
         return;
     if (t->why_pre)
         fprintf(out, "default     pre in place of post: %s\n", t->why_pre);
+    const unsigned level = t->level - t->finer_done;
+    if (t->share_above > 0)
+        fprintf(out, "levels      %u, and %.0f %% of the picture of level %u\n", level,
+                100 * t->share_above, level + 1);
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.slices)
         fprintf(out,
                 "slices      %d by the view: rays move up to %.2f voxels along a sheet to the "
@@ -134,6 +138,29 @@ static void note_rate(triptych *t)
     t->bytes_per_ms = t->bytes_per_ms > 0 ? 0.5 * (t->bytes_per_ms + bytes / ms) : bytes / ms;
 }
 
+/* A frame of two levels takes what both take. */
+static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *finer)
+{
+    to->ms += finer->ms;
+    to->plan_ms += finer->plan_ms;
+    to->wait_ms += finer->wait_ms;
+    to->draw_ms += finer->draw_ms;
+    to->merge_ms += finer->merge_ms;
+    to->splats += finer->splats;
+    to->bytes_read += finer->bytes_read;
+    to->reads += finer->reads;
+    to->bytes_cached += finer->bytes_cached;
+    to->runs_occluded += finer->runs_occluded;
+    to->bytes_occluded += finer->bytes_occluded;
+}
+
+/* The lists of the first of two levels keep their numbers. */
+static bool is_of_finer(const triptych *t, unsigned i)
+{
+    const unsigned level = t->session.data->lists[i].level;
+    return t->finer_done && level + 1 == t->level;
+}
+
 int trip_context_note_stats(triptych *t)
 {
     unsigned count = t->session.data->list_count;
@@ -143,8 +170,11 @@ int trip_context_note_stats(triptych *t)
         return trip_fail(TRIP_ERROR, "render", t->name,
                          "the frame's statistics do not fit the memory given; raise --memory");
     t->stats = frame_stats(t);
+    if (t->finer_done)
+        add_stats(&t->stats, &t->finer_stats);
     for (unsigned i = 0; i < count; i++)
-        t->list_stats[i] = list_stats(t, i);
+        if (!is_of_finer(t, i))
+            t->list_stats[i] = list_stats(t, i);
     t->has_stats = true;
     note_rate(t);
     return 0;

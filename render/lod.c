@@ -162,18 +162,44 @@ bool trip_lod_brick(const trip_lod *lod, const trip_list *list, const trip_file_
     return false;
 }
 
-unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, unsigned most)
+/* Of the whole grid. */
+static double widest(const trip_dataset *data, const trip_camera *camera)
 {
     const int64_t first[3] = { 0, 0, 0 };
     const int64_t past[3] = { (int64_t)data->header.dims[0], (int64_t)data->header.dims[1],
                               (int64_t)data->header.dims[2] };
-    double width = width_in(camera, first, past);
-    unsigned level = settings->lod_px > 0
-                         ? trip_lod_level(width, settings->lod_px * settings->samples, most)
-                         : 0;
+    return width_in(camera, first, past);
+}
+
+unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
+                         const trip_settings *settings, unsigned most)
+{
+    unsigned level =
+        settings->lod_px > 0
+            ? trip_lod_level(widest(data, camera), settings->lod_px * settings->samples, most)
+            : 0;
     while (settings->max_bytes > 0 && level < most &&
            trip_lod_values_bytes(data, camera, settings, level) > settings->max_bytes)
         level++;
     return level;
+}
+
+/* Octaves of distance over which a level gives way to the next. */
+#define MIXED_OCTAVES 0.25
+
+double trip_lod_share_above(const trip_dataset *data, const trip_camera *camera,
+                            const trip_settings *settings, unsigned level, unsigned most)
+{
+    const double px = settings->lod_px * settings->samples, width = widest(data, camera);
+    if (!(px > 0) || level >= most || level != trip_lod_level(width, px, most))
+        return 0;
+    const double share = 1 - log2(ldexp(width, (int)level + 1) / px) / MIXED_OCTAVES;
+    if (!(share > 0))
+        return 0;
+    if (settings->max_bytes > 0 &&
+        trip_lod_values_bytes(data, camera, settings, level) +
+                trip_lod_values_bytes(data, camera, settings, level + 1) >
+            settings->max_bytes)
+        return 0;
+    return fmin(share, 1);
 }

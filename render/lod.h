@@ -47,6 +47,14 @@ double trip_lod_cell_width(const trip_lod *lod, const trip_dataset *data, const 
 unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
                          const trip_settings *settings, unsigned most);
 
+/* Where a frame has one level for all, what part of the picture of the next coarser one is mixed
+ * into that of `level`, trip_lod_of_all()'s, so that nothing pops as the eye moves away: it grows
+ * from 0 to 1 while that level's voxels become narrower by a quarter of an octave, down to lod_px
+ * pixels, where that level is chosen. 0 where a bound on bytes chose the level, or leaves no room
+ * for two. */
+double trip_lod_share_above(const trip_dataset *data, const trip_camera *camera,
+                            const trip_settings *settings, unsigned level, unsigned most);
+
 /* Whether voxels of the list are chosen by level: those that `brick` makes for splats. All others
  * are drawn whatever the levels. */
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list);

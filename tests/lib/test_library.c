@@ -834,6 +834,72 @@ static void more_samples_are_the_mean_of_a_larger_picture(void **state)
     triptych_destroy(t);
 }
 
+/* In steps, whose pictures on the way are those of the first level, or parts of it. */
+static triptych_frame_stats draw_in_steps(triptych *t, float *rgba)
+{
+    triptych_frame_stats stats = { 0 };
+    int status = TRIPTYCH_MORE;
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    while (status > 0) {
+        status = triptych_step(t, 0);
+        if (status == TRIPTYCH_WAITS)
+            triptych_await(t, 20000000);
+        if (status >= 0)
+            assert_int_equal(triptych_picture(t, rgba), TRIPTYCH_OK);
+    }
+    assert_int_equal(status, TRIPTYCH_OK);
+    triptych_end(t);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_OK);
+    return stats;
+}
+
+/* Voxels of level 1 are 2^octaves times as wide as those that are drawn. */
+static triptych_frame_stats draw_at(triptych *t, double octaves, float *rgba)
+{
+    triptych_settings s = triptych_default_settings();
+    triptych_camera camera;
+    assert_int_equal(triptych_get_camera(t, &camera), TRIPTYCH_OK);
+    s.classify = TRIPTYCH_POST;
+    s.lod_px = 2 * camera.height / camera.ortho_height * exp2(-octaves);
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    return draw_in_steps(t, rgba);
+}
+
+static void a_level_is_mixed_into_the_one_before_it(void **state)
+{
+    (void)state;
+    static float fine[FLOATS], coarse[FLOATS], mixed[FLOATS], again[FLOATS];
+    const triptych_view view = {
+        .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO, .ortho_fit = 1
+    };
+    triptych *t = new_context();
+    const triptych_brick_options options = { .levels = 1, .memory_bytes = 64 << 20 };
+    assert_int_equal(triptych_brick(t, VOLUME, "levels.trip", &options, NULL), TRIPTYCH_OK);
+    const triptych_resources resources = { .memory_bytes = 64 << 20,
+                                           .renderer = TRIPTYCH_RENDERER_CPU };
+    assert_int_equal(triptych_open(t, "levels.trip", &resources), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
+    const uint64_t of_fine = draw_at(t, 0.26, fine).splats;
+    const uint64_t of_coarse = draw_at(t, -0.01, coarse).splats;
+    assert_true(of_coarse > 0 && of_coarse < of_fine / 4);
+    const double octaves[] = { 0.2, 0.05 };
+    for (int i = 0; i < 2; i++) {
+        const double share = 1 - octaves[i] / 0.25;
+        double most = 0;
+        assert_int_equal(draw_at(t, octaves[i], mixed).splats, of_fine + of_coarse);
+        for (int n = 0; n < FLOATS; n++) {
+            double a = fine[n], b = coarse[n];
+            most = fmax(most, fabs(a - b));
+            assert_float_equal(mixed[n], a + share * (b - a), 1e-6);
+        }
+        assert_int_equal(triptych_draw(t, again), TRIPTYCH_OK);
+        assert_memory_equal(again, mixed, sizeof again);
+        assert_true(most > 0.01);
+    }
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r levels.trip"), 0);
+}
+
 static void *draw_until_cancelled(void *user)
 {
     worker *w = user;
@@ -1007,6 +1073,7 @@ int main(void)
         cmocka_unit_test(the_integral_of_what_is_kept_is_that_of_the_volume),
         cmocka_unit_test(what_only_splats_have_is_drawn_by_them),
         cmocka_unit_test(more_samples_are_the_mean_of_a_larger_picture),
+        cmocka_unit_test(a_level_is_mixed_into_the_one_before_it),
         cmocka_unit_test(effects_cost_what_is_asked_for_and_are_kept_from_view_to_view),
         cmocka_unit_test(measurements_keep_their_colours_unless_effects_are_asked_for),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
