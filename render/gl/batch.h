@@ -38,9 +38,13 @@ typedef struct trip_gl_piece {
 } trip_gl_piece;
 
 /* What a part of the GPU's work may cost: a step passes its deadline by the time of one. Splats of
- * up to so many pixels cost 1; larger parts would keep a frame on a software GL from ending soon.
- */
-enum { TRIP_GL_COST_PX = 128, TRIP_GL_PART_COST = TRIP_FRAME_PIECE };
+ * up to so many pixels cost 1; larger parts would keep a frame on a software GL from ending soon,
+ * where a part is a fourth of that. */
+enum {
+    TRIP_GL_COST_PX = 128,
+    TRIP_GL_PART_COST = TRIP_FRAME_PIECE,
+    TRIP_GL_SOFTWARE_PARTS = 4,
+};
 
 typedef struct trip_gl_part {
     size_t offset, bytes; /* in its slot; bytes 0: not there */

@@ -368,12 +368,18 @@ static int count_piece(gl_renderer *r, const trip_gl_piece *piece)
     return TRIP_OK;
 }
 
+/* A processor that stands for a GPU works on vertices within the calls that draw them. */
+static uint32_t part_cost(const gl_renderer *r)
+{
+    return r->base.software ? TRIP_GL_PART_COST / TRIP_GL_SOFTWARE_PARTS : TRIP_GL_PART_COST;
+}
+
 /* Does `run` with the pieces of a part of the batch from the cursor on. */
 static int for_part(gl_renderer *r, trip_gl_cursor *at,
                     int (*run)(gl_renderer *, const trip_gl_piece *))
 {
     int status = TRIP_OK;
-    uint32_t room = TRIP_GL_PART_COST;
+    uint32_t room = part_cost(r);
     while (room > 0 && !trip_gl_batch_is_drawn(&r->batch, at) && !status) {
         const trip_gl_piece piece = trip_gl_batch_next(&r->batch, at, &room);
         status = run(r, &piece);

@@ -93,8 +93,8 @@ static void a_batch_is_drawn_in_pieces_when_there_is_a_deadline(void **state)
                 trip_frame_await(&drawing, UINT64_MAX);
             steps += status == TRIP_FRAME_MORE;
         }
-        /* 24000 splats a layer, which one batch holds. */
-        assert_int_equal(steps, 6);
+        /* 24000 splats a layer, which one batch holds; a software GL has pieces of 4096. */
+        assert_int_equal(steps, d.renderer->software ? 18 : 6);
         trip_frame_end(&drawing);
         put_away(&d);
     }
