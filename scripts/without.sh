@@ -1,0 +1,49 @@
+#!/bin/sh
+# Builds the program without the GL renderer, without OpenVDB, and without both, and sees that each
+# says its version, describes a data set and draws it, and that each refuses what it lacks with a
+# line. Takes as long as three builds.
+set -eu
+cd "$(dirname "$0")/.."
+mkdir -p build
+
+fail() { echo "without: $*" >&2; exit 1; }
+
+# Ends with a status, not a signal, and says what is missing.
+refuses() { # LINE COMMAND...
+    line=$1
+    shift
+    if "$@" > build/without.txt 2>&1; then
+        fail "not refused: $*"
+    elif [ $? -gt 2 ] || ! grep -q "$line" build/without.txt; then
+        cat build/without.txt
+        fail "not refused by a line with '$line': $*"
+    fi
+}
+
+for lacks in "GL" "OPENVDB" "GL OPENVDB"; do
+    folder=build/without-$(echo "$lacks" | tr 'A-Z ' 'a-z-')
+    rm -rf "$folder/cloud.trip"
+    options="-DTRIP_GL=ON -DTRIP_OPENVDB=ON"
+    for each in $lacks; do
+        options="$options -DTRIP_$each=OFF"
+    done
+    # shellcheck disable=SC2086
+    cmake --preset release -B "$folder" -DCMAKE_RUNTIME_OUTPUT_DIRECTORY="$PWD/$folder" \
+        -DTRIP_VIEW=OFF -DTRIP_SERVE=OFF $options > build/without.txt || { cat build/without.txt; exit 1; }
+    cmake --build "$folder" --target triptych triptych-generate triptych-images ${TRIP_JOBS:+-j "$TRIP_JOBS"} \
+        > build/without.txt || { tail -20 build/without.txt; exit 1; }
+    triptych=$folder/triptych
+    "$triptych" --version
+    "$folder/triptych-generate" --size 48 --output "$folder/cloud.nrrd" cloud
+    "$triptych" brick "$folder/cloud.nrrd" --output "$folder/cloud.trip" --force --quiet
+    "$triptych" info "$folder/cloud.trip" > build/without.txt
+    "$triptych" render "$folder/cloud.trip" --renderer auto --size 64x64 --output "$folder/cloud.png"
+    case " $lacks " in
+    *" GL "*) refuses "without" "$triptych" render "$folder/cloud.trip" --renderer gl -o "$folder/gl.png" ;;
+    esac
+    case " $lacks " in
+    *" OPENVDB "*) printf ' BDV\0\0\0\0' > "$folder/empty.vdb"
+                   refuses "OpenVDB" "$triptych" brick "$folder/empty.vdb" -o "$folder/no.trip" ;;
+    esac
+    echo "without $lacks: builds, says its version, bricks, describes and draws"
+done
