@@ -155,6 +155,19 @@ static void what_is_found_does_not_depend_on_how_it_is_bricked(void **state)
         assert_mirror(ways[i], "\"mirror\":\"z\"");
 }
 
+/* Where it is not even, the mirror image of voxels is not that of the object. */
+static void no_symmetry_is_found_across_uneven_spacing(void **state)
+{
+    (void)state;
+    char table[16 * NZ] = "", files[160];
+    for (int k = 0, used = 0; k < NZ; k++)
+        used += snprintf(table + used, sizeof table - (size_t)used, "%d\n", k * (k + 10));
+    test_write("z.txt", table, strlen(table));
+    snprintf(files, sizeof files, ",,%s", test_path("z.txt"));
+    write_wedge(2, 0, false);
+    assert_mirror((trip_brick_params){ .volume.coordinates = files }, NULL);
+}
+
 static void nothing_is_guessed_where_it_is_said_how_the_volume_lies(void **state)
 {
     (void)state;
@@ -172,6 +185,7 @@ int main(void)
         TEST(one_axis_stands_out_or_there_is_none),
         TEST(a_wedge_is_symmetric_across_its_own_axis),
         TEST(what_is_found_does_not_depend_on_how_it_is_bricked),
+        TEST(no_symmetry_is_found_across_uneven_spacing),
         TEST(nothing_is_guessed_where_it_is_said_how_the_volume_lies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
