@@ -27,6 +27,7 @@ typedef struct brick {
     trip_brick_input in;
     trip_piece_format format;
     trip_brick_codes codes;
+    trip_coordinates coordinates; /* which the writer looks at until it is done */
     trip_memory_plan plan;
     trip_brick_temporary temporary;
     trip_writer *writer;
@@ -105,8 +106,8 @@ static int update_memory_plan(brick *b)
 static int open_writer(brick *b)
 {
     trip_writer_list lists[6 * (TRIP_LEVELS_MOST + 1)];
-    const trip_coordinates coordinates = trip_brick_coordinates(&b->in);
-    const int levels = trip_coordinates_uneven(&coordinates) ? -1 : b->params->levels;
+    b->coordinates = trip_brick_coordinates(&b->in);
+    const int levels = trip_coordinates_uneven(&b->coordinates) ? -1 : b->params->levels;
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
                              .code_bytes = b->codes.code_bytes,
@@ -114,7 +115,7 @@ static int open_writer(brick *b)
                              .tile_voxels = b->params->tile_voxels,
                              .slab_sheets = b->params->slab_sheets,
                              .index_to_world = b->in.info->index_to_world,
-                             .coordinates = &coordinates,
+                             .coordinates = &b->coordinates,
                              .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     b->levels = trip_levels_count(p.dims, levels, 1u << b->format.tile_log2);

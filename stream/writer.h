@@ -41,7 +41,8 @@ typedef struct trip_writer_params {
     unsigned page_bytes;   /* default 16384 */
     int64_t dims[3];
     trip_affine index_to_world;
-    const trip_coordinates *coordinates; /* NULL: spacing is even; with levels it is */
+    const trip_coordinates
+        *coordinates; /* kept until the end; NULL: spacing is even, as with levels */
     trip_writer_codes codes;
     /* Among them the voxels at level 0 along each axis, of the grid above. NULL: those, X, Y and Z,
      * and then their halos. */
