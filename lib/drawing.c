@@ -249,8 +249,8 @@ static void choose_settings(triptych *t)
     if (!t->settings.slices)
         t->drawn_settings.slices = t->slices.slices;
     t->drawn_settings.clip = trip_context_clip(t);
-    if (t->normalise) /* what is behind comes after that */
-        memset(t->drawn_settings.background, 0, sizeof t->drawn_settings.background);
+    if (t->normalise) /* what is behind comes after that, but what is far fades into its colour */
+        t->drawn_settings.background[3] = 0;
 }
 
 /* The plan of a frame by the integral renderer: what its field is made of. */
