@@ -47,6 +47,7 @@ void trip_rounding_check(const session *s, const trip_settings *settings)
               "what is less than %.2g: %s",
               by_sheets ? "sheets" : "splats", opacity, names[settings->target],
               trip_rounding_least(settings->target),
-              !by_sheets ? "--compositing sheet rounds once a sheet"
-                         : "--target rgba32f loses less");
+              !by_sheets                                ? "--compositing sheet rounds once a sheet"
+              : settings->target != TRIP_TARGET_RGBA32F ? "--target rgba32f loses less"
+                                                        : "--renderer reference rounds nothing");
 }
