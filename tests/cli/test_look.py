@@ -57,6 +57,8 @@ class Look(program.ProgramTest):
                 ("thin", ["--target", "rgba8", "--compositing", "sheet"], "--target rgba32f"),
                 ("thin", ["--target", "rgba32f"], ""),
                 ("thin", ["--classify", "pre", "--opacity-scale", "1e-4"], "layers of rgba32f"),
+                ("thin", ["--target", "rgba16f", "--compositing", "sheet"], "--target rgba32f"),
+                ("thin", ["--compositing", "sheet", "--opacity-scale", "1e-4"], "reference rounds nothing"),
                 ("thin", ["--opacity-scale", "1e-4"], ""), # post
                 ("thick", ["--target", "rgba16f"], ""),
                 ("peak", [], "a peak at 100.0015 that is narrower than")):
@@ -64,6 +66,17 @@ class Look(program.ProgramTest):
                              "--tf", tf + ".tf", "--orbit", "2", *options)
             self.assertEqual(run.stderr.count("warning: ball.trip: "), says != "", run.stderr)
             self.assertIn(says, run.stderr)
+
+    def test_normalised_colours_are_divided_by_their_opacity(self):
+        view = ["--size=32x32", "--renderer", "cpu", "--tf", "viridis", "--opacity-scale", "0.2"]
+        plain = self.picture("ball.trip", *view, "--background", "none").astype(float)
+        drawn = self.picture("ball.trip", *view, "--background", "1,0,0", "--normalise")
+        covered, free = plain[..., 3] > 0.01, plain[..., 3] == 0
+        self.assertTrue(covered.sum() > 100 and free.sum() > 100)
+        means = plain[covered][:, :3] / plain[covered][:, 3:]
+        self.assertLess(abs(drawn[covered][:, :3] - means).max(), 1e-3)
+        self.assertTrue((drawn[..., 3] == 1).all())
+        self.assertLess(abs(drawn[free][:, :3] - (1, 0, 0)).max(), 1e-3)
 
     def test_opacity_scale_multiplies_extinction(self):
         view = ["--eye=9.5,-60,9.5", "--look=9.5,9.5,9.5", "--ortho=24", "--size=32x32"]
