@@ -276,7 +276,8 @@ class Orientation(program.ProgramTest):
             self.check_default_view(source)
 
     def test_axes_that_are_given_are_as_if_the_file_had_said_so(self):
-        for name, letters in ("axial", "LPS"), ("coronal", "LIP"), ("sagittal", "PIR"), ("mirrored", "RPS"):
+        given = {"axial": "LPS", "coronal": "LIP", "sagittal": "PIR", "mirrored": "RPS"}
+        for name, letters in given.items():
             affine, values = acquisition(*ACQUISITIONS[name][:3])
             affine[:3, 3] = 0  # as of a file that says nothing
             program.write_nrrd("said.nrrd", values, geometry=nrrd_geometry("LPS", affine))
@@ -300,9 +301,10 @@ class Orientation(program.ProgramTest):
         for axes, source in ("PIR", "said.nrrd"), ("LIP", "said.nii"), ("LPS", "slices"):
             command = "brick", source, "-o", "b.trip", "-q", "--axes", axes
             self.fails(2, *command, says="says itself how it lies in the patient")
-        program.write_nrrd("turned.nrrd", slices, geometry="space dimension: 3\n"
-                           "space directions: (0,1,0) (1,0,0) (0,0,1)")
-        self.fails(2, "brick", "turned.nrrd", "-o", "b.trip", "--axes", "PIR", says="directions of their own")
+        turned = "space dimension: 3\nspace directions: (0,1,0) (1,0,0) (0,0,1)"
+        program.write_nrrd("turned.nrrd", slices, geometry=turned)
+        command = "brick", "turned.nrrd", "-o", "b.trip", "--axes", "PIR"
+        self.fails(2, *command, says="directions of their own")
 
     def test_axes_are_part_of_what_is_drawn_at_once(self):
         """And of what the cache knows a data set by."""

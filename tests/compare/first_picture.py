@@ -69,6 +69,18 @@ def write_pages(path, values):
             f.write(image.tobytes())
 
 
+def write_netcdf(path, values):
+    """Of the classic form: three dimensions and a variable of floats, without attributes."""
+    name = lambda text: struct.pack(">I", len(text)) + text + b"\0" * (-len(text) % 4)
+    sizes = zip((b"z", b"y", b"x"), values.shape)
+    dims = b"".join(name(axis) + struct.pack(">I", size) for axis, size in sizes)
+    head = b"CDF\1" + struct.pack(">3I", 0, 10, 3) + dims
+    head += struct.pack(">4I", 0, 0, 11, 1) + name(b"values")
+    head += struct.pack(">6I", 3, 0, 1, 2, 0, 0)
+    head += struct.pack(">3I", 5, 4 * values.size, len(head) + 12)
+    program.write(path, head + values.astype(">f4").tobytes())
+
+
 def write_detached(values, raw):
     """Headers beside their data: a file, packed or not, a file a slice, and NIfTI's pair."""
     z, y, x = values.shape
@@ -125,10 +137,13 @@ def write_forms(values):
     for k, image in enumerate(values):
         program.write_dicom(f"dicom/{k:04d}.dcm", image.astype(numpy.uint16), k)
     stacks = [(name, name.split()[0].lower()) for name in ("TIFF stack", "PNG stack", "EXR stack")]
+    write_netcdf("plain.nc", values)
     write_pages("pages.tif", values)
     places = [(0, 0, k) for k in range(z)]
-    program.write_dicom("frames.dcm", values.astype(numpy.uint16), 0, (1, 1, 1), places[0], frames=places)
+    frames = values.astype(numpy.uint16)
+    program.write_dicom("frames.dcm", frames, 0, (1, 1, 1), places[0], frames=places)
     pages = ("TIFF of pages", "pages.tif")
+    forms.append(("netCDF", "plain.nc"))
     return forms + stacks + [pages, ("DICOM series", "dicom"), ("DICOM of frames", "frames.dcm")]
 
 
