@@ -4,7 +4,7 @@
 
 #include "report.h"
 
-/* Cells as small as bricks of level 0 usually are, larger where there would be too many, or where
+/* Cubes as small as bricks of level 0 usually are, larger where there would be too many, or where
  * what is in them counts: then the largest tiles do not reach over them. */
 enum { CELL_LOG2 = 6, LIMITED_CELL_LOG2 = 7, MOST_CELLS = 1 << 22 };
 
@@ -25,19 +25,19 @@ static unsigned count_levels(const trip_dataset *data)
     return level;
 }
 
-static void choose_cells(trip_lod *lod, const trip_dataset *data, int least_log2)
+static void choose_cubes(trip_lod *lod, const trip_dataset *data, int least_log2)
 {
-    double cells;
-    lod->cell_log2 = (int)lod->levels > least_log2 ? (int)lod->levels : least_log2;
-    lod->cell_log2--;
+    double cubes;
+    lod->cube_log2 = (int)lod->levels > least_log2 ? (int)lod->levels : least_log2;
+    lod->cube_log2--;
     do {
-        lod->cell_log2++;
-        cells = 1;
+        lod->cube_log2++;
+        cubes = 1;
         for (int a = 0; a < 3; a++) {
-            lod->cells[a] = (((int64_t)data->header.dims[a] - 1) >> lod->cell_log2) + 1;
-            cells *= (double)lod->cells[a];
+            lod->cubes[a] = (((int64_t)data->header.dims[a] - 1) >> lod->cube_log2) + 1;
+            cubes *= (double)lod->cubes[a];
         }
-    } while (cells > MOST_CELLS);
+    } while (cubes > MOST_CELLS);
 }
 
 double trip_lod_width_px(const trip_camera *camera, double depth)
@@ -71,13 +71,13 @@ static double width_in(const trip_camera *camera, const int64_t first[3], const 
     return camera->ortho || depth > 0 ? trip_lod_width_px(camera, depth) : HUGE_VAL;
 }
 
-double trip_lod_cell_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
-                           const int64_t cell[3])
+double trip_lod_cube_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                           const int64_t cube[3])
 {
     int64_t first[3], past[3];
     for (int a = 0; a < 3; a++) {
-        first[a] = cell[a] << lod->cell_log2;
-        past[a] = (cell[a] + 1) << lod->cell_log2;
+        first[a] = cube[a] << lod->cube_log2;
+        past[a] = (cube[a] + 1) << lod->cube_log2;
         past[a] = past[a] < (int64_t)data->header.dims[a] ? past[a] : (int64_t)data->header.dims[a];
     }
     return width_in(camera, first, past);
@@ -87,11 +87,11 @@ static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_came
                         double px)
 {
     uint8_t *to = lod->level;
-    int64_t cell[3];
-    for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
-        for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
-            for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++) {
-                double width = trip_lod_cell_width(lod, data, camera, cell);
+    int64_t cube[3];
+    for (cube[2] = 0; cube[2] < lod->cubes[2]; cube[2]++)
+        for (cube[1] = 0; cube[1] < lod->cubes[1]; cube[1]++)
+            for (cube[0] = 0; cube[0] < lod->cubes[0]; cube[0]++) {
+                double width = trip_lod_cube_width(lod, data, camera, cube);
                 *to++ = (uint8_t)trip_lod_level(width, px, lod->levels);
             }
 }
@@ -102,12 +102,12 @@ int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *ca
     *lod = (trip_lod){ .levels = trip_settings_has_levels(settings) ? count_levels(data) : 0 };
     if (lod->levels == 0)
         return 0;
-    choose_cells(lod, data, settings->max_bytes > 0 ? LIMITED_CELL_LOG2 : CELL_LOG2);
-    lod->bytes = (size_t)(lod->cells[0] * lod->cells[1] * lod->cells[2]);
+    choose_cubes(lod, data, settings->max_bytes > 0 ? LIMITED_CELL_LOG2 : CELL_LOG2);
+    lod->bytes = (size_t)(lod->cubes[0] * lod->cubes[1] * lod->cubes[2]);
     lod->level = trip_budget_take(budget, lod->bytes);
     if (!lod->level)
         return trip_fail(TRIP_ERROR, "render", "levels",
-                         "%zu cells do not fit the memory given; raise --memory", lod->bytes);
+                         "%zu cubes do not fit the memory given; raise --memory", lod->bytes);
     fill_levels(lod, data, camera, settings->lod_px * settings->samples);
     int status = settings->max_bytes > 0 ? trip_lod_bound(lod, data, camera, settings, budget) : 0;
     if (status)
@@ -125,7 +125,7 @@ void trip_lod_release(trip_lod *lod, trip_budget *budget)
 uint64_t trip_lod_square(const trip_lod *lod, const trip_list *list, int64_t sheet, int64_t u,
                          int64_t v)
 {
-    const int shift = lod->cell_log2 - (int)list->level;
+    const int shift = lod->cube_log2 - (int)list->level;
     const int64_t u_end = list->dims[(list->axis + 1) % 3],
                   v_end = list->dims[(list->axis + 2) % 3];
     uint64_t mask = 0;
@@ -143,21 +143,21 @@ uint64_t trip_lod_square(const trip_lod *lod, const trip_list *list, int64_t she
 bool trip_lod_brick(const trip_lod *lod, const trip_list *list, const trip_file_header *header,
                     const trip_file_brick *brick, int64_t slab)
 {
-    const int shift = lod->cell_log2 - (int)list->level, axis = list->axis;
+    const int shift = lod->cube_log2 - (int)list->level, axis = list->axis;
     const int64_t sheet = slab * header->slab_sheets;
     const int64_t u = (int64_t)brick->tile_u << header->tile_log2;
     const int64_t v = (int64_t)brick->tile_v << header->tile_log2;
-    int64_t lo[3], hi[3], cell[3];
+    int64_t lo[3], hi[3], cube[3];
     lo[axis] = (sheet + brick->sheet_min) >> shift;
     hi[axis] = (sheet + brick->sheet_max) >> shift;
     lo[(axis + 1) % 3] = (u + brick->u_min) >> shift;
     hi[(axis + 1) % 3] = (u + brick->u_max) >> shift;
     lo[(axis + 2) % 3] = (v + brick->v_min) >> shift;
     hi[(axis + 2) % 3] = (v + brick->v_max) >> shift;
-    for (cell[2] = lo[2]; cell[2] <= hi[2]; cell[2]++)
-        for (cell[1] = lo[1]; cell[1] <= hi[1]; cell[1]++)
-            for (cell[0] = lo[0]; cell[0] <= hi[0]; cell[0]++)
-                if (trip_lod_at(lod, cell) == list->level)
+    for (cube[2] = lo[2]; cube[2] <= hi[2]; cube[2]++)
+        for (cube[1] = lo[1]; cube[1] <= hi[1]; cube[1]++)
+            for (cube[0] = lo[0]; cube[0] <= hi[0]; cube[0]++)
+                if (trip_lod_at(lod, cube) == list->level)
                     return true;
     return false;
 }

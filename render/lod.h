@@ -1,11 +1,11 @@
-/* Which level of detail each cell of a frame is drawn at. A cell is an aligned cube of voxels of
- * the grid, of a size that depends on the grid alone; its level follows from the cell, the view and
+/* Which level of detail each cube of a frame is drawn at. A cube is an aligned one of voxels of
+ * the grid, of a size that depends on the grid alone; its level follows from the cube, the view and
  * the settings, so never from bricks, tiles or memory. A voxel of a level covers voxels of one
- * cell, and is drawn where that cell has its level: so each place is drawn at one level, once.
+ * cube, and is drawn where that cube has its level: so each place is drawn at one level, once.
  *
- * Without a bound on bytes (lod_limit.h) a cell has the coarsest level whose voxels are at most
- * lod_px pixels wide where the cell comes nearest to the eye, all along the grid's longest step;
- * cells about the eye have level 0. Read-only once made. */
+ * Without a bound on bytes (lod_limit.h) a cube has the coarsest level whose voxels are at most
+ * lod_px pixels wide where the cube comes nearest to the eye, all along the grid's longest step;
+ * cubes about the eye have level 0. Read-only once made. */
 #ifndef TRIP_LOD_H
 #define TRIP_LOD_H
 
@@ -24,9 +24,9 @@ typedef struct trip_lod_limit {
 
 typedef struct trip_lod {
     unsigned levels;  /* that may be chosen: the data set has them all */
-    int cell_log2;    /* voxels of level 0 along a cell's edge */
-    int64_t cells[3]; /* along i, j, k */
-    uint8_t *level;   /* of a cell, i fastest; NULL: level 0 everywhere */
+    int cube_log2;    /* voxels of level 0 along a cube's edge */
+    int64_t cubes[3]; /* along i, j, k */
+    uint8_t *level;   /* of a cube, i fastest; NULL: level 0 everywhere */
     size_t bytes;     /* of those, from the budget */
     trip_lod_limit limit;
 } trip_lod;
@@ -37,10 +37,10 @@ int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *ca
                   const trip_settings *settings, trip_budget *budget);
 void trip_lod_release(trip_lod *lod, trip_budget *budget);
 
-/* How wide voxels of level 0 are where a cell comes nearest to the eye; cells about the eye:
+/* How wide voxels of level 0 are where a cube comes nearest to the eye; cubes about the eye:
  * HUGE_VAL. */
-double trip_lod_cell_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
-                           const int64_t cell[3]);
+double trip_lod_cube_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                           const int64_t cube[3]);
 
 /* The level of all of the grid where a frame has one alone, as those that classify after
  * interpolation do: the finest of its places' levels, at most `most`. */
@@ -67,21 +67,21 @@ unsigned trip_lod_level(double width_px, double px, unsigned levels);
  */
 double trip_lod_width_px(const trip_camera *camera, double depth);
 
-static inline unsigned trip_lod_at(const trip_lod *lod, const int64_t cell[3])
+static inline unsigned trip_lod_at(const trip_lod *lod, const int64_t cube[3])
 {
-    return lod->level[(cell[2] * lod->cells[1] + cell[1]) * lod->cells[0] + cell[0]];
+    return lod->level[(cube[2] * lod->cubes[1] + cube[1]) * lod->cubes[0] + cube[0]];
 }
 
 /* Whether the voxel of a list at sheet, u and v is drawn. */
 static inline bool trip_lod_has(const trip_lod *lod, const trip_list *list, int64_t sheet,
                                 int64_t u, int64_t v)
 {
-    const int shift = lod->cell_log2 - (int)list->level;
-    int64_t cell[3];
-    cell[list->axis] = sheet >> shift;
-    cell[(list->axis + 1) % 3] = u >> shift;
-    cell[(list->axis + 2) % 3] = v >> shift;
-    return trip_lod_at(lod, cell) == list->level;
+    const int shift = lod->cube_log2 - (int)list->level;
+    int64_t cube[3];
+    cube[list->axis] = sheet >> shift;
+    cube[(list->axis + 1) % 3] = u >> shift;
+    cube[(list->axis + 2) % 3] = v >> shift;
+    return trip_lod_at(lod, cube) == list->level;
 }
 
 /* Of the 8 x 8 square of a list's sheet with its corner at u and v, which voxels are drawn: a bit

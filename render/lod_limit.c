@@ -5,14 +5,14 @@
 #include "report.h"
 #include "weight.h"
 
-/* Cells about the eye count as if they began so far from it, so that they too can be coarser. */
+/* Cubes about the eye count as if they began so far from it, so that they too can be coarser. */
 #define NEAREST_CELLS 0.25
 
-/* What the levels are chosen from; a cell's numbers are in the order of trip_lod.level. */
+/* What the levels are chosen from; a cube's numbers are in the order of trip_lod.level. */
 typedef struct limiting {
     trip_lod *lod;
     const trip_dataset *data;
-    uint32_t *voxels; /* of level 0 in the cell; 0 where it is out of view */
+    uint32_t *voxels; /* of level 0 in the cube; 0 where it is out of view */
     float *width;     /* px, of those voxels */
     double bytes[32]; /* of a voxel of level 0, drawn at a level, in all lists that are read */
 } limiting;
@@ -45,16 +45,16 @@ static void weigh_levels(limiting *l, const trip_camera *camera, const trip_sett
     }
 }
 
-static uint32_t *cell_at(const limiting *l, const double place[3])
+static uint32_t *cube_at(const limiting *l, const double place[3])
 {
     const trip_lod *lod = l->lod;
-    int64_t cell[3];
+    int64_t cube[3];
     for (int a = 0; a < 3; a++)
-        cell[a] = (int64_t)place[a] >> lod->cell_log2;
-    return &l->voxels[(cell[2] * lod->cells[1] + cell[1]) * lod->cells[0] + cell[0]];
+        cube[a] = (int64_t)place[a] >> lod->cube_log2;
+    return &l->voxels[(cube[2] * lod->cubes[1] + cube[1]) * lod->cubes[0] + cube[0]];
 }
 
-/* Tiles lie in cells; slabs need not, sheets do. */
+/* Tiles lie in cubes; slabs need not, sheets do. */
 static void count_voxels(limiting *l)
 {
     const trip_list *list = trip_dataset_find(l->data, 2, 0, TRIP_KIND_VOXELS);
@@ -67,53 +67,53 @@ static void count_voxels(limiting *l)
                 const double place[3] = { (double)brick->tile_u * (1u << h->tile_log2),
                                           (double)brick->tile_v * (1u << h->tile_log2),
                                           (double)slab->slab * h->slab_sheets + i };
-                *cell_at(l, place) += list->runs[b * h->slab_sheets + i].records;
+                *cube_at(l, place) += list->runs[b * h->slab_sheets + i].records;
             }
         }
     }
 }
 
-/* Widths of the voxels of a cell in view; cells out of view have no voxels. */
-static void place_cell(limiting *l, const trip_cull *cull, const int64_t cell[3], size_t at)
+/* Widths of the voxels of a cube in view; cubes out of view have no voxels. */
+static void place_cube(limiting *l, const trip_cull *cull, const int64_t cube[3], size_t at)
 {
     const trip_lod *lod = l->lod;
-    const double edge = ldexp(1, lod->cell_log2);
+    const double edge = ldexp(1, lod->cube_log2);
     double lo[3], hi[3];
     for (int a = 0; a < 3; a++) {
-        lo[a] = (double)cell[a] * edge - 0.5;
-        hi[a] = fmin((double)(cell[a] + 1) * edge, (double)l->data->header.dims[a]) - 0.5;
+        lo[a] = (double)cube[a] * edge - 0.5;
+        hi[a] = fmin((double)(cube[a] + 1) * edge, (double)l->data->header.dims[a]) - 0.5;
     }
     if (!trip_cull_may_see(cull, lo, hi))
         l->voxels[at] = 0;
     const double nearest = trip_lod_width_px(cull->camera, NEAREST_CELLS * edge);
-    const double width = trip_lod_cell_width(lod, l->data, cull->camera, cell);
+    const double width = trip_lod_cube_width(lod, l->data, cull->camera, cube);
     l->width[at] = (float)(width < nearest || cull->camera->ortho ? width : nearest);
 }
 
-static int place_cells(limiting *l, const trip_camera *camera, const trip_settings *settings)
+static int place_cubes(limiting *l, const trip_camera *camera, const trip_settings *settings)
 {
     const trip_lod *lod = l->lod;
     const trip_list *list = trip_dataset_find(l->data, 2, 0, TRIP_KIND_VOXELS);
     trip_list_grid grid;
-    int64_t cell[3];
+    int64_t cube[3];
     size_t at = 0;
     int status = trip_list_grid_make(&grid, l->data, list);
     if (status)
         return status;
     const trip_cull cull = trip_cull_make(l->data, camera, &grid, settings,
                                           trip_weight_axis_of_view(camera), NULL, NULL);
-    for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
-        for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
-            for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++)
-                place_cell(l, &cull, cell, at++);
+    for (cube[2] = 0; cube[2] < lod->cubes[2]; cube[2]++)
+        for (cube[1] = 0; cube[1] < lod->cubes[1]; cube[1]++)
+            for (cube[0] = 0; cube[0] < lod->cubes[0]; cube[0]++)
+                place_cube(l, &cull, cube, at++);
     return 0;
 }
 
-/* The level of a cell where voxels may be so wide. */
-static unsigned level_at(const limiting *l, size_t cell, double px)
+/* The level of a cube where voxels may be so wide. */
+static unsigned level_at(const limiting *l, size_t cube, double px)
 {
-    const unsigned level = trip_lod_level((double)l->width[cell], px, l->lod->levels);
-    return level > l->lod->level[cell] ? level : l->lod->level[cell];
+    const unsigned level = trip_lod_level((double)l->width[cube], px, l->lod->levels);
+    return level > l->lod->level[cube] ? level : l->lod->level[cube];
 }
 
 static double bytes_at(const limiting *l, double px)
@@ -159,25 +159,25 @@ static void choose(limiting *l, double most_bytes)
 int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, trip_budget *budget)
 {
-    const size_t cells = lod->bytes;
+    const size_t cubes = lod->bytes;
     limiting l = { .lod = lod, .data = data };
-    l.voxels = trip_budget_take(budget, cells * sizeof *l.voxels);
-    l.width = trip_budget_take(budget, cells * sizeof *l.width);
+    l.voxels = trip_budget_take(budget, cubes * sizeof *l.voxels);
+    l.width = trip_budget_take(budget, cubes * sizeof *l.width);
     int status = l.voxels && l.width
                      ? 0
                      : trip_fail(TRIP_ERROR, "render", "levels",
-                                 "%zu cells do not fit the memory given; raise --memory", cells);
+                                 "%zu cubes do not fit the memory given; raise --memory", cubes);
     if (!status) {
         count_voxels(&l);
         weigh_levels(&l, camera, settings);
-        status = place_cells(&l, camera, settings);
+        status = place_cubes(&l, camera, settings);
     }
     if (!status)
         choose(&l, settings->max_bytes);
     if (l.voxels)
-        trip_budget_release(budget, l.voxels, cells * sizeof *l.voxels);
+        trip_budget_release(budget, l.voxels, cubes * sizeof *l.voxels);
     if (l.width)
-        trip_budget_release(budget, l.width, cells * sizeof *l.width);
+        trip_budget_release(budget, l.width, cubes * sizeof *l.width);
     return status;
 }
 

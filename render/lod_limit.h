@@ -1,6 +1,6 @@
-/* Levels of cells under a bound on bytes: as if settings.lod_px were larger, by no more than it
+/* Levels of cubes under a bound on bytes: as if settings.lod_px were larger, by no more than it
  * takes. What is widest in the picture is so drawn finest. Bytes are those of codes and normals in
- * cells in view, by the number of voxels of level 0 in a cell and what share of these the lists of
+ * cubes in view, by the number of voxels of level 0 in a cube and what share of these the lists of
  * a level have; in all lists that some ray of the view has weight in. None of that depends on
  * tiles, slabs or what was read before, so neither does the picture. Pure functions. */
 #ifndef TRIP_LOD_LIMIT_H
@@ -9,7 +9,7 @@
 #include "lod.h"
 
 /* Raises levels until settings->max_bytes suffice, or all are the coarsest, and fills lod->limit.
- * Cells are at least as large as tiles. TRIP_ERROR without memory. */
+ * Cubes are at least as large as tiles. TRIP_ERROR without memory. */
 int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, trip_budget *budget);
 

@@ -566,8 +566,8 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
         fprintf(out, "levels      %s: level %u for all of the grid: %s%s\n",
                 plan->level ? "run" : "do not run", plan->level, chosen, bound);
     else if (plan->lod.level)
-        fprintf(out, "levels      run: cells of %d voxels a side, each at one of %u levels: %s%s\n",
-                1 << plan->lod.cell_log2, plan->lod.levels + 1, chosen, bound);
+        fprintf(out, "levels      run: cubes of %d voxels a side, each at one of %u levels: %s%s\n",
+                1 << plan->lod.cube_log2, plan->lod.levels + 1, chosen, bound);
     else
         fprintf(out, "levels      do not run: the data set has none\n");
 }

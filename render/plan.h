@@ -79,7 +79,7 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
 bool trip_plan_halo_is_short(const trip_dataset *data, const trip_settings *settings);
 
 /* Of the 8 x 8 square of a list's sheet with its corner at u and v, which voxels are splatted: not
- * those of cells that another level is drawn in, nor those that are cut away. A bit each by Morton
+ * those of cubes that another level is drawn in, nor those that are cut away. A bit each by Morton
  * number, as in a block. */
 uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t sheet, int64_t u,
                           int64_t v);

@@ -122,7 +122,7 @@ typedef struct trip_settings {
     double h;                  /* 0 <= h < 1 */
     double kernel_radius;      /* voxels (index space) */
     double background[4];      /* r, g, b, a; not premultiplied */
-    double lod_px;             /* cells are drawn at the coarsest level whose voxels are at most so
+    double lod_px;             /* cubes are drawn at the coarsest level whose voxels are at most so
                                   many pixels of the picture wide (lod.h); 0: all at the finest */
     double max_bytes;          /* and at coarser ones still, so that no more is read (lod_limit.h);
                                   0: no bound */

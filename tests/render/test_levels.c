@@ -9,7 +9,7 @@
 #include "visible.h"
 #include "weight.h"
 
-/* Data sets of two levels. Most are one object in cells of 4 x 4 x 4 voxels of level 0, every other
+/* Data sets of two levels. Most are one object in cubes of 4 x 4 x 4 voxels of level 0, every other
  * one drawn by its voxels, the rest by those of level 1, so that the levels alternate along every
  * ray and each hides much of the other. */
 

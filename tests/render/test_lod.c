@@ -301,16 +301,16 @@ static void tables_of_means_have_their_opacity(void **state)
 static double bytes_of(const trip_lod *lod, const scene *s, int lists)
 {
     double bytes = 0;
-    int64_t cell[3];
-    for (cell[2] = 0; cell[2] < lod->cells[2]; cell[2]++)
-        for (cell[1] = 0; cell[1] < lod->cells[1]; cell[1]++)
-            for (cell[0] = 0; cell[0] < lod->cells[0]; cell[0]++) {
+    int64_t cube[3];
+    for (cube[2] = 0; cube[2] < lod->cubes[2]; cube[2]++)
+        for (cube[1] = 0; cube[1] < lod->cubes[1]; cube[1]++)
+            for (cube[0] = 0; cube[0] < lod->cubes[0]; cube[0]++) {
                 double voxels = 1;
                 for (int a = 0; a < 3; a++)
                     voxels *=
-                        fmin(ldexp(1, lod->cell_log2), (double)s->data->header.dims[a] -
-                                                           ldexp((double)cell[a], lod->cell_log2));
-                bytes += lists * 2 * ldexp(voxels, -3 * (int)trip_lod_at(lod, cell));
+                        fmin(ldexp(1, lod->cube_log2), (double)s->data->header.dims[a] -
+                                                           ldexp((double)cube[a], lod->cube_log2));
+                bytes += lists * 2 * ldexp(voxels, -3 * (int)trip_lod_at(lod, cube));
             }
     return bytes;
 }
@@ -338,8 +338,8 @@ static void bounds_are_kept_and_what_is_nearest_is_finest(void **state)
     assert_int_equal(s.data->header.code_bytes, 2);
     for (double part = 2; part > 1.0 / 512; part /= 1.5) {
         trip_lod lod = bounded(&s, part * full);
-        const int64_t far_cell[3] = { 0, 0, 0 }, near_cell[3] = { 1, 0, 0 };
-        const unsigned farther = trip_lod_at(&lod, far_cell), nearer = trip_lod_at(&lod, near_cell);
+        const int64_t far_cube[3] = { 0, 0, 0 }, near_cube[3] = { 1, 0, 0 };
+        const unsigned farther = trip_lod_at(&lod, far_cube), nearer = trip_lod_at(&lod, near_cube);
         const double bytes = bytes_of(&lod, &s, 1);
         assert_float_equal(lod.limit.bytes, bytes, 1e-6 * full);
         assert_float_equal(lod.limit.full_bytes, full, 1e-6 * full);
