@@ -283,7 +283,12 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
     if (uneven && trip_effects_some(&s->effects) && !frame->plan->gathers)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects in grids with uneven spacing; the integral does");
-    if (trip_effects_some(&s->effects) && !(renderer->ops->effects >> s->classify & 1))
+    const bool all = renderer->ops->effects >> s->classify & 1;
+    if (trip_effects_light(&s->effects) && !all)
+        return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
+                         "draws no shadows and no occlusion; choose another renderer, or --effects "
+                         "none");
+    if (s->effects.cueing > 0 && !all && !renderer->ops->cueing)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects; choose another renderer, or none: --effects none");
     return frame->plan->gathers ? 0 : check_forms(s, renderer);

@@ -74,6 +74,7 @@ typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
     bool classifies_post; /* draws frames whose settings say so (sheet.h) */
     unsigned effects;     /* draws frames with effects: a bit per trip_classify */
+    bool cueing;          /* or at least with depth cueing */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
     unsigned uneven;      /* draws grids with uneven spacing: a bit per trip_classify */
     void (*destroy)(trip_renderer *r);

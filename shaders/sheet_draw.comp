@@ -246,6 +246,9 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
 #ifdef SHADED
     colour = lit_between(colour, r, gradient_at(a, from) + gradient_at(b, to));
 #endif
+#ifdef CUED
+    colour = cued(colour, mix(start, end, 0.5 * (first + last)) * depth.x);
+#endif
     float through = 1.0 - pixel.a, add = opacity(means.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);
     pixel_depth += mix(start, end, 0.5 * (first + last)) * add;

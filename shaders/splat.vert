@@ -102,6 +102,9 @@ void main()
 #ifdef SHADED
     entry.rgb = shade(entry.rgb, r.normal, r.from_eye);
 #endif
+#ifdef CUED
+    entry.rgb = cued(entry.rgb, r.place.z * depth.x);
+#endif
     colour = vec4(entry.rgb, entry.a * s.amplitude);
 #ifdef DEPTH
     centre_depth = max(r.place.z, 0.0) * depth.x;

@@ -25,7 +25,8 @@ enum trip_gl_effect {
     TRIP_GL_FLATTENED = 4096, /* kernels, along their gradients */
     TRIP_GL_WIDE = 8192,      /* values are interpolated from 64 voxels (render/kernel.h) */
     TRIP_GL_FIXED = 16384,    /* footprints of one size; AFFINE, too, in perspective */
-    TRIP_GL_EFFECT_SETS = 32768,
+    TRIP_GL_CUED = 32768,     /* colours fade into the background with depth (render/effects.h) */
+    TRIP_GL_EFFECT_SETS = 65536,
 };
 
 /* Of a list that the plan draws. */

@@ -613,6 +613,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops gl_ops = {
     .name = "gl",
     .classifies_post = true,
+    .cueing = true,
     .forms = TRIP_DRAWS_FIXED,
     .destroy = destroy,
     .device = device,

@@ -81,6 +81,7 @@
                       the ray at the image's centre; y: world units a voxel of level 0 */              \
     R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                     \
     R4 background; /* r, g, b, a; not premultiplied */                                                 \
+    R4 cue;  /* what fades into the background: x of a layer's depth and y, in [0, 1], times z */      \
     R4 tint;       /* rgb: of all that is drawn, before it is lit, where w is not 0 */
 
 /* Constants of a pass over the sheets of a list (render/sheet.h). Linear functions of a pixel are

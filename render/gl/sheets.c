@@ -25,7 +25,8 @@ static unsigned effects_of(const trip_frame *frame)
     const trip_settings *s = frame->settings;
     return (s->kernel != TRIP_KERNEL_LINEAR ? TRIP_GL_WIDE : 0) |
            (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
-           (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0);
+           (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
+           (s->effects.cueing > 0 ? TRIP_GL_CUED : 0);
 }
 
 static void forget(trip_gl_sheets *s)

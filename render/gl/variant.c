@@ -27,7 +27,7 @@ static const struct {
     [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", 0, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
-                                      TRIP_GL_DEPTH | TRIP_GL_WIDE,
+                                      TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED,
                                   false },
 };
 
@@ -44,7 +44,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_DEPTH, "DEPTH" },         { TRIP_GL_NEAR, "NEAR" },
         { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
         { TRIP_GL_FLATTENED, "FLATTENED" }, { TRIP_GL_WIDE, "WIDE" },
-        { TRIP_GL_FIXED, "FIXED" },
+        { TRIP_GL_FIXED, "FIXED" },         { TRIP_GL_CUED, "CUED" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)

@@ -270,6 +270,38 @@ static void every_renderer_draws_them_alike(void **state)
     scene_destroy(&s);
 }
 
+/* Without light's lattices, gl too; from afar, near, and in parallel. */
+static void every_renderer_fades_with_depth(void **state)
+{
+    (void)state;
+    scene s;
+    create_ball(&s, 0.6, &sheared);
+    for (int n = 0; n < 8; n++) {
+        trip_camera_params view =
+            scene_view(&s, trip_v3(0.4, -1, 0.5), n < 4 ? 60 : 25, 50 + 5 * n, 24);
+        view.ortho_height = n == 2 || n == 5 ? 50 : 0;
+        trip_settings settings = trip_settings_default();
+        settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+        settings.shading = n & 2;
+        settings.depth = n == 3;
+        settings.background[0] = 0.7;
+        settings.background[1] = 0.4;
+        scene_picture plain = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+        settings.effects.cueing = 0.8;
+        scene_picture expected = scene_draw(&s, &scene_renderers()[0], &view, &settings);
+        assert_true(scene_difference(&expected, &plain) > 0.05);
+        scene_turn turn = scene_turns(scene_renderers() + 1, &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            double apart = scene_difference(&turn.picture, &expected);
+            if (!(apart <= turn.renderer->tolerance))
+                fail_msg("%s, %d: %g apart", turn.renderer->name, n, apart);
+        }
+        scene_picture_free(&plain);
+        scene_picture_free(&expected);
+    }
+    scene_destroy(&s);
+}
+
 static int create_single(trip_renderer **out, trip_budget *budget)
 {
     return trip_cpu_create(out, budget, 1);
@@ -523,6 +555,7 @@ int main(void)
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
         cmocka_unit_test(openness_is_the_mean_over_directions),
         cmocka_unit_test(every_renderer_draws_them_alike),
+        cmocka_unit_test(every_renderer_fades_with_depth),
         cmocka_unit_test(threads_and_slots_change_no_bit),
         cmocka_unit_test(in_a_clear_volume_effects_change_nothing),
         cmocka_unit_test(what_is_farther_fades_into_the_background),
