@@ -35,7 +35,7 @@ static void add_qualities(sweep *w, const triptych_settings *usual)
 static void add_post(sweep *w)
 {
     static const int slices[] = { 1, 2, 3, 4, 6, 8, 16 };
-    static const double h[] = { 0, 0.5, 0.7, 0.95, 0.99 };
+    static const double h[] = { 0, 0.5, 0.7, 0.85, 0.95 };
     triptych_settings s = w->post;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post");
     for (size_t i = 0; i < sizeof slices / sizeof *slices; i++) {

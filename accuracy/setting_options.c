@@ -52,7 +52,7 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
     if (one->renderer == TRIPTYCH_RENDERER_REFERENCE && s->classify == TRIPTYCH_PRE)
         count--; /* has no target */
     put(out, &count, "method", "%s", methods[s->method]);
-    if (s->method == TRIPTYCH_MERGE)
+    if (s->method == TRIPTYCH_MERGE && s->h >= 0)
         put(out, &count, "h", "%g", s->h);
     if (s->lod_px > 0)
         put(out, &count, "lod", "%g", s->lod_px);

@@ -179,8 +179,8 @@ static const struct argp_option options[] = {
       "(default: "
       "merge)",
       3 },
-    { "h", KEY_H, "H", 0, "Where lists begin to blend, 0 to below 1 (default: 0.85); merge only",
-      3 },
+    { "h", KEY_H, "H", 0,
+      "Where lists begin to blend, 0 to below 1 (default: pre 0.85, post 0.99); merge only", 3 },
     { "weights", KEY_WEIGHTS, "pixel|vertex", 0,
       "What merge blends by: the weights of each pixel, or of the corners of splats, interpolated "
       "over them (by reference only) (default: pixel); pre only",

@@ -177,8 +177,8 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "a sheet has 1 to 16 slices, or as many as the view calls for (0)";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
         return "rounded layers have no depth; leave the target at rgba32f";
-    if (!(s->h >= 0 && s->h < 1))
-        return "h lies between 0 and below 1";
+    if (!(s->h >= 0 && s->h < 1) && s->h != TRIPTYCH_H_AUTO)
+        return "h lies between 0 and below 1, or is by the classification (-1)";
     if ((s->shading || s->effects) && !s->headlight && !(length > 0 && isfinite(length)))
         return "the direction to the light is zero or not finite";
     for (int i = 0; i < 4; i++)

@@ -111,7 +111,8 @@ typedef struct triptych_info {
     uint64_t kept;               /* of those: not what no function given to `brick` shows */
     uint64_t halo;               /* neighbours of those, for interpolation */
     uint64_t bytes, index_bytes; /* on disk: of everything, of the index */
-    uint64_t checksum; /* of the index, which has those of all else: the same data, the same number */
+    uint64_t
+        checksum; /* of the index, which has those of all else: the same data, the same number */
     unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
     double gradient_step[3], gradient_full;                   /* of normals of 3 bytes, of all */
     unsigned tile_voxels, slab_sheets, page_bytes;
@@ -280,6 +281,9 @@ enum {
     TRIPTYCH_EFFECTS_AUTO = 8, /* and those that the kind of data and the function call for */
 };
 
+/* The h that suits the classification: 0.85 of splats, 0.99 of values. */
+#define TRIPTYCH_H_AUTO (-1.0)
+
 typedef struct triptych_settings {
     triptych_classify classify;
     triptych_compositing compositing; /* pre */
@@ -299,7 +303,7 @@ typedef struct triptych_settings {
     int shading;            /* from gradients */
     int headlight;          /* light from the eye; else from light[] */
     double light[3];        /* world direction to the light, not zero */
-    double h;               /* where layers begin to blend, 0 to below 1 */
+    double h;               /* where layers begin to blend, 0 to below 1, or TRIPTYCH_H_AUTO */
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
@@ -329,8 +333,9 @@ typedef struct triptych_settings {
 } triptych_settings;
 
 /* Classified by itself, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
- * outward, rgba32f, h 0.85, kernel radius 2, shading by headlight, black; values, linear, 1e-4, one
- * ray a pixel; no effects, and where they are set scattering alike, cueing 0.6, 128 cells. */
+ * outward, rgba32f, h by the classification, kernel radius 2, shading by headlight, black; values,
+ * linear, 1e-4, one ray a pixel; no effects, and where they are set scattering alike, cueing 0.6,
+ * 128 cells. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 /* How close to the integral pictures are to be, for the time that takes; measured by `triptych
  * accuracy`, triptych-accuracy(1) has the figures. */

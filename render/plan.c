@@ -537,7 +537,7 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     case TRIP_METHOD_MERGE:
         fprintf(out,
                 "method      merge: layers of up to three lists, blended by w^2 with h = %g%s\n",
-                s->h, s->vertex_weights ? ", w from the corners of splats" : "");
+                trip_settings_h(s), s->vertex_weights ? ", w from the corners of splats" : "");
         break;
     case TRIP_METHOD_CLIP:
         fprintf(out, "method      clip: every pixel from the list its ray is most aligned with\n");

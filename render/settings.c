@@ -13,7 +13,7 @@ trip_settings trip_settings_default(void)
         .shading = true,
         .headlight = true,
         .light_direction = { 0, 0, 1 },
-        .h = 0.85,
+        .h = TRIP_H_AUTO,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
         .flatten = 1,
         .background = { 0, 0, 0, 1 },

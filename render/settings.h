@@ -119,7 +119,7 @@ typedef struct trip_settings {
     bool shading;              /* diffuse and specular from the stored gradients */
     bool headlight;            /* light from the eye; otherwise from light_direction */
     trip_vec3 light_direction; /* world space, towards the light, unit length */
-    double h;                  /* 0 <= h < 1 */
+    double h;                  /* 0 <= h < 1, or TRIP_H_AUTO: trip_settings_h() */
     double kernel_radius;      /* voxels (index space) */
     double background[4];      /* r, g, b, a; not premultiplied */
     double lod_px;             /* cubes are drawn at the coarsest level whose voxels are at most so
@@ -137,10 +137,24 @@ typedef struct trip_settings {
     trip_effects effects;
 } trip_settings;
 
+/* Where layers begin to blend, by how they are classified: of splats 0.85, as the papers have it.
+ * By post layers agree so well that a narrow border hides where they meet (`triptych bench popping
+ * --classify post`), and fewer pixels are drawn twice. */
+#define TRIP_H_AUTO (-1.0)
+#define TRIP_H_PRE 0.85
+#define TRIP_H_POST 0.99
+
 /* The defaults: pre, splat by splat, exact footprints, EWA's low-pass, 2 slices, merge, outward, h
- * 0.85, kernel radius 2, shading by headlight, rgba32f, no depth, black; values, linear, to 1e-4,
- * one ray a pixel. */
+ * by the classification, kernel radius 2, shading by headlight, rgba32f, no depth, black; values,
+ * linear, to 1e-4, one ray a pixel. */
 trip_settings trip_settings_default(void);
+
+/* The h of merge. */
+static inline double trip_settings_h(const trip_settings *s)
+{
+    const double of_class = s->classify == TRIP_CLASSIFY_POST ? TRIP_H_POST : TRIP_H_PRE;
+    return s->h >= 0 ? s->h : of_class;
+}
 
 /* Whether splats are summed sheet by sheet. */
 static inline bool trip_settings_sum_sheets(const trip_settings *s)

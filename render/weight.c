@@ -21,7 +21,8 @@ static int largest_axis(trip_vec3 r)
 
 double trip_weight_signed(const trip_settings *s, trip_vec3 ray, int axis)
 {
-    return (fabs(trip_component(ray, axis)) / largest(ray) - s->h) / (1 - s->h);
+    const double h = trip_settings_h(s);
+    return (fabs(trip_component(ray, axis)) / largest(ray) - h) / (1 - h);
 }
 
 double trip_weight(const trip_settings *s, int axis_of_view, trip_vec3 ray, int axis)

@@ -21,7 +21,7 @@ int trip_weight_axis_of_view(const trip_camera *c);
 /* The h of a method: clip weighs as merge does with h = 1. */
 static inline double trip_weight_h(const trip_settings *s)
 {
-    return s->method == TRIP_METHOD_CLIP ? 1 : s->h;
+    return s->method == TRIP_METHOD_CLIP ? 1 : trip_settings_h(s);
 }
 
 /* A bound for culling by w +- dw (2008 section 5.4), exact in the safe direction: false only when

@@ -293,7 +293,8 @@ static bool set_setting(triptych_settings *s, const char *name, const char *valu
         good = choose(value, no_yes, &which);
         s->shading = good ? which : s->shading;
     } else if (!strcmp(name, "h")) {
-        good = set_number(&s->h, value, 0, 0.999);
+        good = set_number(&s->h, value, TRIPTYCH_H_AUTO, 0.999);
+        s->h = s->h >= 0 ? s->h : TRIPTYCH_H_AUTO;
     } else {
         good = !strcmp(name, "light") && set_light(s, value);
     }

@@ -496,8 +496,12 @@ bool draw_quality(trip_panel *p, trip_document *d)
     }
     changed |= slide(p, "Level of detail", &s->lod_px, 0, 8, "%.1f px");
     changed |= choose(p, "Method", &s->method, methods, 3);
-    if (s->method == TRIPTYCH_MERGE)
-        changed |= slide(p, "h", &s->h, 0, 0.99, "%.2f");
+    if (s->method == TRIPTYCH_MERGE) {
+        const double leftmost = -0.01;
+        double h = s->h >= 0 ? s->h : leftmost;
+        changed |= slide(p, "h", &h, leftmost, 0.99, h < 0 ? "by the classification" : "%.2f");
+        s->h = h >= 0 ? h : TRIPTYCH_H_AUTO;
+    }
     changed |= mark_beside(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
     return changed;
 }

@@ -58,7 +58,7 @@ static const entry setting_entries[] = {
     { "anisotropy", SETTING(anisotropy), NUMBERS, 1, -0.95, 0.95 },
     { "cueing", SETTING(cueing), NUMBERS, 1, 1e-6, 1 },
     { "light_cells", SETTING(light_cells), WHOLE, 1, 8, 1024 },
-    { "h", SETTING(h), NUMBERS, 1, 0, 0.999999 },
+    { "h", SETTING(h), NUMBERS, 1, TRIPTYCH_H_AUTO, 0.999999 },
     { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
     { "background", SETTING(background), NUMBERS, 4, 0, 1 },
     { "lod_px", SETTING(lod_px), NUMBERS, 1, 0, 1000 },
