@@ -618,7 +618,8 @@ static void put_blobs(trip_field **field, const scene *s)
         assert_int_equal(trip_field_put(*field, (int64_t[3]){ at[0], at[1], at[2] }, code, NULL),
                          0);
     }
-    const trip_field_map map = { s->data->index_to_world, 1.0 / 65535, false };
+    const trip_field_map map = { .index_to_world = s->data->index_to_world,
+                                 .value_per_code = 1.0 / 65535 };
     assert_int_equal(trip_field_finish(*field, &map), 0);
 }
 
