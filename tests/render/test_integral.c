@@ -340,7 +340,9 @@ static void put_ball(trip_field *f, double radius)
         assert_int_equal(trip_field_put(f, at, code, NULL), 0);
     }
     assert_int_equal(
-        trip_field_finish(f, &(trip_field_map){ trip_affine_identity(), 1.0 / 65535, false }), 0);
+        trip_field_finish(f, &(trip_field_map){ .index_to_world = trip_affine_identity(),
+                                                .value_per_code = 1.0 / 65535 }),
+        0);
 }
 
 /* Normals stored in 4 bytes and in 3, and by differences of the values. */
