@@ -18,6 +18,8 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
     MEMBER(compositing);
     MEMBER(footprint);
     MEMBER(low_pass);
+    MEMBER(vertex_weights);
+    MEMBER(normalise);
     MEMBER(flatten);
     MEMBER(slices);
     MEMBER(method);

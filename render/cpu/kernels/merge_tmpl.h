@@ -63,7 +63,8 @@ INLINE vd weight_half(const trip_cpu_view *view, const trip_settings *s, int axi
     if (s->method == TRIP_METHOD_CLIP)
         return vd_select(is_largest(&r, axis), vd_set(1), vd_set(0));
     vd most = vd_max(r.r[0], vd_max(r.r[1], r.r[2]));
-    return vd_max(vd_set(0), (r.r[axis] / most - vd_set(s->h)) / vd_set(1 - s->h));
+    const double h = trip_settings_h(s);
+    return vd_max(vd_set(0), (r.r[axis] / most - vd_set(h)) / vd_set(1 - h));
 }
 
 INLINE vd_pair centres(int first, const float offsets[V])
