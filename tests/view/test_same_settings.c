@@ -81,6 +81,8 @@ static void every_member_counts(void **state)
     COUNTS(compositing);
     COUNTS(footprint);
     COUNTS(low_pass);
+    COUNTS(vertex_weights);
+    COUNTS(normalise);
     COUNTS(flatten);
     COUNTS(slices);
     COUNTS(method);
