@@ -1,7 +1,8 @@
 /* NetCDF in its classic forms (CDF-1, CDF-2 and CDF-5): a variable of three dimensions or more, the
  * last of which are k, j and i; of those before, the first place. A dimension with a variable of
  * its own name has that for coordinates. What an attribute names as fill or missing is no value.
- * Files of netCDF-4 are HDF5, and refused. */
+ * Files of netCDF-4 are HDF5, and refused. Not by libnetcdf: nc_open() of 4.9.0 writes beyond its
+ * memory and takes gigabytes for damaged files, and reads shortened ones as if they were whole. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>

@@ -88,7 +88,8 @@ class Hidden(limits.Test):
                          self.explained(data, "--no-shading", *pre)[0])
         self.assertAlmostEqual(float(said[1]), 1e-6 * normals, delta=0.01)
         # Post takes differences of values, and reads what it reads without light.
-        lit, flat = (self.stats(data, "--occluded", "draw", *more)[0]["frames"][0]
+        of_as_much = "--h", "0.85", "--occluded", "draw"
+        lit, flat = (self.stats(data, *of_as_much, *more)[0]["frames"][0]
                      for more in ((), ("--no-shading",)))
         self.assertEqual(lit["lists"], flat["lists"])
         self.assertGreaterEqual(lit["bytes_of_planes_left_out"], normals)
