@@ -18,8 +18,8 @@
 #include "volume_reader.h"
 
 enum {
-    HEADER_MOST = 1 << 24,
-    DIMS_MOST = 32, /* of a variable */
+    HEADER_MOST = 1 << 20, /* with what is made of it, some 14 MB */
+    DIMS_MOST = 32,        /* of a variable */
     TAG_DIMENSION = 10,
     TAG_VARIABLE = 11,
     TAG_ATTRIBUTE = 12,
@@ -330,9 +330,12 @@ static int read_header(header *h, int fd, const char *path)
         parse(h);
     if (!h->broken && (!h->dims || !h->variables))
         return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
-    return h->broken
-               ? trip_fail(TRIP_ERROR, "read", path, "byte %zu: its header makes no sense", h->at)
-               : 0;
+    if (!h->broken)
+        return 0;
+    const char *what = h->file_bytes > HEADER_MOST
+                           ? "its header makes no sense, or is longer than 1 MiB"
+                           : "its header makes no sense";
+    return trip_fail(TRIP_ERROR, "read", path, "byte %zu: %s", h->at, what);
 }
 
 /* ---- the volume ---- */

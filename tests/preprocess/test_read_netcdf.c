@@ -231,6 +231,28 @@ static void files_of_hdf5_are_refused(void **state)
     assert_refused(write_bytes("e.nc", "\x89HDF\r\n\x1a\n\0\0\0\0", 12), "nccopy");
 }
 
+/* 60,000 numbers, each a variable of its own. */
+static void a_header_takes_little_memory(void **state)
+{
+    (void)state;
+    enum { START = 32, EACH = 28, COUNT = 60000 };
+    static unsigned char whole[START + EACH * COUNT];
+    memcpy(whole, "CDF\1", 4);
+    whole[27] = 11; /* a list of variables */
+    whole[30] = COUNT >> 8;
+    whole[31] = COUNT & 255;
+    for (int i = 0; i < COUNT; i++) {
+        unsigned char *type = whole + START + EACH * i + 16;
+        type[3] = type[7] = 4;
+        type[11] = 100;
+    }
+    assert_refused(write_bytes("h.nc", whole, START + EACH * 100), "makes no sense");
+    assert_refused(write_bytes("h.nc", whole, sizeof whole), "longer than 1 MiB");
+    whole[30] = 0;
+    whole[31] = 100;
+    assert_refused(write_bytes("h.nc", whole, sizeof whole), "three dimensions");
+}
+
 static void any_damage_is_read_or_refused(void **state)
 {
     (void)state;
@@ -259,6 +281,7 @@ int main(void)
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),
         cmocka_unit_test(files_of_hdf5_are_refused),
+        cmocka_unit_test(a_header_takes_little_memory),
         cmocka_unit_test(any_damage_is_read_or_refused),
     };
     return cmocka_run_group_tests_name("netcdf", tests, make_folder, remove_folder);
