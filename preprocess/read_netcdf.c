@@ -3,7 +3,6 @@
  * its own name has that for coordinates. What an attribute names as fill or missing is no value.
  * Files of netCDF-4 are HDF5, and refused. Not by libnetcdf: nc_open() of 4.9.0 writes beyond its
  * memory and takes gigabytes for damaged files, and reads shortened ones as if they were whole. */
-#include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -13,6 +12,7 @@
 #include <unistd.h>
 
 #include "dense_file.h"
+#include "read_at.h"
 #include "report.h"
 #include "volume_coordinates.h"
 #include "volume_reader.h"
@@ -285,20 +285,12 @@ static void parse(header *h)
 
 static int read_at(int fd, const char *path, uint64_t offset, void *to, size_t bytes)
 {
-    unsigned char *p = to;
-    while (bytes > 0) {
-        ssize_t n = pread(fd, p, bytes, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n < 0)
-            return trip_fail_errno("read", path, "cannot read");
-        if (n == 0)
-            return trip_fail(TRIP_ERROR, "read", path, "ends early, at byte %" PRIu64, offset);
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
-    return 0;
+    const ssize_t n = trip_read_at(fd, to, bytes, bytes, offset);
+    if (n < 0)
+        return trip_fail_errno("read", path, "cannot read");
+    return (size_t)n == bytes ? 0
+                              : trip_fail(TRIP_ERROR, "read", path, "ends early, at byte %" PRIu64,
+                                          offset + (uint64_t)n);
 }
 
 static void free_header(header *h)

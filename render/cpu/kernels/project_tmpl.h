@@ -138,7 +138,8 @@ INLINE void split(vd_pair p, vf *whole, vf *part)
     *part = v_narrow(p.lo - vd_low(*whole), p.hi - vd_high(*whole));
 }
 
-/* Positions of voxels along an axis of the grid. Lanes beyond the last voxel may hold any number. */
+/* Positions of voxels along an axis of the grid. Lanes beyond the last voxel may hold any number.
+ */
 INLINE vd_pair positions(const trip_cpu_view *view, int axis, const int32_t *voxels)
 {
     if (!view->coordinates)
@@ -211,6 +212,19 @@ INLINE v3 v3_of(trip_vec3 a)
     return (v3){ v_set((float)a.x), v_set((float)a.y), v_set((float)a.z) };
 }
 
+/* The direction of one of two forms of a normal, and its length, which strong ones keep
+ * apart. */
+INLINE v3 strong_or_weak(vm is_strong, v3 strong, vf strong_length, v3 weak, vf *length)
+{
+    vf weak_length;
+    v3 direction =
+        unit_of((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
+                      v_select(is_strong, strong.z, weak.z) },
+                &weak_length);
+    *length = v_select(is_strong, strong_length, weak_length);
+    return direction;
+}
+
 /* As trip_normal_unpack(): the direction, and the length over gradient_full. */
 INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
 {
@@ -227,13 +241,7 @@ INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
     strong.y = v_select(below, v_copysign(v_set(1) - v_abs(a), b), b);
     vf root = v_fma(v_from_int(v_shift_right(normal, 24) & 127), v_set(1.0f / 32), v_set(1));
     vm is_strong = v_gt(v_set(0), v_from_int(normal));
-    vf weak_length;
-    v3 direction =
-        unit_of((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
-                      v_select(is_strong, strong.z, weak.z) },
-                &weak_length);
-    *length = v_select(is_strong, root * root * v_set(view->normal_full), weak_length);
-    return direction;
+    return strong_or_weak(is_strong, strong, root * root * v_set(view->normal_full), weak, length);
 }
 
 /* As trip_compact_normal_unpack(): the direction, and the length over gradient_full. */
@@ -249,13 +257,7 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
     vf q = v_fma(v_from_int(v_shift_right(normal, 12) & 2047), v_set(1.0f / 2047), v_set(-0.5f));
     v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) };
     vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
-    vf weak_length;
-    v3 direction =
-        unit_of((v3){ v_select(is_strong, strong.x, weak.x), v_select(is_strong, strong.y, weak.y),
-                      v_select(is_strong, strong.z, weak.z) },
-                &weak_length);
-    *length = v_select(is_strong, v_set(view->normal_full), weak_length);
-    return direction;
+    return strong_or_weak(is_strong, strong, v_set(view->normal_full), weak, length);
 }
 
 /* How kernels are flattened: trip_flattening, along the list's own axes. */
