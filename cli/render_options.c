@@ -107,7 +107,8 @@ static const struct argp_option options[] = {
     { "up", KEY_UP, "X,Y,Z", 0,
       "What is up; the sides follow it (default: 0,0,1; OpenVDB 0,1,0; where the file says "
       "nothing, "
-      "0,0,-1 for thick slices, 0,-1,0 for what is mirror-symmetric across z)",
+      "0,-1,0 for what is mirror-symmetric across z, 0,0,-1 for thick slices, else away from the "
+      "one level side)",
       1 },
     { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
     { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (default: the middle of what is visible)", 1 },

@@ -36,6 +36,20 @@ trip_vec3 trip_anatomy_direction(const char *space, char end)
     return trip_v3(v[0], v[1], v[2]);
 }
 
+bool trip_anatomy_is_scan_from_above(const trip_affine *index_to_world)
+{
+    const double(*m)[4] = index_to_world->m;
+    double least = INFINITY, most = 0;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 4; j++)
+            if (i != j && m[i][j] != 0)
+                return false;
+        least = fmin(least, m[i][i]);
+        most = fmax(most, m[i][i]);
+    }
+    return least > 0 && most >= 1.5 * least;
+}
+
 const char *trip_anatomy_end_name(char end)
 {
     switch (end) {

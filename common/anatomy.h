@@ -25,6 +25,11 @@ trip_vec3 trip_anatomy_direction(const char *space, char end);
     "three letters, where x, y and z point to: one of R and L, one of A and P, one of S and I"
 bool trip_anatomy_axes_valid(const char *axes);
 
+/* Whether a grid whose file gives no orientation is taken for a scan from the top of the head down,
+ * with the face in the first rows, as most are: its axes are those of the world, and its voxels
+ * clearly longer along one than along another. */
+bool trip_anatomy_is_scan_from_above(const trip_affine *index_to_world);
+
 /* "right", "left", "anterior", "posterior", "superior", "inferior"; "" for other letters. */
 const char *trip_anatomy_end_name(char end);
 

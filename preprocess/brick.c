@@ -16,9 +16,9 @@
 #include "folder.h"
 #include "levels.h"
 #include "list_builder.h"
-#include "mirror.h"
 #include "report.h"
 #include "splats.h"
+#include "upright.h"
 
 /* One run; zeroed at first, so that close_all() undoes any part of it. */
 typedef struct brick {
@@ -33,8 +33,8 @@ typedef struct brick {
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
-    unsigned levels;         /* coarse ones */
-    int mirror;              /* axis across which what was kept is symmetric; -1: none */
+    unsigned levels; /* coarse ones */
+    trip_upright upright;
     uint64_t written_before; /* up to the end of the last stage */
 } brick;
 
@@ -390,16 +390,16 @@ static bool is_up_unknown(const trip_volume_info *info)
            strcmp(info->format, "nifti");
 }
 
-static int find_mirror(brick *b)
+static int find_upright(brick *b)
 {
     const trip_quantiser *q = &b->codes.quantiser;
-    trip_mirror_params p = { .levels = b->levels,
-                             .level_lists = trip_piece_list_count(&b->format),
-                             .tile_log2 = b->format.tile_log2,
-                             .scale = trip_mean_scale_make(b->in.tally->value_min,
-                                                           b->in.tally->value_max, q->lo, q->hi) };
+    trip_occupancy_params p = { .levels = b->levels,
+                                .level_lists = trip_piece_list_count(&b->format),
+                                .tile_log2 = b->format.tile_log2,
+                                .scale = trip_mean_scale_make(
+                                    b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
-    return is_up_unknown(b->in.info) ? trip_mirror_find(&b->mirror, b->writer, &p, b->in.budget)
+    return is_up_unknown(b->in.info) ? trip_upright_find(&b->upright, b->writer, &p, b->in.budget)
                                      : 0;
 }
 
@@ -411,7 +411,7 @@ static int finish_output(brick *b)
                                                           .envelope = &b->in.envelope,
                                                           .functions = b->in.functions,
                                                           .histogram = &b->in.histogram,
-                                                          .mirror = b->mirror });
+                                                          .upright = b->upright });
     if (!text)
         return TRIP_ERROR;
     trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
@@ -431,7 +431,7 @@ static void fill_summary(brick *b)
     trip_brick_summary *s = b->summary;
     const double(*m)[4] = b->in.info->index_to_world.m;
     memcpy(s->dims, b->in.info->dims, sizeof s->dims);
-    trip_brick_text_note(b->in.info, b->mirror, s->note);
+    trip_brick_text_note(b->in.info, b->upright, s->note);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
     s->voxels = b->in.tally->voxels;
@@ -483,7 +483,7 @@ static int make(brick *b)
     if (status == 0)
         status = make_levels(b);
     if (status == 0)
-        status = find_mirror(b);
+        status = find_upright(b);
     return status == 0 ? finish_output(b) : status;
 }
 
@@ -510,7 +510,7 @@ static void close_all(brick *b, int status)
 
 int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
 {
-    brick b = { .params = params, .summary = summary, .mirror = -1 };
+    brick b = { .params = params, .summary = summary, .upright = { -1, -1 } };
     b.temporary = trip_brick_temporary_none();
     *summary = (trip_brick_summary){ 0 };
     int status = run(&b);

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "anatomy.h"
+#include "footing.h"
 #include "json.h"
 #include "report.h"
 #include "text.h"
@@ -179,23 +181,39 @@ static const char *base_name(const char *path)
     return slash && slash[1] ? slash + 1 : path;
 }
 
-void trip_brick_text_note(const trip_volume_info *info, int mirror,
+/* What drawing (render/dataset_text.c) makes of it, where that is not what it takes by default. */
+static void print_guess(const trip_volume_info *info, trip_upright u,
+                        char guess[TRIP_BRICK_NOTE_BYTES / 2])
+{
+    guess[0] = 0;
+    if (u.mirror == 2)
+        snprintf(
+            guess, TRIP_BRICK_NOTE_BYTES / 2,
+            "its file does not say what is up: being mirror-symmetric across z, its slices are "
+            "taken for views from the side, with up at -y and the front at -x; --up, --view "
+            "and --axes say otherwise");
+    else if (u.footing >= 0 && u.footing != TRIP_FOOTING_LOW_Z &&
+             !trip_anatomy_is_scan_from_above(&info->index_to_world))
+        snprintf(guess, TRIP_BRICK_NOTE_BYTES / 2,
+                 "its file does not say what is up: being level at %s alone, it is taken to stand "
+                 "there, with up at %s; --up, --view and --axes say otherwise",
+                 trip_footing_name(u.footing), trip_footing_name(u.footing ^ 1));
+}
+
+void trip_brick_text_note(const trip_volume_info *info, trip_upright upright,
                           char note[TRIP_BRICK_NOTE_BYTES])
 {
-    static const char guess[] =
-        "its file does not say what is up: being mirror-symmetric across z, its slices are taken "
-        "for views from the side, with up at -y and the front at -x; --up, --view and --axes say "
-        "otherwise";
-    bool guessed = mirror == 2;
+    char guess[TRIP_BRICK_NOTE_BYTES / 2];
+    print_guess(info, upright, guess);
     snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s%s", info->note,
-             guessed && info->note[0] ? "; " : "", guessed ? guess : "");
+             guess[0] && info->note[0] ? "; " : "", guess);
 }
 
 char *trip_brick_text_make(const trip_brick_text *t)
 {
     static const char *const axes[] = { "x", "y", "z" };
     char note[TRIP_BRICK_NOTE_BYTES];
-    trip_brick_text_note(t->info, t->mirror, note);
+    trip_brick_text_note(t->info, t->upright, note);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "source", base_name(t->params->input));
     add_source_options(root, t->params);
@@ -208,8 +226,10 @@ char *trip_brick_text_make(const trip_brick_text *t)
         cJSON_AddStringToObject(root, "space", t->info->space);
     if (t->info->oriented)
         cJSON_AddTrueToObject(root, "oriented");
-    if (t->mirror >= 0)
-        cJSON_AddStringToObject(root, "mirror", axes[t->mirror]);
+    if (t->upright.mirror >= 0)
+        cJSON_AddStringToObject(root, "mirror", axes[t->upright.mirror]);
+    if (t->upright.footing >= 0)
+        cJSON_AddStringToObject(root, "footing", trip_footing_name(t->upright.footing));
     cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
     cJSON_AddStringToObject(root, "function_kind",
                             trip_tf_kind_name(trip_brick_kind(t->info, t->histogram)));

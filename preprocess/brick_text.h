@@ -5,6 +5,7 @@
 
 #include "brick.h"
 #include "envelope.h"
+#include "upright.h"
 
 typedef struct trip_brick_text {
     const trip_brick_params *params;
@@ -12,16 +13,16 @@ typedef struct trip_brick_text {
     const trip_envelope *envelope;
     trip_tf *const *functions; /* params->function_count of them, in data units */
     const trip_histogram *histogram;
-    int mirror; /* axis across which what was kept is mirror-symmetric, where that counts, or -1 */
+    trip_upright upright; /* without any, where the file or its format says how the volume lies */
 } trip_brick_text;
 
 /* The kind of a volume, recognised from its header and histogram; never TRIP_TF_AUTOMATIC. */
 trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h);
 
-/* What the user is to be told of how the volume was taken: its reader's note, and what follows from
- * the symmetry; "" where there is nothing. */
+/* What the user is to be told of how the volume was taken: its reader's note, and what its
+ * shape says of how it lies; "" where there is nothing. */
 enum { TRIP_BRICK_NOTE_BYTES = 1024 };
-void trip_brick_text_note(const trip_volume_info *info, int mirror,
+void trip_brick_text_note(const trip_volume_info *info, trip_upright upright,
                           char note[TRIP_BRICK_NOTE_BYTES]);
 
 /* The text, for free(); NULL after a reported failure. */

@@ -238,22 +238,6 @@ static trip_vec3 direction_at(const trip_dataset_text *t, const char *key)
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
 }
 
-/* Sheets that lie further apart than the voxels in them are those of a scan, and where no
- * orientation was given, scans are mostly stored from the top of the head down, with the face in
- * the first rows. */
-static bool is_scan_from_above(const trip_affine *m)
-{
-    double least = INFINITY, most = 0;
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 4; j++)
-            if (i != j && m->m[i][j] != 0)
-                return false;
-        least = fmin(least, m->m[i][i]);
-        most = fmax(most, m->m[i][i]);
-    }
-    return least > 0 && most >= 1.5 * least;
-}
-
 /* Of what has a left and a right along z, the slices are views from the side. Such pictures run
  * from the top down and, by custom, from the front to the back. Which side is left is not known. */
 static bool is_mirrored_across_z(const trip_dataset_text *t)
@@ -263,7 +247,7 @@ static bool is_mirrored_across_z(const trip_dataset_text *t)
 }
 
 /* Which way is up and where the front is: as the text has it, else as the patient stands, else by
- * the format's custom, else by a guess. */
+ * the format's custom, else by a guess, of which preprocess/brick_text.c makes a note. */
 static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 *up,
                    trip_vec3 *front)
 {
@@ -287,8 +271,11 @@ static void orient(const trip_dataset_text *t, const trip_dataset *d, trip_vec3 
         *front = trip_length(*front) > 0 ? *front : trip_v3(-1, 0, 0);
         return;
     }
-    bool scan = unknown && is_scan_from_above(&d->index_to_world);
+    bool scan = unknown && trip_anatomy_is_scan_from_above(&d->index_to_world);
+    trip_vec3 footing = direction_at(t, "footing");
     *up = y_up ? trip_v3(0, 1, 0) : trip_v3(0, 0, scan ? -1 : 1);
+    if (unknown && !scan && trip_length(footing) > 0)
+        *up = trip_scale(footing, -1);
     if (!(trip_length(*front) > 0) && (patient || scan))
         *front = trip_v3(0, patient ? 1 : -1, 0);
 }

@@ -4,8 +4,9 @@
  *   "format"             "openvdb", "nrrd", ... : where the volume came from
  *   "space"              "LPS" or "RAS": how world space lies in the patient (anatomy.h)
  *   "oriented"           true: the file gave the directions of its axes, so none are guessed
- *   "mirror"             "x", "y", "z": what was kept is mirror-symmetric across that axis of the grid
- *                        and no other, in volumes whose files do not say how they lie
+ *   "mirror"             "x", "y", "z": what was kept is mirror-symmetric across this axis of the
+ *                        grid alone, in volumes whose files do not say how they lie
+ *   "footing"            "-x" ... "+z": it is level at this side of the grid alone, in the same
  *   "source", "source_options"  the file it was made of, and the options of `brick` that make it
  *                        again, but for those of what is kept
  *   "note"               what was chosen where the file leaves a choice, for people

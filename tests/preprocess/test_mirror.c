@@ -5,18 +5,18 @@
 
 #include "mirror.h"
 
-static double score(int i, int j, int k, const uint64_t *weights, int axis)
+static double score(int i, int j, int k, const uint16_t *weights, int axis)
 {
-    uint64_t own[64];
-    memcpy(own, weights, (size_t)(i * j * k) * sizeof *own);
-    return trip_mirror_score(&(trip_mirror_cells){ { i, j, k }, own }, axis);
+    trip_occupancy o = { { i, j, k }, { 0 } };
+    memcpy(o.weights, weights, (size_t)(i * j * k) * sizeof *weights);
+    return trip_mirror_score(&o, axis);
 }
 
 static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
 {
     (void)state;
     /* 1 2 on itself: 1, 4 and 4, by the mirror's place; its squares come to 5. */
-    const uint64_t row[] = { 1, 2 };
+    const uint16_t row[] = { 1, 2 };
     for (int axis = 0; axis < 3; axis++) {
         int n[3] = { 1, 1, 1 };
         n[axis] = 2;
@@ -24,28 +24,23 @@ static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
         assert_float_equal(score(n[0], n[1], n[2], row, (axis + 1) % 3), 1, 0);
     }
     /* Beside the middle: the mirror is where it fits best. */
-    const uint64_t aside[] = { 0, 0, 0, 7, 9, 7, 0 };
+    const uint16_t aside[] = { 0, 0, 0, 7, 9, 7, 0 };
     assert_float_equal(score(7, 1, 1, aside, 0), 1, 0);
     /* Rows share a mirror: 3 and 1 0 3 0 of the second row, at the same place, 9 + 9 of 9 + 10. */
-    const uint64_t rows[] = { 0, 0, 3, 0, 1, 0, 3, 0 };
+    const uint16_t rows[] = { 0, 0, 3, 0, 1, 0, 3, 0 };
     assert_float_equal(score(4, 2, 1, rows, 0), 18.0 / 19, 1e-15);
-    const uint64_t nothing[8] = { 0 };
+    const uint16_t nothing[8] = { 0 };
     assert_float_equal(score(2, 2, 2, nothing, 1), 0, 0);
 }
 
 static void the_greatest_weights_do_not_overflow(void **state)
 {
     (void)state;
-    const size_t count = (size_t)TRIP_MIRROR_EDGE * TRIP_MIRROR_EDGE * TRIP_MIRROR_EDGE;
-    uint64_t *weights = malloc(count * sizeof *weights);
-    assert_non_null(weights);
-    for (size_t i = 0; i < count; i++)
-        weights[i] = UINT16_MAX;
-    const trip_mirror_cells full = { { TRIP_MIRROR_EDGE, TRIP_MIRROR_EDGE, TRIP_MIRROR_EDGE },
-                                     weights };
+    trip_occupancy full = { { TRIP_OCCUPANCY_EDGE, TRIP_OCCUPANCY_EDGE, TRIP_OCCUPANCY_EDGE },
+                            { 0 } };
+    memset(full.weights, 0xff, sizeof full.weights);
     for (int axis = 0; axis < 3; axis++)
         assert_float_equal(trip_mirror_score(&full, axis), 1, 0);
-    free(weights);
 }
 
 static void one_axis_stands_out_or_there_is_none(void **state)

@@ -157,6 +157,14 @@ static void thick_slices_without_an_orientation_are_a_scan_from_above(void **sta
     trip_dataset_text_destroy(t);
 }
 
+static void assert_same_view(char *own_text, char *other_text)
+{
+    trip_vec3 own_up, other_up;
+    trip_vec3 own = view_from(own_text, &own_up), other = view_from(other_text, &other_up);
+    assert_true(trip_length(trip_sub(own, other)) == 0);
+    assert_true(trip_length(trip_sub(own_up, other_up)) == 0);
+}
+
 static void slices_of_what_is_mirrored_across_them_are_views_from_the_side(void **state)
 {
     (void)state;
@@ -175,13 +183,30 @@ static void slices_of_what_is_mirrored_across_them_are_views_from_the_side(void 
         { "{\"mirror\": \"zz\"}", "{}" },
         { "{\"mirror\": 2}", "{}" },
     };
-    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
-        trip_vec3 own_up, other_up;
-        trip_vec3 own = view_from(others[i][0], &own_up),
-                  other = view_from(others[i][1], &other_up);
-        assert_true(trip_length(trip_sub(own, other)) == 0);
-        assert_true(trip_length(trip_sub(own_up, other_up)) == 0);
-    }
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        assert_same_view(others[i][0], others[i][1]);
+}
+
+static void what_stands_on_a_side_has_the_other_up(void **state)
+{
+    (void)state;
+    trip_vec3 up;
+    view_from("{\"footing\": \"-y\"}", &up);
+    assert_true(up.x == 0 && up.y == 1 && up.z == 0);
+    view_from("{\"footing\": \"+x\"}", &up);
+    assert_true(up.x == -1 && up.y == 0 && up.z == 0);
+    /* What is said, what a format is used for, and slices seen from the side come first. */
+    char *const others[][2] = {
+        { "{\"footing\": \"-x\", \"mirror\": \"z\"}", "{\"mirror\": \"z\"}" },
+        { "{\"footing\": \"-x\", \"space\": \"RAS\"}", "{\"space\": \"RAS\"}" },
+        { "{\"footing\": \"-x\", \"oriented\": true}", "{\"oriented\": true}" },
+        { "{\"footing\": \"-x\", \"format\": \"openvdb\"}", "{\"format\": \"openvdb\"}" },
+        { "{\"footing\": \"-x\", \"up\": \"+y\"}", "{\"up\": \"+y\"}" },
+        { "{\"footing\": \"below\"}", "{}" },
+        { "{\"footing\": -1}", "{}" },
+    };
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        assert_same_view(others[i][0], others[i][1]);
 }
 
 static void voxels_shown_but_left_out_are_counted_from_the_histogram(void **state)
@@ -222,6 +247,7 @@ int main(void)
         cmocka_unit_test(thick_slices_of_a_known_orientation_are_not_turned_over),
         cmocka_unit_test(thick_slices_without_an_orientation_are_a_scan_from_above),
         cmocka_unit_test(slices_of_what_is_mirrored_across_them_are_views_from_the_side),
+        cmocka_unit_test(what_stands_on_a_side_has_the_other_up),
         cmocka_unit_test(voxels_shown_but_left_out_are_counted_from_the_histogram),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,116 @@
+#include "occupancy.h"
+
+#include <math.h>
+
+#include "format.h"
+#include "report.h"
+
+enum {
+    MOST_VOXELS = 128, /* along each axis of the level that is read */
+    KEPT_ALONG_Z = 2,
+    WHOLE_VOXEL = 1023, /* weight of a voxel of the greatest value */
+};
+
+typedef struct summing {
+    const trip_occupancy_params *params;
+    unsigned level;
+    int shift[3]; /* from a voxel of the level to its bin, as powers of 2 */
+    int dims[3];  /* bins */
+    uint64_t weights[TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE];
+} summing;
+
+static void choose_level(summing *s)
+{
+    const trip_occupancy_params *p = s->params;
+    for (int a = 0; a < 3; a++)
+        while (s->level < p->levels && (p->dims[a] - 1) >> s->level >= MOST_VOXELS)
+            s->level++;
+    for (int a = 0; a < 3; a++) {
+        int64_t last = (p->dims[a] - 1) >> s->level;
+        while (last >> s->shift[a] >= TRIP_OCCUPANCY_EDGE)
+            s->shift[a]++;
+        s->dims[a] = (int)(last >> s->shift[a]) + 1;
+    }
+}
+
+/* How far its value is from the volume's least, times the part of it that was kept. */
+static uint64_t weight_of(const summing *s, unsigned code)
+{
+    const trip_mean_scale *scale = &s->params->scale;
+    if (s->level == 0) {
+        double part = scale->width > 0 ? ((double)code - scale->lo) / scale->width : 1;
+        return (uint64_t)(fmin(1, fmax(0, part)) * WHOLE_VOXEL + 0.5);
+    }
+    unsigned shares = code % TRIP_MEAN_SHARES;
+    double kept = trip_mean_cover(shares) * trip_mean_depth(shares);
+    unsigned mean = scale->width > 0 ? code >> TRIP_MEAN_AXIS_BITS : WHOLE_VOXEL;
+    return (uint64_t)(mean * kept + 0.5);
+}
+
+static void add_run(summing *s, const trip_list_run *run, unsigned tile_log2)
+{
+    const int *dims = s->dims;
+    const uint64_t plane = (uint64_t)(run->sheet >> s->shift[2]) * (uint64_t)dims[1];
+    for (uint32_t n = 0; n < run->count; n++) {
+        uint32_t voxel = run->voxels[n];
+        uint64_t i = (((uint64_t)run->tile_u << tile_log2) + trip_voxel_u(voxel)) >> s->shift[0];
+        uint64_t j = (((uint64_t)run->tile_v << tile_log2) + trip_voxel_v(voxel)) >> s->shift[1];
+        s->weights[(plane + j) * (uint64_t)dims[0] + i] += weight_of(s, trip_voxel_code(voxel));
+    }
+}
+
+static int add_sheets(summing *s, trip_writer *w, bool odd, trip_budget *budget)
+{
+    unsigned list = s->level * s->params->level_lists + KEPT_ALONG_Z;
+    trip_list_cursor *cursor;
+    trip_list_run run;
+    int status = trip_list_cursor_open(&cursor, w, list, odd, budget);
+    if (status < 0)
+        return status;
+    while ((status = trip_list_cursor_next(cursor, &run)) > 0) {
+        add_run(s, &run, s->params->tile_log2);
+        if (trip_interrupted()) {
+            status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
+            break;
+        }
+    }
+    trip_list_cursor_close(cursor);
+    return status;
+}
+
+/* As parts of the greatest. */
+static void scale_weights(const summing *s, trip_occupancy *o)
+{
+    const size_t count = (size_t)s->dims[0] * (size_t)s->dims[1] * (size_t)s->dims[2];
+    uint64_t most = 1;
+    memcpy(o->dims, s->dims, sizeof o->dims);
+    for (size_t i = 0; i < count; i++)
+        most = s->weights[i] > most ? s->weights[i] : most;
+    for (size_t i = 0; i < count; i++)
+        o->weights[i] = (uint16_t)((double)s->weights[i] / (double)most * UINT16_MAX + 0.5);
+}
+
+int trip_occupancy_read(trip_occupancy *o, trip_writer *w, const trip_occupancy_params *params,
+                        trip_budget *budget)
+{
+    summing *s = trip_budget_take(budget, sizeof *s);
+    if (!s)
+        return trip_fail(TRIP_ERROR, "brick", "how the volume lies",
+                         "finding it takes 3 MiB: give more with --memory");
+    *s = (summing){ .params = params };
+    choose_level(s);
+    int status = add_sheets(s, w, false, budget);
+    if (status == 0)
+        status = add_sheets(s, w, true, budget);
+    if (status == 0)
+        scale_weights(s, o);
+    trip_budget_release(budget, s, sizeof *s);
+    return status;
+}
+
+trip_occupancy_row trip_occupancy_along(const trip_occupancy *o, int axis, int a, int b)
+{
+    const size_t steps[3] = { 1, (size_t)o->dims[0], (size_t)o->dims[0] * (size_t)o->dims[1] };
+    const size_t at = (size_t)a * steps[(axis + 1) % 3] + (size_t)b * steps[(axis + 2) % 3];
+    return (trip_occupancy_row){ o->weights + at, steps[axis], o->dims[axis] };
+}
