@@ -1,6 +1,7 @@
 #include "occupancy.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "format.h"
 #include "report.h"
