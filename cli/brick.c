@@ -34,6 +34,7 @@ enum key {
     KEY_TF,
     KEY_RANGE,
     KEY_KEEP_ALL,
+    KEY_REGION,
     KEY_NORMALS,
     KEY_HALO,
     KEY_LEVELS,
@@ -81,6 +82,10 @@ static const struct argp_option option_table[] = {
     { "tf", KEY_TF, "FILE", 0, "What this transfer function shows; several add up", 2 },
     { "range", KEY_RANGE, "LO:HI", 0, "Values from LO to HI; several add up", 2 },
     { "keep-all", KEY_KEEP_ALL, NULL, 0, "Every finite value", 2 },
+    { "region", KEY_REGION, "I0:I1,J0:J1,K0:K1", 0,
+      "Of these, voxels from I0 to before I1 and so on alone; an empty side is open. Regions of a "
+      "volume are drawn together by `triptych render A.trip B.trip`",
+      2 },
     { NULL, 0, NULL, 0, "Output:", 3 },
     { "output", 'o', "NAME.trip", 0, "The data set (default: the input's name, in this folder)",
       3 },
@@ -152,6 +157,51 @@ static int parse_range(options *o, const char *text)
         return trip_option_fail("--range", "takes two numbers, the smaller first, as LO:HI");
     o->brick.range_count++;
     return 0;
+}
+
+/* A voxel's index; "" leaves it as it is. */
+static bool parse_index(const char *text, int64_t *index)
+{
+    double number;
+    if (!*text)
+        return true;
+    bool good = trip_text_to_double(text, &number) && number >= 0 && number <= INT32_MAX &&
+                number == floor(number);
+    *index = good ? (int64_t)number : 0;
+    return good;
+}
+
+/* "I0:I1" at the start of a text, which goes on behind it. */
+static bool parse_side(const char **text, int64_t *first, int64_t *past)
+{
+    char side[64];
+    size_t length = strcspn(*text, ",");
+    if (length >= sizeof side)
+        return false;
+    memcpy(side, *text, length);
+    side[length] = 0;
+    *text += length;
+    char *colon = strchr(side, ':');
+    if (!colon)
+        return false;
+    *colon = 0;
+    return parse_index(side, first) && parse_index(colon + 1, past) &&
+           (!colon[1] || *first < *past);
+}
+
+/* "I0:I1,J0:J1,K0:K1"; an empty side is open. */
+static int parse_region(const char *text, triptych_brick_options *o)
+{
+    bool good = true;
+    for (int a = 0; a < 3 && good; a++) {
+        o->region_first[a] = o->region_past[a] = 0;
+        good = parse_side(&text, &o->region_first[a], &o->region_past[a]) &&
+               *text == (a < 2 ? ',' : 0);
+        text += good && a < 2;
+    }
+    return good ? 0
+                : trip_option_fail("--region", "takes voxels as I0:I1,J0:J1,K0:K1, each from the "
+                                               "first to before the second; empty sides are open");
 }
 
 static int add_function(options *o, const char *path)
@@ -313,6 +363,8 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     case KEY_KEEP_ALL:
         o->brick.keep_all = true;
         return 0;
+    case KEY_REGION:
+        return parse_region(argument, &o->brick);
     case KEY_DRY_RUN:
         o->dry_run = true;
         return 0;

@@ -30,6 +30,14 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
     };
 }
 
+static trip_region region_of(const triptych_brick_options *o)
+{
+    return (trip_region){
+        .first = { o->region_first[0], o->region_first[1], o->region_first[2] },
+        .past = { o->region_past[0], o->region_past[1], o->region_past[2] },
+    };
+}
+
 /* `ranges`: the options', as the bricker takes them. */
 static trip_brick_params brick_params(triptych *t, const char *volume,
                                       const triptych_brick_options *o,
@@ -44,6 +52,7 @@ static trip_brick_params brick_params(triptych *t, const char *volume,
         .range_count = o->range_count,
         .keep_all = o->keep_all,
         .automatic = o->automatic,
+        .region = region_of(o),
         .normals = (trip_brick_normals)o->normals,
         .no_halo = o->no_halo,
         .levels = o->levels,

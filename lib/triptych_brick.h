@@ -61,6 +61,10 @@ typedef struct triptych_brick_options {
     size_t range_count;
     int keep_all;  /* every finite value */
     int automatic; /* what the automatic transfer function shows */
+    /* Of these, voxels from `first` to before `past` along i, j, k alone; past 0: to the end. All
+     * 0: of the whole volume, which is read whatever the region is: regions of a volume have codes
+     * alike, and the halo reaches beyond them, so that triptych_add() puts them together. */
+    int64_t region_first[3], region_past[3];
 
     /* What is made. */
     triptych_normals normals;

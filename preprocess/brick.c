@@ -150,6 +150,7 @@ static int open_splatter(brick *b)
 {
     trip_splat_params p = { .info = b->in.info,
                             .envelope = &b->in.envelope,
+                            .region = &b->in.region,
                             .format = b->format,
                             .quantiser = b->codes.quantiser,
                             .compact = b->codes.normal_bytes == 3 ? &b->codes.compact : NULL,
@@ -255,8 +256,9 @@ static int check_tally(brick *b)
     if (b->summary->kept == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input,
                          "no voxel is visible: the values are from %g to %g, and the transfer "
-                         "functions and ranges show none of them",
-                         t->value_min, t->value_max);
+                         "functions and ranges show none of them%s",
+                         t->value_min, t->value_max,
+                         trip_region_is_whole(&b->params->region) ? "" : " in the region");
     if (t->value_min == t->value_max)
         trip_warn(
             b->params->input,
@@ -399,8 +401,11 @@ static int find_upright(brick *b)
                                 .scale = trip_mean_scale_make(
                                     b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
-    return is_up_unknown(b->in.info) ? trip_upright_find(&b->upright, b->writer, &p, b->in.budget)
-                                     : 0;
+    /* A region of an object need not look as the whole does. */
+    const bool whole = trip_region_is_whole(&b->params->region);
+    return whole && is_up_unknown(b->in.info)
+               ? trip_upright_find(&b->upright, b->writer, &p, b->in.budget)
+               : 0;
 }
 
 static int finish_output(brick *b)

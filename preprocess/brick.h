@@ -4,6 +4,7 @@
 #ifndef TRIP_BRICK_H
 #define TRIP_BRICK_H
 
+#include "region.h"
 #include "transfer_function.h"
 #include "volume.h"
 
@@ -29,8 +30,9 @@ typedef struct trip_brick_params {
     size_t function_count;
     const trip_value_range *ranges;
     size_t range_count;
-    bool keep_all;  /* every finite voxel */
-    bool automatic; /* adds the automatic function's, which is also what is drawn by default */
+    bool keep_all;      /* every finite voxel */
+    trip_region region; /* of what these keep, that alone; the halo reaches beyond it */
+    bool automatic;     /* adds the automatic function's, which is also what is drawn by default */
 
     trip_brick_normals normals;
     /* Coarse levels: 0 as many as it takes until one is a single brick; below 0: none; else so

@@ -1,5 +1,6 @@
 #include "brick_input.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -24,6 +25,21 @@ static int check_dims(const trip_brick_input *in)
         if (in->info->dims[a] > 1 << 24)
             return trip_fail(TRIP_ERROR, "brick", in->params->input,
                              "more than 16777216 voxels along an axis");
+    return 0;
+}
+
+static int set_region(trip_brick_input *in)
+{
+    in->region = in->params->region;
+    for (int a = 0; a < 3; a++) {
+        int64_t *past = &in->region.past[a], voxels = in->info->dims[a];
+        *past = *past ? *past : voxels;
+        if (in->region.first[a] < 0 || in->region.first[a] >= *past || *past > voxels)
+            return trip_fail(TRIP_USAGE, "brick", in->params->input,
+                             "the region is empty or leaves the grid along %c, where voxels are "
+                             "numbered from 0 to before %" PRId64,
+                             "ijk"[a], voxels);
+    }
     return 0;
 }
 
@@ -65,7 +81,8 @@ static int open_volume(trip_brick_input *in)
         return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");
     trip_tally_clear(in->tally);
     in->memory_bytes = trip_budget_left_bytes(in->budget);
-    return check_dims(in);
+    status = check_dims(in);
+    return status == 0 ? set_region(in) : status;
 }
 
 static int load_functions(trip_brick_input *in)

@@ -17,6 +17,7 @@ typedef struct trip_brick_input {
     trip_volume *volume;
     const trip_volume_info *info;
     uint64_t grid_voxels;  /* product of the dims, in which progress is counted */
+    trip_region region;    /* params->region, its ends those of the grid where they were open */
     uint64_t memory_bytes; /* left once the input was opened */
     trip_tf **functions;   /* params->function_count of them */
     bool scanned;          /* the tally is complete: the volume was scanned */

@@ -159,11 +159,25 @@ static void add_volume_options(cJSON *options, const trip_volume_params *v)
         add_option(options, "--allow-gaps");
 }
 
+static void add_region(cJSON *options, const trip_region *r)
+{
+    char sides[3][64];
+    if (trip_region_is_whole(r))
+        return;
+    for (int a = 0; a < 3; a++)
+        if (r->past[a])
+            snprintf(sides[a], sizeof sides[a], "%" PRId64 ":%" PRId64, r->first[a], r->past[a]);
+        else
+            snprintf(sides[a], sizeof sides[a], "%" PRId64 ":", r->first[a]);
+    add_option(options, "--region=%s,%s,%s", sides[0], sides[1], sides[2]);
+}
+
 /* What `brick` has to be given to make the data set again, but for what is kept. */
 static void add_source_options(cJSON *root, const trip_brick_params *p)
 {
     cJSON *options = cJSON_AddArrayToObject(root, "source_options");
     add_volume_options(options, &p->volume);
+    add_region(options, &p->region);
     static const char *const normals[] = { NULL, "compact", "full", "none" };
     if (p->normals)
         add_option(options, "--normals=%s", normals[p->normals]);

@@ -62,13 +62,24 @@ static int on_progress(void *user, uint64_t voxels)
     return now_seconds() > s->until ? STOPPED : 0;
 }
 
-/* Scales the sample up to the volume. A layer of one voxel around a body has three voxels for each
- * pair of neighbours along x across its border, in the mean over directions. */
+/* The part of the grid that is in the region. */
+static double part_in_region(const trip_brick_input *in)
+{
+    double part = 1;
+    for (int a = 0; a < 3; a++)
+        part *= (double)(in->region.past[a] - in->region.first[a]) / (double)in->info->dims[a];
+    return part;
+}
+
+/* Scales the sample up to the volume, and down to the region. A layer of one voxel around a body
+ * has three voxels for each pair of neighbours along x across its border, in the mean over
+ * directions. */
 static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick_estimate *e)
 {
     double all = in->info->sparse ? (double)t->voxels : (double)in->grid_voxels;
     double scale = t->voxels ? all / (double)t->voxels : 0;
     e->voxels = (uint64_t)all;
+    scale *= part_in_region(in);
     e->kept = (uint64_t)(scale * (double)t->kept);
     e->halo = in->params->no_halo ? 0 : (uint64_t)(3 * scale * (double)t->borders);
 }

@@ -303,6 +303,26 @@ static void find_kept(const work *k)
         w->kept[i] &= w->active[i];
 }
 
+/* Clears the flags of the window's voxels outside of the region. */
+static void keep_region(const work *k)
+{
+    const trip_region *r = k->s->params.region;
+    int64_t begin[3], end[3]; /* in the window */
+    for (int a = 0; a < 3; a++) {
+        begin[a] = r->first[a] > k->lo[a] ? r->first[a] - k->lo[a] : 0;
+        end[a] = r->past[a] - k->lo[a] < k->size[a] ? r->past[a] - k->lo[a] : k->size[a];
+    }
+    for (int64_t z = 0; z < k->size[2]; z++)
+        for (int64_t y = 0; y < k->size[1]; y++) {
+            uint8_t *row = k->w->kept + z * k->step[2] + y * k->step[1];
+            bool in =
+                z >= begin[2] && z < end[2] && y >= begin[1] && y < end[1] && begin[0] < end[0];
+            memset(row, 0, (size_t)(in ? begin[0] : k->size[0]));
+            if (in)
+                memset(row + end[0], 0, (size_t)(k->size[0] - end[0]));
+        }
+}
+
 /* Clears the flags of voxels without a finite value; few voxels have a flag. */
 static void drop_not_finite(const float *values, uint8_t *flags, size_t count)
 {
@@ -399,6 +419,8 @@ int trip_splatter_box(trip_splatter *s, unsigned thread, const trip_box *box)
     if (s->params.tally)
         tally_box(&k);
     find_kept(&k);
+    if (s->params.region)
+        keep_region(&k);
     status = make_pieces(&k, box->lo, box->size, k.w->kept, 0, &k.w->kept_count);
     return status == 0 && s->params.format.halo ? make_halo(&k) : status;
 }

@@ -7,12 +7,14 @@
 #include "envelope.h"
 #include "normal.h"
 #include "piece.h"
+#include "region.h"
 #include "scan.h"
 #include "walk.h"
 
 typedef struct trip_splat_params {
     const trip_volume_info *info;
     const trip_envelope *envelope;
+    const trip_region *region; /* of what the envelope keeps; its ends are not open; NULL: all */
     trip_piece_format format;
     trip_quantiser quantiser; /* where the format is quantised */
     /* How normals of 3 bytes are encoded, for quantised formats only; NULL: they have 4 bytes. */

@@ -30,6 +30,7 @@ BRICK = {
     "--tile": COUNTS + ["17", "8", "256"],
     "--slab-sheets": COUNTS + ["65"],
     "--keep-all": None,
+    "--region": ["", "1:2", "1:2,3:4,5:6,", "1:2,3:4,6:5", "a:,:,:", "-1:,:,:"],
     "--force": None,
     "--json": None,
     "--normals": ["", "nonsense", "3"],
