@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "budget.h"
+#include "library.h"
 #include "report.h"
 
 enum { MOST_CONTEXTS = 16, REPORT_BYTES = 4096 };
@@ -61,6 +62,8 @@ static int open_data(pilot *p)
                                    .keep_pages = 1,
                                    .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
                                    .name = o->input });
+    if (!status)
+        status = library_add(p->t, o->more, o->more_count);
     if (!status)
         status = triptych_set_function(p->t, &o->function);
     if (!status)

@@ -39,6 +39,14 @@ int library_create(triptych **out, trip_progress *progress)
     return 0;
 }
 
+int library_add(triptych *t, const char *const *paths, int count)
+{
+    int status = 0;
+    for (int i = 0; i < count && !status; i++)
+        status = triptych_add(t, paths[i]);
+    return status;
+}
+
 int library_set_function_quietly(triptych *t, const triptych_function *function)
 {
     triptych_set_messages(t, NULL, NULL);

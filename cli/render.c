@@ -63,15 +63,16 @@ static int brick_volume(drawing *d)
 static int open_data(drawing *d, const char *path)
 {
     const render_options *o = &d->o;
-    return triptych_open(
-        d->t, path,
-        &(triptych_resources){ .memory_bytes = o->memory_bytes,
-                               .threads = (unsigned)o->threads,
-                               .renderer = o->renderer,
-                               .engine = o->engine,
-                               .keep_pages = d->sequence.frames > 1,
-                               .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
-                               .name = o->input });
+    int status =
+        triptych_open(d->t, path,
+                      &(triptych_resources){ .memory_bytes = o->memory_bytes,
+                                             .threads = (unsigned)o->threads,
+                                             .renderer = o->renderer,
+                                             .engine = o->engine,
+                                             .keep_pages = d->sequence.frames > 1,
+                                             .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
+                                             .name = o->input });
+    return status ? status : library_add(d->t, o->more, o->more_count);
 }
 
 /* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the

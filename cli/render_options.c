@@ -824,6 +824,36 @@ static int check_classify(const parse *p)
     return 0;
 }
 
+static int add_input(render_options *o, const char *path)
+{
+    if (!o->input) {
+        o->input = path;
+        return 0;
+    }
+    if (o->more_count == RENDER_MORE_MAX)
+        return trip_option_fail(path, "is one data set too many");
+    o->more[o->more_count++] = path;
+    return 0;
+}
+
+/* Several inputs are data sets, which were bricked to go together. */
+static int check_more(const parse *p)
+{
+    const render_options *o = p->o;
+    for (int i = 0; i < o->more_count; i++) {
+        const char *volume = cached_volume_wanted(o->input)     ? o->input
+                             : cached_volume_wanted(o->more[i]) ? o->more[i]
+                                                                : NULL;
+        if (volume)
+            return trip_option_fail(volume, "is no data set, and those alone are drawn together: "
+                                            "`triptych brick --region` makes them; -o names the "
+                                            "picture");
+    }
+    if (o->more_count && p->quality.error > 0)
+        return trip_option_fail("--error", "takes settings that were measured on one data set");
+    return 0;
+}
+
 /* Options that cannot apply together; what one implies for another. */
 static int check(parse *p)
 {
@@ -838,7 +868,9 @@ static int check(parse *p)
         !cached_volume_wanted(o->input))
         return trip_option_fail(o->input, "is a data set: --grid, --level-set, --spacing, "
                                           "--coordinates, --axes and --allow-gaps are for volumes");
-    int status = check_view(p);
+    int status = check_more(p);
+    if (!status)
+        status = check_view(p);
     if (!status)
         status = check_sequence(p);
     if (status)
@@ -916,10 +948,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         p->o->count = true;
         return 0;
     case ARGP_KEY_ARG:
-        if (p->o->input)
-            return trip_option_fail(arg, TRIP_ONE_VOLUME "; -o names the picture");
-        p->o->input = arg;
-        return 0;
+        return add_input(p->o, arg);
     case ARGP_KEY_END:
         return check(p);
     default:
@@ -940,11 +969,12 @@ int render_options_parse(render_options *o, int argc, char **argv)
     static const struct argp argp = {
         .options = options,
         .parser = parse_key,
-        .args_doc = "VOLUME|NAME.trip",
+        .args_doc = "VOLUME|NAME.trip [NAME.trip...]",
         .doc = "Draws a volume, or a data set made of one by `triptych brick`, into an image file. "
                "A volume is bricked into a cache first, which `triptych cache` lists and clears; "
-               "the next picture of it is drawn at once.\vPoints and lengths are in the data's "
-               "world units.",
+               "the next picture of it is drawn at once. Several data sets, of regions of one "
+               "volume, are drawn in one picture.\vPoints and lengths are in the data's world "
+               "units.",
     };
     const render_options usual = { .width = 1024,
                                    .height = 1024,

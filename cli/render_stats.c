@@ -108,14 +108,32 @@ static int each_list(triptych *t,
     return status;
 }
 
+/* Lists of one name, of data sets that are drawn together, add up. */
+static void put_list(cJSON *lists, const char *name, cJSON *list)
+{
+    const cJSON *before = cJSON_GetObjectItemCaseSensitive(lists, name);
+    if (!before) {
+        cJSON_AddItemToObject(lists, name, list);
+        return;
+    }
+    const cJSON *more = list ? list->child : NULL;
+    for (cJSON *sum = before->child; sum && more; sum = sum->next, more = more->next)
+        cJSON_SetNumberValue(sum, sum->valuedouble + more->valuedouble);
+    cJSON_Delete(list);
+}
+
 static void add_whole(void *user, const char *name, const triptych_list_stats *s)
 {
-    add_list(cJSON_AddObjectToObject(user, name), s);
+    cJSON *list = cJSON_CreateObject();
+    add_list(list, s);
+    put_list(user, name, list);
 }
 
 static void add_counted(void *user, const char *name, const triptych_list_stats *s)
 {
-    add_splats(cJSON_AddObjectToObject(user, name), s);
+    cJSON *list = cJSON_CreateObject();
+    add_splats(list, s);
+    put_list(user, name, list);
 }
 
 static int add_camera(cJSON *frame, triptych *t)

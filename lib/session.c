@@ -5,28 +5,35 @@
 #include <string.h>
 
 #include "brick_command.h"
+#include "dataset_join.h"
 #include "report.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 
-/* Whether values which show were left out, where the caller wants that in place of a warning. */
+/* Whether values which show were left out of some part, where the caller wants that in place of a
+ * warning. */
 static bool find_missing(const session *s, const trip_tf *tf, const session_look *look)
 {
     double range[2];
+    bool missing = false;
+    for (unsigned i = 0; i < s->part_count && look->missing; i++)
+        missing = missing || trip_dataset_text_culled(s->texts[i], tf, range) >= 1;
     if (look->missing)
-        *look->missing = trip_dataset_text_culled(s->text, tf, range) >= 1;
-    return look->missing && *look->missing;
+        *look->missing = missing;
+    return missing;
 }
 
-static void warn_of_culled_values(const session *s, const trip_tf *tf, const session_look *look)
+static void warn_of_culled_values(const session *s, unsigned part, const trip_tf *tf,
+                                  const session_look *look)
 {
-    double range[2], voxels = trip_dataset_text_culled(s->text, tf, range);
+    const char *input = part ? s->parts[part]->path : s->input;
+    double range[2], voxels = trip_dataset_text_culled(s->texts[part], tf, range);
     if (voxels < 1)
         return;
     double span[2];
     trip_tf_visible_span(tf, s->data->header.value_min, s->data->header.value_max, span);
-    char *command = brick_command(s->text, s->input, look->tf, look->window > 0 ? span : NULL);
-    trip_warn(s->input,
+    char *command = brick_command(s->texts[part], input, look->tf, look->window > 0 ? span : NULL);
+    trip_warn(input,
               "the transfer function shows about %.0f voxels with values from %g to %g that were "
               "left out when the data set was made; to have them: %s",
               voxels, range[0], range[1], command ? command : "brick it again");
@@ -75,7 +82,12 @@ static int take_table(session *s)
 
 int session_read_text(session *s)
 {
-    return s->text ? 0 : trip_dataset_text_parse(&s->text, s->data);
+    int status = 0;
+    for (unsigned i = 0; i < s->part_count && !status; i++)
+        if (!s->texts[i])
+            status = trip_dataset_text_parse(&s->texts[i], s->parts[i]);
+    s->text = s->texts[0];
+    return status;
 }
 
 int session_use_function(session *s, const session_look *look)
@@ -89,7 +101,8 @@ int session_use_function(session *s, const session_look *look)
         status = load_function(s, look, &tf);
     if (!status && !find_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
-        warn_of_culled_values(s, tf, look);
+        for (unsigned i = 0; i < s->part_count; i++)
+            warn_of_culled_values(s, i, tf, look);
         warn_of_lost_peak(s, tf);
         double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
         trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
@@ -99,11 +112,46 @@ int session_use_function(session *s, const session_look *look)
     return status;
 }
 
+/* Opens one more, which is not drawn yet. */
+static int open_part(session *s, const char *input)
+{
+    trip_dataset **parts = realloc(s->parts, (s->part_count + 1) * sizeof *parts);
+    s->parts = parts ? parts : s->parts;
+    trip_dataset_text **texts = realloc(s->texts, (s->part_count + 1) * sizeof *texts);
+    s->texts = texts ? texts : s->texts;
+    if (!parts || !texts)
+        return trip_fail(TRIP_ERROR, "open", input, "out of memory");
+    texts[s->part_count] = NULL;
+    int status = trip_dataset_open(&parts[s->part_count], input, s->budget);
+    s->part_count += status == 0;
+    return status;
+}
+
 int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 {
     *s = (session){ .input = input };
     int status = trip_budget_create(&s->budget, memory_bytes);
-    return status ? status : trip_dataset_open(&s->data, input, s->budget);
+    if (!status)
+        status = open_part(s, input);
+    if (!status)
+        s->data = s->parts[0];
+    return status;
+}
+
+int session_add_data(session *s, const char *input)
+{
+    trip_dataset *joined;
+    int status = open_part(s, input);
+    if (status)
+        return status;
+    status = trip_dataset_join(&joined, s->parts, s->part_count, s->budget);
+    if (status) {
+        trip_dataset_close(s->parts[--s->part_count]);
+        return status;
+    }
+    trip_dataset_join_close(s->joined);
+    s->data = s->joined = joined;
+    return 0;
 }
 
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
@@ -116,9 +164,13 @@ void session_close(session *s)
 {
     if (s->table)
         trip_budget_release(s->budget, s->table, table_bytes);
-    trip_dataset_text_destroy(s->text);
-    if (s->data)
-        trip_dataset_close(s->data);
+    trip_dataset_join_close(s->joined);
+    for (unsigned i = 0; i < s->part_count; i++) {
+        trip_dataset_text_destroy(s->texts[i]);
+        trip_dataset_close(s->parts[i]);
+    }
+    free(s->parts);
+    free(s->texts);
     if (s->budget)
         trip_budget_destroy(s->budget);
     *s = (session){ 0 };

@@ -10,11 +10,15 @@
 #include "transfer_function.h"
 
 typedef struct session {
-    const char *input;
+    const char *input; /* the first data set, for messages */
     trip_budget *budget;
-    trip_dataset *data;
-    trip_dataset_text *text; /* NULL until it is wanted */
-    trip_tf_entry *table;    /* 65536 entries; the same */
+    trip_dataset **parts; /* data sets that were opened, in this order */
+    unsigned part_count;
+    trip_dataset *joined;      /* all of them as one; NULL where there is one */
+    trip_dataset *data;        /* that is drawn: that, or the one there is */
+    trip_dataset_text **texts; /* by part; NULL until they are wanted */
+    trip_dataset_text *text;   /* the first of these */
+    trip_tf_entry *table;      /* 65536 entries; the same */
 } session;
 
 /* The transfer function; zero means the one kept in the data set, as it is. */
@@ -28,6 +32,9 @@ typedef struct session_look {
 
 /* The data set alone. */
 int session_open_data(session *s, const char *input, uint64_t memory_bytes);
+/* Another data set to be drawn with it, and to be closed with it: its function is then to be used
+ * anew. After a failure all is as it was. */
+int session_add_data(session *s, const char *input);
 /* What `brick` wrote about it, where that is not read yet. */
 int session_read_text(session *s);
 /* Its function, from now on: reads the text and takes the table where they are not there yet. */

@@ -266,6 +266,21 @@ int triptych_open(triptych *t, const char *path, const triptych_resources *resou
     return trip_context_leave(before, status);
 }
 
+int triptych_add(triptych *t, const char *path)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = trip_context_check_idle(t, true);
+    if (status)
+        return trip_context_leave(before, status);
+    trip_context_drop_stats(t);
+    trip_context_drop_renderer(t);
+    trip_context_drop_level(t);
+    status = session_add_data(&t->session, path);
+    if (!status)
+        t->has_function = t->has_view = false;
+    return trip_context_leave(before, status);
+}
+
 /* The box of world space about voxels `first` to `last`, from edge to edge. */
 static void find_box(const trip_dataset *d, triptych_info *out)
 {
@@ -357,6 +372,7 @@ static triptych_list list_of(const trip_list *l)
 {
     const trip_kind_info *kind = trip_kind_of(l->kind);
     triptych_list list = {
+        .path = l->path,
         .axis = l->axis,
         .level = l->level,
         .kind = kind->name,
@@ -382,11 +398,19 @@ int triptych_get_list(triptych *t, unsigned number, triptych_list *out)
     return trip_context_leave(before, status);
 }
 
+static int verify_parts(const session *s)
+{
+    int status = 0;
+    for (unsigned i = 0; i < s->part_count && !status; i++)
+        status = trip_dataset_verify(s->parts[i], s->budget);
+    return status;
+}
+
 int triptych_verify(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_idle(t, true);
     if (!status)
-        status = trip_dataset_verify(t->session.data, t->session.budget);
+        status = verify_parts(&t->session);
     return trip_context_leave(before, status);
 }

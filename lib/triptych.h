@@ -95,6 +95,12 @@ typedef struct triptych_resources {
 
 /* Closes what is open, and opens a data set; resources NULL: the defaults. */
 TRIPTYCH_API int triptych_open(triptych *t, const char *path, const triptych_resources *resources);
+/* Opens one more, to be drawn in one picture with what is open, sheet by sheet in one order:
+ * another region of the same volume, with the same codes, as triptych_brick_options.region_first
+ * makes them. All of them are drawn at their finest level. A function and a view that were set are
+ * forgotten; the default function is the first data set's. A voxel that several hold counts once in
+ * post, and for each of them in pre. After a failure what was open still is. */
+TRIPTYCH_API int triptych_add(triptych *t, const char *path);
 TRIPTYCH_API void triptych_close(triptych *t);
 
 typedef struct triptych_info {
@@ -123,6 +129,7 @@ TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
 /* Records of one kind along one axis at one level of detail. */
 typedef struct triptych_list {
+    const char *path; /* of its data set; lasts until that is closed */
     int axis;         /* 0 to 2 */
     unsigned level;   /* 0: all details */
     const char *kind; /* "voxels", "halo" */

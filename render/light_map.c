@@ -31,8 +31,9 @@ struct trip_light_map {
     size_t nodes, open_nodes;
 
     stage stage;
-    trip_reader *reader; /* while it gathers; else NULL */
-    trip_selection selections[TRIP_KINDS];
+    trip_reader *reader;        /* while it gathers; else NULL */
+    trip_selection *selections; /* then: room for all lists of the data set */
+    unsigned list_count;
     trip_pass pass;
     trip_light_sweep sweep;
     bool sweeping;
@@ -57,6 +58,8 @@ static void stop_gathering(trip_light_map *m)
     m->reader = NULL;
     for (unsigned i = 0; i < m->pass.selection_count; i++)
         trip_selection_destroy(&m->selections[i], m->budget);
+    trip_budget_release(m->budget, m->selections, m->list_count * sizeof *m->selections);
+    m->selections = NULL;
     m->pass = (trip_pass){ 0 };
 }
 
@@ -185,12 +188,15 @@ static int axis_of(const trip_light_source *s)
     return axis;
 }
 
+/* Halo counts where values are interpolated; where several data sets are joined not, as what is
+ * halo of one and shows is kept in another. */
 static bool is_read(const trip_light_source *s, const trip_list *list, int axis)
 {
     const trip_kind_info *kind = trip_kind_of(list->kind);
-    bool pre = s->settings->classify == TRIP_CLASSIFY_PRE;
+    const bool kept_alone =
+        s->settings->classify == TRIP_CLASSIFY_PRE || trip_dataset_parts(s->data) > 1;
     return list->axis == axis && list->level == 0 && list->records > 0 &&
-           (pre ? kind->splatted && !kind->coarse : kind->lattice);
+           (kept_alone ? kind->splatted && !kind->coarse : kind->lattice);
 }
 
 /* All bricks in which the function shows something. */
@@ -218,9 +224,14 @@ static int start_gathering(trip_light_map *m, const trip_light_source *s)
 {
     const int axis = axis_of(s);
     int status = 0;
+    m->list_count = s->data->list_count;
+    m->selections = trip_budget_take(m->budget, m->list_count * sizeof *m->selections);
+    if (!m->selections)
+        return trip_fail(TRIP_ERROR, "render", "light",
+                         "%u lists do not fit the memory given; raise --memory", m->list_count);
     m->pass = (trip_pass){ .selections = m->selections };
-    for (unsigned i = 0; i < s->data->list_count && !status; i++)
-        if (is_read(s, &s->data->lists[i], axis) && m->pass.selection_count < TRIP_KINDS)
+    for (unsigned i = 0; i < m->list_count && !status; i++)
+        if (is_read(s, &s->data->lists[i], axis))
             status = select_list(m, &s->data->lists[i]);
     if (status || m->pass.selection_count == 0)
         return status;

@@ -227,7 +227,7 @@ static int read_selected(summing *s, const trip_selection *selection)
     return status;
 }
 
-static int sum(summing *s)
+static int sum_list(summing *s)
 {
     const trip_outline_params *p = s->params;
     trip_selection selection;
@@ -240,6 +240,19 @@ static int sum(summing *s)
             trip_selection_add(&selection, b);
     status = read_selected(s, &selection);
     trip_selection_destroy(&selection, p->budget);
+    return status;
+}
+
+/* Of all data sets that are joined. */
+static int sum(summing *s)
+{
+    const trip_list *list = s->list;
+    int status = 0;
+    for (; list && !status;
+         list = trip_dataset_next(s->params->data, list, AXIS, list->level, list->kind)) {
+        s->list = list;
+        status = sum_list(s);
+    }
     return status;
 }
 
@@ -282,7 +295,7 @@ int trip_outline_make(trip_outline **out, const trip_outline_params *params)
     const trip_list *list = coarse_list(params->data);
     int status = 0;
     *out = NULL;
-    if (!list || list->records == 0)
+    if (!list)
         return 0;
     trip_outline *o = trip_budget_take(params->budget, sizeof *o);
     summing *s = trip_budget_take(params->budget, sizeof *s);

@@ -748,8 +748,12 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
     explain_levels(plan, settings, out);
     explain_limit(plan, settings, out);
     explain_clip(plan, settings, out);
-    for (unsigned i = 0; i < data->list_count; i++)
-        explain_list(plan, &data->lists[i], out);
+    for (unsigned i = 0; i < data->list_count; i++) {
+        const trip_list *list = &data->lists[i];
+        if (trip_dataset_parts(data) > 1 && (i == 0 || list[-1].part != list->part))
+            fprintf(out, "data set    %s\n", list->path);
+        explain_list(plan, list, out);
+    }
     for (int axis = 0; axis < 3; axis++)
         used += plan->layers[axis].pass_count > 0;
     explain_shading(plan, data, settings, out);

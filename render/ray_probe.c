@@ -138,19 +138,25 @@ static int read_selected(samples *s, const trip_selection *selection)
     return status;
 }
 
-static int read_list(samples *s, trip_kind kind)
+static int read_list(samples *s, const trip_list *list)
 {
     const trip_ray_probe *p = s->probe;
-    const trip_list *list = trip_dataset_find(p->data, s->axis, 0, kind);
     trip_selection selection;
-    if (!list)
-        return 0;
     int status = trip_selection_create(&selection, p->data, list, false, 0, INT32_MAX, p->budget);
     if (status)
         return status;
     if (select_bricks(s, &selection))
         status = read_selected(s, &selection);
     trip_selection_destroy(&selection, p->budget);
+    return status;
+}
+
+static int read_kind(samples *s, trip_kind kind)
+{
+    const trip_list *list = NULL;
+    int status = 0;
+    while (!status && (list = trip_dataset_next(s->probe->data, list, s->axis, 0, kind)))
+        status = read_list(s, list);
     return status;
 }
 
@@ -230,9 +236,9 @@ int trip_ray_probe_find(const trip_ray_probe *probe, trip_ray_hit *out)
     if (!s.codes)
         return trip_fail(TRIP_ERROR, "render", "probe", "the ray does not fit the memory given");
     memset(s.codes, 0xff, bytes);
-    int status = read_list(&s, TRIP_KIND_VOXELS);
+    int status = read_kind(&s, TRIP_KIND_VOXELS);
     if (!status)
-        status = read_list(&s, TRIP_KIND_HALO);
+        status = read_kind(&s, TRIP_KIND_HALO);
     if (!status)
         find_hit(&s, out);
     trip_budget_release(probe->budget, s.codes, bytes);

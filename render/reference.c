@@ -49,7 +49,7 @@ typedef struct reference {
     trip_image_sheets *slabs;      /* of frames that are composited by them; else NULL */
     int axis;                      /* of the layer being drawn; -1 before the first */
     bool sums;                     /* splats, sheet by sheet */
-    int64_t sheet;                 /* that is open, of `list` */
+    int64_t sheet;                 /* that is open, of the level of `list` */
     trip_pixels rows;              /* that it may have touched */
     bool front_to_back;            /* of the splats last drawn */
     bool broken;                   /* some splat's numbers are not finite */
@@ -256,7 +256,8 @@ static int use_list(reference *r, const trip_list *of)
     int status = 0;
     if (list == r->list)
         return 0;
-    end_sheet(r);
+    if (!r->list || r->frame->data->lists[r->number].level != of->level)
+        end_sheet(r); /* lists of one level have sheets in common */
     r->list = list;
     r->number = of->index;
     r->constants = trip_splat_frame_make(&list->camera, r->frame->settings);

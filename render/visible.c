@@ -24,6 +24,7 @@ typedef struct form {
 
 typedef struct search {
     trip_visible *visible;
+    const trip_list *list; /* that is being read */
     trip_vec3 across[2];
     double from[2];
     int count;
@@ -131,8 +132,6 @@ static form make_form(const search *s, trip_vec3 normal, double offset, double a
         .per_voxel = per_voxel,
         .slack = around > 0 ? 1e-5 * per_voxel : 0,
         .best = -INFINITY,
-        .step = per_voxel * (double)(1u << s->visible->data->header.tile_log2) / 4,
-        .read = INFINITY,
     };
 }
 
@@ -154,7 +153,7 @@ static bool bound_brick(const search *s, const trip_file_brick *b, const trip_fi
 /* How far bricks that were not read may reach. */
 static void look_ahead(search *s)
 {
-    const trip_list *list = trip_dataset_find(s->visible->data, AXIS, 0, TRIP_KIND_VOXELS);
+    const trip_list *list = s->list;
     double bounds[TRIP_REACHES_MAX];
     for (int i = 0; i < s->count; i++)
         s->forms[i].left = -INFINITY;
@@ -168,7 +167,7 @@ static void look_ahead(search *s)
 /* Selects those that reach the farthest; false when none may reach farther than what was found. */
 static bool select_bricks(search *s, trip_selection *selection)
 {
-    const trip_list *list = trip_dataset_find(s->visible->data, AXIS, 0, TRIP_KIND_VOXELS);
+    const trip_list *list = s->list;
     double from[TRIP_REACHES_MAX], bounds[TRIP_REACHES_MAX];
     bool some = false;
     for (int i = 0; i < s->count; i++) {
@@ -242,12 +241,17 @@ static int read_selected(search *s, const trip_selection *selection)
 }
 
 /* The farthest first: most often what they hold reaches farther than all others may. */
-static int find(search *s)
+static int find_in_list(search *s, const trip_list *list)
 {
     const trip_visible *v = s->visible;
-    const trip_list *list = trip_dataset_find(v->data, AXIS, 0, TRIP_KIND_VOXELS);
     trip_selection selection;
     int status = 0;
+    s->list = list;
+    for (int i = 0; i < s->count; i++) {
+        form *f = &s->forms[i];
+        f->step = f->per_voxel * (double)(1u << v->data->header.tile_log2) / 4;
+        f->read = INFINITY;
+    }
     for (bool more = true; more && !status;) {
         status = trip_selection_create(&selection, v->data, list, false, 0, INT32_MAX, v->budget);
         if (status)
@@ -259,6 +263,16 @@ static int find(search *s)
         trip_reader_begin(v->reader, NULL); /* nothing is read of it any more */
         trip_selection_destroy(&selection, v->budget);
     }
+    return status;
+}
+
+/* What one list shows need not be looked for in the next where that reaches no farther. */
+static int find(search *s)
+{
+    const trip_list *list = NULL;
+    int status = 0;
+    while (!status && (list = trip_dataset_next(s->visible->data, list, AXIS, 0, TRIP_KIND_VOXELS)))
+        status = find_in_list(s, list);
     return status;
 }
 

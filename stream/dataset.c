@@ -175,6 +175,7 @@ static int set_lists(trip_dataset *d)
     for (; d->list_count < count; d->list_count++) {
         trip_list *l = &d->lists[d->list_count];
         l->index = d->list_count;
+        l->path = d->path;
         for (int plane = 0; plane < TRIP_PLANES; plane++)
             l->plane_fd[plane] = -1;
         set_list(d, l, &files[d->list_count]);
@@ -297,7 +298,13 @@ void trip_dataset_close(trip_dataset *d)
 
 const trip_list *trip_dataset_find(const trip_dataset *d, int axis, unsigned level, trip_kind kind)
 {
-    for (unsigned i = 0; i < d->list_count; i++) {
+    return trip_dataset_next(d, NULL, axis, level, kind);
+}
+
+const trip_list *trip_dataset_next(const trip_dataset *d, const trip_list *list, int axis,
+                                   unsigned level, trip_kind kind)
+{
+    for (unsigned i = list ? list->index + 1 : 0; i < d->list_count; i++) {
         const trip_list *l = &d->lists[i];
         if (l->axis == axis && l->level == level && l->kind == kind)
             return l;
@@ -305,15 +312,19 @@ const trip_list *trip_dataset_find(const trip_dataset *d, int axis, unsigned lev
     return NULL;
 }
 
-/* From the bricks of one list: all three hold every splat. */
-void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3])
+const trip_list *trip_dataset_along(const trip_dataset *d, const trip_list *list, int axis)
 {
-    const trip_list *list = trip_dataset_find(d, 2, 0, TRIP_KIND_VOXELS);
-    for (int a = 0; a < 3; a++) {
-        lo[a] = list && list->brick_count ? INFINITY : 0;
-        hi[a] = list && list->brick_count ? -INFINITY : (double)d->header.dims[a] - 1;
-    }
-    for (uint64_t i = 0; list && i < list->slab_count; i++) {
+    const trip_list *along = NULL;
+    do
+        along = trip_dataset_next(d, along, axis, list->level, list->kind);
+    while (along && along->part != list->part);
+    return along;
+}
+
+/* Widens the box to the bricks of a list along z. */
+static void add_kept(const trip_dataset *d, const trip_list *list, double lo[3], double hi[3])
+{
+    for (uint64_t i = 0; i < list->slab_count; i++) {
         const trip_file_slab *slab = &list->slabs[i];
         double sheet = (double)slab->slab * d->header.slab_sheets;
         for (uint64_t j = slab->first_brick; j < slab->first_brick + slab->brick_count; j++) {
@@ -327,5 +338,22 @@ void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3])
             lo[2] = fmin(lo[2], sheet + b->sheet_min);
             hi[2] = fmax(hi[2], sheet + b->sheet_max);
         }
+    }
+}
+
+/* From the bricks along one axis: those along all three hold every splat. */
+void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3])
+{
+    const trip_list *list = NULL;
+    for (int a = 0; a < 3; a++) {
+        lo[a] = INFINITY;
+        hi[a] = -INFINITY;
+    }
+    while ((list = trip_dataset_next(d, list, 2, 0, TRIP_KIND_VOXELS)))
+        add_kept(d, list, lo, hi);
+    const bool some = lo[0] <= hi[0];
+    for (int a = 0; a < 3 && !some; a++) {
+        lo[a] = 0;
+        hi[a] = (double)d->header.dims[a] - 1;
     }
 }

@@ -16,7 +16,9 @@
 
 /* Records of one kind, in the order along one axis, at one level. */
 typedef struct trip_list {
-    unsigned index; /* in the data set's lists */
+    unsigned index;   /* in the data set's lists */
+    unsigned part;    /* where several data sets are joined: the number of its own; else 0 */
+    const char *path; /* of its data set, for messages */
     int axis;
     unsigned level; /* 0: full resolution */
     trip_kind kind;
@@ -61,8 +63,22 @@ int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
  * shows all of one object. What another level alone shows takes no part in it. */
 void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3]);
 
-/* NULL where the data set has no such list. */
+/* NULL where the data set has no such list; of several that are joined the first one's. */
 const trip_list *trip_dataset_find(const trip_dataset *d, int axis, unsigned level, trip_kind kind);
+
+/* Lists of that kind, one of each data set that is joined: the one after `list`, or the first after
+ * NULL; NULL: there are no more. */
+const trip_list *trip_dataset_next(const trip_dataset *d, const trip_list *list, int axis,
+                                   unsigned level, trip_kind kind);
+/* The list along `axis` that has the records of `list`, which may be that itself; NULL: none has.
+ */
+const trip_list *trip_dataset_along(const trip_dataset *d, const trip_list *list, int axis);
+
+/* How many data sets are joined; 1: it is one. */
+static inline unsigned trip_dataset_parts(const trip_dataset *d)
+{
+    return d->list_count ? d->lists[d->list_count - 1].part + 1 : 1;
+}
 
 /* Where a sheet lies along the list's axis, in level-0 index units: passes merge lists by it. */
 static inline double trip_list_sheet_coordinate(const trip_list *list, int64_t sheet)

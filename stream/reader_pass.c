@@ -323,11 +323,11 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass)
     return TRIP_OK;
 }
 
-static int report_fault(const trip_reader *r, const trip_request *q)
+static int report_fault(const trip_request *q)
 {
     char name[32], where[4096];
     unsigned long long at = q->fault_at;
-    snprintf(where, sizeof where, "%s/%s", r->data->path,
+    snprintf(where, sizeof where, "%s/%s", q->list->path,
              trip_list_plane_name(q->list, q->plane, name));
     if (q->fault == TRIP_REQUEST_CHECKSUM)
         return trip_fail(TRIP_ERROR, "read", where,
@@ -340,11 +340,11 @@ static int report_fault(const trip_reader *r, const trip_request *q)
                      strerrordesc_np(q->fault_errno));
 }
 
-static int check_slot(const trip_reader *r, const trip_slot *s)
+static int check_slot(const trip_slot *s)
 {
     for (unsigned i = 0; i < s->request_count; i++)
         if (s->requests[i].fault != TRIP_REQUEST_OK)
-            return report_fault(r, &s->requests[i]);
+            return report_fault(&s->requests[i]);
     return TRIP_OK;
 }
 
@@ -373,25 +373,25 @@ static unsigned long long block_offset(const trip_slot *s, const trip_run *run)
     return range->offset + (at - range->slot_offset);
 }
 
-static int report_block(const trip_reader *r, const trip_batch *b, const trip_run *run,
-                        const char *why)
+static int report_block(const trip_batch *b, const trip_run *run, const char *why)
 {
+    const trip_list *list = trip_batch_list(b, run);
     char name[32], where[4096];
-    snprintf(where, sizeof where, "%s/%s", r->data->path,
-             trip_list_plane_name(trip_batch_list(b, run), TRIP_PLANE_VOXELS, name));
+    snprintf(where, sizeof where, "%s/%s", list->path,
+             trip_list_plane_name(list, TRIP_PLANE_VOXELS, name));
     return trip_fail(TRIP_ERROR, "read", where, "byte %llu: %s: make the data set again",
                      block_offset(b->slot, run), why);
 }
 
 /* What draws takes blocks as they are: those that do not agree with their bricks end here. */
-static int check_blocks(const trip_reader *r, const trip_batch *b)
+static int check_blocks(const trip_batch *b)
 {
     for (size_t i = 0; i < b->run_count && b->planes[TRIP_PLANE_VOXELS]; i++) {
         const trip_run *run = &b->runs[i];
         const trip_block block = trip_block_of(b, run);
         const char *why = trip_block_check(&block, &trip_batch_list(b, run)->bricks[run->brick]);
         if (why)
-            return report_block(r, b, run, why);
+            return report_block(b, run, why);
     }
     return TRIP_OK;
 }
@@ -430,11 +430,11 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "all %u slots of the ring are held: release one first", r->params.slots);
     trip_slot *s = take_first(r);
-    r->failed = check_slot(r, s);
+    r->failed = check_slot(s);
     if (!r->failed) {
         copy_borders(r, s);
         fill_batch(r, s, batch);
-        r->failed = check_blocks(r, batch);
+        r->failed = check_blocks(batch);
     }
     s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
     return r->failed ? r->failed : 1;

@@ -340,8 +340,9 @@ static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
 {
     unsigned effects = r->constants.lists[piece->list].effects |
                        (piece->quads ? TRIP_GL_QUADS : 0) | (piece->near ? TRIP_GL_NEAR : 0);
+    const unsigned level = r->frame->data->lists[piece->list].level;
     int status =
-        sums_sheets(r) ? trip_gl_sums_use(&r->sums, r->band, piece->list, piece->sheet) : TRIP_OK;
+        sums_sheets(r) ? trip_gl_sums_use(&r->sums, r->band, level, piece->sheet) : TRIP_OK;
     if (!status)
         status = use_program(r, TRIP_GL_PASS_SPLAT, effects);
     if (status)

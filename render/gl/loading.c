@@ -178,7 +178,7 @@ static const trip_list *next_list(trip_gl_loading *l)
             trip_gl_resident_base(data, base) != base)
             continue;
         for (; l->turn < 3 && !list; l->turn += !list)
-            list = trip_dataset_find(data, (base->axis + l->turn) % 3, base->level, base->kind);
+            list = trip_dataset_along(data, base, (base->axis + l->turn) % 3);
         if (list)
             return list;
     }

@@ -13,7 +13,7 @@ const trip_list *trip_gl_resident_base(const trip_dataset *data, const trip_list
 {
     const trip_list *base = NULL;
     for (int axis = AXES - 1; axis >= 0 && !base; axis--)
-        base = trip_dataset_find(data, axis, list->level, list->kind);
+        base = trip_dataset_along(data, list, axis);
     return base;
 }
 

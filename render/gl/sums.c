@@ -42,9 +42,9 @@ static int end_sheet(trip_gl_sums *s, const trip_gl_band *band)
     return TRIP_OK;
 }
 
-int trip_gl_sums_use(trip_gl_sums *s, const trip_gl_band *band, unsigned list, int32_t sheet)
+int trip_gl_sums_use(trip_gl_sums *s, const trip_gl_band *band, unsigned level, int32_t sheet)
 {
-    uint64_t key = (uint64_t)list << 32 | (uint32_t)sheet;
+    uint64_t key = (uint64_t)level << 32 | (uint32_t)sheet;
     int status = *open_of(s, band) == key ? TRIP_OK : end_sheet(s, band);
     if (status)
         return status;

@@ -20,8 +20,9 @@ typedef struct trip_gl_sums {
 
 /* The target's layer of `axis` was begun with sums. */
 void trip_gl_sums_begin_layer(trip_gl_sums *s, int axis);
-/* Readies a band for splats of a sheet of a list: they are to be added up from now on. */
-int trip_gl_sums_use(trip_gl_sums *s, const trip_gl_band *band, unsigned list, int32_t sheet);
+/* Readies a band for splats of a sheet, which lists of a level have in common: they are to be added
+ * up from now on. */
+int trip_gl_sums_use(trip_gl_sums *s, const trip_gl_band *band, unsigned level, int32_t sheet);
 /* Composites what is open. */
 int trip_gl_sums_end_layer(trip_gl_sums *s);
 

@@ -65,7 +65,7 @@ static void wrong_usage_is_one_line_and_exit_status_2(void **state)
         "",
         "fog.trip",
         "-o a.png",
-        "fog.trip stent.trip -o a.png",
+        "fog.trip stent.nrrd -o a.png",
         "fog.trip -o a.xyz",
         "fog.trip -o a.png --nonsense",
         "fog.trip -o a.png --size",

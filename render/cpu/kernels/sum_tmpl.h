@@ -145,10 +145,10 @@ INLINE void add_to_sheet(patch *p, const trip_cpu_splat *splat, float depth, tri
         p->depth = v_fma(share, v_set(depth * splat->peak), p->depth);
 }
 
-/* Sheets of a list; no list has this many. */
+/* Lists of one level have sheets in common; no level has this many. */
 INLINE uint64_t sheet_key(const trip_cpu_view *view, int32_t sheet)
 {
-    return (uint64_t)view->list->index << 32 | (uint32_t)sheet;
+    return (uint64_t)view->list->level << 32 | (uint32_t)sheet;
 }
 
 /* All splats of the group, which are of one list, that may touch a stamp, in order; false when its
@@ -162,7 +162,7 @@ INLINE bool sum_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays kind)
         t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
     p.number = number;
     p.sheet = (int32_t)before;
-    if (before >> 32 != s->view->list->index && before != TRIP_CPU_NO_SHEET)
+    if (before >> 32 != s->view->list->level && before != TRIP_CPU_NO_SHEET)
         end_sheet(&p);
     blend_each(&p, &t, add_to_sheet, kind, true, TRIP_TARGET_RGBA32F);
     store_stamp(s->sums, number, &p);

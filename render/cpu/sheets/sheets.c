@@ -514,6 +514,13 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
 
+/* Runs that are decoded at once have no voxel in common: those of one data set. */
+static bool is_of_another_part(const trip_cpu_sheets *s, const trip_run *run)
+{
+    return s->run_count > 0 &&
+           trip_batch_list(s->batch, run)->part != trip_batch_list(s->batch, s->runs[0])->part;
+}
+
 static int add_run(trip_cpu_sheets *s, const trip_run *run)
 {
     int status = 0;
@@ -525,7 +532,7 @@ static int add_run(trip_cpu_sheets *s, const trip_run *run)
     }
     if (status || is_occluded(s, run))
         return status;
-    if (s->run_count == TRIP_CPU_SHEETS_RUNS)
+    if (s->run_count == TRIP_CPU_SHEETS_RUNS || is_of_another_part(s, run))
         decode_runs(s);
     status = take_rasters(s, run);
     if (!status)

@@ -104,7 +104,8 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
 /* Runs of a kept sheet, decoded into a sheet of the store. */
 typedef struct decoding {
     const trip_cpu_sheets *s;
-    const trip_cpu_kept_sheet *from;
+    const trip_cpu_kept_run *runs;
+    const uint64_t *words; /* of all the sheet's runs */
     const trip_cpu_sheet *to;
 } decoding;
 
@@ -116,12 +117,12 @@ static int64_t raster_of(int64_t voxel)
 static void decode_run(void *context, unsigned task, unsigned thread)
 {
     const decoding *d = context;
-    const trip_cpu_kept_run *kept = &d->from->runs[task];
+    const trip_cpu_kept_run *kept = &d->runs[task];
     const trip_block_form form =
         trip_block_form_of(&d->s->of->frame->data->header, (trip_kind)kept->kind);
     (void)thread;
     const trip_block block =
-        trip_block_make(&form, kept->count, kept->words, d->from->words + kept->at, NULL);
+        trip_block_make(&form, kept->count, kept->words, d->words + kept->at, NULL);
     trip_cpu_store_decode(&d->s->store, d->to, &block, &(trip_run){ .u = kept->u, .v = kept->v });
 }
 
@@ -153,6 +154,20 @@ static bool is_at_hand(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *shee
     return false;
 }
 
+/* Runs from `first` on of one data set, which have no voxel in common; returns where those end. */
+static size_t decode_part(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *from, size_t first,
+                          const trip_cpu_sheet *to)
+{
+    size_t end = first + 1;
+    while (end < from->run_count && from->runs[end].part == from->runs[first].part)
+        end++;
+    decoding d = { s, from->runs + first, from->words, to };
+    trip_cpu_job job = { .run = decode_run, .context = &d, .tasks = (unsigned)(end - first) };
+    trip_cpu_pool_start(s->of->pool, &job);
+    trip_cpu_pool_wait(s->of->pool, &job);
+    return end;
+}
+
 static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_rasters *hand)
 {
     const trip_cpu_kept_sheet *from = &s->windows.sheets[i];
@@ -160,10 +175,8 @@ static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_rasters *hand)
     to->number = from->number;
     for (size_t n = 0; n < from->run_count; n++)
         take_rasters(s, to, &from->runs[n], hand);
-    decoding d = { s, from, to };
-    trip_cpu_job job = { .run = decode_run, .context = &d, .tasks = (unsigned)from->run_count };
-    trip_cpu_pool_start(s->of->pool, &job);
-    trip_cpu_pool_wait(s->of->pool, &job);
+    for (size_t n = 0; n < from->run_count;)
+        n = decode_part(s, from, n, to);
 }
 
 /* Of the interval's two sheets: what may show between them, and gradients there. */
@@ -293,15 +306,16 @@ int trip_cpu_windows_add_run(trip_cpu_sheets *s, const trip_run *run)
         status = begin_sheet(s, run->sheet);
     if (status)
         return status;
+    const trip_list *list = trip_batch_list(s->batch, run);
     trip_cpu_kept_sheet *sheet = &w->sheets[w->count - 1];
     const unsigned char *from = s->batch->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
-    sheet->runs[sheet->run_count++] =
-        (trip_cpu_kept_run){ .u = run->u,
-                             .v = run->v,
-                             .kind = trip_batch_list(s->batch, run)->kind,
-                             .count = run->count,
-                             .words = run->words,
-                             .at = sheet->word_count };
+    sheet->runs[sheet->run_count++] = (trip_cpu_kept_run){ .u = run->u,
+                                                           .v = run->v,
+                                                           .kind = (uint16_t)list->kind,
+                                                           .part = (uint16_t)list->part,
+                                                           .count = run->count,
+                                                           .words = run->words,
+                                                           .at = sheet->word_count };
     memcpy(sheet->words + sheet->word_count, from, (size_t)run->words * 8);
     sheet->word_count += run->words;
     return 0;

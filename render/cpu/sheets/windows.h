@@ -17,7 +17,7 @@ enum { TRIP_CPU_WINDOW_SHEETS = 4 };
 
 typedef struct trip_cpu_kept_run {
     int32_t u, v;
-    uint32_t kind; /* of the list */
+    uint16_t kind, part; /* of the list */
     uint32_t count, words;
     size_t at; /* in words */
 } trip_cpu_kept_run;

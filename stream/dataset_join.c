@@ -1,0 +1,121 @@
+#include "dataset_join.h"
+
+#include <string.h>
+#include <xxhash.h>
+
+#include "report.h"
+
+static bool has_same_coordinates(const trip_dataset *a, const trip_dataset *b)
+{
+    bool same = true;
+    for (int axis = 0; axis < 3 && same; axis++) {
+        const double *x = a->coordinates.along[axis], *y = b->coordinates.along[axis];
+        same = !x == !y && (!x || !memcmp(x, y, a->header.dims[axis] * sizeof *x));
+    }
+    return same;
+}
+
+/* What of a data set is not as in the first; NULL: nothing that matters. */
+static const char *find_difference(const trip_dataset *first, const trip_dataset *d)
+{
+    const trip_file_header *a = &first->header, *b = &d->header;
+    if (memcmp(a->dims, b->dims, sizeof a->dims) != 0 ||
+        memcmp(a->index_to_world, b->index_to_world, sizeof a->index_to_world) != 0 ||
+        !has_same_coordinates(first, d))
+        return "is on another grid";
+    if (a->code_lo != b->code_lo || a->code_hi != b->code_hi || a->code_bytes != b->code_bytes)
+        return "has another scale of values";
+    if (a->normal_bytes != b->normal_bytes || a->gradient_full != b->gradient_full ||
+        memcmp(a->gradient_step, b->gradient_step, sizeof a->gradient_step) != 0)
+        return "has other normals";
+    if (a->tile_log2 != b->tile_log2 || a->slab_sheets != b->slab_sheets ||
+        a->page_log2 != b->page_log2)
+        return "has other tiles, slabs or pages";
+    return NULL;
+}
+
+/* Lists of all parts at level 0. */
+static unsigned count_lists(trip_dataset *const *parts, unsigned count)
+{
+    unsigned lists = 0;
+    for (unsigned p = 0; p < count; p++)
+        for (unsigned i = 0; i < parts[p]->list_count; i++)
+            lists += parts[p]->lists[i].level == 0;
+    return lists;
+}
+
+static int check(trip_dataset *const *parts, unsigned count)
+{
+    for (unsigned p = 1; p < count; p++) {
+        const char *why = find_difference(parts[0], parts[p]);
+        if (why)
+            return trip_fail(TRIP_ERROR, "open", parts[p]->path,
+                             "%s than %s: what is drawn together are regions of one volume, "
+                             "bricked alike (triptych brick --region)",
+                             why, parts[0]->path);
+    }
+    if (count_lists(parts, count) > TRIP_LISTS_MAX)
+        return trip_fail(TRIP_ERROR, "open", parts[count - 1]->path,
+                         "has more lists, with those before it, than the %d there may be",
+                         TRIP_LISTS_MAX);
+    return TRIP_OK;
+}
+
+static void add_lists(trip_dataset *d, const trip_dataset *part, unsigned number)
+{
+    for (unsigned i = 0; i < part->list_count; i++) {
+        if (part->lists[i].level > 0)
+            continue;
+        trip_list *list = &d->lists[d->list_count];
+        *list = part->lists[i];
+        list->index = d->list_count++;
+        list->part = number;
+    }
+}
+
+/* What is of all of them. Where one has no halo, values cannot be interpolated at its border. */
+static void add_header(trip_dataset *d, const trip_dataset *part)
+{
+    trip_file_header *h = &d->header;
+    const trip_file_header *of = &part->header;
+    const uint64_t sums[2] = { h->header_checksum, of->header_checksum };
+    h->header_checksum = XXH64(sums, sizeof sums, 0);
+    h->value_min = h->value_min < of->value_min ? h->value_min : of->value_min;
+    h->value_max = h->value_max > of->value_max ? h->value_max : of->value_max;
+    h->voxels = h->voxels > of->voxels ? h->voxels : of->voxels;
+    h->halo = h->halo && of->halo ? h->halo + of->halo : 0;
+    h->kept += of->kept;
+    h->index_bytes += of->index_bytes;
+    d->bytes += part->bytes;
+}
+
+int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned count,
+                      trip_budget *budget)
+{
+    *out = NULL;
+    int status = check(parts, count);
+    if (status < 0)
+        return status;
+    const unsigned lists = count_lists(parts, count);
+    trip_dataset *d = trip_budget_take(budget, sizeof *d + lists * sizeof *d->lists);
+    if (!d)
+        return trip_fail(TRIP_ERROR, "open", parts[count - 1]->path,
+                         "no memory for the %u lists of all: give more with --memory", lists);
+    *d = *parts[0];
+    d->budget = budget;
+    d->lists = (trip_list *)(void *)(d + 1);
+    d->list_count = 0;
+    for (unsigned p = 0; p < count; p++) {
+        add_lists(d, parts[p], p);
+        if (p > 0)
+            add_header(d, parts[p]);
+    }
+    *out = d;
+    return TRIP_OK;
+}
+
+void trip_dataset_join_close(trip_dataset *d)
+{
+    if (d)
+        trip_budget_release(d->budget, d, sizeof *d + d->list_count * sizeof *d->lists);
+}
