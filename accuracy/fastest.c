@@ -93,19 +93,23 @@ static void warn_of_differences(const cJSON *root, const char *path, const accur
                   s->shading ? "without light" : "with light");
 }
 
+int accuracy_check_data(const char *measured, const char *drawn, const char *path)
+{
+    return !strcmp(measured, drawn)
+               ? 0
+               : trip_fail(
+                     TRIP_ERROR, "--error", path,
+                     "the report is of another data set, or of before this one was bricked anew: "
+                     "`triptych accuracy` measures it");
+}
+
 /* Reports of before they had a checksum may be of anything. */
 static int check_data(const cJSON *root, const char *path, const accuracy_wanted *w)
 {
     const char *checksum = text_of(root, "checksum");
-    if (!w->checksum)
-        return 0;
-    if (!checksum)
+    if (w->checksum && !checksum)
         trip_warn(path, "does not say which data set it was made of; measure it anew");
-    return !checksum || !strcmp(checksum, w->checksum)
-               ? 0
-               : trip_fail(TRIP_ERROR, "--error", path,
-                           "was made of another data set, or before this one was bricked anew: "
-                           "`triptych accuracy` measures it");
+    return w->checksum && checksum ? accuracy_check_data(checksum, w->checksum, path) : 0;
 }
 
 static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
@@ -135,6 +139,8 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
                          closest.setting.name, closest.error);
     warn_of_differences(root, path, w, &usual);
     *out = best;
+    const char *checksum = text_of(root, "checksum");
+    snprintf(out->checksum, sizeof out->checksum, "%s", checksum ? checksum : "");
     return 0;
 }
 

@@ -8,6 +8,10 @@
 
 #include "setting.h"
 
+/* triptych_info.checksum as reports have it. */
+enum { ACCURACY_CHECKSUM_BYTES = 17 };
+void accuracy_checksum_text(uint64_t checksum, char text[ACCURACY_CHECKSUM_BYTES]);
+
 typedef struct accuracy_wanted {
     double error;         /* of 255: the 99th percentile of the view where that is largest */
     unsigned renderers;   /* of which: bits 1 << TRIPTYCH_RENDERER_...; 0: any */
@@ -18,6 +22,7 @@ typedef struct accuracy_wanted {
 typedef struct accuracy_found {
     accuracy_setting setting;
     double error, ms;
+    char checksum[ACCURACY_CHECKSUM_BYTES]; /* of the report's data set; "": it names none */
 } accuracy_found;
 
 /* `path` is a report's folder or its accuracy.json. out->setting.settings has what the report says
@@ -29,9 +34,9 @@ int accuracy_fastest(const char *path, const accuracy_wanted *wanted, accuracy_f
 int accuracy_fastest_in(const char *text, const char *path, const accuracy_wanted *wanted,
                         accuracy_found *out);
 
-/* triptych_info.checksum as reports have it. */
-enum { ACCURACY_CHECKSUM_BYTES = 17 };
-void accuracy_checksum_text(uint64_t checksum, char text[ACCURACY_CHECKSUM_BYTES]);
+/* Fails where the checksums of the data set measured and of the one drawn differ; `path` is for the
+ * message. */
+int accuracy_check_data(const char *measured, const char *drawn, const char *path);
 
 /* Where the report of a data set or volume lies: NAME.accuracy beside NAME.trip, NAME.nrrd, ...;
  * for free(), NULL without memory. */

@@ -1,5 +1,6 @@
 #include "quality_options.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "cached_volume.h"
@@ -51,7 +52,18 @@ static int find_checksum(const char *input, char text[ACCURACY_CHECKSUM_BYTES])
     return status;
 }
 
-static int use_report(const quality_options *q, const quality_drawn *drawn, triptych_settings *s,
+int quality_options_check_data(const char *measured, triptych *t, const char *volume)
+{
+    char checksum[ACCURACY_CHECKSUM_BYTES];
+    triptych_info info;
+    if (!measured[0])
+        return 0;
+    int status = triptych_get_info(t, &info);
+    accuracy_checksum_text(info.checksum, checksum);
+    return status ? status : accuracy_check_data(measured, checksum, volume);
+}
+
+static int use_report(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
                       triptych_renderer *renderer, bool slow_too)
 {
     char checksum[ACCURACY_CHECKSUM_BYTES];
@@ -75,6 +87,7 @@ static int use_report(const quality_options *q, const quality_drawn *drawn, trip
     if (!status) {
         *s = found.setting.settings;
         *renderer = found.setting.renderer;
+        snprintf(q->measured, sizeof q->measured, "%s", checksum[0] ? "" : found.checksum);
         trip_note("--error", "%s, measured to be off by %.2f, in %.1f ms", found.setting.name,
                   found.error, found.ms);
     }
@@ -82,7 +95,7 @@ static int use_report(const quality_options *q, const quality_drawn *drawn, trip
     return status;
 }
 
-int quality_options_use(const quality_options *q, const quality_drawn *drawn, triptych_settings *s,
+int quality_options_use(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
                         triptych_renderer *renderer, bool slow_too)
 {
     if (q->error > 0)

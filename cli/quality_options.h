@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 
+#include "fastest.h"
 #include "triptych.h"
 
 typedef struct quality_options {
@@ -12,6 +13,8 @@ typedef struct quality_options {
     triptych_quality quality;
     double error;       /* 0: not given */
     const char *report; /* NULL: NAME.accuracy beside the data */
+    /* Once used for a volume: the data set that the report is of; "": not known, or no volume. */
+    char measured[ACCURACY_CHECKSUM_BYTES];
 } quality_options;
 
 /* The keys are KEY_QUALITY, KEY_ERROR and KEY_REPORT. */
@@ -49,9 +52,12 @@ typedef struct quality_drawn {
     const char *input, *function;
 } quality_drawn;
 
+/* Of a volume, once its data set is open: fails where `measured` is another. */
+int quality_options_check_data(const char *measured, triptych *t, const char *volume);
+
 /* Changes settings as the options say, and with --error the renderer where it is auto. Prints what
  * --error has chosen. */
-int quality_options_use(const quality_options *q, const quality_drawn *drawn, triptych_settings *s,
+int quality_options_use(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
                         triptych_renderer *renderer, bool slow_too);
 
 #endif

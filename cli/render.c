@@ -113,6 +113,8 @@ static int open_from_cache(drawing *d)
 static int open_volume(drawing *d)
 {
     int status = open_from_cache(d);
+    if (!status)
+        status = quality_options_check_data(d->o.measured, d->t, d->o.input);
     if (!status && d->o.field == RENDER_FIELD_SOURCE)
         status = triptych_set_source(d->t, d->o.input, &d->o.volume);
     char *note = status == 0 ? library_note(d->t, "note") : NULL;

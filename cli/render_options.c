@@ -994,6 +994,7 @@ int render_options_parse(render_options *o, int argc, char **argv)
     if (status)
         return status;
     *o = chosen;
+    memcpy(o->measured, p.quality.measured, sizeof o->measured);
     p = (parse){ .o = o, .again = true };
     argv[0] = name;
     return trip_options_parse(&argp, argc, argv, &p);

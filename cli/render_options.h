@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "quality_options.h"
 #include "triptych_brick.h"
 
 /* What the integral renderer integrates. */
@@ -51,6 +52,7 @@ typedef struct render_options {
     uint64_t memory_bytes; /* 0: the default */
     int threads;           /* 0: the default */
     bool explain, count;
+    char measured[ACCURACY_CHECKSUM_BYTES]; /* the data set that --error has to be of, or "" */
 } render_options;
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */

@@ -9,6 +9,7 @@ import os
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -260,6 +261,18 @@ class Accuracy(program.ProgramTest):
             self.works("brick", "a.nrrd", "-q", "--tile", "16", "-o", name + ".trip", *options)
         self.works("render", "again.trip", *size, "--report", "report")
         self.fails(1, "render", "other.trip", *size, "--report", "report", says="another data set")
+        self.works("brick", "a.nrrd", "-q", "-o", "usual.trip")
+        with open("usual.trip/index.trip", "rb") as f:
+            (checksum,) = struct.unpack_from("<Q", f.read(24), 16)
+        os.makedirs("usual", exist_ok=True)
+        with open("usual/accuracy.json", "w", encoding="utf-8") as f:
+            json.dump({**self.report, "checksum": f"{checksum:016x}"}, f)
+        volume = ["render", "a.nrrd", *size[:4], "--error", "255", "--report"]
+        cache = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
+        self.works(*volume, "usual", env=cache)
+        run = program.call(*volume, "report", env=cache)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("triptych: --error: a.nrrd: the report is of another data set", run.stderr)
 
     def test_qualities_are_settings(self):
         """Options beside a quality go before what it says, wherever they stand."""
