@@ -37,7 +37,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     trip_affine_invert(&data->index_to_world, &s->to_index); /* it was checked on opening */
     s->coordinates = &data->coordinates;
     s->value_per_code = (h->code_hi - h->code_lo) / 65535;
-    s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world);
+    s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
     if (status) {
         trip_reference_sheets_destroy(s);

@@ -24,12 +24,14 @@
 #define TRIP_SHININESS 24.0
 #define TRIP_FACING 4.0
 
-/* |gradient| in value per world unit at which shading is full. */
-static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world)
+/* |gradient| in value per world unit at which shading is full: the same at every level, the voxels
+ * of which are `voxel_world` long. */
+static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world,
+                                              unsigned level)
 {
     double range =
         h->value_max > h->value_min ? h->value_max - h->value_min : h->code_hi - h->code_lo;
-    return TRIP_GRADIENT_FULL * range / voxel_world;
+    return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 
 /* What is the same for all gradients at a point: unit vectors in world space. Along a ray from the

@@ -131,7 +131,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
                       int axis, bool front_to_back)
 {
     const trip_file_header *header = &frame->data->header;
-    const double full = trip_shade_gradient_full(header, frame->camera->voxel_world);
+    const double full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
     const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
     *view = (trip_cpu_view){
         .of = frame,

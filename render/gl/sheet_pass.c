@@ -66,8 +66,8 @@ static double within_floats(double x)
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
     const trip_file_header *h = &frame->data->header;
-    double unit =
-        (h->code_hi - h->code_lo) / 65535 / trip_shade_gradient_full(h, frame->camera->voxel_world);
+    double full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
+    double unit = (h->code_hi - h->code_lo) / 65535 / full;
     trip_gl_float4 *columns[3] = { &v->constants.gradient_0, &v->constants.gradient_1,
                                    &v->constants.gradient_2 };
     trip_affine to_index;

@@ -122,7 +122,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .camera = frame->camera,
         .clip = &frame->plan->clip,
         .shaded = frame->settings->shading && header->planes >> TRIP_PLANE_NORMALS & 1,
-        .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world),
+        .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
         .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };
     return status;

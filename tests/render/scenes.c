@@ -297,6 +297,7 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     scene_picture p = { .width = view->width, .height = view->height };
     assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
     assert_int_equal(trip_plan_make(&plan, s->data, &camera, settings, s->table, s->budget), 0);
+    plan.level = s->level;
     params.planes = plan.planes;
     assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
     assert_int_equal(renderer->create(&r, s->budget), 0);

@@ -47,6 +47,7 @@ typedef struct scene {
     char folder[64], path[96];
     trip_budget *budget;
     trip_dataset *data;
+    unsigned level;       /* that the data set is of, as trip_dataset_level_open() makes it */
     trip_tf_entry *table; /* 65536 entries, all transparent black at first */
 } scene;
 

@@ -9,6 +9,7 @@
 #include "dataset_level.h"
 #include "lod.h"
 #include "mean.h"
+#include "shade.h"
 
 enum { NX = 192, NY = 128, NZ = 64, SIZE_PX = 40, LEVELS = 3 };
 
@@ -265,6 +266,56 @@ static void interpolated_fog_is_as_thick_at_a_coarse_level(void **state)
     scene_destroy(&s);
 }
 
+/* Values that rise along z by so much of their range a voxel, half of what full shading takes. */
+#define RISE (0.5 * TRIP_GRADIENT_FULL)
+
+static bool rising(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const unsigned *level = user;
+    const double edge = ldexp(1, (int)*level);
+    (void)gradient;
+    (void)i;
+    (void)j;
+    *code = (unsigned)(65535 * RISE * (edge * k + 0.5 * (edge - 1)) + 0.5);
+    return true;
+}
+
+/* What faces the light has the highlight of its steepness, which is the same at every level. */
+static void shading_is_as_strong_at_a_coarse_level(void **state)
+{
+    (void)state;
+    enum { SHEETS = 32 };
+    unsigned levels[2] = { 0, 1 };
+    scene s, at;
+    const scene_part part = {
+        .level = 1, .kind = TRIP_KIND_VALUES, .by = { 2, 2, 2 }, .voxel = rising, .user = &levels[1]
+    };
+    scene_create(&s, &(scene_params){ .dims = { 64, 64, SHEETS },
+                                      .voxel = rising,
+                                      .user = &levels[0],
+                                      .parts = &part,
+                                      .part_count = 1 });
+    scene_colour(&s, 0, 65535, 0.5, 0.5, 0.5, 0.9);
+    trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 300, 40, SIZE_PX);
+    view.ortho_height = 60;
+    trip_settings settings = settings_at(0);
+    settings.classify = TRIP_CLASSIFY_POST;
+    settings.shading = true;
+    settings.headlight = true;
+    at = s;
+    at.level = 1;
+    assert_int_equal(trip_dataset_level_open(&at.data, s.data, 1), 0);
+    for (const scene_renderer *r = scene_renderers_post(); r->name; r++)
+        for (int level = 0; level < 2; level++) {
+            scene_picture p = scene_draw(level ? &at : &s, r, &view, &settings);
+            const float *pixel = scene_pixel(&p, SIZE_PX / 2, SIZE_PX / 2);
+            assert_float_equal(pixel[0], 0.5 + 0.5 * TRIP_SPECULAR, 2e-3);
+            scene_picture_free(&p);
+        }
+    trip_dataset_level_close(at.data);
+    scene_destroy(&s);
+}
+
 /* A code of means that covers a half shows a half, and where it is thin as much as was kept. */
 static void tables_of_means_have_their_opacity(void **state)
 {
@@ -413,6 +464,7 @@ int main(void)
         cmocka_unit_test(renderers_agree_on_mixed_levels),
         cmocka_unit_test(tiles_make_no_difference),
         cmocka_unit_test(interpolated_fog_is_as_thick_at_a_coarse_level),
+        cmocka_unit_test(shading_is_as_strong_at_a_coarse_level),
         cmocka_unit_test(tables_of_means_have_their_opacity),
         cmocka_unit_test(bounds_are_kept_and_what_is_nearest_is_finest),
         cmocka_unit_test(tiles_make_no_difference_to_bounds),

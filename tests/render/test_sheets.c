@@ -374,8 +374,8 @@ static void light_comes_by_differences_of_values(void **state)
         const double *row = to_index.m[axis]; /* the world gradient of the index along the axis */
         const double rise = RISE / 65535.0, g[3] = { row[0] * rise, row[1] * rise, row[2] * rise };
         trip_shade(&settings, &camera,
-                   trip_shade_gradient_full(&s.data->header, camera.voxel_world), trip_v3(0, 0, 0),
-                   g, rgb);
+                   trip_shade_gradient_full(&s.data->header, camera.voxel_world, 0),
+                   trip_v3(0, 0, 0), g, rgb);
         most = fmax(most, fabs(rgb[0] - unlit[0]));
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {

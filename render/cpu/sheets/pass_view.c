@@ -29,7 +29,7 @@ static float within_floats(double x)
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, trip_cpu_codes codes)
 {
     const trip_file_header *h = &frame->data->header;
-    double full = trip_shade_gradient_full(h, 1);
+    double full = trip_shade_gradient_full(h, 1, frame->plan->level);
     double unit = ldexp(0.5 * (h->code_hi - h->code_lo) / 65535 / full, -(int)codes.shift);
     const double(*m)[3] = (const double(*)[3])view->world;
     double adjugate[3][3];
