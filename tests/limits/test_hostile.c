@@ -132,11 +132,12 @@ static void check_text(const char *what, const trip_dataset *data)
     trip_dataset_text_destroy(text);
 }
 
-/* The CPU renderer draws every data set, the slow ones take turns where there is reason to. */
-static bool takes_part(const scene_renderer *r, bool slow)
+/* The CPU renderer draws every data set, under sanitizers by each classification in turn; the slow
+ * ones take turns where there is reason to. */
+static bool takes_part(const scene_renderer *r, trip_classify classify, bool slow)
 {
     if (!strcmp(r->name, "cpu"))
-        return true;
+        return !TEST_BY_TURNS || counts.tried % 2 == (classify == TRIP_CLASSIFY_POST);
     return slow && counts.tried % 6 == (r == shared.renderers ? 0 : 3);
 }
 
@@ -158,10 +159,10 @@ static void judge(const char *what, bool slow)
         check_reports(what, "verify", verified);
         counts.verified += verified == 0;
         for (const scene_renderer *r = shared.renderers; r->name; r++)
-            if (takes_part(r, slow))
+            if (takes_part(r, TRIP_CLASSIFY_PRE, slow))
                 check_picture(what, data, r, TRIP_CLASSIFY_PRE, budget);
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++)
-            if (takes_part(r, slow))
+            if (takes_part(r, TRIP_CLASSIFY_POST, slow))
                 check_picture(what, data, r, TRIP_CLASSIFY_POST, budget);
         trip_dataset_close(data);
     }

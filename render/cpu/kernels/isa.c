@@ -15,12 +15,14 @@ __attribute__((constructor)) static void find_runnable(void)
     __builtin_cpu_init();
     bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
                 __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
+#if !defined(TRIP_CPU_WITHOUT_AVX512)
     bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
                   __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
     if (avx512 && __builtin_cpu_supports("avx512vbmi2"))
         runnable[n++] = &trip_cpu_avx512_vbmi2;
     if (avx512)
         runnable[n++] = &trip_cpu_avx512;
+#endif
     if (avx2)
         runnable[n++] = &trip_cpu_avx2;
 #elif defined(__aarch64__)
