@@ -845,9 +845,9 @@ static int check_more(const parse *p)
                              : cached_volume_wanted(o->more[i]) ? o->more[i]
                                                                 : NULL;
         if (volume)
-            return trip_option_fail(volume, "is no data set, and those alone are drawn together: "
-                                            "`triptych brick --region` makes them; -o names the "
-                                            "picture");
+            return trip_option_fail(volume,
+                                    TRIP_ONE_VOLUME "; what is drawn together are data sets "
+                                                    "(triptych brick --region)");
     }
     if (o->more_count && p->quality.error > 0)
         return trip_option_fail("--error", "takes settings that were measured on one data set");
