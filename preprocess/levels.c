@@ -8,7 +8,7 @@
 #include "mean.h"
 #include "report.h"
 #include "sharpen.h"
-#include "splat_cell.h"
+#include "splat_box.h"
 
 enum { SOURCES = 4, FILE_BUFFER_BYTES = 1 << 16 };
 
@@ -31,8 +31,8 @@ typedef struct making {
     trip_sharpen sharpen;
     uint64_t sheets_before, sheets; /* of all levels: progress */
 
-    trip_cell_tables tables;
-    trip_splat_cell cell;
+    trip_splat_box_tables tables;
+    trip_splat_box box;
     unsigned edge_log2;
     trip_coarse_sum *sums; /* of a square, by row */
     uint64_t *touched;     /* bits of those */
@@ -107,10 +107,10 @@ static size_t lay_out(making *m, unsigned char *base)
     m->sums = carve(base, &used, plane * sizeof *m->sums);
     m->voxels = carve(base, &used, plane * sizeof *m->voxels);
     m->touched = carve(base, &used, plane / 8);
-    m->cell.values = carve(base, &used, plane * sizeof(uint32_t));
-    m->cell.normals = carve(base, &used, plane * sizeof(uint32_t));
+    m->box.values = carve(base, &used, plane * sizeof(uint32_t));
+    m->box.normals = carve(base, &used, plane * sizeof(uint32_t));
     for (int axis = 0; axis < 3; axis++)
-        m->cell.bits[axis] = carve(base, &used, (axis == 2 ? 1 : edge) * plane / 8);
+        m->box.bits[axis] = carve(base, &used, (axis == 2 ? 1 : edge) * plane / 8);
     return used;
 }
 
@@ -124,14 +124,14 @@ static int fail_memory(void)
 static int take_memory(making *m)
 {
     m->edge_log2 =
-        (unsigned)__builtin_ctzll((unsigned long long)trip_cell_edge(&m->params->format));
+        (unsigned)__builtin_ctzll((unsigned long long)trip_splat_box_edge(&m->params->format));
     m->memory_bytes = lay_out(m, NULL);
     m->memory = trip_budget_take(m->budget, m->memory_bytes);
     if (!m->memory)
         return fail_memory();
     lay_out(m, m->memory);
-    trip_cell_tables_fill(&m->tables, &m->params->format);
-    m->cell.tables = &m->tables;
+    trip_splat_box_tables_fill(&m->tables, &m->params->format);
+    m->box.tables = &m->tables;
     return 0;
 }
 
@@ -244,7 +244,7 @@ static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
     return trip_list_builder_reserve(user, thread, list, bytes);
 }
 
-/* Marks the voxels of a square in the cell: all, or of lists of means those that were kept. False
+/* Marks the voxels of a square in the box: all, or of lists of means those that were kept. False
  * where there are none. */
 static bool mark(making *m, const trip_coarse_voxel *voxels, uint32_t count, bool kept)
 {
@@ -252,7 +252,7 @@ static bool mark(making *m, const trip_coarse_voxel *voxels, uint32_t count, boo
     for (uint32_t i = 0; i < count; i++) {
         if (kept && !voxels[i].kept)
             continue;
-        trip_splat_cell_mark(&m->cell, voxels[i].v, 0, &voxels[i].u, 1);
+        trip_splat_box_mark(&m->box, voxels[i].v, 0, &voxels[i].u, 1);
         some = true;
     }
     return some;
@@ -276,14 +276,14 @@ static int emit(making *m, const trip_coarse_voxel *voxels, uint32_t count, unsi
     const trip_piece_sink sink = { reserve, m->builder, 0 };
     for (uint32_t i = 0; i < count; i++) {
         const trip_coarse_voxel *voxel = &voxels[i];
-        size_t at = trip_splat_cell_row(&m->cell, voxel->v, 0) + voxel->u;
+        size_t at = trip_splat_box_row(&m->box, voxel->v, 0) + voxel->u;
         if (list >= TRIP_HALO_LISTS)
-            m->cell.values[at] = value_code(m, voxel);
+            m->box.values[at] = value_code(m, voxel);
         else if (voxel->kept)
-            m->cell.values[at] = mean_code(m, voxel, trip_list_axis(list));
-        m->cell.normals[at] = voxel->normal;
+            m->box.values[at] = mean_code(m, voxel, trip_list_axis(list));
+        m->box.normals[at] = voxel->normal;
     }
-    return trip_splat_cell_emit(&m->cell, &f, list, &sink);
+    return trip_splat_box_emit(&m->box, &f, list, &sink);
 }
 
 /* Of a square, in the three lists from `first` on: those of means, or of values. */
@@ -299,7 +299,7 @@ static int make_pieces(making *m, uint64_t key, const trip_coarse_voxel *voxels,
         lo[bit % 2] |= (int64_t)(morton >> bit & 1) << bit / 2;
     lo[0] <<= m->edge_log2;
     lo[1] <<= m->edge_log2;
-    trip_splat_cell_begin(&m->cell, lo, size);
+    trip_splat_box_begin(&m->box, lo, size);
     if (!mark(m, voxels, count, first == 0))
         return 0;
     for (unsigned list = first; list < first + 3 && status == 0; list++)

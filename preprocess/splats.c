@@ -8,7 +8,7 @@
 #include "gradient.h"
 #include "normal.h"
 #include "report.h"
-#include "splat_cell.h"
+#include "splat_box.h"
 
 /* One thread's memory. The window is the box with one voxel around it where gradients or a halo are
  * wanted; its arrays are dense, x fastest. */
@@ -18,7 +18,7 @@ typedef struct workspace {
     uint8_t *kept;    /* flags */
     uint8_t *halo;    /* flags */
     uint8_t *scratch; /* for trip_dilate() */
-    trip_splat_cell cell;
+    trip_splat_box box;
     uint64_t kept_count, halo_count; /* in all boxes so far, see trip_splatter_halo() */
     trip_tally tally;
 } workspace;
@@ -28,7 +28,7 @@ struct trip_splatter {
     trip_budget *budget;
     double to_world[3][3]; /* of gradients: the inverse transpose of index_to_world */
     double gradient_unit;
-    trip_cell_tables tables;
+    trip_splat_box_tables tables;
     size_t thread_bytes, bytes;
     unsigned char *memory; /* of all threads; each begins with its workspace */
 };
@@ -45,7 +45,7 @@ typedef struct work {
 
 int64_t trip_splat_edge(const trip_piece_format *f)
 {
-    return trip_cell_edge(f);
+    return trip_splat_box_edge(f);
 }
 
 /* The next `bytes` of a thread's memory; NULL while only the size is computed. */
@@ -59,10 +59,10 @@ static void *carve(unsigned char *base, size_t *used, size_t bytes)
 /* Lays a workspace out from `base` and returns its bytes; NULL as base computes these only. */
 static size_t lay_out(const trip_piece_format *f, bool sparse, unsigned char *base, workspace *w)
 {
-    size_t edge = (size_t)trip_cell_edge(f), plane = edge * edge, used = 0;
+    size_t edge = (size_t)trip_splat_box_edge(f), plane = edge * edge, used = 0;
     size_t window = (edge + 2) * (edge + 2) * (TRIP_SPLAT_HEIGHT + 2);
     size_t voxels = plane * TRIP_SPLAT_HEIGHT, height = TRIP_SPLAT_HEIGHT + (f->halo ? 2 : 0);
-    trip_splat_cell *c = &w->cell;
+    trip_splat_box *c = &w->box;
     carve(base, &used, sizeof *w);
     w->decoded = carve(base, &used, window * sizeof(float));
     w->active = carve(base, &used, sparse ? window : 0);
@@ -105,7 +105,7 @@ static void fill_workspaces(trip_splatter *s)
         unsigned char *base = s->memory + i * s->thread_bytes;
         workspace *w = workspace_of(s, i);
         lay_out(&p->format, p->info->sparse, base, w);
-        w->cell.tables = &s->tables;
+        w->box.tables = &s->tables;
         trip_tally_clear(&w->tally);
     }
 }
@@ -126,7 +126,7 @@ int trip_splatter_create(trip_splatter **out, const trip_splat_params *params, t
     s->bytes = bytes;
     s->thread_bytes = each;
     s->memory = (unsigned char *)s + own;
-    trip_cell_tables_fill(&s->tables, &params->format);
+    trip_splat_box_tables_fill(&s->tables, &params->format);
     fill_map(s);
     fill_workspaces(s);
     return 0;
@@ -163,14 +163,14 @@ static size_t entry_of(const work *k, const int64_t voxel[3])
 typedef struct splat_row {
     const float *values; /* decoded, of the voxel at local x `first` */
     unsigned first;
-    size_t index; /* in the cell's arrays, of local x 0 */
+    size_t index; /* in the box's arrays, of local x 0 */
     unsigned count;
     uint8_t x[128]; /* local, ascending */
 } splat_row;
 
 static void put_values(const work *k, const splat_row *r)
 {
-    uint32_t *to = k->w->cell.values + r->index;
+    uint32_t *to = k->w->box.values + r->index;
     const trip_quantiser q = k->s->params.quantiser;
     if (k->s->params.format.quantised)
         for (unsigned i = 0; i < r->count; i++)
@@ -211,7 +211,7 @@ static double share_of(const work *k, int axis, int64_t at)
 /* `voxel`: the one at local x `first`. */
 static void put_normals(const work *k, const splat_row *r, const int64_t voxel[3])
 {
-    const trip_splat_cell *c = &k->w->cell;
+    const trip_splat_box *c = &k->w->box;
     const trip_compact_normals *compact = k->s->params.compact;
     double share[3] = { 0, share_of(k, 1, voxel[1]), share_of(k, 2, voxel[2]) };
     for (unsigned i = 0; i < r->count; i++) {
@@ -252,21 +252,21 @@ static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, u
     return n;
 }
 
-/* Makes splats of the voxels of a row of the cell that have a flag; returns their number. `y` and
- * `z` count from the part's first voxel. */
+/* Makes splats of the voxels of a row of the box that have a flag; returns their number. `y` and
+ * `z` count from its first voxel. */
 static unsigned put_row(const work *k, const uint8_t *flags, int64_t y, int64_t z, bool normals)
 {
-    trip_splat_cell *c = &k->w->cell;
+    trip_splat_box *c = &k->w->box;
     const int64_t voxel[3] = { c->origin[0] + c->first[0], c->origin[1] + c->first[1] + y,
                                c->origin[2] + z };
     size_t at = entry_of(k, voxel);
     splat_row r = { .values = k->w->decoded + at,
                     .first = (unsigned)c->first[0],
-                    .index = trip_splat_cell_row(c, c->first[1] + y, z) };
+                    .index = trip_splat_box_row(c, c->first[1] + y, z) };
     r.count = find_flags(flags + at, c->size[0], c->first[0], r.x);
     if (r.count == 0)
         return 0;
-    trip_splat_cell_mark(c, c->first[1] + y, z, r.x, r.count);
+    trip_splat_box_mark(c, c->first[1] + y, z, r.x, r.count);
     put_values(k, &r);
     if (normals)
         put_normals(k, &r, voxel);
@@ -282,12 +282,12 @@ static int make_pieces(const work *k, const int64_t lo[3], const int64_t size[3]
     const trip_piece_sink sink = { k->s->params.reserve, k->s->params.user, k->thread };
     uint64_t made = 0;
     int status = 0;
-    trip_splat_cell_begin(&k->w->cell, lo, size);
+    trip_splat_box_begin(&k->w->box, lo, size);
     for (int64_t z = 0; z < size[2]; z++)
         for (int64_t y = 0; y < size[1]; y++)
             made += put_row(k, flags, y, z, f.normals);
     for (unsigned l = list; l < list + 3 && made > 0 && status == 0; l++)
-        status = trip_splat_cell_emit(&k->w->cell, &f, l, &sink);
+        status = trip_splat_box_emit(&k->w->box, &f, l, &sink);
     *count += made;
     return status;
 }
@@ -367,14 +367,14 @@ static void halo_range(const work *k, int axis, int64_t *begin, int64_t *end)
         ++*end;
 }
 
-/* The end of the part of [at, end) that is in the cell of `at`. */
-static int64_t cell_end(const trip_splatter *s, int64_t at, int64_t end)
+/* How far of [at, end) a box of splats that begins at `at` may reach. */
+static int64_t box_end(const trip_splatter *s, int64_t at, int64_t end)
 {
     int64_t past = (at & ~(s->tables.edge - 1)) + s->tables.edge;
     return past < end ? past : end;
 }
 
-/* Cell by cell, as voxels around a box may lie in others. */
+/* In several boxes of splats, as voxels around one may lie beyond a multiple of their edge. */
 static int make_halo(const work *k)
 {
     const trip_splatter *s = k->s;
@@ -384,13 +384,13 @@ static int make_halo(const work *k)
         return 0;
     for (int a = 0; a < 3; a++)
         halo_range(k, a, &begin[a], &end[a]);
-    for (at[2] = begin[2]; at[2] < end[2]; at[2] = cell_end(s, at[2], end[2]))
-        for (at[1] = begin[1]; at[1] < end[1]; at[1] = cell_end(s, at[1], end[1]))
+    for (at[2] = begin[2]; at[2] < end[2]; at[2] = box_end(s, at[2], end[2]))
+        for (at[1] = begin[1]; at[1] < end[1]; at[1] = box_end(s, at[1], end[1]))
             for (at[0] = begin[0]; at[0] < end[0] && status == 0;
-                 at[0] = cell_end(s, at[0], end[0])) {
+                 at[0] = box_end(s, at[0], end[0])) {
                 int64_t size[3];
                 for (int a = 0; a < 3; a++)
-                    size[a] = cell_end(s, at[a], end[a]) - at[a];
+                    size[a] = box_end(s, at[a], end[a]) - at[a];
                 status = make_pieces(k, at, size, k->w->halo, TRIP_HALO_LISTS, &k->w->halo_count);
             }
     return status;

@@ -1,6 +1,6 @@
 /* One traversal of a volume: the calling thread reads portions while the workers process the boxes
- * that earlier portions were cut into. A box never crosses the borders of an aligned grid of cells
- * as large as the largest tile, so that few boxes give voxels to one tile of a sheet. */
+ * that earlier portions were cut into. Along i and j a box never crosses a multiple of its edge, so
+ * that few boxes give voxels to one tile of a sheet. */
 #ifndef TRIP_WALK_H
 #define TRIP_WALK_H
 
@@ -18,7 +18,7 @@ typedef struct trip_box {
 typedef struct trip_walk_params {
     int64_t slices;  /* of a portion of a dense volume */
     bool read_ahead; /* read the next batch while the boxes of one are processed */
-    int64_t edge;    /* voxels of a box and of a cell along i and j: a power of two */
+    int64_t edge;    /* of a box along i and j: a power of two, at least that of a tile */
     int64_t height;  /* of a box along k: a power of two, at most `edge` */
     uint64_t skip;   /* how much of the volume is skipped at its start, counted as `done` below */
     uint64_t stride; /* after that, of `stride` batches the first is processed; 0: each is */

@@ -16,7 +16,7 @@ namespace io = openvdb::io;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr int32_t cell_voxels = 64;
+constexpr int32_t box_voxels = 64;
 
 /* The density of a stored value, and whether the voxel exists. */
 struct Sample {
@@ -85,15 +85,15 @@ class BoxList
     BoxList(trip_vdb_grid &grid, trip_budget *budget) : grid_(grid), budget_(budget)
     {
     }
-    /* Adds a box for each cell of a node or tile that consists of whole cells. */
+    /* Adds the boxes of a node or tile that is full. */
     void add_full(const CoordBBox &box)
     {
         include(box);
-        for (int32_t z = box.min().z(); z <= box.max().z(); z += cell_voxels)
-            for (int32_t y = box.min().y(); y <= box.max().y(); y += cell_voxels)
-                for (int32_t x = box.min().x(); x <= box.max().x(); x += cell_voxels)
-                    add(CoordBBox(x, y, z, x + cell_voxels - 1, y + cell_voxels - 1,
-                                  z + cell_voxels - 1));
+        for (int32_t z = box.min().z(); z <= box.max().z(); z += box_voxels)
+            for (int32_t y = box.min().y(); y <= box.max().y(); y += box_voxels)
+                for (int32_t x = box.min().x(); x <= box.max().x(); x += box_voxels)
+                    add(CoordBBox(x, y, z, x + box_voxels - 1, y + box_voxels - 1,
+                                  z + box_voxels - 1));
     }
     void add(const CoordBBox &box)
     {
@@ -304,7 +304,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
                 if (tile_exists(*tile, tile.isValueOn()))
                     list.add_full(CoordBBox::createCube(tile.getCoord(), MiddleT::DIM));
             for (auto middle = top->cbeginChildOn(); middle; ++middle)
-                collect_cells(*middle, list);
+                collect_boxes(*middle, list);
         }
         list.finish();
     }
@@ -314,20 +314,20 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         return convert_((double)value, active).exists;
     }
 
-    /* Adds the boxes of a node of 128 voxels a side, one for each of its eight cells, around the
-     * leaves and leaf-sized tiles in it. */
-    void collect_cells(const MiddleT &node, BoxList &list) const
+    /* Adds the boxes of a node of 128 voxels a side, one for each octant, around the leaves
+     * and leaf-sized tiles in it. */
+    void collect_boxes(const MiddleT &node, BoxList &list) const
     {
-        CoordBBox cells[8];
-        auto cell_of = [&](const Coord &c) -> CoordBBox & {
+        CoordBBox octants[8];
+        auto octant_of = [&](const Coord &c) -> CoordBBox & {
             Coord at = (c - node.origin()) >> 6;
-            return cells[at.x() | at.y() << 1 | at.z() << 2];
+            return octants[at.x() | at.y() << 1 | at.z() << 2];
         };
         for (auto tile = node.cbeginValueAll(); tile; ++tile)
             if (tile_exists(*tile, tile.isValueOn())) {
                 CoordBBox box = CoordBBox::createCube(tile.getCoord(), LeafT::DIM);
                 list.include(box);
-                cell_of(box.min()).expand(box);
+                octant_of(box.min()).expand(box);
             }
         for (auto leaf = node.cbeginChildOn(); leaf; ++leaf) {
             Coord origin = leaf.getCoord();
@@ -339,11 +339,11 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
             if (convert_.fills()) /* inactive voxels may be inside */
                 box = CoordBBox::createCube(origin, LeafT::DIM);
             if (!box.empty())
-                cell_of(origin).expand(box);
+                octant_of(origin).expand(box);
         }
-        for (const CoordBBox &cell : cells)
-            if (!cell.empty())
-                list.add(cell);
+        for (const CoordBBox &octant : octants)
+            if (!octant.empty())
+                list.add(octant);
     }
 
     void decode_leaves(const Part &whole) const

@@ -11,8 +11,8 @@
 #include "vdb_file.h"
 #include "volume.h"
 
-/* A box of at most 64 voxels a side around existing voxels, in the grid's own coordinates. It lies
- * in one cell of a grid of 64-voxel cells, so boxes do not overlap. */
+/* A box of at most 64 voxels a side around existing voxels, in the grid's own coordinates. It
+ * crosses no multiple of 64, so boxes do not overlap. */
 struct trip_vdb_box {
     int32_t lo[3];
     uint8_t size[3];

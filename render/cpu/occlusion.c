@@ -11,7 +11,7 @@
 #define NEAREST_RADII 8.0
 #define MOST_GROWTH 0.23
 
-enum { CELL = 4, CELLS = TRIP_CPU_PANE / CELL };
+enum { TEXEL = 4, TEXELS = TRIP_CPU_PANE / TEXEL };
 
 static double dot(const double along[3], const double at[3])
 {
@@ -58,22 +58,23 @@ static uint64_t bits_of(int left, int right, int top, int bottom)
     return columns & UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
 }
 
-/* What of the cells [first, last] lies in a pane, counted from its first. */
-static trip_pixels in_pane(trip_pixels cells, int pane)
+/* What of the texels [first, last] lies in a pane, counted from its first. */
+static trip_pixels in_pane(trip_pixels texels, int pane)
 {
-    int first = cells.first - pane * CELLS, last = cells.last - pane * CELLS;
-    return (trip_pixels){ first > 0 ? first : 0, last < CELLS - 1 ? last : CELLS - 1 };
+    int first = texels.first - pane * TEXELS, last = texels.last - pane * TEXELS;
+    return (trip_pixels){ first > 0 ? first : 0, last < TEXELS - 1 ? last : TEXELS - 1 };
 }
 
 static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px, trip_pixels py)
 {
-    static_assert(CELLS == 8, "a byte for a row");
-    trip_pixels x = { px.first / CELL, px.last / CELL }, y = { py.first / CELL, py.last / CELL };
+    static_assert(TEXELS == 8, "a byte for a row");
+    trip_pixels x = { px.first / TEXEL, px.last / TEXEL },
+                y = { py.first / TEXEL, py.last / TEXEL };
     bool open = false, saturated = false;
     if (px.first > px.last || py.first > py.last)
         return TRIP_CPU_OCCLUDED;
-    for (int ty = y.first / CELLS; ty <= y.last / CELLS; ty++)
-        for (int tx = x.first / CELLS; tx <= x.last / CELLS; tx++) {
+    for (int ty = y.first / TEXELS; ty <= y.last / TEXELS; ty++)
+        for (int tx = x.first / TEXELS; tx <= x.last / TEXELS; tx++) {
             trip_pixels h = in_pane(x, tx), v = in_pane(y, ty);
             uint64_t bits = bits_of(h.first, h.last, v.first, v.last);
             uint64_t rest =

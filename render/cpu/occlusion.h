@@ -1,6 +1,6 @@
 /* Whether anything of a box of voxels can still change a pixel, by which runs are left out before
  * they are projected and bricks before they are read. Any thread may call it while others blend:
- * cells become saturated, and never open again. */
+ * texels become saturated, and never open again. */
 #ifndef TRIP_CPU_OCCLUSION_H
 #define TRIP_CPU_OCCLUSION_H
 
@@ -13,7 +13,7 @@ typedef struct trip_cpu_grid {
     uint32_t across, down;
 } trip_cpu_grid;
 
-/* An occlusion map of cells of 4 x 4 pixels, a bit each: 1 where some pixel is open, 0 where all
+/* An occlusion map with texels of 4 x 4 pixels, a bit each: 1 where some pixel is open, 0 where all
  * are saturated. Of each pane eight rows of eight, the first row lowest. */
 typedef struct trip_cpu_mask {
     trip_cpu_grid grid;
@@ -32,9 +32,9 @@ typedef struct trip_cpu_box {
 
 typedef enum trip_cpu_occlusion {
     TRIP_CPU_OCCLUDED, /* no splat of a voxel in the box can change a pixel: every pixel of
-                          its support lies in a saturated cell or outside the image */
+                          its support lies in a saturated texel or outside the image */
     TRIP_CPU_PARTLY,   /* parts of the box may be occluded */
-    TRIP_CPU_VISIBLE,  /* no cell is saturated there */
+    TRIP_CPU_VISIBLE,  /* no texel is saturated there */
 } trip_cpu_occlusion;
 
 trip_cpu_occlusion trip_cpu_box_occlusion(const trip_cpu_view *view, const trip_cpu_mask *mask,

@@ -82,8 +82,8 @@ static inline bool test_exists(const char *name)
 
 enum { TEST_LISTS = 6 };
 
-/* What a data set holds at level 0: [k][j][i] of every list (X, Y and Z of kept voxels, then of the halo),
- * code -1 where there is no splat. */
+/* What a data set holds at level 0: [k][j][i] of every list (X, Y and Z of kept voxels, then of the
+ * halo), code -1 where there is no splat. */
 typedef struct test_lists {
     trip_file_header header;
     size_t voxels;
@@ -200,6 +200,31 @@ static inline bool test_same_file(const char *a, const char *b)
     fclose(f);
     fclose(g);
     return c == d;
+}
+
+/* Bricks a raw volume of bytes, those from 100 on being kept, and returns the data set's text, for
+ * free(). `p`: what else is said of it. */
+static inline char *test_brick_bytes(trip_brick_params p, const uint8_t *bytes, const int dims[3],
+                                     trip_brick_summary *s)
+{
+    static const trip_value_range high = { 100, 255 };
+    test_lists lists;
+    test_write("bytes.raw", bytes, (size_t)dims[0] * (size_t)dims[1] * (size_t)dims[2]);
+    p.input = test_path("bytes.raw");
+    p.output = test_path("bytes.trip");
+    p.ranges = &high;
+    p.range_count = 1;
+    p.replace = true;
+    p.volume.raw_type = "uint8";
+    for (int a = 0; a < 3; a++)
+        p.volume.raw_dims[a] = dims[a];
+    if (trip_brick(&p, s) != 0)
+        fail_msg("%s", test_report);
+    test_read_lists("bytes.trip", &lists);
+    char *text = strdup(lists.text);
+    assert_non_null(text);
+    test_free_lists(&lists);
+    return text;
 }
 
 /* All files of two data sets alike, byte for byte. */

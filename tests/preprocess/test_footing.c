@@ -71,14 +71,11 @@ static void one_side_stands_out_or_there_is_none(void **state)
         assert_int_equal(trip_footing_side(rows[i].shares), rows[i].side);
 }
 
-enum { NX = 90, NY = 84, NZ = 76 };
-
 /* Half a ball on `side`, or a whole one for -1; its text is for free(), its note in the summary. */
 static char *brick_ball(int side, trip_brick_params p, trip_brick_summary *s)
 {
+    enum { NX = 90, NY = 84, NZ = 76 };
     static uint8_t bytes[NX * NY * NZ];
-    static const trip_value_range high = { 100, 255 };
-    static char input[128], output[128];
     for (int n = 0; n < NX * NY * NZ; n++) {
         const double at[3] = { (n % NX + 0.5) / NX * 2 - 1, (n / NX % NY + 0.5) / NY * 2 - 1,
                                (n / NX / NY + 0.5) / NZ * 2 - 1 };
@@ -86,26 +83,7 @@ static char *brick_ball(int side, trip_brick_params p, trip_brick_summary *s)
                             : is_in_half_ball(at, 0) || is_in_half_ball(at, 1);
         bytes[n] = in ? 200 : 10;
     }
-    test_write("ball.raw", bytes, sizeof bytes);
-    snprintf(input, sizeof input, "%s", test_path("ball.raw"));
-    snprintf(output, sizeof output, "%s", test_path("ball.trip"));
-    p.input = input;
-    p.output = output;
-    p.ranges = &high;
-    p.range_count = 1;
-    p.replace = true;
-    p.volume.raw_dims[0] = NX;
-    p.volume.raw_dims[1] = NY;
-    p.volume.raw_dims[2] = NZ;
-    p.volume.raw_type = "uint8";
-    test_lists lists;
-    if (trip_brick(&p, s) != 0)
-        fail_msg("%s", test_report);
-    test_read_lists("ball.trip", &lists);
-    char *text = strdup(lists.text);
-    assert_non_null(text);
-    test_free_lists(&lists);
-    return text;
+    return test_brick_bytes(p, bytes, (const int[]){ NX, NY, NZ }, s);
 }
 
 static void half_a_ball_stands_on_its_flat_side(void **state)

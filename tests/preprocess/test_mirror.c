@@ -69,9 +69,10 @@ static bool is_in_wedge(double side, double front, double up)
 
 enum { NX = 90, NY = 84, NZ = 76 };
 
-static void write_wedge(int axis, double aside, bool lopsided)
+static uint8_t wedge[NX * NY * NZ];
+
+static void make_wedge(int axis, double aside, bool lopsided)
 {
-    static uint8_t bytes[NX * NY * NZ];
     const int dims[3] = { NX, NY, NZ };
     for (int n = 0; n < NX * NY * NZ; n++) {
         const int at[3] = { n % NX, n / NX % NY, n / NX / NY };
@@ -80,43 +81,16 @@ static void write_wedge(int axis, double aside, bool lopsided)
             p[a] = 2 * (at[a] + 0.5) / dims[a] - 1;
         double side = p[axis] - aside;
         bool ear = lopsided && side > 0.2 && side < 0.8 && p[(axis + 1) % 3] < 0.8;
-        bytes[n] = is_in_wedge(side, p[(axis + 1) % 3], p[(axis + 2) % 3]) || ear ? 200 : 10;
+        wedge[n] = is_in_wedge(side, p[(axis + 1) % 3], p[(axis + 2) % 3]) || ear ? 200 : 10;
     }
-    test_write("wedge.raw", bytes, sizeof bytes);
-}
-
-/* The text of the data set, for free(). */
-static char *brick_wedge(trip_brick_params p)
-{
-    static const trip_value_range high = { 100, 255 };
-    static char input[128], output[128];
-    trip_brick_summary s;
-    test_lists lists;
-    snprintf(input, sizeof input, "%s", test_path("wedge.raw"));
-    snprintf(output, sizeof output, "%s", test_path("wedge.trip"));
-    p.input = input;
-    p.output = output;
-    p.ranges = &high;
-    p.range_count = 1;
-    p.replace = true;
-    p.volume.raw_dims[0] = NX;
-    p.volume.raw_dims[1] = NY;
-    p.volume.raw_dims[2] = NZ;
-    p.volume.raw_type = "uint8";
-    if (trip_brick(&p, &s) != 0)
-        fail_msg("%s", test_report);
-    test_read_lists("wedge.trip", &lists);
-    char *text = strdup(lists.text);
-    assert_non_null(text);
-    assert_true((s.note[0] != 0) == (strstr(text, "\"mirror\":\"z\"") != NULL));
-    assert_true(!s.note[0] || strstr(s.note, "mirror-symmetric across z"));
-    test_free_lists(&lists);
-    return text;
 }
 
 static void assert_mirror(trip_brick_params p, const char *expected)
 {
-    char *text = brick_wedge(p);
+    trip_brick_summary s;
+    char *text = test_brick_bytes(p, wedge, (const int[]){ NX, NY, NZ }, &s);
+    assert_true((s.note[0] != 0) == (strstr(text, "\"mirror\":\"z\"") != NULL));
+    assert_true(!s.note[0] || strstr(s.note, "mirror-symmetric across z"));
     if (expected ? !strstr(text, expected) : strstr(text, "\"mirror\"") != NULL)
         fail_msg("%s is not in: %.200s", expected ? expected : "no mirror", text);
     free(text);
@@ -128,10 +102,10 @@ static void a_wedge_is_symmetric_across_its_own_axis(void **state)
     static const char *const expected[] = { "\"mirror\":\"x\"", "\"mirror\":\"y\"",
                                             "\"mirror\":\"z\"" };
     for (int axis = 0; axis < 3; axis++) {
-        write_wedge(axis, axis * 0.04, false);
+        make_wedge(axis, axis * 0.04, false);
         assert_mirror((trip_brick_params){ 0 }, expected[axis]);
     }
-    write_wedge(2, 0, true);
+    make_wedge(2, 0, true);
     assert_mirror((trip_brick_params){ 0 }, NULL);
 }
 
@@ -145,7 +119,7 @@ static void what_is_found_does_not_depend_on_how_it_is_bricked(void **state)
         { .no_halo = true, .threads = 1 },
         { .threads = 1, .memory_bytes = 27 << 20 },
     };
-    write_wedge(2, 0.05, false);
+    make_wedge(2, 0.05, false);
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++)
         assert_mirror(ways[i], "\"mirror\":\"z\"");
 }
@@ -159,14 +133,14 @@ static void no_symmetry_is_found_across_uneven_spacing(void **state)
         used += snprintf(table + used, sizeof table - (size_t)used, "%d\n", k * (k + 10));
     test_write("z.txt", table, strlen(table));
     snprintf(files, sizeof files, ",,%s", test_path("z.txt"));
-    write_wedge(2, 0, false);
+    make_wedge(2, 0, false);
     assert_mirror((trip_brick_params){ .volume.coordinates = files }, NULL);
 }
 
 static void nothing_is_guessed_where_it_is_said_how_the_volume_lies(void **state)
 {
     (void)state;
-    write_wedge(2, 0, false);
+    make_wedge(2, 0, false);
     assert_mirror((trip_brick_params){ .volume.axes = "PIR" }, NULL);
 }
 

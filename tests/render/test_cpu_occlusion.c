@@ -108,7 +108,7 @@ static void what_is_occluded_reaches_no_open_cell(void **state)
     scene_destroy(&s);
 }
 
-static void without_saturated_cells_all_is_visible(void **state)
+static void without_saturated_texels_all_is_visible(void **state)
 {
     (void)state;
     scene s;
@@ -214,7 +214,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_occluded_reaches_no_open_cell),
-        cmocka_unit_test(without_saturated_cells_all_is_visible),
+        cmocka_unit_test(without_saturated_texels_all_is_visible),
         cmocka_unit_test(runs_show_all_that_reaches_an_open_cell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -223,7 +223,7 @@ typedef struct trip_cpu_kernels {
     uint32_t (*stage)(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
-     * order. With `open`, a word a pane as in trip_cpu_mask, those over saturated cells alone may
+     * order. With `open`, a word a pane as in trip_cpu_mask, those over saturated texels alone may
      * be left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many.
      */
     uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
@@ -241,7 +241,7 @@ typedef struct trip_cpu_kernels {
      * this view. */
     void (*pane_blend)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                        const float *depths, const uint16_t *order, uint32_t count);
-    /* Ends with every splat in the pixels, or in the open sheet. Returns which cells of the
+    /* Ends with every splat in the pixels, or in the open sheet. Returns which texels of the
      * quarters are open, as trip_cpu_mask has them. */
     uint64_t (*pane_end)(trip_cpu_scratch *s);
     /* Empties a pane's open sheet. */
@@ -282,7 +282,7 @@ typedef struct trip_cpu_kernels {
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);
-    /* Composites a group's segments into a pane's pixels. Returns which of its cells are open, as
+    /* Composites a group's segments into a pane's pixels. Returns which of its texels are open, as
      * trip_cpu_mask has them. */
     uint64_t (*sheet_pane)(const trip_cpu_sheet_view *view, const trip_cpu_group *group, int x,
                            int y, float *pixels);

@@ -871,7 +871,7 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
 }
 
 /* In three loops, each short enough that the processor works on several vectors at a time: one
- * loop's chain of divisions and roots would leave it waiting. What lies over saturated cells is
+ * loop's chain of divisions and roots would leave it waiting. What lies over saturated texels is
  * left out before it is coloured, stored, sorted and gathered. */
 INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic uint64_t *open,
                            const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
@@ -904,7 +904,7 @@ INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic
         vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
         unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~scalar;
         if (open && kept)
-            kept &= over_open_cells(lanes, i, open, view->panes_across);
+            kept &= over_open_texels(lanes, i, open, view->panes_across);
         lanes->kept[i / V] = kept;
         lanes->scalar[i / V] = scalar;
     }

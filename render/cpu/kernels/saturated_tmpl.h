@@ -1,5 +1,5 @@
-/* Which projected splats lie over saturated cells alone (trip_cpu_mask), V at a time: included by
- * project_tmpl.h. Saturated pixels never change, so that those splats can be left out; cells may
+/* Which projected splats lie over saturated texels alone (trip_cpu_mask), V at a time: included by
+ * project_tmpl.h. Saturated pixels never change, so that those splats can be left out; texels may
  * become saturated meanwhile, and never open again. */
 #ifndef TRIP_CPU_SATURATED_H
 #define TRIP_CPU_SATURATED_H
@@ -7,24 +7,24 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 
-/* The cells of four panes, two by two, that each lane's support may touch. */
-typedef struct cells {
+/* The texels of four panes, two by two, that each lane's support may touch. */
+typedef struct texels {
     vi pane;              /* the first; 0 in lanes without pixels */
     vi columns;           /* bits: eight of the first pane, eight of the one to the right */
     vi top, bottom;       /* rows, counted from the first pane's */
     vi any_right, across; /* 1 and a row of panes where the support goes there, else 0 */
-} cells;
+} texels;
 
-INLINE cells cells_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int panes_across)
+INLINE texels texels_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int panes_across)
 {
     vi first = vi_load(lanes->first + at), last = vi_load(lanes->last + at);
     vi panes = vi_load(lanes->panes + at);
     vi x0 = first & 0xffff, y0 = v_shift_right(first, 16);
     vi x1 = last & 0xffff, y1 = v_shift_right(last, 16);
-    static_assert(TRIP_CPU_PANE == 32, "eight cells of four pixels, in the shifts below");
+    static_assert(TRIP_CPU_PANE == 32, "eight texels of four pixels, in the shifts below");
     vi left = x0 >> 2 & 7, right = ((x1 >> 2) - (x0 >> 5) * 8) & 15;
     panes &= (vi)(x0 <= x1) & (vi)(y0 <= y1);
-    return (cells){
+    return (texels){
         .pane = panes & TRIP_CPU_PANES_FIRST,
         .columns = (vi_set(0xffff) << left) & (vi_set(0xffff) >> (15 - right)),
         .top = y0 >> 2 & 7,
@@ -48,7 +48,7 @@ INLINE vw rows_of_below(vw bottom)
     return ~(vw_set(UINT64_MAX) << half << half);
 }
 
-/* The lanes, a bit each, with an open cell among those of one of the four panes. */
+/* The lanes, a bit each, with an open texel among those of one of the four panes. */
 INLINE unsigned open_in(const _Atomic uint64_t *open, vi pane, vi columns, vw rows_low,
                         vw rows_high)
 {
@@ -59,12 +59,12 @@ INLINE unsigned open_in(const _Atomic uint64_t *open, vi pane, vi columns, vw ro
     return vw_not_0(low) | vw_not_0(high) << V / 2;
 }
 
-/* The lanes, a bit each, that may touch an open cell; `open` is a word a pane, as in
+/* The lanes, a bit each, that may touch an open texel; `open` is a word a pane, as in
  * trip_cpu_mask. Those without pixels give any bit. */
-INLINE unsigned over_open_cells(const trip_cpu_lanes *lanes, uint32_t at,
-                                const _Atomic uint64_t *open, int panes_across)
+INLINE unsigned over_open_texels(const trip_cpu_lanes *lanes, uint32_t at,
+                                 const _Atomic uint64_t *open, int panes_across)
 {
-    cells b = cells_of_lanes(lanes, at, panes_across);
+    texels b = texels_of_lanes(lanes, at, panes_across);
     vw bottom_low = vw_low(b.bottom), bottom_high = vw_high(b.bottom);
     vw low = rows_of_first(vw_low(b.top), bottom_low);
     vw high = rows_of_first(vw_high(b.top), bottom_high);

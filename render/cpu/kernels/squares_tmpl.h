@@ -54,7 +54,7 @@ static uint64_t squares(const trip_cpu_view *view, const trip_cpu_region *region
         vi_store(lanes->panes + i, panes_of(x0, y0, x1, y1, view->panes_across));
         unsigned any = vm_bits(vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1)));
         if (any)
-            any &= over_open_cells(lanes, i, open, view->panes_across);
+            any &= over_open_texels(lanes, i, open, view->panes_across);
         visible |= (uint64_t)any << i;
     }
     return visible;

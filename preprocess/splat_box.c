@@ -1,18 +1,18 @@
-#include "splat_cell.h"
+#include "splat_box.h"
 
 #include <string.h>
 
 #include "format.h"
 #include "report.h"
 
-int64_t trip_cell_edge(const trip_piece_format *f)
+int64_t trip_splat_box_edge(const trip_piece_format *f)
 {
     return f->tile_log2 > 6 ? (int64_t)1 << f->tile_log2 : 64;
 }
 
-void trip_cell_tables_fill(trip_cell_tables *t, const trip_piece_format *f)
+void trip_splat_box_tables_fill(trip_splat_box_tables *t, const trip_piece_format *f)
 {
-    t->edge = trip_cell_edge(f);
+    t->edge = trip_splat_box_edge(f);
     t->words = (unsigned)(t->edge * t->edge / 64);
     for (unsigned x = 0; x < 128; x++)
         t->even_bits[x] = (uint16_t)trip_morton(x, 0);
@@ -23,7 +23,7 @@ void trip_cell_tables_fill(trip_cell_tables *t, const trip_piece_format *f)
         }
 }
 
-void trip_splat_cell_begin(trip_splat_cell *c, const int64_t lo[3], const int64_t size[3])
+void trip_splat_box_begin(trip_splat_box *c, const int64_t lo[3], const int64_t size[3])
 {
     const size_t words = c->tables->words;
     for (int a = 0; a < 3; a++) {
@@ -37,8 +37,7 @@ void trip_splat_cell_begin(trip_splat_cell *c, const int64_t lo[3], const int64_
 
 /* In the sheets along X and Y the second coordinate of z counts from a multiple of the edge, as
  * tiles do. */
-void trip_splat_cell_mark(trip_splat_cell *c, int64_t y, int64_t z, const uint8_t *x,
-                          unsigned count)
+void trip_splat_box_mark(trip_splat_box *c, int64_t y, int64_t z, const uint8_t *x, unsigned count)
 {
     const uint16_t *even = c->tables->even_bits;
     const size_t words = c->tables->words;
@@ -60,11 +59,11 @@ void trip_splat_cell_mark(trip_splat_cell *c, int64_t y, int64_t z, const uint8_
 typedef struct tile_splats {
     int axis;
     int64_t sheet;          /* local */
-    unsigned first_place;   /* Morton code in the cell of the tile's first voxel */
+    unsigned first_place;   /* Morton code of the tile's first voxel, from a multiple of the edge */
     const uint64_t *bitmap; /* of the tile */
 } tile_splats;
 
-static uint64_t key_of(const trip_splat_cell *c, unsigned tile_log2, const tile_splats *t)
+static uint64_t key_of(const trip_splat_box *c, unsigned tile_log2, const tile_splats *t)
 {
     const int u = (t->axis + 1) % 3, v = (t->axis + 2) % 3;
     const int64_t edge = c->tables->edge;
@@ -76,12 +75,12 @@ static uint64_t key_of(const trip_splat_cell *c, unsigned tile_log2, const tile_
 }
 
 /* Indices of the splats in the arrays, in list order; returns their number. */
-static uint32_t gather_indices(const trip_splat_cell *c, unsigned words, const tile_splats *t,
+static uint32_t gather_indices(const trip_splat_box *c, unsigned words, const tile_splats *t,
                                uint32_t *indices)
 {
     const int64_t edge = c->tables->edge, stride[3] = { 1, edge, edge * edge };
     const int64_t su = stride[(t->axis + 1) % 3], sv = stride[(t->axis + 2) % 3];
-    /* In the bitmaps z counts from a multiple of the edge, in the arrays from the part's start. */
+    /* In the bitmaps z counts from a multiple of the edge, in the arrays from the box's start. */
     int64_t base = t->sheet * stride[t->axis];
     if (t->axis != 2)
         base -= (c->origin[2] & (edge - 1)) * stride[2];
@@ -95,7 +94,7 @@ static uint32_t gather_indices(const trip_splat_cell *c, unsigned words, const t
     return n;
 }
 
-static void fill_piece(const trip_splat_cell *c, const trip_piece_format *f, trip_piece *piece,
+static void fill_piece(const trip_splat_box *c, const trip_piece_format *f, trip_piece *piece,
                        const uint32_t *indices, uint32_t splats)
 {
     unsigned char *base = (unsigned char *)piece;
@@ -117,7 +116,7 @@ static void fill_piece(const trip_splat_cell *c, const trip_piece_format *f, tri
             magnitudes[i] = c->magnitudes[indices[i]];
 }
 
-static int emit_piece(const trip_splat_cell *c, const trip_piece_format *f, unsigned list,
+static int emit_piece(const trip_splat_box *c, const trip_piece_format *f, unsigned list,
                       const tile_splats *t, const trip_piece_sink *sink)
 {
     uint32_t indices[TRIP_TILE_MAX_SPLATS];
@@ -137,8 +136,8 @@ static int emit_piece(const trip_splat_cell *c, const trip_piece_format *f, unsi
     return 0;
 }
 
-int trip_splat_cell_emit(const trip_splat_cell *c, const trip_piece_format *f, unsigned list,
-                         const trip_piece_sink *sink)
+int trip_splat_box_emit(const trip_splat_box *c, const trip_piece_format *f, unsigned list,
+                        const trip_piece_sink *sink)
 {
     const unsigned words = c->tables->words;
     const int axis = trip_list_axis(list);
