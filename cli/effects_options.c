@@ -8,12 +8,16 @@
 
 int trip_option_light(const char *text, triptych_settings *s)
 {
+    static const char point[] = "point:";
+    const size_t length = sizeof point - 1;
     int count;
     s->headlight = !strcmp(text, "head");
+    s->point_light = !strncmp(text, point, length);
     if (s->headlight)
         return 0;
-    int status = trip_option_numbers("--light", text, 3, 3, s->light, &count);
-    if (!status && !(s->light[0] != 0 || s->light[1] != 0 || s->light[2] != 0))
+    int status = trip_option_numbers("--light", text + (s->point_light ? length : 0), 3, 3,
+                                     s->light, &count);
+    if (!status && !s->point_light && !(s->light[0] != 0 || s->light[1] != 0 || s->light[2] != 0))
         return trip_option_fail("--light", "the direction is zero");
     return status;
 }
@@ -75,6 +79,7 @@ int trip_option_check_effects(const triptych_settings *s)
         return trip_option_fail("--light-cells", "applies to --effects shadows and occlusion");
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
         return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "
-                                             "its direction: --light X,Y,Z");
+                                             "its direction, --light X,Y,Z, or place, --light "
+                                             "point:X,Y,Z");
     return 0;
 }

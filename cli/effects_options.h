@@ -9,9 +9,9 @@
  * KEY_LIGHT_CELLS, and KEY_LIGHT where a command has that. */
 #define TRIP_OPTION_LIGHT(group)                                                                   \
     {                                                                                              \
-        "light", KEY_LIGHT, "X,Y,Z|head", 0,                                                       \
-            "Direction to the light, or from the eye (default: head); what is not shaded has it "  \
-            "for --effects alone",                                                                 \
+        "light", KEY_LIGHT, "X,Y,Z|point:X,Y,Z|head", 0,                                           \
+            "Direction to the light, its place, or from the eye (default: head); what is not "     \
+            "shaded has it for --effects alone",                                                   \
             group                                                                                  \
     }
 #define TRIP_OPTIONS_EFFECTS(group)                                                                \

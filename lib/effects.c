@@ -23,9 +23,10 @@ static int choose(triptych *t)
     const bool surfaces = is_of_surfaces(t);
     switch (trip_dataset_text_kind(t->session.text)) {
     case TRIP_TF_FOG:
-        t->why_effects = t->settings.headlight
-                             ? "smoke, clouds or fog, lit from the eye: give the light a direction"
-                             : "smoke, clouds or fog scatter the light";
+        t->why_effects =
+            t->settings.headlight
+                ? "smoke, clouds or fog, lit from the eye: give the light a direction or place"
+                : "smoke, clouds or fog scatter the light";
         return t->settings.headlight ? 0 : TRIPTYCH_SHADOWS;
     case TRIP_TF_LABELS:
         t->why_effects = surfaces ? "labels are drawn as surfaces"

@@ -153,7 +153,7 @@ static const char *fault_of_effects(const triptych_settings *s)
     if (s->effects & ~all)
         return "there is no such effect";
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
-        return "light from the eye casts no shadows that are seen; give its direction";
+        return "light from the eye casts no shadows that are seen; give its direction or place";
     if (!(s->anisotropy >= -0.95 && s->anisotropy <= 0.95))
         return "the anisotropy of scattering lies between -0.95 and 0.95";
     if (s->effects & TRIPTYCH_CUEING && !(s->cueing > 0 && s->cueing <= 1))
@@ -179,8 +179,10 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1) && s->h != TRIPTYCH_H_AUTO)
         return "h lies between 0 and below 1, or is by the classification (-1)";
-    if ((s->shading || s->effects) && !s->headlight && !(length > 0 && isfinite(length)))
-        return "the direction to the light is zero or not finite";
+    if ((s->shading || s->effects) && !s->headlight && !isfinite(length))
+        return "the light is too far away, or not finite";
+    if ((s->shading || s->effects) && !s->headlight && !s->point_light && !(length > 0))
+        return "the direction to the light is zero";
     for (int i = 0; i < 4; i++)
         if (!(s->background[i] >= 0 && s->background[i] <= 1))
             return "components of the background lie between 0 and 1";
@@ -243,6 +245,17 @@ static void warn_of_ripple(double kernel_radius)
               TRIP_KERNEL_RADIUS_VOXELS, 100 * (usual.through - 1), 100 * (usual.between - 1));
 }
 
+static void set_light(trip_settings *out, const triptych_settings *s)
+{
+    const trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
+    out->headlight = s->headlight;
+    out->point_light = s->point_light && !s->headlight;
+    if (out->point_light)
+        out->light_place = light;
+    else if (!s->headlight)
+        out->light_direction = trip_normalize(light);
+}
+
 int triptych_set_settings(triptych *t, const triptych_settings *s)
 {
     trip_scope *before = trip_context_enter_anew(t);
@@ -277,7 +290,6 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .triangles = s->triangles,
         .depth = s->depth,
         .shading = s->shading,
-        .headlight = s->headlight,
         .h = s->h,
         .kernel_radius = s->kernel_radius,
         .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
@@ -294,9 +306,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
     t->clip = s->clip;
     t->counting = s->count;
     t->normalise = s->normalise;
-    if (!s->headlight)
-        t->settings.light_direction =
-            trip_normalize(trip_v3(s->light[0], s->light[1], s->light[2]));
+    set_light(&t->settings, s);
     return trip_context_leave(before, 0);
 }
 

@@ -281,10 +281,10 @@ typedef enum triptych_show {
 
 /* Effects besides shading. What is not among them costs nothing. */
 enum {
-    TRIPTYCH_SHADOWS = 1,   /* what lies towards light[] attenuates its light, which fog scatters;
-                               not with the headlight */
-    TRIPTYCH_OCCLUSION = 2, /* what lies around attenuates the light from everywhere */
-    TRIPTYCH_CUEING = 4,    /* what is farther fades into the background */
+    TRIPTYCH_SHADOWS = 1,      /* what lies towards the light attenuates it, and fog scatters it;
+                                  not with the headlight */
+    TRIPTYCH_OCCLUSION = 2,    /* what lies around attenuates the light from everywhere */
+    TRIPTYCH_CUEING = 4,       /* what is farther fades into the background */
     TRIPTYCH_EFFECTS_AUTO = 8, /* and those that the kind of data and the function call for */
 };
 
@@ -309,7 +309,8 @@ typedef struct triptych_settings {
     int indexed, triangles; /* how GL is given splats: one array for all lists, quads */
     int shading;            /* from gradients */
     int headlight;          /* light from the eye; else from light[] */
-    double light[3];        /* world direction to the light, not zero */
+    int point_light;        /* not 0: light[] is the light's place, as bright at any distance */
+    double light[3];        /* world direction to the light, not zero; or its place */
     double h;               /* where layers begin to blend, 0 to below 1, or TRIPTYCH_H_AUTO */
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */

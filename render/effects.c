@@ -34,7 +34,9 @@ trip_effects_view trip_effects_view_make(const trip_settings *s, const trip_came
     const trip_light_grid grid = trip_light_grid_over(dims, s->effects.cells, 1);
     e.bias = TRIP_LIGHT_BIAS * grid.spacing * camera->voxel_world;
     trip_affine_invert(&camera->index_to_world, &e.to_index); /* it was checked on opening */
-    e.to_light = trip_affine_vector(&e.to_index, s->light_direction);
+    e.point_light = s->point_light;
+    e.light = s->point_light ? trip_light_place(s, &camera->index_to_world)
+                             : trip_affine_vector(&e.to_index, s->light_direction);
     for (int k = 0; k < 3; k++)
         e.cue_rgb[k] = s->background[k];
     set_cue(&e, camera, dims);
@@ -64,6 +66,17 @@ static double openness(const trip_effects_view *e, trip_vec3 voxel, double stren
     return fmin(1, (1 + strength) * fmax(one, other));
 }
 
+/* So far from a place on towards the light, world units; `direction` is of unit length. */
+static trip_vec3 nearer(const trip_effects_view *e, trip_vec3 voxel, trip_vec3 direction,
+                        double distance)
+{
+    const trip_vec3 step = trip_affine_vector(&e->to_index, trip_scale(direction, distance));
+    const trip_vec3 whole = trip_sub(e->light, voxel);
+    if (e->point_light && trip_dot(step, step) > trip_dot(whole, whole))
+        return e->light;
+    return trip_add(voxel, step);
+}
+
 static void light_colour(const trip_effects_view *e, const trip_light *light, trip_vec3 voxel,
                          const double *gradient, double rgb[3])
 {
@@ -75,8 +88,7 @@ static void light_colour(const trip_effects_view *e, const trip_light *light, tr
         normal = trip_normalize(trip_v3(gradient[0], gradient[1], gradient[2]));
     }
     if (e->effects.shadows) {
-        trip_vec3 towards = trip_scale(e->to_light, lit.strength * e->bias);
-        reached = e->reached(e->user, trip_add(voxel, towards));
+        reached = e->reached(e->user, nearer(e, voxel, light->light, lit.strength * e->bias));
         phase = trip_effects_phase(e->effects.anisotropy, -trip_dot(light->light, light->eye));
     }
     if (e->effects.occlusion)

@@ -3,15 +3,15 @@
  *     c (AMBIENT open + DIFFUSE reached ((1 - s) phase + s |n . l|)) + s reached SPECULAR specular
  * clamped to [0, 1], in the place of what shade.h makes of it, with its strength s (0 where nothing
  * is shaded, as in fog), n and l. It is the same where all of these are 1:
- *     reached(x) = T(x + s b l),  T(y) = exp(-integral of extinction from y towards the light)
+ *     reached(x) = T(x + s b l),  T(y) = exp(-integral of extinction from y to the light)
  *     open(x)    = min(1, (1 + s) max(m(x + s b n), m(x - s b n)))
  *     phase      = (1 - g^2) / (1 + g^2 - 2 g cos)^(3/2)
  * m is the mean of T over directions. phase is that of Henyey & Greenstein 1941, times 4 pi, cos
  * that of the angle by which light turns towards the eye. So fog has single scattering after Max
  * 1995 (Optical models for direct volume rendering, section 5) with a share of light from
  * everywhere, and surfaces have cast shadows. A surface is lit where light reaches it, a little
- * outside: b is TRIP_LIGHT_BIAS cells of the grid below long. Half of what is around a surface is
- * the body itself, hence 1 + s.
+ * outside: b is TRIP_LIGHT_BIAS cells of the grid below long, but takes it no farther than to a
+ * light that is at a place. Half of what is around a surface is the body itself, hence 1 + s.
  *
  * T and m are looked up in a lattice over the volume (light_grid.h), that of m with cells twice as
  * long; the integral renderer works them out, m by the same directions. What is cut away does not
@@ -50,8 +50,9 @@ typedef double (*trip_light_reached)(const void *user, trip_vec3 voxel);
 /* Constants of a frame. */
 typedef struct trip_effects_view {
     trip_effects effects;
-    double bias;        /* world units */
-    trip_vec3 to_light; /* index space, for a world unit */
+    double bias; /* world units */
+    bool point_light;
+    trip_vec3 light; /* index space: the light's place, or the way to it for a world unit */
     trip_affine to_index;
     double cue[4]; /* f: the first three times the place in index space, and the last, in [0, 1], */
     double cue_rgb[3];

@@ -19,9 +19,10 @@ struct trip_light_map {
     const trip_dataset *data;
     unsigned level;
     trip_clip clip;
-    float extinctions[CODES];   /* per world unit, by code */
-    uint32_t shown[CODES + 1];  /* how many codes below have some */
-    trip_vec3 light_direction;  /* that `reached` is made for */
+    float extinctions[CODES];  /* per world unit, by code */
+    uint32_t shown[CODES + 1]; /* how many codes below have some */
+    bool point_light;
+    trip_vec3 light;            /* as trip_effects_view has it: that `reached` is made for */
     bool has_reached, has_open; /* they are complete */
 
     /* Sums of extinctions while they are gathered; then floats, and behind them those of `reached`.
@@ -37,7 +38,7 @@ struct trip_light_map {
     trip_pass pass;
     trip_light_sweep sweep;
     bool sweeping;
-    int direction; /* of `open`, being swept */
+    int part; /* direction of `open`, or region of a light at a place, being swept */
     trip_light_stats stats;
     uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
 };
@@ -67,7 +68,7 @@ static void stop_sweeping(trip_light_map *m)
 {
     trip_light_sweep_end(&m->sweep);
     m->sweeping = false;
-    m->direction = 0;
+    m->part = 0;
 }
 
 static void drop_open(trip_light_map *m)
@@ -128,10 +129,28 @@ static bool is_gathered_for(const trip_light_map *m, const trip_light_source *s)
            same_function(m, s->table);
 }
 
-static bool same_light(const trip_light_map *m, trip_vec3 light)
+static trip_vec3 to_index(const trip_light_source *s, trip_vec3 direction)
 {
-    return m->light_direction.x == light.x && m->light_direction.y == light.y &&
-           m->light_direction.z == light.z;
+    trip_affine map;
+    trip_affine_invert(&s->data->index_to_world, &map); /* it was checked on opening */
+    return trip_affine_vector(&map, direction);
+}
+
+/* Index space: the way to the light for a world unit, or its place. */
+static trip_vec3 light_of(const trip_light_source *s)
+{
+    return s->settings->point_light ? trip_light_place(s->settings, &s->data->index_to_world)
+                                    : to_index(s, s->settings->light_direction);
+}
+
+/* Notes the light; false where `reached` is made for another. */
+static bool is_made_for(trip_light_map *m, const trip_light_source *s)
+{
+    const trip_vec3 light = light_of(s), apart = trip_sub(light, m->light);
+    const bool same = m->point_light == s->settings->point_light && trip_dot(apart, apart) == 0;
+    m->point_light = s->settings->point_light;
+    m->light = light;
+    return same;
 }
 
 /* ---- beginning ---- */
@@ -178,9 +197,11 @@ static int take_grids(trip_light_map *m, const trip_light_source *s)
 /* The axis of the list that is read. */
 static int axis_of(const trip_light_source *s)
 {
-    trip_affine to_index;
-    trip_affine_invert(&s->data->index_to_world, &to_index); /* it was checked on opening */
-    trip_vec3 light = trip_affine_vector(&to_index, s->settings->light_direction);
+    const uint64_t *dims = s->data->header.dims;
+    const trip_vec3 last = trip_v3((double)dims[0] - 1, (double)dims[1] - 1, (double)dims[2] - 1);
+    trip_vec3 light = light_of(s);
+    if (s->settings->point_light) /* from the middle */
+        light = trip_sub(light, trip_scale(last, 0.5));
     int axis = 2;
     for (int a = 0; a < 2 && s->settings->effects.shadows; a++)
         if (fabs(trip_component(light, a)) > fabs(trip_component(light, axis)))
@@ -289,9 +310,8 @@ int trip_light_map_begin(trip_light_map *m, const trip_light_source *s)
         drop_open(m);
     if (status)
         return status;
-    const bool same = same_light(m, s->settings->light_direction);
+    const bool same = is_made_for(m, s);
     m->has_reached &= same;
-    m->light_direction = s->settings->light_direction;
     if (m->stage != GATHER && !(same && m->stage == next_stage(m))) {
         stop_sweeping(m);
         m->stage = next_stage(m);
@@ -404,17 +424,13 @@ static int gather(trip_light_map *m)
 
 /* ---- sweeps ---- */
 
-/* A world direction of unit length. */
-static bool begin_sweep(trip_light_map *m, trip_light_grid *out, double weight, trip_vec3 direction)
+static bool begin_sweep(trip_light_map *m)
 {
-    trip_affine to_index;
-    trip_affine_invert(&m->data->index_to_world, &to_index);
-    m->sweep = (trip_light_sweep){ .extinction = &m->extinction, .out = out, .weight = weight };
-    for (int a = 0; a < 3; a++)
-        m->sweep.last[a] = (double)m->data->header.dims[a] - 1;
-    m->sweeping =
-        trip_light_sweep_begin(&m->sweep, trip_affine_vector(&to_index, direction), 1, m->budget);
-    return m->sweeping;
+    if (m->stage == SWEEP_OPEN)
+        return trip_light_sweep_begin(
+            &m->sweep, to_index(&m->source, trip_effects_direction(m->part)), m->budget);
+    return m->point_light ? trip_light_sweep_begin_at(&m->sweep, m->light, m->part, m->budget)
+                          : trip_light_sweep_begin(&m->sweep, m->light, m->budget);
 }
 
 /* The first time, the grid starts from 0. */
@@ -422,12 +438,22 @@ static int start_sweep(trip_light_map *m)
 {
     bool open = m->stage == SWEEP_OPEN;
     trip_light_grid *out = open ? &m->open : &m->reached;
-    if (m->direction == 0)
+    if (m->part == 0)
         memset(out->at, 0, (open ? m->open_nodes : m->nodes) * sizeof *out->at);
-    if (begin_sweep(m, out, open ? 1.0 / TRIP_OPEN_DIRECTIONS : 1,
-                    open ? trip_effects_direction(m->direction) : m->light_direction))
-        return 0;
-    return no_memory(out, trip_light_sweep_most_bytes(out));
+    m->sweep = (trip_light_sweep){ .extinction = &m->extinction,
+                                   .out = out,
+                                   .weight = open ? 1.0 / TRIP_OPEN_DIRECTIONS : 1,
+                                   .index_to_world = &m->data->index_to_world };
+    for (int a = 0; a < 3; a++)
+        m->sweep.last[a] = (double)m->data->header.dims[a] - 1;
+    m->sweeping = begin_sweep(m);
+    return m->sweeping ? 0 : no_memory(out, trip_light_sweep_most_bytes(out));
+}
+
+/* Of the stage. */
+static int sweep_count(const trip_light_map *m)
+{
+    return m->stage == SWEEP_OPEN ? TRIP_OPEN_DIRECTIONS : m->point_light ? TRIP_LIGHT_REGIONS : 1;
 }
 
 /* A layer. */
@@ -440,9 +466,9 @@ static int sweep(trip_light_map *m, const trip_task_runner *runner)
         return TRIP_FRAME_MORE;
     trip_light_sweep_end(&m->sweep);
     m->sweeping = false;
-    if (m->stage == SWEEP_OPEN && ++m->direction < TRIP_OPEN_DIRECTIONS)
+    if (++m->part < sweep_count(m))
         return TRIP_FRAME_MORE;
-    m->direction = 0;
+    m->part = 0;
     m->has_reached |= m->stage == SWEEP_REACHED;
     m->has_open |= m->stage == SWEEP_OPEN;
     m->stage = next_stage(m);

@@ -12,43 +12,118 @@ static size_t column_bytes(const trip_light_sweep *s)
     return (size_t)s->columns[0] * (size_t)s->columns[1] * sizeof *s->through;
 }
 
+/* Those from a place spread widest where it is half as far from the lattice as that is wide. */
 size_t trip_light_sweep_most_bytes(const trip_light_grid *out)
 {
     size_t most = 0;
     for (int axis = 0; axis < 3; axis++) {
         size_t columns = sizeof(double);
         for (int i = 1; i < 3; i++)
-            columns *= (size_t)out->nodes[(axis + i) % 3] + (size_t)out->nodes[axis] + 2;
+            columns *= (size_t)out->nodes[(axis + i) % 3] + 2 * (size_t)out->nodes[axis] + 4;
         most = columns > most ? columns : most;
     }
     return most;
 }
 
-bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, double world_length,
-                            trip_budget *budget)
+static void set_axes(trip_light_sweep *s, int axis, bool descending)
 {
-    s->axis = 0;
-    for (int a = 1; a < 3; a++)
-        if (fabs(trip_component(to_light, a)) > fabs(trip_component(to_light, s->axis)))
-            s->axis = a;
-    s->across = (s->axis + 1) % 3;
-    s->down = (s->axis + 2) % 3;
+    s->axis = axis;
+    s->across = (axis + 1) % 3;
+    s->down = (axis + 2) % 3;
+    s->descending = descending;
+}
+
+static int last_layer(const trip_light_sweep *s)
+{
+    return s->out->nodes[s->axis] - 1;
+}
+
+/* A layer's node, or a place's between them. */
+static double node_of(const trip_light_sweep *s, double layer)
+{
+    return s->descending ? last_layer(s) - layer : layer;
+}
+
+/* Where a ray that is at a node of a layer is at the last one: across (0) or down (1). */
+static double column_of(const trip_light_sweep *s, int i, double node, int layer)
+{
+    const double back = layer - last_layer(s);
+    return (node - back * s->slope[i]) / (1 + back * s->spread);
+}
+
+/* Columns from one to another, and one more on either side. */
+static void set_columns(trip_light_sweep *s, int i, double from, double to)
+{
+    s->first[i] = (int)floor(from) - 1;
+    s->columns[i] = (int)ceil(to) + 1 - s->first[i] + 1;
+}
+
+static bool take_columns(trip_light_sweep *s, trip_budget *budget)
+{
     s->budget = budget;
-    s->layer = 0;
-    const double along = trip_component(to_light, s->axis), layers = s->out->nodes[s->axis] - 1;
-    s->descending = along > 0;
-    s->length = s->out->spacing * world_length / fabs(along);
-    for (int i = 0; i < 2; i++) {
-        int nodes = s->out->nodes[i ? s->down : s->across];
-        s->slope[i] = -trip_component(to_light, i ? s->down : s->across) / fabs(along);
-        double moved = s->slope[i] * layers; /* columns begin so much before where they end */
-        s->first[i] = (int)floor(fmin(0, -moved));
-        s->columns[i] = (int)ceil(nodes - 1 + fmax(0, -moved)) - s->first[i] + 1;
-    }
+    s->layer = s->start;
     s->through = trip_budget_take(budget, column_bytes(s));
     for (size_t i = 0; s->through && i < column_bytes(s) / sizeof *s->through; i++)
         s->through[i] = 1;
     return s->through != NULL;
+}
+
+bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget *budget)
+{
+    int axis = 0;
+    for (int a = 1; a < 3; a++)
+        if (fabs(trip_component(to_light, a)) > fabs(trip_component(to_light, axis)))
+            axis = a;
+    const double along = trip_component(to_light, axis);
+    set_axes(s, axis, along > 0);
+    for (int i = 0; i < 2; i++) {
+        const double last = s->out->nodes[i ? s->down : s->across] - 1;
+        s->slope[i] = -trip_component(to_light, i ? s->down : s->across) / fabs(along);
+        set_columns(s, i, fmin(0, column_of(s, i, 0, 0)), fmax(last, column_of(s, i, last, 0)));
+    }
+    return take_columns(s, budget);
+}
+
+/* The layers that lie on the region's side of the light: those at it count as above. False where
+ * there are none. */
+static bool set_start(trip_light_sweep *s)
+{
+    const double above = ceil(s->light[s->axis]);
+    const double start = s->descending ? last_layer(s) - (above - 1) : above;
+    if (start > last_layer(s))
+        return false;
+    s->start = start > 0 ? (int)start : 0;
+    s->before = start >= 0 ? fabs(node_of(s, s->start) - s->light[s->axis]) : 0;
+    return true;
+}
+
+/* Columns that pass nodes of the region; false where there are none. */
+static bool set_spread(trip_light_sweep *s)
+{
+    const double far = fabs(node_of(s, last_layer(s)) - s->light[s->axis]);
+    bool some = true;
+    s->spread = far > 0 ? 1 / far : 0;
+    for (int i = 0; i < 2; i++) {
+        const int axis = i ? s->down : s->across;
+        const double last = s->out->nodes[axis] - 1, middle = s->light[axis];
+        s->slope[i] = -middle * s->spread;
+        double from = fmax(middle - far, fmin(0, column_of(s, i, 0, s->start)));
+        double to = fmin(middle + far, fmax(last, column_of(s, i, last, s->start)));
+        some &= from <= to;
+        if (some)
+            set_columns(s, i, from, to);
+    }
+    return some;
+}
+
+bool trip_light_sweep_begin_at(trip_light_sweep *s, trip_vec3 light, int region,
+                               trip_budget *budget)
+{
+    s->point = true;
+    set_axes(s, region / 2, region % 2);
+    for (int a = 0; a < 3; a++)
+        s->light[a] = trip_component(light, a) / s->out->spacing;
+    return !set_start(s) || !set_spread(s) || take_columns(s, budget);
 }
 
 void trip_light_sweep_end(trip_light_sweep *s)
@@ -70,8 +145,8 @@ static void cut(double from, double step, double last, double *t0, double *t1)
     *t1 = fmin(*t1, fmax(a, b));
 }
 
-/* The optical depth of a column from the layer before to this one: voxel indices. Two points of
- * Gauss: exact for cubics, as extinction is where the column stays in one cell. */
+/* The optical depth of a column's step: voxel indices. Two points of Gauss: exact for cubics, as
+ * extinction is where the column stays in one cell. */
 static double depth_of(const trip_light_sweep *s, const double from[3], const double step[3])
 {
     static const double points[2] = { 0.21132486540518712, 0.78867513459481288 };
@@ -86,37 +161,41 @@ static double depth_of(const trip_light_sweep *s, const double from[3], const do
             trip_light_grid_at(s->extinction, trip_v3(from[0] + t * step[0], from[1] + t * step[1],
                                                       from[2] + t * step[2]));
     }
-    return 0.5 * sum * (t1 - t0) * s->length;
+    const trip_vec3 way = trip_v3(step[0], step[1], step[2]);
+    return 0.5 * sum * (t1 - t0) * trip_length(trip_affine_vector(s->index_to_world, way));
 }
 
-static double layer_coordinate(const trip_light_sweep *s, int layer)
+/* Of rows from one before another. */
+static int end_of_band(unsigned band, int first, int end)
 {
-    return s->out->spacing * (s->descending ? s->out->nodes[s->axis] - 1 - layer : layer);
-}
-
-/* Of rows before `end`. */
-static int end_of_band(unsigned band, int end)
-{
-    const int last = (int)(band + 1) * BAND_ROWS;
+    const int last = first + (int)(band + 1) * BAND_ROWS;
     return last < end ? last : end;
+}
+
+/* Where a column that is at w at the last layer is at the layer before, and its step: voxels. */
+static void place_column(const trip_light_sweep *s, int i, double w, double passed, double from[3],
+                         double step[3])
+{
+    const int axis = i ? s->down : s->across;
+    const double moved = s->slope[i] + s->spread * w;
+    from[axis] = (w + (s->layer - passed - last_layer(s)) * moved) * s->out->spacing;
+    step[axis] = passed * moved * s->out->spacing;
 }
 
 /* Some rows of columns from the layer before to this one. */
 static void attenuate(void *sweep, unsigned band)
 {
     const trip_light_sweep *s = sweep;
-    const int first = (int)band * BAND_ROWS, end = end_of_band(band, s->columns[1]);
-    const double spacing = s->out->spacing;
+    const int first = (int)band * BAND_ROWS, end = end_of_band(band, 0, s->columns[1]);
+    const double passed = s->layer > s->start ? 1 : s->before;
     double from[3], step[3];
-    from[s->axis] = layer_coordinate(s, s->layer - 1);
-    step[s->axis] = layer_coordinate(s, s->layer) - from[s->axis];
-    step[s->across] = s->slope[0] * spacing;
-    step[s->down] = s->slope[1] * spacing;
+    from[s->axis] = node_of(s, s->layer - passed) * s->out->spacing;
+    step[s->axis] = node_of(s, s->layer) * s->out->spacing - from[s->axis];
     double *through = s->through + (ptrdiff_t)first * s->columns[0];
     for (int row = first; row < end; row++) {
-        from[s->down] = (s->first[1] + row + (s->layer - 1) * s->slope[1]) * spacing;
+        place_column(s, 1, s->first[1] + row, passed, from, step);
         for (int column = 0; column < s->columns[0]; column++, through++) {
-            from[s->across] = (s->first[0] + column + (s->layer - 1) * s->slope[0]) * spacing;
+            place_column(s, 0, s->first[0] + column, passed, from, step);
             double depth = *through > 0 ? depth_of(s, from, step) : 0;
             if (depth > 0)
                 *through *= exp(-depth);
@@ -125,33 +204,62 @@ static void attenuate(void *sweep, unsigned band)
     }
 }
 
-/* Some rows of the layer's nodes from the columns around them: all nodes lie alike between columns.
- */
+/* Of the column before a place, and how far that is behind it: 0 to 1. */
+static int column_before(const trip_light_sweep *s, int i, double at, double *part)
+{
+    const double last = s->columns[i] - 2;
+    double x = at - s->first[i];
+    x = x > 0 ? x < last ? x : last : 0; /* 0 for what is no number */
+    const int before = (int)x;
+    *part = x - before;
+    return before;
+}
+
+/* Some rows of the layer's nodes from the columns around them. */
 static void give(void *sweep, unsigned band)
 {
     const trip_light_sweep *s = sweep;
     const size_t strides[3] = { 1, (size_t)s->out->nodes[0],
                                 (size_t)s->out->nodes[0] * (size_t)s->out->nodes[1] };
-    const int layer = s->descending ? s->out->nodes[s->axis] - 1 - s->layer : s->layer;
+    const int first = s->nodes[1][0] + (int)band * BAND_ROWS;
+    const int end = end_of_band(band, s->nodes[1][0], s->nodes[1][1]);
+    float *layer = s->out->at + (size_t)node_of(s, s->layer) * strides[s->axis];
     double part[2];
-    int begin[2];
-    for (int i = 0; i < 2; i++) {
-        double at = -s->layer * s->slope[i] - s->first[i];
-        begin[i] = (int)floor(at);
-        part[i] = at - begin[i];
-    }
-    const int end = end_of_band(band, s->out->nodes[s->down]);
-    for (int v = (int)band * BAND_ROWS; v < end; v++) {
-        const int row = begin[1] + v, below = row + (part[1] > 0);
-        const double *upper = s->through + (ptrdiff_t)row * s->columns[0] + begin[0];
-        const double *lower = s->through + (ptrdiff_t)below * s->columns[0] + begin[0];
-        float *to = s->out->at + (size_t)layer * strides[s->axis] + (size_t)v * strides[s->down];
-        for (int u = 0; u < s->out->nodes[s->across]; u++, to += strides[s->across]) {
-            const int next = u + (part[0] > 0);
-            double first = upper[u] + part[0] * (upper[next] - upper[u]);
-            double second = lower[u] + part[0] * (lower[next] - lower[u]);
-            *to += (float)(s->weight * (first + part[1] * (second - first)));
+    for (int v = first; v < end; v++) {
+        const int row = column_before(s, 1, column_of(s, 1, v, s->layer), &part[1]);
+        const double *upper = s->through + (ptrdiff_t)row * s->columns[0];
+        const double *lower = upper + s->columns[0];
+        for (int u = s->nodes[0][0]; u < s->nodes[0][1]; u++) {
+            const int n = column_before(s, 0, column_of(s, 0, u, s->layer), &part[0]);
+            double above = upper[n] + part[0] * (upper[n + 1] - upper[n]);
+            double below = lower[n] + part[0] * (lower[n + 1] - lower[n]);
+            layer[(size_t)v * strides[s->down] + (size_t)u * strides[s->across]] +=
+                (float)(s->weight * (above + part[1] * (below - above)));
         }
+    }
+}
+
+/* Whether a node of the layer is in the region as far as an axis has a say: where the way to it is
+ * as long along two axes, that of the first. */
+static bool is_in_region(const trip_light_sweep *s, int axis, int node)
+{
+    const double along = fabs(node_of(s, s->layer) - s->light[s->axis]);
+    const double beside = fabs(node - s->light[axis]);
+    return beside < along || (beside == along && s->axis < axis);
+}
+
+/* The nodes of the layer that are the region's. */
+static void find_nodes(trip_light_sweep *s)
+{
+    for (int i = 0; i < 2; i++) {
+        const int axis = i ? s->down : s->across;
+        int from = 0, to = s->out->nodes[axis];
+        while (s->point && from < to && !is_in_region(s, axis, from))
+            from++;
+        while (s->point && from < to && !is_in_region(s, axis, to - 1))
+            to--;
+        s->nodes[i][0] = from;
+        s->nodes[i][1] = to;
     }
 }
 
@@ -167,8 +275,11 @@ static void run(const trip_task_runner *runner, void (*task)(void *context, unsi
 
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner)
 {
-    if (s->layer > 0)
+    if (!s->through)
+        return false;
+    if (s->layer > s->start || s->before > 0)
         run(runner, attenuate, s, s->columns[1]);
-    run(runner, give, s, s->out->nodes[s->down]);
-    return ++s->layer < s->out->nodes[s->axis];
+    find_nodes(s);
+    run(runner, give, s, s->nodes[1][1] - s->nodes[1][0]);
+    return ++s->layer <= last_layer(s);
 }

@@ -6,6 +6,7 @@
 #include "plan_cull.h"
 #include "mean.h"
 #include "report.h"
+#include "shade.h"
 #include "sheet.h"
 #include "weight.h"
 
@@ -382,6 +383,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
     place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
     if (!status)
+        status = trip_light_check(settings, &data->index_to_world);
+    if (!status)
         status = trip_plan_check_coordinates(data, settings);
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         status = trip_plan_check_cells(data, "--classify pre");
@@ -458,7 +461,9 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
                          .gathers = true,
                          .planes = planes_gathered(data, settings) };
     place_whole_clip(plan, data, camera, settings);
-    int status = trip_plan_check_coordinates(data, settings);
+    int status = trip_light_check(settings, &data->index_to_world);
+    if (!status)
+        status = trip_plan_check_coordinates(data, settings);
     if (!status)
         status = take_lists(plan, data->list_count, budget);
     if (!status)
@@ -719,7 +724,9 @@ uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *dat
 static void explain_shading(const trip_plan *plan, const trip_dataset *data, const trip_settings *s,
                             FILE *out)
 {
-    const char *light = s->headlight ? "from the eye" : "from the direction given";
+    const char *light = s->headlight     ? "from the eye"
+                        : s->point_light ? "from the place given"
+                                         : "from the direction given";
     char bytes[32];
     bool of_values =
         plan->gathers ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;

@@ -87,7 +87,7 @@ typedef enum trip_show {
 
 /* What is simulated besides colour and shading (effects.h). What is off costs nothing. */
 typedef struct trip_effects {
-    bool shadows;      /* what lies towards light_direction attenuates its light */
+    bool shadows;      /* what lies towards the light attenuates it */
     bool occlusion;    /* what lies around attenuates the light that comes from everywhere */
     double cueing;     /* share of the background in the colour of what is farthest: 0 (off) to 1 */
     double anisotropy; /* of scattering, where shadows are: -1 < g < 1 */
@@ -117,8 +117,10 @@ typedef struct trip_settings {
     bool triangles;            /* bounding quads of two triangles instead of point sprites */
     bool depth;                /* a picture of distances too, see layer.h; rgba32f only */
     bool shading;              /* diffuse and specular from the stored gradients */
-    bool headlight;            /* light from the eye; otherwise from light_direction */
+    bool headlight;            /* light from the eye; otherwise from light_direction, */
+    bool point_light;          /* or from light_place, as bright at any distance */
     trip_vec3 light_direction; /* world space, towards the light, unit length */
+    trip_vec3 light_place;     /* world space */
     double h;                  /* 0 <= h < 1, or TRIP_H_AUTO: trip_settings_h() */
     double kernel_radius;      /* voxels (index space) */
     double background[4];      /* r, g, b, a; not premultiplied */

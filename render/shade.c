@@ -2,6 +2,8 @@
 
 #include <assert.h>
 
+#include "report.h"
+
 /* World-space unit vector from a voxel to the eye: from their difference in index space, which is
  * exact however far the volume lies from the world's origin. */
 static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
@@ -11,10 +13,40 @@ static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
     return trip_normalize(trip_affine_vector(&c->index_to_world, trip_sub(c->eye, voxel)));
 }
 
+/* From the first voxel to the light, world space. */
+static trip_vec3 from_first_voxel(const trip_settings *s, const trip_affine *m)
+{
+    return trip_sub(s->light_place, trip_v3(m->m[0][3], m->m[1][3], m->m[2][3]));
+}
+
+trip_vec3 trip_light_place(const trip_settings *s, const trip_affine *index_to_world)
+{
+    trip_affine to_index;
+    trip_affine_invert(index_to_world, &to_index); /* it was checked on opening */
+    return trip_affine_vector(&to_index, from_first_voxel(s, index_to_world));
+}
+
+int trip_light_check(const trip_settings *s, const trip_affine *index_to_world)
+{
+    double far = s->point_light ? trip_length(trip_light_place(s, index_to_world)) : 0;
+    return far <= TRIP_LIGHT_FARTHEST_VOXELS
+               ? 0
+               : trip_fail(TRIP_USAGE, "render", "light",
+                           "its place is too far from the volume; give the direction to it");
+}
+
+static trip_vec3 towards_light(const trip_settings *s, const trip_affine *m, trip_vec3 voxel)
+{
+    if (!s->point_light)
+        return s->light_direction;
+    return trip_normalize(trip_sub(from_first_voxel(s, m), trip_affine_vector(m, voxel)));
+}
+
 trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gradient_full,
                          trip_vec3 voxel)
 {
-    trip_vec3 eye = towards_eye(c, voxel), light = s->headlight ? eye : s->light_direction;
+    trip_vec3 eye = towards_eye(c, voxel);
+    trip_vec3 light = s->headlight ? eye : towards_light(s, &c->index_to_world, voxel);
     return (trip_light){ eye, light, trip_normalize(trip_add(light, eye)), gradient_full };
 }
 

@@ -34,12 +34,22 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 
-/* What is the same for all gradients at a point: unit vectors in world space. Along a ray from the
- * eye it does not change. */
+/* What is the same for all gradients at a point: unit vectors in world space, that to a light which
+ * is at the very point zero. Along a ray from the eye it does not change, but for a light that is
+ * at a place. */
 typedef struct trip_light {
     trip_vec3 eye, light, half; /* towards them */
     double gradient_full;
 } trip_light;
+
+/* Farther from the first voxel (in voxels) a light cannot be, as an eye cannot; one that is so far
+ * is a direction. */
+#define TRIP_LIGHT_FARTHEST_VOXELS TRIP_CAMERA_FARTHEST_VOXELS
+
+/* Of a light that is at a place: where in index space. */
+trip_vec3 trip_light_place(const trip_settings *s, const trip_affine *index_to_world);
+/* Fails (usage) where that is too far. */
+int trip_light_check(const trip_settings *s, const trip_affine *index_to_world);
 
 /* At a point in index space. */
 trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gradient_full,

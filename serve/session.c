@@ -10,6 +10,7 @@
 
 #include "encode.h"
 #include "json.h"
+#include "light.h"
 #include "report.h"
 #include "script.h"
 #include "text.h"
@@ -236,32 +237,27 @@ static const char *const classes[] = { "pre", "post", "auto", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", NULL };
 static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
 
-/* "head", or where the light comes from: degrees round from the x axis, and up. */
-static bool set_light(triptych_settings *s, const char *value)
+/* "head", or "ROUND,UP,DISTANCE" as of trip_light_control. */
+static bool set_light(trip_document *d, const char *value)
 {
-    double degrees[2];
-    char *end;
+    char copy[64], *rest = copy;
+    double numbers[3];
     if (!strcmp(value, "head")) {
-        s->headlight = 1;
+        d->settings.headlight = 1;
         return true;
     }
-    char copy[64];
+    if (!d->opened || strlen(value) >= sizeof copy)
+        return false;
     snprintf(copy, sizeof copy, "%s", value);
-    char *comma = strchr(copy, ',');
-    if (!comma || strlen(value) >= sizeof copy)
+    for (int i = 0; i < 3; i++) {
+        const char *number = strsep(&rest, ",");
+        if (!number || !trip_text_to_double(number, &numbers[i]))
+            return false;
+    }
+    const trip_light_control c = { numbers[0], numbers[1], numbers[2] };
+    if (rest || !(fabs(c.round) <= 360 && fabs(c.up) <= 90 && c.distance >= TRIP_LIGHT_NEAREST))
         return false;
-    *comma = 0;
-    degrees[0] = strtod(copy, &end);
-    bool good = end != copy && !*end;
-    degrees[1] = strtod(comma + 1, &end);
-    good &= end != comma + 1 && !*end;
-    if (!good || !(fabs(degrees[0]) <= 360 && fabs(degrees[1]) <= 90))
-        return false;
-    const double unit = acos(-1) / 180, round = degrees[0] * unit, up = degrees[1] * unit;
-    s->headlight = 0;
-    s->light[0] = cos(up) * cos(round);
-    s->light[1] = cos(up) * sin(round);
-    s->light[2] = sin(up);
+    trip_light_control_set(&d->settings, &d->info, &c);
     return true;
 }
 
@@ -292,11 +288,9 @@ static bool set_setting(triptych_settings *s, const char *name, const char *valu
     } else if (!strcmp(name, "shading")) {
         good = choose(value, no_yes, &which);
         s->shading = good ? which : s->shading;
-    } else if (!strcmp(name, "h")) {
-        good = set_number(&s->h, value, TRIPTYCH_H_AUTO, 0.999);
-        s->h = s->h >= 0 ? s->h : TRIPTYCH_H_AUTO;
     } else {
-        good = !strcmp(name, "light") && set_light(s, value);
+        good = !strcmp(name, "h") && set_number(&s->h, value, TRIPTYCH_H_AUTO, 0.999);
+        s->h = s->h >= 0 ? s->h : TRIPTYCH_H_AUTO;
     }
     return good;
 }
@@ -308,6 +302,8 @@ bool trip_session_set(trip_session *s, const char *name, const char *value)
     trip_document *d = trip_viewer_document(&s->viewer);
     if (d && !strcmp(name, "opacity"))
         good = set_number(&d->opacity_scale, value, 1e-3, 1e3);
+    else if (d && !strcmp(name, "light"))
+        good = set_light(d, value);
     else if (d)
         good = set_setting(&d->settings, name, value);
     s->viewer.changed |= good;

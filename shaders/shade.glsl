@@ -58,13 +58,23 @@ vec3 towards_eye(vec3 from_eye)
 #endif
 }
 
-// With a gradient as unpack_normal() has it.
-vec3 lit(vec3 colour, vec4 gradient, vec3 eye)
+// Likewise; without HEADLIGHT.
+vec3 light_from(vec3 from_eye)
+{
+    if (light.w == 0.0)
+        return vec3(light.xyz);
+    vec3 way = vec3(light.xyz) - from_eye;
+    vec3 world = vec3(world_0.xyz) * way.x + vec3(world_1.xyz) * way.y + vec3(world_2.xyz) * way.z;
+    return world / max(length(world), 1e-15);
+}
+
+// With a gradient as unpack_normal() has it, at what lies in a direction `eye` to the eye.
+vec3 lit(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye)
 {
 #ifdef HEADLIGHT
     vec3 towards_light = eye, middle = eye;
 #else
-    vec3 towards_light = light.xyz, middle = light.xyz + eye;
+    vec3 towards_light = light_from(from_eye), middle = towards_light + eye;
     middle /= max(length(middle), 1e-30);
 #endif
     float strength = min(1.0, gradient.w);
@@ -79,6 +89,6 @@ vec3 lit(vec3 colour, vec4 gradient, vec3 eye)
 
 vec3 shade(vec3 colour, uint normal, vec3 from_eye)
 {
-    return lit(colour, unpack_normal(normal), towards_eye(from_eye));
+    return lit(colour, unpack_normal(normal), towards_eye(from_eye), from_eye);
 }
 #endif

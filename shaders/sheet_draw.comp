@@ -36,7 +36,10 @@ struct ray {
     float along;   // per depth
     float start;   // parallel views: where it begins along the list
     float world;   // voxels' lengths over a sheet
-    vec3 eye;      // towards it
+#ifdef SHADED
+    vec3 eye;        // towards it
+    vec3 first, way; // from the eye, list axes: at depth 0, and on over a depth
+#endif
     float from, to; // what of it is not cut away, in depths
 };
 
@@ -74,7 +77,15 @@ ray ray_of(vec2 p)
             r.to = -1e30;
     }
 #ifdef SHADED
-    r.eye = towards_eye(ray_0.xyz + (ray_x.xyz * p.x + ray_y.xyz * p.y) * ray_x.w);
+#ifdef PARALLEL
+    vec2 corner = p + screen.xy;
+    r.first = (ray_x.xyz * corner.x + ray_y.xyz * corner.y) * ray_x.w;
+    r.way = ray_0.xyz;
+#else
+    r.first = vec3(0.0);
+    r.way = ray_0.xyz + (ray_x.xyz * p.x + ray_y.xyz * p.y) * ray_x.w;
+#endif
+    r.eye = towards_eye(r.way);
 #endif
     return r;
 }
@@ -215,13 +226,13 @@ vec3 gradient_at(place at, trip_gl_sheet_end end)
 }
 #endif
 
-// Of a segment, by the mean of the gradients of its ends.
-vec3 lit_between(vec3 colour, ray r, vec3 gradient_sum)
+// Of a segment with its middle at a depth, by the mean of the gradients of its ends.
+vec3 lit_between(vec3 colour, ray r, vec3 gradient_sum, float at)
 {
     vec3 g = 0.5 * (gradient_0.xyz * gradient_sum.x + gradient_1.xyz * gradient_sum.y +
                     gradient_2.xyz * gradient_sum.z);
     float strength = length(g);
-    return lit(colour, vec4(g / max(strength, 1e-15), strength), r.eye);
+    return lit(colour, vec4(g / max(strength, 1e-15), strength), r.eye, r.first + r.way * at);
 }
 #endif
 
@@ -243,15 +254,16 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
     if (!(means.a > 0.0))
         return;
     vec3 colour = tint.w > 0.0 ? vec3(tint.xyz) : means.rgb / means.a;
+    float middle = mix(start, end, 0.5 * (first + last));
 #ifdef SHADED
-    colour = lit_between(colour, r, gradient_at(a, from) + gradient_at(b, to));
+    colour = lit_between(colour, r, gradient_at(a, from) + gradient_at(b, to), middle);
 #endif
 #ifdef CUED
-    colour = cued(colour, mix(start, end, 0.5 * (first + last)) * depth.x);
+    colour = cued(colour, middle * depth.x);
 #endif
     float through = 1.0 - pixel.a, add = opacity(means.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);
-    pixel_depth += mix(start, end, 0.5 * (first + last)) * add;
+    pixel_depth += middle * add;
     if (1.0 - pixel.a < SHEET_SATURATION) {
         pixel_depth /= pixel.a;
         pixel = vec4(pixel.rgb / pixel.a, 1.0);

@@ -16,6 +16,7 @@
 
 #include "annotation.h"
 #include "clipping.h"
+#include "light.h"
 #include "report.h"
 
 namespace
@@ -439,19 +440,16 @@ void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
 
 // ---- light, quality ----
 
-// By two angles: round, and up.
-bool draw_direction(trip_panel *p, double light[3])
+bool draw_light_place(trip_panel *p, trip_document *d)
 {
-    const double length = std::hypot(light[0], light[1], light[2]);
-    double round = std::atan2(light[1], light[0]) * 180 / M_PI;
-    double up = length > 0 ? std::asin(light[2] / length) * 180 / M_PI : 90;
-    bool changed = slide(p, "Light round", &round, -180, 180, "%.0f°");
-    changed |= slide(p, "Light up", &up, -89, 89, "%.0f°");
-    if (changed) {
-        light[0] = std::cos(up * M_PI / 180) * std::cos(round * M_PI / 180);
-        light[1] = std::cos(up * M_PI / 180) * std::sin(round * M_PI / 180);
-        light[2] = std::sin(up * M_PI / 180);
-    }
+    trip_light_control c = trip_light_control_of(&d->settings, &d->info);
+    const bool far = c.distance >= TRIP_LIGHT_FARTHEST;
+    bool changed = slide(p, "Light round", &c.round, -180, 180, "%.0f°");
+    changed |= slide(p, "Light up", &c.up, -89, 89, "%.0f°");
+    changed |= slide(p, "Light distance", &c.distance, TRIP_LIGHT_NEAREST, TRIP_LIGHT_FARTHEST,
+                     far ? "far away" : "%.2f", ImGuiSliderFlags_Logarithmic);
+    if (changed)
+        trip_light_control_set(&d->settings, &d->info, &c);
     return changed;
 }
 
@@ -466,7 +464,7 @@ bool draw_light(trip_panel *p, trip_document *d)
     if (s->shading && d->info.normal_bytes) {
         changed |= check(p, "Light from the eye", &s->headlight);
         if (!s->headlight)
-            changed |= draw_direction(p, s->light);
+            changed |= draw_light_place(p, d);
     }
     float rgb[3];
     for (int i = 0; i < 3; i++)

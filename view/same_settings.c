@@ -41,7 +41,8 @@ bool trip_same_settings(const triptych_settings *a, const triptych_settings *b)
 {
     return same_form(a, b) && same_footprints(a, b) && same_effects(a, b) &&
            a->normalise == b->normalise && a->shading == b->shading &&
-           a->headlight == b->headlight && same_numbers(a->light, b->light, 3) &&
-           same_numbers(a->background, b->background, 4) && a->depth == b->depth &&
-           a->count == b->count && a->show == b->show && same_clip(&a->clip, &b->clip);
+           a->headlight == b->headlight && a->point_light == b->point_light &&
+           same_numbers(a->light, b->light, 3) && same_numbers(a->background, b->background, 4) &&
+           a->depth == b->depth && a->count == b->count && a->show == b->show &&
+           same_clip(&a->clip, &b->clip);
 }

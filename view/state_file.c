@@ -53,6 +53,7 @@ static const entry setting_entries[] = {
     { "method", SETTING(method), WHOLE, 1, TRIPTYCH_MERGE, TRIPTYCH_AXIS },
     { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
     { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },
+    { "point_light", SETTING(point_light), WHOLE, 1, 0, 1 },
     { "light", SETTING(light), NUMBERS, 3, -FAR, FAR },
     { "effects", SETTING(effects), WHOLE, 1, 0, 15 },
     { "anisotropy", SETTING(anisotropy), NUMBERS, 1, -0.95, 0.95 },
@@ -212,7 +213,8 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     if (!status)
         status = read_entries(s, root, ENTRIES(other_entries), false, path);
     const triptych_settings *t = &s->settings;
-    if (!status && (t->shading || t->effects) && !t->headlight && !(length_of(t->light) > 0))
+    if (!status && (t->shading || t->effects) && !t->headlight && !t->point_light &&
+        !(length_of(t->light) > 0))
         status = trip_fail(TRIP_ERROR, "read", path, "its light has no direction");
     if (!status && !trip_clipping_is_sound(&t->clip))
         status = trip_fail(TRIP_ERROR, "read", path, "its clipping box or planes are none");

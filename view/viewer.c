@@ -8,6 +8,7 @@
 
 #include "camera_text.h"
 #include "clipping.h"
+#include "light.h"
 #include "state_file.h"
 
 enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
@@ -529,11 +530,12 @@ char *trip_viewer_camera_options(trip_viewer *v)
         return NULL;
     const triptych_settings s = settings_of(d);
     char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
-    char *clip = trip_clipping_text(&s.clip);
-    if (camera && clip && asprintf(&text, "%s%s", camera, clip) < 0)
+    char *clip = trip_clipping_text(&s.clip), *light = trip_light_text(&s);
+    if (camera && clip && light && asprintf(&text, "%s%s%s", camera, clip, light) < 0)
         text = NULL;
     free(camera);
     free(clip);
+    free(light);
     return text;
 }
 

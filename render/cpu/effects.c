@@ -15,12 +15,12 @@ static trip_cpu_light light_of(const trip_light_grid *grid, int axis)
     return light;
 }
 
-static void set_bias(trip_cpu_effects *e, const trip_effects_view *view, int axis)
+static void set_light(trip_cpu_effects *e, const trip_effects_view *view, int axis)
 {
-    const trip_vec3 towards = trip_scale(view->to_light, view->bias);
+    e->point_light = view->point_light;
     for (int i = 0; i < 3; i++) {
         const int a = (axis + 1 + i) % 3;
-        e->towards[i] = (float)trip_component(towards, a);
+        e->light[i] = (float)trip_component(view->light, a);
         for (int k = 0; k < 3; k++)
             e->aside[i][k] = (float)(view->bias * view->to_index.m[a][k]);
     }
@@ -54,5 +54,5 @@ void trip_cpu_effects_make(trip_cpu_effects *e, const trip_frame *frame, int axi
     e->phase[0] = (float)(1 - g * g);
     e->phase[1] = (float)(1 + g * g);
     e->phase[2] = (float)(2 * g);
-    set_bias(e, &view, axis);
+    set_light(e, &view, axis);
 }

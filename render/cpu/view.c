@@ -133,6 +133,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
     const trip_file_header *header = &frame->data->header;
     const double full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
     const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
+    const trip_vec3 light = trip_light_place(frame->settings, &camera->index_to_world);
     *view = (trip_cpu_view){
         .of = frame,
         .table = frame->table,
@@ -151,6 +152,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
     const int axes[3] = { view->u_axis, view->v_axis, axis };
     for (int i = 0; i < 3; i++) {
         view->eye[i] = eye[axes[i]];
+        view->light[i] = trip_component(light, axes[i]);
         for (int k = 0; k < 3; k++)
             view->world[k][i] = camera->index_to_world.m[k][axes[i]] / camera->voxel_world;
     }

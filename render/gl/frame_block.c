@@ -125,6 +125,9 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const tr
     }
     double full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
     f->light = as_it_is(frame->settings->light_direction, 0);
+    if (frame->settings->point_light)
+        f->light = in_list_axes(
+            trip_sub(trip_light_place(frame->settings, &c->index_to_world), c->eye), axis, 1);
     f->to_eye =
         as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_full / full, 1e30));
 }

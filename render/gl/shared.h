@@ -48,41 +48,41 @@
 
 /* Constants of one list of a frame, or of a layer by level 0's map; R is float for drawing, double
  * for counting and weights. */
-#define TRIP_GL_FRAME_FIELDS(R4)                                                                       \
-    R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */       \
-    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective); w of the first: how much       \
-                          kernels are flattened, trip_splat_frame.flatten */                           \
-    R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's           \
-                          centre; w: step, and (r . ray_x x ray_y)^2 */                                \
-    R4 ray_0;          /* xyz: the ray at the image's centre */                                        \
-    R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */                   \
-    R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                          \
-    R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                    \
-    R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                          \
-    R4 compact_0, compact_1,                                                                           \
-        compact_2; /* 3-byte normals: xyz: columns of the map from steps to                            \
-                      world space, over full shading; w of the first: length of                        \
-                      those of which the direction alone is kept, likewise */                          \
-    R4 light;      /* xyz: towards the light, world space */                                           \
-    R4 to_eye;     /* xyz: towards the eye in parallel views; w: gradient_full of the header           \
-                      over that at full shading */                                                     \
-    R4 screen;     /* xy: the image's centre, pixels; zw: width, height */                             \
-    R4 kernel;     /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */              \
-    R4 edge;     /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code;     \
-                    z: 1 / (2 erf(cutoff / sqrt 2)); w: of lists of means, the length of a voxel along \
-                    the axis, else 0 */                                                                \
-    R4 parallel; /* the one footprint of a parallel view, or of FIXED: conic xx, xy, yy, amplitude     \
-                  */                                                                                   \
-    R4 parallel_size; /* its half extents in x and y, its radius in index space (FIXED: at depth       \
-                         1), its amplitude without low-pass */                                                                                   \
-    R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;        \
-                         w: the largest of them */                                                     \
-    R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along     \
-                      the ray at the image's centre; y: world units a voxel of level 0 */              \
-    R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                     \
-    R4 background; /* r, g, b, a; not premultiplied */                                                 \
-    R4 cue;  /* what fades into the background: x of a layer's depth and y, in [0, 1], times z */      \
-    R4 tint;       /* rgb: of all that is drawn, before it is lit, where w is not 0 */
+#define TRIP_GL_FRAME_FIELDS(R4)                                                                     \
+    R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */     \
+    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective); w of the first: how much     \
+                          kernels are flattened, trip_splat_frame.flatten */                         \
+    R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's         \
+                          centre; w: step, and (r . ray_x x ray_y)^2 */                              \
+    R4 ray_0;          /* xyz: the ray at the image's centre */                                      \
+    R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */                 \
+    R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                        \
+    R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                  \
+    R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                        \
+    R4 compact_0, compact_1,                                                                         \
+        compact_2; /* 3-byte normals: xyz: columns of the map from steps to                          \
+                      world space, over full shading; w of the first: length of                      \
+                      those of which the direction alone is kept, likewise */                        \
+    R4 light;  /* xyz: towards the light, world space; with w its place from the eye, list axes */   \
+    R4 to_eye; /* xyz: towards the eye in parallel views; w: gradient_full of the header             \
+                  over that at full shading */                                                       \
+    R4 screen; /* xy: the image's centre, pixels; zw: width, height */                               \
+    R4 kernel; /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */                \
+    R4 edge;   /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: bytes of a code;     \
+                  z: 1 / (2 erf(cutoff / sqrt 2)); w: of lists of means, the length of a voxel along \
+                  the axis, else 0 */                                                                \
+    R4 parallel; /* the one footprint of a parallel view, or of FIXED: conic xx, xy, yy, amplitude   \
+                  */                                                                                 \
+    R4 parallel_size; /* its half extents in x and y, its radius in index space (FIXED: at depth     \
+                         1), its amplitude without low-pass */                                       \
+    R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;      \
+                         w: the largest of them */                                                   \
+    R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along   \
+                      the ray at the image's centre; y: world units a voxel of level 0 */            \
+    R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                   \
+    R4 background; /* r, g, b, a; not premultiplied */                                               \
+    R4 cue;  /* what fades into the background: x of a layer's depth and y, in [0, 1], times z */    \
+    R4 tint; /* rgb: of all that is drawn, before it is lit, where w is not 0 */
 
 /* Constants of a pass over the sheets of a list (render/sheet.h). Linear functions of a pixel are
  * xyz . (1, x, y) from the image's centre; lengths of rays are those of trip_gl_frame. */

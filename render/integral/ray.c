@@ -7,7 +7,7 @@ static double inverse(double x)
 
 trip_ray trip_ray_make(const trip_camera *c, double x, double y)
 {
-    trip_ray r = { .origin = c->eye, .direction = trip_camera_ray(c, x, y) };
+    trip_ray r = { .origin = c->eye, .direction = trip_camera_ray(c, x, y), .end = INFINITY };
     if (c->ortho)
         r.origin = trip_add(r.origin, trip_add(trip_scale(c->rx, x), trip_scale(c->ry, y)));
     r.inverse = trip_v3(inverse(r.direction.x), inverse(r.direction.y), inverse(r.direction.z));
@@ -15,10 +15,11 @@ trip_ray trip_ray_make(const trip_camera *c, double x, double y)
     return r;
 }
 
-trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t)
+trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t, double end)
 {
     return (trip_ray){ .origin = origin,
                        .direction = direction,
+                       .end = end,
                        .inverse = trip_v3(inverse(direction.x), inverse(direction.y),
                                           inverse(direction.z)),
                        .world_per_t = world_per_t };

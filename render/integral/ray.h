@@ -5,17 +5,18 @@
 #include "camera.h"
 #include "coordinates.h"
 
-/* The points origin + t direction, t >= 0. */
+/* The points origin + t direction, 0 <= t <= end. */
 typedef struct trip_ray {
     trip_vec3 origin, direction;
+    double end;
     trip_vec3 inverse;  /* of the direction's components; of 0: not a number */
     double world_per_t; /* length of `direction` in the world */
 } trip_ray;
 
-/* Of a pixel position. */
+/* Of a pixel position, without end. */
 trip_ray trip_ray_make(const trip_camera *c, double x, double y);
 /* From a place in a direction, index space; world_per_t is the direction's length in the world. */
-trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t);
+trip_ray trip_ray_from(trip_vec3 origin, trip_vec3 direction, double world_per_t, double end);
 
 static inline trip_vec3 trip_ray_at(const trip_ray *r, double t)
 {

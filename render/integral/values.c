@@ -5,11 +5,16 @@
 typedef struct passage {
     const trip_integrand *in;
     const trip_ray *ray;
-    trip_light light; /* the same all along the ray */
+    trip_light light; /* the same all along the ray, but where the light is at a place */
     trip_effects_view effects;
     trip_cell_line line; /* of the cell where it is */
     trip_ray_sum sum;
 } passage;
+
+static trip_light light_at(const trip_integrand *in, trip_vec3 place)
+{
+    return trip_light_at(in->settings, in->camera, in->gradient_full, place);
+}
 
 static void sample(void *user, double t, trip_ray_sample *out)
 {
@@ -17,14 +22,18 @@ static void sample(void *user, double t, trip_ray_sample *out)
     double here[4]; /* code, gradient */
     trip_cell_line_at(&p->line, t, here);
     double extinction = trip_classes_at(p->in->classes, here[0], out->rgb);
+    const bool effects = trip_effects_some(&p->effects.effects);
     out->extinction = extinction * p->ray->world_per_t;
     out->form = 1;
-    if (extinction > 0 && trip_effects_some(&p->effects.effects)) {
-        trip_effects_colour(&p->effects, &p->light, trip_ray_at(p->ray, t),
-                            p->in->shaded ? here + 1 : NULL, out->rgb);
+    if (!(extinction > 0) || !(effects || p->in->shaded))
+        return;
+    const trip_vec3 place = trip_ray_at(p->ray, t);
+    const trip_light light = p->in->settings->point_light ? light_at(p->in, place) : p->light;
+    if (effects) {
+        trip_effects_colour(&p->effects, &light, place, p->in->shaded ? here + 1 : NULL, out->rgb);
         out->form = 0;
-    } else if (p->in->shaded && extinction > 0) {
-        out->form = trip_light_colour(&p->light, here + 1, out->rgb);
+    } else {
+        out->form = trip_light_colour(&light, here + 1, out->rgb);
     }
 }
 
@@ -109,29 +118,37 @@ static bool visit_cube(void *user, const int64_t at[3], double from, double to)
     return trip_ray_walk(p->ray, &cells, from, to, visit_cell, p);
 }
 
-/* Transmittance from a place on, in a world direction given in index space. */
-static double through(const trip_integrand *in, trip_vec3 from, trip_vec3 direction)
+/* Transmittance along a ray. */
+static double through(const trip_integrand *in, const trip_ray *ray)
 {
     trip_integrand bare = *in;
     bare.shaded = false;
     bare.effects.effects = (trip_effects){ 0 };
-    const trip_ray ray = trip_ray_from(from, direction, 1);
-    return trip_integrate_values(&bare, &ray).transmittance;
+    return trip_integrate_values(&bare, ray).transmittance;
 }
 
 static double reached_at(const void *user, trip_vec3 voxel)
 {
     const trip_integrand *in = user;
-    return through(in, voxel, in->effects.to_light);
+    trip_ray ray = trip_ray_from(voxel, in->effects.light, 1, INFINITY);
+    if (in->effects.point_light) {
+        const trip_vec3 way = trip_sub(in->effects.light, voxel);
+        const trip_vec3 world = trip_affine_vector(&in->camera->index_to_world, way);
+        ray = trip_ray_from(voxel, way, trip_length(world), 1);
+    }
+    return through(in, &ray);
 }
 
 static double open_at(const void *user, trip_vec3 voxel)
 {
     const trip_integrand *in = user;
     double sum = 0;
-    for (int n = 0; n < TRIP_OPEN_DIRECTIONS; n++)
-        sum += through(in, voxel,
-                       trip_affine_vector(&in->effects.to_index, trip_effects_direction(n)));
+    for (int n = 0; n < TRIP_OPEN_DIRECTIONS; n++) {
+        const trip_ray ray = trip_ray_from(
+            voxel, trip_affine_vector(&in->effects.to_index, trip_effects_direction(n)), 1,
+            INFINITY);
+        sum += through(in, &ray);
+    }
     return sum / TRIP_OPEN_DIRECTIONS;
 }
 
@@ -150,11 +167,11 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
     const trip_ray_boxes cubes = { .hi = { dims[0] - 1, dims[1] - 1, dims[2] - 1 },
                                    .edge = TRIP_FIELD_EDGE,
                                    .coordinates = in->coordinates };
-    double from = 0, to = INFINITY;
+    double from = 0, to = ray->end;
     passage p = { .in = in, .ray = ray, .sum = trip_ray_sum_begin(in->settings->tolerance, 1) };
     if (trip_ray_clip(ray, &cubes, &from, &to) &&
         trip_clip_ray(in->clip, ray->origin, ray->direction, &from, &to)) {
-        p.light = trip_light_at(in->settings, in->camera, in->gradient_full, trip_ray_at(ray, 1));
+        p.light = light_at(in, trip_ray_at(ray, 1));
         if (trip_effects_some(&in->effects.effects))
             p.effects = effects_of(in);
         p.sum.length = to - from;

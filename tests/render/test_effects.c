@@ -106,6 +106,84 @@ static void fog_lit_from_the_front_scatters_backwards(void **state)
     scene_destroy(&s);
 }
 
+static trip_settings with_point_light(trip_vec3 place)
+{
+    trip_settings s = with_shadows(trip_v3(0, 0, 1));
+    s.point_light = true;
+    s.light_place = place;
+    return s;
+}
+
+/* The length of the way from a point of the box of voxel centres to another that lies in the box.
+ */
+static double length_in_box(trip_vec3 from, trip_vec3 to)
+{
+    const trip_vec3 way = trip_sub(to, from);
+    double end = 1;
+    for (int a = 0; a < 3; a++) {
+        double d = trip_component(way, a), limit = d > 0 ? EDGE - 1 : 0;
+        end = d == 0 ? end : fmin(end, (limit - trip_component(from, a)) / d);
+    }
+    return end * trip_length(way);
+}
+
+/* The integral along a pixel's ray, from above down z: Simpson's rule. */
+static double lit_from_a_place(double x, double y, trip_vec3 light, double g)
+{
+    enum { STEPS = 2000 };
+    const double depth = EDGE - 1;
+    double sum = 0;
+    for (int n = 0; n <= STEPS; n++) {
+        const double t = depth * n / STEPS;
+        const trip_vec3 at = trip_v3(x, y, depth - t), way = trip_sub(light, at);
+        double cosine = -way.z / trip_length(way);
+        double phase = (1 - g * g) / pow(1 + g * g - 2 * g * cosine, 1.5);
+        double lit = fmin(1, 0.3 + 0.7 * phase * exp(-FOG * length_in_box(at, light)));
+        sum += (n == 0 || n == STEPS ? 1 : n % 2 ? 4 : 2) * FOG * exp(-FOG * t) * lit;
+    }
+    return sum * depth / STEPS / 3;
+}
+
+/* The mean difference of a component. */
+static double off(const scene_picture *a, const scene_picture *b)
+{
+    double sum = 0;
+    size_t count = 4 * (size_t)a->width * (size_t)a->height;
+    for (size_t i = 0; i < count; i++)
+        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
+    return sum / (double)count;
+}
+
+/* Beside the fog, above an edge of it, in it, and on a node of the lattice. */
+static void fog_is_lit_from_a_place(void **state)
+{
+    (void)state;
+    const trip_vec3 lights[] = { { 24, 8, 11 }, { 20, 22, 9.5 }, { 6.3, 8.1, 12.7 }, { 15, 9, 4 } };
+    scene s;
+    create_fog(&s, (float)FOG);
+    const trip_camera_params view = along_z(&s);
+    for (size_t n = 0; n < sizeof lights / sizeof *lights; n++) {
+        trip_settings settings = with_point_light(lights[n]);
+        settings.effects.anisotropy = n % 2 ? 0.3 : 0;
+        scene_picture exact = integrate(&s, &view, &settings);
+        for (int i = 0; i < SIZE * SIZE; i++) {
+            trip_vec3 o, d;
+            scene_ray(&s, &view, i % SIZE, i / SIZE, &o, &d);
+            assert_close(scene_pixel(&exact, i % SIZE, i / SIZE)[0],
+                         lit_from_a_place(o.x, o.y, lights[n], settings.effects.anisotropy), 5e-5);
+        }
+        for (int i = 0; i < 2; i++) {
+            scene_picture p = scene_draw(&s, &scene_renderers()[i], &view, &settings);
+            double apart = scene_difference(&p, &exact);
+            if (!(apart < 0.01 && off(&p, &exact) < 1e-3))
+                fail_msg("light %zu, renderer %d: %g apart", n, i, apart);
+            scene_picture_free(&p);
+        }
+        scene_picture_free(&exact);
+    }
+    scene_destroy(&s);
+}
+
 /* Two slabs across x, empty between: voxels 4 to 7 and 13 to 16. */
 static bool two_slabs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -184,25 +262,25 @@ static void create_ball(scene *s, double extinction, const trip_affine *map)
         s->table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, (float)(extinction * code / 65535) };
 }
 
-static double off(const scene_picture *a, const scene_picture *b)
+/* Lights of the ball: in a direction, beside it, above a corner of its box, and in it. */
+static trip_settings with_light(int number)
 {
-    double sum = 0;
-    size_t count = 4 * (size_t)a->width * (size_t)a->height;
-    for (size_t i = 0; i < count; i++)
-        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
-    return sum / (double)count;
+    const trip_vec3 places[] = { { 40, 8, 14 }, { 36, 36, -2 }, { 20.4, 12, 16 } };
+    return number == 0 ? with_shadows(trip_v3(0.8, -0.3, 0.6))
+                       : with_point_light(places[number - 1]);
 }
 
 /* Against the double integral: from a place of the ray, on towards the light. */
 static void the_error_falls_as_the_lattice_becomes_finer(void **state)
 {
     (void)state;
-    const trip_affine maps[2] = { trip_affine_identity(), sheared };
-    for (int n = 0; n < 2; n++) {
+    const trip_affine identity = trip_affine_identity();
+    for (int n = 0; n < 5; n++) {
+        const trip_affine *map = n == 1 ? &sheared : &identity;
         scene s;
-        create_ball(&s, 0.15, &maps[n]);
+        create_ball(&s, 0.15, map);
         const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, SIZE);
-        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        trip_settings settings = with_light(n > 0 ? n - 1 : 0);
         settings.tolerance = 1e-4;
         settings.effects.anisotropy = 0.3;
         scene_picture exact = integrate(&s, &view, &settings);
@@ -212,7 +290,7 @@ static void the_error_falls_as_the_lattice_becomes_finer(void **state)
             scene_picture p = scene_draw(&s, &scene_renderers()[0], &view, &settings);
             double error = off(&p, &exact);
             if (!(error < before / 1.8))
-                fail_msg("%d cells: %g, before %g", cells, error, before);
+                fail_msg("light %d, %d cells: %g, before %g", n, cells, error, before);
             before = error;
             scene_picture_free(&p);
         }
@@ -220,6 +298,32 @@ static void the_error_falls_as_the_lattice_becomes_finer(void **state)
         scene_picture_free(&exact);
         scene_destroy(&s);
     }
+}
+
+static void a_light_far_away_is_one_in_a_direction(void **state)
+{
+    (void)state;
+    scene s;
+    create_ball(&s, 0.15, &sheared);
+    const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, SIZE);
+    trip_settings direction = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    direction.shading = true;
+    for (double far = 1e7; far < 1e13; far *= 1e5) {
+        trip_settings place = with_point_light(trip_scale(direction.light_direction, far));
+        place.shading = true;
+        for (int i = 0; i < 3; i++) {
+            scene_picture a = i < 2 ? scene_draw(&s, &scene_renderers()[i], &view, &direction)
+                                    : integrate(&s, &view, &direction);
+            scene_picture b = i < 2 ? scene_draw(&s, &scene_renderers()[i], &view, &place)
+                                    : integrate(&s, &view, &place);
+            double apart = scene_difference(&a, &b);
+            if (!(apart < 1e-4))
+                fail_msg("renderer %d, at %g: %g apart", i, far, apart);
+            scene_picture_free(&a);
+            scene_picture_free(&b);
+        }
+    }
+    scene_destroy(&s);
 }
 
 static void openness_is_the_mean_over_directions(void **state)
@@ -251,8 +355,9 @@ static void every_renderer_draws_them_alike(void **state)
     scene s;
     create_ball(&s, 0.6, &sheared);
     trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 24);
-    for (int n = 0; n < 8; n++) {
-        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    for (int n = 0; n < 16; n++) {
+        trip_settings settings = with_light(n / 8 * (1 + n / 2 % 3));
+        settings.light_place = trip_affine_point(&sheared, settings.light_place);
         settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
         settings.shading = n & 2;
         settings.effects.occlusion = n & 4;
@@ -449,6 +554,91 @@ static void the_lattice_is_kept_until_something_changes(void **state)
     scene_destroy(&s);
 }
 
+static void complete(trip_light_map *m, const trip_light_source *source)
+{
+    assert_int_equal(trip_light_map_begin(m, source), 0);
+    while (trip_light_map_step(m, NULL) > 0)
+        trip_light_map_await(m, UINT64_MAX);
+    assert_true(trip_light_map_is_complete(m));
+}
+
+/* On the rim of fog columns beside the node have left it. */
+static bool is_on_rim(trip_vec3 node)
+{
+    for (int a = 0; a < 3; a++)
+        if (trip_component(node, a) < 1 || trip_component(node, a) > EDGE - 2)
+            return true;
+    return false;
+}
+
+/* Between two places of a line that are one apart and `part` of that from the first: by how much
+ * the mean of their transmittances by distance differs from that of the place itself. */
+static double mean_is_off(trip_vec3 place, trip_vec3 along, double part, trip_vec3 light)
+{
+    const trip_vec3 before = trip_sub(place, trip_scale(along, part));
+    const double mean = (1 - part) * exp(-FOG * length_in_box(before, light)) +
+                        part * exp(-FOG * length_in_box(trip_add(before, along), light));
+    return fabs(mean - exp(-FOG * length_in_box(place, light)));
+}
+
+/* What a node in fog may be off: columns are exact there, and at most a node apart in a layer, so
+ * it is what linear interpolation between two is off, wherever they lie, along both of its axes. */
+static double most_off(trip_vec3 node, trip_vec3 light)
+{
+    const trip_vec3 way = trip_sub(node, light),
+                    axes[3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    const double rounding = 1e-6;
+    double sum = rounding;
+    int longest = 0;
+    for (int a = 1; a < 3; a++)
+        if (fabs(trip_component(way, a)) > fabs(trip_component(way, longest)))
+            longest = a;
+    for (int i = 1; i < 3; i++) {
+        double most = 0;
+        for (int n = 1; n < 8; n++)
+            most = fmax(most, mean_is_off(node, axes[(longest + i) % 3], n / 8.0, light));
+        sum += most;
+    }
+    return sum;
+}
+
+/* In even fog the number of a node is known; where there is none it is 1 to the last bit, whichever
+ * region the node is of. */
+static void every_node_is_lit_from_a_place_once(void **state)
+{
+    (void)state;
+    const double c = 0.5 * (EDGE - 1), last = EDGE - 1;
+    const trip_vec3 lights[] = { { c, c, c },    { 4, 4, 4 },       { 4, 4, 9 },   { 0, 0, 0 },
+                                 { last, 0, 7 }, { 30, 30, 30 },    { -1, 9, 9 },  { 5.5, 40, 5.5 },
+                                 { 9, 9, -1e9 }, { last, last, 9 }, { -7, 26, 3 }, { 0.5, 0, 19 } };
+    const trip_clip none = { 0 };
+    for (int fog = 0; fog < 2; fog++) {
+        scene s;
+        trip_light_map *m;
+        create_fog(&s, fog ? (float)FOG : 0);
+        assert_int_equal(trip_light_map_create(&m, s.budget), 0);
+        for (size_t n = 0; n < sizeof lights / sizeof *lights; n++) {
+            const trip_settings settings = with_point_light(lights[n]);
+            complete(m, &(trip_light_source){ .data = s.data,
+                                              .settings = &settings,
+                                              .clip = &none,
+                                              .table = s.table,
+                                              .threads = 1 });
+            const float *reached = trip_light_map_reached(m)->at;
+            for (int i = 0; i < EDGE * EDGE * EDGE; i++) {
+                const trip_vec3 node = trip_v3(i % EDGE, i / EDGE % EDGE, i / EDGE / EDGE);
+                const double expected = exp(-fog * FOG * length_in_box(node, lights[n]));
+                double apart = fabs((double)reached[i] - expected);
+                if (!(fog && is_on_rim(node)) && !(apart <= (fog ? most_off(node, lights[n]) : 0)))
+                    fail_msg("light %zu, node %g %g %g: %g, not %g", n, node.x, node.y, node.z,
+                             (double)reached[i], expected);
+            }
+        }
+        trip_light_map_destroy(m);
+        scene_destroy(&s);
+    }
+}
+
 /* The last task first. */
 static void run_backwards(void *user, void (*task)(void *context, unsigned number), void *context,
                           unsigned count)
@@ -551,7 +741,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fog_lit_from_the_side_is_darker_away_from_the_light),
         cmocka_unit_test(fog_lit_from_the_front_scatters_backwards),
+        cmocka_unit_test(fog_is_lit_from_a_place),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
+        cmocka_unit_test(a_light_far_away_is_one_in_a_direction),
+        cmocka_unit_test(every_node_is_lit_from_a_place_once),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
         cmocka_unit_test(openness_is_the_mean_over_directions),
         cmocka_unit_test(every_renderer_draws_them_alike),

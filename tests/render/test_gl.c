@@ -174,6 +174,13 @@ static void light_and_kernel_settings_agree_with_the_reference(void **state)
     compare("directional light", &s, &view, &settings);
     settings.light_direction = trip_normalize(trip_v3(1, -0.2, -0.4));
     compare("light from behind", &s, &view, &settings);
+    settings.point_light = true;
+    settings.light_place = trip_affine_point(&sheared, trip_v3(8, 31, 26.5));
+    compare("light in the volume", &s, &view, &settings);
+    view.ortho_height = 50;
+    compare("light in the volume, parallel", &s, &view, &settings);
+    view.ortho_height = 0;
+    settings.point_light = false;
     settings.shading = false;
     settings.background[0] = 0.8;
     settings.background[3] = 0.5;

@@ -107,6 +107,11 @@ static void grids_of_any_shape_agree_with_the_reference(void **state)
         view = scene_view(&s, trip_v3(-0.2, 0.3, -1), 80 * unit, 30, 60);
         view.ortho_height = 35 * unit;
         compare(names[i], &s, &view, &settings);
+        settings.point_light = true;
+        settings.light_place = trip_affine_point(&maps[i], trip_v3(8, 31, 26.5));
+        compare(names[i], &s, &view, &settings);
+        view.ortho_height = 0;
+        compare(names[i], &s, &view, &settings);
         scene_destroy(&s);
     }
 }

@@ -161,14 +161,26 @@ class Serve(program.ProgramTest):
             self.assertTrue((picture != before).any(), (name, value))
         for name, value in (
             ("classify", "x"), ("classify", ""), ("shading", "2"), ("h", "1"), ("h", "nan"),
-            ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2,3"),
-            ("light", "nan,0"), ("light", "0,91"), ("light", "," * 500), ("samples", "64"), ("", ""),
+            ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2"),
+            ("light", "nan,0,9"), ("light", "0,91,9"), ("light", "0,0,0"), ("light", "1,2,3,4"),
+            ("light", "," * 500), ("samples", "64"), ("", ""),
         ):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, (name, value))
-        self.assertEqual(self.ask("/set", "POST", name="light", value="30,45")[0], 204)
+        self.assertEqual(self.ask("/set", "POST", name="light", value="30,45,1.5")[0], 204)
         self.assertEqual(self.status()["settings"], {
             "classify": "pre", "method": "merge", "show": "picture", "shading": 0, "h": 0.2})
         self.assertIn("bone", json.loads(self.ask("/presets")[2]))
+
+    def test_a_light_at_a_place_is_drawn_as_the_options_have_it(self):
+        self.do("resize 60 50")
+        before, number, camera = self.whole_picture()
+        for value in ("30,45,0.7", "30,45,1.2", "30,45,10"):
+            self.assertEqual(self.ask("/set", "POST", name="light", value=value)[0], 204)
+            picture, number, camera = self.whole_picture(number)
+            self.assertEqual("--light point:" in camera, value != "30,45,10", camera)
+            self.assert_rendered(picture, camera)
+            self.assertTrue((picture != before).any(), value)
+            before = picture
 
     def test_a_volume_is_bricked_and_shown(self):
         self.tearDown()

@@ -29,6 +29,7 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
     MEMBER(triangles);
     MEMBER(shading);
     MEMBER(headlight);
+    MEMBER(point_light);
     MEMBER(light);
     MEMBER(h);
     MEMBER(kernel_radius);
@@ -92,6 +93,7 @@ static void every_member_counts(void **state)
     COUNTS(triangles);
     COUNTS(shading);
     COUNTS(headlight);
+    COUNTS(point_light);
     COUNTS(light[2]);
     COUNTS(h);
     COUNTS(kernel_radius);

@@ -27,6 +27,7 @@ static trip_view_state unusual(void)
     s.settings.compositing = TRIPTYCH_BY_SHEET;
     s.settings.lod_px = 1.5;
     s.settings.headlight = 0;
+    s.settings.point_light = 1;
     s.settings.light[1] = -1.0 / 7;
     s.settings.background[2] = 0.2;
     s.settings.show = TRIPTYCH_SHOW_LEVELS;
@@ -58,6 +59,7 @@ static void assert_same(const trip_view_state *a, const trip_view_state *b)
     free(p);
     free(q);
     assert_memory_equal(&a->navigation, &b->navigation, sizeof a->navigation);
+    assert_int_equal(a->settings.point_light, b->settings.point_light);
     assert_memory_equal(a->settings.light, b->settings.light, sizeof a->settings.light);
     assert_true(a->settings.background[2] == b->settings.background[2]);
     assert_int_equal(a->settings.classify, b->settings.classify);

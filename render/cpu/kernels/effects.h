@@ -19,8 +19,9 @@ typedef struct trip_cpu_effects {
     /* From places of the list to those of level 0, in which what follows is. */
     float scale[3], offset[3];
     trip_cpu_light reached, open;
-    float towards[3];         /* the bias towards the light */
-    float aside[3][3];        /* and along a unit vector of the world: [u, v, sheet][world] */
+    float aside[3][3]; /* the bias along a unit vector of the world: [u, v, sheet][world] */
+    bool point_light;
+    float light[3];           /* of that, its place */
     float phase[3];           /* 1 - g^2, 1 + g^2, 2 g */
     float cue[4], cue_rgb[3]; /* as of trip_effects_view */
     float cueing;

@@ -51,14 +51,31 @@ INLINE vf phase_of(const trip_cpu_effects *e, const vf light[3], const vf to_eye
     return v_set(e->phase[0]) / (d * v_sqrt(d));
 }
 
+/* Along a unit vector of the world, the bias times `share`. */
+INLINE vf aside_of(const trip_cpu_effects *e, int axis, const vf unit[3], vf share)
+{
+    return v_fma(unit[0], v_set(e->aside[axis][0]),
+                 v_fma(unit[1], v_set(e->aside[axis][1]), unit[2] * v_set(e->aside[axis][2]))) *
+           share;
+}
+
+/* Where light that reaches a surface is looked up: towards the light, but not beyond it. */
+INLINE void towards_light(const trip_cpu_effects *e, const vf place[3], const surface *s,
+                          const vf light[3], vf out[3])
+{
+    for (int a = 0; a < 3; a++) {
+        const vf end = v_set(e->light[a]);
+        out[a] = place[a] + aside_of(e, a, light, s->strength);
+        if (e->point_light)
+            out[a] = v_min(v_max(out[a], v_min(place[a], end)), v_max(place[a], end));
+    }
+}
+
 INLINE vf open_of(const trip_cpu_effects *e, const vf place[3], const surface *s)
 {
     vf one[3], other[3];
     for (int a = 0; a < 3; a++) {
-        vf aside = v_fma(s->normal[0], v_set(e->aside[a][0]),
-                         v_fma(s->normal[1], v_set(e->aside[a][1]),
-                               s->normal[2] * v_set(e->aside[a][2]))) *
-                   s->strength;
+        const vf aside = aside_of(e, a, s->normal, s->strength);
         one[a] = place[a] + aside;
         other[a] = place[a] - aside;
     }
@@ -72,8 +89,7 @@ INLINE void light_places(const trip_cpu_effects *e, const vf place[3], const sur
     vf reached = v_set(1), open = v_set(1), phase = v_set(1);
     if (e->reached.at) {
         vf nearer[3];
-        for (int a = 0; a < 3; a++)
-            nearer[a] = v_fma(s->strength, v_set(e->towards[a]), place[a]);
+        towards_light(e, place, s, light, nearer);
         reached = light_at(&e->reached, nearer);
         phase = phase_of(e, light, to_eye);
     }

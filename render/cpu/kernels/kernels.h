@@ -110,7 +110,7 @@ typedef struct trip_cpu_view {
     int panes_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double forward_length;                     /* most that z changes by over an index length */
-    double eye[3];                             /* [u, v, sheet] */
+    double eye[3], light[3];                   /* [u, v, sheet]; of a light that is at a place */
     double world[3][3];  /* index_to_world's columns for u, v, sheet, over voxel_world */
     double depth_unit;   /* by which z is to be multiplied to be that of layers */
     trip_splat parallel; /* the footprint of all, in parallel views */

@@ -552,15 +552,13 @@ INLINE vf offset(vd_pair a, double eye)
     return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
 }
 
-/* From the voxel to the eye, world space, not normalised. */
-INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
+/* From the voxel to a place, world space, not normalised. */
+INLINE v3 towards(const trip_cpu_view *view, const double place[3], const trip_cpu_staged *staged,
+                  uint32_t at)
 {
-    const trip_camera *camera = &view->splat.camera;
-    if (camera->ortho)
-        return v3_of(trip_scale(camera->world_forward, -1));
-    vf c[3] = { offset(positions(view, view->u_axis, staged->u + at), view->eye[0]),
-                offset(positions(view, view->v_axis, staged->v + at), view->eye[1]),
-                offset(positions(view, view->axis, staged->sheet + at), view->eye[2]) };
+    vf c[3] = { offset(positions(view, view->u_axis, staged->u + at), place[0]),
+                offset(positions(view, view->v_axis, staged->v + at), place[1]),
+                offset(positions(view, view->axis, staged->sheet + at), place[2]) };
     vf w[3];
     for (int i = 0; i < 3; i++)
         w[i] = -v_fma(
@@ -569,9 +567,28 @@ INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_staged *staged, 
     return (v3){ w[0], w[1], w[2] };
 }
 
-/* As trip_light_on(), `eye` of unit length. With light from the eye `facing` changes nothing that a
- * float keeps. */
-INLINE surface surface_of(const trip_cpu_view *view, v3 eye, vi packed)
+/* To the eye, likewise. */
+INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
+{
+    const trip_camera *camera = &view->splat.camera;
+    if (camera->ortho)
+        return v3_of(trip_scale(camera->world_forward, -1));
+    return towards(view, view->eye, staged, at);
+}
+
+/* To the light, of unit length; `eye` is that to the eye. */
+INLINE v3 light_of(const trip_cpu_view *view, v3 eye, const trip_cpu_staged *staged, uint32_t at)
+{
+    const trip_settings *s = view->of->settings;
+    if (s->headlight)
+        return eye;
+    return s->point_light ? unit(towards(view, view->light, staged, at))
+                          : v3_of(s->light_direction);
+}
+
+/* As trip_light_on(), `eye` and `light` of unit length. With light from the eye `facing` changes
+ * nothing that a float keeps. */
+INLINE surface surface_of(const trip_cpu_view *view, v3 eye, v3 light, vi packed)
 {
     const trip_settings *s = view->of->settings;
     vf magnitude;
@@ -581,7 +598,6 @@ INLINE surface surface_of(const trip_cpu_view *view, v3 eye, vi packed)
     vf strength = v_min(v_set(1), magnitude), shining = strength;
     vf to_light = dot(normal, eye);
     if (!s->headlight) {
-        v3 light = v3_of(s->light_direction);
         half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
         vf to_eye = to_light * v_set((float)TRIP_FACING);
         to_light = dot(normal, light);
@@ -610,13 +626,11 @@ INLINE colour shaded(const surface *s, colour c)
 }
 
 /* With effects; `s` of strength 0 where nothing is shaded. */
-INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, const surface *s,
+INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, v3 light, const surface *s,
                            const trip_cpu_staged *staged, uint32_t at)
 {
-    const trip_settings *settings = view->of->settings;
     const vf place[3] = { v_from_int(vi_load(staged->u + at)), v_from_int(vi_load(staged->v + at)),
                           v_from_int(vi_load(staged->sheet + at)) };
-    const v3 light = settings->headlight ? eye : v3_of(settings->light_direction);
     const vf to_light[3] = { light.x, light.y, light.z }, to_eye[3] = { eye.x, eye.y, eye.z };
     vf rgb[3] = { c.r, c.g, c.b };
     effects_on(&view->effects, place, s, to_light, to_eye, rgb);
@@ -771,11 +785,11 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
         c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
     if (!view->shading && !view->effects.some)
         return c;
-    v3 eye = unit(towards_eye(view, staged, at));
+    const v3 eye = unit(towards_eye(view, staged, at)), light = light_of(view, eye, staged, at);
     surface s = { .strength = v_set(0), .gloss = v_set(0) };
     if (view->shading)
-        s = surface_of(view, eye, vi_load(staged->normal + at));
-    return view->effects.some ? with_effects(view, c, eye, &s, staged, at) : shaded(&s, c);
+        s = surface_of(view, eye, light, vi_load(staged->normal + at));
+    return view->effects.some ? with_effects(view, c, eye, light, &s, staged, at) : shaded(&s, c);
 }
 
 /* trip_cpu_splat.c[] of thin splats. */

@@ -424,6 +424,11 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 
 /* ---- rays at a slice ---- */
 
+/* Unit vectors of the world: to the light, and between it and the eye. */
+typedef struct light_way {
+    vf light[3], half[3];
+} light_way;
+
 /* The rays of a stamp. */
 typedef struct stamp_rays {
     vf slope[2], shift[2]; /* from the pane's corner's */
@@ -432,7 +437,8 @@ typedef struct stamp_rays {
     vf depth_at_start;
     vm along;    /* they go the pass's way */
     vf from, to; /* what of them is not cut away: sheets from the first slice, the pass's way */
-    vf light[3], to_eye[3], half[3];
+    vf to_eye[3];
+    light_way way; /* of a light that is not at a place */
 } stamp_rays;
 
 INLINE vi vi_within(vi a, int32_t least, int32_t most)
@@ -793,9 +799,40 @@ INLINE vf dot3(const vf a[3], const vf b[3])
     return v_fma(a[0], b[0], v_fma(a[1], b[1], a[2] * b[2]));
 }
 
+INLINE void set_unit(vf v[3])
+{
+    vf inverse = v_set(1) / v_sqrt(v_max(dot3(v, v), v_set(1e-30f)));
+    for (int k = 0; k < 3; k++)
+        v[k] = v[k] * inverse;
+}
+
+INLINE void set_half(light_way *way, const vf to_eye[3])
+{
+    for (int k = 0; k < 3; k++)
+        way->half[k] = way->light[k] + to_eye[k];
+    set_unit(way->half);
+}
+
+/* From a voxel of the list to a light that is at a place. Not inlined: frames without are not to
+ * pay for it. */
+static __attribute__((noinline)) void find_way(const trip_cpu_sheet_view *view, const vf at[3],
+                                               const vf to_eye[3], light_way *way)
+{
+    vf d[3];
+    for (int a = 0; a < 3; a++)
+        d[a] = v_set(view->light[a]) - at[a];
+    for (int k = 0; k < 3; k++)
+        way->light[k] = v_fma(
+            d[0], v_set((float)view->world[k][0]),
+            v_fma(d[1], v_set((float)view->world[k][1]), d[2] * v_set((float)view->world[k][2])));
+    set_unit(way->light);
+    set_half(way, to_eye);
+}
+
 /* As trip_light_on(), with the mean of the gradients of the ends. */
 INLINE surface surface_between(const trip_cpu_sheet_view *view, const pane_path *path,
-                               const stamp_rays *l, const sample *a, const sample *b)
+                               const stamp_rays *l, const light_way *way, const sample *a,
+                               const sample *b)
 {
     vf g[3], n[3];
     for (int k = 0; k < 3; k++) /* twice their mean */
@@ -808,10 +845,10 @@ INLINE surface surface_between(const trip_cpu_sheet_view *view, const pane_path 
     vm lit = v_gt(length2, v_set(1e-20f));
     vf strength = v_select(lit, v_min(length, v_set(1)), v_set(0));
     vf inverse = v_set(1) / v_select(lit, length, v_set(1));
-    vf to_light = dot3(n, l->light) * inverse;
+    vf to_light = dot3(n, way->light) * inverse;
     vf to_half = to_light, facing = to_light * to_light;
     if (!view->headlight) {
-        to_half = dot3(n, l->half) * inverse;
+        to_half = dot3(n, way->half) * inverse;
         facing = to_light * dot3(n, l->to_eye) * inverse;
     }
     facing = v_min(v_set(1), v_max(v_set(0), facing * v_set((float)TRIP_FACING)));
@@ -919,15 +956,22 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     if (!vm_any(open))
         return false;
     surface lit = { .strength = v_set(0), .gloss = v_set(0) };
+    light_way of_place;
+    const light_way *way = &l->way;
+    vf at[3];
+    if (view->effects.some || view->point_light)
+        places_at(g, path, l, n, middle - v_set(path->along[n]), at);
+    if (view->point_light) {
+        find_way(view, at, l->to_eye, &of_place);
+        way = &of_place;
+    }
     if (view->shading) {
         find_light(g, a);
         find_light(g, b);
-        lit = surface_between(view, path, l, a, b);
+        lit = surface_between(view, path, l, way, a, b);
     }
     if (view->effects.some) {
-        vf at[3];
-        places_at(g, path, l, n, middle - v_set(path->along[n]), at);
-        effects_on(&view->effects, at, &lit, l->light, l->to_eye, s.rgb);
+        effects_on(&view->effects, at, &lit, way->light, l->to_eye, s.rgb);
     } else if (view->shading) {
         light_segment(&lit, &s);
     }
@@ -959,22 +1003,11 @@ INLINE void finish_saturated(vf pixel[CHANNELS])
 
 /* ---- stamps ---- */
 
-INLINE void set_unit(vf v[3])
-{
-    vf inverse = v_set(1) / v_sqrt(v_max(dot3(v, v), v_set(1e-30f)));
-    for (int k = 0; k < 3; k++)
-        v[k] = v[k] * inverse;
-}
-
 INLINE void set_light(const trip_cpu_sheet_view *view, stamp_rays *l)
 {
     for (int k = 0; k < 3; k++)
-        l->light[k] = view->headlight ? l->to_eye[k] : v_set(view->light[k]);
-    for (int k = 0; k < 3; k++)
-        l->half[k] = l->light[k] + l->to_eye[k];
-    if (view->headlight)
-        return;
-    set_unit(l->half);
+        l->way.light[k] = view->headlight ? l->to_eye[k] : v_set(view->light[k]);
+    set_half(&l->way, l->to_eye);
 }
 
 INLINE vf form_of(const float form[3], vf x, vf y)

@@ -107,13 +107,13 @@ typedef struct trip_cpu_sheet_view {
     const struct trip_frame *of;
     const trip_cpu_integrals *integrals;
     int axis;
-    bool ortho, shading, headlight;
+    bool ortho, shading, headlight, point_light;
     double direction; /* 1: ascending; -1 */
     double eye[3], r0[3], rx[3], ry[3];
     double steepest;      /* rays move at most so far along u or v from one sheet to the next */
     double world[3][3];   /* row, column: index_to_world of u, v, sheet, over voxel_world */
     float gradient[3][3]; /* from differences of codes to half of world space, over gradient_full */
-    float light[3];       /* without headlight, or in parallel views towards the eye */
+    float light[3];       /* without headlight: the way to it in the world; or its place */
     float to_eye[3];      /* in parallel views */
     int clips; /* half-spaces that rays are cut to, [u, v, sheet, offset] as in trip_clip */
     double clip[TRIP_CLIP_MOST][4];

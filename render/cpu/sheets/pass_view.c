@@ -46,10 +46,12 @@ static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, tri
 
 static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
 {
-    const trip_vec3 light = frame->settings->light_direction;
+    const trip_settings *s = frame->settings;
+    const trip_vec3 place = trip_light_place(s, &frame->camera->index_to_world);
     const trip_vec3 forward = frame->camera->world_forward;
     for (int k = 0; k < 3; k++) {
-        view->light[k] = (float)trip_component(light, k);
+        view->light[k] = (float)(s->point_light ? trip_component(place, (view->axis + 1 + k) % 3)
+                                                : trip_component(s->light_direction, k));
         view->to_eye[k] = (float)-trip_component(forward, k);
     }
 }
@@ -89,6 +91,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         .ortho = c->ortho,
         .shading = s->shading,
         .headlight = s->headlight,
+        .point_light = s->point_light && !s->headlight,
         .direction = descending ? -1 : 1,
         .steepest = trip_cpu_pass_steepest(s),
     };

@@ -1,0 +1,96 @@
+#include "test.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "light.h"
+
+/* Its middle is (1, 2, 3), half of its diagonal 6. */
+static const triptych_info box = { .lo = { -3, -2, 1 }, .hi = { 5, 6, 5 } };
+
+static void a_light_stands_about_the_middle_of_the_data(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    trip_light_control_set(&s, &box, &(trip_light_control){ 90, 30, 2 });
+    assert_false(s.headlight);
+    assert_true(s.point_light);
+    const double place[3] = { 1, 2 + 12 * sqrt(0.75), 9 };
+    for (int i = 0; i < 3; i++)
+        assert_close(s.light[i], place[i], 1e-12);
+}
+
+static void from_the_farthest_on_it_is_a_direction(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    trip_light_control_set(&s, &box, &(trip_light_control){ 180, 0, TRIP_LIGHT_FARTHEST });
+    assert_false(s.point_light);
+    const double way[3] = { -1, 0, 0 };
+    for (int i = 0; i < 3; i++)
+        assert_close(s.light[i], way[i], 1e-12);
+    assert_true(trip_light_control_of(&s, &box).distance == TRIP_LIGHT_FARTHEST);
+}
+
+static void what_is_set_is_shown(void **state)
+{
+    (void)state;
+    const double distances[] = { TRIP_LIGHT_NEAREST, 0.3, 1, 9.9, TRIP_LIGHT_FARTHEST };
+    for (int i = 0; i < 5; i++)
+        for (double round = -170; round < 180; round += 35) {
+            const trip_light_control set = { round, round / 2, distances[i] };
+            triptych_settings s = triptych_default_settings();
+            trip_light_control_set(&s, &box, &set);
+            const trip_light_control shown = trip_light_control_of(&s, &box);
+            assert_close(shown.round, set.round, 1e-9);
+            assert_close(shown.up, set.up, 1e-9);
+            assert_close(shown.distance, set.distance, 1e-9);
+        }
+}
+
+/* In the very middle it has no direction. */
+static void any_light_has_numbers_to_show(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    s.point_light = 1;
+    for (int i = 0; i < 3; i++)
+        s.light[i] = 0.5 * (box.lo[i] + box.hi[i]);
+    const trip_light_control c = trip_light_control_of(&s, &box);
+    assert_true(isfinite(c.round) && isfinite(c.up) && c.distance == 0);
+}
+
+static void assert_text(const triptych_settings *s, const char *expected)
+{
+    char *text = trip_light_text(s);
+    assert_string_equal(text, expected);
+    free(text);
+}
+
+static void it_is_written_as_an_option_where_it_lights(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    assert_text(&s, "");
+    s.headlight = 0;
+    s.light[0] = 0.1, s.light[1] = -2, s.light[2] = 1e-20;
+    assert_text(&s, " --light 0.1,-2,1e-20");
+    s.point_light = 1;
+    assert_text(&s, " --light point:0.1,-2,1e-20");
+    s.shading = 0;
+    assert_text(&s, "");
+    s.effects = TRIPTYCH_SHADOWS;
+    assert_text(&s, " --light point:0.1,-2,1e-20");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_light_stands_about_the_middle_of_the_data),
+        cmocka_unit_test(from_the_farthest_on_it_is_a_direction),
+        cmocka_unit_test(what_is_set_is_shown),
+        cmocka_unit_test(any_light_has_numbers_to_show),
+        cmocka_unit_test(it_is_written_as_an_option_where_it_lights),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
