@@ -6,7 +6,7 @@
 
 /* Cubes as small as bricks of level 0 usually are, larger where there would be too many, or where
  * what is in them counts: then the largest tiles do not reach over them. */
-enum { CELL_LOG2 = 6, LIMITED_CELL_LOG2 = 7, MOST_CELLS = 1 << 22 };
+enum { CUBE_LOG2 = 6, LIMITED_CUBE_LOG2 = 7, MOST_CUBES = 1 << 22 };
 
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
 {
@@ -37,7 +37,7 @@ static void choose_cubes(trip_lod *lod, const trip_dataset *data, int least_log2
             lod->cubes[a] = (((int64_t)data->header.dims[a] - 1) >> lod->cube_log2) + 1;
             cubes *= (double)lod->cubes[a];
         }
-    } while (cubes > MOST_CELLS);
+    } while (cubes > MOST_CUBES);
 }
 
 double trip_lod_width_px(const trip_camera *camera, double depth)
@@ -102,7 +102,7 @@ int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *ca
     *lod = (trip_lod){ .levels = trip_settings_has_levels(settings) ? count_levels(data) : 0 };
     if (lod->levels == 0)
         return 0;
-    choose_cubes(lod, data, settings->max_bytes > 0 ? LIMITED_CELL_LOG2 : CELL_LOG2);
+    choose_cubes(lod, data, settings->max_bytes > 0 ? LIMITED_CUBE_LOG2 : CUBE_LOG2);
     lod->bytes = (size_t)(lod->cubes[0] * lod->cubes[1] * lod->cubes[2]);
     lod->level = trip_budget_take(budget, lod->bytes);
     if (!lod->level)
@@ -110,6 +110,8 @@ int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *ca
                          "%zu cubes do not fit the memory given; raise --memory", lod->bytes);
     fill_levels(lod, data, camera, settings->lod_px * settings->samples);
     int status = settings->max_bytes > 0 ? trip_lod_bound(lod, data, camera, settings, budget) : 0;
+    for (size_t i = 0; i < lod->bytes && !status; i++)
+        lod->chosen |= 1u << lod->level[i];
     if (status)
         trip_lod_release(lod, budget);
     return status;

@@ -28,6 +28,7 @@ typedef struct trip_lod {
     int64_t cubes[3]; /* along i, j, k */
     uint8_t *level;   /* of a cube, i fastest; NULL: level 0 everywhere */
     size_t bytes;     /* of those, from the budget */
+    uint32_t chosen;  /* levels that some cube has, a bit each */
     trip_lod_limit limit;
 } trip_lod;
 

@@ -264,11 +264,15 @@ static int make_table(const planning *p, const trip_list *list, trip_plan_list *
     const trip_file_header *h = &p->data->header;
     const trip_mean_scale scale =
         trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
+    double extinctions[TRIP_MEAN_SHARES] = { 0 };
+    float of_mean = 0;
     for (unsigned code = 0; code < TABLE_ENTRIES; code++) {
         to[code] = p->table[trip_mean_value(&scale, code)];
-        if (to[code].extinction > 0)
-            to[code].extinction = (float)trip_mean_extinction(code % TRIP_MEAN_SHARES,
-                                                              (double)to[code].extinction, length);
+        if (to[code].extinction != of_mean) {
+            of_mean = to[code].extinction;
+            trip_mean_extinctions((double)of_mean, length, extinctions);
+        }
+        to[code].extinction = (float)extinctions[code % TRIP_MEAN_SHARES];
     }
     planned->table = to;
     return 0;
@@ -283,7 +287,8 @@ static int place_list(const planning *p, const trip_list *list)
     planned->by_level = trip_lod_concerns(&p->plan->lod, list);
     place_clip(p, list, planned);
     int status = trip_list_grid_make(&planned->grid, p->data, list);
-    if (!status && trip_kind_of(list->kind)->axis_bits > 0)
+    if (!status && trip_kind_of(list->kind)->axis_bits > 0 &&
+        p->plan->lod.chosen >> list->level & 1)
         status = make_table(p, list, planned);
     if (status)
         return status;

@@ -44,10 +44,23 @@ unsigned trip_mean_pack(const trip_mean_scale *scale, double value, double cover
     return m << TRIP_MEAN_AXIS_BITS | (unsigned)d * COVERS | c;
 }
 
+/* `column`: minus the opacity of a column. */
+static double extinction_of(double cover, double extinction, double column, double length)
+{
+    return cover < 1 ? -log1p(cover * column) / length : extinction;
+}
+
 double trip_mean_extinction(unsigned shares, double extinction, double length)
 {
-    double cover = trip_mean_cover(shares), depth = trip_mean_depth(shares);
-    if (cover >= 1)
-        return extinction * depth;
-    return -log1p(cover * expm1(-extinction * depth * length)) / length;
+    const double own = extinction * trip_mean_depth(shares);
+    return extinction_of(trip_mean_cover(shares), own, expm1(-own * length), length);
+}
+
+void trip_mean_extinctions(double extinction, double length, double out[TRIP_MEAN_SHARES])
+{
+    for (unsigned shares = 0; shares < TRIP_MEAN_SHARES; shares += COVERS) {
+        const double own = extinction * trip_mean_depth(shares), column = expm1(-own * length);
+        for (unsigned c = 0; c < COVERS; c++)
+            out[shares + c] = extinction_of(covers[c], own, column, length);
+    }
 }

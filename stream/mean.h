@@ -43,5 +43,7 @@ unsigned trip_mean_value(const trip_mean_scale *scale, unsigned code);
 /* The extinction with which a splat of that shows the cube: k' with 1 - exp(-k' L) = alpha, where
  * the extinction of the mean is k; `length` is L. */
 double trip_mean_extinction(unsigned shares, double extinction, double length);
+/* The same for all shares. */
+void trip_mean_extinctions(double extinction, double length, double out[TRIP_MEAN_SHARES]);
 
 #endif

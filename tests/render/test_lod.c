@@ -316,33 +316,54 @@ static void shading_is_as_strong_at_a_coarse_level(void **state)
     scene_destroy(&s);
 }
 
-/* A code of means that covers a half shows a half, and where it is thin as much as was kept. */
+static bool is_chosen(const trip_lod *lod, unsigned level)
+{
+    for (size_t i = 0; i < lod->bytes; i++)
+        if (lod->level[i] == level)
+            return true;
+    return false;
+}
+
+/* A code of means that covers a half shows a half, and where it is thin as much as was kept. Lists
+ * of levels that no cube has need no table. */
+static void check_tables(const scene *s, const trip_plan *plan, bool seen[LEVELS + 1])
+{
+    const trip_mean_scale scale = { 0, 65535 };
+    const unsigned code = trip_mean_pack(&scale, 65535, 0.5, 0.75);
+    for (unsigned i = 0; i < s->data->list_count; i++) {
+        const trip_list *list = &s->data->lists[i];
+        const double length = (double)(1u << list->level), k = -log(0.5);
+        if (!plan->lists[i].drawn)
+            continue;
+        const bool own = list->level > 0 && is_chosen(&plan->lod, list->level);
+        assert_int_equal(plan->lists[i].own_table != NULL, own);
+        if (!own)
+            continue;
+        double depth = (double)plan->lists[i].table[code].extinction * length;
+        assert_float_equal(1 - exp(-depth), 0.5 * (1 - exp(-k * 0.75 * length)), 1e-6);
+        assert_float_equal(plan->lists[i].table[code].r, 1, 0);
+        seen[list->level] = true;
+    }
+}
+
 static void tables_of_means_have_their_opacity(void **state)
 {
     (void)state;
     scene s;
     trip_camera c;
-    trip_plan plan;
+    bool seen[LEVELS + 1] = { true };
     create(&s, 64, 0.5);
     const trip_camera_params view = view_along(&s);
-    const trip_settings settings = settings_at(100);
     assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
-    assert_int_equal(trip_plan_make(&plan, s.data, &c, &settings, s.table, s.budget), 0);
-    for (unsigned i = 0; i < s.data->list_count; i++) {
-        const trip_list *list = &s.data->lists[i];
-        double length = (double)(1u << list->level), k = -log(0.5);
-        if (!plan.lists[i].drawn)
-            continue;
-        assert_int_equal(plan.lists[i].own_table != NULL, list->level > 0);
-        if (list->level == 0)
-            continue;
-        const trip_mean_scale scale = { 0, 65535 };
-        unsigned code = trip_mean_pack(&scale, 65535, 0.5, 0.75);
-        double depth = (double)plan.lists[i].table[code].extinction * length;
-        assert_float_equal(1 - exp(-depth), 0.5 * (1 - exp(-k * 0.75 * length)), 1e-6);
-        assert_float_equal(plan.lists[i].table[code].r, 1, 0);
+    for (double px = 0.7; px < 100; px *= 3) {
+        trip_plan plan;
+        const trip_settings settings = settings_at(px);
+        assert_int_equal(trip_plan_make(&plan, s.data, &c, &settings, s.table, s.budget), 0);
+        check_tables(&s, &plan, seen);
+        trip_plan_release(&plan, s.budget);
     }
-    trip_plan_release(&plan, s.budget);
+    for (unsigned level = 0; level <= LEVELS; level++)
+        assert_true(seen[level]);
     scene_destroy(&s);
 }
 
