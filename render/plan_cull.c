@@ -33,8 +33,11 @@ static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, do
                               c->ortho ? sign * pixel / length : 0 };
 }
 
-static double behind_eye(const trip_camera *camera, const trip_settings *settings)
+/* Of sheets the cells about the eye have voxels behind it. */
+static double behind_eye(const trip_camera *camera, const trip_settings *settings, bool sheets)
 {
+    if (sheets)
+        return trip_sheet_radius(settings->kernel) * trip_length(camera->forward) * (1 + 1e-9);
     const trip_splat_frame f = trip_splat_frame_make(camera, settings);
     double behind = camera->ortho ? trip_splat_parallel_near(&f) : trip_splat_behind(&f);
     return behind * (1 + 1e-9);
@@ -66,7 +69,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. Of fixed footprints all there
          * is. */
         .low_pass2 = room * widest * widest * pixel2,
-        .behind = about ? 0 : data->coordinates.widest * behind_eye(camera, settings),
+        .behind = data->coordinates.widest * behind_eye(camera, settings, about != NULL),
         .table = table,
         .about = about,
     };

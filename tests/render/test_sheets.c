@@ -218,12 +218,14 @@ static void a_cell_without_a_corner_is_empty(void **state)
 static void from_within_what_lies_before_the_eye_is_seen(void **state)
 {
     (void)state;
-    const trip_vec3 eyes[] = { { 7.3, 9.1, 12.7 }, { 7, 9, 12 }, { 7.5, 9.5, 12.5 } };
+    /* The last looks along an axis from between two bricks. */
+    const trip_vec3 eyes[] = { { 7.3, 9.1, 12.7 }, { 7, 9, 12 }, { 7.5, 7.6, 7.4 } };
     scene s;
-    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .slab_sheets = 8 });
     fill_table(&s, 1, 1, 1, 0.1);
     for (int i = 0; i < 36; i++) {
-        double d[3] = { 0.1, -0.05, 0.07 };
+        const double aside = i / 6 % 3 == 2 ? 0.01 : 1;
+        double d[3] = { 0.1 * aside, -0.05 * aside, 0.07 * aside };
         d[i % 3] = i / 3 % 2 ? 1 : -1;
         trip_camera_params view = { .eye = eyes[i / 6 % 3],
                                     .up = { 0.3, 0.5, 0.7 },
