@@ -15,12 +15,14 @@ const char *trip_coordinates_fault(const double *table, int64_t count)
 
 trip_coordinates trip_coordinates_make(const double *const along[3], const int64_t voxels[3])
 {
-    trip_coordinates c = { .widest = 1 };
+    trip_coordinates c = { .widest = 1, .nearest = 1 };
     for (int a = 0; a < 3; a++) {
         c.along[a] = along ? along[a] : NULL;
         c.voxels[a] = voxels[a];
         for (int64_t i = 0; along && i < voxels[a]; i++)
             c.widest = fmax(c.widest, trip_coordinates_width(&c, a, i));
+        for (int64_t i = 1; along && i < voxels[a]; i++)
+            c.nearest = fmin(c.nearest, along[a][i] - along[a][i - 1]);
     }
     return c;
 }

@@ -25,7 +25,8 @@ extern "C" {
 typedef struct trip_coordinates {
     const double *along[3]; /* by axis, ascending; all NULL: the spacing is even */
     int64_t voxels[3];
-    double widest; /* the most of trip_coordinates_width() */
+    double widest;  /* the most of trip_coordinates_width() */
+    double nearest; /* the least distance of two voxels along an axis */
 } trip_coordinates;
 
 static inline bool trip_coordinates_uneven(const trip_coordinates *c)

@@ -278,8 +278,7 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
     const bool uneven = trip_coordinates_uneven(&frame->data->coordinates);
     if (uneven && !(renderer->ops->uneven >> s->classify & 1))
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                         "does not draw grids with uneven spacing classified so; cpu draws them "
-                         "by --classify pre, and --renderer reference and integral all of them");
+                         "does not draw grids with uneven spacing; cpu, reference and integral do");
     if (uneven && trip_effects_some(&s->effects) && !frame->plan->gathers)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects in grids with uneven spacing; the integral does");

@@ -199,12 +199,21 @@ static int begin_sheets(trip_cpu *r)
 static int check_kernels(const trip_frame *frame)
 {
     const trip_settings *s = frame->settings;
-    if (s->footprint == TRIP_FOOTPRINT_EWA || frame->camera->ortho ||
-        !trip_coordinates_uneven(&frame->data->coordinates))
+    if (s->footprint == TRIP_FOOTPRINT_EWA || s->classify == TRIP_CLASSIFY_POST ||
+        frame->camera->ortho || !trip_coordinates_uneven(&frame->data->coordinates))
         return 0;
     return trip_fail(TRIP_USAGE, "render", "cpu",
                      "grids with uneven spacing are drawn by --kernel ewa alone; reference has the "
                      "exact kernel too");
+}
+
+/* Sheets with uneven spacing are drawn by the plain kernels (kernels/sheet_tmpl.h). */
+static const trip_cpu_kernels *kernels_for(const trip_cpu *r, const trip_frame *frame)
+{
+    const bool plain = frame->settings->classify == TRIP_CLASSIFY_POST &&
+                       trip_coordinates_uneven(&frame->data->coordinates);
+    const trip_cpu_kernels *isa = plain ? &trip_cpu_plain : r->isa;
+    return frame->settings->depth ? isa->with_depth : isa;
 }
 
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
@@ -212,7 +221,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_cpu *r = (trip_cpu *)base;
     r->in_layer = false;
     r->frame = frame;
-    r->kernels = frame->settings->depth ? r->isa->with_depth : r->isa;
+    r->kernels = kernels_for(r, frame);
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
     if (classifies_post(r))
@@ -299,7 +308,7 @@ static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
-    .uneven = 1u << TRIP_CLASSIFY_PRE,
+    .uneven = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -53,7 +53,17 @@ typedef struct pane_path {
     /* How far inside each half-space a ray is at the first slice, in perspective times the length
      * of `toward`, and by how much that grows over a sheet the pass's way, likewise. */
     float clip_at[TRIP_CLIP_MOST][3], clip_toward[TRIP_CLIP_MOST][3];
+    /* Where spacing is uneven positions are places, from the grid's first voxel; else NULL. */
+    const trip_coordinates *coordinates;
+    int axes[2];       /* u and v */
+    int32_t corner[2]; /* voxels: of the grid of rasters */
 } pane_path;
+
+/* Such grids are drawn by the plain kernels alone, so that even ones take no instruction more. */
+INLINE bool is_uneven(const pane_path *path)
+{
+    return TRIP_SIMD == TRIP_SIMD_PLAIN && path->coordinates;
+}
 
 /* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
  * over a sheet; false where it does not go the pass's way, or is too steep. */
@@ -193,8 +203,14 @@ static void find_clip(const trip_cpu_sheet_view *view, int x, int y, double alon
 static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
                       pane_path *path)
 {
-    const double origin[2] = { (double)g->first_u, (double)g->first_v };
+    double origin[2] = { (double)g->first_u, (double)g->first_v };
     beam b = beam_of(view, x, y, TRIP_CPU_PANE);
+    path->coordinates = view->coordinates;
+    for (int a = 0; a < 2 && is_uneven(path); a++) {
+        path->axes[a] = (view->axis + 1 + a) % 3;
+        path->corner[a] = (int32_t)origin[a];
+        origin[a] = 0;
+    }
     for (int a = 0; a < 2; a++) {
         path->slope[a] = b.slope[0][a];
         path->start[a] = b.start[0][a];
@@ -231,14 +247,14 @@ typedef struct voxel_box {
 /* The beam of a patch or pane, from the pane's corner's ray. */
 typedef struct patch_beam {
     float4 slope[2], shift[2];
-    bool whole;
+    bool whole; /* and voxels lie evenly */
 } patch_beam;
 
 static patch_beam patch_beam_of(const trip_cpu_sheet_view *view, const pane_path *path, int x,
                                 int y, int size)
 {
     beam b = beam_of(view, x, y, size);
-    patch_beam p = { .whole = b.whole };
+    patch_beam p = { .whole = b.whole && !is_uneven(path) };
     for (int a = 0; a < 2; a++)
         for (int i = 0; i < 4; i++) {
             p.slope[a][i] = (float)(b.slope[i][a] - path->slope[a]);
@@ -260,6 +276,14 @@ INLINE int32_t floor_within(float a)
     return whole - ((float)whole > a);
 }
 
+/* In voxels of the grid, and a cell at most beyond that. */
+static double index_of(const pane_path *path, int a, double place)
+{
+    const double index = trip_coordinates_index(path->coordinates, path->axes[a], place);
+    const double last = (double)path->coordinates->voxels[path->axes[a]];
+    return within(index, -1, last) - path->corner[a];
+}
+
 /* What a beam passes at a slice: a little more for what single precision makes of it. */
 INLINE voxel_box beam_box(const pane_path *path, const patch_beam *b, unsigned n)
 {
@@ -268,8 +292,15 @@ INLINE voxel_box beam_box(const pane_path *path, const patch_beam *b, unsigned n
         float4 at = b->slope[a] * path->along[n] + b->shift[a];
         float low = least_of_4(at), high = -least_of_4(-at), first = path->first[a][n];
         float more = 0x1p-6f + 0x1p-20f * (fabsf(low) + fabsf(high));
-        box.lo[a] = path->base[a][n] + floor_within(first + low - more);
-        box.hi[a] = path->base[a][n] + floor_within(first + high + more);
+        low = first + low - more;
+        high = first + high + more;
+        if (is_uneven(path)) {
+            box.lo[a] = (int32_t)floor(index_of(path, a, path->base[a][n] + (double)low));
+            box.hi[a] = (int32_t)floor(index_of(path, a, path->base[a][n] + (double)high));
+            continue;
+        }
+        box.lo[a] = path->base[a][n] + floor_within(low);
+        box.hi[a] = path->base[a][n] + floor_within(high);
     }
     return box;
 }
@@ -491,6 +522,33 @@ INLINE corners corners_at(const pane_path *path, const stamp_rays *l, unsigned n
     return c;
 }
 
+/* The same of a grid with uneven spacing, from where its rays are. */
+static corners uneven_corners(const pane_path *path, unsigned n, corners at)
+{
+    for (int a = 0; a < 2; a++) {
+        const int32_t base = path->base[a][n];
+        int32_t whole[V];
+        float part[V];
+        vi_store(whole, at.whole[a]);
+        v_store(part, at.part[a]);
+        for (int i = 0; i < V; i++) {
+            double index = index_of(path, a, (double)(base + whole[i]) + (double)part[i]);
+            double cell = floor(index);
+            whole[i] = (int32_t)cell - base;
+            part[i] = (float)(index - cell);
+        }
+        at.whole[a] = vi_load(whole);
+        at.part[a] = v_load(part);
+    }
+    return at;
+}
+
+INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
+{
+    corners c = corners_at(path, l, n);
+    return is_uneven(path) ? uneven_corners(path, n, c) : c;
+}
+
 /* What rays meet at a slice: the entry of the function's integrals nearest to the code, and what
  * the rest is worked out from where it is needed. */
 typedef struct sample {
@@ -533,7 +591,7 @@ INLINE void find_cells(const trip_cpu_group *g, const pane_path *path, unsigned 
 }
 
 /* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
- * their gradients. */
+ * their gradients. With uneven spacing weights are set anew. */
 INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
                       unsigned n, const corners *c, sample *s)
 {
@@ -543,7 +601,13 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
         return in + area->raster[n];
     }
     vi whole[2];
-    find_cells(g, path, n, c, whole);
+    if (is_uneven(path)) {
+        corners uneven = uneven_corners(path, n, *c);
+        set_weights(uneven.part, s);
+        find_cells(g, path, n, &uneven, whole);
+    } else {
+        find_cells(g, path, n, c, whole);
+    }
     vi raster = (whole[1] >> TRIP_CPU_RASTER_LOG2) * g->across + (whole[0] >> TRIP_CPU_RASTER_LOG2);
     vi in = (whole[1] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
             (whole[0] & (TRIP_CPU_RASTER - 1));
@@ -712,7 +776,7 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 static vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
                          unsigned n, unsigned segment)
 {
-    corners c = corners_at(path, l, n);
+    corners c = cells_at(path, l, n);
     vi whole[2], lack;
     int32_t u[V], v[V];
     find_cells(g, path, n, &c, whole);
@@ -1069,7 +1133,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
 /* The rays whose cell at the first slice is in the group's window. */
 INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l)
 {
-    corners c = corners_at(path, l, 0);
+    corners c = cells_at(path, l, 0);
     vm in = l->along;
     for (int a = 0; a < 2; a++) {
         vf at = v_from_int(c.whole[a] + path->base[a][0]);

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "camera.h"
+#include "coordinates.h"
 #include "cpu/kernels/effects.h"
 #include "settings.h"
 
@@ -59,7 +60,7 @@ typedef struct trip_cpu_cells {
  * absent: the number of each in the pool; 0 is the raster in which every voxel is missing. */
 typedef struct trip_cpu_slice {
     const int32_t *rasters;
-    double coordinate; /* along the list's axis */
+    double coordinate; /* along the list's axis: a place, where spacing is uneven */
 } trip_cpu_slice;
 
 /* Integrals of the transfer function from code 0 to each entry, times a factor that makes the
@@ -106,6 +107,7 @@ typedef struct trip_cpu_group {
 typedef struct trip_cpu_sheet_view {
     const struct trip_frame *of;
     const trip_cpu_integrals *integrals;
+    const trip_coordinates *coordinates; /* of uneven spacing; else NULL */
     int axis;
     bool ortho, shading, headlight, point_light;
     double direction; /* 1: ascending; -1 */

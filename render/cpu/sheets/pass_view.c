@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "cpu/effects.h"
+#include "cpu/sheets/uneven.h"
 #include "shade.h"
 #include "tint.h"
 #include "weight.h"
@@ -25,12 +26,14 @@ static float within_floats(double x)
 }
 
 /* World-space gradients from those of index space: the inverse transpose of the map. Differences
- * are of codes, lengths over that of full shading; half of it, for what takes the sum of two. */
+ * are of codes, by the store's unit, lengths over that of full shading; half of it, for what takes
+ * the sum of two. */
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, trip_cpu_codes codes)
 {
     const trip_file_header *h = &frame->data->header;
     double full = trip_shade_gradient_full(h, 1, frame->plan->level);
-    double unit = ldexp(0.5 * (h->code_hi - h->code_lo) / 65535 / full, -(int)codes.shift);
+    double unit = ldexp(0.5 * (h->code_hi - h->code_lo) / 65535 / full, -(int)codes.shift) /
+                  trip_cpu_gradient_unit(&frame->data->coordinates);
     const double(*m)[3] = (const double(*)[3])view->world;
     double adjugate[3][3];
     for (int i = 0; i < 3; i++)
@@ -87,6 +90,8 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
     *view = (trip_cpu_sheet_view){
         .of = frame,
         .integrals = &function->integrals,
+        .coordinates =
+            trip_coordinates_uneven(&frame->data->coordinates) ? &frame->data->coordinates : NULL,
         .axis = axis,
         .ortho = c->ortho,
         .shading = s->shading,

@@ -69,6 +69,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->count = 0;
     s->run_count = 0;
     s->store.codes = trip_cpu_codes_of(r->frame->data);
+    s->store.coordinates = &r->frame->data->coordinates;
     trip_cpu_function_set(&s->function, r->frame->table, s->store.codes,
                           r->frame->camera->voxel_world);
     return 0;
@@ -123,10 +124,15 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const tr
     return trip_cpu_store_fit(&s->store, all, sheets, least, most, room);
 }
 
-/* How far, in rasters, rays go along a sheet to the next. */
-static int64_t reach_of(const trip_settings *settings)
+/* How far, in rasters, rays go along a sheet to the next; sheets are at most twice as far apart as
+ * a voxel is wide. */
+static int64_t reach_of(const trip_frame *frame)
 {
-    return ((int64_t)trip_cpu_pass_steepest(settings) + 4) / TRIP_CPU_RASTER + 1;
+    const trip_coordinates *c = &frame->data->coordinates;
+    double voxels = trip_cpu_pass_steepest(frame->settings);
+    if (trip_coordinates_uneven(c))
+        voxels = fmin(voxels * 2 * c->widest / c->nearest, 0x1p31);
+    return ((int64_t)voxels + 4) / TRIP_CPU_RASTER + 1;
 }
 
 /* What the smallest windows of any layer of the frame take. */
@@ -142,8 +148,8 @@ static int find_least(const trip_cpu_sheets *s, uint64_t *bytes)
         status = trip_cpu_need_find(&need, layer, rasters_in(&all), s->store.budget);
         if (status)
             break;
-        uint64_t least = trip_cpu_windows_least_bytes(&all, reach_of(frame->settings), &need,
-                                                      frame->settings->slices);
+        uint64_t least =
+            trip_cpu_windows_least_bytes(&all, reach_of(frame), &need, frame->settings->slices);
         *bytes = least > *bytes ? least : *bytes;
     }
     return status;
@@ -169,7 +175,7 @@ static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
 {
     const trip_cpu_rasters all = rasters_of_layer(layer);
     const uint64_t grid = rasters_in(&all);
-    const int64_t reach = reach_of(s->of->frame->settings);
+    const int64_t reach = reach_of(s->of->frame);
     trip_cpu_windows_release(&s->windows, s->store.budget);
     uint64_t left = trip_budget_left_bytes(s->store.budget) + trip_cpu_store_held_bytes(&s->store);
     uint64_t room = left / LEFT_OVER * (LEFT_OVER - 1);
@@ -189,7 +195,7 @@ static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
 
 int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis)
 {
-    s->axis = axis;
+    s->axis = s->store.axis = axis;
     s->pass = NULL;
     s->count = 0;
     return fit_layer(s, &s->of->frame->plan->layers[axis]);
@@ -206,12 +212,12 @@ static void drop_all(trip_cpu_sheets *s)
 
 bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to)
 {
-    return s->view.ortho || ((double)to - s->view.eye[2]) * (double)s->way > 0;
+    return s->view.ortho || ((double)to - s->eye) * (double)s->way > 0;
 }
 
 bool trip_cpu_sheets_leap(const trip_cpu_sheets *s)
 {
-    return s->view.steepest > 0.999 * s->of->frame->settings->slices;
+    return s->view.coordinates || s->view.steepest > 0.999 * s->of->frame->settings->slices;
 }
 
 /* Of complete sheets: ranges, and what may show between them. */
@@ -254,11 +260,11 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
     trip_cpu_store_find_gradients(&s->store, work, count);
 }
 
-/* The segment before the slice lies between held[i] and held[i + 1]; `first`: the slice is the
- * group's first, before which there is none. */
-static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double coordinate, int i,
-                      bool first)
+/* The slice lies at an index of the axis, the segment before it between held[i] and held[i + 1];
+ * `first`: the slice is the group's first, before which there is none. */
+static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index, int i, bool first)
 {
+    const double coordinate = trip_coordinates_place(s->store.coordinates, s->axis, index);
     trip_cpu_group *g = &s->group;
     if (!first) {
         const trip_cpu_sheet *from = sheet_of(s, i);
@@ -301,7 +307,7 @@ static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
     const int slices = s->of->frame->settings->slices;
     const unsigned count_before = cut->count;
     const trip_cpu_group before = s->group;
-    double eye = s->view.ortho ? 0 : (s->view.eye[2] - (double)from->number) * (double)s->way;
+    double eye = s->view.ortho ? 0 : (s->eye - (double)from->number) * (double)s->way;
     bool fits = true;
     if (first && eye <= 0)
         add_slice(s, from, (double)from->number, i, true);
@@ -510,6 +516,8 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
 {
     const trip_cpu *r = s->of;
     const trip_cpu_view *view = &r->views[trip_batch_list(s->batch, run)->index];
+    if (view->coordinates)
+        return false;
     trip_cpu_box box = trip_cpu_brick_box(view, run->brick, run->sheet, run->sheet);
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
@@ -546,6 +554,7 @@ static int begin_pass(trip_cpu_sheets *s, const trip_pass *pass)
     s->pass = pass;
     s->way = pass->descending ? -1 : 1;
     trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending, &s->function);
+    s->eye = trip_coordinates_index(s->store.coordinates, s->axis, s->view.eye[2]);
     return status;
 }
 

@@ -20,6 +20,7 @@ struct trip_cpu_sheets {
     int axis;
     const trip_pass *pass; /* being drawn; NULL: none */
     int64_t way;           /* from one sheet to the next: 1 or -1 */
+    double eye;            /* along the sheets, as they are numbered */
     /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[0] all
      * is drawn. */
     int held[TRIP_CPU_SHEETS_MAX];

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "cpu/sheets/uneven.h"
 #include "cpu/squares.h"
 #include "report.h"
 
@@ -435,7 +436,8 @@ static uint64_t beside(const trip_cpu_edges *e, int edge)
            ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & COLUMN_7);
 }
 
-/* Outermost rasters have no squares that may show. */
+/* Outermost rasters have no squares that may show. With uneven spacing a segment may reach across
+ * any number of squares. */
 static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_edges *e = &w->sheet->edges[at];
@@ -443,6 +445,8 @@ static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_
     w->sheet->needed[at] =
         beside(e, TRIP_CPU_ALL) | beside(e, TRIP_CPU_ABOVE) >> 8 | beside(e, TRIP_CPU_BELOW) << 8 |
         beside(e - across, TRIP_CPU_BELOW) >> 56 | beside(e + across, TRIP_CPU_ABOVE) << 56;
+    if (trip_coordinates_uneven(job->store->coordinates))
+        w->sheet->needed[at] = UINT64_MAX;
 }
 
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
@@ -458,11 +462,22 @@ static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, si
     const uint64_t before = w->needed_before ? w->needed_before[at] : 0;
     const uint64_t behind = w->needed ? w->needed[at] : 0;
     const uint64_t squares = w->everywhere ? UINT64_MAX : before | behind;
-    if (squares)
-        s->kernels->sheet_gradients(raster_at(s, w->sheet, at), squares,
-                                    raster_at(s, w->sheet, at - 1),
-                                    raster_at(s, w->sheet, at - (size_t)s->across),
-                                    raster_at(s, w->other, at), raster_at(s, w->third, at));
+    const size_t across = (size_t)s->across;
+    const trip_cpu_uneven_raster r = {
+        .raster = raster_at(s, w->sheet, at),
+        .left = raster_at(s, w->sheet, at - 1),
+        .above = raster_at(s, w->sheet, at - across),
+        .sheet_before = raster_at(s, w->other, at),
+        .sheet_behind = raster_at(s, w->third, at),
+        .first = { (s->first_u + (int64_t)(at % across)) * TRIP_CPU_RASTER,
+                   (s->first_v + (int64_t)(at / across)) * TRIP_CPU_RASTER, w->sheet->number },
+        .axis = s->axis,
+    };
+    if (squares && trip_coordinates_uneven(s->coordinates))
+        trip_cpu_uneven_gradients(s->coordinates, &r, squares);
+    else if (squares)
+        s->kernels->sheet_gradients(r.raster, squares, r.left, r.above, r.sheet_before,
+                                    r.sheet_behind);
 }
 
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,

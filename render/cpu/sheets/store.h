@@ -51,6 +51,8 @@ typedef struct trip_cpu_store {
     const trip_cpu_kernels *kernels;
     trip_cpu_pool *pool;
     trip_cpu_codes codes; /* of the frame's data set */
+    const trip_coordinates *coordinates;
+    int axis; /* of the layer's lists */
 
     trip_cpu_voxels *voxels; /* rasters */
     size_t voxels_bytes;

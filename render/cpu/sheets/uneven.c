@@ -1,0 +1,57 @@
+#include "cpu/sheets/uneven.h"
+
+double trip_cpu_gradient_unit(const trip_coordinates *c)
+{
+    return trip_coordinates_uneven(c) ? fmax(c->nearest, 1.0 / 64) : 1;
+}
+
+/* The codes of a voxel and of its neighbours along one axis. */
+typedef struct row {
+    int16_t before, here, behind;
+} row;
+
+static int16_t slope(const double *x, int64_t at, row codes, double unit)
+{
+    const bool has_before = codes.before != TRIP_CPU_CODE_MISSING;
+    const bool has_behind = codes.behind != TRIP_CPU_CODE_MISSING;
+    if (!has_before && !has_behind)
+        return 0;
+    const int rise =
+        (has_behind ? codes.behind : codes.here) - (has_before ? codes.before : codes.here);
+    const double run = x[has_behind ? at + 1 : at] - x[has_before ? at - 1 : at];
+    return (int16_t)fmax(INT16_MIN, fmin(INT16_MAX, floor(rise * unit / run)));
+}
+
+static trip_cpu_gradient gradient_of(const trip_coordinates *c, const trip_cpu_uneven_raster *r,
+                                     int u, int v, double unit)
+{
+    enum { STRIDE = TRIP_CPU_RASTER_STRIDE, LAST = TRIP_CPU_RASTER - 1 };
+    const int i = v * STRIDE + u;
+    const int16_t *at = r->raster->codes + i;
+    const row rows[3] = {
+        { u ? at[-1] : r->left->codes[i + LAST], *at, at[1] },
+        { v ? at[-STRIDE] : r->above->codes[i + LAST * STRIDE], *at, at[STRIDE] },
+        { r->sheet_before->codes[i], *at, r->sheet_behind->codes[i] },
+    };
+    const int64_t voxel[3] = { r->first[0] + u, r->first[1] + v, r->first[2] };
+    trip_cpu_gradient g;
+    for (int a = 0; a < 3; a++)
+        g.along[a] = slope(c->along[(r->axis + 1 + a) % 3], voxel[a], rows[a], unit);
+    return g;
+}
+
+void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r,
+                               uint64_t squares)
+{
+    const double unit = trip_cpu_gradient_unit(c);
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        const int square = __builtin_ctzll(rest);
+        for (int n = 0; n < 64; n++) {
+            const int u = square % TRIP_CPU_SQUARES_ACROSS * 8 + n % 8;
+            const int v = square / TRIP_CPU_SQUARES_ACROSS * 8 + n / 8;
+            const int at = v * TRIP_CPU_RASTER_STRIDE + u;
+            if (r->raster->codes[at] != TRIP_CPU_CODE_MISSING)
+                r->raster->gradients[at] = gradient_of(c, r, u, v, unit);
+        }
+    }
+}
