@@ -52,7 +52,7 @@ typedef struct quality_drawn {
     const char *input, *function;
 } quality_drawn;
 
-/* Of a volume, once its data set is open: fails where `measured` is another. */
+/* Of a volume, once its data set is open: fails where `measured` is another, and not "". */
 int quality_options_check_data(const char *measured, triptych *t, const char *volume);
 
 /* Changes settings as the options say, and with --error the renderer where it is auto. Prints what

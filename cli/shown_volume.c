@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "quality_options.h"
 #include "report.h"
 
 /* Of volumes whose files are larger, at least, a version of so many voxels is made first. */
@@ -54,12 +55,26 @@ static char *source_of(triptych *t, const char *data_set)
     return path;
 }
 
+/* Of the data set that a volume is drawn from at first: what is made of it later holds more. */
+static int check_measured(const shown_volume *s, triptych *t, const char *path, const char *volume)
+{
+    if (!s->measured || strcmp(volume, s->measured_volume) != 0)
+        return 0;
+    int status = triptych_open(t, path, NULL);
+    if (!status)
+        status = quality_options_check_data(s->measured, t, volume);
+    triptych_close(t);
+    return status;
+}
+
 static int open_volume(const shown_volume *s, cached_volume *cached, triptych *t, const char *input,
                        bool keep_all)
 {
     const triptych_brick_options wanted = options_of(s, keep_all);
     char *volume = cached_volume_wanted(input) ? strdup(input) : source_of(t, input);
-    const int status = volume ? cached_volume_open(cached, t, volume, &wanted) : TRIP_ERROR;
+    int status = volume ? cached_volume_open(cached, t, volume, &wanted) : TRIP_ERROR;
+    if (!status && !keep_all)
+        status = check_measured(s, t, cached->path, volume);
     free(volume);
     return status;
 }

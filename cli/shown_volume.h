@@ -10,6 +10,9 @@
 typedef struct shown_volume {
     triptych_brick_options options; /* how a volume is read, memory and threads; nothing else */
     const char *function;           /* that is to be shown, or NULL */
+    /* The volume that --error is for, and the data set that its report is of, as in
+     * quality_options.h; NULL: none. */
+    const char *measured_volume, *measured;
     bool samples;         /* of large volumes that are not in the cache a small one is found,
                              of samples */
     cached_volume cached; /* zeroed at first */

@@ -263,6 +263,8 @@ static int choose_settings(view_options *o)
     if (o->classify_given)
         p->settings.classify = o->classify;
     p->settings_given |= o->classify_given || quality_options_given(&o->quality);
+    o->volume.measured_volume = drawn.input;
+    o->volume.measured = o->quality.error > 0 ? o->quality.measured : NULL;
     return status;
 }
 

@@ -70,7 +70,10 @@ class Serve(program.ProgramTest):
         assert run.returncode == 0, run.stderr
 
     def setUp(self):
-        self.server = program.start("serve", "v.trip", "--memory", "128M", "--threads", "2")
+        self.serve("v.trip")
+
+    def serve(self, *arguments):
+        self.server = program.start("serve", *arguments, "--memory", "128M", "--threads", "2")
         self.address = self.server.stdout.readline().decode().strip()
         url = urllib.parse.urlsplit(self.address)
         self.host, self.port = url.hostname, url.port
@@ -270,6 +273,22 @@ class Serve(program.ProgramTest):
         self.ask("/picture", after=0)
         self.server.send_signal(signal.SIGINT)
         self.assertEqual(self.server.wait(60), 0)
+
+    def test_a_volume_s_report_is_of_its_data_set(self):
+        os.environ["XDG_CACHE_HOME"] = os.path.abspath("cache")
+        self.works("brick", "v.nhdr", "-q", "-o", "usual.trip")
+        program.write_report("usual", "usual.trip")
+        program.write_report("other", None)
+        for report in "usual", "other":
+            self.tearDown()
+            self.serve("v.nhdr", "--error", "255", "--report", report)
+            status = self.status()
+            while not (status["exact"] or status["failed"]):
+                self.ask("/picture", after=0)
+                status = self.status()
+            self.assertEqual(status["failed"], report == "other", status)
+            if status["failed"]:
+                self.assertIn("the report is of another data set", status["message"])
 
     def test_what_cannot_be_served_is_said(self):
         self.fails(1, "serve", "no.trip")

@@ -254,6 +254,21 @@ class View(program.ProgramTest):
                    "--background=0,0,0")
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
+    def test_a_volume_s_report_is_of_its_data_set(self):
+        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
+        self.works("brick", "ball.nrrd", "-q", "-o", "usual.trip")
+        program.write_report("usual", "usual.trip")
+        program.write_report("other", None)
+        for report in "usual", "other":
+            self.view(f"wait\ndrop {os.path.abspath('noise.nrrd')}\nwait\nstatus {report}.json\n"
+                      "key tab\nwait\nstatus status.json\n",
+                      "ball.nrrd", "--error=255", f"--report={report}")
+            status = self.status()
+            self.assertTrue(self.status(report + ".json")["exact"])  # the report is not for it
+            self.assertEqual(status["failed"], report == "other", status)
+            if status["failed"]:
+                self.assertIn("the report is of another data set", status["message"])
+
     def test_a_large_volume_is_shown_by_samples_until_it_is_bricked(self):
         os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         program.write_nrrd("large.nrrd", program.ball((204, 204, 204), radius=0.5))
