@@ -86,20 +86,18 @@ static int read_next(replay *r, int plane, void *data, size_t bytes)
     return 0;
 }
 
-/* Reads the next block, whose first words determine its length. */
-static int read_block(replay *r, uint32_t splats, uint32_t *words)
+/* Reads the next block, part after part, each of which determines the length of the next. */
+static int read_block(replay *r, uint32_t *words)
 {
-    uint32_t present = trip_block_present_words(r->form->tile_log2);
-    uint32_t squares = 0;
-    int status = read_next(r, TRIP_PLANE_VOXELS, r->block, present * sizeof *r->block);
-    for (uint32_t i = 0; i < present && status == 0; i++)
-        squares += (uint32_t)__builtin_popcountll(r->block[i]);
-    *words = present + squares + trip_block_code_words(splats, r->form->code_bytes);
-    if (status == 0 && !trip_block_words_fit(r->form, splats, *words))
-        status = fail_damaged();
-    return status == 0 ? read_next(r, TRIP_PLANE_VOXELS, r->block + present,
-                                   (*words - present) * sizeof *r->block)
-                       : status;
+    uint32_t end;
+    int status = 0;
+    for (*words = 0; status == 0 && (end = trip_block_end(r->form, r->block, *words)) > *words;
+         *words = end)
+        status = end <= trip_block_most_words(r->form)
+                     ? read_next(r, TRIP_PLANE_VOXELS, r->block + *words,
+                                 (end - *words) * sizeof *r->block)
+                     : fail_damaged();
+    return status;
 }
 
 static int read_normals(replay *r, uint32_t splats)
@@ -120,7 +118,9 @@ static int read_run(replay *r, const trip_run_record *run)
 {
     const trip_file_brick tile = whole_tile(r->form);
     uint32_t words;
-    int status = read_block(r, run->splats, &words);
+    int status = read_block(r, &words);
+    if (status == 0 && !trip_block_words_fit(r->form, run->splats, words))
+        status = fail_damaged();
     if (status == 0)
         status = read_normals(r, run->splats);
     if (status < 0)

@@ -52,6 +52,8 @@ uint find_bit(uint low, uint high, uint k)
     return at;
 }
 
+#include "code.glsl"
+
 // Every second bit of a Morton number in a square.
 uint even_bits(uint n)
 {
@@ -61,9 +63,7 @@ uint even_bits(uint n)
 real3 offset_of(trip_gl_square square, uint k, out uint code)
 {
     uint place = find_bit(square.mask_low, square.mask_high, k);
-    uint code_bytes = uint(edge.y), at = square.codes + code_bytes * k;
-    uint word = voxels[at >> 2] >> (at & 3u) * 8u;
-    code = code_bytes == 1u ? (word & 255u) * 257u : word & 0xffffu;
+    code = code_at(square.codes, square.least_width, k) * (uint(edge.y) == 1u ? 257u : 1u);
     return real3(0.0, (square.corner & 0xffffu) + even_bits(place),
                  (square.corner >> 16) + even_bits(place >> 1));
 }

@@ -9,6 +9,8 @@ layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip
 layout(r32f, binding = TRIP_GL_IMAGE) writeonly uniform image2D sheet;
 layout(location = TRIP_GL_SHEET) uniform uvec2 form; // the first square, bytes of a code
 
+#include "code.glsl"
+
 // Every second bit of a Morton number in a square.
 uint even_bits(uint n)
 {
@@ -23,8 +25,7 @@ void main()
     if ((word & bit) == 0u)
         return;
     uint before = uint(bitCount(word & (bit - 1u))) + (n < 32u ? 0u : uint(bitCount(square.mask_low)));
-    uint at = square.codes + form.y * before, bytes = voxels[at >> 2] >> (at & 3u) * 8u;
-    uint code = form.y == 1u ? (bytes & 255u) * 257u : bytes & 0xffffu;
+    uint code = code_at(square.codes, square.least_width, before) * (form.y == 1u ? 257u : 1u);
     uvec2 place = uvec2(square.corner, square.corner >> 16) + uvec2(even_bits(n), even_bits(n >> 1));
     imageStore(sheet, ivec2(place & 0xffffu), vec4(code));
 }

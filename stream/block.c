@@ -30,30 +30,134 @@ static uint32_t number_of(uint32_t voxel)
     return (x & 0xffff) | x >> 15;
 }
 
+static uint32_t code_words(uint32_t bytes)
+{
+    return (bytes + 7) / 8;
+}
+
+/* Words of so many forms. */
+static uint32_t form_words(uint32_t groups)
+{
+    return (groups + 1) / 2;
+}
+
+uint32_t trip_block_most_words(const trip_block_form *f)
+{
+    uint32_t records = 1u << 2 * f->tile_log2, squares = records / 64;
+    return trip_block_present_words(f->tile_log2) + squares +
+           (f->code_bytes == 1 ? 0 : form_words(squares)) + code_words(records * f->code_bytes);
+}
+
 bool trip_block_words_fit(const trip_block_form *f, uint32_t records, uint32_t words)
 {
-    uint32_t all = 1u << 2 * f->tile_log2;
-    uint32_t fixed =
-        trip_block_present_words(f->tile_log2) + trip_block_code_words(records, f->code_bytes);
-    if (records < 1 || records > all || words <= fixed)
+    uint32_t all = 1u << 2 * f->tile_log2, present = trip_block_present_words(f->tile_log2);
+    if (records < 1 || records > all)
         return false;
-    uint32_t squares = words - fixed;
-    return squares <= records && squares <= all / 64 && records <= 64 * squares;
+    uint32_t least = (records + 63) / 64, most = records < all / 64 ? records : all / 64;
+    if (f->code_bytes == 1) {
+        uint32_t codes = code_words(records);
+        return words >= present + least + codes && words <= present + most + codes;
+    }
+    return words > present + least &&
+           words <= present + most + form_words(most) + code_words(2 * records);
+}
+
+/* ---- groups ---- */
+
+/* The square behind the group that begins with `square`. */
+static uint32_t group_end(const uint64_t *masks, uint32_t squares, uint32_t square)
+{
+    uint32_t records = 0;
+    while (square < squares && records < TRIP_GROUP_RECORDS)
+        records += (uint32_t)__builtin_popcountll(masks[square++]);
+    return square;
+}
+
+static uint32_t count_groups(const uint64_t *masks, uint32_t squares)
+{
+    uint32_t groups = 0;
+    for (uint32_t i = 0; i < squares; groups++)
+        i = group_end(masks, squares, i);
+    return groups;
+}
+
+static uint32_t width_of(uint32_t form)
+{
+    return form >> 16;
+}
+
+static uint32_t count_squares(const uint64_t *present, unsigned words)
+{
+    uint32_t squares = 0;
+    for (unsigned w = 0; w < words; w++)
+        squares += (uint32_t)__builtin_popcountll(present[w]);
+    return squares;
+}
+
+static uint32_t count_records(const uint64_t *masks, uint32_t squares)
+{
+    uint32_t records = 0;
+    for (uint32_t i = 0; i < squares; i++)
+        records += (uint32_t)__builtin_popcountll(masks[i]);
+    return records;
+}
+
+/* Bytes of packed codes. */
+static uint32_t packed_bytes(const uint64_t *masks, uint32_t squares, const uint32_t *forms)
+{
+    uint32_t bytes = 0;
+    for (uint32_t i = 0; i < squares; forms++)
+        for (uint32_t end = group_end(masks, squares, i); i < end; i++)
+            bytes += ((uint32_t)__builtin_popcountll(masks[i]) * width_of(*forms) + 7) / 8;
+    return bytes;
+}
+
+uint32_t trip_block_end(const trip_block_form *f, const uint64_t *block, uint32_t words)
+{
+    const uint32_t present = trip_block_present_words(f->tile_log2);
+    if (words < present)
+        return present;
+    const uint64_t *masks = block + present;
+    const uint32_t squares = count_squares(block, present), behind = present + squares;
+    if (words < behind)
+        return behind;
+    if (f->code_bytes == 1)
+        return behind + code_words(count_records(masks, squares));
+    const uint32_t head = behind + form_words(count_groups(masks, squares));
+    const void *forms = masks + squares;
+    return words < head ? head : head + code_words(packed_bytes(masks, squares, forms));
 }
 
 trip_block trip_block_make(const trip_block_form *f, uint32_t records, uint32_t words,
                            const void *block, const void *normals)
 {
     trip_block b = { .count = records,
+                     .words = words,
                      .present_words = trip_block_present_words(f->tile_log2),
                      .code_bytes = f->code_bytes,
                      .normal_bytes = f->normal_bytes,
                      .present = block,
                      .normals = normals };
-    b.squares = words - b.present_words - trip_block_code_words(records, f->code_bytes);
+    b.squares = count_squares(b.present, b.present_words);
     b.masks = b.present + b.present_words;
-    b.codes = (const unsigned char *)(b.masks + b.squares);
     return b;
+}
+
+/* What lies behind the masks. */
+static const void *forms_of(const trip_block *b)
+{
+    return b->masks + b->squares;
+}
+
+const unsigned char *trip_block_codes(const trip_block *b)
+{
+    const uint32_t forms = b->code_bytes == 1 ? 0 : count_groups(b->masks, b->squares);
+    return (const unsigned char *)(b->masks + b->squares + form_words(forms));
+}
+
+size_t trip_block_codes_bytes(const trip_block *b)
+{
+    return (size_t)((const unsigned char *)(b->present + b->words) - trip_block_codes(b));
 }
 
 /* ---- packing ---- */
@@ -80,23 +184,67 @@ static uint32_t pack_places(unsigned tile_log2, const uint32_t *voxels, uint32_t
     return squares;
 }
 
-static bool pack_codes(unsigned code_bytes, const uint32_t *voxels, uint32_t count,
-                       unsigned char *codes)
+static bool pack_bytes(const uint32_t *voxels, uint32_t count, unsigned char *codes)
 {
     uint32_t rest = 0;
-    if (code_bytes == 1) {
-        for (uint32_t i = 0; i < count; i++) {
-            uint32_t code = trip_voxel_code(voxels[i]);
-            codes[i] = (unsigned char)code;
-            rest |= code ^ (code & 255) * CODE_STEP;
-        }
-        return rest == 0;
-    }
     for (uint32_t i = 0; i < count; i++) {
-        uint16_t code = (uint16_t)trip_voxel_code(voxels[i]);
-        memcpy(codes + 2 * (size_t)i, &code, sizeof code);
+        uint32_t code = trip_voxel_code(voxels[i]);
+        codes[i] = (unsigned char)code;
+        rest |= code ^ (code & 255) * CODE_STEP;
     }
-    return true;
+    return rest == 0;
+}
+
+/* The form that fits the codes. */
+static uint32_t form_of(const uint32_t *voxels, uint32_t count)
+{
+    uint32_t least = UINT16_MAX, most = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t code = trip_voxel_code(voxels[i]);
+        least = code < least ? code : least;
+        most = code > most ? code : most;
+    }
+    uint32_t width = most > least ? 32 - (uint32_t)__builtin_clz(most - least) : 0;
+    return least | (width + width % 2) << 16;
+}
+
+/* A square's codes; returns the bytes. */
+static uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t form,
+                            unsigned char *out)
+{
+    const uint32_t least = form & UINT16_MAX, width = width_of(form);
+    uint64_t bits = 0;
+    uint32_t filled = 0, bytes = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        bits |= (uint64_t)(trip_voxel_code(voxels[i]) - least) << filled;
+        for (filled += width; filled >= 8; filled -= 8, bits >>= 8)
+            out[bytes++] = (unsigned char)bits;
+    }
+    if (filled > 0)
+        out[bytes++] = (unsigned char)bits;
+    return bytes;
+}
+
+/* Forms and codes of all groups; returns the words. */
+static uint32_t pack_groups(const uint32_t *voxels, const uint64_t *masks, uint32_t squares,
+                            uint64_t *out)
+{
+    const uint32_t head = form_words(count_groups(masks, squares));
+    void *forms_at = out, *codes_at = out + head;
+    uint32_t *form = forms_at, bytes = 0;
+    unsigned char *codes = codes_at;
+    out[head - 1] = 0;
+    for (uint32_t i = 0; i < squares; form++) {
+        const uint32_t end = group_end(masks, squares, i);
+        *form = form_of(voxels, count_records(masks + i, end - i));
+        for (; i < end; i++) {
+            const uint32_t count = (uint32_t)__builtin_popcountll(masks[i]);
+            bytes += pack_square(voxels, count, *form, codes + bytes);
+            voxels += count;
+        }
+    }
+    memset(codes + bytes, 0, 8 * code_words(bytes) - bytes);
+    return head + code_words(bytes);
 }
 
 uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels, uint32_t count,
@@ -107,14 +255,14 @@ uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels, uint3
     if (count > 1u << 2 * f->tile_log2)
         return 0;
     uint32_t squares = pack_places(f->tile_log2, voxels, count, block, block + present);
-    uint64_t *codes = block + present + squares;
-    uint32_t words = trip_block_code_words(count, f->code_bytes);
+    uint64_t *behind = block + present + squares;
+    uint32_t words = code_words(count);
     if (squares == 0)
         return 0;
-    codes[words - 1] = 0;
-    if (!pack_codes(f->code_bytes, voxels, count, (unsigned char *)codes))
-        return 0;
-    return present + squares + words;
+    if (f->code_bytes != 1)
+        return present + squares + pack_groups(voxels, block + present, squares, behind);
+    behind[words - 1] = 0;
+    return pack_bytes(voxels, count, (unsigned char *)behind) ? present + squares + words : 0;
 }
 
 void trip_normals_pack(unsigned normal_bytes, const uint32_t *normals, uint32_t count,
@@ -126,6 +274,65 @@ void trip_normals_pack(unsigned normal_bytes, const uint32_t *normals, uint32_t 
     }
     for (uint32_t i = 0; i < count; i++)
         memcpy(out + 3 * (size_t)i, &normals[i], 3);
+}
+
+/* ---- squares ---- */
+
+uint32_t trip_block_squares(const trip_block *b, trip_square squares[TRIP_BLOCK_SQUARES_MAX])
+{
+    const bool packed = b->code_bytes != 1;
+    const uint32_t *forms = forms_of(b);
+    const unsigned char *codes = trip_block_codes(b);
+    uint32_t n = 0, first = 0, left = 0, form = 8u << 16; /* records that the group is short of */
+    for (unsigned w = 0; w < b->present_words; w++)
+        for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, n++) {
+            const uint64_t mask = b->masks[n];
+            const uint32_t count = (uint32_t)__builtin_popcountll(mask);
+            if (packed && left == 0) {
+                form = *forms++;
+                left = TRIP_GROUP_RECORDS;
+            }
+            squares[n] = (trip_square){ .mask = mask,
+                                        .number = 64 * w + (uint32_t)__builtin_ctzll(bits),
+                                        .first = first,
+                                        .count = count,
+                                        .least = form & UINT16_MAX,
+                                        .width = width_of(form),
+                                        .codes = codes };
+            left -= count < left ? count : left;
+            first += count;
+            codes += trip_square_code_bytes(&squares[n]);
+        }
+    return n;
+}
+
+/* What codes are above the least one. Four begin at a whole byte and take at most 8, which are read
+ * of a copy, whatever lies behind. */
+static void unpack_square(const trip_square *s, uint16_t above[64])
+{
+    unsigned char bytes[2 * 64 + sizeof(uint64_t)] = { 0 };
+    const uint32_t width = s->width, most = (1u << width) - 1;
+    memcpy(bytes, s->codes, trip_square_code_bytes(s));
+    for (uint32_t i = 0; i < s->count; i += 4) {
+        uint64_t four;
+        memcpy(&four, bytes + i / 4 * width / 2, sizeof four);
+        for (uint32_t k = 0; k < 4; k++)
+            above[i + k] = (uint16_t)(four >> k * width & most);
+    }
+}
+
+void trip_square_codes(const trip_square *s, uint16_t codes[64])
+{
+    if (s->width == 8 && s->least == 0) {
+        unsigned char bytes[64]; /* a copy, which compilers then know to be apart */
+        memcpy(bytes, s->codes, s->count);
+        for (uint32_t i = 0; i < s->count; i++)
+            codes[i] = bytes[i];
+        return;
+    }
+    unpack_square(s, codes);
+    for (uint32_t i = 0; i < 64; i++)
+        codes[i] = (uint16_t)(codes[i] + s->least);
 }
 
 /* ---- checking ---- */
@@ -176,13 +383,11 @@ static uint64_t bits_within(const trip_file_brick *b, uint32_t corner)
 
 static const char *check_places(const trip_block *b, const trip_file_brick *brick)
 {
-    uint32_t squares = 0, records = 0;
+    uint32_t records = 0;
     uint64_t outside = 0;
     bool empty = false;
-    for (unsigned w = 0; w < b->present_words; w++)
-        squares += (uint32_t)__builtin_popcountll(b->present[w]);
-    if (squares != b->squares)
-        return "a run's squares are not as many as its masks";
+    if (b->present_words + b->squares > b->words)
+        return "a run's squares are more than its block has room for";
     const uint64_t *mask = b->masks;
     for (unsigned w = 0; w < b->present_words; w++)
         for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, mask++) {
@@ -198,51 +403,82 @@ static const char *check_places(const trip_block *b, const trip_file_brick *bric
     return outside ? "a voxel is outside its brick's bounds" : NULL;
 }
 
-/* Smallest and largest code, as in the file. */
-static void code_range(const trip_block *b, unsigned range[2])
+/* Whether the block ends where its parts do, and packed codes have widths that there are. */
+static const char *check_length(const trip_block *b)
 {
-    unsigned lo = UINT16_MAX, hi = 0;
-    if (b->code_bytes == 1) {
-        uint8_t least = UINT8_MAX, most = 0;
-        for (uint32_t i = 0; i < b->count; i++) {
-            least = b->codes[i] < least ? b->codes[i] : least;
-            most = b->codes[i] > most ? b->codes[i] : most;
-        }
-        lo = least;
-        hi = most;
-    } else {
-        const uint16_t *codes = (const void *)b->codes; /* at a multiple of 8 bytes */
-        uint16_t least = UINT16_MAX, most = 0;
-        for (uint32_t i = 0; i < b->count; i++) {
-            least = codes[i] < least ? codes[i] : least;
-            most = codes[i] > most ? codes[i] : most;
-        }
-        lo = least;
-        hi = most;
+    const uint32_t behind = b->present_words + b->squares,
+                   groups = count_groups(b->masks, b->squares);
+    const uint32_t *forms = forms_of(b);
+    const char *why = "a run's block has not the length of its codes";
+    if (b->code_bytes == 1)
+        return behind + code_words(b->count) == b->words ? NULL : why;
+    if (behind + form_words(groups) > b->words)
+        return why;
+    for (uint32_t i = 0; i < groups; i++)
+        if (width_of(forms[i]) > 16 || width_of(forms[i]) % 2)
+            return "codes have a width that there is not";
+    const uint32_t bytes = packed_bytes(b->masks, b->squares, forms);
+    return behind + form_words(groups) + code_words(bytes) == b->words ? NULL : why;
+}
+
+static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
+{
+    const unsigned char *codes = trip_block_codes(b);
+    uint8_t least = UINT8_MAX, most = 0;
+    for (uint32_t i = 0; i < b->count; i++) {
+        least = codes[i] < least ? codes[i] : least;
+        most = codes[i] > most ? codes[i] : most;
     }
-    range[0] = lo;
-    range[1] = hi;
+    return least * CODE_STEP >= brick->code_min && most * CODE_STEP <= brick->code_max;
+}
+
+/* Codes are looked at where the width's bits could say more than the brick's range has. */
+static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
+{
+    uint16_t above[64];
+    uint32_t most = 0;
+    if (s->least < brick->code_min)
+        return false;
+    if (s->least + (1u << s->width) - 1 <= brick->code_max)
+        return true;
+    unpack_square(s, above);
+    for (uint32_t i = 0; i < s->count; i++)
+        most = above[i] > most ? above[i] : most;
+    return s->least + most <= brick->code_max;
+}
+
+static bool are_codes_within(const trip_block *b, const trip_file_brick *brick)
+{
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    if (b->code_bytes == 1)
+        return are_bytes_within(b, brick);
+    const uint32_t count = trip_block_squares(b, squares);
+    bool within = true;
+    for (uint32_t i = 0; i < count && within; i++)
+        within = is_square_within(&squares[i], brick);
+    return within;
 }
 
 const char *trip_block_check(const trip_block *b, const trip_file_brick *brick)
 {
-    unsigned range[2], step = b->code_bytes == 1 ? CODE_STEP : 1;
     const char *fault = check_places(b, brick);
+    if (!fault)
+        fault = check_length(b);
     if (fault)
         return fault;
-    code_range(b, range);
-    return range[0] * step < brick->code_min || range[1] * step > brick->code_max
-               ? "a value is outside its brick's range"
-               : NULL;
+    return are_codes_within(b, brick) ? NULL : "a value is outside its brick's range";
 }
 
 bool trip_block_is_padded(const trip_block *b)
 {
-    size_t end = 8 * (size_t)trip_block_code_words(b->count, b->code_bytes);
-    for (size_t i = (size_t)b->count * b->code_bytes; i < end; i++)
-        if (b->codes[i])
+    const unsigned char *end = (const unsigned char *)(b->present + b->words);
+    const uint32_t *forms = forms_of(b), groups = count_groups(b->masks, b->squares);
+    const bool packed = b->code_bytes != 1;
+    const uint32_t bytes = packed ? packed_bytes(b->masks, b->squares, forms) : b->count;
+    for (const unsigned char *at = trip_block_codes(b) + bytes; at < end; at++)
+        if (*at)
             return false;
-    return true;
+    return !packed || groups % 2 == 0 || forms[groups] == 0;
 }
 
 /* ---- decoding ---- */
@@ -264,17 +500,26 @@ static uint32_t square_places(uint64_t mask, uint32_t corner, uint32_t skip, uin
     return n;
 }
 
+/* Adds codes of 16 bits to the places of all records from `first` on. */
 static void add_codes(const trip_block *b, uint32_t first, uint32_t count, uint32_t *voxels)
 {
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    uint16_t codes[64];
     if (b->code_bytes == 1) {
-        const unsigned char *codes = b->codes + first;
+        const unsigned char *from = trip_block_codes(b) + first;
         for (uint32_t i = 0; i < count; i++)
-            voxels[i] |= (uint32_t)codes[i] * CODE_STEP << 16;
+            voxels[i] |= (uint32_t)from[i] * CODE_STEP << 16;
         return;
     }
-    const uint16_t *codes = (const void *)b->codes;
-    for (uint32_t i = 0; i < count; i++)
-        voxels[i] |= (uint32_t)codes[first + i] << 16;
+    const uint32_t n = trip_block_squares(b, squares);
+    for (uint32_t s = 0, done = 0; s < n && done < count; s++) {
+        const uint32_t skip = first + done - squares[s].first;
+        if (skip >= squares[s].count)
+            continue;
+        trip_square_codes(&squares[s], codes);
+        for (uint32_t i = skip; i < squares[s].count && done < count; i++)
+            voxels[done++] |= (uint32_t)codes[i] << 16;
+    }
 }
 
 void trip_block_voxels(const trip_block *b, uint32_t first, uint32_t count, uint32_t *voxels)

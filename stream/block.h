@@ -6,7 +6,13 @@
  * - masks: a word for each square that is present, ascending: a bit for each voxel by its Morton
  *   number in the square, u in the even bits and v in the odd ones; never 0;
  *
- * - codes: of code_bytes each, in the order of the bits;
+ * - forms, with code_bytes 2: how the codes of a group of squares are packed. A group is as many
+ *   squares, in order, as it takes to hold TRIP_GROUP_RECORDS records, or those that are left. A
+ *   form has 32 bits: bits 0-15 the group's least code, bits 16-20 the width, an even number of
+ *   bits from 0 to 16; padded to a multiple of 8 bytes;
+ *
+ * - codes, in the order of the bits: with code_bytes 1 a byte each; with 2 what each is above its
+ *   group's least, of that width, the lowest bit first, each square from a whole byte on;
  *
  * - padding: zeros up to a multiple of 8 bytes.
  *
@@ -25,8 +31,9 @@ enum {
     TRIP_BLOCK_PRESENT_MAX = 4, /* words */
     TRIP_BLOCK_SQUARES_MAX = 256,
     TRIP_RUN_RECORDS_MAX = 128 * 128,
-    TRIP_BLOCK_WORDS_MAX =
-        TRIP_BLOCK_PRESENT_MAX + TRIP_BLOCK_SQUARES_MAX + TRIP_RUN_RECORDS_MAX / 4,
+    TRIP_GROUP_RECORDS = 32,
+    TRIP_BLOCK_WORDS_MAX = TRIP_BLOCK_PRESENT_MAX + TRIP_BLOCK_SQUARES_MAX +
+                           TRIP_BLOCK_SQUARES_MAX / 2 + TRIP_RUN_RECORDS_MAX / 4,
 };
 
 /* What the header says of all blocks, and a list's kind of its own. */
@@ -35,12 +42,22 @@ typedef struct trip_block_form {
 } trip_block_form;
 
 typedef struct trip_block {
-    uint32_t count;   /* records */
-    uint32_t squares; /* present */
+    uint32_t count, words; /* records; length */
+    uint32_t squares;      /* present */
     unsigned present_words, code_bytes, normal_bytes;
     const uint64_t *present, *masks;
-    const unsigned char *codes, *normals; /* normals NULL without that plane */
+    const unsigned char *normals; /* NULL without that plane */
 } trip_block;
+
+/* A square of a block, and where its codes lie: they are `least` and what the width's bits say
+ * above it; 257 times that with code_bytes 1. */
+typedef struct trip_square {
+    uint64_t mask;
+    uint32_t number;       /* Morton number in the tile */
+    uint32_t first, count; /* records of the run */
+    uint32_t least, width;
+    const unsigned char *codes;
+} trip_square;
 
 static inline trip_block_form trip_block_form_of(const trip_file_header *h, trip_kind kind)
 {
@@ -53,20 +70,11 @@ static inline unsigned trip_block_present_words(unsigned tile_log2)
     return tile_log2 > 6 ? 4 : 1;
 }
 
-/* Words that codes take. */
-static inline uint32_t trip_block_code_words(uint32_t records, unsigned code_bytes)
-{
-    return (records * code_bytes + 7) / 8;
-}
-
 /* Words of the largest block of a tile. */
-static inline uint32_t trip_block_most_words(const trip_block_form *f)
-{
-    uint32_t records = 1u << 2 * f->tile_log2;
-    return trip_block_present_words(f->tile_log2) + records / 64 +
-           trip_block_code_words(records, f->code_bytes);
-}
-
+uint32_t trip_block_most_words(const trip_block_form *f);
+/* How far a block's first `words` determine where it goes on: the end of the next part of it, or of
+ * all of it, which is `words` where that is there. */
+uint32_t trip_block_end(const trip_block_form *f, const uint64_t *block, uint32_t words);
 /* Whether a run of `records`, at least 1, can have a block of `words`. */
 bool trip_block_words_fit(const trip_block_form *f, uint32_t records, uint32_t words);
 
@@ -89,6 +97,20 @@ const char *trip_block_check(const trip_block *b, const trip_file_brick *brick);
 /* What of a checked block is not checked by that, since it does no harm: whether the padding is
  * zero. */
 bool trip_block_is_padded(const trip_block *b);
+
+/* Where the codes of a checked block begin, and the bytes from there to its end, a multiple of 8.
+ */
+const unsigned char *trip_block_codes(const trip_block *b);
+size_t trip_block_codes_bytes(const trip_block *b);
+/* The squares of a checked block, in order; how many. */
+uint32_t trip_block_squares(const trip_block *b, trip_square squares[TRIP_BLOCK_SQUARES_MAX]);
+/* Bytes of a square's codes. */
+static inline uint32_t trip_square_code_bytes(const trip_square *s)
+{
+    return (s->count * s->width + 7) / 8;
+}
+/* The codes of a square as they are in the file: of 8 bits with code_bytes 1. */
+void trip_square_codes(const trip_square *s, uint16_t codes[64]);
 
 /* Records [first, first + count) of a checked block, as voxels with u and v in the tile and 16-bit
  * codes. */

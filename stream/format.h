@@ -1,4 +1,4 @@
-/* The bytes of a data set on disk, `NAME.trip/`, format version 3; FORMAT.md describes the same for
+/* The bytes of a data set on disk, `NAME.trip/`, format version 4; FORMAT.md describes the same for
  * people. Fixed width, little-endian, no pointers; reserved bits are zero and refused otherwise.
  *
  *   index.trip               header, list descriptors, slabs, bricks, runs, page checksums, text
@@ -25,7 +25,7 @@
 #include <stdint.h>
 
 #define TRIP_MAGIC "TRIPTYCH"
-#define TRIP_FORMAT_VERSION 3
+#define TRIP_FORMAT_VERSION 4
 #define TRIP_HEADER_BYTES 1024
 #define TRIP_LISTS_MAX 4096
 #define TRIP_RECORD_BYTES 4 /* of a voxel, and of a normal, in memory */

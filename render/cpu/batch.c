@@ -15,46 +15,53 @@ enum { LEAST_CHUNK = 512 };
 
 /* ---- projecting a chunk ---- */
 
-/* Whether TRIP_CPU_READABLE bytes before and behind those of a plane lie in the batch too. */
-static bool may_read_about(const trip_batch *batch, int plane, const unsigned char *at,
-                           size_t bytes)
+/* Whether TRIP_CPU_READABLE bytes behind those of a plane lie in the batch too. */
+static bool may_read_behind(const trip_batch *batch, int plane, const unsigned char *at,
+                            size_t bytes)
 {
-    size_t before = (size_t)(at - batch->planes[plane]);
-    return before >= TRIP_CPU_READABLE &&
-           before + bytes + TRIP_CPU_READABLE <= batch->plane_bytes[plane];
+    return (size_t)(at - batch->planes[plane]) + bytes + TRIP_CPU_READABLE <=
+           batch->plane_bytes[plane];
 }
 
-/* Copies what of the square's records is drawn: the codes and normals of some of its voxels. */
-static void keep_drawn(trip_cpu_worker *w, const trip_block *b, uint64_t drawn, trip_cpu_square *s)
+/* Copies what of the square's records is drawn: the codes, unpacked, and normals of some of its
+ * voxels. */
+static void keep_drawn(trip_cpu_worker *w, const trip_block *b, const trip_square *at,
+                       uint64_t drawn, trip_cpu_square *s)
 {
-    unsigned char *codes = w->codes + TRIP_CPU_READABLE, *normals = w->normals + TRIP_CPU_READABLE;
+    unsigned char *codes = w->codes, *normals = w->normals;
     const unsigned code = b->code_bytes, normal = b->normal_bytes;
+    uint16_t unpacked[64];
     uint32_t n = 0, k = 0;
+    trip_square_codes(at, unpacked);
     for (uint64_t rest = s->mask; rest; rest &= rest - 1, k++) {
         if (!(drawn & rest & -rest))
             continue;
-        memmove(codes + (size_t)n * code, s->codes + (size_t)k * code, code);
+        memcpy(codes + (size_t)n * code, &unpacked[k], code);
         if (s->normals)
             memmove(normals + (size_t)n * normal, s->normals + (size_t)k * normal, normal);
         n++;
     }
     s->mask &= drawn;
+    s->least = 0;
+    s->width = 8 * code;
     s->codes = codes;
     s->normals = s->normals ? normals : NULL;
 }
 
 trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, const trip_block *b,
-                                     const trip_run *run, const trip_cpu_walk *at)
+                                     const trip_run *run, const trip_square *at)
 {
-    size_t code = (size_t)at->first * b->code_bytes, normal = (size_t)at->first * b->normal_bytes;
-    unsigned square = at->number, code_bytes = at->count * b->code_bytes;
+    const uint32_t code_bytes = trip_square_code_bytes(at);
+    const size_t normal = (size_t)at->first * b->normal_bytes;
     const trip_list *list = trip_batch_list(r->batch, run);
     trip_cpu_square s = {
-        .u = run->u + TRIP_CPU_SQUARE * (int)trip_cpu_square_u(square),
-        .v = run->v + TRIP_CPU_SQUARE * (int)trip_cpu_square_v(square),
+        .u = run->u + TRIP_CPU_SQUARE * (int)trip_cpu_square_u(at->number),
+        .v = run->v + TRIP_CPU_SQUARE * (int)trip_cpu_square_v(at->number),
         .sheet = run->sheet,
         .mask = at->mask,
-        .codes = b->codes + code,
+        .least = at->least,
+        .width = at->width,
+        .codes = at->codes,
         .normals = b->normals ? b->normals + normal : NULL,
     };
     uint64_t drawn = trip_plan_square(r->frame->plan, list, s.sheet, s.u, s.v);
@@ -62,13 +69,13 @@ trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, cons
         s.mask = 0;
         return s;
     }
-    if (!may_read_about(r->batch, TRIP_PLANE_VOXELS, s.codes, code_bytes))
-        s.codes = memcpy(w->codes + TRIP_CPU_READABLE, s.codes, code_bytes);
+    if (!may_read_behind(r->batch, TRIP_PLANE_VOXELS, s.codes, code_bytes))
+        s.codes = memcpy(w->codes, s.codes, code_bytes);
     if (s.normals &&
-        !may_read_about(r->batch, TRIP_PLANE_NORMALS, s.normals, at->count * b->normal_bytes))
-        s.normals = memcpy(w->normals + TRIP_CPU_READABLE, s.normals, at->count * b->normal_bytes);
+        !may_read_behind(r->batch, TRIP_PLANE_NORMALS, s.normals, at->count * b->normal_bytes))
+        s.normals = memcpy(w->normals, s.normals, at->count * b->normal_bytes);
     if (s.mask & ~drawn)
-        keep_drawn(w, b, drawn, &s);
+        keep_drawn(w, b, at, drawn, &s);
     return s;
 }
 
@@ -115,11 +122,13 @@ static void project_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
 {
     const trip_block block = trip_block_of(r->batch, part->run);
     bool reversed = r->batch->pass->descending;
-    trip_cpu_walk at = trip_cpu_walk_begin(&block, reversed);
-    while (trip_cpu_walk_next(&at)) {
-        if (!trip_cpu_part_has(part, at.number))
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(&block, squares);
+    for (uint32_t i = 0; i < count; i++) {
+        const trip_square *at = &squares[reversed ? count - 1 - i : i];
+        if (!trip_cpu_part_has(part, at->number))
             continue;
-        trip_cpu_square square = trip_cpu_make_square(r, w, &block, part->run, &at);
+        trip_cpu_square square = trip_cpu_make_square(r, w, &block, part->run, at);
         if (square.mask == 0)
             continue;
         *staged = r->kernels->stage(&r->views[chunk->list], &square, reversed, &w->scratch.staged,

@@ -12,6 +12,6 @@ int trip_cpu_draw_batch(trip_cpu *r, const trip_batch *batch);
 /* A square of a run of the batch at hand, with room to be read about its bytes. Called by workers.
  */
 trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, const trip_block *b,
-                                     const trip_run *run, const trip_cpu_walk *at);
+                                     const trip_run *run, const trip_square *at);
 
 #endif

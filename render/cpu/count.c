@@ -68,11 +68,12 @@ void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
                          const trip_block *block, const trip_cpu_part *part)
 {
     const trip_cpu_view *view = &r->counted_views[chunk->list];
-    trip_cpu_walk at = trip_cpu_walk_begin(block, false);
-    while (trip_cpu_walk_next(&at)) {
-        if (!trip_cpu_part_has(part, at.number))
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(block, squares);
+    for (uint32_t i = 0; i < count; i++) {
+        if (!trip_cpu_part_has(part, squares[i].number))
             continue;
-        trip_cpu_square square = trip_cpu_make_square(r, w, block, part->run, &at);
+        trip_cpu_square square = trip_cpu_make_square(r, w, block, part->run, &squares[i]);
         if (square.mask == 0)
             continue;
         uint32_t n = r->isa->stage(view, &square, false, &w->scratch.staged, 0);

@@ -19,9 +19,9 @@ enum trip_cpu_pane_state {
 typedef struct trip_cpu_worker {
     trip_cpu_scratch scratch;
     trip_cpu_part parts[TRIP_CPU_CHUNK_RUNS]; /* of the chunk at hand */
-    /* A square's bytes, where those about them may not be read. */
-    unsigned char codes[2 * 64 + 2 * TRIP_CPU_READABLE];
-    unsigned char normals[4 * 64 + 2 * TRIP_CPU_READABLE];
+    /* A square's bytes, where those behind them may not be read. */
+    unsigned char codes[2 * 64 + TRIP_CPU_READABLE];
+    unsigned char normals[4 * 64 + TRIP_CPU_READABLE];
     trip_cpu_sorting sorting;
     /* Of a pane of a picture, where the frame goes on with its own. */
     _Alignas(64) float sum[TRIP_CHANNELS_MAX * TRIP_CPU_PANE_PIXELS];

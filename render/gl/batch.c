@@ -131,30 +131,25 @@ static uint32_t fill_squares(trip_gl_batch *b, filling *f, const trip_plan *plan
 {
     const trip_run *of = &batch->runs[run];
     const trip_block block = trip_block_of(batch, of);
-    bool reversed = batch->pass->descending;
-    size_t codes = b->voxels_start + (size_t)(block.codes - batch->planes[TRIP_PLANE_VOXELS]);
-    size_t normals = b->normals_start + of->at[TRIP_PLANE_NORMALS];
-    uint32_t numbers[TRIP_BLOCK_SQUARES_MAX], firsts[TRIP_BLOCK_SQUARES_MAX], n = 0, first = 0;
+    const bool reversed = batch->pass->descending;
+    const unsigned char *voxels = batch->planes[TRIP_PLANE_VOXELS];
+    const size_t normals = b->normals_start + of->at[TRIP_PLANE_NORMALS];
     const uint32_t before = f->position;
-    for (unsigned w = 0; w < block.present_words; w++)
-        for (uint64_t bits = block.present[w]; bits; bits &= bits - 1, n++) {
-            numbers[n] = 64 * w + (uint32_t)__builtin_ctzll(bits);
-            firsts[n] = first;
-            first += (uint32_t)__builtin_popcountll(block.masks[n]);
-        }
-    for (uint32_t k = 0; k < n; k++) {
-        uint32_t i = reversed ? n - 1 - k : k;
-        uint64_t mask = block.masks[i];
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(&block, squares);
+    for (uint32_t k = 0; k < count; k++) {
+        const trip_square *at = &squares[reversed ? count - 1 - k : k];
         const struct trip_gl_square square = {
-            .mask_low = (uint32_t)mask,
-            .mask_high = (uint32_t)(mask >> 32),
-            .codes = (uint32_t)(codes + (size_t)firsts[i] * block.code_bytes),
-            .normals = (uint32_t)(normals + (size_t)firsts[i] * block.normal_bytes),
+            .mask_low = (uint32_t)at->mask,
+            .mask_high = (uint32_t)(at->mask >> 32),
+            .codes = (uint32_t)(b->voxels_start + (size_t)(at->codes - voxels)),
+            .normals = (uint32_t)(normals + (size_t)at->first * block.normal_bytes),
+            .least_width = at->least | at->width << 16,
             .run = run,
-            .corner = corner_of(numbers[i]),
+            .corner = corner_of(at->number),
         };
-        fill_square(f, square, mask, drawn_of(plan, trip_batch_list(batch, of), of, square.corner),
-                    reversed);
+        fill_square(f, square, at->mask,
+                    drawn_of(plan, trip_batch_list(batch, of), of, square.corner), reversed);
     }
     return f->position - before;
 }

@@ -150,20 +150,22 @@ typedef struct trip_gl_sheet_end {
 #define TRIP_GL_FLOAT float
 #endif
 
-/* An 8 x 8 square of a run's block (stream/block.h); draw position i is number i % 64 of the voxels
- * of square i / 64, by the entry of its position. */
+/* A square of a run's block (trip_square of stream/block.h); draw position i is number i % 64 of the
+ * voxels of square i / 64, by the entry of its position. */
 struct trip_gl_square {
     TRIP_GL_UINT mask_low, mask_high;
     TRIP_GL_UINT codes, normals; /* bytes up to those of its first voxel */
+    TRIP_GL_UINT least_width;    /* of its codes, 16 bits each */
     TRIP_GL_UINT run;
     TRIP_GL_UINT corner; /* u and v in the tile, 16 bits each */
 };
 
-/* A square of a block to put into a sheet: where its codes begin, in bytes, and u and v of its
- * corner in the sheet, 16 bits each. */
+/* A square of a block to put into a sheet: where its codes begin, in bytes, the least of them and
+ * their width, and u and v of its corner in the sheet, 16 bits each. */
 struct trip_gl_sheet_square {
     TRIP_GL_UINT mask_low, mask_high;
     TRIP_GL_UINT codes;
+    TRIP_GL_UINT least_width;
     TRIP_GL_UINT corner;
 };
 

@@ -147,37 +147,34 @@ static void corner_of(uint32_t number, uint32_t at[2])
 static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const trip_block *block,
                              size_t codes, struct trip_gl_sheet_square *out)
 {
-    uint32_t n = 0;
-    for (unsigned w = 0; w < block->present_words; w++)
-        for (uint64_t bits = block->present[w]; bits; bits &= bits - 1, n++) {
-            uint32_t at[2];
-            uint64_t mask = block->masks[n];
-            corner_of(64 * w + (uint32_t)__builtin_ctzll(bits), at);
-            /* A square may begin before the sheet's first voxels: 16 bits go round. */
-            uint32_t u = (uint32_t)(run->u - s->first[0]) + at[0];
-            uint32_t v = (uint32_t)(run->v - s->first[1]) + at[1];
-            out[n] = (struct trip_gl_sheet_square){ .mask_low = (uint32_t)mask,
-                                                    .mask_high = (uint32_t)(mask >> 32),
-                                                    .codes = (uint32_t)codes,
-                                                    .corner = (u & 0xffff) | v << 16 };
-            codes += (size_t)__builtin_popcountll(mask) * block->code_bytes;
-        }
-    return n;
-}
-
-static size_t code_bytes(const trip_block *block)
-{
-    return ((size_t)block->count * block->code_bytes + 3) / 4 * 4;
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(block, squares);
+    for (uint32_t n = 0; n < count; n++) {
+        const trip_square *of = &squares[n];
+        uint32_t at[2];
+        corner_of(of->number, at);
+        /* A square may begin before the sheet's first voxels: 16 bits go round. */
+        uint32_t u = (uint32_t)(run->u - s->first[0]) + at[0];
+        uint32_t v = (uint32_t)(run->v - s->first[1]) + at[1];
+        out[n] = (struct trip_gl_sheet_square){
+            .mask_low = (uint32_t)of->mask,
+            .mask_high = (uint32_t)(of->mask >> 32),
+            .codes = (uint32_t)(codes + (size_t)(of->codes - squares[0].codes)),
+            .least_width = of->least | of->width << 16,
+            .corner = (u & 0xffff) | v << 16
+        };
+    }
+    return count;
 }
 
 /* Squares and codes of all runs into a slot. */
 static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
 {
-    size_t squares = 0, bytes = 0;
+    size_t squares = 0, bytes = sizeof(uint32_t); /* codes may have none, which cannot be bound */
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_block block = trip_block_of(batch, &batch->runs[i]);
         squares += block.squares;
-        bytes += code_bytes(&block);
+        bytes += trip_block_codes_bytes(&block);
     }
     size_t codes = trip_gl_ring_after(0, squares * sizeof(struct trip_gl_sheet_square));
     if (codes + bytes > trip_gl_context_limits(s->context)->storage_block_bytes)
@@ -194,8 +191,8 @@ static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
     for (size_t i = 0, at = 0; i < batch->run_count; i++) {
         const trip_block block = trip_block_of(batch, &batch->runs[i]);
         square += fill_squares(s, &batch->runs[i], &block, at, square);
-        memcpy(slot->memory + codes + at, block.codes, (size_t)block.count * block.code_bytes);
-        at += code_bytes(&block);
+        memcpy(slot->memory + codes + at, trip_block_codes(&block), trip_block_codes_bytes(&block));
+        at += trip_block_codes_bytes(&block);
     }
     return TRIP_OK;
 }

@@ -86,18 +86,16 @@ static uint32_t checksum_of(const given *g, uint32_t splats, size_t at[TRIP_PLAN
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
     const uint8_t edge = (uint8_t)((1u << g->form.tile_log2) - 1);
     const trip_file_brick tile = { .code_max = UINT16_MAX, .u_max = edge, .v_max = edge };
-    uint32_t count = trip_block_present_words(g->form.tile_log2), squares = 0;
-    if (splats > 1u << 2 * g->form.tile_log2 || g->bytes[0] - at[0] < count * sizeof *words)
-        return 0;
-    memcpy(words, g->planes[0] + at[0], count * sizeof *words);
-    for (uint32_t i = 0; i < count; i++)
-        squares += (uint32_t)__builtin_popcountll(words[i]);
-    count += squares + trip_block_code_words(splats, g->form.code_bytes);
+    const uint32_t most = trip_block_most_words(&g->form);
+    uint32_t count = 0;
+    for (uint32_t end; (end = trip_block_end(&g->form, words, count)) > count; count = end) {
+        if (end > most || g->bytes[0] - at[0] < end * sizeof *words)
+            return 0;
+        memcpy(words, g->planes[0] + at[0], end * sizeof *words);
+    }
     size_t normal_bytes = (size_t)splats * g->form.normal_bytes;
-    if (!trip_block_words_fit(&g->form, splats, count) ||
-        g->bytes[0] - at[0] < count * sizeof *words || g->bytes[1] - at[1] < normal_bytes)
+    if (!trip_block_words_fit(&g->form, splats, count) || g->bytes[1] - at[1] < normal_bytes)
         return 0;
-    memcpy(words, g->planes[0] + at[0], count * sizeof *words);
     const trip_block b =
         trip_block_make(&g->form, splats, count, words,
                         normal_bytes ? g->planes[TRIP_PLANE_NORMALS] + at[1] : NULL);

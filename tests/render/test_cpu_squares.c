@@ -4,6 +4,7 @@
 
 #include "test.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -33,16 +34,20 @@ static void fill(fixture *f, unsigned tile_log2, unsigned code_bytes, unsigned n
 {
     f->form = (trip_block_form){ tile_log2, code_bytes, normal_bytes };
     f->count = 0;
-    double share = 0;
+    double share = 0, range = 256;
     for (uint32_t i = 0; i < 1u << 2 * tile_log2; i++) {
         uint32_t u = 0, v = 0;
         for (unsigned bit = 0; bit < tile_log2; bit++) {
             u |= (i >> 2 * bit & 1) << bit;
             v |= (i >> (2 * bit + 1) & 1) << bit;
         }
-        if (i % 64 == 0)
+        if (i % 64 == 0) {
             share = test_random() * 2 - 0.5;
-        unsigned code = (unsigned)(test_random() * 256) * (code_bytes == 1 ? 257 : 255);
+            range = code_bytes == 1 ? 256 : exp2(17 * test_random());
+        }
+        double random = test_random() * range;
+        unsigned code =
+            code_bytes == 1 ? (unsigned)random * 257 : (unsigned)(65535 - fmin(random, 65535));
         if (test_random() >= share)
             continue;
         f->normals[f->count] = (uint32_t)(test_random() * 0x1p24) << (normal_bytes == 4 ? 8 : 0);
@@ -112,36 +117,46 @@ static void parts_of_a_run_hold_every_square_once(void **state)
     free(f);
 }
 
-/* Bytes of a square with room about them to be read. */
-static trip_cpu_square square_at(const fixture *f, const trip_cpu_walk *w,
-                                 unsigned char bytes[2][4 * 64 + 2 * TRIP_CPU_READABLE])
+/* A square and no more than the room behind its bytes that may be read. */
+typedef struct square_bytes {
+    unsigned char *codes, *normals;
+} square_bytes;
+
+static trip_cpu_square square_at(const fixture *f, const trip_square *at, square_bytes *bytes)
 {
     const trip_block *b = &f->block;
-    memset(bytes, 0xee, 2 * sizeof *bytes);
-    unsigned char *codes = bytes[0] + TRIP_CPU_READABLE, *normals = bytes[1] + TRIP_CPU_READABLE;
-    memcpy(codes, b->codes + (size_t)w->first * b->code_bytes, (size_t)w->count * b->code_bytes);
-    memcpy(normals, b->normals + (size_t)w->first * b->normal_bytes,
-           (size_t)w->count * b->normal_bytes);
-    return (trip_cpu_square){ .u = 1000 + 8 * trip_cpu_square_u(w->number),
-                              .v = 2000 + 8 * trip_cpu_square_v(w->number),
+    const size_t codes = trip_square_code_bytes(at), normals = (size_t)at->count * b->normal_bytes;
+    bytes->codes = malloc(codes + TRIP_CPU_READABLE);
+    bytes->normals = malloc(normals + TRIP_CPU_READABLE);
+    assert_true(bytes->codes && bytes->normals);
+    memset(bytes->codes, 0xee, codes + TRIP_CPU_READABLE);
+    memset(bytes->normals, 0xee, normals + TRIP_CPU_READABLE);
+    memcpy(bytes->codes, at->codes, codes);
+    memcpy(bytes->normals, b->normals + (size_t)at->first * b->normal_bytes, normals);
+    return (trip_cpu_square){ .u = 1000 + 8 * trip_cpu_square_u(at->number),
+                              .v = 2000 + 8 * trip_cpu_square_v(at->number),
                               .sheet = 77,
-                              .mask = w->mask,
-                              .codes = codes,
-                              .normals = normals };
+                              .mask = at->mask,
+                              .least = at->least,
+                              .width = at->width,
+                              .codes = bytes->codes,
+                              .normals = bytes->normals };
 }
 
 /* Codes below a third are transparent. */
 static void check_staged(fixture *f, const trip_cpu_kernels *kernels, const trip_cpu_view *view,
                          bool reversed)
 {
-    trip_cpu_walk w = trip_cpu_walk_begin(&f->block, reversed);
-    unsigned char bytes[2][4 * 64 + 2 * TRIP_CPU_READABLE];
-    while (trip_cpu_walk_next(&w)) {
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(&f->block, squares);
+    for (uint32_t i = 0; i < count; i++) {
+        const trip_square *of = &squares[reversed ? count - 1 - i : i];
+        square_bytes bytes;
         uint32_t filled = (uint32_t)(test_random() * (TRIP_CPU_STAGED - 64)), before = filled;
-        trip_cpu_square square = square_at(f, &w, bytes);
+        trip_cpu_square square = square_at(f, of, &bytes);
         uint32_t end = kernels->stage(view, &square, reversed, &f->staged, filled);
-        for (uint32_t k = 0; k < w.count; k++) {
-            uint32_t at = reversed ? w.first + w.count - 1 - k : w.first + k;
+        for (uint32_t k = 0; k < of->count; k++) {
+            uint32_t at = reversed ? of->first + of->count - 1 - k : of->first + k;
             uint32_t voxel = f->voxels[at];
             if (trip_voxel_code(voxel) < 22000)
                 continue;
@@ -154,6 +169,8 @@ static void check_staged(fixture *f, const trip_cpu_kernels *kernels, const trip
             filled++;
         }
         assert_true(end == filled && filled >= before);
+        free(bytes.codes);
+        free(bytes.normals);
     }
 }
 

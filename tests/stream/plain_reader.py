@@ -65,7 +65,7 @@ def read_header(index):
         index,
         0,
     )
-    if at != 328 or header["version"] != 3 or header["header_bytes"] != 1024:
+    if at != 328 or header["version"] != 4 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
     if header["reserved"] or header["reserved_scale"] or any(index[328:1024]):
         fail("index.trip", 328, "reserved bytes")
@@ -173,6 +173,33 @@ def read_plane(folder, index, header, a_list, plane):
     return data
 
 
+def group_forms(masks, data):
+    """Of each square, the form of its group; and how many bytes the forms take."""
+    group_of, count, records = [], 0, 32
+    for mask in masks:
+        if records >= 32:
+            count, records = count + 1, 0
+        records += bin(mask).count("1")
+        group_of.append(count - 1)
+    forms = struct.unpack_from(f"<{count}I", data)
+    return [forms[group] for group in group_of], -(-count // 2) * 8
+
+
+def packed_codes(name, at, masks, data):
+    """Codes of 16 bits, and where they end."""
+    forms, start = group_forms(masks, data)
+    codes = []
+    for mask, form in zip(masks, forms):
+        count, width = bin(mask).count("1"), form >> 16
+        if width > 16 or width % 2:
+            fail(name, at, "width")
+        end = start + -(-count * width // 8)
+        bits = int.from_bytes(data[start:end], "little")
+        codes += [(form & 65535) + (bits >> width * n & (1 << width) - 1) for n in range(count)]
+        start = end
+    return codes, start
+
+
 def decode_block(header, code_bytes, name, at, block, count):
     """(u, v, code) of the records of a block."""
     words = 4 if header["tile_log2"] == 7 else 1
@@ -180,19 +207,20 @@ def decode_block(header, code_bytes, name, at, block, count):
     squares = [n for n in range(64 * words) if present >> n & 1]
     if present >> (1 << 2 * (header["tile_log2"] - 3)):
         fail(name, at, "squares outside the tile")
+    masks = struct.unpack_from(f"<{len(squares)}Q", block, 8 * words)
     places = []
-    for n, square in enumerate(squares):
-        (mask,) = struct.unpack_from("<Q", block, 8 * (words + n))
+    for square, mask in zip(squares, masks):
         if mask == 0:
             fail(name, at, "empty mask")
         places += [place(64 * square + bit) for bit in range(64) if mask >> bit & 1]
-    codes_at, size = 8 * (words + len(squares)), code_bytes
-    end = codes_at + size * count
-    if len(places) != count or len(block) != (end + 7) // 8 * 8 or any(block[end:]):
+    data = block[8 * (words + len(squares)) :]
+    if code_bytes == 1:
+        codes, end = [257 * code for code in data[:count]], count
+    else:
+        codes, end = packed_codes(name, at, masks, data)
+    if len(places) != count or len(data) != (end + 7) // 8 * 8 or any(data[end:]):
         fail(name, at, "block")
-    codes = numpy.frombuffer(block, "u1" if size == 1 else "<u2", count=count, offset=codes_at)
-    factor = 257 if size == 1 else 1
-    return [(u, v, factor * int(code)) for (u, v), code in zip(places, codes)]
+    return [(u, v, code) for (u, v), code in zip(places, codes)]
 
 
 def wide_gradients(normals, full):

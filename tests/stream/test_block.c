@@ -95,9 +95,30 @@ static void a_block_has_the_bytes_that_the_format_says(void **state)
     assert_int_equal(trip_block_pack(&(trip_block_form){ 4, 1, 0 }, voxels, 3, block), 4);
     assert_true(block[0] == 9 && block[1] == 2 && block[2] == (UINT64_C(1) << 63 | 2));
     assert_true(block[3] == 0xff0201);
-    assert_int_equal(trip_block_pack(&(trip_block_form){ 7, 2, 0 }, voxels, 3, block), 7);
+    assert_int_equal(trip_block_pack(&(trip_block_form){ 7, 2, 0 }, voxels, 3, block), 8);
     assert_true(block[0] == 9 && !block[1] && !block[2] && !block[3] && block[4] == 2);
-    assert_true(block[6] == UINT64_C(0xffff02020101));
+    assert_true(block[6] == 0x100101);                 /* one group: from 257 on, 16 bits */
+    assert_true(block[7] == UINT64_C(0xfefe01010000)); /* above 257 */
+}
+
+/* A square of 32 records is a group, whose codes span 31; what is left is another, of one code. */
+static void codes_are_packed_by_groups_of_squares(void **state)
+{
+    uint32_t voxels[33];
+    uint64_t block[TRIP_BLOCK_WORDS_MAX], codes[3] = { 0 };
+    (void)state;
+    for (uint32_t i = 0; i < 32; i++) {
+        const uint32_t above = 5 * i % 32;
+        voxels[i] = trip_voxel_pack((i & 1) | (i >> 1 & 2) | (i >> 2 & 4),
+                                    (i >> 1 & 1) | (i >> 2 & 2), 1000 + above);
+        for (uint32_t bit = 0; bit < 6; bit++) /* 5 would do, but widths are even */
+            codes[(6 * i + bit) / 64] |= (uint64_t)(above >> bit & 1) << (6 * i + bit) % 64;
+    }
+    voxels[32] = trip_voxel_pack(8, 8, 7);
+    assert_int_equal(trip_block_pack(&(trip_block_form){ 4, 2, 0 }, voxels, 33, block), 7);
+    assert_true(block[0] == 9 && block[1] == UINT32_MAX && block[2] == 1);
+    assert_true(block[3] == (UINT64_C(7) << 32 | 6 << 16 | 1000));
+    assert_memory_equal(block + 4, codes, sizeof codes);
 }
 
 static void what_is_no_run_is_not_packed(void **state)
@@ -118,19 +139,50 @@ static void what_is_no_run_is_not_packed(void **state)
 
 static void a_number_of_words_fits_where_squares_can_hold_the_records(void **state)
 {
-    const trip_block_form f = { 4, 2, 0 }; /* a word of presence, four squares, four codes a word */
+    const trip_block_form bytes = { 4, 1, 0 }; /* a word of presence, four squares */
+    const trip_block_form f = { 4, 2, 0 };     /* two groups a word, of no bits to four codes */
     (void)state;
+    assert_false(trip_block_words_fit(&bytes, 0, 2));
+    assert_false(trip_block_words_fit(&bytes, 1, 2));
+    assert_true(trip_block_words_fit(&bytes, 1, 3));
+    assert_false(trip_block_words_fit(&bytes, 1, 4)); /* two squares for one record */
+    assert_true(trip_block_words_fit(&bytes, 64, 1 + 1 + 8));
+    assert_false(trip_block_words_fit(&bytes, 65, 1 + 1 + 9));
+    assert_true(trip_block_words_fit(&bytes, 65, 1 + 4 + 9));
+    assert_false(trip_block_words_fit(&bytes, 65, 1 + 5 + 9));
+    assert_true(trip_block_words_fit(&bytes, 256, 1 + 4 + 32));
+    assert_false(trip_block_words_fit(&bytes, 257, 1 + 4 + 33));
+    assert_false(trip_block_words_fit(&bytes, UINT32_MAX, 65535));
     assert_false(trip_block_words_fit(&f, 0, 2));
-    assert_false(trip_block_words_fit(&f, 1, 2));
-    assert_true(trip_block_words_fit(&f, 1, 3));
-    assert_false(trip_block_words_fit(&f, 1, 4)); /* two squares for one record */
-    assert_true(trip_block_words_fit(&f, 64, 1 + 1 + 16));
-    assert_false(trip_block_words_fit(&f, 65, 1 + 1 + 17));
-    assert_true(trip_block_words_fit(&f, 65, 1 + 4 + 17));
-    assert_false(trip_block_words_fit(&f, 65, 1 + 5 + 17));
-    assert_true(trip_block_words_fit(&f, 256, 1 + 4 + 64));
-    assert_false(trip_block_words_fit(&f, 257, 1 + 4 + 65));
+    assert_false(trip_block_words_fit(&f, 1, 1 + 1));
+    assert_true(trip_block_words_fit(&f, 1, 1 + 1 + 1));
+    assert_true(trip_block_words_fit(&f, 1, 1 + 1 + 1 + 1));
+    assert_false(trip_block_words_fit(&f, 1, 1 + 1 + 1 + 2)); /* two words for one code */
+    assert_false(trip_block_words_fit(&f, 65, 1 + 2));
+    assert_true(trip_block_words_fit(&f, 65, 1 + 2 + 1));
+    assert_true(trip_block_words_fit(&f, 256, 1 + 4 + 2 + 64));
+    assert_false(trip_block_words_fit(&f, 256, 1 + 4 + 2 + 65));
+    assert_false(trip_block_words_fit(&f, 257, 1 + 4 + 2 + 64));
     assert_false(trip_block_words_fit(&f, UINT32_MAX, 65535));
+}
+
+/* As much as the words determine, part after part, until all is there. */
+static void how_far_a_block_goes_follows_from_what_is_there(void **state)
+{
+    (void)state;
+    for (unsigned log2 = 4; log2 <= 7; log2++)
+        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++) {
+            const run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, 0.1, log2);
+            uint64_t *part = calloc(r->words, sizeof *part); /* of which no more is read */
+            uint32_t words = 0, end, parts = 0;
+            assert_non_null(part);
+            for (; (end = trip_block_end(&r->form, part, words)) > words; words = end, parts++) {
+                assert_true(end <= r->words);
+                memcpy(part + words, r->block + words, (end - words) * sizeof *part);
+            }
+            assert_true(words == r->words && parts == 2 + code_bytes);
+            free(part);
+        }
 }
 
 static void expect_fault(const run *r, const char *why)
@@ -176,6 +228,9 @@ static void masks_that_do_not_agree_with_the_run_are_found(void **state)
     (void)state;
     run *r = make_run(f, 0.3, 3);
     r->block[0] &= r->block[0] - 1;
+    expect_fault(r, "as many voxels");
+    r = make_run(f, 0, 3);
+    r->block[0] = UINT64_MAX;
     expect_fault(r, "squares");
     r = make_run(f, 0.3, 3);
     r->block[1] &= r->block[1] - 1;
@@ -197,6 +252,40 @@ static void masks_that_do_not_agree_with_the_run_are_found(void **state)
     expect_fault(r, "outside its brick's bounds");
 }
 
+/* The first form of a block of 64 squares. */
+static uint32_t *first_form(run *r)
+{
+    return (uint32_t *)(r->block + 1 + 64);
+}
+
+/* Widths that there are not, or by which codes do not end where the block does; and codes beyond 16
+ * bits. */
+static void forms_that_lead_astray_are_found(void **state)
+{
+    const trip_block_form f = { 6, 2, 0 };
+    const uint32_t widths[] = { 15, 1, 17, 18, 32, 65535 };
+    (void)state;
+    for (int i = 0; i < 6; i++) {
+        run *r = make_run(f, 1.1, 3);
+        *first_form(r) = widths[i] << 16;
+        expect_fault(r, "width");
+    }
+    for (uint32_t width = 0; width < 16; width += 2) {
+        run *r = make_run(f, 1.1, 3);
+        *first_form(r) = width << 16;
+        expect_fault(r, "length");
+    }
+    run *r = make_run(f, 1.1, 3);
+    r->words--;
+    expect_fault(r, "length");
+    r->words = 1 + 64; /* ends before the forms */
+    expect_fault(r, "length");
+    r = make_run(f, 1.1, 3);
+    r->brick.code_max = UINT16_MAX;
+    *first_form(r) += UINT16_MAX - (*first_form(r) & UINT16_MAX);
+    expect_fault(r, "outside its brick's range");
+}
+
 static void padding_that_is_not_zero_is_found(void **state)
 {
     (void)state;
@@ -207,6 +296,11 @@ static void padding_that_is_not_zero_is_found(void **state)
     assert_true(trip_block_is_padded(&b));
     r->block[r->words - 1] |= UINT64_C(1) << 63;
     assert_false(trip_block_is_padded(&b));
+    r = make_run((trip_block_form){ 4, 2, 0 }, 0, 5); /* one group, of one code */
+    const trip_block one = block_of(r);
+    assert_true(r->words == 3 && trip_block_is_padded(&one));
+    r->block[2] |= UINT64_C(1) << 32;
+    assert_false(trip_block_is_padded(&one));
 }
 
 static void normals_are_packed_and_decoded(void **state)
@@ -232,10 +326,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_packed_is_decoded_from_any_record_on),
         cmocka_unit_test(a_block_has_the_bytes_that_the_format_says),
+        cmocka_unit_test(codes_are_packed_by_groups_of_squares),
         cmocka_unit_test(what_is_no_run_is_not_packed),
         cmocka_unit_test(a_number_of_words_fits_where_squares_can_hold_the_records),
+        cmocka_unit_test(how_far_a_block_goes_follows_from_what_is_there),
         cmocka_unit_test(records_outside_their_brick_are_found),
         cmocka_unit_test(masks_that_do_not_agree_with_the_run_are_found),
+        cmocka_unit_test(forms_that_lead_astray_are_found),
         cmocka_unit_test(padding_that_is_not_zero_is_found),
         cmocka_unit_test(normals_are_packed_and_decoded),
     };

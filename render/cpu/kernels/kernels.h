@@ -121,10 +121,11 @@ typedef struct trip_cpu_view {
 
 /* A square of 8 x 8 voxels of a run, as its block (block.h) has it. */
 typedef struct trip_cpu_square {
-    int u, v, sheet; /* of its corner */
-    uint64_t mask;   /* which voxels are there, by Morton number */
-    /* Of the first voxel; normals are read only with shading. TRIP_CPU_READABLE bytes before and
-     * behind those of the square may be read too. */
+    int u, v, sheet;       /* of its corner */
+    uint64_t mask;         /* which voxels are there, by Morton number */
+    uint32_t least, width; /* of its codes, as trip_square has them */
+    /* Of the first voxel; normals are read only with shading. TRIP_CPU_READABLE bytes behind those
+     * of the square may be read too. */
     const unsigned char *codes, *normals;
 } trip_cpu_square;
 

@@ -22,26 +22,24 @@
 
 /* ---- staging: squares of voxels to lanes ---- */
 
-/* Room for loads that begin before the first byte or end behind the last. */
-enum { PLACES_ROOM = 64 + 2 * V };
+/* Room for loads and stores that end behind the last byte. */
+enum { PLACES_ROOM = 64 + V };
 
-/* The places of a mask's voxels in the square, u + 8 v, from places[V] on; returns their number. */
+/* The places of a mask's voxels in the square, u + 8 v; returns their number. */
 INLINE uint32_t places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
 {
-    uint8_t *out = places + V;
     uint32_t n = 0;
     for (unsigned i = 0; i < 8; i++) {
         unsigned byte = mask >> 8 * i & 255;
         uint64_t row = (i & 1) << 4 | (i & 2) << 1 | (i & 4) << 3;
         uint64_t eight = trip_cpu_places[byte] + row * UINT64_C(0x0101010101010101);
-        memcpy(out + n, &eight, sizeof eight);
+        memcpy(places + n, &eight, sizeof eight);
         n += (uint32_t)__builtin_popcount(byte);
     }
     return n;
 }
 
 typedef uint8_t bytes_of_lanes __attribute__((vector_size(V)));
-typedef uint16_t halves_of_lanes __attribute__((vector_size(2 * V)));
 
 INLINE vi load_bytes(const uint8_t *from)
 {
@@ -50,14 +48,15 @@ INLINE vi load_bytes(const uint8_t *from)
     return __builtin_convertvector(b, vi);
 }
 
-/* 16-bit codes from entry `at` on. */
-INLINE vi load_codes(const unsigned char *codes, unsigned code_bytes, int32_t at)
+/* The codes of V voxels from number `at` on, a multiple of V; those of one byte as 16 bits. Lanes
+ * behind the square's voxels are codes too. */
+INLINE vi load_codes(const trip_cpu_square *square, unsigned code_bytes, int32_t at)
 {
-    halves_of_lanes h;
     if (code_bytes == 1)
-        return load_bytes(codes + at) * 257;
-    memcpy(&h, codes + 2 * at, sizeof h);
-    return __builtin_convertvector(h, vi);
+        return load_bytes(square->codes + at) * 257;
+    const uint32_t width = square->width;
+    return (vi_load_bits(square->codes + (size_t)at * width / 8, width) + (int32_t)square->least) &
+           UINT16_MAX;
 }
 
 INLINE vi load_normals(const unsigned char *normals, unsigned normal_bytes, int32_t at)
@@ -73,10 +72,10 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
     const float *extinction = &view->table[0].extinction;
     const vi u = vi_set(square->u), v = vi_set(square->v), sheet = vi_set(square->sheet);
     uint8_t places[PLACES_ROOM];
-    int32_t count = (int32_t)places_of(square->mask, places);
-    for (int32_t i = 0; i < count; i += V) {
-        int32_t at = reversed ? count - V - i : i;
-        vi place = load_bytes(places + V + at), code = load_codes(square->codes, code_bytes, at);
+    int32_t count = (int32_t)places_of(square->mask, places), all = (count + V - 1) / V * V;
+    for (int32_t i = 0; i < all; i += V) {
+        int32_t at = reversed ? all - V - i : i;
+        vi place = load_bytes(places + at), code = load_codes(square, code_bytes, at);
         vi normal = vi_set(0);
         if (view->shading || view->flattens)
             normal = load_normals(square->normals, view->normal_bytes, at);
@@ -86,8 +85,9 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
             normal = vi_reverse(normal);
         }
         vm seen = v_gt(v_gather(extinction, code * 4), v_set(0));
-        if (count - i < V)
-            seen = vm_and(seen, vm_first((unsigned)(count - i)));
+        if (count - at < V)
+            seen = vm_and(seen, reversed ? vm_last((unsigned)(count - at))
+                                         : vm_first((unsigned)(count - at)));
         vi_store_packed(staged->u + filled, seen, u + (place & 7));
         vi_store_packed(staged->v + filled, seen, v + v_shift_right(place, 3));
         vi_store_packed(staged->sheet + filled, seen, sheet);

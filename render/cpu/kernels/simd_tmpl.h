@@ -254,6 +254,11 @@ INLINE vm vm_first(unsigned lanes)
     return (vm)(lanes >= 16 ? 0xffffu : (1u << lanes) - 1);
 }
 
+INLINE vm vm_last(unsigned lanes)
+{
+    return (vm)~vm_first(V - lanes);
+}
+
 /* (a & low bits) | bits of b elsewhere */
 INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
 {
@@ -395,6 +400,11 @@ INLINE vm vm_first(unsigned lanes)
     for (unsigned i = 0; i < V; i++)
         m[i] = i < lanes ? -1 : 0;
     return m;
+}
+
+INLINE vm vm_last(unsigned lanes)
+{
+    return ~vm_first(V - lanes);
 }
 
 INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
@@ -754,6 +764,65 @@ INLINE vi vi_load_3_bytes(const unsigned char *from)
     for (int i = 0; i < V; i++)
         a[i] = from[3 * i] | from[3 * i + 1] << 8 | from[3 * i + 2] << 16;
     return a;
+#endif
+}
+
+/* Of numbers of `width` bits that follow one another, the bytes that each of four begins in and the
+ * three behind it, and the bits before it there. */
+#define FIRST_BYTE(i, width) (uint8_t)((i) * (width) / 8)
+#define FOUR_BYTES(i, width)                                                                       \
+    FIRST_BYTE(i, width), FIRST_BYTE(i, width) + 1, FIRST_BYTE(i, width) + 2,                      \
+        FIRST_BYTE(i, width) + 3
+#define BITS_OF(width)                                                                             \
+    {                                                                                              \
+        { FOUR_BYTES(0, width), FOUR_BYTES(1, width), FOUR_BYTES(2, width),                        \
+          FOUR_BYTES(3, width) },                                                                  \
+        {                                                                                          \
+            0, 1 * (width) % 8, 2 * (width) % 8, 3 * (width) % 8                                   \
+        }                                                                                          \
+    }
+
+typedef struct bits_of_width {
+    uint8_t bytes[16];
+    uint32_t before[4];
+} bits_of_width;
+
+static const bits_of_width bits_of_widths[9] = { BITS_OF(0),  BITS_OF(2),  BITS_OF(4),
+                                                 BITS_OF(6),  BITS_OF(8),  BITS_OF(10),
+                                                 BITS_OF(12), BITS_OF(14), BITS_OF(16) };
+
+/* V numbers of `width` bits, even and at most 16; up to 16 bytes behind them are read. */
+INLINE vi vi_load_bits(const unsigned char *from, uint32_t width)
+{
+    const bits_of_width *of = &bits_of_widths[width / 2];
+    const vi most = vi_set((1 << width) - 1);
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+    const uint32_t four = width / 2;
+    __m512i bits = _mm512_castsi128_si512(_mm_loadu_si128((const void *)from));
+    bits = _mm512_inserti32x4(bits, _mm_loadu_si128((const void *)(from + four)), 1);
+    bits = _mm512_inserti32x4(bits, _mm_loadu_si128((const void *)(from + 2 * four)), 2);
+    bits = _mm512_inserti32x4(bits, _mm_loadu_si128((const void *)(from + 3 * four)), 3);
+    bits =
+        _mm512_shuffle_epi8(bits, _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)of->bytes)));
+    return (vi)_mm512_srlv_epi32(
+               bits, _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)of->before))) &
+           most;
+#elif TRIP_SIMD == TRIP_SIMD_AVX2
+    __m256i bits = _mm256_castsi128_si256(_mm_loadu_si128((const void *)from));
+    bits = _mm256_inserti128_si256(bits, _mm_loadu_si128((const void *)(from + width / 2)), 1);
+    bits = _mm256_shuffle_epi8(
+        bits, _mm256_broadcastsi128_si256(_mm_loadu_si128((const void *)of->bytes)));
+    return (vi)_mm256_srlv_epi32(
+               bits, _mm256_broadcastsi128_si256(_mm_loadu_si128((const void *)of->before))) &
+           most;
+#else
+    vi a;
+    for (int i = 0; i < V; i++) {
+        int32_t word;
+        memcpy(&word, from + of->bytes[4 * i], sizeof word);
+        a[i] = word >> of->before[i];
+    }
+    return a & most;
 #endif
 }
 

@@ -203,20 +203,16 @@ static const uint16_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PL
 
 /* The codes of a square's records, stretched and biased; by copies, which compilers then know to be
  * apart. */
-static void square_codes(const trip_cpu_walk *at, const trip_block *b, trip_cpu_codes stretch,
+static void square_codes(const trip_square *at, unsigned code_bytes, trip_cpu_codes stretch,
                          int16_t out[64])
 {
-    unsigned char narrow[64];
     uint16_t codes[64];
     int16_t biased[64];
     const uint32_t count = at->count;
-    if (b->code_bytes == 1) {
-        memcpy(narrow, b->codes + at->first, count);
+    trip_square_codes(at, codes);
+    if (code_bytes == 1)
         for (uint32_t i = 0; i < count; i++)
-            codes[i] = (uint16_t)(257 * narrow[i]);
-    } else {
-        memcpy(codes, b->codes + 2 * (size_t)at->first, 2 * (size_t)count);
-    }
+            codes[i] = (uint16_t)(257 * codes[i]);
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
@@ -225,12 +221,12 @@ static void square_codes(const trip_cpu_walk *at, const trip_block *b, trip_cpu_
     memcpy(out, biased, sizeof *out * count);
 }
 
-static void decode_square(int16_t *to, const trip_cpu_walk *at, const trip_block *b,
+static void decode_square(int16_t *to, const trip_square *at, unsigned code_bytes,
                           trip_cpu_codes stretch)
 {
     int16_t codes[64];
     const int16_t *next = codes;
-    square_codes(at, b, stretch, codes);
+    square_codes(at, code_bytes, stretch, codes);
     if (at->mask == UINT64_MAX) { /* two voxels in a row follow one another */
         for (unsigned i = 0; i < 64; i += 2)
             memcpy(to + places[i], codes + i, 2 * sizeof *codes);
@@ -251,16 +247,17 @@ static int32_t raster_of(const trip_cpu_store *s, const trip_cpu_sheet *sheet, i
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run)
 {
-    trip_cpu_walk at = trip_cpu_walk_begin(block, false);
-    while (trip_cpu_walk_next(&at)) {
-        int u = run->u + 8 * trip_cpu_square_u(at.number);
-        int v = run->v + 8 * trip_cpu_square_v(at.number);
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(block, squares);
+    for (const trip_square *at = squares; at < squares + count; at++) {
+        int u = run->u + 8 * trip_cpu_square_u(at->number);
+        int v = run->v + 8 * trip_cpu_square_v(at->number);
         int32_t in = raster_of(s, sheet, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
         u &= TRIP_CPU_RASTER - 1;
         v &= TRIP_CPU_RASTER - 1;
         if (in) /* what is occluded has none, nor has what lies beyond the grid */
-            decode_square(s->voxels[in].codes + v * TRIP_CPU_RASTER_STRIDE + u, &at, block,
-                          s->codes);
+            decode_square(s->voxels[in].codes + v * TRIP_CPU_RASTER_STRIDE + u, at,
+                          block->code_bytes, s->codes);
     }
 }
 
