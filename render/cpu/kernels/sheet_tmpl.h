@@ -13,6 +13,9 @@
 #include "shade.h"
 #include "sheet.h"
 
+/* Of a group: whole vectors of slices. */
+#define SLICES_ROOM (TRIP_CPU_SEGMENTS + V)
+
 /* Weights of a cell's corners are whole numbers of this sum. */
 #define WEIGHT_LOG2 14
 
@@ -35,9 +38,9 @@ INLINE vf exp_of_minus(vf x)
 /* The rays' positions at the slices, in voxels from the first of the grid of rasters. */
 typedef struct pane_path {
     /* A lane is at base + first + along * its slope + its shift, `along` from the eye. */
-    int32_t base[2][TRIP_CPU_SEGMENTS + 1];
-    float first[2][TRIP_CPU_SEGMENTS + 1];
-    float along[TRIP_CPU_SEGMENTS + 1];
+    int32_t base[2][SLICES_ROOM];
+    float first[2][SLICES_ROOM];
+    float along[SLICES_ROOM];
     float
         near[TRIP_CPU_SEGMENTS + 1]; /* the same from the first slice: exact however far the eye */
     float sheets[TRIP_CPU_SEGMENTS]; /* of a segment, how long it is */
@@ -239,42 +242,60 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
 
 /* ---- which segments may show ---- */
 
-/* A box of voxels of the grid, inclusive. */
-typedef struct voxel_box {
-    int32_t lo[2], hi[2];
-} voxel_box;
+INLINE vi vi_within(vi a, int32_t least, int32_t most)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+    return (vi)_mm256_min_epi32(_mm256_max_epi32((__m256i)a, _mm256_set1_epi32(least)),
+                                _mm256_set1_epi32(most));
+#else
+    vi low = (vi)(a < least), high = (vi)(a > most);
+    return (a & ~(low | high)) | (low & least) | (high & most);
+#endif
+}
 
-/* The beam of a patch or pane, from the pane's corner's ray. */
-typedef struct patch_beam {
-    float4 slope[2], shift[2];
-    bool whole; /* and voxels lie evenly */
-} patch_beam;
+/* Rounded down; at most 2^28 from 0. */
+INLINE vi v_floor_within(vf a)
+{
+    a = v_max(v_min(a, v_set(0x1p28f)), v_set(-0x1p28f));
+    vi whole = v_truncate(a);
+    return whole + (vi)(v_from_int(whole) > a);
+}
 
-static patch_beam patch_beam_of(const trip_cpu_sheet_view *view, const pane_path *path, int x,
-                                int y, int size)
+/* Bounds of rays, from the pane's corner's: least and greatest along u and v. */
+typedef struct ray_bounds {
+    float slope[2][2], shift[2][2];
+    bool whole; /* all of the rays are drawn, but for those outside the picture, and voxels lie
+                   evenly */
+} ray_bounds;
+
+INLINE void include(float a, bool first, float bounds[2])
+{
+    bounds[0] = first || a < bounds[0] ? a : bounds[0];
+    bounds[1] = first || a > bounds[1] ? a : bounds[1];
+}
+
+static ray_bounds bounds_of_beam(const trip_cpu_sheet_view *view, const pane_path *path, int x,
+                                 int y, int size)
 {
     beam b = beam_of(view, x, y, size);
-    patch_beam p = { .whole = b.whole && !is_uneven(path) };
+    ray_bounds r = { .whole = b.whole && !is_uneven(path) };
     for (int a = 0; a < 2; a++)
         for (int i = 0; i < 4; i++) {
-            p.slope[a][i] = (float)(b.slope[i][a] - path->slope[a]);
-            p.shift[a][i] = (float)(b.start[i][a] - path->start[a]);
+            include((float)(b.slope[i][a] - path->slope[a]), i == 0, r.slope[a]);
+            include((float)(b.start[i][a] - path->start[a]), i == 0, r.shift[a]);
         }
-    return p;
+    return r;
 }
 
-INLINE float least_of_4(float4 a)
-{
-    float x = a[0] < a[1] ? a[0] : a[1], y = a[2] < a[3] ? a[2] : a[3];
-    return x < y ? x : y;
-}
+/* A box of cells of the grid, inclusive. */
+typedef struct cell_box {
+    int32_t lo[2], hi[2];
+} cell_box;
 
-INLINE int32_t floor_within(float a)
-{
-    a = a < -0x1p28f ? -0x1p28f : a > 0x1p28f ? 0x1p28f : a;
-    int32_t whole = (int32_t)a;
-    return whole - ((float)whole > a);
-}
+/* What rays meet at the slices: of the grid, of which the outermost rasters are absent. */
+typedef struct cell_boxes {
+    int32_t lo[2][SLICES_ROOM], hi[2][SLICES_ROOM];
+} cell_boxes;
 
 /* In voxels of the grid, and a cell at most beyond that. */
 static double index_of(const pane_path *path, int a, double place)
@@ -284,53 +305,66 @@ static double index_of(const pane_path *path, int a, double place)
     return within(index, -1, last) - path->corner[a];
 }
 
-/* What a beam passes at a slice: a little more for what single precision makes of it. */
-INLINE voxel_box beam_box(const pane_path *path, const patch_beam *b, unsigned n)
+static vi uneven_cells(const pane_path *path, int a, unsigned n, vf at)
 {
-    voxel_box box;
-    for (int a = 0; a < 2; a++) {
-        float4 at = b->slope[a] * path->along[n] + b->shift[a];
-        float low = least_of_4(at), high = -least_of_4(-at), first = path->first[a][n];
-        float more = 0x1p-6f + 0x1p-20f * (fabsf(low) + fabsf(high));
-        low = first + low - more;
-        high = first + high + more;
-        if (is_uneven(path)) {
-            box.lo[a] = (int32_t)floor(index_of(path, a, path->base[a][n] + (double)low));
-            box.hi[a] = (int32_t)floor(index_of(path, a, path->base[a][n] + (double)high));
-            continue;
+    vi cells;
+    for (int i = 0; i < V; i++)
+        cells[i] = (int32_t)floor(index_of(path, a, path->base[a][n + i] + (double)at[i]));
+    return cells;
+}
+
+/* The cells of a vector of slices, each at a place from pane_path.base. */
+INLINE vi cells_from_base(const pane_path *path, int a, unsigned n, vf at)
+{
+    if (is_uneven(path))
+        return uneven_cells(path, a, n, at);
+    return vi_load(path->base[a] + n) + v_floor_within(at);
+}
+
+/* At the slices from first to last, a vector at a time: a little more for what single precision
+ * makes of it. */
+static void find_boxes(const trip_cpu_group *g, const pane_path *path, const ray_bounds *r,
+                       unsigned first, unsigned last, cell_boxes *out)
+{
+    const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
+    for (unsigned n = first / V * V; n <= last; n += V)
+        for (int a = 0; a < 2; a++) {
+            const vf along = v_load(path->along + n), corner = v_load(path->first[a] + n);
+            vf one = along * v_set(r->slope[a][0]), other = along * v_set(r->slope[a][1]);
+            vf low = v_min(one, other) + v_set(r->shift[a][0]);
+            vf high = v_max(one, other) + v_set(r->shift[a][1]);
+            vf more = v_fma(v_abs(low) + v_abs(high), v_set(0x1p-20f), v_set(0x1p-6f));
+            vi lo = cells_from_base(path, a, n, corner + low - more);
+            vi hi = cells_from_base(path, a, n, corner + high + more);
+            vi_store(out->lo[a] + n, vi_within(lo, 0, size[a] - 1));
+            vi_store(out->hi[a] + n, vi_within(hi, 0, size[a] - 1));
         }
-        box.lo[a] = path->base[a][n] + floor_within(low);
-        box.hi[a] = path->base[a][n] + floor_within(high);
+}
+
+INLINE int32_t lesser_of(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+INLINE int32_t greater_of(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+INLINE cell_box both_boxes(const cell_boxes *of, unsigned m, unsigned n)
+{
+    cell_box box;
+    for (int a = 0; a < 2; a++) {
+        box.lo[a] = lesser_of(of->lo[a][m], of->lo[a][n]);
+        box.hi[a] = greater_of(of->hi[a][m], of->hi[a][n]);
     }
     return box;
 }
 
-INLINE voxel_box both_boxes(voxel_box a, voxel_box b)
-{
-    for (int i = 0; i < 2; i++) {
-        a.lo[i] = b.lo[i] < a.lo[i] ? b.lo[i] : a.lo[i];
-        a.hi[i] = b.hi[i] > a.hi[i] ? b.hi[i] : a.hi[i];
-    }
-    return a;
-}
-
-/* Cut to the grid; false where nothing is left. */
-INLINE bool cut_box(const trip_cpu_group *g, voxel_box *box)
-{
-    const int32_t last[2] = { g->across * TRIP_CPU_RASTER - 1, g->down * TRIP_CPU_RASTER - 1 };
-    for (int i = 0; i < 2; i++) {
-        box->lo[i] = box->lo[i] < 0 ? 0 : box->lo[i];
-        box->hi[i] = box->hi[i] > last[i] ? last[i] : box->hi[i];
-    }
-    return box->lo[0] <= box->hi[0] && box->lo[1] <= box->hi[1];
-}
-
 /* Whether some square of the box is in a set, or not in it where `flip` is UINT64_MAX and not 0. */
 INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uint64_t flip,
-                           voxel_box box)
+                           cell_box box)
 {
-    if (!cut_box(g, &box))
-        return false;
     int32_t u0 = box.lo[0] >> 3, u1 = box.hi[0] >> 3, v1 = box.hi[1] >> 3;
     for (int32_t v = box.lo[1] >> 3; v <= v1; v++) {
         const uint64_t *row = squares + (size_t)(v >> 3) * (size_t)g->across;
@@ -346,34 +380,31 @@ INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uin
     return false;
 }
 
-/* Whether some square of the box may show. */
-INLINE bool squares_show(const trip_cpu_group *g, const uint64_t *visible, voxel_box box)
+/* Whether some cell of a raster may show, of those from lo to hi that are in it. */
+INLINE bool raster_shows(const trip_cpu_cells *raster, const int32_t lo[2], const int32_t hi[2])
 {
-    return some_square_of(g, visible, 0, box);
+    const int32_t last = TRIP_CPU_RASTER - 1, end = lesser_of(hi[1], last);
+    uint64_t some = 0;
+    for (int32_t row = greater_of(lo[1], 0); row <= end; row++)
+        some |= raster->rows[row];
+    return some & UINT64_MAX << greater_of(lo[0], 0) &
+           UINT64_MAX >> (last - lesser_of(hi[0], last));
 }
 
 /* Whether some cell of the box may show. */
-INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, voxel_box box)
+INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 {
-    if (!cut_box(g, &box))
-        return false;
-    for (int32_t v = box.lo[1] >> 3; v <= box.hi[1] >> 3; v++) {
-        int32_t top = v == box.lo[1] >> 3 ? box.lo[1] & 7 : 0;
-        int32_t bottom = v == box.hi[1] >> 3 ? box.hi[1] & 7 : 7;
-        uint64_t rows = UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
-        for (int32_t u = box.lo[0] >> 3; u <= box.hi[0] >> 3; u++) {
-            size_t at = (size_t)(v >> 3) * (size_t)g->across + (size_t)(u >> 3);
-            int square = (v & 7) * TRIP_CPU_SQUARES_ACROSS + (u & 7);
-            if (!(g->visible[segment][at] >> square & 1))
-                continue;
-            int32_t left = u == box.lo[0] >> 3 ? box.lo[0] & 7 : 0;
-            int32_t right = u == box.hi[0] >> 3 ? box.hi[0] & 7 : 7;
-            uint64_t columns =
-                (0xffu << left & 0xffu >> (7 - right)) * UINT64_C(0x0101010101010101);
-            if (g->cells[segment][at].squares[square] & rows & columns)
+    const int log2 = TRIP_CPU_RASTER_LOG2;
+    for (int32_t v = box.lo[1] >> log2; v <= box.hi[1] >> log2; v++)
+        for (int32_t u = box.lo[0] >> log2; u <= box.hi[0] >> log2; u++) {
+            const size_t at = (size_t)v * (size_t)g->across + (size_t)u;
+            const int32_t u0 = u << log2, v0 = v << log2;
+            if (g->visible[segment][at] &&
+                raster_shows(&g->cells[segment][at],
+                             (const int32_t[2]){ box.lo[0] - u0, box.lo[1] - v0 },
+                             (const int32_t[2]){ box.hi[0] - u0, box.hi[1] - v0 }))
                 return true;
         }
-    }
     return false;
 }
 
@@ -390,65 +421,63 @@ typedef struct patch_path {
     int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
 } patch_path;
 
-static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned n, bool whole,
-                        voxel_box box, patch_path *area)
+/* In outermost rasters there is nothing, and rays may lie anywhere beyond. */
+INLINE bool is_within(const trip_cpu_group *g, int32_t u, int32_t v)
 {
-    const voxel_box all = box;
+    return u > 0 && v > 0 && u < g->across - 1 && v < g->down - 1;
+}
+
+static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned n, bool whole,
+                        const cell_boxes *boxes, patch_path *area)
+{
+    const int log2 = TRIP_CPU_RASTER_LOG2;
+    const int32_t u = boxes->lo[0][n] >> log2, v = boxes->lo[1][n] >> log2;
     area->raster[n] = -1;
-    if (!whole || !cut_box(g, &box))
+    if (!whole || u != boxes->hi[0][n] >> log2 || v != boxes->hi[1][n] >> log2 ||
+        !is_within(g, u, v))
         return;
-    bool one = true;
-    for (int a = 0; a < 2; a++)
-        one &= box.lo[a] == all.lo[a] && box.hi[a] == all.hi[a] &&
-               box.lo[a] >> TRIP_CPU_RASTER_LOG2 == box.hi[a] >> TRIP_CPU_RASTER_LOG2;
-    if (!one)
-        return;
-    int32_t u = box.lo[0] >> TRIP_CPU_RASTER_LOG2, v = box.lo[1] >> TRIP_CPU_RASTER_LOG2;
     area->raster[n] = g->slices[n].rasters[v * g->across + u] * RASTER_NUMBERS;
-    area->within[n] = (path->base[1][n] - (v << TRIP_CPU_RASTER_LOG2)) * TRIP_CPU_RASTER_STRIDE +
-                      path->base[0][n] - (u << TRIP_CPU_RASTER_LOG2);
+    area->within[n] =
+        (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
 
 /* The segments in which a square that the pane meets may show. */
 static uint64_t pane_segments(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                               const pane_path *path, int x, int y)
 {
-    const patch_beam b = patch_beam_of(view, path, x, y, TRIP_CPU_PANE);
+    const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
     uint64_t segments = 0;
-    voxel_box last = beam_box(path, &b, 0), end = beam_box(path, &b, g->segments);
-    if (!squares_show(g, g->some, both_boxes(last, end)))
+    cell_boxes boxes;
+    find_boxes(g, path, &r, 0, g->segments, &boxes);
+    if (!some_square_of(g, g->some, 0, both_boxes(&boxes, 0, g->segments)))
         return 0;
-    for (unsigned n = 0; n < g->segments; n++) {
-        voxel_box next = beam_box(path, &b, n + 1);
-        if (squares_show(g, g->visible[n], both_boxes(last, next)))
+    for (unsigned n = 0; n < g->segments; n++)
+        if (some_square_of(g, g->visible[n], 0, both_boxes(&boxes, n, n + 1)))
             segments |= UINT64_C(1) << n;
-        last = next;
-    }
     return segments;
 }
 
-/* Of the pane's segments. */
+/* Of the pane's segments, of which there are some. */
 static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const pane_path *path, uint64_t segments, int x, int y, patch_path *area)
 {
-    const patch_beam b = patch_beam_of(view, path, x, y, 8);
+    const ray_bounds r = bounds_of_beam(view, path, x, y, 8);
+    unsigned placed = UINT32_MAX;
+    cell_boxes boxes;
+    find_boxes(g, path, &r, (unsigned)__builtin_ctzll(segments),
+               64 - (unsigned)__builtin_clzll(segments), &boxes);
     area->segments = area->gaps = 0;
-    unsigned passed = UINT32_MAX, placed = UINT32_MAX;
-    voxel_box last, next = { 0 };
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
-        last = passed == n ? next : beam_box(path, &b, n);
-        next = beam_box(path, &b, n + 1);
-        passed = n + 1;
-        const voxel_box both = both_boxes(last, next);
-        if (!cells_show(g, n, both))
+        const cell_box box = both_boxes(&boxes, n, n + 1);
+        if (!cells_show(g, n, box))
             continue;
         area->segments |= UINT64_C(1) << n;
-        if (g->without_halo && some_square_of(g, g->whole[n], UINT64_MAX, both))
+        if (g->without_halo && some_square_of(g, g->whole[n], UINT64_MAX, box))
             area->gaps |= UINT64_C(1) << n;
         if (placed != n)
-            find_raster(g, path, n, b.whole, last, area);
-        find_raster(g, path, n + 1, b.whole, next, area);
+            find_raster(g, path, n, r.whole, &boxes, area);
+        find_raster(g, path, n + 1, r.whole, &boxes, area);
         placed = n + 1;
     }
 }
@@ -471,17 +500,6 @@ typedef struct stamp_rays {
     vf to_eye[3];
     light_way way; /* of a light that is not at a place */
 } stamp_rays;
-
-INLINE vi vi_within(vi a, int32_t least, int32_t most)
-{
-#if TRIP_SIMD == TRIP_SIMD_AVX2
-    return (vi)_mm256_min_epi32(_mm256_max_epi32((__m256i)a, _mm256_set1_epi32(least)),
-                                _mm256_set1_epi32(most));
-#else
-    vi low = (vi)(a < least), high = (vi)(a > most);
-    return (a & ~(low | high)) | (low & least) | (high & most);
-#endif
-}
 
 INLINE vm vi_is_0(vi a)
 {
@@ -1214,7 +1232,7 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
                            float *pixels)
 {
-    pane_path path;
+    pane_path path = { .base = { { 0 } } };
     uint64_t open = 0;
     find_path(view, g, x, y, &path);
     const uint64_t segments = pane_segments(view, g, &path, x, y);

@@ -51,9 +51,9 @@ typedef struct trip_cpu_square_ranges {
     uint64_t whole; /* squares whose cells have all of their corners at the sheet */
 } trip_cpu_square_ranges;
 
-/* The cells of a raster's squares, between a sheet and the next: a bit each, row by row. */
+/* The cells of a raster that may show between a sheet and the next: a bit each, a word a row. */
 typedef struct trip_cpu_cells {
-    uint64_t squares[64];
+    uint64_t rows[TRIP_CPU_RASTER];
 } trip_cpu_cells;
 
 /* The rasters of a sheet or slice in a grid of `across` x `down`, the outermost of which are
@@ -87,7 +87,7 @@ typedef struct trip_cpu_group {
     unsigned segments;
     trip_cpu_slice slices[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
     /* For each segment and raster of the grid: the squares in which some cell may show, and those
-     * cells, of squares that have some. */
+     * cells, of rasters that have some. */
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
     const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];
     /* The squares whose cells all have their eight corners, and the rasters of the sheets that

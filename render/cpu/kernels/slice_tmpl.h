@@ -243,19 +243,20 @@ static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, 
                         int16_t least, int16_t most, trip_cpu_cells *out)
 {
     const vh lowest = vh_set(least), highest = vh_set(most);
+    *out = (trip_cpu_cells){ .rows = { 0 } };
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         int square = __builtin_ctzll(rest), at = square_first(square);
-        uint64_t seen = 0;
+        int u = square % TRIP_CPU_SQUARES_ACROSS * 8;
+        uint64_t *row = out->rows + square / TRIP_CPU_SQUARES_ACROSS * 8;
         extremes above = extremes_at(from->codes + at, to->codes + at);
         for (int v = 0; v < 8; v++) {
             at += TRIP_CPU_RASTER_STRIDE;
             extremes below = extremes_at(from->codes + at, to->codes + at);
             vh low = vh_min(above.least, below.least), high = vh_max(above.most, below.most);
             vh out_of = (vh)(low > highest) | (vh)(lowest > high) | vh_is_missing(low);
-            seen |= (uint64_t)(~vh_bits(out_of) & 0xff) << (8 * v);
+            row[v] |= (uint64_t)(~vh_bits(out_of) & 0xff) << u;
             above = below;
         }
-        out->squares[square] = seen;
     }
 }
 

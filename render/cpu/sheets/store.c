@@ -7,9 +7,9 @@
 #include "cpu/squares.h"
 #include "report.h"
 
+/* Of a raster's squares, a bit each; COLUMN_0 also the first cell of each square of a row. */
 #define COLUMN_0 UINT64_C(0x0101010101010101)
 #define COLUMN_7 UINT64_C(0x8080808080808080)
-#define ROW_0 UINT64_C(0xff)
 
 static const size_t raster_bytes = sizeof(trip_cpu_voxels);
 
@@ -348,59 +348,67 @@ void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, 
         work[i].sheet->prepared = true;
 }
 
-/* Which cells of a square may show, one by one: of functions that show here and there. */
-static uint64_t square_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
-                             int square)
+/* Whether the cell may show whose first voxel is `first`: of functions that show here and there. */
+static bool cell_shows(const trip_cpu_function *f, const int16_t *from, const int16_t *to,
+                       int first)
 {
-    const trip_cpu_store *s = job->store;
-    const int16_t *of[2] = { raster_at(s, w->sheet, at)->codes, raster_at(s, w->other, at)->codes };
-    int first = square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_RASTER_STRIDE +
-                square % TRIP_CPU_SQUARES_ACROSS * 8;
-    uint64_t cells = 0;
-    for (int i = 0; i < 64; i++) {
-        int16_t least = INT16_MAX, most = INT16_MIN;
-        for (int k = 0; k < 8; k++) {
-            int16_t code = of[k >> 2][first + (i / 8 + (k >> 1 & 1)) * TRIP_CPU_RASTER_STRIDE +
-                                      i % 8 + (k & 1)];
-            least = code < least ? code : least;
-            most = code > most ? code : most;
-        }
-        if (least != TRIP_CPU_CODE_MISSING && trip_cpu_function_shows(job->function, least, most))
-            cells |= UINT64_C(1) << i;
+    int16_t least = INT16_MAX, most = INT16_MIN;
+    for (int k = 0; k < 8; k++) {
+        int16_t code =
+            (k >> 2 ? to : from)[first + (k >> 1 & 1) * TRIP_CPU_RASTER_STRIDE + (k & 1)];
+        least = code < least ? code : least;
+        most = code > most ? code : most;
     }
-    return cells;
+    return least != TRIP_CPU_CODE_MISSING && trip_cpu_function_shows(f, least, most);
 }
 
-/* Finds the cells that may show, of squares that do: those that then have some. */
-static uint64_t cells_of(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
-                         uint64_t squares)
+static void find_cells_one_by_one(const trip_cpu_function *f, const trip_cpu_voxels *from,
+                                  const trip_cpu_voxels *to, uint64_t squares, trip_cpu_cells *out)
+{
+    for (int v = 0; v < TRIP_CPU_RASTER; v++) {
+        out->rows[v] = 0;
+        for (int u = 0; u < TRIP_CPU_RASTER; u++)
+            if (squares >> (v / 8 * TRIP_CPU_SQUARES_ACROSS + u / 8) & 1 &&
+                cell_shows(f, from->codes, to->codes, v * TRIP_CPU_RASTER_STRIDE + u))
+                out->rows[v] |= UINT64_C(1) << u;
+    }
+}
+
+/* Finds the cells that may show, of squares that do. */
+static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
+                       uint64_t squares)
 {
     const trip_cpu_store *s = job->store;
     const trip_cpu_function *f = job->function;
+    const trip_cpu_voxels *from = raster_at(s, w->sheet, at), *to = raster_at(s, w->other, at);
     trip_cpu_cells *cells = &w->sheet->cells[at];
     if (f->in_a_row)
-        s->kernels->sheet_cells(raster_at(s, w->sheet, at), raster_at(s, w->other, at), squares,
-                                f->first_visible, f->last_visible, cells);
-    for (uint64_t rest = squares; rest; rest &= rest - 1) {
-        int square = __builtin_ctzll(rest);
-        if (!f->in_a_row)
-            cells->squares[square] = square_cells(job, w, at, square);
-        if (!cells->squares[square])
-            squares &= ~(UINT64_C(1) << square);
-    }
-    return squares;
+        s->kernels->sheet_cells(from, to, squares, f->first_visible, f->last_visible, cells);
+    else
+        find_cells_one_by_one(f, from, to, squares, cells);
+}
+
+/* The squares of a row of them that have some of the given cells, those of a row of cells. */
+static uint64_t squares_with(uint64_t cells)
+{
+    cells |= cells >> 4;
+    cells |= cells >> 2;
+    cells |= cells >> 1;
+    return ((cells & COLUMN_0) * UINT64_C(0x0102040810204080)) >> 56;
 }
 
 /* A segment moves less than a voxel along u and v: both of its ends lie in cells that touch the one
  * that it meets, or in that, and their corners from one voxel before it to two behind. */
-static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells, uint64_t squares)
+static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells)
 {
-    for (uint64_t rest = squares; rest; rest &= rest - 1) {
-        const uint64_t bit = rest & -rest, seen = cells->squares[__builtin_ctzll(rest)];
-        edges[TRIP_CPU_LEFT] |= seen & COLUMN_0 ? bit : 0;
-        edges[TRIP_CPU_RIGHT] |= seen & (COLUMN_7 | COLUMN_7 >> 1) ? bit : 0;
-        edges[TRIP_CPU_ABOVE] |= seen & ROW_0 ? bit : 0;
-        edges[TRIP_CPU_BELOW] |= seen & (ROW_0 << 56 | ROW_0 << 48) ? bit : 0;
+    for (int i = 0; i < TRIP_CPU_RASTER; i += 8) {
+        const uint64_t *row = cells->rows + i, last = row[6] | row[7];
+        const uint64_t all = row[0] | row[1] | row[2] | row[3] | row[4] | row[5] | last;
+        edges[TRIP_CPU_ALL] |= squares_with(all) << i;
+        edges[TRIP_CPU_LEFT] |= squares_with(all & COLUMN_0) << i;
+        edges[TRIP_CPU_RIGHT] |= squares_with(all & (COLUMN_7 | COLUMN_7 >> 1)) << i;
+        edges[TRIP_CPU_ABOVE] |= squares_with(row[0]) << i;
+        edges[TRIP_CPU_BELOW] |= squares_with(last) << i;
     }
 }
 
@@ -417,10 +425,14 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
                 visible |= UINT64_C(1) << i;
         }
     w->sheet->whole[at] = w->other->rasters[at] ? a->whole & b->whole : 0;
-    w->sheet->visible[at] = visible = visible ? cells_of(job, w, at, visible) : 0;
-    for (int k = 0; k < TRIP_CPU_EDGES; k++)
-        edges[k] = k == TRIP_CPU_ALL || w->everywhere ? visible : 0;
-    find_edges(edges, &w->sheet->cells[at], w->everywhere ? 0 : visible);
+    memset(edges, 0, sizeof w->sheet->edges[at]);
+    if (visible) {
+        find_cells(job, w, at, visible);
+        find_edges(edges, &w->sheet->cells[at]);
+    }
+    w->sheet->visible[at] = edges[TRIP_CPU_ALL];
+    for (int k = 0; k < TRIP_CPU_EDGES && w->everywhere; k++)
+        edges[k] = edges[TRIP_CPU_ALL];
 }
 
 /* Some squares of a raster, by an edge, and those beside them along u. */

@@ -28,7 +28,7 @@ typedef struct trip_cpu_sheet {
     int32_t *rasters;               /* the number of each in the pool; 0: absent */
     trip_cpu_square_ranges *ranges; /* of sheets; of rasters that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
-    trip_cpu_cells *cells;          /* those of squares that are visible */
+    trip_cpu_cells *cells;          /* those cells, of rasters with visible squares */
     uint64_t *whole;                /* squares whose cells all have eight corners */
     trip_cpu_edges *edges;          /* these squares by edges */
     uint64_t *needed;               /* squares of which segments that may show take voxels */
