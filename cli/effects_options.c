@@ -24,9 +24,10 @@ int trip_option_light(const char *text, triptych_settings *s)
 
 int trip_option_effects(const char *text, triptych_settings *s)
 {
-    static const char *const names[] = { "shadows", "occlusion", "cueing", "auto", "none", NULL };
-    static const int bits[] = { TRIPTYCH_SHADOWS, TRIPTYCH_OCCLUSION, TRIPTYCH_CUEING,
-                                TRIPTYCH_EFFECTS_AUTO, 0 };
+    static const char *const names[] = { "shadows", "occlusion", "cueing", "emission",
+                                         "auto",    "none",      NULL };
+    static const int bits[] = { TRIPTYCH_SHADOWS,  TRIPTYCH_OCCLUSION,    TRIPTYCH_CUEING,
+                                TRIPTYCH_EMISSION, TRIPTYCH_EFFECTS_AUTO, 0 };
     int effects = 0, count = 0;
     bool none = false;
     for (const char *rest = text; rest; count++) {
@@ -67,7 +68,7 @@ int trip_option_light_cells(const char *text, triptych_settings *s)
     return trip_option_integer("--light-cells", text, 8, 1024, &s->light_cells);
 }
 
-int trip_option_check_effects(const triptych_settings *s)
+int trip_option_check_effects(const triptych_settings *s, bool heat)
 {
     const triptych_settings usual = triptych_default_settings();
     const int some = s->effects | (s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : 0);
@@ -75,8 +76,15 @@ int trip_option_check_effects(const triptych_settings *s)
         return trip_option_fail("--anisotropy", "applies to --effects shadows");
     if (s->cueing != usual.cueing && !(some & TRIPTYCH_CUEING))
         return trip_option_fail("--cueing", "applies to --effects cueing");
-    if (s->light_cells != usual.light_cells && !(some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION)))
-        return trip_option_fail("--light-cells", "applies to --effects shadows and occlusion");
+    if (s->light_cells != usual.light_cells &&
+        !(some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION)))
+        return trip_option_fail("--light-cells",
+                                "applies to --effects shadows, occlusion and emission");
+    if (s->effects & TRIPTYCH_EMISSION && !heat)
+        return trip_option_fail("--effects", "emission is of heat, which lies in a data set of its "
+                                             "own: triptych render --emission HEAT.trip");
+    if (heat && !(some & TRIPTYCH_EMISSION))
+        return trip_option_fail("--emission", "applies to --effects emission and auto");
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
         return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "
                                              "its direction, --light X,Y,Z, or place, --light "

@@ -3,6 +3,8 @@
 #ifndef TRIP_EFFECTS_OPTIONS_H
 #define TRIP_EFFECTS_OPTIONS_H
 
+#include <stdbool.h>
+
 #include "triptych.h"
 
 /* Rows of a command's table; the keys are KEY_EFFECTS, KEY_ANISOTROPY, KEY_CUEING and
@@ -20,7 +22,8 @@
       "auto|none|LIST",                                                                            \
       0,                                                                                           \
       "shadows (with scattering in fog, and a --light), occlusion (of light from everywhere), "    \
-      "cueing (of depth), joined by commas; auto: those that the kind of data calls for, which "   \
+      "emission (of heat), cueing (of depth), joined by commas; auto: those that the kind of "     \
+      "data calls for, which "                                                                     \
       "for measurements are none; cpu, reference and integral only (default: none)",               \
       group },                                                                                     \
         { "anisotropy",                                                                            \
@@ -37,8 +40,8 @@
           group },                                                                                 \
     {                                                                                              \
         "light-cells", KEY_LIGHT_CELLS, "N", 0,                                                    \
-            "Cells of the lattice of shadows and occlusion along the volume's longest side, 8 to " \
-            "1024 (default: 128)",                                                                 \
+            "Cells of the lattice of shadows, occlusion and emission along the longest side, 8 "   \
+            "to 1024 (default: 128)",                                                              \
             group                                                                                  \
     }
 
@@ -47,7 +50,7 @@ int trip_option_effects(const char *text, triptych_settings *s);
 int trip_option_anisotropy(const char *text, triptych_settings *s);
 int trip_option_cueing(const char *text, triptych_settings *s);
 int trip_option_light_cells(const char *text, triptych_settings *s);
-/* What does not go together, once all is parsed. */
-int trip_option_check_effects(const triptych_settings *s);
+/* What does not go together, once all is parsed; whether a data set of heat is given, too. */
+int trip_option_check_effects(const triptych_settings *s, bool heat);
 
 #endif

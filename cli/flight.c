@@ -63,7 +63,7 @@ static int open_data(pilot *p)
                                    .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
                                    .name = o->input });
     if (!status)
-        status = library_add(p->t, o->more, o->more_count);
+        status = library_add(p->t, o->more, o->more_count, o->heat);
     if (!status)
         status = triptych_set_function(p->t, &o->function);
     if (!status)

@@ -39,12 +39,12 @@ int library_create(triptych **out, trip_progress *progress)
     return 0;
 }
 
-int library_add(triptych *t, const char *const *paths, int count)
+int library_add(triptych *t, const char *const *paths, int count, const char *heat)
 {
     int status = 0;
     for (int i = 0; i < count && !status; i++)
         status = triptych_add(t, paths[i]);
-    return status;
+    return status || !heat ? status : triptych_set_heat(t, heat);
 }
 
 int library_set_function_quietly(triptych *t, const triptych_function *function)

@@ -10,8 +10,8 @@
 /* `progress`, which may be NULL, outlives the context. 0, or a reported failure. */
 int library_create(triptych **out, trip_progress *progress);
 
-/* Data sets that are drawn with the one that is open. */
-int library_add(triptych *t, const char *const *paths, int count);
+/* Data sets that are drawn with the one that is open, and that of its heat, NULL: none. */
+int library_add(triptych *t, const char *const *paths, int count, const char *heat);
 
 /* The function without its warnings; failures are reported. */
 int library_set_function_quietly(triptych *t, const triptych_function *function);

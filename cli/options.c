@@ -99,6 +99,18 @@ int trip_option_integer(const char *option, const char *text, int lo, int hi, in
     return 0;
 }
 
+int trip_option_range(const char *option, const char *text, double *lo, double *hi)
+{
+    char first[64] = "";
+    const char *colon = strchr(text, ':');
+    if (!colon || colon - text >= (int)sizeof first)
+        return trip_option_fail(option, "takes two values with a colon between them, LO:HI");
+    memcpy(first, text, (size_t)(colon - text));
+    if (!trip_text_to_double(first, lo) || !trip_text_to_double(colon + 1, hi) || *lo >= *hi)
+        return trip_option_fail(option, "takes two numbers, the smaller first, as LO:HI");
+    return 0;
+}
+
 int trip_option_numbers(const char *option, const char *text, int least, int most, double *out,
                         int *count)
 {

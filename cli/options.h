@@ -16,6 +16,8 @@ int trip_option_integer(const char *option, const char *text, int lo, int hi, in
 /* Comma-separated numbers: at least `least`, at most `most`; *count is how many there were. */
 int trip_option_numbers(const char *option, const char *text, int least, int most, double *out,
                         int *count);
+/* "LO:HI", the smaller first. */
+int trip_option_range(const char *option, const char *text, double *lo, double *hi);
 /* Sizes with binary suffixes: "256M". */
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
 /* A picture of 1 to 99999 pixels a side: "1024x768". */

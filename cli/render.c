@@ -72,7 +72,7 @@ static int open_data(drawing *d, const char *path)
                                              .keep_pages = d->sequence.frames > 1,
                                              .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
                                              .name = o->input });
-    return status ? status : library_add(d->t, o->more, o->more_count);
+    return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
 /* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the

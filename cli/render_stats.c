@@ -230,8 +230,8 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
     if (frame.effects) {
         cJSON *effects = cJSON_AddArrayToObject(root, "effects");
-        static const char *const names[] = { "shadows", "occlusion", "cueing" };
-        for (int i = 0; i < 3; i++)
+        static const char *const names[] = { "shadows", "occlusion", "cueing", NULL, "emission" };
+        for (int i = 0; i < 5; i++)
             if (frame.effects >> i & 1)
                 cJSON_AddItemToArray(effects, cJSON_CreateString(names[i]));
     }
@@ -309,6 +309,10 @@ int render_stats_explain_cost(triptych *t, FILE *out)
         fprintf(out, "light       %s read in %.1f ms, worked out in %.1f ms; %s of memory\n",
                 trip_format_bytes(frame.light_bytes_read, bytes), frame.light_gather_ms,
                 frame.light_sweep_ms, trip_format_bytes(frame.light_memory_bytes, memory));
+    if (frame.heat_memory_bytes)
+        fprintf(out, "heat        %s read in %.1f ms; %s of memory\n",
+                trip_format_bytes(frame.heat_bytes_read, bytes), frame.heat_ms,
+                trip_format_bytes(frame.heat_memory_bytes, memory));
     fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame.ms, frame.wait_ms, frame.draw_ms, frame.merge_ms);

@@ -251,7 +251,7 @@ int trip_command_serve(int argc, char **argv)
     if (!status)
         status = choose_settings(&o);
     if (!status)
-        status = trip_option_check_effects(&o.params.settings);
+        status = trip_option_check_effects(&o.params.settings, false);
     if (!status)
         status = check_input(&o.params);
     return trip_exit_status(status ? status : trip_serve_run(&o.params));

@@ -45,20 +45,6 @@ static const struct argp_option option_table[] = {
 
 static const char *const formats[] = { "tf", "paraview", "vp", "vp.json", "slicer", "vtk", NULL };
 
-static int parse_range(options *o, const char *text)
-{
-    char lo[64] = "";
-    const char *colon = strchr(text, ':');
-    if (!colon || colon - text >= (int)sizeof lo)
-        return trip_option_fail("--range", "takes two values with a colon between them, LO:HI");
-    memcpy(lo, text, (size_t)(colon - text));
-    o->range = true;
-    if (!trip_text_to_double(lo, &o->lo) || !trip_text_to_double(colon + 1, &o->hi) ||
-        o->lo >= o->hi)
-        return trip_option_fail("--range", "takes two numbers, the smaller first, as LO:HI");
-    return 0;
-}
-
 static int check(options *o)
 {
     static const char *const actions[] = { "list", "show", "convert", NULL };
@@ -91,7 +77,8 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         o->tf = arg;
         return 0;
     case KEY_RANGE:
-        return parse_range(o, arg);
+        o->range = true;
+        return trip_option_range("--range", arg, &o->lo, &o->hi);
     case KEY_FORMAT:
         return trip_option_choice("--format", arg, formats, &o->format);
     case KEY_FORCE:

@@ -311,7 +311,7 @@ static int parse(view_options *o, int argc, char **argv)
     };
     o->params.settings = triptych_default_settings();
     int status = trip_options_parse(&argp, argc, argv, o);
-    return status ? status : trip_option_check_effects(&o->params.settings);
+    return status ? status : trip_option_check_effects(&o->params.settings, false);
 }
 
 /* A data set that cannot be opened is found here, before there is a window. */

@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <stdio.h>
 
+#include "emission.h"
 #include "frame.h"
 #include "field.h"
 #include "image_file.h"
@@ -55,9 +56,11 @@ struct triptych {
     double bytes_per_ms;     /* that bounded frames took; 0: none was drawn */
     bool kernel_warned;      /* that the halo is short for it */
     bool classify_auto;      /* settings.classify is what that has come to for a frame */
+    double kelvin[2];        /* of emission, as set */
     int effects;             /* as set; frames have what they come to in drawn_settings */
     const char *why_effects; /* of those that auto chose or left; NULL: nothing was left to it */
     trip_light_map *light;   /* of frames with shadows or occlusion; NULL: none was drawn of late */
+    trip_emission *heat;     /* NULL: none is given */
     bool normalise;          /* colours by opacity, as set */
     bool
         counting; /* frames count exactly, and draw what is occluded too; the reader is for that: */
@@ -113,10 +116,11 @@ trip_clip trip_context_clip(const triptych *t);
 void trip_context_drop_renderer(triptych *t);
 /* The effects of a frame that is planned: sets them in drawn_settings. */
 int trip_context_choose_effects(triptych *t);
-/* Begins what light reaches, for the frame that is planned; drops it where nothing depends on it.
- */
+/* Begins what light reaches, and heat, for the frame that is planned; drops them where nothing
+ * depends on them. */
 int trip_context_begin_light(triptych *t);
 void trip_context_drop_light(triptych *t);
+void trip_context_drop_heat(triptych *t);
 /* An effect a line: whether it runs and why. */
 void trip_context_explain_effects(const triptych *t, FILE *out);
 /* What the frame has come to, once its picture is complete. */

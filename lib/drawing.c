@@ -171,7 +171,7 @@ static size_t finer_bytes(const triptych *t)
 /* Of a frame that is planned, before the reader takes its part of what is left. */
 static int take_finer(triptych *t)
 {
-    if (trip_effects_light(&t->drawn_settings.effects))
+    if (trip_effects_light(&t->drawn_settings.effects) || t->drawn_settings.effects.emission)
         t->share_above = 0;
     if (t->share_above > 0)
         t->finer = trip_budget_take(t->session.budget, finer_bytes(t));
@@ -397,6 +397,7 @@ static int start(triptych *t)
         .table = t->session.table,
         .field = t->source,
         .light = t->light,
+        .emission = t->drawn_settings.effects.emission ? t->heat : NULL,
         .count = t->counting,
         .progress = t->show ? show_progress : NULL,
         .progress_user = t,

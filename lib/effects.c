@@ -42,6 +42,14 @@ static int choose(triptych *t)
     }
 }
 
+static int check_heat(const triptych *t, int effects)
+{
+    if (effects & TRIPTYCH_EMISSION && !t->heat)
+        return trip_fail(TRIP_USAGE, "render", "emission",
+                         "there is no data set of heat that it could be of");
+    return 0;
+}
+
 int trip_context_choose_effects(triptych *t)
 {
     trip_effects *e = &t->drawn_settings.effects;
@@ -50,11 +58,15 @@ int trip_context_choose_effects(triptych *t)
     if (t->effects & TRIPTYCH_EFFECTS_AUTO) {
         status = session_read_text(&t->session);
         effects |= status ? 0 : choose(t);
+        effects |= t->heat ? TRIPTYCH_EMISSION : 0;
     }
     if (t->settings.show == TRIP_SHOW_MERGE) /* nothing of the volume is */
         effects = 0;
+    if (!status)
+        status = check_heat(t, effects);
     e->shadows = effects & TRIPTYCH_SHADOWS;
     e->occlusion = effects & TRIPTYCH_OCCLUSION;
+    e->emission = effects & TRIPTYCH_EMISSION;
     e->cueing = effects & TRIPTYCH_CUEING ? t->settings.effects.cueing : 0;
     return status;
 }
@@ -65,7 +77,44 @@ void trip_context_drop_light(triptych *t)
     t->light = NULL;
 }
 
-int trip_context_begin_light(triptych *t)
+int triptych_set_heat(triptych *t, const char *path)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = trip_context_check_idle(t, true);
+    if (status)
+        return trip_context_leave(before, status);
+    trip_context_drop_heat(t);
+    return trip_context_leave(before,
+                              path ? trip_emission_create(&t->heat, path, t->session.budget) : 0);
+}
+
+void trip_context_drop_heat(triptych *t)
+{
+    trip_emission_destroy(t->heat);
+    t->heat = NULL;
+}
+
+/* The integral has each voxel's. */
+static int begin_heat(triptych *t)
+{
+    const trip_effects *e = &t->drawn_settings.effects;
+    const triptych_resources *r = &t->resources;
+    if (!e->emission) {
+        if (t->heat)
+            trip_emission_drop(t->heat);
+        return 0;
+    }
+    const trip_dataset *drawn = t->at_level ? t->at_level : t->session.data;
+    return trip_emission_begin(t->heat, &(trip_emission_params){
+                                            .index_to_world = &drawn->index_to_world,
+                                            .kelvin = { t->kelvin[0], t->kelvin[1] },
+                                            .cells = t->plan.gathers ? 0 : e->cells,
+                                            .engine = (trip_engine)r->engine,
+                                            .threads = trip_context_threads(r->threads),
+                                        });
+}
+
+static int begin_light(triptych *t)
 {
     const triptych_resources *r = &t->resources;
     if (!trip_effects_light(&t->drawn_settings.effects) || t->plan.gathers) {
@@ -85,12 +134,20 @@ int trip_context_begin_light(triptych *t)
     return status ? status : trip_light_map_begin(t->light, &source);
 }
 
+int trip_context_begin_light(triptych *t)
+{
+    const int status = begin_heat(t);
+    return status ? status : begin_light(t);
+}
+
 static void explain(const triptych *t, const char *name, int effect, bool runs, FILE *out)
 {
     const bool automatic = t->effects & TRIPTYCH_EFFECTS_AUTO;
     const char *why = t->effects & effect ? "asked for" : "not asked for";
     /* Of fog it is shadows that there is something to say about, whether they run or not. */
-    if (automatic && !(t->effects & effect))
+    if (automatic && !(t->effects & effect) && effect == TRIPTYCH_EMISSION)
+        why = runs ? "a data set of heat is given" : "no data set of heat is given";
+    else if (automatic && !(t->effects & effect))
         why = runs || effect == TRIPTYCH_SHADOWS ? t->why_effects
                                                  : "the kind of data does not call for it";
     fprintf(out, "%-11s %s: %s\n", name, runs ? "runs" : "does not run", why);
@@ -112,12 +169,26 @@ static void explain_lattice(const triptych *t, FILE *out)
                     : "one more list is read for it");
 }
 
+static void explain_heat(const triptych *t, FILE *out)
+{
+    const trip_light_map *map = trip_emission_map(t->heat);
+    const trip_light_grid *grid = trip_light_map_gathered(map);
+    fprintf(out, "heat        %d x %d x %d nodes, one in %g voxels, %g to %g K: %s\n",
+            grid->nodes[0], grid->nodes[1], grid->nodes[2], grid->spacing, t->kelvin[0],
+            t->kelvin[1],
+            trip_light_map_is_complete(map) ? "kept from the frame before, nothing is read for it"
+                                            : "a list of its data set is read");
+}
+
 void trip_context_explain_effects(const triptych *t, FILE *out)
 {
     const trip_effects *e = &t->drawn_settings.effects;
     explain(t, "shadowing", TRIPTYCH_SHADOWS, e->shadows, out);
     explain(t, "occlusion", TRIPTYCH_OCCLUSION, e->occlusion, out);
+    explain(t, "emission", TRIPTYCH_EMISSION, e->emission, out);
     explain(t, "cueing", TRIPTYCH_CUEING, e->cueing > 0, out);
     if (trip_effects_light(e))
         explain_lattice(t, out);
+    if (e->emission)
+        explain_heat(t, out);
 }

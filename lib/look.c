@@ -71,6 +71,7 @@ triptych_settings triptych_default_settings(void)
         .samples = s.samples,
         .anisotropy = s.effects.anisotropy,
         .cueing = 0.6,
+        .kelvin = { 0, 2500 },
         .light_cells = s.effects.cells,
     };
 }
@@ -149,7 +150,8 @@ static const char *fault_of_clip(const triptych_clip *c)
 
 static const char *fault_of_effects(const triptych_settings *s)
 {
-    const int all = TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING | TRIPTYCH_EFFECTS_AUTO;
+    const int all = TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING |
+                    TRIPTYCH_EFFECTS_AUTO | TRIPTYCH_EMISSION;
     if (s->effects & ~all)
         return "there is no such effect";
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
@@ -158,6 +160,8 @@ static const char *fault_of_effects(const triptych_settings *s)
         return "the anisotropy of scattering lies between -0.95 and 0.95";
     if (s->effects & TRIPTYCH_CUEING && !(s->cueing > 0 && s->cueing <= 1))
         return "depth cueing lies above 0 and up to 1";
+    if (!(s->kelvin[0] >= 0 && s->kelvin[0] < s->kelvin[1] && s->kelvin[1] <= 100000))
+        return "temperatures of emission lie between 0 and 100000 K, the smaller first";
     if (s->effects && !(s->light_cells >= 8 && s->light_cells <= TRIP_LIGHT_CELLS_MAX))
         return "the light's lattice has 8 to 1024 cells";
     return NULL;
@@ -274,6 +278,8 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
     if (s->effects != t->effects || s->light_cells != t->settings.effects.cells)
         trip_context_drop_renderer(t);
     t->effects = s->effects;
+    for (int i = 0; i < 2; i++)
+        t->kelvin[i] = s->kelvin[i];
     t->classify_auto = s->classify == TRIPTYCH_CLASSIFY_AUTO;
     t->settings = (trip_settings){
         .classify = s->classify == TRIPTYCH_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST,

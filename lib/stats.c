@@ -71,14 +71,19 @@ void trip_context_drop_stats(triptych *t)
 static int effects_of(const trip_effects *e)
 {
     return (e->shadows ? TRIPTYCH_SHADOWS : 0) | (e->occlusion ? TRIPTYCH_OCCLUSION : 0) |
-           (e->cueing > 0 ? TRIPTYCH_CUEING : 0);
+           (e->cueing > 0 ? TRIPTYCH_CUEING : 0) | (e->emission ? TRIPTYCH_EMISSION : 0);
+}
+
+static trip_light_stats stats_of(const trip_light_map *map)
+{
+    return map ? trip_light_map_stats(map) : (trip_light_stats){ 0 };
 }
 
 static triptych_frame_stats frame_stats(const triptych *t)
 {
     const trip_frame_stats *s = &t->drawing.stats;
-    const trip_light_stats light =
-        t->light ? trip_light_map_stats(t->light) : (trip_light_stats){ 0 };
+    const trip_light_stats light = stats_of(t->light);
+    const trip_light_stats heat = stats_of(t->heat ? trip_emission_map(t->heat) : NULL);
     return (triptych_frame_stats){
         .ms = s->ms,
         .plan_ms = t->plan_ms,
@@ -105,6 +110,9 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .light_memory_bytes = light.memory_bytes,
         .light_gather_ms = light.gather_ms,
         .light_sweep_ms = light.sweep_ms,
+        .heat_bytes_read = heat.bytes_read,
+        .heat_memory_bytes = heat.memory_bytes,
+        .heat_ms = heat.gather_ms,
     };
 }
 

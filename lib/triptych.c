@@ -210,6 +210,7 @@ static void close_data(triptych *t)
     trip_field_destroy(t->source);
     t->source = NULL;
     trip_context_drop_level(t);
+    trip_context_drop_heat(t);
     session_close(&t->session);
     free(t->name);
     t->name = NULL;

@@ -101,6 +101,9 @@ TRIPTYCH_API int triptych_open(triptych *t, const char *path, const triptych_res
  * forgotten; the default function is the first data set's. A voxel that several hold counts once in
  * post, and for each of them in pre. After a failure what was open still is. */
 TRIPTYCH_API int triptych_add(triptych *t, const char *path);
+/* Opens a data set of the heat of what is open, on any grid with even spacing, in the place of one
+ * that was: for TRIPTYCH_EMISSION, until what is open is closed. NULL: none. */
+TRIPTYCH_API int triptych_set_heat(triptych *t, const char *path);
 TRIPTYCH_API void triptych_close(triptych *t);
 
 typedef struct triptych_info {
@@ -286,6 +289,7 @@ enum {
     TRIPTYCH_OCCLUSION = 2,    /* what lies around attenuates the light from everywhere */
     TRIPTYCH_CUEING = 4,       /* what is farther fades into the background */
     TRIPTYCH_EFFECTS_AUTO = 8, /* and those that the kind of data and the function call for */
+    TRIPTYCH_EMISSION = 16,    /* what is hot radiates as a black body: by triptych_set_heat() */
 };
 
 /* The h that suits the classification: 0.85 of splats, 0.99 of values. */
@@ -336,14 +340,16 @@ typedef struct triptych_settings {
     int effects;        /* the sum of TRIPTYCH_SHADOWS, ...; of GL cueing alone */
     double anisotropy;  /* of fog that scatters: -0.95 backwards to 0.95 forwards, 0 alike */
     double cueing;      /* share of the background in what is farthest, above 0 to 1 */
-    int light_cells;    /* of shadows and occlusion: a lattice of at most so many cells along the
-                           longest side of the volume, 8 to 1024, at least a voxel each */
+    double kelvin[2];   /* of emission: temperature where heat is 0 and where it is greatest, 0 or
+                           more, the second above the first, up to 100000 */
+    int light_cells; /* of shadows, occlusion and emission: a lattice of at most so many cells along
+                        the longest side, 8 to 1024, at least a voxel each */
 } triptych_settings;
 
 /* Classified by itself, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
  * outward, rgba32f, h by the classification, kernel radius 2, shading by headlight, black; values,
  * linear, 1e-4, one ray a pixel; no effects, and where they are set scattering alike, cueing 0.6,
- * 128 cells. */
+ * up to 2500 K, 128 cells. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 /* How close to the integral pictures are to be, for the time that takes; measured by `triptych
  * accuracy`, triptych-accuracy(1) has the figures. */
@@ -477,6 +483,9 @@ typedef struct triptych_frame_stats {
     uint64_t light_bytes_read;                /* not in bytes_read; 0 where it was kept */
     uint64_t light_memory_bytes;
     double light_gather_ms, light_sweep_ms; /* in ms: reading and gathering; working out */
+    uint64_t heat_bytes_read;               /* of emission, likewise */
+    uint64_t heat_memory_bytes;
+    double heat_ms;
 } triptych_frame_stats;
 
 TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);

@@ -1,5 +1,7 @@
 #include "effects.h"
 
+#include "emission.h"
+
 /* On a spiral from pole to pole, each with as much of the sphere (Fibonacci's lattice). */
 trip_vec3 trip_effects_direction(int number)
 {
@@ -100,6 +102,14 @@ static void light_colour(const trip_effects_view *e, const trip_light *light, tr
         rgb[i] = clamp(rgb[i] * matt + lit.strength * reached * TRIP_SPECULAR * lit.specular);
 }
 
+static void add_emission(const trip_emission *emission, trip_vec3 voxel, double rgb[3])
+{
+    double own[3];
+    trip_emission_at(emission, voxel, own);
+    for (int i = 0; i < 3; i++)
+        rgb[i] += own[i];
+}
+
 void trip_effects_colour(const trip_effects_view *e, const trip_light *light, trip_vec3 voxel,
                          const double *gradient, double rgb[3])
 {
@@ -107,6 +117,8 @@ void trip_effects_colour(const trip_effects_view *e, const trip_light *light, tr
         light_colour(e, light, voxel, gradient, rgb);
     else if (gradient)
         trip_light_colour(light, gradient, rgb);
+    if (e->effects.emission)
+        add_emission(e->emission, voxel, rgb);
     if (!(e->effects.cueing > 0))
         return;
     double f = e->effects.cueing *

@@ -1,5 +1,5 @@
-/* Effects: shadows, scattering, ambient occlusion and depth cueing, the same numbers in every
- * renderer. Where one of the first three runs, a colour c of the transfer function becomes
+/* Effects: shadows, scattering, ambient occlusion, emission and depth cueing, the same numbers in
+ * every renderer. Where one of the first three runs, a colour c of the transfer function becomes
  *     c (AMBIENT open + DIFFUSE reached ((1 - s) phase + s |n . l|)) + s reached SPECULAR specular
  * clamped to [0, 1], in the place of what shade.h makes of it, with its strength s (0 where nothing
  * is shaded, as in fog), n and l. It is the same where all of these are 1:
@@ -16,6 +16,8 @@
  * T and m are looked up in a lattice over the volume (light_grid.h), that of m with cells twice as
  * long; the integral renderer works them out, m by the same directions. What is cut away does not
  * attenuate.
+ *
+ * Emission then adds what matter gives off by itself (emission.h).
  *
  * Depth cueing comes last, with f from 0 where the grid's box begins before the eye to `cueing`
  * where it ends, linear in the depth along the view:
@@ -38,7 +40,7 @@ static inline bool trip_effects_light(const trip_effects *e)
 
 static inline bool trip_effects_some(const trip_effects *e)
 {
-    return trip_effects_light(e) || e->cueing > 0;
+    return trip_effects_light(e) || e->emission || e->cueing > 0;
 }
 
 /* Directions that openness is the mean over: unit vectors, evenly spread. */
@@ -58,6 +60,7 @@ typedef struct trip_effects_view {
     double cue_rgb[3];
     const void *user; /* set by who has them: */
     trip_light_reached reached, open;
+    const struct trip_emission *emission; /* that too, where that effect runs */
 } trip_effects_view;
 
 /* `camera` is of the grid of `dims` voxels. */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <time.h>
 
+#include "emission.h"
 #include "light_map.h"
 #include "report.h"
 #include "splat.h"
@@ -186,13 +187,25 @@ static void run_tasks(void *renderer, void (*task)(void *context, unsigned numbe
     r->ops->run_tasks(r, task, context, count);
 }
 
-/* Light reaches places before anything is drawn. */
+/* The lattice that is to be made next; NULL: none is left. */
+static trip_light_map *lattice_left(const trip_drawing *d)
+{
+    const trip_frame *f = d->frame;
+    trip_light_map *const maps[] = { f->emission ? trip_emission_map(f->emission) : NULL,
+                                     f->light };
+    for (size_t i = 0; i < sizeof maps / sizeof *maps; i++)
+        if (maps[i] && !trip_light_map_is_complete(maps[i]))
+            return maps[i];
+    return NULL;
+}
+
+/* Light reaches places, and heat is there, before anything is drawn. */
 static int make_light(trip_drawing *d)
 {
-    trip_light_map *light = d->frame->light;
+    trip_light_map *map = lattice_left(d);
     const trip_task_runner runner = { run_tasks, d->renderer };
-    return light ? trip_light_map_step(light, d->renderer->ops->run_tasks ? &runner : NULL)
-                 : TRIP_FRAME_DONE;
+    return map ? trip_light_map_step(map, d->renderer->ops->run_tasks ? &runner : NULL)
+               : TRIP_FRAME_DONE;
 }
 
 /* One piece of what is ready. */
@@ -283,10 +296,10 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects in grids with uneven spacing; the integral does");
     const bool all = renderer->ops->effects >> s->classify & 1;
-    if (trip_effects_light(&s->effects) && !all)
+    if ((trip_effects_light(&s->effects) || s->effects.emission) && !all)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                         "draws no shadows and no occlusion; choose another renderer, or --effects "
-                         "none");
+                         "draws no shadows, no occlusion and no emission; choose another renderer, "
+                         "or --effects none");
     if (s->effects.cueing > 0 && !all && !renderer->ops->cueing)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects; choose another renderer, or none: --effects none");
@@ -342,8 +355,9 @@ static void await_renderer(trip_drawing *d, uint64_t timeout_ns)
 
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 {
-    if (d->frame->light && !trip_light_map_is_complete(d->frame->light))
-        trip_light_map_await(d->frame->light, timeout_ns);
+    trip_light_map *map = lattice_left(d);
+    if (map)
+        trip_light_map_await(map, timeout_ns);
     else if (!d->loaded || d->in_batch || d->all_read || holds_many(d))
         await_renderer(d, timeout_ns);
     else

@@ -499,6 +499,11 @@ bool trip_light_map_is_complete(const trip_light_map *m)
     return m->stage == COMPLETE;
 }
 
+const trip_light_grid *trip_light_map_gathered(const trip_light_map *m)
+{
+    return &m->extinction;
+}
+
 const trip_light_grid *trip_light_map_reached(const trip_light_map *m)
 {
     return m->source.settings->effects.shadows ? &m->reached : NULL;

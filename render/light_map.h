@@ -45,6 +45,8 @@ int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
 void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns);
 bool trip_light_map_is_complete(const trip_light_map *m);
 
+/* The means of extinction, once those are gathered. */
+const trip_light_grid *trip_light_map_gathered(const trip_light_map *m);
 /* NULL where the effect is off. Their numbers are there once the map is complete. */
 const trip_light_grid *trip_light_map_reached(const trip_light_map *m);
 const trip_light_grid *trip_light_map_open(const trip_light_map *m);

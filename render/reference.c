@@ -142,6 +142,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                            header->gradient_step);
     r->effects = trip_effects_view_make(frame->settings, frame->camera, header->dims);
     trip_light_map_view(frame->light, &r->effects);
+    r->effects.emission = frame->emission;
     r->axis = -1;
     r->broken = false;
     r->sums = trip_settings_sum_sheets(frame->settings);

@@ -48,6 +48,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     trip_segments_make(&s->segments, frame->table);
     s->effects = trip_effects_view_make(frame->settings, frame->camera, h->dims);
     trip_light_map_view(frame->light, &s->effects);
+    s->effects.emission = frame->emission;
     return 0;
 }
 

@@ -14,6 +14,7 @@
 
 struct trip_field;
 struct trip_light_map;
+struct trip_emission;
 
 /* Of a list in one frame. Where frames classify after interpolation nothing is projected: 0. */
 typedef struct trip_list_stats {
@@ -35,7 +36,8 @@ typedef struct trip_frame {
     const struct trip_field *field;
     /* Of frames with shadows or occlusion, but for the integral renderer: begun; else NULL. */
     struct trip_light_map *light;
-    bool count; /* splats projected and drawn, too: counting costs time */
+    struct trip_emission *emission; /* of frames with that effect: begun; else NULL */
+    bool count;                     /* splats projected and drawn, too: counting costs time */
     /* Called between batches with how many splats were drawn, of how many: "draw"; and by the
      * integral renderer with how many pixels: "integrate". May be NULL. */
     void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);

@@ -89,6 +89,7 @@ typedef enum trip_show {
 typedef struct trip_effects {
     bool shadows;      /* what lies towards the light attenuates it */
     bool occlusion;    /* what lies around attenuates the light that comes from everywhere */
+    bool emission;     /* hot matter gives off light of its own (emission.h) */
     double cueing;     /* share of the background in the colour of what is farthest: 0 (off) to 1 */
     double anisotropy; /* of scattering, where shadows are: -1 < g < 1 */
     int cells; /* of the light's grid along its longest axis, TRIP_LIGHT_CELLS_MAX or less */

@@ -34,7 +34,7 @@ static bool same_footprints(const triptych_settings *a, const triptych_settings 
 static bool same_effects(const triptych_settings *a, const triptych_settings *b)
 {
     return a->effects == b->effects && a->anisotropy == b->anisotropy && a->cueing == b->cueing &&
-           a->light_cells == b->light_cells;
+           same_numbers(a->kelvin, b->kelvin, 2) && a->light_cells == b->light_cells;
 }
 
 bool trip_same_settings(const triptych_settings *a, const triptych_settings *b)

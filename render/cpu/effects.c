@@ -1,5 +1,6 @@
 #include "cpu/effects.h"
 
+#include "emission.h"
 #include "light_map.h"
 
 static trip_cpu_light light_of(const trip_light_grid *grid, int axis)
@@ -26,6 +27,21 @@ static void set_light(trip_cpu_effects *e, const trip_effects_view *view, int ax
     }
 }
 
+static void set_emission(trip_cpu_emission *e, const trip_emission *emission, int axis)
+{
+    const trip_emission_view view = trip_emission_view_of(emission);
+    e->heat = light_of(view.heat, axis);
+    e->rgb = view.rgb;
+    e->steps = TRIP_EMISSION_STEPS;
+    for (int i = 0; i < 3; i++) {
+        const int a = (axis + 1 + i) % 3;
+        e->last[i] = (float)view.last[a];
+        e->to_heat[i][3] = (float)view.to_heat.m[a][3];
+        for (int k = 0; k < 3; k++)
+            e->to_heat[i][k] = (float)view.to_heat.m[a][(axis + 1 + k) % 3];
+    }
+}
+
 void trip_cpu_effects_make(trip_cpu_effects *e, const trip_frame *frame, int axis,
                            const trip_list_grid *grid)
 {
@@ -46,6 +62,8 @@ void trip_cpu_effects_make(trip_cpu_effects *e, const trip_frame *frame, int axi
         e->cue_rgb[i] = (float)view.cue_rgb[i];
     }
     e->cue[3] = (float)view.cue[3];
+    if (effects->emission)
+        set_emission(&e->emission, frame->emission, axis);
     if (!e->lit)
         return;
     const double g = effects->anisotropy;

@@ -125,6 +125,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
         .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };
+    r->in.effects.emission = frame->emission;
     return status;
 }
 

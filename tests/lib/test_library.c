@@ -1020,6 +1020,33 @@ static void effects_cost_what_is_asked_for_and_are_kept_from_view_to_view(void *
     triptych_destroy(t);
 }
 
+static void heat_is_read_once_where_emission_runs(void **state)
+{
+    (void)state;
+    static float plain[FLOATS], hot[FLOATS], again[FLOATS];
+    triptych *t = new_context();
+    triptych_settings s = triptych_default_settings();
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    draw(t, plain);
+    assert_int_equal(triptych_set_heat(t, DATA_SET), TRIPTYCH_OK);
+    triptych_frame_stats stats = draw(t, again);
+    assert_int_equal(stats.heat_bytes_read + stats.heat_memory_bytes, 0);
+    assert_true(are_same(plain, again));
+    s.effects = TRIPTYCH_EFFECTS_AUTO;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    stats = draw(t, hot);
+    assert_int_equal(stats.effects, TRIPTYCH_EMISSION);
+    assert_true(stats.heat_bytes_read > 0 && stats.heat_memory_bytes > 0);
+    assert_false(are_same(plain, hot));
+    stats = draw(t, again);
+    assert_int_equal(stats.heat_bytes_read, 0);
+    assert_true(are_same(hot, again));
+    assert_fails(t, triptych_set_heat(t, "none.trip"), TRIPTYCH_ERROR, "none.trip");
+    assert_int_equal(draw(t, again).effects, 0);
+    assert_true(are_same(plain, again));
+    triptych_destroy(t);
+}
+
 static void measurements_keep_their_colours_unless_effects_are_asked_for(void **state)
 {
     (void)state;
@@ -1042,7 +1069,10 @@ static void measurements_keep_their_colours_unless_effects_are_asked_for(void **
     s.effects = TRIPTYCH_SHADOWS;
     s.headlight = 1;
     assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "give its direction");
-    s.effects = 16;
+    s.effects = TRIPTYCH_EMISSION;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "no data set of heat");
+    s.effects = 32;
     assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "no such effect");
     triptych_destroy(t);
 }
@@ -1075,6 +1105,7 @@ int main(void)
         cmocka_unit_test(more_samples_are_the_mean_of_a_larger_picture),
         cmocka_unit_test(a_level_is_mixed_into_the_one_before_it),
         cmocka_unit_test(effects_cost_what_is_asked_for_and_are_kept_from_view_to_view),
+        cmocka_unit_test(heat_is_read_once_where_emission_runs),
         cmocka_unit_test(measurements_keep_their_colours_unless_effects_are_asked_for),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
     };

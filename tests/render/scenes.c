@@ -319,6 +319,7 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                          .plan = &plan,
                          .table = s->table,
                          .light = light,
+                         .emission = s->emission,
                          .count = true };
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);
     assert_non_null(p.rgba);
@@ -369,6 +370,7 @@ scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
                          .plan = &plan,
                          .field = how->field,
                          .table = s->table,
+                         .emission = s->emission,
                          .progress = how->progress,
                          .progress_user = how->progress_user };
     p.rgba = calloc((size_t)p.width * (size_t)p.height, 4 * sizeof *p.rgba);

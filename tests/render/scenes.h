@@ -49,6 +49,7 @@ typedef struct scene {
     trip_dataset *data;
     unsigned level;       /* that the data set is of, as trip_dataset_level_open() makes it */
     trip_tf_entry *table; /* 65536 entries, all transparent black at first */
+    struct trip_emission *emission; /* of who draws, who has begun it; NULL: none */
 } scene;
 
 void scene_create(scene *s, const scene_params *params);

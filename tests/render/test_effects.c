@@ -718,7 +718,12 @@ static void a_renderer_without_effects_refuses_them(void **state)
     create_fog(&s, (float)FOG);
     const trip_camera_params view = along_z(&s);
     trip_settings settings = with_shadows(trip_v3(0, 0, 1));
-    settings.effects = (trip_effects){ .cueing = 0.5, .cells = TRIP_LIGHT_CELLS };
+    const struct {
+        trip_effects effects;
+        const char *why;
+    } refused[] = { { { .cueing = 0.5 }, "draws no effects" },
+                    { { .occlusion = true }, "no occlusion" },
+                    { { .emission = true }, "no emission" } };
     assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
     assert_int_equal(trip_plan_make(&plan, s.data, &camera, &settings, s.table, s.budget), 0);
     assert_int_equal(trip_reader_create(&reader, s.data,
@@ -727,10 +732,14 @@ static void a_renderer_without_effects_refuses_them(void **state)
     const trip_frame frame = {
         .data = s.data, .camera = &camera, .settings = &settings, .plan = &plan, .table = s.table
     };
-    test_catch_reports();
-    assert_true(trip_frame_begin(&drawing, &plain, reader, &frame) < 0);
-    assert_one_report("draws no effects");
-    trip_frame_end(&drawing);
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        settings.effects = refused[i].effects;
+        settings.effects.cells = TRIP_LIGHT_CELLS;
+        test_catch_reports();
+        assert_true(trip_frame_begin(&drawing, &plain, reader, &frame) < 0);
+        assert_one_report(refused[i].why);
+        trip_frame_end(&drawing);
+    }
     trip_reader_destroy(reader);
     trip_plan_release(&plan, s.budget);
     scene_destroy(&s);

@@ -52,6 +52,7 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
     MEMBER(effects);
     MEMBER(anisotropy);
     MEMBER(cueing);
+    MEMBER(kelvin);
     MEMBER(light_cells);
     memcpy(to->clip.plane, s->clip.plane, (size_t)s->clip.planes * sizeof *to->clip.plane);
 #undef MEMBER
@@ -116,6 +117,7 @@ static void every_member_counts(void **state)
     COUNTS(effects);
     COUNTS(anisotropy);
     COUNTS(cueing);
+    COUNTS(kelvin[1]);
     COUNTS(light_cells);
 #undef COUNTS
 }

@@ -101,6 +101,27 @@ INLINE void light_places(const trip_cpu_effects *e, const vf place[3], const sur
         rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss * reached));
 }
 
+/* As trip_emission_at(). */
+INLINE void add_emission(const trip_cpu_emission *e, const vf place[3], vf rgb[3])
+{
+    vf at[3], share = v_set(1);
+    for (int a = 0; a < 3; a++) {
+        at[a] = v_set(e->to_heat[a][3]);
+        for (int k = 0; k < 3; k++)
+            at[a] = v_fma(place[k], v_set(e->to_heat[a][k]), at[a]);
+        const vf beyond = v_max(v_set(0) - at[a], at[a] - v_set(e->last[a]));
+        share = share * (v_set(1) - within_01(beyond));
+    }
+    const vf x = share * light_at(&e->heat, at) * v_set(e->steps);
+    const vi step = v_truncate(v_min(x, v_set(e->steps) - v_set(0.5f)));
+    const vf part = x - v_from_int(step);
+    const vi row = step * 4;
+    for (int k = 0; k < 3; k++) {
+        const vf below = v_gather(e->rgb + k, row), above = v_gather(e->rgb + 4 + k, row);
+        rgb[k] = rgb[k] + v_fma(above - below, part, below);
+    }
+}
+
 /* `at` is a place of the list, `light` and `to_eye` are unit vectors of the world. Not inlined:
  * frames without effects are not to pay for it. */
 static __attribute__((noinline)) void effects_on(const trip_cpu_effects *e, const vf at[3],
@@ -118,6 +139,8 @@ static __attribute__((noinline)) void effects_on(const trip_cpu_effects *e, cons
         for (int k = 0; k < 3; k++)
             rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss));
     }
+    if (e->emission.heat.at)
+        add_emission(&e->emission, place, rgb);
     if (!e->cued)
         return;
     vf f = v_set(e->cue[3]);

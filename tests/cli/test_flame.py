@@ -1,0 +1,89 @@
+"""A flame: the heat of an OpenVDB file makes its soot glow."""
+import os
+
+import numpy
+
+import program
+
+FLAME = os.path.join(program.DATASETS, "densityAndHeat.vdb")
+LOOK = ("--tf", "soot.tf", "--size", "40x60", "--no-shading", "--up", "0,0,1", "--background", "none")
+HEAT = ("--emission", "heat.trip")
+GLOWS = ("--effects", "emission", *HEAT)
+
+
+class Emission(program.ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write("soot.tf", b"unit voxel\nvalues data\n0 0 0 0 0\n1 0 0 0 0.35\n")
+        for grid in ("density", "heat"):
+            run = program.call("brick", FLAME, "--grid", grid, "-o", f"{grid}.trip", "-q")
+            assert run.returncode == 0, run.stderr
+
+    def draw(self, *options, renderer="cpu"):
+        return self.picture("density.trip", *LOOK, "--renderer", renderer, *options)
+
+    @staticmethod
+    def bytes_of(path):
+        with open(path, "rb") as f:
+            return f.read()
+
+    def test_what_is_hot_glows_red_to_yellow_below_its_smoke(self):
+        cold, flame = self.draw(), self.draw(*GLOWS)
+        self.assertEqual(cold[..., :3].max(), 0)
+        numpy.testing.assert_array_equal(flame[..., 3], cold[..., 3])
+        red, green, blue = (flame[..., k] for k in range(3))
+        rounding = 1e-4
+        self.assertTrue((red > green - rounding).all() and (green > blue - rounding).all())
+        self.assertGreater(red.max(), 0.4)
+        rows = red.sum(axis=1)
+        self.assertGreater(rows[30:].sum(), 10 * rows[:30].sum())
+
+    def test_less_hot_is_darker_and_hotter_is_less_red(self):
+        def share_of_blue(*options):
+            flame = self.draw(*GLOWS, *options).sum(axis=(0, 1))
+            return flame[2] / flame[0]
+
+        self.assertLess(share_of_blue("--temperature", "0:1800"), share_of_blue())
+        self.assertLess(share_of_blue(), share_of_blue("--temperature", "0:9000"))
+
+    def test_it_runs_where_heat_is_given_and_wanted_and_costs_nothing_elsewhere(self):
+        for options, runs in (((*GLOWS,), True), (("--effects", "auto", *HEAT), True),
+                              (("--effects", "auto"), False), ((), False)):
+            text = self.works("render", "density.trip", "-o", "a.png", *LOOK, "--explain",
+                              "--renderer", "cpu", *options).stdout.decode()
+            self.assertIn("emission    runs: " if runs else "emission    does not run: ", text)
+            self.assertEqual(text.count("\nheat "), 2 if runs else 0, text)
+        numpy.testing.assert_array_equal(self.draw("--effects", "auto"), self.draw())
+
+    def test_renderers_agree_with_the_integral(self):
+        exact = self.draw(*GLOWS, renderer="integral")
+        for renderer in ("cpu", "reference"):
+            off = abs(self.draw(*GLOWS, "--classify", "post", renderer=renderer) - exact)
+            self.assertLess(off.max(), 0.02, renderer)
+
+    def test_frames_in_flight_glow_alike(self):
+        frames = []
+        for count in ("1", "2"):
+            self.works("render", "density.trip", "-o", "o.png", *LOOK, *GLOWS, "--orbit", "2",
+                       "--in-flight", count)
+            frames.append([self.bytes_of("o-%03d.png" % i) for i in range(2)])
+        self.assertEqual(*frames)
+
+    def test_what_does_not_go_is_refused(self):
+        draw = ("render", "density.trip", "-o", "bad.png", *LOOK)
+        for options, says in (
+            (HEAT, "--effects emission"),
+            (("--effects", "emission"), "--emission HEAT.trip"),
+            (("--effects", "cueing", *HEAT), "--effects emission"),
+            (("--temperature", "0:2000"), "--emission only"),
+            ((*GLOWS, "--temperature", "2000:1000"), "smaller first"),
+            ((*GLOWS, "--temperature", "-5:1000"), "between 0 and"),
+            *[((*GLOWS, "--renderer", gl), "no emission") for gl in program.GL],
+        ):
+            self.fails(2, *draw, *options, says=says)
+        self.fails(1, *draw, "--effects", "emission", "--emission", "none.trip", says="none.trip")
+
+
+if __name__ == "__main__":
+    program.main()
