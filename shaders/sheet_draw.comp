@@ -27,6 +27,13 @@ layout(rgba32f, binding = TRIP_GL_IMAGE_DEPTH) uniform image2D layer_depths;
 #ifdef SHADED
 layout(binding = TRIP_GL_SHEET_GRADIENTS) uniform sampler2DArray gradients;
 #endif
+#ifdef UNEVEN
+// Of voxels along u, then along v: whole and the rest.
+layout(std430, binding = TRIP_GL_PLACES) readonly buffer trip_gl_places
+{
+    vec2 places[];
+};
+#endif
 // x: of the image, in which the band's row 0 lies; y, z: rows of the band, the latter not drawn;
 // w: ends.
 layout(location = TRIP_GL_ROW) uniform ivec4 rows;
@@ -160,6 +167,33 @@ float wide_code(place at, trip_gl_sheet_end end)
 }
 #endif
 
+#ifdef UNEVEN
+// How far a place is beyond that of a voxel.
+float beyond(int voxel, int base, float rest)
+{
+    return (float(base) - places[voxel].x) + (rest - places[voxel].y);
+}
+
+// The cell of a place among `count` voxels, from `first` of `places` on; `rest` is then the part of
+// it. -1: there is none.
+int find_cell(int first, int count, int base, inout float rest)
+{
+    int lo = 0, hi = count - 1;
+    if (hi < 1 || beyond(first, base, rest) < 0.0 || beyond(first + hi, base, rest) > 0.0)
+        return -1;
+    while (hi - lo > 1) {
+        int middle = (lo + hi) / 2;
+        if (beyond(first + middle, base, rest) >= 0.0)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    float before = beyond(first + lo, base, rest), behind = beyond(first + hi, base, rest);
+    rest = before / (before - behind);
+    return lo;
+}
+#endif
+
 place place_at(ray r, trip_gl_sheet_end end)
 {
     place at;
@@ -169,6 +203,10 @@ place place_at(ray r, trip_gl_sheet_end end)
     vec2 p = vec2(end.first_u, end.first_v) + end.along * r.shift;
 #endif
     p = clamp(p, -268435456.0, 268435456.0);
+#ifdef UNEVEN
+    at.cell = ivec2(find_cell(0, extent.x, end.base_u, p.x), find_cell(extent.x, extent.y, end.base_v, p.y));
+    at.part = p;
+#else
     vec2 whole = floor(p);
     at.cell = ivec2(end.base_u, end.base_v) + ivec2(whole);
     at.part = p - whole;
@@ -178,6 +216,7 @@ place place_at(ray r, trip_gl_sheet_end end)
             at.cell[i]--;
             at.part[i] = 1.0;
         }
+#endif
     at.there = false;
     at.code = 0.0;
     if (any(lessThan(at.cell, ivec2(0))) || any(greaterThanEqual(at.cell + 1, extent.xy)))

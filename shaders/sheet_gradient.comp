@@ -1,5 +1,6 @@
 // The gradients of a sheet's voxels, by differences of codes (render/sheet.h). In: the sheet's codes
-// and those of the sheets below and above it. Out: codes per index along the list, u and v. Mirrors
+// and those of the sheets below and above it. Out: codes per index (UNEVEN:
+// per unit of place) along the list, u and v. Mirrors
 // difference() in render/reference_sheets.c.
 #include "shared.h"
 
@@ -8,6 +9,14 @@ layout(binding = TRIP_GL_SHEET_CODES) uniform sampler2DArray codes;
 layout(rgba16f, binding = TRIP_GL_IMAGE) writeonly uniform image2D gradients;
 layout(location = TRIP_GL_SHEET) uniform ivec3 layers; // of the sheet, below, above; -1: there is none
 layout(location = TRIP_GL_SHEET_SIZE) uniform ivec3 size; // width, height, the first row
+#ifdef UNEVEN
+// To the sheets below and above; of voxels along u, then along v, whole and the rest.
+layout(location = TRIP_GL_SHEET_APART) uniform vec2 sheets_apart;
+layout(std430, binding = TRIP_GL_PLACES) readonly buffer trip_gl_places
+{
+    vec2 places[];
+};
+#endif
 
 // Below 0: there is none.
 float code_at(ivec2 place, int layer)
@@ -17,11 +26,23 @@ float code_at(ivec2 place, int layer)
     return texelFetch(codes, ivec3(place, layer), 0).r;
 }
 
-float difference(float before, float here, float after)
+// From voxel i, of `count` from `first` of `places` on, to those before and after it.
+vec2 voxels_apart(int first, int i, int count)
+{
+#ifdef UNEVEN
+    vec2 here = places[first + i];
+    vec2 before = here - places[first + max(i - 1, 0)], after = places[first + min(i + 1, count - 1)] - here;
+    return vec2(before.x + before.y, after.x + after.y);
+#else
+    return vec2(1.0);
+#endif
+}
+
+float difference(float before, float here, float after, vec2 apart)
 {
     if (before >= 0.0 && after >= 0.0)
-        return 0.5 * (after - before);
-    return after >= 0.0 ? after - here : before >= 0.0 ? here - before : 0.0;
+        return (after - before) / (apart.x + apart.y);
+    return after >= 0.0 ? (after - here) / apart.y : before >= 0.0 ? (here - before) / apart.x : 0.0;
 }
 
 void main()
@@ -30,9 +51,13 @@ void main()
     float here = code_at(p, layers.x);
     if (here < 0.0)
         return;
-    vec3 g = vec3(difference(code_at(p, layers.y), here, code_at(p, layers.z)),
-                  difference(code_at(p - u, layers.x), here, code_at(p + u, layers.x)),
-                  difference(code_at(p - v, layers.x), here, code_at(p + v, layers.x)));
+#ifndef UNEVEN
+    const vec2 sheets_apart = vec2(1.0);
+#endif
+    vec2 u_apart = voxels_apart(0, p.x, size.x), v_apart = voxels_apart(size.x, p.y, size.y);
+    vec3 g = vec3(difference(code_at(p, layers.y), here, code_at(p, layers.z), sheets_apart),
+                  difference(code_at(p - u, layers.x), here, code_at(p + u, layers.x), u_apart),
+                  difference(code_at(p - v, layers.x), here, code_at(p + v, layers.x), v_apart));
     // Within what 16 bits hold.
     imageStore(gradients, p, vec4(clamp(g, -65504.0, 65504.0), 0.0));
 }

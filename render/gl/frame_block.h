@@ -26,7 +26,8 @@ enum trip_gl_effect {
     TRIP_GL_WIDE = 8192,      /* values are interpolated from 64 voxels (render/kernel.h) */
     TRIP_GL_FIXED = 16384,    /* footprints of one size; AFFINE, too, in perspective */
     TRIP_GL_CUED = 32768,     /* colours fade into the background with depth (render/effects.h) */
-    TRIP_GL_EFFECT_SETS = 65536,
+    TRIP_GL_UNEVEN = 65536,   /* spacing is uneven */
+    TRIP_GL_EFFECT_SETS = 131072,
 };
 
 /* Of a list that the plan draws. */

@@ -614,6 +614,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops gl_ops = {
     .name = "gl",
     .classifies_post = true,
+    .uneven = 1u << TRIP_CLASSIFY_POST,
     .cueing = true,
     .forms = TRIP_DRAWS_FIXED,
     .destroy = destroy,
@@ -681,7 +682,7 @@ static void set_up_sheets(gl_renderer *r)
     s->target = &r->target;
     r->sums.variants = &r->variants;
     r->sums.target = &r->target;
-    s->textures.budget = s->function.budget = r->budget;
+    s->textures.budget = s->function.budget = s->places.budget = r->budget;
 }
 
 int trip_gl_create(trip_renderer **out, trip_budget *budget)

@@ -22,6 +22,7 @@
 #define TRIP_GL_ORDER 7
 /* Likewise, for frames that classify after interpolation. */
 #define TRIP_GL_SUMS 7
+#define TRIP_GL_PLACES 5
 /* Texture units: the layer of axis a is unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
@@ -39,6 +40,7 @@
 #define TRIP_GL_PIECE 0
 #define TRIP_GL_SHEET 0
 #define TRIP_GL_SHEET_SIZE 1
+#define TRIP_GL_SHEET_APART 2
 /* Invocations of a counting work group. */
 #define TRIP_GL_COUNT_GROUP 64
 /* Of those over a sheet or an image, each way. */
@@ -103,7 +105,8 @@
 /* The end of a segment: where rays pass a slice. `step` is how far along the list it is from the
  * end before; 0: no segment lies between them. A ray's u is base + first + what it moves along
  * `along`; the sheets before and behind the slice lie in two layers, and `part` is the place
- * between them; those beyond the two lie in the outer layers (-1: there is none). */
+ * between them; those beyond the two lie in the outer layers (-1: there is none). With uneven
+ * spacing these are places (coordinates.h), and u and v are from the grid's first voxel. */
 #define TRIP_GL_SHEET_END_FIELDS(INT, FLOAT)                                                       \
     INT base_u, base_v, before, behind;                                                            \
     FLOAT first_u, first_v, along, step, part;                                                     \

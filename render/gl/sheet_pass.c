@@ -105,7 +105,11 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
     const uint64_t *dims = frame->data->header.dims;
     const rays r = rays_of(frame->camera, axis);
     const double way = descending ? -1 : 1;
-    trip_gl_sheet_view v = { .axis = axis, .first_u = first[0], .first_v = first[1] };
+    trip_gl_sheet_view v = { .axis = axis };
+    if (!trip_coordinates_uneven(&frame->data->coordinates)) {
+        v.first_u = first[0];
+        v.first_v = first[1];
+    }
     for (int i = 0; i < 3; i++)
         v.eye[i] = r.start[i];
     choose_slope(&v, &r, way);

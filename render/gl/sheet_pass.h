@@ -8,7 +8,7 @@
 
 typedef struct trip_gl_sheet_view {
     int axis;
-    int64_t first_u, first_v; /* of the sheets' voxels */
+    int64_t first_u, first_v; /* what ends are counted from (shared.h) */
     double eye[3];            /* along the list, u and v: where the ray by which others are taken
                                  starts */
     double slope[2];          /* how far it moves along u and v over a sheet */

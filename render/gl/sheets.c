@@ -26,7 +26,8 @@ static unsigned effects_of(const trip_frame *frame)
     return (s->kernel != TRIP_KERNEL_LINEAR ? TRIP_GL_WIDE : 0) |
            (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
            (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
-           (s->effects.cueing > 0 ? TRIP_GL_CUED : 0);
+           (s->effects.cueing > 0 ? TRIP_GL_CUED : 0) |
+           (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0);
 }
 
 static void forget(trip_gl_sheets *s)
@@ -40,6 +41,7 @@ static void forget(trip_gl_sheets *s)
 int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
 {
     s->frame = frame;
+    s->coordinates = &frame->data->coordinates;
     s->effects = effects_of(frame);
     forget(s);
     if (!s->ends_block) {
@@ -57,6 +59,7 @@ void trip_gl_sheets_release(trip_gl_sheets *s)
 {
     trip_gl_sheet_textures_release(&s->textures);
     trip_gl_sheet_function_release(&s->function);
+    trip_gl_sheet_places_release(&s->places);
     glDeleteBuffers(1, &s->pass_block);
     glDeleteBuffers(1, &s->ends_block);
     s->pass_block = s->ends_block = 0;
@@ -105,8 +108,11 @@ int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis)
     find_extent(s);
     /* Those of an interval, those behind it, and one before it where that is kept. */
     const unsigned least = 2 * (unsigned)sheets_about(s->frame->settings) + 1;
-    return trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], least,
-                                      s->frame->settings->shading);
+    int status = trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], least,
+                                            s->frame->settings->shading);
+    if (!status && s->effects & TRIP_GL_UNEVEN)
+        status = trip_gl_sheet_places_set(&s->places, s->coordinates, axis, s->first, s->size);
+    return status;
 }
 
 static void begin_pass(trip_gl_sheets *s, const trip_pass *pass)
@@ -115,6 +121,7 @@ static void begin_pass(trip_gl_sheets *s, const trip_pass *pass)
     s->way = pass->descending ? -1 : 1;
     s->view = trip_gl_sheet_view_make(s->frame, s->axis, pass->descending, s->first, s->size,
                                       s->function.unit);
+    s->eye = trip_coordinates_index(s->coordinates, s->axis, s->view.eye[0]);
     glNamedBufferSubData(s->pass_block, 0, sizeof s->view.constants, &s->view.constants);
 }
 
@@ -263,7 +270,7 @@ static double eye_behind(const trip_gl_sheets *s, int i)
 {
     if (s->frame->camera->ortho)
         return 0;
-    return (s->view.eye[0] - (double)s->held[i].number) * (double)s->way;
+    return (s->eye - (double)s->held[i].number) * (double)s->way;
 }
 
 /* Whether something between held[i] and the next may show; false where there is no next. */
@@ -285,6 +292,17 @@ static bool shows(const trip_gl_sheets *s, int i)
                                         (unsigned)fmin(65535, ceil(bounds[1])));
 }
 
+/* How far the sheets below and above one are. */
+static void bind_places(const trip_gl_sheets *s, int64_t sheet)
+{
+    const trip_coordinates *c = s->coordinates;
+    const double here = trip_coordinates_place(c, s->axis, (double)sheet);
+    glUniform2f(TRIP_GL_SHEET_APART,
+                (float)(here - trip_coordinates_place(c, s->axis, (double)(sheet - 1))),
+                (float)(trip_coordinates_place(c, s->axis, (double)(sheet + 1)) - here));
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_PLACES, s->places.buffer);
+}
+
 static int make_gradients(trip_gl_sheets *s, int i)
 {
     const int before = i > 0 ? s->held[i - 1].layer : -1;
@@ -298,6 +316,8 @@ static int make_gradients(trip_gl_sheets *s, int i)
                        GL_WRITE_ONLY, GL_RGBA16F);
     glUniform3i(TRIP_GL_SHEET, sheet->layer, s->way > 0 ? before : after,
                 s->way > 0 ? after : before);
+    if (s->effects & TRIP_GL_UNEVEN)
+        bind_places(s, sheet->number);
     const int width = (int)s->size[0], height = (int)s->size[1];
     const int rows = PART_VOXELS / width < 1 ? 1 : PART_VOXELS / width;
     for (int y = 0; y < height && !status; y += rows) {
@@ -335,6 +355,13 @@ static int layer_of(const trip_gl_sheets *s, int i)
     return number >= 0 && number < sheets ? -1 : s->held[i < 0 ? 0 : s->count - 1].layer;
 }
 
+/* Where along the list a part of the way from a sheet to the next is. */
+static double place_at(const trip_gl_sheets *s, const trip_gl_sheet *from, double part)
+{
+    return trip_coordinates_place(s->coordinates, s->axis,
+                                  (double)from->number + part * (double)s->way);
+}
+
 /* The ends of the slices from held[i] to the next; returns how many there are then. */
 static int add_ends(const trip_gl_sheets *s, int i, trip_gl_sheet_end *ends, int count)
 {
@@ -342,17 +369,16 @@ static int add_ends(const trip_gl_sheets *s, int i, trip_gl_sheet_end *ends, int
     const int slices = s->frame->settings->slices;
     const int layers[4] = { layer_of(s, i - 1), layer_of(s, i), layer_of(s, i + 1),
                             layer_of(s, i + 2) };
-    const double eye = fmax(0, eye_behind(s, i)), way = (double)s->way;
-    double last = eye;
-    ends[count++] =
-        trip_gl_sheet_end_at(&s->view, (double)from->number + eye * way, 0, layers, eye);
+    const double eye = fmax(0, eye_behind(s, i));
+    double last = place_at(s, from, eye);
+    ends[count++] = trip_gl_sheet_end_at(&s->view, last, 0, layers, eye);
     for (int n = 1; n <= slices; n++) {
         double part = (double)n / slices;
         if (n <= eye * slices)
             continue;
-        ends[count++] = trip_gl_sheet_end_at(&s->view, (double)from->number + part * way,
-                                             (part - last) * way, layers, part);
-        last = part;
+        const double next = place_at(s, from, part);
+        ends[count++] = trip_gl_sheet_end_at(&s->view, next, next - last, layers, part);
+        last = next;
     }
     return count;
 }
@@ -383,6 +409,8 @@ static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
     glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_PASS, s->pass_block);
     glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_ENDS, s->ends_block);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SUMS, s->function.sums);
+    if (s->effects & TRIP_GL_UNEVEN)
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_PLACES, s->places.buffer);
     glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
     glBindTextureUnit(TRIP_GL_SHEET_GRADIENTS, s->textures.gradients);
     glBindImageTexture(TRIP_GL_IMAGE, layer->colour, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);

@@ -10,6 +10,7 @@
 #include "gl/ring.h"
 #include "gl/sheet_function.h"
 #include "gl/sheet_pass.h"
+#include "gl/sheet_places.h"
 #include "gl/sheet_textures.h"
 #include "gl/target.h"
 #include "gl/variant.h"
@@ -52,14 +53,17 @@ typedef struct trip_gl_sheets {
 
     trip_gl_sheet_textures textures;
     trip_gl_sheet_function function;
+    trip_gl_sheet_places places;
     GLuint pass_block, ends_block;
     const trip_frame *frame;
+    const trip_coordinates *coordinates;
     unsigned effects;
     int axis;
     const trip_pass *pass; /* being drawn; NULL: none */
     int64_t way;           /* from one sheet to the next: 1 or -1 */
     int64_t first[2], size[2];
     trip_gl_sheet_view view;
+    double eye;                             /* along the sheets, as they are numbered */
     trip_gl_sheet held[TRIP_GL_SHEETS_MAX]; /* in a row; the last may not be complete */
     int count;
     int front; /* the first that is not drawn from: 1 where what lies before it reaches over it */

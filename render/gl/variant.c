@@ -1,5 +1,6 @@
 #include "gl/variant.h"
 
+#include <assert.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,10 +25,10 @@ static const struct {
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
     [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", 0, false },
-    [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", 0, false },
+    [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", TRIP_GL_UNEVEN, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
-                                      TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED,
+                                      TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN,
                                   false },
 };
 
@@ -45,6 +46,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
         { TRIP_GL_FLATTENED, "FLATTENED" }, { TRIP_GL_WIDE, "WIDE" },
         { TRIP_GL_FIXED, "FIXED" },         { TRIP_GL_CUED, "CUED" },
+        { TRIP_GL_UNEVEN, "UNEVEN" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -89,9 +91,10 @@ static int build(const trip_gl_variant *variant, GLuint *program)
                                           });
 }
 
+static_assert(TRIP_GL_EFFECT_SETS == 1 << 17, "effects are 17 bits of a key");
 static uint32_t key_of(const trip_gl_variant *v)
 {
-    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 24;
+    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 25;
 }
 
 int trip_gl_variants_get(trip_gl_variants *v, trip_gl_variant variant, GLuint *program)
