@@ -153,8 +153,8 @@ typedef struct trip_gl_sheet_end {
 #define TRIP_GL_FLOAT float
 #endif
 
-/* A square of a run's block (trip_square of stream/block.h); draw position i is number i % 64 of the
- * voxels of square i / 64, by the entry of its position. */
+/* A square of a run's block (trip_square of stream/block.h); draw position i is number i % 64 of
+ * the voxels of square i / 64, by the entry of its position. */
 struct trip_gl_square {
     TRIP_GL_UINT mask_low, mask_high;
     TRIP_GL_UINT codes, normals; /* bytes up to those of its first voxel */
