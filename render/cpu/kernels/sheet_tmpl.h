@@ -297,19 +297,31 @@ typedef struct cell_boxes {
     int32_t lo[2][SLICES_ROOM], hi[2][SLICES_ROOM];
 } cell_boxes;
 
-/* In voxels of the grid, and a cell at most beyond that. */
-static double index_of(const pane_path *path, int a, double place)
+/* In voxels of the grid, and a cell at most beyond that; the place mostly lies about voxel `near`,
+ * which is then the one before it. */
+static double index_near(const pane_path *path, int a, double place, int32_t *near)
 {
-    const double index = trip_coordinates_index(path->coordinates, path->axes[a], place);
-    const double last = (double)path->coordinates->voxels[path->axes[a]];
-    return within(index, -1, last) - path->corner[a];
+    const trip_coordinates *c = path->coordinates;
+    const int axis = path->axes[a];
+    const int32_t last = (int32_t)c->voxels[axis] - 2;
+    const double *x = c->along[axis];
+    int32_t k = *near;
+    for (int step = 0; step < 4 && k < last && place >= x[k + 1]; step++)
+        k++;
+    for (int step = 0; step < 4 && k > 0 && place < x[k]; step++)
+        k--;
+    if ((k > 0 && place < x[k]) || (k < last && place >= x[k + 1]))
+        k = (int32_t)within(floor(trip_coordinates_index(c, axis, place)), 0, last);
+    *near = k;
+    return within(k + (place - x[k]) / (x[k + 1] - x[k]), -1, last + 2) - path->corner[a];
 }
 
 static vi uneven_cells(const pane_path *path, int a, unsigned n, vf at)
 {
     vi cells;
+    int32_t near = 0;
     for (int i = 0; i < V; i++)
-        cells[i] = (int32_t)floor(index_of(path, a, path->base[a][n + i] + (double)at[i]));
+        cells[i] = (int32_t)floor(index_near(path, a, path->base[a][n + i] + (double)at[i], &near));
     return cells;
 }
 
@@ -540,8 +552,8 @@ INLINE corners corners_at(const pane_path *path, const stamp_rays *l, unsigned n
     return c;
 }
 
-/* The same of a grid with uneven spacing, from where its rays are. */
-static corners uneven_corners(const pane_path *path, unsigned n, corners at)
+/* The same of a grid with uneven spacing, from where its rays are; `near` as for index_near(). */
+static corners uneven_corners(const pane_path *path, unsigned n, corners at, int32_t near[2])
 {
     for (int a = 0; a < 2; a++) {
         const int32_t base = path->base[a][n];
@@ -550,7 +562,8 @@ static corners uneven_corners(const pane_path *path, unsigned n, corners at)
         vi_store(whole, at.whole[a]);
         v_store(part, at.part[a]);
         for (int i = 0; i < V; i++) {
-            double index = index_of(path, a, (double)(base + whole[i]) + (double)part[i]);
+            double place = (double)(base + whole[i]) + (double)part[i];
+            double index = index_near(path, a, place, &near[a]);
             double cell = floor(index);
             whole[i] = (int32_t)cell - base;
             part[i] = (float)(index - cell);
@@ -564,7 +577,7 @@ static corners uneven_corners(const pane_path *path, unsigned n, corners at)
 INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
 {
     corners c = corners_at(path, l, n);
-    return is_uneven(path) ? uneven_corners(path, n, c) : c;
+    return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
 /* What rays meet at a slice: the entry of the function's integrals nearest to the code, and what
@@ -577,6 +590,7 @@ typedef struct sample {
     vi gradient[3];   /* times 2^WEIGHT_LOG2 */
     vi sums[4];       /* of the integrals, at the entry */
     bool lit, summed; /* gradient is there; sums are */
+    int32_t near[2];  /* with uneven spacing: voxels that rays were near to, at any slice */
 } sample;
 
 /* Bilinear weights, 2^WEIGHT_LOG2 in all. */
@@ -620,7 +634,7 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
     }
     vi whole[2];
     if (is_uneven(path)) {
-        corners uneven = uneven_corners(path, n, *c);
+        corners uneven = uneven_corners(path, n, *c, s->near);
         set_weights(uneven.part, s);
         find_cells(g, path, n, &uneven, whole);
     } else {
@@ -1171,6 +1185,8 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     unsigned sampled = UINT32_MAX; /* slice, in ends[sampled % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
+    for (int i = 0; i < 4 && is_uneven(path); i++)
+        ends[i / 2].near[i % 2] = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
         if (sampled != n)
