@@ -68,6 +68,12 @@ static bool take_columns(trip_light_sweep *s, trip_budget *budget)
     return s->through != NULL;
 }
 
+/* Of voxel indices in the world. */
+static double length_of(const trip_light_sweep *s, const double step[3])
+{
+    return trip_length(trip_affine_vector(s->index_to_world, trip_v3(step[0], step[1], step[2])));
+}
+
 bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget *budget)
 {
     int axis = 0;
@@ -75,7 +81,9 @@ bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget
         if (fabs(trip_component(to_light, a)) > fabs(trip_component(to_light, axis)))
             axis = a;
     const double along = trip_component(to_light, axis);
+    const double way[3] = { to_light.x, to_light.y, to_light.z };
     set_axes(s, axis, along > 0);
+    s->length = length_of(s, way) / fabs(along) * s->out->spacing;
     for (int i = 0; i < 2; i++) {
         const double last = s->out->nodes[i ? s->down : s->across] - 1;
         s->slope[i] = -trip_component(to_light, i ? s->down : s->across) / fabs(along);
@@ -161,8 +169,7 @@ static double depth_of(const trip_light_sweep *s, const double from[3], const do
             trip_light_grid_at(s->extinction, trip_v3(from[0] + t * step[0], from[1] + t * step[1],
                                                       from[2] + t * step[2]));
     }
-    const trip_vec3 way = trip_v3(step[0], step[1], step[2]);
-    return 0.5 * sum * (t1 - t0) * trip_length(trip_affine_vector(s->index_to_world, way));
+    return 0.5 * sum * (t1 - t0) * (s->point ? length_of(s, step) : s->length);
 }
 
 /* Of rows from one before another. */

@@ -36,6 +36,7 @@ typedef struct trip_light_sweep {
     /* A column that is at w across, or down, at the last layer, moves by slope + spread w from each
      * layer to the next, in nodes. */
     double slope[2], spread;
+    double length;            /* of a step in the world, of a light in a direction */
     int columns[2], first[2]; /* w of the first, and how many one node apart */
     int start;                /* the layer that the light comes to first */
     double before;            /* and layers that it passes before that */

@@ -139,6 +139,7 @@ class View(program.ProgramTest):
                     "click 0.3 Function editor", "click 0.5 Undo", "click 0.5 Redo",
                     "click 0.4 Opacity", "click 0.5 Shading", "click 0.5 Shading",
                     "click 0.5 Light from the eye\nclick 0.2 Light round", "click 0.9 Light up",
+                    "click 0.4 Light distance",
                     "click 0.5 Classify\nclick 0.5 Before splatting",
                     "click 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Sheet by sheet",
                     "click 0.2 h",
