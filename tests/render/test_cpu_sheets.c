@@ -3,6 +3,7 @@
  * sheet.h worked out voxel by voxel. */
 #include "cpu/cpu_renderer.h"
 #include "cpu/kernels/isa.h"
+#include "cpu/sheets/integrals.h"
 #include "cpu_scenes.h"
 #include "test.h"
 
@@ -483,6 +484,51 @@ static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
     }
 }
 
+static void assert_same_function(const trip_cpu_function *a, const trip_cpu_function *b)
+{
+    const trip_cpu_integrals *p = &a->integrals, *q = &b->integrals;
+    const size_t entries = (65536u >> q->entry_log2) + 1;
+    assert_int_equal(p->entry_log2, q->entry_log2);
+    assert_memory_equal(p->sums, q->sums, entries * sizeof *p->sums);
+    assert_memory_equal(p->at, q->at, entries * sizeof *p->at);
+    assert_memory_equal(&p->extinction, &q->extinction, sizeof p->extinction);
+    assert_int_equal(p->first, q->first);
+    assert_int_equal(p->last, q->last);
+    assert_int_equal(a->first_visible, b->first_visible);
+    assert_int_equal(a->last_visible, b->last_visible);
+    assert_memory_equal(a->next_visible, b->next_visible, 65536 * sizeof *a->next_visible);
+}
+
+/* Of frame after frame, each with one thing changed or nothing. */
+static void kept_integrals_are_those_made_anew(void **state)
+{
+    static trip_tf_entry table[65536];
+    static const struct {
+        int visible; /* code */
+        trip_cpu_codes codes;
+        double voxel_world;
+    } frames[] = {
+        { 900, { 0, 0 }, 1 },   { 900, { 0, 0 }, 1 },   { 901, { 0, 0 }, 1 },
+        { 901, { 800, 0 }, 1 }, { 901, { 800, 4 }, 1 }, { 901, { 800, 4 }, 2 },
+    };
+    (void)state;
+    trip_budget *budget;
+    trip_cpu_function kept, anew;
+    assert_int_equal(trip_budget_create(&budget, 4 * trip_cpu_function_bytes()), 0);
+    assert_true(trip_cpu_function_create(&kept, budget));
+    for (size_t i = 0; i < sizeof frames / sizeof *frames; i++) {
+        memset(table, 0, sizeof table);
+        table[frames[i].visible] = (trip_tf_entry){ 0.2f, 0.5f, 1, 3 };
+        assert_true(trip_cpu_function_create(&anew, budget));
+        trip_cpu_function_set(&kept, table, frames[i].codes, frames[i].voxel_world);
+        trip_cpu_function_set(&anew, table, frames[i].codes, frames[i].voxel_world);
+        assert_same_function(&kept, &anew);
+        trip_cpu_function_destroy(&anew, budget);
+    }
+    trip_cpu_function_destroy(&kept, budget);
+    trip_budget_destroy(budget);
+}
+
 enum { FEW_FIRST = 1000, FEW = 40 };
 
 static bool of_few_codes(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -671,6 +717,7 @@ int main(void)
         cmocka_unit_test(grids_too_wide_for_the_memory_are_drawn_in_windows),
         cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
+        cmocka_unit_test(kept_integrals_are_those_made_anew),
         cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
         cmocka_unit_test(labels_keep_their_colours),
         cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),

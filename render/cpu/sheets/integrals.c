@@ -1,15 +1,18 @@
 #include "cpu/sheets/integrals.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MOST, LOG2_MOST = 2 };
+
+static const size_t table_bytes = CODES * sizeof(trip_tf_entry);
 
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
 
 uint64_t trip_cpu_function_bytes(void)
 {
-    return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t);
+    return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t) + table_bytes;
 }
 
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
@@ -19,7 +22,8 @@ bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
     in->sums = trip_budget_take(budget, ENTRIES * sizeof *in->sums);
     in->at = trip_budget_take(budget, ENTRIES * sizeof *in->at);
     f->next_visible = trip_budget_take(budget, CODES * sizeof *f->next_visible);
-    if (in->sums && in->at && f->next_visible)
+    f->table = trip_budget_take(budget, table_bytes);
+    if (in->sums && in->at && f->next_visible && f->table)
         return true;
     trip_cpu_function_destroy(f, budget);
     return false;
@@ -31,6 +35,7 @@ void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget)
     trip_budget_release(budget, in->sums, ENTRIES * sizeof *in->sums);
     trip_budget_release(budget, in->at, ENTRIES * sizeof *in->at);
     trip_budget_release(budget, f->next_visible, CODES * sizeof *f->next_visible);
+    trip_budget_release(budget, f->table, table_bytes);
     *f = (trip_cpu_function){ 0 };
 }
 
@@ -195,13 +200,24 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
     }
 }
 
+static bool is_made_of(const trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
+                       double voxel_world)
+{
+    return f->voxel_world == voxel_world && f->codes.first == codes.first &&
+           f->codes.shift == codes.shift && memcmp(f->table, table, table_bytes) == 0;
+}
+
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
                            double voxel_world)
 {
+    if (is_made_of(f, table, codes, voxel_world))
+        return;
     const double all = whole_integral(table, codes);
     /* A function of one code alone still has what at[] is in units of. */
     const double factor = all > 0 ? GREATEST / all : 1;
+    memcpy(f->table, table, table_bytes);
     f->codes = codes;
+    f->voxel_world = voxel_world;
     f->integrals.entry_log2 = LOG2_MOST;
     while (!suffices(table, codes, f->integrals.entry_log2, voxel_world))
         f->integrals.entry_log2--;

@@ -1,5 +1,6 @@
-/* The transfer function's integrals over codes, as the kernels take them (kernels/sheets.h). Made
- * anew for every frame, read-only then. */
+/* The transfer function's integrals over codes, as the kernels take them (kernels/sheets.h). Set
+ * for every frame, read-only then; those of the frame before are kept where nothing they depend on
+ * has changed. */
 #ifndef TRIP_CPU_SHEETS_INTEGRALS_H
 #define TRIP_CPU_SHEETS_INTEGRALS_H
 
@@ -15,6 +16,9 @@ typedef struct trip_cpu_function {
     bool in_a_row; /* they are first_visible to last_visible, biased */
     int16_t first_visible, last_visible;
     uint32_t *next_visible; /* 65536: the first such code from here on, or 65536 */
+    /* What all of this was made of, with the codes above. */
+    trip_tf_entry *table; /* 65536 */
+    double voxel_world;   /* 0: nothing was made yet */
 } trip_cpu_function;
 
 /* What it takes. */
