@@ -15,11 +15,10 @@ import instructions
 
 SHADERS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "shaders")
 SIZE = ["--size", "40x40", "--threads", "1"]
-# What all pictures of the shaders' test start from: nothing that a shader has a define for.
-PLAIN = ["--renderer", "gl", "--no-shading", "--method", "merge"]
-# By define: what calls for it, with --classify post and pre where that is another shader.
+# By define of the shaders: what calls for it, with --classify post and pre where that is another
+# shader. Light is there where nothing is said.
 CALLED_FOR = {
-    "SHADED": [["--shading"]],
+    "SHADED": [[]],
     "PARALLEL": [["--ortho", "20"], ["--ortho", "20", "--classify", "pre"]],
     "DEPTH": [["--depth", "z.exr"], ["--depth", "z.exr", "--classify", "pre"]],
     "CUED": [["--effects", "cueing"], ["--effects", "cueing", "--classify", "pre"]],
@@ -68,10 +67,10 @@ class Uncalled(program.ProgramTest):
             environment = self.shaders_without(define)
             for scene in scenes:
                 classify = scene[scene.index("--classify") :] if "--classify" in scene else []
-                self.draw(*PLAIN, *classify, env=environment)
-                wanted = [x for x in PLAIN if x != "--no-shading" or define != "SHADED"]
-                run = program.call("render", "ball.trip", "-o", "b.png", *SIZE, *wanted,
-                                   *[x for x in scene if x != "--shading"], env=environment)
+                self.draw("--renderer", "gl", "--no-shading", *classify, env=environment)
+                unlit = [] if define == "SHADED" else ["--no-shading"]
+                run = program.call("render", "ball.trip", "-o", "b.png", *SIZE, "--renderer", "gl",
+                                   *unlit, *scene, env=environment)
                 self.assertIn("uncalled for", run.stderr, (define, scene))
 
     def test_no_byte_is_read_and_no_pass_is_run_for_it(self):
