@@ -26,15 +26,15 @@ class Records(program.ProgramTest):
 
     def change_block(self, axis, number, change):
         """Changes the words of a list's block, by its number, and says where it is in which file.
-        `change` has the presence, the masks and the code words."""
+        `change` has the presence, the masks and the words behind them."""
         shutil.rmtree("b.trip", ignore_errors=True)
         shutil.copytree("a.trip", "b.trip")
         data = craft.Dataset("a.trip")
-        _, _, at, records, words = list(data.runs("xyz".index(axis)))[number]
+        _, _, at, _, words = list(data.runs("xyz".index(axis)))[number]
         plane = data.planes[f"{axis}0.voxels"]
         block = list(struct.unpack_from(f"<{words}Q", plane, at))
-        codes = (records * data.number("<I", 280) + 7) // 8
-        block = change(block[:1], block[1 : words - codes], block[words - codes :])
+        codes = 1 + bin(block[0]).count("1")
+        block = change(block[:1], block[1:codes], block[codes:])
         struct.pack_into(f"<{words}Q", plane, at, *block)
         data.write("b.trip")
         return f"b.trip/{axis}0.voxels: byte {at}: "
@@ -89,10 +89,9 @@ class Records(program.ProgramTest):
             where = self.change_block(axis, number, move)
             self.refused(where, "a voxel is outside its brick's bounds")
 
-    def test_squares_that_are_not_as_many_as_masks(self):
-        change = lambda present, masks, codes: [present[0] | 1 << 63, *masks, *codes]
-        where = self.change_block("y", 7, change)
-        self.refused(where, "squares are not as many as its masks")
+    def test_more_squares_than_masks(self):
+        change = lambda present, masks, codes: [2**64 - 1, *masks, *codes]
+        self.refused(self.change_block("y", 0, change), "squares are more than its block has room for")
 
     def test_masks_that_do_not_hold_as_many_voxels(self):
         def drop(present, masks, codes):
