@@ -2,11 +2,11 @@
 # Installs the Debian packages Triptych is built from, when any is missing. Works as root or with
 # sudo; needs no input and uses no network when everything is there already.
 #
-#   scripts/install-dependencies.sh [--tests] [--compare] [--arm64]
+#   scripts/install-dependencies.sh [--tests] [--compare] [--arm64] [--avx512]
 #   scripts/install-dependencies.sh --libraries
 #
 # --tests adds what the tests use, --compare the programs that the benchmark compares with, --arm64
-# what scripts/arm64.sh needs. --libraries installs nothing and names the libraries that the program
+# and --avx512 what scripts/arm64.sh and avx512.sh need. --libraries installs nothing and names the libraries that the program
 # and its tests are linked with.
 set -eu
 
@@ -17,6 +17,7 @@ build="cmake ninja-build gcc g++ pkg-config libgl1-mesa-dri libegl1 libgbm1 $lib
 tests="libcmocka-dev python3 python3-numpy python3-pil python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
  valgrind xauth xvfb"
 compare="libopenvdb-tools python3-numpy python3-openvdb python3-pil python3-vtk9 xauth xvfb"
+avx512="libsimde-dev"
 arm64="gcc-aarch64-linux-gnu g++-aarch64-linux-gnu mmdebstrap qemu-user-static"
 
 wanted=$build
@@ -25,6 +26,7 @@ for option in "$@"; do
     --tests) wanted="$wanted $tests" ;;
     --compare) wanted="$wanted $compare" ;;
     --arm64) wanted="$wanted $arm64" ;;
+    --avx512) wanted="$wanted $avx512" ;;
     --libraries) echo "$libraries libcmocka-dev" | tr '\n' ' '; exit 0 ;;
     *) echo "install-dependencies: unknown option: $option" >&2; exit 2 ;;
     esac

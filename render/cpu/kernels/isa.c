@@ -16,9 +16,14 @@ __attribute__((constructor)) static void find_runnable(void)
     bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
                 __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
 #if !defined(TRIP_CPU_WITHOUT_AVX512)
+#if defined(TRIP_CPU_EMULATED_AVX512)
+    bool avx512 = avx2, vbmi2 = true;
+#else
     bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
                   __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-    if (avx512 && __builtin_cpu_supports("avx512vbmi2"))
+    bool vbmi2 = __builtin_cpu_supports("avx512vbmi2");
+#endif
+    if (avx512 && vbmi2)
         runnable[n++] = &trip_cpu_avx512_vbmi2;
     if (avx512)
         runnable[n++] = &trip_cpu_avx512;

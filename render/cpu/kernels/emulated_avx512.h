@@ -1,0 +1,149 @@
+/* AVX-512 on processors without it, for tests (TRIP_EMULATE_AVX512): SIMDe's functions in place of
+ * the compiler's, and here those that it lacks. Included before all else of isa_avx512*.c. */
+#ifndef TRIP_CPU_EMULATED_AVX512_H
+#define TRIP_CPU_EMULATED_AVX512_H
+
+#include <immintrin.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#define SIMDE_ENABLE_NATIVE_ALIASES
+#include <simde/x86/avx512.h>
+
+typedef float emulated_ps __attribute__((vector_size(64), may_alias));
+typedef double emulated_pd __attribute__((vector_size(64), may_alias));
+typedef int32_t emulated_i32 __attribute__((vector_size(64), may_alias));
+typedef int64_t emulated_i64 __attribute__((vector_size(64), may_alias));
+
+static inline __m512 emulated_i32gather_ps(__m512i index, const float *base)
+{
+    emulated_ps r;
+    for (int i = 0; i < 16; i++)
+        r[i] = base[((emulated_i32)index)[i]];
+    return (__m512)r;
+}
+#undef _mm512_i32gather_ps
+#define _mm512_i32gather_ps(index, base, scale) emulated_i32gather_ps(index, base)
+
+static inline __m512i emulated_i64gather_epi64(__m512i index, const int64_t *base)
+{
+    emulated_i64 r;
+    for (int i = 0; i < 8; i++)
+        r[i] = base[((emulated_i64)index)[i]];
+    return (__m512i)r;
+}
+#undef _mm512_i64gather_epi64
+#define _mm512_i64gather_epi64(index, base, scale) emulated_i64gather_epi64(index, base)
+
+static inline __m512i emulated_maskz_compress_epi8(uint64_t mask, __m512i a)
+{
+    int8_t from[64], to[64] = { 0 };
+    memcpy(from, &a, sizeof from);
+    for (int i = 0, n = 0; i < 64; i++)
+        if (mask >> i & 1)
+            to[n++] = from[i];
+    memcpy(&a, to, sizeof to);
+    return a;
+}
+#undef _mm512_maskz_compress_epi8
+#define _mm512_maskz_compress_epi8 emulated_maskz_compress_epi8
+
+static inline __m512 emulated_mask_fnmadd_ps(__m512 a, __mmask16 mask, __m512 b, __m512 c)
+{
+    emulated_ps r = (emulated_ps)a;
+    for (int i = 0; i < 16; i++)
+        if (mask >> i & 1)
+            r[i] = fmaf(-((emulated_ps)a)[i], ((emulated_ps)b)[i], ((emulated_ps)c)[i]);
+    return (__m512)r;
+}
+#undef _mm512_mask_fnmadd_ps
+#define _mm512_mask_fnmadd_ps emulated_mask_fnmadd_ps
+
+static inline __mmask16 emulated_testn_epi32_mask(__m512i a, __m512i b)
+{
+    unsigned r = 0;
+    for (int i = 0; i < 16; i++)
+        r |= (unsigned)!(((emulated_i32)a)[i] & ((emulated_i32)b)[i]) << i;
+    return (__mmask16)r;
+}
+#undef _mm512_testn_epi32_mask
+#define _mm512_testn_epi32_mask emulated_testn_epi32_mask
+
+static inline __m512i emulated_cvttps_epi32(__m512 a)
+{
+    __m256 half[2];
+    __m256i r[2];
+    __m512i out;
+    memcpy(half, &a, sizeof half);
+    for (int i = 0; i < 2; i++)
+        r[i] = _mm256_cvttps_epi32(half[i]);
+    memcpy(&out, r, sizeof out);
+    return out;
+}
+#undef _mm512_cvttps_epi32
+#define _mm512_cvttps_epi32 emulated_cvttps_epi32
+
+#undef _mm512_cvtepi32_ps
+#define _mm512_cvtepi32_ps(a) ((__m512) __builtin_convertvector((emulated_i32)(a), emulated_ps))
+
+static inline __m256 emulated_extractf32x8_ps(__m512 a, int half)
+{
+    __m256 r;
+    memcpy(&r, (const char *)&a + 32 * half, sizeof r);
+    return r;
+}
+#undef _mm512_extractf32x8_ps
+#define _mm512_extractf32x8_ps emulated_extractf32x8_ps
+#undef _mm512_extracti32x8_epi32
+#define _mm512_extracti32x8_epi32(a, half) ((__m256i)emulated_extractf32x8_ps((__m512)(a), half))
+
+static inline __m512d emulated_cvtps_pd(__m256 a)
+{
+    emulated_pd r;
+    for (int i = 0; i < 8; i++)
+        r[i] = a[i];
+    return (__m512d)r;
+}
+#undef _mm512_cvtps_pd
+#define _mm512_cvtps_pd emulated_cvtps_pd
+
+static inline __m256 emulated_cvtpd_ps(__m512d a)
+{
+    __m256 r;
+    for (int i = 0; i < 8; i++)
+        r[i] = (float)((emulated_pd)a)[i];
+    return r;
+}
+#undef _mm512_cvtpd_ps
+#define _mm512_cvtpd_ps emulated_cvtpd_ps
+
+static inline __m512d emulated_cvtepi32_pd(__m256i a)
+{
+    emulated_pd r;
+    int32_t from[8];
+    memcpy(from, &a, sizeof from);
+    for (int i = 0; i < 8; i++)
+        r[i] = from[i];
+    return (__m512d)r;
+}
+#undef _mm512_cvtepi32_pd
+#define _mm512_cvtepi32_pd emulated_cvtepi32_pd
+
+static inline __m512i emulated_cvtepu32_epi64(__m256i a)
+{
+    emulated_i64 r;
+    uint32_t from[8];
+    memcpy(from, &a, sizeof from);
+    for (int i = 0; i < 8; i++)
+        r[i] = from[i];
+    return (__m512i)r;
+}
+#undef _mm512_cvtepu32_epi64
+#define _mm512_cvtepu32_epi64 emulated_cvtepu32_epi64
+
+#ifdef TRIP_EMULATED_VBMI2
+#define __AVX512VBMI2__ 1
+#endif
+
+#endif
