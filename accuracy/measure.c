@@ -39,7 +39,7 @@ typedef struct sweep {
     double begin;
     /* What the pictures are of: */
     int stored_data, field_data, reference_data;
-    double field_radius;
+    triptych_settings field; /* that are drawn: what of them the integral depends on */
     triptych_settings reference;
     accuracy_error view; /* scratch */
 } sweep;
@@ -195,14 +195,9 @@ static int leave_out_idle(sweep *s)
 
 /* ---- pictures of the ladder ---- */
 
-static int draw_integral(sweep *s, int data, int renderer, triptych_field field, double radius,
-                         float *rgba)
+static int draw_integral(sweep *s, int data, int renderer, triptych_settings settings, float *rgba)
 {
-    triptych_settings settings = s->usual;
     double ms;
-    settings.field = field;
-    settings.classify = field == TRIPTYCH_SPLATS ? TRIPTYCH_PRE : settings.classify;
-    settings.kernel_radius = radius;
     settings.tolerance = s->o->tolerance;
     settings.samples = s->o->samples;
     bench_progress_step(s->progress, "integral");
@@ -214,23 +209,40 @@ static int draw_integral(sweep *s, int data, int renderer, triptych_field field,
                : status;
 }
 
+/* That of values, as they are interpolated by default. */
+static triptych_settings usual_field(const sweep *s)
+{
+    triptych_settings settings = s->usual;
+    settings.field = TRIPTYCH_VALUES;
+    return settings;
+}
+
 static int need_stored(sweep *s, int data)
 {
     if (s->stored_data == data)
         return 0;
     s->stored_data = data;
-    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, TRIPTYCH_VALUES,
-                         s->usual.kernel_radius, s->pictures[STORED]);
+    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, usual_field(s), s->pictures[STORED]);
 }
 
-static int need_field(sweep *s, int data, double radius)
+/* Of what a row draws: the sum of its splats, or values by its kernel. */
+static int need_field(sweep *s, const accuracy_row *row, bool splats)
 {
-    if (s->field_data == data && s->field_radius == radius)
+    const triptych_settings *drawn = &row->setting.settings;
+    triptych_settings field = usual_field(s);
+    if (splats) {
+        field.field = TRIPTYCH_SPLATS;
+        field.classify = TRIPTYCH_PRE;
+        field.kernel_radius = drawn->kernel_radius;
+    } else {
+        field.kernel = drawn->kernel;
+    }
+    if (s->field_data == row->data && s->field.field == field.field &&
+        s->field.kernel_radius == field.kernel_radius && s->field.kernel == field.kernel)
         return 0;
-    s->field_data = data;
-    s->field_radius = radius;
-    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, TRIPTYCH_SPLATS, radius,
-                         s->pictures[FIELD]);
+    s->field_data = row->data;
+    s->field = field;
+    return draw_integral(s, row->data, TRIPTYCH_RENDERER_INTEGRAL, field, s->pictures[FIELD]);
 }
 
 /* The reference of a row's settings, and at the finest level if that is another. */
@@ -278,9 +290,11 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
         compare(s, row, ACCURACY_PRECISION, RAN, STORED);
         return 0;
     }
-    which drawn = is_pre(stats) ? FIELD : STORED;
+    /* The integral has no Gaussian values: what that kernel smooths counts as the method's. */
+    const bool pre = is_pre(stats), cubic = row->setting.settings.kernel == TRIPTYCH_CUBIC;
+    which drawn = pre || cubic ? FIELD : STORED;
     if (drawn == FIELD)
-        status = need_field(s, row->data, row->setting.settings.kernel_radius);
+        status = need_field(s, row, pre);
     if (status)
         return status;
     compare(s, row, ACCURACY_MODEL, drawn, STORED);
@@ -443,8 +457,7 @@ static int find_truth(sweep *s, int view)
     int status;
     s->stored_data = s->field_data = s->reference_data = -1;
     if (s->o->source)
-        status = draw_integral(s, 0, ACCURACY_SOURCE, TRIPTYCH_VALUES, s->usual.kernel_radius,
-                               s->pictures[TRUTH]);
+        status = draw_integral(s, 0, ACCURACY_SOURCE, usual_field(s), s->pictures[TRUTH]);
     else {
         status = need_stored(s, 0);
         memcpy(s->pictures[TRUTH], s->pictures[STORED], s->picture_bytes);
@@ -513,7 +526,7 @@ static int measure_views(sweep *s)
     int status = 0, steps = 0;
     for (int i = 0; i < s->m->row_count; i++)
         steps += s->m->rows[i].state == ACCURACY_NOT_REACHED;
-    bench_progress_expect(s->progress, s->o->views * (1 + steps * (s->o->ladder ? 2 : 1)));
+    bench_progress_expect(s->progress, s->o->views * (s->o->ladder ? 3 + 2 * steps : 1 + steps));
     for (int view = 0; view < s->o->views && !status && has_time_for(s, view); view++)
         status = measure_view(s, view);
     return status;

@@ -88,14 +88,23 @@ static void add_targets(sweep *w)
     }
 }
 
+/* Radii and footprints of splats; the kernels of values that gl has. */
 static void add_kernels(sweep *w)
 {
     static const double radii[] = { 1.5, 2.5, 3 };
     triptych_settings s = w->pre;
+    s.footprint = TRIPTYCH_FOOTPRINT_EWA;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-ewa");
+    s.footprint = w->pre.footprint;
     for (size_t i = 0; i < sizeof radii / sizeof *radii; i++) {
         s.kernel_radius = radii[i];
         add(w, TRIPTYCH_RENDERER_CPU, s, "pre-radius-%g", radii[i]);
     }
+    s = w->post;
+    s.kernel = TRIPTYCH_CUBIC;
+    add(w, TRIPTYCH_RENDERER_GL, s, "gl-post-cubic");
+    s.kernel = TRIPTYCH_GAUSSIAN;
+    add(w, TRIPTYCH_RENDERER_GL, s, "gl-post-gaussian");
 }
 
 static void add_levels(sweep *w)
@@ -153,6 +162,7 @@ bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_
         a->samples != b->samples || (a->method == TRIPTYCH_MERGE && a->h != b->h))
         return false;
     if (a->classify == TRIPTYCH_PRE)
-        return a->compositing == b->compositing && a->kernel_radius == b->kernel_radius;
-    return a->slices == b->slices;
+        return a->compositing == b->compositing && a->kernel_radius == b->kernel_radius &&
+               a->footprint == b->footprint;
+    return a->slices == b->slices && a->kernel == b->kernel;
 }

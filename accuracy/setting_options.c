@@ -10,6 +10,8 @@ static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "inte
 static const char *const classifies[] = { "pre", "post", "auto", NULL };
 static const char *const compositings[] = { "splat", "sheet", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
+static const char *const footprints[] = { "exact", "ewa", "fixed", NULL };
+static const char *const kernels[] = { "linear", "cubic", "gaussian", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", NULL };
 
 __attribute__((format(printf, 4, 5))) static void put(accuracy_option *out, int *count,
@@ -27,6 +29,8 @@ static void put_pre(const triptych_settings *s, accuracy_option *out, int *count
 {
     put(out, count, "classify", "pre");
     put(out, count, "compositing", "%s", compositings[s->compositing]);
+    if (s->footprint != TRIPTYCH_FOOTPRINT_EXACT)
+        put(out, count, "kernel", "%s", footprints[s->footprint]);
     put(out, count, "kernel-radius", "%g", s->kernel_radius);
     put(out, count, "target", "%s", targets[s->target]);
 }
@@ -46,6 +50,8 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
         put_pre(s, out, &count);
     else {
         put(out, &count, "classify", "%s", classifies[s->classify]);
+        if (s->kernel != TRIPTYCH_LINEAR)
+            put(out, &count, "kernel", "%s", kernels[s->kernel]);
         if (s->slices)
             put(out, &count, "slices", "%d", s->slices);
     }
@@ -101,6 +107,10 @@ bool accuracy_setting_read_option(accuracy_setting *one, const char *name, const
         return s->classify = (triptych_classify)which, true;
     if (!strcmp(name, "compositing") && (which = find(value, compositings)) >= 0)
         return s->compositing = (triptych_compositing)which, true;
+    if (!strcmp(name, "kernel") && (which = find(value, footprints)) >= 0)
+        return s->footprint = (triptych_footprint)which, true;
+    if (!strcmp(name, "kernel") && (which = find(value, kernels)) >= 0)
+        return s->kernel = (triptych_kernel)which, true;
     if (!strcmp(name, "target") && (which = find(value, targets)) >= 0)
         return s->target = (triptych_target)which, true;
     if (!strcmp(name, "method") && (which = find(value, methods)) >= 0)
