@@ -55,7 +55,7 @@ static void take_steps(const scene *s, const scene_renderer *kind, trip_classify
     draw_whole(&d, whole);
     check_range(whole);
     step_by_step(&d, false, stepped, &steps);
-    assert_true(steps > 20);
+    assert_true(steps > 10);
     assert_memory_equal(whole, stepped, sizeof whole);
     step_by_step(&d, true, stepped, &steps);
     assert_memory_equal(whole, stepped, sizeof whole);
