@@ -1,18 +1,16 @@
 #include "cpu/sheets/integrals.h"
 
 #include <math.h>
-#include <string.h>
+#include <xxhash.h>
 
 enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MOST, LOG2_MOST = 2 };
-
-static const size_t table_bytes = CODES * sizeof(trip_tf_entry);
 
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
 
 uint64_t trip_cpu_function_bytes(void)
 {
-    return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t) + table_bytes;
+    return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t);
 }
 
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
@@ -22,8 +20,7 @@ bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
     in->sums = trip_budget_take(budget, ENTRIES * sizeof *in->sums);
     in->at = trip_budget_take(budget, ENTRIES * sizeof *in->at);
     f->next_visible = trip_budget_take(budget, CODES * sizeof *f->next_visible);
-    f->table = trip_budget_take(budget, table_bytes);
-    if (in->sums && in->at && f->next_visible && f->table)
+    if (in->sums && in->at && f->next_visible)
         return true;
     trip_cpu_function_destroy(f, budget);
     return false;
@@ -35,7 +32,6 @@ void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget)
     trip_budget_release(budget, in->sums, ENTRIES * sizeof *in->sums);
     trip_budget_release(budget, in->at, ENTRIES * sizeof *in->at);
     trip_budget_release(budget, f->next_visible, CODES * sizeof *f->next_visible);
-    trip_budget_release(budget, f->table, table_bytes);
     *f = (trip_cpu_function){ 0 };
 }
 
@@ -200,22 +196,19 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
     }
 }
 
-static bool is_made_of(const trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
-                       double voxel_world)
-{
-    return f->voxel_world == voxel_world && f->codes.first == codes.first &&
-           f->codes.shift == codes.shift && memcmp(f->table, table, table_bytes) == 0;
-}
-
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
                            double voxel_world)
 {
-    if (is_made_of(f, table, codes, voxel_world))
+    const XXH128_hash_t hash = XXH3_128bits(table, CODES * sizeof *table);
+    if (f->voxel_world == voxel_world && f->codes.first == codes.first &&
+        f->codes.shift == codes.shift && f->table_hash[0] == hash.low64 &&
+        f->table_hash[1] == hash.high64)
         return;
     const double all = whole_integral(table, codes);
     /* A function of one code alone still has what at[] is in units of. */
     const double factor = all > 0 ? GREATEST / all : 1;
-    memcpy(f->table, table, table_bytes);
+    f->table_hash[0] = hash.low64;
+    f->table_hash[1] = hash.high64;
     f->codes = codes;
     f->voxel_world = voxel_world;
     f->integrals.entry_log2 = LOG2_MOST;

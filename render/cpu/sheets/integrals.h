@@ -17,8 +17,8 @@ typedef struct trip_cpu_function {
     int16_t first_visible, last_visible;
     uint32_t *next_visible; /* 65536: the first such code from here on, or 65536 */
     /* What all of this was made of, with the codes above. */
-    trip_tf_entry *table; /* 65536 */
-    double voxel_world;   /* 0: nothing was made yet */
+    uint64_t table_hash[2];
+    double voxel_world; /* 0: nothing was made yet */
 } trip_cpu_function;
 
 /* What it takes. */
