@@ -144,7 +144,7 @@ static trip_vec3 light_of(const trip_light_source *s)
 }
 
 /* Notes the light; false where `reached` is made for another. */
-static bool is_made_for(trip_light_map *m, const trip_light_source *s)
+static bool take_light(trip_light_map *m, const trip_light_source *s)
 {
     const trip_vec3 light = light_of(s), apart = trip_sub(light, m->light);
     const bool same = m->point_light == s->settings->point_light && trip_dot(apart, apart) == 0;
@@ -310,7 +310,7 @@ int trip_light_map_begin(trip_light_map *m, const trip_light_source *s)
         drop_open(m);
     if (status)
         return status;
-    const bool same = is_made_for(m, s);
+    const bool same = take_light(m, s);
     m->has_reached &= same;
     if (m->stage != GATHER && !(same && m->stage == next_stage(m))) {
         stop_sweeping(m);
