@@ -98,49 +98,19 @@ static inline __m256 emulated_extractf32x8_ps(__m512 a, int half)
 #undef _mm512_extracti32x8_epi32
 #define _mm512_extracti32x8_epi32(a, half) ((__m256i)emulated_extractf32x8_ps((__m512)(a), half))
 
-static inline __m512d emulated_cvtps_pd(__m256 a)
-{
-    emulated_pd r;
-    for (int i = 0; i < 8; i++)
-        r[i] = a[i];
-    return (__m512d)r;
-}
+typedef float emulated_8_ps __attribute__((vector_size(32), may_alias));
+typedef int32_t emulated_8_i32 __attribute__((vector_size(32), may_alias));
+typedef uint32_t emulated_8_u32 __attribute__((vector_size(32), may_alias));
+
 #undef _mm512_cvtps_pd
-#define _mm512_cvtps_pd emulated_cvtps_pd
-
-static inline __m256 emulated_cvtpd_ps(__m512d a)
-{
-    __m256 r;
-    for (int i = 0; i < 8; i++)
-        r[i] = (float)((emulated_pd)a)[i];
-    return r;
-}
+#define _mm512_cvtps_pd(a) ((__m512d) __builtin_convertvector((emulated_8_ps)(a), emulated_pd))
 #undef _mm512_cvtpd_ps
-#define _mm512_cvtpd_ps emulated_cvtpd_ps
-
-static inline __m512d emulated_cvtepi32_pd(__m256i a)
-{
-    emulated_pd r;
-    int32_t from[8];
-    memcpy(from, &a, sizeof from);
-    for (int i = 0; i < 8; i++)
-        r[i] = from[i];
-    return (__m512d)r;
-}
+#define _mm512_cvtpd_ps(a) ((__m256) __builtin_convertvector((emulated_pd)(a), emulated_8_ps))
 #undef _mm512_cvtepi32_pd
-#define _mm512_cvtepi32_pd emulated_cvtepi32_pd
-
-static inline __m512i emulated_cvtepu32_epi64(__m256i a)
-{
-    emulated_i64 r;
-    uint32_t from[8];
-    memcpy(from, &a, sizeof from);
-    for (int i = 0; i < 8; i++)
-        r[i] = from[i];
-    return (__m512i)r;
-}
+#define _mm512_cvtepi32_pd(a) ((__m512d) __builtin_convertvector((emulated_8_i32)(a), emulated_pd))
 #undef _mm512_cvtepu32_epi64
-#define _mm512_cvtepu32_epi64 emulated_cvtepu32_epi64
+#define _mm512_cvtepu32_epi64(a)                                                                   \
+    ((__m512i) __builtin_convertvector((emulated_8_u32)(a), emulated_i64))
 
 #ifdef TRIP_EMULATED_VBMI2
 #define __AVX512VBMI2__ 1
