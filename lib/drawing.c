@@ -155,14 +155,6 @@ static int place_camera(triptych *t)
     return !status && t->at_level ? make_camera(t) : status;
 }
 
-/* Of its own choice one that draws the data set. */
-static trip_renderer_kind renderer_wanted(const triptych *t)
-{
-    const bool uneven = trip_coordinates_uneven(&t->session.data->coordinates);
-    const bool any = t->resources.renderer == TRIPTYCH_RENDERER_AUTO;
-    return any && uneven ? TRIP_RENDERER_CPU : (trip_renderer_kind)t->resources.renderer;
-}
-
 static size_t finer_bytes(const triptych *t)
 {
     return (size_t)t->turned.width * (size_t)t->turned.height * 4 * sizeof *t->finer;
@@ -194,7 +186,8 @@ static int prepare(triptych *t)
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer)
-        status = trip_renderer_create(&t->renderer, renderer_wanted(t), r->threads, s->budget);
+        status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
+                                      s->budget);
     if (!status)
         status = place_camera(t);
     return status;
@@ -227,9 +220,6 @@ static const char *needs_splats(const triptych *t)
         return "the grid is one voxel thick";
     if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
         return "voxels were left out, and their halo is not in the data set";
-    if (trip_coordinates_uneven(&t->session.data->coordinates) &&
-        !(t->renderer->ops->uneven >> TRIP_CLASSIFY_POST & 1))
-        return "the spacing is uneven, and this renderer has no sheets of such grids";
     return NULL;
 }
 

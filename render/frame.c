@@ -289,11 +289,6 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "does not classify after interpolation");
     const bool uneven = trip_coordinates_uneven(&frame->data->coordinates);
-    if (uneven && !(renderer->ops->uneven >> s->classify & 1))
-        return trip_fail(
-            TRIP_USAGE, "render", renderer->ops->name,
-            "draws no splats of grids with uneven spacing: --classify post, or --renderer "
-            "cpu or reference, does");
     if (uneven && trip_effects_some(&s->effects) && !frame->plan->gathers)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects in grids with uneven spacing; the integral does");

@@ -585,7 +585,6 @@ static const trip_renderer_ops reference_ops = {
     .classifies_post = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .forms = TRIP_DRAWS_FIXED | TRIP_DRAWS_VERTEX_WEIGHTS | TRIP_DRAWS_IMAGE_SHEETS,
-    .uneven = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -78,7 +78,6 @@ typedef struct trip_renderer_ops {
     unsigned effects;     /* draws frames with effects: a bit per trip_classify */
     bool cueing;          /* or at least with depth cueing */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
-    unsigned uneven;      /* draws grids with uneven spacing: a bit per trip_classify */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);

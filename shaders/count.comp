@@ -23,7 +23,7 @@ bool touches(splat s, ivec2 pixel)
     real2 p = real2(pixel) + 0.5 - screen.xy, q = p - s.centre;
     real m = s.conic.x * q.x * q.x + 2.0 * s.conic.y * q.x * q.y + s.conic.z * q.y * q.y;
 #ifndef PARALLEL
-    real ray2 = dot(ray2_a, real4(1.0, p, p.x * p.x)) + dot(ray2_b.xy, p.y * p);
+    real ray2 = own_ray2(p);
     real3 at = real3(1.0, p);
     if (s.near)
         m = dot(s.a, at) * dot(s.a, at) + dot(s.b, at) * dot(s.b, at);
@@ -60,6 +60,9 @@ void main()
         return;
     record r = fetch_record(piece.x + gl_GlobalInvocationID.x);
     splat s;
+#ifdef UNEVEN
+    use_width(r.width);
+#endif
     if (!project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius))
         return;
     count(0);

@@ -1,7 +1,7 @@
 // One splat of the batch by its draw position: its place from the eye (list axes), code and normal.
 // Mirrors stream/block.h: the bytes of blocks and normals are as in the files. With INDEXED runs
 // are places in the order of a list, each of which is an index into one array of vertices (x, y, z
-// and code in 16 bits each).
+// and code in 16 bits each). With UNEVEN voxels lie where a table says (coordinates.h).
 #include "real.glsl"
 
 layout(std430, binding = TRIP_GL_RUNS) readonly buffer trip_gl_runs { trip_gl_run runs[]; };
@@ -15,13 +15,27 @@ layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint v
 layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_square squares[]; };
 #endif
 
+#ifdef UNEVEN
+// Entry 3 i + a: of voxel i along axis a of the data the place, then the width, each the sum of two
+// floats.
+#ifdef INDEXED
+#define VOXEL_PLACES TRIP_GL_VOXEL_PLACES_INDEXED
+#else
+#define VOXEL_PLACES TRIP_GL_VOXEL_PLACES
+#endif
+layout(std430, binding = VOXEL_PLACES) readonly buffer trip_gl_voxel_places { vec4 voxel_places[]; };
+#endif
+
 struct record {
     real3 from_eye; // list axes
     real3 place;    // to_x . c, to_y . c in pixels from the image's centre, forward . c
     uint code, normal;
+#ifdef UNEVEN
+    real3 width;    // list axes
+#endif
 };
 
-// Offset of a splat from its run's origin.
+// Offset of a splat from its run's origin, voxels.
 #ifdef INDEXED
 real3 offset_of(uint at, out uint code)
 {
@@ -84,6 +98,23 @@ uint normal_at(uint at)
 }
 #endif
 
+#ifdef UNEVEN
+// Of a voxel and an offset from it, list axes: how far the other's place is from its place, and the
+// other's width.
+real3 place_offset(ivec3 origin, ivec3 offset, out real3 width)
+{
+    real3 apart;
+    for (int i = 0; i < 3; i++) {
+        int axis = (int(weight.z) + i) % 3;
+        vec4 from = voxel_places[3 * origin[i] + axis];
+        vec4 to = voxel_places[3 * (origin[i] + offset[i]) + axis];
+        apart[i] = (real(to.x) - real(from.x)) + (real(to.y) - real(from.y));
+        width[i] = real(to.z) + real(to.w);
+    }
+    return apart;
+}
+#endif
+
 record fetch_record(uint position)
 {
     record r;
@@ -91,11 +122,16 @@ record fetch_record(uint position)
     trip_gl_run run = runs[run_of[position]];
     uint at = order[uint(run.first + run.step * int(position))];
     real3 offset = offset_of(at, r.code);
+    const ivec3 origin = ivec3(0);
 #else
     uint entry = run_of[position], k = entry & 63u;
     trip_gl_square square = squares[entry >> 6];
     trip_gl_run run = runs[square.run];
     real3 offset = offset_of(square, k, r.code);
+    ivec3 origin = ivec3(run.unused, run.first, run.step);
+#endif
+#ifdef UNEVEN
+    offset = place_offset(origin, ivec3(offset), r.width);
 #endif
     // In this order: base + offset cancels almost exactly near the eye.
     r.from_eye = (real3(run.base) + offset) + real3(run.base_low);

@@ -3,8 +3,9 @@
 // size of a splat in pixels: no number leaves a float's range. See render/splat.h for the formulas.
 // `c` and `place` are a record's (fetch.glsl). With NEAR, and wherever splats are counted, some may be
 // near: then all have the numbers of near ones. With AFFINE those that are not near are affine
-// (render/splat.h), and have none of these.
-#include "real.glsl"
+// (render/splat.h), and have none of these. With UNEVEN the own_width and own_size of rays.glsl are the
+// splat's.
+#include "rays.glsl"
 
 #if defined(TRIP_DOUBLE) && !defined(NEAR)
 #define NEAR
@@ -16,12 +17,18 @@ struct splat {
     real ray2;        // |ray|^2 through the centre; 1 in parallel views
     real amplitude;
     real4 bounds;     // x0, y0, x1, y1
-    real radius;      // index space
+    real radius;      // index space of the list
 #ifdef NEAR
     bool near;
     real3 a, b, along; // dot products with (1, x, y), (x, y) pixels from the image's centre
 #endif
 };
+
+// Of round kernels, sigma^2.
+real own_sigma2()
+{
+    return kernel.x * (own_size * own_size);
+}
 
 #ifdef FLATTENED
 // Of the splat at hand: trip_flattening of render/splat.h, list axes.
@@ -39,13 +46,15 @@ real4 flattened(real4 s, real3 gx, real3 gy, real along)
 
 #ifdef NEAR
 #ifdef PARALLEL
-// Sets `along`; false where all of the splat is behind the plane of the eye.
-bool project_near(real3 place, inout splat s)
+// Sets `along`; false where all of the splat is behind the plane of the eye. `half_size` is of the
+// support of the round kernel.
+bool project_near(real3 place, real2 half_size, inout splat s)
 {
-    real unit = 1.0 / (length(ray_0.xyz) * sqrt(kernel.x)), k = sqrt(kernel.y);
-    real2 slope = real2(dot(ray_0.xyz, ray_x.xyz), dot(ray_0.xyz, ray_y.xyz)) * (-ray_x.w * unit);
-    real middle = place.z * dot(ray_0.xyz, ray_0.xyz) * unit;
-    real reach = k + dot(abs(slope), parallel_size.xy);
+    real3 ray = own_vector(ray_0.xyz), x = own_vector(ray_x.xyz), y = own_vector(ray_y.xyz);
+    real unit = 1.0 / (length(ray) * sqrt(own_sigma2())), k = sqrt(kernel.y);
+    real2 slope = real2(dot(ray, x), dot(ray, y)) * (-ray_x.w * unit);
+    real middle = place.z * dot(ray, ray) * unit;
+    real reach = k + dot(abs(slope), half_size);
     s.near = !(middle >= reach);
     s.along = real3(middle - dot(slope, s.centre), slope);
     return middle > -reach;
@@ -53,11 +62,11 @@ bool project_near(real3 place, inout splat s)
 #else
 // The least and greatest p of [-half_size, half_size] with
 // (x - p z)^2 <= reach^2 |to - p forward|^2; false where there are none.
-bool bound_along(real3 to, real x, real z, real reach, real half_size, out real2 bounds)
+bool bound_along(real3 to, real3 forward, real x, real z, real reach, real half_size, out real2 bounds)
 {
-    real r2 = reach * reach, q2 = z * z - r2 * dot(forward.xyz, forward.xyz);
-    real q1 = x * z - r2 * dot(to, forward.xyz), q0 = x * x - r2 * dot(to, to);
-    real3 across = to * z - forward.xyz * x, normal = cross(to, forward.xyz);
+    real r2 = reach * reach, q2 = z * z - r2 * dot(forward, forward);
+    real q1 = x * z - r2 * dot(to, forward), q0 = x * x - r2 * dot(to, to);
+    real3 across = to * z - forward * x, normal = cross(to, forward);
     real root = r2 * (dot(across, across) - r2 * dot(normal, normal));
     bool lowest = (q2 * half_size + 2.0 * q1) * half_size + q0 <= 0.0;
     bool highest = (q2 * half_size - 2.0 * q1) * half_size + q0 <= 0.0;
@@ -77,6 +86,7 @@ bool bound_along(real3 to, real x, real z, real reach, real half_size, out real2
 
 real3 form_of(real3 e, real scale)
 {
+    e = own_vector(e); // e . own_vector(ray) is own_vector(e) . ray
     return real3(dot(e, ray_0.xyz), real2(dot(e, ray_x.xyz), dot(e, ray_y.xyz)) * ray_x.w) * scale;
 }
 
@@ -90,59 +100,82 @@ bool project_near(real3 c, real3 place, inout splat s)
     if (!(dot(v, v) > 0.0))
         v = other.yzx;
     real3 e0 = normalize(cross(v, other)), e1 = normalize(cross(v, e0));
-    real depth = max(place.z, real(0.0)) * ray_x.w, low = kernel.z * depth * depth / kernel.x;
-    real2 x = real2(dot(e0, ray_x.xyz), dot(e1, ray_x.xyz));
-    real2 y = real2(dot(e0, ray_y.xyz), dot(e1, ray_y.xyz));
+    real depth = max(place.z, real(0.0)) * ray_x.w, low = kernel.z * depth * depth / own_sigma2();
+    real3 ray_dx = own_vector(ray_x.xyz), ray_dy = own_vector(ray_y.xyz);
+    real2 x = real2(dot(e0, ray_dx), dot(e1, ray_dx));
+    real2 y = real2(dot(e0, ray_dy), dot(e1, ray_dy));
     real w00 = 1.0 + low * (x.x * x.x + y.x * y.x), w11 = 1.0 + low * (x.y * x.y + y.y * y.y);
     real w01 = low * (x.x * x.y + y.x * y.y), area = low * (x.x * y.y - x.y * y.x);
-    real det = w00 + w11 - 1.0 + area * area, scale = length(c) / sqrt(kernel.x);
+    real det = w00 + w11 - 1.0 + area * area, scale = length(c) / sqrt(own_sigma2());
     s.a = form_of(e0 - e1 * (w01 / w11), scale * sqrt(w11 / det));
     s.b = form_of(e1, scale / sqrt(w11));
-    s.along = form_of(c, 1.0 / sqrt(kernel.x));
+    s.along = form_of(c, 1.0 / sqrt(own_sigma2()));
     if (!s.near)
         return true;
-    s.amplitude = kernel.w / sqrt(det);
+    s.amplitude = kernel.w * own_size / sqrt(det);
     s.ray2 = 1.0;
     s.centre = real2(0.0);
     s.conic = real3(0.0);
     real half_difference = 0.5 * (w00 - w11);
     real largest = 0.5 * (w00 + w11) + sqrt(half_difference * half_difference + w01 * w01);
-    real reach = sqrt(kernel.x * kernel.y * largest);
+    real reach = sqrt(own_sigma2() * kernel.y * largest);
     s.radius = 1e18;
     real2 columns, rows;
-    bool seen = bound_along(to_x.xyz, place.x, place.z, reach, screen.x, columns) &&
-                bound_along(to_y.xyz, place.y, place.z, reach, screen.y, rows);
+    real3 z = own_gradient(forward.xyz);
+    bool seen = bound_along(own_gradient(to_x.xyz), z, place.x, place.z, reach, screen.x, columns) &&
+                bound_along(own_gradient(to_y.xyz), z, place.y, place.z, reach, screen.y, rows);
     s.bounds = real4(columns.x, rows.x, columns.y, rows.y);
-    return seen && place.z >= -sqrt(2.0 * kernel.x * kernel.y * dot(forward.xyz, forward.xyz));
+    return seen && place.z >= -sqrt(2.0 * own_sigma2() * kernel.y * dot(z, z));
 }
 #endif
 #endif
 
 #ifdef PARALLEL
-bool project(real3 c, real3 place, out splat s)
+#if defined(UNEVEN) || defined(FLATTENED)
+// The footprint where it is not that of all, from the covariances over sigma^2 `most`; half_size
+// becomes that of the support of the round kernel.
+void shape_footprint(inout splat s, inout real2 half_size)
 {
+    real3 x = own_gradient(to_x.xyz), y = own_gradient(to_y.xyz), ray = own_vector(ray_0.xyz);
+    real most = max(dot(x, x), dot(y, y)), sigma2 = own_sigma2() * most;
+    real3 gx = x * inversesqrt(most), gy = y * inversesqrt(most), area = cross(gx, gy);
+    real low = kernel.z / sigma2, det_s = dot(area, area);
+    real4 shape = real4(dot(gx, gx), dot(gx, gy), dot(gy, gy), det_s);
+#ifdef UNEVEN
+    real half_difference = 0.5 * (shape.x - shape.z);
+    real largest = 0.5 * (shape.x + shape.z) +
+                   sqrt(half_difference * half_difference + shape.y * shape.y);
+    s.radius = sqrt(own_sigma2() * kernel.y * (1.0 + low * largest / det_s));
+    half_size = sqrt(real2(shape.x + low, shape.z + low) * (kernel.y * sigma2));
+#endif
+#ifdef FLATTENED
+    shape = flattened(shape, gx, gy, dot(normalize(ray), flattening.xyz));
+#endif
+    real det = shape.w + low * (shape.x + shape.z) + low * low;
+    s.conic = real3(shape.z + low, -shape.y, shape.x + low) / (det * sigma2);
+    s.amplitude = parallel_size.w * sqrt(det_s / det);
+#ifdef UNEVEN
+    s.amplitude *= own_size * length(ray_0.xyz) / length(ray);
+#endif
+    real2 reach = sqrt(real2(shape.x + low, shape.z + low) * (kernel.y * sigma2));
+    s.bounds = real4(s.centre - reach, s.centre + reach);
+}
+#endif
+
+bool project_own(real3 c, real3 place, out splat s)
+{
+    real2 half_size = parallel_size.xy;
     s.centre = place.xy;
     s.conic = parallel.xyz;
     s.ray2 = 1.0;
     s.amplitude = parallel.w;
-    s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
-    s.radius = parallel_size.z;
-#ifdef FLATTENED
-    // S, S' and the low-pass over sigma^2 `most`.
-    real most = max(dot(to_x.xyz, to_x.xyz), dot(to_y.xyz, to_y.xyz));
-    real3 gx = to_x.xyz * inversesqrt(most), gy = to_y.xyz * inversesqrt(most);
-    real3 area = cross(gx, gy);
-    real low = kernel.z / (kernel.x * most), det_s = dot(area, area);
-    real4 shape = flattened(real4(dot(gx, gx), dot(gx, gy), dot(gy, gy), det_s), gx, gy,
-                            dot(normalize(ray_0.xyz), flattening.xyz));
-    real det = shape.w + low * (shape.x + shape.z) + low * low;
-    s.conic = real3(shape.z + low, -shape.y, shape.x + low) / (det * kernel.x * most);
-    s.amplitude = parallel_size.w * sqrt(det_s / det);
-    real2 half_size = sqrt(real2(shape.x + low, shape.z + low) * (kernel.x * kernel.y * most));
     s.bounds = real4(s.centre - half_size, s.centre + half_size);
+    s.radius = parallel_size.z;
+#if defined(UNEVEN) || defined(FLATTENED)
+    shape_footprint(s, half_size);
 #endif
 #ifdef NEAR
-    return project_near(place, s);
+    return project_near(place, half_size, s);
 #else
     return place.z > 0.0;
 #endif
@@ -158,10 +191,7 @@ bool project_far(real3 c, real3 place, out splat s)
     s.ray2 = 1.0;
     s.amplitude = parallel.w;
 #ifdef ANISOTROPIC
-    real4 terms = real4(1.0, s.centre, s.centre.x * s.centre.x);
-    real2 more = s.centre.y * s.centre;
-    s.amplitude *= sqrt((dot(world2_a, terms) + dot(world2_b.xy, more)) /
-                        (dot(ray2_a, terms) + dot(ray2_b.xy, more)));
+    s.amplitude *= sqrt(world_ray2(s.centre) / own_ray2(s.centre));
 #endif
     s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
     s.radius = parallel_size.z * place.z;
@@ -178,15 +208,15 @@ bool project_far(real3 c, real3 place, out splat s)
     s.ray2 = dot(ray, ray);
 
     // u S = [b.b -a.b; -a.b a.a]. Beyond 1e17 splats are 1e-8 pixels and only products would suffer.
-    real3 a = cross(ray, ray_x.xyz), b = cross(ray, ray_y.xyz);
-    real u = min(forward.w * forward.w * (place.z * place.z), real(1e17));
+    real3 rx = own_vector(ray_x.xyz), ry = own_vector(ray_y.xyz);
+    real3 a = cross(ray, rx), b = cross(ray, ry);
+    real to_sigma = forward.w / own_size, u = min(to_sigma * to_sigma * (place.z * place.z), real(1e17));
     real low = kernel.z * u;
     real sxx = dot(b, b), sxy = -dot(a, b), syy = dot(a, a);
     real det_s = ray_y.w * s.ray2, det_shape = det_s;
 #ifdef AFFINE
     real spread = dot(real3(sxx + low, 2.0 * sxy, syy + low),
-                      real3(dot(ray_x.xyz, ray_x.xyz), dot(ray_x.xyz, ray_y.xyz),
-                            dot(ray_y.xyz, ray_y.xyz)));
+                      real3(dot(rx, rx), dot(rx, ry), dot(ry, ry)));
 #endif
     real half_difference = 0.5 * (sxx - syy);
     real largest = 0.5 * (sxx + syy) + sqrt(half_difference * half_difference + sxy * sxy);
@@ -200,10 +230,10 @@ bool project_far(real3 c, real3 place, out splat s)
     real inverse_det = 1.0 / (det_shape + low * (sxx + syy) + low * low);
     real3 conic = real3(syy + low, -sxy, sxx + low) * inverse_det;
     s.conic = conic * u;
-    s.amplitude = kernel.w * sqrt(det_s * inverse_det);
+    s.amplitude = kernel.w * own_size * sqrt(det_s * inverse_det);
 
     // The largest eigenvalue of S^-1 is that of S over |S|; of the round kernel.
-    s.radius = sqrt(kernel.x * kernel.y * (1.0 + low * largest / det_s));
+    s.radius = sqrt(own_sigma2() * kernel.y * (1.0 + low * largest / det_s));
 
 #ifdef AFFINE
     if (!(s.ray2 * u * (AFFINE_MOST * AFFINE_MOST) >= kernel.y * ray_x.w * ray_x.w * spread))
@@ -212,18 +242,17 @@ bool project_far(real3 c, real3 place, out splat s)
     s.bounds = real4(s.centre - half_size, s.centre + half_size);
     s.radius *= AFFINE_REACH;
 #ifdef ANISOTROPIC
-    s.amplitude *= sqrt((dot(world2_a, real4(1.0, s.centre, s.centre.x * s.centre.x)) +
-                         dot(world2_b.xy, s.centre.y * s.centre)) / s.ray2);
+    s.amplitude *= sqrt(world_ray2(s.centre) / s.ray2);
 #endif
     s.ray2 = 1.0;
     return true;
 #else
     // E and l over u.
     real k = kernel.y * ray_x.w / (s.ray2 * u), k_step = k * ray_x.w;
-    real exx = conic.x - k_step * dot(ray_x.xyz, ray_x.xyz);
-    real exy = conic.y - k_step * dot(ray_x.xyz, ray_y.xyz);
-    real eyy = conic.z - k_step * dot(ray_y.xyz, ray_y.xyz);
-    real lx = k * dot(ray, ray_x.xyz), ly = k * dot(ray, ray_y.xyz);
+    real exx = conic.x - k_step * dot(rx, rx);
+    real exy = conic.y - k_step * dot(rx, ry);
+    real eyy = conic.z - k_step * dot(ry, ry);
+    real lx = k * dot(ray, rx), ly = k * dot(ray, ry);
     real det = exx * eyy - exy * exy;
     if (!(exx > 0.0 && det > 0.0))
         return false;
@@ -237,7 +266,7 @@ bool project_far(real3 c, real3 place, out splat s)
 }
 #endif
 
-bool project(real3 c, real3 place, out splat s)
+bool project_own(real3 c, real3 place, out splat s)
 {
     bool far = project_far(c, place, s);
 #if defined(NEAR) && defined(FIXED)
@@ -249,13 +278,22 @@ bool project(real3 c, real3 place, out splat s)
     s.a = s.b = s.along = real3(0.0);
     return far || project_near(c, place, s);
 #elif defined(NEAR)
-    s.near = !(far && dot(c, c) >= kernel.x * kernel.y + s.radius * s.radius);
+    s.near = !(far && dot(c, c) >= own_sigma2() * kernel.y + s.radius * s.radius);
     return project_near(c, place, s);
 #else
     return far;
 #endif
 }
 #endif
+
+bool project(real3 c, real3 place, out splat s)
+{
+    bool seen = project_own(own_vector(c), place, s);
+#ifdef UNEVEN
+    s.radius *= max(own_width.x, max(own_width.y, own_width.z));
+#endif
+    return seen;
+}
 
 // First and last pixel (from the image's corner) whose centre lies in the bounds and in the image;
 // none where a first exceeds its last.

@@ -2,7 +2,7 @@
 // blending in list order, and with DEPTH the distance likewise (render/layer.h); with SUMS optical
 // depth in the place of opacity, to be added up. Mirrors
 // trip_splat_radius2() and the opacity in render/splat.h; beyond the cut-off nothing is added.
-#include "real.glsl"
+#include "rays.glsl"
 #include "opacity.glsl"
 
 layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
@@ -14,6 +14,10 @@ layout(location = TRIP_GL_OUT_COLOUR) out vec4 fragment;
 #ifdef DEPTH
 layout(location = 3) flat in float centre_depth;
 layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // its opacity is what is blended by
+#endif
+
+#ifdef OWN_RAYS
+layout(location = 7) flat in vec3 width; // own_width of rays.glsl
 #endif
 
 #ifdef NEAR
@@ -32,17 +36,18 @@ float front_of(float s)
 
 void main()
 {
+#ifdef OWN_RAYS
+    own_width = width;
+#endif
     vec2 p = gl_FragCoord.xy + vec2(0.0, row) - screen.xy, q = p - footprint.xy;
     float m = q.x * (footprint.z * q.x + shear * q.y) + footprint.w * q.y * q.y;
     float stretch = 1.0;
 #ifdef AFFINE
     // Near splats alone have the stretch of the pixel's ray, below.
 #elif defined(ANISOTROPIC)
-    vec4 terms = vec4(1.0, p, p.x * p.x);
-    vec2 more = p.y * p;
-    float inverse_ray2 = 1.0 / (dot(ray2_a, terms) + dot(ray2_b.xy, more));
+    float inverse_ray2 = 1.0 / own_ray2(p);
     m *= inverse_ray2;
-    stretch = sqrt((dot(world2_a, terms) + dot(world2_b.xy, more)) * inverse_ray2);
+    stretch = sqrt(world_ray2(p) * inverse_ray2);
 #elif !defined(PARALLEL) && !defined(NEAR)
     m /= 1.0 + ray2_a.w * dot(p, p);
 #endif
@@ -52,8 +57,7 @@ void main()
 #ifdef PARALLEL
     front = front_of(at.z);
 #else
-    vec4 terms_near = vec4(1.0, p, p.x * p.x);
-    float inverse = 1.0 / (dot(ray2_a, terms_near) + dot(ray2_b.xy, p.y * p));
+    float inverse = 1.0 / own_ray2(p);
 #ifdef AFFINE
     if (footprint.z <= 0.0) // not affine
 #endif
@@ -61,7 +65,7 @@ void main()
         m = dot(at.xy, at.xy) * inverse;
         front = front_of(at.z * sqrt(inverse));
 #if defined(AFFINE) && defined(ANISOTROPIC)
-        stretch = sqrt((dot(world2_a, terms_near) + dot(world2_b.xy, p.y * p)) * inverse);
+        stretch = sqrt(world_ray2(p) * inverse);
 #endif
     }
 #endif

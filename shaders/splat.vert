@@ -18,6 +18,9 @@ layout(location = 3) flat out float centre_depth;  // of the centre's plane, as 
 #ifdef NEAR
 layout(location = 4) flat out mat3 forms; // a, b and along of project.glsl
 #endif
+#ifdef OWN_RAYS
+layout(location = 7) flat out vec3 width;  // own_width of rays.glsl
+#endif
 
 out gl_PerVertex
 {
@@ -69,6 +72,9 @@ void drop()
 #ifdef NEAR
     forms = mat3(0.0);
 #endif
+#ifdef OWN_RAYS
+    width = vec3(1.0);
+#endif
 }
 
 void main()
@@ -80,9 +86,13 @@ void main()
 #endif
     splat s;
     vec4 entry = look_up(r.code);
+#ifdef UNEVEN
+    use_width(r.width);
+#endif
 #ifdef FLATTENED
     vec4 g = unpack_normal(r.normal);
     vec3 n = vec3(dot(world_0.xyz, g.xyz), dot(world_1.xyz, g.xyz), dot(world_2.xyz, g.xyz));
+    n = own_gradient(n);
     flattening = vec4(n / max(length(n), 1e-15), min(1.0, g.w) * to_x.w);
 #endif
     if (entry.a <= 0.0 || !project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius)) {
@@ -108,6 +118,9 @@ void main()
     colour = vec4(entry.rgb, entry.a * s.amplitude);
 #ifdef DEPTH
     centre_depth = max(r.place.z, 0.0) * depth.x;
+#endif
+#ifdef OWN_RAYS
+    width = own_width;
 #endif
 #if defined(NEAR) && defined(PARALLEL)
     forms = mat3(vec3(0.0), vec3(0.0), s.along);

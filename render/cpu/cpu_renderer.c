@@ -308,7 +308,6 @@ static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
-    .uneven = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -173,23 +173,33 @@ static double dot(const trip_gl_double4 *a, const double c[3])
     return a->v[0] * c[0] + a->v[1] * c[1] + a->v[2] * c[2];
 }
 
+/* Of a voxel of level 0, along a list axis. */
+static double place_of(const trip_gl_placing *p, int i, int64_t voxel)
+{
+    return trip_coordinates_at(p->coordinates, (p->axis + i) % 3, voxel);
+}
+
 /* The record of `count` draw positions from `position` on. Positions in GL memory are whole: there
  * the origin is the volume's. */
 static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run, uint64_t first,
                                    bool descending, bool whole, uint32_t position)
 {
     const trip_gl_frame_double *f = &p->constants;
-    const double origin[3] = { whole ? 0 : run->sheet, whole ? 0 : run->u, whole ? 0 : run->v };
+    const int32_t origin[3] = { whole ? 0 : run->sheet, whole ? 0 : run->u, whole ? 0 : run->v };
+    const bool placed = trip_coordinates_uneven(p->coordinates) && !whole;
     double c[3];
     for (int i = 0; i < 3; i++)
-        c[i] = origin[i] - trip_component(p->camera->eye, (p->axis + i) % 3);
+        c[i] = place_of(p, i, origin[i]) - trip_component(p->camera->eye, (p->axis + i) % 3);
     double px = p->camera->ortho ? f->screen.v[0] : 0, py = p->camera->ortho ? f->screen.v[1] : 0;
     int64_t at = (int64_t)first;
     at = descending ? at + run->count - 1 + position : at - position;
     struct trip_gl_run r = {
         .base = { (float)c[0], (float)c[1], (float)c[2] },
-        .first = (int32_t)at,
-        .step = descending ? -1 : 1,
+        .first = placed ? run->u : (int32_t)at,
+        .step = placed       ? run->v
+                : descending ? -1
+                             : 1,
+        .unused = placed ? run->sheet : 0,
         .place = { (float)(dot(&f->to_x, c) - px), (float)(dot(&f->to_y, c) - py),
                    (float)dot(&f->forward, c) },
     };
@@ -198,17 +208,27 @@ static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run
     return r;
 }
 
+/* Of the last voxel of a tile, and of the grid where spacing is uneven. */
+static double last_place(const trip_gl_placing *p, int i, int64_t first)
+{
+    const trip_coordinates *c = p->coordinates;
+    const int64_t last = first + (int64_t)p->tile_voxels - 1;
+    const int64_t end = c->voxels[(p->axis + i) % 3] - 1;
+    return place_of(p, i, trip_coordinates_uneven(c) && last > end ? end : last);
+}
+
 /* The least depth of the places in the run's tile. */
 static double nearest_depth(const trip_gl_placing *p, const trip_run *run)
 {
     int u = (p->axis + 1) % 3, v = (p->axis + 2) % 3;
     trip_vec3 forward = p->camera->forward;
-    double depth = trip_component(forward, p->axis) * run->sheet +
-                   trip_component(forward, u) * run->u + trip_component(forward, v) * run->v -
+    double first[2] = { place_of(p, 1, run->u), place_of(p, 2, run->v) };
+    double depth = trip_component(forward, p->axis) * place_of(p, 0, run->sheet) +
+                   trip_component(forward, u) * first[0] + trip_component(forward, v) * first[1] -
                    trip_dot(forward, p->camera->eye);
-    double far = p->tile_voxels - 1;
-    return depth + fmin(0, trip_component(forward, u) * far) +
-           fmin(0, trip_component(forward, v) * far);
+    double far_u = last_place(p, 1, run->u) - first[0], far_v = last_place(p, 2, run->v) - first[1];
+    return depth + fmin(0, trip_component(forward, u) * far_u) +
+           fmin(0, trip_component(forward, v) * far_v);
 }
 
 static bool is_near(const trip_gl_placing *p, double depth)

@@ -15,15 +15,16 @@
 /* A list of a frame: its constants, and what places its runs. */
 typedef struct trip_gl_placing {
     const trip_camera *camera; /* of the list */
+    const trip_coordinates *coordinates;
     trip_gl_frame_double constants;
     unsigned effects;
     int axis;
     double tile_voxels;
-    double kernel_radius;
-    bool quads;          /* always */
-    double sprite_depth; /* and where voxels may be nearer, trip_gl_frame_sprite_depth() */
-    double near_depth;   /* likewise, trip_gl_frame_near_depth() */
-    uint32_t sheet_cost; /* of compositing a sheet, where splats are summed; else 0 */
+    double kernel_radius; /* of the widest */
+    bool quads;           /* always */
+    double sprite_depth;  /* and where voxels may be nearer, trip_gl_frame_sprite_depth() */
+    double near_depth;    /* likewise, trip_gl_frame_near_depth() */
+    uint32_t sheet_cost;  /* of compositing a sheet, where splats are summed; else 0 */
 } trip_gl_placing;
 
 /* Draw positions [first, first + count), all of one list. */

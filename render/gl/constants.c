@@ -51,18 +51,22 @@ static void fill_list(trip_gl_constants *c, const trip_frame *frame, const trip_
                       double point_size_px)
 {
     trip_gl_placing *p = &c->lists[list->index];
-    const trip_settings *settings = frame->settings;
+    const trip_coordinates *coordinates = &frame->data->coordinates;
+    const double ratio = trip_gl_frame_ratio(coordinates);
+    trip_settings settings = *frame->settings;
+    settings.kernel_radius *= coordinates->widest;
     const trip_camera *camera = &frame->plan->lists[list->index].camera;
     *p = (trip_gl_placing){
         .camera = camera,
+        .coordinates = coordinates,
         .effects = trip_gl_frame_effects(frame, camera, list->axis),
         .axis = list->axis,
-        .sheet_cost = trip_settings_sum_sheets(settings) ? sheet_cost(frame->camera) : 0,
+        .sheet_cost = trip_settings_sum_sheets(&settings) ? sheet_cost(frame->camera) : 0,
         .tile_voxels = (double)(1u << frame->data->header.tile_log2),
-        .kernel_radius = settings->kernel_radius,
-        .quads = settings->triangles,
-        .sprite_depth = trip_gl_frame_sprite_depth(settings, camera, point_size_px),
-        .near_depth = trip_gl_frame_near_depth(settings, camera),
+        .kernel_radius = settings.kernel_radius,
+        .quads = settings.triangles,
+        .sprite_depth = trip_gl_frame_sprite_depth(&settings, camera, ratio, point_size_px),
+        .near_depth = trip_gl_frame_near_depth(&settings, camera, ratio),
     };
     trip_gl_frame_make(&p->constants, frame, list);
     upload(c, LAYER_BLOCKS + list->index, &p->constants);

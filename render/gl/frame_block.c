@@ -251,10 +251,11 @@ static bool is_isotropic(const trip_camera *c)
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis)
 {
     const trip_settings *s = frame->settings;
-    unsigned effects = 0;
+    const bool uneven = trip_coordinates_uneven(&frame->data->coordinates);
+    unsigned effects = uneven ? TRIP_GL_UNEVEN : 0;
     if (camera->ortho)
         effects |= TRIP_GL_PARALLEL;
-    else if (!is_isotropic(camera))
+    else if (uneven || !is_isotropic(camera))
         effects |= TRIP_GL_ANISOTROPIC;
     bool normals = frame->plan->planes & 1u << TRIP_PLANE_NORMALS;
     if (normals && s->shading)
@@ -283,8 +284,12 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
 /* With r_max and r_min the largest and smallest |ray| of the image and of its plane, any support
  * reaches at most  k sigma |ry| r_max / (K depth) + k low-pass r_max / r_min  pixels from its
  * centre along x within the image (from S'_xx and g >= (r_min / r_max)^2 in splat.h), and alike
- * along y. Of affine supports the centre's ray is at most 1 / (1 - TRIP_SPLAT_AFFINE) as long. */
-double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *c,
+ * along y. Of affine supports the centre's ray is at most 1 / (1 - TRIP_SPLAT_AFFINE) as long: by
+ * TRIP_SPLAT_AFFINE / (1 - TRIP_SPLAT_AFFINE) lengths of the pixel's ray away from that in the
+ * index space in which the kernel is round, and by up to `ratio` times as much in the list's. What
+ * keeps exact supports small, whose low-pass is by lengths of rays in that space, is not known
+ * there. */
+double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *c, double ratio,
                                   double point_size_px)
 {
     double half = 0.5 * (point_size_px - 2);
@@ -299,6 +304,8 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
                     fmax(s.x1 - s.x0, s.y1 - s.y0) <= 2 * half;
         return fits ? 0 : HUGE_VAL;
     }
+    if (ratio > 1 && settings->footprint != TRIP_FOOTPRINT_EWA)
+        return HUGE_VAL;
     double r_max = 0;
     for (int i = 0; i < 4; i++)
         r_max = fmax(r_max,
@@ -306,26 +313,47 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
     trip_vec3 normal = trip_cross(c->rx, c->ry);
     double k = fabs(trip_dot(c->r0, normal)), r_min = k / trip_length(normal);
     if (settings->footprint == TRIP_FOOTPRINT_EWA)
-        r_max /= 1 - TRIP_SPLAT_AFFINE;
+        r_max *= 1 + ratio * TRIP_SPLAT_AFFINE / (1 - TRIP_SPLAT_AFFINE);
     double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
     double wide = fmax(trip_length(c->rx), trip_length(c->ry));
     return room > 0 ? settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
 }
 
+double trip_gl_frame_ratio(const trip_coordinates *coordinates)
+{
+    return coordinates->widest / coordinates->nearest;
+}
+
+/* trip_splat_parallel_near(), or what is not less for kernels of other widths: slants are at most
+ * those of rays and pixel steps that run alike. */
+static double parallel_near(const trip_splat_frame *f, double ratio)
+{
+    const trip_camera *c = &f->camera;
+    trip_splat s;
+    if (ratio <= 1)
+        return trip_splat_parallel_near(f);
+    trip_splat_project(f, trip_add(c->eye, c->r0), &s);
+    return (sqrt(f->cutoff2) * f->sigma +
+            0.5 * ratio * (sqrt(f->rxrx) * (s.x1 - s.x0) + sqrt(f->ryry) * (s.y1 - s.y0))) /
+           trip_length(c->r0);
+}
+
 /* With r = |r_c|, r_min the least |ray| of the image's plane, the splat of a depth z is not near
  * where  (z r)^2 >= 2 R^2 (r^2 / r_min^2 + 1) + 2 k^2 low-pass^2 z^2 (rx.rx + ry.ry):  that is the
  * condition of render/cpu/kernels/project_tmpl.h. With 1 / TRIP_SPLAT_AFFINE^2 in place of 2 it is
- * that of affine splats. */
-double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *c)
+ * that of affine splats. In the index space in which a kernel is round rays are up to 1 / w times
+ * as long, w being its least width, and not shorter than 1 / (w ratio) times. */
+double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *c, double ratio)
 {
     const trip_splat_frame f = trip_splat_frame_make(c, settings);
     if (c->ortho)
-        return trip_splat_parallel_near(&f);
+        return parallel_near(&f, ratio);
     if (settings->footprint == TRIP_FOOTPRINT_FIXED)
         return -HUGE_VAL; /* none is near, wherever it is */
     trip_vec3 normal = trip_cross(c->rx, c->ry);
     double r_min2 = pow(trip_dot(c->r0, normal), 2) / trip_dot(normal, normal);
     double times = f.affine ? 1 / (TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE) : 2;
-    double room = 1 - times * f.cutoff2 * f.low_pass2 * (f.rxrx + f.ryry) / r_min2;
+    double apart2 = ratio * ratio * (f.rxrx + f.ryry) / r_min2;
+    double room = 1 - times * f.cutoff2 * f.low_pass2 * apart2;
     return room > 0 ? settings->kernel_radius * sqrt(2 * times / (r_min2 * room)) : HUGE_VAL;
 }

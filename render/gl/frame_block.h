@@ -39,13 +39,19 @@ void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *i
 /* The effects of a list viewed by `camera`, TRIP_GL_QUADS and TRIP_GL_NEAR aside. */
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis);
 
+/* By how many times voxels of uneven spacing are longer than others at most; 1 where it is even. */
+double trip_gl_frame_ratio(const trip_coordinates *coordinates);
+
 /* The depth (world units) from which on the part of a support that lies in the image fits a sprite
- * of the given size; 0 where every support does, infinity where none need. */
+ * of the given size; 0 where every support does, infinity where none need. Here
+ * and below `settings` have the widest kernel's radius, and kernels are up to `ratio` times as wide
+ * as others, each along each axis. */
 double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *camera,
-                                  double point_size_px);
+                                  double ratio, double point_size_px);
 
 /* The depth (as z of the camera) from which on no splat that may show is near; infinity where any
  * may be. */
-double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *camera);
+double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *camera,
+                                double ratio);
 
 #endif

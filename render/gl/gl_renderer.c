@@ -23,6 +23,7 @@
 #include "gl/sums.h"
 #include "gl/target.h"
 #include "gl/variant.h"
+#include "gl/voxel_places.h"
 #include "report.h"
 #include "weight.h"
 
@@ -51,6 +52,7 @@ typedef struct gl_renderer {
     GLuint vertex_array, quad_indices;
     GLuint counts;
     trip_gl_constants constants;
+    trip_gl_voxel_places places;
     trip_gl_sheets sheets; /* frames that classify after interpolation only */
     trip_gl_sums sums;     /* frames that composite splats sheet by sheet only */
     const trip_frame *frame;
@@ -80,6 +82,7 @@ static void destroy(trip_renderer *base)
         trip_gl_slots_release(&r->slots);
         trip_gl_resident_release(&r->resident);
         trip_gl_constants_release(&r->constants);
+        trip_gl_voxel_places_release(&r->places);
         trip_gl_sheets_release(&r->sheets);
     }
     trip_gl_batch_release(&r->batch);
@@ -149,6 +152,8 @@ static int prepare(gl_renderer *r)
     }
     if (classifies_post(r))
         status = trip_gl_sheets_begin_frame(&r->sheets, frame);
+    else
+        status = trip_gl_voxel_places_set(&r->places, &frame->data->coordinates);
     if (status)
         return status;
     r->prepared = true;
@@ -400,6 +405,7 @@ static void prepare_drawing(gl_renderer *r, bool front_to_back)
         glEnable(GL_STENCIL_TEST);
     r->sums.front_to_back = front_to_back;
     bind_batch(&r->batch);
+    trip_gl_voxel_places_bind(&r->places, r->frame->settings->indexed);
 }
 
 static int draw_bands(gl_renderer *r)
@@ -614,7 +620,6 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops gl_ops = {
     .name = "gl",
     .classifies_post = true,
-    .uneven = 1u << TRIP_CLASSIFY_POST,
     .cueing = true,
     .forms = TRIP_DRAWS_FIXED,
     .destroy = destroy,
@@ -683,6 +688,7 @@ static void set_up_sheets(gl_renderer *r)
     r->sums.variants = &r->variants;
     r->sums.target = &r->target;
     s->textures.budget = s->function.budget = s->places.budget = r->budget;
+    r->places.budget = r->budget;
 }
 
 int trip_gl_create(trip_renderer **out, trip_budget *budget)

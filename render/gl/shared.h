@@ -23,6 +23,9 @@
 /* Likewise, for frames that classify after interpolation. */
 #define TRIP_GL_SUMS 7
 #define TRIP_GL_PLACES 5
+/* Likewise, for splats of grids with uneven spacing, and where these are indexed. */
+#define TRIP_GL_VOXEL_PLACES 7
+#define TRIP_GL_VOXEL_PLACES_INDEXED 0
 /* Texture units: the layer of axis a is unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
@@ -182,7 +185,8 @@ struct trip_gl_sum {
 /* A run of a list to draw; of indexed lists draw position i is record first + step * i. Its origin
  * (sheet, tile), formed in double: from the eye as base + base_low, and as the products (to_x . c,
  * to_y . c, forward . c), pixels from the image's centre, whose floats keep their precision however
- * far the eye is. */
+ * far the eye is. With uneven spacing runs of lists that are not indexed have their origin's u, v
+ * and sheet in `first`, `step` and `unused`. */
 struct trip_gl_run {
     TRIP_GL_VEC3 base;
     TRIP_GL_INT first;

@@ -20,7 +20,8 @@ static const struct {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
     [TRIP_GL_PASS_SUM] = { "screen.vert", "sum.frag", NULL, TRIP_GL_DEPTH, false },
     [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp",
-                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_AFFINE | TRIP_GL_FIXED,
+                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_AFFINE | TRIP_GL_FIXED |
+                                 TRIP_GL_UNEVEN,
                              true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },

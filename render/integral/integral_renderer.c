@@ -279,7 +279,6 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops integral_ops = {
     .name = "integral",
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
-    .uneven = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,
     .begin_frame = begin_frame,

@@ -16,7 +16,8 @@ import instructions
 SHADERS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "shaders")
 SIZE = ["--size", "40x40", "--threads", "1"]
 # By define of the shaders: what calls for it, with --classify post and pre where that is another
-# shader. Light is there where nothing is said.
+# shader. Light is there where nothing is said; "uneven.trip" in the place of options is drawn instead
+# of the even grid.
 CALLED_FOR = {
     "SHADED": [[]],
     "PARALLEL": [["--ortho", "20"], ["--ortho", "20", "--classify", "pre"]],
@@ -24,6 +25,7 @@ CALLED_FOR = {
     "CUED": [["--effects", "cueing"], ["--effects", "cueing", "--classify", "pre"]],
     "WIDE": [["--kernel", "cubic"]],
     "AFFINE": [["--kernel", "ewa", "--classify", "pre"]],
+    "UNEVEN": [["uneven.trip"], ["uneven.trip", "--classify", "pre"]],
     "SUMS": [["--compositing", "sheet", "--classify", "pre"]],
 }
 EFFECTS = ["--effects", "shadows,occlusion,cueing,emission", "--light", "1,1,1", "--emission",
@@ -41,6 +43,9 @@ class Uncalled(program.ProgramTest):
         program.write_nrrd("heat.nrrd", heat)
         for name in "ball", "heat":
             cls.brick(cls(), f"{name}.nrrd", f"{name}.trip", "--keep-all")
+        for axis in "xyz":
+            program.write(f"{axis}.txt", " ".join(str(i + i % 2 / 2) for i in range(16)).encode())
+        cls.brick(cls(), "ball.nrrd", "uneven.trip", "--coordinates", "x.txt,y.txt,z.txt")
         for name, opacity in ("clear", 1e-5), ("solid", 0.5):
             program.write(f"{name}.tf", f"0 .6 .3 .1 {opacity}\n255 .6 .3 .1 {opacity}\n".encode())
 
@@ -69,8 +74,9 @@ class Uncalled(program.ProgramTest):
                 classify = scene[scene.index("--classify") :] if "--classify" in scene else []
                 self.draw("--renderer", "gl", "--no-shading", *classify, env=environment)
                 unlit = [] if define == "SHADED" else ["--no-shading"]
-                run = program.call("render", "ball.trip", "-o", "b.png", *SIZE, "--renderer", "gl",
-                                   *unlit, *scene, env=environment)
+                data = scene if define == "UNEVEN" else ["ball.trip", *scene]
+                run = program.call("render", *data, "-o", "b.png", *SIZE, "--renderer", "gl", *unlit,
+                                   env=environment)
                 self.assertIn("uncalled for", run.stderr, (define, scene))
 
     def test_no_byte_is_read_and_no_pass_is_run_for_it(self):

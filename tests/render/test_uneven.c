@@ -1,5 +1,5 @@
 /* Grids with uneven spacing (coordinates.h): the integral against closed forms, sheets by all
- * renderers against the integral, and splats by the CPU renderer against the reference. */
+ * renderers against the integral, and splats by the others against the reference. */
 #include "cpu_scenes.h"
 #include "test.h"
 
@@ -324,10 +324,17 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
         scene_picture_free(&q);
     }
     cpu_scenes_threads = 3;
+    scene_turn turn = scene_turns(scene_renderers() + 2, s, view, settings); /* gl */
+    while (scene_take_turn(&turn)) {
+        assert_true(scene_difference(&p, &turn.picture) <= most);
+        const bool counted = settings->flatten <= 1 && settings->clip.count == 0;
+        for (unsigned i = 0; i < s->data->list_count && counted; i++)
+            scene_compare_counts(&p.lists[i], &turn.picture.lists[i], turn.renderer->name);
+    }
     scene_picture_free(&p);
 }
 
-static void the_cpu_renderer_draws_the_splats_of_the_reference(void **state)
+static void all_draw_the_splats_of_the_reference(void **state)
 {
     (void)state;
     uneven u;
@@ -342,6 +349,36 @@ static void the_cpu_renderer_draws_the_splats_of_the_reference(void **state)
         settings.compositing = i % 5 == 0 ? TRIP_COMPOSITING_SHEET : TRIP_COMPOSITING_SPLAT;
         settings.depth = i == 6;
         compare(&s, &view, &settings, 2e-3);
+        scene_destroy(&s);
+    }
+}
+
+/* Exact kernels, whatever they are drawn as, and near ones, whose rays each have their own length
+ * in each kernel's index space. */
+static void gl_draws_exact_and_near_kernels(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 24; i++) {
+        scene s;
+        uneven u;
+        make_uneven(&u, i % 3 ? 6 : 20);
+        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        trip_camera_params view = view_of(&s, i % 8, 40);
+        if (i >= 16) /* from within */
+            view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
+        trip_settings settings = splats();
+        settings.footprint = i / 2 % 2 ? TRIP_FOOTPRINT_EXACT : TRIP_FOOTPRINT_EWA;
+        settings.triangles = i % 3 == 1;
+        settings.indexed = i % 5 == 1;
+        settings.shading = i % 4 == 1;
+        scene_picture p = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers() + 2, &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            assert_true(scene_difference(&p, &turn.picture) <= 2e-3);
+            for (unsigned n = 0; n < s.data->list_count && !settings.indexed; n++)
+                scene_compare_counts(&p.lists[n], &turn.picture.lists[n], turn.renderer->name);
+        }
+        scene_picture_free(&p);
         scene_destroy(&s);
     }
 }
@@ -506,7 +543,8 @@ int main(void)
         cmocka_unit_test(a_gaussian_has_its_line_integral),
         cmocka_unit_test(slices_come_to_the_integral),
         cmocka_unit_test(splats_have_the_mass_of_their_voxels),
-        cmocka_unit_test(the_cpu_renderer_draws_the_splats_of_the_reference),
+        cmocka_unit_test(all_draw_the_splats_of_the_reference),
+        cmocka_unit_test(gl_draws_exact_and_near_kernels),
         cmocka_unit_test(all_draw_the_sheets_of_the_reference),
         cmocka_unit_test(what_a_segment_leaps_over_is_seen),
         cmocka_unit_test(from_within_it_is_close),

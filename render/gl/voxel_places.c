@@ -1,0 +1,55 @@
+#include "gl/voxel_places.h"
+
+#include "gl/shared.h"
+#include "report.h"
+
+/* A number as the sum of two floats. */
+static void split(double x, float out[2])
+{
+    out[0] = (float)x;
+    out[1] = (float)(x - (double)out[0]);
+}
+
+static int fill(trip_gl_voxel_places *p, const trip_coordinates *c, int64_t rows)
+{
+    const uint64_t bytes = (uint64_t)rows * 3 * sizeof(trip_gl_float4);
+    trip_gl_float4 *places = trip_budget_take(p->budget, bytes);
+    if (!places || !trip_budget_charge(p->budget, bytes)) {
+        trip_budget_release(p->budget, places, bytes);
+        return trip_fail(TRIP_ERROR, "gl", "splats",
+                         "the coordinates do not fit the memory given; raise --memory");
+    }
+    p->bytes = bytes;
+    for (int a = 0; a < 3; a++)
+        for (int64_t i = 0; i < c->voxels[a]; i++) {
+            split(c->along[a][i], places[3 * i + a].v);
+            split(trip_coordinates_width(c, a, i), places[3 * i + a].v + 2);
+        }
+    glCreateBuffers(1, &p->buffer);
+    glNamedBufferStorage(p->buffer, (GLsizeiptr)bytes, places, 0);
+    trip_budget_release(p->budget, places, bytes);
+    return TRIP_OK;
+}
+
+int trip_gl_voxel_places_set(trip_gl_voxel_places *p, const trip_coordinates *c)
+{
+    int64_t rows = 0;
+    trip_gl_voxel_places_release(p);
+    for (int a = 0; a < 3; a++)
+        rows = c->voxels[a] > rows ? c->voxels[a] : rows;
+    return trip_coordinates_uneven(c) ? fill(p, c, rows) : TRIP_OK;
+}
+
+void trip_gl_voxel_places_bind(const trip_gl_voxel_places *p, bool indexed)
+{
+    if (p->buffer)
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER,
+                         indexed ? TRIP_GL_VOXEL_PLACES_INDEXED : TRIP_GL_VOXEL_PLACES, p->buffer);
+}
+
+void trip_gl_voxel_places_release(trip_gl_voxel_places *p)
+{
+    glDeleteBuffers(1, &p->buffer);
+    trip_budget_discharge(p->budget, p->bytes);
+    *p = (trip_gl_voxel_places){ .budget = p->budget };
+}
