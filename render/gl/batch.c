@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gl/frame_block.h"
 #include "report.h"
 #include "settings.h"
 
@@ -203,8 +204,8 @@ static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run
         .place = { (float)(dot(&f->to_x, c) - px), (float)(dot(&f->to_y, c) - py),
                    (float)dot(&f->forward, c) },
     };
-    r.base_low = (trip_gl_vec3){ (float)(c[0] - (double)r.base.x), (float)(c[1] - (double)r.base.y),
-                                 (float)(c[2] - (double)r.base.z) };
+    r.base_low = (trip_gl_vec3){ trip_gl_frame_rest(c[0]), trip_gl_frame_rest(c[1]),
+                                 trip_gl_frame_rest(c[2]) };
     return r;
 }
 

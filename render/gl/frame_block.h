@@ -30,6 +30,14 @@ enum trip_gl_effect {
     TRIP_GL_EFFECT_SETS = 131072,
 };
 
+/* What a float leaves of a number. Volatile, as GCC 12 takes (double)(float)x for x where it works on
+ * two at a time. */
+static inline float trip_gl_frame_rest(double x)
+{
+    const volatile float rounded = (float)x;
+    return (float)(x - (double)rounded);
+}
+
 /* Of a list that the plan draws. */
 void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, const trip_list *list);
 /* Of the layer of an axis. */
