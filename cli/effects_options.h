@@ -24,7 +24,7 @@
       "shadows (with scattering in fog, and a --light), occlusion (of light from everywhere), "    \
       "emission (of heat), cueing (of depth), joined by commas; auto: those that the kind of "     \
       "data calls for, which "                                                                     \
-      "for measurements are none; cpu, reference and integral only (default: none)",               \
+      "for measurements are none (default: none)",                                                 \
       group },                                                                                     \
         { "anisotropy",                                                                            \
           KEY_ANISOTROPY,                                                                          \

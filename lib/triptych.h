@@ -337,7 +337,7 @@ typedef struct triptych_settings {
                   too */
     triptych_clip clip;
     triptych_show show; /* not of the integral, which has no lists or levels */
-    int effects;        /* the sum of TRIPTYCH_SHADOWS, ...; of GL cueing alone */
+    int effects;        /* the sum of TRIPTYCH_SHADOWS, ... */
     double anisotropy;  /* of fog that scatters: -0.95 backwards to 0.95 forwards, 0 alike */
     double cueing;      /* share of the background in what is farthest, above 0 to 1 */
     double kelvin[2];   /* of emission: temperature where heat is 0 and where it is greatest, 0 or

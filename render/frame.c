@@ -292,12 +292,7 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
     if (uneven && trip_effects_some(&s->effects) && !frame->plan->gathers)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects in grids with uneven spacing; the integral does");
-    const bool all = renderer->ops->effects >> s->classify & 1;
-    if ((trip_effects_light(&s->effects) || s->effects.emission) && !all)
-        return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                         "draws no shadows, no occlusion and no emission; choose another renderer, "
-                         "or --effects none");
-    if (s->effects.cueing > 0 && !all && !renderer->ops->cueing)
+    if (trip_effects_some(&s->effects) && !(renderer->ops->effects >> s->classify & 1))
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects; choose another renderer, or none: --effects none");
     return frame->plan->gathers ? 0 : check_forms(s, renderer);

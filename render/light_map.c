@@ -38,7 +38,8 @@ struct trip_light_map {
     trip_pass pass;
     trip_light_sweep sweep;
     bool sweeping;
-    int part; /* direction of `open`, or region of a light at a place, being swept */
+    int part;         /* direction of `open`, or region of a light at a place, being swept */
+    uint64_t made_ns; /* when the last of its numbers came to be */
     trip_light_stats stats;
     uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
 };
@@ -482,7 +483,8 @@ int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner)
         return TRIP_FRAME_DONE;
     bool gathers = m->stage == GATHER;
     int status = gathers ? gather(m) : sweep(m, runner);
-    double ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    m->made_ns = trip_frame_now_ns();
+    double ms = (double)(m->made_ns - start) * 1e-6;
     m->stats.gather_ms += gathers ? ms : 0;
     m->stats.sweep_ms += gathers ? 0 : ms;
     return status;
@@ -497,6 +499,11 @@ void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns)
 bool trip_light_map_is_complete(const trip_light_map *m)
 {
     return m->stage == COMPLETE;
+}
+
+uint64_t trip_light_map_made_ns(const trip_light_map *m)
+{
+    return m->made_ns;
 }
 
 const trip_light_grid *trip_light_map_gathered(const trip_light_map *m)

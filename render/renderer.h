@@ -76,7 +76,6 @@ typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
     bool classifies_post; /* draws frames whose settings say so (sheet.h) */
     unsigned effects;     /* draws frames with effects: a bit per trip_classify */
-    bool cueing;          /* or at least with depth cueing */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);

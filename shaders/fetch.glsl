@@ -3,6 +3,7 @@
 // are places in the order of a list, each of which is an index into one array of vertices (x, y, z
 // and code in 16 bits each). With UNEVEN voxels lie where a table says (coordinates.h).
 #include "real.glsl"
+#include "effects.glsl"
 
 layout(std430, binding = TRIP_GL_RUNS) readonly buffer trip_gl_runs { trip_gl_run runs[]; };
 layout(std430, binding = TRIP_GL_RUN_OF) readonly buffer trip_gl_run_of { uint run_of[]; };
@@ -32,6 +33,9 @@ struct record {
     uint code, normal;
 #ifdef UNEVEN
     real3 width;    // list axes
+#endif
+#ifdef PLACED
+    vec3 voxel; // of the list's grid, list axes
 #endif
 };
 
@@ -135,6 +139,11 @@ record fetch_record(uint position)
 #endif
     // In this order: base + offset cancels almost exactly near the eye.
     r.from_eye = (real3(run.base) + offset) + real3(run.base_low);
+#ifdef PLACED
+    // The eye's place cancels almost exactly, however far it is.
+    precise vec3 corner = (run.base + eye_high.xyz) + (run.base_low + eye_low.xyz);
+    r.voxel = corner + offset;
+#endif
 #ifdef TRIP_DOUBLE
     r.place = real3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
                     dot(forward.xyz, r.from_eye));

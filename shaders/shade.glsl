@@ -2,6 +2,7 @@
 // with COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS and
 // FACING come from render/shade.h.
 #include "real.glsl"
+#include "effects.glsl"
 
 #ifdef CUED
 // Depth cueing of render/effects.h, by a layer's depth.
@@ -46,7 +47,7 @@ vec4 unpack_normal(uint normal)
 #endif
 #endif
 
-#ifdef SHADED
+#if defined(SHADED) || defined(SHADOWS)
 // World space, of what lies in a direction from the eye in list axes.
 vec3 towards_eye(vec3 from_eye)
 {
@@ -58,37 +59,81 @@ vec3 towards_eye(vec3 from_eye)
 #endif
 }
 
-// Likewise; without HEADLIGHT.
-vec3 light_from(vec3 from_eye)
+// Likewise, where `eye` is to the eye.
+vec3 light_from(vec3 from_eye, vec3 eye)
 {
+#ifdef HEADLIGHT
+    return eye;
+#else
     if (light.w == 0.0)
         return vec3(light.xyz);
     vec3 way = vec3(light.xyz) - from_eye;
     vec3 world = vec3(world_0.xyz) * way.x + vec3(world_1.xyz) * way.y + vec3(world_2.xyz) * way.z;
     return world / max(length(world), 1e-15);
+#endif
 }
+#endif
 
+#ifdef SHADED
 // With a gradient as unpack_normal() has it, at what lies in a direction `eye` to the eye.
-vec3 lit(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye)
+surface surface_of(vec4 gradient, vec3 towards_light, vec3 eye)
 {
+    surface s;
 #ifdef HEADLIGHT
-    vec3 towards_light = eye, middle = eye;
+    vec3 middle = eye;
 #else
-    vec3 towards_light = light_from(from_eye), middle = towards_light + eye;
+    vec3 middle = towards_light + eye;
     middle /= max(length(middle), 1e-30);
 #endif
-    float strength = min(1.0, gradient.w);
-    float diffuse = abs(dot(gradient.xyz, towards_light));
     float specular = pow(abs(dot(gradient.xyz, middle)), SHININESS);
 #ifndef HEADLIGHT
     specular *= clamp(FACING * dot(gradient.xyz, towards_light) * dot(gradient.xyz, eye), 0.0, 1.0);
 #endif
-    float matt = 1.0 + strength * (AMBIENT + DIFFUSE * diffuse - 1.0);
-    return clamp(colour * matt + strength * SPECULAR * specular, 0.0, 1.0);
+    s.normal = gradient.xyz;
+    s.strength = min(1.0, gradient.w);
+    s.diffuse = abs(dot(gradient.xyz, towards_light));
+    s.gloss = s.strength * SPECULAR * specular;
+    return s;
+}
+
+vec3 lit(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye)
+{
+    surface s = surface_of(gradient, light_from(from_eye, eye), eye);
+    float matt = 1.0 + s.strength * (AMBIENT + DIFFUSE * s.diffuse - 1.0);
+    return clamp(colour * matt + s.gloss, 0.0, 1.0);
 }
 
 vec3 shade(vec3 colour, uint normal, vec3 from_eye)
 {
     return lit(colour, unpack_normal(normal), towards_eye(from_eye), from_eye);
+}
+#endif
+
+#ifdef LIT
+// The same where effects are looked up, at a place in index space.
+vec3 lit_here(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye, vec3 place)
+{
+    surface s = surface(0.0, 0.0, 0.0, vec3(0.0));
+    vec3 towards_light = vec3(0.0);
+#if defined(SHADED) || defined(SHADOWS)
+    towards_light = light_from(from_eye, eye);
+#endif
+#ifdef SHADED
+    s = surface_of(gradient, towards_light, eye);
+#endif
+    return lit_at(colour, s, place, towards_light, eye);
+}
+
+vec3 shade_here(vec3 colour, uint normal, vec3 from_eye, vec3 place)
+{
+    vec3 eye = vec3(0.0);
+    vec4 gradient = vec4(0.0);
+#if defined(SHADED) || defined(SHADOWS)
+    eye = towards_eye(from_eye);
+#endif
+#ifdef SHADED
+    gradient = unpack_normal(normal);
+#endif
+    return lit_here(colour, gradient, eye, from_eye, place);
 }
 #endif

@@ -2,6 +2,7 @@
 // (render/sheet.h). In: codes and gradients of sheets, ends of segments in draw order. In and out:
 // the layer, and with DEPTH its depths (render/layer.h). Mirrors render/reference_sheets.c.
 #include "segments.glsl"
+#include "effects.glsl"
 #include "shade.glsl"
 #include "opacity.glsl"
 #include "weight.glsl"
@@ -43,7 +44,7 @@ struct ray {
     float along;   // per depth
     float start;   // parallel views: where it begins along the list
     float world;   // voxels' lengths over a sheet
-#ifdef SHADED
+#if defined(SHADED) || defined(SHADOWS)
     vec3 eye;        // towards it
     vec3 first, way; // from the eye, list axes: at depth 0, and on over a depth
 #endif
@@ -83,7 +84,7 @@ ray ray_of(vec2 p)
         else if (start < 0.0)
             r.to = -1e30;
     }
-#ifdef SHADED
+#if defined(SHADED) || defined(SHADOWS)
 #ifdef PARALLEL
     vec2 corner = p + screen.xy;
     r.first = (ray_x.xyz * corner.x + ray_y.xyz * corner.y) * ray_x.w;
@@ -265,13 +266,21 @@ vec3 gradient_at(place at, trip_gl_sheet_end end)
 }
 #endif
 
-// Of a segment with its middle at a depth, by the mean of the gradients of its ends.
-vec3 lit_between(vec3 colour, ray r, vec3 gradient_sum, float at)
+// As unpack_normal() has it: the mean of the gradients of a segment's ends.
+vec4 gradient_between(place a, place b, trip_gl_sheet_end from, trip_gl_sheet_end to)
 {
-    vec3 g = 0.5 * (gradient_0.xyz * gradient_sum.x + gradient_1.xyz * gradient_sum.y +
-                    gradient_2.xyz * gradient_sum.z);
+    vec3 sum = gradient_at(a, from) + gradient_at(b, to);
+    vec3 g = 0.5 * (gradient_0.xyz * sum.x + gradient_1.xyz * sum.y + gradient_2.xyz * sum.z);
     float strength = length(g);
-    return lit(colour, vec4(g / max(strength, 1e-15), strength), r.eye, r.first + r.way * at);
+    return vec4(g / max(strength, 1e-15), strength);
+}
+#endif
+
+#ifdef PLACED
+// In the grid, list axes.
+vec3 voxel_of(place at, trip_gl_sheet_end end)
+{
+    return vec3(end.sheet, vec2(at.cell - clips.yz) + at.part);
 }
 #endif
 
@@ -294,8 +303,26 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
         return;
     vec3 colour = tint.w > 0.0 ? vec3(tint.xyz) : means.rgb / means.a;
     float middle = mix(start, end, 0.5 * (first + last));
-#ifdef SHADED
-    colour = lit_between(colour, r, gradient_at(a, from) + gradient_at(b, to), middle);
+#if defined(SHADED)
+    vec4 gradient = gradient_between(a, b, from, to);
+#elif defined(LIT)
+    vec4 gradient = vec4(0.0);
+#endif
+#if defined(SHADED) || defined(SHADOWS)
+    vec3 eye = r.eye, from_eye = r.first + r.way * middle;
+#elif defined(LIT)
+    vec3 eye = vec3(0.0), from_eye = eye;
+#endif
+#ifdef PLACED
+    vec3 middle_place = place_of(mix(voxel_of(a, from), voxel_of(b, to), 0.5 * (first + last)));
+#endif
+#ifdef LIT
+    colour = lit_here(colour, gradient, eye, from_eye, middle_place);
+#elif defined(SHADED)
+    colour = lit(colour, gradient, eye, from_eye);
+#endif
+#ifdef EMISSION
+    colour += emission_at(middle_place);
 #endif
 #ifdef CUED
     colour = cued(colour, middle * depth.x);

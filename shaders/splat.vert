@@ -109,8 +109,13 @@ void main()
     shear = 2.0 * s.conic.y * s.ray2;
     if (tint.w > 0.0)
         entry.rgb = vec3(tint.xyz);
-#ifdef SHADED
+#ifdef LIT
+    entry.rgb = shade_here(entry.rgb, r.normal, r.from_eye, place_of(r.voxel));
+#elif defined(SHADED)
     entry.rgb = shade(entry.rgb, r.normal, r.from_eye);
+#endif
+#ifdef EMISSION
+    entry.rgb += emission_at(place_of(r.voxel));
 #endif
 #ifdef CUED
     entry.rgb = cued(entry.rgb, r.place.z * depth.x);

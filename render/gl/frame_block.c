@@ -248,6 +248,13 @@ static bool is_isotropic(const trip_camera *c)
     return true;
 }
 
+unsigned trip_gl_frame_lit(const trip_settings *settings)
+{
+    const trip_effects *e = &settings->effects;
+    return (e->shadows ? TRIP_GL_SHADOWS : 0) | (e->occlusion ? TRIP_GL_OCCLUSION : 0) |
+           (e->emission ? TRIP_GL_EMISSION : 0);
+}
+
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis)
 {
     const trip_settings *s = frame->settings;
@@ -270,6 +277,7 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_DEPTH;
     if (s->effects.cueing > 0)
         effects |= TRIP_GL_CUED;
+    effects |= trip_gl_frame_lit(s);
     if (trip_settings_sum_sheets(s))
         effects |= TRIP_GL_SUMMED;
     if (s->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)

@@ -27,11 +27,16 @@ enum trip_gl_effect {
     TRIP_GL_FIXED = 16384,    /* footprints of one size; AFFINE, too, in perspective */
     TRIP_GL_CUED = 32768,     /* colours fade into the background with depth (render/effects.h) */
     TRIP_GL_UNEVEN = 65536,   /* spacing is uneven */
-    TRIP_GL_EFFECT_SETS = 131072,
+    /* Of render/effects.h: */
+    TRIP_GL_SHADOWS = 131072,
+    TRIP_GL_OCCLUSION = 262144,
+    TRIP_GL_EMISSION = 524288,
+    TRIP_GL_LOOKED_UP = TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
+    TRIP_GL_EFFECT_SETS = 1048576,
 };
 
-/* What a float leaves of a number. Volatile, as GCC 12 takes (double)(float)x for x where it works on
- * two at a time. */
+/* What a float leaves of a number. Volatile, as GCC 12 takes (double)(float)x for x where it works
+ * on two at a time. */
 static inline float trip_gl_frame_rest(double x)
 {
     const volatile float rounded = (float)x;
@@ -43,6 +48,9 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
 /* Of the layer of an axis. */
 void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis);
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in);
+
+/* Those of the frame that shaders look lattices up for (gl/lattices.h). */
+unsigned trip_gl_frame_lit(const trip_settings *settings);
 
 /* The effects of a list viewed by `camera`, TRIP_GL_QUADS and TRIP_GL_NEAR aside. */
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis);

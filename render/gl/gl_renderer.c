@@ -15,6 +15,7 @@
 #include "gl/constants.h"
 #include "gl/context.h"
 #include "gl/frame_block.h"
+#include "gl/lattices.h"
 #include "gl/queue.h"
 #include "gl/resident.h"
 #include "gl/ring.h"
@@ -53,8 +54,9 @@ typedef struct gl_renderer {
     GLuint counts;
     trip_gl_constants constants;
     trip_gl_voxel_places places;
-    trip_gl_sheets sheets; /* frames that classify after interpolation only */
-    trip_gl_sums sums;     /* frames that composite splats sheet by sheet only */
+    trip_gl_lattices lattices; /* frames with effects that look light or heat up only */
+    trip_gl_sheets sheets;     /* frames that classify after interpolation only */
+    trip_gl_sums sums;         /* frames that composite splats sheet by sheet only */
     const trip_frame *frame;
     bool in_layer;          /* whose sheets may not all be drawn */
     int axis;               /* of the layer being drawn */
@@ -83,6 +85,7 @@ static void destroy(trip_renderer *base)
         trip_gl_resident_release(&r->resident);
         trip_gl_constants_release(&r->constants);
         trip_gl_voxel_places_release(&r->places);
+        trip_gl_lattices_release(&r->lattices);
         trip_gl_sheets_release(&r->sheets);
     }
     trip_gl_batch_release(&r->batch);
@@ -139,6 +142,8 @@ static int prepare(gl_renderer *r)
     if (!status)
         status = trip_gl_constants_fill(&r->constants, r->context, frame);
     if (!status)
+        status = trip_gl_lattices_begin(&r->lattices, r->context, frame);
+    if (!status)
         status = fit_stats(r, frame->data->list_count);
     if (!status && frame->settings->indexed)
         status = trip_gl_resident_begin(&r->resident, frame->data, frame->plan->planes,
@@ -193,6 +198,8 @@ static int load(trip_renderer *base)
     int status = trip_gl_context_use(r->context);
     if (!status && !r->prepared)
         status = prepare_when_done(r);
+    if (!status)
+        status = trip_gl_lattices_load(&r->lattices, r->context, r->frame);
     if (status || !r->frame->settings->indexed)
         return status;
     return trip_gl_resident_load(&r->resident);
@@ -353,6 +360,8 @@ static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
     if (status)
         return status;
     trip_gl_constants_bind_list(&r->constants, piece->list, false);
+    if (effects & TRIP_GL_LOOKED_UP)
+        trip_gl_lattices_bind_block(&r->lattices, piece->list);
     glUniform1i(TRIP_GL_ROW, r->band->first_row);
     if (piece->quads)
         draw_quads(piece);
@@ -406,6 +415,7 @@ static void prepare_drawing(gl_renderer *r, bool front_to_back)
     r->sums.front_to_back = front_to_back;
     bind_batch(&r->batch);
     trip_gl_voxel_places_bind(&r->places, r->frame->settings->indexed);
+    trip_gl_lattices_bind(&r->lattices);
 }
 
 static int draw_bands(gl_renderer *r)
@@ -620,7 +630,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops gl_ops = {
     .name = "gl",
     .classifies_post = true,
-    .cueing = true,
+    .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .forms = TRIP_DRAWS_FIXED,
     .destroy = destroy,
     .device = device,
@@ -684,6 +694,7 @@ static void set_up_sheets(gl_renderer *r)
     s->queue = &r->queue;
     s->variants = &r->variants;
     s->constants = &r->constants;
+    s->lattices = &r->lattices;
     s->target = &r->target;
     r->sums.variants = &r->variants;
     r->sums.target = &r->target;
@@ -699,7 +710,7 @@ int trip_gl_create(trip_renderer **out, trip_budget *budget)
         return trip_fail(TRIP_ERROR, "gl", "renderer", "out of memory");
     r->base.ops = &gl_ops;
     r->budget = r->ring.budget = r->target.budget = r->resident.budget = budget;
-    r->slots.budget = budget;
+    r->slots.budget = r->lattices.budget = budget;
     r->ring.queue = &r->queue;
     set_up_sheets(r);
     int status = choose_slots(r);

@@ -9,6 +9,8 @@
 #define TRIP_GL_FRAME 0
 #define TRIP_GL_SHEET_PASS 1
 #define TRIP_GL_SHEET_ENDS 2
+#define TRIP_GL_EFFECTS 3
+#define TRIP_GL_HEAT_COLOURS 4
 /* Storage blocks. */
 #define TRIP_GL_VOXELS 0
 #define TRIP_GL_NORMALS 1
@@ -31,6 +33,9 @@
 #define TRIP_GL_LAYER_DEPTH 3
 #define TRIP_GL_SHEET_CODES 6
 #define TRIP_GL_SHEET_GRADIENTS 7
+#define TRIP_GL_LIGHT_REACHED 8
+#define TRIP_GL_LIGHT_OPEN 9
+#define TRIP_GL_HEAT 10
 /* Image units. */
 #define TRIP_GL_IMAGE 0 /* of a layer, or a sheet */
 #define TRIP_GL_IMAGE_DEPTH 1
@@ -50,6 +55,8 @@
 #define TRIP_GL_SQUARE_GROUP 8
 /* Ends of segments that are drawn at a time, at most. */
 #define TRIP_GL_ENDS_MAX 160
+/* Steps between the colours of emission, TRIP_EMISSION_STEPS. */
+#define TRIP_GL_EMISSION_STEPS 256
 
 /* Constants of one list of a frame, or of a layer by level 0's map; R is float for drawing, double
  * for counting and weights. */
@@ -89,6 +96,18 @@
     R4 cue;  /* what fades into the background: x of a layer's depth and y, in [0, 1], times z */    \
     R4 tint; /* rgb: of all that is drawn, before it is lit, where w is not 0 */
 
+/* Constants of the effects of a list, or of a layer of sheets, but for depth cueing
+ * (render/effects.h, render/emission.h). */
+#define TRIP_GL_EFFECTS_FIELDS(R4)                                                                 \
+    R4 eye_high, eye_low; /* its place in the list's grid, list axes: floats, and the rest */      \
+    R4 index_0, index_1, index_2; /* xyz . a place there + w: in index space of level 0 */         \
+    R4 aside_0, aside_1, aside_2; /* xyz . a unit vector of the world: the bias along it, in index \
+                                     space; w: the place of a light that is at one */              \
+    R4 per_voxel;                 /* nodes: of the light that reaches, of openness, of heat */     \
+    R4 phase;                     /* 1 - g^2, 1 + g^2, 2 g; 1: the light is at a place */          \
+    R4 heat_0, heat_1, heat_2;    /* xyz . a place in index space + w: in that of heat */          \
+    R4 heat_last;                 /* xyz: its last voxel */
+
 /* Constants of a pass over the sheets of a list (render/sheet.h). Linear functions of a pixel are
  * xyz . (1, x, y) from the image's centre; lengths of rays are those of trip_gl_frame. */
 #define TRIP_GL_SHEET_PASS_FIELDS(R4, I4)                                                          \
@@ -108,12 +127,14 @@
 /* The end of a segment: where rays pass a slice. `step` is how far along the list it is from the
  * end before; 0: no segment lies between them. A ray's u is base + first + what it moves along
  * `along`; the sheets before and behind the slice lie in two layers, and `part` is the place
- * between them; those beyond the two lie in the outer layers (-1: there is none). With uneven
- * spacing these are places (coordinates.h), and u and v are from the grid's first voxel. */
+ * between them; those beyond the two lie in the outer layers (-1: there is none); `sheet` is where
+ * it is along the list, from the grid's first sheet. With uneven spacing these are places
+ * (coordinates.h), and u and v are from the grid's first voxel. */
 #define TRIP_GL_SHEET_END_FIELDS(INT, FLOAT)                                                       \
     INT base_u, base_v, before, behind;                                                            \
     FLOAT first_u, first_v, along, step, part;                                                     \
-    INT outer_before, outer_behind, unused;
+    INT outer_before, outer_behind;                                                                \
+    FLOAT sheet;
 
 #ifdef TRIP_GLSL
 #define TRIP_GL_VEC3 vec3
@@ -137,6 +158,9 @@ typedef struct trip_gl_frame_float {
 typedef struct trip_gl_frame_double {
     TRIP_GL_FRAME_FIELDS(trip_gl_double4)
 } trip_gl_frame_double;
+typedef struct trip_gl_effects_block {
+    TRIP_GL_EFFECTS_FIELDS(trip_gl_float4)
+} trip_gl_effects_block;
 typedef struct trip_gl_int4 {
     int32_t v[4];
 } trip_gl_int4;

@@ -151,6 +151,7 @@ trip_gl_sheet_end trip_gl_sheet_end_at(const trip_gl_sheet_view *v, double coord
                             .behind = layers[2],
                             .outer_behind = layers[3],
                             .along = (float)along,
+                            .sheet = (float)coordinate,
                             .step = (float)step,
                             .part = (float)part };
     e.base_u = split(v->eye[1] + along * v->slope[0], v->first_u, &e.first_u);

@@ -7,6 +7,7 @@
 #define TRIP_GL_SHEETS_H
 
 #include "gl/constants.h"
+#include "gl/lattices.h"
 #include "gl/ring.h"
 #include "gl/sheet_function.h"
 #include "gl/sheet_pass.h"
@@ -49,6 +50,7 @@ typedef struct trip_gl_sheets {
     trip_gl_queue *queue;
     trip_gl_variants *variants;
     const trip_gl_constants *constants;
+    const trip_gl_lattices *lattices;
     trip_gl_target *target;
 
     trip_gl_sheet_textures textures;

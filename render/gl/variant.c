@@ -29,7 +29,8 @@ static const struct {
     [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", TRIP_GL_UNEVEN, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
-                                      TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN,
+                                      TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN |
+                                      TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
                                   false },
 };
 
@@ -47,7 +48,8 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
         { TRIP_GL_FLATTENED, "FLATTENED" }, { TRIP_GL_WIDE, "WIDE" },
         { TRIP_GL_FIXED, "FIXED" },         { TRIP_GL_CUED, "CUED" },
-        { TRIP_GL_UNEVEN, "UNEVEN" },
+        { TRIP_GL_UNEVEN, "UNEVEN" },       { TRIP_GL_SHADOWS, "SHADOWS" },
+        { TRIP_GL_OCCLUSION, "OCCLUSION" }, { TRIP_GL_EMISSION, "EMISSION" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -69,7 +71,7 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
     if (variant->effects & TRIP_GL_WIDE)
         fprintf(out, "#define CUBIC %d\n#define CUTOFF %.9f\n", (int)TRIP_KERNEL_CUBIC,
                 TRIP_CUTOFF);
-    if (variant->effects & TRIP_GL_SHADED)
+    if (variant->effects & (TRIP_GL_SHADED | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION))
         fprintf(out,
                 "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"
                 "#define SHININESS %f\n#define FACING %f\n",
@@ -80,7 +82,7 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
 
 static int build(const trip_gl_variant *variant, GLuint *program)
 {
-    char defines[1280] = "";
+    char defines[1536] = "";
     int status = write_defines(variant, defines, sizeof defines);
     if (status)
         return status;
@@ -92,10 +94,10 @@ static int build(const trip_gl_variant *variant, GLuint *program)
                                           });
 }
 
-static_assert(TRIP_GL_EFFECT_SETS == 1 << 17, "effects are 17 bits of a key");
+static_assert(TRIP_GL_EFFECT_SETS == 1 << 20, "effects are 20 bits of a key");
 static uint32_t key_of(const trip_gl_variant *v)
 {
-    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 25;
+    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 28;
 }
 
 int trip_gl_variants_get(trip_gl_variants *v, trip_gl_variant variant, GLuint *program)

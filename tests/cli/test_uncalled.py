@@ -1,5 +1,6 @@
 """What a scene or view does not call for is not there: no shader is compiled for it, no byte read,
 no pass run, no instruction taken. Where all effects are on and none matters the picture is the same."""
+import itertools
 import os
 import re
 import shutil
@@ -23,6 +24,11 @@ CALLED_FOR = {
     "PARALLEL": [["--ortho", "20"], ["--ortho", "20", "--classify", "pre"]],
     "DEPTH": [["--depth", "z.exr"], ["--depth", "z.exr", "--classify", "pre"]],
     "CUED": [["--effects", "cueing"], ["--effects", "cueing", "--classify", "pre"]],
+    "SHADOWS": [["--effects", "shadows", "--light", "1,1,1"],
+                ["--effects", "shadows", "--light", "1,1,1", "--classify", "pre"]],
+    "OCCLUSION": [["--effects", "occlusion"], ["--effects", "occlusion", "--classify", "pre"]],
+    "EMISSION": [["--effects", "emission", "--emission", "heat.trip"],
+                 ["--effects", "emission", "--emission", "heat.trip", "--classify", "pre"]],
     "WIDE": [["--kernel", "cubic"]],
     "AFFINE": [["--kernel", "ewa", "--classify", "pre"]],
     "UNEVEN": [["uneven.trip"], ["uneven.trip", "--classify", "pre"]],
@@ -81,8 +87,8 @@ class Uncalled(program.ProgramTest):
 
     def test_no_byte_is_read_and_no_pass_is_run_for_it(self):
         """A measured volume calls for no effect; each that is on reads and runs."""
-        for classify in "pre", "post":
-            options = ["--tf", "solid.tf", "--renderer", "cpu", "--explain", "--classify", classify]
+        for renderer, classify in itertools.product(("cpu", *program.GL), ("pre", "post")):
+            options = ["--tf", "solid.tf", "--renderer", renderer, "--explain", "--classify", classify]
             plain, said = self.draw(*options)
             same, auto = self.draw(*options, "--effects", "auto", "--light", "1,1,1")
             self.assertNotRegex(said + auto, "(?m)^light ")
@@ -97,7 +103,7 @@ class Uncalled(program.ProgramTest):
 
     def test_where_effects_do_not_matter_all_of_them_change_nothing(self):
         """Nothing is dense enough to shade or to glow, and what is far has the colour it fades to."""
-        for renderer in "cpu", "reference":
+        for renderer in "cpu", "reference", *program.GL:
             for classify in "pre", "post":
                 options = [*SIZE, "--renderer", renderer, "--classify", classify, "--no-shading",
                            "--tf", "clear.tf", "--background", "0.6,0.3,0.1,0"]

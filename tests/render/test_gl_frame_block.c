@@ -134,6 +134,14 @@ static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
     assert_int_equal(trip_camera_make(&c, &p, &grid), 0);
     assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), 0);
 
+    settings.effects = (trip_effects){ .shadows = true };
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_SHADOWS);
+    settings.effects = (trip_effects){ .occlusion = true, .cueing = 0.5 };
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_OCCLUSION | TRIP_GL_CUED);
+    settings.effects = (trip_effects){ .emission = true };
+    assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_EMISSION);
+    settings.effects = (trip_effects){ 0 };
+
     plan.planes |= 1u << TRIP_PLANE_NORMALS;
     assert_int_equal(trip_gl_frame_effects(&frame, &c, 0), TRIP_GL_SHADED | TRIP_GL_HEADLIGHT);
     data.header.normal_bytes = 3;
