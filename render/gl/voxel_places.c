@@ -1,13 +1,13 @@
 #include "gl/voxel_places.h"
 
-#include "gl/shared.h"
+#include "gl/frame_block.h"
 #include "report.h"
 
 /* A number as the sum of two floats. */
 static void split(double x, float out[2])
 {
     out[0] = (float)x;
-    out[1] = (float)(x - (double)out[0]);
+    out[1] = trip_gl_frame_rest(x);
 }
 
 static int fill(trip_gl_voxel_places *p, const trip_coordinates *c, int64_t rows)
