@@ -68,7 +68,16 @@ int trip_option_light_cells(const char *text, triptych_settings *s)
     return trip_option_integer("--light-cells", text, 8, 1024, &s->light_cells);
 }
 
-int trip_option_check_effects(const triptych_settings *s, bool heat)
+int trip_option_temperature(const char *text, triptych_settings *s)
+{
+    double *k = s->kelvin;
+    int status = trip_option_range("--temperature", text, &k[0], &k[1]);
+    if (!status && !(k[0] >= 0 && k[0] < k[1] && k[1] <= 100000))
+        return trip_option_fail("--temperature", "lies between 0 and 100000 K, the smaller first");
+    return status;
+}
+
+int trip_option_check_effects(const triptych_settings *s, const char *heat)
 {
     const triptych_settings usual = triptych_default_settings();
     const int some = s->effects | (s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : 0);
@@ -82,9 +91,11 @@ int trip_option_check_effects(const triptych_settings *s, bool heat)
                                 "applies to --effects shadows, occlusion and emission");
     if (s->effects & TRIPTYCH_EMISSION && !heat)
         return trip_option_fail("--effects", "emission is of heat, which lies in a data set of its "
-                                             "own: triptych render --emission HEAT.trip");
+                                             "own: --emission HEAT.trip");
     if (heat && !(some & TRIPTYCH_EMISSION))
         return trip_option_fail("--emission", "applies to --effects emission and auto");
+    if (!heat && (s->kelvin[0] != usual.kelvin[0] || s->kelvin[1] != usual.kelvin[1]))
+        return trip_option_fail("--temperature", "applies to --emission only");
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
         return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "
                                              "its direction, --light X,Y,Z, or place, --light "

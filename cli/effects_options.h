@@ -45,12 +45,29 @@
             group                                                                                  \
     }
 
+/* Keys: KEY_EMISSION and KEY_TEMPERATURE. */
+#define TRIP_OPTIONS_EMISSION(group)                                                               \
+    { "emission",                                                                                  \
+      KEY_EMISSION,                                                                                \
+      "HEAT.trip",                                                                                 \
+      0,                                                                                           \
+      "A data set of heat, as brick makes of another grid of the same file, by which what is "     \
+      "drawn glows; for --effects emission and auto",                                              \
+      group },                                                                                     \
+    {                                                                                              \
+        "temperature", KEY_TEMPERATURE, "LO:HI", 0,                                                \
+            "Kelvin where heat is 0 and where it is greatest (default: 0:2500); --emission only",  \
+            group                                                                                  \
+    }
+
 int trip_option_light(const char *text, triptych_settings *s);
 int trip_option_effects(const char *text, triptych_settings *s);
 int trip_option_anisotropy(const char *text, triptych_settings *s);
 int trip_option_cueing(const char *text, triptych_settings *s);
 int trip_option_light_cells(const char *text, triptych_settings *s);
-/* What does not go together, once all is parsed; whether a data set of heat is given, too. */
-int trip_option_check_effects(const triptych_settings *s, bool heat);
+int trip_option_temperature(const char *text, triptych_settings *s);
+/* What does not go together, once all is parsed, with the data set of heat that is given, or NULL.
+ */
+int trip_option_check_effects(const triptych_settings *s, const char *heat);
 
 #endif

@@ -47,6 +47,12 @@ int library_add(triptych *t, const char *const *paths, int count, const char *he
     return status || !heat ? status : triptych_set_heat(t, heat);
 }
 
+int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources)
+{
+    int status = heat ? triptych_open(t, heat, resources) : 0;
+    return status || !heat ? status : triptych_set_heat(t, heat);
+}
+
 int library_set_function_quietly(triptych *t, const triptych_function *function)
 {
     triptych_set_messages(t, NULL, NULL);

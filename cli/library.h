@@ -12,6 +12,8 @@ int library_create(triptych **out, trip_progress *progress);
 
 /* Data sets that are drawn with the one that is open, and that of its heat, NULL: none. */
 int library_add(triptych *t, const char *const *paths, int count, const char *heat);
+/* Fails where `heat` is no data set of heat, NULL: it is none. Closes what is open. */
+int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
 /* The function without its warnings; failures are reported. */
 int library_set_function_quietly(triptych *t, const triptych_function *function);

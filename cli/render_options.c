@@ -138,12 +138,7 @@ static const struct argp_option options[] = {
     { "level", KEY_LEVEL, "L", 0, "The middle of --window", 2 },
     TRIP_OPTION_LIGHT(2),
     TRIP_OPTIONS_EFFECTS(2),
-    { "emission", KEY_EMISSION, "HEAT.trip", 0,
-      "A data set of heat, as brick makes of another grid of the same file, by which what is drawn "
-      "glows; for --effects emission and auto",
-      2 },
-    { "temperature", KEY_TEMPERATURE, "LO:HI", 0,
-      "Kelvin where heat is 0 and where it is greatest (default: 0:2500); --emission only", 2 },
+    TRIP_OPTIONS_EMISSION(2),
     { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
       "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
@@ -263,7 +258,7 @@ static const struct argp_option options[] = {
 typedef struct parse {
     render_options *o;
     quality_options quality;
-    bool h, target, background, lists, forms, side, light, temperature, level, kernel_radius;
+    bool h, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
     bool slices, compositing;
     bool kernel, integral; /* options of the integral renderer */
@@ -561,9 +556,7 @@ static int parse_look(int key, char *arg, parse *p)
         o->heat = arg;
         return 0;
     case KEY_TEMPERATURE:
-        p->temperature = true;
-        return trip_option_range("--temperature", arg, &o->settings.kelvin[0],
-                                 &o->settings.kelvin[1]);
+        return trip_option_temperature(arg, &o->settings);
     case KEY_NO_SHADING:
         o->settings.shading = false;
         return 0;
@@ -902,8 +895,6 @@ static int check(parse *p)
         status = trip_option_check_effects(&o->settings, o->heat);
     if (status)
         return status;
-    if (p->temperature && !o->heat)
-        return trip_option_fail("--temperature", "applies to --emission only");
     if (p->level != (o->function.window > 0))
         return trip_option_fail(p->level ? "--level" : "--window",
                                 "--window and --level are given together");

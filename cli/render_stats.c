@@ -162,6 +162,10 @@ int render_stats_add_frame(render_stats *s, triptych *t)
     cJSON_AddNumberToObject(f, "bytes_of_planes_left_out", (double)frame.bytes_unused);
     cJSON_AddNumberToObject(f, "runs_skipped", (double)frame.runs_occluded);
     cJSON_AddNumberToObject(f, "bytes_skipped", (double)frame.bytes_occluded);
+    if (frame.light_memory_bytes)
+        cJSON_AddNumberToObject(f, "light_bytes_read", (double)frame.light_bytes_read);
+    if (frame.heat_memory_bytes)
+        cJSON_AddNumberToObject(f, "heat_bytes_read", (double)frame.heat_bytes_read);
     cJSON *lists = cJSON_AddObjectToObject(f, "lists");
     if (!f || !lists || !cJSON_AddItemToArray(s->frames, f)) {
         cJSON_Delete(f);

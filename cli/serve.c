@@ -27,6 +27,8 @@ enum {
     KEY_ANISOTROPY,
     KEY_CUEING,
     KEY_LIGHT_CELLS,
+    KEY_EMISSION,
+    KEY_TEMPERATURE,
     KEY_CLIP_BOX,
     KEY_CLIP_PLANE,
     KEY_RENDERER,
@@ -58,6 +60,7 @@ static const struct argp_option options[] = {
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
     TRIP_OPTION_LIGHT(1),
     TRIP_OPTIONS_EFFECTS(1),
+    TRIP_OPTIONS_EMISSION(1),
     TRIP_OPTIONS_CLIP(1),
     { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
     TRIP_OPTION_MEMORY(KEY_MEMORY, 1),
@@ -105,6 +108,11 @@ static int parse_effects(int key, char *arg, trip_serve_params *p)
         return trip_option_cueing(arg, &p->settings);
     case KEY_LIGHT_CELLS:
         return trip_option_light_cells(arg, &p->settings);
+    case KEY_EMISSION:
+        p->heat = arg;
+        return 0;
+    case KEY_TEMPERATURE:
+        return trip_option_temperature(arg, &p->settings);
     default:
         return parse_renderer(key, arg, p);
     }
@@ -196,21 +204,27 @@ static int choose_settings(serve_options *o)
     return status;
 }
 
-/* A data set or function that cannot be taken is found here, before anybody looks; of a volume,
- * which is bricked while its page is there, no more than that it is missing. */
-static int check_input(const trip_serve_params *p)
+/* Of a volume, which is bricked while its page is there, no more than that it is missing. */
+static int check_data(const trip_serve_params *p, triptych *t, const triptych_resources *resources)
 {
-    triptych *t = NULL;
     if (cached_volume_wanted(p->input))
         return access(p->input, R_OK) == 0 || strpbrk(p->input, "*?[%")
                    ? 0
                    : trip_fail_errno("read", p->input, "cannot open");
+    int status = triptych_open(t, p->input, resources);
+    return status ? status : triptych_set_function(t, &(triptych_function){ .name = p->function });
+}
+
+/* A data set or function that cannot be taken is found here, before anybody looks. */
+static int check_input(const trip_serve_params *p)
+{
+    triptych *t = NULL;
+    const triptych_resources resources = { .memory_bytes = p->memory_bytes };
     int status = library_create(&t, NULL);
     if (!status)
-        status =
-            triptych_open(t, p->input, &(triptych_resources){ .memory_bytes = p->memory_bytes });
+        status = check_data(p, t, &resources);
     if (!status)
-        status = triptych_set_function(t, &(triptych_function){ .name = p->function });
+        status = library_check_heat(t, p->heat, &resources);
     triptych_destroy(t);
     return status;
 }
@@ -251,7 +265,7 @@ int trip_command_serve(int argc, char **argv)
     if (!status)
         status = choose_settings(&o);
     if (!status)
-        status = trip_option_check_effects(&o.params.settings, false);
+        status = trip_option_check_effects(&o.params.settings, o.params.heat);
     if (!status)
         status = check_input(&o.params);
     return trip_exit_status(status ? status : trip_serve_run(&o.params));

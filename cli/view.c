@@ -34,6 +34,8 @@ enum {
     KEY_ANISOTROPY,
     KEY_CUEING,
     KEY_LIGHT_CELLS,
+    KEY_EMISSION,
+    KEY_TEMPERATURE,
     KEY_CLIP_BOX,
     KEY_CLIP_PLANE,
     KEY_FPS,
@@ -77,6 +79,7 @@ static const struct argp_option options[] = {
       "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 2 },
     TRIP_OPTION_LIGHT(2),
     TRIP_OPTIONS_EFFECTS(2),
+    TRIP_OPTIONS_EMISSION(2),
     TRIP_OPTIONS_CLIP(2),
     { NULL, 0, NULL, 0, "Renderer:", 3 },
     { "renderer", KEY_RENDERER, "NAME", 0,
@@ -148,7 +151,7 @@ static int parse_view(int key, char *arg, view_options *o)
 static int parse_effects(int key, char *arg, view_options *o)
 {
     triptych_settings *s = &o->params.settings;
-    o->params.settings_given |= key >= KEY_LIGHT && key <= KEY_LIGHT_CELLS;
+    o->params.settings_given |= key >= KEY_LIGHT && key <= KEY_TEMPERATURE;
     switch (key) {
     case KEY_LIGHT:
         return trip_option_light(arg, s);
@@ -160,6 +163,11 @@ static int parse_effects(int key, char *arg, view_options *o)
         return trip_option_cueing(arg, s);
     case KEY_LIGHT_CELLS:
         return trip_option_light_cells(arg, s);
+    case KEY_EMISSION:
+        o->params.heat = arg;
+        return 0;
+    case KEY_TEMPERATURE:
+        return trip_option_temperature(arg, s);
     default:
         return parse_view(key, arg, o);
     }
@@ -252,6 +260,8 @@ static int check(const view_options *o)
                                          "the other");
     if (o->quality.error > 0 && o->params.count != 1)
         return trip_option_fail("--error", "is of one data set: name it");
+    if (o->params.heat && o->params.count != 1)
+        return trip_option_fail("--emission", "is of one data set: name it");
     return quality_options_check(&o->quality);
 }
 
@@ -311,18 +321,20 @@ static int parse(view_options *o, int argc, char **argv)
     };
     o->params.settings = triptych_default_settings();
     int status = trip_options_parse(&argp, argc, argv, o);
-    return status ? status : trip_option_check_effects(&o->params.settings, false);
+    return status ? status : trip_option_check_effects(&o->params.settings, o->params.heat);
 }
 
 /* A data set that cannot be opened is found here, before there is a window. */
 static int check_inputs(const view_options *o)
 {
     triptych *t = NULL;
+    const triptych_resources resources = { .memory_bytes = o->params.memory_bytes };
     int status = library_create(&t, NULL);
     for (int i = 0; i < o->params.count && !status; i++)
         if (!cached_volume_wanted(o->inputs[i]))
-            status = triptych_open(t, o->inputs[i],
-                                   &(triptych_resources){ .memory_bytes = o->params.memory_bytes });
+            status = triptych_open(t, o->inputs[i], &resources);
+    if (!status)
+        status = library_check_heat(t, o->params.heat, &resources);
     triptych_destroy(t);
     return status;
 }

@@ -15,6 +15,7 @@ typedef struct trip_serve_params {
     triptych_renderer renderer;
     triptych_engine engine;
     const char *function;
+    const char *heat; /* the data set of its heat; NULL: none */
     triptych_settings settings;
     /* Called once with the address to open, until the next interruption. */
     void (*ready)(void *user, const char *address);

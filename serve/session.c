@@ -77,6 +77,7 @@ static void show(trip_session *s, const trip_serve_params *p)
     trip_viewer_init(v, s->frames);
     v->settings = p->settings;
     v->function = p->function;
+    v->heat = p->heat;
     v->opacity_scale = 1;
     v->fresh = true; /* what a window showed, with its panel, is another thing */
     trip_viewer_resize(v, WIDTH, HEIGHT);
@@ -388,7 +389,9 @@ char *trip_session_status(trip_session *s)
     trip_frames_status status = trip_frames_get_status(s->frames);
     char *camera = trip_viewer_camera_options(&s->viewer);
     const trip_document *d = trip_viewer_document(&s->viewer);
-    const triptych_settings settings = d ? d->settings : s->viewer.settings;
+    const triptych_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
+    char effects[256];
+    trip_effects_say(&settings, d ? d->heat : NULL, effects, sizeof effects);
     pthread_mutex_unlock(&s->lock);
     cJSON_AddBoolToObject(root, "exact", status.exact);
     cJSON_AddBoolToObject(root, "failed", status.failed);
@@ -396,6 +399,7 @@ char *trip_session_status(trip_session *s)
     cJSON_AddStringToObject(root, "stage", status.stage);
     cJSON_AddNumberToObject(root, "done", status.done);
     cJSON_AddStringToObject(root, "camera", camera ? camera : "");
+    cJSON_AddStringToObject(root, "effects", effects);
     add_settings(root, &settings);
     char *text = root ? trip_json_print(root, false) : NULL;
     cJSON_Delete(root);

@@ -18,6 +18,7 @@ bool trip_wanted_copy(trip_wanted *to, const trip_wanted *from)
     bool fits = true;
     *to = *from;
     to->input = copy_text(from->input, &fits);
+    to->heat = copy_text(from->heat, &fits);
     to->function = copy_text(from->function, &fits);
     to->text = copy_text(from->text, &fits);
     return fits;
@@ -26,6 +27,7 @@ bool trip_wanted_copy(trip_wanted *to, const trip_wanted *from)
 void trip_wanted_release(trip_wanted *w)
 {
     free((char *)(uintptr_t)w->input);
+    free((char *)(uintptr_t)w->heat);
     free((char *)(uintptr_t)w->function);
     free((char *)(uintptr_t)w->text);
     *w = (trip_wanted){ 0 };

@@ -48,7 +48,8 @@ void trip_frames_stop(trip_frames *f);
 typedef struct trip_wanted {
     unsigned document; /* another number: another data set, or the same opened anew */
     const char *input;
-    bool keep_all; /* one that has all values: as find() */
+    bool keep_all;    /* one that has all values: as find() */
+    const char *heat; /* the data set of its heat; NULL: it has none */
     /* Where to look from; without it the view is found by `start`, whose pointers stay valid. */
     bool has_navigation;
     trip_navigation navigation;

@@ -188,6 +188,8 @@ static int open_data(trip_frames *f)
                                                       .engine = p->engine,
                                                       .keep_pages = !f->frugal,
                                                       .name = w->input });
+    if (!status && w->heat)
+        status = triptych_set_heat(f->t, w->heat);
     f->open = status == 0;
     return status;
 }

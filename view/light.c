@@ -1,7 +1,9 @@
 #include "light.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "text.h"
@@ -56,4 +58,95 @@ char *trip_light_text(const triptych_settings *s)
                  trip_text_from_double(s->light[2], z)) < 0)
         return NULL;
     return text;
+}
+
+/* ---- effects ---- */
+
+static const struct {
+    int bit;
+    const char *name, *words;
+} effect_names[] = {
+    { TRIPTYCH_SHADOWS, "shadows", "shadows" },
+    { TRIPTYCH_OCCLUSION, "occlusion", "occlusion" },
+    { TRIPTYCH_CUEING, "cueing", "depth cueing" },
+    { TRIPTYCH_EFFECTS_AUTO, "auto", "what the data calls for" },
+    { TRIPTYCH_EMISSION, "emission", "emission" },
+};
+enum { EFFECTS = sizeof effect_names / sizeof *effect_names };
+
+static bool may_glow(const triptych_settings *s, const char *heat)
+{
+    return heat && s->effects & (TRIPTYCH_EMISSION | TRIPTYCH_EFFECTS_AUTO);
+}
+
+/* As one word of a shell. */
+static void put_word(FILE *out, const char *word)
+{
+    fputc('\'', out);
+    for (; *word; word++)
+        fputs(*word == '\'' ? "'\\''" : (char[2]){ *word }, out);
+    fputc('\'', out);
+}
+
+/* Where it is not the usual one, and some of the effects that it is of may run. */
+static void put_number(FILE *out, const char *option, double number, double usual, int some)
+{
+    char text[32];
+    if (some && number != usual)
+        fprintf(out, " %s %s", option, trip_text_from_double(number, text));
+}
+
+static void put_effects(FILE *out, const triptych_settings *s, const char *heat)
+{
+    const triptych_settings usual = triptych_default_settings();
+    const char *before = " --effects ";
+    for (int i = 0; i < EFFECTS; i++)
+        if (s->effects & effect_names[i].bit) {
+            fprintf(out, "%s%s", before, effect_names[i].name);
+            before = ",";
+        }
+    const int some = s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : s->effects;
+    put_number(out, "--anisotropy", s->anisotropy, usual.anisotropy, some & TRIPTYCH_SHADOWS);
+    put_number(out, "--cueing", s->cueing, usual.cueing, some & TRIPTYCH_CUEING);
+    put_number(out, "--light-cells", s->light_cells, usual.light_cells,
+               some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION));
+    if (!may_glow(s, heat))
+        return;
+    char lo[32], hi[32];
+    fputs(" --emission ", out);
+    put_word(out, heat);
+    fprintf(out, " --temperature %s:%s", trip_text_from_double(s->kelvin[0], lo),
+            trip_text_from_double(s->kelvin[1], hi));
+}
+
+char *trip_effects_text(const triptych_settings *s, const char *heat)
+{
+    char *text = NULL;
+    size_t bytes;
+    if (!s->effects)
+        return strdup("");
+    FILE *out = open_memstream(&text, &bytes);
+    if (!out)
+        return NULL;
+    put_effects(out, s, heat);
+    if (fclose(out) == 0)
+        return text;
+    free(text);
+    return NULL;
+}
+
+void trip_effects_say(const triptych_settings *s, const char *heat, char *text, size_t bytes)
+{
+    size_t at = 0;
+    text[0] = 0;
+    for (int i = 0; i < EFFECTS && at < bytes; i++)
+        if (s->effects & effect_names[i].bit)
+            at += (size_t)snprintf(text + at, bytes - at, "%s%s", at ? ", " : "",
+                                   effect_names[i].words);
+    if (may_glow(s, heat) && at < bytes) {
+        const char *name = strrchr(heat, '/');
+        snprintf(text + at, bytes - at, "%s of %s, %g to %g K",
+                 s->effects & TRIPTYCH_EMISSION ? "" : ", emission", name ? name + 1 : heat,
+                 s->kelvin[0], s->kelvin[1]);
+    }
 }

@@ -1,7 +1,9 @@
-/* The light as controls have it: two angles and how far it is, about the middle of the data; and as
- * options. Plain values. */
+/* The light as controls have it: two angles and how far it is, about the middle of the data; and
+ * the light and effects as options and in words. Plain values. */
 #ifndef TRIP_VIEW_LIGHT_H
 #define TRIP_VIEW_LIGHT_H
+
+#include <stddef.h>
 
 #include "triptych.h"
 
@@ -27,6 +29,10 @@ void trip_light_control_set(triptych_settings *s, const triptych_info *info,
 /* As an option of `triptych render`, with a space before it, to the last bit, for free(); "" where
  * it is from the eye or lights nothing; NULL without memory. */
 char *trip_light_text(const triptych_settings *s);
+/* The same of effects, with the data set of heat of what is shown, or NULL; "" where none runs. */
+char *trip_effects_text(const triptych_settings *s, const char *heat);
+/* In words, which end where the text does; "" where none runs. */
+void trip_effects_say(const triptych_settings *s, const char *heat, char *text, size_t bytes);
 
 #ifdef __cplusplus
 }

@@ -453,6 +453,32 @@ bool draw_light_place(trip_panel *p, trip_document *d)
     return changed;
 }
 
+// Those that run by name; what glows, and how hot it is.
+bool draw_effects(trip_panel *p, trip_document *d)
+{
+    triptych_settings *s = &d->settings;
+    const triptych_settings shown = trip_viewer_settings(d);
+    char text[256];
+    bool changed = false;
+    trip_effects_say(&shown, d->heat, text, sizeof text);
+    if (text[0])
+        ImGui::TextWrapped("Effects: %s", text);
+    if (!d->heat)
+        return false;
+    int glows = (s->effects & TRIPTYCH_EMISSION) != 0;
+    if (check(p, "Emission", &glows)) {
+        s->effects ^= TRIPTYCH_EMISSION;
+        changed = true;
+    }
+    if (glows) {
+        const double most = 12000, apart = 1;
+        changed |= slide(p, "Coldest", &s->kelvin[0], 0, most, "%.0f K");
+        changed |= slide(p, "Hottest", &s->kelvin[1], apart, most, "%.0f K");
+        s->kelvin[1] = std::fmax(s->kelvin[1], s->kelvin[0] + apart);
+    }
+    return changed;
+}
+
 bool draw_light(trip_panel *p, trip_document *d)
 {
     triptych_settings *s = &d->settings;
@@ -466,6 +492,7 @@ bool draw_light(trip_panel *p, trip_document *d)
         if (!s->headlight)
             changed |= draw_light_place(p, d);
     }
+    changed |= draw_effects(p, d);
     float rgb[3];
     for (int i = 0; i < 3; i++)
         rgb[i] = static_cast<float>(s->background[i]);

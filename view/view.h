@@ -21,6 +21,7 @@ typedef struct trip_view_params {
     triptych_engine engine;
     triptych_view start; /* where documents are seen from; what it points to stays valid */
     const char *function;
+    const char *heat; /* the data set of the heat of the inputs; NULL: none */
     double opacity_scale;
     triptych_settings settings;
     bool start_given, settings_given; /* else what was kept of the data set goes before */

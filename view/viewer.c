@@ -30,6 +30,7 @@ static void free_document(trip_document *d)
         return;
     free(d->input);
     free(d->source);
+    free(d->heat);
     free(d->function);
     trip_function_editor_destroy(d->editor);
     trip_camera_path_release(&d->path);
@@ -49,12 +50,14 @@ static void keep(const trip_viewer *v, const trip_document *d)
     if (!path)
         return;
     char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    triptych_settings settings = d->settings;
+    settings.effects &= ~TRIPTYCH_EMISSION; /* of a data set that is not kept here */
     trip_state_file_save(&(trip_view_state){ .has_navigation = d->has_navigation,
                                              .navigation = d->navigation,
                                              .function = d->function,
                                              .text = text,
                                              .opacity_scale = d->opacity_scale,
-                                             .settings = d->settings,
+                                             .settings = settings,
                                              .clips = d->clips,
                                              .panel = v->panel,
                                              .box = v->box,
@@ -131,12 +134,13 @@ static trip_document *make_document(trip_viewer *v, const char *input)
         return NULL;
     *d = (trip_document){ .input = strdup(input),
                           .function = v->function ? strdup(v->function) : NULL,
+                          .heat = v->heat ? strdup(v->heat) : NULL,
                           .editor = trip_function_editor_create(),
                           .start = v->start,
                           .settings = v->settings,
                           .clips = v->settings.clip.box || v->settings.clip.planes > 0,
                           .opacity_scale = v->opacity_scale > 0 ? v->opacity_scale : 1 };
-    if (d->input && d->editor && (d->function || !v->function)) {
+    if (d->input && d->editor && (d->function || !v->function) && (d->heat || !v->heat)) {
         recall(v, d);
         return d;
     }
@@ -184,14 +188,15 @@ void trip_viewer_close(trip_viewer *v)
 
 /* ---- what is wanted ---- */
 
-/* What the library is to be set to. */
-static triptych_settings settings_of(const trip_document *d)
+triptych_settings trip_viewer_settings(const trip_document *d)
 {
     triptych_settings s = d->settings;
     if (!d->clips)
         s.clip = (triptych_clip){ 0 };
     if (s.headlight) /* which casts no shadows that are seen */
         s.effects &= ~TRIPTYCH_SHADOWS;
+    if (!d->heat)
+        s.effects &= ~TRIPTYCH_EMISSION;
     return s;
 }
 
@@ -205,6 +210,7 @@ static void want(trip_viewer *v)
     trip_frames_want(v->frames, &(trip_wanted){ .document = d->number,
                                                 .input = d->input,
                                                 .keep_all = d->keep_all,
+                                                .heat = d->heat,
                                                 .has_navigation = d->has_navigation,
                                                 .navigation = d->navigation,
                                                 .start = &d->start,
@@ -213,7 +219,7 @@ static void want(trip_viewer *v)
                                                 .function = d->function,
                                                 .text = text,
                                                 .opacity_scale = d->opacity_scale,
-                                                .settings = settings_of(d) });
+                                                .settings = trip_viewer_settings(d) });
     d->revision = trip_function_editor_revision(d->editor);
     free(text);
     v->changed = false;
@@ -451,7 +457,7 @@ static int add_key(trip_document *d)
     free(text);
     if (!status) {
         p->keys[p->count - 1].has_clip = true;
-        p->keys[p->count - 1].clip = settings_of(d).clip;
+        p->keys[p->count - 1].clip = trip_viewer_settings(d).clip;
     }
     return status;
 }
@@ -528,11 +534,14 @@ char *trip_viewer_camera_options(trip_viewer *v)
     const trip_document *d = navigable(v);
     if (!d)
         return NULL;
-    const triptych_settings s = settings_of(d);
+    const triptych_settings s = trip_viewer_settings(d);
     char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
     char *clip = trip_clipping_text(&s.clip), *light = trip_light_text(&s);
-    if (camera && clip && light && asprintf(&text, "%s%s%s", camera, clip, light) < 0)
+    char *effects = trip_effects_text(&s, d->heat);
+    if (camera && clip && light && effects &&
+        asprintf(&text, "%s%s%s%s", camera, clip, light, effects) < 0)
         text = NULL;
+    free(effects);
     free(camera);
     free(clip);
     free(light);

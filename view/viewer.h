@@ -18,6 +18,7 @@ typedef struct trip_document {
     unsigned number; /* no two have the same */
     char *input;     /* as the user named it */
     bool keep_all;   /* it is bricked anew, with all values */
+    char *heat;      /* the data set of its heat; NULL: none */
     bool small;      /* of samples: the whole is to be bricked, or is being */
     bool opened;     /* what follows is known */
     triptych_info info;
@@ -69,7 +70,7 @@ typedef struct trip_viewer {
     bool start_given, settings_given;
     triptych_view start;
     triptych_settings settings;
-    const char *function;
+    const char *function, *heat;
     double opacity_scale; /* 0: not given */
 } trip_viewer;
 
@@ -80,6 +81,8 @@ void trip_viewer_release(trip_viewer *v);
 
 /* NULL where none is shown. */
 trip_document *trip_viewer_document(trip_viewer *v);
+/* What the library is to be set to: without what cannot be shown of it. */
+triptych_settings trip_viewer_settings(const trip_document *d);
 /* Opens a data set or volume beside the others, and shows it; one that is open already is opened
  * anew. */
 void trip_viewer_open(trip_viewer *v, const char *input);

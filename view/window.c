@@ -457,6 +457,7 @@ static void open_documents(window *w)
     v->start = p->start;
     v->settings = p->settings;
     v->function = p->function;
+    v->heat = p->heat;
     v->opacity_scale = p->opacity_scale;
     v->start_given = p->start_given;
     v->settings_given = p->settings_given;
@@ -464,6 +465,7 @@ static void open_documents(window *w)
     v->panel = !p->no_panel;
     for (int i = 0; i < p->count; i++)
         trip_viewer_open(v, p->inputs[i]);
+    v->heat = NULL; /* that of no others */
     if (v->count > 1)
         trip_viewer_show(v, 0);
     glfwGetFramebufferSize(w->glfw, &width, &height);

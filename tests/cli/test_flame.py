@@ -1,4 +1,6 @@
 """A flame: the heat of an OpenVDB file makes its soot glow."""
+import glob
+import json
 import os
 
 import numpy
@@ -55,6 +57,18 @@ class Emission(program.ProgramTest):
             self.assertIn("emission    runs: " if runs else "emission    does not run: ", text)
             self.assertEqual(text.count("\nheat "), 2 if runs else 0, text)
         numpy.testing.assert_array_equal(self.draw("--effects", "auto"), self.draw())
+
+    def test_statistics_have_the_bytes_of_heat(self):
+        """Once, however many frames there are: it is kept."""
+        draw = ("render", "density.trip", "-o", "a.png", *LOOK, "--orbit", "2", "--stats", "-")
+        whole = sum(os.path.getsize(path) for path in glob.glob("heat.trip/**", recursive=True))
+        for renderer in ("cpu", *program.GL):
+            frames = json.loads(self.works(*draw, *GLOWS, "--renderer", renderer).stdout)["frames"]
+            first, second = (frame["heat_bytes_read"] for frame in frames)
+            self.assertEqual(second, 0)
+            self.assertTrue(0 < first < whole, (first, whole))
+        cold = json.loads(self.works(*draw, "--renderer", "cpu").stdout)["frames"]
+        self.assertNotIn("heat_bytes_read", cold[0])
 
     def test_renderers_agree_with_the_integral(self):
         exact = self.draw(*GLOWS, renderer="integral")

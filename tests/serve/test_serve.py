@@ -66,8 +66,10 @@ class Serve(program.ProgramTest):
     def setUpClass(cls):
         super().setUpClass()
         program.write_nrrd("v.nhdr", program.noise((24, 28, 32)))
-        run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
-        assert run.returncode == 0, run.stderr
+        program.write_nrrd("heat.nhdr", program.noise((12, 14, 32)))
+        for name in "v", "heat":
+            run = program.call("brick", f"{name}.nhdr", "-o", f"{name}.trip", "-q", "--keep-all")
+            assert run.returncode == 0, run.stderr
 
     def setUp(self):
         self.serve("v.trip")
@@ -185,6 +187,22 @@ class Serve(program.ProgramTest):
             self.assertTrue((picture != before).any(), value)
             before = picture
 
+    def test_heat_glows_as_render_draws_it(self):
+        for renderer in "cpu", "gl":
+            if renderer == "gl" and not program.GL:
+                continue
+            self.tearDown()
+            self.serve("v.trip", "--effects", "emission", "--emission", "heat.trip", "--temperature",
+                       "500:3000", "--renderer", renderer)
+            self.do("resize 60 50")
+            picture, _, camera = self.whole_picture()
+            self.assertIn("--emission", camera)
+            self.assert_rendered(picture, camera, "--renderer", renderer)
+            cold = camera[: camera.index(" --effects")]
+            with self.assertRaises(AssertionError):
+                self.assert_rendered(picture, cold, "--renderer", renderer)
+            self.assertEqual(self.status()["effects"], "emission of heat.trip, 500 to 3000 K")
+
     def test_a_volume_is_bricked_and_shown(self):
         self.tearDown()
         environment = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
@@ -295,6 +313,9 @@ class Serve(program.ProgramTest):
         self.fails(2, "serve")
         self.fails(2, "serve", "v.trip", "--port", "65536")
         self.fails(1, "serve", "v.trip", "--tf", "no.tf")
+        self.fails(2, "serve", "v.trip", "--effects", "emission", says="--emission HEAT.trip")
+        self.fails(2, "serve", "v.trip", "--emission", "heat.trip", says="--effects emission")
+        self.fails(1, "serve", "v.trip", "--effects", "auto", "--emission", "no.trip", says="no.trip")
         self.fails(1, "serve", "v.trip", "--port", self.port, says="--port takes another")
 
 

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "light.h"
 
@@ -83,6 +84,56 @@ static void it_is_written_as_an_option_where_it_lights(void **state)
     assert_text(&s, " --light point:0.1,-2,1e-20");
 }
 
+static void assert_effects(const triptych_settings *s, const char *heat, const char *options,
+                           const char *words)
+{
+    char *text = trip_effects_text(s, heat), said[200];
+    assert_string_equal(text, options);
+    free(text);
+    trip_effects_say(s, heat, said, sizeof said);
+    assert_string_equal(said, words);
+}
+
+static void effects_are_written_as_options_and_said_in_words(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    assert_effects(&s, NULL, "", "");
+    assert_effects(&s, "heat.trip", "", "");
+    s.effects = TRIPTYCH_EMISSION;
+    assert_effects(&s, "its place/it's hot.trip",
+                   " --effects emission --emission 'its place/it'\\''s hot.trip'"
+                   " --temperature 0:2500",
+                   "emission of it's hot.trip, 0 to 2500 K");
+    s.effects = TRIPTYCH_SHADOWS | TRIPTYCH_CUEING;
+    s.cueing = 0.25;
+    s.light_cells = 64;
+    assert_effects(&s, "heat.trip", " --effects shadows,cueing --cueing 0.25 --light-cells 64",
+                   "shadows, depth cueing");
+    s.effects = TRIPTYCH_OCCLUSION;
+    s.anisotropy = 0.5;
+    assert_effects(&s, NULL, " --effects occlusion --light-cells 64", "occlusion");
+    s.effects = TRIPTYCH_EFFECTS_AUTO;
+    s.kelvin[1] = 1800.5;
+    assert_effects(&s, "h",
+                   " --effects auto --anisotropy 0.5 --cueing 0.25 --light-cells 64 --emission 'h'"
+                   " --temperature 0:1800.5",
+                   "what the data calls for, emission of h, 0 to 1800.5 K");
+}
+
+static void words_end_where_the_text_does(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    s.effects = TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION;
+    for (size_t bytes = 1; bytes < 60; bytes++) {
+        char said[64];
+        memset(said, 1, sizeof said);
+        trip_effects_say(&s, "heat.trip", said, bytes);
+        assert_true(strlen(said) < bytes && said[bytes] == 1);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -91,6 +142,8 @@ int main(void)
         cmocka_unit_test(what_is_set_is_shown),
         cmocka_unit_test(any_light_has_numbers_to_show),
         cmocka_unit_test(it_is_written_as_an_option_where_it_lights),
+        cmocka_unit_test(effects_are_written_as_options_and_said_in_words),
+        cmocka_unit_test(words_end_where_the_text_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

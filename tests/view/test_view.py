@@ -64,6 +64,9 @@ class View(program.ProgramTest):
         for name in "noise", "ball":
             run = program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "--keep-all")
             assert run.returncode == 0, run.stderr
+        program.write_nrrd("heat.nrrd", program.noise((12, 20, 14)))
+        run = program.call("brick", "heat.nrrd", "-o", "heat.trip", "--keep-all")
+        assert run.returncode == 0, run.stderr
 
     @classmethod
     def tearDownClass(cls):
@@ -98,6 +101,40 @@ class View(program.ProgramTest):
                        "drawn.exr")
             with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
                 self.assertEqual(seen.read(), drawn.read())
+
+    GLOWS = ["noise.trip", "--effects=emission,cueing", "--emission=heat.trip",
+             "--temperature=500:3000"]
+
+    def test_heat_glows_as_render_draws_it(self):
+        for renderer in "cpu", "gl":
+            self.view("wait\npicture seen.exr\nstatus status.json\n", *self.GLOWS,
+                      f"--renderer={renderer}")
+            camera = shlex.split(self.status()["camera"])
+            self.assertEqual(camera[camera.index("--effects") :],
+                             ["--effects", "cueing,emission", "--emission", "heat.trip",
+                              "--temperature", "500:3000"])
+            self.works("render", "noise.trip", *camera, "--background=0,0,0", "-o", "drawn.exr",
+                       f"--renderer={renderer}")
+            with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
+                self.assertEqual(seen.read(), drawn.read())
+
+    def test_heat_has_controls_and_is_of_its_data_set_alone(self):
+        shutil.rmtree("state", ignore_errors=True)
+        script = ("wait\npicture 0.exr\nclick 0.5 Emission\nwait\npicture 1.exr\n"
+                  "click 0.5 Emission\nclick 0.9 Hottest\nwait\npicture 2.exr\n"
+                  "click 0.1 Coldest\nwait\npicture 3.exr\n"
+                  f"drop {os.path.abspath('ball.trip')}\nwait\npicture 4.exr\n")
+        hot, cold, hotter, warmer, ball = self.pictures(script, range(5), *self.GLOWS, fresh=False)
+        for a, b in (hot, cold), (cold, hotter), (hotter, warmer):
+            self.assertTrue((a != b).any())
+        self.view("wait\npicture cold.exr\n", "noise.trip", "--effects=cueing")
+        numpy.testing.assert_array_equal(program.read_exr("cold.exr"), cold)
+        self.view("wait\npicture ball.exr\n", "ball.trip", "--effects=cueing")
+        numpy.testing.assert_array_equal(program.read_exr("ball.exr"), ball)
+        # What is kept of it does without, as heat is named anew each time.
+        again, = self.pictures("wait\npicture again.exr\n", ["again"], "noise.trip", fresh=False)
+        numpy.testing.assert_array_equal(again, cold)
+        shutil.rmtree("state")
 
     def test_marked_views_are_the_keys_of_a_path(self):
         if os.path.exists("noise-001.json"):
@@ -350,6 +387,17 @@ class View(program.ProgramTest):
         self.fails(1, "view", "missing.trip", says="missing.trip", env=self.screen.environment)
         self.fails(2, "view", "--size=3", says="--size", env=self.screen.environment)
         self.fails(2, "view", "--up=0,0,0", says="--up", env=self.screen.environment)
+        glows = ["--effects=emission", "--emission=heat.trip"]
+        for status, options, says in (
+            (2, ["noise.trip", glows[0]], "--emission HEAT.trip"),
+            (2, ["noise.trip", glows[1]], "--effects emission"),
+            (2, glows, "of one data set"),
+            (2, ["noise.trip", "ball.trip", *glows], "of one data set"),
+            (2, ["noise.trip", "--temperature=0:3000"], "--emission only"),
+            (2, ["noise.trip", *glows, "--temperature=9:3"], "the smaller first"),
+            (1, ["noise.trip", glows[0], "--emission=no.trip"], "no.trip"),
+        ):
+            self.fails(status, "view", *options, says=says, env=self.screen.environment)
         with open("script", "w") as f:
             f.write("wait\nclick 0.5 No such control\n")
         with open("bad", "w") as f:
