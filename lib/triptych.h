@@ -101,8 +101,8 @@ TRIPTYCH_API int triptych_open(triptych *t, const char *path, const triptych_res
  * forgotten; the default function is the first data set's. A voxel that several hold counts once in
  * post, and for each of them in pre. After a failure what was open still is. */
 TRIPTYCH_API int triptych_add(triptych *t, const char *path);
-/* Opens a data set of the heat of what is open, on any grid with even spacing, in the place of one
- * that was: for TRIPTYCH_EMISSION, until what is open is closed. NULL: none. */
+/* Opens a data set of the heat of what is open, on any grid, in the place of one that was: for
+ * TRIPTYCH_EMISSION, until what is open is closed. NULL: none. */
 TRIPTYCH_API int triptych_set_heat(triptych *t, const char *path);
 TRIPTYCH_API void triptych_close(triptych *t);
 

@@ -13,8 +13,8 @@
  * outside: b is TRIP_LIGHT_BIAS cells of the grid below long, but takes it no farther than to a
  * light that is at a place. Half of what is around a surface is the body itself, hence 1 + s.
  *
- * T and m are looked up in a lattice over the volume (light_grid.h), that of m with cells twice as
- * long; the integral renderer works them out, m by the same directions. What is cut away does not
+ * Points of index space are places where spacing is uneven (coordinates.h). T and m are looked up
+ * in a lattice over the volume (light_grid.h), that of m with cells twice as long; the integral renderer works them out, m by the same directions. What is cut away does not
  * attenuate.
  *
  * Emission then adds what matter gives off by itself (emission.h).

@@ -32,9 +32,6 @@ static void set_table(trip_emission *e)
 
 static int check(const trip_dataset *data, const char *path)
 {
-    if (trip_coordinates_uneven(&data->coordinates))
-        return trip_fail(TRIP_USAGE, "render", path,
-                         "its spacing is uneven, which that of heat cannot be");
     if (!(data->header.value_max > 0))
         return trip_fail(TRIP_USAGE, "render", path, "has no heat: no value is above 0");
     return 0;

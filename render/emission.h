@@ -1,4 +1,4 @@
-/* Light that hot matter gives off by itself: a second data set, on any even grid, has its
+/* Light that hot matter gives off by itself: a second data set, on any grid, has its
  * temperatures, and matter radiates as a black body does, as much as it absorbs (Kirchhoff), so
  * that its colour c becomes c' = c + E(T),   linear light of E = (T / HI)^4 black body of T
  * (black_body.h) before depth cueing. Like all colours E is what a screen is given, not linear

@@ -288,10 +288,6 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
         !renderer->ops->classifies_post)
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "does not classify after interpolation");
-    const bool uneven = trip_coordinates_uneven(&frame->data->coordinates);
-    if (uneven && trip_effects_some(&s->effects) && !frame->plan->gathers)
-        return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                         "draws no effects in grids with uneven spacing; the integral does");
     if (trip_effects_some(&s->effects) && !(renderer->ops->effects >> s->classify & 1))
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
                          "draws no effects; choose another renderer, or none: --effects none");

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "frame.h"
+#include "light_shares.h"
 #include "report.h"
 
 enum { CODES = 65536, SLOTS = 4, SLOT_BYTES = 256 << 10 };
@@ -30,6 +31,7 @@ struct trip_light_map {
     double *memory;
     trip_light_grid extinction, reached, open;
     size_t nodes, open_nodes;
+    trip_light_shares shares[3]; /* while it gathers, where spacing is uneven */
 
     stage stage;
     trip_reader *reader;        /* while it gathers; else NULL */
@@ -63,6 +65,8 @@ static void stop_gathering(trip_light_map *m)
     trip_budget_release(m->budget, m->selections, m->list_count * sizeof *m->selections);
     m->selections = NULL;
     m->pass = (trip_pass){ 0 };
+    for (int a = 0; a < 3; a++)
+        trip_light_shares_destroy(&m->shares[a], m->budget);
 }
 
 static void stop_sweeping(trip_light_map *m)
@@ -242,10 +246,24 @@ static int select_list(trip_light_map *m, const trip_list *list)
     return status;
 }
 
+static int take_shares(trip_light_map *m)
+{
+    const trip_coordinates *c = &m->data->coordinates;
+    const trip_light_grid *g = &m->extinction;
+    bool fits = true;
+    for (int a = 0; a < 3 && trip_coordinates_uneven(c) && fits; a++)
+        fits = trip_light_shares_make(&m->shares[a], c, a, g->spacing, g->nodes[a], m->budget);
+    return fits ? 0
+                : trip_fail(TRIP_ERROR, "render", "light",
+                            "what voxels count does not fit the memory given; raise --memory");
+}
+
 static int start_gathering(trip_light_map *m, const trip_light_source *s)
 {
     const int axis = axis_of(s);
-    int status = 0;
+    int status = take_shares(m);
+    if (status)
+        return status;
     m->list_count = s->data->list_count;
     m->selections = trip_budget_take(m->budget, m->list_count * sizeof *m->selections);
     if (!m->selections)
@@ -345,10 +363,34 @@ static void add_voxel(trip_light_map *m, const int64_t at[3], double extinction)
     }
 }
 
+/* The same where spacing is uneven. */
+static void add_shares(trip_light_map *m, const int64_t at[3], double extinction)
+{
+    const trip_light_grid *g = &m->extinction;
+    const double *share[3];
+    size_t count[3], first[3];
+    for (int a = 0; a < 3; a++) {
+        const trip_light_shares *s = &m->shares[a];
+        share[a] = s->shares + s->begin[at[a]];
+        count[a] = s->begin[at[a] + 1] - s->begin[at[a]];
+        first[a] = (size_t)s->first[at[a]];
+    }
+    for (size_t k = 0; k < count[2]; k++)
+        for (size_t j = 0; j < count[1]; j++) {
+            const double part = extinction * share[2][k] * share[1][j];
+            double *row =
+                m->memory + first[0] +
+                (size_t)g->nodes[0] * (first[1] + j + (size_t)g->nodes[1] * (first[2] + k));
+            for (size_t i = 0; i < count[0] && part > 0; i++)
+                row[i] += part * share[0][i];
+        }
+}
+
 static void gather_run(trip_light_map *m, const trip_batch *batch, const trip_run *run)
 {
     const trip_block block = trip_block_of(batch, run);
     const int axis = trip_batch_list(batch, run)->axis;
+    const trip_coordinates *places = &m->data->coordinates;
     trip_block_voxels(&block, 0, run->count, m->voxels);
     for (uint32_t n = 0; n < run->count; n++) {
         const double extinction = (double)m->extinctions[trip_voxel_code(m->voxels[n])];
@@ -358,7 +400,12 @@ static void gather_run(trip_light_map *m, const trip_batch *batch, const trip_ru
         at[axis] = run->sheet;
         at[(axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(m->voxels[n]);
         at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(m->voxels[n]);
-        if (trip_clip_has(&m->clip, trip_v3((double)at[0], (double)at[1], (double)at[2])))
+        const trip_vec3 voxel = trip_v3((double)at[0], (double)at[1], (double)at[2]);
+        if (!trip_clip_has(&m->clip, trip_coordinates_point(places, voxel)))
+            continue;
+        if (trip_coordinates_uneven(places))
+            add_shares(m, at, extinction);
+        else
             add_voxel(m, at, extinction);
     }
 }
@@ -369,6 +416,8 @@ static double shares_at(const trip_light_map *m, int axis, int node)
     const int64_t spacing = (int64_t)m->extinction.spacing, middle = node * spacing;
     const int64_t last = (int64_t)m->data->header.dims[axis] - 1;
     double sum = 0;
+    if (m->shares[axis].sums)
+        return m->shares[axis].sums[node];
     for (int64_t i = middle - spacing + 1; i < middle + spacing; i++)
         if (i >= 0 && i <= last)
             sum +=

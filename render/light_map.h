@@ -2,7 +2,8 @@
  * nearest to the light's direction, whose extinction is gathered at the nodes, and of sweeps
  * through that (light_sweep.h). Kept from frame to frame: a pass is read again when the data, the
  * transfer function or what is cut away has changed, the sweeps are made again when the light has.
- * The lattices depend on the data's size and the settings alone. One thread; renderers read the
+ * Where spacing is uneven they lie over places
+ * (coordinates.h). The lattices depend on the data's size and the settings alone. One thread; renderers read the
  * grids of a map that is complete. */
 #ifndef TRIP_LIGHT_MAP_H
 #define TRIP_LIGHT_MAP_H

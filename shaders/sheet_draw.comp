@@ -277,10 +277,23 @@ vec4 gradient_between(place a, place b, trip_gl_sheet_end from, trip_gl_sheet_en
 #endif
 
 #ifdef PLACED
+#ifdef UNEVEN
+// Of a part of the way from a voxel to the next.
+float place_between(int voxel, float part)
+{
+    vec2 from = places[voxel], to = places[voxel + 1];
+    return from.x + (from.y + part * ((to.x - from.x) + (to.y - from.y)));
+}
+#endif
+
 // In the grid, list axes.
 vec3 voxel_of(place at, trip_gl_sheet_end end)
 {
+#ifdef UNEVEN
+    return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
+#else
     return vec3(end.sheet, vec2(at.cell - clips.yz) + at.part);
+#endif
 }
 #endif
 

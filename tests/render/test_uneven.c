@@ -370,6 +370,7 @@ static void gl_draws_exact_and_near_kernels(void **state)
         settings.footprint = i / 2 % 2 ? TRIP_FOOTPRINT_EXACT : TRIP_FOOTPRINT_EWA;
         settings.triangles = i % 3 == 1;
         settings.indexed = i % 5 == 1;
+        settings.effects.cueing = i % 7 == 3 ? 0.6 : 0;
         settings.shading = i % 4 == 1;
         scene_picture p = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
         scene_turn turn = scene_turns(scene_renderers() + 2, &s, &view, &settings);
@@ -412,6 +413,7 @@ static void all_draw_the_sheets_of_the_reference(void **state)
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
         trip_settings settings = post(1 + i % 4);
         settings.shading = i % 3 == 0;
+        settings.effects.cueing = i % 7 == 3 ? 0.6 : 0;
         settings.depth = i == 6;
         compare_sheets(&s, &view, &settings, 1e-3);
         scene_destroy(&s);

@@ -625,12 +625,21 @@ INLINE colour shaded(const surface *s, colour c)
                      v_min(v_set(1), v_fma(c.b, matt, s->gloss)) };
 }
 
+INLINE vf place_along(const trip_cpu_view *view, int axis, const int32_t *voxels)
+{
+    if (!view->coordinates)
+        return v_from_int(vi_load(voxels));
+    const vd_pair places = positions(view, axis, voxels);
+    return v_narrow(places.lo, places.hi);
+}
+
 /* With effects; `s` of strength 0 where nothing is shaded. */
 INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, v3 light, const surface *s,
                            const trip_cpu_staged *staged, uint32_t at)
 {
-    const vf place[3] = { v_from_int(vi_load(staged->u + at)), v_from_int(vi_load(staged->v + at)),
-                          v_from_int(vi_load(staged->sheet + at)) };
+    const vf place[3] = { place_along(view, view->u_axis, staged->u + at),
+                          place_along(view, view->v_axis, staged->v + at),
+                          place_along(view, view->axis, staged->sheet + at) };
     const vf to_light[3] = { light.x, light.y, light.z }, to_eye[3] = { eye.x, eye.y, eye.z };
     vf rgb[3] = { c.r, c.g, c.b };
     effects_on(&view->effects, place, s, to_light, to_eye, rgb);

@@ -1005,11 +1005,12 @@ INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
     out->summed = false;
 }
 
-/* Where the rays of slice n are `further` along: voxels of the list. */
+/* Where the rays of slice n are `further` along: voxels of the list, or places. */
 INLINE void places_at(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
                       unsigned n, vf further, vf at[3])
 {
-    const int64_t origin[2] = { g->first_u, g->first_v };
+    const int64_t origin[2] = { is_uneven(path) ? 0 : g->first_u,
+                                is_uneven(path) ? 0 : g->first_v };
     for (int a = 0; a < 2; a++) {
         float first = (float)(path->base[a][n] + origin[a]) + path->first[a][n];
         vf slope = l->slope[a] + v_set((float)path->slope[a]);

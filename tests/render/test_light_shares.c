@@ -1,0 +1,147 @@
+/* What voxels count at the nodes of a light's lattice where spacing is uneven. */
+#include "light_shares.h"
+#include "test.h"
+
+enum { MOST = 64 };
+
+static trip_budget *open_budget(uint64_t bytes)
+{
+    trip_budget *b;
+    assert_int_equal(trip_budget_create(&b, bytes), 0);
+    return b;
+}
+
+/* Steps that differ by up to `most` times, along the first axis; the others have one voxel. */
+static trip_coordinates random_coordinates(double table[MOST], int64_t voxels, double most)
+{
+    static const double one[] = { 0 };
+    table[0] = 0;
+    for (int64_t i = 1; i < voxels; i++)
+        table[i] = table[i - 1] + pow(most, test_random());
+    const double last = table[voxels - 1];
+    for (int64_t i = 1; i < voxels; i++)
+        table[i] *= (double)(voxels - 1) / last;
+    return trip_coordinates_make((const double *const[]){ table, one, one },
+                                 (const int64_t[]){ voxels, 1, 1 });
+}
+
+static int nodes_over(int64_t voxels, double spacing)
+{
+    const int cells = (int)ceil((double)(voxels - 1) / spacing);
+    return cells < 1 ? 2 : cells + 1;
+}
+
+static double share_of(const trip_light_shares *s, int64_t voxel, int node)
+{
+    const size_t count = s->begin[voxel + 1] - s->begin[voxel];
+    const int at = node - s->first[voxel];
+    return at >= 0 && (size_t)at < count ? s->shares[s->begin[voxel] + (size_t)at] : 0;
+}
+
+static void with_even_steps_a_voxel_counts_where_it_is_near(void **state)
+{
+    (void)state;
+    trip_budget *b = open_budget(1 << 20);
+    double table[MOST];
+    for (int64_t voxels = 1; voxels < MOST; voxels += 7)
+        for (int spacing = 1; spacing < 6; spacing++) {
+            const trip_coordinates c = random_coordinates(table, voxels, 1);
+            const int nodes = nodes_over(voxels, spacing);
+            trip_light_shares s;
+            assert_true(trip_light_shares_make(&s, &c, 0, spacing, nodes, b));
+            for (int64_t i = 0; i < voxels; i++)
+                for (int n = 0; n < nodes; n++)
+                    assert_close(share_of(&s, i, n), fmax(0, 1 - fabs((double)i / spacing - n)),
+                                 1e-9);
+            trip_light_shares_destroy(&s, b);
+        }
+    trip_budget_destroy(b);
+}
+
+/* A voxel's shares are what lies about it, half of the way to its neighbours; at the ends of the
+ * grid as much again as the point there has. Points are as many steps apart as are 1 long at most.
+ */
+static void shares_make_what_lies_about_a_voxel(void **state)
+{
+    (void)state;
+    trip_budget *b = open_budget(1 << 20);
+    double table[MOST];
+    for (int round = 0; round < 40; round++) {
+        const int64_t voxels = 2 + (int64_t)(test_random() * (MOST - 2));
+        const double spacing = 1 + round % 5;
+        const trip_coordinates c = random_coordinates(table, voxels, 1 + round);
+        const int nodes = nodes_over(voxels, spacing);
+        trip_light_shares s;
+        assert_true(trip_light_shares_make(&s, &c, 0, spacing, nodes, b));
+        double all = 0, sums = 0;
+        for (int64_t i = 0; i < voxels; i++) {
+            const double before = i > 0 ? table[i] - table[i - 1] : 0;
+            const double behind = i < voxels - 1 ? table[i + 1] - table[i] : 0;
+            double expected = (before + behind) / 2, found = 0;
+            if (i == 0 || i == voxels - 1)
+                expected += (before + behind) / ceil(before + behind - 1e-6) / 2;
+            for (int n = 0; n < nodes; n++)
+                found += share_of(&s, i, n);
+            assert_close(found, expected, 1e-9);
+            all += found;
+        }
+        for (int n = 0; n < nodes; n++) {
+            assert_true(s.sums[n] > 0); /* no node is without a value */
+            sums += s.sums[n];
+        }
+        assert_close(sums, all, 1e-9 * all);
+        trip_light_shares_destroy(&s, b);
+    }
+    trip_budget_destroy(b);
+}
+
+/* What is linear among places has at a node the value of the place there, but for points lying
+ * unevenly about it, which are no farther than the spacing, and for as much as a step at the ends.
+ */
+static void a_ramp_stays_near_to_itself(void **state)
+{
+    (void)state;
+    trip_budget *b = open_budget(1 << 20);
+    double table[MOST];
+    for (int round = 0; round < 20; round++) {
+        const trip_coordinates c = random_coordinates(table, MOST, 1 + 2 * round);
+        trip_light_shares s;
+        assert_true(trip_light_shares_make(&s, &c, 0, 4, nodes_over(MOST, 4), b));
+        for (int n = 1; n < s.nodes - 2; n++) {
+            double sum = 0;
+            for (int64_t i = 0; i < MOST; i++)
+                sum += share_of(&s, i, n) * table[i];
+            assert_close(sum / s.sums[n], 4 * n, 0.25);
+        }
+        trip_light_shares_destroy(&s, b);
+    }
+    trip_budget_destroy(b);
+}
+
+static void what_does_not_fit_is_refused_and_nothing_kept(void **state)
+{
+    (void)state;
+    trip_budget *b = open_budget(1 << 20);
+    double table[MOST];
+    const trip_coordinates c = random_coordinates(table, MOST, 5);
+    const uint64_t whole = trip_budget_left_bytes(b);
+    for (uint64_t left = 0; left < 4 * 4096; left += 4096) {
+        trip_light_shares s;
+        assert_true(trip_budget_charge(b, whole - left));
+        assert_false(trip_light_shares_make(&s, &c, 0, 2, nodes_over(MOST, 2), b));
+        assert_int_equal(trip_budget_left_bytes(b), left);
+        trip_budget_discharge(b, whole - left);
+    }
+    trip_budget_destroy(b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(with_even_steps_a_voxel_counts_where_it_is_near),
+        cmocka_unit_test(shares_make_what_lies_about_a_voxel),
+        cmocka_unit_test(a_ramp_stays_near_to_itself),
+        cmocka_unit_test(what_does_not_fit_is_refused_and_nothing_kept),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
