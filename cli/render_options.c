@@ -231,8 +231,7 @@ static const struct argp_option options[] = {
       "as "
       "one in the middle; by reference and gl) (default: exact); "
       "interpolation of values, linear (the default), cubic (Catmull and Rom's, from 64 voxels) or "
-      "gaussian (which smooths; not by integral); of --classify post, gl and reference draw cubic "
-      "and gaussian, cpu does not",
+      "gaussian (which smooths; not by integral)",
       4 },
     { "tolerance", KEY_TOLERANCE, "E", 0,
       "Error of a pixel's components, 1e-12 to 0.1 (default: 1e-4); integral only", 4 },
@@ -714,9 +713,6 @@ static int check_integral(parse *p)
         return trip_option_fail("--kernel", "does not apply to --field splats");
     if (integral && o->settings.kernel == TRIPTYCH_GAUSSIAN)
         return trip_option_fail("--kernel", "is linear or cubic with --renderer integral");
-    if (o->renderer == TRIPTYCH_RENDERER_CPU && o->settings.kernel != TRIPTYCH_LINEAR)
-        return trip_option_fail("--kernel", "is linear with --renderer cpu: gl and reference draw "
-                                            "cubic and gaussian, integral cubic");
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");

@@ -179,16 +179,9 @@ static int fit_buffers(trip_cpu *r)
 
 static int begin_sheets(trip_cpu *r)
 {
-    const trip_kernel kernel = r->frame->settings->kernel;
-    if (kernel != TRIP_KERNEL_LINEAR)
-        return trip_fail(TRIP_USAGE, "render", "CPU renderer",
-                         "does not draw --kernel %s with --classify post; --renderer gl%s",
-                         trip_kernel_name(kernel),
-                         kernel == TRIP_KERNEL_CUBIC ? ", reference and integral do"
-                                                     : " and reference do");
     int status = r->sheets ? 0 : trip_cpu_sheets_create(&r->sheets, r);
     r->sheet_settings = *r->frame->settings;
-    r->sheet_settings.kernel_radius = trip_sheet_radius(kernel);
+    r->sheet_settings.kernel_radius = trip_sheet_radius(r->frame->settings->kernel);
     r->sheet_frame = *r->frame;
     r->sheet_frame.settings = &r->sheet_settings;
     return status ? status : trip_cpu_sheets_begin_frame(r->sheets, r);
@@ -207,11 +200,13 @@ static int check_kernels(const trip_frame *frame)
                      "exact kernel too");
 }
 
-/* Sheets with uneven spacing are drawn by the plain kernels (kernels/sheet_tmpl.h). */
+/* Sheets with uneven spacing, and those interpolated from 64 voxels, are drawn by the plain kernels
+ * (kernels/sheet_tmpl.h). */
 static const trip_cpu_kernels *kernels_for(const trip_cpu *r, const trip_frame *frame)
 {
     const bool plain = frame->settings->classify == TRIP_CLASSIFY_POST &&
-                       trip_coordinates_uneven(&frame->data->coordinates);
+                       (trip_coordinates_uneven(&frame->data->coordinates) ||
+                        frame->settings->kernel != TRIP_KERNEL_LINEAR);
     const trip_cpu_kernels *isa = plain ? &trip_cpu_plain : r->isa;
     return frame->settings->depth ? isa->with_depth : isa;
 }

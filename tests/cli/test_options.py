@@ -238,7 +238,6 @@ class Options(program.ProgramTest):
                 render + ["--kernel=cubic", "--classify=pre"],
                 render + ["--kernel=cubic", "--kernel-radius=3"],
                 render + ["--kernel=cubic", "--kernel=ewa"],
-                render + ["--kernel=cubic", "--renderer=cpu"],
                 render + ["--kernel=gaussian", "--renderer=integral"],
                 render + ["--quality=draft", "--error=1"],
                 render + ["--quality=draft", "--renderer=integral"],

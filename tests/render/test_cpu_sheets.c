@@ -96,8 +96,22 @@ static void assert_shows(const scene_picture *p)
     assert_true(sum > 0.01 * p->width * p->height);
 }
 
+static void check_view(const scene *a, const scene *b, unsigned threads,
+                       const trip_reader_params *reader, const trip_camera_params *view,
+                       const trip_settings *settings)
+{
+    cpu_scenes_threads = 1;
+    scene_picture p = scene_draw(a, &cpu_scenes_cpu, view, settings);
+    cpu_scenes_threads = threads;
+    scene_picture q = scene_draw_with(b, &cpu_scenes_cpu, view, settings, reader);
+    assert_shows(&p);
+    assert_same(&p, &q);
+    scene_picture_free(&p);
+    scene_picture_free(&q);
+}
+
 /* Pictures of `a` by one thread and of `b` as said are the same, with every instruction set (one of
- * them, where they are taken by turns). */
+ * them, where they are taken by turns); and by kernels of 64 voxels, which have one. */
 static void check_same(const scene *a, const scene *b, unsigned threads,
                        const trip_reader_params *reader)
 {
@@ -105,20 +119,18 @@ static void check_same(const scene *a, const scene *b, unsigned threads,
     trip_settings settings = post(2);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
-        for (int i = 0; i < 3; i++) {
-            cpu_scenes_threads = 1;
-            scene_picture p = scene_draw(a, &cpu_scenes_cpu, &views[i], &settings);
-            cpu_scenes_threads = threads;
-            scene_picture q = scene_draw_with(b, &cpu_scenes_cpu, &views[i], &settings, reader);
-            assert_shows(&p);
-            assert_same(&p, &q);
-            scene_picture_free(&p);
-            scene_picture_free(&q);
-        }
+        for (int i = 0; i < 3; i++)
+            check_view(a, b, threads, reader, &views[i], &settings);
         if (TEST_BY_TURNS)
             break;
     }
     unsetenv("TRIPTYCH_ISA");
+    for (int i = 0; i < 2; i++) {
+        trip_camera_params small = views[i];
+        small.width = small.height = PIXELS / 2;
+        settings.kernel = i ? TRIP_KERNEL_GAUSSIAN : TRIP_KERNEL_CUBIC;
+        check_view(a, b, threads, reader, &small, &settings);
+    }
 }
 
 static void any_number_of_threads_draws_the_same(void **state)
@@ -178,20 +190,21 @@ static int draw_within(const scene *s, uint64_t bytes, const trip_settings *sett
     return status;
 }
 
-/* From too little upwards, in steps of less than a sheet: each either fails with a message or draws
- * the same, whether it holds one pair of sheets at a time or all. */
-static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state)
+/* From too little upwards, in steps of less than a sheet by the linear kernel: each either fails
+ * with a message or draws the same, whether it holds one pair of sheets at a time or all. */
+static void check_memories(trip_kernel kernel, int pixels, uint64_t step)
 {
-    (void)state;
     scene s;
     make_waves(&s, 32, 0.4);
     trip_settings settings = post(3);
     trip_camera_params view = from_outside(&s);
+    settings.kernel = kernel;
+    view.width = view.height = pixels;
     size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
     float *whole = malloc(bytes), *some = malloc(bytes);
     assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
     int drawn = 0, refused = 0;
-    for (uint64_t memory = 1 << 20; memory < 20 << 20; memory += TEST_BY_TURNS ? 4000000 : 200000) {
+    for (uint64_t memory = 1 << 20; memory < 20 << 20; memory += step) {
         memset(some, 0, bytes);
         int status = draw_within(&s, memory, &settings, &view, some);
         if (status == 0)
@@ -206,6 +219,13 @@ static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state
     scene_destroy(&s);
 }
 
+static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state)
+{
+    (void)state;
+    check_memories(TRIP_KERNEL_LINEAR, PIXELS, TEST_BY_TURNS ? 4000000 : 200000);
+    check_memories(TRIP_KERNEL_CUBIC, 40, TEST_BY_TURNS ? 4000000 : 1000000);
+}
+
 enum { WIDE_I = 640, WIDE_J = 320, WIDE_K = TEST_BY_TURNS ? 6 : 12 };
 
 static bool wide(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -218,7 +238,7 @@ static bool wide(void *user, int i, int j, int k, unsigned *code, double gradien
 
 /* Three decoded sheets of the wide grid, 8 bytes a voxel, and a slice between them would take more
  * than there is: the picture, buffers and table need that already. */
-static void check_windows(const trip_coordinates *coordinates, int first)
+static void check_windows(const trip_coordinates *coordinates, trip_kernel kernel, int first)
 {
     enum { LITTLE = 9 << 20, SHEETS = 4 * 8 * WIDE_I * WIDE_J };
     scene s;
@@ -237,6 +257,7 @@ static void check_windows(const trip_coordinates *coordinates, int first)
         trip_camera_params view = views[i];
         view.ortho_height = i == 2 ? 300 : 0;
         settings.h = i == 1 ? 0 : settings.h;
+        settings.kernel = kernel;
         size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
         float *much = malloc(bytes), *little = malloc(bytes);
         assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, much), 0);
@@ -266,8 +287,9 @@ static void grids_too_wide_for_the_memory_are_drawn_in_windows(void **state)
         along[a] = tables[a];
     }
     const trip_coordinates coordinates = trip_coordinates_make(along, voxels);
-    check_windows(NULL, 0);
-    check_windows(&coordinates, 1);
+    check_windows(NULL, TRIP_KERNEL_LINEAR, 0);
+    check_windows(&coordinates, TRIP_KERNEL_LINEAR, 1);
+    check_windows(NULL, TRIP_KERNEL_CUBIC, TEST_BY_TURNS ? 2 : 1);
 }
 
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -701,6 +723,9 @@ static void cells_that_lack_a_corner_are_empty_as_in_the_reference(void **state)
                 scene_view(&s, views[i].from, views[i].distance, views[i].fov_degrees, 48);
             view.ortho_height = views[i].ortho_height;
             settings.shading = n == 0;
+            expect_as_in_the_reference(&s, &view, &settings);
+            view.width = view.height = 24;
+            settings.kernel = i % 2 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_GAUSSIAN;
             expect_as_in_the_reference(&s, &view, &settings);
         }
         scene_destroy(&s);

@@ -625,12 +625,6 @@ static void put_blobs(trip_field **field, const scene *s)
     assert_int_equal(trip_field_finish(*field, &map), 0);
 }
 
-/* The CPU renderer interpolates linearly. */
-static bool draws(const scene_renderer *r, trip_kernel kernel)
-{
-    return kernel == TRIP_KERNEL_LINEAR || strcmp(r->name, "cpu") != 0;
-}
-
 /* Of 1, 4 and 16 slices: the integral is of the same field, by the same light. Translucent, so that
  * nothing is saturated. */
 static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, trip_vec3 direction)
@@ -652,7 +646,7 @@ static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, t
         scene_integrate(&s, &view, &settings, &(scene_making){ .threads = 1, .field = field });
     double errors[3] = { 0 };
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-        for (int n = 0; n < 3 && draws(r, kernel); n++) {
+        for (int n = 0; n < 3; n++) {
             settings.slices = 1 << 2 * n;
             scene_picture p = scene_draw(&s, r, &view, &settings);
             double error = mean_apart(&p, &truth);
@@ -746,8 +740,6 @@ static void along_the_sheets_slices_have_the_values_of_the_kernel(void **state)
         trip_settings settings = post(slices);
         settings.kernel = kernel;
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            if (!draws(r, kernel))
-                continue;
             scene_picture p = scene_draw(&s, r, &view, &settings);
             assert_close(p.rgba[3], 1 - exp(-0.05 * sum / 30000), 1e-6 + 0.01 * r->tolerance);
             scene_picture_free(&p);
@@ -802,8 +794,6 @@ static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
     scene_picture linear = scene_integrate(&s, &view, &settings, &(scene_making){ .threads = 1 });
     settings.kernel = TRIP_KERNEL_CUBIC;
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-        if (!draws(r, settings.kernel))
-            continue;
         scene_picture p = scene_draw(&s, r, &view, &settings);
 
         assert_true(mean_apart(&p, &truth) < 0.05 / 255);

@@ -68,6 +68,12 @@ INLINE bool is_uneven(const pane_path *path)
     return TRIP_SIMD == TRIP_SIMD_PLAIN && path->coordinates;
 }
 
+/* So are kernels of 64 voxels. */
+INLINE bool is_wide(const trip_cpu_group *g)
+{
+    return TRIP_SIMD == TRIP_SIMD_PLAIN && g->about;
+}
+
 /* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
  * over a sheet; false where it does not go the pass's way, or is too steep. */
 INLINE bool ray_slope(const trip_cpu_sheet_view *view, double x, double y, double start[2],
@@ -580,6 +586,14 @@ INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
     return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
+/* With kernels of 64 voxels: the cells that rays are in, voxels of the grid of rasters, and the
+ * places in them along u, v and the sheets. */
+typedef struct wide_place {
+    const trip_cpu_about *about;
+    int32_t cell[2][V];
+    float part[2][V], between;
+} wide_place;
+
 /* What rays meet at a slice: the entry of the function's integrals nearest to the code, and what
  * the rest is worked out from where it is needed. */
 typedef struct sample {
@@ -591,6 +605,7 @@ typedef struct sample {
     vi sums[4];       /* of the integrals, at the entry */
     bool lit, summed; /* gradient is there; sums are */
     int32_t near[2];  /* with uneven spacing: voxels that rays were near to, at any slice */
+    wide_place *wide; /* with kernels of 64 voxels: where that is */
 } sample;
 
 /* Bilinear weights, 2^WEIGHT_LOG2 in all. */
@@ -803,6 +818,8 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
     s->lit = s->summed = false;
 }
 
+#include "cpu/kernels/wide_tmpl.h"
+
 /* Which rays at slice n are in cells of a segment that have all of their corners: a slice at a
  * sheet has those at that sheet only. */
 static vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
@@ -974,9 +991,11 @@ INLINE vf ray_depth(const stamp_rays *l, vf along)
     return v_fma(along, l->depth, l->depth_at_start);
 }
 
-INLINE void find_light(const trip_cpu_group *g, sample *s)
+INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g, sample *s)
 {
-    if (!s->lit)
+    if (!s->lit && is_wide(g))
+        find_wide_gradients(view, g, s);
+    else if (!s->lit)
         find_gradients(g, s);
     s->lit = true;
 }
@@ -1063,8 +1082,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         way = &of_place;
     }
     if (view->shading) {
-        find_light(g, a);
-        find_light(g, b);
+        find_light(view, g, a);
+        find_light(view, g, b);
         lit = surface_between(view, path, l, way, a, b);
     }
     if (view->effects.some) {
@@ -1183,16 +1202,25 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     uint64_t segments = area->segments;
     vf pixel[CHANNELS];
     sample ends[2];
+    wide_place places[2];
     unsigned sampled = UINT32_MAX; /* slice, in ends[sampled % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
     for (int i = 0; i < 4 && is_uneven(path); i++)
         ends[i / 2].near[i % 2] = 0;
+    for (int i = 0; i < 2 && is_wide(g); i++)
+        ends[i].wide = &places[i];
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
-        if (sampled != n)
-            sample_at(g, view->integrals, path, area, l, n, &ends[n % 2]);
-        sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
+        if (is_wide(g)) {
+            if (sampled != n || !in_the_same_cells(g, n, &ends[n % 2]))
+                wide_sample_at(view, g, path, l, n, n, &ends[n % 2]);
+            wide_sample_at(view, g, path, l, next, n, &ends[next % 2]);
+        } else {
+            if (sampled != n)
+                sample_at(g, view->integrals, path, area, l, n, &ends[n % 2]);
+            sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
+        }
         sampled = next;
         if (!composite_segment(view, g, l, path, n, area->gaps >> n & 1, &ends[n % 2],
                                &ends[next % 2], pixel))

@@ -9,6 +9,7 @@
 #include "camera.h"
 #include "coordinates.h"
 #include "cpu/kernels/effects.h"
+#include "kernel.h"
 #include "settings.h"
 
 struct trip_frame;
@@ -63,6 +64,14 @@ typedef struct trip_cpu_slice {
     double coordinate; /* along the list's axis: a place, where spacing is uneven */
 } trip_cpu_slice;
 
+/* Of a segment, with kernels of 64 voxels: the sheets from one before it to one behind, by
+ * ascending index. NULL: it is not there, and its voxels count as missing ones do; beyond the grid
+ * its last sheet repeats. */
+typedef struct trip_cpu_about {
+    const int32_t *rasters[TRIP_KERNEL_TAPS];
+    int64_t number; /* of the second */
+} trip_cpu_about;
+
 /* Integrals of the transfer function from code 0 to each entry, times a factor that makes the
  * greatest 2^30: of extinction, and of extinction times each colour component. Differences of them
  * are exact but for the rounding of each. Entries are 1, 2 or 4 codes apart, as far as the function
@@ -95,7 +104,8 @@ typedef struct trip_cpu_group {
     bool without_halo;
     const uint64_t *whole[TRIP_CPU_SEGMENTS];
     const int32_t *sheets[TRIP_CPU_SEGMENTS][2];
-    const uint64_t *some; /* squares visible in any segment */
+    const trip_cpu_about *about; /* for each segment; NULL: the kernel is linear */
+    const uint64_t *some;        /* squares visible in any segment */
     /* Only rays whose cell at the first slice is in [lo, hi) are drawn; voxels, as positions are.
      */
     bool windowed;
@@ -109,6 +119,8 @@ typedef struct trip_cpu_sheet_view {
     const trip_cpu_integrals *integrals;
     const trip_coordinates *coordinates; /* of uneven spacing; else NULL */
     int axis;
+    trip_kernel kernel;
+    int64_t voxels[2]; /* of the grid along u and v */
     bool ortho, shading, headlight, point_light;
     double direction; /* 1: ascending; -1 */
     double eye[3], r0[3], rx[3], ry[3];

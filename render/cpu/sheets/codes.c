@@ -1,8 +1,11 @@
 #include "cpu/sheets/codes.h"
 
+#include <math.h>
+
+#include "field.h"
 #include "kind.h"
 
-trip_cpu_codes trip_cpu_codes_of(const trip_dataset *data)
+trip_cpu_codes trip_cpu_codes_of(const trip_dataset *data, trip_kernel kernel)
 {
     unsigned least = UINT16_MAX, most = 0;
     for (unsigned i = 0; i < data->list_count; i++) {
@@ -17,6 +20,10 @@ trip_cpu_codes trip_cpu_codes_of(const trip_dataset *data)
     trip_cpu_codes c = { .first = 0 };
     if (least > most)
         return c;
+    double bounds[2];
+    trip_field_code_bounds(kernel, least, most, bounds);
+    least = (unsigned)fmax(0, floor(bounds[0]));
+    most = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
     c.first = (uint16_t)least;
     while ((most - least) << (c.shift + 1) <= UINT16_MAX && c.shift < 15)
         c.shift++;

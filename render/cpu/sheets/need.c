@@ -3,12 +3,15 @@
 #include "cpu/kernels/sheets.h"
 #include "report.h"
 
-/* Sheets at hand when an interval is drawn: its own two, one for gradients, one that has begun. */
-enum { AT_HAND = 4 };
-
 typedef struct sheet {
     uint64_t rasters, runs, words;
 } sheet;
+
+/* The last sheets, the latest last. */
+typedef struct row {
+    sheet sheets[TRIP_CPU_AT_HAND_MOST];
+    int count;
+} row;
 
 static uint64_t greater(uint64_t a, uint64_t b)
 {
@@ -16,12 +19,12 @@ static uint64_t greater(uint64_t a, uint64_t b)
 }
 
 /* The sheet after those at hand, which it joins. */
-static void add_sheet(trip_cpu_need *need, sheet at_hand[AT_HAND], sheet next)
+static void add_sheet(trip_cpu_need *need, row *at_hand, sheet next)
 {
     uint64_t rasters = 0;
-    for (int i = 0; i < AT_HAND; i++) {
-        at_hand[i] = i + 1 < AT_HAND ? at_hand[i + 1] : next;
-        rasters += at_hand[i].rasters;
+    for (int i = 0; i < at_hand->count; i++) {
+        at_hand->sheets[i] = i + 1 < at_hand->count ? at_hand->sheets[i + 1] : next;
+        rasters += at_hand->sheets[i].rasters;
     }
     need->rasters = greater(need->rasters, rasters);
     need->of_sheet = greater(need->of_sheet, next.rasters);
@@ -36,15 +39,16 @@ static uint64_t rasters_of_tile(const trip_pass *pass)
 }
 
 static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_cursor *cursors,
-                     uint64_t rasters)
+                     uint64_t rasters, int count)
 {
-    sheet at_hand[AT_HAND] = { 0 }, now = { 0 };
+    row at_hand = { .count = count };
+    sheet now = { 0 };
     const uint64_t of_tile = rasters_of_tile(pass);
     trip_pass_iterator it = trip_pass_begin(pass, cursors);
     int32_t number = 0;
     for (trip_run run; trip_pass_next(&it, &run);) {
         if (now.runs > 0 && run.sheet != number) {
-            add_sheet(need, at_hand, now);
+            add_sheet(need, &at_hand, now);
             now = (sheet){ 0 };
         }
         number = run.sheet;
@@ -52,12 +56,12 @@ static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_curso
         now.words += run.words;
         now.rasters += now.rasters + of_tile <= rasters ? of_tile : rasters - now.rasters;
     }
-    for (int i = 0; i < AT_HAND; i++, now = (sheet){ 0 })
-        add_sheet(need, at_hand, now);
+    for (int i = 0; i < count; i++, now = (sheet){ 0 })
+        add_sheet(need, &at_hand, now);
 }
 
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
-                       trip_budget *budget)
+                       int at_hand, trip_budget *budget)
 {
     *need = (trip_cpu_need){ 0 };
     for (int i = 0; i < layer->pass_count; i++) {
@@ -68,7 +72,7 @@ int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64
             return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                              "%u lists do not fit the memory given; raise --memory",
                              pass->selection_count);
-        add_pass(need, pass, cursors, rasters);
+        add_pass(need, pass, cursors, rasters, at_hand);
         trip_budget_release(budget, cursors, bytes);
     }
     return 0;

@@ -11,8 +11,12 @@ typedef struct trip_cpu_need {
     uint64_t of_sheet, runs, words; /* rasters and so on of the sheet that has most */
 } trip_cpu_need;
 
-/* Of sheets of so many rasters each at most; TRIP_ERROR without the memory to find it. */
+/* The most of `at_hand` of trip_cpu_need_find(). */
+enum { TRIP_CPU_AT_HAND_MOST = 6 };
+
+/* Of sheets of so many rasters each at most, so many at hand at a time; TRIP_ERROR without the
+ * memory to find it. */
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
-                       trip_budget *budget);
+                       int at_hand, trip_budget *budget);
 
 #endif

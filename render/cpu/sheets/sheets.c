@@ -8,6 +8,7 @@
 #include "cpu/sheets/state.h"
 #include "cpu/panes.h"
 #include "report.h"
+#include "sheet.h"
 
 /* Of the memory that is left, what the frame goes on with besides. */
 enum { LEFT_OVER = 4, LEFT_OVER_OF_WINDOWS = 16 };
@@ -66,9 +67,9 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->of = r;
     s->store.kernels = r->kernels;
     s->pass = NULL;
-    s->count = 0;
+    s->count = s->front = 0;
     s->run_count = 0;
-    s->store.codes = trip_cpu_codes_of(r->frame->data);
+    s->store.codes = trip_cpu_codes_of(r->frame->data, r->frame->settings->kernel);
     s->store.coordinates = &r->frame->data->coordinates;
     trip_cpu_function_set(&s->function, r->frame->table, s->store.codes,
                           r->frame->camera->voxel_world);
@@ -114,14 +115,32 @@ static uint64_t rasters_in(const trip_cpu_rasters *all)
 static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const trip_cpu_need *need,
                        uint64_t room)
 {
+    const unsigned fewest = (unsigned)trip_cpu_sheets_at_hand(s->of->frame) + 1;
     s->slice_rasters = need->of_sheet * (uint64_t)s->of->frame->settings->slices;
     const uint64_t least = need->rasters + s->slice_rasters;
     const uint64_t most = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
-    while (sheets > TRIP_CPU_SHEETS_LEAST && trip_cpu_store_bytes(all, sheets, 2 * least) > room)
+    while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * least) > room)
         sheets--;
-    s->most = sheets > TRIP_CPU_SHEETS_LEAST + 2 ? (int)sheets - 4 : 3;
+    s->most = (int)(sheets > fewest + 2 ? sheets - 4 : fewest - 2);
     return trip_cpu_store_fit(&s->store, all, sheets, least, most, room);
+}
+
+int trip_cpu_sheets_about(const trip_frame *frame)
+{
+    return trip_sheet_reach(frame->settings->kernel) - 1;
+}
+
+int trip_cpu_sheets_at_hand(const trip_frame *frame)
+{
+    static_assert(2 + 2 * (TRIP_SHEET_REACH_MOST - 1) == (int)TRIP_CPU_AT_HAND_MOST, "need.h");
+    return 2 + 2 * trip_cpu_sheets_about(frame);
+}
+
+/* With kernels of 64 voxels. */
+static bool is_wide(const trip_cpu_sheets *s)
+{
+    return s->of->frame->settings->kernel != TRIP_KERNEL_LINEAR;
 }
 
 /* How far, in rasters, rays go along a sheet to the next; sheets are at most twice as far apart as
@@ -145,11 +164,12 @@ static int find_least(const trip_cpu_sheets *s, uint64_t *bytes)
         const trip_plan_layer *layer = &frame->plan->layers[axis];
         const trip_cpu_rasters all = rasters_of_layer(layer);
         trip_cpu_need need;
-        status = trip_cpu_need_find(&need, layer, rasters_in(&all), s->store.budget);
+        const int at_hand = trip_cpu_sheets_at_hand(frame);
+        status = trip_cpu_need_find(&need, layer, rasters_in(&all), at_hand, s->store.budget);
         if (status)
             break;
-        uint64_t least =
-            trip_cpu_windows_least_bytes(&all, reach_of(frame), &need, frame->settings->slices);
+        uint64_t least = trip_cpu_windows_least_bytes(&all, reach_of(frame), &need, at_hand,
+                                                      frame->settings->slices);
         *bytes = least > *bytes ? least : *bytes;
     }
     return status;
@@ -176,14 +196,15 @@ static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
     const trip_cpu_rasters all = rasters_of_layer(layer);
     const uint64_t grid = rasters_in(&all);
     const int64_t reach = reach_of(s->of->frame);
+    const int at_hand = trip_cpu_sheets_at_hand(s->of->frame);
     trip_cpu_windows_release(&s->windows, s->store.budget);
     uint64_t left = trip_budget_left_bytes(s->store.budget) + trip_cpu_store_held_bytes(&s->store);
     uint64_t room = left / LEFT_OVER * (LEFT_OVER - 1);
     s->windows.used = false;
-    trip_cpu_need need = { .rasters = 4 * grid, .of_sheet = grid };
+    trip_cpu_need need = { .rasters = (uint64_t)at_hand * grid, .of_sheet = grid };
     if (fit_sheets(s, &all, &need, room))
         return 0;
-    int status = trip_cpu_need_find(&need, layer, grid, s->store.budget);
+    int status = trip_cpu_need_find(&need, layer, grid, at_hand, s->store.budget);
     if (status || fit_sheets(s, &all, &need, room))
         return status;
     trip_cpu_store_release(&s->store);
@@ -197,7 +218,7 @@ int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis)
 {
     s->axis = s->store.axis = axis;
     s->pass = NULL;
-    s->count = 0;
+    s->count = s->front = 0;
     return fit_layer(s, &s->of->frame->plan->layers[axis]);
 }
 
@@ -205,7 +226,7 @@ static void drop_all(trip_cpu_sheets *s)
 {
     for (int i = 0; i < s->count; i++)
         trip_cpu_store_drop(&s->store, sheet_of(s, i));
-    s->count = 0;
+    s->count = s->front = 0;
 }
 
 /* ---- drawing sheets ---- */
@@ -217,7 +238,8 @@ bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to)
 
 bool trip_cpu_sheets_leap(const trip_cpu_sheets *s)
 {
-    return s->view.coordinates || s->view.steepest > 0.999 * s->of->frame->settings->slices;
+    return s->view.coordinates || is_wide(s) ||
+           s->view.steepest > 0.999 * s->of->frame->settings->slices;
 }
 
 /* Of complete sheets: ranges, and what may show between them. */
@@ -230,15 +252,20 @@ static void find_visible(trip_cpu_sheets *s, int complete)
             work[count++] = (trip_cpu_sheet_work){ .sheet = sheet_of(s, i) };
     trip_cpu_store_prepare(&s->store, work, count);
     count = 0;
-    for (int i = 0; i + 1 < complete; i++)
+    for (int i = s->front; i + 1 < complete; i++)
         if (trip_cpu_sheets_are_ahead(s, sheet_of(s, i + 1)->number))
-            work[count++] = (trip_cpu_sheet_work){ .sheet = sheet_of(s, i),
-                                                   .other = sheet_of(s, i + 1),
-                                                   .everywhere = trip_cpu_sheets_leap(s) };
+            work[count++] = (trip_cpu_sheet_work){
+                .sheet = sheet_of(s, i),
+                .other = sheet_of(s, i + 1),
+                .before = is_wide(s) && i > 0 ? sheet_of(s, i - 1) : NULL,
+                .behind = is_wide(s) && i + 2 < complete ? sheet_of(s, i + 2) : NULL,
+                .kernel = s->view.kernel,
+                .everywhere = trip_cpu_sheets_leap(s),
+            };
     trip_cpu_store_find_visible(&s->store, work, count, &s->function);
 }
 
-/* Gradients of held[0] to held[last]; those of held[0] may be there from before. */
+/* Gradients of the first sheets to held[last]; those of some may be there from before. */
 static void find_gradients(trip_cpu_sheets *s, int last, int complete)
 {
     trip_cpu_sheet_work work[TRIP_CPU_SHEETS_MAX] = { 0 };
@@ -260,6 +287,32 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
     trip_cpu_store_find_gradients(&s->store, work, count);
 }
 
+/* Those of the sheet at a number, which is next to held[i]; beyond the grid its own. */
+static const int32_t *rasters_beside(const trip_cpu_sheets *s, int i, int64_t number)
+{
+    const int64_t voxels = (int64_t)s->of->frame->data->header.dims[s->axis];
+    if (number < 0 || number >= voxels)
+        return s->store.sheets[s->held[i]].rasters;
+    for (int k = i > 0 ? i - 1 : 0; k <= i + 1 && k < s->count; k++)
+        if (s->store.sheets[s->held[k]].number == number)
+            return s->store.sheets[s->held[k]].rasters;
+    return NULL;
+}
+
+/* Those about held[i] and held[i + 1]. */
+static trip_cpu_about about_of(const trip_cpu_sheets *s, int i)
+{
+    const bool up = s->way > 0;
+    const int low = up ? i : i + 1, high = up ? i + 1 : i;
+    const trip_cpu_sheet *sheets = s->store.sheets;
+    const int64_t number = sheets[s->held[low]].number;
+    return (trip_cpu_about){
+        .rasters = { rasters_beside(s, low, number - 1), sheets[s->held[low]].rasters,
+                     sheets[s->held[high]].rasters, rasters_beside(s, high, number + 2) },
+        .number = number
+    };
+}
+
 /* The slice lies at an index of the axis, the segment before it between held[i] and held[i + 1];
  * `first`: the slice is the group's first, before which there is none. */
 static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index, int i, bool first)
@@ -271,6 +324,8 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index
         g->visible[g->segments] = from->visible;
         g->cells[g->segments] = from->cells;
         g->whole[g->segments] = from->whole;
+        if (is_wide(s))
+            s->about[g->segments] = about_of(s, i);
         g->sheets[g->segments][0] = from->rasters;
         g->sheets[g->segments++][1] = sheet_of(s, i + 1)->rasters;
     }
@@ -283,18 +338,24 @@ typedef struct cutting {
     unsigned count;
 } cutting;
 
-/* A slice at weight `part` of held[i + 1]; false when memory is full. */
+/* A slice at weight `part` of held[i + 1]; false when memory is full. Kernels of 64 voxels take
+ * values of the sheets themselves. */
 static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
     trip_cpu_sheet *slice = &s->store.slices[cut->count];
+    const double index = (double)from->number + part * (double)s->way;
+    if (is_wide(s)) {
+        add_slice(s, from, index, i, first);
+        return true;
+    }
     const trip_cpu_sheet_work w = {
         .sheet = slice, .other = from, .third = to, .needed = from->needed, .part = part
     };
     if (!trip_cpu_store_take_slice(&s->store, &w))
         return false;
     cut->work[cut->count++] = w;
-    add_slice(s, slice, (double)from->number + part * (double)s->way, i, first);
+    add_slice(s, slice, index, i, first);
     return true;
 }
 
@@ -375,14 +436,14 @@ static void drop_first(trip_cpu_sheets *s, int count)
     for (int i = 0; i < count; i++)
         trip_cpu_store_drop(&s->store, sheet_of(s, i));
     s->count -= count;
+    s->front -= count;
     memmove(s->held, s->held + count, (size_t)s->count * sizeof *s->held);
 }
 
-int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
+void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
 {
     const trip_cpu_store *store = &s->store;
     cutting cut = { .count = 0 };
-    int done = 0;
     bool first = true;
     const unsigned segments = (unsigned)s->of->frame->settings->slices;
     const trip_cpu_group given = s->group;
@@ -391,14 +452,15 @@ int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
                                  .first_v = store->first_v * TRIP_CPU_RASTER,
                                  .across = store->across,
                                  .down = store->down,
+                                 .about = is_wide(s) ? s->about : NULL,
                                  .without_halo = s->of->frame->data->header.halo == 0,
                                  .windowed = s->windows.used,
                                  .lo = { given.lo[0], given.lo[1] },
                                  .hi = { given.hi[0], given.hi[1] } };
-    for (; done < last && s->group.segments + segments < TRIP_CPU_SEGMENTS; done++) {
-        if (!trip_cpu_sheets_are_ahead(s, sheet_of(s, done + 1)->number))
+    for (; s->front < last && s->group.segments + segments < TRIP_CPU_SEGMENTS; s->front++) {
+        if (!trip_cpu_sheets_are_ahead(s, sheet_of(s, s->front + 1)->number))
             continue;
-        if (!take_interval(s, done, first, &cut))
+        if (!take_interval(s, s->front, first, &cut))
             break;
         first = false;
     }
@@ -406,25 +468,27 @@ int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     draw_panes(s);
     while (cut.count > 0)
         trip_cpu_store_drop(&s->store, &s->store.slices[--cut.count]);
-    return done;
 }
 
-/* Draws what the complete sheets held allow: to the last but one, whose gradients depend on the
- * last, or to the last one when none follows it. */
+/* Draws what the complete sheets held allow: to the last one that depends on none behind them, or
+ * to the last of all when none follows it. */
 static int draw_complete(trip_cpu_sheets *s, int complete, bool all)
 {
-    int last = all ? complete - 1 : complete - 2;
-    if (last < 1)
+    const int kept = trip_cpu_sheets_about(s->of->frame) - 1;
+    int last = all ? complete - 1 : complete - 2 - kept;
+    if (last <= s->front)
         return 0;
     find_visible(s, complete);
     if (s->view.shading)
-        find_gradients(s, last, complete);
-    while (last > 0) {
-        int done = trip_cpu_sheets_draw_some(s, last);
-        if (done == 0)
+        find_gradients(s, last + kept < complete ? last + kept : last, complete);
+    while (last > s->front) {
+        const int before = s->front;
+        trip_cpu_sheets_draw_some(s, last);
+        if (s->front == before)
             return too_many_voxels();
-        drop_first(s, done);
-        last -= done;
+        const int drop = s->front > kept ? s->front - kept : 0;
+        drop_first(s, drop);
+        last -= drop;
         int status = trip_frame_poll();
         if (status)
             return status;
@@ -502,10 +566,10 @@ static int take_rasters(trip_cpu_sheets *s, const trip_run *run)
             size_t at =
                 trip_cpu_store_at(&s->store, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
             while (!sheet_of(s, s->count - 1)->rasters[at] && !take_raster(s, at)) {
-                int before = s->count;
+                const int count = s->count, front = s->front;
                 decode_runs(s);
                 int status = draw_complete(s, s->count - 1, false);
-                if (status || s->count == before)
+                if (status || (s->count == count && s->front == front))
                     return status ? status : too_many_voxels();
             }
         }

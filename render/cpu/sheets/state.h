@@ -16,14 +16,16 @@ struct trip_cpu_sheets {
     trip_cpu_store store;
     trip_cpu_function function;
     trip_cpu_group group;
+    trip_cpu_about about[TRIP_CPU_SEGMENTS]; /* of its segments, with kernels of 64 voxels */
     trip_cpu_sheet_view view;
     int axis;
     const trip_pass *pass; /* being drawn; NULL: none */
     int64_t way;           /* from one sheet to the next: 1 or -1 */
     double eye;            /* along the sheets, as they are numbered */
-    /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[0] all
-     * is drawn. */
+    /* Sheets in a row, as indices of store.sheets; the last may not be complete. Up to held[front]
+     * all is drawn; those before are still interpolated from. */
     int held[TRIP_CPU_SHEETS_MAX];
+    int front;
     int count, most;        /* held; and drawn at a time, at most */
     uint64_t slice_rasters; /* set aside for slices */
     const trip_batch *batch;
@@ -32,9 +34,15 @@ struct trip_cpu_sheets {
     trip_cpu_windows windows;
 };
 
-/* Draws from held[0] on, at most to held[last]: 0 when not one interval fits the memory, or how
- * many were drawn. What is visible, and gradients, were found. */
-int trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last);
+/* How many sheets on each side of an interval its picture depends on: for gradients, and with
+ * kernels of 64 voxels for values. */
+int trip_cpu_sheets_about(const trip_frame *frame);
+/* Sheets at hand when an interval is drawn: what it depends on, and one that has begun. */
+int trip_cpu_sheets_at_hand(const trip_frame *frame);
+
+/* Draws from held[front] on, at most to held[last], and moves `front` along: not at all when not
+ * one interval fits the memory. What is visible, and gradients, were found. */
+void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last);
 /* Whether something between two sheets lies before the eye; of the first, `to` is the farther. */
 bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to);
 /* Whether the ends of a segment may lie in cells that do not touch. Then something may show between

@@ -5,6 +5,7 @@
 
 #include "cpu/sheets/uneven.h"
 #include "cpu/squares.h"
+#include "field.h"
 #include "report.h"
 
 /* Of a raster's squares, a bit each; COLUMN_0 also the first cell of each square of a row. */
@@ -382,7 +383,9 @@ static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t
     const trip_cpu_function *f = job->function;
     const trip_cpu_voxels *from = raster_at(s, w->sheet, at), *to = raster_at(s, w->other, at);
     trip_cpu_cells *cells = &w->sheet->cells[at];
-    if (f->in_a_row)
+    if (w->kernel != TRIP_KERNEL_LINEAR)
+        s->kernels->sheet_cells(from, to, squares, TRIP_CPU_CODE_LEAST, INT16_MAX, cells);
+    else if (f->in_a_row)
         s->kernels->sheet_cells(from, to, squares, f->first_visible, f->last_visible, cells);
     else
         find_cells_one_by_one(f, from, to, squares, cells);
@@ -412,6 +415,38 @@ static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells)
     }
 }
 
+/* Widens the range by what is there of a sheet in a square and those beside it. */
+static void add_ranges_about(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at,
+                             int square, int16_t range[2])
+{
+    enum { ACROSS = TRIP_CPU_SQUARES_ACROSS };
+    for (int n = 0; n < 9 && sheet; n++) {
+        const int u = square % ACROSS + n % 3 - 1, v = square / ACROSS + n / 3 - 1;
+        const size_t below = v < 0 ? -(size_t)s->across : v < ACROSS ? 0 : (size_t)s->across;
+        const size_t raster = at + below + (u < 0 ? (size_t)-1 : u < ACROSS ? 0 : 1);
+        if (!sheet->rasters[raster])
+            continue;
+        const trip_cpu_square_ranges *r = &sheet->ranges[raster];
+        const int i = (v + ACROSS) % ACROSS * ACROSS + (u + ACROSS) % ACROSS;
+        range[0] = r->least[i] < range[0] ? r->least[i] : range[0];
+        range[1] = r->most[i] > range[1] ? r->most[i] : range[1];
+    }
+}
+
+/* Whether kernels of 64 voxels may make something of a square that shows. */
+static bool shows_about(const work_job *job, const trip_cpu_sheet_work *w, size_t at, int square)
+{
+    const trip_cpu_sheet *about[] = { w->before, w->sheet, w->other, w->behind };
+    int16_t range[2] = { INT16_MAX, INT16_MIN };
+    double bounds[2];
+    for (int i = 0; i < 4; i++)
+        add_ranges_about(job->store, about[i], at, square, range);
+    trip_field_code_bounds(w->kernel, range[0], range[1], bounds);
+    return trip_cpu_function_shows(job->function,
+                                   (int16_t)fmax(TRIP_CPU_CODE_LEAST, floor(bounds[0])),
+                                   (int16_t)fmin(INT16_MAX, ceil(bounds[1])));
+}
+
 static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_square_ranges *a = &w->sheet->ranges[at], *b = &w->other->ranges[at];
@@ -421,7 +456,9 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
             bool any = a->least[i] <= a->most[i] && b->least[i] <= b->most[i];
             int16_t least = a->least[i] < b->least[i] ? a->least[i] : b->least[i];
             int16_t most = a->most[i] > b->most[i] ? a->most[i] : b->most[i];
-            if (any && trip_cpu_function_shows(job->function, least, most))
+            if (any && (w->kernel == TRIP_KERNEL_LINEAR
+                            ? trip_cpu_function_shows(job->function, least, most)
+                            : shows_about(job, w, at, i)))
                 visible |= UINT64_C(1) << i;
         }
     w->sheet->whole[at] = w->other->rasters[at] ? a->whole & b->whole : 0;

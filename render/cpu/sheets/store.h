@@ -37,7 +37,6 @@ typedef struct trip_cpu_sheet {
 
 enum {
     TRIP_CPU_SHEETS_MAX = 20,                /* at hand at once */
-    TRIP_CPU_SHEETS_LEAST = 5,               /* for groups of one interval */
     TRIP_CPU_SLICES_MAX = TRIP_CPU_SEGMENTS, /* between sheets */
 };
 
@@ -112,6 +111,10 @@ typedef struct trip_cpu_sheet_work {
     /* Cells and slices: the sheets on both sides. Gradients: those before and after in index order,
      * NULL where there is none. */
     const trip_cpu_sheet *other, *third;
+    /* Cells, with kernels of 64 voxels: the sheets beyond, in draw order; NULL where there is none.
+     */
+    const trip_cpu_sheet *before, *behind;
+    trip_kernel kernel;
     /* Squares that are needed: of gradients on both sides of the sheet, NULL where there is
      * nothing; of slices between the sheets. */
     const uint64_t *needed, *needed_before;
@@ -122,7 +125,8 @@ typedef struct trip_cpu_sheet_work {
 /* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
 /* Which squares and cells may show from prepared sheets to the next, `other`, which squares are
- * needed then, and which are whole. */
+ * needed then, and which are whole. With kernels of 64 voxels all cells may that have their eight
+ * corners, of squares about which the function shows something. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
 /* Gradients of prepared sheets' voxels, where they are needed or everywhere. */

@@ -31,34 +31,39 @@ static trip_cpu_rasters at_hand(const trip_cpu_rasters *all, const int64_t size[
     return b;
 }
 
-static uint64_t rasters_of(const trip_cpu_rasters *b, int slices)
+static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_slices)
 {
     return (uint64_t)((b->last[0] - b->first[0] + 1) * (b->last[1] - b->first[1] + 1)) *
-           (uint64_t)(TRIP_CPU_WINDOW_SHEETS + slices);
+           (uint64_t)sheets_and_slices;
 }
 
 static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,
-                         int slices)
+                         int sheets, int slices)
 {
     trip_cpu_rasters b = at_hand(all, size, reach);
-    return trip_cpu_store_bytes(&b, TRIP_CPU_WINDOW_SHEETS, rasters_of(&b, slices));
+    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + slices));
+}
+
+static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
+{
+    return (uint64_t)sheets * sheet_bytes(need);
 }
 
 uint64_t trip_cpu_windows_least_bytes(const trip_cpu_rasters *all, int64_t reach,
-                                      const trip_cpu_need *need, int slices)
+                                      const trip_cpu_need *need, int sheets, int slices)
 {
     const int64_t one[2] = { 1, 1 };
-    return TRIP_CPU_WINDOW_SHEETS * sheet_bytes(need) + bytes_of(all, one, reach, slices);
+    return kept_bytes(need, sheets) + bytes_of(all, one, reach, sheets, slices);
 }
 
 static bool take_runs(trip_cpu_windows *w, const trip_cpu_need *need, trip_budget *budget)
 {
     trip_cpu_windows_release(w, budget);
-    w->bytes = TRIP_CPU_WINDOW_SHEETS * sheet_bytes(need);
+    w->bytes = kept_bytes(need, w->room);
     w->memory = trip_budget_take(budget, w->bytes);
     if (!w->memory)
         w->bytes = 0;
-    for (int i = 0; i < TRIP_CPU_WINDOW_SHEETS && w->memory; i++) {
+    for (int i = 0; i < w->room && w->memory; i++) {
         void *sheet = w->memory + (size_t)i * sheet_bytes(need);
         w->sheets[i] = (trip_cpu_kept_sheet){ .words = sheet };
         void *runs = w->sheets[i].words + need->words;
@@ -79,23 +84,25 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
 {
     trip_cpu_windows *w = &s->windows;
     const int slices = s->of->frame->settings->slices;
-    uint64_t kept = TRIP_CPU_WINDOW_SHEETS * sheet_bytes(need);
-    if (trip_cpu_windows_least_bytes(all, reach, need, slices) > room)
+    const int sheets = trip_cpu_sheets_at_hand(s->of->frame);
+    const uint64_t kept = kept_bytes(need, sheets);
+    if (trip_cpu_windows_least_bytes(all, reach, need, sheets, slices) > room)
         return false;
+    w->room = sheets;
+    w->about = trip_cpu_sheets_about(s->of->frame);
     w->all = *all;
     w->reach = reach;
     w->count = w->from = 0;
     for (int a = 0; a < 2; a++)
         w->size[a] = all->last[a] - all->first[a] + 1;
-    while (bytes_of(all, w->size, reach, slices) > room - kept) {
+    while (bytes_of(all, w->size, reach, sheets, slices) > room - kept) {
         int longer = w->size[0] > w->size[1] ? 0 : 1;
         w->size[longer] = (w->size[longer] + 1) / 2;
     }
     trip_cpu_rasters hand = at_hand(all, w->size, reach);
-    uint64_t rasters = rasters_of(&hand, slices);
-    w->used =
-        take_runs(w, need, s->store.budget) &&
-        trip_cpu_store_fit(&s->store, &hand, TRIP_CPU_WINDOW_SHEETS, rasters, rasters, room - kept);
+    uint64_t rasters = rasters_of(&hand, sheets + slices);
+    w->used = take_runs(w, need, s->store.budget) &&
+              trip_cpu_store_fit(&s->store, &hand, (unsigned)sheets, rasters, rasters, room - kept);
     return w->used;
 }
 
@@ -179,32 +186,50 @@ static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_rasters *hand)
         n = decode_part(s, from, n, to);
 }
 
-/* Of the interval's two sheets: what may show between them, and gradients there. */
+/* The sheets at hand that are at most so many beyond the interval. */
+static int first_about(const trip_cpu_windows *w, int beyond)
+{
+    return (int)greater(0, w->from - beyond);
+}
+
+static int last_about(const trip_cpu_windows *w, int beyond)
+{
+    return (int)lesser(w->count - 1, w->from + 1 + beyond);
+}
+
+/* What may show between the interval's two sheets, and gradients of those that it takes them of. */
 static void find_interval(trip_cpu_sheets *s)
 {
     const trip_cpu_windows *w = &s->windows;
-    trip_cpu_sheet *sheet = s->store.sheets, *a = &sheet[w->from], *b = a + 1;
-    const trip_cpu_sheet *before = w->from > 0 ? a - 1 : NULL;
-    const trip_cpu_sheet *behind = w->from + 2 < w->count ? b + 1 : NULL;
-    bool up = s->way > 0, leap = trip_cpu_sheets_leap(s);
-    const trip_cpu_sheet_work both[2] = {
-        { .sheet = a,
-          .other = up ? before : b,
-          .third = up ? b : before,
-          .needed = a->needed,
-          .everywhere = leap },
-        { .sheet = b,
-          .other = up ? a : behind,
-          .third = up ? behind : a,
-          .needed_before = a->needed,
-          .everywhere = leap },
+    const bool up = s->way > 0, leap = trip_cpu_sheets_leap(s);
+    const int taken = w->about - 1, last = last_about(w, taken), last_loaded = w->count - 1;
+    trip_cpu_sheet *sheets = s->store.sheets, *a = &sheets[w->from];
+    trip_cpu_sheet_work work[TRIP_CPU_AT_HAND_MOST] = { 0 };
+    unsigned count = 0;
+    for (int i = first_about(w, taken); i <= last; i++) {
+        const trip_cpu_sheet *before = i > 0 ? &sheets[i - 1] : NULL;
+        const trip_cpu_sheet *behind = i < last_loaded ? &sheets[i + 1] : NULL;
+        work[count++] = (trip_cpu_sheet_work){
+            .sheet = &sheets[i],
+            .other = up ? before : behind,
+            .third = up ? behind : before,
+            .needed = i == w->from ? a->needed : NULL,
+            .needed_before = i == w->from + 1 ? a->needed : NULL,
+            .everywhere = leap,
+        };
+    }
+    trip_cpu_store_prepare(&s->store, work, count);
+    const trip_cpu_sheet_work cells = {
+        .sheet = a,
+        .other = a + 1,
+        .before = taken > 0 && w->from > 0 ? a - 1 : NULL,
+        .behind = taken > 0 && w->from + 1 < last_loaded ? a + 2 : NULL,
+        .kernel = s->view.kernel,
+        .everywhere = leap,
     };
-    trip_cpu_store_prepare(&s->store, both, 2);
-    trip_cpu_store_find_visible(
-        &s->store, &(trip_cpu_sheet_work){ .sheet = a, .other = b, .everywhere = leap }, 1,
-        &s->function);
+    trip_cpu_store_find_visible(&s->store, &cells, 1, &s->function);
     if (s->view.shading)
-        trip_cpu_store_find_gradients(&s->store, both, 2);
+        trip_cpu_store_find_gradients(&s->store, work, count);
 }
 
 /* Rays that start beside all windows are of the outermost. */
@@ -232,17 +257,16 @@ static int draw_window(trip_cpu_sheets *s, const trip_cpu_rasters *inner)
         !is_at_hand(s, &w->sheets[w->from + 1], &hand))
         return 0;
     trip_cpu_store_move(&s->store, &hand);
-    load_sheet(s, w->from, &hand);
-    load_sheet(s, w->from + 1, &hand);
-    if (w->from > 0)
-        load_sheet(s, w->from - 1, &hand);
-    if (w->from + 2 < w->count)
-        load_sheet(s, w->from + 2, &hand);
+    for (int i = first_about(w, w->about); i <= last_about(w, w->about); i++) {
+        load_sheet(s, i, &hand);
+        s->held[i] = i;
+    }
     find_interval(s);
-    s->held[0] = w->from;
-    s->held[1] = w->from + 1;
+    s->front = w->from;
+    s->count = w->count;
     set_window(s, inner);
-    trip_cpu_sheets_draw_some(s, 1);
+    trip_cpu_sheets_draw_some(s, w->from + 1);
+    s->count = s->front = 0;
     return trip_frame_poll();
 }
 
@@ -261,13 +285,14 @@ static int draw_interval(trip_cpu_sheets *s)
                     &(trip_cpu_rasters){ .first = { u, v },
                                          .last = { lesser(u + w->size[0] - 1, w->all.last[0]),
                                                    lesser(v + w->size[1] - 1, w->all.last[1]) } });
-    if (w->from == 1) {
+    if (w->from == w->about) {
         trip_cpu_kept_sheet first = w->sheets[0];
         w->count--;
         memmove(w->sheets, w->sheets + 1, (size_t)w->count * sizeof first);
         w->sheets[w->count] = first;
+    } else {
+        w->from++;
     }
-    w->from = 1;
     return status;
 }
 
@@ -288,7 +313,7 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
     int status = 0;
     if (w->count > 0 && w->sheets[w->count - 1].number + s->way != number)
         status = trip_cpu_windows_finish_row(s);
-    else if (w->from + 2 < w->count)
+    else if (w->from + 1 + w->about < w->count)
         status = draw_interval(s);
     if (status)
         return status;

@@ -1,5 +1,5 @@
 /* Sheets drawn window by window, where those of a list are too large to be at hand decoded: their
- * runs are kept as they are in the file, of the four sheets that one interval depends on, and for
+ * runs are kept as they are in the file, of the sheets that one interval depends on, and for
  * each window, a rectangle of rasters, decoded with as much about it as rays can reach. Each ray is
  * drawn in the window that it starts in, so that each segment is drawn once, and in order. Called
  * by the renderer's thread. */
@@ -11,9 +11,6 @@
 #include "selection.h"
 
 struct trip_cpu_sheets;
-
-/* Those before and behind an interval are for gradients. */
-enum { TRIP_CPU_WINDOW_SHEETS = 4 };
 
 typedef struct trip_cpu_kept_run {
     int32_t u, v;
@@ -36,15 +33,17 @@ typedef struct trip_cpu_windows {
     int64_t reach;   /* rasters about it */
     char *memory;
     size_t bytes;
-    trip_cpu_kept_sheet sheets[TRIP_CPU_WINDOW_SHEETS]; /* in a row, the last may not be complete */
+    /* In a row, the last may not be complete: those that an interval depends on. */
+    trip_cpu_kept_sheet sheets[TRIP_CPU_AT_HAND_MOST];
+    int room, about; /* sheets at most; before and behind the interval */
     int count;
-    int from; /* the interval to be drawn next begins at this: 0, or 1 where one was drawn before */
+    int from; /* the interval to be drawn next begins at this: `about`, but at first */
 } trip_cpu_windows;
 
 /* What the smallest windows take; and readies the largest that do not take more than `room`: false
  * where that is too little. */
 uint64_t trip_cpu_windows_least_bytes(const trip_cpu_rasters *all, int64_t reach,
-                                      const trip_cpu_need *need, int slices);
+                                      const trip_cpu_need *need, int at_hand, int slices);
 bool trip_cpu_windows_fit(struct trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room);
 void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget);

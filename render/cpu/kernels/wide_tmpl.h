@@ -1,0 +1,146 @@
+/* Samples of sheets by kernels of 64 voxels (kernel.h), one ray after the other: included by
+ * sheet_tmpl.h. The ends of every segment are sampled in its own cells, as sheet.h says, so that
+ * what is missing counts as the corner of that cell. */
+#ifndef TRIP_CPU_WIDE_H
+#define TRIP_CPU_WIDE_H
+
+/* A voxel that has weight: where its raster lies, and where it is there. */
+typedef struct tap {
+    const trip_cpu_voxels *raster;
+    int32_t at;
+} tap;
+
+/* Where a voxel's column of rasters, or row of them, and its column or row in the raster begin. */
+typedef struct tap_line {
+    int32_t raster, voxel;
+} tap_line;
+
+INLINE tap_line line_of(int32_t voxel, int32_t rasters, int32_t voxels)
+{
+    return (tap_line){ (voxel >> TRIP_CPU_RASTER_LOG2) * rasters,
+                       (voxel & (TRIP_CPU_RASTER - 1)) * voxels };
+}
+
+/* False where the voxel is missing. */
+INLINE bool take_tap(const trip_cpu_group *g, const int32_t *rasters, tap_line u, tap_line v,
+                     tap *t)
+{
+    if (!rasters)
+        return false;
+    t->raster = &g->pool[rasters[v.raster + u.raster]];
+    t->at = v.voxel + u.voxel;
+    return t->raster->codes[t->at] != TRIP_CPU_CODE_MISSING;
+}
+
+/* Those of one ray: u fastest, then v, then the sheets. False where the cell is empty. Outermost
+ * rasters have no voxels. */
+static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g, const wide_place *p,
+                      int lane, tap taps[64])
+{
+    const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
+    const int64_t origin[2] = { g->first_u, g->first_v };
+    tap_line lines[2][TRIP_KERNEL_TAPS]; /* beyond the grid its edge repeats */
+    tap eight[8];
+    for (int a = 0; a < 2; a++) {
+        const int32_t cell = p->cell[a][lane];
+        if (cell < 1 || cell > size[a] - TRIP_KERNEL_TAPS)
+            return false;
+        for (int i = 0; i < TRIP_KERNEL_TAPS; i++) {
+            const double voxel =
+                within(cell + i - 1, (double)-origin[a], (double)(view->voxels[a] - 1 - origin[a]));
+            lines[a][i] =
+                line_of((int32_t)voxel, a ? g->across : 1, a ? TRIP_CPU_RASTER_STRIDE : 1);
+        }
+    }
+    for (int n = 0; n < 8; n++)
+        if (!take_tap(g, p->about->rasters[1 + (n >> 2)], lines[0][1 + (n & 1)],
+                      lines[1][1 + (n >> 1 & 1)], &eight[n]))
+            return false;
+    for (int n = 0; n < 64; n++) {
+        const int x = n & 3, y = n >> 2 & 3, z = n >> 4;
+        if (!take_tap(g, p->about->rasters[z], lines[0][x], lines[1][y], &taps[n]))
+            taps[n] = eight[(x > 1) + 2 * (y > 1) + 4 * (z > 1)];
+    }
+    return true;
+}
+
+static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_place *p, int lane,
+                             float weights[64])
+{
+    double w[3][TRIP_KERNEL_TAPS];
+    for (int a = 0; a < 2; a++)
+        trip_kernel_weights(view->kernel, (double)p->part[a][lane], w[a]);
+    trip_kernel_weights(view->kernel, (double)p->between, w[2]);
+    for (int n = 0; n < 64; n++)
+        weights[n] = (float)(w[0][n & 3] * w[1][n >> 2 & 3] * w[2][n >> 4]);
+}
+
+/* Where the rays of slice n are, in cells of a segment. The grid's last voxels are within it. */
+INLINE void find_wide_places(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                             const pane_path *path, const stamp_rays *l, unsigned n,
+                             unsigned segment, wide_place *p)
+{
+    const corners c = corners_at(path, l, n);
+    const int64_t origin[2] = { g->first_u, g->first_v };
+    vi whole[2];
+    find_cells(g, path, n, &c, whole);
+    p->about = &g->about[segment];
+    p->between = (float)(g->slices[n].coordinate - (double)p->about->number);
+    for (int a = 0; a < 2; a++) {
+        vi_store(p->cell[a], whole[a]);
+        v_store(p->part[a], c.part[a]);
+        for (int i = 0; i < V; i++)
+            if (p->cell[a][i] + origin[a] == view->voxels[a] - 1 && p->part[a][i] == 0) {
+                p->cell[a][i]--;
+                p->part[a][i] = 1;
+            }
+    }
+}
+
+/* As sample_at(), at an end of a segment. */
+static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                           const pane_path *path, const stamp_rays *l, unsigned n, unsigned segment,
+                           sample *s)
+{
+    vi code = { 0 }, lack = { 0 };
+    find_wide_places(view, g, path, l, n, segment, s->wide);
+    for (int i = 0; i < V; i++) {
+        tap taps[64];
+        float weights[64], sum = 0;
+        lack[i] = !take_taps(view, g, s->wide, i, taps);
+        if (lack[i])
+            continue;
+        find_tap_weights(view, s->wide, i, weights);
+        for (int k = 0; k < 64; k++)
+            sum += weights[k] * taps[k].raster->codes[taps[k].at];
+        code[i] =
+            (int32_t)(within((double)sum, TRIP_CPU_CODE_LEAST, INT16_MAX) * (1 << WEIGHT_LOG2));
+    }
+    s->there = vi_is_0(lack);
+    s->index = nearest_entry(view->integrals, code);
+    s->lit = s->summed = false;
+}
+
+/* Whether a sample is of the cells of a segment, too. */
+INLINE bool in_the_same_cells(const trip_cpu_group *g, unsigned segment, const sample *s)
+{
+    return s->wide->about->number == g->about[segment].number;
+}
+
+static void find_wide_gradients(const trip_cpu_sheet_view *view, const trip_cpu_group *g, sample *s)
+{
+    for (int i = 0; i < V; i++) {
+        tap taps[64];
+        float weights[64], sums[3] = { 0 };
+        if (take_taps(view, g, s->wide, i, taps)) {
+            find_tap_weights(view, s->wide, i, weights);
+            for (int k = 0; k < 64; k++)
+                for (int a = 0; a < 3; a++)
+                    sums[a] += weights[k] * taps[k].raster->gradients[taps[k].at].along[a];
+        }
+        for (int a = 0; a < 3; a++)
+            s->gradient[a][i] = (int32_t)(sums[a] * (1 << WEIGHT_LOG2));
+    }
+}
+
+#endif
