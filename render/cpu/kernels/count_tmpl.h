@@ -29,8 +29,8 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
     } else {
         in = vm_and(in, v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)));
     }
-    return vm_any(in) &&
-           vm_any(vm_and(in, v_gt(weight(view, view->axis, s->x, s->y, column, row), v_set(0))));
+    pixel_rays r = pixel_rays_at(view, s->x, s->y, column, row);
+    return vm_any(in) && vm_any(vm_and(in, v_gt(weight(view, view->axis, &r), v_set(0))));
 }
 
 /* Whether some pixel of the pane at (x, y) does. */

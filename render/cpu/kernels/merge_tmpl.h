@@ -1,13 +1,14 @@
 /* Kernels that begin and finish the pixels of a pane: weights of the lists, the merge (equation 3
  * of Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
- * The weights are computed in double precision by the operations of weight.c in their order, so
- * that a list begins at the same pixel wherever that is computed, and what is near there is exact
- * for any h. */
+ * The weights are what the operations of weight.c in their order give in double precision, so that
+ * a list begins at the same pixel wherever that is computed, and what is near there is exact for any
+ * h. */
 #ifndef TRIP_CPU_MERGE_H
 #define TRIP_CPU_MERGE_H
 
 #include "cpu/kernels/blend_tmpl.h"
 #include "cpu/kernels/kernels.h"
+#include "cpu/kernels/project_tmpl.h"
 #include "weight.h"
 
 typedef int64_t vl __attribute__((vector_size(4 * V)));
@@ -20,11 +21,6 @@ INLINE vd vd_select(vl m, vd a, vd b)
 INLINE vd vd_abs(vd a)
 {
     return (vd)((vl)a & INT64_MAX);
-}
-
-INLINE vd vd_max(vd a, vd b)
-{
-    return vd_select((vl)(a > b), a, b);
 }
 
 typedef struct rays {
@@ -55,16 +51,25 @@ INLINE vl is_largest(const rays *r, int axis)
     return axis == 1 ? y : ~x & ~y;
 }
 
-INLINE vd weight_half(const trip_cpu_view *view, const trip_settings *s, int axis, vd x, vd y)
+INLINE vd most_of(const rays *r)
+{
+    return vd_max(r->r[0], vd_max(r->r[1], r->r[2]));
+}
+
+/* Not by an index, so that compilers keep vectors in registers. */
+INLINE vd magnitude(const rays *r, int axis)
+{
+    return axis == 0 ? r->r[0] : axis == 1 ? r->r[1] : r->r[2];
+}
+
+INLINE vd weight_half(const trip_cpu_view *view, const trip_settings *s, int axis, const rays *r)
 {
     if (s->method == TRIP_METHOD_AXIS)
         return vd_set(axis == view->of->plan->axis_of_view);
-    rays r = rays_at(view->of->camera, x, y);
     if (s->method == TRIP_METHOD_CLIP)
-        return vd_select(is_largest(&r, axis), vd_set(1), vd_set(0));
-    vd most = vd_max(r.r[0], vd_max(r.r[1], r.r[2]));
+        return vd_select(is_largest(r, axis), vd_set(1), vd_set(0));
     const double h = trip_settings_h(s);
-    return vd_max(vd_set(0), (r.r[axis] / most - vd_set(h)) / vd_set(1 - h));
+    return vd_max(vd_set(0), (magnitude(r, axis) / most_of(r) - vd_set(h)) / vd_set(1 - h));
 }
 
 INLINE vd_pair centres(int first, const float offsets[V])
@@ -73,8 +78,16 @@ INLINE vd_pair centres(int first, const float offsets[V])
     return (vd_pair){ vd_low(f) + vd_set(first), vd_high(f) + vd_set(first) };
 }
 
-/* The list's weight at the pixels of stamp (column, row) of the pane at (x, y). */
-INLINE vf weight(const trip_cpu_view *view, int axis, int x, int y, int column, int row)
+/* Rays through the pixels of a stamp, and 1 / the largest of each one's magnitudes: a Newton step
+ * from the single-precision quotient, whose error is at most 2^-45 of it where it is `usual`. */
+typedef struct pixel_rays {
+    rays lo, hi;
+    vd_pair inverse;
+    vm usual;
+} pixel_rays;
+
+/* Of stamp (column, row) of the pane at (x, y). */
+INLINE pixel_rays pixel_rays_at(const trip_cpu_view *view, int x, int y, int column, int row)
 {
     float across[V], down[V];
     for (int i = 0; i < V; i++) {
@@ -82,9 +95,35 @@ INLINE vf weight(const trip_cpu_view *view, int axis, int x, int y, int column, 
         down[i] = (float)(STAMP_ROWS * row + i / 4) + 0.5f;
     }
     vd_pair px = centres(x, across), py = centres(y, down);
+    const trip_camera *camera = view->of->camera;
+    rays lo = rays_at(camera, px.lo, py.lo), hi = rays_at(camera, px.hi, py.hi);
+    vd_pair most = { most_of(&lo), most_of(&hi) };
+    vf z = v_narrow(most.lo, most.hi), inverse = v_set(1) / z;
+    return (pixel_rays){
+        lo,
+        hi,
+        { refine(most.lo, vd_low(inverse)), refine(most.hi, vd_high(inverse)) },
+        vm_and(v_gt(z, v_set(0x1p-60f)), v_gt(v_set(0x1p60f), z)),
+    };
+}
+
+/* The list's weight at a stamp's pixels. Products by the inverses give bounds of the quotients,
+ * 2^-44 from them at most; where those are one float, so is the weight, and else it is divided for.
+ */
+INLINE vf weight(const trip_cpu_view *view, int axis, const pixel_rays *r)
+{
     const trip_settings *s = view->of->settings;
-    return v_narrow(weight_half(view, s, axis, px.lo, py.lo),
-                    weight_half(view, s, axis, px.hi, py.hi));
+    if (s->method == TRIP_METHOD_MERGE) {
+        const double h = trip_settings_h(s), scale = 1 / (1 - h), slack = 0x1p-44 * scale;
+        vd lo = vd_fma(magnitude(&r->lo, axis), r->inverse.lo, vd_set(-h)) * vd_set(scale);
+        vd hi = vd_fma(magnitude(&r->hi, axis), r->inverse.hi, vd_set(-h)) * vd_set(scale);
+        const vd off = vd_set(slack);
+        vf below = v_max(v_narrow(lo - off, hi - off), v_set(0));
+        vf above = v_max(v_narrow(lo + off, hi + off), v_set(0));
+        if (vm_all(vm_and(r->usual, v_ge(below, above))))
+            return below;
+    }
+    return v_narrow(weight_half(view, s, axis, &r->lo), weight_half(view, s, axis, &r->hi));
 }
 
 /* Lanes of a stamp that lie in the image. */
@@ -106,8 +145,10 @@ static void pane_clear(const trip_cpu_view *view, int x, int y, bool alone, floa
         vf t = v_set(1);
         if (view->front_to_back) {
             vm open = in_image(&view->splat.camera, x, y, column, row);
-            if (!alone)
-                open = vm_and(open, v_gt(weight(view, view->axis, x, y, column, row), v_set(0)));
+            if (!alone) {
+                pixel_rays r = pixel_rays_at(view, x, y, column, row);
+                open = vm_and(open, v_gt(weight(view, view->axis, &r), v_set(0)));
+            }
             t = v_select(open, t, v_set(0));
         }
         for (int c = 0; c < 3; c++)
@@ -124,7 +165,8 @@ static void pane_merge(const trip_cpu_view *view, int x, int y, const float *pix
     for (int b = 0; b < STAMPS; b++) {
         const float *stamp = pixels + STAMP_FLOATS * b;
         float *to = sum + STAMP_FLOATS * b;
-        vf w = weight(view, view->axis, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
+        pixel_rays r = pixel_rays_at(view, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
+        vf w = weight(view, view->axis, &r);
         w = w * w;
         for (int c = 0; c < CHANNELS; c++) {
             vf layer = v_load(stamp + c * V);
@@ -141,8 +183,9 @@ INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
     vf sum = v_set(0);
     if (view->of->settings->method != TRIP_METHOD_MERGE)
         return v_set(1);
+    pixel_rays r = pixel_rays_at(view, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
     for (int axis = 0; axis < 3; axis++) {
-        vf w = weight(view, axis, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
+        vf w = weight(view, axis, &r);
         sum = v_fma(w, w, sum);
     }
     return v_set(1) / sum;

@@ -198,6 +198,11 @@ INLINE vf v_max(vf a, vf b)
     return (vf)_mm512_max_ps((__m512)a, (__m512)b);
 }
 
+INLINE vd vd_max(vd a, vd b)
+{
+    return (vd)_mm512_max_pd((__m512d)a, (__m512d)b);
+}
+
 INLINE vi v_truncate(vf a)
 {
     return (vi)_mm512_cvttps_epi32((__m512)a);
@@ -449,6 +454,11 @@ INLINE vf v_max(vf a, vf b)
     return (vf)_mm256_max_ps((__m256)a, (__m256)b);
 }
 
+INLINE vd vd_max(vd a, vd b)
+{
+    return (vd)_mm256_max_pd((__m256d)a, (__m256d)b);
+}
+
 INLINE vi v_truncate(vf a)
 {
     return (vi)_mm256_cvttps_epi32((__m256)a);
@@ -643,6 +653,12 @@ INLINE vf v_min(vf a, vf b)
 INLINE vf v_max(vf a, vf b)
 {
     return v_select((vm)(a > b), a, b);
+}
+
+INLINE vd vd_max(vd a, vd b)
+{
+    const vl2 m = (vl2)(a > b);
+    return (vd)((m & (vl2)a) | (~m & (vl2)b));
 }
 
 #if TRIP_SIMD == TRIP_SIMD_PLAIN
