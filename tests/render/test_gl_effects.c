@@ -2,9 +2,11 @@
  * sheet against the reference, and its copies of the lattices from frame to frame. What all
  * renderers must show: test_effects.c and test_emission.c. */
 #include "emission.h"
+#include "gl/shared.h"
 #include "scenes.h"
 #include "test.h"
 
+#include <epoxy/gl.h>
 #include <string.h>
 
 static const scene_renderer reference = { "reference", trip_reference_create, 0 };
@@ -332,6 +334,82 @@ static void a_changed_lattice_is_copied_anew(void **state)
     destroy(&l);
 }
 
+/* What goes to the device for effects. */
+static struct {
+    unsigned copies, textures, blocks;
+    PFNGLTEXTURESUBIMAGE3DPROC copy;
+    PFNGLBINDTEXTUREUNITPROC bind_texture;
+    PFNGLBINDBUFFERRANGEPROC bind_block;
+} device;
+
+static void counting_copy(GLuint texture, GLint level, GLint x, GLint y, GLint z, GLsizei width,
+                          GLsizei height, GLsizei depth, GLenum format, GLenum type,
+                          const void *pixels)
+{
+    device.copies++;
+    device.copy(texture, level, x, y, z, width, height, depth, format, type, pixels);
+}
+
+static void counting_bind_texture(GLuint unit, GLuint texture)
+{
+    device.textures += unit >= TRIP_GL_LIGHT_REACHED;
+    device.bind_texture(unit, texture);
+}
+
+static void counting_bind_block(GLenum target, GLuint index, GLuint buffer, GLintptr offset,
+                                GLsizeiptr size)
+{
+    device.blocks += target == GL_UNIFORM_BUFFER && index == TRIP_GL_EFFECTS;
+    device.bind_block(target, index, buffer, offset, size);
+}
+
+static void watch(bool watched)
+{
+    if (watched) {
+        device.copy = epoxy_glTextureSubImage3D;
+        device.bind_texture = epoxy_glBindTextureUnit;
+        device.bind_block = epoxy_glBindBufferRange;
+    }
+    epoxy_glTextureSubImage3D = watched ? counting_copy : device.copy;
+    epoxy_glBindTextureUnit = watched ? counting_bind_texture : device.bind_texture;
+    epoxy_glBindBufferRange = watched ? counting_bind_block : device.bind_block;
+}
+
+/* A lattice is copied once; without effects nothing is copied and nothing bound. */
+static void what_is_not_called_for_is_not_copied(void **state)
+{
+    static float rgba[4 * SIZE * SIZE];
+    (void)state;
+    lit_scene l;
+    desk d;
+    create(&l, &maps[0], 0);
+    for (int n = 0; n < 2; n++) {
+        set_up(&d, &l);
+        trip_settings settings = with_all(&l, both[n]), plain = settings;
+        plain.effects = (trip_effects){ .cueing = 0.5, .cells = 20 };
+        assert_int_equal(draw(&d, &settings, rgba), 0); /* the functions of GL are found */
+        assert_int_equal(draw(&d, &plain, rgba), 0);
+        watch(true);
+        const unsigned copies[] = { 0, 3, 0, 0, 0, 3, 1 };
+        for (int frame = 0; frame < 7; frame++) {
+            const bool runs = frame > 0 && frame != 4;
+            device.copies = device.textures = device.blocks = 0;
+            if (frame == 3) /* another view */
+                d.camera.eye.x += 2;
+            if (frame == 6) { /* heat is as it was */
+                settings.light_direction = trip_v3(0, 1, 0);
+                settings.effects.occlusion = false;
+            }
+            assert_int_equal(draw(&d, runs ? &settings : &plain, rgba), 0);
+            assert_int_equal(device.copies, copies[frame]);
+            assert_true((device.textures > 0) == runs && (device.blocks > 0) == runs);
+        }
+        watch(false);
+        put_away(&d);
+    }
+    destroy(&l);
+}
+
 /* Nodes of the lattice over so many voxels along each axis. */
 static uint64_t nodes_over(const trip_dataset *data, int cells, int stride)
 {
@@ -375,6 +453,7 @@ int main(void)
         cmocka_unit_test(from_within_and_far_away_it_agrees_with_the_reference),
         cmocka_unit_test(every_form_agrees_with_the_reference),
         cmocka_unit_test(a_changed_lattice_is_copied_anew),
+        cmocka_unit_test(what_is_not_called_for_is_not_copied),
         cmocka_unit_test(lattices_count_against_the_memory_given),
     };
     for (const scene_renderer *r = scene_renderers(); r->name; r++)
