@@ -188,9 +188,7 @@ class Serve(program.ProgramTest):
             before = picture
 
     def test_heat_glows_as_render_draws_it(self):
-        for renderer in "cpu", "gl":
-            if renderer == "gl" and not program.GL:
-                continue
+        for renderer in "cpu", *program.GL:
             self.tearDown()
             self.serve("v.trip", "--effects", "emission", "--emission", "heat.trip", "--temperature",
                        "500:3000", "--renderer", renderer)

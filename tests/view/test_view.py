@@ -106,7 +106,7 @@ class View(program.ProgramTest):
              "--temperature=500:3000"]
 
     def test_heat_glows_as_render_draws_it(self):
-        for renderer in "cpu", "gl":
+        for renderer in "cpu", *program.GL:
             self.view("wait\npicture seen.exr\nstatus status.json\n", *self.GLOWS,
                       f"--renderer={renderer}")
             camera = shlex.split(self.status()["camera"])
