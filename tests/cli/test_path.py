@@ -1,10 +1,13 @@
-"""Paths of the camera, several frames at once, and videos. What stands in for ffmpeg here keeps what
-it is given."""
+"""Paths of the camera, several frames at once, and videos: by ffmpeg, and by what stands in for it and
+keeps what it is given, or fails."""
 import json
 import math
 import os
+import shutil
 import stat
+import subprocess
 import sys
+import unittest
 
 import numpy
 
@@ -37,12 +40,39 @@ def options(k):
     ]
 
 
+def decoded(video, height, width):
+    """The frames of a video, 8 bits a channel, by ffmpeg's own decoder."""
+    command = ["ffmpeg", "-loglevel", "error", "-i", video, "-vf", "scale=in_color_matrix=bt709"]
+    run = subprocess.run(
+        [*command, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True
+    )
+    return numpy.frombuffer(run.stdout, numpy.uint8).reshape(-1, height, width, 3).astype(float)
+
+
+def rate_of(video):
+    command = ["ffprobe", "-loglevel", "error", "-show_entries", "stream=r_frame_rate"]
+    run = subprocess.run(
+        [*command, "-of", "csv=p=0", video], capture_output=True, check=True, text=True
+    )
+    return run.stdout.strip()
+
+
+def blob():
+    """Smooth, off the middle, and longer one way than the others: it looks different from each side."""
+    x, y, z = numpy.mgrid[:32, :32, :32].astype(float)
+    there = numpy.exp(-((x - 9) ** 2 / 40 + (y - 16) ** 2 / 90 + (z - 20) ** 2 / 30))
+    return (255 * there).astype(numpy.uint8)
+
+
 class Paths(program.ProgramTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         program.write_nrrd("v.nhdr", program.noise((32, 32, 32)))
         run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
+        assert run.returncode == 0, run.stderr
+        program.write_nrrd("blob.nhdr", blob())
+        run = program.call("brick", "blob.nhdr", "-o", "blob.trip", "-q")
         assert run.returncode == 0, run.stderr
         os.mkdir("bin")
         program.write("bin/ffmpeg", (ENCODER % sys.executable).encode())
@@ -182,6 +212,25 @@ class Paths(program.ProgramTest):
         self.assertEqual(given[given.index("-framerate") + 1], "12.5")
         self.assertEqual(os.path.getsize("a.webm"), 3 * 3600)
         os.remove("a.webm")
+
+    @unittest.skipUnless(shutil.which("ffmpeg") and shutil.which("ffprobe"), "no ffmpeg")
+    def test_a_video_shows_the_pictures_in_order(self):
+        size = ("--size", "160x120")
+        path = self.path(key(0, 0), key(0.5, 40), key(1, 80))
+        look = ("--path", path, "--tf", "grey", *size)
+        self.works("render", "blob.trip", "-o", "p.exr", *look)
+        pictures = [255 * program.read_exr(f"p-{i:03d}.exr")[..., :3] for i in range(5)]
+        for extension in "mp4", "mov", "mkv", "webm":
+            video = "c." + extension
+            self.works("render", "blob.trip", "-o", video, *look)
+            frames = decoded(video, 120, 160)
+            self.assertEqual(len(frames), 5)
+            self.assertEqual(rate_of(video), "4/1")
+            for i, frame in enumerate(frames):
+                apart = [numpy.abs(frame - p).mean() for p in pictures]
+                self.assertEqual(numpy.argmin(apart), i)
+                self.assertLess(apart[i], 2)
+            os.remove(video)
 
     def test_a_video_that_cannot_be_made_leaves_nothing(self):
         orbit = ("--orbit", "4", *SIZE)
