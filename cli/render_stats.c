@@ -223,11 +223,13 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
     cJSON_AddStringToObject(root, "classify", frame.classify == TRIPTYCH_POST ? "post" : "pre");
-    if (frame.classify == TRIPTYCH_POST)
+    if (frame.classify == TRIPTYCH_POST) {
         cJSON_AddNumberToObject(root, "slices", frame.slices);
-    else
+        cJSON_AddBoolToObject(root, "closed_form", frame.closed_form);
+    } else {
         cJSON_AddStringToObject(root, "compositing",
                                 o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
+    }
     if (frame.classify == TRIPTYCH_PRE)
         cJSON_AddStringToObject(root, "kernel", footprint_names[o->settings.footprint]);
     if (o->settings.lod_px > 0)

@@ -113,6 +113,8 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .heat_bytes_read = heat.bytes_read,
         .heat_memory_bytes = heat.memory_bytes,
         .heat_ms = heat.gather_ms,
+        .closed_form = t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->plan.gathers &&
+                       t->renderer->ops->closed_forms && !t->plan.not_closed,
     };
 }
 

@@ -486,6 +486,7 @@ typedef struct triptych_frame_stats {
     uint64_t heat_bytes_read;               /* of emission, likewise */
     uint64_t heat_memory_bytes;
     double heat_ms;
+    int closed_form; /* post: the function is linear in the value, or nearly, and was not looked up */
 } triptych_frame_stats;
 
 TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);

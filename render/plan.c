@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "field.h"
 #include "plan_cull.h"
 #include "mean.h"
 #include "report.h"
@@ -371,6 +372,49 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
     return why ? trip_fail(TRIP_USAGE, "render", data->path, "has uneven spacing: %s", why) : 0;
 }
 
+/* Of all that frames of level 0 may read, and what the kernel interpolates from it. */
+static void find_codes(trip_plan *plan, const trip_dataset *data, trip_kernel kernel)
+{
+    unsigned least = UINT16_MAX, most = 0;
+    double bounds[2];
+    for (unsigned i = 0; i < data->list_count; i++) {
+        const trip_list *list = &data->lists[i];
+        if (list->level > 0 || !trip_kind_of(list->kind)->lattice)
+            continue;
+        for (uint64_t n = 0; n < list->brick_count; n++) {
+            least = list->bricks[n].code_min < least ? list->bricks[n].code_min : least;
+            most = list->bricks[n].code_max > most ? list->bricks[n].code_max : most;
+        }
+    }
+    plan->code_least = least;
+    plan->code_most = most;
+    if (least > most)
+        return;
+    trip_field_code_bounds(kernel, least, most, bounds);
+    plan->code_least = (unsigned)fmax(0, floor(bounds[0]));
+    plan->code_most = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
+}
+
+/* No ray in the volume is longer: world units. */
+static double longest_ray(const trip_dataset *data)
+{
+    const trip_affine *map = &data->index_to_world;
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (double)data->header.dims[a] *
+               trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a]));
+    return sum;
+}
+
+/* Whether values need be looked up. */
+static void plan_classification(const planning *p)
+{
+    trip_plan *plan = p->plan;
+    find_codes(plan, p->data, p->settings->kernel);
+    plan->not_closed = trip_closed_form_find(&plan->closed, p->table, plan->code_least,
+                                             plan->code_most, longest_ray(p->data));
+}
+
 static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                              const trip_settings *settings)
 {
@@ -405,6 +449,8 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
             status = settings->classify == TRIP_CLASSIFY_POST ? plan_sheets(&p, axis)
                                                               : plan_layer(&p, axis);
     }
+    if (!status && settings->classify == TRIP_CLASSIFY_POST)
+        plan_classification(&p);
     if (status)
         trip_plan_release(plan, budget);
     return status;
@@ -561,6 +607,27 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
                 axis_names[plan->axis_of_view]);
         break;
     }
+}
+
+/* Of a voxel it is one entry of a table, whatever the function. */
+static void explain_classification(const trip_plan *plan, const trip_settings *s, FILE *out)
+{
+    static const char *const why[] = {
+        [TRIP_CLOSED_FORM_ENDS] = "neither the least nor the greatest of the values shows",
+        [TRIP_CLOSED_FORM_EXTINCTION] = "extinction is not linear in the value, nor nearly",
+        [TRIP_CLOSED_FORM_COLOUR] = "colours are not linear in the value",
+    };
+    const double *k = plan->closed.k;
+    if (plan->gathers || s->classify != TRIP_CLASSIFY_POST)
+        return;
+    if (plan->not_closed)
+        fprintf(out, "integrals   of the function are looked up: %s\n", why[plan->not_closed]);
+    else
+        fprintf(out,
+                "integrals   have a closed form: extinction is %s, colours are %s; cpu and gl "
+                "look nothing up\n",
+                k[1] != 0 || k[2] != 0 || k[3] != 0 ? "linear in the value, or nearly" : "constant",
+                plan->closed.coloured ? "linear" : "constant");
 }
 
 static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *out)
@@ -757,6 +824,7 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
     explain_method(plan, settings, out);
     if (!plan->gathers)
         explain_kernel(data, settings, out);
+    explain_classification(plan, settings, out);
     explain_levels(plan, settings, out);
     explain_limit(plan, settings, out);
     explain_clip(plan, settings, out);

@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "camera.h"
+#include "closed_form.h"
 #include "list_grid.h"
 #include "lod.h"
 #include "selection.h"
@@ -50,6 +51,12 @@ typedef struct trip_plan {
     trip_clip clip; /* in index space: what of the grid is inside */
     const trip_coordinates *coordinates; /* of the data set */
     unsigned planes;                     /* bit per trip_plane to read */
+    /* post: what all of the data set's codes lie between (least > most: there are none), and
+     * whether segments between them have a closed form. It does not go by the bricks of the frame:
+     * a picture does not depend on how these were cut. */
+    unsigned code_least, code_most;
+    trip_closed_form_fault not_closed;
+    trip_closed_form closed; /* where not_closed is TRIP_CLOSED_FORM_FOUND */
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */
     trip_plan_layer layers[3];

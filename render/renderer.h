@@ -75,6 +75,7 @@ enum {
 typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
     bool classifies_post; /* draws frames whose settings say so (sheet.h) */
+    bool closed_forms;    /* looks nothing up where segments have one (closed_form.h) */
     unsigned effects;     /* draws frames with effects: a bit per trip_classify */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
     void (*destroy)(trip_renderer *r);

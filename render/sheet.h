@@ -30,6 +30,10 @@
  * seen of the segment lies, or colours attenuated within it, come closer to the integral with some
  * volumes and less close with others.
  *
+ * These are looked up in sums over the codes (segments.h), but by cpu and gl where extinction and
+ * colours are linear in the value, or nearly: then they have a closed form, within 0.16/255 of a
+ * picture (closed_form.h).
+ *
  * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
  * below TRIP_SHEET_SATURATION takes no more: its colour is divided by its opacity, which becomes
  * 1. So no component is off by more than that. */

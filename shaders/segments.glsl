@@ -1,6 +1,37 @@
-// What a segment between two codes shows. Mirrors trip_segment_of() in render/segments.c: all terms
-// of a sum have the same sign, and differences of the integrals between whole codes are exact.
+// What a segment between two codes shows: colour and extinction, of a voxel's length. Mirrors
+// trip_segment_of() in render/segments.c: all terms of a sum have the same sign, and differences of
+// the integrals between whole codes are exact. With CLOSED it mirrors render/closed_form.h.
 #include "shared.h"
+
+#ifdef CLOSED
+
+layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_closed_form
+{
+    vec4 x, k, q0, q1; // as trip_gl_closed has it
+} form;
+
+float place_of(float code)
+{
+#ifdef WIDE
+    code = clamp(code, 0.0, 65535.0);
+#endif
+    return code * form.x.x + form.x.y;
+}
+
+vec4 segment_between(float a, float b, float unit)
+{
+    float from = place_of(a), to = place_of(b), x = max(from, 0.0), y = max(to, 0.0);
+    float m = 0.5 * (x + y), dd = (y - x) * (y - x) / 12.0;
+    vec4 k = form.k;
+    float extinction = ((k.w * m + k.z) * m + k.y) * m + k.x + (3.0 * k.w * m + k.z) * dd;
+    float slope = (3.0 * k.w * m + 2.0 * k.z) * m + k.y + 1.8 * k.w * dd;
+    float at = m + dd * slope / max(extinction, 1e-20);
+    if (form.x.z > 0.0 && min(from, to) < 0.0)
+        extinction *= (y - x) / (to == from ? 1.0 : to - from);
+    return vec4(form.q0.rgb + at * form.q1.rgb, extinction);
+}
+
+#else
 
 // As trip_gl_sum has it.
 struct code_sums {
@@ -22,6 +53,11 @@ vec4 means_within(int code, float t0, float t1)
     return (products(mix(a, b, t0)) + 4.0 * products(mix(a, b, 0.5 * (t0 + t1))) + products(mix(a, b, t1))) / 6.0;
 }
 
+vec4 colour_of(vec4 means)
+{
+    return vec4(means.rgb / means.a, means.a);
+}
+
 // Of the sums' unit.
 vec4 integral_between(int from, int to)
 {
@@ -30,16 +66,18 @@ vec4 integral_between(int from, int to)
     return vec4(high) * 4294967296.0 + vec4(low);
 }
 
-// Means over codes from a to b, in any order.
-vec4 segment_means(float a, float b, float unit)
+// Codes may be in any order; without extinction the colour means nothing.
+vec4 segment_between(float a, float b, float unit)
 {
     float from = clamp(min(a, b), 0.0, 65535.0), to = clamp(max(a, b), 0.0, 65535.0);
     int first = min(int(from), 65534), last = min(int(to), 65534);
     float f = from - float(first), g = to - float(last);
     if (first == last)
-        return means_within(first, f, g);
+        return colour_of(means_within(first, f, g));
     vec4 sum = means_within(first, f, 1.0) * (1.0 - f) + means_within(last, 0.0, g) * g;
     if (last > first + 1)
         sum += integral_between(first + 1, last) * unit;
-    return sum / (to - from);
+    return colour_of(sum / (to - from));
 }
+
+#endif

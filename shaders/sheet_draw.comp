@@ -310,11 +310,11 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
     }
     if (!(first < last))
         return;
-    vec4 means = segment_means(first > 0.0 ? mix(a.code, b.code, first) : a.code,
-                               last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
-    if (!(means.a > 0.0))
+    vec4 medium = segment_between(first > 0.0 ? mix(a.code, b.code, first) : a.code,
+                                  last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
+    if (!(medium.a > 0.0))
         return;
-    vec3 colour = tint.w > 0.0 ? vec3(tint.xyz) : means.rgb / means.a;
+    vec3 colour = tint.w > 0.0 ? vec3(tint.xyz) : medium.rgb;
     float middle = mix(start, end, 0.5 * (first + last));
 #if defined(SHADED)
     vec4 gradient = gradient_between(a, b, from, to);
@@ -340,7 +340,7 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
 #ifdef CUED
     colour = cued(colour, middle * depth.x);
 #endif
-    float through = 1.0 - pixel.a, add = opacity(means.a * (last - first) * abs(to.step) * r.world) * through;
+    float through = 1.0 - pixel.a, add = opacity(medium.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);
     pixel_depth += middle * add;
     if (1.0 - pixel.a < SHEET_SATURATION) {

@@ -302,6 +302,7 @@ static void run_tasks(trip_renderer *base, void (*task)(void *context, unsigned 
 static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
+    .closed_forms = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,
     .device = device,

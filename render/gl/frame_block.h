@@ -32,7 +32,8 @@ enum trip_gl_effect {
     TRIP_GL_OCCLUSION = 262144,
     TRIP_GL_EMISSION = 524288,
     TRIP_GL_LOOKED_UP = TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
-    TRIP_GL_EFFECT_SETS = 1048576,
+    TRIP_GL_CLOSED = 1048576, /* segments have a closed form (render/closed_form.h) */
+    TRIP_GL_EFFECT_SETS = 2097152,
 };
 
 /* What a float leaves of a number. Volatile, as GCC 12 takes (double)(float)x for x where it works

@@ -630,6 +630,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops gl_ops = {
     .name = "gl",
     .classifies_post = true,
+    .closed_forms = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .forms = TRIP_DRAWS_FIXED,
     .destroy = destroy,

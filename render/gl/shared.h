@@ -206,6 +206,13 @@ struct trip_gl_sum {
     TRIP_GL_FLOAT entry[4];
 };
 
+/* In place of these where segments have a closed form, which names its terms (render/closed_form.h);
+ * of a voxel's length. */
+struct trip_gl_closed {
+    TRIP_GL_FLOAT scale, offset, ramp, unused;
+    TRIP_GL_FLOAT k[4], q0[4], q1[4];
+};
+
 /* A run of a list to draw; of indexed lists draw position i is record first + step * i. Its origin
  * (sheet, tile), formed in double: from the eye as base + base_low, and as the products (to_x . c,
  * to_y . c, forward . c), pixels from the image's centre, whose floats keep their precision however

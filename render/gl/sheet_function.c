@@ -16,16 +16,19 @@ static int no_memory(void)
                      "its integrals do not fit the memory given; raise --memory");
 }
 
-static int make(trip_gl_sheet_function *f)
+static int take_next_visible(trip_gl_sheet_function *f)
+{
+    if (!f->next_visible)
+        f->next_visible = trip_budget_take(f->budget, CODES * sizeof *f->next_visible);
+    return f->next_visible ? TRIP_OK : no_memory();
+}
+
+static int make_sums(trip_gl_sheet_function *f)
 {
     if (f->sums)
         return TRIP_OK;
-    f->next_visible = trip_budget_take(f->budget, CODES * sizeof *f->next_visible);
-    if (!f->next_visible || !trip_budget_charge(f->budget, SUMS_BYTES)) {
-        trip_budget_release(f->budget, f->next_visible, CODES * sizeof *f->next_visible);
-        f->next_visible = NULL;
+    if (!trip_budget_charge(f->budget, SUMS_BYTES))
         return no_memory();
-    }
     glCreateBuffers(1, &f->sums);
     glNamedBufferStorage(f->sums, SUMS_BYTES, NULL, GL_DYNAMIC_STORAGE_BIT);
     return TRIP_OK;
@@ -86,19 +89,18 @@ static void fill_sums(struct trip_gl_sum *sums, double factor)
     }
 }
 
-static void set_next_visible(trip_gl_sheet_function *f, const struct trip_gl_sum *sums)
+static void set_next_visible(trip_gl_sheet_function *f, const trip_tf_entry *table)
 {
     uint32_t next = CODES;
     for (int code = CODES - 1; code >= 0; code--) {
-        next = sums[code].entry[3] > 0 ? (uint32_t)code : next;
+        next = table[code].extinction > 0 ? (uint32_t)code : next;
         f->next_visible[code] = next;
     }
 }
 
-int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *table,
-                               double voxel_world)
+static int set_sums(trip_gl_sheet_function *f, const trip_tf_entry *table, double voxel_world)
 {
-    int status = make(f);
+    int status = make_sums(f);
     struct trip_gl_sum *sums = status ? NULL : trip_budget_take(f->budget, SUMS_BYTES);
     if (status)
         return status;
@@ -109,9 +111,40 @@ int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *t
     double factor = all > 0 ? GREATEST / all : 1;
     f->unit = 1 / factor;
     fill_sums(sums, factor);
-    set_next_visible(f, sums);
     glNamedBufferSubData(f->sums, 0, SUMS_BYTES, sums);
     trip_budget_release(f->budget, sums, SUMS_BYTES);
+    return TRIP_OK;
+}
+
+static void set_closed(trip_gl_sheet_function *f, const trip_closed_form *form, double voxel_world)
+{
+    struct trip_gl_closed c = { .scale = (float)form->scale,
+                                .offset = (float)form->offset,
+                                .ramp = form->ramp };
+    for (int i = 0; i < 4; i++)
+        c.k[i] = (float)(form->k[i] * voxel_world);
+    for (int i = 0; i < 3; i++) {
+        c.q0[i] = (float)form->q0[i];
+        c.q1[i] = (float)form->q1[i];
+    }
+    if (!f->closed) {
+        glCreateBuffers(1, &f->closed);
+        glNamedBufferStorage(f->closed, sizeof c, NULL, GL_DYNAMIC_STORAGE_BIT);
+    }
+    glNamedBufferSubData(f->closed, 0, sizeof c, &c);
+}
+
+int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *table,
+                               const trip_closed_form *closed, double voxel_world)
+{
+    int status = take_next_visible(f);
+    if (!status && !closed)
+        status = set_sums(f, table, voxel_world);
+    if (status)
+        return status;
+    if (closed)
+        set_closed(f, closed, voxel_world);
+    set_next_visible(f, table);
     return TRIP_OK;
 }
 
@@ -120,7 +153,9 @@ void trip_gl_sheet_function_release(trip_gl_sheet_function *f)
     if (f->sums) {
         glDeleteBuffers(1, &f->sums);
         trip_budget_discharge(f->budget, SUMS_BYTES);
-        trip_budget_release(f->budget, f->next_visible, CODES * sizeof *f->next_visible);
     }
+    if (f->closed)
+        glDeleteBuffers(1, &f->closed);
+    trip_budget_release(f->budget, f->next_visible, CODES * sizeof *f->next_visible);
     *f = (trip_gl_sheet_function){ .budget = f->budget };
 }

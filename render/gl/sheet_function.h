@@ -8,18 +8,21 @@
 #include <stdbool.h>
 
 #include "budget.h"
+#include "closed_form.h"
 #include "transfer_function.h"
 
 typedef struct trip_gl_sheet_function {
     trip_budget *budget;
-    GLuint sums;            /* 65536 of struct trip_gl_sum */
-    double unit;            /* 1 of the sums */
+    GLuint sums;   /* 65536 of struct trip_gl_sum */
+    double unit;   /* 1 of the sums */
+    GLuint closed; /* one struct trip_gl_closed: of functions with a closed form, instead */
     uint32_t *next_visible; /* 65536: the first code from here on with extinction, or 65536 */
 } trip_gl_sheet_function;
 
-/* Of a table of 65536 entries, whose extinction is per world unit; fails without memory. */
+/* Of a table of 65536 entries, whose extinction is per world unit, and its closed form; NULL: it
+ * has none. Fails without memory. */
 int trip_gl_sheet_function_set(trip_gl_sheet_function *f, const trip_tf_entry *table,
-                               double voxel_world);
+                               const trip_closed_form *closed, double voxel_world);
 void trip_gl_sheet_function_release(trip_gl_sheet_function *f);
 
 /* Whether some code of [least, most] has extinction. */

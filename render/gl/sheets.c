@@ -27,7 +27,8 @@ static unsigned effects_of(const trip_frame *frame)
            (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
            (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
            (s->effects.cueing > 0 ? TRIP_GL_CUED : 0) | trip_gl_frame_lit(s) |
-           (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0);
+           (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0) |
+           (frame->plan->not_closed ? 0 : TRIP_GL_CLOSED);
 }
 
 static void forget(trip_gl_sheets *s)
@@ -52,7 +53,9 @@ int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
         glNamedBufferStorage(s->ends_block, TRIP_GL_ENDS_MAX * sizeof(trip_gl_sheet_end), NULL,
                              GL_DYNAMIC_STORAGE_BIT);
     }
-    return trip_gl_sheet_function_set(&s->function, frame->table, frame->camera->voxel_world);
+    return trip_gl_sheet_function_set(&s->function, frame->table,
+                                      frame->plan->not_closed ? NULL : &frame->plan->closed,
+                                      frame->camera->voxel_world);
 }
 
 void trip_gl_sheets_release(trip_gl_sheets *s)
@@ -408,7 +411,8 @@ static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
     trip_gl_constants_bind_layer(s->constants, s->axis, false);
     glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_PASS, s->pass_block);
     glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_ENDS, s->ends_block);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SUMS, s->function.sums);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SUMS,
+                     s->effects & TRIP_GL_CLOSED ? s->function.closed : s->function.sums);
     if (s->effects & TRIP_GL_UNEVEN)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_PLACES, s->places.buffer);
     glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);

@@ -30,7 +30,8 @@ static const struct {
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
                                       TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN |
-                                      TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
+                                      TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION |
+                                      TRIP_GL_CLOSED,
                                   false },
 };
 
@@ -50,6 +51,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_FIXED, "FIXED" },         { TRIP_GL_CUED, "CUED" },
         { TRIP_GL_UNEVEN, "UNEVEN" },       { TRIP_GL_SHADOWS, "SHADOWS" },
         { TRIP_GL_OCCLUSION, "OCCLUSION" }, { TRIP_GL_EMISSION, "EMISSION" },
+        { TRIP_GL_CLOSED, "CLOSED" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -94,10 +96,10 @@ static int build(const trip_gl_variant *variant, GLuint *program)
                                           });
 }
 
-static_assert(TRIP_GL_EFFECT_SETS == 1 << 20, "effects are 20 bits of a key");
+static_assert(TRIP_GL_EFFECT_SETS == 1 << 21, "effects are 21 bits of a key");
 static uint32_t key_of(const trip_gl_variant *v)
 {
-    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 28;
+    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 29;
 }
 
 int trip_gl_variants_get(trip_gl_variants *v, trip_gl_variant variant, GLuint *program)

@@ -1,6 +1,7 @@
 """What a scene or view does not call for is not there: no shader is compiled for it, no byte read,
 no pass run, no instruction taken. Where all effects are on and none matters the picture is the same."""
 import itertools
+import json
 import os
 import re
 import shutil
@@ -33,6 +34,7 @@ CALLED_FOR = {
     "AFFINE": [["--kernel", "ewa", "--classify", "pre"]],
     "UNEVEN": [["uneven.trip"], ["uneven.trip", "--classify", "pre"]],
     "SUMS": [["--compositing", "sheet", "--classify", "pre"]],
+    "CLOSED": [["--tf", "solid.tf"]],
 }
 EFFECTS = ["--effects", "shadows,occlusion,cueing,emission", "--light", "1,1,1", "--emission",
            "heat.trip", "--temperature", "1:100000"]
@@ -54,6 +56,9 @@ class Uncalled(program.ProgramTest):
         cls.brick(cls(), "ball.nrrd", "uneven.trip", "--coordinates", "x.txt,y.txt,z.txt")
         for name, opacity in ("clear", 1e-5), ("solid", 0.5):
             program.write(f"{name}.tf", f"0 .6 .3 .1 {opacity}\n255 .6 .3 .1 {opacity}\n".encode())
+        # Linear in the value, and a little less so.
+        program.write("line.tf", b"0 .6 .3 .1 0\n255 .6 .3 .1 .1\n")
+        program.write("bent.tf", b"0 .6 .3 .1 0\n128 .61 .3 .1 .0502\n255 .6 .3 .1 .1\n")
 
     def draw(self, *arguments, **options):
         """The picture's bytes and what is said of it."""
@@ -101,6 +106,13 @@ class Uncalled(program.ProgramTest):
                 self.assertEqual(bool(re.search(r"(?m)^light .* read in ", said)),
                                  on[0] in ("shadows", "occlusion"), on)
 
+    def test_a_function_is_looked_up_only_where_it_is_not_linear(self):
+        for renderer in "cpu", "reference", *program.GL:
+            for function, closed in ("line.tf", renderer != "reference"), ("bent.tf", False):
+                run = self.works("render", "ball.trip", "-o", "a.exr", *SIZE, "--renderer", renderer,
+                                 "--tf", function, "--classify", "post", "--stats", "-")
+                self.assertEqual(json.loads(run.stdout)["closed_form"], closed, (renderer, function))
+
     def test_where_effects_do_not_matter_all_of_them_change_nothing(self):
         """Nothing is dense enough to shade or to glow, and what is far has the colour it fades to."""
         for renderer in "cpu", "reference", *program.GL:
@@ -116,10 +128,10 @@ class Uncalled(program.ProgramTest):
     @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
     def test_no_instruction_is_taken_for_it(self):
         """Of what draws, exactly; of the whole run little, for the decision."""
-        def cost(effects):
+        def cost(effects, *look):
             self.works("--tool=callgrind", "--callgrind-out-file=cost", program.PROGRAM, "render",
                        "ball.trip", "-o", "a.tif", *SIZE, "--renderer", "cpu", "--engine", "pread",
-                       "--light", "1,1,1", "--effects", effects,
+                       "--light", "1,1,1", "--effects", effects, *look,
                        program="valgrind", env=dict(os.environ, TRIPTYCH_ISA="plain"))
             with open("cost", encoding="utf-8") as f:
                 costs, total = instructions.function_costs(f)
@@ -130,6 +142,11 @@ class Uncalled(program.ProgramTest):
         same, more = cost("auto")
         self.assertEqual(same, drawing)
         self.assertLess(abs(more - total), 0.01 * total)
+        looked_up, whole = cost("none", "--tf", "bent.tf")
+        closed, less = cost("none", "--tf", "line.tf")
+        self.assertLess(closed[0], 0.98 * looked_up[0])
+        self.assertEqual(closed[1:], looked_up[1:])
+        self.assertLess(less, whole)
         lit, most = cost("occlusion")
         self.assertGreater(lit[0], drawing[0])
         self.assertGreater(most, 1.05 * total)

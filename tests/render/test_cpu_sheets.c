@@ -542,8 +542,8 @@ static void kept_integrals_are_those_made_anew(void **state)
         memset(table, 0, sizeof table);
         table[frames[i].visible] = (trip_tf_entry){ 0.2f, 0.5f, 1, 3 };
         assert_true(trip_cpu_function_create(&anew, budget));
-        trip_cpu_function_set(&kept, table, frames[i].codes, frames[i].voxel_world);
-        trip_cpu_function_set(&anew, table, frames[i].codes, frames[i].voxel_world);
+        trip_cpu_function_set(&kept, table, NULL, frames[i].codes, frames[i].voxel_world);
+        trip_cpu_function_set(&anew, table, NULL, frames[i].codes, frames[i].voxel_world);
         assert_same_function(&kept, &anew);
         trip_cpu_function_destroy(&anew, budget);
     }

@@ -345,6 +345,38 @@ static void the_plan_explains_what_runs_and_why(void **state)
     scene_destroy(&s);
 }
 
+/* Of splats it is an entry a voxel; between values it is integrals. */
+static void the_plan_says_whether_the_function_is_looked_up(void **state)
+{
+    (void)state;
+    static const char form[] = "integrals   have a closed form: extinction is ";
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(0, 0, 1), 150, 20, 32);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+    char *text = explain(&s, &c, &settings);
+    assert_null(strstr(text, "integrals"));
+    free(text);
+    settings.classify = TRIP_CLASSIFY_POST;
+    for (int i = 0; i < 4; i++) {
+        static const char *const why[] = { "constant, colours are constant;",
+                                           "linear in the value, or nearly, colours are linear;",
+                                           "looked up: extinction is not linear in the value",
+                                           "looked up: colours are not linear in the value\n" };
+        for (int code = 0; code < 65536; code++) {
+            const float x = (float)code / 65535;
+            const float k = i == 0 ? 0.5F : i == 2 ? x * x * x * x * x + 0.1F : x + 0.1F;
+            s.table[code] = (trip_tf_entry){ i == 0 ? 1 : i == 3 ? x * x : x, 1, 1, k };
+        }
+        text = explain(&s, &c, &settings);
+        assert_non_null(strstr(text, why[i]));
+        assert_int_equal(strstr(text, form) != NULL, i < 2);
+        free(text);
+    }
+    scene_destroy(&s);
+}
+
 static void grids_one_voxel_thick_have_no_values_between_voxels(void **state)
 {
     static const char *const along[] = { "along i", "along j", "along k" };
@@ -381,6 +413,7 @@ int main(void)
         cmocka_unit_test(a_brick_is_transparent_when_no_code_of_its_range_has_extinction),
         cmocka_unit_test(normals_are_planned_only_for_shading),
         cmocka_unit_test(the_plan_explains_what_runs_and_why),
+        cmocka_unit_test(the_plan_says_whether_the_function_is_looked_up),
         cmocka_unit_test(grids_one_voxel_thick_have_no_values_between_voxels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

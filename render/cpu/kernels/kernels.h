@@ -207,6 +207,11 @@ typedef enum trip_cpu_content {
 
 struct trip_cpu_region;
 
+/* Composites a group's segments into a pane's pixels. Returns which of its texels are open, as
+ * trip_cpu_mask has them. */
+typedef uint64_t trip_cpu_sheet_kernel(const trip_cpu_sheet_view *view, const trip_cpu_group *group,
+                                       int x, int y, float *pixels);
+
 /* Kernels are compiled for layers of colour alone and once more for layers with depth. Arguments
  * named `depths` are one float a splat, and nothing without depth. */
 typedef struct trip_cpu_kernels {
@@ -283,10 +288,8 @@ typedef struct trip_cpu_kernels {
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);
-    /* Composites a group's segments into a pane's pixels. Returns which of its texels are open, as
-     * trip_cpu_mask has them. */
-    uint64_t (*sheet_pane)(const trip_cpu_sheet_view *view, const trip_cpu_group *group, int x,
-                           int y, float *pixels);
+    /* The latter where segments have a closed form (closed_form.h). */
+    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed;
 } trip_cpu_kernels;
 
 #endif

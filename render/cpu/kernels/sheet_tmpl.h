@@ -2,7 +2,8 @@
  * table_tmpl.h after merge_tmpl.h. For each patch of 8 x 8 pixels it finds the segments in which
  * something may show; then each stamp takes those one after the other, its pixels all the while in
  * registers. Positions are worked out from the pane's own corner at each slice, so that they do not
- * depend on how slices are grouped or rasters laid out. */
+ * depend on how slices are grouped or rasters laid out. With TRIP_CPU_CLOSED segments have a closed
+ * form (closed_form.h). */
 #ifndef TRIP_CPU_SHEET_H
 #define TRIP_CPU_SHEET_H
 
@@ -18,6 +19,7 @@
 
 /* Weights of a cell's corners are whole numbers of this sum. */
 #define WEIGHT_LOG2 14
+static_assert(1 << WEIGHT_LOG2 == TRIP_CPU_CODE_PARTS, "parts of a code that samples are in");
 
 /* exp(-x), x >= 0, within 3e-7 of itself and exact at 0. */
 INLINE vf exp_of_minus(vf x)
@@ -594,8 +596,9 @@ typedef struct wide_place {
     float part[2][V], between;
 } wide_place;
 
-/* What rays meet at a slice: the entry of the function's integrals nearest to the code, and what
- * the rest is worked out from where it is needed. */
+/* What rays meet at a slice: the entry of the function's integrals nearest to the code (where
+ * segments have a closed form the code itself, biased, times 2^WEIGHT_LOG2), and what the rest is
+ * worked out from where it is needed. */
 typedef struct sample {
     vi index;
     vm there;         /* all corners are */
@@ -667,10 +670,13 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
     return from + in;
 }
 
-/* The entry of the function's integrals that is nearest to a code, biased, times 2^WEIGHT_LOG2. */
-INLINE vi nearest_entry(const trip_cpu_integrals *in, vi code)
+/* Of a biased code times 2^WEIGHT_LOG2: the entry of the function's integrals nearest to it, or
+ * where segments have a closed form the same. */
+INLINE vi index_of(const trip_cpu_integrals *in, vi code)
 {
     const int log2 = WEIGHT_LOG2 + in->entry_log2;
+    if (TRIP_CPU_CLOSED)
+        return code;
     return ((code + (1 << (log2 - 1))) >> log2) + (TRIP_CPU_CODE_BIAS >> in->entry_log2);
 }
 
@@ -689,7 +695,7 @@ INLINE __m256i two_codes(const int16_t *pool, const int32_t at[V])
     return _mm256_inserti128_si256(_mm256_castsi128_si256(of[0]), of[1], 1);
 }
 
-/* The nearest entry, and which rays lack a corner. */
+/* The index, and which rays lack a corner. */
 INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
     const int16_t *pool = (const int16_t *)g->pool;
@@ -703,7 +709,7 @@ INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi
     vi sum = (vi)_mm256_madd_epi16(top, (__m256i)s->top) +
              (vi)_mm256_madd_epi16(bottom, (__m256i)s->bottom);
     s->there = vi_is_0(lack);
-    s->index = nearest_entry(in, sum);
+    s->index = index_of(in, sum);
 }
 
 /* Gradients of two corners beside each other, of lanes i and i + 4: along u twice, along v, ... */
@@ -782,7 +788,7 @@ INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi
         sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
     }
     s->there = vi_is_0(lack);
-    s->index = nearest_entry(in, sum);
+    s->index = index_of(in, sum);
 }
 
 INLINE void find_gradients(const trip_cpu_group *g, sample *s)
@@ -904,6 +910,38 @@ INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
         s.rgb[k] = v_from_int(sums[k + 1]) * per_extinction;
     s.extinction =
         v_select(some, extinction * (inverse * extinction) * v_set(in->extinction), v_set(0));
+    return s;
+}
+
+/* The same where it has a closed form, of lanes that are open. */
+INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sample *a,
+                                const sample *b)
+{
+    const vf none = v_set(0), scale = v_set(f->scale), offset = v_set(f->offset);
+    const vf from = v_fma(v_from_int(a->index), scale, offset);
+    const vf to = v_fma(v_from_int(b->index), scale, offset);
+    const vf x = v_max(from, none), y = v_max(to, none), d = y - x;
+    const vf m = v_set(0.5f) * (x + y), dd = d * d * v_set(1.0f / 12);
+    vf k = v_fma(v_fma(v_set(f->k[3]), m, v_set(f->k[2])), m, v_set(f->k[1]));
+    k = v_fma(k, m, v_set(f->k[0]));
+    k = v_fma(v_fma(v_set(3 * f->k[3]), m, v_set(f->k[2])), dd, k);
+    medium s = { .extinction = k };
+    vf at = none;
+    if (f->coloured) {
+        vf slope = v_fma(v_fma(v_set(3 * f->k[3]), m, v_set(2 * f->k[2])), m, v_set(f->k[1]));
+        slope = v_fma(v_set(1.8f * f->k[3]), dd, slope);
+        at = v_fma(dd, slope / v_max(k, v_set(1e-20f)), m); /* finite in any case */
+    }
+    for (int i = 0; i < 3; i++)
+        s.rgb[i] = f->coloured ? v_fma(at, v_set(f->q1[i]), v_set(f->q0[i])) : v_set(f->q0[i]);
+    if (!f->ramp)
+        return s;
+    s.extinction = v_select(v_gt(v_max(from, to), v_set(f->least)), k, none);
+    const vm cut = vm_and(open, v_gt(none, v_min(from, to)));
+    if (vm_any(cut)) {
+        const vf whole = v_select(v_gt(v_abs(to - from), none), to - from, v_set(1));
+        s.extinction = v_select(cut, s.extinction * d / whole, s.extinction);
+    }
     return s;
 }
 
@@ -1045,7 +1083,9 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
                               sample *a, sample *b, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
-    open = vm_and(open, vm_and(l->along, may_show(view->integrals, a->index, b->index)));
+    open = vm_and(open, TRIP_CPU_CLOSED
+                            ? l->along
+                            : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* what begins behind the eye's plane is left out */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
     if (gaps && vm_any(open))
@@ -1065,7 +1105,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     }
     if (!vm_any(open))
         return false;
-    medium s = classified(view->integrals, first, last);
+    medium s = TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
+                               : classified(view->integrals, first, last);
     for (int k = 0; k < 3 && view->tinted; k++)
         s.rgb[k] = v_set(view->tint[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));

@@ -78,12 +78,23 @@ typedef struct trip_cpu_about {
  * is linear between them: fewer stay in a processor's cache. */
 #define TRIP_CPU_ENTRIES_MOST 65537
 
+/* Where segments have a closed form (closed_form.h): x is scale c + offset of a biased code times
+ * TRIP_CPU_CODE_PARTS, extinction is per voxel_world. */
+#define TRIP_CPU_CODE_PARTS 16384
+typedef struct trip_cpu_closed_form {
+    float scale, offset, k[4], q0[3], q1[3];
+    bool ramp, coloured;
+    float least; /* of a ramp: a segment whose x do not exceed it shows nothing */
+} trip_cpu_closed_form;
+
 typedef struct trip_cpu_integrals {
     int32_t (*sums)[4];  /* TRIP_CPU_ENTRIES_MOST: extinction, red, green, blue */
     int32_t (*at)[4];    /* what they would grow by to the next entry if all was as at this one */
     int entry_log2;      /* codes from one entry to the next */
     float extinction;    /* 1 of sums[0], per voxel_world */
     int32_t first, last; /* entries with extinction are among these; first > last: none */
+    bool is_closed;      /* none of what stands above is used, but: */
+    trip_cpu_closed_form closed;
 } trip_cpu_integrals;
 
 /* Segments of a group: at most so many, and one slice more. */

@@ -117,7 +117,7 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
             (int32_t)(within((double)sum, TRIP_CPU_CODE_LEAST, INT16_MAX) * (1 << WEIGHT_LOG2));
     }
     s->there = vi_is_0(lack);
-    s->index = nearest_entry(view->integrals, code);
+    s->index = index_of(view->integrals, code);
     s->lit = s->summed = false;
 }
 

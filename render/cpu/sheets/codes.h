@@ -4,8 +4,7 @@
 #ifndef TRIP_CPU_SHEETS_CODES_H
 #define TRIP_CPU_SHEETS_CODES_H
 
-#include "dataset.h"
-#include "settings.h"
+#include <stdint.h>
 
 /* A code c of the data set is (c - first) 2^shift, below 65536. */
 typedef struct trip_cpu_codes {
@@ -13,8 +12,8 @@ typedef struct trip_cpu_codes {
     unsigned shift;
 } trip_cpu_codes;
 
-/* Of all that frames of level 0 may read, and what the kernel interpolates from it. */
-trip_cpu_codes trip_cpu_codes_of(const trip_dataset *data, trip_kernel kernel);
+/* Of frames whose values have codes between these; least > most: they have none. */
+trip_cpu_codes trip_cpu_codes_of(unsigned least, unsigned most);
 
 static inline uint16_t trip_cpu_code(trip_cpu_codes c, uint16_t code)
 {

@@ -196,26 +196,56 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
     }
 }
 
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
-                           double voxel_world)
+static void set_integrals(trip_cpu_function *f, const trip_tf_entry *table)
 {
-    const XXH128_hash_t hash = XXH3_128bits(table, CODES * sizeof *table);
-    if (f->voxel_world == voxel_world && f->codes.first == codes.first &&
-        f->codes.shift == codes.shift && f->table_hash[0] == hash.low64 &&
-        f->table_hash[1] == hash.high64)
-        return;
-    const double all = whole_integral(table, codes);
+    const double all = whole_integral(table, f->codes);
     /* A function of one code alone still has what at[] is in units of. */
     const double factor = all > 0 ? GREATEST / all : 1;
+    f->integrals.entry_log2 = LOG2_MOST;
+    while (!suffices(table, f->codes, f->integrals.entry_log2, f->voxel_world))
+        f->integrals.entry_log2--;
+    set_sums(&f->integrals, table, f->codes, factor);
+    f->integrals.extinction = (float)fmin(
+        1e25, f->voxel_world / ldexp(factor, f->integrals.entry_log2)); /* opaque anyway */
+}
+
+/* Of codes as samples have them, and of voxels in place of world units. */
+static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cpu_codes codes,
+                                           double voxel_world)
+{
+    trip_cpu_closed_form f = { .ramp = form->ramp, .coloured = form->coloured };
+    const double scale = ldexp(form->scale, -(int)codes.shift);
+    f.scale = (float)(scale / TRIP_CPU_CODE_PARTS);
+    f.offset = (float)(form->offset + form->scale * codes.first + scale * TRIP_CPU_CODE_BIAS);
+    /* Code 0 is taken for 1, where a ramp has begun: by half a code more, for what floats round. */
+    f.least = (float)fmax(
+        0, form->scale > 0 ? form->offset + form->scale * codes.first + 1.5 * scale : 0);
+    for (int i = 0; i < 4; i++)
+        f.k[i] = (float)(form->k[i] * voxel_world);
+    for (int i = 0; i < 3; i++) {
+        f.q0[i] = (float)form->q0[i];
+        f.q1[i] = (float)form->q1[i];
+    }
+    return f;
+}
+
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
+                           const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
+{
+    const XXH128_hash_t hash = XXH3_128bits(table, CODES * sizeof *table);
+    if (closed) /* goes by more than what is compared below */
+        f->integrals.closed = closed_form_of(closed, codes, voxel_world);
+    if (f->voxel_world == voxel_world && f->integrals.is_closed == (closed != NULL) &&
+        f->codes.first == codes.first && f->codes.shift == codes.shift &&
+        f->table_hash[0] == hash.low64 && f->table_hash[1] == hash.high64)
+        return;
     f->table_hash[0] = hash.low64;
     f->table_hash[1] = hash.high64;
     f->codes = codes;
     f->voxel_world = voxel_world;
-    f->integrals.entry_log2 = LOG2_MOST;
-    while (!suffices(table, codes, f->integrals.entry_log2, voxel_world))
-        f->integrals.entry_log2--;
-    set_sums(&f->integrals, table, codes, factor);
+    f->integrals.is_closed = closed != NULL;
+    f->integrals.entry_log2 = 0;
+    if (!closed)
+        set_integrals(f, table);
     set_next_visible(f, table);
-    f->integrals.extinction =
-        (float)fmin(1e25, voxel_world / ldexp(factor, f->integrals.entry_log2)); /* opaque anyway */
 }

@@ -5,6 +5,7 @@
 #define TRIP_CPU_SHEETS_INTEGRALS_H
 
 #include "budget.h"
+#include "closed_form.h"
 #include "cpu/kernels/sheets.h"
 #include "cpu/sheets/codes.h"
 #include "transfer_function.h"
@@ -27,8 +28,10 @@ uint64_t trip_cpu_function_bytes(void);
 bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget);
 void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
 
-/* Of a table of 65536 entries of the data set's codes, whose extinction is per world unit. */
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table, trip_cpu_codes codes,
+/* Of a table of 65536 entries of the data set's codes, whose extinction is per world unit; with
+ * `closed`, its form, no integrals are made. */
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
+                           const trip_closed_form *closed, trip_cpu_codes codes,
                            double voxel_world);
 
 /* Whether some code of [least, most] may show; biased codes. */

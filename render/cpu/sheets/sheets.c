@@ -69,10 +69,13 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->pass = NULL;
     s->count = s->front = 0;
     s->run_count = 0;
-    s->store.codes = trip_cpu_codes_of(r->frame->data, r->frame->settings->kernel);
+    const trip_plan *plan = r->frame->plan;
+    const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
+    s->store.codes = trip_cpu_codes_of(plan->code_least, plan->code_most);
     s->store.coordinates = &r->frame->data->coordinates;
-    trip_cpu_function_set(&s->function, r->frame->table, s->store.codes,
-                          r->frame->camera->voxel_world);
+    s->sheet_pane = closed ? r->kernels->sheet_pane_closed : r->kernels->sheet_pane;
+    trip_cpu_function_set(&s->function, r->frame->table, closed ? &plan->closed : NULL,
+                          s->store.codes, r->frame->camera->voxel_world);
     return 0;
 }
 
@@ -401,7 +404,7 @@ static void draw_pane(void *context, unsigned task, unsigned thread)
         r->kernels->pane_clear(&r->view, x, y, trip_cpu_is_alone(r, task), pixels);
         r->states[task] |= TRIP_CPU_PANE_BEGUN;
     }
-    uint64_t open = r->kernels->sheet_pane(&s->view, &s->group, x, y, pixels);
+    uint64_t open = s->sheet_pane(&s->view, &s->group, x, y, pixels);
     atomic_store_explicit(&r->mask.panes[task], open, memory_order_relaxed);
 }
 

@@ -15,6 +15,7 @@ struct trip_cpu_sheets {
     trip_cpu *of;
     trip_cpu_store store;
     trip_cpu_function function;
+    trip_cpu_sheet_kernel *sheet_pane; /* by whether segments have a closed form */
     trip_cpu_group group;
     trip_cpu_about about[TRIP_CPU_SEGMENTS]; /* of its segments, with kernels of 64 voxels */
     trip_cpu_sheet_view view;
