@@ -88,7 +88,7 @@ static void add_targets(sweep *w)
     }
 }
 
-/* Radii and footprints of splats; the kernels of values that gl has. */
+/* Radii and footprints of splats; kernels of values. */
 static void add_kernels(sweep *w)
 {
     static const double radii[] = { 1.5, 2.5, 3 };
@@ -102,9 +102,9 @@ static void add_kernels(sweep *w)
     }
     s = w->post;
     s.kernel = TRIPTYCH_CUBIC;
-    add(w, TRIPTYCH_RENDERER_GL, s, "gl-post-cubic");
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post-cubic");
     s.kernel = TRIPTYCH_GAUSSIAN;
-    add(w, TRIPTYCH_RENDERER_GL, s, "gl-post-gaussian");
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post-gaussian");
 }
 
 static void add_levels(sweep *w)

@@ -145,7 +145,7 @@ class Accuracy(program.ProgramTest):
         assert program.call("brick", "a.nrrd", "-q", "--keep-all", "--tile", "16").returncode == 0
         run = program.call(
             "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", "--pictures", "--source", "a.nrrd",
-            "--settings", "post,post-slices-1,pre,pre-rgba8,pre-ewa,pre-lod-4,gl-post-cubic,post-samples-2",
+            "--settings", "post,post-slices-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2",
             program=program.QUICK_PROGRAM)
         assert run.returncode == 0, run.stderr
         assert run.stderr == "", run.stderr
@@ -190,8 +190,8 @@ class Accuracy(program.ProgramTest):
         self.assertEqual(rows["post"]["model"]["max"], 0)
         self.assertEqual(rows["pre-ewa"]["model"], rows["pre"]["model"])
         self.assertNotEqual(rows["pre-ewa"]["method"], rows["pre"]["method"])
-        self.assertGreater(rows["gl-post-cubic"]["model"]["max"], 1)
-        self.assertLess(rows["gl-post-cubic"]["method"]["mean"], 2 * rows["post"]["method"]["mean"])
+        self.assertGreater(rows["post-cubic"]["model"]["max"], 1)
+        self.assertLess(rows["post-cubic"]["method"]["mean"], 2 * rows["post"]["method"]["mean"])
         self.assertGreater(rows["pre"]["model"]["mean"], 0.5)
         self.assertEqual(rows["pre"]["method"], rows["pre-rgba8"]["method"])
         self.assertEqual(rows["pre"]["model"], rows["pre-rgba8"]["model"])
@@ -231,7 +231,7 @@ class Accuracy(program.ProgramTest):
         view = self.report["views"][0]
         camera = ["--size", "40x32", "--fov", repr(view["fov_degrees"]), "--tf", "a.tf"]
         camera += [f"--{k}=" + ",".join(map(repr, view[k])) for k in ("eye", "look", "up")]
-        for name in "post", "pre-rgba8", "pre-ewa", "gl-post-cubic":
+        for name in "post", "pre-rgba8", "pre-ewa", "post-cubic":
             options = [x for k, v in self.rows[name]["options"].items() for x in ("--" + k, v)]
             again = self.picture("a.trip", *camera, *options)
             self.assertTrue((again == program.read_exr(f"report/{name}-0.exr")).all())
