@@ -172,11 +172,24 @@ INLINE vf long_depth(const patch *p, const trip_cpu_splat *splat, vf u)
     return exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
 }
 
+/* Near splats are few: not inlined, and by values, so that loops over the others keep their stamp
+ * in registers. */
+static __attribute__((noinline, cold)) vf near_depth_at(const trip_cpu_scratch *pane,
+                                                        const trip_cpu_splat *splat, vf x, vf y,
+                                                        vf ray, vf stretch, vf cutoff,
+                                                        trip_cpu_rays rays)
+{
+    const patch p = {
+        .x = x, .y = y, .ray = ray, .stretch = stretch, .cutoff = cutoff, .pane = pane
+    };
+    ray_lengths of = rays_of_near(&p, rays);
+    vf depth = long_depth(&p, splat, nearness_by(&p, splat, of.g));
+    return depth * of.stretch * front_of(&p, splat, of.g);
+}
+
 INLINE vf near_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
-    ray_lengths of = rays_of_near(p, rays);
-    vf depth = long_depth(p, splat, nearness_by(p, splat, of.g));
-    return depth * of.stretch * front_of(p, splat, of.g);
+    return near_depth_at(p->pane, splat, p->x, p->y, p->ray, p->stretch, p->cutoff, rays);
 }
 
 INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
