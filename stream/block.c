@@ -69,7 +69,7 @@ static uint32_t group_end(const uint64_t *masks, uint32_t squares, uint32_t squa
 {
     uint32_t records = 0;
     while (square < squares && records < TRIP_GROUP_RECORDS)
-        records += (uint32_t)__builtin_popcountll(masks[square++]);
+        records += trip_bits_set(masks[square++]);
     return square;
 }
 
@@ -90,7 +90,7 @@ static uint32_t count_squares(const uint64_t *present, unsigned words)
 {
     uint32_t squares = 0;
     for (unsigned w = 0; w < words; w++)
-        squares += (uint32_t)__builtin_popcountll(present[w]);
+        squares += trip_bits_set(present[w]);
     return squares;
 }
 
@@ -98,7 +98,7 @@ static uint32_t count_records(const uint64_t *masks, uint32_t squares)
 {
     uint32_t records = 0;
     for (uint32_t i = 0; i < squares; i++)
-        records += (uint32_t)__builtin_popcountll(masks[i]);
+        records += trip_bits_set(masks[i]);
     return records;
 }
 
@@ -108,7 +108,7 @@ static uint32_t packed_bytes(const uint64_t *masks, uint32_t squares, const uint
     uint32_t bytes = 0;
     for (uint32_t i = 0; i < squares; forms++)
         for (uint32_t end = group_end(masks, squares, i); i < end; i++)
-            bytes += ((uint32_t)__builtin_popcountll(masks[i]) * width_of(*forms) + 7) / 8;
+            bytes += (trip_bits_set(masks[i]) * width_of(*forms) + 7) / 8;
     return bytes;
 }
 
@@ -238,7 +238,7 @@ static uint32_t pack_groups(const uint32_t *voxels, const uint64_t *masks, uint3
         const uint32_t end = group_end(masks, squares, i);
         *form = form_of(voxels, count_records(masks + i, end - i));
         for (; i < end; i++) {
-            const uint32_t count = (uint32_t)__builtin_popcountll(masks[i]);
+            const uint32_t count = trip_bits_set(masks[i]);
             bytes += pack_square(voxels, count, *form, codes + bytes);
             voxels += count;
         }
@@ -282,27 +282,31 @@ uint32_t trip_block_squares(const trip_block *b, trip_square squares[TRIP_BLOCK_
 {
     const bool packed = b->code_bytes != 1;
     const uint32_t *forms = forms_of(b);
-    const unsigned char *codes = trip_block_codes(b);
-    uint32_t n = 0, first = 0, left = 0, form = 8u << 16; /* records that the group is short of */
+    uint32_t n = 0, first = 0, groups = 0, left = 0; /* records that the group is short of */
     for (unsigned w = 0; w < b->present_words; w++)
         for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, n++) {
             const uint64_t mask = b->masks[n];
-            const uint32_t count = (uint32_t)__builtin_popcountll(mask);
-            if (packed && left == 0) {
-                form = *forms++;
-                left = TRIP_GROUP_RECORDS;
-            }
+            const uint32_t count = trip_bits_set(mask);
+            groups += left == 0;
+            left = left == 0 ? TRIP_GROUP_RECORDS : left;
+            left -= count < left ? count : left;
             squares[n] = (trip_square){ .mask = mask,
                                         .number = 64 * w + (uint32_t)__builtin_ctzll(bits),
                                         .first = first,
                                         .count = count,
-                                        .least = form & UINT16_MAX,
-                                        .width = width_of(form),
-                                        .codes = codes };
-            left -= count < left ? count : left;
+                                        .least = groups - 1 /* whose it is */ };
             first += count;
-            codes += trip_square_code_bytes(&squares[n]);
         }
+    const void *behind = b->masks + b->squares + (packed ? form_words(groups) : 0);
+    const unsigned char *codes = behind;
+    for (uint32_t i = 0; i < n; i++) {
+        trip_square *s = &squares[i];
+        const uint32_t form = packed ? forms[s->least] : 8u << 16;
+        s->least = form & UINT16_MAX;
+        s->width = width_of(form);
+        s->codes = codes;
+        codes += trip_square_code_bytes(s);
+    }
     return n;
 }
 
@@ -392,7 +396,7 @@ static const char *check_places(const trip_block *b, const trip_file_brick *bric
     for (unsigned w = 0; w < b->present_words; w++)
         for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, mask++) {
             uint32_t corner = corner_of(64 * w + (uint32_t)__builtin_ctzll(bits));
-            records += (uint32_t)__builtin_popcountll(*mask);
+            records += trip_bits_set(*mask);
             outside |= *mask & ~bits_within(brick, corner);
             empty |= *mask == 0;
         }
@@ -528,7 +532,7 @@ void trip_block_voxels(const trip_block *b, uint32_t first, uint32_t count, uint
     uint32_t skip = first, done = 0;
     for (unsigned w = 0; w < b->present_words; w++)
         for (uint64_t bits = b->present[w]; bits && done < count; bits &= bits - 1, mask++) {
-            uint32_t here = (uint32_t)__builtin_popcountll(*mask);
+            uint32_t here = trip_bits_set(*mask);
             if (skip >= here) {
                 skip -= here;
                 continue;

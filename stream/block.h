@@ -59,6 +59,20 @@ typedef struct trip_square {
     const unsigned char *codes;
 } trip_square;
 
+/* How many bits are set. Compilers call a function for that where not every processor of the target
+ * has an instruction. */
+static inline uint32_t trip_bits_set(uint64_t x)
+{
+#if defined(__x86_64__) && !defined(__POPCNT__)
+    x -= x >> 1 & UINT64_C(0x5555555555555555);
+    x = (x & UINT64_C(0x3333333333333333)) + (x >> 2 & UINT64_C(0x3333333333333333));
+    x = (x + (x >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+    return (uint32_t)(x * UINT64_C(0x0101010101010101) >> 56);
+#else
+    return (uint32_t)__builtin_popcountll(x);
+#endif
+}
+
 static inline trip_block_form trip_block_form_of(const trip_file_header *h, trip_kind kind)
 {
     unsigned own = trip_kind_of(kind)->code_bytes;

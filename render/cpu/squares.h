@@ -45,7 +45,7 @@ static inline bool trip_cpu_walk_next(trip_cpu_walk *w)
     w->left--;
     w->mask = b->masks[w->reversed ? w->left : b->squares - 1 - w->left];
     uint32_t before = w->count;
-    w->count = (uint32_t)__builtin_popcountll(w->mask);
+    w->count = trip_bits_set(w->mask);
     w->first = w->reversed ? w->first - w->count : w->first + before;
     return true;
 }

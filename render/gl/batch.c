@@ -108,7 +108,7 @@ static uint64_t ranks_of(uint64_t mask, uint64_t drawn)
 static void fill_square(filling *f, struct trip_gl_square square, uint64_t mask, uint64_t drawn,
                         bool reversed)
 {
-    const uint32_t count = (uint32_t)__builtin_popcountll(mask);
+    const uint32_t count = trip_bits_set(mask);
     const uint64_t ranks = (mask & ~drawn) ? ranks_of(mask, drawn) : UINT64_MAX;
     f->squares[f->square] = square;
     for (uint32_t n = 0; n < count; n++) {
