@@ -28,6 +28,13 @@ enum { PLACES_ROOM = 64 + V };
 /* The places of a mask's voxels in the square, u + 8 v; returns their number. */
 INLINE uint32_t places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
 {
+#ifdef V_PACKS_BITS
+    v_bytes all;
+    for (unsigned i = 0; i < 64; i++)
+        all[i] = (uint8_t)((i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i & 2) << 2 | (i & 8) << 1 |
+                           (i & 32));
+    return v_pack_bytes(places, mask, all);
+#else
     uint32_t n = 0;
     for (unsigned i = 0; i < 8; i++) {
         unsigned byte = mask >> 8 * i & 255;
@@ -37,6 +44,7 @@ INLINE uint32_t places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
         n += (uint32_t)__builtin_popcount(byte);
     }
     return n;
+#endif
 }
 
 typedef uint8_t bytes_of_lanes __attribute__((vector_size(V)));
@@ -795,9 +803,11 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
     if (!view->shading && !view->effects.some)
         return c;
     const v3 eye = unit(towards_eye(view, staged, at)), light = light_of(view, eye, staged, at);
-    surface s = { .strength = v_set(0), .gloss = v_set(0) };
+    surface s;
     if (view->shading)
         s = surface_of(view, eye, light, vi_load(staged->normal + at));
+    else
+        s = (surface){ .strength = v_set(0), .gloss = v_set(0) };
     return view->effects.some ? with_effects(view, c, eye, light, &s, staged, at) : shaded(&s, c);
 }
 

@@ -340,17 +340,23 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
 #ifdef __AVX512VBMI2__
 #define V_PACKS_BITS
 
-/* The places of a word's bits, from `first` on, to the front of `out`, of which 64 bytes may be
- * overwritten; returns how many they are. */
+typedef uint8_t v_bytes __attribute__((vector_size(64)));
+
+/* Those of 64 bytes whose bits are set to the front of `out`, all of which may be overwritten;
+ * returns how many they are. */
+INLINE uint32_t v_pack_bytes(uint8_t *out, uint64_t bits, v_bytes from)
+{
+    _mm512_storeu_si512(out, _mm512_maskz_compress_epi8(bits, (__m512i)from));
+    return (uint32_t)__builtin_popcountll(bits);
+}
+
+/* The places of a word's bits, from `first` on, likewise. */
 INLINE uint32_t v_pack_bits(uint8_t *out, uint64_t bits, unsigned first)
 {
-    typedef uint8_t bytes __attribute__((vector_size(64)));
-    bytes place;
+    v_bytes place;
     for (int i = 0; i < 64; i++)
         place[i] = (uint8_t)i;
-    place += (uint8_t)first;
-    _mm512_storeu_si512(out, _mm512_maskz_compress_epi8(bits, (__m512i)place));
-    return (uint32_t)__builtin_popcountll(bits);
+    return v_pack_bytes(out, bits, place + (uint8_t)first);
 }
 #endif
 
