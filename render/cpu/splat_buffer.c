@@ -219,12 +219,24 @@ static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *n
             order[next[r.first + y * across + x]++] = index;
 }
 
-typedef uint16_t places __attribute__((vector_size(2 * AT_A_TIME)));
+/* Consecutive splats, in vectors that every processor of the target has. */
+typedef uint16_t eight __attribute__((vector_size(AT_A_TIME / 2 * sizeof(uint16_t))));
+typedef struct places {
+    eight low, high;
+} places;
+
+static inline places places_from(uint32_t first)
+{
+    const eight ahead = { 0, 1, 2, 3, 4, 5, 6, 7 };
+    const eight low = ahead + (uint16_t)first;
+    return (places){ low, low + AT_A_TIME / 2 };
+}
 
 /* `count` splats from `first` on to the next places of a pane; more may be written behind them. */
 static inline void put(uint16_t *order, uint32_t *next, places first, uint32_t count)
 {
-    memcpy(order + *next, &first, sizeof first);
+    memcpy(order + *next, &first.low, sizeof first.low);
+    memcpy(order + *next + AT_A_TIME / 2, &first.high, sizeof first.high);
     *next += count;
 }
 
@@ -247,10 +259,7 @@ static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uin
 static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
                   uint32_t across, uint32_t *next, uint16_t *order)
 {
-    places ahead;
     uint32_t from = 0;
-    for (uint16_t i = 0; i < AT_A_TIME; i++)
-        ahead[i] = i;
     for (uint32_t i = 0; i < n; i++) {
         uint32_t panes = series[i].panes, end = series[i].end;
         if (panes & TRIP_CPU_PANES_MORE) {
@@ -259,8 +268,8 @@ static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, u
             continue;
         }
         for (; end - from > AT_A_TIME; from += AT_A_TIME)
-            put_all(order, next, across, panes, ahead + (uint16_t)from, AT_A_TIME);
-        put_all(order, next, across, panes, ahead + (uint16_t)from, end - from);
+            put_all(order, next, across, panes, places_from(from), AT_A_TIME);
+        put_all(order, next, across, panes, places_from(from), end - from);
         from = end;
     }
 }
