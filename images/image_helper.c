@@ -19,7 +19,6 @@
 #include "companion.h"
 #include "report.h"
 
-#define PROGRAM "triptych-images"
 enum {
     TEXT_BYTES = 4096,
     MOST_WARNINGS = 64,   /* of one request */
@@ -29,8 +28,21 @@ enum {
     REAP_MS = 1000,
 };
 
+/* A program that may help. */
+typedef struct helper_program {
+    const char *name;
+    const char *built; /* NULL: it was not */
+    const char *does;
+} helper_program;
+
+static const helper_program image_program = { "triptych-images", TRIP_IMAGE_HELPER_BUILT,
+                                              "reads and writes pictures" };
+static const helper_program netcdf_program = { "triptych-netcdf", TRIP_NETCDF_HELPER_BUILT,
+                                               "reads netCDF-4" };
+
 struct trip_image_helper {
     const char *what;
+    const char *program;
     char path[PATH_MAX]; /* of the last request */
     pid_t pid;           /* 0: gone */
     int fd;
@@ -75,7 +87,7 @@ static void reset_signals(void)
  * ended before that was set is not its parent any more. */
 static _Noreturn void become_helper(launch *l)
 {
-    char *argv[] = { (char[]){ PROGRAM }, NULL };
+    char *argv[] = { l->program, NULL };
     bool ready = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == l->parent &&
                  (l->fd == TRIP_IMAGE_HELPER_FD ? fcntl(l->fd, F_SETFD, 0)
                                                 : dup2(l->fd, TRIP_IMAGE_HELPER_FD)) >= 0;
@@ -111,14 +123,15 @@ static int spawn(char *program, int fd, pid_t *pid)
     return error;
 }
 
-int trip_image_helper_start(trip_image_helper **out, const char *what)
+static int start(trip_image_helper **out, const char *what, const helper_program *of)
 {
     char program[PATH_MAX] = "";
     int fds[2], error = ENOMEM;
-    if (!stand_in && !trip_companion_find(program, PROGRAM, TRIP_IMAGE_HELPER_BUILT, X_OK))
-        return trip_fail(TRIP_ERROR, what, PROGRAM,
-                         "is not beside this program nor in ../libexec/triptych; it reads and "
-                         "writes pictures");
+    if (!stand_in && !of->built)
+        return trip_fail(TRIP_ERROR, what, of->name, "was not built; it %s", of->does);
+    if (!stand_in && !trip_companion_find(program, of->name, of->built, X_OK))
+        return trip_fail(TRIP_ERROR, what, of->name,
+                         "is not beside this program nor in ../libexec/triptych; it %s", of->does);
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fds) != 0)
         return trip_fail_errno(what, program, "cannot connect");
     trip_image_helper *h = calloc(1, sizeof *h);
@@ -127,6 +140,7 @@ int trip_image_helper_start(trip_image_helper **out, const char *what)
     close(fds[1]);
     if (h && error == 0) {
         h->what = what;
+        h->program = of->name;
         h->fd = fds[0];
         h->patience_ms = stand_in ? stand_in_patience_ms : PATIENCE_MS;
         *out = h;
@@ -136,6 +150,16 @@ int trip_image_helper_start(trip_image_helper **out, const char *what)
     free(h);
     errno = error;
     return trip_fail_errno(what, program, "cannot start");
+}
+
+int trip_image_helper_start(trip_image_helper **out, const char *what)
+{
+    return start(out, what, &image_program);
+}
+
+int trip_image_helper_start_netcdf(trip_image_helper **out, const char *what)
+{
+    return start(out, what, &netcdf_program);
 }
 
 /* Ends the process and returns its status. One that the kernel cannot end at once, in the middle of
@@ -172,15 +196,15 @@ static int helper_lost(trip_image_helper *h)
         return trip_fail(TRIP_ERROR, h->what, h->path,
                          "brought the decoder down (%s): corrupt, or of an unusual kind",
                          strsignal(WTERMSIG(status)));
-    return trip_fail(TRIP_ERROR, h->what, h->path, PROGRAM " ended before it was done");
+    return trip_fail(TRIP_ERROR, h->what, h->path, "%s ended before it was done", h->program);
 }
 
 int trip_image_helper_distrust(trip_image_helper *h, const char *why)
 {
     end_process(h);
     h->broken = true;
-    return trip_fail(TRIP_ERROR, h->what, h->path, PROGRAM " gives an answer that cannot be: %s",
-                     why);
+    return trip_fail(TRIP_ERROR, h->what, h->path, "%s gives an answer that cannot be: %s",
+                     h->program, why);
 }
 
 /* Until the connection can be read or written. 0, or a reported failure, after which the helper is
@@ -204,7 +228,7 @@ static int wait_for(trip_image_helper *h, short events)
     end_process(h);
     h->broken = true;
     return trip_fail(TRIP_ERROR, h->what, h->path,
-                     PROGRAM " has not answered for %g s: corrupt, or of an unusual kind",
+                     "%s has not answered for %g s: corrupt, or of an unusual kind", h->program,
                      h->patience_ms / 1e3);
 }
 

@@ -1,8 +1,9 @@
-/* Everything that touches picture files is done by a second program, triptych-images, and this is
- * how the others talk to it. OpenImageIO brings some 250 libraries, 120 MB of resident memory and a
- * fifth of a second to start; here they count only where pictures are read or written, and not
- * towards the memory that the renderer promises. A decoder that a broken file brings down takes
- * nobody with it, and what the libraries print goes nowhere.
+/* Everything that touches picture files is done by a second program, triptych-images, and files of
+ * netCDF-4 are read by another, triptych-netcdf; this is how the others talk to them. OpenImageIO
+ * brings some 250 libraries, 120 MB of resident memory and a fifth of a second to start; here they
+ * count only where pictures are read or written, and not towards the memory that the renderer
+ * promises. A decoder that a broken file brings down takes nobody with it, and what the libraries
+ * print goes nowhere.
  *
  * Nor is a decoder that a hostile file has taken over trusted: the helper may read files, use the
  * memory it is given and write to the descriptor it is given, and no more (sandbox.h); whatever it
@@ -46,6 +47,10 @@ enum trip_image_task {
     TRIP_IMAGE_OPEN_STACK,
     /* numbers: k. Data: the slice's values as stored, in this machine's byte order. */
     TRIP_IMAGE_READ_SLICE,
+    /* Opens a variable of a file of netCDF-4, whose slices are then read. numbers: bytes the helper
+     * may use, bytes of the variable's name, which follow; 0: of its own choice. Data:
+     * trip_image_netcdf, and the coordinates that it announces. */
+    TRIP_IMAGE_OPEN_NETCDF,
 };
 
 /* What a picture's file holds, of rows of RGBA the first two, of rows of distances the last. */
@@ -90,11 +95,24 @@ typedef struct trip_image_stack {
     uint64_t helper_bytes; /* of the allowed memory that it uses until it ends */
 } trip_image_stack;
 
+typedef struct trip_image_netcdf {
+    int64_t dims[3];
+    int32_t type;   /* trip_scalar; floats, not a number where nothing is, where some are missing */
+    int32_t placed; /* bit a: coordinates along axis a follow, dims[a] doubles, those of i first */
+    double slope, inter;
+    char name[64];         /* of the variable; terminated */
+    int32_t others;        /* 1: there are more volumes in the file */
+    int32_t deeper;        /* 1: it has more dimensions */
+    uint64_t helper_bytes; /* of the allowed memory that it uses until it ends, beside a slice */
+} trip_image_netcdf;
+
 typedef struct trip_image_helper trip_image_helper;
 
 /* Starts the program; it gets ready while the caller goes on. `what` ("read", "write") begins the
  * lines about it and must outlive it. */
 int trip_image_helper_start(trip_image_helper **out, const char *what);
+/* The same of triptych-netcdf; fails where that was not built. */
+int trip_image_helper_start_netcdf(trip_image_helper **out, const char *what);
 /* Ends it, also in the middle of something. NULL is fine. */
 void trip_image_helper_stop(trip_image_helper *h);
 

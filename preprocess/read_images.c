@@ -12,19 +12,9 @@
 #include <sys/stat.h>
 
 #include "anatomy.h"
-#include "image_helper.h"
+#include "helper_slices.h"
 #include "report.h"
 #include "volume_reader.h"
-
-typedef struct state {
-    trip_image_helper *helper;
-    trip_budget *budget;
-    void *reserved; /* budget for the helper's memory, never touched */
-    size_t reserved_bytes;
-    int64_t next; /* slice */
-    size_t slice_bytes;
-    char path[];
-} state;
 
 static bool probe(const char *path, const unsigned char *head, size_t bytes,
                   const trip_volume_params *params)
@@ -33,15 +23,7 @@ static bool probe(const char *path, const unsigned char *head, size_t bytes,
     return bytes == 0 || trip_image_kind_of(head, bytes) != TRIP_IMAGE_OTHER;
 }
 
-static void close_images(void *opaque)
-{
-    state *s = opaque;
-    trip_image_helper_stop(s->helper);
-    trip_budget_release(s->budget, s->reserved, s->reserved_bytes);
-    free(s);
-}
-
-static int open_stack(state *s, bool allow_gaps, trip_image_stack *stack)
+static int open_stack(trip_helper_slices *s, bool allow_gaps, trip_image_stack *stack)
 {
     const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), allow_gaps };
     int status = trip_image_helper_start(&s->helper, "read");
@@ -80,45 +62,22 @@ static const char *fault_of(const trip_image_stack *stack)
     return finite ? NULL : "a map that is not finite";
 }
 
-/* Takes the helper's memory from the budget: one slice and what it reports. */
-static int reserve_memory(state *s, const trip_image_stack *stack)
-{
-    if (__builtin_mul_overflow((uint64_t)stack->dims[0], (uint64_t)stack->dims[1],
-                               &s->slice_bytes) ||
-        __builtin_mul_overflow(s->slice_bytes, trip_scalar_bytes((trip_scalar)stack->type),
-                               &s->slice_bytes) ||
-        __builtin_add_overflow(s->slice_bytes, stack->helper_bytes, &s->reserved_bytes))
-        return trip_fail(TRIP_ERROR, "read", s->path, "has slices of an impossible size");
-    s->reserved = trip_budget_take(s->budget, s->reserved_bytes);
-    if (s->reserved)
-        return 0;
-    char needed[32], left[32];
-    trip_format_bytes(s->reserved_bytes, needed);
-    trip_format_bytes(trip_budget_left_bytes(s->budget), left);
-    return trip_fail(TRIP_ERROR, "read", s->path,
-                     "its slices need %s, but %s are left of the memory allowed; a larger --memory "
-                     "would do",
-                     needed, left);
-}
-
 static int open_images(const char *path, const trip_volume_params *params, trip_budget *budget,
                        trip_volume_info *info, void **out)
 {
-    size_t path_bytes = strlen(path) + 1;
-    state *s = calloc(1, sizeof *s + path_bytes);
+    trip_helper_slices *s = trip_helper_slices_create(path, budget);
     if (!s)
-        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
-    memcpy(s->path, path, path_bytes);
-    s->budget = budget;
+        return TRIP_ERROR;
     trip_image_stack stack = { 0 };
     int status = open_stack(s, params->allow_gaps, &stack);
     const char *fault = status == 0 ? fault_of(&stack) : NULL;
     if (fault)
         status = trip_image_helper_distrust(s->helper, fault);
     if (status == 0)
-        status = reserve_memory(s, &stack);
+        status =
+            trip_helper_slices_reserve(s, stack.dims, (trip_scalar)stack.type, stack.helper_bytes);
     if (status < 0) {
-        close_images(s);
+        trip_helper_slices_close(s);
         return status;
     }
     memcpy(info->dims, stack.dims, sizeof info->dims);
@@ -135,43 +94,6 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
     info->name[0] = 0;
     *out = s;
     return 0;
-}
-
-static int rewind_images(void *opaque)
-{
-    ((state *)opaque)->next = 0;
-    return 0;
-}
-
-static int skip_slices(void *opaque, int64_t count)
-{
-    ((state *)opaque)->next += count;
-    return 0;
-}
-
-static int read_slices(void *opaque, int64_t count, void *values)
-{
-    state *s = opaque;
-    for (int64_t i = 0; i < count; i++) {
-        const int64_t numbers[5] = { s->next++ };
-        int status =
-            trip_image_helper_request(s->helper, TRIP_IMAGE_READ_SLICE, s->path, numbers, -1);
-        if (status == 0)
-            status = trip_image_helper_expect(s->helper, s->slice_bytes);
-        if (status == 0)
-            status = trip_image_helper_receive(
-                s->helper, (char *)values + (size_t)i * s->slice_bytes, s->slice_bytes);
-        if (status < 0)
-            return status;
-    }
-    return 0;
-}
-
-/* The helper delivers the machine's byte order. */
-static bool swap_images(const void *opaque)
-{
-    (void)opaque;
-    return false;
 }
 
 typedef int visit_file(void *user, const char *file);
@@ -264,9 +186,9 @@ const trip_volume_reader trip_read_images = {
     .probe = probe,
     .list = list_images,
     .open = open_images,
-    .close = close_images,
-    .rewind = rewind_images,
-    .read_slices = read_slices,
-    .skip_slices = skip_slices,
-    .swap = swap_images,
+    .close = trip_helper_slices_close,
+    .rewind = trip_helper_slices_rewind,
+    .read_slices = trip_helper_slices_read,
+    .skip_slices = trip_helper_slices_skip,
+    .swap = trip_helper_slices_swap,
 };

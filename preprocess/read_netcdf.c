@@ -1,8 +1,8 @@
 /* NetCDF in its classic forms (CDF-1, CDF-2 and CDF-5): a variable of three dimensions or more, the
  * last of which are k, j and i; of those before, the first place. A dimension with a variable of
  * its own name has that for coordinates. What an attribute names as fill or missing is no value.
- * Files of netCDF-4 are HDF5, and refused. Not by libnetcdf: nc_open() of 4.9.0 writes beyond its
- * memory and takes gigabytes for damaged files, and reads shortened ones as if they were whole. */
+ * Those of netCDF-4 are read_netcdf4.c's. Not by libnetcdf as these: nc_open() of 4.9.0 writes beyond
+ * its memory and takes gigabytes for damaged files, and reads shortened ones as if they were whole. */
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -314,10 +314,6 @@ static int read_header(header *h, int fd, const char *path)
     int status = read_at(fd, path, 0, h->bytes, h->count);
     if (status)
         return status;
-    if (h->count >= 4 && memcmp(h->bytes, "CDF", 3) != 0)
-        return trip_fail(TRIP_ERROR, "read", path,
-                         "is netCDF-4 or another HDF5 file, which is not read: `nccopy -k cdf5` "
-                         "makes a classic one of it");
     if (h->count >= 4)
         parse(h);
     if (!h->broken && (!h->dims || !h->variables))
@@ -348,9 +344,8 @@ static bool netcdf_probe(const char *path, const unsigned char *head, size_t byt
 {
     (void)path;
     (void)params;
-    bool classic =
-        bytes >= 4 && memcmp(head, "CDF", 3) == 0 && (head[3] == 1 || head[3] == 2 || head[3] == 5);
-    return classic || (bytes >= 8 && memcmp(head, "\x89HDF\r\n\x1a\n", 8) == 0);
+    return bytes >= 4 && memcmp(head, "CDF", 3) == 0 &&
+           (head[3] == 1 || head[3] == 2 || head[3] == 5);
 }
 
 /* Values of the last three dimensions; 0: it is no volume. */

@@ -22,8 +22,8 @@
 
 /* In the order of their probing: formats with a magic number first. */
 static const trip_volume_reader *const readers[] = {
-    &trip_read_vdb, &trip_read_nrrd,   &trip_read_nifti, &trip_read_netcdf,
-    &trip_read_vol, &trip_read_images, &trip_read_raw,
+    &trip_read_vdb,     &trip_read_nrrd, &trip_read_nifti,  &trip_read_netcdf,
+    &trip_read_netcdf4, &trip_read_vol,  &trip_read_images, &trip_read_raw,
 };
 
 /* The stored slices [first, first + count) of a portion: its own and one neighbour on each side. */

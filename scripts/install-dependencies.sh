@@ -12,7 +12,7 @@ set -eu
 
 libraries="libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev libglfw3-dev
  libimgui-dev libmicrohttpd-dev libjpeg62-turbo-dev libpng-dev
- liburing-dev libseccomp-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
+ liburing-dev libseccomp-dev libnetcdf-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
 build="cmake ninja-build gcc g++ pkg-config libgl1-mesa-dri libegl1 libgbm1 $libraries"
 tests="libcmocka-dev python3 python3-numpy python3-pil python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
  valgrind xauth xvfb chromium ffmpeg locales"

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds the program without the GL renderer, without OpenVDB, and without both, and sees that each
+# Builds the program without the GL renderer, without OpenVDB and libnetcdf, and without all, and sees that each
 # says its version, describes a data set and draws it, and that each refuses what it lacks with a
 # line. Takes as long as three builds.
 set -eu
@@ -20,10 +20,10 @@ refuses() { # LINE COMMAND...
     fi
 }
 
-for lacks in "GL" "OPENVDB" "GL OPENVDB"; do
+for lacks in "GL" "OPENVDB NETCDF" "GL OPENVDB NETCDF"; do
     folder=build/without-$(echo "$lacks" | tr 'A-Z ' 'a-z-')
     rm -rf "$folder/cloud.trip"
-    options="-DTRIP_GL=ON -DTRIP_OPENVDB=ON"
+    options="-DTRIP_GL=ON -DTRIP_OPENVDB=ON -DTRIP_NETCDF=ON"
     for each in $lacks; do
         options="$options -DTRIP_$each=OFF"
     done
@@ -44,6 +44,10 @@ for lacks in "GL" "OPENVDB" "GL OPENVDB"; do
     case " $lacks " in
     *" OPENVDB "*) printf ' BDV\0\0\0\0' > "$folder/empty.vdb"
                    refuses "OpenVDB" "$triptych" brick "$folder/empty.vdb" -o "$folder/no.trip" ;;
+    esac
+    case " $lacks " in
+    *" NETCDF "*) printf '\211HDF\r\n\032\n' > "$folder/empty.nc"
+                  refuses "libnetcdf" "$triptych" brick "$folder/empty.nc" -o "$folder/no.trip" ;;
     esac
     echo "without $lacks: builds, says its version, bricks, describes and draws"
 done

@@ -46,6 +46,12 @@ class SwitchedOff(program.ProgramTest):
         self.refused(program.GENERATE, "marschner-lobb", "--size=8", "-o", "v.vdb", says="built without OpenVDB")
         self.assertEqual(sorted(os.listdir(".")), before)
 
+    def test_netcdf(self):
+        if "NETCDF" not in program.SWITCHED_OFF:
+            self.skipTest("built with libnetcdf")
+        program.write("x.nc", b"\x89HDF\r\n\x1a\n" + bytes(100))
+        self.refused(program.PROGRAM, "brick", "x.nc", "-o", "x.trip", says="nccopy")
+
 
 if __name__ == "__main__":
     program.main()

@@ -1,5 +1,6 @@
 /* A helper that answers anything: no crash, no hang and no leak, and what is accepted is a volume
- * or a picture of its own size. The first byte chooses the request. */
+ * or a picture of its own size. The first byte chooses the request: odd, a picture; else slices, of
+ * netCDF-4 where it is 2 more than a multiple of 4. */
 #include "fuzz.h"
 
 #include "image_file.h"
@@ -7,7 +8,9 @@
 #include "volume.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -36,13 +39,25 @@ static int refuse(int fd)
     return EIO;
 }
 
-static void read_slices(void)
+/* The name of a file that begins as one of netCDF-4. */
+static const char *netcdf_file(void)
+{
+    static char path[64];
+    if (!path[0]) {
+        const int fd = memfd_create("netcdf", MFD_CLOEXEC);
+        FUZZ_PROMISE(fd >= 0 && write(fd, "\x89HDF\r\n\x1a\n", 8) == 8);
+        snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    }
+    return path;
+}
+
+static void read_slices(const char *path)
 {
     trip_budget *budget;
     trip_volume *v;
     trip_volume_portion b;
     FUZZ_PROMISE(trip_budget_create(&budget, MEMORY_BYTES) == 0);
-    if (trip_volume_open(&v, "/", NULL, budget) == 0) {
+    if (trip_volume_open(&v, path, NULL, budget) == 0) {
         const trip_volume_info *info = trip_volume_get_info(v);
         FUZZ_PROMISE(info->dims[0] >= 1 && info->dims[1] >= 1 && info->dims[2] >= 1);
         FUZZ_PROMISE(info->type >= 0 && info->type < TRIP_SCALARS);
@@ -79,7 +94,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (data[0] % 2)
         read_picture(&files);
     else
-        read_slices();
+        read_slices(data[0] & 2 ? netcdf_file() : "/");
     trip_image_helper_replace(refuse, PATIENCE_MS);
     FUZZ_PROMISE(trip_image_read(&files, "", &(int){ 0 }, &(int){ 0 }, &(float *){ NULL }) < 0);
     trip_image_close(&files);

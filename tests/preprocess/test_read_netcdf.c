@@ -225,12 +225,6 @@ static void a_variable_is_chosen_by_name(void **state)
                       "not three dimensions");
 }
 
-static void files_of_hdf5_are_refused(void **state)
-{
-    (void)state;
-    assert_refused(write_bytes("e.nc", "\x89HDF\r\n\x1a\n\0\0\0\0", 12), "nccopy");
-}
-
 /* 60,000 numbers, each a variable of its own. */
 static void a_header_takes_little_memory(void **state)
 {
@@ -280,7 +274,6 @@ int main(void)
         cmocka_unit_test(coordinates_become_places),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),
-        cmocka_unit_test(files_of_hdf5_are_refused),
         cmocka_unit_test(a_header_takes_little_memory),
         cmocka_unit_test(any_damage_is_read_or_refused),
     };

@@ -1,0 +1,260 @@
+#include "netcdf_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <netcdf.h>
+
+#include "volume_reader.h"
+
+namespace
+{
+
+/* By the number of a type; of characters there are no volumes. */
+const int scalar_of[] = { -1,       TRIP_I8, -1,       TRIP_I16, TRIP_I32, TRIP_F32,
+                          TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64 };
+constexpr int types = sizeof scalar_of / sizeof *scalar_of;
+
+void check(int status)
+{
+    if (status != NC_NOERR)
+        throw trip_netcdf_error(std::string("libnetcdf says: ") + nc_strerror(status));
+}
+
+bool is_number(int type)
+{
+    return type >= 0 && type < types && scalar_of[type] >= 0;
+}
+
+/* Of an attribute with numbers, the first; what there is none of stays. */
+void take_attribute(int group, int variable, const char *name, double &value)
+{
+    nc_type type;
+    size_t count;
+    if (nc_inq_att(group, variable, name, &type, &count) != NC_NOERR || !is_number(type) ||
+        count == 0 || count > 1 << 16)
+        return;
+    std::vector<double> all(count);
+    check(nc_get_att_double(group, variable, name, all.data()));
+    value = all[0];
+}
+
+std::vector<int> dimensions_of(int group, int variable)
+{
+    int count;
+    check(nc_inq_varndims(group, variable, &count));
+    std::vector<int> dimensions((size_t)count);
+    check(nc_inq_vardimid(group, variable, dimensions.data()));
+    return dimensions;
+}
+
+size_t length_of(int group, int dimension)
+{
+    size_t length;
+    check(nc_inq_dimlen(group, dimension, &length));
+    return length;
+}
+
+/* Values of the last three dimensions; 0: it is no volume. */
+double volume_of(int group, int variable)
+{
+    nc_type type;
+    check(nc_inq_vartype(group, variable, &type));
+    const std::vector<int> dimensions = dimensions_of(group, variable);
+    if (dimensions.size() < 3 || !is_number(type))
+        return 0;
+    double values = 1;
+    for (size_t i = dimensions.size() - 3; i < dimensions.size(); i++)
+        values *= (double)length_of(group, dimensions[i]);
+    return values;
+}
+
+std::string name_of(int group, int variable)
+{
+    char name[NC_MAX_NAME + 1] = "";
+    check(nc_inq_varname(group, variable, name));
+    return name;
+}
+
+} // namespace
+
+struct trip_netcdf_file::variable {
+    int group = -1, number = -1;
+    std::string name;
+    double values = -1;
+    int volumes = 0;
+};
+
+trip_netcdf_file::trip_netcdf_file(const std::string &path, const std::string &name,
+                                   uint64_t memory_bytes)
+{
+    check(nc_open(path.c_str(), NC_NOWRITE, &file_));
+    try {
+        open_variable(name, memory_bytes);
+    } catch (...) {
+        nc_close(file_);
+        throw;
+    }
+}
+
+trip_netcdf_file::~trip_netcdf_file()
+{
+    nc_close(file_);
+}
+
+/* That of the name, else the largest, of a group and those in it. */
+void trip_netcdf_file::find(int group, const std::string &prefix, const std::string &name,
+                            variable &found)
+{
+    int count = 0;
+    check(nc_inq_varids(group, &count, nullptr));
+    std::vector<int> numbers((size_t)count);
+    check(nc_inq_varids(group, &count, numbers.data()));
+    for (int number : numbers) {
+        const std::string full = prefix + name_of(group, number);
+        const double values = volume_of(group, number);
+        found.volumes += values > 0;
+        if (name.empty() ? values > std::max(0.0, found.values) : full == name) {
+            found.group = group;
+            found.number = number;
+            found.name = full;
+            found.values = values;
+        }
+    }
+    check(nc_inq_grps(group, &count, nullptr));
+    std::vector<int> groups((size_t)count);
+    check(nc_inq_grps(group, &count, groups.data()));
+    for (int inner : groups) {
+        char of_group[NC_MAX_NAME + 1] = "";
+        check(nc_inq_grpname(inner, of_group));
+        find(inner, prefix + of_group + "/", name, found);
+    }
+}
+
+void trip_netcdf_file::set_type(int type)
+{
+    stored_ = scalar_of[type];
+    about.slope = 1;
+    missing_[0] = missing_[1] = std::numeric_limits<double>::quiet_NaN();
+    take_attribute(group_, variable_, "scale_factor", about.slope);
+    take_attribute(group_, variable_, "add_offset", about.inter);
+    take_attribute(group_, variable_, "_FillValue", missing_[0]);
+    take_attribute(group_, variable_, "missing_value", missing_[1]);
+    if ((type == NC_FLOAT || type == NC_DOUBLE) && std::isnan(missing_[0]))
+        missing_[0] = NC_FILL_DOUBLE;
+    decoded_ = !std::isnan(missing_[0]) || !std::isnan(missing_[1]);
+    about.type = decoded_ ? TRIP_F32 : stored_;
+}
+
+/* A dimension has its coordinates from a variable of its name, in its group or one around. */
+void trip_netcdf_file::place(int axis, int dimension)
+{
+    char name[NC_MAX_NAME + 1] = "";
+    check(nc_inq_dimname(group_, dimension, name));
+    for (int group = group_;;) {
+        int number;
+        nc_type type;
+        if (nc_inq_varid(group, name, &number) == NC_NOERR) {
+            check(nc_inq_vartype(group, number, &type));
+            if (is_number(type) && dimensions_of(group, number) == std::vector<int>{ dimension }) {
+                const size_t before = coordinates.size(), count = (size_t)about.dims[axis];
+                double slope = 1, inter = 0;
+                coordinates.resize(before + count);
+                check(nc_get_var_double(group, number, coordinates.data() + before));
+                take_attribute(group, number, "scale_factor", slope);
+                take_attribute(group, number, "add_offset", inter);
+                for (size_t i = before; i < coordinates.size(); i++)
+                    coordinates[i] = slope * coordinates[i] + inter;
+                about.placed |= 1 << axis;
+                return;
+            }
+        }
+        if (nc_inq_grp_parent(group, &group) != NC_NOERR)
+            return;
+    }
+}
+
+/* Chunks are kept that slices of the same chunks are read of, if they take half of the memory at
+ * most: each is then decoded once. */
+void trip_netcdf_file::keep_chunks(uint64_t memory_bytes)
+{
+    int storage;
+    std::vector<size_t> chunk((size_t)count_);
+    check(nc_inq_var_chunking(group_, variable_, &storage, chunk.data()));
+    about.helper_bytes = slice_bytes();
+    if (storage != NC_CHUNKED)
+        return;
+    double one = (double)trip_scalar_bytes((trip_scalar)stored_), across = 1;
+    for (size_t length : chunk)
+        one *= (double)length;
+    for (int a = 0; a < 2; a++)
+        across *= std::ceil((double)about.dims[a] / (double)chunk[(size_t)(count_ - 1 - a)]);
+    const double all = one * across <= 0.5 * (double)memory_bytes ? one * across : one;
+    if (!(all <= 0.5 * (double)memory_bytes))
+        throw trip_netcdf_error("its chunks do not fit the memory allowed; a larger --memory would "
+                                "do");
+    /* A hash table with a hundred times as many places as chunks, as HDF5 recommends. */
+    const size_t places = 100 * (size_t)std::min(across, 1e5) + 1;
+    check(nc_set_var_chunk_cache(group_, variable_, (size_t)all, places, 1.0F));
+    about.helper_bytes += (uint64_t)(all + one) + places * sizeof(void *);
+}
+
+void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_bytes)
+{
+    variable found;
+    find(file_, "", name, found);
+    if (found.number < 0)
+        throw trip_netcdf_error(name.empty() ? "has no variable of numbers with three dimensions"
+                                             : "has no variable \"" + name + "\"");
+    if (!(found.values > 0))
+        throw trip_netcdf_error("its variable \"" + found.name +
+                                "\" has not three dimensions of numbers");
+    group_ = found.group;
+    variable_ = found.number;
+    const std::vector<int> dimensions = dimensions_of(group_, variable_);
+    count_ = (int)dimensions.size();
+    nc_type type;
+    check(nc_inq_vartype(group_, variable_, &type));
+    set_type(type);
+    for (int a = 0; a < 3; a++) {
+        const size_t length = length_of(group_, dimensions[(size_t)(count_ - 1 - a)]);
+        about.dims[a] = (int64_t)std::min(length, (size_t)INT64_MAX);
+    }
+    if ((double)about.dims[0] * (double)about.dims[1] * 8 > (double)memory_bytes)
+        throw trip_netcdf_error("its slices do not fit the memory allowed; a larger --memory would "
+                                "do");
+    for (int a = 0; a < 3; a++)
+        place(a, dimensions[(size_t)(count_ - 1 - a)]);
+    std::strncpy(about.name, found.name.c_str(), sizeof about.name - 1);
+    about.others = found.volumes > 1;
+    about.deeper = count_ > 3;
+    keep_chunks(memory_bytes);
+}
+
+size_t trip_netcdf_file::slice_bytes() const
+{
+    return (size_t)about.dims[0] * (size_t)about.dims[1] *
+           trip_scalar_bytes((trip_scalar)about.type);
+}
+
+void trip_netcdf_file::read(int64_t k, void *values)
+{
+    std::vector<size_t> start((size_t)count_, 0), count((size_t)count_, 1);
+    const size_t in_slice = (size_t)about.dims[0] * (size_t)about.dims[1];
+    start[(size_t)count_ - 3] = (size_t)k;
+    count[(size_t)count_ - 2] = (size_t)about.dims[1];
+    count[(size_t)count_ - 1] = (size_t)about.dims[0];
+    if (decoded_)
+        raw_.resize(in_slice * trip_scalar_bytes((trip_scalar)stored_));
+    check(nc_get_vara(group_, variable_, start.data(), count.data(),
+                      decoded_ ? raw_.data() : values));
+    if (!decoded_)
+        return;
+    float *to = static_cast<float *>(values);
+    trip_scalar_decode((trip_scalar)stored_, false, 1, 0, raw_.data(), in_slice, to);
+    for (size_t i = 0; i < in_slice; i++)
+        if (to[i] == (float)missing_[0] || to[i] == (float)missing_[1])
+            to[i] = std::numeric_limits<float>::quiet_NaN();
+}

@@ -1,0 +1,336 @@
+/* Files of netCDF-4, written by libnetcdf. */
+#include <errno.h>
+#include <netcdf.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "image_helper.h"
+#include "volume_files.h"
+
+/* By the number of a type of netCDF. */
+static const trip_scalar scalar_of[] = {
+    TRIP_U8,  TRIP_I8, TRIP_U8,  TRIP_I16, TRIP_I32, TRIP_F32,
+    TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64
+};
+
+/* What a file has besides the sample volume as variable "t" of (z, lat, x). */
+typedef struct contents {
+    int type;
+    int endian;       /* NC_ENDIAN_... */
+    bool chunks;      /* of 3 x 3 x 3, packed */
+    bool records;     /* z has no end */
+    bool deeper;      /* a dimension of 2 before: t is at its first place */
+    bool inside;      /* t lies in the group "g" */
+    bool coordinates; /* of x, 1, 2, 4, 8, 16, and of z, 6, 5, 4 ... 0 */
+    bool scaled;      /* t stands for twice as much, and 3 */
+    bool missing;     /* where t is 5 it has no value */
+} contents;
+
+static void put_coordinates(int file, int x, int z)
+{
+    const double places[NX] = { 1, 2, 4, 8, 16 };
+    int variable;
+    assert_int_equal(nc_def_var(file, "x", NC_DOUBLE, 1, &x, &variable), 0);
+    assert_int_equal(nc_put_var_double(file, variable, places), 0);
+    assert_int_equal(nc_def_var(file, "z", NC_INT, 1, &z, &variable), 0);
+    for (size_t k = 0; k < NZ; k++)
+        assert_int_equal(nc_put_var1_int(file, variable, &k, &(int){ NZ - 1 - (int)k }), 0);
+}
+
+static const char *write_contents(const char *name, const contents *c)
+{
+    const char *path = path_of(name);
+    int file, group, dims[4], variable;
+    assert_int_equal(nc_create(path, NC_NETCDF4 | NC_CLOBBER, &file), 0);
+    assert_int_equal(nc_def_dim(file, "w", 2, &dims[0]), 0);
+    assert_int_equal(nc_def_dim(file, "z", c->records ? NC_UNLIMITED : NZ, &dims[1]), 0);
+    assert_int_equal(nc_def_dim(file, "lat", NY, &dims[2]), 0);
+    assert_int_equal(nc_def_dim(file, "x", NX, &dims[3]), 0);
+    group = file;
+    if (c->inside)
+        assert_int_equal(nc_def_grp(file, "g", &group), 0);
+    const int first = c->deeper ? 0 : 1;
+    assert_int_equal(nc_def_var(group, "t", c->type, 4 - first, dims + first, &variable), 0);
+    if (c->chunks) {
+        assert_int_equal(nc_def_var_chunking(group, variable, NC_CHUNKED,
+                                             (const size_t[]){ 3, 3, 3, 3 } + first),
+                         0);
+        assert_int_equal(nc_def_var_deflate(group, variable, 1, 1, 5), 0);
+    }
+    assert_int_equal(nc_def_var_endian(group, variable, c->endian), 0);
+    if (c->scaled) {
+        assert_int_equal(
+            nc_put_att_double(group, variable, "scale_factor", NC_DOUBLE, 1, &(double){ 2 }), 0);
+        assert_int_equal(
+            nc_put_att_float(group, variable, "add_offset", NC_FLOAT, 1, &(float){ 3 }), 0);
+    }
+    if (c->missing)
+        assert_int_equal(
+            nc_put_att_double(group, variable, "missing_value", NC_DOUBLE, 1, &(double){ 5 }), 0);
+    for (size_t v = 0; v < VOXELS; v++) {
+        const size_t at[4] = { 0, v / NX / NY, v / NX % NY, v % NX };
+        const int value = sample(scalar_of[c->type], (int)at[3], (int)at[2], (int)at[1]);
+        assert_int_equal(nc_put_var1_int(group, variable, at + first, &value), 0);
+    }
+    if (c->coordinates)
+        put_coordinates(file, dims[3], dims[1]);
+    assert_int_equal(nc_close(file), 0);
+    return path;
+}
+
+static void every_type_holds_the_sample(void **state)
+{
+    (void)state;
+    for (int type = 1; type <= NC_UINT64; type++)
+        for (int n = 0; n < 8 && type != NC_CHAR; n++) {
+            const contents c = { .type = type,
+                                 .endian = n & 1 ? NC_ENDIAN_BIG : NC_ENDIAN_NATIVE,
+                                 .chunks = n & 2,
+                                 .records = n & 4,
+                                 .deeper = n == 5,
+                                 .inside = n == 3,
+                                 .coordinates = n > 5 };
+            const trip_scalar held = type == NC_DOUBLE ? TRIP_F32 : scalar_of[type];
+            assert_holds_sample(write_contents("a.nc", &c), NULL, held);
+        }
+}
+
+static void coordinates_become_places(void **state)
+{
+    (void)state;
+    static const double x[NX] = { 0, 4.0 / 15, 12.0 / 15, 28.0 / 15, 4 };
+    for (int inside = 0; inside < 2; inside++) {
+        const contents c = { .type = NC_FLOAT, .coordinates = true, .inside = inside };
+        trip_budget *budget;
+        trip_volume *v;
+        assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
+        assert_int_equal(trip_volume_open(&v, write_contents("b.nc", &c), NULL, budget), 0);
+        const trip_volume_info *info = trip_volume_get_info(v);
+        assert_map(&info->index_to_world,
+                   (const double[3][4]){ { 3.75, 0, 0, 1 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
+        for (int i = 0; i < NX; i++)
+            assert_true(fabs(info->coordinates[0][i] - x[i]) < 1e-12);
+        for (int k = 0; k < NZ; k++)
+            assert_true(info->coordinates[2][k] == k);
+        assert_string_equal(info->name, inside ? "g/t" : "t");
+        trip_volume_close(v);
+        trip_budget_destroy(budget);
+    }
+}
+
+static void numbers_are_scaled_and_missing_ones_are_none(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 4; n++) {
+        const contents c = {
+            .type = n / 2 ? NC_FLOAT : NC_SHORT, .chunks = n % 2, .scaled = true, .missing = true
+        };
+        float values[VOXELS];
+        trip_volume_info info;
+        int missing = 0;
+        assert_int_equal(read_volume(write_contents("c.nc", &c), NULL, 2, values, VOXELS, &info),
+                         0);
+        for (int v = 0; v < VOXELS; v++) {
+            int stored = sample(scalar_of[c.type], v % NX, v / NX % NY, v / NX / NY);
+            missing += stored == 5;
+            assert_true(stored == 5 ? isnan(values[v]) : values[v] == 2.0F * (float)stored + 3);
+        }
+        assert_in_range(missing, 1, VOXELS / 10);
+    }
+}
+
+static void a_variable_is_chosen_by_name(void **state)
+{
+    (void)state;
+    const contents c = { .type = NC_SHORT, .coordinates = true, .inside = true };
+    const char *path = write_contents("d.nc", &c);
+    assert_holds_sample(path, &(trip_volume_params){ .grid = "g/t" }, TRIP_I16);
+    assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "t" }, "no variable \"t\"");
+    assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "x" },
+                      "not three dimensions");
+}
+
+/* One that starts like one, and one that ends early. */
+static void what_is_no_whole_file_is_refused(void **state)
+{
+    (void)state;
+    unsigned char whole[1 << 16];
+    const contents c = { .type = NC_SHORT };
+    FILE *f = fopen(write_contents("e.nc", &c), "rb");
+    const size_t count = fread(whole, 1, sizeof whole, f);
+    fclose(f);
+    assert_in_range(count, 1000, sizeof whole - 1);
+    assert_refused(write_bytes("f.nc", "\x89HDF\r\n\x1a\n\0\0\0\0", 12), "libnetcdf says");
+    assert_refused(write_bytes("f.nc", whole, count / 2), "libnetcdf says");
+}
+
+/* The program lives on, whatever the library makes of it: it reads something, or says one line. */
+static void any_damage_is_read_or_refused(void **state)
+{
+    (void)state;
+    static unsigned char whole[1 << 16], damaged[1 << 16];
+    const contents c = { .type = NC_SHORT, .chunks = true, .coordinates = true, .missing = true };
+    FILE *f = fopen(write_contents("g.nc", &c), "rb");
+    const size_t count = fread(whole, 1, sizeof whole, f);
+    fclose(f);
+    unsigned seed = 7;
+    int refused = 0;
+    for (int round = 0; round < 60; round++) {
+        memcpy(damaged, whole, count);
+        for (int n = 0; n < 1 + round % 8; n++)
+            damaged[8 + (size_t)(rand_r(&seed) % (int)(count - 8))] = (unsigned char)rand_r(&seed);
+        refused += survives(write_bytes("h.nc", damaged, count), NULL);
+    }
+    assert_in_range(refused, 5, 60);
+}
+
+/* What a helper answers: all at once, and no more after it. */
+static struct {
+    trip_image_reply reply;
+    trip_image_netcdf about;
+    double coordinates[NX];
+} answer;
+
+static int answer_fd;
+
+static int answer_at_once(int fd)
+{
+    answer_fd = dup(fd);
+    const ssize_t sent = send(answer_fd, &answer, sizeof answer, MSG_NOSIGNAL);
+    shutdown(answer_fd, SHUT_WR);
+    return sent == (ssize_t)sizeof answer ? 0 : EIO;
+}
+
+/* A sound answer, changed by what `number` says. */
+static void make_answer(int number)
+{
+    trip_image_netcdf *v = &answer.about;
+    answer.reply = (trip_image_reply){ .outcome = TRIP_IMAGE_DONE,
+                                       .data_bytes = sizeof *v + sizeof answer.coordinates };
+    *v = (trip_image_netcdf){ .dims = { NX, NY, NZ },
+                              .type = TRIP_I16,
+                              .placed = 1,
+                              .slope = 1,
+                              .name = "t",
+                              .helper_bytes = 1000 };
+    for (int i = 0; i < NX; i++)
+        answer.coordinates[i] = i * i;
+    switch (number) {
+    case 1:
+        v->type = TRIP_SCALARS;
+        break;
+    case 2:
+        v->dims[1] = 0;
+        break;
+    case 3:
+        memset(v->name, 'x', sizeof v->name);
+        break;
+    case 4:
+        v->placed = 8;
+        break;
+    case 5:
+        v->slope = NAN;
+        break;
+    case 6:
+        answer.reply.data_bytes = sizeof *v - 1;
+        break;
+    case 7:
+        v->placed = 3;
+        break;
+    case 8:
+        v->dims[2] = INT64_MAX / 8;
+        break;
+    case 9:
+        v->helper_bytes = UINT64_MAX;
+        break;
+    case 10:
+        answer.coordinates[2] = NAN;
+        break;
+    case 11:
+        v->name[0] = '\n';
+        break;
+    default:
+        break;
+    }
+}
+
+static void answers_of_the_helper_are_not_trusted(void **state)
+{
+    (void)state;
+    static const char *const why[] = { NULL,
+                                       "slices of an unknown type",
+                                       "slices of no size",
+                                       "a variable without a name",
+                                       "no known axis",
+                                       "not finite",
+                                       "data of another size",
+                                       "coordinates of another size",
+                                       "",
+                                       "impossible size",
+                                       "not finite",
+                                       "a variable without a name" };
+    const char *path = write_bytes("i.nc", "\x89HDF\r\n\x1a\n", 8);
+    for (int n = 0; n < (int)(sizeof why / sizeof *why); n++) {
+        trip_budget *budget;
+        trip_volume *v;
+        assert_int_equal(trip_budget_create(&budget, 16 << 20), 0);
+        make_answer(n);
+        trip_image_helper_replace(answer_at_once, 1000);
+        catch_reports();
+        const int status = trip_volume_open(&v, path, NULL, budget);
+        trip_report_redirect(NULL, NULL);
+        trip_image_helper_replace(NULL, 0);
+        if (status == 0)
+            trip_volume_close(v);
+        close(answer_fd);
+        if ((status == 0) != (why[n] == NULL) || (why[n] && !strstr(reported, why[n])))
+            fail_msg("%d: status %d: %s", n, status, reported);
+        assert_int_equal(reports, why[n] != NULL);
+        assert_int_equal(trip_budget_left_bytes(budget), trip_budget_limit_bytes(budget));
+        trip_budget_destroy(budget);
+    }
+}
+
+/* Where the memory is less than a chunk takes, or than slices do. */
+static void what_does_not_fit_is_refused(void **state)
+{
+    (void)state;
+    int file, dims[3], variable;
+    for (int chunks = 0; chunks < 2; chunks++) {
+        const char *path = path_of("j.nc");
+        const size_t sizes[3] = { chunks ? 512 : 1, 1024, chunks ? 8 : 4096 };
+        assert_int_equal(nc_create(path, NC_NETCDF4 | NC_CLOBBER, &file), 0);
+        assert_int_equal(nc_set_fill(file, NC_NOFILL, NULL), 0);
+        for (int a = 0; a < 3; a++)
+            assert_int_equal(
+                nc_def_dim(file, (const char *[]){ "z", "y", "x" }[a], sizes[a], &dims[a]), 0);
+        assert_int_equal(nc_def_var(file, "t", NC_INT, 3, dims, &variable), 0);
+        if (chunks)
+            assert_int_equal(nc_def_var_chunking(file, variable, NC_CHUNKED, sizes), 0);
+        assert_int_equal(nc_close(file), 0);
+        trip_budget *budget;
+        trip_volume *v;
+        assert_int_equal(trip_budget_create(&budget, 8 << 20), 0);
+        catch_reports();
+        assert_int_equal(trip_volume_open(&v, path, NULL, budget), TRIP_ERROR);
+        trip_report_redirect(NULL, NULL);
+        assert_int_equal(reports, 1);
+        assert_non_null(strstr(reported, "larger --memory"));
+        trip_budget_destroy(budget);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_type_holds_the_sample),
+        cmocka_unit_test(coordinates_become_places),
+        cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
+        cmocka_unit_test(a_variable_is_chosen_by_name),
+        cmocka_unit_test(what_is_no_whole_file_is_refused),
+        cmocka_unit_test(any_damage_is_read_or_refused),
+        cmocka_unit_test(answers_of_the_helper_are_not_trusted),
+        cmocka_unit_test(what_does_not_fit_is_refused),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
