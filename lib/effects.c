@@ -42,8 +42,10 @@ static int choose(triptych *t)
     }
 }
 
-static int check_heat(const triptych *t, int effects)
+static int check_effects(const triptych *t, int effects)
 {
+    if (!TRIP_HAS_EFFECTS && effects)
+        return trip_fail(TRIP_USAGE, "render", "effects", "this build has none");
     if (effects & TRIPTYCH_EMISSION && !t->heat)
         return trip_fail(TRIP_USAGE, "render", "emission",
                          "there is no data set of heat that it could be of");
@@ -63,7 +65,7 @@ int trip_context_choose_effects(triptych *t)
     if (t->settings.show == TRIP_SHOW_MERGE) /* nothing of the volume is */
         effects = 0;
     if (!status)
-        status = check_heat(t, effects);
+        status = check_effects(t, effects);
     e->shadows = effects & TRIPTYCH_SHADOWS;
     e->occlusion = effects & TRIPTYCH_OCCLUSION;
     e->emission = effects & TRIPTYCH_EMISSION;

@@ -40,6 +40,7 @@ typedef enum trip_closed_form_fault {
     TRIP_CLOSED_FORM_ENDS, /* neither the least code shows nor the greatest, or there is none */
     TRIP_CLOSED_FORM_EXTINCTION, /* is no such polynomial */
     TRIP_CLOSED_FORM_COLOUR,     /* is not linear */
+    TRIP_CLOSED_FORM_EFFECTS, /* not asked: frames with effects, which take far more, look it up */
 } trip_closed_form_fault;
 
 /* Of the codes from `least` to `most` of a table of 65536; `longest` is D, world units. Most

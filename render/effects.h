@@ -14,8 +14,8 @@
  * light that is at a place. Half of what is around a surface is the body itself, hence 1 + s.
  *
  * Points of index space are places where spacing is uneven (coordinates.h). T and m are looked up
- * in a lattice over the volume (light_grid.h), that of m with cells twice as long; the integral renderer works them out, m by the same directions. What is cut away does not
- * attenuate.
+ * in a lattice over the volume (light_grid.h), that of m with cells twice as long; the integral
+ * renderer works them out, m by the same directions. What is cut away does not attenuate.
  *
  * Emission then adds what matter gives off by itself (emission.h).
  *
@@ -35,12 +35,12 @@
 /* Whether some effect depends on what light passes. */
 static inline bool trip_effects_light(const trip_effects *e)
 {
-    return e->shadows || e->occlusion;
+    return TRIP_HAS_EFFECTS && (e->shadows || e->occlusion);
 }
 
 static inline bool trip_effects_some(const trip_effects *e)
 {
-    return trip_effects_light(e) || e->emission || e->cueing > 0;
+    return TRIP_HAS_EFFECTS && (trip_effects_light(e) || e->emission || e->cueing > 0);
 }
 
 /* Directions that openness is the mean over: unit vectors, evenly spread. */

@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "effects.h"
 #include "field.h"
 #include "plan_cull.h"
 #include "mean.h"
@@ -411,8 +412,10 @@ static void plan_classification(const planning *p)
 {
     trip_plan *plan = p->plan;
     find_codes(plan, p->data, p->settings->kernel);
-    plan->not_closed = trip_closed_form_find(&plan->closed, p->table, plan->code_least,
-                                             plan->code_most, longest_ray(p->data));
+    plan->not_closed = TRIP_CLOSED_FORM_EFFECTS;
+    if (!trip_effects_some(&p->settings->effects))
+        plan->not_closed = trip_closed_form_find(&plan->closed, p->table, plan->code_least,
+                                                 plan->code_most, longest_ray(p->data));
 }
 
 static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
@@ -616,6 +619,7 @@ static void explain_classification(const trip_plan *plan, const trip_settings *s
         [TRIP_CLOSED_FORM_ENDS] = "neither the least nor the greatest of the values shows",
         [TRIP_CLOSED_FORM_EXTINCTION] = "extinction is not linear in the value, nor nearly",
         [TRIP_CLOSED_FORM_COLOUR] = "colours are not linear in the value",
+        [TRIP_CLOSED_FORM_EFFECTS] = "frames with effects do so",
     };
     const double *k = plan->closed.k;
     if (plan->gathers || s->classify != TRIP_CLASSIFY_POST)

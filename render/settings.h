@@ -85,6 +85,14 @@ typedef enum trip_show {
     TRIP_SHOW_LEVELS,  /* which level of detail */
 } trip_show;
 
+/* A build without effects refuses them: what they would cost where none runs is counted beside it
+ * (tests/compare/uncalled). */
+#ifdef TRIP_WITHOUT_EFFECTS
+#define TRIP_HAS_EFFECTS 0
+#else
+#define TRIP_HAS_EFFECTS 1
+#endif
+
 /* What is simulated besides colour and shading (effects.h). What is off costs nothing. */
 typedef struct trip_effects {
     bool shadows;      /* what lies towards the light attenuates it */

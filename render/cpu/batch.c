@@ -111,9 +111,9 @@ static void empty_staged(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
 {
     const _Atomic uint64_t *open = much_is_occluded(r) ? r->mask.panes : NULL;
     uint32_t at = chunk->splat + chunk->splats;
-    chunk->splats += r->kernels->project(&r->views[chunk->list], open, &w->scratch.staged, *staged,
-                                         &w->scratch.lanes, r->filling->splats + at,
-                                         trip_cpu_depths_from(r->filling, at));
+    chunk->splats +=
+        r->project(&r->views[chunk->list], open, &w->scratch.staged, *staged, &w->scratch.lanes,
+                   r->filling->splats + at, trip_cpu_depths_from(r->filling, at));
     *staged = 0;
 }
 

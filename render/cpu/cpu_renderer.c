@@ -15,6 +15,7 @@
 #include "cpu/sheets/sheets.h"
 #include "cpu/panes.h"
 #include "cpu/view.h"
+#include "light_map.h"
 #include "report.h"
 #include "sheet.h"
 
@@ -217,6 +218,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->in_layer = false;
     r->frame = frame;
     r->kernels = kernels_for(r, frame);
+    r->project = trip_effects_some(&frame->settings->effects) ? r->kernels->project_effects
+                                                              : r->kernels->project;
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
     if (classifies_post(r))

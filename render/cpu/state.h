@@ -42,8 +42,9 @@ typedef struct trip_cpu_sheets trip_cpu_sheets;
 typedef struct trip_cpu {
     trip_renderer base;
     trip_budget *budget;
-    const trip_cpu_kernels *isa;     /* for layers of colour alone */
-    const trip_cpu_kernels *kernels; /* for the frame's layers */
+    const trip_cpu_kernels *isa;      /* for layers of colour alone */
+    const trip_cpu_kernels *kernels;  /* for the frame's layers */
+    trip_cpu_project_kernel *project; /* of these, for its effects or without */
     trip_cpu_pool *pool;
     char device[64];
     trip_cpu_worker *workers;

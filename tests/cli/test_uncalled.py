@@ -34,6 +34,7 @@ CALLED_FOR = {
     "AFFINE": [["--kernel", "ewa", "--classify", "pre"]],
     "UNEVEN": [["uneven.trip"], ["uneven.trip", "--classify", "pre"]],
     "SUMS": [["--compositing", "sheet", "--classify", "pre"]],
+    "FLATTENED": [["--flatten", "2", "--kernel", "ewa", "--classify", "pre"]],
     "CLOSED": [["--tf", "solid.tf"]],
 }
 EFFECTS = ["--effects", "shadows,occlusion,cueing,emission", "--light", "1,1,1", "--emission",

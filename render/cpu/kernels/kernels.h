@@ -207,6 +207,10 @@ typedef enum trip_cpu_content {
 
 struct trip_cpu_region;
 
+typedef uint32_t trip_cpu_project_kernel(const trip_cpu_view *view, const _Atomic uint64_t *open,
+                                         const trip_cpu_staged *staged, uint32_t count,
+                                         trip_cpu_lanes *lanes, trip_cpu_splat *out, float *depths);
+
 /* Composites a group's segments into a pane's pixels. Returns which of its texels are open, as
  * trip_cpu_mask has them. */
 typedef uint64_t trip_cpu_sheet_kernel(const trip_cpu_sheet_view *view, const trip_cpu_group *group,
@@ -232,9 +236,7 @@ typedef struct trip_cpu_kernels {
      * order. With `open`, a word a pane as in trip_cpu_mask, those over saturated texels alone may
      * be left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many.
      */
-    uint32_t (*project)(const trip_cpu_view *view, const _Atomic uint64_t *open,
-                        const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
-                        trip_cpu_splat *out, float *depths);
+    trip_cpu_project_kernel *project, *project_effects; /* the latter of frames with effects */
 
     /* Empties a pane's pixels: transparent where the list has weight, saturated elsewhere; `alone`
      * says that its weight is 1 all over the pane. */
@@ -288,8 +290,8 @@ typedef struct trip_cpu_kernels {
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);
-    /* The latter where segments have a closed form (closed_form.h). */
-    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed;
+    /* The latter where segments have a closed form (closed_form.h), and of frames with effects. */
+    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed, *sheet_pane_effects;
 } trip_cpu_kernels;
 
 #endif

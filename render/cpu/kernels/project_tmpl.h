@@ -800,7 +800,7 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
                  v_gather(table + 2, code * 4) };
     if (view->tinted)
         c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
-    if (!view->shading && !view->effects.some)
+    if (!view->shading && !TRIP_CPU_EFFECTS)
         return c;
     const v3 eye = unit(towards_eye(view, staged, at)), light = light_of(view, eye, staged, at);
     surface s;
@@ -808,7 +808,7 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
         s = surface_of(view, eye, light, vi_load(staged->normal + at));
     else
         s = (surface){ .strength = v_set(0), .gloss = v_set(0) };
-    return view->effects.some ? with_effects(view, c, eye, light, &s, staged, at) : shaded(&s, c);
+    return TRIP_CPU_EFFECTS ? with_effects(view, c, eye, light, &s, staged, at) : shaded(&s, c);
 }
 
 /* trip_cpu_splat.c[] of thin splats. */

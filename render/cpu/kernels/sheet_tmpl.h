@@ -1116,7 +1116,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     light_way of_place;
     const light_way *way = &l->way;
     vf at[3];
-    if (view->effects.some || view->point_light)
+    if (TRIP_CPU_EFFECTS || view->point_light)
         places_at(g, path, l, n, middle - v_set(path->along[n]), at);
     if (view->point_light) {
         find_way(view, at, l->to_eye, &of_place);
@@ -1127,7 +1127,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         find_light(view, g, b);
         lit = surface_between(view, path, l, way, a, b);
     }
-    if (view->effects.some) {
+    if (TRIP_CPU_EFFECTS) {
         effects_on(&view->effects, at, &lit, way->light, l->to_eye, s.rgb);
     } else if (view->shading) {
         light_segment(&lit, &s);

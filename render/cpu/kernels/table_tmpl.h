@@ -2,7 +2,7 @@
 #ifndef TRIP_CPU_TABLE_H
 #define TRIP_CPU_TABLE_H
 
-#if TRIP_CPU_CLOSED
+#if TRIP_CPU_CLOSED || TRIP_CPU_EFFECTS
 #pragma GCC diagnostic ignored "-Wunused-function"
 #endif
 
@@ -18,33 +18,52 @@
 #include "cpu/kernels/sum_tmpl.h"
 
 /* Defines the table `name` of the instruction set called `isa`, or with depth the one that `name`
- * names for layers with depth; with TRIP_CPU_CLOSED what either has for segments in closed form. */
-#if TRIP_CPU_CLOSED && TRIP_CPU_DEPTH
-#define TRIP_CPU_TABLE(name, isa_name) CLOSED(name##_depth_closed)
-#elif TRIP_CPU_CLOSED
-#define TRIP_CPU_TABLE(name, isa_name) CLOSED(name##_closed)
-#elif TRIP_CPU_DEPTH
-#define TRIP_CPU_TABLE(name, isa_name)                                                             \
-    extern trip_cpu_sheet_kernel name##_depth_closed;                                              \
-    const trip_cpu_kernels name##_depth = KERNELS(isa_name, NULL, name##_depth_closed)
+ * names for layers with depth; with TRIP_CPU_CLOSED or TRIP_CPU_EFFECTS what either has for segments
+ * in closed form or for frames with effects. */
+#if TRIP_CPU_DEPTH
+#define TRIP_CPU_TABLE(name, isa_name) DEFINE(name##_depth, isa_name, NULL)
 #else
 #define TRIP_CPU_TABLE(name, isa_name)                                                             \
-    extern trip_cpu_sheet_kernel name##_closed;                                                    \
     extern const trip_cpu_kernels name##_depth;                                                    \
-    const trip_cpu_kernels name = KERNELS(isa_name, &name##_depth, name##_closed)
+    DEFINE(name, isa_name, &name##_depth)
 #endif
 
-/* Of the kernels it alone is compiled then. */
-#define CLOSED(name)                                                                               \
+#define SHEET_KERNEL(name)                                                                         \
     extern trip_cpu_sheet_kernel name;                                                             \
     uint64_t name(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,          \
                   float *pixels)                                                                   \
     {                                                                                              \
         return sheet_pane(view, g, x, y, pixels);                                                  \
-    }                                                                                              \
-    static_assert(TRIP_CPU_CLOSED, "for the semicolon")
+    }
 
-#define KERNELS(isa_name, depth_table, closed)                                                     \
+#define PROJECT_KERNEL(name)                                                                       \
+    extern trip_cpu_project_kernel name;                                                           \
+    uint32_t name(const trip_cpu_view *view, const _Atomic uint64_t *open,                         \
+                  const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,            \
+                  trip_cpu_splat *out, float *depths)                                              \
+    {                                                                                              \
+        return project(view, open, staged, count, lanes, out, depths);                             \
+    }
+
+/* Each ends as a declaration that a semicolon is to follow. */
+#if TRIP_CPU_CLOSED
+#define DEFINE(name, isa_name, depth_table)                                                        \
+    SHEET_KERNEL(name##_sheet_closed)                                                              \
+    static_assert(TRIP_CPU_CLOSED, "it alone is compiled then")
+#elif TRIP_CPU_EFFECTS
+#define DEFINE(name, isa_name, depth_table)                                                        \
+    SHEET_KERNEL(name##_sheet_effects)                                                             \
+    PROJECT_KERNEL(name##_project_effects)                                                         \
+    static_assert(TRIP_CPU_EFFECTS, "they alone are compiled then")
+#else
+#define DEFINE(name, isa_name, depth_table)                                                        \
+    extern trip_cpu_sheet_kernel name##_sheet_closed, name##_sheet_effects;                        \
+    extern trip_cpu_project_kernel name##_project_effects;                                         \
+    const trip_cpu_kernels name = KERNELS(isa_name, depth_table, name##_sheet_closed,              \
+                                          name##_sheet_effects, name##_project_effects)
+#endif
+
+#define KERNELS(isa_name, depth_table, closed, with_effects, project_with_effects)                 \
     {                                                                                              \
         .isa = isa_name, .lanes = V, .channels = CHANNELS, .with_depth = depth_table,              \
         .squares = squares, .stage = stage, .project = project, .pane_clear = pane_clear,          \
@@ -54,6 +73,7 @@
         .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
         .sheet_gradients = sheet_gradients, .sheet_between = sheet_between,                        \
         .sheet_pane = sheet_pane, .sheet_pane_closed = (closed),                                   \
+        .sheet_pane_effects = (with_effects), .project_effects = (project_with_effects),           \
     }
 
 #endif

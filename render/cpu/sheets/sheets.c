@@ -7,6 +7,7 @@
 #include "cpu/sheets/pass_view.h"
 #include "cpu/sheets/state.h"
 #include "cpu/panes.h"
+#include "effects.h"
 #include "report.h"
 #include "sheet.h"
 
@@ -73,7 +74,9 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
     s->store.codes = trip_cpu_codes_of(plan->code_least, plan->code_most);
     s->store.coordinates = &r->frame->data->coordinates;
-    s->sheet_pane = closed ? r->kernels->sheet_pane_closed : r->kernels->sheet_pane;
+    s->sheet_pane = trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
+                    : closed                                        ? r->kernels->sheet_pane_closed
+                                                                    : r->kernels->sheet_pane;
     trip_cpu_function_set(&s->function, r->frame->table, closed ? &plan->closed : NULL,
                           s->store.codes, r->frame->camera->voxel_world);
     return 0;
