@@ -25,6 +25,7 @@ struct trip_workers {
     uint64_t items, next_item;
     unsigned busy; /* threads that have not yet left the loop */
     int status;
+    bool reported; /* a failure of this loop */
 };
 
 typedef struct seat {
@@ -53,12 +54,14 @@ static bool take_item(trip_workers *w, uint64_t *item)
     return some;
 }
 
-/* True for the first one of a loop. */
-static bool note_failure(trip_workers *w, int status)
+/* True for the first report of a loop. A failure may have none: that of another thread has it,
+ * which need not end first. */
+static bool note_failure(trip_workers *w, int status, const trip_held_report *report)
 {
     pthread_mutex_lock(&w->lock);
-    bool first = w->status == 0;
-    if (first)
+    bool first = *report->line && !w->reported;
+    w->reported |= first;
+    if (w->status == 0)
         w->status = status;
     pthread_mutex_unlock(&w->lock);
     return first;
@@ -72,7 +75,7 @@ static void run_loop(trip_workers *w, unsigned thread)
         trip_report_hold(&report);
         int status = w->work(w->user, thread, item);
         trip_report_release(&report);
-        if (status < 0 && note_failure(w, status))
+        if (status < 0 && note_failure(w, status, &report))
             trip_report_print(&report);
     }
 }
@@ -177,6 +180,7 @@ void trip_workers_start(trip_workers *w, trip_work work, void *user, uint64_t it
     w->items = items;
     w->next_item = 0;
     w->status = 0;
+    w->reported = false;
     w->busy = w->count;
     w->loop++;
     pthread_cond_broadcast(&w->started);

@@ -2,8 +2,10 @@
 #include "interrupt.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
+#include <unistd.h>
 
 #include "workers.h"
 
@@ -133,6 +135,33 @@ static int count_up(void *user, unsigned thread, uint64_t item)
     return 0;
 }
 
+/* One thread has failed without a report of its own when the other reports why. */
+static int fail_late_with_the_report(void *user, unsigned thread, uint64_t item)
+{
+    atomic_int *failed = user;
+    (void)thread;
+    if (item == 1) {
+        *failed = 1;
+        return -5;
+    }
+    while (!*failed)
+        sched_yield();
+    usleep(20000);
+    return trip_fail(-4, "write", "here", "no space left");
+}
+
+static void a_report_that_comes_after_a_failure_without_one_is_kept(void **state)
+{
+    (void)state;
+    trip_workers *pool;
+    atomic_int failed = 0;
+    assert_int_equal(trip_workers_create(&pool, 2), 0);
+    test_catch_reports();
+    assert_true(trip_workers_run(pool, fail_late_with_the_report, &failed, 2) < 0);
+    assert_one_report("no space left");
+    trip_workers_destroy(pool);
+}
+
 static void a_signal_to_stop_ends_a_loop_with_one_report(void **state)
 {
     (void)state;
@@ -157,6 +186,7 @@ int main(void)
         cmocka_unit_test(a_loop_of_nothing_is_over_at_once),
         cmocka_unit_test(waiting_may_be_cut_short),
         cmocka_unit_test(a_failure_of_several_threads_at_once_is_reported_once),
+        cmocka_unit_test(a_report_that_comes_after_a_failure_without_one_is_kept),
         cmocka_unit_test(a_signal_to_stop_ends_a_loop_with_one_report),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
