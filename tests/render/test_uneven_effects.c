@@ -22,6 +22,7 @@ static void make_uneven(uneven *u)
 {
     static const int steps[EDGE - 1] = { 1, 1, 2, 3, 3, 2, 2, 3, 1, 1, 1, 3, 3, 2, 1, 3, 1, 3, 2 };
     const double *along[3];
+    u->hot = false;
     for (int a = 0; a < 3; a++) {
         u->at[a][0] = 0;
         for (int i = 1; i < EDGE; i++)
