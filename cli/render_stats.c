@@ -319,6 +319,7 @@ int render_stats_explain_cost(triptych *t, FILE *out)
         fprintf(out, "heat        %s read in %.1f ms; %s of memory\n",
                 trip_format_bytes(frame.heat_bytes_read, bytes), frame.heat_ms,
                 trip_format_bytes(frame.heat_memory_bytes, memory));
+    fprintf(out, "drawn by    %s: %s\n", frame.renderer, frame.device);
     fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
             frame.ms, frame.wait_ms, frame.draw_ms, frame.merge_ms);

@@ -203,13 +203,15 @@ static int check_kernels(const trip_frame *frame)
 
 /* Sheets with uneven spacing, and those interpolated from 64 voxels, are drawn by the plain kernels
  * (kernels/sheet_tmpl.h). */
-static const trip_cpu_kernels *kernels_for(const trip_cpu *r, const trip_frame *frame)
+static void choose_kernels(trip_cpu *r)
 {
-    const bool plain = frame->settings->classify == TRIP_CLASSIFY_POST &&
-                       (trip_coordinates_uneven(&frame->data->coordinates) ||
-                        frame->settings->kernel != TRIP_KERNEL_LINEAR);
-    const trip_cpu_kernels *isa = plain ? &trip_cpu_plain : r->isa;
-    return frame->settings->depth ? isa->with_depth : isa;
+    const trip_settings *s = r->frame->settings;
+    r->draws_plain =
+        s->classify == TRIP_CLASSIFY_POST &&
+        (trip_coordinates_uneven(&r->frame->data->coordinates) || s->kernel != TRIP_KERNEL_LINEAR);
+    const trip_cpu_kernels *isa = r->draws_plain ? &trip_cpu_plain : r->isa;
+    r->kernels = s->depth ? isa->with_depth : isa;
+    r->project = trip_effects_some(&s->effects) ? r->kernels->project_effects : r->kernels->project;
 }
 
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
@@ -217,9 +219,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     trip_cpu *r = (trip_cpu *)base;
     r->in_layer = false;
     r->frame = frame;
-    r->kernels = kernels_for(r, frame);
-    r->project = trip_effects_some(&frame->settings->effects) ? r->kernels->project_effects
-                                                              : r->kernels->project;
+    choose_kernels(r);
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].scratch.lanes.broken = false;
     if (classifies_post(r))
@@ -263,7 +263,8 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 
 static const char *device(const trip_renderer *base)
 {
-    return ((const trip_cpu *)base)->device;
+    const trip_cpu *r = (const trip_cpu *)base;
+    return r->draws_plain ? r->plain_device : r->device;
 }
 
 static void destroy(trip_renderer *base)
@@ -333,6 +334,12 @@ bool trip_cpu_occluded(void *renderer, const trip_selection *selection, uint32_t
 
 /* ---- creation ---- */
 
+static void describe(char device[TRIP_CPU_DEVICE], const trip_cpu_kernels *isa, unsigned threads)
+{
+    snprintf(device, TRIP_CPU_DEVICE, "CPU, %s, %u thread%s", isa->isa, threads,
+             threads == 1 ? "" : "s");
+}
+
 static int create_parts(trip_cpu *r, unsigned threads)
 {
     int status = trip_cpu_pool_create(&r->pool, threads);
@@ -348,8 +355,8 @@ static int create_parts(trip_cpu *r, unsigned threads)
                          threads);
     }
     status = create_buffers(r);
-    snprintf(r->device, sizeof r->device, "CPU, %s, %u thread%s", r->isa->isa, threads,
-             threads == 1 ? "" : "s");
+    describe(r->device, r->isa, threads);
+    describe(r->plain_device, &trip_cpu_plain, threads);
     return status;
 }
 

@@ -39,6 +39,8 @@ typedef struct trip_cpu_portion {
 /* Of frames that classify after interpolation. */
 typedef struct trip_cpu_sheets trip_cpu_sheets;
 
+enum { TRIP_CPU_DEVICE = 64 };
+
 typedef struct trip_cpu {
     trip_renderer base;
     trip_budget *budget;
@@ -46,7 +48,8 @@ typedef struct trip_cpu {
     const trip_cpu_kernels *kernels;  /* for the frame's layers */
     trip_cpu_project_kernel *project; /* of these, for its effects or without */
     trip_cpu_pool *pool;
-    char device[64];
+    bool draws_plain; /* the frame, by plain kernels whatever `isa` is */
+    char device[TRIP_CPU_DEVICE], plain_device[TRIP_CPU_DEVICE];
     trip_cpu_worker *workers;
     size_t workers_bytes;
 
