@@ -309,8 +309,8 @@ static int plan_frame(triptych *t)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
         return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
-    status = trip_plan_make(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
-                            s->table, s->budget);
+    status = trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
+                                 s->table, session_classified(s, t->level), s->budget);
     t->plan.level = t->level;
     return status;
 }

@@ -90,11 +90,22 @@ int session_read_text(session *s)
     return status;
 }
 
+trip_classification *session_classified(session *s, unsigned level)
+{
+    trip_classification *c = &s->classified[level % 2];
+    if (s->classified_level[level % 2] != level)
+        *c = (trip_classification){ 0 };
+    s->classified_level[level % 2] = level;
+    return c;
+}
+
 int session_use_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
     int status = session_read_text(s);
+    for (int i = 0; i < 2; i++)
+        trip_classification_forget_form(&s->classified[i]);
     if (!status && !s->table)
         status = take_table(s);
     if (!status)
@@ -151,6 +162,7 @@ int session_add_data(session *s, const char *input)
     }
     trip_dataset_join_close(s->joined);
     s->data = s->joined = joined;
+    memset(s->classified, 0, sizeof s->classified);
     return 0;
 }
 

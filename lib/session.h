@@ -19,6 +19,10 @@ typedef struct session {
     trip_dataset_text **texts; /* by part; NULL until they are wanted */
     trip_dataset_text *text;   /* the first of these */
     trip_tf_entry *table;      /* 65536 entries; the same */
+    /* Of frames before, by whether their level is odd: a frame may have two, one above the other.
+     */
+    trip_classification classified[2];
+    unsigned classified_level[2];
 } session;
 
 /* The transfer function; zero means the one kept in the data set, as it is. */
@@ -39,6 +43,8 @@ int session_add_data(session *s, const char *input);
 int session_read_text(session *s);
 /* Its function, from now on: reads the text and takes the table where they are not there yet. */
 int session_use_function(session *s, const session_look *look);
+/* What is known of frames that are drawn from a level of its data with its function. */
+trip_classification *session_classified(session *s, unsigned level);
 /* Both. Warns when the function shows values that were left out when the data set was made, with
  * the command that makes it anew. Close it also after a failure. */
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);

@@ -24,7 +24,8 @@ typedef struct planning {
     const trip_settings *settings;
     const trip_tf_entry *table;
     trip_budget *budget;
-    trip_brick_ranges *about; /* post: of the lists along the axis at hand; else NULL */
+    trip_classification *classified; /* by frames before */
+    trip_brick_ranges *about;        /* post: of the lists along the axis at hand; else NULL */
 } planning;
 
 /* The sheets on one side of the eye, or all. */
@@ -373,49 +374,20 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
     return why ? trip_fail(TRIP_USAGE, "render", data->path, "has uneven spacing: %s", why) : 0;
 }
 
-/* Of all that frames of level 0 may read, and what the kernel interpolates from it. */
-static void find_codes(trip_plan *plan, const trip_dataset *data, trip_kernel kernel)
-{
-    unsigned least = UINT16_MAX, most = 0;
-    double bounds[2];
-    for (unsigned i = 0; i < data->list_count; i++) {
-        const trip_list *list = &data->lists[i];
-        if (list->level > 0 || !trip_kind_of(list->kind)->lattice)
-            continue;
-        for (uint64_t n = 0; n < list->brick_count; n++) {
-            least = list->bricks[n].code_min < least ? list->bricks[n].code_min : least;
-            most = list->bricks[n].code_max > most ? list->bricks[n].code_max : most;
-        }
-    }
-    plan->code_least = least;
-    plan->code_most = most;
-    if (least > most)
-        return;
-    trip_field_code_bounds(kernel, least, most, bounds);
-    plan->code_least = (unsigned)fmax(0, floor(bounds[0]));
-    plan->code_most = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
-}
-
-/* No ray in the volume is longer: world units. */
-static double longest_ray(const trip_dataset *data)
-{
-    const trip_affine *map = &data->index_to_world;
-    double sum = 0;
-    for (int a = 0; a < 3; a++)
-        sum += (double)data->header.dims[a] *
-               trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a]));
-    return sum;
-}
-
 /* Whether values need be looked up. */
 static void plan_classification(const planning *p)
 {
     trip_plan *plan = p->plan;
-    find_codes(plan, p->data, p->settings->kernel);
-    plan->not_closed = TRIP_CLOSED_FORM_EFFECTS;
-    if (!trip_effects_some(&p->settings->effects))
-        plan->not_closed = trip_closed_form_find(&plan->closed, p->table, plan->code_least,
-                                                 plan->code_most, longest_ray(p->data));
+    trip_classification *c = p->classified;
+    const bool effects = trip_effects_some(&p->settings->effects);
+    if (effects)
+        trip_classification_codes(c, p->data, p->settings->kernel);
+    else
+        trip_classification_form(c, p->data, p->settings->kernel, p->table);
+    plan->code_least = c->code_least;
+    plan->code_most = c->code_most;
+    plan->not_closed = effects ? TRIP_CLOSED_FORM_EFFECTS : c->not_closed;
+    plan->closed = c->closed;
 }
 
 static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
@@ -428,7 +400,15 @@ static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const tr
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
-    const planning p = { plan, data, camera, settings, table, budget, NULL };
+    return trip_plan_make_next(plan, data, camera, settings, table, &(trip_classification){ 0 },
+                               budget);
+}
+
+int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
+                        const trip_settings *settings, const trip_tf_entry *table,
+                        trip_classification *classified, trip_budget *budget)
+{
+    const planning p = { plan, data, camera, settings, table, budget, classified, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .planes = planes_of(data, settings) };
@@ -509,7 +489,7 @@ static unsigned planes_gathered(const trip_dataset *data, const trip_settings *s
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                          const trip_settings *settings, unsigned kinds, trip_budget *budget)
 {
-    const planning p = { plan, data, camera, settings, NULL, budget, NULL };
+    const planning p = { plan, data, camera, settings, NULL, budget, NULL, NULL };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .gathers = true,

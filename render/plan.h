@@ -6,7 +6,7 @@
 #include <stdio.h>
 
 #include "camera.h"
-#include "closed_form.h"
+#include "classification.h"
 #include "list_grid.h"
 #include "lod.h"
 #include "selection.h"
@@ -51,9 +51,7 @@ typedef struct trip_plan {
     trip_clip clip; /* in index space: what of the grid is inside */
     const trip_coordinates *coordinates; /* of the data set */
     unsigned planes;                     /* bit per trip_plane to read */
-    /* post: what all of the data set's codes lie between (least > most: there are none), and
-     * whether segments between them have a closed form. It does not go by the bricks of the frame:
-     * a picture does not depend on how these were cut. */
+    /* post: as classification.h has them, but that frames with effects have no closed form. */
     unsigned code_least, code_most;
     trip_closed_form_fault not_closed;
     trip_closed_form closed; /* where not_closed is TRIP_CLOSED_FORM_FOUND */
@@ -68,6 +66,11 @@ typedef struct trip_plan {
  * transparent are left out. */
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget);
+/* The same after other frames of the data set, with what is known from them in `classified`; what
+ * is known after this one is put there. */
+int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
+                        const trip_settings *settings, const trip_tf_entry *table,
+                        trip_classification *classified, trip_budget *budget);
 /* For the integral renderer: one pass over all of the list of level 0 along z, whatever the view
  * and the function. `kinds` has a bit for each trip_kind that is read; 0: nothing is. */
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,

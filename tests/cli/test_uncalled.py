@@ -114,6 +114,18 @@ class Uncalled(program.ProgramTest):
                                  "--tf", function, "--classify", "post", "--stats", "-")
                 self.assertEqual(json.loads(run.stdout)["closed_form"], closed, (renderer, function))
 
+    def test_the_kernels_that_draw_are_named(self):
+        """Of grids with uneven spacing those of sheets are plain ones, those of splats the processor's."""
+        def device(data, *options):
+            run = self.works("render", data, "-o", "a.exr", *SIZE, "--renderer", "cpu", *options,
+                             "--stats", "-")
+            return json.loads(run.stdout)["device"]
+        usual = device("ball.trip")
+        self.assertEqual(device("uneven.trip", "--classify", "pre"), usual)
+        self.assertEqual(device("uneven.trip"), "CPU, plain, 1 thread")
+        _, said = self.draw("--renderer", "cpu", "--kernel", "cubic", "--explain")
+        self.assertRegex(said, "(?m)^drawn by    cpu: CPU, plain, 1 thread$")
+
     def test_where_effects_do_not_matter_all_of_them_change_nothing(self):
         """Nothing is dense enough to shade or to glow, and what is far has the colour it fades to."""
         for renderer in "cpu", "reference", *program.GL:
@@ -125,6 +137,22 @@ class Uncalled(program.ProgramTest):
                 self.assertGreater(plain[..., 3].max(), 1e-4)
                 self.assertLess(abs(forced - plain).max(), 0.02 * plain[..., 3].max())
 
+    def costs(self):
+        with open("cost", encoding="utf-8") as f:
+            return instructions.function_costs(f)
+
+    @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
+    @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
+    def test_what_a_function_comes_to_is_worked_out_once(self):
+        found = []
+        for frames in 1, 3:
+            self.works("--tool=callgrind", "--callgrind-out-file=cost", program.PROGRAM, "render",
+                       "ball.trip", "-o", "a.tif", *SIZE, "--renderer", "cpu", "--engine", "pread",
+                       "--tf", "line.tf", "--orbit", frames, "--in-flight", 1,
+                       program="valgrind")
+            found.append(self.costs()[0]["trip_closed_form_find"])
+        self.assertEqual(found[0], found[1])
+
     @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
     @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
     def test_no_instruction_is_taken_for_it(self):
@@ -134,8 +162,7 @@ class Uncalled(program.ProgramTest):
                        "ball.trip", "-o", "a.tif", *SIZE, "--renderer", "cpu", "--engine", "pread",
                        "--light", "1,1,1", "--effects", effects, *look,
                        program="valgrind", env=dict(os.environ, TRIPTYCH_ISA="plain"))
-            with open("cost", encoding="utf-8") as f:
-                costs, total = instructions.function_costs(f)
+            costs, total = self.costs()
             drawing = [costs[name] for name in ("sheet_pane", "pane_merge", "sheet_gradients",
                                                 "sheet_between", "trip_cpu_store_decode")]
             return drawing, total

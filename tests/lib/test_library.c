@@ -1047,6 +1047,109 @@ static void heat_is_read_once_where_emission_runs(void **state)
     triptych_destroy(t);
 }
 
+/* In steps along z, so that the values of a part of it end below those of the whole. */
+static void brick_rising_volume(void)
+{
+    enum { EDGE = 16 };
+    FILE *f = fopen("rising.nrrd", "wb");
+    assert_non_null(f);
+    fprintf(f, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: %d %d %d\nencoding: raw\n\n", EDGE,
+            EDGE, EDGE);
+    for (int i = 0; i < EDGE * EDGE * EDGE; i++)
+        fputc(i / EDGE / EDGE * 17, f);
+    assert_int_equal(fclose(f), 0);
+    triptych *t = new_context();
+    for (int part = 0; part < 2; part++) {
+        const triptych_brick_options options = { .keep_all = 1,
+                                                 .replace = 1,
+                                                 .region_first = { 0, 0, 8 * part },
+                                                 .region_past = { EDGE, EDGE, 8 + 8 * part },
+                                                 .memory_bytes = 64 << 20,
+                                                 .threads = 1 };
+        assert_int_equal(
+            triptych_brick(t, "rising.nrrd", part ? "high.trip" : "low.trip", &options, NULL),
+            TRIPTYCH_OK);
+    }
+    triptych_destroy(t);
+}
+
+/* As a context draws it that has drawn nothing before, and whether the function had a closed form.
+ */
+static void assert_drawn_afresh(triptych *t, const char *function, const triptych_settings *s,
+                                bool with_high, bool closed)
+{
+    static float rgba[FLOATS], expected[FLOATS];
+    triptych *other = new_context();
+    assert_int_equal(triptych_open(other, "low.trip", NULL), TRIPTYCH_OK);
+    if (with_high)
+        assert_int_equal(triptych_add(other, "high.trip"), TRIPTYCH_OK);
+    triptych *both[2] = { t, other };
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(triptych_set_function(both[i], &(triptych_function){ .text = function }),
+                         TRIPTYCH_OK);
+        assert_int_equal(triptych_set_settings(both[i], s), TRIPTYCH_OK);
+        assert_int_equal(
+            triptych_set_view(
+                both[i], &(triptych_view){ .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO }),
+            TRIPTYCH_OK);
+    }
+    for (int i = 0; i < 2; i++) /* what the first frame found is there for the second */
+        assert_int_equal(draw(t, rgba).closed_form, closed);
+    assert_int_equal(draw(other, expected).closed_form, closed);
+    assert_true(are_same(rgba, expected));
+    triptych_destroy(other);
+}
+
+#define LOOK "unit voxel\nvalues data\n0 .9 .6 .3 0\n"
+
+static void whether_a_function_is_looked_up_goes_by_what_is_drawn_now(void **state)
+{
+    (void)state;
+    static const char *const line = LOOK "255 .9 .6 .3 .1\n";
+    /* Up to 140 as before; the greatest value of the lower part and about it is 136. */
+    static const char *const bent = LOOK "140 .9 .6 .3 .054902\n255 .1 .6 .9 .9\n";
+    triptych_settings usual = triptych_default_settings(), cued = usual, cubic = usual;
+    cued.effects = TRIPTYCH_CUEING;
+    cubic.kernel = TRIPTYCH_CUBIC; /* which overshoots that */
+    brick_rising_volume();
+    triptych *t = new_context();
+    assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
+    assert_drawn_afresh(t, line, &usual, false, true);
+    assert_drawn_afresh(t, LOOK "60 .9 .6 .3 .02\n255 .1 .6 .9 .9\n", &usual, false, false);
+    assert_drawn_afresh(t, bent, &usual, false, true);
+    assert_drawn_afresh(t, bent, &cued, false, false);
+    assert_drawn_afresh(t, bent, &cubic, false, false);
+    assert_drawn_afresh(t, line, &cubic, false, true);
+    assert_drawn_afresh(t, bent, &usual, false, true);
+    assert_int_equal(triptych_add(t, "high.trip"), TRIPTYCH_OK);
+    assert_drawn_afresh(t, bent, &usual, true, false);
+    assert_drawn_afresh(t, line, &usual, true, true);
+    assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
+    assert_drawn_afresh(t, bent, &usual, false, true);
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r low.trip high.trip rising.nrrd"), 0);
+}
+
+/* Sheets that are interpolated from 64 voxels have plain kernels alone. */
+static void the_device_names_the_kernels_that_draw(void **state)
+{
+    (void)state;
+    static float rgba[FLOATS];
+    char usual[64];
+    triptych *t = new_context();
+    triptych_settings s = triptych_default_settings();
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    snprintf(usual, sizeof usual, "%s", draw(t, rgba).device);
+    for (int i = 0; i < 4; i++) {
+        s.kernel = i == 1 ? TRIPTYCH_CUBIC : i == 2 ? TRIPTYCH_GAUSSIAN : TRIPTYCH_LINEAR;
+        s.classify = i == 3 ? TRIPTYCH_PRE : TRIPTYCH_POST;
+        assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+        assert_string_equal(draw(t, rgba).device,
+                            i == 1 || i == 2 ? "CPU, plain, 2 threads" : usual);
+    }
+    triptych_destroy(t);
+}
+
 static void measurements_keep_their_colours_unless_effects_are_asked_for(void **state)
 {
     (void)state;
@@ -1106,6 +1209,8 @@ int main(void)
         cmocka_unit_test(a_level_is_mixed_into_the_one_before_it),
         cmocka_unit_test(effects_cost_what_is_asked_for_and_are_kept_from_view_to_view),
         cmocka_unit_test(heat_is_read_once_where_emission_runs),
+        cmocka_unit_test(whether_a_function_is_looked_up_goes_by_what_is_drawn_now),
+        cmocka_unit_test(the_device_names_the_kernels_that_draw),
         cmocka_unit_test(measurements_keep_their_colours_unless_effects_are_asked_for),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
     };

@@ -377,6 +377,40 @@ static void the_plan_says_whether_the_function_is_looked_up(void **state)
     scene_destroy(&s);
 }
 
+/* What is known is not looked for again, in a table that is another by now, until it is forgotten.
+ */
+static void what_is_known_of_a_function_is_kept_from_plan_to_plan(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(0, 0, 1), 150, 20, 32);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+    settings.classify = TRIP_CLASSIFY_POST;
+    trip_classification known = { 0 };
+    for (int i = 0; i < 6; i++) {
+        trip_plan plan;
+        if (i == 1) /* it is constant, and now a step */
+            scene_colour(&s, 7000, 65535, 1, 1, 1, 0.5);
+        if (i == 4)
+            trip_classification_forget_form(&known);
+        settings.effects.cueing = i == 2 ? 0.5 : 0;
+        settings.kernel = i == 5 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_LINEAR;
+        assert_int_equal(
+            trip_plan_make_next(&plan, s.data, &c, &settings, s.table, &known, s.budget), 0);
+        assert_int_equal(plan.not_closed, i == 2  ? TRIP_CLOSED_FORM_EFFECTS
+                                          : i < 4 ? TRIP_CLOSED_FORM_FOUND
+                                                  : TRIP_CLOSED_FORM_EXTINCTION);
+        trip_plan afresh = make_plan(&s, &c, &settings);
+        assert_int_equal(plan.code_least, afresh.code_least);
+        assert_int_equal(plan.code_most, afresh.code_most);
+        trip_plan_release(&plan, s.budget);
+        trip_plan_release(&afresh, s.budget);
+    }
+    scene_destroy(&s);
+}
+
 static void grids_one_voxel_thick_have_no_values_between_voxels(void **state)
 {
     static const char *const along[] = { "along i", "along j", "along k" };
@@ -414,6 +448,7 @@ int main(void)
         cmocka_unit_test(normals_are_planned_only_for_shading),
         cmocka_unit_test(the_plan_explains_what_runs_and_why),
         cmocka_unit_test(the_plan_says_whether_the_function_is_looked_up),
+        cmocka_unit_test(what_is_known_of_a_function_is_kept_from_plan_to_plan),
         cmocka_unit_test(grids_one_voxel_thick_have_no_values_between_voxels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,69 @@
+#include "classification.h"
+
+#include <math.h>
+
+#include "field.h"
+#include "kind.h"
+#include "geometry.h"
+
+/* Of all that frames of level 0 may read. */
+static void find_held(trip_classification *c, const trip_dataset *data)
+{
+    unsigned least = UINT16_MAX, most = 0;
+    for (unsigned i = 0; i < data->list_count; i++) {
+        const trip_list *list = &data->lists[i];
+        if (list->level > 0 || !trip_kind_of(list->kind)->lattice)
+            continue;
+        for (uint64_t n = 0; n < list->brick_count; n++) {
+            least = list->bricks[n].code_min < least ? list->bricks[n].code_min : least;
+            most = list->bricks[n].code_max > most ? list->bricks[n].code_max : most;
+        }
+    }
+    c->held_least = least;
+    c->held_most = most;
+    c->has_codes = true;
+}
+
+void trip_classification_codes(trip_classification *c, const trip_dataset *data, trip_kernel kernel)
+{
+    double bounds[2];
+    if (!c->has_codes)
+        find_held(c, data);
+    else if (c->kernel == kernel)
+        return;
+    c->kernel = kernel;
+    c->has_form = false;
+    c->code_least = c->held_least;
+    c->code_most = c->held_most;
+    if (c->held_least > c->held_most)
+        return;
+    trip_field_code_bounds(kernel, c->held_least, c->held_most, bounds);
+    c->code_least = (unsigned)fmax(0, floor(bounds[0]));
+    c->code_most = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
+}
+
+/* No ray in the volume is longer: world units. */
+static double longest_ray(const trip_dataset *data)
+{
+    const trip_affine *map = &data->index_to_world;
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += (double)data->header.dims[a] *
+               trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a]));
+    return sum;
+}
+
+void trip_classification_form(trip_classification *c, const trip_dataset *data, trip_kernel kernel,
+                              const trip_tf_entry *table)
+{
+    trip_classification_codes(c, data, kernel);
+    if (!c->has_form)
+        c->not_closed = trip_closed_form_find(&c->closed, table, c->code_least, c->code_most,
+                                              longest_ray(data));
+    c->has_form = true;
+}
+
+void trip_classification_forget_form(trip_classification *c)
+{
+    c->has_form = false;
+}
