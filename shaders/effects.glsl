@@ -1,13 +1,13 @@
 // What light reaches a place, and what heat there gives off: the lattices of render/light_grid.h as
 // textures. Mirrors trip_effects_colour() in render/effects.c and trip_emission_at() in
-// render/emission.c. SHADOWS, OCCLUSION and EMISSION are the effects that run, LIT one of the first
+// render/emission.c. SHADOWS, OCCLUSION, EMISSION and CUED are the effects that run, LIT one of the first
 // two. Places are in index space of level 0, directions in world space.
 #include "shared.h"
 
 #if defined(SHADOWS) || defined(OCCLUSION)
 #define LIT
 #endif
-#if defined(LIT) || defined(EMISSION)
+#if defined(LIT) || defined(EMISSION) || defined(CUED)
 #define PLACED
 
 layout(std140, binding = TRIP_GL_EFFECTS) uniform trip_gl_effects
@@ -21,6 +21,14 @@ vec3 place_of(vec3 voxel)
     vec4 v = vec4(voxel, 1.0);
     return vec3(dot(index_0, v), dot(index_1, v), dot(index_2, v));
 }
+
+#ifdef CUED
+// What is farther fades into the background.
+vec3 cued(vec3 colour, vec3 place)
+{
+    return mix(colour, faded.rgb, faded.w * clamp(dot(cue, vec4(place, 1.0)), 0.0, 1.0));
+}
+#endif
 
 // Linear between nodes, in full precision, which filters of textures lack.
 float lattice_at(sampler3D lattice, vec3 node)

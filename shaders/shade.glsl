@@ -4,14 +4,6 @@
 #include "real.glsl"
 #include "effects.glsl"
 
-#ifdef CUED
-// Depth cueing of render/effects.h, by a layer's depth.
-vec3 cued(vec3 colour, float layer_depth)
-{
-    return mix(colour, vec3(background.rgb), float(cue.z) * clamp(layer_depth * float(cue.x) + float(cue.y), 0.0, 1.0));
-}
-#endif
-
 #if defined(SHADED) || defined(FLATTENED)
 // World-space gradient direction and, in w, its magnitude over that at full shading.
 #ifdef COMPACT

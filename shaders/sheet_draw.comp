@@ -338,7 +338,7 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
     colour += emission_at(middle_place);
 #endif
 #ifdef CUED
-    colour = cued(colour, middle * depth.x);
+    colour = cued(colour, middle_place);
 #endif
     float through = 1.0 - pixel.a, add = opacity(medium.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);

@@ -118,7 +118,7 @@ void main()
     entry.rgb += emission_at(place_of(r.voxel));
 #endif
 #ifdef CUED
-    entry.rgb = cued(entry.rgb, r.place.z * depth.x);
+    entry.rgb = cued(entry.rgb, place_of(r.voxel));
 #endif
     colour = vec4(entry.rgb, entry.a * s.amplitude);
 #ifdef DEPTH

@@ -148,19 +148,6 @@ static void set_compact_normals(trip_gl_frame_double *f, const trip_frame *frame
                      c.full / full);
 }
 
-/* By a layer's depth, that of the camera times the length of the ray at the image's centre. */
-static void set_cue(trip_gl_frame_double *f, const trip_frame *frame)
-{
-    const trip_camera *c = frame->camera;
-    const trip_effects_view e =
-        trip_effects_view_make(frame->settings, c, frame->data->header.dims);
-    const trip_vec3 cue = trip_v3(e.cue[0], e.cue[1], e.cue[2]);
-    if (frame->settings->effects.cueing > 0)
-        f->cue = (trip_gl_double4){ { trip_dot(cue, c->r0) / centre_length(c),
-                                      trip_dot(cue, c->eye) + e.cue[3],
-                                      frame->settings->effects.cueing, 0 } };
-}
-
 static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_camera *c, int axis)
 {
     const trip_settings *s = frame->settings;
@@ -187,7 +174,6 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
     double h = trip_weight_h(s);
     out->to_grid = (trip_gl_double4){ { 1, 1, 1, 1 } };
     out->weight = (trip_gl_double4){ { h, sqrt(1 + h * h), axis, frame->plan->axis_of_view } };
-    set_cue(out, frame);
     const double *b = s->background;
     out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
 }
@@ -248,11 +234,11 @@ static bool is_isotropic(const trip_camera *c)
     return true;
 }
 
-unsigned trip_gl_frame_lit(const trip_settings *settings)
+unsigned trip_gl_frame_placed(const trip_settings *settings)
 {
     const trip_effects *e = &settings->effects;
     return (e->shadows ? TRIP_GL_SHADOWS : 0) | (e->occlusion ? TRIP_GL_OCCLUSION : 0) |
-           (e->emission ? TRIP_GL_EMISSION : 0);
+           (e->emission ? TRIP_GL_EMISSION : 0) | (e->cueing > 0 ? TRIP_GL_CUED : 0);
 }
 
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis)
@@ -275,9 +261,7 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_INDEXED;
     if (s->depth)
         effects |= TRIP_GL_DEPTH;
-    if (s->effects.cueing > 0)
-        effects |= TRIP_GL_CUED;
-    effects |= trip_gl_frame_lit(s);
+    effects |= trip_gl_frame_placed(s);
     if (trip_settings_sum_sheets(s))
         effects |= TRIP_GL_SUMMED;
     if (s->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)

@@ -25,13 +25,13 @@ enum trip_gl_effect {
     TRIP_GL_FLATTENED = 4096, /* kernels, along their gradients */
     TRIP_GL_WIDE = 8192,      /* values are interpolated from 64 voxels (render/kernel.h) */
     TRIP_GL_FIXED = 16384,    /* footprints of one size; AFFINE, too, in perspective */
-    TRIP_GL_CUED = 32768,     /* colours fade into the background with depth (render/effects.h) */
     TRIP_GL_UNEVEN = 65536,   /* spacing is uneven */
-    /* Of render/effects.h: */
+    /* Of render/effects.h, for which shaders have the place of what they draw: */
+    TRIP_GL_CUED = 32768,
     TRIP_GL_SHADOWS = 131072,
     TRIP_GL_OCCLUSION = 262144,
     TRIP_GL_EMISSION = 524288,
-    TRIP_GL_LOOKED_UP = TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
+    TRIP_GL_PLACED = TRIP_GL_CUED | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
     TRIP_GL_CLOSED = 1048576, /* segments have a closed form (render/closed_form.h) */
     TRIP_GL_EFFECT_SETS = 2097152,
 };
@@ -50,8 +50,8 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
 void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis);
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in);
 
-/* Those of the frame that shaders look lattices up for (gl/lattices.h). */
-unsigned trip_gl_frame_lit(const trip_settings *settings);
+/* Those of TRIP_GL_PLACED that the frame has. */
+unsigned trip_gl_frame_placed(const trip_settings *settings);
 
 /* The effects of a list viewed by `camera`, TRIP_GL_QUADS and TRIP_GL_NEAR aside. */
 unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camera, int axis);

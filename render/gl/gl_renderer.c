@@ -360,7 +360,7 @@ static int draw_piece(gl_renderer *r, const trip_gl_piece *piece)
     if (status)
         return status;
     trip_gl_constants_bind_list(&r->constants, piece->list, false);
-    if (effects & TRIP_GL_LOOKED_UP)
+    if (effects & TRIP_GL_PLACED)
         trip_gl_lattices_bind_block(&r->lattices, piece->list);
     glUniform1i(TRIP_GL_ROW, r->band->first_row);
     if (piece->quads)

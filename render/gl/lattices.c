@@ -16,8 +16,7 @@ static_assert((int)TRIP_GL_EMISSION_STEPS == (int)TRIP_EMISSION_STEPS, "shared.h
 
 bool trip_gl_lattices_wanted(const trip_frame *frame)
 {
-    const trip_effects *e = &frame->settings->effects;
-    return trip_effects_light(e) || e->emission;
+    return trip_effects_some(&frame->settings->effects);
 }
 
 /* ---- lattices ---- */
@@ -158,18 +157,23 @@ static float nodes_per_voxel(const trip_light_grid *grid)
     return grid ? (float)(1 / grid->spacing) : 0;
 }
 
-static void set_light(trip_gl_effects_block *b, const trip_frame *frame)
+static void set_cue(trip_gl_effects_block *b, const trip_effects_view *view)
 {
-    const trip_effects_view view =
-        trip_effects_view_make(frame->settings, frame->camera, frame->data->header.dims);
-    const double g = view.effects.anisotropy;
+    const double *rgb = view->cue_rgb;
+    b->cue = row(view->cue[0], view->cue[1], view->cue[2], view->cue[3]);
+    b->faded = row(rgb[0], rgb[1], rgb[2], view->effects.cueing);
+}
+
+static void set_light(trip_gl_effects_block *b, const trip_effects_view *view)
+{
+    const double g = view->effects.anisotropy;
     trip_gl_float4 *rows[3] = { &b->aside_0, &b->aside_1, &b->aside_2 };
     for (int a = 0; a < 3; a++) {
-        const double *to = view.to_index.m[a];
-        *rows[a] = row(view.bias * to[0], view.bias * to[1], view.bias * to[2],
-                       trip_component(view.light, a));
+        const double *to = view->to_index.m[a];
+        *rows[a] = row(view->bias * to[0], view->bias * to[1], view->bias * to[2],
+                       trip_component(view->light, a));
     }
-    b->phase = row(1 - g * g, 1 + g * g, 2 * g, view.point_light);
+    b->phase = row(1 - g * g, 1 + g * g, 2 * g, view->point_light);
 }
 
 static void set_heat(trip_gl_effects_block *b, const trip_emission *emission)
@@ -192,8 +196,11 @@ trip_gl_effects_block trip_gl_effects_block_of(const trip_frame *frame, const tr
     set_places(&b, frame, list, list ? list->axis : axis);
     for (int i = 0; i < TRIP_GL_LATTICES; i++)
         b.per_voxel.v[i] = nodes_per_voxel(sources[i].grid);
-    if (trip_effects_light(&frame->settings->effects))
-        set_light(&b, frame);
+    const trip_effects_view view =
+        trip_effects_view_make(frame->settings, frame->camera, frame->data->header.dims);
+    set_cue(&b, &view);
+    if (trip_effects_light(&view.effects))
+        set_light(&b, &view);
     if (frame->settings->effects.emission)
         set_heat(&b, frame->emission);
     return b;

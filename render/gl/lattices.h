@@ -1,6 +1,7 @@
 /* What a frame's effects are drawn from (render/effects.h, render/emission.h): the lattices of what
  * light reaches and of heat as textures, kept until their numbers change, and the constants by
- * which shaders look places up in them. A frame without such effects has none of it. Owned by one
+ * which shaders place what they draw in them and along the view. A frame without effects has none
+ * of it. Owned by one
  * renderer; needs its context current. Textures count against the budget. */
 #ifndef TRIP_GL_LATTICES_H
 #define TRIP_GL_LATTICES_H
@@ -30,7 +31,7 @@ typedef struct trip_gl_lattices {
     unsigned room;          /* blocks */
 } trip_gl_lattices;
 
-/* Whether a frame has effects of this kind. */
+/* Whether a frame has effects. */
 bool trip_gl_lattices_wanted(const trip_frame *frame);
 /* Takes memory for a frame whose light and heat are begun, and gives back what an earlier one
  * needed; sets the constants: of lists, or of the layers of frames that classify after

@@ -93,20 +93,21 @@
                       the ray at the image's centre; y: world units a voxel of level 0 */            \
     R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                   \
     R4 background; /* r, g, b, a; not premultiplied */                                               \
-    R4 cue;  /* what fades into the background: x of a layer's depth and y, in [0, 1], times z */    \
-    R4 tint; /* rgb: of all that is drawn, before it is lit, where w is not 0 */
+    R4 tint;       /* rgb: of all that is drawn, before it is lit, where w is not 0 */
 
-/* Constants of the effects of a list, or of a layer of sheets, but for depth cueing
- * (render/effects.h, render/emission.h). */
+/* Constants of the effects of a list, or of a layer of sheets (render/effects.h,
+ * render/emission.h). */
 #define TRIP_GL_EFFECTS_FIELDS(R4)                                                                 \
     R4 eye_high, eye_low; /* its place in the list's grid, list axes: floats, and the rest */      \
     R4 index_0, index_1, index_2; /* xyz . a place there + w: in index space of level 0 */         \
     R4 aside_0, aside_1, aside_2; /* xyz . a unit vector of the world: the bias along it, in index \
                                      space; w: the place of a light that is at one */              \
     R4 per_voxel;                 /* nodes: of the light that reaches, of openness, of heat */     \
-    R4 phase;                     /* 1 - g^2, 1 + g^2, 2 g; 1: the light is at a place */          \
-    R4 heat_0, heat_1, heat_2;    /* xyz . a place in index space + w: in that of heat */          \
-    R4 heat_last;                 /* xyz: its last voxel */
+    R4 cue;   /* xyz . a place in index space + w: how far it has faded, from 0 to 1 */            \
+    R4 faded; /* rgb: what into, the background; w: how much of it at 1 */                         \
+    R4 phase; /* 1 - g^2, 1 + g^2, 2 g; 1: the light is at a place */                              \
+    R4 heat_0, heat_1, heat_2; /* xyz . a place in index space + w: in that of heat */             \
+    R4 heat_last;              /* xyz: its last voxel */
 
 /* Constants of a pass over the sheets of a list (render/sheet.h). Linear functions of a pixel are
  * xyz . (1, x, y) from the image's centre; lengths of rays are those of trip_gl_frame. */
@@ -206,8 +207,8 @@ struct trip_gl_sum {
     TRIP_GL_FLOAT entry[4];
 };
 
-/* In place of these where segments have a closed form, which names its terms (render/closed_form.h);
- * of a voxel's length. */
+/* In place of these where segments have a closed form, which names its terms
+ * (render/closed_form.h); of a voxel's length. */
 struct trip_gl_closed {
     TRIP_GL_FLOAT scale, offset, ramp, unused;
     TRIP_GL_FLOAT k[4], q0[4], q1[4];

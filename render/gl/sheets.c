@@ -26,7 +26,7 @@ static unsigned effects_of(const trip_frame *frame)
     return (s->kernel != TRIP_KERNEL_LINEAR ? TRIP_GL_WIDE : 0) |
            (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
            (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
-           (s->effects.cueing > 0 ? TRIP_GL_CUED : 0) | trip_gl_frame_lit(s) |
+           trip_gl_frame_placed(s) |
            (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0) |
            (frame->plan->not_closed ? 0 : TRIP_GL_CLOSED);
 }
@@ -417,7 +417,7 @@ static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_PLACES, s->places.buffer);
     glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
     glBindTextureUnit(TRIP_GL_SHEET_GRADIENTS, s->textures.gradients);
-    if (s->effects & TRIP_GL_LOOKED_UP) {
+    if (s->effects & TRIP_GL_PLACED) {
         trip_gl_lattices_bind(s->lattices);
         trip_gl_lattices_bind_block(s->lattices, (unsigned)s->axis);
     }

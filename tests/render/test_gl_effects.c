@@ -179,7 +179,6 @@ static void from_within_and_far_away_it_agrees_with_the_reference(void **state)
             scene_view(&l.s, trip_v3(0.9, 0.8, 0.7), distance,
                        i / 2 == 0 ? 100 : 2 * atan(20 / distance) * 180 / 3.14159265358979, SIZE);
         trip_settings settings = with_all(&l, both[i % 2]);
-        settings.effects.cueing = 0; /* which is by a distance in single precision */
         if (view.fov_degrees < 1e-5)
             view.ortho_height = 40; /* from there too */
         compare(i / 2 == 0 ? "within" : "far away", &l, &view, &settings);
@@ -386,7 +385,7 @@ static void what_is_not_called_for_is_not_copied(void **state)
     for (int n = 0; n < 2; n++) {
         set_up(&d, &l);
         trip_settings settings = with_all(&l, both[n]), plain = settings;
-        plain.effects = (trip_effects){ .cueing = 0.5, .cells = 20 };
+        plain.effects = (trip_effects){ .cells = 20 };
         assert_int_equal(draw(&d, &settings, rgba), 0); /* the functions of GL are found */
         assert_int_equal(draw(&d, &plain, rgba), 0);
         watch(true);
@@ -404,6 +403,10 @@ static void what_is_not_called_for_is_not_copied(void **state)
             assert_int_equal(device.copies, copies[frame]);
             assert_true((device.textures > 0) == runs && (device.blocks > 0) == runs);
         }
+        plain.effects.cueing = 0.5; /* of places alone */
+        device.copies = device.textures = 0;
+        assert_int_equal(draw(&d, &plain, rgba), 0);
+        assert_int_equal(device.copies + device.textures, 0);
         watch(false);
         put_away(&d);
     }
