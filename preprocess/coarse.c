@@ -31,6 +31,25 @@ static void add_gradient(trip_coarse_sum *s, double part, const double gradient[
         s->gradient[a] += (float)(copysign(weight, along) * gradient[a]);
 }
 
+/* Of a voxel whose coordinates are odd as the bits of the index say, its column along each axis. */
+static const uint8_t columns[8][3] = { { 0, 0, 0 }, { 0, 2, 1 }, { 1, 0, 2 }, { 1, 2, 3 },
+                                       { 2, 1, 0 }, { 2, 3, 1 }, { 3, 1, 2 }, { 3, 3, 3 } };
+
+void trip_coarse_sum_add_whole(trip_coarse_sum *s, uint16_t code, bool kept, unsigned odd,
+                               const double gradient[3])
+{
+    s->known += TRIP_COARSE_ALL;
+    s->value += (float)TRIP_COARSE_ALL * code;
+    if (!kept)
+        return;
+    s->kept += TRIP_COARSE_ALL;
+    s->mean += (float)TRIP_COARSE_ALL * code;
+    for (int a = 0; a < 3; a++)
+        s->open[a][columns[odd][a]] = 0;
+    if (gradient)
+        add_gradient(s, TRIP_COARSE_ALL, gradient);
+}
+
 void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, unsigned odd,
                          const double gradient[3])
 {
@@ -40,10 +59,8 @@ void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, uns
         return;
     s->kept += voxel->kept;
     s->mean += (float)voxel->kept * voxel->mean;
-    for (int a = 0; a < 3; a++) {
-        unsigned column = (odd >> (a + 1) % 3 & 1) | (odd >> (a + 2) % 3 & 1) << 1;
-        cover_column(&s->open[a][column], voxel->cover[a]);
-    }
+    for (int a = 0; a < 3; a++)
+        cover_column(&s->open[a][columns[odd][a]], voxel->cover[a]);
     if (gradient)
         add_gradient(s, voxel->kept, gradient);
 }

@@ -32,6 +32,10 @@ void trip_coarse_sum_clear(trip_coarse_sum *s);
 void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, unsigned odd,
                          const double gradient[3]);
 
+/* The same of a voxel of level 0, which has a value, and was kept or is of the halo. */
+void trip_coarse_sum_add_whole(trip_coarse_sum *s, uint16_t code, bool kept, unsigned odd,
+                               const double gradient[3]);
+
 /* Without u, v and normal; false where there was nothing to add up. */
 bool trip_coarse_sum_get(const trip_coarse_sum *s, trip_coarse_voxel *out);
 

@@ -1,7 +1,6 @@
 #include "level_source.h"
 
 #include <assert.h>
-#include <stdlib.h>
 
 #include "format.h"
 #include "report.h"
@@ -23,7 +22,7 @@ static int64_t even_bits(uint64_t m)
     return n;
 }
 
-/* Places the square at hand, of a sheet and a Morton code, in one of the next level. */
+/* Says of the square that it is at, of a sheet and a Morton code, where in the next level it is. */
 static void place(trip_level_source *s, uint64_t sheet, uint64_t morton)
 {
     unsigned up = s->edge_log2 + 1 - s->tile_log2;
@@ -34,66 +33,30 @@ static void place(trip_level_source *s, uint64_t sheet, uint64_t morton)
     s->has = true;
 }
 
-static int take_memory(trip_level_source *s)
-{
-    s->room = (size_t)1 << 2 * s->tile_log2;
-    s->memory = trip_budget_take(s->budget, s->room * sizeof *s->memory);
-    s->voxels = s->memory;
-    if (s->memory)
-        return 0;
-    return trip_fail(TRIP_ERROR, "brick", "levels",
-                     "need more memory: give more with --memory, or "
-                     "leave them out with --levels 0");
-}
-
 int trip_level_source_list(trip_level_source *s, trip_writer *w, unsigned list, bool kept,
                            unsigned odd, unsigned tile_log2, unsigned edge_log2,
                            trip_budget *budget)
 {
     *s = (trip_level_source){
-        .budget = budget, .odd = odd, .kept = kept, .edge_log2 = edge_log2, .tile_log2 = tile_log2
+        .odd = odd, .kept = kept, .edge_log2 = edge_log2, .tile_log2 = tile_log2
     };
-    int status = take_memory(s);
-    if (status == 0)
-        status = trip_list_cursor_open(&s->cursor, w, list, odd, budget);
+    int status = trip_list_cursor_open(&s->cursor, w, list, odd, budget);
     return status == 0 ? trip_level_source_next(s) : status;
 }
 
 int trip_level_source_file(trip_level_source *s, const trip_output *file, unsigned odd,
-                           unsigned edge_log2, trip_budget *budget)
+                           unsigned edge_log2)
 {
     *s = (trip_level_source){
-        .budget = budget, .odd = odd, .file = file, .edge_log2 = edge_log2, .tile_log2 = edge_log2
+        .odd = odd, .file = file, .edge_log2 = edge_log2, .tile_log2 = edge_log2
     };
-    int status = take_memory(s);
-    return status == 0 ? trip_level_source_next(s) : status;
+    return trip_level_source_next(s);
 }
 
 void trip_level_source_close(trip_level_source *s)
 {
     trip_list_cursor_close(s->cursor);
-    if (s->memory)
-        trip_budget_release(s->budget, s->memory, s->room * sizeof *s->memory);
     *s = (trip_level_source){ 0 };
-}
-
-static void take_run(trip_level_source *s, const trip_list_run *run)
-{
-    for (uint32_t i = 0; i < run->count; i++) {
-        const uint16_t code = (uint16_t)trip_voxel_code(run->voxels[i]);
-        trip_coarse_voxel *to = &s->memory[i];
-        *to = (trip_coarse_voxel){ .u = (uint8_t)trip_voxel_u(run->voxels[i]),
-                                   .v = (uint8_t)trip_voxel_v(run->voxels[i]),
-                                   .known = TRIP_COARSE_ALL,
-                                   .value = code };
-        if (!s->kept)
-            continue;
-        to->kept = to->cover[0] = to->cover[1] = to->cover[2] = TRIP_COARSE_ALL;
-        to->mean = code;
-        to->normal = run->normals ? run->normals[i] : 0;
-    }
-    s->count = run->count;
-    place(s, run->sheet, trip_morton(run->tile_u, run->tile_v));
 }
 
 int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_log2, uint64_t *key,
@@ -111,32 +74,29 @@ int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_l
 /* Over the sheets that are not wanted. */
 static int next_of_file(trip_level_source *s)
 {
-    square_header h;
-    while (s->at < s->file->bytes) {
-        int status = trip_level_file_square(s->file, s->at, s->tile_log2, &h.key, &h.count);
+    uint64_t key;
+    while (s->next < s->file->bytes) {
+        int status = trip_level_file_square(s->file, s->next, s->tile_log2, &key, &s->voxels.count);
         if (status < 0)
             return status;
-        uint64_t sheet = h.key >> TRIP_TILE_MORTON_BITS, bytes = h.count * sizeof *s->memory;
-        uint64_t first = s->at + sizeof h;
-        s->at = first + bytes;
-        if (sheet % 2 != s->odd)
-            continue;
-        place(s, sheet, h.key & TILE_MASK);
-        s->count = h.count;
-        return trip_output_read(s->file, first, s->memory, bytes);
+        s->voxels.at = s->next + TRIP_LEVEL_SQUARE_BYTES;
+        s->next = s->voxels.at + s->voxels.count * sizeof(trip_coarse_voxel);
+        if ((key >> TRIP_TILE_MORTON_BITS) % 2 == s->odd) {
+            place(s, key >> TRIP_TILE_MORTON_BITS, key & TILE_MASK);
+            return 0;
+        }
     }
     return 0;
 }
 
 int trip_level_source_next(trip_level_source *s)
 {
-    trip_list_run run;
     s->has = false;
     if (s->file)
         return next_of_file(s);
-    int status = trip_list_cursor_next(s->cursor, &run);
+    int status = trip_list_cursor_next(s->cursor, &s->run);
     if (status == 1)
-        take_run(s, &run);
+        place(s, s->run.sheet, trip_morton(s->run.brick.tile_u, s->run.brick.tile_v));
     return status < 0 ? status : 0;
 }
 

@@ -48,32 +48,38 @@ static uint64_t weight_of(const summing *s, unsigned code)
     return (uint64_t)(mean * kept + 0.5);
 }
 
-static void add_run(summing *s, const trip_list_run *run, unsigned tile_log2)
+static void add_run(summing *s, const trip_list_place *place, const trip_list_run *run,
+                    unsigned tile_log2)
 {
     const int *dims = s->dims;
-    const uint64_t plane = (uint64_t)(run->sheet >> s->shift[2]) * (uint64_t)dims[1];
+    const uint64_t plane = (uint64_t)(place->sheet >> s->shift[2]) * (uint64_t)dims[1];
     for (uint32_t n = 0; n < run->count; n++) {
         uint32_t voxel = run->voxels[n];
-        uint64_t i = (((uint64_t)run->tile_u << tile_log2) + trip_voxel_u(voxel)) >> s->shift[0];
-        uint64_t j = (((uint64_t)run->tile_v << tile_log2) + trip_voxel_v(voxel)) >> s->shift[1];
+        uint64_t i =
+            (((uint64_t)place->brick.tile_u << tile_log2) + trip_voxel_u(voxel)) >> s->shift[0];
+        uint64_t j =
+            (((uint64_t)place->brick.tile_v << tile_log2) + trip_voxel_v(voxel)) >> s->shift[1];
         s->weights[(plane + j) * (uint64_t)dims[0] + i] += weight_of(s, trip_voxel_code(voxel));
     }
 }
 
-static int add_sheets(summing *s, trip_writer *w, bool odd, trip_budget *budget)
+static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *buffer,
+                      trip_budget *budget)
 {
     unsigned list = s->level * s->params->level_lists + KEPT_ALONG_Z;
     trip_list_cursor *cursor;
+    trip_list_place place;
     trip_list_run run;
     int status = trip_list_cursor_open(&cursor, w, list, odd, budget);
     if (status < 0)
         return status;
-    while ((status = trip_list_cursor_next(cursor, &run)) > 0) {
-        add_run(s, &run, s->params->tile_log2);
-        if (trip_interrupted()) {
+    while ((status = trip_list_cursor_next(cursor, &place)) > 0) {
+        status = trip_list_cursor_read(cursor, &place, buffer, &run);
+        if (status == 0 && trip_interrupted())
             status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
+        if (status < 0)
             break;
-        }
+        add_run(s, &place, &run, s->params->tile_log2);
     }
     trip_list_cursor_close(cursor);
     return status;
@@ -100,11 +106,15 @@ int trip_occupancy_read(trip_occupancy *o, trip_writer *w, const trip_occupancy_
                          "finding it takes 3 MiB: give more with --memory");
     *s = (summing){ .params = params };
     choose_level(s);
-    int status = add_sheets(s, w, false, budget);
+    trip_list_buffer *buffer;
+    int status = trip_list_buffer_create(&buffer, w, budget);
     if (status == 0)
-        status = add_sheets(s, w, true, budget);
+        status = add_sheets(s, w, false, buffer, budget);
+    if (status == 0)
+        status = add_sheets(s, w, true, buffer, budget);
     if (status == 0)
         scale_weights(s, o);
+    trip_list_buffer_destroy(buffer, budget);
     trip_budget_release(budget, s, sizeof *s);
     return status;
 }

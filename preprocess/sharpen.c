@@ -33,37 +33,30 @@ static void *part(unsigned char *memory, size_t *at, size_t bytes)
     return p;
 }
 
-/* Returns the bytes; with memory NULL it computes these only. */
-static size_t lay_out(trip_sharpen *s, unsigned char *memory)
+size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned char *memory)
 {
-    const size_t plane = (size_t)1 << 2 * s->edge_log2;
+    const size_t plane = (size_t)1 << 2 * edge_log2;
     size_t at = 0;
-    s->voxels = part(memory, &at, plane * sizeof *s->voxels);
-    s->sums = part(memory, &at, plane * sizeof *s->sums);
-    s->squares = part(memory, &at, (1 + HELD) * sizeof *s->squares);
+    l->voxels = part(memory, &at, plane * sizeof *l->voxels);
+    l->sums = part(memory, &at, plane * sizeof *l->sums);
+    l->squares = part(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
         uint64_t *known = part(memory, &at, plane / 8);
         uint16_t *values = part(memory, &at, plane * sizeof *values);
         if (memory)
-            s->squares[i] = (trip_sharpen_square){ .known = known, .values = values };
+            l->squares[i] = (trip_sharpen_square){ .known = known, .values = values };
     }
     return at;
 }
 
-int trip_sharpen_open(trip_sharpen *s, const trip_output *file, unsigned edge_log2, uint16_t least,
-                      uint16_t most, trip_budget *budget)
+void trip_sharpen_open(trip_sharpen *s, const trip_output *file, unsigned edge_log2, uint16_t least,
+                       uint16_t most, trip_budget *budget)
 {
     *s = (trip_sharpen){
         .budget = budget, .file = file, .edge_log2 = edge_log2, .least = least, .most = most
     };
     for (unsigned i = 0; i < 3; i++)
         s->sheets[i].number = UINT64_MAX;
-    s->bytes = lay_out(s, NULL);
-    s->memory = trip_budget_take(budget, s->bytes);
-    if (!s->memory)
-        return fail_memory();
-    lay_out(s, s->memory);
-    return 0;
 }
 
 void trip_sharpen_close(trip_sharpen *s)
@@ -72,8 +65,6 @@ void trip_sharpen_close(trip_sharpen *s)
         if (s->sheets[i].places)
             trip_budget_release(s->budget, s->sheets[i].places,
                                 s->sheets[i].room * sizeof *s->sheets[i].places);
-    if (s->memory)
-        trip_budget_release(s->budget, s->memory, s->bytes);
     *s = (trip_sharpen){ 0 };
 }
 
@@ -91,15 +82,15 @@ uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uin
         squares = voxels;
     if (squares < LEAST_ROOM)
         squares = LEAST_ROOM;
-    return 7 * squares * sizeof(struct trip_sharpen_place);
+    return 7 * squares * sizeof(trip_sharpen_place);
 }
 
-static int add_place(trip_sharpen *s, trip_sharpen_sheet *sheet, struct trip_sharpen_place place)
+static int add_place(trip_sharpen *s, trip_sharpen_sheet *sheet, trip_sharpen_place place)
 {
     if (sheet->count == sheet->room) {
         const size_t room = sheet->room ? 2 * sheet->room : LEAST_ROOM,
                      size = sizeof *sheet->places;
-        struct trip_sharpen_place *places = trip_budget_take(s->budget, room * size);
+        trip_sharpen_place *places = trip_budget_take(s->budget, room * size);
         if (!places)
             return fail_memory();
         if (sheet->count > 0)
@@ -118,7 +109,7 @@ static int look_ahead(trip_sharpen *s, uint64_t last)
 {
     int status = 0;
     while (status == 0 && s->ahead < s->file->bytes) {
-        struct trip_sharpen_place place = { 0 };
+        trip_sharpen_place place = { 0 };
         status = trip_level_file_square(s->file, s->ahead, s->edge_log2, &place.key, &place.count);
         const uint64_t number = place.key >> TRIP_TILE_MORTON_BITS;
         if (status < 0 || number > last)
@@ -128,14 +119,14 @@ static int look_ahead(trip_sharpen *s, uint64_t last)
             sheet->count = 0;
         sheet->number = number;
         place.at = s->ahead + TRIP_LEVEL_SQUARE_BYTES;
-        s->ahead = place.at + place.count * sizeof *s->voxels;
+        s->ahead = place.at + place.count * sizeof(trip_coarse_voxel);
         status = add_place(s, sheet, place);
     }
     return status;
 }
 
 /* NULL: it has no voxels. */
-static const struct trip_sharpen_place *find_place(const trip_sharpen *s, uint64_t key)
+static const trip_sharpen_place *find_place(const trip_sharpen *s, uint64_t key)
 {
     const uint64_t number = key >> TRIP_TILE_MORTON_BITS;
     const trip_sharpen_sheet *sheet = &s->sheets[number % 3];
@@ -154,99 +145,82 @@ static const struct trip_sharpen_place *find_place(const trip_sharpen *s, uint64
 
 /* ---- squares ---- */
 
-static int read_square(trip_sharpen *s, const struct trip_sharpen_place *place,
+static int read_voxels(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place)
+{
+    return trip_output_read(s->file, place->at, l->voxels, place->count * sizeof *l->voxels);
+}
+
+static int read_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
                        trip_sharpen_square *to)
 {
-    int status = trip_output_read(s->file, place->at, s->voxels, place->count * sizeof *s->voxels);
+    int status = read_voxels(s, l, place);
     to->key = place->key;
     to->held = status == 0;
     memset(to->known, 0, (size_t)1 << (2 * s->edge_log2 - 3));
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
-        const size_t at = ((size_t)s->voxels[i].v << s->edge_log2) + s->voxels[i].u;
+        const size_t at = ((size_t)l->voxels[i].v << s->edge_log2) + l->voxels[i].u;
         to->known[at / 64] |= UINT64_C(1) << at % 64;
-        to->values[at] = s->voxels[i].value;
+        to->values[at] = l->voxels[i].value;
     }
     return status;
 }
 
-/* NULL: it has no voxels. */
-static int hold_square(trip_sharpen *s, uint64_t key, const trip_sharpen_square **out)
+static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
+                       const trip_sharpen_square **out)
 {
-    const struct trip_sharpen_place *place = find_place(s, key);
     trip_sharpen_square *square =
-        &s->squares[1 + (key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
-    *out = place ? square : NULL;
-    if (!place || (square->held && square->key == key))
-        return 0;
-    return read_square(s, place, square);
+        &l->squares[1 + (place->key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
+    *out = square;
+    return square->held && square->key == place->key ? 0 : read_square(s, l, place, square);
 }
 
 /* Of the square at hand the voxels of `count` rows from `row` on and of `width` columns from
  * `column` on, with those of another that are `shift` further. */
-static void add_beside(trip_sharpen *s, const trip_sharpen_square *other, size_t row, size_t count,
-                       size_t column, size_t width, ptrdiff_t shift)
+static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
+                       const trip_sharpen_square *other, size_t row, size_t count, size_t column,
+                       size_t width, ptrdiff_t shift)
 {
-    const trip_sharpen_square *here = &s->squares[0];
+    const trip_sharpen_square *here = &l->squares[0];
     for (size_t v = row; v < row + count; v++)
         for (size_t u = column; u < column + width; u++) {
             const size_t at = (v << s->edge_log2) + u, to = (size_t)((ptrdiff_t)at + shift);
             if (other->known[to / 64] >> to % 64 & 1)
-                s->sums[at] += here->values[at] - other->values[to];
+                l->sums[at] += here->values[at] - other->values[to];
         }
 }
 
-static uint64_t key_of(uint64_t sheet, int64_t u, int64_t v)
-{
-    return sheet << TRIP_TILE_MORTON_BITS | trip_morton((uint32_t)u, (uint32_t)v);
-}
-
-static int add_square(trip_sharpen *s, uint64_t key, size_t row, size_t count, size_t column,
-                      size_t width, ptrdiff_t shift)
+static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
+                      size_t row, size_t count, size_t column, size_t width, ptrdiff_t shift)
 {
     const trip_sharpen_square *other;
-    int status = hold_square(s, key, &other);
-    if (status == 0 && other)
-        add_beside(s, other, row, count, column, width, shift);
+    int status = place->count > 0 ? hold_square(s, l, place, &other) : 0;
+    if (status == 0 && place->count > 0)
+        add_beside(s, l, other, row, count, column, width, shift);
     return status;
 }
 
-static int64_t even_bits(uint64_t m)
-{
-    int64_t n = 0;
-    for (int bit = 0; bit < TRIP_TILE_MORTON_BITS / 2; bit++)
-        n |= (int64_t)(m >> 2 * bit & 1) << bit;
-    return n;
-}
-
-/* Along u and v, within the square at hand and from those around it. */
-static int add_around(trip_sharpen *s, uint64_t key)
+/* Along u and v, within the square at hand and from those around it; and from the sheets before and
+ * behind. */
+static int add_around(const trip_sharpen *s, trip_sharpen_lane *l,
+                      const trip_sharpen_place beside[6])
 {
     const size_t edge = (size_t)1 << s->edge_log2, last = edge - 1;
     const ptrdiff_t down = (ptrdiff_t)edge, across = (ptrdiff_t)last;
-    const int64_t u = even_bits(key & TILE_MASK), v = even_bits((key & TILE_MASK) >> 1);
-    const uint64_t sheet = key >> TRIP_TILE_MORTON_BITS;
-    int status = 0;
-    add_beside(s, &s->squares[0], 0, edge, 1, last, -1);
-    add_beside(s, &s->squares[0], 0, edge, 0, last, 1);
-    add_beside(s, &s->squares[0], 1, last, 0, edge, -down);
-    add_beside(s, &s->squares[0], 0, last, 0, edge, down);
-    if (u > 0)
-        status = add_square(s, key_of(sheet, u - 1, v), 0, edge, 0, 1, across);
+    const trip_sharpen_square *here = &l->squares[0];
+    add_beside(s, l, here, 0, edge, 1, last, -1);
+    add_beside(s, l, here, 0, edge, 0, last, 1);
+    add_beside(s, l, here, 1, last, 0, edge, -down);
+    add_beside(s, l, here, 0, last, 0, edge, down);
+    int status = add_square(s, l, &beside[0], 0, edge, 0, 1, across);
     if (status == 0)
-        status = add_square(s, key_of(sheet, u + 1, v), 0, edge, last, 1, -across);
-    if (status == 0 && v > 0)
-        status = add_square(s, key_of(sheet, u, v - 1), 0, 1, 0, edge, across * down);
+        status = add_square(s, l, &beside[1], 0, edge, last, 1, -across);
     if (status == 0)
-        status = add_square(s, key_of(sheet, u, v + 1), last, 1, 0, edge, -across * down);
+        status = add_square(s, l, &beside[2], 0, 1, 0, edge, across * down);
+    if (status == 0)
+        status = add_square(s, l, &beside[3], last, 1, 0, edge, -across * down);
+    for (int i = 4; i < 6 && status == 0; i++)
+        status = add_square(s, l, &beside[i], 0, edge, 0, edge, 0);
     return status;
-}
-
-static int add_sheets(trip_sharpen *s, uint64_t key)
-{
-    const uint64_t one = UINT64_C(1) << TRIP_TILE_MORTON_BITS;
-    const size_t edge = (size_t)1 << s->edge_log2;
-    int status = key >= one ? add_square(s, key - one, 0, edge, 0, edge, 0) : 0;
-    return status == 0 ? add_square(s, key + one, 0, edge, 0, edge, 0) : status;
 }
 
 /* value + sum / TRIP_SHARPEN_PART, the nearest. */
@@ -257,23 +231,24 @@ static uint16_t sharpened(const trip_sharpen *s, uint16_t value, int32_t sum)
     return (uint16_t)(to < s->least ? s->least : to > s->most ? s->most : to);
 }
 
-static int sharpen_square(trip_sharpen *s, const struct trip_sharpen_place *place)
+int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task)
 {
-    int status = read_square(s, place, &s->squares[0]);
-    memset(s->sums, 0, sizeof *s->sums << 2 * s->edge_log2);
+    const trip_sharpen_place *place = &task->square;
+    int status = read_square(s, l, place, &l->squares[0]);
+    memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     if (status == 0)
-        status = add_around(s, place->key);
-    if (status == 0)
-        status = add_sheets(s, place->key);
+        status = add_around(s, l, task->beside);
     if (status == 0) /* others were read into the same memory */
-        status = trip_output_read(s->file, place->at, s->voxels, place->count * sizeof *s->voxels);
+        status = read_voxels(s, l, place);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
-        trip_coarse_voxel *voxel = &s->voxels[i];
+        trip_coarse_voxel *voxel = &l->voxels[i];
         voxel->value =
-            sharpened(s, voxel->value, s->sums[((size_t)voxel->v << s->edge_log2) + voxel->u]);
+            sharpened(s, voxel->value, l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u]);
     }
     return status;
 }
+
+/* ---- one after the other ---- */
 
 /* The number of the next sheet with squares, UINT64_MAX when there is none. */
 static int next_sheet(trip_sharpen *s, uint64_t *number)
@@ -293,7 +268,39 @@ static int next_sheet(trip_sharpen *s, uint64_t *number)
     return status;
 }
 
-int trip_sharpen_next(trip_sharpen *s, uint64_t *key, trip_coarse_voxel **voxels, uint32_t *count)
+static int64_t even_bits(uint64_t m)
+{
+    int64_t n = 0;
+    for (int bit = 0; bit < TRIP_TILE_MORTON_BITS / 2; bit++)
+        n |= (int64_t)(m >> 2 * bit & 1) << bit;
+    return n;
+}
+
+/* Where the square is that lies so much further. */
+static trip_sharpen_place beside(const trip_sharpen *s, uint64_t key, int64_t u, int64_t v,
+                                 int64_t sheet)
+{
+    u += even_bits(key & TILE_MASK);
+    v += even_bits((key & TILE_MASK) >> 1);
+    sheet += (int64_t)(key >> TRIP_TILE_MORTON_BITS);
+    const trip_sharpen_place *place = NULL;
+    if (u >= 0 && v >= 0 && sheet >= 0)
+        place = find_place(s, (uint64_t)sheet << TRIP_TILE_MORTON_BITS |
+                                  trip_morton((uint32_t)u, (uint32_t)v));
+    return place ? *place : (trip_sharpen_place){ 0 };
+}
+
+static void find_beside(const trip_sharpen *s, trip_sharpen_task *task)
+{
+    const uint64_t key = task->square.key;
+    for (int i = 0; i < 6; i++) {
+        const int step = i % 2 ? 1 : -1;
+        task->beside[i] =
+            beside(s, key, i / 2 == 0 ? step : 0, i / 2 == 1 ? step : 0, i / 2 == 2 ? step : 0);
+    }
+}
+
+int trip_sharpen_take(trip_sharpen *s, trip_sharpen_task *task)
 {
     const trip_sharpen_sheet *sheet = &s->sheets[s->sheet % 3];
     if (sheet->number != s->sheet || s->next == sheet->count) {
@@ -308,10 +315,7 @@ int trip_sharpen_next(trip_sharpen *s, uint64_t *key, trip_coarse_voxel **voxels
             return status;
         sheet = &s->sheets[number % 3];
     }
-    const struct trip_sharpen_place *place = &sheet->places[s->next++];
-    *key = place->key;
-    *voxels = s->voxels;
-    *count = place->count;
-    int status = sharpen_square(s, place);
-    return status < 0 ? status : 1;
+    task->square = sheet->places[s->next++];
+    find_beside(s, task);
+    return 1;
 }

@@ -6,7 +6,9 @@
  *
  * those that are not there counting as equal, and within the volume's range of values. The voxels
  * come from the file that trip_level_file_append() writes, square by square; of the sheets before
- * and behind only where their squares lie is held, and a few squares. One thread. */
+ * and behind only where their squares lie is held, and a few squares by each lane. One thread opens
+ * and closes it; threads take squares one at a time, and sharpen them at the same time, each in a
+ * lane. */
 #ifndef TRIP_SHARPEN_H
 #define TRIP_SHARPEN_H
 
@@ -18,15 +20,30 @@ enum { TRIP_SHARPEN_PART = 10 };
 
 typedef struct trip_sharpen_square trip_sharpen_square;
 
+typedef struct trip_sharpen_place {
+    uint64_t key, at; /* in the file: of its voxels */
+    uint32_t count;
+} trip_sharpen_place;
+
 /* The squares of a sheet, by ascending key. */
 typedef struct trip_sharpen_sheet {
     uint64_t number;
-    struct trip_sharpen_place {
-        uint64_t key, at; /* in the file: of its voxels */
-        uint32_t count;
-    } * places;
+    trip_sharpen_place *places;
     size_t count, room;
 } trip_sharpen_sheet;
+
+/* A square, and those beside it, which have no voxels where the count is 0: along u, along v, in
+ * the sheets before and behind. */
+typedef struct trip_sharpen_task {
+    trip_sharpen_place square, beside[6];
+} trip_sharpen_task;
+
+/* Memory of a thread. */
+typedef struct trip_sharpen_lane {
+    trip_coarse_voxel *voxels;
+    int32_t *sums; /* of a square's voxels: how much more each is than those beside */
+    trip_sharpen_square *squares; /* the one at hand, and some that were needed lately */
+} trip_sharpen_lane;
 
 typedef struct trip_sharpen {
     trip_budget *budget;
@@ -37,24 +54,24 @@ typedef struct trip_sharpen {
     trip_sharpen_sheet sheets[3]; /* by number, modulo 3 */
     uint64_t sheet;               /* of the square at hand */
     size_t next;                  /* square of that sheet */
-    trip_coarse_voxel *voxels;
-    int32_t *sums; /* of a square's voxels: how much more each is than those beside */
-    trip_sharpen_square *squares; /* the one at hand, and some that were needed lately */
-    size_t bytes;
-    unsigned char *memory; /* of the arrays above */
 } trip_sharpen;
 
 /* Of a file with squares of 2^edge_log2 voxels; values remain in [least, most]. The file is
- * complete and flushed before the first square is read. */
-int trip_sharpen_open(trip_sharpen *s, const trip_output *file, unsigned edge_log2, uint16_t least,
-                      uint16_t most, trip_budget *budget);
+ * complete and flushed before the first square is taken. */
+void trip_sharpen_open(trip_sharpen *s, const trip_output *file, unsigned edge_log2, uint16_t least,
+                       uint16_t most, trip_budget *budget);
 void trip_sharpen_close(trip_sharpen *s);
 
 /* What it takes of the budget later, at most, of a level of at most so many voxels. */
 uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uint64_t voxels);
 
-/* The next square, its key and voxels, which are valid until the next call. Returns 1, 0 after the
- * last one, or a negative status. */
-int trip_sharpen_next(trip_sharpen *s, uint64_t *key, trip_coarse_voxel **voxels, uint32_t *count);
+/* Lays out a lane in memory of so many bytes, zeroed and aligned to 64; with NULL it computes these
+ * only. */
+size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned char *memory);
+
+/* The next square. Returns 1, 0 after the last one, or a negative status. One thread at a time. */
+int trip_sharpen_take(trip_sharpen *s, trip_sharpen_task *task);
+/* Its task.square.count voxels, in the lane until the next call. */
+int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task);
 
 #endif

@@ -5,6 +5,12 @@
 #include "report.h"
 #include "writer_state.h"
 
+struct trip_list_buffer {
+    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
+};
+
 /* At a run of a slab. The tables of the slab at hand are in memory, as they are while it is
  * written: their length is bounded by the tiles of a sheet. */
 struct trip_list_cursor {
@@ -19,10 +25,30 @@ struct trip_list_cursor {
     size_t tables_bytes;     /* of both, from the budget */
     uint64_t sheet, brick;   /* the next run, within the slab */
     uint64_t at[TRIP_PLANES];
-    uint64_t block[TRIP_BLOCK_WORDS_MAX];
-    unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
 };
+
+static int fail_memory(const trip_writer *w)
+{
+    return trip_fail(TRIP_ERROR, "brick", w->folder.path,
+                     "no memory to read a list back: give more with --memory");
+}
+
+int trip_list_buffer_create(trip_list_buffer **out, const trip_writer *w, trip_budget *budget)
+{
+    *out = trip_budget_take(budget, sizeof **out);
+    return *out ? TRIP_OK : fail_memory(w);
+}
+
+void trip_list_buffer_destroy(trip_list_buffer *b, trip_budget *budget)
+{
+    if (b)
+        trip_budget_release(budget, b, sizeof *b);
+}
+
+uint64_t trip_list_buffer_bytes(void)
+{
+    return sizeof(trip_list_buffer);
+}
 
 static int flush_list(trip_writer *w, trip_list_writer *l)
 {
@@ -40,8 +66,7 @@ int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list,
 {
     trip_list_cursor *c = *out = trip_budget_take(budget, sizeof *c);
     if (!c)
-        return trip_fail(TRIP_ERROR, "brick", w->folder.path,
-                         "no memory to read a list back: give more with --memory");
+        return fail_memory(w);
     c->budget = budget;
     c->writer = w;
     c->list = &w->lists[list];
@@ -68,8 +93,7 @@ static int fit_tables(trip_list_cursor *c)
         c->tables_bytes = 0;
         c->bricks = trip_budget_take(c->budget, bytes);
         if (!c->bricks)
-            return trip_fail(TRIP_ERROR, "brick", c->writer->folder.path,
-                             "no memory to read a list back: give more with --memory");
+            return fail_memory(c->writer);
         c->tables_bytes = bytes;
     }
     c->runs = (void *)(c->bricks + c->slab.brick_count);
@@ -98,61 +122,63 @@ static int enter_slab(trip_list_cursor *c)
     return status;
 }
 
-static int read_run(trip_list_cursor *c, const trip_file_run *r, trip_list_run *run)
+int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place,
+                          trip_list_buffer *to, trip_list_run *run)
 {
     const trip_list_writer *l = c->list;
-    const trip_file_brick *b = &c->bricks[c->brick];
+    const trip_file_run *r = &place->run;
     const bool normals = l->planes_present >> TRIP_PLANE_NORMALS & 1;
-    int status = trip_output_read(&l->planes[TRIP_PLANE_VOXELS], c->at[TRIP_PLANE_VOXELS], c->block,
-                                  8 * (size_t)r->words);
+    int status = trip_output_read(&l->planes[TRIP_PLANE_VOXELS], place->at[TRIP_PLANE_VOXELS],
+                                  to->block, 8 * (size_t)r->words);
     if (status == TRIP_OK && normals)
-        status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], c->at[TRIP_PLANE_NORMALS],
-                                  c->packed, (size_t)r->records * l->form.normal_bytes);
+        status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], place->at[TRIP_PLANE_NORMALS],
+                                  to->packed, (size_t)r->records * l->form.normal_bytes);
     if (status < 0)
         return status;
     const trip_block block =
-        trip_block_make(&l->form, r->records, r->words, c->block, normals ? c->packed : NULL);
-    if (!trip_block_words_fit(&l->form, r->records, r->words) || trip_block_check(&block, b))
+        trip_block_make(&l->form, r->records, r->words, to->block, normals ? to->packed : NULL);
+    if (!trip_block_words_fit(&l->form, r->records, r->words) ||
+        trip_block_check(&block, &place->brick))
         return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,
                          "is not what was written: the disk, or another program, changed it");
-    trip_block_voxels(&block, 0, r->records, c->voxels);
+    trip_block_voxels(&block, 0, r->records, to->voxels);
     if (normals)
-        trip_block_normals(&block, 0, r->records, c->normals);
-    *run = (trip_list_run){
-        .sheet = (uint32_t)(c->slab.slab * (uint64_t)c->writer->params.slab_sheets + c->sheet),
-        .tile_u = b->tile_u,
-        .tile_v = b->tile_v,
-        .count = r->records,
-        .voxels = c->voxels,
-        .normals = normals ? c->normals : NULL
-    };
+        trip_block_normals(&block, 0, r->records, to->normals);
+    *run = (trip_list_run){ .count = r->records,
+                            .voxels = to->voxels,
+                            .normals = normals ? to->normals : NULL };
     return TRIP_OK;
 }
 
-/* Goes on to the next run of the slab; 1 where *run is one that is wanted. */
-static int take_run(trip_list_cursor *c, trip_list_run *run)
+/* Goes on to the next run of the slab; true where *place is of one that is wanted. */
+static bool take_run(trip_list_cursor *c, trip_list_place *place)
 {
     const uint64_t sheets = c->writer->params.slab_sheets;
     const trip_file_run *r = &c->runs[c->brick * sheets + c->sheet];
-    bool odd = (c->slab.slab * sheets + c->sheet) % 2, wanted = r->records > 0 && odd == c->odd;
-    int status = wanted ? read_run(c, r, run) : TRIP_OK;
+    const uint64_t sheet = c->slab.slab * sheets + c->sheet;
+    const bool wanted = r->records > 0 && sheet % 2 == c->odd;
+    if (wanted)
+        *place = (trip_list_place){ .sheet = (uint32_t)sheet,
+                                    .brick = c->bricks[c->brick],
+                                    .run = *r,
+                                    .at = { c->at[TRIP_PLANE_VOXELS], c->at[TRIP_PLANE_NORMALS] } };
     c->at[TRIP_PLANE_VOXELS] += 8 * (uint64_t)r->words;
     c->at[TRIP_PLANE_NORMALS] += (uint64_t)r->records * c->list->form.normal_bytes;
     if (++c->brick == c->slab.brick_count) {
         c->brick = 0;
         c->sheet++;
     }
-    return status < 0 ? status : wanted;
+    return wanted;
 }
 
-int trip_list_cursor_next(trip_list_cursor *c, trip_list_run *run)
+int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place)
 {
     int status = 0;
     while (status == 0) {
         bool in_slab = c->next_slab > 0 && c->sheet < c->writer->params.slab_sheets;
         if (!in_slab && c->next_slab == c->list->slab_count)
             return 0;
-        status = in_slab ? take_run(c, run) : enter_slab(c);
+        status = in_slab ? take_run(c, place) : enter_slab(c);
     }
     return status;
 }

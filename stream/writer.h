@@ -78,20 +78,38 @@ int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary);
 void trip_writer_abort(trip_writer *w);
 
 /* The runs of a list that nothing is appended to any more, read back in list order: what coarser
- * levels are made from before the data set is finished. Memory does not grow with the list. */
+ * levels are made from before the data set is finished. Memory does not grow with the list. One
+ * thread goes on from run to run, any may read those that it came to. */
 typedef struct trip_list_cursor trip_list_cursor;
 
+/* Where a run is. */
+typedef struct trip_list_place {
+    uint32_t sheet;
+    trip_file_brick brick;
+    trip_file_run run;
+    uint64_t at[TRIP_PLANES];
+} trip_list_place;
+
+/* What a thread reads a run into. */
+typedef struct trip_list_buffer trip_list_buffer;
+
 typedef struct trip_list_run {
-    uint32_t sheet, tile_u, tile_v, count;
-    const uint32_t *voxels, *normals; /* as appended, until the next run; normals may be NULL */
+    uint32_t count;
+    const uint32_t *voxels, *normals; /* as appended, in the buffer; normals may be NULL */
 } trip_list_run;
 
 /* Sheets with sheet % 2 == `odd` alone. */
 int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list, bool odd,
                           trip_budget *budget);
 void trip_list_cursor_close(trip_list_cursor *c);
-/* 1: *run is the next one; 0: there is none; negative: failed. */
-int trip_list_cursor_next(trip_list_cursor *c, trip_list_run *run);
+/* 1: *place is that of the next one; 0: there is none; negative: failed. */
+int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place);
+
+int trip_list_buffer_create(trip_list_buffer **out, const trip_writer *w, trip_budget *budget);
+void trip_list_buffer_destroy(trip_list_buffer *b, trip_budget *budget);
+uint64_t trip_list_buffer_bytes(void);
+int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place,
+                          trip_list_buffer *to, trip_list_run *run);
 
 uint64_t trip_writer_bytes(const trip_writer *w);
 /* Of a list, by its number. */
