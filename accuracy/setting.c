@@ -88,14 +88,31 @@ static void add_targets(sweep *w)
     }
 }
 
-/* Radii and footprints of splats; kernels of values. */
+/* Less than the defaults, which are between, and more. */
+static void add_saturations(sweep *w)
+{
+    static const double saturations[] = { 0, 1.0 / 128, 1.0 / 32 };
+    for (size_t i = 0; i < sizeof saturations / sizeof *saturations; i++) {
+        triptych_settings pre = w->pre, post = w->post;
+        pre.saturation = post.saturation = saturations[i];
+        add(w, TRIPTYCH_RENDERER_CPU, post, "post-saturation-%g", saturations[i]);
+        add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-saturation-%g", saturations[i]);
+    }
+}
+
+/* Footprints of splats, their low-pass and radii; kernels of values. */
 static void add_kernels(sweep *w)
 {
     static const double radii[] = { 1.5, 2.5, 3 };
     triptych_settings s = w->pre;
     s.footprint = TRIPTYCH_FOOTPRINT_EWA;
     add(w, TRIPTYCH_RENDERER_CPU, s, "pre-ewa");
-    s.footprint = w->pre.footprint;
+    s.flatten = 3;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-ewa-flatten-3");
+    s = w->pre;
+    s.low_pass = TRIPTYCH_LOW_PASS_NONE;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "pre-low-pass-none");
+    s = w->pre;
     for (size_t i = 0; i < sizeof radii / sizeof *radii; i++) {
         s.kernel_radius = radii[i];
         add(w, TRIPTYCH_RENDERER_CPU, s, "pre-radius-%g", radii[i]);
@@ -149,6 +166,7 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptyc
     add_pre(&w, TRIPTYCH_BY_SPLAT);
     add_targets(&w);
     add_pre(&w, TRIPTYCH_BY_SHEET);
+    add_saturations(&w);
     add_levels(&w);
     add_kernels(&w);
     add_renderers(&w);
@@ -159,10 +177,12 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptyc
 bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b)
 {
     if (a->classify != b->classify || a->method != b->method || a->lod_px != b->lod_px ||
-        a->samples != b->samples || (a->method == TRIPTYCH_MERGE && a->h != b->h))
+        a->saturation != b->saturation || a->samples != b->samples ||
+        (a->method == TRIPTYCH_MERGE && a->h != b->h))
         return false;
     if (a->classify == TRIPTYCH_PRE)
         return a->compositing == b->compositing && a->kernel_radius == b->kernel_radius &&
-               a->footprint == b->footprint;
+               a->footprint == b->footprint && a->low_pass == b->low_pass &&
+               a->flatten == b->flatten;
     return a->slices == b->slices && a->kernel == b->kernel;
 }

@@ -7,7 +7,7 @@
 
 #include "triptych.h"
 
-enum { ACCURACY_NAME_BYTES = 48, ACCURACY_SETTINGS_MAX = 96, ACCURACY_OPTIONS_MAX = 12 };
+enum { ACCURACY_NAME_BYTES = 48, ACCURACY_SETTINGS_MAX = 96, ACCURACY_OPTIONS_MAX = 14 };
 
 typedef struct accuracy_setting {
     char name[ACCURACY_NAME_BYTES];

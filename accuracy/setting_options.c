@@ -11,6 +11,7 @@ static const char *const classifies[] = { "pre", "post", "auto", NULL };
 static const char *const compositings[] = { "splat", "sheet", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const footprints[] = { "exact", "ewa", "fixed", NULL };
+static const char *const low_passes[] = { "ewa", "uniform", "none", NULL };
 static const char *const kernels[] = { "linear", "cubic", "gaussian", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", NULL };
 
@@ -31,6 +32,10 @@ static void put_pre(const triptych_settings *s, accuracy_option *out, int *count
     put(out, count, "compositing", "%s", compositings[s->compositing]);
     if (s->footprint != TRIPTYCH_FOOTPRINT_EXACT)
         put(out, count, "kernel", "%s", footprints[s->footprint]);
+    if (s->flatten > 1)
+        put(out, count, "flatten", "%g", s->flatten);
+    if (s->low_pass != TRIPTYCH_LOW_PASS_EWA)
+        put(out, count, "low-pass", "%s", low_passes[s->low_pass]);
     put(out, count, "kernel-radius", "%g", s->kernel_radius);
     put(out, count, "target", "%s", targets[s->target]);
 }
@@ -60,6 +65,8 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
     put(out, &count, "method", "%s", methods[s->method]);
     if (s->method == TRIPTYCH_MERGE && s->h >= 0)
         put(out, &count, "h", "%g", s->h);
+    if (s->saturation >= 0)
+        put(out, &count, "saturation", "%.10g", s->saturation);
     if (s->lod_px > 0)
         put(out, &count, "lod", "%g", s->lod_px);
     return count;
@@ -91,6 +98,8 @@ static bool read_number(const char *name, const char *text, triptych_settings *s
         return read_integer(text, &s->slices);
     double *number = !strcmp(name, "h")               ? &s->h
                      : !strcmp(name, "kernel-radius") ? &s->kernel_radius
+                     : !strcmp(name, "flatten")       ? &s->flatten
+                     : !strcmp(name, "saturation")    ? &s->saturation
                      : !strcmp(name, "lod")           ? &s->lod_px
                      : !strcmp(name, "tolerance")     ? &s->tolerance
                                                       : NULL;
@@ -111,6 +120,8 @@ bool accuracy_setting_read_option(accuracy_setting *one, const char *name, const
         return s->footprint = (triptych_footprint)which, true;
     if (!strcmp(name, "kernel") && (which = find(value, kernels)) >= 0)
         return s->kernel = (triptych_kernel)which, true;
+    if (!strcmp(name, "low-pass") && (which = find(value, low_passes)) >= 0)
+        return s->low_pass = (triptych_low_pass)which, true;
     if (!strcmp(name, "target") && (which = find(value, targets)) >= 0)
         return s->target = (triptych_target)which, true;
     if (!strcmp(name, "method") && (which = find(value, methods)) >= 0)

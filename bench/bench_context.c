@@ -35,6 +35,7 @@ static triptych_settings settings_of(const trip_settings *s)
     to.compositing =
         s->compositing == TRIP_COMPOSITING_SHEET ? TRIPTYCH_BY_SHEET : TRIPTYCH_BY_SPLAT;
     to.slices = s->slices;
+    to.saturation = s->saturation;
     to.shading = s->shading;
     to.kernel_radius = s->kernel_radius;
     memset(to.background, 0, sizeof to.background);

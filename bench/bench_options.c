@@ -22,6 +22,7 @@ enum {
     KEY_CLASSIFY,
     KEY_COMPOSITING,
     KEY_SLICES,
+    KEY_SATURATION,
     KEY_FIELD,
     KEY_FINEST,
     KEY_PLOT,
@@ -31,7 +32,7 @@ enum {
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
-#define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES))
+#define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES) | BIT(KEY_SATURATION))
 #define OF_FLIGHT (BIT(KEY_SECONDS) | BIT(KEY_FPS))
 #define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST))
 
@@ -69,6 +70,10 @@ static const struct argp_option options[] = {
       "Likewise, pre (default: splat); renderers, stream, popping and levels only", 0 },
     { "slices", KEY_SLICES, "N", 0,
       "Slices of a sheet, post (default: by the view); renderers, stream, popping and levels only",
+      0 },
+    { "saturation", KEY_SATURATION, "T", 0,
+      "As of `triptych render` (default: pre 1/8192, post 1/512); renderers, stream, popping and "
+      "levels only",
       0 },
     { "field", KEY_FIELD, "NAME", 0,
       "What is sampled finer and finer: marschner-lobb, cloud, shells or filaments (default: "
@@ -322,6 +327,9 @@ static int parse_option(int key, char *arg, bench_options *o)
         return parse_compositing(arg, o);
     case KEY_SLICES:
         return trip_option_integer("--slices", arg, 1, TRIP_SLICES_MAX, &o->settings.slices);
+    case KEY_SATURATION:
+        return trip_option_number("--saturation", arg, 0, TRIP_SATURATION_MAX,
+                                  &o->settings.saturation);
     case KEY_FIELD:
         return parse_field(arg, o);
     case KEY_FINEST:

@@ -57,6 +57,7 @@ enum {
     KEY_TEMPERATURE,
     KEY_NO_SHADING,
     KEY_H,
+    KEY_SATURATION,
     KEY_KERNEL_RADIUS,
     KEY_LOW_PASS,
     KEY_FLATTEN,
@@ -185,6 +186,10 @@ static const struct argp_option options[] = {
       3 },
     { "h", KEY_H, "H", 0,
       "Where lists begin to blend, 0 to below 1 (default: pre 0.85, post 0.99); merge only", 3 },
+    { "saturation", KEY_SATURATION, "T", 0,
+      "Transmittance below which a pixel takes nothing of what lies behind, 0 (never) to 0.1, and "
+      "the most that it is off by (default: pre 1/8192, post 1/512)",
+      3 },
     { "weights", KEY_WEIGHTS, "pixel|vertex", 0,
       "What merge blends by: the weights of each pixel, or of the corners of splats, interpolated "
       "over them (by reference only) (default: pixel); pre only",
@@ -257,7 +262,7 @@ static const struct argp_option options[] = {
 typedef struct parse {
     render_options *o;
     quality_options quality;
-    bool h, target, background, lists, forms, side, light, level, kernel_radius;
+    bool h, saturation, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
     bool slices, compositing;
     bool kernel, integral; /* options of the integral renderer */
@@ -499,6 +504,9 @@ static int parse_method(int key, char *arg, parse *p)
         p->h = true;
         status = trip_option_number("--h", arg, 0, 1, &s->h);
         return !status && s->h == 1 ? trip_option_fail("--h", "must be below 1") : status;
+    case KEY_SATURATION:
+        p->saturation = true;
+        return trip_option_number("--saturation", arg, 0, 0.1, &s->saturation);
     case KEY_KERNEL_RADIUS:
         p->kernel_radius = true;
         return trip_option_number("--kernel-radius", arg, 0.1, 100, &s->kernel_radius);
@@ -716,6 +724,9 @@ static int check_integral(parse *p)
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");
+    if (integral && p->saturation)
+        return trip_option_fail("--saturation", "does not apply to --renderer integral, whose "
+                                                "--tolerance bounds what is left out");
     if (integral && (p->h || p->order || p->compositing || p->weights))
         return trip_option_fail("--method, --h, --weights, --traversal, --compositing",
                                 "do not apply to --renderer integral, which has no layers");
@@ -894,6 +905,9 @@ static int check(parse *p)
     if (p->level != (o->function.window > 0))
         return trip_option_fail(p->level ? "--level" : "--window",
                                 "--window and --level are given together");
+    if (p->saturation && o->settings.traversal != TRIPTYCH_OUTWARD)
+        return trip_option_fail("--saturation", "goes with --traversal outward: from back to front "
+                                                "all is drawn");
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     status = check_integral(p);

@@ -241,6 +241,8 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
             if (frame.effects >> i & 1)
                 cJSON_AddItemToArray(effects, cJSON_CreateString(names[i]));
     }
+    if (frame.saturation >= 0)
+        cJSON_AddNumberToObject(root, "saturation", frame.saturation);
     cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);

@@ -62,6 +62,7 @@ triptych_settings triptych_default_settings(void)
         .headlight = s.headlight,
         .light = { s.light_direction.x, s.light_direction.y, s.light_direction.z },
         .h = s.h,
+        .saturation = s.saturation,
         .kernel_radius = s.kernel_radius,
         .background = { s.background[0], s.background[1], s.background[2], s.background[3] },
         .lod_px = s.lod_px,
@@ -91,6 +92,7 @@ int triptych_set_quality(triptych_settings *s, triptych_quality quality)
     s->slices = quality == TRIPTYCH_EXACT ? 16 : s->slices;
     s->method = usual.method;
     s->h = usual.h;
+    s->saturation = quality == TRIPTYCH_EXACT ? TRIP_SATURATION_PRE : usual.saturation;
     s->target = usual.target;
     s->kernel_radius = usual.kernel_radius;
     s->lod_px = usual.lod_px;
@@ -183,6 +185,9 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1) && s->h != TRIPTYCH_H_AUTO)
         return "h lies between 0 and below 1, or is by the classification (-1)";
+    if (!(s->saturation >= 0 && s->saturation <= TRIP_SATURATION_MAX) &&
+        s->saturation != TRIPTYCH_SATURATION_AUTO)
+        return "saturation lies between 0 and 0.1, or is by the classification (-1)";
     if ((s->shading || s->effects) && !s->headlight && !isfinite(length))
         return "the light is too far away, or not finite";
     if ((s->shading || s->effects) && !s->headlight && !s->point_light && !(length > 0))
@@ -297,6 +302,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .depth = s->depth,
         .shading = s->shading,
         .h = s->h,
+        .saturation = s->saturation,
         .kernel_radius = s->kernel_radius,
         .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
         .lod_px = s->lod_px,

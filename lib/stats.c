@@ -104,6 +104,7 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .engine = trip_reader_engine_name(t->reader),
         .classify = (triptych_classify)t->drawn_settings.classify,
         .slices = t->drawn_settings.classify == TRIP_CLASSIFY_POST ? t->drawn_settings.slices : 0,
+        .saturation = t->plan.gathers ? -1 : trip_settings_saturation(&t->drawn_settings),
         .ring = ring_text(t->renderer, t->reader),
         .effects = effects_of(&t->drawn_settings.effects),
         .light_bytes_read = light.bytes_read,

@@ -295,6 +295,9 @@ enum {
 /* The h that suits the classification: 0.85 of splats, 0.99 of values. */
 #define TRIPTYCH_H_AUTO (-1.0)
 
+/* The saturation that suits the classification: 1/8192 of splats, 1/512 of values. */
+#define TRIPTYCH_SATURATION_AUTO (-1.0)
+
 typedef struct triptych_settings {
     triptych_classify classify;
     triptych_compositing compositing; /* pre */
@@ -316,6 +319,9 @@ typedef struct triptych_settings {
     int point_light;        /* not 0: light[] is the light's place, as bright at any distance */
     double light[3];        /* world direction to the light, not zero; or its place */
     double h;               /* where layers begin to blend, 0 to below 1, or TRIPTYCH_H_AUTO */
+    double saturation;    /* transmittance below which a pixel takes nothing of what lies behind, 0
+                             (none is) to 0.1, or TRIPTYCH_SATURATION_AUTO: no component is off by more
+                             than that. By gl with pre at most the default */
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
@@ -347,9 +353,9 @@ typedef struct triptych_settings {
 } triptych_settings;
 
 /* Classified by itself, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
- * outward, rgba32f, h by the classification, kernel radius 2, shading by headlight, black; values,
- * linear, 1e-4, one ray a pixel; no effects, and where they are set scattering alike, cueing 0.6,
- * up to 2500 K, 128 cells. */
+ * outward, rgba32f, h and saturation by the classification, kernel radius 2, shading by headlight,
+ * black; values, linear, 1e-4, one ray a pixel; no effects, and where they are set scattering
+ * alike, cueing 0.6, up to 2500 K, 128 cells. */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
 /* How close to the integral pictures are to be, for the time that takes; measured by `triptych
  * accuracy`, triptych-accuracy(1) has the figures. */
@@ -357,12 +363,12 @@ typedef enum triptych_quality {
     TRIPTYCH_DRAFT,
     TRIPTYCH_NORMAL, /* the default settings */
     TRIPTYCH_HIGH,
-    TRIPTYCH_EXACT,
+    TRIPTYCH_EXACT, /* with a saturation of 1/8192 also of values */
 } triptych_quality;
 
 /* Changes what accuracy is traded for time by: classify, compositing, footprint, low_pass, flatten,
- * vertex_weights, slices, method, h, target, kernel_radius, lod_px, max_bytes, max_ms and samples;
- * the rest stays. TRIPTYCH_USAGE: there is no such quality. */
+ * vertex_weights, slices, method, h, saturation, target, kernel_radius, lod_px, max_bytes, max_ms
+ * and samples; the rest stays. TRIPTYCH_USAGE: there is no such quality. */
 TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 
@@ -479,14 +485,16 @@ typedef struct triptych_frame_stats {
     const char *ring;                         /* where reads land, in words */
     triptych_classify classify;               /* pre or post, what was drawn */
     int slices;                               /* of a sheet, post; else 0 */
-    int effects;                              /* that ran; of shadows and occlusion: */
-    uint64_t light_bytes_read;                /* not in bytes_read; 0 where it was kept */
+    double saturation; /* transmittance below which pixels took no more; -1 of the integral */
+    int effects;       /* that ran; of shadows and occlusion: */
+    uint64_t light_bytes_read; /* not in bytes_read; 0 where it was kept */
     uint64_t light_memory_bytes;
     double light_gather_ms, light_sweep_ms; /* in ms: reading and gathering; working out */
     uint64_t heat_bytes_read;               /* of emission, likewise */
     uint64_t heat_memory_bytes;
     double heat_ms;
-    int closed_form; /* post: the function is linear in the value, or nearly, and was not looked up */
+    int closed_form; /* post: the function is linear in the value, or nearly, and was not looked up
+                      */
 } triptych_frame_stats;
 
 TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);

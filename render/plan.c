@@ -572,6 +572,8 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
         fprintf(out,
                 "compositing sheet: the splats of a sheet are summed, and composited as one\n");
     explain_footprints(s, out);
+    fprintf(out, "saturation  below %g of transmittance a pixel takes no more\n",
+            trip_settings_saturation(s));
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out,

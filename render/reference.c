@@ -41,6 +41,7 @@ typedef struct reference {
     trip_splat_frame local;        /* where spacing is uneven */
     unsigned channels;             /* of a layer */
     double gradient_full;
+    double saturation; /* trip_settings_saturation() */
     trip_effects_view effects;
     trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
@@ -137,6 +138,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->slabs = NULL;
     r->frame = frame;
     r->channels = trip_layer_channels(frame->settings);
+    r->saturation = trip_settings_saturation(frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
     r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
                                            header->gradient_step);
@@ -167,7 +169,7 @@ static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
         double through = 1 - layer[TRIP_CHANNEL_ALPHA];
         keep = 1;
         add = alpha * through;
-        if (through < TRIP_SATURATION)
+        if (through < r->saturation)
             return;
     }
     for (unsigned c = 0; c < r->channels; c++)

@@ -15,6 +15,7 @@ struct trip_reference_sheets {
     trip_affine to_index;
     const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
+    double saturation; /* trip_settings_saturation() */
     trip_field *field; /* gradients are in index space, codes per index */
     bool has_gradients;
     trip_field_fill fill;
@@ -36,6 +37,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     s->frame = frame;
     trip_affine_invert(&data->index_to_world, &s->to_index); /* it was checked on opening */
     s->coordinates = &data->coordinates;
+    s->saturation = trip_settings_saturation(frame->settings);
     s->value_per_code = (h->code_hi - h->code_lo) / 65535;
     s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
@@ -210,14 +212,14 @@ static void light(const passage *p, const place ends[2], trip_vec3 middle, doubl
 }
 
 /* False once the pixel is saturated. */
-static bool composite(double layer[TRIP_CHANNELS_MAX], const double fragment[TRIP_CHANNELS_MAX],
-                      double alpha)
+static bool composite(const trip_reference_sheets *s, double layer[TRIP_CHANNELS_MAX],
+                      const double fragment[TRIP_CHANNELS_MAX], double alpha)
 {
     double through = 1 - layer[TRIP_CHANNEL_ALPHA];
     for (int c = 0; c < TRIP_CHANNELS_MAX; c++)
         layer[c] += fragment[c] * alpha * through;
     double opacity = layer[TRIP_CHANNEL_ALPHA];
-    if (!(1 - opacity < TRIP_SHEET_SATURATION))
+    if (!(1 - opacity < s->saturation))
         return true;
     for (int c = 0; c < TRIP_CHANNELS_MAX; c++)
         layer[c] /= opacity;
@@ -255,7 +257,7 @@ static bool add_segment(passage *p, double t0, double t1, int64_t cells)
         [TRIP_CHANNEL_BLUE] = segment.rgb[2],      [TRIP_CHANNEL_ALPHA] = 1,
         [TRIP_CHANNEL_DEPTH] = t * p->world_per_t,
     };
-    return composite(p->layer, fragment,
+    return composite(p->s, p->layer, fragment,
                      -expm1(-segment.extinction * (to - from) * p->world_per_t));
 }
 

@@ -14,6 +14,7 @@ trip_settings trip_settings_default(void)
         .headlight = true,
         .light_direction = { 0, 0, 1 },
         .h = TRIP_H_AUTO,
+        .saturation = TRIP_SATURATION_AUTO,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
         .flatten = 1,
         .background = { 0, 0, 0, 1 },

@@ -16,10 +16,6 @@
 /* Standard deviation of the low-pass Gaussian in pixels (the h of Zwicker et al. 2001, EWA volume
  * resampling filter), so that a splat never falls between pixel centres. */
 #define TRIP_LOW_PASS_PX 0.4
-/* Compositing front to back, a pixel whose transmittance is below this takes no more splats, or
- * sheets of splats. */
-#define TRIP_SATURATION (1.0 / 8192.0)
-
 typedef enum trip_method {
     TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005, 5.2; 2008, 4.2) */
     TRIP_METHOD_CLIP,  /* every pixel from the list its ray is most aligned with (2005, 5.1) */
@@ -131,13 +127,15 @@ typedef struct trip_settings {
     trip_vec3 light_direction; /* world space, towards the light, unit length */
     trip_vec3 light_place;     /* world space */
     double h;                  /* 0 <= h < 1, or TRIP_H_AUTO: trip_settings_h() */
-    double kernel_radius;      /* voxels (index space) */
-    double background[4];      /* r, g, b, a; not premultiplied */
-    double lod_px;             /* cubes are drawn at the coarsest level whose voxels are at most so
-                                  many pixels of the picture wide (lod.h); 0: all at the finest */
-    double max_bytes;          /* and at coarser ones still, so that no more is read (lod_limit.h);
-                                  0: no bound */
-    trip_kernel kernel;        /* of values, post and the integral */
+    double saturation; /* compositing front to back, the transmittance below which a pixel takes no
+                          more: 0 (none is) to TRIP_SATURATION_MAX, or TRIP_SATURATION_AUTO */
+    double kernel_radius; /* voxels (index space) */
+    double background[4]; /* r, g, b, a; not premultiplied */
+    double lod_px;        /* cubes are drawn at the coarsest level whose voxels are at most so
+                             many pixels of the picture wide (lod.h); 0: all at the finest */
+    double max_bytes;     /* and at coarser ones still, so that no more is read (lod_limit.h);
+                             0: no bound */
+    trip_kernel kernel;   /* of values, post and the integral */
     /* Of the integral renderer alone. */
     trip_field_kind field;
     double tolerance; /* of a component of a pixel, 0 to 1 */
@@ -155,9 +153,17 @@ typedef struct trip_settings {
 #define TRIP_H_PRE 0.85
 #define TRIP_H_POST 0.99
 
+/* Where pixels are saturated, by how they are classified: what lies behind adds less than that to
+ * any component. Of values it is half of 1/255, since a saturated pixel is opaque there (sheet.h).
+ * At the most it is 26/255. */
+#define TRIP_SATURATION_AUTO (-1.0)
+#define TRIP_SATURATION_PRE (1.0 / 8192.0)
+#define TRIP_SATURATION_POST (1.0 / 512.0)
+#define TRIP_SATURATION_MAX 0.1
+
 /* The defaults: pre, splat by splat, exact footprints, EWA's low-pass, 2 slices, merge, outward, h
- * by the classification, kernel radius 2, shading by headlight, rgba32f, no depth, black; values,
- * linear, to 1e-4, one ray a pixel. */
+ * and saturation by the classification, kernel radius 2, shading by headlight, rgba32f, no depth,
+ * black; values, linear, to 1e-4, one ray a pixel. */
 trip_settings trip_settings_default(void);
 
 /* The h of merge. */
@@ -165,6 +171,13 @@ static inline double trip_settings_h(const trip_settings *s)
 {
     const double of_class = s->classify == TRIP_CLASSIFY_POST ? TRIP_H_POST : TRIP_H_PRE;
     return s->h >= 0 ? s->h : of_class;
+}
+
+/* The transmittance below which a pixel takes no more. */
+static inline double trip_settings_saturation(const trip_settings *s)
+{
+    const bool post = s->classify == TRIP_CLASSIFY_POST;
+    return s->saturation >= 0 ? s->saturation : post ? TRIP_SATURATION_POST : TRIP_SATURATION_PRE;
 }
 
 /* Whether splats are summed sheet by sheet. */

@@ -35,15 +35,13 @@
  * picture (closed_form.h).
  *
  * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
- * below TRIP_SHEET_SATURATION takes no more: its colour is divided by its opacity, which becomes
- * 1. So no component is off by more than that. */
+ * below trip_settings_saturation() takes no more: its colour is divided by its opacity, which
+ * becomes
+ * 1. So no component is off by more than that, of colours from 0 to 1. */
 #ifndef TRIP_SHEET_H
 #define TRIP_SHEET_H
 
 #include "kernel.h"
-
-/* Half of 1/255. */
-#define TRIP_SHEET_SATURATION (1.0 / 512.0)
 
 /* How far in indices, along each axis, a voxel changes what is drawn: cells about it are
  * interpolated from it, and the gradients of its neighbours depend on it. */

@@ -32,7 +32,7 @@
  *     v(p) = sum of depth_i(p) v_i / depth(p)
  * for each channel v of layer.h, so that their order within the sheet does not matter: a mirrored
  * volume gives the mirrored picture. Sheets are composited in list order. Front to back, a pixel
- * whose transmittance is below TRIP_SATURATION takes no more of what is composited.
+ * whose transmittance is below trip_settings_saturation() takes no more of what is composited.
  *
  * The support {m(p) <= TRIP_CUTOFF^2} is the inside of a conic. Writing k = TRIP_CUTOFF,
  *     E = S'^-1 - (k^2 / |r_c|^2) [rx.rx rx.ry; rx.ry ry.ry],  l = (k^2 / |r_c|^2) (r_c.rx, r_c.ry)

@@ -289,6 +289,9 @@ static bool set_setting(triptych_settings *s, const char *name, const char *valu
     } else if (!strcmp(name, "shading")) {
         good = choose(value, no_yes, &which);
         s->shading = good ? which : s->shading;
+    } else if (!strcmp(name, "saturation")) {
+        good = set_number(&s->saturation, value, TRIPTYCH_SATURATION_AUTO, 0.1);
+        s->saturation = s->saturation >= 0 ? s->saturation : TRIPTYCH_SATURATION_AUTO;
     } else {
         good = !strcmp(name, "h") && set_number(&s->h, value, TRIPTYCH_H_AUTO, 0.999);
         s->h = s->h >= 0 ? s->h : TRIPTYCH_H_AUTO;
@@ -380,6 +383,7 @@ static void add_settings(cJSON *root, const triptych_settings *s)
     cJSON_AddStringToObject(settings, "show", shows[s->show]);
     cJSON_AddNumberToObject(settings, "shading", s->shading != 0);
     cJSON_AddNumberToObject(settings, "h", s->h);
+    cJSON_AddNumberToObject(settings, "saturation", s->saturation);
 }
 
 char *trip_session_status(trip_session *s)

@@ -343,7 +343,7 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
     float through = 1.0 - pixel.a, add = opacity(medium.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);
     pixel_depth += middle * add;
-    if (1.0 - pixel.a < SHEET_SATURATION) {
+    if (1.0 - pixel.a < across_v.w) {
         pixel_depth /= pixel.a;
         pixel = vec4(pixel.rgb / pixel.a, 1.0);
     }

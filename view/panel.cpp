@@ -527,6 +527,13 @@ bool draw_quality(trip_panel *p, trip_document *d)
         changed |= slide(p, "h", &h, leftmost, 0.99, h < 0 ? "by the classification" : "%.2f");
         s->h = h >= 0 ? h : TRIPTYCH_H_AUTO;
     }
+    {
+        const double leftmost = -0.001;
+        double saturation = s->saturation >= 0 ? s->saturation : leftmost;
+        changed |= slide(p, "Saturation", &saturation, leftmost, 0.1,
+                         saturation < 0 ? "by the classification" : "%.3f");
+        s->saturation = saturation >= 0 ? saturation : TRIPTYCH_SATURATION_AUTO;
+    }
     changed |= mark_beside(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
     return changed;
 }

@@ -60,6 +60,7 @@ static const entry setting_entries[] = {
     { "cueing", SETTING(cueing), NUMBERS, 1, 1e-6, 1 },
     { "light_cells", SETTING(light_cells), WHOLE, 1, 8, 1024 },
     { "h", SETTING(h), NUMBERS, 1, TRIPTYCH_H_AUTO, 0.999999 },
+    { "saturation", SETTING(saturation), NUMBERS, 1, TRIPTYCH_SATURATION_AUTO, 0.1 },
     { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
     { "background", SETTING(background), NUMBERS, 4, 0, 1 },
     { "lod_px", SETTING(lod_px), NUMBERS, 1, 0, 1000 },

@@ -100,6 +100,7 @@ static void set_limits(trip_cpu_view *view)
         most = most_stretch(&camera->index_to_world) / view->stretch;
     view->thin = (float)((double)TRIP_CPU_THIN / most);
     view->behind = (float)(-widest(view) * trip_splat_behind(&view->splat) * (1 + 1e-6));
+    view->saturation = trip_cpu_saturation(view->of->settings);
     view->cutoff = (float)(0.5 * LOG2_E * TRIP_CPU_EXP_UNIT * view->splat.cutoff2);
     view->panes_across = (camera->width + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE;
 }

@@ -172,10 +172,23 @@ static int prepare_when_done(gl_renderer *r)
     return done < 0 ? done : done ? prepare(r) : TRIP_FRAME_WAITS;
 }
 
+/* Splats are all blended, which is within the default of what saturated pixels are. */
+static int check_saturation(const trip_settings *s)
+{
+    if (s->classify == TRIP_CLASSIFY_POST || s->saturation <= TRIP_SATURATION_PRE)
+        return TRIP_OK;
+    return trip_fail(TRIP_USAGE, "render", "gl",
+                     "draws all splats, however little is seen of them: a saturation of %g is of "
+                     "cpu and reference, or of --classify post",
+                     s->saturation);
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     gl_renderer *r = (gl_renderer *)base;
     int status = check_size(r, frame->camera);
+    if (!status)
+        status = check_saturation(frame->settings);
     if (!status)
         status = trip_gl_context_use(r->context);
     if (status)

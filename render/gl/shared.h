@@ -114,7 +114,8 @@
 #define TRIP_GL_SHEET_PASS_FIELDS(R4, I4)                                                          \
     R4 along;              /* how far a ray goes along the list; w: which way, 1 or -1 */          \
     R4 across_u, across_v; /* and farther along u and v than slope_ref says; in parallel views how \
-                              far apart rays start. w of the first: 1 of the sums  */              \
+                              far apart rays start. w: 1 of the sums; the transmittance below      \
+                              which a pixel is saturated */                                        \
     R4 start;              /* parallel views: where rays start along the list, from the one at the \
                               image's centre */                                                    \
     R4 gradient_0, gradient_1, gradient_2; /* xyz: columns of the map from differences of codes,   \

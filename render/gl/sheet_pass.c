@@ -126,6 +126,7 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
         v.constants.extent.v[2 + a] = (int32_t)((int64_t)dims[(axis + 1 + a) % 3] - 1 - first[a]);
     }
     v.constants.across_u.v[3] = (float)unit;
+    v.constants.across_v.v[3] = (float)trip_settings_saturation(frame->settings);
     v.constants.clips.v[3] = (int32_t)frame->settings->kernel;
     v.constants.along = linear(r.r0[0], r.rx[0], r.ry[0], way);
     v.constants.start = linear(0, r.x_start[0], r.y_start[0], 0);

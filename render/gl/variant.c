@@ -9,7 +9,6 @@
 #include "gl/program.h"
 #include "report.h"
 #include "shade.h"
-#include "sheet.h"
 #include "splat.h"
 
 static const struct {
@@ -66,7 +65,6 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
     if (passes[variant->pass].in_double)
         fprintf(out, "#define TRIP_DOUBLE\n");
     fprintf(out, "#define METHOD %d\n#define LAYERS %u\n", (int)variant->method, variant->layers);
-    fprintf(out, "#define SHEET_SATURATION %.9f\n", TRIP_SHEET_SATURATION);
     fprintf(out, "#define AFFINE_MOST %f\n#define AFFINE_REACH %f\n", TRIP_SPLAT_AFFINE,
             TRIP_SPLAT_AFFINE_REACH);
     write_effects(out, variant->effects);

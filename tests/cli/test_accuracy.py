@@ -284,8 +284,8 @@ class Accuracy(program.ProgramTest):
         same = {("--quality", "draft"): ("--slices", "1"),
                 ("--quality", "normal"): (),
                 ("--quality", "high"): ("--slices", "8"),
-                ("--quality", "exact"): ("--slices", "16"),
-                ("--slices", "2", "--quality", "exact"): ("--slices", "2"),
+                ("--quality", "exact"): ("--slices", "16", "--saturation", 1 / 8192),
+                ("--slices", "2", "--quality", "exact"): ("--slices", "2", "--saturation", 1 / 8192),
                 ("--quality", "draft", "--classify", "pre"): ("--classify", "pre")}
         pictures = [draw(*options) for options in same]
         for options, picture in zip(same, pictures):

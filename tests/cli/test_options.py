@@ -97,6 +97,7 @@ RENDER = {
     "--emission": [],
     "--temperature": NUMBERS + ["5", "5:", ":5", "2000:1000", "nan:5", "1:2:3"],
     "--h": NUMBERS + ["1", "-0.1", "1.5"],
+    "--saturation": NUMBERS + ["-0.1", "0.11"],
     "--quality": NAMES + ["best"],
     "--error": NUMBERS + ["0", "-1", "256"],
     "--report": [],

@@ -42,6 +42,32 @@ class Hidden(limits.Test):
                        "--explain", "--occluded", "skip", *look)
         self.assertRegex(r.out, r"occluded +[\d.]+ [kMG]?B in \d+ runs not read")
 
+    def test_the_larger_the_saturation_the_less_is_read_behind(self):
+        volume = self.generate("haze.nrrd", "marschner-lobb", 192)
+        haze = self.path("haze.tf")
+        with open(haze, "w") as f:
+            f.write("0 0.3 0.5 0.9 0.05\n255 1 0.8 0.4 0.15\n")
+        data = self.brick(volume, "haze.trip", "--keep-all", "--tf", haze)
+        for classify in "pre", "post":
+            read = []
+            for saturation in "0", None, "0.03125", "0.1":
+                look = ["--tf", haze, "--classify", classify, "--fov", 60, "--look", "96,96,96",
+                        "--eye", "96,-64,96"]
+                look += ["--saturation", saturation] if saturation else []
+                wanted = self.stats(data, *look, "--occluded", "draw", size="256x256")[1]
+                stats, picture = self.stats(data, *look, "--occluded", "skip", size="256x256")
+                self.assertEqual(picture, wanted)
+                picture = self.stats(data, *look, "--occluded", "skip", "--threads", 1, "--memory",
+                                     "48M", size="256x256")[1]
+                self.assertEqual(picture, wanted)
+                read.append(bytes_read(stats))
+                usual = 1 / 8192 if classify == "pre" else 1 / 512
+                self.assertEqual(stats["saturation"], float(saturation or usual))
+            self.note(f"{classify}: {', '.join(map(limits.text_bytes, read))} with 0, the default, "
+                      "1/32, 0.1")
+            self.assertEqual(read, sorted(read, reverse=True))
+            self.assertLess(read[3], 0.8 * read[1])
+
     def explained(self, data, *arguments):
         r = self.works("triptych", "render", data, "-o", self.path("p.png"), "--size", "160x120",
                        "--explain", "--occluded", "draw", *arguments)

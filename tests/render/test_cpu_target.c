@@ -114,7 +114,7 @@ static unsigned occlusion_of(const trip_splat_frame *f, double x, double y)
 /* A blend rounds a pixel by at most half a step. In colour that adds up to n halves; the same in
  * alpha lets other light through, which again adds up to at most as much: what an error of the
  * transmittance shows is that error times the opacity of all that lies behind. Merging takes
- * averages. The rest is what single precision and closing at TRIP_SATURATION may do. */
+ * averages. The rest is what single precision and closing at TRIP_SATURATION_PRE may do. */
 static void targets_are_off_by_at_most_a_step_a_splat(void **state)
 {
     (void)state;

@@ -47,7 +47,7 @@ static void expect_off(double alpha, double depth, double most, const char *what
 }
 
 /* 720,000 on a ray, at 12.8 of opacity 1e-4 each. Each is rounded once, to 2^-25 at most; pixels
- * take no more below TRIP_SATURATION. */
+ * take no more below TRIP_SATURATION_PRE. */
 static void a_million_splats_lose_what_roundings_can(void **state)
 {
     (void)state;

@@ -182,7 +182,7 @@ static void put_behind(const brute *b, const item *i, double x, double y, double
     const trip_splat *s = &i->splat;
     double m = trip_splat_radius2(f, s, x, y);
     if (x < s->x0 || x > s->x1 || y < s->y0 || y > s->y1 || m > f->cutoff2 ||
-        1 - layer[3] < TRIP_SATURATION)
+        1 - layer[3] < TRIP_SATURATION_PRE)
         return;
     double depth = (double)i->entry->extinction * trip_splat_stretch(f, x, y) * s->amplitude *
                    (exp(-m / 2) - f->edge) * trip_splat_front(f, s, x, y);

@@ -302,7 +302,7 @@ static void from_outside_ascending_order_gives_the_same_picture(void **state)
             scene_picture a = scene_draw(&s, r, &view, &outward);
             scene_picture b = scene_draw(&s, r, &view, &ascending);
             /* Saturation stops front-to-back drawing only. */
-            assert_true(scene_difference(&a, &b) < 2 * TRIP_SATURATION + r->tolerance);
+            assert_true(scene_difference(&a, &b) < 2 * TRIP_SATURATION_PRE + r->tolerance);
             scene_picture_free(&a);
             scene_picture_free(&b);
         }

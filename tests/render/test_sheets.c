@@ -319,26 +319,29 @@ static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
     }
 }
 
-/* Of two bodies one is a little below the transmittance at which pixels are saturated. */
+/* Of bodies one is a little below the transmittance at which pixels are saturated, and one far
+ * below that of a frame in which none is. */
 static void a_saturated_pixel_is_opaque(void **state)
 {
     (void)state;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 5; i++) {
         scene s;
         scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
-        double through = TRIP_SHEET_SATURATION * (i ? 0.9 : 1.1);
+        const double saturation = i < 2 ? TRIP_SATURATION_POST : i < 4 ? 0.06 : 0;
+        const double through = i < 4 ? saturation * (i % 2 ? 0.9 : 1.1) : 1e-4;
         fill_table(&s, 0.75, 1, 1, -log(through) / (EDGE - 1));
         trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 60, 20, 1);
         view.ortho_height = 0.1;
         trip_settings settings = post(2);
+        settings.saturation = i < 2 ? TRIP_SATURATION_AUTO : saturation;
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
-            if (i)
+            if (i % 2)
                 assert_true(turn.picture.rgba[3] == 1);
             else
                 assert_close(turn.picture.rgba[3], 1 - through,
                              1e-6 + turn.renderer->tolerance / 16);
-            assert_close(turn.picture.rgba[0], 0.75 * (i ? 1 : 1 - through),
+            assert_close(turn.picture.rgba[0], 0.75 * (i % 2 ? 1 : 1 - through),
                          1e-6 + turn.renderer->tolerance);
         }
         scene_destroy(&s);

@@ -32,6 +32,7 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
     MEMBER(point_light);
     MEMBER(light);
     MEMBER(h);
+    MEMBER(saturation);
     MEMBER(kernel_radius);
     MEMBER(background);
     MEMBER(lod_px);
@@ -97,6 +98,7 @@ static void every_member_counts(void **state)
     COUNTS(point_light);
     COUNTS(light[2]);
     COUNTS(h);
+    COUNTS(saturation);
     COUNTS(kernel_radius);
     COUNTS(background[3]);
     COUNTS(lod_px);

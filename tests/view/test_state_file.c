@@ -25,6 +25,7 @@ static trip_view_state unusual(void)
     s.settings.classify = TRIPTYCH_POST;
     s.settings.slices = 3;
     s.settings.compositing = TRIPTYCH_BY_SHEET;
+    s.settings.saturation = 1.0 / 96;
     s.settings.lod_px = 1.5;
     s.settings.headlight = 0;
     s.settings.point_light = 1;

@@ -227,7 +227,7 @@ INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, float depth, 
 INLINE void put_behind(patch *p, const trip_cpu_splat *splat, float depth, vf opacity,
                        trip_target target)
 {
-    vm open = v_ge(p->t, v_set((float)TRIP_SATURATION));
+    vm open = v_ge(p->t, v_load(p->pane->saturation));
     vf left = v_fnma_where(open, p->t, opacity, p->t), taken = p->t - left;
     p->r = kept(v_fma(taken, v_set(splat->r), p->r), target);
     p->g = kept(v_fma(taken, v_set(splat->g), p->g), target);
@@ -259,14 +259,14 @@ INLINE void put_over(patch *p, const trip_cpu_splat *splat, float depth, vf opti
     p->t = v_select(inside, left, p->t);
 }
 
-INLINE bool any_open(vf t)
+INLINE bool any_open(const trip_cpu_scratch *s, vf t)
 {
-    return vm_any(v_ge(t, v_set((float)TRIP_SATURATION)));
+    return vm_any(v_ge(t, v_load(s->saturation)));
 }
 
-INLINE bool all_open(vf t)
+INLINE bool all_open(const patch *p)
 {
-    return vm_all(v_ge(t, v_set((float)TRIP_SATURATION)));
+    return vm_all(v_ge(p->t, v_load(p->pane->saturation)));
 }
 
 static void set_rays(trip_cpu_scratch *s, unsigned number);
@@ -378,10 +378,10 @@ INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_c
 INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 {
     patch q = *p;
-    if (!all_open(q.t))
+    if (!all_open(&q))
         return false;
     blend_each(&q, t, blend_thin_open, rays, true, TRIP_TARGET_RGBA32F);
-    if (!all_open(q.t))
+    if (!all_open(&q))
         return false;
     *p = q;
     return true;
@@ -403,7 +403,7 @@ INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     if (!simple || !blend_open(&p, &t, rays))
         blend_each(&p, &t, blend_any, rays, front_to_back, target);
     store_stamp(s->pixels, number, &p);
-    return !front_to_back || any_open(p.t);
+    return !front_to_back || any_open(s, p.t);
 }
 
 INLINE void blend_group(trip_cpu_scratch *s, trip_cpu_rays rays, bool front_to_back,
@@ -717,7 +717,7 @@ static void find_open(trip_cpu_scratch *s, unsigned quarters)
             continue;
         for (uint64_t rest = s->open[band]; rest; rest &= rest - 1) {
             unsigned bit = (unsigned)__builtin_ctzll(rest);
-            if (!any_open(v_load(s->pixels + STAMP_FLOATS * (64 * band + bit) + 3 * V)))
+            if (!any_open(s, v_load(s->pixels + STAMP_FLOATS * (64 * band + bit) + 3 * V)))
                 s->open[band] &= ~(UINT64_C(1) << bit);
         }
     }
@@ -733,6 +733,7 @@ static void pane_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, in
     s->sums = sums;
     s->splats = 0;
     s->blend = choose_blend(view);
+    v_store(s->saturation, v_set(view->saturation));
     memset(s->rays_known, 0, sizeof s->rays_known);
     find_open(s, quarters);
 }

@@ -13,8 +13,8 @@
 #include "renderer.h"
 #include "splat.h"
 
-/* A pixel is saturated when its transmittance is below TRIP_SATURATION, or where its layer has no
- * weight: it takes no more splats, front to back. Until then it is open.
+/* A pixel is saturated when its transmittance is below trip_cpu_view.saturation, or where its layer
+ * has no weight: it takes no more splats, front to back. Until then it is open.
  *
  * Edge in pixels of a pane, an aligned square of the picture (tiles are squares of a sheet). Its
  * pixels are kept as V-lane vectors of four columns times V / 4 rows (a stamp), so that a small
@@ -105,8 +105,9 @@ typedef struct trip_cpu_view {
     /* |r|^2 and |J r|^2 / stretch^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2
      * times these. */
     float ray2[6], world2[6];
-    float cutoff; /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
-    float thin;   /* the largest optical depth, stretch aside, of thin splats */
+    float cutoff;     /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
+    float saturation; /* trip_cpu_saturation() */
+    float thin;       /* the largest optical depth, stretch aside, of thin splats */
     int panes_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double forward_length;                     /* most that z changes by over an index length */
@@ -180,6 +181,7 @@ typedef struct trip_cpu_reach {
 
 /* What one thread needs while it blends a pane. */
 typedef struct trip_cpu_scratch {
+    _Alignas(64) float saturation[16];                 /* of the view, in every lane */
     _Alignas(64) float rays[2 * TRIP_CPU_PANE_PIXELS]; /* by stamp: G[V], stretch[V] */
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
     float local_depths[TRIP_CPU_LOCAL]; /* of layers with depth */

@@ -1145,10 +1145,9 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
 }
 
 /* A pixel of which this is left is saturated: it takes no more, and its colour counts for all. */
-INLINE void finish_saturated(vf pixel[CHANNELS])
+INLINE void finish_saturated(const trip_cpu_sheet_view *view, vf pixel[CHANNELS])
 {
-    vm saturated =
-        vm_and(v_gt(v_set((float)TRIP_SHEET_SATURATION), pixel[3]), v_gt(pixel[3], v_set(0)));
+    vm saturated = vm_and(v_gt(v_set(view->saturation), pixel[3]), v_gt(pixel[3], v_set(0)));
     if (!vm_any(saturated))
         return;
     vf whole = v_set(1) / (v_set(1) - pixel[3]);
@@ -1266,7 +1265,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (!composite_segment(view, g, l, path, n, area->gaps >> n & 1, &ends[n % 2],
                                &ends[next % 2], pixel))
             continue;
-        finish_saturated(pixel);
+        finish_saturated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
             break;
     }

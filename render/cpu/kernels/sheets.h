@@ -3,6 +3,7 @@
 #ifndef TRIP_CPU_SHEETS_H
 #define TRIP_CPU_SHEETS_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -13,6 +14,15 @@
 #include "settings.h"
 
 struct trip_frame;
+
+/* trip_settings_saturation(), but above 0, so that pixels without weight, which let nothing
+ * through, are saturated, and numbers stay normal. What is behind so little changes no float of a
+ * picture. */
+static inline float trip_cpu_saturation(const trip_settings *s)
+{
+    const double least = 0x1p-60;
+    return (float)fmax(trip_settings_saturation(s), least);
+}
 
 /* A voxel's code less 32768: at least TRIP_CPU_CODE_LEAST, so that code 0 is taken for 1. */
 #define TRIP_CPU_CODE_BIAS 32768
@@ -133,6 +143,7 @@ typedef struct trip_cpu_sheet_view {
     trip_kernel kernel;
     int64_t voxels[2]; /* of the grid along u and v */
     bool ortho, shading, headlight, point_light;
+    float saturation; /* trip_cpu_saturation() */
     double direction; /* 1: ascending; -1 */
     double eye[3], r0[3], rx[3], ry[3];
     double steepest;      /* rays move at most so far along u or v from one sheet to the next */

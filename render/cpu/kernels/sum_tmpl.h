@@ -42,10 +42,11 @@ INLINE void add_behind(float *channel, vf w, vf sum, trip_target target)
     v_store(channel, kept(v_fma(w, sum, v_load(channel)), target));
 }
 
-INLINE void put_sheet_behind(float *pixels, const patch *sum, trip_target target)
+INLINE void put_sheet_behind(const trip_cpu_view *view, float *pixels, const patch *sum,
+                             trip_target target)
 {
     vf t = v_load(pixels + 3 * V), w = t * mean_transmittance(sum->t);
-    w = v_select(v_ge(t, v_set((float)TRIP_SATURATION)), w, v_set(0));
+    w = v_select(v_ge(t, v_set(view->saturation)), w, v_set(0));
     add_behind(pixels, w, sum->r, target);
     add_behind(pixels + V, w, sum->g, target);
     add_behind(pixels + 2 * V, w, sum->b, target);
@@ -82,7 +83,7 @@ INLINE void put_sheet(const trip_cpu_view *view, float *pixels, const patch *sum
 {
     trip_target target = view->of->settings->target;
     if (view->front_to_back)
-        put_sheet_behind(pixels, sum, target);
+        put_sheet_behind(view, pixels, sum, target);
     else
         put_sheet_over(pixels, sum, target);
 }
@@ -167,7 +168,8 @@ INLINE bool sum_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays kind)
     blend_each(&p, &t, add_to_sheet, kind, true, TRIP_TARGET_RGBA32F);
     store_stamp(s->sums, number, &p);
     set_sheet_of_stamp(s->sums, number, sheet_key(s->view, p.sheet));
-    return !s->view->front_to_back || any_open(v_load(s->pixels + STAMP_FLOATS * number + 3 * V));
+    return !s->view->front_to_back ||
+           any_open(s, v_load(s->pixels + STAMP_FLOATS * number + 3 * V));
 }
 
 INLINE void sum_group(trip_cpu_scratch *s, trip_cpu_rays kind)

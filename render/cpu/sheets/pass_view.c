@@ -100,6 +100,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         .shading = s->shading,
         .headlight = s->headlight,
         .point_light = s->point_light && !s->headlight,
+        .saturation = trip_cpu_saturation(s),
         .direction = descending ? -1 : 1,
         .steepest = trip_cpu_pass_steepest(s),
     };
