@@ -299,6 +299,27 @@ static bool set_setting(triptych_settings *s, const char *name, const char *valu
     return good;
 }
 
+static bool set_switch(trip_document *d, const trip_effect_switch *e, const char *value)
+{
+    static const char *const no_yes[] = { "0", "1", NULL };
+    int on = 0;
+    return choose(value, no_yes, &on) && trip_effect_turn(e, on, &d->settings, trip_viewer_heat(d));
+}
+
+/* One of light.h's. */
+static bool set_effect(trip_document *d, const char *name, const char *value)
+{
+    double number;
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++)
+        if (!strcmp(name, trip_effect_switches[i].name))
+            return set_switch(d, &trip_effect_switches[i], value);
+    for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++)
+        if (!strcmp(name, trip_effect_numbers[i].name))
+            return trip_text_to_double(value, &number) &&
+                   trip_effect_number_set(&trip_effect_numbers[i], number, &d->settings);
+    return false;
+}
+
 bool trip_session_set(trip_session *s, const char *name, const char *value)
 {
     bool good = false;
@@ -309,7 +330,7 @@ bool trip_session_set(trip_session *s, const char *name, const char *value)
     else if (d && !strcmp(name, "light"))
         good = set_light(d, value);
     else if (d)
-        good = set_setting(&d->settings, name, value);
+        good = set_setting(&d->settings, name, value) || set_effect(d, name, value);
     s->viewer.changed |= good;
     trip_viewer_tick(&s->viewer, 0);
     pthread_mutex_unlock(&s->lock);
@@ -386,6 +407,54 @@ static void add_settings(cJSON *root, const triptych_settings *s)
     cJSON_AddNumberToObject(settings, "saturation", s->saturation);
 }
 
+static void add_numbers(cJSON *to, int bit, const triptych_settings *s)
+{
+    cJSON *numbers = cJSON_AddArrayToObject(to, "numbers");
+    for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
+        const trip_effect_number *n = &trip_effect_numbers[i];
+        if (n->bit != bit)
+            continue;
+        cJSON *number = cJSON_CreateObject();
+        cJSON_AddStringToObject(number, "name", n->name);
+        cJSON_AddStringToObject(number, "label", n->label);
+        cJSON_AddStringToObject(number, "unit", n->unit);
+        cJSON_AddNumberToObject(number, "lo", n->lo);
+        cJSON_AddNumberToObject(number, "hi", n->hi);
+        cJSON_AddNumberToObject(number, "step", n->step);
+        cJSON_AddNumberToObject(number, "value", trip_effect_number_get(n, s));
+        cJSON_AddItemToArray(numbers, number);
+    }
+}
+
+/* What the page's controls of effects show. */
+static void add_switches(cJSON *root, const trip_document *d)
+{
+    const triptych_settings *s = &d->settings;
+    cJSON *switches = cJSON_AddArrayToObject(root, "switches");
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++) {
+        const trip_effect_switch *e = &trip_effect_switches[i];
+        const char *lacks = trip_effect_lacks(e, s, trip_viewer_heat(d));
+        cJSON *to = cJSON_CreateObject();
+        cJSON_AddStringToObject(to, "name", e->name);
+        cJSON_AddStringToObject(to, "label", e->label);
+        cJSON_AddBoolToObject(to, "on", s->effects & e->bit && !lacks);
+        cJSON_AddStringToObject(to, "lacks", lacks ? lacks : "");
+        add_numbers(to, e->bit, s);
+        cJSON_AddItemToArray(switches, to);
+    }
+}
+
+/* As trip_session_set() takes it, but for "head". */
+static void add_light(cJSON *root, const trip_document *d)
+{
+    const trip_light_control c = trip_light_control_of(&d->settings, &d->info);
+    cJSON *light = cJSON_AddObjectToObject(root, "light");
+    cJSON_AddBoolToObject(light, "head", d->settings.headlight);
+    cJSON_AddNumberToObject(light, "round", c.round);
+    cJSON_AddNumberToObject(light, "up", c.up);
+    cJSON_AddNumberToObject(light, "distance", c.distance);
+}
+
 char *trip_session_status(trip_session *s)
 {
     cJSON *root = cJSON_CreateObject();
@@ -395,7 +464,11 @@ char *trip_session_status(trip_session *s)
     const trip_document *d = trip_viewer_document(&s->viewer);
     const triptych_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
     char effects[256];
-    trip_effects_say(&settings, d ? d->heat : NULL, effects, sizeof effects);
+    trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
+    if (d && d->opened)
+        add_light(root, d);
+    if (d)
+        add_switches(root, d);
     pthread_mutex_unlock(&s->lock);
     cJSON_AddBoolToObject(root, "exact", status.exact);
     cJSON_AddBoolToObject(root, "failed", status.failed);

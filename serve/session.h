@@ -25,7 +25,8 @@ bool trip_session_do(trip_session *s, const char *text, size_t bytes);
 bool trip_session_set_function(trip_session *s, const char *name);
 
 /* A setting by its name, as the page has them: classify, method, h, shading, light (head, or
- * degrees "ROUND,UP"), opacity, show. False where there is no such name or value; nothing happens
+ * "ROUND,UP,DISTANCE" of trip_light_control), opacity, show, and those of effects by their names in
+ * light.h. False where there is no such name or value; nothing happens
  * then. */
 bool trip_session_set(trip_session *s, const char *name, const char *value);
 /* The built-in functions' names as JSON, for free(); NULL without memory. */

@@ -70,6 +70,7 @@ typedef struct trip_opened {
     unsigned document;
     bool first;         /* it has just been opened; else only navigation and function are set */
     bool small;         /* as find() says */
+    bool cold;          /* the data set of its heat cannot be had: it is shown without */
     triptych_info info; /* without notes */
     triptych_histogram histogram;
     char *function; /* its text; NULL where it is as it was, or has none in data units */

@@ -42,6 +42,7 @@ struct trip_frames {
     uint64_t taken;  /* wanted_count when that was wanted; of what was worked on last: */
     uint64_t served;
     bool small;                 /* as find() says */
+    bool cold;                  /* its heat cannot be had */
     bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
     bool frugal;                /* no pages are kept between frames of it */
     unsigned document;

@@ -162,6 +162,19 @@ static void close_data(trip_frames *f)
     pthread_mutex_unlock(&f->lock);
 }
 
+/* Without it the data set is shown as it is, and why is said. */
+static int open_heat(trip_frames *f)
+{
+    char line[512];
+    const int status = triptych_set_heat(f->t, f->now.heat);
+    f->cold = status == TRIPTYCH_ERROR;
+    if (!f->cold)
+        return status;
+    snprintf(line, sizeof line, "%s", triptych_error(f->t));
+    say(f, line, false);
+    return 0;
+}
+
 static int open_data(trip_frames *f)
 {
     f->frugal &= f->document == f->now.document;
@@ -169,7 +182,7 @@ static int open_data(trip_frames *f)
     const trip_wanted *w = &f->now;
     int status = 0;
     f->source = w->input;
-    f->small = false;
+    f->small = f->cold = false;
     f->document = w->document;
     pthread_mutex_lock(&f->lock);
     f->status = (trip_frames_status){ .document = w->document,
@@ -189,7 +202,7 @@ static int open_data(trip_frames *f)
                                                       .keep_pages = !f->frugal,
                                                       .name = w->input });
     if (!status && w->heat)
-        status = triptych_set_heat(f->t, w->heat);
+        status = open_heat(f);
     f->open = status == 0;
     return status;
 }
@@ -305,7 +318,9 @@ static void post(trip_frames *f, trip_opened *o)
 
 static int announce(trip_frames *f)
 {
-    trip_opened o = { .document = f->now.document, .first = !f->announced, .small = f->small };
+    trip_opened o = {
+        .document = f->now.document, .first = !f->announced, .small = f->small, .cold = f->cold
+    };
     int status = find_navigation(f, &o.navigation);
     if (!status && o.first)
         status = describe(f, &o);
@@ -540,6 +555,8 @@ static int prepare(trip_frames *f)
         close_data(f);
         status = open_data(f);
     }
+    if (f->cold)
+        f->now.settings.effects &= ~TRIPTYCH_EMISSION;
     if (!status)
         status = take_pictures(f);
     if (!status)

@@ -1,7 +1,6 @@
 #include "light.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,17 +61,57 @@ char *trip_light_text(const triptych_settings *s)
 
 /* ---- effects ---- */
 
-static const struct {
-    int bit;
-    const char *name, *words;
-} effect_names[] = {
-    { TRIPTYCH_SHADOWS, "shadows", "shadows" },
-    { TRIPTYCH_OCCLUSION, "occlusion", "occlusion" },
-    { TRIPTYCH_CUEING, "cueing", "depth cueing" },
-    { TRIPTYCH_EFFECTS_AUTO, "auto", "what the data calls for" },
-    { TRIPTYCH_EMISSION, "emission", "emission" },
+const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES] = {
+    { TRIPTYCH_SHADOWS, "shadows", "Shadows", "shadows" },
+    { TRIPTYCH_OCCLUSION, "occlusion", "Occlusion", "occlusion" },
+    { TRIPTYCH_CUEING, "cueing", "Depth cueing", "depth cueing" },
+    { TRIPTYCH_EFFECTS_AUTO, "auto", "By the data", "what the data calls for" },
+    { TRIPTYCH_EMISSION, "emission", "Emission", "emission" },
 };
-enum { EFFECTS = sizeof effect_names / sizeof *effect_names };
+
+#define AT(member) offsetof(triptych_settings, member)
+#define HOTTEST 12000
+
+const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS] = {
+    { TRIPTYCH_SHADOWS, "anisotropy", "Anisotropy", "", AT(anisotropy), -0.95, 0.95, 0.05 },
+    { TRIPTYCH_CUEING, "fading", "Fading", "", AT(cueing), 0.01, 1, 0.01 },
+    { TRIPTYCH_EMISSION, "coldest", "Coldest", "K", AT(kelvin[0]), 0, HOTTEST - 1, 1 },
+    { TRIPTYCH_EMISSION, "hottest", "Hottest", "K", AT(kelvin[1]), 1, HOTTEST, 1 },
+};
+
+const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_settings *s,
+                              const char *heat)
+{
+    if (effect->bit == TRIPTYCH_SHADOWS && s->headlight)
+        return "the light is from the eye";
+    return effect->bit == TRIPTYCH_EMISSION && !heat ? "no data set of heat (--emission)" : NULL;
+}
+
+bool trip_effect_turn(const trip_effect_switch *effect, bool on, triptych_settings *s,
+                      const char *heat)
+{
+    if (on && trip_effect_lacks(effect, s, heat))
+        return false;
+    s->effects = on ? s->effects | effect->bit : s->effects & ~effect->bit;
+    return true;
+}
+
+double trip_effect_number_get(const trip_effect_number *number, const triptych_settings *s)
+{
+    return *(const double *)((const char *)s + number->at);
+}
+
+bool trip_effect_number_set(const trip_effect_number *number, double value, triptych_settings *s)
+{
+    if (!(value >= number->lo && value <= number->hi))
+        return false;
+    *(double *)((char *)s + number->at) = value;
+    if (!(s->kelvin[0] < s->kelvin[1]) && number->at == AT(kelvin[0]))
+        s->kelvin[1] = s->kelvin[0] + 1;
+    else if (!(s->kelvin[0] < s->kelvin[1]))
+        s->kelvin[0] = s->kelvin[1] - 1;
+    return true;
+}
 
 static bool may_glow(const triptych_settings *s, const char *heat)
 {
@@ -100,9 +139,9 @@ static void put_effects(FILE *out, const triptych_settings *s, const char *heat)
 {
     const triptych_settings usual = triptych_default_settings();
     const char *before = " --effects ";
-    for (int i = 0; i < EFFECTS; i++)
-        if (s->effects & effect_names[i].bit) {
-            fprintf(out, "%s%s", before, effect_names[i].name);
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++)
+        if (s->effects & trip_effect_switches[i].bit) {
+            fprintf(out, "%s%s", before, trip_effect_switches[i].name);
             before = ",";
         }
     const int some = s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : s->effects;
@@ -139,10 +178,10 @@ void trip_effects_say(const triptych_settings *s, const char *heat, char *text, 
 {
     size_t at = 0;
     text[0] = 0;
-    for (int i = 0; i < EFFECTS && at < bytes; i++)
-        if (s->effects & effect_names[i].bit)
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES && at < bytes; i++)
+        if (s->effects & trip_effect_switches[i].bit)
             at += (size_t)snprintf(text + at, bytes - at, "%s%s", at ? ", " : "",
-                                   effect_names[i].words);
+                                   trip_effect_switches[i].words);
     if (may_glow(s, heat) && at < bytes) {
         const char *name = strrchr(heat, '/');
         snprintf(text + at, bytes - at, "%s of %s, %g to %g K",

@@ -1,8 +1,9 @@
-/* The light as controls have it: two angles and how far it is, about the middle of the data; and
- * the light and effects as options and in words. Plain values. */
+/* The light and effects as controls have them, in the window and in a browser alike, as options and
+ * in words. Plain values. */
 #ifndef TRIP_VIEW_LIGHT_H
 #define TRIP_VIEW_LIGHT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "triptych.h"
@@ -16,6 +17,7 @@ extern "C" {
 #define TRIP_LIGHT_NEAREST 0.02
 #define TRIP_LIGHT_FARTHEST 10.0
 
+/* About the middle of the data. */
 typedef struct trip_light_control {
     double round, up; /* degrees: from the x axis towards y, and towards z */
     double distance;
@@ -33,6 +35,37 @@ char *trip_light_text(const triptych_settings *s);
 char *trip_effects_text(const triptych_settings *s, const char *heat);
 /* In words, which end where the text does; "" where none runs. */
 void trip_effects_say(const triptych_settings *s, const char *heat, char *text, size_t bytes);
+
+/* ---- effects as controls ---- */
+
+enum { TRIP_EFFECT_SWITCHES = 5, TRIP_EFFECT_NUMBERS = 4 };
+
+typedef struct trip_effect_switch {
+    int bit;                          /* of triptych_settings.effects */
+    const char *name, *label, *words; /* as --effects has it, and for people */
+} trip_effect_switch;
+
+/* A number that counts while an effect is on. */
+typedef struct trip_effect_number {
+    int bit; /* of that */
+    const char *name, *label, *unit;
+    size_t at; /* in triptych_settings */
+    double lo, hi, step;
+} trip_effect_number;
+
+extern const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES];
+extern const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS];
+
+/* What keeps it from running, in words; NULL: nothing. `heat` is the data set of that, or NULL. */
+const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_settings *s,
+                              const char *heat);
+/* False, and nothing happens, where it lacks something. */
+bool trip_effect_turn(const trip_effect_switch *effect, bool on, triptych_settings *s,
+                      const char *heat);
+double trip_effect_number_get(const trip_effect_number *number, const triptych_settings *s);
+/* False, and nothing happens, where the number does not lie within its bounds. The colder and the
+ * hotter temperature move one another along. */
+bool trip_effect_number_set(const trip_effect_number *number, double value, triptych_settings *s);
 
 #ifdef __cplusplus
 }

@@ -453,29 +453,40 @@ bool draw_light_place(trip_panel *p, trip_document *d)
     return changed;
 }
 
-// Those that run by name; what glows, and how hot it is.
+bool draw_effect_numbers(trip_panel *p, triptych_settings *s, int bit)
+{
+    bool changed = false;
+    for (const trip_effect_number &n : trip_effect_numbers) {
+        double value = trip_effect_number_get(&n, s);
+        const char *format = n.unit[0] ? "%.0f K" : "%.2f";
+        if (n.bit == bit && slide(p, n.label, &value, n.lo, n.hi, format))
+            changed |= trip_effect_number_set(&n, value, s);
+    }
+    return changed;
+}
+
 bool draw_effects(trip_panel *p, trip_document *d)
 {
     triptych_settings *s = &d->settings;
+    const char *heat = trip_viewer_heat(d);
     const triptych_settings shown = trip_viewer_settings(d);
     char text[256];
     bool changed = false;
-    trip_effects_say(&shown, d->heat, text, sizeof text);
+    for (const trip_effect_switch &e : trip_effect_switches) {
+        const char *lacks = trip_effect_lacks(&e, s, heat);
+        bool on = (s->effects & e.bit) != 0;
+        if (lacks) {
+            ImGui::TextDisabled("%s: %s.", e.label, lacks);
+            continue;
+        }
+        if (check(p, e.label, &on))
+            changed |= trip_effect_turn(&e, on, s, heat);
+        if (on)
+            changed |= draw_effect_numbers(p, s, e.bit);
+    }
+    trip_effects_say(&shown, heat, text, sizeof text);
     if (text[0])
-        ImGui::TextWrapped("Effects: %s", text);
-    if (!d->heat)
-        return false;
-    int glows = (s->effects & TRIPTYCH_EMISSION) != 0;
-    if (check(p, "Emission", &glows)) {
-        s->effects ^= TRIPTYCH_EMISSION;
-        changed = true;
-    }
-    if (glows) {
-        const double most = 12000, apart = 1;
-        changed |= slide(p, "Coldest", &s->kelvin[0], 0, most, "%.0f K");
-        changed |= slide(p, "Hottest", &s->kelvin[1], apart, most, "%.0f K");
-        s->kelvin[1] = std::fmax(s->kelvin[1], s->kelvin[0] + apart);
-    }
+        ImGui::TextWrapped("On: %s", text);
     return changed;
 }
 
@@ -487,12 +498,9 @@ bool draw_light(trip_panel *p, trip_document *d)
         changed |= check(p, "Shading", &s->shading);
     else
         ImGui::TextDisabled("No normals: it cannot be shaded.");
-    if (s->shading && d->info.normal_bytes) {
-        changed |= check(p, "Light from the eye", &s->headlight);
-        if (!s->headlight)
-            changed |= draw_light_place(p, d);
-    }
-    changed |= draw_effects(p, d);
+    changed |= check(p, "Light from the eye", &s->headlight); /* which lights effects, too */
+    if (!s->headlight)
+        changed |= draw_light_place(p, d);
     float rgb[3];
     for (int i = 0; i < 3; i++)
         rgb[i] = static_cast<float>(s->background[i]);
@@ -869,6 +877,8 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         draw_function(p, v, d);
     if (section(p, "Light"))
         v->changed |= draw_light(p, d);
+    if (section(p, "Effects", d->settings.effects != 0))
+        v->changed |= draw_effects(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);
     if (section(p, "Clipping", false))

@@ -55,9 +55,10 @@ static const entry setting_entries[] = {
     { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },
     { "point_light", SETTING(point_light), WHOLE, 1, 0, 1 },
     { "light", SETTING(light), NUMBERS, 3, -FAR, FAR },
-    { "effects", SETTING(effects), WHOLE, 1, 0, 15 },
+    { "effects", SETTING(effects), WHOLE, 1, 0, 31 },
     { "anisotropy", SETTING(anisotropy), NUMBERS, 1, -0.95, 0.95 },
     { "cueing", SETTING(cueing), NUMBERS, 1, 1e-6, 1 },
+    { "kelvin", SETTING(kelvin), NUMBERS, 2, 0, 100000 },
     { "light_cells", SETTING(light_cells), WHOLE, 1, 8, 1024 },
     { "h", SETTING(h), NUMBERS, 1, TRIPTYCH_H_AUTO, 0.999999 },
     { "saturation", SETTING(saturation), NUMBERS, 1, TRIPTYCH_SATURATION_AUTO, 0.1 },
@@ -114,6 +115,8 @@ char *trip_view_state_print(const trip_view_state *s, const char *data)
         cJSON_AddStringToObject(root, "function_text", s->text);
     else if (s->function)
         cJSON_AddStringToObject(root, "function", s->function);
+    if (s->heat)
+        cJSON_AddStringToObject(root, "heat", s->heat);
     add_entries(cJSON_AddObjectToObject(root, "settings"), s, ENTRIES(setting_entries));
     add_entries(root, s, ENTRIES(other_entries));
     char *text = root ? trip_json_print(root, true) : NULL;
@@ -207,6 +210,8 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
 {
     int status = read_function(s, root, path);
     if (!status)
+        status = read_string(root, "heat", &s->heat, path);
+    if (!status)
         status = read_camera(s, cJSON_GetObjectItemCaseSensitive(root, "camera"), path);
     if (!status)
         status = read_entries(s, cJSON_GetObjectItemCaseSensitive(root, "settings"),
@@ -217,6 +222,8 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     if (!status && (t->shading || t->effects) && !t->headlight && !t->point_light &&
         !(length_of(t->light) > 0))
         status = trip_fail(TRIP_ERROR, "read", path, "its light has no direction");
+    if (!status && !(t->kelvin[0] < t->kelvin[1]))
+        status = trip_fail(TRIP_ERROR, "read", path, "its temperatures are none");
     if (!status && !trip_clipping_is_sound(&t->clip))
         status = trip_fail(TRIP_ERROR, "read", path, "its clipping box or planes are none");
     return status;
@@ -236,7 +243,7 @@ int trip_view_state_parse(trip_view_state *s, const char *data, const char *text
 {
     trip_json json;
     trip_view_state next = *s;
-    next.function = next.text = NULL;
+    next.function = next.text = next.heat = NULL;
     next.has_navigation = false;
     int status = trip_json_parse(&json, text, path, NULL);
     if (status)
@@ -254,7 +261,8 @@ void trip_view_state_release(trip_view_state *s)
 {
     free(s->function);
     free(s->text);
-    s->function = s->text = NULL;
+    free(s->heat);
+    s->function = s->text = s->heat = NULL;
 }
 
 /* ---- files ---- */

@@ -15,9 +15,10 @@ typedef struct trip_view_state {
     trip_navigation navigation;
     char *function; /* preset or file; NULL: the data set's own */
     char *text;     /* of a function, in its place; NULL: none */
+    char *heat;     /* the data set of its heat, by its whole path; NULL: none */
     double opacity_scale;
     /* Of these what a viewer changes: classification, compositing, slices, method, shading, light,
-     * h, kernel radius, background, level of detail, samples, clipping, what is shown. */
+     * effects, h, kernel radius, background, level of detail, samples, clipping, what is shown. */
     triptych_settings settings;
     bool clips;                       /* settings.clip counts */
     bool panel, box, axes, scale_bar; /* shown */

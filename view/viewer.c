@@ -50,12 +50,15 @@ static void keep(const trip_viewer *v, const trip_document *d)
     if (!path)
         return;
     char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    char *heat = d->heat ? realpath(d->heat, NULL) : NULL; /* it may be away for a while */
     triptych_settings settings = d->settings;
-    settings.effects &= ~TRIPTYCH_EMISSION; /* of a data set that is not kept here */
+    if (!d->heat)
+        settings.effects &= ~TRIPTYCH_EMISSION;
     trip_state_file_save(&(trip_view_state){ .has_navigation = d->has_navigation,
                                              .navigation = d->navigation,
                                              .function = d->function,
                                              .text = text,
+                                             .heat = heat ? heat : d->heat,
                                              .opacity_scale = d->opacity_scale,
                                              .settings = settings,
                                              .clips = d->clips,
@@ -64,6 +67,7 @@ static void keep(const trip_viewer *v, const trip_document *d)
                                              .axes = v->axes,
                                              .scale_bar = v->scale_bar },
                          path);
+    free(heat);
     free(text);
     free(path);
 }
@@ -78,6 +82,9 @@ static void take_state(trip_viewer *v, trip_document *d, trip_view_state *s)
     if (!v->settings_given) {
         d->settings = s->settings;
         d->clips = s->clips;
+        free(d->heat);
+        d->heat = s->heat;
+        s->heat = NULL;
     }
     if (!(v->opacity_scale > 0))
         d->opacity_scale = s->opacity_scale;
@@ -188,6 +195,11 @@ void trip_viewer_close(trip_viewer *v)
 
 /* ---- what is wanted ---- */
 
+const char *trip_viewer_heat(const trip_document *d)
+{
+    return d->cold ? NULL : d->heat;
+}
+
 triptych_settings trip_viewer_settings(const trip_document *d)
 {
     triptych_settings s = d->settings;
@@ -195,7 +207,7 @@ triptych_settings trip_viewer_settings(const trip_document *d)
         s.clip = (triptych_clip){ 0 };
     if (s.headlight) /* which casts no shadows that are seen */
         s.effects &= ~TRIPTYCH_SHADOWS;
-    if (!d->heat)
+    if (!trip_viewer_heat(d))
         s.effects &= ~TRIPTYCH_EMISSION;
     return s;
 }
@@ -231,6 +243,7 @@ static void describe(trip_document *d, trip_opened *o)
         trip_clipping_rescale(&d->settings.clip, &d->info, &o->info);
     d->opened = true;
     d->small = o->small;
+    d->cold = o->cold;
     d->info = o->info;
     d->histogram = o->histogram;
     free(d->source);
@@ -537,7 +550,7 @@ char *trip_viewer_camera_options(trip_viewer *v)
     const triptych_settings s = trip_viewer_settings(d);
     char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
     char *clip = trip_clipping_text(&s.clip), *light = trip_light_text(&s);
-    char *effects = trip_effects_text(&s, d->heat);
+    char *effects = trip_effects_text(&s, trip_viewer_heat(d));
     if (camera && clip && light && effects &&
         asprintf(&text, "%s%s%s%s", camera, clip, light, effects) < 0)
         text = NULL;

@@ -19,6 +19,7 @@ typedef struct trip_document {
     char *input;     /* as the user named it */
     bool keep_all;   /* it is bricked anew, with all values */
     char *heat;      /* the data set of its heat; NULL: none */
+    bool cold;       /* which cannot be had: it is shown without */
     bool small;      /* of samples: the whole is to be bricked, or is being */
     bool opened;     /* what follows is known */
     triptych_info info;
@@ -83,6 +84,8 @@ void trip_viewer_release(trip_viewer *v);
 trip_document *trip_viewer_document(trip_viewer *v);
 /* What the library is to be set to: without what cannot be shown of it. */
 triptych_settings trip_viewer_settings(const trip_document *d);
+/* The data set of its heat that can be had; NULL: there is none. */
+const char *trip_viewer_heat(const trip_document *d);
 /* Opens a data set or volume beside the others, and shows it; one that is open already is opened
  * anew. */
 void trip_viewer_open(trip_viewer *v, const char *input);

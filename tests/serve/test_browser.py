@@ -127,12 +127,41 @@ class InBrowser(program.ProgramTest):
             ("[data-set=classify]", "value = 'post'"), ("[data-set=classify]", "value = 'pre'"),
             ("[data-set=h]", "value = '0.1'"), ("[data-set=method]", "value = 'axis'"),
             ("[data-set=show]", "value = 'lists'"), ("[data-set=show]", "value = 'merge'"),
-            ("[data-set=show]", "value = 'picture'"),
+            ("[data-set=show]", "value = 'picture'"), ("#occlusion", "checked = true"),
+            ("#cueing", "checked = true"), ("#fading", "value = '0.2'"), ("#head", "checked = false"),
+            ("#shadows", "checked = true"), ("#anisotropy", "value = '0.5'"),
+            ("#cueing", "checked = false"), ("#occlusion", "checked = false"),
         ):
+            self.ready(query)
             self.browser.value(f"(c => {{ c.{value}; c.dispatchEvent(new Event('input')); }})"
                                f"(document.querySelector('{query}'))")
             before = self.exact(before)
+        self.assertEqual(self.status()["effects"], "shadows")
+        self.assertEqual(self.shown_effects(), {"shadows": True, "anisotropy": True})
+        self.assertTrue(self.browser.value("document.getElementById('emission').disabled"))
         self.browser.value("document.getElementById('panel').open = false")
+
+    def ready(self, query):
+        """The control is there, and can be used by now."""
+        for _ in range(1000):
+            if self.browser.value(f"(c => !!c && !c.disabled && !c.parentNode.hidden)"
+                                  f"(document.querySelector('{query}'))"):
+                return
+            time.sleep(0.01)
+        raise AssertionError(query)
+
+    def shown_effects(self):
+        """Those that are on, and numbers that are to be seen, once the page has been told."""
+        shown = {}
+        for _ in range(1000):
+            shown = self.browser.value(
+                "Object.fromEntries([...document.querySelectorAll('#effects input')].filter("
+                "c => c.type === 'checkbox' ? c.checked : !c.parentNode.hidden).map("
+                "c => [c.id, true]))")
+            if len(shown) == 2:
+                break
+            time.sleep(0.01)
+        return shown
 
     def test_drags_wheels_keys_and_functions_change_the_picture(self):
         before = self.exact()

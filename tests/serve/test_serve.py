@@ -171,7 +171,9 @@ class Serve(program.ProgramTest):
             ("saturation", "0.11"), ("saturation", "-2"), ("saturation", "x"),
             ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2"),
             ("light", "nan,0,9"), ("light", "0,91,9"), ("light", "0,0,0"), ("light", "1,2,3,4"),
-            ("light", "," * 500), ("samples", "64"), ("", ""),
+            ("light", "," * 500), ("samples", "64"), ("", ""), ("shadows", "1"), ("emission", "1"),
+            ("cueing", "2"), ("occlusion", ""), ("auto", "yes"), ("fading", "0"), ("fading", "1.1"),
+            ("anisotropy", "nan"), ("anisotropy", "-1"), ("coldest", "-1"), ("hottest", "1e9"),
         ):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, (name, value))
         self.assertEqual(self.ask("/set", "POST", name="light", value="30,45,1.5")[0], 204)
@@ -189,6 +191,34 @@ class Serve(program.ProgramTest):
             self.assert_rendered(picture, camera)
             self.assertTrue((picture != before).any(), value)
             before = picture
+
+    def test_effects_are_switched_and_drawn_as_the_options_have_them(self):
+        self.tearDown()
+        self.serve("v.trip", "--effects", "auto", "--emission", "heat.trip")
+        self.do("resize 60 50")
+        before, number, camera = self.whole_picture()
+        for name, value in (
+            ("auto", "0"), ("emission", "1"), ("hottest", "4000"), ("coldest", "500"), ("emission", "0"),
+            ("light", "30,45,10"), ("shadows", "1"), ("anisotropy", "0.5"), ("shadows", "0"),
+            ("occlusion", "1"), ("cueing", "1"), ("fading", "0.25"),
+        ):
+            status, _, data = self.ask("/set", "POST", name=name, value=value)
+            self.assertEqual(status, 204, (name, data))
+            picture, number, camera = self.whole_picture(number)
+            self.assert_rendered(picture, camera)
+            self.assertTrue((picture != before).any(), (name, value))
+            before = picture
+        now = self.status()
+        self.assertEqual(now["effects"], "occlusion, depth cueing")
+        self.assertEqual([e["name"] for e in now["switches"] if e["on"]], ["occlusion", "cueing"])
+        self.assertEqual({n["name"]: n["value"] for e in now["switches"] for n in e["numbers"]},
+                         {"anisotropy": 0.5, "fading": 0.25, "coldest": 500, "hottest": 4000})
+        self.assertFalse(now["light"]["head"])
+        for name, degrees in ("round", 30), ("up", 45):
+            self.assertAlmostEqual(now["light"][name], degrees, 9)
+        self.ask("/set", "POST", name="light", value="head")
+        lacking = {e["name"]: e["lacks"] for e in self.status()["switches"] if e["lacks"]}
+        self.assertEqual(lacking, {"shadows": "the light is from the eye"})
 
     def test_heat_glows_as_render_draws_it(self):
         for renderer in "cpu", *program.GL:

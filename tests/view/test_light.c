@@ -121,6 +121,81 @@ static void effects_are_written_as_options_and_said_in_words(void **state)
                    "what the data calls for, emission of h, 0 to 1800.5 K");
 }
 
+static const trip_effect_switch *switch_of(int bit)
+{
+    int i = 0;
+    while (trip_effect_switches[i].bit != bit)
+        i++;
+    return &trip_effect_switches[i];
+}
+
+static void every_effect_has_a_switch_that_turns_it_alone(void **state)
+{
+    (void)state;
+    int all = 0;
+    triptych_settings s = triptych_default_settings();
+    s.headlight = 0;
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++) {
+        const trip_effect_switch *e = &trip_effect_switches[i];
+        assert_true(trip_effect_turn(e, true, &s, "heat.trip"));
+        assert_int_equal(s.effects, e->bit);
+        assert_true(trip_effect_turn(e, false, &s, NULL));
+        assert_int_equal(s.effects, 0);
+        all |= e->bit;
+    }
+    assert_int_equal(all, TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING |
+                              TRIPTYCH_EFFECTS_AUTO | TRIPTYCH_EMISSION);
+}
+
+static void what_lacks_its_light_or_heat_is_not_turned_on(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    assert_non_null(strstr(trip_effect_lacks(switch_of(TRIPTYCH_SHADOWS), &s, "h"), "the eye"));
+    assert_false(trip_effect_turn(switch_of(TRIPTYCH_SHADOWS), true, &s, "h"));
+    assert_non_null(
+        strstr(trip_effect_lacks(switch_of(TRIPTYCH_EMISSION), &s, NULL), "--emission"));
+    assert_false(trip_effect_turn(switch_of(TRIPTYCH_EMISSION), true, &s, NULL));
+    assert_int_equal(s.effects, 0);
+    assert_null(trip_effect_lacks(switch_of(TRIPTYCH_OCCLUSION), &s, NULL));
+    s.headlight = 0;
+    assert_null(trip_effect_lacks(switch_of(TRIPTYCH_SHADOWS), &s, NULL));
+}
+
+static const trip_effect_number *number_of(const char *name)
+{
+    int i = 0;
+    while (strcmp(trip_effect_numbers[i].name, name))
+        i++;
+    return &trip_effect_numbers[i];
+}
+
+static void numbers_of_effects_keep_within_their_bounds(void **state)
+{
+    (void)state;
+    for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
+        const trip_effect_number *n = &trip_effect_numbers[i];
+        triptych_settings s = triptych_default_settings();
+        const double usual = trip_effect_number_get(n, &s);
+        const double bad[] = { n->lo - 0.001, n->hi + 0.001, NAN, INFINITY };
+        assert_true(usual >= n->lo && usual <= n->hi);
+        for (int k = 0; k < 4; k++) {
+            assert_false(trip_effect_number_set(n, bad[k], &s));
+            assert_true(trip_effect_number_get(n, &s) == usual);
+        }
+        assert_true(trip_effect_number_set(n, n->lo, &s));
+        assert_true(trip_effect_number_get(n, &s) == n->lo && s.kelvin[0] < s.kelvin[1]);
+        assert_true(trip_effect_number_set(n, n->hi, &s));
+        assert_true(trip_effect_number_get(n, &s) == n->hi && s.kelvin[0] < s.kelvin[1]);
+    }
+    triptych_settings s = triptych_default_settings();
+    assert_true(trip_effect_number_set(number_of("anisotropy"), 0.25, &s) && s.anisotropy == 0.25);
+    assert_true(trip_effect_number_set(number_of("fading"), 0.5, &s) && s.cueing == 0.5);
+    assert_true(trip_effect_number_set(number_of("hottest"), 3000, &s) && s.kelvin[1] == 3000);
+    assert_true(trip_effect_number_set(number_of("coldest"), 400, &s) && s.kelvin[0] == 400);
+    assert_true(s.kelvin[1] == 3000);
+}
+
 static void words_end_where_the_text_does(void **state)
 {
     (void)state;
@@ -143,6 +218,9 @@ int main(void)
         cmocka_unit_test(any_light_has_numbers_to_show),
         cmocka_unit_test(it_is_written_as_an_option_where_it_lights),
         cmocka_unit_test(effects_are_written_as_options_and_said_in_words),
+        cmocka_unit_test(every_effect_has_a_switch_that_turns_it_alone),
+        cmocka_unit_test(what_lacks_its_light_or_heat_is_not_turned_on),
+        cmocka_unit_test(numbers_of_effects_keep_within_their_bounds),
         cmocka_unit_test(words_end_where_the_text_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

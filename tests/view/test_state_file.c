@@ -21,6 +21,7 @@ static trip_view_state unusual(void)
                                       .fov_degrees = 30.000000000000004,
                                       .ortho_height = 0.1 };
     s.text = strdup("unit voxel\nvalues data\n0 0 0 0 0\n1 1 1 1 0.5\n");
+    s.heat = strdup("/data/heat of it.trip");
     s.opacity_scale = 2.5;
     s.settings.classify = TRIPTYCH_POST;
     s.settings.slices = 3;
@@ -30,6 +31,9 @@ static trip_view_state unusual(void)
     s.settings.headlight = 0;
     s.settings.point_light = 1;
     s.settings.light[1] = -1.0 / 7;
+    s.settings.effects = TRIPTYCH_EMISSION | TRIPTYCH_CUEING;
+    s.settings.kelvin[0] = 100.0 / 3;
+    s.settings.kelvin[1] = 3000;
     s.settings.background[2] = 0.2;
     s.settings.show = TRIPTYCH_SHOW_LEVELS;
     s.settings.clip = (triptych_clip){ .box = 1,
@@ -69,6 +73,9 @@ static void assert_same(const trip_view_state *a, const trip_view_state *b)
     assert_true(a->settings.lod_px == b->settings.lod_px);
     assert_same_clip(&a->settings.clip, &b->settings.clip);
     assert_int_equal(a->settings.show, b->settings.show);
+    assert_int_equal(a->settings.effects, b->settings.effects);
+    assert_memory_equal(a->settings.kelvin, b->settings.kelvin, sizeof a->settings.kelvin);
+    assert_string_equal(a->heat, b->heat);
     assert_int_equal(a->clips, b->clips);
 }
 
@@ -154,6 +161,9 @@ static void what_is_no_state_is_refused_whole(void **state)
     assert_refused("5e+20", "5, 3", "eye");
     assert_refused("[0.1, 0.7, 0]", "[0, 0, 0]", "its camera is none");
     assert_refused("[0, 1, 0]", "[0, 0.5, 0]", "its camera is none");
+    assert_refused("\"heat\":\t\"/data/heat of it.trip\"", "\"heat\":\t7", "heat");
+    assert_refused("\"effects\":\t20", "\"effects\":\t32", "effects");
+    assert_refused("33.3", "3333.3", "its temperatures are none");
     assert_refused("\"panel\":\ttrue", "\"panel\":\t1", "panel");
     assert_refused("1 1 1 1 0.5", "1 1 1 1 7.5", "opacity");
     assert_refused("-0.142", "x", "is not what the viewer keeps");

@@ -131,10 +131,57 @@ class View(program.ProgramTest):
         numpy.testing.assert_array_equal(program.read_exr("cold.exr"), cold)
         self.view("wait\npicture ball.exr\n", "ball.trip", "--effects=cueing")
         numpy.testing.assert_array_equal(program.read_exr("ball.exr"), ball)
-        # What is kept of it does without, as heat is named anew each time.
+        # Kept with the rest, as it was left; and the other has none.
         again, = self.pictures("wait\npicture again.exr\n", ["again"], "noise.trip", fresh=False)
-        numpy.testing.assert_array_equal(again, cold)
+        numpy.testing.assert_array_equal(again, warmer)
+        again, = self.pictures("wait\npicture again.exr\n", ["again"], "ball.trip", fresh=False)
+        numpy.testing.assert_array_equal(again, ball)
         shutil.rmtree("state")
+
+    def test_heat_that_cannot_be_had_is_said_and_the_rest_is_as_it_was_left(self):
+        shutil.rmtree("state", ignore_errors=True)
+        script = "wait\ndrag left 100 100 160 130 5\nwait\npicture hot.exr\nstatus status.json\n"
+        hot, = self.pictures(script, ["hot"], *self.GLOWS, fresh=False)
+        camera = shlex.split(self.status()["camera"])
+        cold = [*camera[: camera.index("--effects")], "--effects=cueing"]
+        self.works("render", "noise.trip", *cold, "--background=0,0,0", "-o", "cold.exr",
+                   "--renderer=cpu")
+        cold = program.read_exr("cold.exr")
+        self.assertTrue((hot != cold).any())
+        for spoil in "missing", "damaged":
+            shutil.copytree("heat.trip", "kept.trip")
+            if spoil == "missing":
+                shutil.rmtree("heat.trip")
+            else:
+                program.write(os.path.join("heat.trip", "index.trip"), b"nothing of the kind")
+            self.view("wait\nstatus status.json\nscreenshot said.png\npicture without.exr\n", "noise.trip",
+                      "--renderer=cpu", fresh=False)
+            without = program.read_exr("without.exr")
+            numpy.testing.assert_array_equal(without, cold, spoil)
+            status = self.status()
+            self.assertTrue(status["exact"] and not status["failed"])
+            self.assertIn("heat.trip", status["message"])
+            self.assertNotIn("\n", status["message"])
+            self.assertNotIn("--emission", status["camera"])
+            shutil.rmtree("heat.trip", ignore_errors=True)
+            os.rename("kept.trip", "heat.trip")
+            again, = self.pictures("wait\npicture again.exr\n", ["again"], "noise.trip",
+                                   "--renderer=cpu", fresh=False)
+            numpy.testing.assert_array_equal(again, hot)
+        shutil.rmtree("state")
+
+    def test_effects_have_controls_that_draw_as_render_does(self):
+        script = "wait\npicture 0.exr\nclick 0.1 Effects\n"
+        for i, control in enumerate(("Occlusion", "Depth cueing", "Fading", "Light from the eye",
+                                     "Light up", "Shadows", "Anisotropy"), 1):
+            script += f"click 0.3 {control}\nwait\npicture {i}.exr\nstatus {i}.json\n"
+        pictures = self.pictures(script, range(8), "noise.trip")
+        for i in range(1, 8):
+            self.assertTrue((pictures[i] != pictures[i - 1]).any(), i)
+            camera = shlex.split(self.status(f"{i}.json")["camera"])
+            self.works("render", "noise.trip", *camera, "--background=0,0,0", "-o", "drawn.exr")
+            numpy.testing.assert_array_equal(program.read_exr("drawn.exr"), pictures[i])
+        self.assertEqual(camera[camera.index("--effects") + 1], "shadows,occlusion,cueing")
 
     def test_marked_views_are_the_keys_of_a_path(self):
         if os.path.exists("noise-001.json"):
