@@ -65,16 +65,24 @@ void trip_coarse_sum_add(trip_coarse_sum *s, const trip_coarse_voxel *voxel, uns
         add_gradient(s, voxel->kept, gradient);
 }
 
+/* As rint() of what is from 0 to 2^51, which many processors have no instruction for. */
+static double nearest(double x)
+{
+    const double whole = 0x1p52;
+    return x + whole - whole;
+}
+
 /* Of a sum over eight; what there is does not become nothing. */
 static uint16_t eighth(float sum)
 {
-    double part = rint((double)sum / 8);
+    double part = nearest((double)sum / 8);
     return (uint16_t)(sum > 0 && part < 1 ? 1 : part);
 }
 
 static uint16_t mean_of(float sum, float weight)
 {
-    return weight > 0 ? (uint16_t)fmin(65535, rint((double)sum / (double)weight)) : 0;
+    double mean = weight > 0 ? nearest((double)sum / (double)weight) : 0;
+    return (uint16_t)(mean < 65535 ? mean : 65535);
 }
 
 bool trip_coarse_sum_get(const trip_coarse_sum *s, trip_coarse_voxel *out)

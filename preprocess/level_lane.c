@@ -71,15 +71,19 @@ static int add_run(trip_level_lane *l, const trip_level_work *w, const trip_leve
     double gradient[3];
     int status = trip_list_cursor_read(square->cursor, &square->run, l->run, &run);
     const bool normals = run.normals && square->kept;
+    trip_coarse_sum *sum = NULL;
+    size_t last = SIZE_MAX; /* in list order those of a voxel come together */
     for (uint32_t i = 0; i < run.count && status == 0; i++) {
         const uint32_t voxel = run.voxels[i];
         const size_t u = (size_t)square->u + trip_voxel_u(voxel),
                      v = (size_t)square->v + trip_voxel_v(voxel);
         const unsigned odd = (u & 1) | (v & 1) << 1 | square->odd << 2;
+        const size_t at = (v >> 1 << w->edge_log2) + (u >> 1);
+        if (at != last)
+            sum = sum_at(l, last = at);
         if (normals)
             gradient_of(w, run.normals[i], gradient);
-        trip_coarse_sum_add_whole(sum_at(l, (v >> 1 << w->edge_log2) + (u >> 1)),
-                                  (uint16_t)trip_voxel_code(voxel), square->kept, odd,
+        trip_coarse_sum_add_whole(sum, (uint16_t)trip_voxel_code(voxel), square->kept, odd,
                                   normals ? gradient : NULL);
     }
     return status;
@@ -159,10 +163,38 @@ static uint32_t value_code(const trip_level_work *w, const trip_coarse_voxel *vo
     return w->params->code_bytes == 1 ? (voxel->value + 128u) / 257 * 257 : voxel->value;
 }
 
-static uint32_t mean_code(const trip_level_work *w, const trip_coarse_voxel *voxel, int axis)
+static uint32_t shares_of(const trip_coarse_voxel *voxel, int axis)
 {
-    return trip_mean_pack(&w->scale, voxel->mean, voxel->cover[axis] / (double)TRIP_COARSE_ALL,
-                          voxel->kept / (double)voxel->cover[axis]);
+    if (voxel->kept == TRIP_COARSE_ALL)
+        return TRIP_MEAN_SHARES - 1;
+    return trip_mean_pack_shares(voxel->cover[axis] / (double)TRIP_COARSE_ALL,
+                                 voxel->kept / (double)voxel->cover[axis]);
+}
+
+static void put_values(trip_level_lane *l, const trip_level_work *w,
+                       const trip_coarse_voxel *voxels, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++)
+        l->box.values[trip_splat_box_row(&l->box, voxels[i].v, 0) + voxels[i].u] =
+            value_code(w, &voxels[i]);
+}
+
+/* The values of a list of means, and with the first of them what the others have too. */
+static void put_means(trip_level_lane *l, const trip_level_work *w, const trip_coarse_voxel *voxels,
+                      uint32_t count, unsigned list)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const trip_coarse_voxel *voxel = &voxels[i];
+        const size_t at = trip_splat_box_row(&l->box, voxel->v, 0) + voxel->u;
+        if (!voxel->kept)
+            continue;
+        if (list == 0) {
+            l->box.normals[at] = voxel->normal;
+            l->box.values[at] = trip_mean_pack_value(&w->scale, voxel->mean);
+        }
+        l->box.values[at] = (l->box.values[at] & ~(uint32_t)(TRIP_MEAN_SHARES - 1)) |
+                            shares_of(voxel, trip_list_axis(list));
+    }
 }
 
 /* The pieces of a list. */
@@ -171,15 +203,10 @@ static int emit(trip_level_lane *l, const trip_level_work *w, const trip_coarse_
 {
     const trip_piece_format f = trip_piece_format_of(&w->format, list);
     const trip_piece_sink sink = { reserve, w->builder, l->producer };
-    for (uint32_t i = 0; i < count; i++) {
-        const trip_coarse_voxel *voxel = &voxels[i];
-        size_t at = trip_splat_box_row(&l->box, voxel->v, 0) + voxel->u;
-        if (list >= TRIP_HALO_LISTS)
-            l->box.values[at] = value_code(w, voxel);
-        else if (voxel->kept)
-            l->box.values[at] = mean_code(w, voxel, trip_list_axis(list));
-        l->box.normals[at] = voxel->normal;
-    }
+    if (list < TRIP_HALO_LISTS)
+        put_means(l, w, voxels, count, list);
+    else if (list == TRIP_HALO_LISTS) /* the same along all axes */
+        put_values(l, w, voxels, count);
     return trip_splat_box_emit(&l->box, &f, list, &sink);
 }
 

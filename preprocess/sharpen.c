@@ -15,7 +15,7 @@ static const uint64_t TILE_MASK = (UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1;
 struct trip_sharpen_square {
     uint64_t key;
     bool held;
-    uint64_t *known; /* bits */
+    uint16_t *known; /* all bits, or none where there is no voxel */
     uint16_t *values;
 };
 
@@ -41,7 +41,7 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
     l->sums = part(memory, &at, plane * sizeof *l->sums);
     l->squares = part(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
-        uint64_t *known = part(memory, &at, plane / 8);
+        uint16_t *known = part(memory, &at, plane * sizeof *known);
         uint16_t *values = part(memory, &at, plane * sizeof *values);
         if (memory)
             l->squares[i] = (trip_sharpen_square){ .known = known, .values = values };
@@ -156,10 +156,10 @@ static int read_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_s
     int status = read_voxels(s, l, place);
     to->key = place->key;
     to->held = status == 0;
-    memset(to->known, 0, (size_t)1 << (2 * s->edge_log2 - 3));
+    memset(to->known, 0, sizeof *to->known << 2 * s->edge_log2);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
         const size_t at = ((size_t)l->voxels[i].v << s->edge_log2) + l->voxels[i].u;
-        to->known[at / 64] |= UINT64_C(1) << at % 64;
+        to->known[at] = UINT16_MAX;
         to->values[at] = l->voxels[i].value;
     }
     return status;
@@ -174,6 +174,14 @@ static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_s
     return square->held && square->key == place->key ? 0 : read_square(s, l, place, square);
 }
 
+/* Where the others are there. */
+static void add_differences(int32_t *restrict sums, const uint16_t *here, const uint16_t *others,
+                            const uint16_t *known, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        sums[i] += (here[i] & known[i]) - (others[i] & known[i]);
+}
+
 /* Of the square at hand the voxels of `count` rows from `row` on and of `width` columns from
  * `column` on, with those of another that are `shift` further. */
 static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
@@ -181,12 +189,11 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
                        size_t width, ptrdiff_t shift)
 {
     const trip_sharpen_square *here = &l->squares[0];
-    for (size_t v = row; v < row + count; v++)
-        for (size_t u = column; u < column + width; u++) {
-            const size_t at = (v << s->edge_log2) + u, to = (size_t)((ptrdiff_t)at + shift);
-            if (other->known[to / 64] >> to % 64 & 1)
-                l->sums[at] += here->values[at] - other->values[to];
-        }
+    for (size_t v = row; v < row + count; v++) {
+        const size_t at = (v << s->edge_log2) + column;
+        add_differences(l->sums + at, here->values + at, other->values + at + shift,
+                        other->known + at + shift, width);
+    }
 }
 
 static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,

@@ -32,16 +32,25 @@ double trip_mean_depth(unsigned shares)
     return (shares / COVERS % DEPTHS + 1) / (double)DEPTHS;
 }
 
-unsigned trip_mean_pack(const trip_mean_scale *scale, double value, double cover, double depth)
+unsigned trip_mean_pack_value(const trip_mean_scale *scale, double value)
 {
     const double part = scale->width > 0 ? (value - scale->lo) / scale->width : 0;
-    const unsigned m = (unsigned)rint(fmin(1, fmax(0, part)) * (VALUES - 1));
+    return (unsigned)rint(fmin(1, fmax(0, part)) * (VALUES - 1)) << TRIP_MEAN_AXIS_BITS;
+}
+
+unsigned trip_mean_pack_shares(double cover, double depth)
+{
     unsigned c = 0;
     double d = rint(depth * DEPTHS) - 1;
     while (c + 1 < COVERS && cover >= 0.5 * (covers[c] + covers[c + 1]))
         c++;
     d = fmax(0, fmin(DEPTHS - 1, d));
-    return m << TRIP_MEAN_AXIS_BITS | (unsigned)d * COVERS | c;
+    return (unsigned)d * COVERS | c;
+}
+
+unsigned trip_mean_pack(const trip_mean_scale *scale, double value, double cover, double depth)
+{
+    return trip_mean_pack_value(scale, value) | trip_mean_pack_shares(cover, depth);
 }
 
 /* `column`: minus the opacity of a column. */

@@ -32,6 +32,9 @@ trip_mean_scale trip_mean_scale_make(double value_min, double value_max, double 
 
 /* `value`: a code of level 0; cover and depth above 0, at most 1. The nearest that there are. */
 unsigned trip_mean_pack(const trip_mean_scale *scale, double value, double cover, double depth);
+/* Its two parts, the bits of the mean and those of the shares. */
+unsigned trip_mean_pack_value(const trip_mean_scale *scale, double value);
+unsigned trip_mean_pack_shares(double cover, double depth);
 
 /* Of a code's lowest bits, its shares. */
 double trip_mean_cover(unsigned shares);
