@@ -114,24 +114,7 @@ static int latest_at(const flyer *f, double ms)
     return i;
 }
 
-static void note_picture(void *user, const trip_picture *p)
-{
-    flyer *f = user;
-    const double ms = now_ms();
-    const int step = step_of(f, &p->navigation);
-    f->number = p->number;
-    if (step < 0 || !has_room(f))
-        return;
-    const flyer_picture *before = f->picture_count ? &f->pictures[f->picture_count - 1] : NULL;
-    f->pictures[f->picture_count] =
-        (flyer_picture){ .ms = ms - f->begun_ms,
-                         .step = step,
-                         .latest = before ? latest_at(f, f->begun_ms + before->ms) : step,
-                         .age_ms = ms - f->wanted_ms[step],
-                         .scale = (double)p->width / p->full_width };
-    f->picture_count++;
-}
-
+/* Keeps the last picture that is whole. */
 static void look(void *user, const trip_picture *p)
 {
     flyer *f = user;
@@ -143,6 +126,24 @@ static void look(void *user, const trip_picture *p)
     f->last = malloc(bytes);
     if (f->last)
         memcpy(f->last, p->rgba, bytes);
+}
+
+static void note_picture(void *user, const trip_picture *p)
+{
+    flyer *f = user;
+    const double ms = now_ms();
+    const int step = step_of(f, &p->navigation);
+    look(f, p); /* that of the last step may come here */
+    if (step < 0 || !has_room(f))
+        return;
+    const flyer_picture *before = f->picture_count ? &f->pictures[f->picture_count - 1] : NULL;
+    f->pictures[f->picture_count] =
+        (flyer_picture){ .ms = ms - f->begun_ms,
+                         .step = step,
+                         .latest = before ? latest_at(f, f->begun_ms + before->ms) : step,
+                         .age_ms = ms - f->wanted_ms[step],
+                         .scale = (double)p->width / p->full_width };
+    f->picture_count++;
 }
 
 /* ---- the flight ---- */
