@@ -50,7 +50,8 @@ void trip_context_drop_renderer(triptych *t)
     t->renderer = NULL;
 }
 
-/* One that reads all the planes wanted, of any level: its lists keep their numbers. Counting is by
+/* One that reads the planes wanted, of any level: its lists keep their numbers; where it keeps what
+ * it has read, one that reads more will do. Counting is by
  * a reader of its own, so that nothing that was read then is in the cache of the frames that are
  * timed. */
 static int make_reader(triptych *t, unsigned planes)
@@ -67,7 +68,8 @@ static int make_reader(triptych *t, unsigned planes)
         .skip = finds_occluded && !draws_all ? trip_cpu_occluded : NULL,
         .skip_user = t->renderer,
     };
-    if (t->reader && !(planes & ~t->planes) && t->counting == t->reader_counts)
+    const bool reads = wanted.cache ? !(planes & ~t->planes) : planes == t->planes;
+    if (t->reader && reads && t->counting == t->reader_counts)
         return 0;
     trip_context_drop_reader(t);
     t->planes = planes;

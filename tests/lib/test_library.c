@@ -177,6 +177,29 @@ static void a_frame_has_statistics_by_list(void **state)
     triptych_destroy(t);
 }
 
+/* Normals are those that splats are lit by. */
+static void a_frame_reads_what_it_needs_whatever_was_drawn_before(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    triptych_settings s = triptych_default_settings();
+    triptych_frame_stats stats;
+    uint64_t bytes[3] = { 0 };
+    float *rgba = calloc((size_t)SIZE * SIZE * 4, sizeof *rgba);
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    for (int i = 0; i < 3; i++) {
+        s.classify = i == 1 ? TRIPTYCH_PRE : TRIPTYCH_POST;
+        assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+        assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+        assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_OK);
+        bytes[i] = stats.bytes_read;
+    }
+    assert_true(bytes[0] > 0 && bytes[1] > bytes[0]);
+    assert_int_equal(bytes[2], bytes[0]);
+    free(rgba);
+    triptych_destroy(t);
+}
+
 static void the_plan_of_a_frame_can_be_printed(void **state)
 {
     (void)state;
@@ -1186,6 +1209,7 @@ int main(void)
         cmocka_unit_test(info_is_that_of_the_volume),
         cmocka_unit_test(lists_hold_the_kept_voxels_along_each_axis),
         cmocka_unit_test(a_frame_has_statistics_by_list),
+        cmocka_unit_test(a_frame_reads_what_it_needs_whatever_was_drawn_before),
         cmocka_unit_test(the_plan_of_a_frame_can_be_printed),
         cmocka_unit_test(the_view_found_gives_the_same_picture_again),
         cmocka_unit_test(pictures_take_of_the_memory_given),
