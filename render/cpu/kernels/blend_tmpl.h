@@ -192,20 +192,25 @@ INLINE vf near_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays 
     return near_depth_at(p->pane, splat, p->x, p->y, p->ray, p->stretch, p->cutoff, rays);
 }
 
-INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
+/* Of splats that are not near. */
+INLINE vf far_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
-    if (is_near(splat))
-        return near_depth(p, splat, rays);
     vf depth = long_depth(p, splat, nearness(p, splat, rays));
     return rays == TRIP_CPU_STRETCHED ? depth * p->stretch : depth;
 }
 
+INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
+{
+    return is_near(splat) ? near_depth(p, splat, rays) : far_depth(p, splat, rays);
+}
+
+/* Thin splats are not near. */
 INLINE vf opacity(const patch *p, const trip_cpu_splat *splat, bool thick, trip_cpu_rays rays)
 {
     if (rays != TRIP_CPU_STRETCHED && !thick)
         return thin_opacity(splat, nearness(p, splat, rays));
-    vf depth = optical_depth(p, splat, rays);
-    if (is_near(splat))
+    vf depth = thick ? optical_depth(p, splat, rays) : far_depth(p, splat, rays);
+    if (thick && is_near(splat))
         return v_select(v_gt(v_set(TRIP_CPU_THIN), depth), depth * thin_ratio(depth),
                         v_set(1) - exp_minus(depth));
     return thick ? v_set(1) - exp_minus(depth) : depth * thin_ratio(depth);

@@ -794,10 +794,9 @@ static void replace_scalar(trip_cpu_splat *out, const uint32_t row[V], unsigned 
 
 INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
-    const float *table = &view->table[0].r;
-    vi code = vi_load(staged->code + at);
-    colour c = { v_gather(table, code * 4), v_gather(table + 1, code * 4),
-                 v_gather(table + 2, code * 4) };
+    vf entry[4];
+    v_load_rows(&view->table[0].r, staged->code + at, entry);
+    colour c = { entry[0], entry[1], entry[2] };
     if (view->tinted)
         c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
     if (!view->shading && !TRIP_CPU_EFFECTS)
@@ -854,11 +853,14 @@ INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32
     float *base = &out->l11;
     vf depth = v_load(lanes->depth + at), c[TRIP_CPU_TERMS];
     vf panes = v_load(lanes->panes + at), limit = v_set(view->thin);
-    thin_terms(depth, c);
-    if (view->rays == TRIP_CPU_STRETCHED)
-        long_terms(view, depth, v_ge(depth, v_set(0)), c);
-    else if (vm_any(v_gt(depth, limit)))
-        long_terms(view, depth, v_gt(depth, limit), c);
+    if (view->rays == TRIP_CPU_STRETCHED) {
+        c[0] = c[1] = c[2] = c[3] = c[4] = v_set(0);
+        long_terms(view, depth, vm_first(V), c);
+    } else {
+        thin_terms(depth, c);
+        if (vm_any(v_gt(depth, limit)))
+            long_terms(view, depth, v_gt(depth, limit), c);
+    }
     const vi thick = vi_set(INT32_MIN);
     static_assert(TRIP_CPU_PANES_THICK_SHIFT == 31, "the bit above");
     panes = v_select(v_gt(depth, limit), v_from_bits(v_bits(panes) | thick), panes);
@@ -905,18 +907,21 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
 
 /* In three loops, each short enough that the processor works on several vectors at a time: one
  * loop's chain of divisions and roots would leave it waiting. What lies over saturated texels is
- * left out before it is coloured, stored, sorted and gathered. */
-INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic uint64_t *open,
-                           const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
-                           trip_cpu_splat *out, float *depths)
+ * left out before it is coloured, stored, sorted and gathered. `common`: round kernels in
+ * perspective, whose footprints are not affine; `uneven` is then view->stretch_varies. */
+INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
+                           const _Atomic uint64_t *open, const trip_cpu_staged *staged,
+                           uint32_t count, trip_cpu_lanes *lanes, trip_cpu_splat *out,
+                           float *depths)
 {
     uint32_t n = 0;
-    const float *extinction = &view->table[0].extinction;
     const bool ortho = !common && view->splat.camera.ortho, flattens = !common && view->flattens;
     footprint parallel = footprint_parallel(view);
     perspective persp = perspective_of(view);
-    if (common)
-        persp.uneven = persp.affine = false;
+    if (common) {
+        persp.uneven = uneven;
+        persp.affine = false;
+    }
     for (uint32_t i = 0; i < count; i += V)
         place(view, staged, i, lanes);
     for (uint32_t i = 0; i < count; i += V) {
@@ -934,8 +939,9 @@ INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic
         unsigned behind = vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
         unsigned usual = view->coordinates ? 0 : vm_bits(f.usual);
         unsigned scalar = valid & ~behind & ~usual;
-        vf tau = v_gather(extinction, vi_load(staged->code + i) * 4);
-        unsigned kept = complete(view, &f, tau, lanes, i) & valid & ~scalar;
+        vf entry[4];
+        v_load_rows(&view->table[0].r, staged->code + i, entry);
+        unsigned kept = complete(view, &f, entry[3], lanes, i) & valid & ~scalar;
         if (open && kept)
             kept &= over_open_texels(lanes, i, open, view->panes_across);
         lanes->kept[i / V] = kept;
@@ -946,15 +952,17 @@ INLINE uint32_t project_as(bool common, const trip_cpu_view *view, const _Atomic
     return n;
 }
 
-/* Perspective views of cubes by round kernels are compiled by themselves, without what they do not
- * need. */
+/* Perspective views by round kernels are compiled by themselves, without what they do not need, of
+ * cubes and of others. */
 static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
                         trip_cpu_splat *out, float *depths)
 {
-    if (view->splat.camera.ortho || view->splat.affine || view->stretch_varies || view->flattens)
-        return project_as(false, view, open, staged, count, lanes, out, depths);
-    return project_as(true, view, open, staged, count, lanes, out, depths);
+    if (view->splat.camera.ortho || view->splat.affine || view->flattens)
+        return project_as(false, false, view, open, staged, count, lanes, out, depths);
+    if (view->stretch_varies)
+        return project_as(true, true, view, open, staged, count, lanes, out, depths);
+    return project_as(true, false, view, open, staged, count, lanes, out, depths);
 }
 
 #endif

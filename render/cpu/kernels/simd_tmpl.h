@@ -15,6 +15,7 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -383,6 +384,28 @@ INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf
 #undef QUARTER
 }
 
+/* The four floats at base + 4 row[i] to lane i of r[0], r[1], r[2] and r[3]. */
+INLINE void v_load_rows(const float *base, const int32_t row[V], vf r[4])
+{
+#define ROW(lane) _mm_loadu_ps(base + 4 * (ptrdiff_t)row[lane])
+#define ROWS(lane)                                                                                 \
+    _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ROW(lane)),    \
+                                                             ROW(lane + 4), 1),                    \
+                                          ROW(lane + 8), 2),                                       \
+                       ROW(lane + 12), 3)
+    __m512 r0 = ROWS(0), r1 = ROWS(1), r2 = ROWS(2), r3 = ROWS(3);
+#undef ROWS
+#undef ROW
+    __m512 ab01 = _mm512_unpacklo_ps(r0, r1), cd01 = _mm512_unpackhi_ps(r0, r1);
+    __m512 ab23 = _mm512_unpacklo_ps(r2, r3), cd23 = _mm512_unpackhi_ps(r2, r3);
+#define PAIR(x, y, unpack) (vf) unpack(_mm512_castps_pd(x), _mm512_castps_pd(y))
+    r[0] = PAIR(ab01, ab23, _mm512_unpacklo_pd);
+    r[1] = PAIR(ab01, ab23, _mm512_unpackhi_pd);
+    r[2] = PAIR(cd01, cd23, _mm512_unpacklo_pd);
+    r[3] = PAIR(cd01, cd23, _mm512_unpackhi_pd);
+#undef PAIR
+}
+
 #else /* ---- vectors of masks: AVX2, NEON and plain ---- */
 
 INLINE vm v_ge(vf a, vf b)
@@ -565,6 +588,23 @@ INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf
 #undef HALF
 }
 
+INLINE void v_load_rows(const float *base, const int32_t row[V], vf r[4])
+{
+#define ROW(lane) _mm_loadu_ps(base + 4 * (ptrdiff_t)row[lane])
+#define ROWS(lane) _mm256_insertf128_ps(_mm256_castps128_ps256(ROW(lane)), ROW(lane + 4), 1)
+    __m256 r0 = ROWS(0), r1 = ROWS(1), r2 = ROWS(2), r3 = ROWS(3);
+#undef ROWS
+#undef ROW
+    __m256 ab01 = _mm256_unpacklo_ps(r0, r1), cd01 = _mm256_unpackhi_ps(r0, r1);
+    __m256 ab23 = _mm256_unpacklo_ps(r2, r3), cd23 = _mm256_unpackhi_ps(r2, r3);
+#define PAIR(x, y, unpack) (vf) unpack(_mm256_castps_pd(x), _mm256_castps_pd(y))
+    r[0] = PAIR(ab01, ab23, _mm256_unpacklo_pd);
+    r[1] = PAIR(ab01, ab23, _mm256_unpackhi_pd);
+    r[2] = PAIR(cd01, cd23, _mm256_unpacklo_pd);
+    r[3] = PAIR(cd01, cd23, _mm256_unpackhi_pd);
+#undef PAIR
+}
+
 #else /* NEON and plain: four floats, two doubles */
 
 #if TRIP_SIMD == TRIP_SIMD_NEON
@@ -743,6 +783,14 @@ INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf
         vf r = { a[i], b[i], c[i], d[i] };
         v_store(out + row[i], r);
     }
+}
+
+INLINE void v_load_rows(const float *base, const int32_t row[V], vf r[4])
+{
+    const float *a = base + 4 * (ptrdiff_t)row[0], *b = base + 4 * (ptrdiff_t)row[1];
+    const float *c = base + 4 * (ptrdiff_t)row[2], *d = base + 4 * (ptrdiff_t)row[3];
+    for (int i = 0; i < 4; i++)
+        r[i] = (vf){ a[i], b[i], c[i], d[i] };
 }
 
 #endif
