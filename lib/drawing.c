@@ -234,8 +234,8 @@ static void choose_settings(triptych *t)
     if (t->why_pre || (t->classify_auto && integral))
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
-        t->drawn_settings.classify == TRIP_CLASSIFY_PRE &&
-        t->drawn_settings.footprint == TRIP_FOOTPRINT_EXACT)
+        trip_settings_sum_sheets(&t->drawn_settings) &&
+        t->drawn_settings.footprint == TRIP_FOOTPRINT_EXACT) /* which are not summed there */
         t->drawn_settings.footprint = TRIP_FOOTPRINT_EWA;
     t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
     if (!t->settings.slices)

@@ -413,6 +413,13 @@ bool trip_splat_project_flat(const trip_splat_frame *f, trip_vec3 voxel,
     return set_near(f, v, out);
 }
 
+bool trip_splat_project_near(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out)
+{
+    const trip_vec3 v = trip_sub(voxel, f->camera.eye);
+    *out = (trip_splat){ .z = trip_dot(f->camera.forward, v) };
+    return set_near(f, v, out);
+}
+
 bool trip_splat_is_broken(const trip_splat *s)
 {
     double sum = s->amplitude;

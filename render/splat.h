@@ -170,6 +170,10 @@ bool trip_splat_project(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *
 bool trip_splat_project_flat(const trip_splat_frame *f, trip_vec3 voxel,
                              const trip_flattening *flat, trip_splat *out);
 
+/* In perspective, by the numbers of near ones, wherever it lies: those are m(p) and the rest too.
+ */
+bool trip_splat_project_near(const trip_splat_frame *f, trip_vec3 voxel, trip_splat *out);
+
 /* Whether numbers of a splat just projected are not finite, so that it can neither be drawn nor be
  * known not to show: the frame is to end with trip_splat_fail(). No view that trip_camera_make()
  * accepts has such splats. */

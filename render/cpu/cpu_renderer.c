@@ -188,17 +188,19 @@ static int begin_sheets(trip_cpu *r)
     return status ? status : trip_cpu_sheets_begin_frame(r->sheets, r);
 }
 
-/* With uneven spacing rays are as long in no two kernels' index spaces, but affine ones need none.
- */
+/* With uneven spacing rays are as long in no two kernels' index spaces, but affine ones need none,
+ * and splats that are summed have no room for their own. */
 static int check_kernels(const trip_frame *frame)
 {
     const trip_settings *s = frame->settings;
     if (s->footprint == TRIP_FOOTPRINT_EWA || s->classify == TRIP_CLASSIFY_POST ||
-        frame->camera->ortho || !trip_coordinates_uneven(&frame->data->coordinates))
+        !trip_settings_sum_sheets(s) || frame->camera->ortho ||
+        !trip_coordinates_uneven(&frame->data->coordinates))
         return 0;
-    return trip_fail(TRIP_USAGE, "render", "cpu",
-                     "grids with uneven spacing are drawn by --kernel ewa alone; reference has the "
-                     "exact kernel too");
+    return trip_fail(
+        TRIP_USAGE, "render", "cpu",
+        "exact kernels of grids with uneven spacing are not summed by sheets: --kernel "
+        "ewa are, and --compositing splat draws these");
 }
 
 /* Sheets with uneven spacing, and those interpolated from 64 voxels, are drawn by the plain kernels

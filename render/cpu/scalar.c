@@ -138,8 +138,8 @@ static splat_space space_of(const trip_cpu_view *view, trip_vec3 voxel)
     return s;
 }
 
-/* Of a near splat, blended by rays in the view's index space: their lengths in its own are taken to
- * be as much longer as that through its centre is. */
+/* Of a near splat that is summed, by rays in the view's index space: their lengths in its own are
+ * taken to be as much longer as that through its centre is. */
 static void divide_forms(trip_splat *s, double by)
 {
     for (int i = 0; i < 3; i++) {
@@ -147,6 +147,21 @@ static void divide_forms(trip_splat *s, double by)
         s->b[i] /= by;
         s->along[i] /= by;
     }
+}
+
+/* |c|^2 / sigma^2 of a near splat. Of those that lie in front as a whole, `along` serves the ray's
+ * length alone: that the low-pass has made the others narrower, on the mean of the two, is made up
+ * for there. */
+static double set_own_rays(const splat_space *space, trip_splat *s)
+{
+    const trip_vec3 away = trip_sub(space->centre, space->frame.camera.eye);
+    const double away2 = trip_dot(away, away) / (space->frame.sigma * space->frame.sigma);
+    const double wider = space->frame.amplitude / s->amplitude;
+    if (!s->near || !(away2 > 4 * space->frame.cutoff2))
+        return away2;
+    for (int i = 0; i < 3; i++)
+        s->along[i] /= sqrt(wider);
+    return away2 / wider;
 }
 
 bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet, double extinction,
@@ -164,16 +179,20 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
         };
     trip_splat s;
     memset(out, 0, sizeof *out);
-    bool drawn = trip_splat_project_flat(&space.frame, space.centre, &flattening, &s);
-    if (s.near && !camera->ortho)
+    const bool own = trip_cpu_own_rays(view);
+    bool drawn = own && !view->affine
+                     ? trip_splat_project_near(&space.frame, space.centre, &s)
+                     : trip_splat_project_flat(&space.frame, space.centre, &flattening, &s);
+    if (s.near && !camera->ortho && !own)
         divide_forms(&s, space.ray);
+    const double away2 = own ? set_own_rays(&space, &s) : 0;
     if (trip_splat_is_broken(&s))
         *broken = true;
     if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
     /* What is opaque anyway stays within what exponents of floats hold. */
-    double stretch = s.affine ? 1 : view->stretch / space.ray;
+    double stretch = s.affine ? 1 : view->stretch / (own ? 1 : space.ray);
     double depth = fmin(0x1p90, extinction * s.amplitude * stretch);
     out->panes = trip_cpu_panes(out, view->panes_across);
     if (s.near) {
@@ -186,5 +205,7 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
     else
         set_centre(&s, out);
     set_opacity(view, depth, sheet, out);
+    if (s.near && own)
+        out->c[TRIP_CPU_AWAY2] = (float)away2;
     return depth > 0x1p-60;
 }

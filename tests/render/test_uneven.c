@@ -348,6 +348,8 @@ static void all_draw_the_splats_of_the_reference(void **state)
         settings.flatten = i % 4 == 1 ? 3 : 1;
         settings.compositing = i % 5 == 0 ? TRIP_COMPOSITING_SHEET : TRIP_COMPOSITING_SPLAT;
         settings.depth = i == 6;
+        if (i / 2 % 2 && settings.flatten <= 1 && i % 5)
+            settings.footprint = TRIP_FOOTPRINT_EXACT;
         compare(&s, &view, &settings, 2e-3);
         scene_destroy(&s);
     }
@@ -463,19 +465,27 @@ static void what_a_segment_leaps_over_is_seen(void **state)
 }
 
 /* Where the eye is among the splats, those about it have rays whose lengths in their own index
- * space the CPU renderer takes from the one through the centre. */
-static void from_within_it_is_close(void **state)
+ * space differ; where splats are summed the CPU renderer takes these from the one through the
+ * centre. */
+static void from_within_all_draw_the_splats_of_the_reference(void **state)
 {
     (void)state;
-    uneven u;
-    make_uneven(&u, 3);
-    scene s;
-    create_blob(&s, &u, NULL);
-    trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 60, 40);
-    view.eye = trip_v3(4.2, 5.1, 14.7);
-    const trip_settings settings = splats();
-    compare(&s, &view, &settings, 0.06);
-    scene_destroy(&s);
+    for (int i = 0; i < 16; i++) {
+        uneven u;
+        make_uneven(&u, i % 4 ? i % 4 * 6 : 3);
+        scene s;
+        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 60 + 2 * i, 40);
+        view.eye = trip_affine_point(&s.data->index_to_world,
+                                     i % 3 ? trip_v3(9.3, 7.7, 12.1) : trip_v3(4.2, 5.1, 14.7));
+        trip_settings settings = splats();
+        settings.footprint = i / 4 % 2 ? TRIP_FOOTPRINT_EXACT : TRIP_FOOTPRINT_EWA;
+        settings.shading = i % 4 == 1;
+        settings.depth = i == 5;
+        settings.compositing = i == 3 ? TRIP_COMPOSITING_SHEET : TRIP_COMPOSITING_SPLAT;
+        compare(&s, &view, &settings, i == 3 ? 0.06 : 1.0 / 255);
+        scene_destroy(&s);
+    }
 }
 
 /* Tables of even steps draw what no tables draw. */
@@ -549,7 +559,7 @@ int main(void)
         cmocka_unit_test(gl_draws_exact_and_near_kernels),
         cmocka_unit_test(all_draw_the_sheets_of_the_reference),
         cmocka_unit_test(what_a_segment_leaps_over_is_seen),
-        cmocka_unit_test(from_within_it_is_close),
+        cmocka_unit_test(from_within_all_draw_the_splats_of_the_reference),
         cmocka_unit_test(even_coordinates_change_nothing),
         cmocka_unit_test(voxels_are_clipped_where_they_lie),
     };

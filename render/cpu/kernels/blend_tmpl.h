@@ -133,11 +133,32 @@ INLINE bool is_near(const trip_cpu_splat *splat)
     return __builtin_expect((splat->panes & TRIP_CPU_PANES_NEAR) != 0, 0);
 }
 
+/* `along` of a near splat, before it is divided by the length of the ray. */
+INLINE vf along_of(const patch *p, const trip_cpu_splat *splat)
+{
+    vf x = p->x + v_set((float)p->pane->x), y = p->y + v_set((float)p->pane->y);
+    vf along = v_fma(x, v_set(splat->c[TRIP_CPU_ALONG_X]), v_set(splat->c[TRIP_CPU_ALONG]));
+    return v_fma(y, v_set(splat->c[TRIP_CPU_ALONG_Y]), along);
+}
+
+/* In the index space of the splat (trip_cpu_own_rays()). */
+INLINE ray_lengths own_rays(const patch *p, const trip_cpu_splat *splat, vf x, vf y)
+{
+    vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
+    vf b = v_fma(p->y, v_set(splat->l22), v_set(splat->l2)), along = along_of(p, splat);
+    vf all = v_fma(v_set((float)(TRIP_CUTOFF * TRIP_CUTOFF)), v_fma(b, b, a * a), along * along);
+    vf g = v_set(splat->c[TRIP_CPU_AWAY2]) / v_max(all, v_set(1e-30f));
+    return (ray_lengths){ .g = g, .stretch = v_sqrt(form_at(p->pane->view->world2, x, y) * g) };
+}
+
 /* What near splats are blended with: their own G and stretch where others are affine. */
-INLINE ray_lengths rays_of_near(const patch *p, trip_cpu_rays rays)
+INLINE ray_lengths rays_of_near(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
     const trip_cpu_scratch *s = p->pane;
     const trip_camera *camera = &s->view->splat.camera;
+    if (trip_cpu_own_rays(s->view))
+        return own_rays(p, splat, v_set((float)(s->x - 0.5 * camera->width)) + p->x,
+                        v_set((float)(s->y - 0.5 * camera->height)) + p->y);
     if (s->view->affine)
         return ray_lengths_at(s->view, v_set((float)(s->x - 0.5 * camera->width)) + p->x,
                               v_set((float)(s->y - 0.5 * camera->height)) + p->y);
@@ -149,9 +170,7 @@ INLINE ray_lengths rays_of_near(const patch *p, trip_cpu_rays rays)
  * 2e-5 (Abramowitz and Stegun 1964, 7.1.25), exp_minus() aside. */
 INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, vf g)
 {
-    vf x = p->x + v_set((float)p->pane->x), y = p->y + v_set((float)p->pane->y);
-    vf along = v_fma(x, v_set(splat->c[TRIP_CPU_ALONG_X]), v_set(splat->c[TRIP_CPU_ALONG]));
-    along = v_fma(y, v_set(splat->c[TRIP_CPU_ALONG_Y]), along);
+    vf along = along_of(p, splat);
     if (!p->pane->view->splat.camera.ortho)
         along = along * v_sqrt(g);
     vf end = v_set((float)TRIP_CUTOFF), s = v_min(v_abs(along), end);
@@ -172,6 +191,13 @@ INLINE vf long_depth(const patch *p, const trip_cpu_splat *splat, vf u)
     return exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
 }
 
+/* Of those with rays of their own, whose edge is what the least comes to. */
+INLINE vf own_depth(const patch *p, const trip_cpu_splat *splat, vf u)
+{
+    vf least = v_set(splat->c[TRIP_CPU_LEAST]);
+    return exp2_biased_less(v_fma(u, p->cutoff, least), exp2_biased_less(least, v_set(0)));
+}
+
 /* Near splats are few: not inlined, and by values, so that loops over the others keep their stamp
  * in registers. */
 static __attribute__((noinline, cold)) vf near_depth_at(const trip_cpu_scratch *pane,
@@ -182,8 +208,9 @@ static __attribute__((noinline, cold)) vf near_depth_at(const trip_cpu_scratch *
     const patch p = {
         .x = x, .y = y, .ray = ray, .stretch = stretch, .cutoff = cutoff, .pane = pane
     };
-    ray_lengths of = rays_of_near(&p, rays);
-    vf depth = long_depth(&p, splat, nearness_by(&p, splat, of.g));
+    ray_lengths of = rays_of_near(&p, splat, rays);
+    vf u = nearness_by(&p, splat, of.g);
+    vf depth = trip_cpu_own_rays(pane->view) ? own_depth(&p, splat, u) : long_depth(&p, splat, u);
     return depth * of.stretch * front_of(&p, splat, of.g);
 }
 

@@ -23,7 +23,7 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
                 .pane = s };
     vm in = in_image(&view->splat.camera, s->x, s->y, column, row);
     if (is_near(splat)) {
-        ray_lengths of = rays_of_near(&p, TRIP_CPU_PERSPECTIVE);
+        ray_lengths of = rays_of_near(&p, splat, TRIP_CPU_PERSPECTIVE);
         in = vm_and(in, v_gt(nearness_by(&p, splat, of.g), v_set(0)));
         in = vm_and(in, v_gt(front_of(&p, splat, of.g), v_set(0)));
     } else {

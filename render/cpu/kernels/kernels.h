@@ -34,8 +34,10 @@
 #define TRIP_CPU_TERMS 5
 
 /* What is kept instead of c[] by a splat that is thick, near or in a view whose stretch varies; of
- * near splats (splat.h) alone, what `along` is at the image's corner and its change by x and y. */
+ * near splats (splat.h) alone, what `along` is at the image's corner and its change by x and y; of
+ * those with rays of their own, in place of the edge, |c|^2 / sigma^2. */
 enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE, TRIP_CPU_ALONG, TRIP_CPU_ALONG_X, TRIP_CPU_ALONG_Y };
+enum { TRIP_CPU_AWAY2 = TRIP_CPU_EDGE };
 
 /* One splat, ready to blend; 64 bytes, a cache line. With (x, y) a pixel's position from the corner
  * of the pane at hand (of the first that the splat lies in, until pane_blend() takes it up),
@@ -119,6 +121,18 @@ typedef struct trip_cpu_view {
     float near;          /* in parallel views: splats of less depth are near */
     trip_cpu_effects effects;
 } trip_cpu_view;
+
+/* Whether near splats have G and the stretch in index spaces of their own: in perspective, with
+ * uneven spacing, but where splats are summed, which have no room for it. As the two unit vectors
+ * across c and the one along it are at right angles, the ray of a pixel has there
+ *     |r|^2 = (a^2 + b^2 + along^2) sigma^2 / |c|^2
+ * with a and b before the low-pass, which adds to each of their squares no more than that of
+ * TRIP_LOW_PASS_PX pixels' angle times |r c / sigma|^2. Without EWA all splats are taken for near.
+ */
+static inline bool trip_cpu_own_rays(const trip_cpu_view *view)
+{
+    return view->coordinates && !view->splat.camera.ortho && !view->sums;
+}
 
 /* A square of 8 x 8 voxels of a run, as its block (block.h) has it. */
 typedef struct trip_cpu_square {

@@ -120,7 +120,7 @@ INLINE vf falloff(vf u)
 INLINE vf share_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays kind)
 {
     if (is_near(splat)) {
-        ray_lengths of = rays_of_near(p, kind);
+        ray_lengths of = rays_of_near(p, splat, kind);
         return falloff(nearness_by(p, splat, of.g)) * of.stretch * front_of(p, splat, of.g);
     }
     vf share = falloff(nearness(p, splat, kind));
