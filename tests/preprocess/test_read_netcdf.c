@@ -1,5 +1,5 @@
 /* Files of netCDF's classic forms, put together by hand. */
-#include "volume_files.h"
+#include "netcdf_files.h"
 
 static void put(bytes *b, uint64_t x, unsigned width)
 {
@@ -38,11 +38,11 @@ static void put_float_attribute(file *f, const char *name, int value)
     append_value(&f->b, TRIP_F32, value, true);
 }
 
-/* What a file has besides the sample volume as variable "t" of (z, y, x). */
+/* What a file has besides the sample volume (netcdf_files.h). */
 typedef struct contents {
     int form;
     bool records;     /* z has as many as there are records */
-    bool coordinates; /* of x, 1, 2, 4, 8, 16, and of z, 6, 5, 4 ... 0 */
+    bool coordinates; /* of x and z (netcdf_files.h) */
     bool scaled;      /* t stands for twice as much, and 3 */
     bool missing;     /* where t is 5 it has no value */
     int type;         /* of t: 3 int16, 5 float */
@@ -136,7 +136,7 @@ static const char *write_contents(const char *name, const contents *c)
     if (c->coordinates) {
         begin_values(&f, 1);
         for (int i = 0; i < NX; i++)
-            append_value(&f.b, TRIP_F64, 1 << i, true);
+            append_value(&f.b, TRIP_F64, x_place(i), true);
     }
     begin_values(&f, 0);
     if (!c->records) {
@@ -144,7 +144,7 @@ static const char *write_contents(const char *name, const contents *c)
         if (c->coordinates)
             begin_values(&f, 2);
         for (int k = 0; k < NZ && c->coordinates; k++)
-            append_value(&f.b, TRIP_I32, NZ - 1 - k, true);
+            append_value(&f.b, TRIP_I32, z_place(k), true);
         return write_file(name, &f.b);
     }
     for (int k = 0; k < NZ; k++) {
@@ -152,7 +152,7 @@ static const char *write_contents(const char *name, const contents *c)
         if (k == 0 && c->coordinates)
             begin_values(&f, 2);
         if (c->coordinates)
-            append_value(&f.b, TRIP_I32, NZ - 1 - k, true);
+            append_value(&f.b, TRIP_I32, z_place(k), true);
     }
     return write_file(name, &f.b);
 }
@@ -173,23 +173,9 @@ static void every_form_holds_the_sample(void **state)
 static void coordinates_become_places(void **state)
 {
     (void)state;
-    static const double x[NX] = { 0, 4.0 / 15, 12.0 / 15, 28.0 / 15, 4 };
     for (int records = 0; records < 2; records++) {
         const contents c = { .form = 2, .records = records, .coordinates = true, .type = 5 };
-        trip_budget *budget;
-        trip_volume *v;
-        assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
-        assert_int_equal(trip_volume_open(&v, write_contents("b.nc", &c), NULL, budget), 0);
-        const trip_volume_info *info = trip_volume_get_info(v);
-        assert_map(&info->index_to_world,
-                   (const double[3][4]){ { 3.75, 0, 0, 1 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
-        for (int i = 0; i < NX; i++)
-            assert_true(fabs(info->coordinates[0][i] - x[i]) < 1e-12);
-        for (int k = 0; k < NZ; k++)
-            assert_true(info->coordinates[2][k] == k);
-        assert_string_equal(info->name, "t");
-        trip_volume_close(v);
-        trip_budget_destroy(budget);
+        assert_placed(write_contents("b.nc", &c), "t");
     }
 }
 
@@ -200,17 +186,7 @@ static void numbers_are_scaled_and_missing_ones_are_none(void **state)
         const contents c = {
             .form = 1, .records = n % 2, .scaled = true, .missing = true, .type = n / 2 ? 5 : 3
         };
-        float values[VOXELS];
-        trip_volume_info info;
-        int missing = 0;
-        assert_int_equal(read_volume(write_contents("c.nc", &c), NULL, 2, values, VOXELS, &info),
-                         0);
-        for (int v = 0; v < VOXELS; v++) {
-            int stored = sample(scalar_of(&c), v % NX, v / NX % NY, v / NX / NY);
-            missing += stored == 5;
-            assert_true(stored == 5 ? isnan(values[v]) : values[v] == 2.0F * (float)stored + 3);
-        }
-        assert_in_range(missing, 1, VOXELS / 10);
+        assert_scaled(write_contents("c.nc", &c), scalar_of(&c));
     }
 }
 

@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "image_helper.h"
-#include "volume_files.h"
+#include "netcdf_files.h"
 
 /* By the number of a type of netCDF. */
 static const trip_scalar scalar_of[] = {
@@ -13,7 +13,7 @@ static const trip_scalar scalar_of[] = {
     TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64
 };
 
-/* What a file has besides the sample volume as variable "t" of (z, lat, x). */
+/* What a file has besides the sample volume (netcdf_files.h). */
 typedef struct contents {
     int type;
     int endian;       /* NC_ENDIAN_... */
@@ -21,20 +21,20 @@ typedef struct contents {
     bool records;     /* z has no end */
     bool deeper;      /* a dimension of 2 before: t is at its first place */
     bool inside;      /* t lies in the group "g" */
-    bool coordinates; /* of x, 1, 2, 4, 8, 16, and of z, 6, 5, 4 ... 0 */
+    bool coordinates; /* of x and z (netcdf_files.h) */
     bool scaled;      /* t stands for twice as much, and 3 */
     bool missing;     /* where t is 5 it has no value */
 } contents;
 
 static void put_coordinates(int file, int x, int z)
 {
-    const double places[NX] = { 1, 2, 4, 8, 16 };
     int variable;
     assert_int_equal(nc_def_var(file, "x", NC_DOUBLE, 1, &x, &variable), 0);
-    assert_int_equal(nc_put_var_double(file, variable, places), 0);
+    for (size_t i = 0; i < NX; i++)
+        assert_int_equal(nc_put_var1_int(file, variable, &i, &(int){ x_place((int)i) }), 0);
     assert_int_equal(nc_def_var(file, "z", NC_INT, 1, &z, &variable), 0);
     for (size_t k = 0; k < NZ; k++)
-        assert_int_equal(nc_put_var1_int(file, variable, &k, &(int){ NZ - 1 - (int)k }), 0);
+        assert_int_equal(nc_put_var1_int(file, variable, &k, &(int){ z_place((int)k) }), 0);
 }
 
 static const char *write_contents(const char *name, const contents *c)
@@ -98,23 +98,9 @@ static void every_type_holds_the_sample(void **state)
 static void coordinates_become_places(void **state)
 {
     (void)state;
-    static const double x[NX] = { 0, 4.0 / 15, 12.0 / 15, 28.0 / 15, 4 };
     for (int inside = 0; inside < 2; inside++) {
         const contents c = { .type = NC_FLOAT, .coordinates = true, .inside = inside };
-        trip_budget *budget;
-        trip_volume *v;
-        assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
-        assert_int_equal(trip_volume_open(&v, write_contents("b.nc", &c), NULL, budget), 0);
-        const trip_volume_info *info = trip_volume_get_info(v);
-        assert_map(&info->index_to_world,
-                   (const double[3][4]){ { 3.75, 0, 0, 1 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
-        for (int i = 0; i < NX; i++)
-            assert_true(fabs(info->coordinates[0][i] - x[i]) < 1e-12);
-        for (int k = 0; k < NZ; k++)
-            assert_true(info->coordinates[2][k] == k);
-        assert_string_equal(info->name, inside ? "g/t" : "t");
-        trip_volume_close(v);
-        trip_budget_destroy(budget);
+        assert_placed(write_contents("b.nc", &c), inside ? "g/t" : "t");
     }
 }
 
@@ -125,17 +111,7 @@ static void numbers_are_scaled_and_missing_ones_are_none(void **state)
         const contents c = {
             .type = n / 2 ? NC_FLOAT : NC_SHORT, .chunks = n % 2, .scaled = true, .missing = true
         };
-        float values[VOXELS];
-        trip_volume_info info;
-        int missing = 0;
-        assert_int_equal(read_volume(write_contents("c.nc", &c), NULL, 2, values, VOXELS, &info),
-                         0);
-        for (int v = 0; v < VOXELS; v++) {
-            int stored = sample(scalar_of[c.type], v % NX, v / NX % NY, v / NX / NY);
-            missing += stored == 5;
-            assert_true(stored == 5 ? isnan(values[v]) : values[v] == 2.0F * (float)stored + 3);
-        }
-        assert_in_range(missing, 1, VOXELS / 10);
+        assert_scaled(write_contents("c.nc", &c), scalar_of[c.type]);
     }
 }
 
