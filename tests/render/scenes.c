@@ -9,6 +9,28 @@
 
 #include "normal.h"
 
+const trip_affine scene_sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
+
+trip_settings scene_post(int slices)
+{
+    trip_settings s = trip_settings_default();
+    s.classify = TRIP_CLASSIFY_POST;
+    s.slices = slices;
+    s.shading = false;
+    s.background[3] = 0;
+    return s;
+}
+
+trip_settings scene_with_shadows(trip_vec3 to_light)
+{
+    trip_settings s = scene_post(4);
+    s.headlight = false;
+    s.light_direction = trip_normalize(to_light);
+    s.tolerance = 1e-5;
+    s.effects.shadows = true;
+    return s;
+}
+
 enum { PARTS_MAX = 4 };
 
 /* What is written into a data set, and how. */

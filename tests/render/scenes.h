@@ -52,6 +52,14 @@ typedef struct scene {
     struct trip_emission *emission; /* of who draws, who has begun it; NULL: none */
 } scene;
 
+/* A map with shear, unequal steps and an offset. */
+extern const trip_affine scene_sheared;
+
+/* Values are interpolated, in so many slices, not shaded, before no background. */
+trip_settings scene_post(int slices);
+/* The same with shadows of light from a direction. */
+trip_settings scene_with_shadows(trip_vec3 to_light);
+
 void scene_create(scene *s, const scene_params *params);
 /* The map of a grid whose voxels are `by` voxels of `fine` long and begin where those do. */
 trip_affine scene_coarse_map(const trip_affine *fine, const int by[3]);

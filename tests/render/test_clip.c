@@ -18,8 +18,6 @@ static trip_settings clear(trip_classify classify)
     return s;
 }
 
-static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
-
 static void a_box_is_the_inside_of_its_six_faces(void **state)
 {
     (void)state;
@@ -145,12 +143,12 @@ static void what_is_left_of_the_path_has_its_opacity(void **state)
         const int axis = i % 3, which = i % PLANES;
         const bool rises = i / 2 % 2, skewed = i / 5;
         scene s;
-        scene_create(&s,
-                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                      .index_to_world = skewed ? sheared : trip_affine_identity(),
-                                      .tile_voxels = 16,
-                                      .slab_sheets = 4,
-                                      .voxel = ramp });
+        scene_create(
+            &s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                 .index_to_world = skewed ? scene_sheared : trip_affine_identity(),
+                                 .tile_voxels = 16,
+                                 .slab_sheets = 4,
+                                 .voxel = ramp });
         fill(&s, rises);
         double d[3] = { 0.04, -0.05, 0.03 };
         d[axis] = i % 2 ? 1 : -1;

@@ -143,16 +143,6 @@ static void one_code_that_is_off_is_found(void **state)
 
 /* ---- drawn ---- */
 
-static trip_settings post(int slices)
-{
-    trip_settings s = trip_settings_default();
-    s.classify = TRIP_CLASSIFY_POST;
-    s.slices = slices;
-    s.shading = false;
-    s.background[3] = 0;
-    return s;
-}
-
 static bool is_closed(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
     trip_camera camera;
@@ -235,7 +225,7 @@ static void one_segment_shows_the_integrals_of_lines(void **state)
         d[two.axis] = i % 2 ? 1 : -1;
         trip_camera_params view = scene_view(&s, trip_v3(d[0], d[1], d[2]), 30, 20, 4);
         view.ortho_height = 3;
-        trip_settings settings = post(1);
+        trip_settings settings = scene_post(1);
         assert_true(is_closed(&s, &view, &settings) || two.codes[0] == two.codes[1] ||
                     (two.codes[0] < start && two.codes[1] < start));
         const double a = two.codes[0], b = two.codes[1];
@@ -336,7 +326,7 @@ static void a_ramp_of_values_is_as_opaque_as_its_integral(void **state)
         d[thin] = i % 2 ? 1 : -1;
         trip_camera_params view = scene_view(&s, trip_v3(d[0], d[1], d[2]), 80, 6, 4);
         view.ortho_height = i / 12 ? 4 : 0;
-        trip_settings settings = post(1 + i % 3);
+        trip_settings settings = scene_post(1 + i % 3);
         of.view = &view;
         of.settings = &settings;
         assert_true(is_closed(&s, &view, &settings));
@@ -397,7 +387,7 @@ static void by_form_or_by_table_the_picture_is_the_same(void **state)
         memcpy(b.table, a.table, (LAST + 1) * sizeof *a.table);
         trip_camera_params view = scene_view(&a, trip_v3(0.7, 0.5, 1), i < 6 ? 70 : 5, 30, 24);
         view.ortho_height = i == 2 || i == 3 ? 34 : 0;
-        trip_settings settings = post(1 + i % 3);
+        trip_settings settings = scene_post(1 + i % 3);
         settings.shading = i != 0;
         settings.kernel = i == 6 ? TRIP_KERNEL_GAUSSIAN : TRIP_KERNEL_LINEAR;
         settings.depth = i == 1 || i == 4;

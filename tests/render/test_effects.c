@@ -10,21 +10,6 @@
 enum { EDGE = 20, SIZE = 9 };
 #define FOG 0.05
 
-static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
-
-static trip_settings with_shadows(trip_vec3 to_light)
-{
-    trip_settings s = trip_settings_default();
-    s.classify = TRIP_CLASSIFY_POST;
-    s.slices = 4;
-    s.shading = s.headlight = false;
-    s.light_direction = trip_normalize(to_light);
-    s.background[3] = 0;
-    s.tolerance = 1e-5;
-    s.effects.shadows = true;
-    return s;
-}
-
 /* Constant fog, white. */
 static void create_fog(scene *s, float extinction)
 {
@@ -68,7 +53,7 @@ static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
     create_fog(&s, (float)FOG);
     const trip_camera_params view = along_z(&s);
     for (int n = 0; n < 2; n++) {
-        trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+        trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
         settings.effects.anisotropy = 0.4 * n;
         scene_picture exact = integrate(&s, &view, &settings);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
@@ -91,7 +76,7 @@ static void fog_lit_from_the_front_scatters_backwards(void **state)
     scene s;
     create_fog(&s, (float)FOG);
     const trip_camera_params view = along_z(&s);
-    trip_settings settings = with_shadows(trip_v3(0, 0, 1));
+    trip_settings settings = scene_with_shadows(trip_v3(0, 0, 1));
     settings.effects.anisotropy = 0.3;
     const double g = 0.3, depth = FOG * (EDGE - 1), phase = (1 - g * g) / pow(1 + g, 3);
     scene_picture exact = integrate(&s, &view, &settings);
@@ -106,7 +91,7 @@ static void fog_lit_from_the_front_scatters_backwards(void **state)
 
 static trip_settings with_point_light(trip_vec3 place)
 {
-    trip_settings s = with_shadows(trip_v3(0, 0, 1));
+    trip_settings s = scene_with_shadows(trip_v3(0, 0, 1));
     s.point_light = true;
     s.light_place = place;
     return s;
@@ -217,7 +202,7 @@ static void a_box_casts_its_shadow_on_the_next(void **state)
     for (int code = 0; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)(0.4 * code / 65535) };
     const trip_camera_params view = along_z(&s);
-    const trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+    const trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
     scene_picture exact = integrate(&s, &view, &settings);
     int seen = 0;
     for (int x = 0; x < SIZE; x++) {
@@ -263,7 +248,7 @@ static void create_ball(scene *s, double extinction, const trip_affine *map)
 static trip_settings with_light(int number)
 {
     const trip_vec3 places[] = { { 40, 8, 14 }, { 36, 36, -2 }, { 20.4, 12, 16 } };
-    return number == 0 ? with_shadows(trip_v3(0.8, -0.3, 0.6))
+    return number == 0 ? scene_with_shadows(trip_v3(0.8, -0.3, 0.6))
                        : with_point_light(places[number - 1]);
 }
 
@@ -273,7 +258,7 @@ static void the_error_falls_as_the_lattice_becomes_finer(void **state)
     (void)state;
     const trip_affine identity = trip_affine_identity();
     for (int n = 0; n < 5; n++) {
-        const trip_affine *map = n == 1 ? &sheared : &identity;
+        const trip_affine *map = n == 1 ? &scene_sheared : &identity;
         scene s;
         create_ball(&s, 0.15, map);
         const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, SIZE);
@@ -301,9 +286,9 @@ static void a_light_far_away_is_one_in_a_direction(void **state)
 {
     (void)state;
     scene s;
-    create_ball(&s, 0.15, &sheared);
+    create_ball(&s, 0.15, &scene_sheared);
     const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, SIZE);
-    trip_settings direction = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    trip_settings direction = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
     direction.shading = true;
     for (double far = 1e7; far < 1e13; far *= 1e5) {
         trip_settings place = with_point_light(trip_scale(direction.light_direction, far));
@@ -330,7 +315,7 @@ static void openness_is_the_mean_over_directions(void **state)
     const trip_affine map = trip_affine_identity();
     create_ball(&s, 0.15, &map);
     const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 90, 40, 5);
-    trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+    trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
     settings.effects.shadows = false;
     settings.effects.occlusion = true;
     settings.tolerance = 1e-2;
@@ -350,11 +335,11 @@ static void every_renderer_draws_them_alike(void **state)
 {
     (void)state;
     scene s;
-    create_ball(&s, 0.6, &sheared);
+    create_ball(&s, 0.6, &scene_sheared);
     trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 24);
     for (int n = 0; n < 16; n++) {
         trip_settings settings = with_light(n / 8 * (1 + n / 2 % 3));
-        settings.light_place = trip_affine_point(&sheared, settings.light_place);
+        settings.light_place = trip_affine_point(&scene_sheared, settings.light_place);
         settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
         settings.shading = n & 2;
         settings.effects.occlusion = n & 4;
@@ -378,7 +363,7 @@ static void every_renderer_fades_with_depth(void **state)
 {
     (void)state;
     scene s;
-    create_ball(&s, 0.6, &sheared);
+    create_ball(&s, 0.6, &scene_sheared);
     for (int n = 0; n < 8; n++) {
         trip_camera_params view =
             scene_view(&s, trip_v3(0.4, -1, 0.5), n < 4 ? 60 : 25, 50 + 5 * n, 24);
@@ -419,7 +404,7 @@ static void threads_and_slots_change_no_bit(void **state)
     const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 40);
     const scene_renderer single = { "cpu", create_single, 0 };
     for (int n = 0; n < 2; n++) {
-        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
         settings.classify = n ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
         settings.effects.occlusion = settings.shading = true;
         scene_picture a = scene_draw(&s, &scene_renderers()[1], &view, &settings);
@@ -442,7 +427,7 @@ static void in_a_clear_volume_effects_change_nothing(void **state)
     create_ball(&s, 1e-4, &map);
     const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 16);
     for (int n = 0; n < 4; n++) {
-        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
         settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
         settings.shading = n & 2;
         settings.effects.occlusion = true;
@@ -478,7 +463,7 @@ static void what_is_farther_fades_into_the_background(void **state)
         for (int code = 0; code < 65536; code++)
             s.table[code] = (trip_tf_entry){ 1, 0.5F, 0, code > 65000 ? 50 : 0 };
         const trip_camera_params view = along_z(&s);
-        trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+        trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
         settings.effects.shadows = false;
         settings.effects.cueing = 0.8;
         settings.background[2] = 1;
@@ -532,7 +517,7 @@ static void the_lattice_is_kept_until_something_changes(void **state)
     const trip_affine map = trip_affine_identity();
     const trip_clip none = { 0 };
     create_ball(&s, 0.6, &map);
-    trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
     const trip_light_source source = {
         .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
     };
@@ -656,7 +641,7 @@ static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
     const trip_affine map = trip_affine_identity();
     const trip_clip none = { 0 };
     create_ball(&s, 0.6, &map);
-    trip_settings settings = with_shadows(trip_v3(0.3, -0.8, 0.5));
+    trip_settings settings = scene_with_shadows(trip_v3(0.3, -0.8, 0.5));
     settings.effects.occlusion = true;
     const trip_light_source source = {
         .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
@@ -690,7 +675,7 @@ static void a_lattice_that_does_not_fit_is_refused(void **state)
     const trip_affine map = trip_affine_identity();
     const trip_clip none = { 0 };
     create_ball(&s, 0.6, &map);
-    const trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    const trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
     const trip_light_source source = {
         .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
     };
@@ -717,7 +702,7 @@ static void a_renderer_without_effects_refuses_them(void **state)
     scene s;
     create_fog(&s, (float)FOG);
     const trip_camera_params view = along_z(&s);
-    trip_settings settings = with_shadows(trip_v3(0, 0, 1));
+    trip_settings settings = scene_with_shadows(trip_v3(0, 0, 1));
     const trip_effects refused[] = { { .cueing = 0.5 },
                                      { .occlusion = true },
                                      { .emission = true } };

@@ -236,14 +236,13 @@ static void the_error_falls_as_the_lattice_becomes_finer(void **state)
     assert_true(before < 0.02);
 }
 
-/* With all else that effects and classification may be, in a sheared grid. */
+/* With all else that effects and classification may be, in a scene_sheared grid. */
 static void every_renderer_draws_it_alike(void **state)
 {
     (void)state;
-    const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
     scene s, hot;
     scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                      .index_to_world = sheared,
+                                      .index_to_world = scene_sheared,
                                       .normals = true,
                                       .voxel = ball });
     for (int code = 0; code < 65536; code++)

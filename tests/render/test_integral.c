@@ -26,8 +26,6 @@ static trip_settings exact(double tolerance)
     return s;
 }
 
-static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
-
 static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
 {
     (void)state;
@@ -35,9 +33,9 @@ static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
     for (int i = 0; i < 16; i++) {
         scene s;
         int crossed = 0;
-        scene_create(&s,
-                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                      .index_to_world = i % 2 ? sheared : trip_affine_identity() });
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .index_to_world =
+                                              i % 2 ? scene_sheared : trip_affine_identity() });
         for (int code = 0; code < 65536; code++)
             s.table[code] = (trip_tf_entry){ 1, 0.5F, 0.25F, 0.05F };
         trip_camera_params view = scene_view(&s, directions[i / 4], 60, 40, 9);
@@ -395,10 +393,10 @@ static void a_splat_is_a_gaussian_cut_off_and_lowered(void **state)
         scene s;
         const double k = TRIP_CUTOFF, edge = exp(-k * k / 2);
         int covered = 0;
-        scene_create(&s,
-                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                      .voxel = one_voxel,
-                                      .index_to_world = i % 2 ? sheared : trip_affine_identity() });
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .voxel = one_voxel,
+                                          .index_to_world =
+                                              i % 2 ? scene_sheared : trip_affine_identity() });
         s.table[7] = (trip_tf_entry){ 0.2F, 0.4F, 1, 3 };
         trip_settings settings = exact(1e-7);
         settings.field = TRIP_FIELD_SPLATS;

@@ -10,18 +10,6 @@
 
 enum { EDGE = 20 }; /* voxels of most volumes here; between their centres EDGE - 1 */
 
-static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
-
-static trip_settings post(int slices)
-{
-    trip_settings s = trip_settings_default();
-    s.classify = TRIP_CLASSIFY_POST;
-    s.slices = slices;
-    s.shading = false;
-    s.background[3] = 0;
-    return s;
-}
-
 static void fill_table(scene *s, double r, double g, double b, double extinction)
 {
     for (int code = 0; code < 65536; code++)
@@ -49,7 +37,7 @@ static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
         double d[3] = { diagonal ? 0.95 : 0.4, diagonal ? 0.95 : 0.4, diagonal ? 0.95 : 0.4 };
         scene_params params = { .dims = { 60, 60, 60 } };
         params.dims[axis] = 9;
-        params.index_to_world = i / 12 % 2 ? sheared : trip_affine_identity();
+        params.index_to_world = i / 12 % 2 ? scene_sheared : trip_affine_identity();
         d[axis] = i % 2 ? 1 : -1;
         d[(axis + 1) % 3] *= 0.3;
         scene s;
@@ -57,7 +45,7 @@ static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
         fill_table(&s, 1, 0.5, 0.25, 0.06);
         trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 5, 5);
         view.ortho_height = i / 24 ? 3 : 0;
-        trip_settings settings = post(diagonal ? 16 : 1 + i / 3 % 4);
+        trip_settings settings = scene_post(diagonal ? 16 : 1 + i / 3 % 4);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
@@ -107,7 +95,7 @@ static void a_narrow_peak_is_seen_whole_at_any_slices(void **state)
         trip_camera_params view =
             scene_view(&s, trip_v3(1, i / 3 % 2 ? 0.9 : -0.3, 0.4 - 0.1 * (i % 5)), 60, 10, 5);
         view.ortho_height = i / 6 % 2 ? 8 : 0;
-        trip_settings settings = post(1 + i / 12);
+        trip_settings settings = scene_post(1 + i / 12);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
@@ -167,7 +155,7 @@ static void values_fall_to_those_of_the_halo_and_end_without_it(void **state)
         for (int i = 0; i < 9; i++) {
             trip_camera_params view = scene_view(&s, directions[i % 3], 60, 20, 1);
             view.ortho_height = 0.1;
-            trip_settings settings = post(1 + i / 3);
+            trip_settings settings = scene_post(1 + i / 3);
             scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
             while (scene_take_turn(&turn)) {
                 assert_close(turn.picture.rgba[3], 1 - exp(-0.1 * (parts ? 8 : 7)),
@@ -204,7 +192,7 @@ static void a_cell_without_a_corner_is_empty(void **state)
         view.ortho_height = 0.01;
         view.look = trip_v3(at[0], at[1], at[2]);
         view.eye = trip_add(view.look, trip_v3(d[0], d[1], d[2]));
-        trip_settings settings = post(1 + i / 9);
+        trip_settings settings = scene_post(1 + i / 9);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             double length = beside < 2 ? EDGE - 3 : EDGE - 1;
@@ -233,7 +221,7 @@ static void from_within_what_lies_before_the_eye_is_seen(void **state)
                                     .width = 5,
                                     .height = 5 };
         view.look = trip_add(view.eye, trip_v3(d[0], d[1], d[2]));
-        trip_settings settings = post(1 + i / 18 * 2);
+        trip_settings settings = scene_post(1 + i / 18 * 2);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             for (int n = 0; n < 25; n++) {
@@ -281,7 +269,7 @@ static void the_nearest_wall_hides_those_behind_it(void **state)
             d[axis] = i % 2 ? 1 : -1;
             trip_camera_params view = scene_view(&s, trip_v3(d[0], d[1], d[2]), 60, 2, 3);
             view.ortho_height = i / 6 % 2 ? 2 : 0;
-            trip_settings settings = post(1 + i / 12);
+            trip_settings settings = scene_post(1 + i / 12);
             settings.method = (trip_method)(i / 2 % 3);
             settings.h = 0.5;
             scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
@@ -310,7 +298,7 @@ static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
                                     .width = 8,
                                     .height = 8 };
         view.look = trip_add(view.eye, trip_v3(d[0], d[1], d[2]));
-        trip_settings settings = post(1 + i / 6);
+        trip_settings settings = scene_post(1 + i / 6);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             expect_colour(&turn.picture, i / 3 % 2, turn.renderer->name);
@@ -332,7 +320,7 @@ static void a_saturated_pixel_is_opaque(void **state)
         fill_table(&s, 0.75, 1, 1, -log(through) / (EDGE - 1));
         trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 60, 20, 1);
         view.ortho_height = 0.1;
-        trip_settings settings = post(2);
+        trip_settings settings = scene_post(2);
         settings.saturation = i < 2 ? TRIP_SATURATION_AUTO : saturation;
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
@@ -355,17 +343,17 @@ static void light_comes_by_differences_of_values(void **state)
     for (int i = 0; i < 12; i++) {
         int axis = i % 3;
         scene s;
-        scene_create(
-            &s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                 .index_to_world = i / 3 % 2 ? sheared : trip_affine_identity(),
-                                 .voxel = ramp,
-                                 .user = &axis });
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .index_to_world =
+                                              i / 3 % 2 ? scene_sheared : trip_affine_identity(),
+                                          .voxel = ramp,
+                                          .user = &axis });
         fill_table(&s, 0.6, 0.3, 0.1, 0.05);
         double d[3] = { 0.3, 0.2, -0.3 };
         d[axis] = 1;
         trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 5, 1);
         view.ortho_height = 0.1;
-        trip_settings settings = post(2);
+        trip_settings settings = scene_post(2);
         settings.shading = true;
         settings.headlight = i / 6;
         settings.light_direction = trip_normalize(trip_v3(0.5, 0.6, 0.7));
@@ -417,7 +405,7 @@ static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
     trip_camera_params view = scene_view(&s, trip_v3(0, 0, -1), 60, 150, 8);
     view.eye = trip_v3(21.8, 24.3, -2);
     view.look = trip_v3(21.8, 24.3, 8);
-    trip_settings settings = post(1);
+    trip_settings settings = scene_post(1);
     settings.method = TRIP_METHOD_AXIS;
     for (int lit = 0; lit < 2; lit++) {
         settings.shading = lit;
@@ -443,15 +431,15 @@ static void depth_is_the_mean_distance_of_what_is_seen(void **state)
     (void)state;
     for (int i = 0; i < 12; i++) {
         scene s;
-        scene_create(&s,
-                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                      .index_to_world = i % 2 ? sheared : trip_affine_identity() });
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .index_to_world =
+                                              i % 2 ? scene_sheared : trip_affine_identity() });
         fill_table(&s, 1, 1, 1, 0.1);
         double d[3] = { 0.2, 0.1, -0.2 };
         d[i / 4] = i / 2 % 2 ? 1 : -1;
         trip_camera_params view = view_along(&s, trip_v3(d[0], d[1], d[2]), 4, 5);
         view.ortho_height = i % 3 == 0 ? 2 : 0;
-        trip_settings settings = post(2);
+        trip_settings settings = scene_post(2);
         settings.depth = true;
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
@@ -537,7 +525,7 @@ static scene_picture draw_lumps(const scene_renderer *r, arrangement as, bool pa
 {
     scene s;
     create_lumps(&s, &as);
-    trip_settings settings = post(2);
+    trip_settings settings = scene_post(2);
     settings.shading = true;
     settings.h = 0.3;
     trip_camera_params view = { .eye = arrange(&as, trip_v3(40, -27, 35), false),
@@ -639,7 +627,7 @@ static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, t
     for (int code = 0; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ (float)code / 65535, 0.5F, 1 - (float)code / 65535,
                                          0.25F * (float)fmax(0, code - 10000) / 30000 };
-    trip_settings settings = post(1);
+    trip_settings settings = scene_post(1);
     settings.kernel = kernel;
     settings.tolerance = 1e-6;
     settings.shading = lit;
@@ -740,7 +728,7 @@ static void along_the_sheets_slices_have_the_values_of_the_kernel(void **state)
         trip_vec3 direction = { l.axis == 0, l.axis == 1, l.axis == 2 };
         trip_camera_params view = scene_view(&s, direction, 60, 20, 1);
         view.ortho_height = 0.1;
-        trip_settings settings = post(slices);
+        trip_settings settings = scene_post(slices);
         settings.kernel = kernel;
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
             scene_picture p = scene_draw(&s, r, &view, &settings);
@@ -787,7 +775,7 @@ static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
                                       .part_count = 1 });
     for (int code = 8000; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, 0.5F * (float)(code - 8000) / 30000 };
-    trip_settings settings = post(16);
+    trip_settings settings = scene_post(16);
     settings.kernel = TRIP_KERNEL_CUBIC;
     settings.tolerance = 1e-6;
     settings.shading = true;
@@ -835,7 +823,7 @@ static void turning_across_45_degrees_nothing_pops(void **state)
     scene_create(&s, &(scene_params){ .dims = { 28, 28, 28 }, .voxel = blobs });
     for (int code = 20000; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, 2 };
-    trip_settings settings = post(1);
+    trip_settings settings = scene_post(1);
     settings.shading = true;
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
         settings.method = TRIP_METHOD_MERGE;
@@ -879,7 +867,7 @@ static void bricks_and_coarser_levels_change_no_bit(void **state)
                                                   .part_count = form == 2 });
                 for (int code = 30000; code < 65536; code++)
                     s.table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, 1 };
-                trip_settings settings = post(2);
+                trip_settings settings = scene_post(2);
                 settings.shading = true;
                 trip_camera_params params =
                     scene_view(&s, directions[view % 3], view / 3 ? 20 : 60, view / 3 ? 50 : 8, 24);

@@ -54,8 +54,6 @@ static trip_settings splats(void)
     return s;
 }
 
-static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
-
 static scene_picture integrate(const scene *s, const trip_camera_params *view,
                                const trip_settings *settings)
 {
@@ -81,10 +79,10 @@ static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
     for (int i = 0; i < 16; i++) {
         scene s;
         int crossed = 0;
-        scene_create(&s,
-                     &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                      .coordinates = &u.coordinates,
-                                      .index_to_world = i / 8 ? sheared : trip_affine_identity() });
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .coordinates = &u.coordinates,
+                                          .index_to_world =
+                                              i / 8 ? scene_sheared : trip_affine_identity() });
         for (int code = 0; code < 65536; code++)
             s.table[code] = (trip_tf_entry){ 1, 0.5F, 0.25F, 0.05F };
         const trip_camera_params view = view_of(&s, i, 9);
@@ -258,7 +256,7 @@ static void slices_come_to_the_integral(void **state)
         scene s;
         uneven u;
         make_uneven(&u, i < 10 ? 6 : 20);
-        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = view_of(&s, i % 10, 12);
         if (i % 10 >= 8) /* from within */
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
@@ -341,7 +339,7 @@ static void all_draw_the_splats_of_the_reference(void **state)
     make_uneven(&u, 6);
     for (int i = 0; i < 16; i++) {
         scene s;
-        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         const trip_camera_params view = view_of(&s, i / 2, 40);
         trip_settings settings = splats();
         settings.shading = i % 3 == 0;
@@ -364,7 +362,7 @@ static void gl_draws_exact_and_near_kernels(void **state)
         scene s;
         uneven u;
         make_uneven(&u, i % 3 ? 6 : 20);
-        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = view_of(&s, i % 8, 40);
         if (i >= 16) /* from within */
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
@@ -409,7 +407,7 @@ static void all_draw_the_sheets_of_the_reference(void **state)
         scene s;
         uneven u;
         make_uneven(&u, i % 3 ? 20 : 6);
-        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = view_of(&s, i / 2, 40);
         if (i >= 16) /* from within */
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
@@ -474,7 +472,7 @@ static void from_within_all_draw_the_splats_of_the_reference(void **state)
         uneven u;
         make_uneven(&u, i % 4 ? i % 4 * 6 : 3);
         scene s;
-        create_blob(&s, &u, i % 2 ? &sheared : NULL);
+        create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 60 + 2 * i, 40);
         view.eye = trip_affine_point(&s.data->index_to_world,
                                      i % 3 ? trip_v3(9.3, 7.7, 12.1) : trip_v3(4.2, 5.1, 14.7));
@@ -498,8 +496,8 @@ static void even_coordinates_change_nothing(void **state)
         scene with, without;
         uneven none = u;
         none.coordinates = (trip_coordinates){ .along = { NULL }, .widest = 1 };
-        create_blob(&with, &u, i / 4 ? &sheared : NULL);
-        create_blob(&without, &none, i / 4 ? &sheared : NULL);
+        create_blob(&with, &u, i / 4 ? &scene_sheared : NULL);
+        create_blob(&without, &none, i / 4 ? &scene_sheared : NULL);
         assert_true(trip_coordinates_uneven(&with.data->coordinates));
         assert_false(trip_coordinates_uneven(&without.data->coordinates));
         const trip_camera_params view = view_of(&with, i, 20);

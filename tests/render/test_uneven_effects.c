@@ -44,21 +44,6 @@ static trip_affine fine_map(const trip_affine *map)
     return fine;
 }
 
-static const trip_affine sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
-
-static trip_settings with_shadows(trip_vec3 to_light)
-{
-    trip_settings s = trip_settings_default();
-    s.classify = TRIP_CLASSIFY_POST;
-    s.slices = 4;
-    s.shading = s.headlight = false;
-    s.light_direction = trip_normalize(to_light);
-    s.background[3] = 0;
-    s.tolerance = 1e-5;
-    s.effects.shadows = true;
-    return s;
-}
-
 static scene_picture integrate(const scene *s, const trip_camera_params *view,
                                const trip_settings *settings)
 {
@@ -109,7 +94,7 @@ static void fog_lit_from_the_side_is_as_dark_as_it_is_thick(void **state)
         s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)FOG };
     const trip_camera_params view = along_z(&s);
     const double depth = EDGE - 1, g = 0.4, phase = (1 - g * g) / pow(1 + g * g, 1.5);
-    trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+    trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
     settings.effects.anisotropy = g;
     for (int i = 0; i <= renderers(); i++) {
         scene_picture p = draw(i, &s, &view, &settings);
@@ -162,7 +147,7 @@ static void a_box_casts_its_shadow_on_the_next(void **state)
     for (int code = 0; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)(0.4 * code / 65535) };
     const trip_camera_params view = along_z(&s);
-    const trip_settings settings = with_shadows(trip_v3(1, 0, 0));
+    const trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
     for (int i = 0; i <= renderers(); i++) {
         scene_picture p = draw(i, &s, &view, &settings);
         int seen = 0;
@@ -257,7 +242,7 @@ static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
     (void)state;
     const trip_affine identity = trip_affine_identity();
     for (int n = 0; n < 6; n++) {
-        const trip_affine *map = n % 2 ? &sheared : &identity;
+        const trip_affine *map = n % 2 ? &scene_sheared : &identity;
         uneven u;
         scene few, all;
         make_uneven(&u);
@@ -266,7 +251,7 @@ static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
         brighten(&few);
         brighten(&all);
         const trip_camera_params view = scene_view(&few, trip_v3(0.4, -1, 0.5), 60, 25, SIZE);
-        trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+        trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
         settings.effects.shadows = n < 4;
         settings.effects.occlusion = n >= 4;
         settings.effects.anisotropy = 0.3;
@@ -321,7 +306,7 @@ static void heat_of_uneven_spacing_lies_where_its_voxels_do(void **state)
     create_blob(&hot[0], &u, true, false, &identity);
     create_blob(&hot[1], &u, false, false, &identity);
     const trip_camera_params view = scene_view(&few, trip_v3(0.4, -1, 0.5), 60, 25, SIZE);
-    trip_settings settings = with_shadows(trip_v3(0, 0, 1));
+    trip_settings settings = scene_with_shadows(trip_v3(0, 0, 1));
     settings.effects.shadows = false;
     scene_picture cold = integrate(&few, &view, &settings), truth = { 0 };
     settings.effects.emission = true;
@@ -348,7 +333,7 @@ static void heat_of_uneven_spacing_lies_where_its_voxels_do(void **state)
 
 static trip_settings some_effects(int n)
 {
-    trip_settings settings = with_shadows(trip_v3(0.8, -0.3, 0.6));
+    trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
     settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
     settings.footprint = n & 1 ? TRIP_FOOTPRINT_EXACT : TRIP_FOOTPRINT_EWA;
     settings.shading = n & 2;
@@ -365,15 +350,15 @@ static void every_renderer_draws_them_alike(void **state)
     uneven u;
     scene s, hot;
     make_uneven(&u);
-    create_blob(&s, &u, false, true, &sheared);
+    create_blob(&s, &u, false, true, &scene_sheared);
     u.hot = true;
-    create_blob(&hot, &u, false, false, &sheared);
+    create_blob(&hot, &u, false, false, &scene_sheared);
     begin_heat(&s, &hot);
     trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 24);
     for (int n = 0; n < 32; n++) {
         trip_settings settings = some_effects(n);
         settings.point_light = n & 16;
-        settings.light_place = trip_affine_point(&sheared, trip_v3(18, 3, 15));
+        settings.light_place = trip_affine_point(&scene_sheared, trip_v3(18, 3, 15));
         view.ortho_height = n & 2 ? 50 : 0;
         scene_picture reference = scene_draw(&s, &scene_renderers()[0], &view, &settings);
         for (int i = 1; i < renderers(); i++) {
@@ -407,7 +392,7 @@ static void what_is_cut_away_casts_no_shadow(void **state)
     for (int code = 0; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)(0.4 * code / 65535) };
     const trip_camera_params view = along_z(&s);
-    trip_settings settings = with_shadows(trip_v3(-1, 0, 0));
+    trip_settings settings = scene_with_shadows(trip_v3(-1, 0, 0));
     trip_clip_add(&settings.clip, trip_v3(1, 0, 0), -cut);
     for (int i = 0; i <= renderers(); i++) {
         scene_picture p = draw(i, &s, &view, &settings);
@@ -439,11 +424,11 @@ static void even_coordinates_change_nothing(void **state)
             u.tables[a][i] = i;
     none = u;
     none.coordinates = (trip_coordinates){ .along = { NULL }, .widest = 1 };
-    create_blob(&with, &u, false, true, &sheared);
-    create_blob(&without, &none, false, true, &sheared);
+    create_blob(&with, &u, false, true, &scene_sheared);
+    create_blob(&without, &none, false, true, &scene_sheared);
     u.hot = none.hot = true;
-    create_blob(&hot[0], &u, false, false, &sheared);
-    create_blob(&hot[1], &none, false, false, &sheared);
+    create_blob(&hot[0], &u, false, false, &scene_sheared);
+    create_blob(&hot[1], &none, false, false, &scene_sheared);
     begin_heat(&with, &hot[0]);
     begin_heat(&without, &hot[1]);
     const trip_camera_params view = scene_view(&with, trip_v3(0.4, -1, 0.5), 60, 50, 20);
