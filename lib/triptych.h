@@ -226,8 +226,8 @@ typedef enum triptych_field {
 
 typedef enum triptych_kernel {
     TRIPTYCH_LINEAR,   /* between the 8 voxels around */
-    TRIPTYCH_CUBIC,    /* Catmull and Rom's, between 64; not of the CPU renderer */
-    TRIPTYCH_GAUSSIAN, /* a splat's, of 64, which smooths; of the reference and gl */
+    TRIPTYCH_CUBIC,    /* Catmull and Rom's, between 64 */
+    TRIPTYCH_GAUSSIAN, /* a splat's, of 64, which smooths; not of the integral */
 } triptych_kernel;
 
 /* What comes first. */
