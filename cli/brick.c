@@ -35,6 +35,7 @@ enum key {
     KEY_RANGE,
     KEY_KEEP_ALL,
     KEY_REGION,
+    KEY_CODE_BITS,
     KEY_NORMALS,
     KEY_HALO,
     KEY_LEVELS,
@@ -91,6 +92,10 @@ static const struct argp_option option_table[] = {
       3 },
     { "force", KEY_FORCE, NULL, 0, "Replace an existing data set", 3 },
     { "resume", KEY_RESUME, NULL, 0, "Go on from where the same command was killed", 3 },
+    { "code-bits", KEY_CODE_BITS, "8|16|auto", 0,
+      "Bits of a value: 8 rounds to 256 codes between the least and the greatest (default: auto, 8 "
+      "where these are exact, else 16)",
+      3 },
     { "normals", KEY_NORMALS, "HOW", 0,
       "What shading needs: compact (3 bytes), full (4), none or auto (default: auto, compact where "
       "that changes no colour by half of 1/255)",
@@ -222,6 +227,15 @@ static int parse_tile(const char *text, unsigned *tile)
     return status;
 }
 
+static int parse_code_bits(const char *text, triptych_code_bits *bits)
+{
+    static const char *const names[] = { "auto", "8", "16", NULL };
+    int choice = 0;
+    int status = trip_option_choice("--code-bits", text, names, &choice);
+    *bits = (triptych_code_bits)choice; /* in their order */
+    return status;
+}
+
 static int parse_normals(const char *text, triptych_normals *normals)
 {
     static const char *const names[] = { "auto", "compact", "full", "none", NULL };
@@ -312,6 +326,8 @@ static error_t parse_output_option(int key, char *argument, options *o)
     case KEY_RESUME:
         o->brick.resume = true;
         return 0;
+    case KEY_CODE_BITS:
+        return parse_code_bits(argument, &o->brick.code_bits);
     case KEY_NORMALS:
         return parse_normals(argument, &o->brick.normals);
     case KEY_HALO:

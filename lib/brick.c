@@ -53,6 +53,7 @@ static trip_brick_params brick_params(triptych *t, const char *volume,
         .keep_all = o->keep_all,
         .automatic = o->automatic,
         .region = region_of(o),
+        .code_bits = (trip_brick_code_bits)o->code_bits,
         .normals = (trip_brick_normals)o->normals,
         .no_halo = o->no_halo,
         .levels = o->levels,
@@ -95,6 +96,8 @@ static const char *fault_of_options(const triptych_brick_options *o)
         return "a tile has 16, 32, 64 or 128 voxels either way";
     if (o->slab_sheets > 64)
         return "a brick has 1 to 64 sheets";
+    if (o->code_bits < TRIPTYCH_CODE_BITS_AUTO || o->code_bits > TRIPTYCH_CODE_BITS_16)
+        return "codes have 8 or 16 bits";
     if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_NONE)
         return "there are no such normals";
     for (size_t i = 0; i < o->range_count; i++)

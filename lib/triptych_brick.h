@@ -24,6 +24,12 @@ typedef enum triptych_endian {
     TRIPTYCH_ENDIAN_BIG,
 } triptych_endian;
 
+typedef enum triptych_code_bits {
+    TRIPTYCH_CODE_BITS_AUTO, /* 8 where these keep all values of the type exactly, else 16 */
+    TRIPTYCH_CODE_BITS_8, /* values are rounded to 256 codes between the least and the greatest */
+    TRIPTYCH_CODE_BITS_16,
+} triptych_code_bits;
+
 typedef enum triptych_normals {
     TRIPTYCH_NORMALS_AUTO,    /* compact where they change no colour by half of 1/255 */
     TRIPTYCH_NORMALS_COMPACT, /* 3 bytes */
@@ -67,6 +73,7 @@ typedef struct triptych_brick_options {
     int64_t region_first[3], region_past[3];
 
     /* What is made. */
+    triptych_code_bits code_bits; /* of a value */
     triptych_normals normals;
     int no_halo;           /* not 0: not the transparent neighbours of what is kept */
     int levels;            /* coarse levels; 0: down to one brick, below 0: none */

@@ -12,6 +12,12 @@ typedef struct trip_value_range {
     double lo, hi; /* inclusive */
 } trip_value_range;
 
+typedef enum trip_brick_code_bits {
+    TRIP_CODE_BITS_AUTO, /* 8 where these keep all values of the type exactly, else 16 */
+    TRIP_CODE_BITS_8,
+    TRIP_CODE_BITS_16,
+} trip_brick_code_bits;
+
 typedef enum trip_brick_normals {
     TRIP_NORMALS_AUTO,    /* compact where they keep gradients below full shading exactly */
     TRIP_NORMALS_COMPACT, /* in 3 bytes, see normal.h */
@@ -34,6 +40,7 @@ typedef struct trip_brick_params {
     trip_region region; /* of what these keep, that alone; the halo reaches beyond it */
     bool automatic;     /* adds the automatic function's, which is also what is drawn by default */
 
+    trip_brick_code_bits code_bits;
     trip_brick_normals normals;
     /* Coarse levels: 0 as many as it takes until one is a single brick; below 0: none; else so
      * many, or fewer where fewer come to one voxel. */

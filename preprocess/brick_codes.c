@@ -24,14 +24,15 @@ void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in,
 {
     hi = hi > lo ? hi : lo + 1;
     c->quantiser = (trip_quantiser){ lo, hi, trip_brick_gradient_full(in, lo, hi),
-                                     trip_gradient_unit(&in->info->index_to_world) };
+                                     trip_gradient_unit(&in->info->index_to_world),
+                                     trip_brick_rounds_codes(in) };
     include_background(&c->quantiser, in);
 }
 
 static void choose_range(trip_brick_codes *c, const trip_brick_input *in)
 {
     double lo = 0, hi = 1;
-    if (trip_brick_has_narrow_type(in)) {
+    if (trip_brick_has_narrow_type(in) && !trip_brick_rounds_codes(in)) {
         trip_brick_type_range(in->info, &lo, &hi);
     } else if (in->scanned) {
         lo = in->tally->value_min;

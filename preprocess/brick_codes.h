@@ -13,8 +13,8 @@ typedef struct trip_brick_codes {
 } trip_brick_codes;
 
 /* Chooses how to encode the values and normals of the input, after the scan if there is one. Codes
- * cover the range of types of 8 or 16 bits, else the range of the values, if that was scanned; else
- * it is to be set before values are quantised. */
+ * cover the range of types of 8 or 16 bits that are not rounded, else the range of the values, if
+ * that was scanned; else it is to be set before values are quantised. */
 void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in);
 /* Codes cover [lo, hi], the values, and the background of a sparse volume where that is not much
  * farther off than values are apart. */

@@ -140,18 +140,36 @@ void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
 }
 
 /* Values are rounded to floats, in which a large offset may leave too few bits for exact codes. */
-unsigned trip_brick_code_bytes(const trip_brick_input *in)
+static bool are_bytes_exact(const trip_brick_input *in)
 {
     trip_quantiser q = { 0 };
     if (!has_byte_type(in))
-        return 2;
+        return false;
     trip_brick_type_range(in->info, &q.lo, &q.hi);
     for (int stored = in->info->type == TRIP_I8 ? -128 : 0, i = 0; i < 256; i++) {
         double value = in->info->slope * (stored + i) + in->info->inter;
-        if (trip_quantise(&q, (float)value) % 257)
-            return 2;
+        if (trip_quantise(&q, (float)value) % TRIP_BYTE_CODE)
+            return false;
     }
-    return 1;
+    return true;
+}
+
+unsigned trip_brick_code_bytes(const trip_brick_input *in)
+{
+    switch (in->params->code_bits) {
+    case TRIP_CODE_BITS_8:
+        return 1;
+    case TRIP_CODE_BITS_16:
+        return 2;
+    case TRIP_CODE_BITS_AUTO:
+        break;
+    }
+    return are_bytes_exact(in) ? 1 : 2;
+}
+
+bool trip_brick_rounds_codes(const trip_brick_input *in)
+{
+    return in->params->code_bits == TRIP_CODE_BITS_8 && !are_bytes_exact(in);
 }
 
 double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi)
@@ -208,7 +226,8 @@ static bool is_envelope_automatic(const trip_brick_params *p)
 
 bool trip_brick_input_needs_scan(const trip_brick_input *in)
 {
-    bool needed = is_envelope_automatic(in->params) || depend_normals_on_range(in);
+    bool needed = is_envelope_automatic(in->params) || depend_normals_on_range(in) ||
+                  trip_brick_rounds_codes(in);
     for (size_t i = 0; i < in->params->function_count; i++)
         needed = needed || trip_tf_needs_data(in->functions[i]);
     return needed;

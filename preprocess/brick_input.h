@@ -38,8 +38,10 @@ void trip_brick_input_close(trip_brick_input *in);
 
 /* Whether values are integers of 8 or 16 bits, so that codes cover the whole range of the type. */
 bool trip_brick_has_narrow_type(const trip_brick_input *in);
-/* Bytes of a code: 1 where 8-bit codes represent all values of the type exactly, else 2. */
+/* Bytes of a code: by default 1 where 8-bit codes represent all values of the type exactly. */
 unsigned trip_brick_code_bytes(const trip_brick_input *in);
+/* Whether values are rounded to codes of a byte, which then cover the range of the values. */
+bool trip_brick_rounds_codes(const trip_brick_input *in);
 /* Bytes of a normal, 0 without normals; after the scan, if there is one. */
 unsigned trip_brick_normal_bytes(const trip_brick_input *in);
 /* The magnitude from which on shading is full, for the range of the values or, where that is

@@ -178,6 +178,9 @@ static void add_source_options(cJSON *root, const trip_brick_params *p)
     cJSON *options = cJSON_AddArrayToObject(root, "source_options");
     add_volume_options(options, &p->volume);
     add_region(options, &p->region);
+    static const char *const code_bits[] = { NULL, "8", "16" };
+    if (p->code_bits)
+        add_option(options, "--code-bits=%s", code_bits[p->code_bits]);
     static const char *const normals[] = { NULL, "compact", "full", "none" };
     if (p->normals)
         add_option(options, "--normals=%s", normals[p->normals]);

@@ -39,8 +39,9 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 
 static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
 {
-    fprintf(f, "%d %d %d %d %d %d %u %u %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
-            p->automatic, (int)p->normals, p->no_halo, p->tile_voxels, p->slab_sheets, p->levels);
+    fprintf(f, "%d %d %d %d %d %d %d %u %u %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
+            p->automatic, (int)p->code_bits, (int)p->normals, p->no_halo, p->tile_voxels,
+            p->slab_sheets, p->levels);
     for (int a = 0; a < 3 && !trip_region_is_whole(&p->region); a++)
         fprintf(f, "%" PRId64 ":%" PRId64 "\n", p->region.first[a], p->region.past[a]);
     for (size_t i = 0; i < p->range_count; i++)

@@ -37,12 +37,17 @@ typedef struct trip_quantiser {
     double lo, hi;
     double gradient_full; /* of 4-byte normals (normal.h) */
     double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
+    bool rounds;          /* to multiples of TRIP_BYTE_CODE, which 8 bits hold */
 } trip_quantiser;
 
+enum { TRIP_BYTE_CODE = 257 };
+
+/* The nearest code. */
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
 {
-    double code = (value - q->lo) * (65535 / (q->hi - q->lo)) + 0.5;
-    return !(code > 0) ? 0 : code >= 65535 ? 65535 : (uint32_t)code; /* NaN: 0 */
+    const uint32_t step = q->rounds ? TRIP_BYTE_CODE : 1, most = 65535 / step;
+    double code = (value - q->lo) * (most / (q->hi - q->lo)) + 0.5;
+    return !(code > 0) ? 0 : code >= most ? 65535 : (uint32_t)code * step; /* NaN: 0 */
 }
 
 /* The format of all pieces that one bricking makes; those of the halo have no normals. */

@@ -154,6 +154,82 @@ static void codes_of_floats_are_of_the_range_of_all_values(void **state)
     test_free_lists(&l);
 }
 
+static void codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("float", "a.trip");
+    trip_value_range range = { -1, 20 };
+    float lo = INFINITY, hi = -INFINITY;
+    p.ranges = &range;
+    p.range_count = 1;
+    p.code_bits = TRIP_CODE_BITS_8;
+    make_floats();
+    for (int i = 0; i < N; i++) {
+        lo = fminf(lo, floats[i]);
+        hi = fmaxf(hi, floats[i]);
+    }
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    assert_int_equal(s.code_bytes, 1);
+    assert_int_equal(l.header.code_bytes, 1);
+    assert_true(l.header.code_lo == lo && l.header.code_hi == hi);
+    for (int i = 0; i < N; i++) {
+        double value = lo + ((double)hi - lo) * l.codes[0][i] / 65535;
+        assert_int_equal(l.codes[0][i] >= 0, floats[i] >= -1 && floats[i] <= 20);
+        if (l.codes[0][i] >= 0) {
+            assert_int_equal(l.codes[0][i] % 257, 0);
+            assert_true(fabs(value - floats[i]) <= 0.5001 * ((double)hi - lo) / 255);
+        }
+    }
+    test_free_lists(&l);
+}
+
+/* The range is that of the values, not of the type, in which they would be a few codes. */
+static void shorts_of_a_narrow_range_have_all_codes_of_a_byte(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("uint16", "a.trip");
+    uint16_t shorts[N];
+    p.keep_all = true;
+    p.code_bits = TRIP_CODE_BITS_8;
+    make_bytes();
+    for (int i = 0; i < N; i++)
+        shorts[i] = (uint16_t)(1000 + 2 * bytes[i]);
+    shorts[0] = 1000;
+    shorts[1] = 1510;
+    test_write("v.raw", shorts, sizeof shorts);
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    assert_true(l.header.code_lo == 1000 && l.header.code_hi == 1510);
+    for (int i = 0; i < N; i++)
+        assert_int_equal(l.codes[0][i], 257 * (shorts[i] - 1000) / 2);
+    test_free_lists(&l);
+}
+
+static void codes_of_bytes_are_as_exact_in_16_bits(void **state)
+{
+    (void)state;
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    p.keep_all = true;
+    p.code_bits = TRIP_CODE_BITS_16;
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    test_check_lists(&l);
+    assert_int_equal(l.header.code_bytes, 2);
+    for (int i = 0; i < N; i++)
+        assert_int_equal(l.codes[0][i], 257 * bytes[i]);
+    test_free_lists(&l);
+}
+
 static void gradients_of_floats_are_right(void **state)
 {
     (void)state;
@@ -539,6 +615,13 @@ int main(void)
         cmocka_unit_test_setup_teardown(without_an_envelope_something_is_kept_and_a_function_stored,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(codes_of_floats_are_of_the_range_of_all_values, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(
+            codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values, test_begin,
+            test_end),
+        cmocka_unit_test_setup_teardown(shorts_of_a_narrow_range_have_all_codes_of_a_byte,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(codes_of_bytes_are_as_exact_in_16_bits, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(gradients_of_floats_are_right, test_begin, test_end),
         cmocka_unit_test_setup_teardown(values_that_are_not_finite_are_left_out_with_one_warning,
