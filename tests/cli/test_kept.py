@@ -142,7 +142,7 @@ class Counts(program.ProgramTest):
             kept = self.brick("typed.nrrd", "a.trip", "--range=40:90")["kept"]
             self.assertEqual(kept, ((typed >= 40) & (typed <= 90)).sum(), kind)
 
-    def test_tiles_memory_and_threads_do_not_change_the_count(self):
+    def test_tiles_memory_threads_and_codes_do_not_change_the_count(self):
         source = os.path.join(program.DATASETS, "tooth.nhdr")
         wanted = self.brick(source, "a.trip")["kept"]
         for options in (
@@ -152,6 +152,7 @@ class Counts(program.ProgramTest):
             ("--memory=64M", "--threads=2"),
             ("--normals=none", "--halo=0"),
             ("--normals=full",),
+            ("--code-bits=8",),
         ):
             self.assertEqual(self.brick(source, "a.trip", *options)["kept"], wanted, options)
             self.works("info", "--verify", "a.trip")
