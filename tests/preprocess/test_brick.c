@@ -124,10 +124,9 @@ static void without_an_envelope_something_is_kept_and_a_function_stored(void **s
     test_free_lists(&l);
 }
 
-/* The range of wide types is only known at the end; codes are of the whole range nevertheless. */
-static void codes_of_floats_are_of_the_range_of_all_values(void **state)
+/* Codes of so many steps are the nearest over the whole range of the values, kept or not. */
+static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes, int steps)
 {
-    (void)state;
     test_lists l;
     trip_brick_summary s;
     trip_brick_params p = params_for("float", "a.trip");
@@ -135,6 +134,7 @@ static void codes_of_floats_are_of_the_range_of_all_values(void **state)
     float lo = INFINITY, hi = -INFINITY;
     p.ranges = &range;
     p.range_count = 1;
+    p.code_bits = bits;
     make_floats();
     for (int i = 0; i < N; i++) {
         lo = fminf(lo, floats[i]);
@@ -143,48 +143,32 @@ static void codes_of_floats_are_of_the_range_of_all_values(void **state)
     assert_int_equal(trip_brick(&p, &s), 0);
     test_read_lists("a.trip", &l);
     test_check_lists(&l);
+    assert_int_equal(s.code_bytes, code_bytes);
+    assert_int_equal(l.header.code_bytes, code_bytes);
     assert_true(l.header.code_lo == lo && l.header.code_hi == hi);
     assert_true(l.header.value_min == lo && l.header.value_max == hi);
     for (int i = 0; i < N; i++) {
         double value = lo + ((double)hi - lo) * l.codes[0][i] / 65535;
         assert_int_equal(l.codes[0][i] >= 0, floats[i] >= -1 && floats[i] <= 20);
-        if (l.codes[0][i] >= 0)
-            assert_true(fabs(value - floats[i]) <= 0.5001 * ((double)hi - lo) / 65535);
+        if (l.codes[0][i] >= 0) {
+            assert_int_equal(l.codes[0][i] % (65535 / steps), 0);
+            assert_true(fabs(value - floats[i]) <= 0.5001 * ((double)hi - lo) / steps);
+        }
     }
     test_free_lists(&l);
+}
+
+/* The range of wide types is only known at the end; codes are of the whole range nevertheless. */
+static void codes_of_floats_are_of_the_range_of_all_values(void **state)
+{
+    (void)state;
+    check_codes_of_floats(TRIP_CODE_BITS_AUTO, 2, 65535);
 }
 
 static void codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values(void **state)
 {
     (void)state;
-    test_lists l;
-    trip_brick_summary s;
-    trip_brick_params p = params_for("float", "a.trip");
-    trip_value_range range = { -1, 20 };
-    float lo = INFINITY, hi = -INFINITY;
-    p.ranges = &range;
-    p.range_count = 1;
-    p.code_bits = TRIP_CODE_BITS_8;
-    make_floats();
-    for (int i = 0; i < N; i++) {
-        lo = fminf(lo, floats[i]);
-        hi = fmaxf(hi, floats[i]);
-    }
-    assert_int_equal(trip_brick(&p, &s), 0);
-    test_read_lists("a.trip", &l);
-    test_check_lists(&l);
-    assert_int_equal(s.code_bytes, 1);
-    assert_int_equal(l.header.code_bytes, 1);
-    assert_true(l.header.code_lo == lo && l.header.code_hi == hi);
-    for (int i = 0; i < N; i++) {
-        double value = lo + ((double)hi - lo) * l.codes[0][i] / 65535;
-        assert_int_equal(l.codes[0][i] >= 0, floats[i] >= -1 && floats[i] <= 20);
-        if (l.codes[0][i] >= 0) {
-            assert_int_equal(l.codes[0][i] % 257, 0);
-            assert_true(fabs(value - floats[i]) <= 0.5001 * ((double)hi - lo) / 255);
-        }
-    }
-    test_free_lists(&l);
+    check_codes_of_floats(TRIP_CODE_BITS_8, 1, 255);
 }
 
 /* The range is that of the values, not of the type, in which they would be a few codes. */
