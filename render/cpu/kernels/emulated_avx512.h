@@ -70,7 +70,7 @@ static inline __mmask16 emulated_testn_epi32_mask(__m512i a, __m512i b)
 #undef _mm512_testn_epi32_mask
 #define _mm512_testn_epi32_mask emulated_testn_epi32_mask
 
-static inline __m512i emulated_cvttps_epi32(__m512 a)
+static inline __attribute__((always_inline)) __m512i emulated_cvttps_epi32(__m512 a)
 {
     __m256 half[2];
     __m256i r[2];
