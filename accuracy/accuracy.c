@@ -21,6 +21,9 @@ static int print_settings(void)
         accuracy_write_options(stdout, &all[i]);
         printf("\n");
     }
+    for (int i = 0; i < ACCURACY_POPPINGS; i++)
+        printf("%-20s --classify %s, turned, by each method and h\n", accuracy_poppings[i].name,
+               accuracy_poppings[i].classify == TRIPTYCH_POST ? "post" : "pre");
     return 0;
 }
 

@@ -143,6 +143,13 @@ void accuracy_write_options(FILE *f, const accuracy_setting *s)
         fprintf(f, "%s--%s %s", i ? " " : "", options[i].name, options[i].value);
 }
 
+static void print_why(FILE *f, const char *name, accuracy_state state, const char *why)
+{
+    if (state != ACCURACY_MEASURED)
+        fprintf(f, "left out: %s: %s\n", name,
+                state == ACCURACY_LEFT_OUT ? why : "the seconds of --budget were over");
+}
+
 void accuracy_report_print(FILE *f, const accuracy_report *r)
 {
     fprintf(f, "\n| settings | median ms | error, of 255: mean | 99 %% | most | PSNR, dB | SSIM | "
@@ -157,10 +164,9 @@ void accuracy_report_print(FILE *f, const accuracy_report *r)
     }
     fprintf(f, "\n* on the front: no other is as fast and as close at the 99th percentile.\n");
     for (int i = 0; i < r->m->row_count; i++)
-        if (!is_measured(r, i))
-            fprintf(f, "left out: %s: %s\n", r->m->rows[i].setting.name,
-                    r->m->rows[i].state == ACCURACY_LEFT_OUT ? r->m->rows[i].why
-                                                             : "the seconds of --budget were over");
+        print_why(f, r->m->rows[i].setting.name, r->m->rows[i].state, r->m->rows[i].why);
+    for (int i = 0; i < r->m->popping_count; i++)
+        print_why(f, r->m->popping[i].name, r->m->popping[i].state, r->m->popping[i].why);
     if (r->m->view_count < r->m->options->views)
         fprintf(f, "left out: views %d to %d: the seconds of --budget were over\n",
                 r->m->view_count + 1, r->m->options->views);

@@ -147,7 +147,10 @@ static int add_rows(accuracy_measured *m, const triptych_settings *usual)
         status = add_others(m, usual);
     if (!status)
         status = add_programs(m);
-    if (!status && !m->row_count)
+    for (int i = 0; i < ACCURACY_POPPINGS; i++)
+        if (is_wanted(m->options->settings, accuracy_poppings[i].name))
+            m->popping[m->popping_count++] = accuracy_poppings[i];
+    if (!status && !m->row_count && !m->popping_count)
         return trip_fail(TRIP_USAGE, "usage", "--settings",
                          "\"%s\" names none; `triptych accuracy --list` prints the names",
                          m->options->settings);
@@ -521,15 +524,25 @@ static triptych_settings usual_settings(const accuracy_options *o)
     return s;
 }
 
+static int measure_popping(sweep *s)
+{
+    int status = 0;
+    for (int i = 0; i < s->m->popping_count && !status && !is_over(s); i++)
+        status = accuracy_popping_measure(&s->m->popping[i], &s->contexts, &s->usual, s->progress,
+                                          s->pictures[RAN]);
+    return status;
+}
+
 static int measure_views(sweep *s)
 {
     int status = 0, steps = 0;
     for (int i = 0; i < s->m->row_count; i++)
         steps += s->m->rows[i].state == ACCURACY_NOT_REACHED;
     bench_progress_expect(s->progress, s->o->views * (s->o->ladder ? 3 + 2 * steps : 1 + steps));
+    bench_progress_expect(s->progress, ACCURACY_POPPING_ROWS * s->m->popping_count);
     for (int view = 0; view < s->o->views && !status && has_time_for(s, view); view++)
         status = measure_view(s, view);
-    return status;
+    return status ? status : measure_popping(s);
 }
 
 int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder)

@@ -7,6 +7,7 @@
 #include "accuracy_options.h"
 #include "beside.h"
 #include "error.h"
+#include "popping.h"
 #include "setting.h"
 #include "views.h"
 
@@ -21,12 +22,6 @@ typedef enum accuracy_step {
     ACCURACY_PRECISION, /* what ran to the reference */
     ACCURACY_STEPS
 } accuracy_step;
-
-typedef enum accuracy_state {
-    ACCURACY_NOT_REACHED, /* the seconds were over */
-    ACCURACY_MEASURED,
-    ACCURACY_LEFT_OUT,
-} accuracy_state;
 
 typedef struct accuracy_row {
     accuracy_setting setting;
@@ -50,6 +45,8 @@ typedef struct accuracy_measured {
     const char *folder; /* that is being written */
     accuracy_row *rows;
     int row_count;
+    accuracy_popping popping[ACCURACY_POPPINGS];
+    int popping_count; /* wanted */
     accuracy_view *views;
     int view_count; /* done */
     char *truth;    /* picture of the first view */

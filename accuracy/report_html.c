@@ -151,6 +151,29 @@ static void write_table(FILE *f, const accuracy_report *r)
           f);
 }
 
+static void write_popping(FILE *f, const accuracy_report *r)
+{
+    bool any = false;
+    for (int i = 0; i < r->m->popping_count; i++) {
+        const accuracy_popping *p = &r->m->popping[i];
+        if (p->state != ACCURACY_MEASURED)
+            continue;
+        if (!any)
+            fprintf(
+                f,
+                "<h2>Popping</h2>\n<p>The eye goes round the object in %d steps of %g degrees, "
+                "through where X and Y are equally near to the ray at the picture's centre. How "
+                "much more a pixel changes in a step than in its median step, over the pixels "
+                "that change at all, in the step where it is most; <b>motion</b> is the mean of "
+                "that median. One list a frame (axis) jumps there; merged lists should not.</p>\n",
+                BENCH_POPPING_STEPS, bench_popping_degrees(1) - bench_popping_degrees(0));
+        any = true;
+        fputs("<figure>\n", f);
+        bench_popping_draw(f, p->rows, ACCURACY_POPPING_ROWS);
+        fprintf(f, "<figcaption>%s</figcaption></figure>\n", p->name);
+    }
+}
+
 static void write_figure(FILE *f, const char *name, const char *picture, const char *difference,
                          const accuracy_error_figures *e)
 {
@@ -178,26 +201,32 @@ static void write_pictures(FILE *f, const accuracy_report *r)
     }
 }
 
+static void write_why(FILE *f, const char *name, accuracy_state state, const char *why)
+{
+    if (state == ACCURACY_MEASURED)
+        return;
+    fprintf(f, "<li>%s: ", name);
+    write_escaped(f, state == ACCURACY_LEFT_OUT ? why : "the seconds given were over");
+    fputs("\n", f);
+}
+
 static void write_left_out(FILE *f, const accuracy_report *r)
 {
     bool any = r->m->view_count < r->m->options->views;
     for (int i = 0; i < r->m->row_count; i++)
         any |= r->m->rows[i].state != ACCURACY_MEASURED;
+    for (int i = 0; i < r->m->popping_count; i++)
+        any |= r->m->popping[i].state != ACCURACY_MEASURED;
     if (!any)
         return;
     fputs("<h2>Left out</h2>\n<ul>\n", f);
     if (r->m->view_count < r->m->options->views)
         fprintf(f, "<li>views %d to %d: the seconds given were over\n", r->m->view_count + 1,
                 r->m->options->views);
-    for (int i = 0; i < r->m->row_count; i++) {
-        const accuracy_row *row = &r->m->rows[i];
-        if (row->state == ACCURACY_MEASURED)
-            continue;
-        fprintf(f, "<li>%s: ", row->setting.name);
-        write_escaped(f,
-                      row->state == ACCURACY_LEFT_OUT ? row->why : "the seconds given were over");
-        fputs("\n", f);
-    }
+    for (int i = 0; i < r->m->row_count; i++)
+        write_why(f, r->m->rows[i].setting.name, r->m->rows[i].state, r->m->rows[i].why);
+    for (int i = 0; i < r->m->popping_count; i++)
+        write_why(f, r->m->popping[i].name, r->m->popping[i].state, r->m->popping[i].why);
     fputs("</ul>\n", f);
 }
 
@@ -253,6 +282,7 @@ char *accuracy_report_html(const accuracy_report *r)
     write_head(f, r);
     write_plots(f, r);
     write_table(f, r);
+    write_popping(f, r);
     write_pictures(f, r);
     write_left_out(f, r);
     write_commands(f, r);

@@ -87,13 +87,27 @@ static void add_view(cJSON *views, const accuracy_view *view)
         cJSON_AddNumberToObject(o, "fov_degrees", c->fov_degrees);
 }
 
-static void add_left_out(cJSON *list, const accuracy_row *row)
+static void add_left_out(cJSON *list, const char *name, accuracy_state state, const char *why)
 {
     cJSON *o = cJSON_CreateObject();
     cJSON_AddItemToArray(list, o);
-    cJSON_AddStringToObject(o, "name", row->setting.name);
-    cJSON_AddStringToObject(o, "why",
-                            row->state == ACCURACY_LEFT_OUT ? row->why : "the seconds were over");
+    cJSON_AddStringToObject(o, "name", name);
+    cJSON_AddStringToObject(o, "why", state == ACCURACY_LEFT_OUT ? why : "the seconds were over");
+}
+
+static void add_popping(cJSON *to, const accuracy_popping *p)
+{
+    cJSON *rows = cJSON_AddArrayToObject(to, p->name);
+    for (int i = 0; i < ACCURACY_POPPING_ROWS; i++) {
+        const bench_popping_row *row = &p->rows[i];
+        cJSON *o = cJSON_CreateObject();
+        cJSON_AddItemToArray(rows, o);
+        cJSON_AddStringToObject(o, "settings", bench_popping_settings[i].name);
+        add_number(o, "mean", row->mean);
+        add_number(o, "percentile_99", row->percentile_99);
+        add_number(o, "max", row->most);
+        add_number(o, "motion", row->motion);
+    }
 }
 
 static void add_facts(cJSON *root, const accuracy_report *r)
@@ -129,6 +143,7 @@ char *accuracy_report_json(const accuracy_report *r)
     cJSON *views = cJSON_AddArrayToObject(root, "views");
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     cJSON *beside = cJSON_AddArrayToObject(root, "beside");
+    cJSON *popping = cJSON_AddObjectToObject(root, "popping");
     cJSON *left_out = cJSON_AddArrayToObject(root, "left_out");
     for (int i = 0; i < r->m->view_count; i++)
         add_view(views, &r->m->views[i]);
@@ -136,7 +151,15 @@ char *accuracy_report_json(const accuracy_report *r)
         if (r->m->rows[i].state == ACCURACY_MEASURED)
             add_row(r->m->rows[i].beside ? beside : rows, r, i);
         else
-            add_left_out(left_out, &r->m->rows[i]);
+            add_left_out(left_out, r->m->rows[i].setting.name, r->m->rows[i].state,
+                         r->m->rows[i].why);
+    for (int i = 0; i < r->m->popping_count; i++) {
+        const accuracy_popping *p = &r->m->popping[i];
+        if (p->state == ACCURACY_MEASURED)
+            add_popping(popping, p);
+        else
+            add_left_out(left_out, p->name, p->state, p->why);
+    }
     cJSON_AddNumberToObject(root, "views_left_out", r->m->options->views - r->m->view_count);
     char *text = trip_json_print(root, true);
     cJSON_Delete(root);

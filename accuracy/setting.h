@@ -15,6 +15,13 @@ typedef struct accuracy_setting {
     triptych_settings settings;
 } accuracy_setting;
 
+/* What became of one that was wanted. */
+typedef enum accuracy_state {
+    ACCURACY_NOT_REACHED, /* the seconds were over */
+    ACCURACY_MEASURED,
+    ACCURACY_LEFT_OUT,
+} accuracy_state;
+
 /* All of them, those first that matter most; `usual` has what they have in common (shading,
  * background). Returns how many. */
 int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptych_settings *usual);

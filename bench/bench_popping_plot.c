@@ -119,37 +119,38 @@ static void draw_names(const plot *p)
     }
 }
 
-static void draw(const plot *p)
+void bench_popping_draw(FILE *f, const bench_popping_row *rows, int count)
 {
-    fprintf(p->file,
+    double most = 10 * least;
+    for (int i = 0; i < count; i++)
+        most = fmax(most, fmax(rows[i].most, rows[i].motion));
+    const plot p = { .rows = rows,
+                     .count = count,
+                     .lo = (int)floor(log10(least)),
+                     .hi = (int)ceil(log10(most)),
+                     .file = f };
+    fprintf(f,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
             "font-family=\"sans-serif\" font-size=\"13\">\n"
             "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
             WIDTH, HEIGHT);
-    draw_axes(p);
+    draw_axes(&p);
     for (int c = CURVES - 1; c >= 0; c--)
-        draw_curve(p, &curves[c]);
-    draw_names(p);
-    fprintf(p->file, "</svg>\n");
+        draw_curve(&p, &curves[c]);
+    draw_names(&p);
+    fprintf(f, "</svg>\n");
 }
 
 int bench_popping_plot(const char *path, const bench_popping_row *rows, int count)
 {
     char *svg = NULL;
     size_t bytes = 0;
-    double most = 10 * least;
-    for (int i = 0; i < count; i++)
-        most = fmax(most, fmax(rows[i].most, rows[i].motion));
-    plot p = { .rows = rows,
-               .count = count,
-               .lo = (int)floor(log10(least)),
-               .hi = (int)ceil(log10(most)),
-               .file = open_memstream(&svg, &bytes) };
-    if (!p.file)
+    FILE *f = open_memstream(&svg, &bytes);
+    if (!f)
         return trip_fail(TRIP_ERROR, "bench", path, "out of memory");
-    draw(&p);
-    int status = fclose(p.file) ? trip_fail(TRIP_ERROR, "bench", path, "out of memory")
-                                : trip_new_file_of_text("bench", path, svg);
+    bench_popping_draw(f, rows, count);
+    int status = fclose(f) ? trip_fail(TRIP_ERROR, "bench", path, "out of memory")
+                           : trip_new_file_of_text("bench", path, svg);
     free(svg);
     return status;
 }

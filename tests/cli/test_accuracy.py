@@ -145,7 +145,7 @@ class Accuracy(program.ProgramTest):
         assert program.call("brick", "a.nrrd", "-q", "--keep-all", "--tile", "16").returncode == 0
         run = program.call(
             "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", "--pictures", "--source", "a.nrrd",
-            "--settings", "post,post-slices-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2",
+            "--settings", "post,post-slices-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2,popping-post",
             program=program.QUICK_PROGRAM)
         assert run.returncode == 0, run.stderr
         assert run.stderr == "", run.stderr
@@ -205,6 +205,40 @@ class Accuracy(program.ProgramTest):
             self.assertGreater(row["bytes_read"], 0)
         self.assertGreater(rows["pre"]["splats_drawn"], 0)
         self.assertIsNone(rows["post"]["splats_drawn"])
+
+    def turned(self, degrees, method):
+        """From so many degrees of index space from X towards Y, as far as the first view is."""
+        view = self.report["views"][0]
+        eye, look = numpy.array(view["eye"]), numpy.array(view["look"])
+        way = numpy.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.3])
+        eye = look + way / numpy.linalg.norm(way) * numpy.linalg.norm(eye - look)
+        return self.picture(
+            "a.trip", "--size", "40x32", "--fov", repr(view["fov_degrees"]), "--tf", "a.tf",
+            "--classify", "post", "--method", method, "--eye=" + ",".join(map(repr, map(float, eye))),
+            "--look=" + ",".join(map(repr, view["look"])), "--up=0,0,1")
+
+    def test_popping_is_that_of_the_pictures(self):
+        rows = {row["settings"]: row for row in self.report["popping"]["popping-post"]}
+        self.assertEqual(list(rows), ["merge, h 0", "merge, h 0.5", "merge, h 0.85", "merge, h 0.95",
+                                      "merge, h 0.99", "clip", "axis"])
+        steps = [self.turned(45 + 0.05 * (i - 20), "axis") for i in range(41)]
+        changes = 255 * abs(numpy.diff(steps, axis=0)).max(axis=3).reshape(40, -1)
+        changes = changes[:, changes.max(axis=0) > 0]
+        motion = numpy.sort(changes, axis=0)[20]
+        beyond = numpy.maximum(0, changes - motion)
+        axis = rows["axis"]
+        self.assertGreater(changes.shape[1], 300)
+        self.assertAlmostEqual(axis["motion"], motion.mean(), 3)
+        self.assertAlmostEqual(axis["mean"], beyond.mean(axis=1).max(), 3)
+        self.assertAlmostEqual(axis["max"], beyond.max(), 2)
+        self.assertAlmostEqual(
+            axis["percentile_99"],
+            max(numpy.sort(b)[(b.size - 1) * 99 // 100] for b in beyond), 2)
+        for name, row in rows.items():
+            if name.startswith("merge"):
+                self.assertLess(row["mean"], axis["mean"] / 2)
+        with open("report/index.html", encoding="utf-8") as f:
+            self.assertIn("0.95</text>", f.read())
 
     def test_what_is_left_out_is_listed(self):
         (left_out,) = self.report["left_out"]
@@ -297,7 +331,7 @@ class Accuracy(program.ProgramTest):
         page = Page()
         with open("report/index.html", encoding="utf-8") as f:
             page.feed(f.read())
-        self.assertEqual(page.tags.count("svg"), 2)
+        self.assertEqual(page.tags.count("svg"), 3)
         self.assertEqual(page.tags.count("img"), 1 + 2 * len(self.rows))
         for source in page.sources:
             self.assertTrue(source.startswith("data:image/png;base64,"), source[:40])
@@ -315,7 +349,7 @@ class Accuracy(program.ProgramTest):
                  "--user-data-dir=" + home, "file://" + os.path.abspath("report/index.html")],
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=120, text=True, check=False)
         self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertEqual(run.stdout.count("<svg"), 2)
+        self.assertEqual(run.stdout.count("<svg"), 3)
         self.assertIn("</html>", run.stdout)
 
     def test_seconds_bound_the_work(self):
