@@ -45,8 +45,9 @@ static const struct argp_option options[] = {
       "up to 7",
       1 },
     { "beside", KEY_BESIDE, "COMMAND", 0,
-      "Another program that draws the same views of the source, as VTK's ray caster by "
-      "vtk_worker.py, up to 4: see triptych-accuracy(1)",
+      "Another program that draws the same views of the source, up to 4; none: not VTK's ray "
+      "caster "
+      "either, which is one where it is installed: see triptych-accuracy(1)",
       1 },
     TRIP_OPTION_TF(KEY_TF, 1),
     TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 1),
@@ -126,6 +127,8 @@ static int parse_word(int key, char *arg, accuracy_options *o)
         o->source = arg;
         return 0;
     case KEY_BESIDE:
+        if (strcmp(arg, "none") == 0)
+            return o->beside_none = true, 0;
         if (o->beside_count == ACCURACY_BESIDE_MAX)
             return trip_option_fail("--beside", "4 other programs at most");
         o->beside[o->beside_count++] = arg;
@@ -171,6 +174,8 @@ static int check(parse *p)
         return trip_option_fail("NAME.trip",
                                 "none given: `triptych accuracy NAME.trip -o REPORT/`");
     int status = 0;
+    if (o->beside_none && o->beside_count)
+        return trip_option_fail("--beside", "a program or none");
     for (int i = 0; i < p->also_count && !status; i++)
         status = add_data(p->also[i], o);
     return status;

@@ -12,6 +12,7 @@ typedef struct accuracy_options {
     int data_count;
     const char *beside[ACCURACY_BESIDE_MAX]; /* commands of programs that draw the same views */
     int beside_count;
+    bool beside_none; /* nor VTK, which stands there of itself where it is installed */
     const char *output;
     const char *source;   /* the volume that the data were made of; NULL: not known */
     const char *tf;       /* NULL: the function kept in the data set */

@@ -139,13 +139,12 @@ static int introduce(accuracy_beside *b, const accuracy_options *o, triptych *t,
     return status;
 }
 
-int accuracy_beside_start(accuracy_beside *b, const char *command, const accuracy_options *o,
-                          triptych *t, char why[256])
+int accuracy_beside_start(accuracy_beside *b, const accuracy_options *o, triptych *t, char why[256])
 {
-    *b = (accuracy_beside){ .socket = -1 };
+    *b = (accuracy_beside){ .socket = -1, .command = b->command };
     if (!o->source)
         return fail(why, "--source is the volume that it draws, and was not given");
-    int status = spawn(b, command, why);
+    int status = spawn(b, b->command, why);
     return status ? status : introduce(b, o, t, why);
 }
 

@@ -13,6 +13,7 @@
 enum { ACCURACY_BESIDE_TEXT = 128 };
 
 typedef struct accuracy_beside {
+    const char *command; /* the caller's */
     int process, socket;
     char name[ACCURACY_BESIDE_TEXT], about[ACCURACY_BESIDE_TEXT]; /* as it says */
     char *line;                                                   /* last read */
@@ -20,11 +21,11 @@ typedef struct accuracy_beside {
     FILE *answers;
 } accuracy_beside;
 
-/* Starts `command` by sh and describes the volume to it: the options' source, in the world of the
+/* Starts its command by sh and describes the volume to it: the options' source, in the world of the
  * data set that `t` has open, and its function. Where that cannot be, TRIP_ERROR with `why` set and
  * nothing reported, as in what follows. accuracy_beside_end() follows in any case. */
-int accuracy_beside_start(accuracy_beside *b, const char *command, const accuracy_options *o,
-                          triptych *t, char why[256]);
+int accuracy_beside_start(accuracy_beside *b, const accuracy_options *o, triptych *t,
+                          char why[256]);
 /* Draws a view; *ms is what the program says that it took. */
 int accuracy_beside_draw(accuracy_beside *b, const accuracy_view *view, double *ms, char why[256]);
 /* The same, and gives its picture, premultiplied; by way of a file in `folder`, which is removed.

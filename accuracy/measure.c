@@ -14,6 +14,7 @@
 #include "picture_data.h"
 #include "report.h"
 #include "ssim.h"
+#include "vtk.h"
 
 enum { THUMBNAIL_PX = 128 };
 
@@ -116,19 +117,33 @@ static int add_others(accuracy_measured *m, const triptych_settings *usual)
     return status;
 }
 
-/* Other programs, each of which starts with the first view. */
+static int add_program(accuracy_measured *m, const char *name, const char *command)
+{
+    accuracy_setting one = { 0 };
+    snprintf(one.name, sizeof one.name, "%s", name);
+    int status = add_row(m, 0, &one);
+    accuracy_row *row = &m->rows[m->row_count - 1];
+    if (!status && !(row->beside = calloc(1, sizeof *row->beside)))
+        status = trip_fail(TRIP_ERROR, "accuracy", one.name, "out of memory");
+    if (!status)
+        *row->beside = (accuracy_beside){ .socket = -1, .command = command };
+    return status;
+}
+
+/* Other programs, each of which starts with the first view: those given, else VTK's ray caster. */
 static int add_programs(accuracy_measured *m)
 {
+    const accuracy_options *o = m->options;
     int status = 0;
-    for (int i = 0; i < m->options->beside_count && !status; i++) {
-        accuracy_setting one = { 0 };
-        snprintf(one.name, sizeof one.name, "beside-%d", i + 1);
-        status = add_row(m, 0, &one);
-        accuracy_row *row = &m->rows[m->row_count - 1];
-        if (!status && !(row->beside = calloc(1, sizeof *row->beside)))
-            status = trip_fail(TRIP_ERROR, "accuracy", one.name, "out of memory");
-        if (!status)
-            row->beside->socket = -1;
+    for (int i = 0; i < o->beside_count && !status; i++) {
+        char name[ACCURACY_NAME_BYTES];
+        snprintf(name, sizeof name, "beside-%d", i + 1);
+        status = add_program(m, name, o->beside[i]);
+    }
+    if (!status && !o->beside_count && !o->beside_none && o->source &&
+        is_wanted(o->settings, "vtk") && accuracy_vtk_command(o->source, m->vtk, sizeof m->vtk)) {
+        status = add_program(m, "vtk", m->vtk);
+        m->rows[m->row_count - 1].is_vtk = true;
     }
     return status;
 }
@@ -185,6 +200,11 @@ static int leave_out_idle(sweep *s)
             levels = list.level;
     for (int i = 0; i < s->m->row_count; i++) {
         accuracy_row *row = &s->m->rows[i];
+        const int64_t *n = info.dims;
+        if (row->is_vtk && (double)n[0] * (double)n[1] * (double)n[2] * ACCURACY_VTK_VOXEL_BYTES >
+                               0.25 * (double)trip_memory_available_bytes())
+            leave_out(row,
+                      "VTK would hold the whole volume in memory; --beside draws it all the same");
         if (row->beside)
             continue;
         if (row->setting.settings.lod_px > 0 && !levels)
@@ -394,13 +414,13 @@ static int draw_beside(sweep *s, accuracy_row *row, int view)
 }
 
 /* Another program, as measure_row() does settings. */
-static int measure_beside(sweep *s, accuracy_row *row, int view, int number)
+static int measure_beside(sweep *s, accuracy_row *row, int view)
 {
     triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
     int status = 0;
     bench_progress_step(s->progress, row->setting.name);
     if (view == 0) {
-        status = accuracy_beside_start(row->beside, s->o->beside[number], s->o, t, row->why);
+        status = accuracy_beside_start(row->beside, s->o, t, row->why);
         if (!status)
             snprintf(row->setting.name, sizeof row->setting.name, "%.*s",
                      (int)sizeof row->setting.name - 1, row->beside->name);
@@ -486,12 +506,11 @@ static int measure_view(sweep *s, int view)
     if (status)
         return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "no view: %s", triptych_error(t));
     status = find_truth(s, view);
-    const int settings = m->row_count - s->o->beside_count;
     for (int i = 0; i < m->row_count && !status; i++)
         if (m->rows[i].state == (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED) &&
             (view || i == 0 || !is_over(s)))
-            status = i < settings ? measure_row(s, &m->rows[i], view)
-                                  : measure_beside(s, &m->rows[i], view, i - settings);
+            status = m->rows[i].beside ? measure_beside(s, &m->rows[i], view)
+                                       : measure_row(s, &m->rows[i], view);
     if (!status)
         m->view_count++;
     return status;

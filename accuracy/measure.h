@@ -11,7 +11,10 @@
 #include "setting.h"
 #include "views.h"
 
-enum { ACCURACY_ROWS_MAX = ACCURACY_SETTINGS_MAX + 2 * ACCURACY_DATA_MAX + ACCURACY_BESIDE_MAX };
+enum {
+    ACCURACY_ROWS_MAX = ACCURACY_SETTINGS_MAX + 2 * ACCURACY_DATA_MAX + ACCURACY_BESIDE_MAX,
+    ACCURACY_COMMAND_BYTES = 4200
+};
 
 typedef enum accuracy_step {
     ACCURACY_TOTAL,   /* what ran to the integral that is true */
@@ -27,6 +30,7 @@ typedef struct accuracy_row {
     accuracy_setting setting;
     int data;                /* of accuracy_options.data */
     accuracy_beside *beside; /* another program, whose name is the setting's; NULL: a setting */
+    bool is_vtk;             /* without being given */
     accuracy_state state;
     char why[256]; /* it was left out */
     accuracy_error error[ACCURACY_STEPS];
@@ -42,7 +46,8 @@ typedef struct accuracy_row {
 
 typedef struct accuracy_measured {
     const accuracy_options *options;
-    const char *folder; /* that is being written */
+    char vtk[ACCURACY_COMMAND_BYTES]; /* the command of VTK's ray caster; "": there is none */
+    const char *folder;               /* that is being written */
     accuracy_row *rows;
     int row_count;
     accuracy_popping popping[ACCURACY_POPPINGS];

@@ -89,7 +89,7 @@ static void write_plots(FILE *f, const accuracy_report *r)
             "<span class=key style='background:#c21f3a'></span>quality"
             "%s. "
             "The line is the front: no setting is both faster and closer.</p>\n",
-            r->m->options->beside_count
+            r->m->options->beside_count || r->m->vtk[0]
                 ? "<span class=key style='background:#7b3fa0;border-radius:0'></span>"
                   "another program, with its own light"
                 : "");

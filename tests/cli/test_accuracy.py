@@ -423,6 +423,18 @@ for line in sys.stdin:
             [row] = json.load(f)["beside"]
         self.assertEqual(row["name"], "vtk-cpu-step-0.5")
         self.assertLess(row["total"]["mean"], 8)
+        # Of itself, and not where it is not wanted.
+        path = {**os.environ, "PATH": os.path.dirname(sys.executable) + ":" + os.environ["PATH"]}
+        for arguments, beside in (["--settings", "post,vtk"], [row["name"]]), (
+                ["--settings", "post,vtk", "--beside", "none"], []), (["--settings", "post"], []):
+            self.works("accuracy", "a.trip", "-o", "vtk", "--force", *SMALL, "--no-ladder", "--source",
+                       "a.nrrd", "--tf", "a.tf", "--no-shading", *arguments, env=path)
+            with open("vtk/accuracy.json", encoding="utf-8") as f:
+                report = json.load(f)
+            self.assertEqual([one["name"] for one in report["beside"]], beside)
+            if beside:
+                self.assertEqual(report["beside"][0]["total"], row["total"])
+        self.fails(2, "accuracy", "a.trip", "--beside", "none", "--beside", "true", says="--beside")
 
     # Trouble
 
