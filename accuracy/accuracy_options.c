@@ -45,9 +45,9 @@ static const struct argp_option options[] = {
       "up to 7",
       1 },
     { "beside", KEY_BESIDE, "COMMAND", 0,
-      "Another program that draws the same views of the source, up to 4; none: not VTK's ray "
-      "caster "
-      "either, which is one where it is installed: see triptych-accuracy(1)",
+      "Another program that draws the same views of the source, up to 4; none: nor VTK's ray "
+      "caster, "
+      "which is one where it is installed: see triptych-accuracy(1)",
       1 },
     TRIP_OPTION_TF(KEY_TF, 1),
     TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 1),

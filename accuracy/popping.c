@@ -109,10 +109,15 @@ int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
     orbit turn;
     if (find_turn(t, o, &turn))
         return trip_fail(TRIP_ERROR, "accuracy", o->data[0], "no view: %s", triptych_error(t));
-    int status = bench_popping_begin(&changes, contexts->budget,
-                                     (size_t)o->width * (size_t)o->height, "accuracy");
-    if (!status)
-        status = measure_settings(p, contexts, t, usual, progress, &turn, rgba, &changes);
+    const size_t pixels = (size_t)o->width * (size_t)o->height;
+    if (!bench_popping_begin(&changes, contexts->budget, pixels)) {
+        snprintf(p->why, sizeof p->why,
+                 "%zu bytes of changes do not fit the memory given: raise --memory",
+                 bench_popping_bytes(pixels));
+        p->state = ACCURACY_LEFT_OUT;
+        return 0;
+    }
+    int status = measure_settings(p, contexts, t, usual, progress, &turn, rgba, &changes);
     bench_popping_end(&changes);
     return status;
 }

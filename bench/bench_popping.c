@@ -89,9 +89,12 @@ int bench_popping(const session *s, const bench_options *o, bench_report *r)
     bench_popping_changes p = { 0 };
     bench_progress_expect(o->progress, BENCH_POPPING_SETTINGS * (BENCH_POPPING_STEPS + 1));
     int status = bench_scene_open(&scene, s, o, r);
-    if (!status)
-        status = bench_popping_begin(&p, s->budget, (size_t)scene.size[0] * (size_t)scene.size[1],
-                                     "bench");
+    const size_t pixels = (size_t)scene.size[0] * (size_t)scene.size[1];
+    if (!status && !bench_popping_begin(&p, s->budget, pixels))
+        status = trip_fail(TRIP_ERROR, "bench", "popping",
+                           "%zu bytes of changes do not fit the memory given; raise --memory or "
+                           "measure smaller pictures",
+                           bench_popping_bytes(pixels));
     if (!status)
         status = measure(s, &scene, o, &p, r);
     if (!status)

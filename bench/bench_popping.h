@@ -38,9 +38,9 @@ typedef struct bench_popping_changes {
     float *sorted;                         /* room for the changes of a step */
 } bench_popping_changes;
 
-/* Takes memory of the budget; where it does not suffice says so for `command`. */
-int bench_popping_begin(bench_popping_changes *p, trip_budget *budget, size_t pixels,
-                        const char *command);
+/* Takes bench_popping_bytes() of the budget; false where it does not suffice. */
+bool bench_popping_begin(bench_popping_changes *p, trip_budget *budget, size_t pixels);
+size_t bench_popping_bytes(size_t pixels);
 void bench_popping_end(bench_popping_changes *p);
 
 /* The picture of a step, premultiplied; from 0 on, to BENCH_POPPING_STEPS. */

@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "report.h"
-
 const bench_popping_setting bench_popping_settings[BENCH_POPPING_SETTINGS] = {
     { "merge, h 0", "0", TRIPTYCH_MERGE, 0 },
     { "merge, h 0.5", "0.5", TRIPTYCH_MERGE, 0.5 },
@@ -21,30 +19,27 @@ const bench_popping_setting bench_popping_settings[BENCH_POPPING_SETTINGS] = {
 
 enum { STEPS = BENCH_POPPING_STEPS };
 
-static size_t bytes_of(const bench_popping_changes *p)
+size_t bench_popping_bytes(size_t pixels)
 {
-    return p->pixels * (4 * sizeof *p->before + sizeof *p->changes + sizeof *p->sorted);
+    const bench_popping_changes *p = NULL;
+    return pixels * (4 * sizeof *p->before + sizeof *p->changes + sizeof *p->sorted);
 }
 
-int bench_popping_begin(bench_popping_changes *p, trip_budget *budget, size_t pixels,
-                        const char *command)
+bool bench_popping_begin(bench_popping_changes *p, trip_budget *budget, size_t pixels)
 {
     *p = (bench_popping_changes){ .budget = budget, .pixels = pixels };
-    p->changes = trip_budget_take(budget, bytes_of(p));
+    p->changes = trip_budget_take(budget, bench_popping_bytes(pixels));
     if (!p->changes)
-        return trip_fail(TRIP_ERROR, command, "popping",
-                         "%zu bytes of changes do not fit the memory given; raise --memory or "
-                         "measure smaller pictures",
-                         bytes_of(p));
+        return false;
     p->before = (float *)(p->changes + pixels);
     p->sorted = p->before + 4 * pixels;
-    return 0;
+    return true;
 }
 
 void bench_popping_end(bench_popping_changes *p)
 {
     if (p->changes)
-        trip_budget_release(p->budget, p->changes, bytes_of(p));
+        trip_budget_release(p->budget, p->changes, bench_popping_bytes(p->pixels));
     *p = (bench_popping_changes){ 0 };
 }
 

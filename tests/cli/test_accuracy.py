@@ -240,6 +240,18 @@ class Accuracy(program.ProgramTest):
         with open("report/index.html", encoding="utf-8") as f:
             self.assertIn("0.95</text>", f.read())
 
+    def test_popping_is_left_out_where_its_changes_do_not_fit(self):
+        """They take twice the memory of the pictures that are compared."""
+        small = [a if a != "40x32" else "300x300" for a in SMALL]
+        self.assertNotEqual(small, SMALL)
+        run = self.works("accuracy", "a.trip", "-o", "fits", *small, "--no-ladder", "--settings",
+                         "post,popping-pre", "--memory", "108M")
+        self.assertIn("left out: popping-pre: 16560000 bytes of changes do not fit", run.stdout)
+        with open("fits/accuracy.json", encoding="utf-8") as f:
+            report = json.load(f)
+        self.assertEqual([one["name"] for one in report["left_out"]], ["popping-pre"])
+        self.assertEqual(report["popping"], {})
+
     def test_what_is_left_out_is_listed(self):
         (left_out,) = self.report["left_out"]
         self.assertEqual(left_out["name"], "post-samples-2")
