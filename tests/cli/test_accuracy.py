@@ -246,7 +246,8 @@ class Accuracy(program.ProgramTest):
         self.assertNotEqual(small, SMALL)
         run = self.works("accuracy", "a.trip", "-o", "fits", *small, "--no-ladder", "--settings",
                          "post,popping-pre", "--memory", "108M")
-        self.assertIn("left out: popping-pre: 16560000 bytes of changes do not fit", run.stdout)
+        self.assertIn("left out: popping-pre: 16560000 bytes of changes do not fit",
+                      run.stdout.decode())
         with open("fits/accuracy.json", encoding="utf-8") as f:
             report = json.load(f)
         self.assertEqual([one["name"] for one in report["left_out"]], ["popping-pre"])
