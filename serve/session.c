@@ -407,12 +407,12 @@ static void add_settings(cJSON *root, const triptych_settings *s)
     cJSON_AddNumberToObject(settings, "saturation", s->saturation);
 }
 
-static void add_numbers(cJSON *to, int bit, const triptych_settings *s)
+static void add_numbers(cJSON *to, const trip_effect_switch *below, const triptych_settings *s)
 {
     cJSON *numbers = cJSON_AddArrayToObject(to, "numbers");
     for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
         const trip_effect_number *n = &trip_effect_numbers[i];
-        if (n->bit != bit)
+        if (!trip_effect_number_is_below(n, below, s))
             continue;
         cJSON *number = cJSON_CreateObject();
         cJSON_AddStringToObject(number, "name", n->name);
@@ -439,7 +439,7 @@ static void add_switches(cJSON *root, const trip_document *d)
         cJSON_AddStringToObject(to, "label", e->label);
         cJSON_AddBoolToObject(to, "on", s->effects & e->bit && !lacks);
         cJSON_AddStringToObject(to, "lacks", lacks ? lacks : "");
-        add_numbers(to, e->bit, s);
+        add_numbers(to, e, s);
         cJSON_AddItemToArray(switches, to);
     }
 }

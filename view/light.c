@@ -71,12 +71,14 @@ const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES] = {
 
 #define AT(member) offsetof(triptych_settings, member)
 #define HOTTEST 12000
+#define LATTICES (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION)
 
 const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS] = {
-    { TRIPTYCH_SHADOWS, "anisotropy", "Anisotropy", "", AT(anisotropy), -0.95, 0.95, 0.05 },
-    { TRIPTYCH_CUEING, "fading", "Fading", "", AT(cueing), 0.01, 1, 0.01 },
-    { TRIPTYCH_EMISSION, "coldest", "Coldest", "K", AT(kelvin[0]), 0, HOTTEST - 1, 1 },
-    { TRIPTYCH_EMISSION, "hottest", "Hottest", "K", AT(kelvin[1]), 1, HOTTEST, 1 },
+    { TRIPTYCH_SHADOWS, "anisotropy", "Anisotropy", "", AT(anisotropy), false, -0.95, 0.95, 0.05 },
+    { LATTICES, "light-cells", "Light cells", "", AT(light_cells), true, 8, 1024, 1 },
+    { TRIPTYCH_CUEING, "fading", "Fading", "", AT(cueing), false, 0.01, 1, 0.01 },
+    { TRIPTYCH_EMISSION, "coldest", "Coldest", "K", AT(kelvin[0]), false, 0, HOTTEST - 1, 1 },
+    { TRIPTYCH_EMISSION, "hottest", "Hottest", "K", AT(kelvin[1]), false, 1, HOTTEST, 1 },
 };
 
 const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_settings *s,
@@ -96,16 +98,31 @@ bool trip_effect_turn(const trip_effect_switch *effect, bool on, triptych_settin
     return true;
 }
 
+bool trip_effect_number_is_below(const trip_effect_number *number, const trip_effect_switch *effect,
+                                 const triptych_settings *s)
+{
+    const int on = number->bits & s->effects;
+    int i = 0;
+    while (!(trip_effect_switches[i].bit & (on ? on : number->bits)))
+        i++;
+    return effect == &trip_effect_switches[i];
+}
+
 double trip_effect_number_get(const trip_effect_number *number, const triptych_settings *s)
 {
-    return *(const double *)((const char *)s + number->at);
+    const char *at = (const char *)s + number->at;
+    return number->whole ? *(const int *)at : *(const double *)at;
 }
 
 bool trip_effect_number_set(const trip_effect_number *number, double value, triptych_settings *s)
 {
-    if (!(value >= number->lo && value <= number->hi))
+    char *at = (char *)s + number->at;
+    if (!(value >= number->lo && value <= number->hi) || (number->whole && value != floor(value)))
         return false;
-    *(double *)((char *)s + number->at) = value;
+    if (number->whole)
+        *(int *)at = (int)value;
+    else
+        *(double *)at = value;
     if (!(s->kelvin[0] < s->kelvin[1]) && number->at == AT(kelvin[0]))
         s->kelvin[1] = s->kelvin[0] + 1;
     else if (!(s->kelvin[0] < s->kelvin[1]))
@@ -147,8 +164,7 @@ static void put_effects(FILE *out, const triptych_settings *s, const char *heat)
     const int some = s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : s->effects;
     put_number(out, "--anisotropy", s->anisotropy, usual.anisotropy, some & TRIPTYCH_SHADOWS);
     put_number(out, "--cueing", s->cueing, usual.cueing, some & TRIPTYCH_CUEING);
-    put_number(out, "--light-cells", s->light_cells, usual.light_cells,
-               some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION));
+    put_number(out, "--light-cells", s->light_cells, usual.light_cells, some & LATTICES);
     if (!may_glow(s, heat))
         return;
     char lo[32], hi[32];

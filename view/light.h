@@ -38,7 +38,7 @@ void trip_effects_say(const triptych_settings *s, const char *heat, char *text, 
 
 /* ---- effects as controls ---- */
 
-enum { TRIP_EFFECT_SWITCHES = 5, TRIP_EFFECT_NUMBERS = 4 };
+enum { TRIP_EFFECT_SWITCHES = 5, TRIP_EFFECT_NUMBERS = 5 };
 
 typedef struct trip_effect_switch {
     int bit;                          /* of triptych_settings.effects */
@@ -47,9 +47,10 @@ typedef struct trip_effect_switch {
 
 /* A number that counts while an effect is on. */
 typedef struct trip_effect_number {
-    int bit; /* of that */
+    int bits; /* of those that it is of, any of which will do */
     const char *name, *label, *unit;
-    size_t at; /* in triptych_settings */
+    size_t at;  /* in triptych_settings */
+    bool whole; /* an int there, not a double */
     double lo, hi, step;
 } trip_effect_number;
 
@@ -62,9 +63,13 @@ const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_s
 /* False, and nothing happens, where it lacks something. */
 bool trip_effect_turn(const trip_effect_switch *effect, bool on, triptych_settings *s,
                       const char *heat);
+/* Whether it stands below an effect's switch: each does below one, that of the first of its effects
+ * which is on, or of the first. */
+bool trip_effect_number_is_below(const trip_effect_number *number, const trip_effect_switch *effect,
+                                 const triptych_settings *s);
 double trip_effect_number_get(const trip_effect_number *number, const triptych_settings *s);
-/* False, and nothing happens, where the number does not lie within its bounds. The colder and the
- * hotter temperature move one another along. */
+/* False, and nothing happens, where the number does not lie within its bounds or is not whole where
+ * it should be. The colder and the hotter temperature move one another along. */
 bool trip_effect_number_set(const trip_effect_number *number, double value, triptych_settings *s);
 
 #ifdef __cplusplus

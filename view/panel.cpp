@@ -453,14 +453,15 @@ bool draw_light_place(trip_panel *p, trip_document *d)
     return changed;
 }
 
-bool draw_effect_numbers(trip_panel *p, triptych_settings *s, int bit)
+bool draw_effect_numbers(trip_panel *p, triptych_settings *s, const trip_effect_switch &below)
 {
     bool changed = false;
     for (const trip_effect_number &n : trip_effect_numbers) {
         double value = trip_effect_number_get(&n, s);
-        const char *format = n.unit[0] ? "%.0f K" : "%.2f";
-        if (n.bit == bit && slide(p, n.label, &value, n.lo, n.hi, format))
-            changed |= trip_effect_number_set(&n, value, s);
+        const char *format = n.unit[0] ? "%.0f K" : n.whole ? "%.0f" : "%.2f";
+        if (trip_effect_number_is_below(&n, &below, s) &&
+            slide(p, n.label, &value, n.lo, n.hi, format))
+            changed |= trip_effect_number_set(&n, n.whole ? std::round(value) : value, s);
     }
     return changed;
 }
@@ -482,7 +483,7 @@ bool draw_effects(trip_panel *p, trip_document *d)
         if (check(p, e.label, &on))
             changed |= trip_effect_turn(&e, on, s, heat);
         if (on)
-            changed |= draw_effect_numbers(p, s, e.bit);
+            changed |= draw_effect_numbers(p, s, e);
     }
     trip_effects_say(&shown, heat, text, sizeof text);
     if (text[0])

@@ -137,7 +137,7 @@ class InBrowser(program.ProgramTest):
                                f"(document.querySelector('{query}'))")
             before = self.exact(before)
         self.assertEqual(self.status()["effects"], "shadows")
-        self.assertEqual(self.shown_effects(), {"shadows": True, "anisotropy": True})
+        self.assertEqual(self.shown_effects(), {"shadows": True, "anisotropy": True, "light-cells": True})
         self.assertTrue(self.browser.value("document.getElementById('emission').disabled"))
         self.browser.value("document.getElementById('panel').open = false")
 

@@ -174,6 +174,7 @@ class Serve(program.ProgramTest):
             ("light", "," * 500), ("samples", "64"), ("", ""), ("shadows", "1"), ("emission", "1"),
             ("cueing", "2"), ("occlusion", ""), ("auto", "yes"), ("fading", "0"), ("fading", "1.1"),
             ("anisotropy", "nan"), ("anisotropy", "-1"), ("coldest", "-1"), ("hottest", "1e9"),
+            ("light-cells", "7"), ("light-cells", "1025"), ("light-cells", "8.5"),
         ):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, (name, value))
         self.assertEqual(self.ask("/set", "POST", name="light", value="30,45,1.5")[0], 204)
@@ -199,8 +200,8 @@ class Serve(program.ProgramTest):
         before, number, camera = self.whole_picture()
         for name, value in (
             ("auto", "0"), ("emission", "1"), ("hottest", "4000"), ("coldest", "500"), ("emission", "0"),
-            ("light", "30,45,10"), ("shadows", "1"), ("anisotropy", "0.5"), ("shadows", "0"),
-            ("occlusion", "1"), ("cueing", "1"), ("fading", "0.25"),
+            ("light", "30,45,10"), ("shadows", "1"), ("anisotropy", "0.5"),
+            ("light-cells", "9"), ("shadows", "0"), ("occlusion", "1"), ("cueing", "1"), ("fading", "0.25"),
         ):
             status, _, data = self.ask("/set", "POST", name=name, value=value)
             self.assertEqual(status, 204, (name, data))
@@ -212,7 +213,10 @@ class Serve(program.ProgramTest):
         self.assertEqual(now["effects"], "occlusion, depth cueing")
         self.assertEqual([e["name"] for e in now["switches"] if e["on"]], ["occlusion", "cueing"])
         self.assertEqual({n["name"]: n["value"] for e in now["switches"] for n in e["numbers"]},
-                         {"anisotropy": 0.5, "fading": 0.25, "coldest": 500, "hottest": 4000})
+                         {"anisotropy": 0.5, "light-cells": 9, "fading": 0.25, "coldest": 500,
+                          "hottest": 4000})
+        self.assertEqual({e["name"]: [n["name"] for n in e["numbers"]] for e in now["switches"] if e["on"]},
+                         {"occlusion": ["light-cells"], "cueing": ["fading"]})
         self.assertFalse(now["light"]["head"])
         for name, degrees in ("round", 30), ("up", 45):
             self.assertAlmostEqual(now["light"][name], degrees, 9)

@@ -177,9 +177,9 @@ static void numbers_of_effects_keep_within_their_bounds(void **state)
         const trip_effect_number *n = &trip_effect_numbers[i];
         triptych_settings s = triptych_default_settings();
         const double usual = trip_effect_number_get(n, &s);
-        const double bad[] = { n->lo - 0.001, n->hi + 0.001, NAN, INFINITY };
+        const double bad[] = { n->lo - 0.001, n->hi + 0.001, NAN, INFINITY, n->lo + 0.5 };
         assert_true(usual >= n->lo && usual <= n->hi);
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < (n->whole ? 5 : 4); k++) {
             assert_false(trip_effect_number_set(n, bad[k], &s));
             assert_true(trip_effect_number_get(n, &s) == usual);
         }
@@ -194,6 +194,25 @@ static void numbers_of_effects_keep_within_their_bounds(void **state)
     assert_true(trip_effect_number_set(number_of("hottest"), 3000, &s) && s.kelvin[1] == 3000);
     assert_true(trip_effect_number_set(number_of("coldest"), 400, &s) && s.kelvin[0] == 400);
     assert_true(s.kelvin[1] == 3000);
+}
+
+/* The cells of lattices are of three effects, and stand below one of them. */
+static void a_number_of_several_effects_stands_below_one(void **state)
+{
+    (void)state;
+    const trip_effect_number *n = number_of("light-cells");
+    triptych_settings s = triptych_default_settings();
+    const int on[] = { 0, TRIPTYCH_SHADOWS, TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING, TRIPTYCH_EMISSION,
+                       TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION };
+    const int below[] = { TRIPTYCH_SHADOWS, TRIPTYCH_SHADOWS, TRIPTYCH_OCCLUSION, TRIPTYCH_EMISSION,
+                          TRIPTYCH_SHADOWS };
+    for (int i = 0; i < 5; i++) {
+        s.effects = on[i];
+        for (int k = 0; k < TRIP_EFFECT_SWITCHES; k++)
+            assert_int_equal(trip_effect_number_is_below(n, &trip_effect_switches[k], &s),
+                             trip_effect_switches[k].bit == below[i]);
+    }
+    assert_true(trip_effect_number_set(n, 48, &s) && s.light_cells == 48);
 }
 
 static void words_end_where_the_text_does(void **state)
@@ -221,6 +240,7 @@ int main(void)
         cmocka_unit_test(every_effect_has_a_switch_that_turns_it_alone),
         cmocka_unit_test(what_lacks_its_light_or_heat_is_not_turned_on),
         cmocka_unit_test(numbers_of_effects_keep_within_their_bounds),
+        cmocka_unit_test(a_number_of_several_effects_stands_below_one),
         cmocka_unit_test(words_end_where_the_text_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
