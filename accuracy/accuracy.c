@@ -21,6 +21,7 @@ static int print_settings(void)
         accuracy_write_options(stdout, &all[i]);
         printf("\n");
     }
+    printf("%-20s VTK's ray caster where it is installed, with --source\n", "vtk");
     for (int i = 0; i < ACCURACY_POPPINGS; i++)
         printf("%-20s --classify %s, turned, by each method and h\n", accuracy_poppings[i].name,
                accuracy_poppings[i].classify == TRIPTYCH_POST ? "post" : "pre");

@@ -6,35 +6,25 @@
 #include <strings.h>
 #include <unistd.h>
 
+#include "companion.h"
+
 static bool ends_with(const char *path, const char *end)
 {
     const size_t length = strlen(path), least = strlen(end);
     return length >= least && strcasecmp(path + length - least, end) == 0;
 }
 
-/* Beside an installed program, else where the program was built from. Names that sh would take
- * apart do not come into the command. */
-static bool find_worker(char *path, size_t bytes)
-{
-    char program[2048];
-    ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
-    program[length > 0 ? length : 0] = 0;
-    char *slash = strrchr(program, '/');
-    snprintf(path, bytes, "%.*s/" TRIP_WORKER_FROM_BIN, slash ? (int)(slash - program) : 0,
-             program);
-    if (!slash || access(path, R_OK) != 0)
-        snprintf(path, bytes, "%s", TRIP_WORKER_OF_SOURCE);
-    return access(path, R_OK) == 0 && !strchr(path, '\'');
-}
-
 bool accuracy_vtk_command(const char *source, char *command, size_t bytes)
 {
     static const char *const ends[] = { ".nrrd", ".nhdr", ".nii", ".nii.gz" };
-    char worker[4096];
+    char worker[PATH_MAX];
     bool is_read = false;
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
         is_read |= ends_with(source, ends[i]);
-    if (!is_read || !find_worker(worker, sizeof worker) ||
+    /* A name that sh would take apart does not come into the command. */
+    if (!is_read ||
+        !trip_companion_find(worker, TRIP_WORKER_FROM_BIN, TRIP_WORKER_OF_SOURCE, R_OK) ||
+        strchr(worker, '\'') ||
         system("command -v xvfb-run >/dev/null && "
                "python3 -c 'import numpy, vtkmodules.vtkRenderingVolume' >/dev/null 2>&1") != 0)
         return false;

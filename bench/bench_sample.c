@@ -2,33 +2,18 @@
 
 #include <ftw.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "brick.h"
+#include "companion.h"
 #include "fields.h"
 #include "new_file.h"
 #include "report.h"
 
 #define VOLUME "tooth.nhdr"
-
-/* Beside an installed program, else where the program was built from. */
-static bool find_volume(char *path, size_t bytes)
-{
-    char program[2048];
-    ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
-    program[length > 0 ? length : 0] = 0;
-    char *slash = strrchr(program, '/');
-    snprintf(path, bytes, "%.*s/" TRIP_DATASETS_FROM_BIN "/" VOLUME,
-             slash ? (int)(slash - program) : 0, program);
-    if (slash && access(path, R_OK) == 0)
-        return true;
-    snprintf(path, bytes, "%s", TRIP_DATASETS_OF_SOURCE "/" VOLUME);
-    return access(path, R_OK) == 0;
-}
 
 static int make_folder(bench_sample *s)
 {
@@ -47,9 +32,10 @@ static int make_folder(bench_sample *s)
 
 int bench_sample_make(bench_sample *s)
 {
-    char path[4096];
+    char path[PATH_MAX];
     *s = (bench_sample){ 0 };
-    if (!find_volume(path, sizeof path))
+    if (!trip_companion_find(path, TRIP_DATASETS_FROM_BIN "/" VOLUME,
+                             TRIP_DATASETS_OF_SOURCE "/" VOLUME, R_OK))
         return trip_fail(TRIP_ERROR, "bench", VOLUME,
                          "the included volume is not there; name a data set: `triptych bench "
                          "TABLE NAME.trip`");
