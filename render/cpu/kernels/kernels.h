@@ -290,8 +290,9 @@ typedef struct trip_cpu_kernels {
     uint32_t (*drawn)(const trip_cpu_view *view, trip_cpu_scratch *s, const trip_cpu_splat *splats,
                       uint32_t count);
 
-    /* Of a raster's squares: what their cells lie between. */
-    void (*sheet_ranges)(const trip_cpu_voxels *raster, trip_cpu_square_ranges *out);
+    /* Of some of a raster's squares: what their cells lie between. The others have no cells. */
+    void (*sheet_ranges)(const trip_cpu_voxels *raster, uint64_t squares,
+                         trip_cpu_square_ranges *out);
     /* Which cells of the squares lie between two sheets on some code from `least` to `most`
      * (biased): none that lacks a corner, and none of other squares. */
     void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,

@@ -208,10 +208,16 @@ static int16_t least_there(const int16_t *at)
     return (int16_t)(low == INT16_MAX ? low : low + 1);
 }
 
-static void sheet_ranges(const trip_cpu_voxels *raster, trip_cpu_square_ranges *out)
+static void sheet_ranges(const trip_cpu_voxels *raster, uint64_t squares,
+                         trip_cpu_square_ranges *out)
 {
     out->whole = 0;
-    for (int square = 0; square < 64; square++) {
+    for (int i = 0; i < 64; i++) {
+        out->least[i] = INT16_MAX;
+        out->most[i] = INT16_MIN;
+    }
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        const int square = __builtin_ctzll(rest);
         const int16_t *first = raster->codes + square_first(square), *at = first;
         vh least = vh_set(INT16_MAX), most = vh_set(INT16_MIN);
         for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE) {

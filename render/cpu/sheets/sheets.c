@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cpu/occlusion.h"
+#include "cpu/sheets/open_squares.h"
 #include "cpu/sheets/pass_view.h"
 #include "cpu/sheets/state.h"
 #include "cpu/panes.h"
@@ -472,6 +473,7 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     }
     trip_cpu_store_cut(&s->store, cut.work, cut.count);
     draw_panes(s);
+    trip_cpu_open_squares_forget(s);
     while (cut.count > 0)
         trip_cpu_store_drop(&s->store, &s->store.slices[--cut.count]);
 }
@@ -532,6 +534,7 @@ static int finish_row(trip_cpu_sheets *s)
         return trip_cpu_windows_finish_row(s);
     int status = draw_complete(s, s->count, true);
     drop_all(s);
+    trip_cpu_open_squares_forget(s);
     return status;
 }
 
@@ -553,6 +556,7 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
         next++;
     s->held[s->count++] = next;
     s->store.sheets[next].number = number;
+    trip_cpu_open_squares_of_sheet(s, number);
     return 0;
 }
 
@@ -571,7 +575,8 @@ static int take_rasters(trip_cpu_sheets *s, const trip_run *run)
         for (int u = run->u; u < run->u + edge; u += TRIP_CPU_RASTER) {
             size_t at =
                 trip_cpu_store_at(&s->store, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
-            while (!sheet_of(s, s->count - 1)->rasters[at] && !take_raster(s, at)) {
+            while (s->store.open[at] && !sheet_of(s, s->count - 1)->rasters[at] &&
+                   !take_raster(s, at)) {
                 const int count = s->count, front = s->front;
                 decode_runs(s);
                 int status = draw_complete(s, s->count - 1, false);
@@ -608,7 +613,7 @@ static int add_run(trip_cpu_sheets *s, const trip_run *run)
         decode_runs(s);
         status = begin_sheet(s, run->sheet);
     }
-    if (status || is_occluded(s, run))
+    if (status || !trip_cpu_open_squares_some_of_run(s, run))
         return status;
     if (s->run_count == TRIP_CPU_SHEETS_RUNS || is_of_another_part(s, run))
         decode_runs(s);
@@ -621,6 +626,7 @@ static int add_run(trip_cpu_sheets *s, const trip_run *run)
 static int begin_pass(trip_cpu_sheets *s, const trip_pass *pass)
 {
     int status = s->pass ? finish_row(s) : 0;
+    trip_cpu_open_squares_forget(s);
     s->pass = pass;
     s->way = pass->descending ? -1 : 1;
     trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending, &s->function);

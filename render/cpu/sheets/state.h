@@ -32,6 +32,7 @@ struct trip_cpu_sheets {
     const trip_batch *batch;
     const trip_run *runs[TRIP_CPU_SHEETS_RUNS]; /* to be decoded, of the last sheet */
     unsigned run_count;
+    int open_sheets; /* to come, for which the store's open squares hold */
     trip_cpu_windows windows;
 };
 

@@ -69,6 +69,7 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         trip_cpu_sheet *sheet = &s->sheets[i];
         sheet->rasters = part(memory, &at, grid * sizeof *sheet->rasters);
         sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
+        sheet->filled = part(memory, &at, grid * sizeof *sheet->filled);
         sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
         sheet->whole = part(memory, &at, grid * sizeof *sheet->whole);
         sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
@@ -78,6 +79,7 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
     for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++)
         s->slices[i].rasters = part(memory, &at, grid * sizeof *s->slices[i].rasters);
     s->some = part(memory, &at, grid * sizeof *s->some);
+    s->open = part(memory, &at, grid * sizeof *s->open);
     return at;
 }
 
@@ -123,6 +125,7 @@ void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to)
 {
     set_grid(s, to);
     memset(s->grids, 0, lay_out(s, s->grids));
+    memset(s->open, 0xff, trip_cpu_store_grid(s) * sizeof *s->open);
     for (unsigned i = 0; i < s->sheet_room; i++)
         s->sheets[i].prepared = s->sheets[i].shaded = false;
     free_all(s);
@@ -171,6 +174,8 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
         return false;
     sheet->rasters[at] = s->free[--s->free_count];
     clear_raster(s, sheet->rasters[at]);
+    if (sheet->filled)
+        atomic_store_explicit(&sheet->filled[at], 0, memory_order_relaxed);
     return true;
 }
 
@@ -237,12 +242,10 @@ static void decode_square(int16_t *to, const trip_square *at, unsigned code_byte
         to[places[__builtin_ctzll(rest)]] = *next++;
 }
 
-/* The number of raster (u, v) of a sheet; 0 beyond the grid. */
-static int32_t raster_of(const trip_cpu_store *s, const trip_cpu_sheet *sheet, int64_t u, int64_t v)
+static bool is_within(const trip_cpu_store *s, int64_t u, int64_t v)
 {
-    bool within = u >= s->first_u && v >= s->first_v && u < s->first_u + s->across &&
-                  v < s->first_v + s->down;
-    return within ? sheet->rasters[trip_cpu_store_at(s, u, v)] : 0;
+    return u >= s->first_u && v >= s->first_v && u < s->first_u + s->across &&
+           v < s->first_v + s->down;
 }
 
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
@@ -250,15 +253,21 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     const uint32_t count = trip_block_squares(block, squares);
-    for (const trip_square *at = squares; at < squares + count; at++) {
-        int u = run->u + 8 * trip_cpu_square_u(at->number);
-        int v = run->v + 8 * trip_cpu_square_v(at->number);
-        int32_t in = raster_of(s, sheet, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
+    for (const trip_square *square = squares; square < squares + count; square++) {
+        int u = run->u + 8 * trip_cpu_square_u(square->number);
+        int v = run->v + 8 * trip_cpu_square_v(square->number);
+        if (!is_within(s, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2))
+            continue;
+        const size_t at =
+            trip_cpu_store_at(s, u >> TRIP_CPU_RASTER_LOG2, v >> TRIP_CPU_RASTER_LOG2);
         u &= TRIP_CPU_RASTER - 1;
         v &= TRIP_CPU_RASTER - 1;
-        if (in) /* what is occluded has none, nor has what lies beyond the grid */
-            decode_square(s->voxels[in].codes + v * TRIP_CPU_RASTER_STRIDE + u, at,
-                          block->code_bytes, s->codes);
+        const uint64_t bit = UINT64_C(1) << (v / 8 * TRIP_CPU_SQUARES_ACROSS + u / 8);
+        if (!sheet->rasters[at] || !(s->open[at] & bit))
+            continue;
+        decode_square(s->voxels[sheet->rasters[at]].codes + v * TRIP_CPU_RASTER_STRIDE + u, square,
+                      block->code_bytes, s->codes);
+        atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
     }
 }
 
@@ -339,7 +348,8 @@ static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_
 {
     const trip_cpu_store *s = job->store;
     copy_codes_beside(job, w, at);
-    s->kernels->sheet_ranges(raster_at(s, w->sheet, at), &w->sheet->ranges[at]);
+    const uint64_t filled = atomic_load_explicit(&w->sheet->filled[at], memory_order_relaxed);
+    s->kernels->sheet_ranges(raster_at(s, w->sheet, at), filled, &w->sheet->ranges[at]);
 }
 
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)

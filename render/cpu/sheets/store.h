@@ -27,6 +27,7 @@ typedef struct trip_cpu_sheet {
     int64_t number;                 /* of the sheet */
     int32_t *rasters;               /* the number of each in the pool; 0: absent */
     trip_cpu_square_ranges *ranges; /* of sheets; of rasters that are there */
+    _Atomic uint64_t *filled;       /* squares with voxels; of rasters that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
     trip_cpu_cells *cells;          /* those cells, of rasters with visible squares */
     uint64_t *whole;                /* squares whose cells all have eight corners */
@@ -66,6 +67,7 @@ typedef struct trip_cpu_store {
     unsigned sheet_room; /* sheets that there is room for */
     trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], slices[TRIP_CPU_SLICES_MAX];
     uint64_t *some; /* squares visible in any of the segments drawn at a time */
+    uint64_t *open; /* squares of a sheet that voxels are decoded of; at first all */
 } trip_cpu_store;
 
 /* What so many sheets of a rectangle take, with a pool of so many rasters. */
@@ -101,7 +103,8 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at);
 /* Every raster of a sheet or slice is free again. */
 void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 
-/* A run's voxels into rasters of a sheet that are there. May run beside those of other runs. */
+/* A run's voxels into open squares of rasters of a sheet that are there. May run beside those of other
+ * runs. */
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run);
 

@@ -1,0 +1,187 @@
+#include "cpu/sheets/open_squares.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sheet.h"
+
+/* Sheets that squares are found for at once: rays move along as they pass them, and more squares
+ * are open then. */
+enum { SHEETS = 8 };
+
+/* Pixels of a patch along a side, and patches of a pane. */
+enum { PATCH = 8, ACROSS = TRIP_CPU_PANE / PATCH };
+
+/* More than what single precision makes of where rays are. */
+#define SLACK_VOXELS 0.125
+
+/* What rays pass from the first to the last of some sheets, and all that voxels about these change:
+ * distances along the list's axis from where rays start, in no order. */
+typedef struct extent {
+    double ends[2];
+    int reach; /* trip_sheet_reach() */
+} extent;
+
+/* Positions along u and v. */
+typedef struct bounds {
+    double least[2], most[2];
+} bounds;
+
+static void include(bounds *b, int a, double at)
+{
+    b->least[a] = fmin(b->least[a], at);
+    b->most[a] = fmax(b->most[a], at);
+}
+
+/* The ray of a pixel position between the ends, of those that are drawn: steeper ones are taken for
+ * the steepest of these. False where it does not go the pass's way. */
+static bool include_ray(const trip_cpu_sheet_view *view, const extent *e, double x, double y,
+                        bounds *b)
+{
+    double beside[3], r[3];
+    for (int i = 0; i < 3; i++) {
+        beside[i] = x * view->rx[i] + y * view->ry[i];
+        r[i] = view->r0[i] + (view->ortho ? 0 : beside[i]);
+    }
+    if (!(r[2] * view->direction > 0))
+        return false;
+    const double inverse = 1 / r[2];
+    for (int a = 0; a < 2; a++) {
+        const double slope = fmax(-view->steepest, fmin(view->steepest, r[a] * inverse));
+        double start = view->eye[a];
+        if (view->ortho) /* where the ray passes sheet 0 */
+            start += beside[a] - (view->eye[2] + beside[2]) * slope;
+        include(b, a, start + e->ends[0] * slope);
+        include(b, a, start + e->ends[1] * slope);
+    }
+    return true;
+}
+
+static void open_row(trip_cpu_store *s, int64_t v, int64_t first, int64_t last)
+{
+    uint64_t *row = s->open + (v >> 3) * s->across;
+    for (int64_t u = first; u <= last;) {
+        const int64_t end = last < (u | 7) ? last : u | 7; /* of the raster */
+        row[u >> 3] |= ((UINT64_C(2) << (end - u)) - 1) << ((v & 7) * 8 + (u & 7));
+        u = end + 1;
+    }
+}
+
+/* Every square with voxels that rays within the bounds may take. */
+static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
+{
+    const int64_t origin[2] = { s->first_u * TRIP_CPU_RASTER, s->first_v * TRIP_CPU_RASTER };
+    const int64_t size[2] = { (int64_t)s->across * TRIP_CPU_RASTER,
+                              (int64_t)s->down * TRIP_CPU_RASTER };
+    int64_t first[2], last[2];
+    for (int a = 0; a < 2; a++) {
+        const double lo = floor(b->least[a] - SLACK_VOXELS) - (reach - 1) - (double)origin[a];
+        const double hi = floor(b->most[a] + SLACK_VOXELS) + reach - (double)origin[a];
+        if (!(hi >= 0 && lo < (double)size[a]))
+            return;
+        first[a] = (int64_t)fmax(lo, 0) / 8;
+        last[a] = (int64_t)fmin(hi, (double)(size[a] - 1)) / 8;
+    }
+    for (int64_t v = first[1]; v <= last[1]; v++)
+        open_row(s, v, first[0], last[0]);
+}
+
+/* False where rays of a rectangle of pixels may be drawn and go any way. */
+static bool open_rectangle(trip_cpu_sheets *s, const extent *e, int x, int y, int size)
+{
+    bounds b = { { INFINITY, INFINITY }, { -INFINITY, -INFINITY } };
+    int along = 0;
+    for (int i = 0; i < 4; i++)
+        along += include_ray(&s->view, e, x + (i & 1) * size, y + (i >> 1) * size, &b);
+    if (along == 4)
+        open_squares(&s->store, &b, e->reach);
+    return along == 4 || along == 0;
+}
+
+/* Of the texels of a pane, those of one of its patches. */
+static bool patch_is_open(uint64_t texels, int i)
+{
+    static_assert(PATCH == 8 && ACROSS == 4, "two by two texels of 4 x 4 pixels");
+    return texels >> (i / ACROSS * 16 + i % ACROSS * 2) & 0x303;
+}
+
+static bool open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64_t texels)
+{
+    const int x = trip_cpu_pane_x(s->of, pane), y = trip_cpu_pane_y(s->of, pane);
+    if (texels == UINT64_MAX)
+        return open_rectangle(s, e, x, y, TRIP_CPU_PANE);
+    for (int i = 0; i < ACROSS * ACROSS; i++)
+        if (patch_is_open(texels, i) &&
+            !open_rectangle(s, e, x + i % ACROSS * PATCH, y + i / ACROSS * PATCH, PATCH))
+            return false;
+    return true;
+}
+
+static uint64_t open_texels(const trip_cpu *r, uint32_t pane)
+{
+    return atomic_load_explicit(&r->mask.panes[pane], memory_order_relaxed);
+}
+
+/* Of the panes that the layer may show in; the others are all saturated. */
+static bool some_is_saturated(const trip_cpu *r, int axis)
+{
+    for (uint32_t i = 0; i < trip_cpu_pane_count(r); i++)
+        if (r->axes[i] >> axis & 1 && open_texels(r, i) != UINT64_MAX)
+            return true;
+    return false;
+}
+
+/* From a sheet on; false where all squares may be open. */
+static bool find_open_squares(trip_cpu_sheets *s, int64_t number)
+{
+    const trip_cpu *r = s->of;
+    trip_cpu_store *store = &s->store;
+    if (s->view.coordinates || !some_is_saturated(r, s->axis))
+        return false;
+    extent e = { .reach = trip_sheet_reach(s->view.kernel) };
+    for (int i = 0; i < 2; i++) {
+        const int64_t sheets = i ? SHEETS - 1 + e.reach : -e.reach;
+        double at = (double)(number + s->way * sheets) - (s->view.ortho ? 0 : s->view.eye[2]);
+        if (!s->view.ortho && at * s->view.direction < 0)
+            at = 0; /* rays start there */
+        e.ends[i] = at;
+    }
+    memset(store->open, 0, trip_cpu_store_grid(store) * sizeof *store->open);
+    for (uint32_t i = 0; i < trip_cpu_pane_count(r); i++) {
+        const uint64_t texels = open_texels(r, i);
+        if (texels && !open_pane(s, &e, i, texels))
+            return false;
+    }
+    return true;
+}
+
+void trip_cpu_open_squares_of_sheet(trip_cpu_sheets *s, int64_t number)
+{
+    if (s->open_sheets > 0) {
+        s->open_sheets--;
+        return;
+    }
+    s->open_sheets = SHEETS - 1;
+    if (!find_open_squares(s, number))
+        memset(s->store.open, 0xff, trip_cpu_store_grid(&s->store) * sizeof *s->store.open);
+}
+
+bool trip_cpu_open_squares_some_of_run(const trip_cpu_sheets *s, const trip_run *run)
+{
+    const trip_cpu_store *store = &s->store;
+    const int edge = 1 << s->of->frame->data->header.tile_log2;
+    const unsigned columns = edge < TRIP_CPU_RASTER ? (1u << edge / 8) - 1 : 0xff;
+    for (int v = run->v; v < run->v + edge; v += 8)
+        for (int u = run->u; u < run->u + edge; u += TRIP_CPU_RASTER) {
+            const uint64_t open = store->open[trip_cpu_store_at(store, u >> TRIP_CPU_RASTER_LOG2,
+                                                                v >> TRIP_CPU_RASTER_LOG2)];
+            if (open >> (v / 8 % 8 * 8 + u / 8 % 8) & columns)
+                return true;
+        }
+    return false;
+}
+
+void trip_cpu_open_squares_forget(trip_cpu_sheets *s)
+{
+    s->open_sheets = 0;
+}
