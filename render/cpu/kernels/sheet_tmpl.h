@@ -250,15 +250,38 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
 
 /* ---- which segments may show ---- */
 
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+
+INLINE vi vi_lesser(vi a, vi b)
+{
+    return (vi)_mm256_min_epi32((__m256i)a, (__m256i)b);
+}
+
+INLINE vi vi_greater(vi a, vi b)
+{
+    return (vi)_mm256_max_epi32((__m256i)a, (__m256i)b);
+}
+
+#else
+
+INLINE vi vi_lesser(vi a, vi b)
+{
+    vi m = (vi)(a < b);
+    return (a & m) | (b & ~m);
+}
+
+INLINE vi vi_greater(vi a, vi b)
+{
+    vi m = (vi)(a > b);
+    return (a & m) | (b & ~m);
+}
+
+#endif
+
 INLINE vi vi_within(vi a, int32_t least, int32_t most)
 {
-#if TRIP_SIMD == TRIP_SIMD_AVX2
-    return (vi)_mm256_min_epi32(_mm256_max_epi32((__m256i)a, _mm256_set1_epi32(least)),
-                                _mm256_set1_epi32(most));
-#else
-    vi low = (vi)(a < least), high = (vi)(a > most);
-    return (a & ~(low | high)) | (low & least) | (high & most);
-#endif
+    const vi zero = { 0 };
+    return vi_lesser(vi_greater(a, zero + least), zero + most);
 }
 
 /* Rounded down; at most 2^28 from 0. */
@@ -381,6 +404,25 @@ INLINE cell_box both_boxes(const cell_boxes *of, unsigned m, unsigned n)
     return box;
 }
 
+/* What rays meet of a segment. */
+INLINE cell_box box_of_segment(const cell_boxes *of, unsigned n)
+{
+    return (cell_box){ { of->lo[0][n], of->lo[1][n] }, { of->hi[0][n], of->hi[1][n] } };
+}
+
+/* From what rays meet at slices to what they meet of segments, of those from first to last. */
+static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *slices,
+                               cell_boxes *out)
+{
+    for (unsigned n = first / V * V; n <= last; n += V)
+        for (int a = 0; a < 2; a++) {
+            vi_store(out->lo[a] + n,
+                     vi_lesser(vi_load(slices->lo[a] + n), vi_load(slices->lo[a] + n + 1)));
+            vi_store(out->hi[a] + n,
+                     vi_greater(vi_load(slices->hi[a] + n), vi_load(slices->hi[a] + n + 1)));
+        }
+}
+
 /* Whether some square of the box is in a set, or not in it where `flip` is UINT64_MAX and not 0. */
 INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uint64_t flip,
                            cell_box box)
@@ -400,31 +442,35 @@ INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uin
     return false;
 }
 
-/* Whether some cell of a raster may show, of those from lo to hi that are in it. */
-INLINE bool raster_shows(const trip_cpu_cells *raster, const int32_t lo[2], const int32_t hi[2])
+/* The cells of a raster that may show in some of the rows from lo to hi. */
+INLINE uint64_t cells_of_rows(const trip_cpu_cells *raster, int32_t lo, int32_t hi)
 {
-    const int32_t last = TRIP_CPU_RASTER - 1, end = lesser_of(hi[1], last);
     uint64_t some = 0;
-    for (int32_t row = greater_of(lo[1], 0); row <= end; row++)
-        some |= raster->rows[row];
-    return some & UINT64_MAX << greater_of(lo[0], 0) &
-           UINT64_MAX >> (last - lesser_of(hi[0], last));
+    if (hi - lo < 3) {
+        for (; lo <= hi; lo++)
+            some |= raster->rows[lo];
+        return some;
+    }
+    for (; lo < hi - 3; lo += 4)
+        some |= raster->fours[lo];
+    return some | raster->fours[hi - 3];
 }
 
 /* Whether some cell of the box may show. */
 INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 {
-    const int log2 = TRIP_CPU_RASTER_LOG2;
-    for (int32_t v = box.lo[1] >> log2; v <= box.hi[1] >> log2; v++)
-        for (int32_t u = box.lo[0] >> log2; u <= box.hi[0] >> log2; u++) {
-            const size_t at = (size_t)v * (size_t)g->across + (size_t)u;
-            const int32_t u0 = u << log2, v0 = v << log2;
+    const int log2 = TRIP_CPU_RASTER_LOG2, last = TRIP_CPU_RASTER - 1;
+    for (int32_t v = box.lo[1]; v <= box.hi[1]; v = (v | last) + 1) {
+        const int32_t end_v = lesser_of(v | last, box.hi[1]);
+        for (int32_t u = box.lo[0]; u <= box.hi[0]; u = (u | last) + 1) {
+            const int32_t end_u = lesser_of(u | last, box.hi[0]);
+            const size_t at = (size_t)(v >> log2) * (size_t)g->across + (size_t)(u >> log2);
             if (g->visible[segment][at] &&
-                raster_shows(&g->cells[segment][at],
-                             (const int32_t[2]){ box.lo[0] - u0, box.lo[1] - v0 },
-                             (const int32_t[2]){ box.hi[0] - u0, box.hi[1] - v0 }))
+                cells_of_rows(&g->cells[segment][at], v & last, end_v & last) >> (u & last) &
+                    UINT64_MAX >> (last - (end_u - u)))
                 return true;
         }
+    }
     return false;
 }
 
@@ -467,12 +513,13 @@ static uint64_t pane_segments(const trip_cpu_sheet_view *view, const trip_cpu_gr
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
     uint64_t segments = 0;
-    cell_boxes boxes;
-    find_boxes(g, path, &r, 0, g->segments, &boxes);
-    if (!some_square_of(g, g->some, 0, both_boxes(&boxes, 0, g->segments)))
+    cell_boxes slices, boxes;
+    find_boxes(g, path, &r, 0, g->segments, &slices);
+    if (!some_square_of(g, g->some, 0, both_boxes(&slices, 0, g->segments)))
         return 0;
+    find_segment_boxes(0, g->segments - 1, &slices, &boxes);
     for (unsigned n = 0; n < g->segments; n++)
-        if (some_square_of(g, g->visible[n], 0, both_boxes(&boxes, n, n + 1)))
+        if (some_square_of(g, g->visible[n], 0, box_of_segment(&boxes, n)))
             segments |= UINT64_C(1) << n;
     return segments;
 }
@@ -483,21 +530,23 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, 8);
     unsigned placed = UINT32_MAX;
-    cell_boxes boxes;
-    find_boxes(g, path, &r, (unsigned)__builtin_ctzll(segments),
-               64 - (unsigned)__builtin_clzll(segments), &boxes);
+    cell_boxes slices, boxes;
+    const unsigned first = (unsigned)__builtin_ctzll(segments);
+    const unsigned last = 63 - (unsigned)__builtin_clzll(segments);
+    find_boxes(g, path, &r, first, last + 1, &slices);
+    find_segment_boxes(first, last, &slices, &boxes);
     area->segments = area->gaps = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
-        const cell_box box = both_boxes(&boxes, n, n + 1);
+        const cell_box box = box_of_segment(&boxes, n);
         if (!cells_show(g, n, box))
             continue;
         area->segments |= UINT64_C(1) << n;
         if (g->without_halo && some_square_of(g, g->whole[n], UINT64_MAX, box))
             area->gaps |= UINT64_C(1) << n;
         if (placed != n)
-            find_raster(g, path, n, r.whole, &boxes, area);
-        find_raster(g, path, n + 1, r.whole, &boxes, area);
+            find_raster(g, path, n, r.whole, &slices, area);
+        find_raster(g, path, n + 1, r.whole, &slices, area);
         placed = n + 1;
     }
 }
@@ -528,18 +577,6 @@ INLINE vm vi_is_0(vi a)
 #else
     return (vm)(a == 0);
 #endif
-}
-
-INLINE vi vi_lesser(vi a, vi b)
-{
-    vi m = (vi)(a < b);
-    return (a & m) | (b & ~m);
-}
-
-INLINE vi vi_greater(vi a, vi b)
-{
-    vi m = (vi)(a > b);
-    return (a & m) | (b & ~m);
 }
 
 /* The cells that rays pass at a slice: from pane_path.base. */

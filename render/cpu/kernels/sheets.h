@@ -65,6 +65,7 @@ typedef struct trip_cpu_square_ranges {
 /* The cells of a raster that may show between a sheet and the next: a bit each, a word a row. */
 typedef struct trip_cpu_cells {
     uint64_t rows[TRIP_CPU_RASTER];
+    uint64_t fours[TRIP_CPU_RASTER]; /* those of a row and the three below it together */
 } trip_cpu_cells;
 
 /* The rasters of a sheet or slice in a grid of `across` x `down`, the outermost of which are

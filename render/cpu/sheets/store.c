@@ -399,6 +399,12 @@ static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t
         s->kernels->sheet_cells(from, to, squares, f->first_visible, f->last_visible, cells);
     else
         find_cells_one_by_one(f, from, to, squares, cells);
+    const uint64_t *rows = cells->rows;
+    for (int v = 0; v < TRIP_CPU_RASTER; v++)
+        cells->fours[v] = rows[v];
+    for (int n = 1; n < 4; n++)
+        for (int v = 0; v < TRIP_CPU_RASTER - n; v++)
+            cells->fours[v] |= rows[v + n];
 }
 
 /* The squares of a row of them that have some of the given cells, those of a row of cells. */
