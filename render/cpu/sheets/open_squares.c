@@ -9,7 +9,7 @@
  * are open then. */
 enum { SHEETS = 8 };
 
-/* Pixels of a patch along a side, and patches of a pane. */
+/* Pixels of a patch along a side, and patches along that of a pane. */
 enum { PATCH = 8, ACROSS = TRIP_CPU_PANE / PATCH };
 
 /* More than what single precision makes of where rays are. */
@@ -29,32 +29,38 @@ typedef struct bounds {
 
 static void include(bounds *b, int a, double at)
 {
-    b->least[a] = fmin(b->least[a], at);
-    b->most[a] = fmax(b->most[a], at);
+    b->least[a] = at < b->least[a] ? at : b->least[a];
+    b->most[a] = at > b->most[a] ? at : b->most[a];
 }
 
-/* The ray of a pixel position between the ends, of those that are drawn: steeper ones are taken for
- * the steepest of these. False where it does not go the pass's way. */
-static bool include_ray(const trip_cpu_sheet_view *view, const extent *e, double x, double y,
-                        bounds *b)
+/* The rays of a pane's pixel positions at the corners of its patches. */
+enum { CORNERS = ACROSS + 1 };
+typedef struct pane_rays {
+    bool along[CORNERS * CORNERS];      /* they go the pass's way */
+    double at[2][2][CORNERS * CORNERS]; /* positions along u and v, at both ends */
+} pane_rays;
+
+/* Of those that are drawn: steeper rays are taken for the steepest of these. */
+static void find_ray(const trip_cpu_sheet_view *view, const extent *e, double x, double y, int i,
+                     pane_rays *rays)
 {
     double beside[3], r[3];
-    for (int i = 0; i < 3; i++) {
-        beside[i] = x * view->rx[i] + y * view->ry[i];
-        r[i] = view->r0[i] + (view->ortho ? 0 : beside[i]);
+    for (int k = 0; k < 3; k++) {
+        beside[k] = x * view->rx[k] + y * view->ry[k];
+        r[k] = view->r0[k] + (view->ortho ? 0 : beside[k]);
     }
-    if (!(r[2] * view->direction > 0))
-        return false;
-    const double inverse = 1 / r[2];
+    rays->along[i] = r[2] * view->direction > 0;
+    if (!rays->along[i])
+        return;
+    const double inverse = 1 / r[2], most = view->steepest;
     for (int a = 0; a < 2; a++) {
-        const double slope = fmax(-view->steepest, fmin(view->steepest, r[a] * inverse));
-        double start = view->eye[a];
+        double start = view->eye[a], slope = r[a] * inverse;
+        slope = slope < -most ? -most : slope > most ? most : slope;
         if (view->ortho) /* where the ray passes sheet 0 */
             start += beside[a] - (view->eye[2] + beside[2]) * slope;
-        include(b, a, start + e->ends[0] * slope);
-        include(b, a, start + e->ends[1] * slope);
+        for (int end = 0; end < 2; end++)
+            rays->at[end][a][i] = start + e->ends[end] * slope;
     }
-    return true;
 }
 
 static void open_row(trip_cpu_store *s, int64_t v, int64_t first, int64_t last)
@@ -75,26 +81,32 @@ static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
                               (int64_t)s->down * TRIP_CPU_RASTER };
     int64_t first[2], last[2];
     for (int a = 0; a < 2; a++) {
-        const double lo = floor(b->least[a] - SLACK_VOXELS) - (reach - 1) - (double)origin[a];
-        const double hi = floor(b->most[a] + SLACK_VOXELS) + reach - (double)origin[a];
+        const double lo = b->least[a] - SLACK_VOXELS - reach - (double)origin[a];
+        const double hi = b->most[a] + SLACK_VOXELS + reach - (double)origin[a];
         if (!(hi >= 0 && lo < (double)size[a]))
             return;
-        first[a] = (int64_t)fmax(lo, 0) / 8;
-        last[a] = (int64_t)fmin(hi, (double)(size[a] - 1)) / 8;
+        first[a] = lo > 0 ? (int64_t)lo / 8 : 0;
+        last[a] = (hi < (double)size[a] ? (int64_t)hi : size[a] - 1) / 8;
     }
     for (int64_t v = first[1]; v <= last[1]; v++)
         open_row(s, v, first[0], last[0]);
 }
 
-/* False where rays of a rectangle of pixels may be drawn and go any way. */
-static bool open_rectangle(trip_cpu_sheets *s, const extent *e, int x, int y, int size)
+/* Between four corners, the first of which is `first`, each `step` patches from the next; false
+ * where rays between them may be drawn and go any way. */
+static bool open_rectangle(trip_cpu_store *s, const extent *e, const pane_rays *rays, int first,
+                           int step)
 {
     bounds b = { { INFINITY, INFINITY }, { -INFINITY, -INFINITY } };
     int along = 0;
-    for (int i = 0; i < 4; i++)
-        along += include_ray(&s->view, e, x + (i & 1) * size, y + (i >> 1) * size, &b);
+    for (int i = 0; i < 4; i++) {
+        const int corner = first + (i & 1) * step + (i >> 1) * step * CORNERS;
+        along += rays->along[corner];
+        for (int n = 0; n < 4 && rays->along[corner]; n++)
+            include(&b, n & 1, rays->at[n >> 1][n & 1][corner]);
+    }
     if (along == 4)
-        open_squares(&s->store, &b, e->reach);
+        open_squares(s, &b, e->reach);
     return along == 4 || along == 0;
 }
 
@@ -108,11 +120,16 @@ static bool patch_is_open(uint64_t texels, int i)
 static bool open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64_t texels)
 {
     const int x = trip_cpu_pane_x(s->of, pane), y = trip_cpu_pane_y(s->of, pane);
-    if (texels == UINT64_MAX)
-        return open_rectangle(s, e, x, y, TRIP_CPU_PANE);
+    const bool whole = texels == UINT64_MAX;
+    pane_rays rays;
+    for (int i = 0; i < CORNERS * CORNERS; i++)
+        if (!whole || (i % CORNERS % ACROSS == 0 && i / CORNERS % ACROSS == 0))
+            find_ray(&s->view, e, x + i % CORNERS * PATCH, y + i / CORNERS * PATCH, i, &rays);
+    if (whole)
+        return open_rectangle(&s->store, e, &rays, 0, ACROSS);
     for (int i = 0; i < ACROSS * ACROSS; i++)
         if (patch_is_open(texels, i) &&
-            !open_rectangle(s, e, x + i % ACROSS * PATCH, y + i / ACROSS * PATCH, PATCH))
+            !open_rectangle(&s->store, e, &rays, i / ACROSS * CORNERS + i % ACROSS, 1))
             return false;
     return true;
 }

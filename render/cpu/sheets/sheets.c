@@ -70,7 +70,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->store.kernels = r->kernels;
     s->pass = NULL;
     s->count = s->front = 0;
-    s->run_count = 0;
+    s->run_count = s->taken_count = 0;
     const trip_plan *plan = r->frame->plan;
     const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
     s->store.codes = trip_cpu_codes_of(plan->code_least, plan->code_most);
@@ -394,6 +394,15 @@ static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
     return false;
 }
 
+static void run_tasks(trip_cpu_sheets *s, void (*run)(void *, unsigned, unsigned), unsigned tasks)
+{
+    trip_cpu_job job = { .run = run, .context = s, .tasks = tasks };
+    if (tasks == 0)
+        return;
+    trip_cpu_pool_start(s->of->pool, &job);
+    trip_cpu_pool_wait(s->of->pool, &job);
+}
+
 static void draw_pane(void *context, unsigned task, unsigned thread)
 {
     trip_cpu_sheets *s = context;
@@ -432,9 +441,7 @@ static void draw_panes(trip_cpu_sheets *s)
 {
     if (!find_some(s))
         return;
-    trip_cpu_job job = { .run = draw_pane, .context = s, .tasks = trip_cpu_pane_count(s->of) };
-    trip_cpu_pool_start(s->of->pool, &job);
-    trip_cpu_pool_wait(s->of->pool, &job);
+    run_tasks(s, draw_pane, trip_cpu_pane_count(s->of));
 }
 
 /* Lets go of the first sheets. */
@@ -506,25 +513,30 @@ static int draw_complete(trip_cpu_sheets *s, int complete, bool all)
 
 /* ---- from runs to sheets ---- */
 
+static void clear_taken(void *context, unsigned task, unsigned thread)
+{
+    const trip_cpu_sheets *s = context;
+    (void)thread;
+    trip_cpu_store_clear(&s->store, s->taken[task]);
+}
+
 static void decode_run(void *context, unsigned task, unsigned thread)
 {
-    trip_cpu_sheets *s = context;
+    const trip_cpu_sheets *s = context;
     (void)thread;
     if (trip_interrupted())
         return;
-    const trip_run *run = s->runs[task];
+    const trip_run *run = s->runs[task].run;
     const trip_block block = trip_block_of(s->batch, run);
-    trip_cpu_store_decode(&s->store, sheet_of(s, s->count - 1), &block, run);
+    trip_cpu_store_decode(&s->store, s->runs[task].sheet, &block, run);
 }
 
+/* Before the store's open squares change, the batch ends, or sheets are drawn. */
 static void decode_runs(trip_cpu_sheets *s)
 {
-    if (s->run_count == 0)
-        return;
-    trip_cpu_job job = { .run = decode_run, .context = s, .tasks = s->run_count };
-    trip_cpu_pool_start(s->of->pool, &job);
-    trip_cpu_pool_wait(s->of->pool, &job);
-    s->run_count = 0;
+    run_tasks(s, clear_taken, s->taken_count);
+    run_tasks(s, decode_run, s->run_count);
+    s->run_count = s->taken_count = 0;
 }
 
 /* All sheets held are complete. */
@@ -541,8 +553,11 @@ static int finish_row(trip_cpu_sheets *s)
 /* The sheet that the next runs are of: those held are complete. */
 static int begin_sheet(trip_cpu_sheets *s, int64_t number)
 {
+    const bool ends_row = s->count > 0 && sheet_of(s, s->count - 1)->number + s->way != number;
     int status = 0;
-    if (s->count > 0 && sheet_of(s, s->count - 1)->number + s->way != number)
+    if (ends_row || s->count >= s->most || s->open_sheets == 0)
+        decode_runs(s);
+    if (ends_row)
         status = finish_row(s);
     else if (s->count >= s->most)
         status = draw_complete(s, s->count, false);
@@ -563,8 +578,13 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
 /* A raster of the last sheet; false where none is left but for slices. */
 static bool take_raster(trip_cpu_sheets *s, size_t at)
 {
-    return s->store.free_count > s->slice_rasters &&
-           trip_cpu_store_take(&s->store, sheet_of(s, s->count - 1), at);
+    trip_cpu_sheet *sheet = sheet_of(s, s->count - 1);
+    if (s->taken_count == TRIP_CPU_SHEETS_TAKEN)
+        decode_runs(s);
+    if (s->store.free_count <= s->slice_rasters || !trip_cpu_store_take(&s->store, sheet, at))
+        return false;
+    s->taken[s->taken_count++] = sheet->rasters[at];
+    return true;
 }
 
 /* Rasters of the last sheet for a run's voxels. */
@@ -601,7 +621,7 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
 static bool is_of_another_part(const trip_cpu_sheets *s, const trip_run *run)
 {
     return s->run_count > 0 &&
-           trip_batch_list(s->batch, run)->part != trip_batch_list(s->batch, s->runs[0])->part;
+           trip_batch_list(s->batch, run)->part != trip_batch_list(s->batch, s->runs[0].run)->part;
 }
 
 static int add_run(trip_cpu_sheets *s, const trip_run *run)
@@ -609,17 +629,15 @@ static int add_run(trip_cpu_sheets *s, const trip_run *run)
     int status = 0;
     if (s->windows.used)
         return is_occluded(s, run) ? 0 : trip_cpu_windows_add_run(s, run);
-    if (s->count == 0 || sheet_of(s, s->count - 1)->number != run->sheet) {
-        decode_runs(s);
+    if (s->count == 0 || sheet_of(s, s->count - 1)->number != run->sheet)
         status = begin_sheet(s, run->sheet);
-    }
     if (status || !trip_cpu_open_squares_some_of_run(s, run))
         return status;
     if (s->run_count == TRIP_CPU_SHEETS_RUNS || is_of_another_part(s, run))
         decode_runs(s);
     status = take_rasters(s, run);
     if (!status)
-        s->runs[s->run_count++] = run;
+        s->runs[s->run_count++] = (trip_cpu_sheet_run){ run, sheet_of(s, s->count - 1) };
     return status;
 }
 

@@ -8,8 +8,14 @@
 #include "cpu/sheets/windows.h"
 #include "cpu/state.h"
 
-/* Runs decoded at a time. */
-enum { TRIP_CPU_SHEETS_RUNS = 256 };
+/* Runs decoded at a time, and rasters that are taken for them. */
+enum { TRIP_CPU_SHEETS_RUNS = 256, TRIP_CPU_SHEETS_TAKEN = 1024 };
+
+/* A run to be decoded into a sheet of the store. */
+typedef struct trip_cpu_sheet_run {
+    const trip_run *run;
+    const trip_cpu_sheet *sheet;
+} trip_cpu_sheet_run;
 
 struct trip_cpu_sheets {
     trip_cpu *of;
@@ -30,8 +36,10 @@ struct trip_cpu_sheets {
     int count, most;        /* held; and drawn at a time, at most */
     uint64_t slice_rasters; /* set aside for slices */
     const trip_batch *batch;
-    const trip_run *runs[TRIP_CPU_SHEETS_RUNS]; /* to be decoded, of the last sheet */
+    trip_cpu_sheet_run runs[TRIP_CPU_SHEETS_RUNS]; /* to be decoded */
     unsigned run_count;
+    int32_t taken[TRIP_CPU_SHEETS_TAKEN]; /* rasters that are to be cleared before */
+    unsigned taken_count;
     int open_sheets; /* to come, for which the store's open squares hold */
     trip_cpu_windows windows;
 };

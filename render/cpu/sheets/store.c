@@ -16,9 +16,9 @@ static const size_t raster_bytes = sizeof(trip_cpu_voxels);
 
 /* ---- memory ---- */
 
-static void clear_raster(const trip_cpu_store *s, int32_t at)
+void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster)
 {
-    int16_t *codes = s->voxels[at].codes;
+    int16_t *codes = s->voxels[raster].codes;
     for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++)
         codes[i] = TRIP_CPU_CODE_MISSING;
 }
@@ -129,7 +129,7 @@ void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to)
     for (unsigned i = 0; i < s->sheet_room; i++)
         s->sheets[i].prepared = s->sheets[i].shaded = false;
     free_all(s);
-    clear_raster(s, 0);
+    trip_cpu_store_clear(s, 0);
 }
 
 static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets)
@@ -173,7 +173,6 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
     if (s->free_count == 0)
         return false;
     sheet->rasters[at] = s->free[--s->free_count];
-    clear_raster(s, sheet->rasters[at]);
     if (sheet->filled)
         atomic_store_explicit(&sheet->filled[at], 0, memory_order_relaxed);
     return true;
@@ -570,6 +569,7 @@ static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t
 {
     const trip_cpu_store *s = job->store;
     int32_t to = (int32_t)lrint(w->part * 16384);
+    trip_cpu_store_clear(s, w->sheet->rasters[at]);
     s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), w->needed[at],
                               to << 16 | (16384 - to), w->other->shaded,
                               raster_at(s, w->sheet, at));

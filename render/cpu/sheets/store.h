@@ -98,8 +98,10 @@ static inline size_t trip_cpu_store_grid(const trip_cpu_store *s)
     return (size_t)s->across * (size_t)s->down;
 }
 
-/* A raster in which all is missing; false when none is free. */
+/* A raster, which is to be cleared; false when none is free. */
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at);
+/* All of a raster is missing. Any thread may clear one. */
+void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster);
 /* Every raster of a sheet or slice is free again. */
 void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 

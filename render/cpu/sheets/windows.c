@@ -142,8 +142,8 @@ static void take_rasters(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_c
         for (int64_t u = raster_of(run->u); u <= raster_of(run->u + last); u++)
             if (trip_cpu_rasters_have(hand, u, v)) {
                 size_t at = trip_cpu_store_at(&s->store, u, v);
-                if (!sheet->rasters[at])
-                    trip_cpu_store_take(&s->store, sheet, at);
+                if (!sheet->rasters[at] && trip_cpu_store_take(&s->store, sheet, at))
+                    trip_cpu_store_clear(&s->store, sheet->rasters[at]);
             }
 }
 
