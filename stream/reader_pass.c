@@ -383,9 +383,12 @@ static int report_block(const trip_batch *b, const trip_run *run, const char *wh
                      block_offset(b->slot, run), why);
 }
 
-/* What draws takes blocks as they are: those that do not agree with their bricks end here. */
-static int check_blocks(const trip_batch *b)
+/* What draws takes blocks as they are: those that do not agree with their bricks end here. Those of
+ * a data set in memory were checked when it was loaded. */
+static int check_blocks(const trip_reader *r, const trip_batch *b)
 {
+    if (r->in_memory)
+        return TRIP_OK;
     for (size_t i = 0; i < b->run_count && b->planes[TRIP_PLANE_VOXELS]; i++) {
         const trip_run *run = &b->runs[i];
         const trip_block block = trip_block_of(b, run);
@@ -434,7 +437,7 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     if (!r->failed) {
         copy_borders(r, s);
         fill_batch(r, s, batch);
-        r->failed = check_blocks(batch);
+        r->failed = check_blocks(r, batch);
     }
     s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
     return r->failed ? r->failed : 1;
