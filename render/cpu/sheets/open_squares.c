@@ -92,11 +92,12 @@ static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
         open_row(s, v, first[0], last[0]);
 }
 
-/* Between four corners, the first of which is `first`, each `step` patches from the next; false
- * where rays between them may be drawn and go any way. */
-static bool open_rectangle(trip_cpu_store *s, const extent *e, const pane_rays *rays, int first,
+/* Between four corners, the first of which is `first`, each `step` patches from the next. Where
+ * some go another way than the pass, rays between them may go any way. */
+static void open_rectangle(trip_cpu_sheets *s, const extent *e, const pane_rays *rays, int first,
                            int step)
 {
+    const trip_cpu_sheet_view *view = &s->view;
     bounds b = { { INFINITY, INFINITY }, { -INFINITY, -INFINITY } };
     int along = 0;
     for (int i = 0; i < 4; i++) {
@@ -105,9 +106,12 @@ static bool open_rectangle(trip_cpu_store *s, const extent *e, const pane_rays *
         for (int n = 0; n < 4 && rays->along[corner]; n++)
             include(&b, n & 1, rays->at[n >> 1][n & 1][corner]);
     }
-    if (along == 4)
-        open_squares(s, &b, e->reach);
-    return along == 4 || along == 0;
+    for (int n = 0; n < 8 && along > 0 && along < 4; n++)
+        include(&b, n & 1,
+                view->eye[n & 1] +
+                    e->ends[n >> 1 & 1] * (n >> 2 ? view->steepest : -view->steepest));
+    if (along > 0)
+        open_squares(&s->store, &b, e->reach);
 }
 
 /* Of the texels of a pane, those of one of its patches. */
@@ -117,7 +121,7 @@ static bool patch_is_open(uint64_t texels, int i)
     return texels >> (i / ACROSS * 16 + i % ACROSS * 2) & 0x303;
 }
 
-static bool open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64_t texels)
+static void open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64_t texels)
 {
     const int x = trip_cpu_pane_x(s->of, pane), y = trip_cpu_pane_y(s->of, pane);
     const bool whole = texels == UINT64_MAX;
@@ -126,12 +130,10 @@ static bool open_pane(trip_cpu_sheets *s, const extent *e, uint32_t pane, uint64
         if (!whole || (i % CORNERS % ACROSS == 0 && i / CORNERS % ACROSS == 0))
             find_ray(&s->view, e, x + i % CORNERS * PATCH, y + i / CORNERS * PATCH, i, &rays);
     if (whole)
-        return open_rectangle(&s->store, e, &rays, 0, ACROSS);
-    for (int i = 0; i < ACROSS * ACROSS; i++)
-        if (patch_is_open(texels, i) &&
-            !open_rectangle(&s->store, e, &rays, i / ACROSS * CORNERS + i % ACROSS, 1))
-            return false;
-    return true;
+        open_rectangle(s, e, &rays, 0, ACROSS);
+    for (int i = 0; i < ACROSS * ACROSS && !whole; i++)
+        if (patch_is_open(texels, i))
+            open_rectangle(s, e, &rays, i / ACROSS * CORNERS + i % ACROSS, 1);
 }
 
 static uint64_t open_texels(const trip_cpu *r, uint32_t pane)
@@ -148,39 +150,43 @@ static bool some_is_saturated(const trip_cpu *r, int axis)
     return false;
 }
 
-/* From a sheet on; false where all squares may be open. */
-static bool find_open_squares(trip_cpu_sheets *s, int64_t number)
+static extent extent_from(const trip_cpu_sheets *s, int64_t number)
 {
-    const trip_cpu *r = s->of;
-    trip_cpu_store *store = &s->store;
-    if (s->view.coordinates || !some_is_saturated(r, s->axis))
-        return false;
-    extent e = { .reach = trip_sheet_reach(s->view.kernel) };
+    const trip_cpu_sheet_view *view = &s->view;
+    extent e = { .reach = trip_sheet_reach(view->kernel) };
+    const int64_t first = number - s->way * e.reach,
+                  last = number + s->way * (SHEETS - 1 + e.reach);
     for (int i = 0; i < 2; i++) {
-        const int64_t sheets = i ? SHEETS - 1 + e.reach : -e.reach;
-        double at = (double)(number + s->way * sheets) - (s->view.ortho ? 0 : s->view.eye[2]);
-        if (!s->view.ortho && at * s->view.direction < 0)
-            at = 0; /* rays start there */
-        e.ends[i] = at;
+        const double at = (double)(i ? last : first) - (view->ortho ? 0 : view->eye[2]);
+        const bool before_eye = view->ortho || at * view->direction > 0;
+        e.ends[i] = before_eye ? at : 0; /* rays start there */
     }
-    memset(store->open, 0, trip_cpu_store_grid(store) * sizeof *store->open);
-    for (uint32_t i = 0; i < trip_cpu_pane_count(r); i++) {
-        const uint64_t texels = open_texels(r, i);
-        if (texels && !open_pane(s, &e, i, texels))
-            return false;
+    return e;
+}
+
+/* From a sheet on. */
+static void find_open_squares(trip_cpu_sheets *s, int64_t number)
+{
+    const extent e = extent_from(s, number);
+    for (uint32_t i = 0; i < trip_cpu_pane_count(s->of); i++) {
+        const uint64_t texels = open_texels(s->of, i);
+        if (texels)
+            open_pane(s, &e, i, texels);
     }
-    return true;
 }
 
 void trip_cpu_open_squares_of_sheet(trip_cpu_sheets *s, int64_t number)
 {
+    const size_t bytes = trip_cpu_store_grid(&s->store) * sizeof *s->store.open;
     if (s->open_sheets > 0) {
         s->open_sheets--;
         return;
     }
     s->open_sheets = SHEETS - 1;
-    if (!find_open_squares(s, number))
-        memset(s->store.open, 0xff, trip_cpu_store_grid(&s->store) * sizeof *s->store.open);
+    const bool some = !s->view.coordinates && some_is_saturated(s->of, s->axis);
+    memset(s->store.open, some ? 0 : 0xff, bytes);
+    if (some)
+        find_open_squares(s, number);
 }
 
 bool trip_cpu_open_squares_some_of_run(const trip_cpu_sheets *s, const trip_run *run)
