@@ -120,8 +120,9 @@ static int measure_view(const bench_frame *base, const bench_options *o, bench_r
 
 static void add_limits(bench_report *r)
 {
-    bench_report_limit(r, "The data set is in memory (null engine): no figure contains the disk. A "
-                          "frame is planning, drawing from memory and merging.");
+    bench_report_limit(r, "The data set is in memory (null engine), where it was checked when it "
+                          "was loaded: no figure contains the disk. A frame is planning, drawing "
+                          "from memory and merging.");
     bench_report_limit(r, "Drawn: the footprint touches a pixel centre where its list has weight, "
                           "whatever its opacity there; counted in a frame apart from the timed "
                           "ones. Kept: voxels in each list of the data set. Bricks that the "

@@ -233,9 +233,10 @@ static bool leaves_out_occluded(const race *c)
 
 static void add_limits(const race *c, bench_report *r)
 {
-    bench_report_limit(r, "The data set is in memory (null engine): no figure contains the disk. A "
-                          "frame is planning, drawing from memory and merging, and ends "
-                          "with the picture in the program's memory.");
+    bench_report_limit(r, "The data set is in memory (null engine), where it was checked when it "
+                          "was loaded: no figure contains the disk. A frame is planning, drawing "
+                          "from memory and merging, and ends with the picture in the program's "
+                          "memory.");
     bench_report_limit(r, "Msplats/s: splats with a pixel centre in their footprint where their "
                           "list has weight, all views together, over the time of all views. Those "
                           "behind saturated pixels count too, though a renderer may skip them.");
