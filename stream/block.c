@@ -504,6 +504,21 @@ static uint32_t square_places(uint64_t mask, uint32_t corner, uint32_t skip, uin
     return n;
 }
 
+uint32_t trip_square_corner(const trip_square *s)
+{
+    return corner_of(s->number);
+}
+
+void trip_square_voxels(const trip_block *b, const trip_square *s, uint32_t voxels[64])
+{
+    const uint32_t step = b->code_bytes == 1 ? CODE_STEP : 1;
+    uint16_t codes[64];
+    trip_square_codes(s, codes);
+    square_places(s->mask, corner_of(s->number), 0, s->count, voxels);
+    for (uint32_t i = 0; i < s->count; i++)
+        voxels[i] |= codes[i] * step << 16;
+}
+
 /* Adds codes of 16 bits to the places of all records from `first` on. */
 static void add_codes(const trip_block *b, uint32_t first, uint32_t count, uint32_t *voxels)
 {

@@ -126,6 +126,11 @@ static inline uint32_t trip_square_code_bytes(const trip_square *s)
 /* The codes of a square as they are in the file: of 8 bits with code_bytes 1. */
 void trip_square_codes(const trip_square *s, uint16_t codes[64]);
 
+/* u and v of a square's corner in the tile, as a voxel with code 0. */
+uint32_t trip_square_corner(const trip_square *s);
+/* The records of a square of the block, as voxels with u and v in the tile and 16-bit codes. */
+void trip_square_voxels(const trip_block *b, const trip_square *s, uint32_t voxels[64]);
+
 /* Records [first, first + count) of a checked block, as voxels with u and v in the tile and 16-bit
  * codes. */
 void trip_block_voxels(const trip_block *b, uint32_t first, uint32_t count, uint32_t *voxels);

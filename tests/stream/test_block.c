@@ -85,6 +85,27 @@ static void what_is_packed_is_decoded_from_any_record_on(void **state)
             }
 }
 
+static void squares_hold_the_records_of_their_block(void **state)
+{
+    static uint32_t out[ROOM];
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    (void)state;
+    for (unsigned log2 = 4; log2 <= 7; log2++)
+        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++) {
+            const run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, 0.3, log2);
+            const trip_block b = block_of(r);
+            const uint32_t count = trip_block_squares(&b, squares);
+            for (uint32_t i = 0; i < count; i++) {
+                uint32_t voxels[64], corner = trip_square_corner(&squares[i]);
+                trip_square_voxels(&b, &squares[i], voxels);
+                for (uint32_t k = 0; k < squares[i].count; k++)
+                    assert_int_equal(voxels[k] & 0xf8f8, corner);
+                memcpy(out + squares[i].first, voxels, squares[i].count * sizeof *voxels);
+            }
+            assert_memory_equal(out, r->voxels, r->count * sizeof *out);
+        }
+}
+
 static void a_block_has_the_bytes_that_the_format_says(void **state)
 {
     (void)state;
@@ -325,6 +346,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_packed_is_decoded_from_any_record_on),
+        cmocka_unit_test(squares_hold_the_records_of_their_block),
         cmocka_unit_test(a_block_has_the_bytes_that_the_format_says),
         cmocka_unit_test(codes_are_packed_by_groups_of_squares),
         cmocka_unit_test(what_is_no_run_is_not_packed),
