@@ -29,7 +29,7 @@ typedef struct search {
     double from[2];
     int count;
     form forms[TRIP_REACHES_MAX];
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX]; /* of a run */
 } search;
 
 /* The extinction, per world unit, from which on voxels count. */
@@ -194,32 +194,56 @@ static bool select_bricks(search *s, trip_selection *selection)
     return some;
 }
 
-static bool may_matter(const search *s, const trip_run *run)
+/* The forms that may be greater in the box than what was found, a bit each. */
+static unsigned forms_beyond(const search *s, const trip_brick_box *place)
 {
-    double last = (double)((1u << s->visible->data->header.tile_log2) - 1);
-    const trip_brick_box place = { { run->u, run->v, run->sheet },
-                                   { run->u + last, run->v + last, run->sheet } };
+    unsigned beyond = 0;
     for (int i = 0; i < s->count; i++)
-        if (bound(s, &s->forms[i], &place) > s->forms[i].best)
-            return true;
-    return false;
+        if (bound(s, &s->forms[i], place) > s->forms[i].best)
+            beyond |= 1u << i;
+    return beyond;
 }
 
-static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
+/* So many voxels along u and v from a corner in the run's tile on. */
+static trip_brick_box box_at(const trip_run *run, uint32_t corner, unsigned side)
 {
-    const trip_block block = trip_block_of(batch, run);
-    uint32_t *voxels = s->voxels;
-    trip_block_voxels(&block, 0, run->count, voxels);
-    s->visible->splats += run->count;
-    for (uint32_t n = 0; n < run->count; n++) {
+    const double u = run->u + (double)trip_voxel_u(corner);
+    const double v = run->v + (double)trip_voxel_v(corner);
+    return (trip_brick_box){ { u, v, run->sheet }, { u + side - 1, v + side - 1, run->sheet } };
+}
+
+static void look_at_square(search *s, const trip_run *run, const trip_block *block,
+                           const trip_square *square, unsigned forms)
+{
+    uint32_t voxels[64];
+    trip_square_voxels(block, square, voxels);
+    s->visible->splats += square->count;
+    for (uint32_t n = 0; n < square->count; n++) {
         if (!is_visible(s->visible, trip_voxel_code(voxels[n])))
             continue;
-        double u = run->u + (double)trip_voxel_u(voxels[n]);
-        double v = run->v + (double)trip_voxel_v(voxels[n]);
-        for (int i = 0; i < s->count; i++) {
-            double value = value_at(s, &s->forms[i], u, v, run->sheet);
-            s->forms[i].best = value > s->forms[i].best ? value : s->forms[i].best;
+        const double u = run->u + (double)trip_voxel_u(voxels[n]);
+        const double v = run->v + (double)trip_voxel_v(voxels[n]);
+        for (unsigned rest = forms; rest; rest &= rest - 1) {
+            form *f = &s->forms[__builtin_ctz(rest)];
+            const double value = value_at(s, f, u, v, run->sheet);
+            f->best = value > f->best ? value : f->best;
         }
+    }
+}
+
+/* Squares that reach no farther than what was found are left out: most of them are. */
+static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
+{
+    const trip_brick_box all = box_at(run, 0, 1u << s->visible->data->header.tile_log2);
+    if (!forms_beyond(s, &all))
+        return;
+    const trip_block block = trip_block_of(batch, run);
+    const uint32_t count = trip_block_squares(&block, s->squares);
+    for (uint32_t i = 0; i < count; i++) {
+        const trip_brick_box place = box_at(run, trip_square_corner(&s->squares[i]), 8);
+        const unsigned forms = forms_beyond(s, &place);
+        if (forms)
+            look_at_square(s, run, &block, &s->squares[i], forms);
     }
 }
 
@@ -231,8 +255,7 @@ static int read_selected(search *s, const trip_selection *selection)
     int status = trip_reader_begin(reader, &pass);
     while (!status && (status = trip_reader_next(reader, &batch)) > 0) {
         for (size_t i = 0; i < batch.run_count; i++)
-            if (may_matter(s, &batch.runs[i]))
-                look_at_run(s, &batch, &batch.runs[i]);
+            look_at_run(s, &batch, &batch.runs[i]);
         trip_reader_release(reader, &batch);
         status =
             trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "render", "view", "interrupted") : 0;
