@@ -35,10 +35,10 @@ unsigned bench_planes(const session *s, const trip_settings *settings)
     return planes;
 }
 
-static bool is_occluded(void *user, const trip_selection *selection, uint32_t brick)
+static bool is_occluded(void *user, const trip_selection *selection, const trip_run *run)
 {
     trip_renderer *occluder = *(trip_renderer **)user;
-    return occluder && trip_cpu_occluded(occluder, selection, brick);
+    return occluder && trip_cpu_occluded(occluder, selection, run);
 }
 
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,

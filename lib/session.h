@@ -57,7 +57,7 @@ typedef struct session_reader {
     int threads;
     bool cache;              /* keep pages for the frames to come */
     trip_renderer *renderer; /* whose memory the ring lies in where it has such; NULL: in none's */
-    bool (*skip)(void *user, const trip_selection *selection, uint32_t brick);
+    bool (*skip)(void *user, const trip_selection *selection, const trip_run *run);
     void *skip_user;
 } session_reader;
 

@@ -122,7 +122,7 @@ static bool place(trip_planner *p, trip_extent *e)
 
 static bool skip_run(trip_planner *p)
 {
-    if (!p->skip || !p->skip(p->skip_user, selection_of(p), p->run.brick))
+    if (!p->skip || !p->skip(p->skip_user, selection_of(p), &p->run))
         return false;
     trip_piece piece = piece_of(p);
     for (int plane = 0; plane < TRIP_PLANES; plane++)

@@ -44,7 +44,7 @@ typedef struct trip_planner {
     unsigned planes; /* bit per trip_plane to read */
     size_t normal_bytes;
     size_t page_bytes, slot_bytes, gap_bytes;
-    bool (*skip)(void *user, const trip_selection *s, uint32_t brick);
+    bool (*skip)(void *user, const trip_selection *s, const trip_run *run);
     void *skip_user;
     bool one_piece; /* an extent has no more: it is of one list */
     uint64_t runs_skipped, bytes_skipped;

@@ -214,7 +214,7 @@ static int load_list(trip_reader *r, const trip_list *list)
 /* For the null engine: passes that leave everything in the cache. */
 static int load_lists(trip_reader *r)
 {
-    bool (*skip)(void *, const trip_selection *, uint32_t) = r->params.skip;
+    bool (*skip)(void *, const trip_selection *, const trip_run *) = r->params.skip;
     int status = TRIP_OK;
     r->params.skip = NULL;
     for (unsigned i = 0; i < r->data->list_count && status == TRIP_OK; i++)

@@ -35,9 +35,9 @@ typedef struct trip_reader_params {
      * slot_bytes, which are a multiple of the page size and not too few for a run. It is read into
      * until trip_reader_destroy() returns. NULL: taken from the budget. */
     void *const *slot_memory;
-    /* Called right before a run's bytes are requested; true: it is occluded by saturated pixels,
-     * and left out. On the thread that calls begin and next. */
-    bool (*skip)(void *user, const trip_selection *s, uint32_t brick);
+    /* Called right before a run's bytes are requested; true: it cannot matter any more, as where
+     * saturated pixels occlude it, and is left out. On the thread that calls begin and next. */
+    bool (*skip)(void *user, const trip_selection *s, const trip_run *run);
     void *skip_user;
     /* For tests: given the bytes that a read has put at `data` from `offset` on and its result (a
      * count or -errno), returns the result to go on with; may wait, and change the bytes. Called on

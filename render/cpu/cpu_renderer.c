@@ -322,7 +322,7 @@ static const trip_renderer_ops cpu_ops = {
     .stats = stats,
 };
 
-bool trip_cpu_occluded(void *renderer, const trip_selection *selection, uint32_t brick)
+bool trip_cpu_occluded(void *renderer, const trip_selection *selection, const trip_run *run)
 {
     trip_cpu *r = renderer;
     if (r->base.ops != &cpu_ops || !r->in_layer || selection->list->axis != r->view.axis ||
@@ -330,7 +330,7 @@ bool trip_cpu_occluded(void *renderer, const trip_selection *selection, uint32_t
         return false;
     const trip_cpu_view *view = &r->views[selection->list->index];
     trip_cpu_box box =
-        trip_cpu_brick_box(view, brick, selection->sheet_first, selection->sheet_last);
+        trip_cpu_brick_box(view, run->brick, selection->sheet_first, selection->sheet_last);
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
 

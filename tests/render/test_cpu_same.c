@@ -175,7 +175,7 @@ static void draw_pieces(frame_by_hand *f, const trip_batch *batch, size_t piece,
         for (n = 0; n < piece && i + n < batch->run_count; n++)
             f->splats += some.runs[n].count;
         some.run_count = n;
-        if (skip && trip_cpu_occluded(f->renderer, batch->pass->selections, some.runs->brick)) {
+        if (skip && trip_cpu_occluded(f->renderer, batch->pass->selections, some.runs)) {
             f->occluded += some.runs->count;
             continue;
         }

@@ -328,10 +328,10 @@ static void memory_that_reads_do_not_land_in_is_found_out(void **state)
 }
 
 /* Counts its calls, and skips no brick. */
-static bool count_calls(void *user, const trip_selection *s, uint32_t brick)
+static bool count_calls(void *user, const trip_selection *s, const trip_run *run)
 {
     (void)s;
-    (void)brick;
+    (void)run;
     ++*(unsigned *)user;
     return false;
 }
@@ -679,10 +679,10 @@ static long pace_read(void *user, void *data, uint64_t offset, size_t bytes, lon
     return result;
 }
 
-static bool pace_plan(void *user, const trip_selection *s, uint32_t brick)
+static bool pace_plan(void *user, const trip_selection *s, const trip_run *run)
 {
     (void)s;
-    (void)brick;
+    (void)run;
     usleep(((pace *)user)->plan_us);
     return false;
 }
@@ -813,11 +813,11 @@ static void pages_at_the_borders_of_slots_are_read_once(void **state)
     close_fixture(&f, d);
 }
 
-static bool skip_odd(void *user, const trip_selection *s, uint32_t brick)
+static bool skip_odd(void *user, const trip_selection *s, const trip_run *run)
 {
     (void)s;
     ++*(int *)user;
-    return brick % 2;
+    return run->brick % 2;
 }
 
 static void skipped_bricks_are_left_out_and_counted(void **state)
