@@ -172,8 +172,11 @@ static int make_fitted(trip_found_view *v, const triptych_view *o, const session
 {
     trip_visible visible = { .data = s->data, .budget = s->budget };
     trip_outline *outline = NULL;
+    session_reader with = *wanted;
+    with.skip = trip_visible_skip;
+    with.skip_user = &visible;
     trip_dataset_kept_bounds(s->data, visible.lo, visible.hi);
-    int status = session_make_reader(s, &visible.reader, wanted);
+    int status = session_make_reader(s, &visible.reader, &with);
     if (status)
         return status;
     trip_visible_start(&visible, s->table, false);

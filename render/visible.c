@@ -14,17 +14,20 @@ enum { AXIS = 2 }; /* the list that is read; all hold the same voxels */
 typedef struct form {
     trip_vec3 normal;
     double offset, around;
-    double per_voxel; /* how fast it grows at most */
-    double slack;     /* more than rounding makes of a bound; 0 where bounds are exact */
-    double best;      /* found so far */
-    double step;      /* bounds are looked at in steps, the largest first */
-    double read;      /* all bricks that may reach this were read */
-    double left;      /* the farthest that any other may reach */
+    double per_voxel;         /* how fast it grows at most */
+    double slack;             /* more than rounding makes of a bound; 0 where bounds are exact */
+    double best;              /* found so far, */
+    trip_visible_place where; /* there */
+    double step;              /* bounds are looked at in steps, the largest first */
+    double left;              /* the farthest that bricks which were not read may reach, */
+    double from;              /* and what those reach at least that are read next */
 } form;
 
-typedef struct search {
+typedef struct trip_visible_search {
     trip_visible *visible;
-    const trip_list *list; /* that is being read */
+    const trip_list *list;     /* that is being read */
+    trip_selection open;       /* those of its bricks that were not read and may matter */
+    trip_selection *selection; /* those that are read next */
     trip_vec3 across[2];
     double from[2];
     int count;
@@ -135,62 +138,68 @@ static form make_form(const search *s, trip_vec3 normal, double offset, double a
     };
 }
 
-/* The bounds of a brick that may matter: false when it holds nothing visible or was read. */
-static bool bound_brick(const search *s, const trip_file_brick *b, const trip_file_slab *slab,
-                        double *bounds)
+/* The bounds of an open brick; false, and it is open no more, when it reaches no farther than what
+ * was found. */
+static bool bound_brick(search *s, uint64_t index, const trip_file_slab *slab, double *bounds)
 {
-    if (!some_visible(s->visible, b->code_min, b->code_max))
-        return false;
-    trip_brick_box place = trip_brick_box_of(&s->visible->data->header, slab, b);
+    const trip_brick_box place =
+        trip_brick_box_of(&s->visible->data->header, slab, &s->list->bricks[index]);
+    bool open = false;
     for (int i = 0; i < s->count; i++) {
         bounds[i] = bound(s, &s->forms[i], &place);
-        if (bounds[i] >= s->forms[i].read)
-            return false;
+        open |= bounds[i] > s->forms[i].best;
     }
-    return true;
+    if (!open)
+        trip_selection_remove(&s->open, index);
+    return open;
 }
 
-/* How far bricks that were not read may reach. */
-static void look_ahead(search *s)
+/* Calls `each` for all bricks that are open. */
+static void each_open(search *s, void (*each)(search *s, uint64_t index, const double *bounds))
 {
     const trip_list *list = s->list;
     double bounds[TRIP_REACHES_MAX];
-    for (int i = 0; i < s->count; i++)
-        s->forms[i].left = -INFINITY;
     for (const trip_file_slab *slab = list->slabs; slab < list->slabs + list->slab_count; slab++)
-        for (uint32_t b = 0; b < slab->brick_count; b++)
-            if (bound_brick(s, &list->bricks[slab->first_brick + b], slab, bounds))
-                for (int i = 0; i < s->count; i++)
-                    s->forms[i].left = fmax(s->forms[i].left, bounds[i]);
+        for (uint64_t b = slab->first_brick; b < slab->first_brick + slab->brick_count; b++)
+            if (trip_selection_has(&s->open, b) && bound_brick(s, b, slab, bounds))
+                each(s, b, bounds);
+}
+
+static void look_ahead_at(search *s, uint64_t index, const double *bounds)
+{
+    (void)index;
+    for (int i = 0; i < s->count; i++)
+        s->forms[i].left = fmax(s->forms[i].left, bounds[i]);
+}
+
+static void select_brick(search *s, uint64_t index, const double *bounds)
+{
+    bool wanted = false;
+    for (int i = 0; i < s->count; i++)
+        wanted |= bounds[i] >= s->forms[i].from;
+    if (!wanted)
+        return;
+    trip_selection_add(s->selection, index);
+    trip_selection_remove(&s->open, index);
 }
 
 /* Selects those that reach the farthest; false when none may reach farther than what was found. */
 static bool select_bricks(search *s, trip_selection *selection)
 {
-    const trip_list *list = s->list;
-    double from[TRIP_REACHES_MAX], bounds[TRIP_REACHES_MAX];
+    const double tile = (double)(1u << s->visible->data->header.tile_log2);
     bool some = false;
+    for (int i = 0; i < s->count; i++)
+        s->forms[i].left = -INFINITY;
+    each_open(s, look_ahead_at);
     for (int i = 0; i < s->count; i++) {
         form *f = &s->forms[i];
-        bool open = f->left > f->best;
-        from[i] = open ? fmax(f->left - f->step, nextafter(f->best, INFINITY)) : f->read;
-        f->step *= 2;
-        some |= open;
+        f->from = fmax(f->left - f->step, nextafter(f->best, INFINITY));
+        f->step = f->step > 0 ? 2 * f->step : f->per_voxel * tile;
+        some |= f->left > f->best;
     }
-    for (uint64_t k = 0; some && k < list->slab_count; k++) {
-        const trip_file_slab *slab = &list->slabs[k];
-        for (uint32_t b = 0; b < slab->brick_count; b++) {
-            uint64_t index = slab->first_brick + b;
-            bool wanted = false;
-            if (bound_brick(s, &list->bricks[index], slab, bounds))
-                for (int i = 0; i < s->count; i++)
-                    wanted |= bounds[i] >= from[i];
-            if (wanted)
-                trip_selection_add(selection, index);
-        }
-    }
-    for (int i = 0; i < s->count; i++)
-        s->forms[i].read = from[i];
+    s->selection = selection;
+    if (some)
+        each_open(s, select_brick);
     return some;
 }
 
@@ -204,12 +213,32 @@ static unsigned forms_beyond(const search *s, const trip_brick_box *place)
     return beyond;
 }
 
-/* So many voxels along u and v from a corner in the run's tile on. */
-static trip_brick_box box_at(const trip_run *run, uint32_t corner, unsigned side)
+/* The voxels of a brick in a sheet lie there. */
+static trip_brick_box run_box(const trip_list *list, const trip_run *run)
 {
+    const trip_file_brick *b = &list->bricks[run->brick];
+    return (trip_brick_box){ { run->u + b->u_min, run->v + b->v_min, run->sheet },
+                             { run->u + b->u_max, run->v + b->v_max, run->sheet } };
+}
+
+static trip_brick_box square_box(const trip_run *run, const trip_square *square)
+{
+    const uint32_t corner = trip_square_corner(square);
     const double u = run->u + (double)trip_voxel_u(corner);
     const double v = run->v + (double)trip_voxel_v(corner);
-    return (trip_brick_box){ { u, v, run->sheet }, { u + side - 1, v + side - 1, run->sheet } };
+    return (trip_brick_box){ { u, v, run->sheet }, { u + 7, v + 7, run->sheet } };
+}
+
+static void look_at_voxel(search *s, unsigned forms, const trip_visible_place *at)
+{
+    for (; forms; forms &= forms - 1) {
+        form *f = &s->forms[__builtin_ctz(forms)];
+        const double value = value_at(s, f, at->u, at->v, at->sheet);
+        if (value > f->best) {
+            f->best = value;
+            f->where = *at;
+        }
+    }
 }
 
 static void look_at_square(search *s, const trip_run *run, const trip_block *block,
@@ -219,32 +248,37 @@ static void look_at_square(search *s, const trip_run *run, const trip_block *blo
     trip_square_voxels(block, square, voxels);
     s->visible->splats += square->count;
     for (uint32_t n = 0; n < square->count; n++) {
-        if (!is_visible(s->visible, trip_voxel_code(voxels[n])))
-            continue;
-        const double u = run->u + (double)trip_voxel_u(voxels[n]);
-        const double v = run->v + (double)trip_voxel_v(voxels[n]);
-        for (unsigned rest = forms; rest; rest &= rest - 1) {
-            form *f = &s->forms[__builtin_ctz(rest)];
-            const double value = value_at(s, f, u, v, run->sheet);
-            f->best = value > f->best ? value : f->best;
-        }
+        const trip_visible_place at = { run->u + (double)trip_voxel_u(voxels[n]),
+                                        run->v + (double)trip_voxel_v(voxels[n]), run->sheet,
+                                        trip_voxel_code(voxels[n]) };
+        if (is_visible(s->visible, at.code))
+            look_at_voxel(s, forms, &at);
     }
 }
 
 /* Squares that reach no farther than what was found are left out: most of them are. */
 static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
 {
-    const trip_brick_box all = box_at(run, 0, 1u << s->visible->data->header.tile_log2);
+    const trip_brick_box all = run_box(s->list, run);
     if (!forms_beyond(s, &all))
         return;
     const trip_block block = trip_block_of(batch, run);
     const uint32_t count = trip_block_squares(&block, s->squares);
     for (uint32_t i = 0; i < count; i++) {
-        const trip_brick_box place = box_at(run, trip_square_corner(&s->squares[i]), 8);
+        const trip_brick_box place = square_box(run, &s->squares[i]);
         const unsigned forms = forms_beyond(s, &place);
         if (forms)
             look_at_square(s, run, &block, &s->squares[i], forms);
     }
+}
+
+bool trip_visible_skip(void *user, const trip_selection *selection, const trip_run *run)
+{
+    const search *s = ((const trip_visible *)user)->search;
+    if (!s)
+        return false;
+    const trip_brick_box place = run_box(selection->list, run);
+    return !forms_beyond(s, &place);
 }
 
 static int read_selected(search *s, const trip_selection *selection)
@@ -263,30 +297,54 @@ static int read_selected(search *s, const trip_selection *selection)
     return status;
 }
 
-/* The farthest first: most often what they hold reaches farther than all others may. */
+static int open_bricks(search *s, const trip_list *list)
+{
+    const trip_visible *v = s->visible;
+    int status = trip_selection_create(&s->open, v->data, list, false, 0, INT32_MAX, v->budget);
+    for (uint64_t b = 0; b < list->brick_count && !status; b++)
+        if (some_visible(v, list->bricks[b].code_min, list->bricks[b].code_max))
+            trip_selection_add(&s->open, b);
+    return status;
+}
+
+/* The farthest first, at first those alone: most often what they hold reaches farther than most
+ * others may. */
 static int find_in_list(search *s, const trip_list *list)
 {
     const trip_visible *v = s->visible;
     trip_selection selection;
-    int status = 0;
     s->list = list;
-    for (int i = 0; i < s->count; i++) {
-        form *f = &s->forms[i];
-        f->step = f->per_voxel * (double)(1u << v->data->header.tile_log2) / 4;
-        f->read = INFINITY;
-    }
+    for (int i = 0; i < s->count; i++)
+        s->forms[i].step = 0;
+    int status = open_bricks(s, list);
     for (bool more = true; more && !status;) {
         status = trip_selection_create(&selection, v->data, list, false, 0, INT32_MAX, v->budget);
         if (status)
-            return status;
-        look_ahead(s);
+            break;
         more = select_bricks(s, &selection);
         if (more)
             status = read_selected(s, &selection);
         trip_reader_begin(v->reader, NULL); /* nothing is read of it any more */
         trip_selection_destroy(&selection, v->budget);
     }
+    trip_selection_destroy(&s->open, v->budget);
     return status;
+}
+
+static void begin_with_places(search *s)
+{
+    const trip_visible *v = s->visible;
+    for (unsigned i = 0; i < v->place_count && i < TRIP_VISIBLE_PLACES; i++)
+        if (is_visible(v, v->places[i].code))
+            look_at_voxel(s, (1u << s->count) - 1, &v->places[i]);
+}
+
+static void keep_places(const search *s)
+{
+    trip_visible *v = s->visible;
+    for (int i = 0; i < s->count; i++)
+        if (s->forms[i].best > -INFINITY)
+            v->places[v->place_count++ % TRIP_VISIBLE_PLACES] = s->forms[i].where;
 }
 
 /* What one list shows need not be looked for in the next where that reaches no farther. */
@@ -294,8 +352,12 @@ static int find(search *s)
 {
     const trip_list *list = NULL;
     int status = 0;
+    begin_with_places(s);
+    s->visible->search = s;
     while (!status && (list = trip_dataset_next(s->visible->data, list, AXIS, 0, TRIP_KIND_VOXELS)))
         status = find_in_list(s, list);
+    s->visible->search = NULL;
+    keep_places(s);
     return status;
 }
 

@@ -1,6 +1,7 @@
 /* How far the voxels that a transfer function shows reach in given directions: the greatest values
  * of convex functions over all of them, exactly, whatever the tiles. Bricks that cannot reach
- * farther than what was found are not read: mostly a small part of one list is. One thread.
+ * farther than what was found are not read, nor sheets of them: mostly a small part of one list is.
+ * One thread.
  *
  * A voxel counts as visible together with others when a ray that met its like along a sixteenth of
  * the data set's diagonal would lose at least 1/255 of its light: fainter ones are seen where many
@@ -13,10 +14,18 @@
 #include "reader.h"
 #include "transfer_function.h"
 
+enum { TRIP_VISIBLE_PLACES = 32 };
+
+/* Of a voxel. */
+typedef struct trip_visible_place {
+    double u, v, sheet;
+    unsigned code;
+} trip_visible_place;
+
 typedef struct trip_visible {
     /* Set by the caller, and outliving this. */
     const trip_dataset *data;
-    trip_reader *reader; /* of voxels, no pass under way */
+    trip_reader *reader; /* of voxels, no pass under way; it may skip by trip_visible_skip() */
     trip_budget *budget;
     double kernel_radius; /* voxels: how far beyond their voxel splats count as reaching */
     double lo[3], hi[3];  /* bounds of all splats in index space */
@@ -24,11 +33,19 @@ typedef struct trip_visible {
     bool alone;           /* which of them count: trip_visible_start() */
     uint64_t splats;      /* looked at so far */
     uint64_t codes[1024]; /* a bit a code: whether its voxels are visible */
+    /* Where earlier searches ended, the last ones: later ones begin with what reaches far there. */
+    trip_visible_place places[TRIP_VISIBLE_PLACES];
+    unsigned place_count;                     /* so far */
+    const struct trip_visible_search *search; /* under way; NULL: none */
 } trip_visible;
 
 /* After the caller's part is set. `table` as filled for the data set. Those visible alone count, or
  * all that are visible together with others. */
 void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone);
+
+/* For trip_reader_params.skip, `user` being the trip_visible: what reaches no farther than what was
+ * found is left out. */
+bool trip_visible_skip(void *user, const trip_selection *selection, const trip_run *run);
 
 /* Bounds of the visible voxels in index space, without kernels. */
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);

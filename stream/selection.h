@@ -66,6 +66,11 @@ static inline void trip_selection_add(trip_selection *s, uint64_t brick)
     s->bricks[brick / 64] |= UINT64_C(1) << (brick % 64);
 }
 
+static inline void trip_selection_remove(trip_selection *s, uint64_t brick)
+{
+    s->bricks[brick / 64] &= ~(UINT64_C(1) << (brick % 64));
+}
+
 static inline bool trip_selection_has(const trip_selection *s, uint64_t brick)
 {
     return s->bricks[brick / 64] >> (brick % 64) & 1;
