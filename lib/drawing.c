@@ -311,8 +311,12 @@ static int plan_frame(triptych *t)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
         return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
-    status = trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
-                                 s->table, session_classified(s, t->level), s->budget);
+    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST ||
+        !trip_settings_has_levels(&t->drawn_settings)) /* such frames have all the memory */
+        trip_mean_tables_release(&s->mean_tables, s->budget);
+    status =
+        trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
+                            s->table, session_classified(s, t->level), &s->mean_tables, s->budget);
     t->plan.level = t->level;
     return status;
 }
@@ -408,6 +412,8 @@ static void end(triptych *t)
         trip_frame_end(&t->drawing);
     if (t->begun)
         trip_plan_release(&t->plan, t->session.budget);
+    if (t->begun)
+        session_keep_tables(&t->session);
     t->begun = t->drawn = false;
 }
 

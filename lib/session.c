@@ -99,6 +99,13 @@ trip_classification *session_classified(session *s, unsigned level)
     return c;
 }
 
+void session_keep_tables(session *s)
+{
+    enum { SMALL_PART = 8 };
+    if (trip_mean_tables_bytes(&s->mean_tables) > trip_budget_left_bytes(s->budget) / SMALL_PART)
+        trip_mean_tables_release(&s->mean_tables, s->budget);
+}
+
 int session_use_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
@@ -106,6 +113,7 @@ int session_use_function(session *s, const session_look *look)
     int status = session_read_text(s);
     for (int i = 0; i < 2; i++)
         trip_classification_forget_form(&s->classified[i]);
+    trip_mean_tables_release(&s->mean_tables, s->budget);
     if (!status && !s->table)
         status = take_table(s);
     if (!status)
@@ -163,6 +171,7 @@ int session_add_data(session *s, const char *input)
     trip_dataset_join_close(s->joined);
     s->data = s->joined = joined;
     memset(s->classified, 0, sizeof s->classified);
+    trip_mean_tables_release(&s->mean_tables, s->budget);
     return 0;
 }
 
@@ -176,6 +185,8 @@ void session_close(session *s)
 {
     if (s->table)
         trip_budget_release(s->budget, s->table, table_bytes);
+    if (s->budget)
+        trip_mean_tables_release(&s->mean_tables, s->budget);
     trip_dataset_join_close(s->joined);
     for (unsigned i = 0; i < s->part_count; i++) {
         trip_dataset_text_destroy(s->texts[i]);

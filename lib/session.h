@@ -22,6 +22,7 @@ typedef struct session {
     /* Of frames before, by whether their level is odd: a frame may have two, one above the other.
      */
     trip_classification classified[2];
+    trip_mean_tables mean_tables; /* the same: they may be kept for the next frame */
     unsigned classified_level[2];
 } session;
 
@@ -43,6 +44,9 @@ int session_add_data(session *s, const char *input);
 int session_read_text(session *s);
 /* Its function, from now on: reads the text and takes the table where they are not there yet. */
 int session_use_function(session *s, const session_look *look);
+/* Between frames: keeps the tables of coarse levels where they are a small part of the memory that
+ * is left. */
+void session_keep_tables(session *s);
 /* What is known of frames that are drawn from a level of its data with its function. */
 trip_classification *session_classified(session *s, unsigned level);
 /* Both. Warns when the function shows values that were left out when the data set was made, with

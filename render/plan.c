@@ -6,13 +6,10 @@
 #include "effects.h"
 #include "field.h"
 #include "plan_cull.h"
-#include "mean.h"
 #include "report.h"
 #include "shade.h"
 #include "sheet.h"
 #include "weight.h"
-
-enum { TABLE_ENTRIES = 65536 };
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
 
@@ -23,6 +20,7 @@ typedef struct planning {
     const trip_camera *camera;
     const trip_settings *settings;
     const trip_tf_entry *table;
+    trip_mean_tables *tables; /* the plan's own, or those of frames before */
     trip_budget *budget;
     trip_classification *classified; /* by frames before */
     trip_brick_ranges *about;        /* post: of the lists along the axis at hand; else NULL */
@@ -252,35 +250,6 @@ static void place_clip(const planning *p, const trip_list *list, trip_plan_list 
     trip_clip_simplify(&planned->clip, dims);
 }
 
-/* What codes of means look like: their value as the function shows it, with the extinction by which
- * a splat shows the part of its cube that was kept. */
-static int make_table(const planning *p, const trip_list *list, trip_plan_list *planned)
-{
-    const trip_affine *map = &list->index_to_world;
-    const int a = list->axis;
-    const double length = trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a]));
-    trip_tf_entry *to = planned->own_table =
-        trip_budget_take(p->budget, TABLE_ENTRIES * sizeof *to);
-    if (!to)
-        return trip_fail(TRIP_ERROR, "render", "plan",
-                         "tables of coarse levels do not fit the memory given; raise --memory");
-    const trip_file_header *h = &p->data->header;
-    const trip_mean_scale scale =
-        trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
-    double extinctions[TRIP_MEAN_SHARES] = { 0 };
-    float of_mean = 0;
-    for (unsigned code = 0; code < TABLE_ENTRIES; code++) {
-        to[code] = p->table[trip_mean_value(&scale, code)];
-        if (to[code].extinction != of_mean) {
-            of_mean = to[code].extinction;
-            trip_mean_extinctions((double)of_mean, length, extinctions);
-        }
-        to[code].extinction = (float)extinctions[code % TRIP_MEAN_SHARES];
-    }
-    planned->table = to;
-    return 0;
-}
-
 /* The view in a list's own index space. */
 static int place_list(const planning *p, const trip_list *list)
 {
@@ -292,7 +261,8 @@ static int place_list(const planning *p, const trip_list *list)
     int status = trip_list_grid_make(&planned->grid, p->data, list);
     if (!status && trip_kind_of(list->kind)->axis_bits > 0 &&
         p->plan->lod.chosen >> list->level & 1)
-        status = make_table(p, list, planned);
+        status =
+            trip_mean_tables_get(p->tables, p->data, list, p->table, p->budget, &planned->table);
     if (status)
         return status;
     planned->camera = *p->camera;
@@ -401,14 +371,22 @@ int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera 
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
     return trip_plan_make_next(plan, data, camera, settings, table, &(trip_classification){ 0 },
-                               budget);
+                               NULL, budget);
 }
 
 int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                         const trip_settings *settings, const trip_tf_entry *table,
-                        trip_classification *classified, trip_budget *budget)
+                        trip_classification *classified, trip_mean_tables *tables,
+                        trip_budget *budget)
 {
-    const planning p = { plan, data, camera, settings, table, budget, classified, NULL };
+    const planning p = { .plan = plan,
+                         .data = data,
+                         .camera = camera,
+                         .settings = settings,
+                         .table = table,
+                         .tables = tables ? tables : &plan->own_tables,
+                         .budget = budget,
+                         .classified = classified };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .planes = planes_of(data, settings) };
@@ -489,7 +467,9 @@ static unsigned planes_gathered(const trip_dataset *data, const trip_settings *s
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                          const trip_settings *settings, unsigned kinds, trip_budget *budget)
 {
-    const planning p = { plan, data, camera, settings, NULL, budget, NULL, NULL };
+    const planning p = {
+        .plan = plan, .data = data, .camera = camera, .settings = settings, .budget = budget
+    };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .gathers = true,
@@ -512,10 +492,7 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
     size_t count = plan->list_count;
     for (unsigned i = 0; i < plan->selection_count; i++)
         trip_selection_destroy(&plan->selections[i], budget);
-    for (unsigned i = 0; plan->lists && i < count; i++)
-        if (plan->lists[i].own_table)
-            trip_budget_release(budget, plan->lists[i].own_table,
-                                TABLE_ENTRIES * sizeof(trip_tf_entry));
+    trip_mean_tables_release(&plan->own_tables, budget);
     trip_lod_release(&plan->lod, budget);
     trip_budget_release(budget, plan->selections, 2 * count * sizeof *plan->selections);
     trip_budget_release(budget, plan->lists, count * sizeof *plan->lists);

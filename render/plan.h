@@ -9,6 +9,7 @@
 #include "classification.h"
 #include "list_grid.h"
 #include "lod.h"
+#include "mean_tables.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
@@ -22,7 +23,6 @@ typedef struct trip_plan_list {
     trip_clip clip;      /* of its voxels, in its own index space */
     bool by_level;       /* of its voxels those are drawn that trip_plan.lod says */
     const trip_tf_entry *table; /* of 65536: what its codes look like */
-    trip_tf_entry *own_table;   /* the same where it is not the frame's; from the budget */
     uint64_t bricks, bricks_selected;
     uint64_t bricks_outside, bricks_without_weight, bricks_transparent, bricks_of_other_levels,
         bricks_clipped; /* why left out */
@@ -58,7 +58,8 @@ typedef struct trip_plan {
     unsigned list_count;
     trip_plan_list *lists; /* by the data set's lists */
     trip_plan_layer layers[3];
-    trip_selection *selections; /* of all passes: room for two a list */
+    trip_mean_tables own_tables; /* of coarse levels, where the caller keeps none */
+    trip_selection *selections;  /* of all passes: room for two a list */
     unsigned selection_count;
 } trip_plan;
 
@@ -66,11 +67,13 @@ typedef struct trip_plan {
  * transparent are left out. */
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget);
-/* The same after other frames of the data set, with what is known from them in `classified`; what
- * is known after this one is put there. */
+/* The same after other frames of the data set, with what is known from them in `classified` and
+ * `tables`; what is known after this one is put there. `tables` stay there until the plan is
+ * released; NULL: the plan has its own. */
 int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                         const trip_settings *settings, const trip_tf_entry *table,
-                        trip_classification *classified, trip_budget *budget);
+                        trip_classification *classified, trip_mean_tables *tables,
+                        trip_budget *budget);
 /* For the integral renderer: one pass over all of the list of level 0 along z, whatever the view
  * and the function. `kinds` has a bit for each trip_kind that is read; 0: nothing is. */
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,

@@ -336,7 +336,7 @@ static void check_tables(const scene *s, const trip_plan *plan, bool seen[LEVELS
         if (!plan->lists[i].drawn)
             continue;
         const bool own = list->level > 0 && is_chosen(&plan->lod, list->level);
-        assert_int_equal(plan->lists[i].own_table != NULL, own);
+        assert_int_equal(plan->lists[i].table != s->table, own);
         if (!own)
             continue;
         double depth = (double)plan->lists[i].table[code].extinction * length;
@@ -364,6 +364,39 @@ static void tables_of_means_have_their_opacity(void **state)
     }
     for (unsigned level = 0; level <= LEVELS; level++)
         assert_true(seen[level]);
+    scene_destroy(&s);
+}
+
+/* One for the three axes, whose cubes are as long; the next frame has the same. */
+static void tables_are_kept_where_the_caller_keeps_them(void **state)
+{
+    (void)state;
+    scene s;
+    trip_camera c;
+    trip_plan plan, alone;
+    trip_classification known = { 0 };
+    trip_mean_tables kept = { 0 };
+    create(&s, 64, 0.5);
+    const trip_camera_params view = view_along(&s);
+    assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    const trip_settings settings = settings_at(100);
+    unsigned count = 0;
+    for (int frame = 0; frame < 2; frame++) {
+        assert_int_equal(
+            trip_plan_make_next(&plan, s.data, &c, &settings, s.table, &known, &kept, s.budget), 0);
+        assert_int_equal(trip_plan_make(&alone, s.data, &c, &settings, s.table, s.budget), 0);
+        assert_true(kept.count > 0 && kept.count <= LEVELS);
+        assert_true(frame == 0 || kept.count == count);
+        count = kept.count;
+        for (unsigned i = 0; i < s.data->list_count; i++)
+            if (plan.lists[i].drawn)
+                assert_memory_equal(plan.lists[i].table, alone.lists[i].table,
+                                    65536 * sizeof(trip_tf_entry));
+        trip_plan_release(&plan, s.budget);
+        trip_plan_release(&alone, s.budget);
+    }
+    trip_mean_tables_release(&kept, s.budget);
+    assert_int_equal(trip_mean_tables_bytes(&kept), 0);
     scene_destroy(&s);
 }
 
@@ -487,6 +520,7 @@ int main(void)
         cmocka_unit_test(interpolated_fog_is_as_thick_at_a_coarse_level),
         cmocka_unit_test(shading_is_as_strong_at_a_coarse_level),
         cmocka_unit_test(tables_of_means_have_their_opacity),
+        cmocka_unit_test(tables_are_kept_where_the_caller_keeps_them),
         cmocka_unit_test(bounds_are_kept_and_what_is_nearest_is_finest),
         cmocka_unit_test(tiles_make_no_difference_to_bounds),
         cmocka_unit_test(values_of_a_level_are_an_eighth),

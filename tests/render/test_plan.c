@@ -398,7 +398,7 @@ static void what_is_known_of_a_function_is_kept_from_plan_to_plan(void **state)
         settings.effects.cueing = i == 2 ? 0.5 : 0;
         settings.kernel = i == 5 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_LINEAR;
         assert_int_equal(
-            trip_plan_make_next(&plan, s.data, &c, &settings, s.table, &known, s.budget), 0);
+            trip_plan_make_next(&plan, s.data, &c, &settings, s.table, &known, NULL, s.budget), 0);
         assert_int_equal(plan.not_closed, i == 2  ? TRIP_CLOSED_FORM_EFFECTS
                                           : i < 4 ? TRIP_CLOSED_FORM_FOUND
                                                   : TRIP_CLOSED_FORM_EXTINCTION);
