@@ -5,6 +5,8 @@
 /* What a frame's sums keep when the next is noted. */
 static const double kept = 0.7;
 
+#define MOST_GROWTH 3.0
+
 void trip_pace_note(trip_pace *p, double pixels, double ms)
 {
     const double x = pixels * 1e-6;
@@ -13,18 +15,22 @@ void trip_pace_note(trip_pace *p, double pixels, double ms)
     p->px_px = p->px_px * kept + x * x;
     p->ms = p->ms * kept + ms;
     p->px_ms = p->px_ms * kept + x * ms;
+    p->ms_ms = p->ms_ms * kept + ms * ms;
 }
 
-/* The line of least squares through the frames: ms = fixed + slope * megapixels, neither below 0.
- * From frames of one size the two do not follow: all is then taken to be of pixels. */
+/* The line of least squares through the frames: ms = fixed + slope * megapixels, neither below 0,
+ * as steep as it may be where frames scatter about it: by its standard error more. From frames of
+ * one size the two do not follow: all is then taken to be of pixels. */
 static void fit(const trip_pace *p, double *fixed, double *slope)
 {
     const double mean_px = p->px / p->weight, mean_ms = p->ms / p->weight;
     const double variance = p->px_px / p->weight - mean_px * mean_px;
     const double both = p->px_ms / p->weight - mean_px * mean_ms;
     const double most = mean_ms / mean_px;
-    *slope = variance > 1e-4 * mean_px * mean_px ? both / variance : most;
-    *slope = fmin(fmax(*slope, 0), most);
+    const double rest = p->ms_ms / p->weight - mean_ms * mean_ms - both * both / variance;
+    const double error = sqrt(fmax(rest, 0) / (variance * p->weight));
+    *slope = variance > 1e-4 * mean_px * mean_px ? fmax(both / variance, 0) + error : most;
+    *slope = fmin(*slope, most);
     *fixed = fmax(mean_ms - *slope * mean_px, 0);
 }
 
@@ -45,6 +51,7 @@ double trip_pace_scale(const trip_pace *p, double pixels, double target_ms)
     fit(p, &fixed, &slope);
     const double left = fmax(target_ms - fixed, fixed / 4);
     const double all = slope * pixels * 1e-6;
-    const double part = all > left ? sqrt(left / all) : 1;
+    const double known = MOST_GROWTH * 1e6 * p->px / p->weight;
+    const double part = sqrt(fmin(fmin(all > left ? left / all : 1, known / pixels), 1));
     return fmin(fmax(part, TRIP_PACE_LEAST), 1);
 }

@@ -9,7 +9,7 @@ extern "C" {
 
 /* Zeroed at first: nothing is known. Sums over the frames noted, of which older ones count less. */
 typedef struct trip_pace {
-    double weight, px, px_px, ms, px_ms;
+    double weight, px, px_px, ms, px_ms, ms_ms;
 } trip_pace;
 
 /* A frame of so many pixels took so long. */
@@ -22,7 +22,8 @@ double trip_pace_expect_ms(const trip_pace *p, double pixels);
 
 /* The part of the width and height of a picture of so many pixels with which a frame keeps to
  * `target_ms`, TRIP_PACE_LEAST to 1; a half where nothing is known. Where what every frame costs
- * leaves too little, pixels get a quarter of that cost: fewer would gain nothing. */
+ * leaves too little, pixels get a quarter of that cost: fewer would gain nothing. A frame has at
+ * most three times the pixels of those noted, in the mean: beyond them the cost is not known. */
 double trip_pace_scale(const trip_pace *p, double pixels, double target_ms);
 
 #ifdef __cplusplus

@@ -42,6 +42,24 @@ static void where_the_time_cannot_be_met_pixels_are_not_thrown_away(void **state
     assert_true(fabs(trip_pace_scale(&p, 1e6, 33) - sqrt(25.0 / 40)) < 1e-6);
 }
 
+/* The slower frames are the smaller ones, by chance: that is no reason for a large one. */
+static void frames_that_scatter_do_not_make_the_next_one_large(void **state)
+{
+    (void)state;
+    trip_pace p = { 0 };
+    const double pixels[] = { 21e3, 20e3, 22e3, 20e3, 21e3 }, ms[] = { 36, 43, 35, 41, 38 };
+    for (int i = 0; i < 5; i++)
+        trip_pace_note(&p, pixels[i], ms[i]);
+    const double part = trip_pace_scale(&p, 480e3, 33);
+    assert_true(part * part * 480e3 < 3.1 * 21e3);
+    trip_pace free = { 0 }; /* pixels cost nothing: it grows, step by step */
+    for (int i = 0; i < 8; i++) {
+        const double size = trip_pace_scale(&free, 480e3, 33);
+        trip_pace_note(&free, size * size * 480e3, 5);
+    }
+    assert_true(trip_pace_scale(&free, 480e3, 33) == 1);
+}
+
 /* Followed as a viewer does, from a start that says nothing, the time is met. */
 static void following_it_comes_to_the_time(void **state)
 {
@@ -62,6 +80,7 @@ int main(void)
         cmocka_unit_test(with_nothing_known_frames_are_half_as_wide),
         cmocka_unit_test(the_size_meets_the_time),
         cmocka_unit_test(where_the_time_cannot_be_met_pixels_are_not_thrown_away),
+        cmocka_unit_test(frames_that_scatter_do_not_make_the_next_one_large),
         cmocka_unit_test(following_it_comes_to_the_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
