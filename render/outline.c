@@ -136,12 +136,16 @@ static void fill_masses(summing *s)
         trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
     const double length = trip_length(column(m, AXIS));
     const double area = fabs(trip_affine_determinant(m)) / length;
-    for (unsigned code = 0; code < CODES; code++) {
-        unsigned value = s->list->level ? trip_mean_value(&scale, code) : code;
-        double extinction = (double)s->params->table[value].extinction;
+    double extinctions[TRIP_MEAN_SHARES];
+    for (unsigned code = 0; code < CODES; code += TRIP_MEAN_SHARES) {
+        const double of_mean = (double)s->params->table[trip_mean_value(&scale, code)].extinction;
         if (s->list->level)
-            extinction = trip_mean_extinction(code % TRIP_MEAN_SHARES, extinction, length);
-        s->mass[code] = -expm1(-extinction * length) * area;
+            trip_mean_extinctions(of_mean, length, extinctions);
+        for (unsigned i = 0; i < TRIP_MEAN_SHARES; i++) {
+            if (!s->list->level)
+                extinctions[i] = (double)s->params->table[code + i].extinction;
+            s->mass[code + i] = extinctions[i] > 0 ? -expm1(-extinctions[i] * length) * area : 0;
+        }
     }
 }
 
@@ -153,17 +157,18 @@ static bool some_has_mass(const summing *s, const trip_file_brick *b)
     return false;
 }
 
-/* What of the pixels from `first` on is covered by [lo, hi], as parts of its length. */
-static double part_in(int at, double lo, double hi)
+/* What of the pixel at `at` is covered by [lo, hi], as a part of its length. */
+static inline double part_in(int at, double lo, double hi)
 {
-    return (fmin(hi, at + 1) - fmax(lo, at)) / (hi - lo);
+    const double past = hi < at + 1 ? hi : at + 1, from = lo > at ? lo : at;
+    return (past - from) / (hi - lo);
 }
 
-static void add_to(pixel *p, double optical, double z)
+static inline void add_to(pixel *p, double optical, float z)
 {
-    p->depth += (uint64_t)(fmin(optical, MOST_OF_A_VOXEL) * UNIT);
-    p->nearest = fminf(p->nearest, (float)z);
-    p->farthest = fmaxf(p->farthest, (float)z);
+    p->depth += (uint64_t)((optical < MOST_OF_A_VOXEL ? optical : MOST_OF_A_VOXEL) * UNIT);
+    p->nearest = z < p->nearest ? z : p->nearest;
+    p->farthest = z > p->farthest ? z : p->farthest;
 }
 
 /* A voxel is drawn as a rectangle of its size. */
@@ -172,23 +177,26 @@ static void add_voxel(summing *s, double x, double y, double z, double mass)
     trip_outline *o = s->outline;
     const double scale = (o->parallel ? 1 : 1 / z) / o->pixel;
     const double at[2] = { x, y };
-    double lo[2], hi[2];
+    double lo[2], hi[2], columns[PIXELS];
     int first[2], last[2];
     if (!o->parallel && !(z > 0))
         return;
     for (int a = 0; a < 2; a++) {
         double middle = at[a] * scale - o->origin[a] / o->pixel;
-        double half = fmax(0.5 * s->width[a] * scale, 1e-6);
+        double half = 0.5 * s->width[a] * scale;
+        half = half > 1e-6 ? half : 1e-6;
         lo[a] = middle - half;
         hi[a] = middle + half;
-        first[a] = (int)fmax(0, floor(lo[a]));
-        last[a] = (int)fmin(o->size[a] - 1, floor(hi[a]));
+        first[a] = lo[a] > 0 ? lo[a] < PIXELS ? (int)lo[a] : PIXELS : 0;
+        last[a] = hi[a] < 0 ? -1 : hi[a] < o->size[a] - 1 ? (int)hi[a] : o->size[a] - 1;
     }
     mass *= scale * scale;
+    for (int u = first[0]; u <= last[0]; u++)
+        columns[u] = part_in(u, lo[0], hi[0]);
     for (int v = first[1]; v <= last[1]; v++) {
         double row = mass * part_in(v, lo[1], hi[1]);
         for (int u = first[0]; u <= last[0]; u++)
-            add_to(&o->pixels[v][u], row * part_in(u, lo[0], hi[0]), z);
+            add_to(&o->pixels[v][u], row * columns[u], (float)z);
     }
 }
 
