@@ -124,12 +124,8 @@ static int reach_of_fitted(void *user, const trip_reach_origin *origin, const tr
                            int count, double *values)
 {
     const fitted *f = user;
-    double of_outline[TRIP_REACHES_MAX];
-    int status = trip_visible_reach(f->visible, origin, wanted, count, values);
-    trip_outline_reach(f->outline, origin, wanted, count, of_outline);
-    for (int i = 0; i < count; i++)
-        values[i] = fmax(values[i], of_outline[i]);
-    return status;
+    trip_outline_reach(f->outline, origin, wanted, count, values);
+    return trip_visible_raise(f->visible, origin, wanted, count, values);
 }
 
 /* Of the view that has all of the box in it. */

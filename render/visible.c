@@ -16,7 +16,8 @@ typedef struct form {
     double offset, around;
     double per_voxel;         /* how fast it grows at most */
     double slack;             /* more than rounding makes of a bound; 0 where bounds are exact */
-    double best;              /* found so far, */
+    double best;              /* found so far, or known without looking; */
+    bool found;               /* found */
     trip_visible_place where; /* there */
     double step;              /* bounds are looked at in steps, the largest first */
     double left;              /* the farthest that bricks which were not read may reach, */
@@ -236,6 +237,7 @@ static void look_at_voxel(search *s, unsigned forms, const trip_visible_place *a
         const double value = value_at(s, f, at->u, at->v, at->sheet);
         if (value > f->best) {
             f->best = value;
+            f->found = true;
             f->where = *at;
         }
     }
@@ -343,7 +345,7 @@ static void keep_places(const search *s)
 {
     trip_visible *v = s->visible;
     for (int i = 0; i < s->count; i++)
-        if (s->forms[i].best > -INFINITY)
+        if (s->forms[i].found)
             v->places[v->place_count++ % TRIP_VISIBLE_PLACES] = s->forms[i].where;
 }
 
@@ -387,18 +389,48 @@ int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3])
     return status;
 }
 
-int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
-                       int count, double *values)
+static search make_search(trip_visible *v, const trip_reach_origin *origin,
+                          const trip_reach *wanted, int count)
 {
-    trip_visible *v = user;
     search s = { .visible = v, .count = count };
     set_across(&s, origin);
     for (int i = 0; i < count; i++) {
         trip_vec3 n = trip_affine_transpose_vector(&v->data->index_to_world, wanted[i].along);
         s.forms[i] = make_form(&s, n, -trip_dot(n, origin->index), wanted[i].around);
     }
+    return s;
+}
+
+/* The kernel reaches beyond a voxel. */
+static double with_kernel(const trip_visible *v, const form *f, double value)
+{
+    return value + v->kernel_radius * f->per_voxel;
+}
+
+int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values)
+{
+    trip_visible *v = user;
+    search s = make_search(v, origin, wanted, count);
     int status = find(&s);
     for (int i = 0; i < count; i++)
-        values[i] = result(&s, &s.forms[i]) + v->kernel_radius * s.forms[i].per_voxel;
+        values[i] = with_kernel(v, &s.forms[i], result(&s, &s.forms[i]));
+    return status;
+}
+
+int trip_visible_raise(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values)
+{
+    search s = make_search(v, origin, wanted, count);
+    for (int i = 0; i < count; i++) {
+        form *f = &s.forms[i];
+        f->best = values[i] - v->kernel_radius * f->per_voxel;
+        while (with_kernel(v, f, f->best) > values[i]) /* by rounding */
+            f->best = nextafter(f->best, -INFINITY);
+    }
+    int status = find(&s);
+    for (int i = 0; i < count; i++)
+        if (s.forms[i].found)
+            values[i] = fmax(values[i], with_kernel(v, &s.forms[i], s.forms[i].best));
     return status;
 }

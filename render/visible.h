@@ -55,4 +55,9 @@ int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);
 int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 
+/* Raises values to those of trip_visible_reach() where these are greater, of voxels that are
+ * visible alone: what reaches no farther is not looked for. */
+int trip_visible_raise(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values);
+
 #endif

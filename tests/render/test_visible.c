@@ -101,6 +101,37 @@ static void reaches_are_those_of_the_visible_voxels_whatever_the_tiles_and_slots
     }
 }
 
+/* Whatever is known before, and however the searches before have ended. */
+static void values_are_raised_where_visible_voxels_reach_farther(void **state)
+{
+    (void)state;
+    scene s;
+    make(&s, 16, 4);
+    trip_visible v = {
+        .data = s.data, .budget = s.budget, .kernel_radius = 2, .hi = { NX - 1, NY - 1, NZ - 1 }
+    };
+    const trip_reader_params params = { .skip = trip_visible_skip, .skip_user = &v };
+    assert_int_equal(trip_reader_create(&v.reader, s.data, &params, s.budget), 0);
+    trip_visible_start(&v, s.table, true);
+    for (int t = 0; t < 6; t++) {
+        trip_reach_origin origin;
+        trip_reach wanted[TRIP_REACHES_MAX];
+        double reach[TRIP_REACHES_MAX], raised[TRIP_REACHES_MAX], known[TRIP_REACHES_MAX];
+        any_reaches(&origin, wanted);
+        assert_int_equal(trip_visible_reach(&v, &origin, wanted, TRIP_REACHES_MAX, reach), 0);
+        v.place_count = t % 2 ? v.place_count : 0;
+        for (int n = 0; n < TRIP_REACHES_MAX; n++)
+            raised[n] = known[n] = n % 4 == 0   ? -INFINITY
+                                   : n % 4 == 1 ? reach[n]
+                                                : reach[n] + 20 * (test_random() - 0.5);
+        assert_int_equal(trip_visible_raise(&v, &origin, wanted, TRIP_REACHES_MAX, raised), 0);
+        for (int n = 0; n < TRIP_REACHES_MAX; n++)
+            assert_true(raised[n] == fmax(known[n], reach[n]));
+    }
+    trip_reader_destroy(v.reader);
+    scene_destroy(&s);
+}
+
 static void bounds_are_those_of_the_visible_voxels(void **state)
 {
     (void)state;
@@ -199,6 +230,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(reaches_are_those_of_the_visible_voxels_whatever_the_tiles_and_slots),
+        cmocka_unit_test(values_are_raised_where_visible_voxels_reach_farther),
         cmocka_unit_test(bounds_are_those_of_the_visible_voxels),
         cmocka_unit_test(most_of_a_list_is_not_looked_at),
         cmocka_unit_test(kernels_reach_beyond_their_voxels),
