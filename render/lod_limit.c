@@ -45,31 +45,36 @@ static void weigh_levels(limiting *l, const trip_camera *camera, const trip_sett
     }
 }
 
-static uint32_t *cube_at(const limiting *l, const double place[3])
+static uint32_t *cube_at(const limiting *l, int64_t i, int64_t j, int64_t k)
 {
     const trip_lod *lod = l->lod;
-    int64_t cube[3];
-    for (int a = 0; a < 3; a++)
-        cube[a] = (int64_t)place[a] >> lod->cube_log2;
-    return &l->voxels[(cube[2] * lod->cubes[1] + cube[1]) * lod->cubes[0] + cube[0]];
+    const int log2 = lod->cube_log2;
+    return &l->voxels[((k >> log2) * lod->cubes[1] + (j >> log2)) * lod->cubes[0] + (i >> log2)];
 }
 
 /* Tiles lie in cubes; slabs need not, sheets do. */
+static void count_brick(limiting *l, const trip_list *list, uint64_t index, int64_t slab_sheet)
+{
+    const trip_file_header *h = &l->data->header;
+    const trip_file_brick *brick = &list->bricks[index];
+    const int64_t u = (int64_t)brick->tile_u << h->tile_log2;
+    const int64_t v = (int64_t)brick->tile_v << h->tile_log2;
+    const int64_t first = slab_sheet + brick->sheet_min, last = slab_sheet + brick->sheet_max;
+    if (first >> l->lod->cube_log2 == last >> l->lod->cube_log2) {
+        *cube_at(l, u, v, first) += brick->records;
+        return;
+    }
+    for (unsigned i = brick->sheet_min; i <= brick->sheet_max; i++)
+        *cube_at(l, u, v, slab_sheet + i) += list->runs[index * h->slab_sheets + i].records;
+}
+
 static void count_voxels(limiting *l)
 {
     const trip_list *list = trip_dataset_find(l->data, 2, 0, TRIP_KIND_VOXELS);
-    const trip_file_header *h = &l->data->header;
     for (uint64_t s = 0; s < list->slab_count; s++) {
         const trip_file_slab *slab = &list->slabs[s];
-        for (uint64_t b = slab->first_brick; b < slab->first_brick + slab->brick_count; b++) {
-            const trip_file_brick *brick = &list->bricks[b];
-            for (unsigned i = brick->sheet_min; i <= brick->sheet_max; i++) {
-                const double place[3] = { (double)brick->tile_u * (1u << h->tile_log2),
-                                          (double)brick->tile_v * (1u << h->tile_log2),
-                                          (double)slab->slab * h->slab_sheets + i };
-                *cube_at(l, place) += list->runs[b * h->slab_sheets + i].records;
-            }
-        }
+        for (uint64_t b = slab->first_brick; b < slab->first_brick + slab->brick_count; b++)
+            count_brick(l, list, b, (int64_t)slab->slab * l->data->header.slab_sheets);
     }
 }
 

@@ -206,6 +206,10 @@ static int select_bricks(const planning *p, const trip_list *list)
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
     planned->bricks = list->brick_count;
+    if (planned->by_level && !(plan->lod.chosen >> list->level & 1)) {
+        planned->bricks_of_other_levels = list->brick_count;
+        return 0;
+    }
     for (uint64_t i = 0; i < list->slab_count; i++) {
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "render", "plan", "interrupted");
