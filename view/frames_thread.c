@@ -520,11 +520,15 @@ static int draw_moving(trip_frames *f, double pixels, double target_ms)
     return draw(f, trip_pace_scale(&f->pace, pixels, target_ms), &settings, true);
 }
 
-/* One of the picture's size, before the whole one. */
-static int draw_coarse(trip_frames *f)
+/* One of the picture's size, before the whole one, which takes about so long: for it, a part of
+ * that. */
+static int draw_coarse(trip_frames *f, double whole_ms)
 {
+    enum { PART = 5 };
+    const double wanted_ms = f->now.settings.max_ms, most_ms = whole_ms / PART;
     const triptych_settings settings =
-        with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px), f->now.settings.max_ms);
+        with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px),
+                    wanted_ms > 0 ? fmin(wanted_ms, most_ms) : most_ms);
     return draw(f, 1, &settings, false);
 }
 
@@ -542,7 +546,7 @@ static int draw_wanted(trip_frames *f)
         return draw(f, 1, whole, true);
     int status = draw_moving(f, pixels, target_ms);
     if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))
-        status = draw_coarse(f);
+        status = draw_coarse(f, whole_ms);
     if (!status && !f->whole && !has_newer(f))
         status = draw(f, 1, whole, false);
     return status;
