@@ -20,8 +20,9 @@ static bool is_of_surfaces(const triptych *t)
 /* What the kind of data and the function call for. */
 static int choose(triptych *t)
 {
-    const bool surfaces = is_of_surfaces(t);
-    switch (trip_dataset_text_kind(t->session.text)) {
+    const trip_tf_kind kind = trip_dataset_text_kind(t->session.text);
+    const bool surfaces = kind == TRIP_TF_LABELS && is_of_surfaces(t);
+    switch (kind) {
     case TRIP_TF_FOG:
         t->why_effects =
             t->settings.headlight
