@@ -1,5 +1,5 @@
-/* Which squares of sheets rays of open pixels may take voxels of: the others are neither decoded nor
- * prepared, which changes no picture. Of the renderer's thread alone. */
+/* Which squares of sheets rays of open pixels may take voxels of: the others are neither decoded
+ * nor prepared, which changes no picture. Of the renderer's thread alone. */
 #ifndef TRIP_CPU_SHEETS_OPEN_SQUARES_H
 #define TRIP_CPU_SHEETS_OPEN_SQUARES_H
 

@@ -105,8 +105,8 @@ void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster);
 /* Every raster of a sheet or slice is free again. */
 void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 
-/* A run's voxels into open squares of rasters of a sheet that are there. May run beside those of other
- * runs. */
+/* A run's voxels into open squares of rasters of a sheet that are there. May run beside those of
+ * other runs. */
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run);
 
