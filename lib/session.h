@@ -22,8 +22,8 @@ typedef struct session {
     /* Of frames before, by whether their level is odd: a frame may have two, one above the other.
      */
     trip_classification classified[2];
-    trip_mean_tables mean_tables; /* the same: they may be kept for the next frame */
     unsigned classified_level[2];
+    trip_mean_tables mean_tables; /* of coarse levels: they may be kept for the next frame */
 } session;
 
 /* The transfer function; zero means the one kept in the data set, as it is. */

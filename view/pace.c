@@ -27,10 +27,12 @@ static void fit(const trip_pace *p, double *fixed, double *slope)
     const double variance = p->px_px / p->weight - mean_px * mean_px;
     const double both = p->px_ms / p->weight - mean_px * mean_ms;
     const double most = mean_ms / mean_px;
-    const double rest = p->ms_ms / p->weight - mean_ms * mean_ms - both * both / variance;
-    const double error = sqrt(fmax(rest, 0) / (variance * p->weight));
-    *slope = variance > 1e-4 * mean_px * mean_px ? fmax(both / variance, 0) + error : most;
-    *slope = fmin(*slope, most);
+    *slope = most;
+    if (variance > 1e-4 * mean_px * mean_px) {
+        const double rest = p->ms_ms / p->weight - mean_ms * mean_ms - both * both / variance;
+        const double error = sqrt(fmax(rest, 0) / (variance * p->weight));
+        *slope = fmin(fmax(both / variance, 0) + error, most);
+    }
     *fixed = fmax(mean_ms - *slope * mean_px, 0);
 }
 
