@@ -18,12 +18,6 @@ typedef struct flying {
     trip_frames_status status; /* at rest */
 } flying;
 
-static triptych_settings settings_of(const bench_options *o)
-{
-    (void)o;
-    return triptych_default_settings();
-}
-
 /* ---- frame times ---- */
 
 static int ascending(const void *a, const void *b)
@@ -128,7 +122,7 @@ static int byte_of(float x)
 static int draw_alone(const flying *m, triptych *t, int *differ)
 {
     const bench_options *o = m->options;
-    const triptych_settings settings = settings_of(o);
+    const triptych_settings settings = triptych_default_settings();
     const int width = o->sizes[0][0], height = o->sizes[0][1];
     const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
     float *rgba = NULL;
@@ -238,7 +232,7 @@ static int fly(flying *m)
                                  .height = o->sizes[0][1],
                                  .function = o->tf,
                                  .opacity_scale = 1,
-                                 .settings = settings_of(o) };
+                                 .settings = triptych_default_settings() };
     int status = flyer_fly(&m->flyer, &params, &wanted, o->seconds);
     if (m->flyer.frames)
         m->status = trip_frames_get_status(m->flyer.frames);

@@ -1,5 +1,5 @@
-"""Bricking and drawing a volume many times the size of a memory cgroup, each in one of its own: what
-test_memory.py does at a small scale and large.py at any."""
+"""Bricking a volume many times the size of a memory cgroup, drawing it and flying through it, each in
+a cgroup of its own: what test_memory.py does at a small scale and large.py at any."""
 import json
 import os
 
@@ -28,7 +28,8 @@ class Stage:
         return None
 
     def line(self, moved_bytes):
-        return (f"{self.what:<24}{self.seconds:8.1f} s {moved_bytes / 1e9 / self.seconds:6.2f} GB/s"
+        rate = f"{moved_bytes / 1e9 / self.seconds:6.2f} GB/s" if moved_bytes else " " * 11
+        return (f"{self.what:<24}{self.seconds:8.1f} s {rate}"
                 f"   resident {limits.text_bytes(self.peak_bytes):>10} of "
                 f"{limits.text_bytes(self.promise_bytes)} + {limits.text_bytes(SLACK_BYTES)}"
                 f"{' and the driver' if self.driver else ''}   group with page cache "
@@ -50,9 +51,7 @@ class Bounded:
                                  preexec_fn=group.enter)
             return Stage(what, outcome, group, self.memory_bytes, driver)
 
-    def judge(self, stage, moved_bytes=0):
-        if moved_bytes:
-            self.note(stage.line(moved_bytes))
+    def judge(self, stage):
         problem = stage.problem()
         assert problem is None, problem
 
@@ -72,9 +71,9 @@ class Bounded:
 
     def brick(self, volume):
         stage = self.stage("brick", "brick", volume, "-o", self.data, "--json", "--range", RANGE)
-        self.judge(stage)  # before there is something to parse
+        self.judge(stage)
         made = json.loads(stage.outcome.out)
-        self.judge(stage, made["input_bytes"] + made["bytes"])
+        self.note(stage.line(made["input_bytes"] + made["bytes"]))
         share = 100 * made["kept"] / made["voxels"]
         self.note(f"    {limits.text_bytes(made['input_bytes'])} read, {share:.1f} % of the voxels "
                   f"kept, {limits.text_bytes(made['temporary_bytes'])} spilled, "
@@ -91,5 +90,26 @@ class Bounded:
                            "--size", size, "--stats", "-", *arguments, driver=renderer == "gl")
         self.judge(stage)
         frames = json.loads(stage.outcome.out)["frames"]
-        self.judge(stage, sum(axis["bytes_read"] for f in frames for axis in f["lists"].values()))
+        lists = [one for frame in frames for one in frame["lists"].values()]
+        self.note(stage.line(sum(one["bytes_read"] for one in lists)))
         return frames
+
+    def flight(self, *arguments):
+        """What the viewer draws while the eye moves, from the disk: what `bench flight` prints, as
+        JSON. At rest the picture is that of render."""
+        limits.forget_pages(self.data)
+        stage = self.stage("flight", "bench", "flight", self.data, "--renderer", "cpu", "--json",
+                           *arguments)
+        self.judge(stage)
+        flown = json.loads(stage.outcome.out)
+        self.note(stage.line(0))
+        for part in flown["tables"]["parts"]["rows"]:
+            self.note("    {part:<10}{fps:6.1f} pictures a second; ms between: median {ms:.1f}, "
+                      "99 % {ms_99:.1f}, most {ms_most:.1f}; from input: median {age_ms:.1f}, "
+                      "99 % {age_ms_99:.1f}".format(**part))
+        rest = flown["tables"]["rest"]["rows"][0]
+        self.note("    first picture {first_ms:.0f} ms, whole picture {first_whole_ms:.0f}, whole "
+                  "after the flight {rest_ms:.0f}".format(**rest))
+        assert rest["differ"] == 0, "the picture at rest is not that of render"
+        assert rest["peak_bytes"] <= rest["limit_bytes"], "more memory was taken than promised"
+        return flown

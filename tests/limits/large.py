@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""At full size what test_memory.py does small: generates a volume, bricks it and draws it with
---memory in a memory cgroup, and prints for each stage time, throughput, promise, and what the kernel
-says was resident. Fails when a stage fails or takes more than it promised.
+"""At full size what test_memory.py does small: generates a volume, bricks it, draws it and flies
+through it with --memory in a memory cgroup, and prints for each stage time, throughput, promise, and
+what the kernel says was resident. Fails when a stage fails or takes more than it promised.
 
     cmake --preset release && cmake --build --preset release
     sudo tests/limits/large.py --work /a/folder/on/a/disk
@@ -37,6 +37,8 @@ def parse():
     p.add_argument("--size", default="1024x1024", help="of the picture")
     p.add_argument("--renderers", default="cpu", help="cpu, gl, reference, with commas")
     p.add_argument("--orbit", type=int, default=3, help="frames of the sequence drawn besides")
+    p.add_argument("--flight", type=float, default=12, metavar="SECONDS",
+                   help="that the eye moves, in 800x600 by cpu; 0: no flight")
     p.add_argument("--keep", action="store_true", help="leave the files, and use the volume if there")
     return p.parse_args()
 
@@ -59,6 +61,8 @@ def work(o, note):
             bounded.render(renderer, o.size)
             if o.orbit > 1 and renderer != "reference":
                 bounded.render(renderer, o.size, "--orbit", o.orbit)
+        if o.flight > 0:
+            bounded.flight("--seconds", o.flight)
     finally:
         if not o.keep:
             remove_made(o, bounded, volume)

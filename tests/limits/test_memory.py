@@ -1,5 +1,6 @@
-"""In a memory cgroup much smaller than the volume, page cache included, brick and render finish, and
-what they hold stays under the promise and 64 MiB. At full size: large.py."""
+"""In a memory cgroup much smaller than the volume, page cache included, brick, render and the
+viewer's drawing finish, and what they hold stays under the promise and 64 MiB. At full size:
+large.py."""
 import json
 import os
 import unittest
@@ -32,6 +33,7 @@ class Memory(limits.Test):
         bounded.render("cpu", "256x256")
         bounded.render("cpu", "256x256", "--orbit", 3)
         bounded.render("reference", "256x256", "--classify", "pre")  # post holds the whole volume
+        bounded.flight("--seconds", 2, "--size", "256x256")
 
     def test_the_default_is_a_quarter_of_the_limit(self):
         data = self.path("small.trip")
