@@ -11,6 +11,7 @@
 #include "field.h"
 #include "image_file.h"
 #include "light_map.h"
+#include "lod_parts.h"
 #include "renderer_choice.h"
 #include "session.h"
 #include "slices.h"
@@ -43,13 +44,12 @@ struct triptych {
     trip_renderer *renderer; /* NULL until a frame is begun */
     trip_reader *reader;     /* the same; of these planes: */
     unsigned planes;
-    trip_dataset
-        *at_level;  /* what frames are drawn from that have a coarse level alone; else NULL */
-    unsigned level; /* that */
-    double
-        share_above; /* of a frame of two levels, that of the next coarser one's picture; else 0 */
-    float *finer;    /* and the picture of the finer one, once it is complete, of the budget */
-    bool finer_done;
+    trip_dataset *at_level; /* what a part is drawn from that has a coarse level; else NULL */
+    unsigned level;         /* that */
+    trip_lod_parts parts;   /* of the frame that is begun */
+    int part;               /* of these the one that is drawn, */
+    float *before;          /* and the picture of those before it, of the budget; else NULL */
+    triptych_frame_stats before_stats;
     trip_settings settings;  /* slices 0: by the view */
     triptych_clip clip;      /* as given; frames have it in drawn_settings */
     double max_ms;           /* 0: no bound of time */
@@ -84,8 +84,7 @@ struct triptych {
     bool rounding_checked; /* of the function and the settings that are set */
     bool has_stats;
     triptych_frame_stats stats;
-    triptych_frame_stats finer_stats; /* of the first of two levels */
-    triptych_list_stats *list_stats;  /* by the data set's lists, of the budget; NULL: not yet */
+    triptych_list_stats *list_stats; /* by the data set's lists, of the budget; NULL: not yet */
 
     trip_image_files files;
 };

@@ -6,7 +6,6 @@
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
 #include "kernel.h"
-#include "lod_limit.h"
 #include "normalise.h"
 #include "report.h"
 #include "rounding.h"
@@ -106,17 +105,6 @@ static trip_settings bounded_settings(const triptych *t)
     return s;
 }
 
-/* The coarse level of a frame that has one alone. */
-static unsigned choose_level(const triptych *t, const trip_camera *camera)
-{
-    const trip_dataset *data = t->session.data;
-    if (t->settings.classify != TRIP_CLASSIFY_POST || t->classify_auto ||
-        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
-        return 0;
-    const trip_settings settings = bounded_settings(t);
-    return trip_lod_of_all(data, camera, &settings, trip_dataset_value_levels(data));
-}
-
 /* From here on frames are drawn from that level. */
 static int use_level(triptych *t, unsigned level)
 {
@@ -127,71 +115,6 @@ static int use_level(triptych *t, unsigned level)
     if (level > 0)
         status = trip_dataset_level_open(&t->at_level, t->session.data, level);
     t->level = t->at_level ? level : 0;
-    return status;
-}
-
-/* That of the next coarser level. Distances are of one surface, and light that reaches places is
- * worked out for one level. */
-static double choose_share_above(const triptych *t, unsigned level)
-{
-    const trip_settings settings = bounded_settings(t);
-    if (t->settings.classify != TRIP_CLASSIFY_POST || t->classify_auto || t->counting ||
-        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL || t->settings.depth)
-        return 0;
-    return trip_lod_share_above(t->session.data, &t->camera, &settings, level,
-                                trip_dataset_value_levels(t->session.data));
-}
-
-/* Takes up the level of the frame, by the view of level 0, and makes its camera. */
-static int place_camera(triptych *t)
-{
-    trip_dataset *before = t->at_level;
-    t->at_level = NULL;
-    int status = make_camera(t);
-    t->at_level = before;
-    if (status)
-        return status;
-    const unsigned level = choose_level(t, &t->camera);
-    t->share_above = choose_share_above(t, level);
-    status = use_level(t, level);
-    return !status && t->at_level ? make_camera(t) : status;
-}
-
-static size_t finer_bytes(const triptych *t)
-{
-    return (size_t)t->turned.width * (size_t)t->turned.height * 4 * sizeof *t->finer;
-}
-
-/* Of a frame that is planned, before the reader takes its part of what is left. */
-static int take_finer(triptych *t)
-{
-    if (trip_effects_light(&t->drawn_settings.effects) || t->drawn_settings.effects.emission)
-        t->share_above = 0;
-    if (t->share_above > 0)
-        t->finer = trip_budget_take(t->session.budget, finer_bytes(t));
-    if (t->share_above > 0 && !t->finer)
-        return trip_fail(TRIP_ERROR, "render", "levels",
-                         "two pictures, of two levels, do not fit the memory given; raise "
-                         "--memory");
-    return 0;
-}
-
-static int prepare(triptych *t)
-{
-    session *s = &t->session;
-    const triptych_resources *r = &t->resources;
-    int status = trip_context_check_idle(t, true);
-    if (status)
-        return status;
-    if (!t->has_function)
-        status = trip_context_use_function(t, &(triptych_function){ 0 });
-    if (!status && !t->has_view)
-        status = trip_context_find_view(t, &(triptych_view){ 0 });
-    if (!status && !t->renderer)
-        status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
-                                      s->budget);
-    if (!status)
-        status = place_camera(t);
     return status;
 }
 
@@ -208,8 +131,6 @@ static const char *needs_splats(const triptych *t)
         return "the target is rounded";
     if (s->indexed || s->triangles)
         return "a form of submission is set";
-    if (trip_settings_has_levels(s))
-        return "coarse levels are to be drawn";
     if (s->compositing != TRIP_COMPOSITING_SPLAT)
         return "splats are to be composited by sheets";
     if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
@@ -225,7 +146,7 @@ static const char *needs_splats(const triptych *t)
     return NULL;
 }
 
-/* The frame's settings: those that are set, with what is chosen by itself. */
+/* What of the frame's settings does not depend on its levels, and what classifies it. */
 static void choose_settings(triptych *t)
 {
     bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
@@ -237,12 +158,84 @@ static void choose_settings(triptych *t)
         trip_settings_sum_sheets(&t->drawn_settings) &&
         t->drawn_settings.footprint == TRIP_FOOTPRINT_EXACT) /* which are not summed there */
         t->drawn_settings.footprint = TRIP_FOOTPRINT_EWA;
-    t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
-    if (!t->settings.slices)
-        t->drawn_settings.slices = t->slices.slices;
-    t->drawn_settings.clip = trip_context_clip(t);
     if (t->normalise) /* what is behind comes after that, but what is far fades into its colour */
         t->drawn_settings.background[3] = 0;
+}
+
+/* The levels of the frame, by the view of level 0. Distances are of one surface, and light that
+ * reaches places is worked out for one level. */
+static int choose_parts(triptych *t)
+{
+    const trip_settings *s = &t->drawn_settings;
+    const bool one =
+        t->counting || s->depth || s->effects.emission || trip_effects_light(&s->effects);
+    trip_dataset *before = t->at_level;
+    t->at_level = NULL;
+    int status = make_camera(t);
+    t->at_level = before;
+    t->parts = (trip_lod_parts){ .count = 1 };
+    t->part = 0;
+    if (status || s->classify != TRIP_CLASSIFY_POST ||
+        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return status;
+    status = trip_lod_parts_make(&t->parts, t->session.data, &t->camera, s, one, t->session.budget);
+    if (t->parts.count > 1) /* what is behind comes after the last */
+        t->drawn_settings.background[3] = 0;
+    return status;
+}
+
+/* Takes up the level of the part that is next, and makes its camera. */
+static int enter_part(triptych *t)
+{
+    int status = use_level(t, t->parts.level[t->part]);
+    if (!status)
+        status = make_camera(t);
+    if (status)
+        return status;
+    t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
+    t->drawn_settings.slices = t->settings.slices ? t->settings.slices : t->slices.slices;
+    t->drawn_settings.clip = trip_context_clip(t);
+    trip_lod_parts_clip(&t->parts, t->part, &t->drawn_settings.clip);
+    return 0;
+}
+
+static size_t pixels_drawn(const triptych *t)
+{
+    return (size_t)t->camera.width * (size_t)t->camera.height;
+}
+
+static size_t before_bytes(const triptych *t)
+{
+    return pixels_drawn(t) * 4 * sizeof *t->before;
+}
+
+/* Of a frame that is planned, before the reader takes its part of what is left. */
+static int take_before(triptych *t)
+{
+    if (t->parts.count == 1)
+        return 0;
+    t->before = trip_budget_take(t->session.budget, before_bytes(t));
+    if (t->before)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", "levels",
+                     "pictures of several levels do not fit the memory given; raise --memory");
+}
+
+static int prepare(triptych *t)
+{
+    session *s = &t->session;
+    const triptych_resources *r = &t->resources;
+    int status = trip_context_check_idle(t, true);
+    if (status)
+        return status;
+    if (!t->has_function)
+        status = trip_context_use_function(t, &(triptych_function){ 0 });
+    if (!status && !t->has_view)
+        status = trip_context_find_view(t, &(triptych_view){ 0 });
+    if (!status && !t->renderer)
+        status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
+                                      s->budget);
+    return status;
 }
 
 /* The plan of a frame by the integral renderer: what its field is made of. */
@@ -338,9 +331,7 @@ static void check_bound(const triptych *t)
     char is[32], allowed[32];
     if (!(most > 0))
         return;
-    const double bytes = t->plan.lod.level ? t->plan.lod.limit.bytes
-                                           : trip_lod_values_bytes(t->session.data, &t->camera,
-                                                                   &t->drawn_settings, t->level);
+    const double bytes = t->plan.lod.level ? t->plan.lod.limit.bytes : t->parts.limit.bytes;
     if (bytes <= most)
         return;
     trip_format_bytes((uint64_t)bytes, is);
@@ -351,18 +342,32 @@ static void check_bound(const triptych *t)
         is, allowed);
 }
 
+/* The part that is next. */
 static int plan(triptych *t)
+{
+    uint64_t start = trip_frame_now_ns();
+    int status = enter_part(t);
+    if (!status)
+        status = plan_frame(t);
+    t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    t->begun = status == 0;
+    return status;
+}
+
+static int plan_first(triptych *t)
 {
     uint64_t start = trip_frame_now_ns();
     choose_settings(t);
     check_rounding(t);
     int status = trip_context_choose_effects(t);
     if (!status)
-        status = plan_frame(t);
+        status = choose_parts(t);
+    const double ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    if (!status)
+        status = plan(t);
+    t->plan_ms += ms;
     if (!status)
         check_bound(t);
-    t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
-    t->begun = status == 0;
     return status;
 }
 
@@ -417,12 +422,11 @@ static void end(triptych *t)
     t->begun = t->drawn = false;
 }
 
-static void end_levels(triptych *t)
+static void drop_before(triptych *t)
 {
-    if (t->finer)
-        trip_budget_release(t->session.budget, t->finer, finer_bytes(t));
-    t->finer = NULL;
-    t->finer_done = false;
+    if (t->before)
+        trip_budget_release(t->session.budget, t->before, before_bytes(t));
+    t->before = NULL;
 }
 
 int triptych_begin(triptych *t)
@@ -431,14 +435,14 @@ int triptych_begin(triptych *t)
     int status = prepare(t);
     if (status)
         return trip_context_leave(before, status);
-    status = plan(t);
+    status = plan_first(t);
     if (!status)
-        status = take_finer(t);
+        status = take_before(t);
     if (!status)
         status = start(t);
     if (status) {
         end(t);
-        end_levels(t);
+        drop_before(t);
     }
     return trip_context_leave(before, status);
 }
@@ -473,13 +477,21 @@ static void take_means(const float *fine, int side, int width, int height, float
         }
 }
 
+/* With what parts before it have, and what is behind all. */
 static int take_drawn(triptych *t, float *rgba, float *depth)
 {
+    const double *behind = t->settings.background;
+    const size_t pixels = pixels_drawn(t);
     int status = trip_frame_picture(&t->drawing, rgba, depth);
-    if (!status && t->normalise)
-        trip_normalise(rgba, (size_t)t->camera.width * (size_t)t->camera.height,
-                       t->settings.background);
-    return status;
+    if (status)
+        return status;
+    if (t->part > 0)
+        trip_lod_parts_add(&t->parts, t->before, rgba, t->drawing.done, pixels, rgba);
+    if (t->normalise)
+        trip_normalise(rgba, pixels, behind);
+    else if (t->parts.count > 1)
+        trip_put_behind(rgba, pixels, behind);
+    return 0;
 }
 
 static int take_colours(triptych *t, float *rgba, float *depth)
@@ -488,7 +500,7 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     if (side == 1)
         return take_drawn(t, rgba, depth);
     trip_budget *budget = t->session.budget;
-    size_t bytes = (size_t)t->camera.width * (size_t)t->camera.height * 4 * sizeof *rgba;
+    size_t bytes = pixels_drawn(t) * 4 * sizeof *rgba;
     float *fine = trip_budget_take(budget, bytes);
     if (!fine)
         return trip_fail(TRIP_ERROR, "render", "samples",
@@ -502,25 +514,36 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     return status;
 }
 
-/* The first of two levels is drawn: keeps its picture, and begins the other. */
-static int begin_coarser(triptych *t)
+/* Adds the part that is drawn to those before it. */
+static int keep_before(triptych *t)
 {
-    int status = take_colours(t, t->finer, NULL);
+    if (t->part == 0)
+        return trip_frame_picture(&t->drawing, t->before, NULL);
+    trip_budget *budget = t->session.budget;
+    float *picture = trip_budget_take(budget, before_bytes(t));
+    if (!picture)
+        return trip_fail(TRIP_ERROR, "render", "levels",
+                         "pictures of several levels do not fit the memory given; raise --memory");
+    int status = trip_frame_picture(&t->drawing, picture, NULL);
+    if (!status)
+        trip_lod_parts_add(&t->parts, t->before, picture, true, pixels_drawn(t), t->before);
+    trip_budget_release(budget, picture, before_bytes(t));
+    return status;
+}
+
+/* A part is drawn: begins the next. */
+static int begin_next(triptych *t)
+{
+    int status = keep_before(t);
     if (!status)
         status = trip_context_note_stats(t);
     if (status)
         return status;
-    t->finer_stats = t->stats;
+    t->before_stats = t->stats;
     end(t);
-    t->finer_done = true;
-    status = use_level(t, t->level + 1);
-    if (!status)
-        status = make_camera(t);
-    if (!status)
-        status = plan(t);
-    if (!status)
-        status = start(t);
-    return status;
+    t->part++;
+    status = plan(t);
+    return status ? status : start(t);
 }
 
 int triptych_step(triptych *t, uint64_t deadline_ns)
@@ -529,20 +552,11 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
     int status = check_drawing(t);
     if (!status)
         status = trip_frame_step(&t->drawing, deadline_ns);
-    if (status == TRIP_FRAME_DONE && t->finer && !t->finer_done) {
-        status = begin_coarser(t);
+    while (status == TRIP_FRAME_DONE && t->part + 1 < t->parts.count) {
+        status = begin_next(t);
         status = status ? status : trip_frame_step(&t->drawing, deadline_ns);
     }
     return trip_context_leave(before, status);
-}
-
-/* Of the first level until the other is complete. */
-static void mix_levels(const triptych *t, float *rgba)
-{
-    const size_t count = finer_bytes(t) / sizeof *t->finer;
-    const double share = t->drawing.done ? t->share_above : 0;
-    for (size_t i = 0; i < count; i++)
-        rgba[i] = (float)(t->finer[i] + share * ((double)rgba[i] - t->finer[i]));
 }
 
 /* Of the picture's own pixels, whatever was drawn. */
@@ -570,8 +584,6 @@ static int take_picture(triptych *t, float *rgba, float *depth)
                       depth ? "the frame was begun without" : "is to be taken with the picture");
     if (!status)
         status = take_colours(t, rgba, depth);
-    if (!status && t->finer_done)
-        mix_levels(t, rgba);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
         draw_merge_map(t, rgba);
     if (!status && t->drawing.done)
@@ -595,7 +607,7 @@ void triptych_end(triptych *t)
 {
     trip_scope *before = trip_scope_enter(&t->scope); /* the error of the last call stays */
     end(t);
-    end_levels(t);
+    drop_before(t);
     trip_context_leave(before, 0);
 }
 

@@ -139,7 +139,7 @@ static const char *fault_of_clip(const triptych_clip *c)
 {
     if (c->box && !is_a_box(c->box_lo, c->box_hi))
         return "the clipping box ends before it begins";
-    if (!(c->planes >= 0 && c->planes <= TRIP_CLIP_MOST - TRIP_CLIP_BOX_PLANES))
+    if (!(c->planes >= 0 && c->planes <= TRIP_CLIP_GIVEN_PLANES))
         return "there are 0 to 6 clipping planes";
     for (int i = 0; i < c->planes; i++) {
         const double *p = c->plane[i];

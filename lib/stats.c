@@ -1,9 +1,28 @@
 /* What a frame takes: the plan in words, statistics of the frame and by list. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "context.h"
 #include "report.h"
+
+/* The levels of a frame that classifies after interpolation, from the eye on. */
+static void explain_parts(const triptych *t, FILE *out)
+{
+    const trip_lod_parts *p = &t->parts;
+    const trip_settings *s = &t->drawn_settings;
+    if (s->classify != TRIP_CLASSIFY_POST || !trip_settings_has_levels(s))
+        return;
+    fprintf(out, "levels      %s: level %u", p->count > 1 || p->level[0] > 0 ? "run" : "do not run",
+            p->level[0]);
+    if (p->share > 0)
+        fprintf(out, ", and %.0f %% of the picture of level %u", 100 * p->share, p->level[1]);
+    for (int i = 1; i < p->count && !(p->share > 0); i++)
+        fprintf(out, ", from %.6g along the view on level %u", p->distance[i], p->level[i]);
+    fprintf(out, ": the coarsest whose voxels are at most %.3g pixels wide%s\n",
+            fmax(s->lod_px, p->limit.px / s->samples),
+            p->limit.px > 0 ? ", by the bound on bytes" : "");
+}
 
 /* What was not set, and what it came to. */
 static void explain_choices(const triptych *t, FILE *out)
@@ -12,10 +31,7 @@ static void explain_choices(const triptych *t, FILE *out)
         return;
     if (t->why_pre)
         fprintf(out, "default     pre in place of post: %s\n", t->why_pre);
-    const unsigned level = t->level - t->finer_done;
-    if (t->share_above > 0)
-        fprintf(out, "levels      %u, and %.0f %% of the picture of level %u\n", level,
-                100 * t->share_above, level + 1);
+    explain_parts(t, out);
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.slices)
         fprintf(out,
                 "slices      %d by the view: rays move up to %.2f voxels along a sheet to the "
@@ -142,34 +158,36 @@ static triptych_list_stats list_stats(const triptych *t, unsigned i)
 /* Of frames whose levels are bounded: what bounds of time are made of. */
 static void note_rate(triptych *t)
 {
-    const trip_frame_stats *s = &t->drawing.stats;
-    const double bytes = t->plan.lod.limit.bytes, ms = s->ms - s->merge_ms;
-    if (!(bytes > 0 && ms > 0))
+    const double bytes = t->plan.lod.limit.bytes + t->parts.limit.bytes;
+    const double ms = t->stats.ms - t->stats.merge_ms;
+    if (!(bytes > 0 && ms > 0) || t->part + 1 < t->parts.count)
         return;
     t->bytes_per_ms = t->bytes_per_ms > 0 ? 0.5 * (t->bytes_per_ms + bytes / ms) : bytes / ms;
 }
 
-/* A frame of two levels takes what both take. */
-static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *finer)
+/* A frame takes what all of its parts take. */
+static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *before)
 {
-    to->ms += finer->ms;
-    to->plan_ms += finer->plan_ms;
-    to->wait_ms += finer->wait_ms;
-    to->draw_ms += finer->draw_ms;
-    to->merge_ms += finer->merge_ms;
-    to->splats += finer->splats;
-    to->bytes_read += finer->bytes_read;
-    to->reads += finer->reads;
-    to->bytes_cached += finer->bytes_cached;
-    to->runs_occluded += finer->runs_occluded;
-    to->bytes_occluded += finer->bytes_occluded;
+    to->ms += before->ms;
+    to->plan_ms += before->plan_ms;
+    to->wait_ms += before->wait_ms;
+    to->draw_ms += before->draw_ms;
+    to->merge_ms += before->merge_ms;
+    to->splats += before->splats;
+    to->bytes_read += before->bytes_read;
+    to->reads += before->reads;
+    to->bytes_cached += before->bytes_cached;
+    to->runs_occluded += before->runs_occluded;
+    to->bytes_occluded += before->bytes_occluded;
 }
 
-/* The lists of the first of two levels keep their numbers. */
-static bool is_of_finer(const triptych *t, unsigned i)
+/* The lists of parts before keep their numbers. */
+static bool is_of_part_before(const triptych *t, unsigned i)
 {
-    const unsigned level = t->session.data->lists[i].level;
-    return t->finer_done && level + 1 == t->level;
+    for (int part = 0; part < t->part; part++)
+        if (t->session.data->lists[i].level == t->parts.level[part])
+            return true;
+    return false;
 }
 
 int trip_context_note_stats(triptych *t)
@@ -181,10 +199,10 @@ int trip_context_note_stats(triptych *t)
         return trip_fail(TRIP_ERROR, "render", t->name,
                          "the frame's statistics do not fit the memory given; raise --memory");
     t->stats = frame_stats(t);
-    if (t->finer_done)
-        add_stats(&t->stats, &t->finer_stats);
+    if (t->part > 0)
+        add_stats(&t->stats, &t->before_stats);
     for (unsigned i = 0; i < count; i++)
-        if (!is_of_finer(t, i))
+        if (!is_of_part_before(t, i))
             t->list_stats[i] = list_stats(t, i);
     t->has_stats = true;
     note_rate(t);

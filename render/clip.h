@@ -16,8 +16,8 @@
 #include "coordinates.h"
 #include "geometry.h"
 
-/* Six of a box, and six more. */
-enum { TRIP_CLIP_BOX_PLANES = 6, TRIP_CLIP_MOST = 12 };
+/* Six of a box, six more, and two between which a level of detail is drawn (lod_parts.h). */
+enum { TRIP_CLIP_BOX_PLANES = 6, TRIP_CLIP_GIVEN_PLANES = 6, TRIP_CLIP_MOST = 14 };
 
 /* Voxels so near to a plane are inside: on it, whatever rounding makes of the distance. In indices.
  */

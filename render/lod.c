@@ -1,7 +1,7 @@
 #include "lod.h"
 
+#include "dataset_level.h"
 #include "lod_limit.h"
-
 #include "report.h"
 
 /* Cubes as small as bricks of level 0 usually are, larger where there would be too many, or where
@@ -12,17 +12,6 @@ bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
 {
     return lod->level && list->level <= lod->levels &&
            list->kind == (list->level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
-}
-
-/* How many levels the data set has without a gap, each along all axes. */
-static unsigned count_levels(const trip_dataset *data)
-{
-    unsigned level = 0;
-    while (trip_dataset_find(data, 0, level + 1, TRIP_KIND_MEANS) &&
-           trip_dataset_find(data, 1, level + 1, TRIP_KIND_MEANS) &&
-           trip_dataset_find(data, 2, level + 1, TRIP_KIND_MEANS))
-        level++;
-    return level;
 }
 
 static void choose_cubes(trip_lod *lod, const trip_dataset *data, int least_log2)
@@ -96,10 +85,12 @@ static void fill_levels(trip_lod *lod, const trip_dataset *data, const trip_came
             }
 }
 
-int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
-                  const trip_settings *settings, trip_budget *budget)
+int trip_lod_make(trip_lod *lod, const trip_dataset *data, trip_kind kind,
+                  const trip_camera *camera, const trip_settings *settings, trip_budget *budget)
 {
-    *lod = (trip_lod){ .levels = trip_settings_has_levels(settings) ? count_levels(data) : 0 };
+    *lod = (trip_lod){ .kind = kind };
+    if (trip_settings_has_levels(settings))
+        lod->levels = trip_dataset_levels(data, kind);
     if (lod->levels == 0)
         return 0;
     choose_cubes(lod, data, settings->max_bytes > 0 ? LIMITED_CUBE_LOG2 : CUBE_LOG2);
@@ -162,46 +153,4 @@ bool trip_lod_brick(const trip_lod *lod, const trip_list *list, const trip_file_
                 if (trip_lod_at(lod, cube) == list->level)
                     return true;
     return false;
-}
-
-/* Of the whole grid. */
-static double widest(const trip_dataset *data, const trip_camera *camera)
-{
-    const int64_t first[3] = { 0, 0, 0 };
-    const int64_t past[3] = { (int64_t)data->header.dims[0], (int64_t)data->header.dims[1],
-                              (int64_t)data->header.dims[2] };
-    return width_in(camera, first, past);
-}
-
-unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, unsigned most)
-{
-    unsigned level =
-        settings->lod_px > 0
-            ? trip_lod_level(widest(data, camera), settings->lod_px * settings->samples, most)
-            : 0;
-    while (settings->max_bytes > 0 && level < most &&
-           trip_lod_values_bytes(data, camera, settings, level) > settings->max_bytes)
-        level++;
-    return level;
-}
-
-/* Octaves of distance over which a level gives way to the next. */
-#define MIXED_OCTAVES 0.25
-
-double trip_lod_share_above(const trip_dataset *data, const trip_camera *camera,
-                            const trip_settings *settings, unsigned level, unsigned most)
-{
-    const double px = settings->lod_px * settings->samples, width = widest(data, camera);
-    if (!(px > 0) || level >= most || level != trip_lod_level(width, px, most))
-        return 0;
-    const double share = 1 - log2(ldexp(width, (int)level + 1) / px) / MIXED_OCTAVES;
-    if (!(share > 0))
-        return 0;
-    if (settings->max_bytes > 0 &&
-        trip_lod_values_bytes(data, camera, settings, level) +
-                trip_lod_values_bytes(data, camera, settings, level + 1) >
-            settings->max_bytes)
-        return 0;
-    return fmin(share, 1);
 }

@@ -23,6 +23,7 @@ typedef struct trip_lod_limit {
 } trip_lod_limit;
 
 typedef struct trip_lod {
+    trip_kind kind;   /* of coarse levels: means or values */
     unsigned levels;  /* that may be chosen: the data set has them all */
     int cube_log2;    /* voxels of level 0 along a cube's edge */
     int64_t cubes[3]; /* along i, j, k */
@@ -32,29 +33,16 @@ typedef struct trip_lod {
     trip_lod_limit limit;
 } trip_lod;
 
-/* `camera` is made with level 0's map. Where the settings call for the finest level, nothing is
- * allocated. */
-int trip_lod_make(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
-                  const trip_settings *settings, trip_budget *budget);
+/* `camera` is made with level 0's map, `kind` is what coarse levels are drawn from. Where the
+ * settings call for the finest level, nothing is allocated. */
+int trip_lod_make(trip_lod *lod, const trip_dataset *data, trip_kind kind,
+                  const trip_camera *camera, const trip_settings *settings, trip_budget *budget);
 void trip_lod_release(trip_lod *lod, trip_budget *budget);
 
 /* How wide voxels of level 0 are where a cube comes nearest to the eye; cubes about the eye:
  * HUGE_VAL. */
 double trip_lod_cube_width(const trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
                            const int64_t cube[3]);
-
-/* The level of all of the grid where a frame has one alone, as those that classify after
- * interpolation do: the finest of its places' levels, at most `most`. */
-unsigned trip_lod_of_all(const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, unsigned most);
-
-/* Where a frame has one level for all, what part of the picture of the next coarser one is mixed
- * into that of `level`, trip_lod_of_all()'s, so that nothing pops as the eye moves away: it grows
- * from 0 to 1 while that level's voxels become narrower by a quarter of an octave, down to lod_px
- * pixels, where that level is chosen. 0 where a bound on bytes chose the level, or leaves no room
- * for two. */
-double trip_lod_share_above(const trip_dataset *data, const trip_camera *camera,
-                            const trip_settings *settings, unsigned level, unsigned most);
 
 /* Whether voxels of the list are chosen by level: those that `brick` makes for splats. All others
  * are drawn whatever the levels. */

@@ -5,9 +5,6 @@
 #include "report.h"
 #include "weight.h"
 
-/* Cubes about the eye count as if they began so far from it, so that they too can be coarser. */
-#define NEAREST_CELLS 0.25
-
 /* What the levels are chosen from; a cube's numbers are in the order of trip_lod.level. */
 typedef struct limiting {
     trip_lod *lod;
@@ -32,16 +29,32 @@ static double code_bytes(const trip_dataset *data, const trip_list *list)
     return own ? own : data->header.code_bytes;
 }
 
+/* What is drawn at a level: by splats voxels or means, where values are interpolated those and
+ * their halo. */
+static bool is_drawn(const limiting *l, const trip_list *list, unsigned level)
+{
+    if (list->axis != 2 || list->level != level)
+        return false;
+    if (level > 0)
+        return list->kind == l->lod->kind;
+    return list->kind == TRIP_KIND_VOXELS ||
+           (list->kind == TRIP_KIND_HALO && l->lod->kind == TRIP_KIND_VALUES);
+}
+
 static void weigh_levels(limiting *l, const trip_camera *camera, const trip_settings *settings)
 {
-    const double normals = settings->shading ? l->data->header.normal_bytes : 0;
+    const bool splats = l->lod->kind == TRIP_KIND_MEANS;
+    const double normals = settings->shading && splats ? l->data->header.normal_bytes : 0;
     const double kept = (double)l->data->header.kept;
     for (unsigned level = 0; level <= l->lod->levels; level++) {
-        const trip_list *list =
-            trip_dataset_find(l->data, 2, level, level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
-        const double share = kept > 0 ? (double)list->records / kept : 0;
-        l->bytes[level] =
-            lists_read(camera, settings) * share * (code_bytes(l->data, list) + normals);
+        l->bytes[level] = 0;
+        for (unsigned i = 0; i < l->data->list_count; i++) {
+            const trip_list *list = &l->data->lists[i];
+            const double share = kept > 0 ? (double)list->records / kept : 0;
+            if (is_drawn(l, list, level))
+                l->bytes[level] +=
+                    lists_read(camera, settings) * share * (code_bytes(l->data, list) + normals);
+        }
     }
 }
 
@@ -90,7 +103,7 @@ static void place_cube(limiting *l, const trip_cull *cull, const int64_t cube[3]
     }
     if (!trip_cull_may_see(cull, lo, hi))
         l->voxels[at] = 0;
-    const double nearest = trip_lod_width_px(cull->camera, NEAREST_CELLS * edge);
+    const double nearest = trip_lod_width_px(cull->camera, TRIP_LOD_NEAREST_VOXELS);
     const double width = trip_lod_cube_width(lod, l->data, cull->camera, cube);
     l->width[at] = (float)(width < nearest || cull->camera->ortho ? width : nearest);
 }
@@ -184,18 +197,4 @@ int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *c
     if (l.width)
         trip_budget_release(budget, l.width, cubes * sizeof *l.width);
     return status;
-}
-
-double trip_lod_values_bytes(const trip_dataset *data, const trip_camera *camera,
-                             const trip_settings *settings, unsigned level)
-{
-    double bytes = 0;
-    for (unsigned i = 0; i < data->list_count; i++) {
-        const trip_list *list = &data->lists[i];
-        const bool read = level ? list->kind == TRIP_KIND_VALUES
-                                : list->kind == TRIP_KIND_VOXELS || list->kind == TRIP_KIND_HALO;
-        if (read && list->axis == 2 && list->level == level)
-            bytes += (double)list->records * code_bytes(data, list);
-    }
-    return bytes * lists_read(camera, settings);
 }

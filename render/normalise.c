@@ -10,3 +10,12 @@ void trip_normalise(float *rgba, size_t pixels, const double background[4])
         rgba[3] = covered ? 1 : (float)background[3];
     }
 }
+
+void trip_put_behind(float *rgba, size_t pixels, const double background[4])
+{
+    for (size_t i = 0; i < pixels; i++, rgba += 4) {
+        const double through = 1 - (double)rgba[3];
+        for (int c = 0; c < 4; c++)
+            rgba[c] += (float)(through * (c < 3 ? background[c] : 1) * background[3]);
+    }
+}

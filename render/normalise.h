@@ -12,4 +12,7 @@
  * premultiplied) that is put behind. */
 void trip_normalise(float *rgba, size_t pixels, const double background[4]);
 
+/* The same background behind pixels as they are. */
+void trip_put_behind(float *rgba, size_t pixels, const double background[4]);
+
 #endif

@@ -1,5 +1,6 @@
 #include "plan.h"
 
+#include <float.h>
 #include <inttypes.h>
 #include <string.h>
 
@@ -24,6 +25,8 @@ typedef struct planning {
     trip_budget *budget;
     trip_classification *classified; /* by frames before */
     trip_brick_ranges *about;        /* post: of the lists along the axis at hand; else NULL */
+    trip_code_set shown;             /* by the table: */
+    const trip_tf_entry *shown_by;
 } planning;
 
 /* The sheets on one side of the eye, or all. */
@@ -195,13 +198,22 @@ static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t i
     }
 }
 
-static int select_bricks(const planning *p, const trip_list *list)
+/* The codes that a list shows. Most lists of a plan have one table. */
+static const trip_code_set *shown_by(planning *p, const trip_tf_entry *table)
+{
+    if (p->shown_by != table)
+        trip_code_set_make(&p->shown, table, FLT_TRUE_MIN);
+    p->shown_by = table;
+    return &p->shown;
+}
+
+static int select_bricks(planning *p, const trip_list *list)
 {
     trip_plan *plan = p->plan;
     trip_plan_list *planned = &plan->lists[list->index];
     selecting of = { .p = p, .list = list, .planned = planned };
     of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
-                             plan->axis_of_view, planned->table, p->about);
+                             plan->axis_of_view, shown_by(p, planned->table), p->about);
     of.cull.clip = &planned->clip;
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
@@ -275,7 +287,7 @@ static int place_list(const planning *p, const trip_list *list)
     return trip_camera_make(&planned->camera, &p->camera->params, &list->index_to_world);
 }
 
-static int plan_layer(const planning *p, int axis)
+static int plan_layer(planning *p, int axis)
 {
     int status = 0;
     for (unsigned i = 0; i < p->data->list_count && !status; i++)
@@ -292,13 +304,13 @@ static int plan_layer(const planning *p, int axis)
 }
 
 /* The layer of lists whose values are interpolated. */
-static int plan_sheets(const planning *p, int axis)
+static int plan_sheets(planning *p, int axis)
 {
-    planning with = *p;
     trip_brick_ranges about;
     trip_brick_ranges_create(&about, p->data, axis, p->settings->kernel, p->budget);
-    with.about = &about;
-    int status = plan_layer(&with, axis);
+    p->about = &about;
+    int status = plan_layer(p, axis);
+    p->about = NULL;
     trip_brick_ranges_destroy(&about);
     return status;
 }
@@ -383,14 +395,14 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
                         trip_classification *classified, trip_mean_tables *tables,
                         trip_budget *budget)
 {
-    const planning p = { .plan = plan,
-                         .data = data,
-                         .camera = camera,
-                         .settings = settings,
-                         .table = table,
-                         .tables = tables ? tables : &plan->own_tables,
-                         .budget = budget,
-                         .classified = classified };
+    planning p = { .plan = plan,
+                   .data = data,
+                   .camera = camera,
+                   .settings = settings,
+                   .table = table,
+                   .tables = tables ? tables : &plan->own_tables,
+                   .budget = budget,
+                   .classified = classified };
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .planes = planes_of(data, settings) };
@@ -403,7 +415,7 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         status = trip_plan_check_cells(data, "--classify pre");
     if (!status && settings->classify == TRIP_CLASSIFY_PRE)
-        status = trip_lod_make(&plan->lod, data, camera, settings, budget);
+        status = trip_lod_make(&plan->lod, data, TRIP_KIND_MEANS, camera, settings, budget);
     if (!status)
         status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {
@@ -599,17 +611,14 @@ static void explain_classification(const trip_plan *plan, const trip_settings *s
 
 static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
-    if (!trip_settings_has_levels(s) || plan->gathers)
+    if (!trip_settings_has_levels(s) || plan->gathers || s->classify == TRIP_CLASSIFY_POST)
         return;
     char chosen[64] = "the finest";
     const char *bound = s->max_bytes > 0 ? ", or what the bound on bytes calls for" : "";
     if (s->lod_px > 0)
         snprintf(chosen, sizeof chosen, "the coarsest whose voxels are at most %g pixels wide",
                  s->lod_px);
-    if (s->classify == TRIP_CLASSIFY_POST)
-        fprintf(out, "levels      %s: level %u for all of the grid: %s%s\n",
-                plan->level ? "run" : "do not run", plan->level, chosen, bound);
-    else if (plan->lod.level)
+    if (plan->lod.level)
         fprintf(out, "levels      run: cubes of %d voxels a side, each at one of %u levels: %s%s\n",
                 1 << plan->lod.cube_log2, plan->lod.levels + 1, chosen, bound);
     else

@@ -5,14 +5,9 @@
 #include "sheet.h"
 #include "weight.h"
 
-enum { RANGE_CODES = 256 };
-
 /* Voxels along u or v that a ray of a list moves at most from one sheet to the next, where its
  * weight has no bound of its own that is lower: beyond, it is too little to show. */
 #define TRIP_CULL_STEEPEST 64.0
-
-/* What a range of RANGE_CODES codes is. */
-enum { UNKNOWN, TRANSPARENT, VISIBLE };
 
 /* Bounds of the voxel positions of a brick, from the eye. */
 typedef struct box {
@@ -45,7 +40,7 @@ static double behind_eye(const trip_camera *camera, const trip_settings *setting
 
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
-                         int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about)
+                         int axis_of_view, const trip_code_set *shown, trip_brick_ranges *about)
 {
     double radius = about ? trip_sheet_radius(settings->kernel) : settings->kernel_radius, room = 1;
     if (settings->footprint == TRIP_FOOTPRINT_EWA && !camera->ortho)
@@ -70,33 +65,9 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
          * is. */
         .low_pass2 = room * widest * widest * pixel2,
         .behind = data->coordinates.widest * behind_eye(camera, settings, about != NULL),
-        .table = table,
+        .shown = shown,
         .about = about,
     };
-}
-
-static bool range_is_visible(trip_cull *cull, unsigned range)
-{
-    const trip_tf_entry *codes = cull->table + range * RANGE_CODES;
-    if (cull->ranges[range] == UNKNOWN) {
-        int i = 0;
-        while (i < RANGE_CODES && !(codes[i].extinction > 0))
-            i++;
-        cull->ranges[range] = i < RANGE_CODES ? VISIBLE : TRANSPARENT;
-    }
-    return cull->ranges[range] == VISIBLE;
-}
-
-/* Whether some code of [first, last] has extinction. The first mostly has: it was kept. */
-static bool some_visible(trip_cull *cull, unsigned first, unsigned last)
-{
-    for (unsigned code = first; code <= last;) {
-        bool whole = code % RANGE_CODES == 0 && last - code >= RANGE_CODES - 1;
-        if (whole ? range_is_visible(cull, code / RANGE_CODES) : cull->table[code].extinction > 0)
-            return true;
-        code += whole ? RANGE_CODES : 1;
-    }
-    return false;
 }
 
 /* By index axes, from the eye. */
@@ -157,12 +128,12 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
 static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
                            const trip_file_slab *slab)
 {
-    if (some_visible(cull, brick->code_min, brick->code_max))
+    if (trip_code_set_has_some(cull->shown, brick->code_min, brick->code_max))
         return false;
     if (!cull->about)
         return true;
     trip_code_range range = trip_brick_ranges_about(cull->about, slab->slab, brick);
-    return !some_visible(cull, range.least, range.most);
+    return !trip_code_set_has_some(cull->shown, range.least, range.most);
 }
 
 /* Of sheets a value counts that is within reach of a slice that a ray inside the clip, or its

@@ -5,10 +5,10 @@
 
 #include "brick_ranges.h"
 #include "camera.h"
+#include "code_set.h"
 #include "dataset.h"
 #include "list_grid.h"
 #include "settings.h"
-#include "transfer_function.h"
 
 typedef enum trip_cull_reason {
     TRIP_CULL_KEEP,
@@ -31,20 +31,19 @@ typedef struct trip_cull {
     const trip_file_header *header;
     const trip_coordinates *coordinates;
     int axis_of_view;
-    trip_cull_plane sides[4];  /* through the outermost pixel centres */
-    double radius2, low_pass2; /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */
-    double behind;             /* how deep behind the eye splats may still show */
-    const trip_clip *clip;     /* in the list's index space; set once it is made */
-    const trip_tf_entry *table;
-    trip_brick_ranges *about; /* where what bricks lie next to counts; NULL: they alone do */
-    uint8_t ranges[256]; /* of 256 codes each, as far as looked at: whether some have extinction */
+    trip_cull_plane sides[4];   /* through the outermost pixel centres */
+    double radius2, low_pass2;  /* radius of a splat at depth z: sqrt(radius2 + low_pass2 z^2) */
+    double behind;              /* how deep behind the eye splats may still show */
+    const trip_clip *clip;      /* in the list's index space; set once it is made */
+    const trip_code_set *shown; /* codes with extinction */
+    trip_brick_ranges *about;   /* where what bricks lie next to counts; NULL: they alone do */
 } trip_cull;
 
 /* For a list of the data set: `camera` views its index space, `grid` is its place in that of level
  * 0; `about` NULL where voxels are drawn one by one. What it is made from outlives it. */
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
-                         int axis_of_view, const trip_tf_entry *table, trip_brick_ranges *about);
+                         int axis_of_view, const trip_code_set *shown, trip_brick_ranges *about);
 
 /* Whether splats of voxels in a box of the list's grid may be seen, by the view alone. */
 bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double hi[3]);

@@ -51,28 +51,7 @@ void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone)
 {
     v->alone = alone;
     v->splats = 0;
-    double least = least_extinction(v);
-    for (unsigned code = 0; code < 65536; code++) {
-        uint64_t bit = UINT64_C(1) << (code % 64);
-        v->codes[code / 64] =
-            (v->codes[code / 64] & ~bit) | (table[code].extinction >= least ? bit : 0);
-    }
-}
-
-static inline bool is_visible(const trip_visible *v, unsigned code)
-{
-    return v->codes[code / 64] >> (code % 64) & 1;
-}
-
-static bool some_visible(const trip_visible *v, unsigned first, unsigned last)
-{
-    for (unsigned code = first; code <= last;) {
-        uint64_t rest = v->codes[code / 64] >> (code % 64);
-        if (rest)
-            return code + (unsigned)__builtin_ctzll(rest) <= last;
-        code += 64 - code % 64;
-    }
-    return false;
+    trip_code_set_make(&v->codes, table, least_extinction(v));
 }
 
 /* Every operation rounds monotonically in x, y and z alone, so that the corners of a box bound the
@@ -253,7 +232,7 @@ static void look_at_square(search *s, const trip_run *run, const trip_block *blo
         const trip_visible_place at = { run->u + (double)trip_voxel_u(voxels[n]),
                                         run->v + (double)trip_voxel_v(voxels[n]), run->sheet,
                                         trip_voxel_code(voxels[n]) };
-        if (is_visible(s->visible, at.code))
+        if (trip_code_set_has(&s->visible->codes, at.code))
             look_at_voxel(s, forms, &at);
     }
 }
@@ -304,7 +283,7 @@ static int open_bricks(search *s, const trip_list *list)
     const trip_visible *v = s->visible;
     int status = trip_selection_create(&s->open, v->data, list, false, 0, INT32_MAX, v->budget);
     for (uint64_t b = 0; b < list->brick_count && !status; b++)
-        if (some_visible(v, list->bricks[b].code_min, list->bricks[b].code_max))
+        if (trip_code_set_has_some(&v->codes, list->bricks[b].code_min, list->bricks[b].code_max))
             trip_selection_add(&s->open, b);
     return status;
 }
@@ -337,7 +316,7 @@ static void begin_with_places(search *s)
 {
     const trip_visible *v = s->visible;
     for (unsigned i = 0; i < v->place_count && i < TRIP_VISIBLE_PLACES; i++)
-        if (is_visible(v, v->places[i].code))
+        if (trip_code_set_has(&v->codes, v->places[i].code))
             look_at_voxel(s, (1u << s->count) - 1, &v->places[i]);
 }
 

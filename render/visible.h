@@ -10,6 +10,7 @@
 #ifndef TRIP_VISIBLE_H
 #define TRIP_VISIBLE_H
 
+#include "code_set.h"
 #include "framing.h"
 #include "reader.h"
 #include "transfer_function.h"
@@ -30,9 +31,9 @@ typedef struct trip_visible {
     double kernel_radius; /* voxels: how far beyond their voxel splats count as reaching */
     double lo[3], hi[3];  /* bounds of all splats in index space */
 
-    bool alone;           /* which of them count: trip_visible_start() */
-    uint64_t splats;      /* looked at so far */
-    uint64_t codes[1024]; /* a bit a code: whether its voxels are visible */
+    bool alone;          /* which of them count: trip_visible_start() */
+    uint64_t splats;     /* looked at so far */
+    trip_code_set codes; /* whose voxels are visible */
     /* Where earlier searches ended, the last ones: later ones begin with what reaches far there. */
     trip_visible_place places[TRIP_VISIBLE_PLACES];
     unsigned place_count;                     /* so far */

@@ -5,12 +5,11 @@
 
 #include "report.h"
 
-unsigned trip_dataset_value_levels(const trip_dataset *d)
+unsigned trip_dataset_levels(const trip_dataset *d, trip_kind kind)
 {
     unsigned level = 0;
-    while (trip_dataset_find(d, 0, level + 1, TRIP_KIND_VALUES) &&
-           trip_dataset_find(d, 1, level + 1, TRIP_KIND_VALUES) &&
-           trip_dataset_find(d, 2, level + 1, TRIP_KIND_VALUES))
+    while (trip_dataset_find(d, 0, level + 1, kind) && trip_dataset_find(d, 1, level + 1, kind) &&
+           trip_dataset_find(d, 2, level + 1, kind))
         level++;
     return level;
 }

@@ -6,10 +6,10 @@
 
 #include "dataset.h"
 
-/* How many coarse levels have values along each axis, without a gap. */
-unsigned trip_dataset_value_levels(const trip_dataset *d);
+/* How many coarse levels have lists of a kind along each axis, without a gap. */
+unsigned trip_dataset_levels(const trip_dataset *d, trip_kind kind);
 
-/* `level`: from 1 to that number. */
+/* `level`: from 1 to the number of those that have values. */
 int trip_dataset_level_open(trip_dataset **out, const trip_dataset *d, unsigned level);
 void trip_dataset_level_close(trip_dataset *d);
 

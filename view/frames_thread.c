@@ -23,9 +23,11 @@ static void wake(trip_frames *f)
 
 /* Of moving views, in pixels of their frames: voxels no wider are drawn by coarse levels. */
 #define MOVING_LOD_PX 1.0
+#define MOVING_SLICES 1
+/* Of the time that such a frame has, which it keeps to by detail alone: where it would take more
+ * than so many times as long, what is near becomes coarse too. */
+#define MOVING_MOST 1.5
 #define USUAL_FPS 30.0
-/* Of the time that such a frame has, what is for data: the rest is for pixels. */
-#define DATA_SHARE 0.6
 
 /* ---- what there is to say ---- */
 
@@ -397,7 +399,8 @@ typedef struct frame {
     int width, height;
     bool whole; /* of the size and detail that are wanted */
     triptych_settings settings;
-    bool first; /* there is no picture of this view: parts of it are shown, and it is finished */
+    double detail; /* the part of the picture's width and height that there are voxels for */
+    bool first;    /* there is no picture of this view: parts of it are shown, and it is finished */
     double begun_ms;
 } frame;
 
@@ -448,12 +451,25 @@ static void keep_plan(trip_frames *f)
     pthread_mutex_unlock(&f->lock);
 }
 
+static double wanted_pixels(const trip_frames *f)
+{
+    return (double)f->now.width * f->now.height;
+}
+
+/* A moving frame counts as of so many pixels as it has detail for. */
+static void note_pace(trip_frames *f, const frame *d, double ms)
+{
+    if (d->whole)
+        trip_pace_note(&f->whole_pace, wanted_pixels(f), ms);
+    else if (d->first)
+        trip_pace_note(&f->pace, d->detail * d->detail * wanted_pixels(f), ms);
+}
+
 static void note_frame(trip_frames *f, const frame *d, double ms)
 {
     triptych_frame_stats stats = { 0 };
-    const double pixels = (double)d->width * d->height;
     if (f->warm)
-        trip_pace_note(d->whole ? &f->whole_pace : &f->pace, pixels, ms);
+        note_pace(f, d, ms);
     f->warm = true;
     const bool counted = triptych_get_frame_stats(f->t, &stats) == 0;
     pthread_mutex_lock(&f->lock);
@@ -480,13 +496,15 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
     pthread_mutex_unlock(&f->lock);
 }
 
-static int draw(trip_frames *f, double scale, const triptych_settings *settings, bool first)
+static int draw(trip_frames *f, double scale, double detail, const triptych_settings *settings,
+                bool first)
 {
     const trip_wanted *w = &f->now;
     frame d = { .width = (int)ceil(w->width * scale),
                 .height = (int)ceil(w->height * scale),
                 .whole = scale == 1 && trip_same_settings(settings, &w->settings),
                 .settings = *settings,
+                .detail = detail,
                 .first = first,
                 .begun_ms = now_ms() };
     const triptych_view view = trip_navigation_view(&w->navigation, d.width, d.height);
@@ -512,12 +530,19 @@ static int draw(trip_frames *f, double scale, const triptych_settings *settings,
     return 0;
 }
 
-/* A frame of a moving view: coarse and small, to keep to the time. */
-static int draw_moving(trip_frames *f, double pixels, double target_ms)
+/* A frame of a moving view, coarse and small to keep to the time. What it has less detail for is
+ * shared out: both its pixels and the voxels in it are wider. */
+static int draw_moving(trip_frames *f, double target_ms)
 {
-    const triptych_settings settings =
-        with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px), DATA_SHARE * target_ms);
-    return draw(f, trip_pace_scale(&f->pace, pixels, target_ms), &settings, true);
+    const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), target_ms);
+    const double scale = sqrt(detail);
+    triptych_settings settings = with_levels(
+        f, fmax(MOVING_LOD_PX * scale / detail, f->now.settings.lod_px), MOVING_MOST * target_ms);
+    if (f->now.settings.max_ms > 0)
+        settings.max_ms = fmin(settings.max_ms, f->now.settings.max_ms);
+    if (settings.slices == 0)
+        settings.slices = MOVING_SLICES;
+    return draw(f, scale, detail, &settings, true);
 }
 
 /* One of the picture's size, before the whole one, which takes about so long: for it, a part of
@@ -529,7 +554,7 @@ static int draw_coarse(trip_frames *f, double whole_ms)
     const triptych_settings settings =
         with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px),
                     wanted_ms > 0 ? fmin(wanted_ms, most_ms) : most_ms);
-    return draw(f, 1, &settings, false);
+    return draw(f, 1, 1, &settings, false);
 }
 
 /* A picture at once, then the whole one; between them one of its size but coarser where that is
@@ -540,15 +565,14 @@ static int draw_wanted(trip_frames *f)
     const triptych_settings *whole = &f->now.settings;
     const double wanted = f->params.frames_per_second;
     const double target_ms = 1000 / (wanted > 0 ? wanted : USUAL_FPS);
-    const double pixels = (double)f->now.width * f->now.height;
-    const double whole_ms = trip_pace_expect_ms(&f->whole_pace, pixels);
+    const double whole_ms = trip_pace_expect_ms(&f->whole_pace, wanted_pixels(f));
     if (whole_ms > 0 && whole_ms < target_ms)
-        return draw(f, 1, whole, true);
-    int status = draw_moving(f, pixels, target_ms);
+        return draw(f, 1, 1, whole, true);
+    int status = draw_moving(f, target_ms);
     if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))
         status = draw_coarse(f, whole_ms);
     if (!status && !f->whole && !has_newer(f))
-        status = draw(f, 1, whole, false);
+        status = draw(f, 1, 1, whole, false);
     return status;
 }
 

@@ -17,8 +17,8 @@ void trip_pace_note(trip_pace *p, double pixels, double ms);
 /* What a frame of so many pixels would take; 0 where nothing is known. */
 double trip_pace_expect_ms(const trip_pace *p, double pixels);
 
-/* Smaller pictures show nothing. */
-#define TRIP_PACE_LEAST 0.125
+/* Less shows nothing. */
+#define TRIP_PACE_LEAST 0.03125
 
 /* The part of the width and height of a picture of so many pixels with which a frame keeps to
  * `target_ms`, TRIP_PACE_LEAST to 1; a half where nothing is known. Where what every frame costs

@@ -124,7 +124,7 @@
     I4 clips;  /* x: half-spaces that rays are cut to: how far inside they begin, and how much     \
                   that grows by as far as `along` and `across` say; y, z: the grid's first voxels  \
                   from the sheets' first; w: the kernel */                                         \
-    R4 clip_start[12], clip_along[12];
+    R4 clip_start[14], clip_along[14];
 
 /* The end of a segment: where rays pass a slice. `step` is how far along the list it is from the
  * end before; 0: no segment lies between them. A ray's u is base + first + what it moves along

@@ -87,7 +87,7 @@ static double inner(const double a[3], const double b[3])
 /* Rays begin at `start`, at depth 0. */
 static void set_clip(trip_gl_sheet_view *v, const rays *r, const trip_clip *clip)
 {
-    static_assert((int)TRIP_CLIP_MOST == 12, "shared.h");
+    static_assert((int)TRIP_CLIP_MOST == 14, "shared.h");
     v->constants.clips.v[0] = clip->count;
     for (int i = 0; i < clip->count; i++) {
         double n[3];

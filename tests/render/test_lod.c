@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "dataset_level.h"
-#include "lod.h"
+#include "lod_parts.h"
 #include "mean.h"
 #include "shade.h"
 
@@ -118,7 +118,7 @@ static void each_place_is_drawn_at_one_level(void **state)
     const trip_camera_params view = view_along(&s);
     const trip_settings settings = settings_at(0.7);
     assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
-    assert_int_equal(trip_lod_make(&lod, s.data, &c, &settings, s.budget), 0);
+    assert_int_equal(trip_lod_make(&lod, s.data, TRIP_KIND_MEANS, &c, &settings, s.budget), 0);
     assert_int_equal(lod.levels, LEVELS);
     for (int64_t i = 0; i < (int64_t)NX * NY * NZ; i += 37) {
         const int64_t voxel[3] = { i % NX, i / NX % NY, i / NX / NY };
@@ -247,8 +247,11 @@ static void interpolated_fog_is_as_thick_at_a_coarse_level(void **state)
     settings.classify = TRIP_CLASSIFY_POST;
     trip_camera c;
     assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
-    assert_int_equal(trip_dataset_value_levels(s.data), 1);
-    assert_int_equal(trip_lod_of_all(s.data, &c, &settings, 1), 1);
+    assert_int_equal(trip_dataset_levels(s.data, TRIP_KIND_VALUES), 1);
+    trip_lod_parts parts;
+    assert_int_equal(trip_lod_parts_make(&parts, s.data, &c, &settings, true, s.budget), 0);
+    assert_int_equal(parts.count, 1);
+    assert_int_equal(parts.level[0], 1);
     at = s;
     assert_int_equal(trip_dataset_level_open(&at.data, s.data, 1), 0);
     assert_int_equal(at.data->header.dims[2], NZ / 2);
@@ -429,7 +432,7 @@ static trip_lod bounded(scene *s, double max_bytes)
     settings.method = TRIP_METHOD_AXIS;
     settings.max_bytes = max_bytes;
     assert_int_equal(trip_camera_make(&c, &view, &s->data->index_to_world), 0);
-    assert_int_equal(trip_lod_make(&lod, s->data, &c, &settings, s->budget), 0);
+    assert_int_equal(trip_lod_make(&lod, s->data, TRIP_KIND_MEANS, &c, &settings, s->budget), 0);
     return lod;
 }
 
@@ -500,10 +503,15 @@ static void values_of_a_level_are_an_eighth(void **state)
     settings.method = TRIP_METHOD_AXIS;
     const trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 300, 40, SIZE_PX);
     assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    trip_lod_parts parts;
     settings.max_bytes = 2.0 * 64 * 64 * NZ;
-    assert_int_equal(trip_lod_of_all(s.data, &c, &settings, 1), 0);
+    assert_int_equal(trip_lod_parts_make(&parts, s.data, &c, &settings, true, s.budget), 0);
+    assert_int_equal(parts.level[0], 0);
     settings.max_bytes -= 1;
-    assert_int_equal(trip_lod_of_all(s.data, &c, &settings, 1), 1);
+    assert_int_equal(trip_lod_parts_make(&parts, s.data, &c, &settings, true, s.budget), 0);
+    assert_int_equal(parts.level[0], 1);
+    assert_float_equal(parts.limit.bytes, 2.0 * 32 * 32 * NZ / 2, 1);
+    assert_float_equal(parts.limit.full_bytes, 2.0 * 64 * 64 * NZ, 1);
     scene_destroy(&s);
 }
 

@@ -1,6 +1,7 @@
 #include "scenes.h"
 #include "test.h"
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -275,7 +276,9 @@ static void a_brick_is_transparent_when_no_code_of_its_range_has_extinction(void
     trip_camera c = make_camera(&s, &p);
     trip_settings settings = unlit(TRIP_METHOD_AXIS, 0);
     const trip_list_grid grid = { { 1, 1, 1 }, { 0, 0, 0 } };
-    trip_cull cull = trip_cull_make(s.data, &c, &grid, &settings, 0, s.table, NULL);
+    trip_code_set set;
+    trip_code_set_make(&set, s.table, FLT_TRUE_MIN);
+    trip_cull cull = trip_cull_make(s.data, &c, &grid, &settings, 0, &set, NULL);
     trip_file_brick brick = s.data->lists[0].bricks[0];
     const trip_file_slab *slab = s.data->lists[0].slabs;
     for (unsigned i = 0; i < 20000; i++) {

@@ -229,15 +229,20 @@ static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cp
     return f;
 }
 
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
-                           const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
+static bool is_of(const trip_cpu_function *f, XXH128_hash_t table, const trip_closed_form *closed,
+                  trip_cpu_codes codes, double voxel_world)
 {
-    const XXH128_hash_t hash = XXH3_128bits(table, CODES * sizeof *table);
+    return f->voxel_world == voxel_world && f->integrals.is_closed == (closed != NULL) &&
+           f->codes.first == codes.first && f->codes.shift == codes.shift &&
+           f->table_hash[0] == table.low64 && f->table_hash[1] == table.high64;
+}
+
+static void set(trip_cpu_function *f, const trip_tf_entry *table, XXH128_hash_t hash,
+                const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
+{
     if (closed) /* goes by more than what is compared below */
         f->integrals.closed = closed_form_of(closed, codes, voxel_world);
-    if (f->voxel_world == voxel_world && f->integrals.is_closed == (closed != NULL) &&
-        f->codes.first == codes.first && f->codes.shift == codes.shift &&
-        f->table_hash[0] == hash.low64 && f->table_hash[1] == hash.high64)
+    if (is_of(f, hash, closed, codes, voxel_world))
         return;
     f->table_hash[0] = hash.low64;
     f->table_hash[1] = hash.high64;
@@ -248,4 +253,62 @@ void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
     if (!closed)
         set_integrals(f, table);
     set_next_visible(f, table);
+}
+
+static XXH128_hash_t hash_of(const trip_tf_entry *table)
+{
+    return XXH3_128bits(table, CODES * sizeof *table);
+}
+
+void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
+                           const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
+{
+    set(f, table, hash_of(table), closed, codes, voxel_world);
+}
+
+/* ---- those that are kept ---- */
+
+bool trip_cpu_functions_create(trip_cpu_functions *f, trip_budget *budget)
+{
+    *f = (trip_cpu_functions){ 0 };
+    return trip_cpu_function_create(&f->kept[0], budget);
+}
+
+void trip_cpu_functions_destroy(trip_cpu_functions *f, trip_budget *budget)
+{
+    for (int i = 0; i < TRIP_CPU_FUNCTIONS; i++)
+        if (f->kept[i].next_visible)
+            trip_cpu_function_destroy(&f->kept[i], budget);
+}
+
+/* Where the next is set. */
+static int place_of_next(trip_cpu_functions *f, trip_budget *budget)
+{
+    enum { SMALL_PART = 32 };
+    int longest = 0;
+    for (int i = 0; i < TRIP_CPU_FUNCTIONS; i++) {
+        if (!f->kept[i].next_visible) {
+            const uint64_t left = trip_budget_left_bytes(budget);
+            const bool is_small = trip_cpu_function_bytes() < left / SMALL_PART;
+            return is_small && trip_cpu_function_create(&f->kept[i], budget) ? i : longest;
+        }
+        longest = f->turns[i] < f->turns[longest] ? i : longest;
+    }
+    return longest;
+}
+
+const trip_cpu_function *trip_cpu_functions_take(trip_cpu_functions *f, trip_budget *budget,
+                                                 const trip_tf_entry *table,
+                                                 const trip_closed_form *closed,
+                                                 trip_cpu_codes codes, double voxel_world)
+{
+    const XXH128_hash_t hash = hash_of(table);
+    int at = 0;
+    while (at < TRIP_CPU_FUNCTIONS && !is_of(&f->kept[at], hash, closed, codes, voxel_world))
+        at++;
+    if (at == TRIP_CPU_FUNCTIONS)
+        at = place_of_next(f, budget);
+    f->turns[at] = ++f->turn;
+    set(&f->kept[at], table, hash, closed, codes, voxel_world);
+    return &f->kept[at];
 }

@@ -1,6 +1,6 @@
 /* The transfer function's integrals over codes, as the kernels take them (kernels/sheets.h). Set
- * for every frame, read-only then; those of the frame before are kept where nothing they depend on
- * has changed. */
+ * for every frame, read-only then; those of frames before are kept where nothing they depend on
+ * has changed: of several, since the parts of a picture may have levels of their own. */
 #ifndef TRIP_CPU_SHEETS_INTEGRALS_H
 #define TRIP_CPU_SHEETS_INTEGRALS_H
 
@@ -33,6 +33,23 @@ void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
 void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
                            const trip_closed_form *closed, trip_cpu_codes codes,
                            double voxel_world);
+
+enum { TRIP_CPU_FUNCTIONS = 6 };
+
+typedef struct trip_cpu_functions {
+    trip_cpu_function kept[TRIP_CPU_FUNCTIONS]; /* of the first there is memory from the start */
+    uint64_t turn, turns[TRIP_CPU_FUNCTIONS];   /* when each was last taken */
+} trip_cpu_functions;
+
+/* Memory for one; false where the budget does not suffice. */
+bool trip_cpu_functions_create(trip_cpu_functions *f, trip_budget *budget);
+void trip_cpu_functions_destroy(trip_cpu_functions *f, trip_budget *budget);
+/* As set by trip_cpu_function_set(): one that is kept, else in the place of the one that was not
+ * taken for longest, or in memory of its own where that is a small part of what is left. */
+const trip_cpu_function *trip_cpu_functions_take(trip_cpu_functions *f, trip_budget *budget,
+                                                 const trip_tf_entry *table,
+                                                 const trip_closed_form *closed,
+                                                 trip_cpu_codes codes, double voxel_world);
 
 /* Whether some code of [least, most] may show; biased codes. */
 static inline bool trip_cpu_function_shows(const trip_cpu_function *f, int16_t least, int16_t most)

@@ -46,7 +46,7 @@ int trip_cpu_sheets_create(trip_cpu_sheets **out, const trip_cpu *r)
         return no_memory(r->budget);
     s->store.budget = r->budget;
     s->store.pool = r->pool;
-    if (trip_cpu_function_create(&s->function, r->budget))
+    if (trip_cpu_functions_create(&s->functions, r->budget))
         return 0;
     trip_cpu_sheets_destroy(s);
     *out = NULL;
@@ -60,7 +60,7 @@ void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
     trip_budget *budget = s->store.budget;
     trip_cpu_store_release(&s->store);
     trip_cpu_windows_release(&s->windows, budget);
-    trip_cpu_function_destroy(&s->function, budget);
+    trip_cpu_functions_destroy(&s->functions, budget);
     trip_budget_release(budget, s, sizeof *s);
 }
 
@@ -78,8 +78,9 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->sheet_pane = trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
                     : closed                                        ? r->kernels->sheet_pane_closed
                                                                     : r->kernels->sheet_pane;
-    trip_cpu_function_set(&s->function, r->frame->table, closed ? &plan->closed : NULL,
-                          s->store.codes, r->frame->camera->voxel_world);
+    s->function = trip_cpu_functions_take(&s->functions, r->budget, r->frame->table,
+                                          closed ? &plan->closed : NULL, s->store.codes,
+                                          r->frame->camera->voxel_world);
     return 0;
 }
 
@@ -269,7 +270,7 @@ static void find_visible(trip_cpu_sheets *s, int complete)
                 .kernel = s->view.kernel,
                 .everywhere = trip_cpu_sheets_leap(s),
             };
-    trip_cpu_store_find_visible(&s->store, work, count, &s->function);
+    trip_cpu_store_find_visible(&s->store, work, count, s->function);
 }
 
 /* Gradients of the first sheets to held[last]; those of some may be there from before. */
@@ -647,7 +648,7 @@ static int begin_pass(trip_cpu_sheets *s, const trip_pass *pass)
     trip_cpu_open_squares_forget(s);
     s->pass = pass;
     s->way = pass->descending ? -1 : 1;
-    trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending, &s->function);
+    trip_cpu_pass_view_make(&s->view, s->of->frame, s->axis, pass->descending, s->function);
     s->eye = trip_coordinates_index(s->store.coordinates, s->axis, s->view.eye[2]);
     return status;
 }

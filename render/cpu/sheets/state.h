@@ -20,7 +20,8 @@ typedef struct trip_cpu_sheet_run {
 struct trip_cpu_sheets {
     trip_cpu *of;
     trip_cpu_store store;
-    trip_cpu_function function;
+    trip_cpu_functions functions;
+    const trip_cpu_function *function; /* of these the frame's */
     trip_cpu_sheet_kernel *sheet_pane; /* by whether segments have a closed form */
     trip_cpu_group group;
     trip_cpu_about about[TRIP_CPU_SEGMENTS]; /* of its segments, with kernels of 64 voxels */

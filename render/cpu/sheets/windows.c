@@ -227,7 +227,7 @@ static void find_interval(trip_cpu_sheets *s)
         .kernel = s->view.kernel,
         .everywhere = leap,
     };
-    trip_cpu_store_find_visible(&s->store, &cells, 1, &s->function);
+    trip_cpu_store_find_visible(&s->store, &cells, 1, s->function);
     if (s->view.shading)
         trip_cpu_store_find_gradients(&s->store, work, count);
 }

@@ -1,0 +1,279 @@
+/* Pictures of interpolated values in parts of several levels of detail, of a volume whose levels
+ * are all alike: its values rise linearly, so that means of them, interpolated, are the values
+ * themselves. Whatever the levels, the picture is then that of the integral through the finest. */
+#include <triptych_brick.h>
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { NX = 64, NY = 64, NZ = 192, SIZE = 64, FLOATS = 4 * SIZE * SIZE };
+
+#define VOLUME "ramp.nrrd"
+#define DATA_SET "ramp.trip"
+
+/* Away from the border, where coarse levels end earlier than fine ones. */
+static const triptych_clip inside = {
+    .box = 1, .box_of_voxels = 1, .box_lo = { 9, 9, 9 }, .box_hi = { NX - 10, NY - 10, NZ - 10 }
+};
+
+static const char function[] = "unit voxel\nvalues data\n"
+                               "0 1 0.2 0.1 0.002\n"
+                               "1 0.1 0.4 1 0.03\n";
+
+static int write_volume(void)
+{
+    FILE *f = fopen(VOLUME, "wb");
+    if (!f)
+        return -1;
+    fprintf(f,
+            "NRRD0004\ntype: float\ndimension: 3\nsizes: %d %d %d\nendian: little\n"
+            "encoding: raw\n\n",
+            NX, NY, NZ);
+    for (int k = 0; k < NZ; k++)
+        for (int j = 0; j < NY; j++)
+            for (int i = 0; i < NX; i++) {
+                const float value =
+                    0.25f * (float)i / NX + 0.25f * (float)j / NY + 0.5f * (float)k / NZ;
+                fwrite(&value, sizeof value, 1, f);
+            }
+    return fclose(f);
+}
+
+static triptych *new_context(void)
+{
+    triptych *t;
+    assert_int_equal(triptych_create(&t), TRIPTYCH_OK);
+    return t;
+}
+
+static int brick(void **state)
+{
+    (void)state;
+    if (write_volume())
+        return -1;
+    triptych *t = new_context();
+    const triptych_brick_options options = {
+        .keep_all = 1, .levels = 4, .tile_voxels = 16, .memory_bytes = 64 << 20, .replace = 1
+    };
+    int status = triptych_brick(t, VOLUME, DATA_SET, &options, NULL);
+    if (status)
+        print_error("%s\n", triptych_error(t));
+    triptych_destroy(t);
+    return status;
+}
+
+static int remove_data(void **state)
+{
+    (void)state;
+    return system("rm -r " VOLUME " " DATA_SET);
+}
+
+/* Along the volume, from a little before it, and from within. */
+static const double eyes[2][3] = { { 20, 40, -30 }, { 30, 35, 40 } };
+
+static triptych *open_at(triptych_renderer renderer, const double eye[3])
+{
+    triptych *t = new_context();
+    const triptych_resources resources = { .memory_bytes = 256 << 20, .renderer = renderer };
+    const triptych_view view = { .width = SIZE,
+                                 .height = SIZE,
+                                 .eye = eye,
+                                 .look = (double[]){ 33, 30, 180 },
+                                 .up = (double[]){ 0, 1, 0 },
+                                 .fov_degrees = 25 };
+    assert_int_equal(triptych_open(t, DATA_SET, &resources), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_function(t, &(triptych_function){ .text = function }),
+                     TRIPTYCH_OK);
+    assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
+    return t;
+}
+
+static triptych_settings plain(double lod_px)
+{
+    triptych_settings s = triptych_default_settings();
+    s.shading = 0;
+    s.lod_px = lod_px;
+    s.tolerance = 1e-4;
+    s.clip = inside;
+    memset(s.background, 0, sizeof s.background);
+    return s;
+}
+
+static uint64_t draw(triptych *t, const triptych_settings *s, float *rgba)
+{
+    triptych_frame_stats stats;
+    assert_int_equal(triptych_set_settings(t, s), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+    assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_OK);
+    return stats.splats;
+}
+
+static void assert_near(const float *a, const float *b, double mean, double most)
+{
+    double sum = 0, greatest = 0;
+    for (int i = 0; i < FLOATS; i++) {
+        const double d = fabs((double)a[i] - (double)b[i]);
+        sum += d;
+        greatest = fmax(greatest, d);
+    }
+    if (!(255 * sum / FLOATS <= mean && 255 * greatest <= most))
+        fail_msg("%.3f in the mean, at most %.3f of 255", 255 * sum / FLOATS, 255 * greatest);
+}
+
+/* Of how many levels a frame is made, by what it says. */
+static int count_parts(triptych *t)
+{
+    char *text = NULL;
+    int parts = 1;
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
+    for (const char *at = text; (at = strstr(at, "along the view on")); at++)
+        parts++;
+    free(text);
+    triptych_end(t);
+    return parts;
+}
+
+static const triptych_renderer renderers[] = {
+    TRIPTYCH_RENDERER_CPU,
+    TRIPTYCH_RENDERER_REFERENCE,
+#ifndef TRIP_WITHOUT_GL
+    TRIPTYCH_RENDERER_GL,
+#endif
+};
+
+/* A gap or an overlap of a voxel would be up to 7 of 255. */
+static void parts_join_without_a_seam(void **state)
+{
+    (void)state;
+    static float truth[FLOATS], fine[FLOATS], parts[FLOATS];
+    for (int e = 0; e < 2; e++) {
+        triptych *t = open_at(TRIPTYCH_RENDERER_INTEGRAL, eyes[e]);
+        triptych_settings s = plain(0);
+        draw(t, &s, truth);
+        triptych_destroy(t);
+        assert_true(truth[4 * (SIZE / 2 * SIZE + SIZE / 2) + 3] > 0.7F);
+        for (size_t i = 0; i < sizeof renderers / sizeof *renderers; i++) {
+            t = open_at(renderers[i], eyes[e]);
+            s = plain(0);
+            const uint64_t of_fine = draw(t, &s, fine);
+            assert_near(fine, truth, 0.1, 1.5);
+            s = plain(4);
+            assert_true(draw(t, &s, parts) < of_fine);
+            assert_int_equal(count_parts(t), 3);
+            assert_near(parts, truth, 0.2, 1.5);
+            triptych_destroy(t);
+        }
+    }
+}
+
+/* What is behind all, mean colours and several rays a pixel come after the last part. */
+static void what_comes_after_the_last_part(void **state)
+{
+    (void)state;
+    static float clear[FLOATS], other[FLOATS];
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
+    triptych_settings s = plain(4);
+    draw(t, &s, clear);
+    const double background[4] = { 0.9, 0.3, 0.6, 0.75 };
+    memcpy(s.background, background, sizeof background);
+    draw(t, &s, other);
+    for (int i = 0; i < FLOATS; i++) {
+        const double alpha = clear[i / 4 * 4 + 3];
+        const double behind = (i % 4 < 3 ? background[i % 4] : 1) * background[3];
+        assert_float_equal(other[i], clear[i] + (1 - alpha) * behind, 1e-6);
+    }
+    s.normalise = 1;
+    draw(t, &s, other);
+    for (int i = 0; i < FLOATS; i++)
+        if (clear[i / 4 * 4 + 3] > 1e-3F)
+            assert_float_equal(other[i], clear[i] / clear[i / 4 * 4 + 3], 1e-5);
+    s = plain(8);
+    s.samples = 2;
+    draw(t, &s, other);
+    assert_near(other, clear, 0.3, 12); /* the rim of the box is smooth then */
+    triptych_destroy(t);
+}
+
+/* The same from frame to frame; in steps, pictures on the way are those of the parts before. */
+static void steps_come_to_the_same_bits(void **state)
+{
+    (void)state;
+    static float whole[FLOATS], again[FLOATS], on_the_way[FLOATS];
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
+    const triptych_settings s = plain(4);
+    draw(t, &s, whole);
+    int status = TRIPTYCH_MORE;
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    while (status > 0) {
+        status = triptych_step(t, 0);
+        if (status == TRIPTYCH_WAITS)
+            triptych_await(t, 20000000);
+        assert_true(status >= 0);
+        assert_int_equal(triptych_picture(t, on_the_way), TRIPTYCH_OK);
+        for (int i = 3; i < FLOATS; i += 4)
+            assert_true(on_the_way[i] <= whole[i] + 1e-3F);
+    }
+    assert_int_equal(triptych_picture(t, again), TRIPTYCH_OK);
+    triptych_end(t);
+    assert_memory_equal(again, whole, sizeof again);
+    triptych_destroy(t);
+}
+
+/* Light that reaches places, and distances, are of one level: the finest that is called for. */
+static void what_takes_one_level_has_one(void **state)
+{
+    (void)state;
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
+    triptych_settings s = plain(4);
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(count_parts(t), 3);
+    s.depth = 1;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(count_parts(t), 1);
+    s.depth = 0;
+    s.effects = TRIPTYCH_OCCLUSION;
+    s.shading = 1;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(count_parts(t), 1);
+    triptych_destroy(t);
+}
+
+/* A bound on bytes makes levels coarser, what is nearest last. */
+static void a_bound_makes_parts_coarser(void **state)
+{
+    (void)state;
+    static float truth[FLOATS], bounded[FLOATS];
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
+    triptych_settings s = plain(0);
+    const uint64_t of_fine = draw(t, &s, truth);
+    uint64_t before = of_fine;
+    for (double bytes = 1 << 20; bytes > 1 << 12; bytes /= 4) {
+        s.max_bytes = bytes;
+        const uint64_t splats = draw(t, &s, bounded);
+        assert_true(splats <= before);
+        assert_near(bounded, truth, 0.5, 3);
+        before = splats;
+    }
+    assert_true(before < of_fine / 100);
+    triptych_destroy(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parts_join_without_a_seam),
+        cmocka_unit_test(what_comes_after_the_last_part),
+        cmocka_unit_test(steps_come_to_the_same_bits),
+        cmocka_unit_test(what_takes_one_level_has_one),
+        cmocka_unit_test(a_bound_makes_parts_coarser),
+    };
+    return cmocka_run_group_tests(tests, brick, remove_data);
+}
