@@ -154,9 +154,8 @@ static const struct argp_option options[] = {
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
       "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
       "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
-      "pre with what only splats have (--lod, --kernel-radius, --kernel exact, ewa or fixed, "
-      "--low-pass, "
-      "--flatten, --compositing, --method image, --weights, --target, --submit, "
+      "pre with what only splats have (--kernel-radius, --kernel exact, ewa or fixed, "
+      "--low-pass, --flatten, --compositing, --method image, --weights, --target, --submit, "
       "--traversal ascending, --count) and for data without cells to interpolate in (default: "
       "auto)",
       3 },

@@ -88,21 +88,33 @@ static void add_list(cJSON *list, const triptych_list_stats *s)
     cJSON_AddNumberToObject(list, "bricks_clipped", (double)s->bricks_clipped);
 }
 
+/* Whether frames are drawn from the list: by splats of voxels and means, else of voxels and values
+ * (and their halo, which is not counted apart). */
+static bool is_drawn_from(const triptych_list *list, const triptych_frame_stats *frame)
+{
+    if (list->level == 0 || frame->classify == TRIPTYCH_PRE)
+        return list->drawn;
+    return !strcmp(list->kind, "values");
+}
+
 /* Calls `one` with each list that can be drawn and its statistics. */
 static int each_list(triptych *t,
                      void (*one)(void *user, const char *name, const triptych_list_stats *s),
                      void *user)
 {
     triptych_info info;
+    triptych_frame_stats frame;
     int status = triptych_get_info(t, &info);
-    for (unsigned i = 0; i < info.lists && !status; i++) {
+    if (!status)
+        status = triptych_get_frame_stats(t, &frame);
+    for (unsigned i = 0; !status && i < info.lists; i++) {
         char name[24];
         triptych_list list;
         triptych_list_stats s;
         status = triptych_get_list(t, i, &list);
         if (!status)
             status = triptych_get_list_stats(t, i, &s);
-        if (!status && list.drawn)
+        if (!status && is_drawn_from(&list, &frame))
             one(user, list_name(&list, name), &s);
     }
     return status;

@@ -235,7 +235,7 @@ typedef enum triptych_classify {
     TRIPTYCH_PRE,  /* voxels are classified, and their splats drawn */
     TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
     /* Post, but pre where something is set that only splats have (ascending traversal, the
-     * method image, weights of vertices, a rounded target, indexed, triangles, coarse levels, by
+     * method image, weights of vertices, a rounded target, indexed, triangles, by
      * sheet, EWA footprints, another low-pass or kernel radius than 2, count), or the data has no
      * cells to interpolate in: one voxel thick, or culled without a halo. triptych_explain() says
      * which. Memory has no part in it: where post does not fit, the frame fails, and names what
@@ -325,8 +325,7 @@ typedef struct triptych_settings {
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
-                      0 to 1000; 0, the default: the finest alone. Post has one level for all of a
-                      frame. Not with indexed */
+                      0 to 1000; 0, the default: the finest alone. Not with indexed */
     double max_bytes; /* > 0: what is widest in the picture first is drawn by the finest levels with
                          which codes and normals of so many bytes at most are in view; not counted
                          are positions, some 10 to 30 % more. Not beyond what lod_px calls for */

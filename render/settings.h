@@ -131,8 +131,9 @@ typedef struct trip_settings {
                           more: 0 (none is) to TRIP_SATURATION_MAX, or TRIP_SATURATION_AUTO */
     double kernel_radius; /* voxels (index space) */
     double background[4]; /* r, g, b, a; not premultiplied */
-    double lod_px;        /* cubes are drawn at the coarsest level whose voxels are at most so
-                             many pixels of the picture wide (lod.h); 0: all at the finest */
+    double lod_px;        /* what is far is drawn at the coarsest level whose voxels are at most so
+                             many pixels of the picture wide there (lod.h, lod_parts.h); 0: all at
+                             the finest */
     double max_bytes;     /* and at coarser ones still, so that no more is read (lod_limit.h);
                              0: no bound */
     trip_kernel kernel;   /* of values, post and the integral */
