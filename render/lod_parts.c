@@ -97,11 +97,20 @@ static void divide(trip_lod_parts *parts, const trip_camera *camera, range depth
     }
 }
 
+/* Levels with values, and with cells to interpolate them in. */
+static unsigned count_levels(const trip_dataset *data)
+{
+    unsigned levels = trip_dataset_levels(data, TRIP_KIND_VALUES);
+    for (int a = 0; a < 3; a++)
+        while (levels > 0 && (data->header.dims[a] - 1) >> levels == 0)
+            levels--;
+    return levels;
+}
+
 int trip_lod_parts_make(trip_lod_parts *parts, const trip_dataset *data, const trip_camera *camera,
                         const trip_settings *settings, bool one, trip_budget *budget)
 {
-    const unsigned most =
-        trip_settings_has_levels(settings) ? trip_dataset_levels(data, TRIP_KIND_VALUES) : 0;
+    const unsigned most = trip_settings_has_levels(settings) ? count_levels(data) : 0;
     const range depths = depths_of(data, camera);
     const bool thin = camera->ortho || (depths.nearest > 0 &&
                                         depths.farthest < depths.nearest * exp2(MIXED_OCTAVES));

@@ -180,6 +180,7 @@ static int open_heat(trip_frames *f)
 static int open_data(trip_frames *f)
 {
     f->frugal &= f->document == f->now.document;
+    f->plain &= f->frugal;
     const trip_frames_params *p = &f->params;
     const trip_wanted *w = &f->now;
     int status = 0;
@@ -242,12 +243,15 @@ static int use_function(trip_frames *f)
     return status;
 }
 
-/* Those that are wanted, but for levels. */
-static triptych_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
+/* Those that are wanted, with levels at least so coarse. Not where memory is short: pictures of
+ * several levels take more of it. */
+static triptych_settings with_levels(const trip_frames *f, double lod_px, double most_ms)
 {
     triptych_settings s = f->now.settings;
-    s.lod_px = lod_px;
-    s.max_ms = max_ms;
+    if (f->plain)
+        return s;
+    s.lod_px = fmax(s.lod_px, lod_px);
+    s.max_ms = s.max_ms > 0 ? fmin(s.max_ms, most_ms) : most_ms;
     return s;
 }
 
@@ -536,10 +540,8 @@ static int draw_moving(trip_frames *f, double target_ms)
 {
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), target_ms);
     const double scale = sqrt(detail);
-    triptych_settings settings = with_levels(
-        f, fmax(MOVING_LOD_PX * scale / detail, f->now.settings.lod_px), MOVING_MOST * target_ms);
-    if (f->now.settings.max_ms > 0)
-        settings.max_ms = fmin(settings.max_ms, f->now.settings.max_ms);
+    triptych_settings settings =
+        with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MOST * target_ms);
     if (settings.slices == 0)
         settings.slices = MOVING_SLICES;
     return draw(f, scale, detail, &settings, true);
@@ -550,10 +552,7 @@ static int draw_moving(trip_frames *f, double target_ms)
 static int draw_coarse(trip_frames *f, double whole_ms)
 {
     enum { PART = 5 };
-    const double wanted_ms = f->now.settings.max_ms, most_ms = whole_ms / PART;
-    const triptych_settings settings =
-        with_levels(f, fmax(MOVING_LOD_PX, f->now.settings.lod_px),
-                    wanted_ms > 0 ? fmin(wanted_ms, most_ms) : most_ms);
+    const triptych_settings settings = with_levels(f, MOVING_LOD_PX, whole_ms / PART);
     return draw(f, 1, 1, &settings, false);
 }
 
@@ -602,15 +601,18 @@ static int serve_once(trip_frames *f)
     return status ? status : draw_wanted(f);
 }
 
-/* Where the memory does not suffice for pictures and for pages kept between them, none are kept. */
+/* Where the memory does not suffice for pictures and for pages kept between them, none are kept;
+ * and where it does not for those of several levels, moving views have none. */
 static int serve_wanted(trip_frames *f)
 {
-    int status = serve_once(f);
-    if (status != TRIPTYCH_ERROR || !f->open || f->frugal || has_newer(f))
-        return status;
-    close_data(f);
-    f->frugal = true;
-    return serve_once(f);
+    for (;;) {
+        int status = serve_once(f);
+        if (status != TRIPTYCH_ERROR || !f->open || f->plain || has_newer(f))
+            return status;
+        close_data(f);
+        f->plain = f->frugal;
+        f->frugal = true;
+    }
 }
 
 /* Writes the picture that is there, as `triptych render` would. */

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cpu/sheets/sheets.h"
 #include "report.h"
 #include "weight.h"
 
@@ -57,6 +58,11 @@ int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
     r->has_open_sheets = sums;
     size_t bytes = lay_out(r, NULL);
     char *memory = trip_budget_take(r->budget, bytes);
+    if (!memory && r->sheets) { /* which took what the picture before left */
+        trip_cpu_sheets_destroy(r->sheets);
+        r->sheets = NULL;
+        memory = trip_budget_take(r->budget, bytes);
+    }
     if (!memory) {
         r->mask.grid = (trip_cpu_grid){ 0, 0 };
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",

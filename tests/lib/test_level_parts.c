@@ -27,7 +27,7 @@ static const char function[] = "unit voxel\nvalues data\n"
                                "0 1 0.2 0.1 0.002\n"
                                "1 0.1 0.4 1 0.03\n";
 
-static int write_volume(void)
+static int write_volume(int nx)
 {
     FILE *f = fopen(VOLUME, "wb");
     if (!f)
@@ -35,10 +35,10 @@ static int write_volume(void)
     fprintf(f,
             "NRRD0004\ntype: float\ndimension: 3\nsizes: %d %d %d\nendian: little\n"
             "encoding: raw\n\n",
-            NX, NY, NZ);
+            nx, NY, NZ);
     for (int k = 0; k < NZ; k++)
         for (int j = 0; j < NY; j++)
-            for (int i = 0; i < NX; i++) {
+            for (int i = 0; i < nx; i++) {
                 const float value =
                     0.25f * (float)i / NX + 0.25f * (float)j / NY + 0.5f * (float)k / NZ;
                 fwrite(&value, sizeof value, 1, f);
@@ -53,10 +53,9 @@ static triptych *new_context(void)
     return t;
 }
 
-static int brick(void **state)
+static int brick_volume(int nx)
 {
-    (void)state;
-    if (write_volume())
+    if (write_volume(nx))
         return -1;
     triptych *t = new_context();
     const triptych_brick_options options = {
@@ -67,6 +66,12 @@ static int brick(void **state)
         print_error("%s\n", triptych_error(t));
     triptych_destroy(t);
     return status;
+}
+
+static int brick(void **state)
+{
+    (void)state;
+    return brick_volume(NX);
 }
 
 static int remove_data(void **state)
@@ -266,6 +271,23 @@ static void a_bound_makes_parts_coarser(void **state)
     triptych_destroy(t);
 }
 
+/* The second level of three voxels has one, in which there is no cell: it is not drawn. */
+static void levels_of_a_thin_grid_have_cells(void **state)
+{
+    (void)state;
+    static float thin[FLOATS];
+    assert_int_equal(brick_volume(3), 0);
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, (double[]){ 10, 30, -500 });
+    triptych_settings s = plain(100);
+    s.clip = (triptych_clip){ 0 };
+    draw(t, &s, thin);
+    float most = 0;
+    for (int i = 3; i < FLOATS; i += 4)
+        most = fmaxf(most, thin[i]);
+    assert_true(most > 0.01F);
+    triptych_destroy(t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -274,6 +296,7 @@ int main(void)
         cmocka_unit_test(steps_come_to_the_same_bits),
         cmocka_unit_test(what_takes_one_level_has_one),
         cmocka_unit_test(a_bound_makes_parts_coarser),
+        cmocka_unit_test(levels_of_a_thin_grid_have_cells),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);
 }
