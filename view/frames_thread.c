@@ -24,8 +24,10 @@ static void wake(trip_frames *f)
 /* Of moving views, in pixels of their frames: voxels no wider are drawn by coarse levels. */
 #define MOVING_LOD_PX 1.0
 #define MOVING_SLICES 1
-/* Of the time that such a frame has, which it keeps to by detail alone: where it would take more
- * than so many times as long, what is near becomes coarse too. */
+/* Of the time that such a frame has, what it is to take in the mean, since some take longer. It
+ * keeps to that by detail alone: where it would take so many times as long as it has, what is near
+ * becomes coarse too. */
+#define MOVING_SHARE 0.85
 #define MOVING_MOST 1.5
 #define USUAL_FPS 30.0
 
@@ -538,7 +540,7 @@ static int draw(trip_frames *f, double scale, double detail, const triptych_sett
  * shared out: both its pixels and the voxels in it are wider. */
 static int draw_moving(trip_frames *f, double target_ms)
 {
-    const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), target_ms);
+    const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     triptych_settings settings =
         with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MOST * target_ms);
