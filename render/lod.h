@@ -1,7 +1,8 @@
-/* Which level of detail each cube of a frame is drawn at. A cube is an aligned one of voxels of
- * the grid, of a size that depends on the grid alone; its level follows from the cube, the view and
- * the settings, so never from bricks, tiles or memory. A voxel of a level covers voxels of one
- * cube, and is drawn where that cube has its level: so each place is drawn at one level, once.
+/* Which level of detail each cube of a frame of splats is drawn at; of interpolated values
+ * lod_parts.h says it. A cube is an aligned one of voxels of the grid, of a size that depends on
+ * the grid alone; its level follows from the cube, the view and the settings, so never from bricks,
+ * tiles or memory. A voxel of a level covers voxels of one cube, and is drawn where that cube has
+ * its level: so each place is drawn at one level, once.
  *
  * Without a bound on bytes (lod_limit.h) a cube has the coarsest level whose voxels are at most
  * lod_px pixels wide where the cube comes nearest to the eye, all along the grid's longest step;

@@ -39,8 +39,8 @@ int trip_lod_parts_make(trip_lod_parts *parts, const trip_dataset *data, const t
 /* Adds the planes that a part lies between. */
 void trip_lod_parts_clip(const trip_lod_parts *parts, int part, trip_clip *clip);
 
-/* Puts a part's picture behind the one before, or mixes it in, of which `done` says that it is
- * complete: premultiplied, over nothing. `before` and the result may be the same. */
+/* Puts a part's picture behind those before it, or mixes it in once it is `done`. Pictures are
+ * premultiplied, over nothing; `out` may be one of them. */
 void trip_lod_parts_add(const trip_lod_parts *parts, const float *before, const float *picture,
                         bool done, size_t pixels, float *out);
 

@@ -1,5 +1,6 @@
-/* How large frames may be while the view moves, from how long the last ones took: a frame costs
- * something whatever its size, and something for each pixel. Plain values, one thread. */
+/* How much detail frames may have while the view moves, from how long the last ones took: a frame
+ * costs something whatever its detail, and something for each pixel that it has detail for, of
+ * which there may be fewer than it has pixels. Plain values, one thread. */
 #ifndef TRIP_VIEW_PACE_H
 #define TRIP_VIEW_PACE_H
 
